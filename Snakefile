@@ -1,0 +1,49 @@
+"""DAV-GSWT: a few photos of a patch of ground to Gaussian-splat Wang tiles and an endless terrain.
+
+    photos -> coarse -> active (round 1..T) -> levels -> tiles -> bundle -> terrain
+
+Each stage is one file in rules/, one subpackage of workflow/lib/dav_gswt and one directory level of results/.
+"""
+
+from snakemake.utils import min_version
+
+min_version("9.13")  # the release that brought pathvars
+
+
+configfile: "config/config.yaml"
+
+
+report: "workflow/report/workflow.rst"
+
+
+include: "rules/common.smk"
+include: "rules/photos.smk"
+include: "rules/coarse.smk"
+include: "rules/active.smk"
+include: "rules/levels.smk"
+include: "rules/tiles.smk"
+include: "rules/bundle.smk"
+include: "rules/terrain.smk"
+
+
+# Below the includes: Snakemake skips constraints on wildcards that reach an output through a pathvar unless they are
+# declared after the rules.
+wildcard_constraints:
+    scene=NAME,
+    seed=NATURAL,
+    quality=NAME,
+    policy="|".join(POLICIES),
+    prior="none",
+    p_drop="0",
+    lam="0",
+    k=NATURAL,
+    t=POSITIVE,
+    level=NATURAL,
+    seam=NAME,
+    tau=FRACTION,
+
+
+rule all:
+    default_target: True
+    input:
+        terrains(),

@@ -1,0 +1,213 @@
+"""Active views: score the candidate poses, choose k, capture them, refit, and again.
+
+In: the coarse field. Out, per round t: poses.json, capture/, field.ply, ground.exr, and of that new field scores.csv,
+uncertainty.exr and metrics.json. Round t starts from round t - 1, so T rounds are a prefix of T + 1, and T is only
+which round is asked for. Scoring keeps its terms apart: the policy and k enter when poses are chosen.
+"""
+
+
+def before_round(wildcards):
+    """What round t starts from: the coarse field and its scores, then those of round t - 1."""
+    last = f"<results>/<active>/iter{int(wildcards.t) - 1}"
+    if wildcards.t == "1":
+        last = "<results>/<coarse>"
+    scores = "<results>/<scored>" if wildcards.t == "1" else last
+    return {
+        "field": f"{last}/field.ply",
+        "ground": f"{last}/ground.exr",
+        "scores": f"{scores}/scores.csv",
+    }
+
+
+def captures_before(wildcards):
+    """The photos that rounds 1 to t - 1 took."""
+    return [f"<results>/<active>/iter{t}/capture" for t in range(1, int(wildcards.t))]
+
+
+def captures_until(wildcards):
+    """The photos that rounds 1 to t took."""
+    return [f"<results>/<active>/iter{t}/capture" for t in range(1, int(wildcards.t) + 1)]
+
+
+rule score_coarse:
+    """Score every candidate pose by what the coarse field does not know there."""
+    input:
+        field="<results>/<coarse>/field.ply",
+        ground="<results>/<coarse>/ground.exr",
+        views="<results>/<start>/views.json",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+    output:
+        scores="<results>/<scored>/scores.csv",
+        maps="<results>/<scored>/uncertainty.exr",
+    log:
+        "<logs>/<scored>/score_coarse.log",
+    benchmark:
+        "<benchmarks>/<scored>/score_coarse.tsv"
+    threads: 2
+    params:
+        scene=entry("scenes", "scene"),
+        source=source_of("active", "raster", "coarse/doubt"),
+    script:
+        "../scripts/score_poses.py"
+
+
+use rule score_coarse as score_round with:
+    input:
+        field="<results>/<round>/field.ply",
+        ground="<results>/<round>/ground.exr",
+        views="<results>/<start>/views.json",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+        captures=captures_until,
+    output:
+        scores="<results>/<round>/scores.csv",
+        maps="<results>/<round>/uncertainty.exr",
+    log:
+        "<logs>/<round>/score_round.log",
+    benchmark:
+        "<benchmarks>/<round>/score_round.tsv"
+
+
+rule select_poses:
+    """Choose the k poses that the policy expects most of."""
+    input:
+        unpack(before_round),
+        captures=captures_before,
+        views="<results>/<start>/views.json",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+    output:
+        poses=report(
+            "<results>/<round>/poses.json",
+            caption="../workflow/report/poses.rst",
+            category="View selection",
+            labels={"scene": "{scene}", "policy": "{policy}", "k": "{k}", "round": "{t}"},
+        ),
+    log:
+        "<logs>/<round>/select_poses.log",
+    benchmark:
+        "<benchmarks>/<round>/select_poses.tsv"
+    params:
+        policy=lambda wildcards: wildcards.policy,
+        k=integer("k"),
+        seed=integer("seed"),
+        t=integer("t"),
+        source=source_of("active/selection", "active/poses"),
+    script:
+        "../scripts/select_poses.py"
+
+
+rule capture_views:
+    """Have the scene's agent take the photos."""
+    input:
+        poses="<results>/<round>/poses.json",
+        views="<results>/<start>/views.json",
+        captures=captures_before,
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+    output:
+        capture=directory("<results>/<round>/capture"),
+    log:
+        "<logs>/<round>/capture_views.log",
+    benchmark:
+        "<benchmarks>/<round>/capture_views.tsv"
+    threads: 2
+    params:
+        scene=entry("scenes", "scene"),
+        source=source_of("active/capture", "photos/synthetic"),
+    script:
+        "../scripts/capture_views.py"
+
+
+rule update_field:
+    """Refit the field with the photos of this round."""
+    input:
+        unpack(before_round),
+        captures=captures_until,
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+    output:
+        field="<results>/<round>/field.ply",
+        ground="<results>/<round>/ground.exr",
+    log:
+        "<logs>/<round>/update_field.log",
+    benchmark:
+        "<benchmarks>/<round>/update_field.tsv"
+    wildcard_constraints:
+        policy="farthest|opacity|random",
+        t=POSITIVE,
+    threads: 2
+    params:
+        quality=entry("qualities", "quality"),
+        seed=integer("seed"),
+        t=integer("t"),
+        source=source_of("coarse", "raster"),
+    script:
+        "../scripts/update_field.py"
+
+
+use rule evaluate_coarse as evaluate_round with:
+    input:
+        field="<results>/<round>/field.ply",
+        ground="<results>/<round>/ground.exr",
+        captures=captures_until,
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+    output:
+        metrics="<results>/<round>/metrics.json",
+    log:
+        "<logs>/<round>/evaluate_round.log",
+    benchmark:
+        "<benchmarks>/<round>/evaluate_round.tsv"
+    wildcard_constraints:
+        t=POSITIVE,
+    params:
+        quality=entry("qualities", "quality"),
+        t=integer("t"),
+        source=source_of("metrics", "active/evaluation", "raster"),
+
+
+rule begin_active:
+    """Round 0: no photo was asked for, the coarse field goes on as it is."""
+    input:
+        field="<results>/<coarse>/field.ply",
+        ground="<results>/<coarse>/ground.exr",
+        metrics="<results>/<coarse>/metrics.json",
+    output:
+        field="<results>/<active>/iter0/field.ply",
+        ground="<results>/<active>/iter0/ground.exr",
+        metrics="<results>/<active>/iter0/metrics.json",
+    log:
+        "<logs>/<active>/iter0/begin_active.log",
+    benchmark:
+        "<benchmarks>/<active>/iter0/begin_active.tsv"
+    wildcard_constraints:
+        policy="farthest|opacity|random",
+    script:
+        "../scripts/begin_active.py"
+
+
+rule enter_field:
+    """A finished field enters here: its exemplar's surface is found, no photo is needed."""
+    input:
+        field="<results>/<photos>/field.ply",
+        frame="<results>/<photos>/ground.json",
+    output:
+        field="<results>/<fit>/active_given_none_pdrop0_lam0_k0/iter0/field.ply",
+        ground="<results>/<fit>/active_given_none_pdrop0_lam0_k0/iter0/ground.exr",
+    log:
+        "<logs>/<fit>/active_given_none_pdrop0_lam0_k0/iter0/enter_field.log",
+    benchmark:
+        "<benchmarks>/<fit>/active_given_none_pdrop0_lam0_k0/iter0/enter_field.tsv"
+    threads: 2
+    params:
+        quality=entry("qualities", "quality"),
+        source=source_of("coarse", "raster", "levels"),
+    script:
+        "../scripts/enter_field.py"

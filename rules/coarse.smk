@@ -1,0 +1,51 @@
+"""Coarse field: a ground layer through the start views' points and the things on it, fitted to the start views.
+
+In: photos, their model, views.json. Out: field.ply (standard 3DGS), ground.exr (height, seen or not), metrics.json.
+"""
+
+
+rule fit_coarse:
+    """Fit the coarse field to the start views."""
+    input:
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+    output:
+        field="<results>/<coarse>/field.ply",
+        ground="<results>/<coarse>/ground.exr",
+    log:
+        "<logs>/<coarse>/fit_coarse.log",
+    benchmark:
+        "<benchmarks>/<coarse>/fit_coarse.tsv"
+    threads: 2
+    params:
+        quality=entry("qualities", "quality"),
+        seed=integer("seed"),
+        source=source_of("coarse", "raster"),
+    script:
+        "../scripts/fit_coarse.py"
+
+
+rule evaluate_coarse:
+    """Compare the coarse field with the test photos, which nothing else sees."""
+    input:
+        field="<results>/<coarse>/field.ply",
+        ground="<results>/<coarse>/ground.exr",
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+    output:
+        metrics="<results>/<coarse>/metrics.json",
+    log:
+        "<logs>/<coarse>/evaluate_coarse.log",
+    benchmark:
+        "<benchmarks>/<coarse>/evaluate_coarse.tsv"
+    threads: 2
+    params:
+        quality=entry("qualities", "quality"),
+        t=0,
+        source=source_of("metrics", "active/evaluation", "raster"),
+    script:
+        "../scripts/evaluate_field.py"

@@ -1,0 +1,108 @@
+"""Shared by all stages: the checked config, the result tree, one spelling a number, and what the targets are."""
+
+from decimal import Decimal
+from hashlib import sha256
+from pathlib import Path
+
+import dav_gswt
+from dav_gswt.active.names import POLICIES
+from dav_gswt.config import check
+from dav_gswt.errors import InputError
+
+LIBRARY = Path(dav_gswt.__file__).parent
+VIEWER = sorted(str(p) for p in Path(workflow.basedir, "workflow/viewer").iterdir())
+
+try:
+    check(config, Path(workflow.basedir) / "workflow/schemas/config.schema.yaml")
+except InputError as error:
+    raise WorkflowError(str(error)) from None
+
+
+# One directory level a stage, naming only the parameters that the stage adds: a path is exactly what its file depends
+# on, so two cells of a sweep that agree on the first stages meet in the same directories.
+pathvars:
+    logs="results/logs",
+    benchmarks="results/benchmarks",
+    photos="{scene}/photos",
+    start="{scene}/seed{seed}",
+    fit="{scene}/seed{seed}/{quality}",
+    coarse="<fit>/coarse",
+    scored="<coarse>/scores_{prior}_pdrop{p_drop}",
+    active="<fit>/active_{policy}_{prior}_pdrop{p_drop}_lam{lam}_k{k}",
+    round="<active>/iter{t}",
+    levels="<round>/levels",
+    tiles="<round>/tiles_{seam}",
+    bundle="<tiles>/bundle_tau{tau}",
+    terrain="<bundle>/terrain",
+
+
+NAME = r"(?!(?:logs|benchmarks|sweeps|tables|figures|tradeoff)(?:/|$))[a-z][a-z0-9_-]*"
+NATURAL = r"0|[1-9]\d*"
+POSITIVE = r"[1-9]\d*"
+FRACTION = r"0|1|0\.\d*[1-9]"
+NEVER = r"(?!)"  # a constraint that nothing meets
+
+
+def spell(value):
+    """The one spelling of a number that the constraints accept: 0.1, never 0.10."""
+    text = f"{Decimal(str(value)).normalize():f}"
+    return "0" if text == "-0" else text
+
+
+def integer(wildcard):
+    """A params function: the value of a wildcard, as an int."""
+    return lambda wildcards: int(wildcards[wildcard])
+
+
+def real(wildcard):
+    """A params function: the value of a wildcard, as a float."""
+    return lambda wildcards: float(wildcards[wildcard])
+
+
+def entry(table, wildcard):
+    """A params function: the config's entry of a table that a wildcard names."""
+    return lambda wildcards: config[table][wildcards[wildcard]]
+
+
+def source_of(*places):
+    """Digest of library modules and packages, for params: Snakemake follows a rule's script, not its imports."""
+    files = []
+    for place in places:
+        found = LIBRARY / place
+        files += sorted(found.rglob("*.[pch]*")) if found.is_dir() else [found.with_suffix(".py")]
+    files = [f for f in files if "__pycache__" not in f.parts]
+    return sha256(b"".join(f.read_bytes() for f in files)).hexdigest()[:12]
+
+
+def scenes_of(kind):
+    """A constraint: the names of the config's scenes of a kind."""
+    return "|".join(n for n, s in config["scenes"].items() if s["kind"] == kind) or NEVER
+
+
+def terrain_of(scene, **axes):
+    """What a scene's terrain is made of: page and stills, at the config's parameters with axes laid over."""
+    given = config["scenes"][scene]["kind"] == "field"
+    values = dict(
+        scene=scene,
+        seed=config["seeds"],
+        quality=config["scenes"][scene]["quality"],
+        policy="given" if given else config["policy"],
+        prior="none",
+        p_drop="0",
+        lam="0",
+        k=0 if given else config["k"],
+        t=0 if given else config["rounds"],
+        seam=config["seam"],
+        tau=spell(config["tau"]),
+    )
+    return expand(rules.make_page.output.page + rules.render_terrain.output.stills, **(values | axes))
+
+
+def terrains():
+    return terrain_of(config["scene"])
+
+
+def folder_of(scene):
+    """A scene's photos, as inputs: a photo that comes or goes is noticed."""
+    folder = Path(config["scenes"][scene]["folder"])
+    return sorted(str(p) for p in folder.iterdir() if p.is_file()) if folder.is_dir() else str(folder)

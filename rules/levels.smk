@@ -1,0 +1,48 @@
+"""Levels of detail: ever coarser fields of the exemplar, each fitted to what its finer neighbour shows.
+
+In: the last round's field and ground. Out: level{l}.ply and its grid level{l}.exr, from fine to coarse.
+"""
+
+
+rule crop_level:
+    """The finest level: the field's exemplar and a margin, in whole blocks of the coarsest level's cells."""
+    input:
+        field="<results>/<round>/field.ply",
+        ground="<results>/<round>/ground.exr",
+    output:
+        field="<results>/<levels>/level0.ply",
+        ground="<results>/<levels>/level0.exr",
+    log:
+        "<logs>/<levels>/crop_level.log",
+    benchmark:
+        "<benchmarks>/<levels>/crop_level.tsv"
+    params:
+        levels=lookup(dpath="levels", within=config),
+        source=source_of("levels"),
+    script:
+        "../scripts/crop_level.py"
+
+
+rule fit_level:
+    """A level with half the resolution and about a quarter of the Gaussians of its finer neighbour."""
+    input:
+        field=lambda wildcards: f"<results>/<levels>/level{int(wildcards.level) - 1}.ply",
+        ground=lambda wildcards: f"<results>/<levels>/level{int(wildcards.level) - 1}.exr",
+        frame="<results>/<photos>/ground.json",
+    output:
+        field="<results>/<levels>/level{level}.ply",
+        ground="<results>/<levels>/level{level}.exr",
+    log:
+        "<logs>/<levels>/fit_level{level}.log",
+    benchmark:
+        "<benchmarks>/<levels>/fit_level{level}.tsv"
+    wildcard_constraints:
+        level=POSITIVE,
+    threads: 2
+    params:
+        quality=entry("qualities", "quality"),
+        seed=integer("seed"),
+        level=integer("level"),
+        source=source_of("levels", "coarse", "raster"),
+    script:
+        "../scripts/fit_level.py"

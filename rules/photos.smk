@@ -1,0 +1,92 @@
+"""Photos: images with known cameras over a ground frame. World: z up, ground at z = 0, COLMAP camera axes.
+
+In: a folder of photos, a synthetic family, or a finished field. Out: images/, sparse/ (a COLMAP model), ground.json,
+and per seed views.json: which photos start, which may be asked for, which only test.
+"""
+
+
+rule register_photos:
+    """Structure from motion over a folder of photos; undistorted images and the ground frame."""
+    input:
+        lambda wildcards: folder_of(wildcards.scene),
+    output:
+        images=directory("<results>/<photos>/images"),
+        model=directory("<results>/<photos>/sparse"),
+        frame="<results>/<photos>/ground.json",
+    log:
+        "<logs>/<photos>/register_photos.log",
+    benchmark:
+        "<benchmarks>/<photos>/register_photos.tsv"
+    wildcard_constraints:
+        scene=scenes_of("photos"),
+    threads: 2
+    resources:
+        mem_mb=3000,
+        runtime="60m",
+    params:
+        scene=entry("scenes", "scene"),
+        source=source_of("photos/sfm", "photos/ground", "photos/model", "images"),
+    script:
+        "../scripts/register_photos.py"
+
+
+rule render_photos:
+    """The start views and the test views of a synthetic scene, with points triangulated from its exact poses."""
+    output:
+        images=directory("<results>/<photos>/images"),
+        model=directory("<results>/<photos>/sparse"),
+        frame="<results>/<photos>/ground.json",
+    log:
+        "<logs>/<photos>/render_photos.log",
+    benchmark:
+        "<benchmarks>/<photos>/render_photos.tsv"
+    wildcard_constraints:
+        scene=scenes_of("synthetic"),
+    threads: 2
+    resources:
+        mem_mb=2500,
+        runtime="20m",
+    params:
+        scene=entry("scenes", "scene"),
+        source=source_of("photos"),
+    script:
+        "../scripts/render_photos.py"
+
+
+rule import_field:
+    """A finished 3DGS .ply, turned into the ground frame."""
+    input:
+        lambda wildcards: config["scenes"][wildcards.scene]["field"],
+    output:
+        field="<results>/<photos>/field.ply",
+        frame="<results>/<photos>/ground.json",
+    log:
+        "<logs>/<photos>/import_field.log",
+    benchmark:
+        "<benchmarks>/<photos>/import_field.tsv"
+    wildcard_constraints:
+        scene=scenes_of("field"),
+    params:
+        scene=entry("scenes", "scene"),
+        source=source_of("photos/splat", "field"),
+    script:
+        "../scripts/import_field.py"
+
+
+rule split_views:
+    """Which photos start, which are left to ask for, and which only test."""
+    input:
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+    output:
+        views="<results>/<start>/views.json",
+    log:
+        "<logs>/<start>/split_views.log",
+    benchmark:
+        "<benchmarks>/<start>/split_views.tsv"
+    params:
+        scene=entry("scenes", "scene"),
+        seed=integer("seed"),
+        source=source_of("photos/views", "photos/model"),
+    script:
+        "../scripts/split_views.py"

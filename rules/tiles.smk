@@ -1,0 +1,28 @@
+"""Wang tiles: a centre, two strips per direction and one corner, joined along cuts that nobody should find.
+
+In: the levels. Out: labels.npz, lod{l}_tile_{TT}.ply and seams.json. The cut is made on the finest level; coarser
+levels follow it.
+"""
+
+TILES = [f"{number:02d}" for number in range(16)]
+
+
+rule cut_tiles:
+    """Cut sixteen tiles from the exemplar."""
+    input:
+        fields=[f"<results>/<levels>/level{level}.ply" for level in range(config["levels"])],
+        grounds=[f"<results>/<levels>/level{level}.exr" for level in range(config["levels"])],
+    output:
+        seams="<results>/<tiles>/seams.json",
+        tiles=directory("<results>/<tiles>/tiles"),
+    log:
+        "<logs>/<tiles>/cut_tiles.log",
+    benchmark:
+        "<benchmarks>/<tiles>/cut_tiles.tsv"
+    threads: 2
+    params:
+        seam=entry("seams", "seam"),
+        seed=integer("seed"),
+        source=source_of("tiles", "raster"),
+    script:
+        "../scripts/cut_tiles.py"

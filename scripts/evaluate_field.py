@@ -1,0 +1,19 @@
+"""Rules evaluate_coarse and evaluate_round: what the test photos say about a field."""
+
+from dav_gswt import field, provenance, views
+from dav_gswt.active import evaluation
+from dav_gswt.coarse import build, ground
+from dav_gswt.files import read_json, write_json
+from dav_gswt.logs import logging_to
+
+with logging_to(snakemake.log[0]):
+    given, params = snakemake.input, snakemake.params
+    split, captures = read_json(given.views), given.get("captures", [])
+    captures = [captures] if isinstance(captures, str) else list(captures)
+    tests = views.taken(given.images, given.model, split["test"], [], params.quality["size"])
+    shots = sum(len(read_json(f"{folder}/capture.json")["shots"]) for folder in captures)
+    fitted, grid = field.read(given.field), ground.read(given.ground)
+    result = evaluation.evaluate(fitted, build.modelled(tests, grid))
+    result |= {"round": params.t, "photos": len(split["start"]) + shots, "gaussians": len(fitted)}
+    inputs = {"field": given.field, "ground": given.ground, "views": given.views}
+    write_json(snakemake.output.metrics, result | {"provenance": provenance.of(inputs, dict(params.quality))})

@@ -1,0 +1,20 @@
+"""Rule fit_coarse: the first field, from the start views alone."""
+
+import numpy as np
+
+from dav_gswt import field, views
+from dav_gswt.coarse import build, ground
+from dav_gswt.files import read_json
+from dav_gswt.logs import logging_to
+from dav_gswt.photos import model
+
+with logging_to(snakemake.log[0]):
+    given, quality = snakemake.input, build.Quality(**snakemake.params.quality)
+    names = read_json(given.views)["start"]
+    photos = views.taken(given.images, given.model, names, [], quality.size)
+    points, colours = model.points_seen_by(model.read(given.model), names)
+    fitted, grid = build.coarse(
+        read_json(given.frame), photos, points, colours, quality, np.random.default_rng(snakemake.params.seed)
+    )
+    field.write(fitted, snakemake.output.field)
+    ground.write(grid, snakemake.output.ground)

@@ -1,0 +1,27 @@
+"""Rule update_field: the field of the round before, refitted with this round's photos."""
+
+import numpy as np
+
+from dav_gswt import field, views
+from dav_gswt.coarse import build, ground
+from dav_gswt.files import read_json
+from dav_gswt.logs import logging_to
+
+with logging_to(snakemake.log[0]):
+    given, params = snakemake.input, snakemake.params
+    quality = build.Quality(**params.quality)
+    names = read_json(given.views)["start"]
+    captures = [given.captures] if isinstance(given.captures, str) else list(given.captures)
+    before = views.taken(given.images, given.model, names, captures[:-1], quality.size)
+    new = views.captured(captures[-1], quality.size)
+    refined, grid = build.update(
+        field.read(given.field),
+        ground.read(given.ground),
+        read_json(given.frame),
+        before,
+        new,
+        quality,
+        np.random.default_rng([params.seed, params.t]),
+    )
+    field.write(refined, snakemake.output.field)
+    ground.write(grid, snakemake.output.ground)

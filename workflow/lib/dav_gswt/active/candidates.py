@@ -1,0 +1,57 @@
+"""The pool: where a photo could still be taken. A hemisphere for scenes that can be rendered, the set's own frames else."""
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray as Array
+
+from dav_gswt import cameras
+from dav_gswt.active.poses import Pose, middle, of_camera
+from dav_gswt.cameras import Camera
+from dav_gswt.files import read_json
+from dav_gswt.photos import model, synthetic
+
+Candidates = list[tuple[Pose, Camera]]
+
+
+def left(scene: dict, frame: dict, model_folder: Path | str, split: dict, captures: list) -> Candidates:
+    """Every pose that can still be captured: the scene's candidates less those that captures have used."""
+    if scene["agent"] == "replay":
+        known = model.read(model_folder)
+        at = dict(zip(known.names, known.cameras, strict=True))
+        pool = [(of_camera(name, at[name], frame), at[name]) for name in split["pool"]]
+    else:
+        pool = hemisphere(scene, frame)
+    used = {name for folder in captures for name in _names(folder)}
+    return [(pose, camera) for pose, camera in pool if pose.name not in used]
+
+
+def hemisphere(scene: dict, frame: dict) -> Candidates:
+    """Poses spread evenly over the hemisphere from which a synthetic scene can be photographed."""
+    found = synthetic.candidates(scene, middle(frame))
+    return [(of_camera(f"pose_{i:04d}", camera, frame), camera) for i, camera in enumerate(found)]
+
+
+def places_taken(frame: dict, model_folder: Path | str, split: dict, captures: list) -> Float[Array, "m 3"]:
+    """Where the photos taken so far stand, relative to the exemplar's centre."""
+    known = model.read(model_folder)
+    at = dict(zip(known.names, known.cameras, strict=True))
+    taken = [at[name] for name in split["start"]]
+    taken += [cameras.from_json(shot["got"]) for folder in captures for shot in _shots(folder)]
+    return np.array([camera.centre - middle(frame) for camera in taken]).reshape(-1, 3)
+
+
+def as_asked(pool: Candidates, chosen: list[dict]) -> Candidates:
+    """The candidates that poses.json names."""
+    by_name = {pose.name: (pose, camera) for pose, camera in pool}
+    return [by_name[pose["name"]] for pose in chosen]
+
+
+def _shots(folder: Path | str) -> list[dict]:
+    return read_json(Path(folder) / "capture.json")["shots"]
+
+
+def _names(folder: Path | str) -> list[str]:
+    """Names of poses asked for and of photos got: a frame got in place of another leaves the pool too."""
+    return [name for shot in _shots(folder) for name in (shot["asked"]["name"], shot["name"])]

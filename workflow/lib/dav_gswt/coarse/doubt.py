@@ -1,0 +1,48 @@
+"""What is known of each Gaussian: one minus the opacity that the captured photos' cameras see where it is.
+
+Until a prior says more this is the uncertainty of a Gaussian: 1 where no photo looks, near 0 where the ground is
+closed. A map of it, drawn like a colour, is the uncertainty of a pixel: sum of w_i u_i + what light passes through.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float, Float32
+from numpy import ndarray as Array
+
+from dav_gswt.cameras import Camera
+from dav_gswt.field import Field
+from dav_gswt.raster import cpu
+from dav_gswt.views import View
+
+SEEN = 0.05  # pixels of blend weight from which a photo counts as seeing a Gaussian
+
+
+def with_uncertainty(field: Field, views: list[View]) -> Field:
+    """The field with uncertainty u_i = 1 - max over views of (sum of w_i alpha / sum of w_i), 1 where none sees it."""
+    known = np.zeros(len(field), np.float32)
+    raster = cpu.Rasterizer()
+    for view in views:
+        seen = raster.forward(**arrays(field), camera=view.camera)
+        alone = raster.contributions((view.weight * seen.alpha)[..., None])
+        weight = raster.contributions(view.weight[..., None])
+        share = np.where(weight.mapped[:, 0] > SEEN, alone.mapped[:, 0] / np.maximum(weight.mapped[:, 0], SEEN), 0)
+        known = np.maximum(known, share)
+    return replace(field, uncertainty=np.clip(1 - known, 0, 1).astype(np.float32))
+
+
+def uncertainty_map(field: Field, camera: Camera, raster: cpu.Rasterizer) -> Float32[Array, "h w"]:
+    """Per pixel: blend-weighted uncertainty of what is seen, plus the transmittance (nothing at all is known there)."""
+    seen = raster.forward(**(arrays(field) | {"colours": field.uncertainty[:, None]}), camera=camera)
+    return np.clip(seen.colour[..., 0] + 1 - seen.alpha, 0, 1)
+
+
+def arrays(field: Field) -> dict[str, Float[Array, "..."]]:
+    """A field's arrays as the rasterizer takes them."""
+    return {
+        "means": field.means,
+        "log_scales": field.log_scales,
+        "quats": field.quats,
+        "opacity_logits": field.opacity_logits,
+        "colours": np.ascontiguousarray(field.base_colours, np.float32),
+    }

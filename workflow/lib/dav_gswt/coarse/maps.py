@@ -1,0 +1,41 @@
+"""Maps of a field from straight above, one pixel a cell of a ground grid; rows from south to north, as the grid's."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float32
+from numpy import ndarray as Array
+
+from dav_gswt import cameras
+from dav_gswt.coarse.doubt import arrays
+from dav_gswt.coarse.ground import Ground
+from dav_gswt.field import Field
+from dav_gswt.raster import cpu
+
+
+@dataclass(frozen=True)
+class Maps:
+    """What lies over each cell. colour and height are of what is opaque there, 0 where nothing is."""
+
+    colour: Float32[Array, "rows columns 3"]
+    height: Float32[Array, "rows columns"]
+    alpha: Float32[Array, "rows columns"]
+    uncertainty: Float32[Array, "rows columns"]
+
+
+def from_above(field: Field, grid: Ground) -> Maps:
+    """Draw the field by an orthographic camera over the grid, from above its highest Gaussian."""
+    rows, columns = grid.shape
+    top = float(field.means[:, 2].max()) + 10 * grid.spacing
+    camera = cameras.top_down(grid.west, grid.south, columns, rows, grid.spacing, top)
+    raster = cpu.Rasterizer()
+    seen = raster.forward(**arrays(field), camera=camera)
+    doubt = raster.forward(**(arrays(field) | {"colours": field.uncertainty[:, None]}), camera=camera)
+    solid = np.maximum(seen.alpha, 1e-6)
+    maps = Maps(
+        seen.colour / solid[..., None],
+        np.where(seen.alpha > 1e-6, top - seen.depth / solid, 0),
+        seen.alpha,
+        np.clip(doubt.colour[..., 0] + 1 - seen.alpha, 0, 1),
+    )
+    return Maps(*(np.ascontiguousarray(m[::-1], np.float32) for m in vars(maps).values()))

@@ -1,0 +1,160 @@
+"""A 3D Gaussian field: arrays in the form that training optimises and the 3DGS PLY stores."""
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float32
+from numpy import ndarray as Array
+from plyfile import PlyData, PlyElement, PlyParseError
+
+from dav_gswt.errors import InputError
+from dav_gswt.files import whole
+
+SH0 = 0.28209479177387814  # the constant real spherical harmonic, 1 / (2 sqrt(pi))
+
+
+@dataclass(frozen=True)
+class Field:
+    """n Gaussians in the world frame: z up, the unit of length is the scene's.
+
+    log_scales: natural logarithm of the standard deviations along the axes of `quats` (w x y z, any length but 0).
+    opacity_logits: peak opacity is expit of it. sh: colour coefficients, degree 0 first; colour = 0.5 + SH0 sh[:, 0] + ...
+    uncertainty: 0 (sure) to 1 (nothing is known). ground: the Gaussian is a disc of the ground layer.
+    """
+
+    means: Float32[Array, "n 3"]
+    log_scales: Float32[Array, "n 3"]
+    quats: Float32[Array, "n 4"]
+    opacity_logits: Float32[Array, "n"]
+    sh: Float32[Array, "n k 3"]
+    uncertainty: Float32[Array, "n"]
+    ground: Bool[Array, "n"]
+
+    def __len__(self) -> int:
+        return len(self.means)
+
+    def __getitem__(self, index) -> "Field":
+        """The Gaussians that a mask, slice or index array names."""
+        return Field(*(getattr(self, f.name)[index] for f in fields(self)))
+
+    @property
+    def base_colours(self) -> Float32[Array, "n 3"]:
+        """Colour without its view-dependent part."""
+        return 0.5 + np.float32(SH0) * self.sh[:, 0]
+
+
+def joined(parts: list[Field]) -> Field:
+    """One field of all parts, in their order."""
+    return Field(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Field)))
+
+
+def sh_of(colours: Float32[Array, "n 3"]) -> Float32[Array, "n 1 3"]:
+    """Degree-0 coefficients of a colour that is the same from all sides."""
+    return ((colours - 0.5) / SH0).astype(np.float32)[:, None]
+
+
+def _columns(k: int) -> dict[str, list[str]]:
+    """Names of the 3DGS PLY's properties by field; f_rest is channel-major, as the original 3DGS writes it."""
+    return {
+        "means": ["x", "y", "z"],
+        "dc": [f"f_dc_{i}" for i in range(3)],
+        "rest": [f"f_rest_{i}" for i in range(3 * (k - 1))],
+        "opacity_logits": ["opacity"],
+        "log_scales": [f"scale_{i}" for i in range(3)],
+        "quats": [f"rot_{i}" for i in range(4)],
+    }
+
+
+def write(field: Field, path: Path | str) -> None:
+    """Write a standard 3DGS PLY; `uncertainty` and `ground` follow as two more properties, which viewers ignore."""
+    n, k = field.sh.shape[:2]
+    names = _columns(k)
+    order = ["means", "normals", "dc", "rest", "opacity_logits", "log_scales", "quats"]
+    values = {
+        "means": field.means,
+        "normals": np.zeros((n, 3), np.float32),
+        "dc": field.sh[:, 0],
+        "rest": field.sh[:, 1:].transpose(0, 2, 1).reshape(n, -1),
+        "opacity_logits": field.opacity_logits[:, None],
+        "log_scales": field.log_scales,
+        "quats": field.quats,
+    }
+    names["normals"] = ["nx", "ny", "nz"]
+    columns = [(name, "<f4") for key in order for name in names[key]] + [("uncertainty", "<f4"), ("ground", "u1")]
+    rows = np.empty(n, dtype=columns)
+    for key in order:
+        for j, name in enumerate(names[key]):
+            rows[name] = values[key][:, j]
+    rows["uncertainty"], rows["ground"] = field.uncertainty, field.ground
+    with whole(path) as part:
+        PlyData([PlyElement.describe(rows, "vertex")], byte_order="<").write(str(part))
+
+
+def read(path: Path | str) -> Field:
+    """Read a 3DGS PLY: ours, or anybody's (then nothing is uncertain and nothing is known to be ground).
+
+    Raises: InputError: not a PLY, a property is missing, or a value is not finite (with its index).
+    """
+    path = Path(path)
+    rows = _vertices(path)
+    rest = sum(name.startswith("f_rest_") for name in rows.dtype.names)
+    k = 1 + rest // 3
+    if rest % 3 or k not in (1, 4, 9, 16):
+        raise InputError(f"{path}: {rest} f_rest properties; 0, 9, 24 or 45 make whole spherical harmonics")
+    columns = {key: _stack(rows, names, path) for key, names in _columns(k).items()}
+    quats = columns["quats"]
+    if len(zero := np.flatnonzero(~(np.abs(quats).max(1) > 0))):
+        raise InputError(f"{path}: Gaussian {zero[0]} has a zero quaternion; remove it and try again")
+    n = len(rows)
+    shs = np.concatenate([columns["dc"][:, None], columns["rest"].reshape(n, 3, k - 1).transpose(0, 2, 1)], 1)
+    extra = {name: rows[name] if name in rows.dtype.names else np.zeros(n) for name in ("uncertainty", "ground")}
+    return Field(
+        columns["means"],
+        columns["log_scales"],
+        quats,
+        columns["opacity_logits"][:, 0],
+        np.ascontiguousarray(shs, np.float32),
+        _finite(np.asarray(extra["uncertainty"], np.float32), "uncertainty", path),
+        np.asarray(extra["ground"]).astype(bool),
+    )
+
+
+def _vertices(path: Path) -> Array:
+    """The vertex table, memory-mapped where it is binary: a header's false count is found before any allocation."""
+    try:
+        with path.open("rb") as file:
+            header = PlyData._parse_header(file)
+            room = path.stat().st_size - file.tell()
+        if "vertex" not in header or not len(header["vertex"].properties):
+            raise InputError(f"{path}: no vertices; a 3DGS .ply has an element 'vertex'")
+        least = sum(e.count * max(1, len(e.properties)) for e in header.elements)
+        if least > room:
+            raise InputError(f"{path}: the header promises more than the file holds ({room} bytes); is it cut short?")
+        return PlyData.read(str(path))["vertex"].data
+    except InputError:
+        raise
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file") from None
+    except (PlyParseError, ValueError, KeyError, UnicodeDecodeError, OSError) as error:
+        raise InputError(f"{path}: not a readable PLY ({error})") from error
+
+
+def _stack(rows: Array, names: list[str], path: Path) -> Float32[Array, "n m"]:
+    missing = [name for name in names if name not in rows.dtype.names]
+    if missing:
+        raise InputError(f"{path}: property {missing[0]} is missing; a 3D Gaussian splatting .ply is needed")
+    out = np.empty((len(rows), len(names)), np.float32)
+    for j, name in enumerate(names):
+        with np.errstate(over="ignore"):
+            out[:, j] = rows[name]
+        _finite(out[:, j], name, path)
+    return out
+
+
+def _finite(values: Array, name: str, path: Path) -> Array:
+    if len(bad := np.flatnonzero(~np.isfinite(values))):
+        raise InputError(
+            f"{path}: {name} of Gaussian {bad[0]} is not finite ({len(bad)} such); remove them and try again"
+        )
+    return values

@@ -1,0 +1,49 @@
+"""Outputs that appear whole or not at all, JSON that says where it comes from, and digests."""
+
+import hashlib
+import json
+import os
+from contextlib import contextmanager
+from pathlib import Path
+
+from dav_gswt.errors import InputError
+
+
+@contextmanager
+def whole(path: Path | str):
+    """A path beside `path` to write to; it takes `path`'s place when the block ends well, and goes when it does not."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}.part{path.suffix}")
+    try:
+        yield part
+        with part.open("rb") as file:
+            os.fsync(file.fileno())
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def write_json(path: Path | str, value) -> None:
+    """Write JSON; NaN and infinity are refused, since JSON has neither."""
+    text = json.dumps(value, indent=1, allow_nan=False) + "\n"
+    with whole(path) as part:
+        part.write_text(text, encoding="utf-8")
+
+
+def read_json(path: Path | str):
+    """Read JSON. Raises: InputError: missing or malformed, by name."""
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: not readable as JSON ({error})") from error
+
+
+def digest(*paths: Path | str) -> str:
+    """SHA-256 over the bytes of files, in the order given."""
+    state = hashlib.sha256()
+    for path in paths:
+        with open(path, "rb") as file:
+            while block := file.read(1 << 20):
+                state.update(block)
+    return state.hexdigest()

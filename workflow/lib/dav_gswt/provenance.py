@@ -1,0 +1,17 @@
+"""Where a result comes from: the code, the parameters, the bytes of every input. Times stand in benchmarks only."""
+
+from pathlib import Path
+
+import dav_gswt
+from dav_gswt.files import digest
+from dav_gswt.raster import cpu
+
+
+def of(inputs: dict[str, Path | str], parameters: dict) -> dict:
+    """A JSON value that says what a result was made from and with."""
+    return {
+        "version": dav_gswt.__version__,
+        "renderer": {"backend": "cpu", "instruction_set": cpu.instruction_set()},
+        "parameters": parameters,
+        "inputs": {name: digest(path) for name, path in sorted(inputs.items())},
+    }
