@@ -21,6 +21,7 @@ rule bundle_tiles:
     params:
         tau=real("tau"),
         seed=integer("seed"),
+        schema=str(Path(workflow.basedir, "workflow/schemas/davgswt.schema.json")),
         source=source_of("bundle"),
     script:
         "../scripts/bundle_tiles.py"

@@ -105,4 +105,14 @@ def terrains():
 def folder_of(scene):
     """A scene's photos, as inputs: a photo that comes or goes is noticed."""
     folder = Path(config["scenes"][scene]["folder"])
-    return sorted(str(p) for p in folder.iterdir() if p.is_file()) if folder.is_dir() else str(folder)
+    if not folder.is_dir():
+        raise WorkflowError(f"config: scenes.{scene}.folder: there is no folder {folder}")
+    return sorted(str(p) for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
+
+
+def file_of(scene):
+    """A scene's finished field, as an input."""
+    file = Path(config["scenes"][scene]["field"])
+    if not file.is_file():
+        raise WorkflowError(f"config: scenes.{scene}.field: there is no file {file}")
+    return str(file)

@@ -25,7 +25,9 @@ rule register_photos:
         runtime="60m",
     params:
         scene=entry("scenes", "scene"),
-        source=source_of("photos/sfm", "photos/ground", "photos/model", "images"),
+        source=source_of(
+            "photos/build", "photos/exif", "photos/folder", "photos/ground", "photos/model", "photos/sfm", "images"
+        ),
     script:
         "../scripts/register_photos.py"
 
@@ -56,7 +58,7 @@ rule render_photos:
 rule import_field:
     """A finished 3DGS .ply, turned into the ground frame."""
     input:
-        lambda wildcards: config["scenes"][wildcards.scene]["field"],
+        lambda wildcards: file_of(wildcards.scene),
     output:
         field="<results>/<photos>/field.ply",
         frame="<results>/<photos>/ground.json",
@@ -68,7 +70,7 @@ rule import_field:
         scene=scenes_of("field"),
     params:
         scene=entry("scenes", "scene"),
-        source=source_of("photos/splat", "field"),
+        source=source_of("photos/build", "photos/ground", "photos/splat", "field"),
     script:
         "../scripts/import_field.py"
 

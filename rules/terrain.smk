@@ -26,6 +26,7 @@ rule render_terrain:
     """Stills of the endless terrain: walking, from a hill, and from above."""
     input:
         manifest="<results>/<bundle>/davgswt.json",
+        seams="<results>/<tiles>/seams.json",
         tiles="<results>/<tiles>/tiles",
     output:
         stills=report(

@@ -12,7 +12,7 @@ with logging_to(snakemake.log[0]):
     given, quality = snakemake.input, build.Quality(**snakemake.params.quality)
     names = read_json(given.views)["start"]
     photos = views.taken(given.images, given.model, names, [], quality.size)
-    points, colours = model.points_seen_by(model.read(given.model), names)
+    points, colours = model.points_seen_by(model.read(given.model), names, given.images)
     fitted, grid = build.coarse(
         read_json(given.frame), photos, points, colours, quality, np.random.default_rng(snakemake.params.seed)
     )

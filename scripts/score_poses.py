@@ -13,6 +13,7 @@ with logging_to(snakemake.log[0]):
     pool = candidates.left(
         snakemake.params.scene, read_json(given.frame), given.model, read_json(given.views), captures
     )
-    scored, maps = scoring.score(field.read(given.field), ground.read(given.ground), pool)
+    fitted, grid = field.read(given.field), ground.read(given.ground)
+    scored, maps = scoring.score(fitted, grid, pool)
     poses.write_scores(snakemake.output.scores, scored)
-    images.write_exr_parts(snakemake.output.maps, scoring.parts(scored, maps))
+    images.write_exr_parts(snakemake.output.maps, scoring.parts(fitted, grid, scored, maps))

@@ -7,7 +7,7 @@ import sysconfig
 from pathlib import Path
 
 missing = []
-if sys.version_info < (3, 11):  # noqa: UP036: this runs on whatever Python is there
+if sys.version_info < (3, 11):  # noqa: UP036 (this runs on whatever Python is there)
     sys.exit(f"Python {sys.version.split()[0]} is too old: 3.11 or newer is needed (make run PYTHON=python3.12)")
 if not Path(".venv/bin/python").exists() and not all(map(importlib.util.find_spec, ("venv", "ensurepip"))):
     missing.append("python3-venv")

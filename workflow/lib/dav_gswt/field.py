@@ -4,7 +4,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float32
+from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 from plyfile import PlyData, PlyElement, PlyParseError
 
@@ -19,7 +19,8 @@ class Field:
     """n Gaussians in the world frame: z up, the unit of length is the scene's.
 
     log_scales: natural logarithm of the standard deviations along the axes of `quats` (w x y z, any length but 0).
-    opacity_logits: peak opacity is expit of it. sh: colour coefficients, degree 0 first; colour = 0.5 + SH0 sh[:, 0] + ...
+    opacity_logits: peak opacity is expit of it. sh: colour coefficients, degree 0 first:
+    colour = 0.5 + SH0 sh[:, 0] + ...
     uncertainty: 0 (sure) to 1 (nothing is known). ground: the Gaussian is a disc of the ground layer.
     """
 
@@ -49,7 +50,7 @@ def joined(parts: list[Field]) -> Field:
     return Field(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Field)))
 
 
-def sh_of(colours: Float32[Array, "n 3"]) -> Float32[Array, "n 1 3"]:
+def sh_of(colours: Float[Array, "n 3"]) -> Float32[Array, "n 1 3"]:
     """Degree-0 coefficients of a colour that is the same from all sides."""
     return ((colours - 0.5) / SH0).astype(np.float32)[:, None]
 
@@ -75,7 +76,7 @@ def write(field: Field, path: Path | str) -> None:
         "means": field.means,
         "normals": np.zeros((n, 3), np.float32),
         "dc": field.sh[:, 0],
-        "rest": field.sh[:, 1:].transpose(0, 2, 1).reshape(n, -1),
+        "rest": field.sh[:, 1:].transpose(0, 2, 1).reshape(n, 3 * (k - 1)),
         "opacity_logits": field.opacity_logits[:, None],
         "log_scales": field.log_scales,
         "quats": field.quats,

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import shutil
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -24,6 +25,24 @@ def whole(path: Path | str):
         part.unlink(missing_ok=True)
 
 
+@contextmanager
+def whole_folder(path: Path | str):
+    """A folder beside `path` to fill; it takes `path`'s place when the block ends well, and goes when it does not."""
+    path = Path(path)
+    part, old = path.with_name(f".{path.name}.part"), path.with_name(f".{path.name}.old")
+    for rest in (part, old):  # of a run that was killed
+        shutil.rmtree(rest, ignore_errors=True)
+    part.mkdir(parents=True)
+    try:
+        yield part
+        if path.exists():
+            path.rename(old)
+        part.rename(path)
+    finally:
+        for rest in (part, old):
+            shutil.rmtree(rest, ignore_errors=True)
+
+
 def write_json(path: Path | str, value) -> None:
     """Write JSON; NaN and infinity are refused, since JSON has neither."""
     text = json.dumps(value, indent=1, allow_nan=False) + "\n"
@@ -43,7 +62,7 @@ def digest(*paths: Path | str) -> str:
     """SHA-256 over the bytes of files, in the order given."""
     state = hashlib.sha256()
     for path in paths:
-        with open(path, "rb") as file:
+        with Path(path).open("rb") as file:
             while block := file.read(1 << 20):
                 state.update(block)
     return state.hexdigest()

@@ -14,7 +14,7 @@ from dav_gswt.files import read_json
 
 @dataclass(frozen=True)
 class View:
-    """A photo and its camera on the same pixel grid. weight: 1 where the photo counts, 0 where it is not to be fitted."""
+    """A photo and its camera on the same pixel grid. weight: 1 where the photo counts, 0 where it is not fitted."""
 
     name: str
     camera: Camera

@@ -1,4 +1,4 @@
-"""The pool: where a photo could still be taken. A hemisphere for scenes that can be rendered, the set's own frames else."""
+"""The pool: where a photo could still be taken: on a hemisphere if a scene can be rendered, else at its frames."""
 
 from pathlib import Path
 

@@ -8,6 +8,7 @@ from dav_gswt.active.poses import Pose, Scored
 from dav_gswt.cameras import Camera
 from dav_gswt.coarse.doubt import uncertainty_map
 from dav_gswt.coarse.ground import Ground
+from dav_gswt.coarse.maps import from_above
 from dav_gswt.field import Field
 from dav_gswt.logs import progress
 from dav_gswt.raster import cpu
@@ -36,8 +37,20 @@ def score(
     return scored, maps
 
 
-def shown(scored: list[Scored], others: int = 16) -> list[str]:
-    """Names of the poses whose maps are kept: spread evenly over the ranking by opacity."""
-    ranked = [s.pose.name for s in sorted(scored, key=lambda s: -s.opacity)]
-    step = max(1, len(ranked) // others)
-    return ranked[::step][:others]
+def parts(
+    field: Field, grid: Ground, scored: list[Scored], maps: dict[str, Float32[Array, "h w"]], others: int = 16
+) -> dict[str, tuple[dict[str, Array], dict[str, str]]]:
+    """The maps to keep, as parts of an EXR: the ground from above (north on top), and candidates evenly over the ranking.
+
+    Each part's header says which pose it is of.
+    """
+    ranked = sorted(scored, key=lambda s: -s.opacity)
+    kept = ranked[:: max(1, len(ranked) // others)][:others]
+    above = {"above": ({"uncertainty": from_above(field, grid).uncertainty[::-1]}, {"camera": "straight above"})}
+    return above | {
+        s.pose.name: (
+            {"uncertainty": maps[s.pose.name]},
+            {k: repr(getattr(s.pose, k)) for k in ("elevation", "azimuth", "radius")} | {"opacity": repr(s.opacity)},
+        )
+        for s in kept
+    }

@@ -13,7 +13,7 @@ _log = logging.getLogger(__name__)
 
 
 def farthest(scored: list[Scored], captured: Float[Array, "m 3"], k: int, rng: np.random.Generator) -> list[int]:
-    """Greedily the candidate farthest from every view taken or chosen so far (farthest-point sampling); ties by index."""
+    """Greedily the candidate farthest from all views taken or chosen so far (farthest points); ties by index."""
     places = np.array([place(s.pose) for s in scored]).reshape(-1, 3)
     nearest = np.full(len(places), np.inf)
     for view in captured:

@@ -13,6 +13,7 @@ from dav_gswt.views import View
 WIDTH = 0.72  # standard deviation of a disc in spacings: neighbours overlap, the ground is opaque (docs/deviations.md)
 THICKNESS = 0.1  # of a disc, in spacings
 OPAQUE = 4.0  # opacity logit of a disc before the first step
+ALONE = 8.0  # spacings to its neighbours from which a point in the air is taken for a wrong match
 STANDS = 1.5  # a point this many spacings above the surface is a thing
 
 
@@ -50,8 +51,10 @@ def things(grid: Ground, points: Float[Array, "n 3"], colours: Float[Array, "n 3
     above = points[:, 2] - grid.height_at(points)
     stand = (above > STANDS * grid.spacing) & (above < band)
     points, colours = points[stand], colours[stand]
+    apart = cKDTree(points).query(points, k=4)[0][:, 1:].mean(1) if len(points) > 3 else np.zeros(len(points))
+    together = apart < ALONE * grid.spacing
+    points, colours, apart = points[together], colours[together], apart[together]
     n = len(points)
-    apart = cKDTree(points).query(points, k=4)[0][:, 1:].mean(1) if n > 3 else np.full(n, grid.spacing)
     scales = np.clip(0.5 * apart, 0.5 * grid.spacing, 1.5 * grid.spacing)
     quats = np.zeros((n, 4), np.float32)
     quats[:, 0] = 1

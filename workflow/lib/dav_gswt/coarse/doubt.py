@@ -24,9 +24,9 @@ def with_uncertainty(field: Field, views: list[View]) -> Field:
     raster = cpu.Rasterizer()
     for view in views:
         seen = raster.forward(**arrays(field), camera=view.camera)
-        alone = raster.contributions((view.weight * seen.alpha)[..., None])
-        weight = raster.contributions(view.weight[..., None])
-        share = np.where(weight.mapped[:, 0] > SEEN, alone.mapped[:, 0] / np.maximum(weight.mapped[:, 0], SEEN), 0)
+        maps = np.stack([view.weight * seen.alpha, view.weight, 0 * view.weight], -1)
+        opaque, weight, _ = raster.carried(np.ascontiguousarray(maps, np.float32)).T
+        share = np.where(weight > SEEN, opaque / np.maximum(weight, SEEN), 0)
         known = np.maximum(known, share)
     return replace(field, uncertainty=np.clip(1 - known, 0, 1).astype(np.float32))
 

@@ -76,8 +76,8 @@ def _gradients(raster: cpu.Rasterizer, values: dict[str, Array], view: View, beh
     seen = raster.forward(**values, camera=view.camera)
     clear = (1 - seen.alpha)[..., None]
     image = seen.colour + clear * behind
-    _, grad = cpu.loss(image, view.image, weight=view.weight, structure=STRUCTURE)
-    return raster.backward(grad, -BACKDROP * (grad * behind).sum(-1))
+    _, grad = raster.loss(image, view.image, view.weight, STRUCTURE)
+    return raster.backward(grad, -BACKDROP * (grad @ behind))
 
 
 def _descend(state: _State, gradients, grid: Ground, discs: int, step: int, steps: int) -> None:

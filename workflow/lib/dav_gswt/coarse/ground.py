@@ -80,7 +80,7 @@ class Ground:
 def lay(frame: dict, points: Float[Array, "n 3"], spacing: float, cap: int, block: int, margin: float) -> Ground:
     """Lay the grid over the exemplar and a margin around it, and draw the surface through the points.
 
-    frame: ground.json. spacing: of the discs, in world units; it is widened where more than `cap` cells would be needed.
+    frame: ground.json. spacing: of the discs, in world units; widened where more than `cap` cells would be needed.
     block: the exemplar's side becomes a multiple of it, in cells. margin: ground kept around the exemplar, as a share
     of its side, as far as a photo sees any.
     Raises: InputError: the exemplar is too small for one block.

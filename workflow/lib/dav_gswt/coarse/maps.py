@@ -23,6 +23,12 @@ class Maps:
     uncertainty: Float32[Array, "rows columns"]
 
 
+def over_exemplar(field: Field, grid: Ground) -> Maps:
+    """The maps of the exemplar's cells alone."""
+    block = np.s_[grid.first_row : grid.first_row + grid.cells, grid.first_column : grid.first_column + grid.cells]
+    return Maps(*(m[block] for m in vars(from_above(field, grid)).values()))
+
+
 def from_above(field: Field, grid: Ground) -> Maps:
     """Draw the field by an orthographic camera over the grid, from above its highest Gaussian."""
     rows, columns = grid.shape

@@ -3,15 +3,16 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from dav_gswt.terrain.choice import tile_at
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.cameras import Camera
 from dav_gswt.field import Field, joined
+from dav_gswt.terrain.choice import tile_at
+from dav_gswt.tiles.build import TileSet
 
-REACH = 24  # tiles to the horizon at most: beyond it the ground proxy has the terrain's mean colour
-MOST = 6_000_000  # Gaussians in one picture
+REACH = 48  # tiles to the horizon at most: beyond it the ground proxy has the terrain's mean colour
+MOST = 10_000_000  # Gaussians in one picture
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,13 @@ class Terrain:
     distances: list[float]  # level l is used nearer than distances[l]; the last is infinite
     variants: int
     salt: int
+
+
+def of_tiles(tiles: TileSet, manifest: dict) -> Terrain:
+    """A tile set laid as a bundle's manifest says."""
+    fields = {(level, tile): f for level, row in enumerate(tiles.fields) for tile, f in enumerate(row)}
+    far = [np.inf if level["distance"] is None else level["distance"] for level in manifest["levels"]]
+    return Terrain(fields, tiles.side, far, tiles.variants, manifest["salt"])
 
 
 def visible(terrain: Terrain, camera: Camera) -> list[tuple[int, int, int]]:
@@ -47,7 +55,7 @@ def visible(terrain: Terrain, camera: Camera) -> list[tuple[int, int, int]]:
             if ahead.all() and outside.any():
                 continue
             nearest = np.clip(eye[:2] / side, [i, j], [i + 1, j + 1]) * side
-            distance = float(np.hypot(*(nearest - eye[:2]), eye[2]))
+            distance = float(np.linalg.norm([*(nearest - eye[:2]), eye[2]]))
             found.append((distance, i, j))
     found.sort()
     level = [int(np.searchsorted(terrain.distances[:-1], d, side="right")) for d, _, _ in found]

@@ -56,6 +56,6 @@ def backdrop(camera: Camera, terrain: Terrain, sky: dict, ground_colour) -> Floa
     up = np.clip(rise, 0, 1)[..., None] ** 0.5
     above = horizon + (zenith - horizon) * up
     far = camera.centre[2] / (REACH * terrain.side)  # sine at which the last tiles end
-    pale = np.exp(np.clip(rise, -1, 0) / far)[..., None] * 0.8
+    pale = np.exp(np.clip(rise, -1, 0) / (0.3 * far))[..., None]
     below = ground + (horizon - ground) * pale
     return np.where(rise[..., None] > 0, above, below).astype(np.float32)

@@ -1,0 +1,94 @@
+"""How long the page takes to load and order a made-up bundle of 200k Gaussians, and to choose and draw a picture.
+
+In headless Chromium with software rendering; prints a table, asserts nothing. Drawing in software is slow by nature:
+the numbers that carry over to other machines are those of loading and of choosing tiles.
+"""
+
+import statistics
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "browser"))
+
+import made_up
+from visiting import FLAGS, VIEWER, chromium_path, served
+
+from dav_gswt.terrain.page import write_page
+
+GROUND = made_up.Ground(discs=100, levels=3, speckle=20)  # 16 tiles x (100^2 + 50^2 + 25^2) = 210,000
+VISITS = 5
+LOAD = """async () => {
+  while (!window.davgswt) await new Promise(done => setTimeout(done, 5));
+  await davgswt.ready;
+  return performance.now();
+}"""
+CHOOSE = """async () => {
+  const { createTerrain, visible } = await import("./terrain.js");
+  const { cameraOf, createWalker } = await import("./walk.js");
+  const manifest = await (await fetch("davgswt.json")).json();
+  const terrain = createTerrain(manifest);
+  terrain.arrived.forEach(levels => manifest.levels.forEach(({ level }) => levels.add(level)));
+  const times = [];
+  let seen;
+  for (let k = 0; k < 60; k++) {
+    const camera = cameraOf(createWalker(manifest, { eye: 1, pitch: -8, yaw: 6 * k }), 1920, 1080);
+    const start = performance.now();
+    seen = visible(terrain, camera, 1e6);
+    times.push(performance.now() - start);
+  }
+  return { times: times.slice(20), tiles: seen.tiles.length, count: seen.count };
+}"""
+DRAW = """() => {
+  const gl = document.getElementById("picture").getContext("webgl2"), pixel = new Uint8Array(4);
+  const start = performance.now();
+  davgswt.frame();
+  gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+  return [performance.now() - start, davgswt.state.count];
+}"""
+
+
+def main() -> int:
+    path = chromium_path()
+    if path is None:
+        print("page: no chromium on this machine, nothing measured")
+        return 0
+    from playwright.sync_api import sync_playwright
+
+    with tempfile.TemporaryDirectory() as folder:
+        bundle, page = Path(folder) / "bundle", Path(folder) / "page"
+        manifest = made_up.write_bundle(bundle, GROUND)
+        start = time.perf_counter()
+        write_page(bundle, VIEWER, page)
+        written = time.perf_counter() - start
+        chunks = [chunk for tile in manifest["tiles"] for chunk in tile["chunks"]]
+        count, size = (sum(chunk[key] for chunk in chunks) for key in ("count", "bytes"))
+        print(f"page of {count:,} Gaussians, {size / 1e6:.1f} MB, {len(chunks)} chunks; written in {written:.2f} s")
+        with sync_playwright() as playwright, served(page) as address:
+            browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
+            measure(browser, address)
+            browser.close()
+    return 0
+
+
+def measure(browser, address: str) -> None:
+    loads, draws = [], []
+    for _ in range(VISITS):
+        with browser.new_context(viewport={"width": 480, "height": 270}) as context:
+            tab = context.new_page()
+            tab.goto(f"{address}?still#2,2,1,60,-20", wait_until="domcontentloaded")
+            loads.append(tab.evaluate(LOAD))
+            draws.append(tab.evaluate(DRAW))
+            chosen = tab.evaluate(CHOOSE)
+    report("all tiles ready, s after the request", [ms / 1e3 for ms in loads])
+    report(f"one picture 480 x 270 in software, {draws[0][1]:,} splats, ms", [ms for ms, _ in draws])
+    report(f"choose and order {chosen['tiles']} tiles, 1920 x 1080, ms", chosen["times"])
+
+
+def report(what: str, values: list[float]) -> None:
+    print(f"  {what:64} {statistics.mean(values):8.2f} (sd {statistics.stdev(values):.2f}, max {max(values):.2f})")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

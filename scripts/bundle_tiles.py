@@ -1,0 +1,20 @@
+"""Rule bundle_tiles: the tiles as a viewer loads them, and as the public GSWT renderer does."""
+
+from pathlib import Path
+
+from dav_gswt import provenance
+from dav_gswt.bundle import build
+from dav_gswt.files import read_json
+from dav_gswt.logs import logging_to
+from dav_gswt.tiles import store
+
+with logging_to(snakemake.log[0]):
+    given, params, frame = snakemake.input, snakemake.params, read_json(snakemake.input.frame)
+    source = provenance.of({"seams": given.seams, "frame": given.frame}, {"tau": params.tau, "seed": params.seed})
+    build.write_bundle(
+        store.read(given.tiles, given.seams),
+        Path(snakemake.output.manifest).parent,
+        build.Options(tau=params.tau, salt=params.seed, unit=frame["unit"]),
+        params.schema,
+        source | {"tiles": read_json(given.seams)["provenance"]},
+    )

@@ -1,0 +1,12 @@
+"""Rule import_field: a finished 3DGS field in the ground frame."""
+
+from dav_gswt.logs import logging_to
+from dav_gswt.photos import build
+
+with logging_to(snakemake.log[0]):
+    build.from_field(
+        snakemake.input[0],
+        snakemake.output.field,
+        snakemake.output.frame,
+        up=snakemake.params.scene.get("up", (0.0, -1.0, 0.0)),
+    )

@@ -1,0 +1,10 @@
+"""Rule make_page: viewer and bundle in one folder."""
+
+from pathlib import Path
+
+from dav_gswt.logs import logging_to
+from dav_gswt.terrain import page
+
+with logging_to(snakemake.log[0]):
+    bundle, viewer = Path(snakemake.input.manifest).parent, Path(snakemake.input.viewer[0]).parent
+    page.write_page(bundle, viewer, snakemake.output.page)

@@ -1,0 +1,9 @@
+"""Rule render_photos: a synthetic scene's photos, cameras and points."""
+
+from pathlib import Path
+
+from dav_gswt.logs import logging_to
+from dav_gswt.photos import rendered
+
+with logging_to(snakemake.log[0]):
+    rendered.render_set(snakemake.params.scene, Path(snakemake.output.frame).parent)

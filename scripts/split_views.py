@@ -1,0 +1,13 @@
+"""Rule split_views: which photos start, which may be asked for, which only test."""
+
+import numpy as np
+
+from dav_gswt.files import read_json, write_json
+from dav_gswt.logs import logging_to
+from dav_gswt.photos import model, views
+
+with logging_to(snakemake.log[0]):
+    given, params = snakemake.input, snakemake.params
+    start = params.scene.get("start") or params.scene["photos"]
+    found = views.split(model.read(given.model), read_json(given.frame), start, np.random.default_rng(params.seed))
+    write_json(snakemake.output.views, found)

@@ -1,0 +1,54 @@
+"""A headless Chromium, made-up bundles as served pages, and visits to them."""
+
+from pathlib import Path
+
+import made_up
+import pytest
+from visiting import FLAGS, VIEWER, Visit, chromium_path, served
+
+from dav_gswt.terrain.page import write_page
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    if not (path := chromium_path()):
+        pytest.skip("no chromium on this machine: apt-get install chromium")
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=path, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="session")
+def page_of(tmp_path_factory):
+    """Make the page folder of a made-up ground."""
+
+    def make(ground: made_up.Ground) -> Path:
+        folder = tmp_path_factory.mktemp("page")
+        made_up.write_bundle(folder / "bundle", ground)
+        write_page(folder / "bundle", VIEWER, folder / "page")
+        return folder / "page"
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def plain(page_of):
+    """The address of a page with 5120 Gaussians, one plain colour a tile."""
+    with served(page_of(made_up.Ground())) as address:
+        yield address
+
+
+@pytest.fixture
+def visit(chromium):
+    """Start visits; each has a small canvas and knows nothing of the others."""
+    contexts = []
+
+    def start(width: int = 320, height: int = 200, **options) -> Visit:
+        contexts.append(chromium.new_context(viewport={"width": width, "height": height}, **options))
+        return Visit(contexts[-1].new_page())
+
+    yield start
+    for context in contexts:
+        context.close()

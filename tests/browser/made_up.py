@@ -1,0 +1,112 @@
+"""Made-up bundles: a ground of discs on a grid, one plain colour a tile, levels and orders as the contract has them."""
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, UInt8
+from numpy import ndarray as Array
+
+RECORD = np.dtype([("position", "<f4", 3), ("deviation", "<f4", 3), ("paint", "u1", 4), ("turn", "u1", 4)])
+UPRIGHT = (255, 128, 128, 128)  # the quaternion 1 0 0 0 as bytes
+SKY = {"zenith": [0.25, 0.45, 0.8], "horizon": [0.8, 0.85, 0.95]}
+
+
+@dataclass(frozen=True)
+class Ground:
+    """What a made-up bundle looks like. Level l has `discs` / 2^l discs along each side of a tile."""
+
+    discs: int = 16
+    levels: int = 2
+    side: float = 4.0
+    variants: int = 1
+    salt: int = 7
+    eye_floor: float = 0.5
+    speckle: int = 0  # largest change of a disc's colour bytes, so that order and place matter
+    things: int = 0  # upright blobs a tile
+
+
+def colour_of(tile: int) -> UInt8[Array, "3"]:
+    """The plain colour of a tile, none near black or the sky: red and green by number, blue low."""
+    return np.array([120 + 8 * (tile % 16), 190 - 6 * (tile * 7 % 16), 40 + 20 * (tile // 16)], np.uint8)
+
+
+def directions() -> Float[Array, "9 3"]:
+    """Along the four axes, down at 45 degrees in the four diagonals, and straight down."""
+    level = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]]
+    slanted = [[x, y, -np.sqrt(2)] for x in (1, -1) for y in (1, -1)]
+    listed = np.array([*level, *slanted, [0, 0, -1]], float)
+    return listed / np.linalg.norm(listed, axis=1, keepdims=True)
+
+
+def write_bundle(folder: Path, ground: Ground) -> dict:
+    """Write davgswt.json and chunks/ of a made-up ground; returns the manifest."""
+    (folder / "chunks").mkdir(parents=True)
+    tiles = [_tile(folder, ground, tile) for tile in range(16 * ground.variants)]
+    spacing = ground.side / ground.discs
+    levels = [
+        {"level": lv, "mean_scale": spacing * 2**lv, "distance": 2 * ground.side * 2**lv, "band": 0.1 * ground.side}
+        for lv in range(ground.levels)
+    ]
+    levels[-1]["distance"] = None
+    manifest = {
+        "format": "davgswt",
+        "version": 1,
+        "unit": "metre",
+        "tile_side": ground.side,
+        "salt": ground.salt,
+        "eye_floor": ground.eye_floor,
+        "ground_colour": np.mean([colour_of(t["tile"]) for t in tiles], 0).__truediv__(255).tolist(),
+        "sky": SKY,
+        "directions": directions().tolist(),
+        "levels": levels,
+        "tiles": tiles,
+        "provenance": {},
+    }
+    (folder / "davgswt.json").write_text(json.dumps(manifest))
+    return manifest
+
+
+def _tile(folder: Path, ground: Ground, tile: int) -> dict:
+    chunks = []
+    for level in range(ground.levels):
+        rows = _discs(ground, tile, level)
+        along = rows["position"] @ directions().T
+        orders = np.argsort(-along, axis=0, kind="stable").T.astype("<u4")
+        data = rows.tobytes() + orders.tobytes()
+        name = f"chunks/lod{level}_tile_{tile:02d}.bin"
+        (folder / name).write_bytes(data)
+        chunks.append(
+            {
+                "level": level,
+                "file": name,
+                "bytes": len(data),
+                "sha256": hashlib.sha256(data).hexdigest(),
+                "count": len(rows),
+                "orders": list(range(len(orders))),
+            }
+        )
+    return {"tile": tile, "uncertainty": 0.0, "z": [0.0, 0.3 if ground.things else 0.0], "chunks": chunks}
+
+
+def _discs(ground: Ground, tile: int, level: int) -> Array:
+    """Overlapping flat discs on the grid of a level, and upright blobs among them."""
+    random = np.random.default_rng([tile, level])
+    n = ground.discs >> level
+    spacing = ground.side / n
+    rows = np.zeros(n * n + ground.things, RECORD)
+    grid = (np.arange(n) + 0.5) * spacing
+    flat, things = rows[: n * n], rows[n * n :]
+    flat["position"][:, 0], flat["position"][:, 1] = np.tile(grid, n), np.repeat(grid, n)
+    flat["deviation"] = [0.7 * spacing, 0.7 * spacing, 0.02 * spacing]
+    things["position"] = random.uniform(0.1 * ground.side, 0.9 * ground.side, (ground.things, 3))
+    things["position"][:, 2] = 0.12
+    things["deviation"] = [0.05, 0.05, 0.1]
+    speckle = random.integers(-ground.speckle, ground.speckle + 1, (len(rows), 1))
+    rows["paint"][:, :3] = np.clip(colour_of(tile) + speckle, 0, 255)
+    rows["paint"][n * n :, :3] = [40, 70, 30]
+    rows["paint"][:, 3] = 250
+    rows["turn"] = UPRIGHT
+    return rows

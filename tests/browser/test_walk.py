@@ -1,0 +1,154 @@
+"""Walking: keys, mouse, touch, the eye's floor, the link, and what survives a resize or a lost context."""
+
+import pytest
+from made_up import Ground
+from visiting import served
+
+OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
+
+
+def test_a_walk_changes_the_place_and_coming_back_shows_the_same_picture(visit, plain):
+    seen = visit().open(plain)
+    before = seen.at(**OBLIQUE)
+    seen.page.keyboard.down("w")
+    seen.until("davgswt.state.x > 3.2")
+    seen.page.keyboard.up("w")
+    away = seen.state
+    # yaw 20 degrees: the walk goes east by cos 20 and north by sin 20 of it
+    assert (away["y"] - 5) / (away["x"] - 3) == pytest.approx(0.36397, abs=1e-4)
+    assert (seen.picture() != before).any()
+    assert (seen.at(**OBLIQUE) == before).all()
+
+
+@pytest.mark.parametrize(
+    "key, condition",
+    [
+        ("s", "s.x < 2.9 && s.y < 5"),
+        ("a", "s.y > 5.1 && s.x < 3"),
+        ("d", "s.y < 4.9 && s.x > 3"),
+        ("ArrowUp", "s.x > 3.1"),
+        ("ArrowLeft", "s.yaw > 22"),
+        ("ArrowRight", "s.yaw < 18"),
+        ("e", "s.eye > 2.1"),
+        ("q", "s.eye < 1.9"),
+    ],
+)
+def test_each_key_does_what_the_help_says(visit, plain, key, condition):
+    seen = visit(160, 100).open(plain)
+    seen.at(**OBLIQUE)
+    seen.page.keyboard.down(key)
+    seen.until(f"(s => {condition})(davgswt.state)")
+    seen.page.keyboard.up(key)
+
+
+def test_the_eye_stays_above_its_floor(visit, plain):
+    seen = visit(160, 100).open(f"{plain}?still#2,2,0.001,0,-20")
+    assert seen.state["eye"] == Ground().eye_floor
+    seen.at(eye=-5)
+    assert seen.state["eye"] == Ground().eye_floor
+    seen.page.mouse.move(80, 50)
+    for _ in range(3):
+        seen.page.mouse.wheel(0, -200)
+    assert seen.state["eye"] == Ground().eye_floor
+    seen.page.mouse.wheel(0, 200)
+    seen.until(f"davgswt.state.eye > 1.3 * {Ground().eye_floor}")
+
+
+def test_dragging_turns_the_view_as_if_the_picture_were_held(visit, plain):
+    seen = visit().open(f"{plain}?still")
+    seen.at(**OBLIQUE)
+    seen.page.mouse.move(100, 80)
+    seen.page.mouse.down()
+    seen.page.mouse.move(140, 100)
+    seen.page.mouse.up()
+    # 320 pixels are 60 degrees: 40 pixels to the right are 7.5 degrees to the left, 20 down are 3.75 up
+    assert (seen.state["yaw"], seen.state["pitch"]) == (pytest.approx(27.5), pytest.approx(-26.25))
+
+
+def test_a_phone_has_a_pad_to_walk_with(visit, plain):
+    seen = visit(390, 844, has_touch=True, is_mobile=True).open(plain)
+    pad = seen.page.get_by_role("button", name="Hold to walk forward")
+    assert pad.is_visible()
+    before = seen.state["y"]
+    pad.dispatch_event("pointerdown", {"pointerId": 1, "bubbles": True})
+    seen.until(f"davgswt.state.y > {before} + 0.02")
+    assert seen.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_the_address_follows_the_walk_and_a_pasted_one_is_followed(visit, plain):
+    seen = visit(160, 100).open(plain)
+    seen.at(**OBLIQUE)
+    seen.until("location.hash.startsWith('#3.0000,5.0000,2.0000,20.000,-30.000')")
+    seen.page.evaluate("location.hash = '#-7,1.5,1,90,-10'")
+    seen.until("davgswt.state.x === -7 && davgswt.state.yaw === 90")
+
+
+def test_a_link_with_nonsense_starts_at_the_usual_place(visit, plain):
+    usual = visit(160, 100).open(f"{plain}?still").state
+    state = visit(160, 100).open(f"{plain}?still#one,,NaN,Infinity").state
+    assert state == usual
+
+
+def test_a_resized_window_is_filled(visit, plain):
+    seen = visit().open(f"{plain}?still")
+    seen.page.set_viewport_size({"width": 200, "height": 300})
+    seen.until("document.getElementById('picture').height === 300")
+    assert seen.at(**OBLIQUE).shape == (300, 200, 3)
+
+
+def test_a_lost_context_comes_back_with_the_same_picture(visit, plain):
+    seen = visit().open(f"{plain}?still")
+    before = seen.at(**OBLIQUE)
+    seen.page.evaluate(
+        """() => {
+          const gl = document.getElementById("picture").getContext("webgl2");
+          window.loss = gl.getExtension("WEBGL_lose_context");
+          loss.loseContext();
+        }"""
+    )
+    error = seen.page.locator("#error")
+    error.wait_for(state="visible")
+    seen.page.evaluate("loss.restoreContext()")
+    error.wait_for(state="hidden")
+    assert (seen.picture() == before).all()
+
+
+def test_the_budget_takes_fewer_splats_and_still_draws_near_tiles_back_to_front(visit, plain):
+    seen = visit(160, 100).open(f"{plain}?still")
+    result = seen.page.evaluate(
+        """async () => {
+          const { createTerrain, visible } = await import("./terrain.js");
+          const { cameraOf, createWalker } = await import("./walk.js");
+          const manifest = await (await fetch("davgswt.json")).json();
+          const terrain = createTerrain(manifest);
+          terrain.arrived.forEach(levels => manifest.levels.forEach(({ level }) => levels.add(level)));
+          const camera = cameraOf(createWalker(manifest, { eye: 1, pitch: -10 }), 1280, 720);
+          return [1e9, 20000, 5000, 300].map(budget => {
+            const { tiles, count, reach } = visible(terrain, camera, budget);
+            return { budget, count, reach, cells: tiles.map(({ i, j }) => [i, j]),
+              steps: tiles.map(({ i, j }) => Math.abs(i) + Math.abs(j)) };
+          });
+        }"""
+    )
+    assert result[0]["count"] > 20000
+    for now, tighter in zip(result, result[1:], strict=False):
+        assert tighter["count"] <= tighter["budget"]
+        assert tighter["count"] > 0.5 * tighter["budget"], "the budget is used"
+        assert tighter["reach"] <= now["reach"]
+    for each in result:
+        assert each["steps"] == sorted(each["steps"], reverse=True)
+        assert len({tuple(cell) for cell in each["cells"]}) == len(each["cells"])
+        assert min(each["steps"]) == 0, "the tile underfoot is drawn"
+
+
+def test_help_is_shown_on_the_first_visit_and_not_again(visit, page_of):
+    with served(page_of(Ground())) as address:
+        seen = visit().open(address)
+        help_ = seen.page.get_by_role("heading", name="Drag to look, WASD to walk")
+        assert help_.is_visible()
+        seen.page.get_by_role("button", name="Walk", exact=True).click()
+        assert not help_.is_visible()
+        seen.open(address)
+        assert not help_.is_visible()
+        seen.page.get_by_role("button", name="Help").click()
+        assert help_.is_visible()

@@ -1,0 +1,91 @@
+"""Visits to served pages in a headless Chromium: how it is started, what is served, what a visit sees."""
+
+import base64
+import shutil
+import threading
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Int
+from numpy import ndarray as Array
+
+from dav_gswt.terrain import serve
+
+VIEWER = Path(__file__).parents[2] / "workflow" / "viewer"
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+PIXELS = """() => {
+  davgswt.frame();
+  const gl = document.getElementById("picture").getContext("webgl2");
+  const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+  const bytes = new Uint8Array(4 * width * height);
+  gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+  let text = "";
+  for (let k = 0; k < bytes.length; k += 4096) text += String.fromCharCode(...bytes.subarray(k, k + 4096));
+  return [width, height, btoa(text)];
+}"""
+
+
+def chromium_path() -> str | None:
+    """The system's Chromium, if there is one."""
+    return shutil.which("chromium") or shutil.which("chromium-browser")
+
+
+@contextmanager
+def served(folder: Path):
+    """The address of a page folder while the block runs."""
+    http = serve.server(folder, 0)
+    thread = threading.Thread(target=http.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{http.server_address[1]}/"
+    finally:
+        http.shutdown()
+        http.server_close()
+        thread.join()
+
+
+class Visit:
+    """One visit to a page, in a browser profile of its own."""
+
+    def __init__(self, page):
+        self.page = page
+
+    def open(self, address: str, wait: bool = True) -> "Visit":
+        self.page.goto(address)
+        if wait:
+            self.page.evaluate("davgswt.ready.then(() => 0)")
+        return self
+
+    def until(self, condition: str, seconds: float = 20.0) -> None:
+        """Wait for an expression to hold; asked from outside, since the page forbids eval to everybody."""
+        end = time.monotonic() + seconds
+        while not self.page.evaluate(condition):
+            assert time.monotonic() < end, f"in vain for {seconds} s: {condition}"
+            self.page.wait_for_timeout(20)
+
+    @property
+    def state(self) -> dict:
+        return self.page.evaluate("davgswt.state")
+
+    def at(self, **place) -> Int[Array, "h w 3"]:
+        """The picture (rows from the top, RGB bytes) from a place."""
+        self.page.evaluate("place => davgswt.set(place)", place)
+        return self.picture()
+
+    def picture(self) -> Int[Array, "h w 3"]:
+        width, height, text = self.page.evaluate(PIXELS)
+        pixels = np.frombuffer(base64.b64decode(text), np.uint8).reshape(height, width, 4)
+        return pixels[::-1, :, :3].astype(int)

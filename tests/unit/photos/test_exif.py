@@ -1,0 +1,85 @@
+"""Focal lengths from EXIF, by hand."""
+
+import struct
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+
+from dav_gswt.photos import exif
+
+
+def photo(path, width, height, **tags):
+    """A grey JPEG with EXIF tags."""
+    spec = oiio.ImageSpec(width, height, 3, oiio.UINT8)
+    for key, value in tags.items():
+        spec[f"Exif:{key}"] = value
+    file = oiio.ImageOutput.create(str(path))
+    assert file.open(str(path), spec) and file.write_image(np.full((height, width, 3), 128, np.uint8))
+    file.close()
+    return path
+
+
+def with_block(path, entries, order="<"):
+    """A JPEG whose EXIF block is written byte by byte. entries: {tag: (type, struct format, values)}."""
+    plain = photo(path, 400, 300).read_bytes()
+    mark = {"<": b"II*\0", ">": b"MM\0*"}[order]
+    body = mark + struct.pack(order + "IHHHII", 8, 1, 0x8769, 4, 1, 26) + b"\0" * 4
+    table, data, end = b"", b"", 26 + 2 + 12 * len(entries) + 4
+    for tag, (kind, form, values) in sorted(entries.items()):
+        packed = struct.pack(order + form, *values)
+        place = packed.ljust(4, b"\0") if len(packed) <= 4 else struct.pack(order + "I", end + len(data))
+        table += struct.pack(order + "HHI", tag, kind, 1) + place
+        data += b"" if len(packed) <= 4 else packed
+    block = b"Exif\0\0" + body + struct.pack(order + "H", len(entries)) + table + b"\0" * 4 + data
+    path.write_bytes(plain[:2] + b"\xff\xe1" + struct.pack(">H", len(block) + 2) + block + plain[2:])
+    return path
+
+
+def test_the_35_mm_equivalent_compares_diagonals(tmp_path):
+    # 3:2 like the film itself: 24 mm on 36 x 24 mm is 24 / 36 of the width.
+    assert exif.focal_length(photo(tmp_path / "a.jpg", 360, 240, FocalLengthIn35mmFilm=24)) == pytest.approx(240, 1e-4)
+    assert exif.focal_length(photo(tmp_path / "b.jpg", 240, 360, FocalLengthIn35mmFilm=24)) == pytest.approx(240, 1e-4)
+
+
+def test_a_16_to_9_photo_is_cut_from_a_4_to_3_sensor(tmp_path):
+    narrow = exif.focal_length(photo(tmp_path / "a.jpg", 320, 240, FocalLengthIn35mmFilm=20))
+    wide = exif.focal_length(photo(tmp_path / "b.jpg", 320, 180, FocalLengthIn35mmFilm=20))
+    assert wide == narrow == pytest.approx(20 / 43.2666 * 400, rel=1e-6)
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("pitch", [(5, "II", (20000, 2)), (12, "d", (10000.0,))], ids=["rational", "double"])
+def test_the_pixel_pitch_counts_before_the_equivalent(tmp_path, order, pitch):
+    entries = {0x920A: (5, "II", (254, 100)), 0xA20E: pitch, 0xA210: (3, "H", (2,)), 0xA405: (3, "H", (99,))}
+    # 2.54 mm at 10000 pixels an inch.
+    assert exif.focal_length(with_block(tmp_path / "a.jpg", entries, order)) == pytest.approx(1000)
+
+
+def test_a_photo_that_was_shrunk_after_it_was_tagged(tmp_path):
+    entries = {0x920A: (5, "II", (254, 100)), 0xA20E: (5, "II", (10000, 1)), 0xA002: (4, "I", (800,))}
+    assert exif.focal_length(with_block(tmp_path / "a.jpg", entries)) == pytest.approx(500)
+
+
+@pytest.mark.parametrize("film", [0, 2, 60000])
+def test_a_focal_length_that_cannot_be_is_passed_over(tmp_path, film):
+    assert exif.focal_length(photo(tmp_path / "a.jpg", 360, 240, FocalLengthIn35mmFilm=film)) is None
+
+
+def test_without_exif_there_is_none(tmp_path):
+    assert exif.focal_length(photo(tmp_path / "a.jpg", 360, 240)) is None
+    assert exif.focal_length(photo(tmp_path / "a.png", 360, 240)) is None
+
+
+@pytest.mark.parametrize("cut", range(12, 60, 6))
+def test_a_damaged_block_is_passed_over(tmp_path, cut):
+    path = with_block(tmp_path / "a.jpg", {0x920A: (5, "II", (254, 100)), 0xA20E: (5, "II", (10000, 1))})
+    whole = path.read_bytes()
+    path.write_bytes(whole[:cut] + b"\xff" * (130 - cut) + whole[130:])
+    assert exif._jpeg_tags(path) == {} or all(np.isfinite(v) for v in exif._jpeg_tags(path).values())
+
+
+@pytest.mark.parametrize("name, pixels", [("brighton_beach", 592), ("copr_dunes", 1377), ("caliterra_earthworks", 743)])
+def test_the_real_sets_have_the_focal_lengths_that_their_notes_give(shared, name, pixels):
+    first = min((shared / "data" / name / "images").iterdir())
+    assert exif.focal_length(first) == pytest.approx(pixels, abs=1)

@@ -1,0 +1,157 @@
+"""Synthetic scenes: what they refuse, that pictures are taken where cameras say, and that they repeat."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dav_gswt.cameras import pinhole, top_down
+from dav_gswt.errors import InputError
+from dav_gswt.photos import desert, rigs, synthetic
+
+mi = pytest.importorskip("mitsuba")
+BARE = {"stones": 0, "pebbles": 0, "shrubs": 0, "tufts": 0}
+ENTRY = {"family": "desert", "seed": 0, "photos": 8, "test": 6, "size": 64, "candidates": 20}
+
+
+@pytest.fixture(autouse=True)
+def coarse_sand(monkeypatch):
+    """Sand of few texels: quick to make, and otherwise the same."""
+    monkeypatch.setattr(desert, "TEXELS", 256)
+    yield
+    synthetic._world.cache_clear()
+
+
+def off_centre(width=96, height=64):
+    """A camera that looks askance and whose principal point is far from the middle."""
+    camera = pinhole((3.0, -4.0, 5.0), (0.3, 0.2, 0.0), width, height, 50.0)
+    return replace(camera, cx=0.37 * width, cy=0.71 * height)
+
+
+@pytest.mark.parametrize(
+    "family, seed, given, said",
+    [
+        pytest.param("tundra", 0, {}, "tundra.*desert", id="family"),
+        pytest.param("desert", -1, {}, "seed", id="negative seed"),
+        pytest.param("desert", 0, {"shrub": 3}, "'shrub'.*shrubs", id="misspelt option"),
+        pytest.param("desert", 0, {"shrubs": 1e9}, "shrubs.*0.0 to", id="too many"),
+        pytest.param("desert", 0, {"undulation": float("nan")}, "undulation", id="NaN"),
+        pytest.param("desert", 0, {"stones": "many"}, "stones", id="a word"),
+    ],
+)
+def test_what_a_scene_cannot_be_is_said_by_name(family, seed, given, said):
+    with pytest.raises(InputError, match=said):
+        synthetic.make(family, seed, **given)
+
+
+def test_every_option_has_bounds_that_hold_its_default():
+    assert set(desert.BOUNDS) == set(desert.Options.__dataclass_fields__)
+    for name, (low, high) in desert.BOUNDS.items():
+        assert low <= getattr(desert.Options(), name) <= high
+        desert.options(**{name: low}), desert.options(**{name: high})
+
+
+def test_points_of_light_appear_where_the_camera_projects_them():
+    camera = off_centre()
+    points = np.array([[0.0, 0.0, 0.0], [1.2, 0.4, 0.3], [-0.6, -0.9, 0.8], [0.3, 0.6, -0.4], [-0.9, 0.9, 0.1]])
+    expected, depth = camera.project(points)
+    sensor = mi.load_dict(synthetic.sensor(camera, {"type": "multijitter", "sample_count": 256}))
+    rows, columns = np.mgrid[: camera.height, : camera.width] + 0.5
+    for point, pixel, z in zip(points, expected, depth, strict=True):
+        assert 5 < pixel[0] < camera.width - 5 and 5 < pixel[1] < camera.height - 5
+        ball = {"type": "sphere", "center": point.tolist(), "radius": float(2.0 * z / camera.fx)}
+        world = mi.load_dict({"type": "scene", "ball": ball | {"light": {"type": "area"}}})
+        light = np.array(mi.render(world, sensor=sensor, integrator=mi.load_dict({"type": "direct"}), spp=256))[..., 0]
+        found = [(light * columns).sum() / light.sum(), (light * rows).sum() / light.sum()]
+        # a ball of 2 pixels off the axis is seen as an ellipse whose middle is off by 2^2/f * tan < 0.03 pixels;
+        # 256 rays a pixel leave 0.02 more
+        assert found == pytest.approx(pixel, abs=0.06)
+
+
+def test_depth_leads_back_to_the_ground():
+    scene = synthetic.make("desert", 0, **BARE)
+    camera = off_centre()
+    origin, step = camera.rays()
+    depth = synthetic.render_depth(scene, camera)
+    seen = origin + step * depth[..., None]
+    ground = desert.grow(scene.options, 0, scene.exemplar).ground
+    near = np.abs(ground.vertices[:, :2]).max(axis=1) < 4
+    grid = ground.vertices[near].reshape(np.sqrt(near.sum()).astype(int), -1, 3)
+    axis = grid[0, :, 0]
+    inside = np.abs(seen[..., :2]).max(axis=-1) < 3.9
+    i, j = (np.clip(np.searchsorted(axis, seen[inside][:, k]), 1, len(axis) - 1) for k in (1, 0))
+    corners = np.stack([grid[i - a, j - b, 2] for a in (0, 1) for b in (0, 1)])
+    z = seen[inside][:, 2]
+    assert inside.sum() > 2000
+    assert (z > corners.min(axis=0) - 1e-4).all() and (z < corners.max(axis=0) + 1e-4).all()  # float32 at 7 m
+
+
+def test_the_sky_is_infinitely_far():
+    scene = synthetic.make("desert", 0, **BARE)
+    assert np.isinf(synthetic.render_depth(scene, pinhole((0, 0, 2), (0, 5, 12), 8, 8, 30.0))).all()
+
+
+def test_the_mean_ground_of_the_exemplar_is_at_0():
+    scene = synthetic.make("desert", 4, undulation=0.4, **BARE)
+    side, above = scene.exemplar, pinhole((0, 0, 1000.0), (0, 0, 0), 120, 120, np.degrees(2 * np.arctan(3.0 / 1000.0)))
+    height = 1000.0 - synthetic.render_depth(scene, above)
+    assert side == 6.0
+    assert height.mean() == pytest.approx(0, abs=3e-3)  # two samplings of ripples of 20 mm
+    assert height.std() > 0.05
+
+
+def test_a_picture_repeats_to_the_byte_whatever_the_number_of_threads():
+    import drjit
+
+    scene, camera = synthetic.make("desert", 0, shrubs=20, stones=40), off_centre(50, 38)
+    before = drjit.thread_count()
+    try:
+        drjit.set_thread_count(1)
+        one = synthetic.render(scene, camera, 4)
+        drjit.set_thread_count(3)
+        synthetic._world.cache_clear()
+        three = synthetic.render(scene, camera, 4)
+    finally:
+        drjit.set_thread_count(before)
+    assert one.dtype == np.float32 and one.shape == (38, 50, 3)
+    assert one.tobytes() == three.tobytes()
+    assert one.min() >= 0 and one.max() <= 1 and one.std() > 0.02
+
+
+def test_another_seed_is_another_desert():
+    camera = rigs.orbit(90, 0, 7.0, (0, 0, 0), 24, 24, 55.0)
+    one, other = (synthetic.render_depth(synthetic.make("desert", seed), camera) for seed in (0, 1))
+    assert np.abs(one - other).mean() > 0.02
+
+
+def test_a_camera_that_mitsuba_cannot_hold_is_refused():
+    scene = synthetic.make("desert", 0, **BARE)
+    with pytest.raises(ValueError, match="pinhole"):
+        synthetic.render(scene, top_down(-1.0, -1.0, 8, 8, 0.25, 5.0))
+    with pytest.raises(ValueError, match="square"):
+        synthetic.render(scene, replace(off_centre(), fy=10.0))
+
+
+def test_the_config_entry_tells_how_many_pictures_of_which_size():
+    start, tests, pool = synthetic.start_views(ENTRY), synthetic.test_views(ENTRY), synthetic.candidates(ENTRY)
+    assert (len(start), len(tests), len(pool)) == (8, 6, 20)
+    assert {(c.width, c.height) for c in start + tests + pool} == {(64, 64)}
+    moved = synthetic.start_views(ENTRY, (10.0, 0.0, 0.0))
+    assert moved[3].centre - start[3].centre == pytest.approx([10, 0, 0])
+
+
+def test_the_start_views_see_the_whole_exemplar_from_at_least_three_sides():
+    half = synthetic.make("desert", 0).exemplar / 2
+    ground = np.array([[x, y, 0.0] for x in np.linspace(-half, half, 13) for y in np.linspace(-half, half, 13)])
+    seen = np.zeros(len(ground), int)
+    for camera in synthetic.start_views(ENTRY):
+        pixels, depth = camera.project(ground)
+        seen += ((pixels > 0) & (pixels < 64)).all(axis=1) & (depth > 0)
+    assert seen.min() >= 3
+
+
+@pytest.mark.parametrize(
+    "light, code", [(0.0, 0.0), (1.0, 1.0), (7.0, 1.0), (-1.0, 0.0), (0.5, 0.7353570), (0.002, 0.02584)]
+)
+def test_light_is_encoded_as_srgb(light, code):
+    assert synthetic.encode(np.array([light]))[0] == pytest.approx(code, abs=1e-6)

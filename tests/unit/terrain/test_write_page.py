@@ -1,0 +1,105 @@
+"""The page folder appears whole or not at all, and nothing but a sound bundle gets into it."""
+
+import json
+
+import pytest
+
+from dav_gswt.errors import InputError
+from dav_gswt.terrain import page
+from dav_gswt.terrain.page import write_page
+
+
+@pytest.fixture
+def viewer(tmp_path):
+    folder = tmp_path / "viewer"
+    folder.mkdir()
+    (folder / "index.html").write_text("<html>")
+    (folder / "main.js").write_text("//")
+    return folder
+
+
+@pytest.fixture
+def bundle(tmp_path):
+    folder = tmp_path / "bundle"
+    (folder / "chunks").mkdir(parents=True)
+    (folder / "chunks" / "a.bin").write_bytes(b"1234")
+    (folder / "chunks" / "not-named.bin").write_bytes(b"old")
+    rewrite(folder, {"file": "chunks/a.bin", "bytes": 4})
+    return folder
+
+
+def rewrite(folder, chunk, version=1):
+    manifest = {"format": "davgswt", "version": version, "tiles": [{"tile": 0, "chunks": [chunk]}]}
+    (folder / "davgswt.json").write_text(json.dumps(manifest))
+
+
+def names(folder):
+    return sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
+
+
+def test_a_page_is_the_viewer_the_manifest_and_the_chunks_it_names(tmp_path, viewer, bundle):
+    write_page(bundle, viewer, tmp_path / "terrain" / "page")
+    assert names(tmp_path / "terrain") == [
+        f"page/{n}" for n in ("chunks/a.bin", "davgswt.json", "index.html", "main.js")
+    ]
+    assert (tmp_path / "terrain/page/chunks/a.bin").read_bytes() == b"1234"
+
+
+def test_a_new_page_takes_the_place_of_the_old_one(tmp_path, viewer, bundle):
+    out = tmp_path / "page"
+    write_page(bundle, viewer, out)
+    (out / "old.js").write_text("gone soon")
+    write_page(bundle, viewer, out)
+    assert "old.js" not in names(out)
+
+
+def test_what_a_killed_run_left_behind_is_cleared(tmp_path, viewer, bundle):
+    (tmp_path / ".page.part").mkdir()
+    (tmp_path / ".page.part" / "half").write_text("")
+    write_page(bundle, viewer, tmp_path / "page")
+    assert "half" not in names(tmp_path / "page") and not (tmp_path / ".page.part").exists()
+
+
+def test_a_failure_in_the_middle_leaves_the_old_page_and_nothing_half_made(tmp_path, viewer, bundle, monkeypatch):
+    out = tmp_path / "page"
+    write_page(bundle, viewer, out)
+    before = names(tmp_path)
+
+    def full(source, target):
+        raise OSError(28, "No space left on device", str(target))
+
+    monkeypatch.setattr(page, "_copy", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_page(bundle, viewer, out)
+    assert names(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    "chunk, message",
+    [
+        pytest.param({"file": "chunks/b.bin", "bytes": 4}, r"b\.bin: this chunk is missing", id="missing"),
+        pytest.param({"file": "chunks/a.bin", "bytes": 5}, r"a\.bin: 4 bytes instead of 5", id="cut short"),
+        pytest.param({"file": "../secret", "bytes": 4}, "lies outside", id="upwards"),
+        pytest.param({"file": "/etc/hostname", "bytes": 4}, "lies outside", id="absolute"),
+        pytest.param({"file": "", "bytes": 4}, "lies outside", id="no name"),
+        pytest.param({"bytes": 4}, "incomplete tile table", id="no entry"),
+    ],
+)
+def test_an_unsound_chunk_is_refused_by_name(tmp_path, viewer, bundle, chunk, message):
+    (tmp_path / "secret").write_bytes(b"1234")
+    rewrite(bundle, chunk)
+    with pytest.raises(InputError, match=message):
+        write_page(bundle, viewer, tmp_path / "page")
+    assert not (tmp_path / "page").exists()
+
+
+def test_another_version_is_refused(tmp_path, viewer, bundle):
+    rewrite(bundle, {"file": "chunks/a.bin", "bytes": 4}, version=2)
+    with pytest.raises(InputError, match=r"davgswt\.json: not a bundle of format 'davgswt', version 1"):
+        write_page(bundle, viewer, tmp_path / "page")
+
+
+def test_a_viewer_without_its_page_is_refused(tmp_path, viewer, bundle):
+    (viewer / "index.html").unlink()
+    with pytest.raises(InputError, match="no viewer here"):
+        write_page(bundle, viewer, tmp_path / "page")

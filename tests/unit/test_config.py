@@ -1,0 +1,63 @@
+from copy import deepcopy
+from pathlib import Path
+
+import pytest
+import yaml
+
+from dav_gswt.config import check
+from dav_gswt.errors import InputError
+
+ROOT = Path(__file__).parents[2]
+SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
+
+
+@pytest.fixture(params=["config/config.yaml", "config/test/config.yaml"])
+def config(request):
+    return yaml.safe_load((ROOT / request.param).read_text())
+
+
+def test_the_configs_that_come_with_the_project_are_valid(config):
+    check(config, SCHEMA)
+
+
+@pytest.mark.parametrize(
+    "keys, value, named",
+    [
+        pytest.param(["polcy"], "farthest", "polcy", id="a typo"),
+        pytest.param(["tau"], 1.5, "tau", id="tau above 1"),
+        pytest.param(["levels"], 0, "levels", id="no level"),
+        pytest.param(["policy"], "nearest", "policy", id="an unknown policy"),
+        pytest.param(["scene"], "moon", "moon", id="a scene that is not there"),
+        pytest.param(["seam"], "glue", "glue", id="a seam that is not there"),
+        pytest.param(["scenes", "desert", "quality"], "best", "best", id="a quality that is not there"),
+        pytest.param(["scenes", "desert", "famly"], "desert", "famly", id="a typo in a scene"),
+        pytest.param(["scenes", "desert", "kind"], "video", "kind", id="a kind that is not there"),
+        pytest.param(["qualities", "draft", "spacing"], 0, "spacing", id="discs without a distance"),
+        pytest.param(["seams", "colour", "tile"], 1.2, "tile", id="a tile larger than its exemplar"),
+    ],
+)
+def test_what_is_wrong_is_named(config, keys, value, named):
+    broken = deepcopy(config)
+    place = broken
+    for key in keys[:-1]:
+        place = place[key]
+    place[keys[-1]] = value
+    with pytest.raises(InputError, match=named):
+        check(broken, SCHEMA)
+
+
+def test_a_missing_key_is_named(config):
+    del config["qualities"]["draft"]["cap"]
+    with pytest.raises(InputError, match="cap"):
+        check(config, SCHEMA)
+
+
+def test_every_key_of_the_schema_is_explained():
+    text = (ROOT / "config/README.md").read_text()
+    schema = yaml.safe_load(SCHEMA.read_text())
+    keys = set(schema["properties"]) - {"stills"}
+    for kind in schema["properties"]["scenes"]["additionalProperties"]["allOf"]:
+        keys |= set(kind["then"]["properties"])
+    for table in ("qualities", "seams"):
+        keys |= set(schema["properties"][table]["additionalProperties"]["properties"])
+    assert not [key for key in keys if f"`{key}`" not in text]

@@ -1,0 +1,84 @@
+"""What a sweep recomputes: the stages below the parameter it varies, and no others."""
+
+import subprocess
+import sys
+
+import pytest
+
+ROUND = "results/desert/seed0/draft/active_{policy}_none_pdrop0_lam0_k{k}/iter{t}"
+BUNDLE = ROUND + "/tiles_colour/bundle_tau{tau}/davgswt.json"
+DEFAULT = dict(policy="farthest", k=4, t=2, tau=0.6)
+
+
+@pytest.mark.parametrize(
+    "axis, values, jobs",
+    [
+        pytest.param("tau", (0.3, 0.6), dict(fit_coarse=1, update_field=2, cut_tiles=1, bundle_tiles=2), id="tau shares all but the bundle"),
+        pytest.param("k", (2, 4), dict(fit_coarse=1, score_coarse=1, update_field=4, bundle_tiles=2), id="k shares the scored coarse field"),
+        pytest.param("policy", ("farthest", "random"), dict(fit_coarse=1, score_coarse=1, update_field=4), id="policies share it too"),
+        pytest.param("t", (0, 1, 2), dict(fit_coarse=1, begin_active=1, update_field=2, cut_tiles=3), id="rounds share their prefix"),
+    ],
+)  # fmt: skip
+def test_shared_stages_are_planned_once(planned, tmp_path, axis, values, jobs):
+    targets = [BUNDLE.format(**(DEFAULT | {axis: value})) for value in values]
+    plan = planned(tmp_path, *targets)
+    assert {rule: plan[rule] for rule in jobs} == jobs
+
+
+def test_the_default_target_makes_every_stage_once(planned, tmp_path):
+    plan = planned(tmp_path)
+    once = ["render_photos", "split_views", "fit_coarse", "score_coarse", "crop_level", "cut_tiles", "bundle_tiles"]
+    assert all(plan[rule] == 1 for rule in [*once, "make_page", "render_terrain"])
+    assert plan["fit_level"] == 2 and plan["update_field"] == plan["capture_views"] == 2
+    assert plan["evaluate_coarse"] == 1 and plan["evaluate_round"] == 2
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(BUNDLE.format(**(DEFAULT | {"tau": "0.60"})), id="tau with a trailing zero"),
+        pytest.param(BUNDLE.format(**(DEFAULT | {"k": "04"})), id="k with a leading zero"),
+        pytest.param("results/Desert/seed0/views.json", id="a scene in capitals"),
+        pytest.param(ROUND.format(policy="farthest", k=4, t=1).replace("lam0", "lam0.1") + "/field.ply", id="lam for a policy without a prior"),
+        pytest.param("results/moon/photos/ground.json", id="a scene that is not in the config"),
+    ],
+)  # fmt: skip
+def test_a_second_spelling_of_a_path_has_no_rule(snakemake, tmp_path, path):
+    done = snakemake(tmp_path, path, "--dry-run", check=False)
+    assert done.returncode != 0 and "MissingRule" in done.stdout
+
+
+@pytest.mark.parametrize(
+    "setting, named",
+    [("tau=1.5", "tau"), ("polcy=random", "polcy"), ("scene=moon", "moon"), ("rounds=-1", "rounds")],
+)
+def test_a_config_that_is_wrong_stops_before_the_first_job(snakemake, tmp_path, setting, named):
+    done = snakemake(tmp_path, "--dry-run", "--config", setting, check=False)
+    assert done.returncode != 0
+    assert f"config: {named}" in done.stdout or named in done.stdout.split("config: ", 1)[1]
+    assert "Traceback" not in done.stdout
+
+
+def test_a_missing_folder_of_photos_is_named(snakemake, tmp_path):
+    done = snakemake(tmp_path, "--dry-run", "--config", "scene=copr_dunes", check=False)
+    assert done.returncode != 0 and "scenes.copr_dunes.folder" in done.stdout
+
+
+def test_the_workflow_is_lint_clean_but_for_its_environment(snakemake, tmp_path):
+    """One pip environment serves all rules, so lint's wish for a conda or container directive a rule is not met."""
+    done = snakemake(tmp_path, "--lint", check=False)
+    wishes = [line.strip() for line in done.stdout.splitlines() if line.strip().startswith("* ")]
+    assert not [wish for wish in wishes if "No conda/container" not in wish and "environment" not in wish], done.stdout
+
+
+@pytest.mark.parametrize(
+    "tool",
+    [
+        pytest.param(["ruff", "check", "."], id="ruff check"),
+        pytest.param(["ruff", "format", "--check", "."], id="ruff format"),
+        pytest.param(["snakefmt", "--check", "Snakefile", "rules"], id="snakefmt"),
+    ],
+)
+def test_the_code_is_formatted(root, tool):
+    done = subprocess.run([sys.executable, "-m", *tool], cwd=root, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr

@@ -1,0 +1,201 @@
+"""Images in and out: photos of any format by OpenImageIO, float maps with named channels as OpenEXR."""
+
+import logging
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import OpenImageIO as oiio
+from jaxtyping import Float, Float32
+from numpy import ndarray as Array
+
+from dav_gswt.errors import InputError
+from dav_gswt.files import whole
+
+_log = logging.getLogger(__name__)
+
+MOST_PIXELS = 200_000_000  # of a photo: what claims more is a broken header, or nothing that two cores should work on
+SUFFIXES = {".jpg", ".jpeg", ".jpe", ".jfif", ".png", ".tif", ".tiff", ".webp", ".jp2", ".jxl", ".bmp", ".ppm", ".tga"}
+FOREIGN = {".heic", ".heif", ".avif", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".rw2", ".raf", ".raw"}
+
+oiio.attribute("threads", 1)  # rules say how many threads a job has; decoding one photo needs no more
+
+
+def listed(folder: Path | str) -> list[Path]:
+    """The photos that lie directly in a folder, by name; hidden files and other kinds of files are passed over.
+
+    Raises: InputError: no folder, or no photo in it.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(f"{folder}: there is no such folder of photos")
+    found = sorted(p for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
+    photos = [p for p in found if p.suffix.lower() in SUFFIXES]
+    foreign = [p for p in found if p.suffix.lower() in FOREIGN]
+    if not photos:
+        hint = f" ({foreign[0].name} is of a kind that is not read: convert it to JPEG)" if foreign else ""
+        raise InputError(f"{folder}: no photos in this folder{hint}; put .jpg, .png or .tif files directly into it")
+    if foreign:
+        _log.warning("%s: %d files like %s are not read; convert them to JPEG", folder, len(foreign), foreign[0].name)
+    return photos
+
+
+def size(path: Path | str) -> tuple[int, int]:
+    """Width and height as seen, that is with the EXIF orientation applied, from the header alone."""
+    file, spec = _opened(path)
+    file.close()
+    return (spec.height, spec.width) if _orientation(spec) >= 5 else (spec.width, spec.height)
+
+
+def read(path: Path | str) -> Float32[Array, "h w 3"]:
+    """A photo as sRGB-encoded colours in [0, 1], upright by its EXIF orientation.
+
+    Any bit depth; grey becomes three equal channels; alpha is left out and the colours stay as they are stored.
+    Raises: InputError: missing, not an image, cut short (a decoder's warning is enough), or too large.
+    """
+    file, spec = _opened(path)
+    try:
+        # one channel too many is read where there is alpha: reading a part of the channels is slower in many formats
+        pixels = file.read_image(0, 0, 0, min(spec.nchannels, 4), oiio.FLOAT)
+        trouble = file.geterror() if file.has_error else ""
+    finally:
+        file.close()
+    if pixels is None or trouble:
+        raise InputError(f"{path}: damaged or cut short ({_first_line(trouble)}); copy it again or remove it")
+    pixels = np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
+    pixels = pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
+    if not np.isfinite(pixels).all():
+        raise InputError(f"{path}: has pixels that are not finite; export it as 8 or 16 bit")
+    return np.ascontiguousarray(_upright(np.clip(pixels, 0, 1), _orientation(spec)))
+
+
+def write(path: Path | str, image: Float[Array, "h w 3"]) -> None:
+    """Write a PNG of 8 bits a channel; values are clipped to [0, 1]. It appears whole or not at all."""
+    pixels = np.ascontiguousarray(np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8))
+    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, oiio.UINT8)
+    spec["oiio:ColorSpace"] = "srgb_rec709_scene"
+    spec["compression"] = "zip:4"
+    with whole(path) as part:
+        file = oiio.ImageOutput.create(str(part))
+        if file is None:
+            raise ValueError(f"{path}: {_first_line(oiio.geterror())}")
+        done = file.open(str(part), spec) and file.write_image(pixels)
+        trouble = "" if done else file.geterror()
+        if not file.close() or not done:
+            raise OSError(f"{path}: not written ({_first_line(trouble or file.geterror())}); is the disk full?")
+
+
+def resized(image: Float32[Array, "h w c"], width: int, height: int) -> Float32[Array, "height width c"]:
+    """The image on a coarser grid: every new pixel is the exact mean over its area, on the encoded values.
+
+    Exact for any ratio (a box filter sampled at pixel centres is up to 7 % off for ratios like 10 to 4).
+    Raises: ValueError: the image would be enlarged, or have no pixels.
+    """
+    if not (1 <= width <= image.shape[1] and 1 <= height <= image.shape[0]):
+        raise ValueError(f"an image of {image.shape[1]} x {image.shape[0]} does not shrink to {width} x {height}")
+    return _mean_over(_mean_over(image, height, 0), width, 1).astype(np.float32)
+
+
+def write_exr(path: Path | str, channels: dict[str, Array], header: dict[str, str] | None = None) -> None:
+    """Write named float maps of one size, with parameters in the header.
+
+    Header values are text: EXR's own numbers are of single precision, so write numbers with repr().
+    """
+    write_exr_parts(path, {"": (channels, header or {})})
+
+
+def read_exr(path: Path | str) -> tuple[dict[str, Array], dict[str, str]]:
+    """Channels by name and the header's texts of a file with one part. Raises: InputError: not readable."""
+    return next(iter(read_exr_parts(path).values()))
+
+
+def write_exr_parts(path: Path | str, parts: dict[str, tuple[dict[str, Array], dict[str, str]]]) -> None:
+    """Write a file of several parts, each with its own channels, size and header, by name."""
+    written = []
+    # Parts of one file must agree on the display window, whatever their own sizes are.
+    shapes = [np.shape(values) for channels, _ in parts.values() for values in channels.values()]
+    last = np.array([max(w for _, w in shapes) - 1, max(h for h, _ in shapes) - 1], np.int32)
+    window = {"displayWindow": (np.zeros(2, np.int32), last)}
+    for name, (channels, header) in parts.items():
+        # The library fills the dicts it is given with its own objects, hence the copies.
+        own = {k: np.array(v, np.float32) for k, v in channels.items()}
+        texts = {k: str(v) for k, v in header.items()}
+        fixed = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        written.append(OpenEXR.Part(texts | fixed | window, own, name))
+    with whole(path) as part:
+        OpenEXR.File(written).write(str(part))
+
+
+def read_exr_parts(path: Path | str) -> dict[str, tuple[dict[str, Array], dict[str, str]]]:
+    """The parts of a file by name: channels, and the header's texts. Raises: InputError: not readable."""
+    if not Path(path).is_file():
+        raise InputError(f"{path}: there is no such file")
+    try:
+        with OpenEXR.File(str(path), header_only=True) as file:
+            promised = len(file.parts)
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            if len(file.parts) < promised:  # the library drops damaged parts with a mere warning
+                raise ValueError("damaged or cut short")
+            return {part.name(): (_channels(part), _texts(part)) for part in file.parts}
+    except (RuntimeError, ValueError, TypeError, OSError) as error:
+        raise InputError(f"{path}: not readable as EXR ({_first_line(str(error))})") from error
+
+
+def _channels(part) -> dict[str, Array]:
+    return {name: np.array(channel.pixels) for name, channel in part.channels.items()}
+
+
+def _texts(part) -> dict[str, str]:
+    return {k: v for k, v in part.header.items() if isinstance(v, str) and k != "name"}
+
+
+def _opened(path: Path | str):
+    """An open image and its header, refused where that promises more than can be."""
+    config = oiio.ImageSpec()
+    config["oiio:UnassociatedAlpha"] = 1
+    if not Path(path).is_file():
+        raise InputError(f"{path}: there is no such file")
+    file = oiio.ImageInput.open(str(path), config)
+    if file is None:
+        raise InputError(f"{path}: not readable as an image ({_first_line(oiio.geterror())}); remove or replace it")
+    spec = file.spec()
+    if spec.width < 1 or spec.height < 1 or spec.nchannels < 1 or spec.depth > 1 or spec.deep:
+        raise InputError(f"{path}: holds no flat picture; remove or replace it")
+    if spec.width * spec.height > MOST_PIXELS:
+        most = MOST_PIXELS // 10**6
+        raise InputError(f"{path}: {spec.width} x {spec.height} pixels; at most {most} megapixels are read: shrink it")
+    return file, spec
+
+
+def _orientation(spec) -> int:
+    value = spec.getattribute("Orientation")
+    return value if isinstance(value, int) and 1 <= value <= 8 else 1
+
+
+def _upright(pixels: Array, orientation: int) -> Array:
+    """Undo EXIF orientation: 5 to 8 are transposed, then rows and columns are mirrored as the number says."""
+    if orientation >= 5:
+        pixels = pixels.transpose(1, 0, 2)
+    if orientation in (3, 4, 7, 8):
+        pixels = pixels[::-1]
+    if orientation in (2, 3, 6, 7):
+        pixels = pixels[:, ::-1]
+    return pixels
+
+
+def _mean_over(values: Array, n: int, axis: int) -> Array:
+    """Means over n equal stretches of an axis: differences of its integral, linear within a pixel."""
+    m = values.shape[axis]
+    if m == n:
+        return values
+    total = np.cumsum(values, axis, dtype=np.float64)
+    total = np.concatenate([np.zeros_like(np.take(total, [0], axis)), total], axis)
+    edges = np.arange(n + 1) * (m / n)
+    below = np.minimum(edges.astype(int), m - 1)
+    share = (edges - below).reshape([-1 if a == axis else 1 for a in range(values.ndim)])
+    at = np.take(total, below, axis) * (1 - share) + np.take(total, below + 1, axis) * share
+    return np.diff(at, axis=axis) * (n / m)
+
+
+def _first_line(text: str) -> str:
+    return (text.strip().splitlines() or ["no reason given"])[0]

@@ -1,0 +1,62 @@
+"""The photos stage as one call for each kind of scene that comes from files."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from dav_gswt import field
+from dav_gswt.errors import InputError
+from dav_gswt.files import write_json
+from dav_gswt.logs import progress
+from dav_gswt.photos import folder, ground, sfm, splat
+from dav_gswt.photos.sfm import Options
+
+
+def from_photos(source: Path | str, out: Path | str, options: Options, extra: dict | None = None) -> dict:
+    """Register the photos in `source`, and write undistorted pictures, model and ground.json into the folder `out`.
+
+    extra: more for ground.json (where it comes from). Returns what ground.json holds.
+    Raises: InputError: see sfm.register and ground.frame.
+    """
+    found = sfm.register(source, options)
+    model, facts = ground.frame(found.model, np.random.default_rng(options.seed))
+    left_out = [{"name": name, "reason": reason} for name, reason in found.left_out]
+    facts = {
+        "kind": "photos",
+        **facts,
+        "test": None,
+        "images": len(model.names) + len(left_out),
+        "registered": len(model.names),
+        "left_out": left_out,
+        "focal_ratio": found.focal_ratio,
+        "reprojection_error": found.error,
+        "points": len(model.points),
+        **(extra or {}),
+    }
+    numbers = progress(range(len(model.names)), "undistort photos")
+    folder.write(out, model, ((model.names[i], sfm.undistorted(found, i)) for i in numbers), facts)
+    return facts
+
+
+def from_field(
+    source: Path | str,
+    out: Path | str,
+    frame: Path | str,
+    up: Sequence = splat.UP,
+    seed: int = 0,
+    extra: dict | None = None,
+) -> dict:
+    """Bring a finished 3DGS .ply into its ground frame: the field to `out`, ground.json to `frame`.
+
+    up: a direction that points roughly upwards in the file. Raises: InputError: see field.read and splat.enter.
+    """
+    given = field.read(source)
+    try:
+        entered, facts = splat.enter(given, np.random.default_rng(seed), up)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from error
+    facts |= {"images": 0, "registered": 0, "left_out": [], "focal_ratio": None} | (extra or {})
+    field.write(entered, out)
+    write_json(frame, facts)
+    return facts

@@ -1,0 +1,267 @@
+"""A sparse model as plain arrays: pinhole cameras, points, and which camera saw which point where."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+from jaxtyping import Bool, Float, Float32, Int
+from numpy import ndarray as Array
+
+from dav_gswt import images
+from dav_gswt.cameras import Camera
+from dav_gswt.errors import InputError
+
+WORST_ERROR = 4.0  # pixels: an observation farther from its point's projection is a wrong match
+LEAST_ANGLE = 1.5  # degrees between two rays, below which their crossing says nothing about depth
+
+
+@dataclass(frozen=True)
+class Model:
+    """n points seen m times by named pinhole cameras.
+
+    colours: sRGB in [0, 1]. Observation k says that image image_of[k] sees point point_of[k] at pixels[k]; observations
+    are ordered by point, then by image.
+    """
+
+    names: tuple[str, ...]
+    cameras: tuple[Camera, ...]
+    points: Float[Array, "n 3"]
+    colours: Float32[Array, "n 3"]
+    point_of: Int[Array, "m"]
+    image_of: Int[Array, "m"]
+    pixels: Float[Array, "m 2"]
+
+    def camera(self, name: str) -> Camera:
+        """The camera of a named image. Raises: InputError: no such image."""
+        if name not in self.names:
+            raise InputError(f"{name}: no such image in the model; it may not have been registered")
+        return self.cameras[self.names.index(name)]
+
+
+def similar(model: Model, scale: float, rotation: Float[Array, "3 3"], shift: Float[Array, "3"]) -> Model:
+    """The model in another world frame: p becomes scale * rotation @ p + shift; the pictures stay as they are."""
+
+    def moved(camera: Camera) -> Camera:
+        turn = camera.rotation @ rotation.T
+        return replace(camera, rotation=turn, translation=scale * camera.translation - turn @ shift)
+
+    return replace(model, cameras=tuple(map(moved, model.cameras)), points=scale * model.points @ rotation.T + shift)
+
+
+def errors(model: Model) -> Float[Array, "m"]:
+    """Distance in pixels of every observation from its point's projection; infinite behind the camera."""
+    distance = np.full(len(model.pixels), np.inf)
+    for i, camera in enumerate(model.cameras):
+        own = np.flatnonzero(model.image_of == i)
+        at, depth = camera.project(model.points[model.point_of[own]])
+        distance[own] = np.where(depth > 0, np.linalg.norm(at - model.pixels[own], axis=1), np.inf)
+    return distance
+
+
+def shared_points(model: Model) -> Int[Array, "images images"]:
+    """How many points each pair of images sees in common; on the diagonal, how many each sees."""
+    sees = np.zeros((len(model.names), len(model.points)), np.float32)  # sums of ones: exact below 2^24
+    sees[model.image_of, model.point_of] = 1
+    return np.rint(sees @ sees.T).astype(int)
+
+
+def points_seen_by(
+    model: Model, names: Sequence[str], photos: Path | str | None = None, at_least: int = 2
+) -> tuple[Float[Array, "n 3"], Float32[Array, "n 3"]]:
+    """Points and their colours as structure from motion would know them from the named images alone.
+
+    The points are those of `triangulated`. Colours are means over the named images in the folder `photos`; without it
+    they are mid-grey, since the model's own colours come from images that may not be captured yet.
+    """
+    part = triangulated(model, names, at_least)
+    return part.points, part.colours if photos is None else _colours(part, Path(photos))
+
+
+def triangulated(model: Model, names: Sequence[str], at_least: int = 2) -> Model:
+    """The model of the named images alone, its points found anew from what these see; colours are mid-grey.
+
+    A point is the one nearest to its rays in the sense of least squares, sum_i |(I - d_i d_i^T)(p - c_i)|^2 over ray
+    directions d_i and camera centres c_i, in closed form. Points seen by fewer than `at_least` of the images, off by
+    more than WORST_ERROR in one of them, behind one, or under rays narrower than LEAST_ANGLE are left out.
+    Cameras stay: in a replay they stand for the vehicle's own positioning.
+    Raises: InputError: a name that the model does not have. ValueError: at_least below 2, as one ray has no crossing.
+    """
+    if at_least < 2:
+        raise ValueError("a point needs at least two rays")
+    if unknown := sorted(set(names) - set(model.names)):
+        raise InputError(f"{unknown[0]}: no such image in the model; it may not have been registered")
+    part = _with_images(model, [i for i, name in enumerate(model.names) if name in set(names)])
+    part = replace(part, colours=np.full(model.points.shape, 0.5, np.float32))
+    part = _with_points(part, np.bincount(part.point_of, minlength=len(part.points)) >= at_least)
+    points, spread = _crossings(part)
+    part = replace(part, points=points)
+    good = spread >= 1 - np.cos(np.radians(LEAST_ANGLE))
+    np.logical_and.at(good, part.point_of, errors(part) <= WORST_ERROR)
+    return _with_points(part, good)
+
+
+def _crossings(model: Model) -> tuple[Float[Array, "n 3"], Float[Array, "n"]]:
+    """The points nearest to their rays, and how well the rays fix them.
+
+    The second is the least eigenvalue of sum_i (I - d_i d_i^T): for two rays at angle a it is 1 - cos a, 0 where all
+    rays are parallel, and another ray never lowers it. Centres are taken relative to their mean, against cancellation.
+    """
+    centres = np.stack([camera.centre for camera in model.cameras])
+    middle = centres.mean(0)
+    rays = np.empty((len(model.pixels), 3))
+    for i, camera in enumerate(model.cameras):
+        own = model.image_of == i
+        rays[own] = _directions(camera, model.pixels[own])
+    across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
+    n = len(model.points)
+    matrix, side = np.zeros((n, 3, 3)), np.zeros((n, 3))
+    np.add.at(matrix, model.point_of, across)
+    np.add.at(side, model.point_of, np.einsum("mij,mj->mi", across, centres[model.image_of] - middle))
+    spread = np.linalg.eigvalsh(matrix)[:, 0] if n else np.zeros(0)
+    solvable = spread > 1e-12
+    points = np.full((n, 3), np.nan)
+    points[solvable] = np.linalg.solve(matrix[solvable], side[solvable][..., None])[..., 0] + middle
+    return points, spread
+
+
+def _directions(camera: Camera, pixels: Float[Array, "k 2"]) -> Float[Array, "k 3"]:
+    """Unit directions in the world of the rays through pixels."""
+    rays = np.ones((len(pixels), 3))
+    rays[:, :2] = (pixels - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    return rays @ camera.rotation
+
+
+def _with_images(model: Model, kept: list[int]) -> Model:
+    """The model of some of its images; all points stay."""
+    number = np.full(len(model.names), -1)
+    number[kept] = np.arange(len(kept))
+    own = number[model.image_of] >= 0
+    return replace(
+        model,
+        names=tuple(model.names[i] for i in kept),
+        cameras=tuple(model.cameras[i] for i in kept),
+        point_of=model.point_of[own],
+        image_of=number[model.image_of[own]],
+        pixels=model.pixels[own],
+    )
+
+
+def _with_points(model: Model, kept: Bool[Array, "n"]) -> Model:
+    """The model of some of its points; all images stay."""
+    own = kept[model.point_of]
+    return replace(
+        model,
+        points=model.points[kept],
+        colours=model.colours[kept],
+        point_of=(np.cumsum(kept) - 1)[model.point_of[own]],
+        image_of=model.image_of[own],
+        pixels=model.pixels[own],
+    )
+
+
+def _colours(model: Model, photos: Path) -> Float32[Array, "n 3"]:
+    """Every point's mean colour over the pixels that see it."""
+    total = np.zeros((len(model.points), 3))
+    for i, name in enumerate(model.names):
+        own = model.image_of == i
+        image = images.read(photos / name)
+        column, row = np.clip(model.pixels[own].astype(int), 0, [image.shape[1] - 1, image.shape[0] - 1]).T
+        np.add.at(total, model.point_of[own], image[row, column])
+    count = np.bincount(model.point_of, minlength=len(model.points))
+    return (total / np.maximum(count, 1)[:, None]).astype(np.float32)
+
+
+def read(folder: Path | str) -> Model:
+    """Read a COLMAP model of pinhole cameras, its images by name. Raises: InputError: missing, damaged, no pinhole."""
+    try:
+        stored = pycolmap.Reconstruction(str(folder))
+    except Exception as error:  # the library raises what its C++ does, bare RuntimeErrors among it
+        raise InputError(f"{folder}: not readable as a COLMAP model ({error})") from error
+    for camera in stored.cameras.values():
+        if camera.model_name not in ("PINHOLE", "SIMPLE_PINHOLE"):
+            raise InputError(f"{folder}: its cameras are {camera.model_name}; undistort the images to PINHOLE first")
+    return of(stored)
+
+
+def of(
+    stored: pycolmap.Reconstruction,
+    names: Mapping[str, str] | None = None,
+    pinholes: Mapping[int, pycolmap.Camera] | None = None,
+) -> Model:
+    """Arrays of a reconstruction, its images ordered by name.
+
+    names: what images are called from here on. pinholes: by the number of a camera the undistorted one that takes its
+    place; observations move with it.
+    """
+    ids = np.array(sorted(stored.points3D), np.int64)
+    registered = [(stored.images[i].name, i) for i in stored.reg_image_ids()]
+    found = sorted((names[name] if names else name, i) for name, i in registered)
+    cameras, numbers, owners, pixels = [], [], [], []
+    for i, (_, key) in enumerate(found):
+        image = stored.images[key]
+        target = pinholes[image.camera_id] if pinholes else image.camera
+        cameras.append(_camera(target, image.cam_from_world()))
+        seen = [(p.point3D_id, *p.xy) for p in image.get_observation_points2D()]
+        seen = np.array(seen, float).reshape(-1, 3)
+        if pinholes:
+            seen[:, 1:] = target.img_from_cam(np.c_[image.camera.cam_from_img(seen[:, 1:]), np.ones(len(seen))])
+        numbers.append(np.searchsorted(ids, seen[:, 0].astype(np.int64)))
+        owners.append(np.full(len(seen), i))
+        pixels.append(seen[:, 1:])
+    point_of, image_of = np.concatenate(numbers or [np.zeros(0, int)]), np.concatenate(owners or [np.zeros(0, int)])
+    order = np.lexsort((image_of, point_of))
+    points = [stored.points3D[i] for i in ids]
+    return Model(
+        tuple(label for label, _ in found),
+        tuple(cameras),
+        np.array([p.xyz for p in points]).reshape(-1, 3),
+        (np.array([p.color for p in points]).reshape(-1, 3) / 255).astype(np.float32),
+        point_of[order],
+        image_of[order],
+        np.concatenate(pixels or [np.zeros((0, 2))])[order],
+    )
+
+
+def _camera(camera: pycolmap.Camera, pose: pycolmap.Rigid3d) -> Camera:
+    matrix = pose.matrix()
+    return Camera(
+        matrix[:, :3].copy(),
+        matrix[:, 3].copy(),
+        float(camera.focal_length_x),
+        float(camera.focal_length_y),
+        float(camera.principal_point_x),
+        float(camera.principal_point_y),
+        camera.width,
+        camera.height,
+    )
+
+
+def write(model: Model, folder: Path | str) -> None:
+    """Write a COLMAP model (binary) into an existing folder; images are numbered from 1 in the model's order."""
+    stored = pycolmap.Reconstruction()
+    numbers: dict[tuple, int] = {}
+    place = np.zeros(len(model.pixels), int)  # of an observation among those of its image
+    for i, (name, camera) in enumerate(zip(model.names, model.cameras, strict=True)):
+        lens = (camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
+        if lens not in numbers:
+            numbers[lens] = len(numbers) + 1
+            stored.add_camera_with_trivial_rig(
+                pycolmap.Camera(
+                    camera_id=numbers[lens], model="PINHOLE", width=lens[0], height=lens[1], params=lens[2:]
+                )
+            )
+        own = np.flatnonzero(model.image_of == i)
+        place[own] = np.arange(len(own))
+        image = pycolmap.Image(name=name, keypoints=model.pixels[own], camera_id=numbers[lens], image_id=i + 1)
+        pose = np.c_[camera.rotation, camera.translation]
+        stored.add_image_with_trivial_frame(image, pycolmap.Rigid3d(pose))
+    starts = np.searchsorted(model.point_of, np.arange(len(model.points) + 1))
+    colours = np.rint(model.colours * 255).astype(np.uint8)
+    for point, colour, a, b in zip(model.points, colours, starts[:-1], starts[1:], strict=True):
+        track = [pycolmap.TrackElement(int(model.image_of[k]) + 1, int(place[k])) for k in range(a, b)]
+        stored.add_point3D(point, pycolmap.Track(track), colour)
+    stored.update_point_3d_errors()
+    stored.write(str(folder))

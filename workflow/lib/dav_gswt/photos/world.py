@@ -1,0 +1,104 @@
+"""A desert as mitsuba holds it: meshes, instances, sand, sun and sky. The variant is set by the caller."""
+
+import mitsuba as mi
+import numpy as np
+
+from dav_gswt.photos.desert import HORIZON, PERIOD, SAND, SUN, ZENITH, Desert, Options
+from dav_gswt.photos.things import Mesh
+
+BLOCK = 16  # pixels; fixed, since mitsuba's own choice follows the number of threads and the noise follows the blocks
+
+
+def build(desert: Desert, options: Options):
+    """The mitsuba scene."""
+    sand = mi.load_dict({"type": "diffuse", "reflectance": _bitmap(desert.sand, "bilinear")})
+    coloured = mi.load_dict({"type": "diffuse", "reflectance": {"type": "mesh_attribute", "name": "vertex_color"}})
+    parts = {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": 3, "rr_depth": 10, "block_size": BLOCK},
+        "ground": _mesh("ground", desert.ground, sand, desert.ground.vertices[:, :2] / PERIOD),
+        "sun": {
+            "type": "directional",
+            "direction": [-float(v) for v in _towards(options.sun_elevation, options.sun_azimuth)],
+            "irradiance": {"type": "rgb", "value": SUN.tolist()},
+            "sampling_weight": 0.6,
+        },
+        "sky": _sky(),
+    }
+    if desert.stones is not None:
+        parts["stones"] = _mesh("stones", desert.stones, coloured)
+    return mi.load_dict(parts | _plants(desert))
+
+
+def _plants(desert: Desert) -> dict:
+    """Every kind of plant once, and an instance wherever one stands."""
+    kinds = {
+        f"kind{k}": {"type": "shapegroup", "plant": _painted(f"plant{k}", mesh)} for k, mesh in enumerate(desert.plants)
+    }
+    found = {}
+    for i, (kind, x, y, z, size, yaw) in enumerate(desert.plant_places):
+        stand = mi.ScalarTransform4f().translate([x, y, z]).rotate([0, 0, 1], float(np.degrees(yaw))).scale(float(size))
+        found[f"plant{i}"] = {"type": "instance", "group": {"type": "ref", "id": f"kind{int(kind)}"}, "to_world": stand}
+    return kinds | found
+
+
+def _sky() -> dict:
+    """A sky that brightens towards the horizon, as a small map of directions; below the horizon, light from sand."""
+    rows = 33
+    elevation = np.radians(90.0 - (np.arange(rows) + 0.5) / rows * 180.0)
+    share = np.clip(1.0 - np.sin(np.maximum(elevation, 0)), 0, 1)[:, None] ** 2.5
+    light = ZENITH + (HORIZON - ZENITH) * share
+    light[elevation < 0] = 0.4 * SAND
+    image = np.repeat(light[:, None], 16, axis=1).astype(np.float32)
+    upright = mi.ScalarTransform4f().rotate([1, 0, 0], 90)
+    return {"type": "envmap", "bitmap": mi.Bitmap(image), "to_world": upright, "sampling_weight": 0.4}
+
+
+def _painted(name: str, mesh: Mesh):
+    """A mesh whose faces are each of one colour, two-sided, with its colours in a texture of one texel a colour.
+
+    Instances need this: mitsuba looks up a vertex attribute by the point in the world, which for an instance is not
+    where its mesh is.
+    """
+    colours, which = np.unique(mesh.colours, axis=0, return_inverse=True)
+    side = int(np.ceil(np.sqrt(len(colours))))
+    texels = np.zeros((side * side, 3), np.float32)
+    texels[: len(colours)] = colours
+    row, column = np.divmod(which.reshape(-1), side)
+    coordinates = np.column_stack([(column + 0.5) / side, (row + 0.5) / side])
+    paint = _bitmap(texels.reshape(side, side, 3), "nearest")
+    bsdf = mi.load_dict({"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": paint}})
+    return _mesh(name, mesh, bsdf, coordinates)
+
+
+def _bitmap(texels, filter_type: str) -> dict:
+    return {
+        "type": "bitmap",
+        "bitmap": mi.Bitmap(texels),
+        "raw": True,
+        "wrap_mode": "repeat",
+        "filter_type": filter_type,
+    }
+
+
+def _mesh(name: str, mesh: Mesh, bsdf, coordinates=None):
+    """A mitsuba mesh. coordinates: of the texture, one pair a vertex; without them it has its vertices' colours."""
+    props = mi.Properties()
+    props["mesh_bsdf"] = bsdf
+    props["face_normals"] = not mesh.smooth
+    textured = coordinates is not None
+    shape = mi.Mesh(name, len(mesh.vertices), len(mesh.faces), props, mesh.smooth, textured)
+    if not textured:
+        shape.add_attribute("vertex_color", 3, np.ascontiguousarray(mesh.colours, np.float32).ravel())
+    values = mi.traverse(shape)
+    values["vertex_positions"] = np.ascontiguousarray(mesh.vertices, np.float32).ravel()
+    values["faces"] = np.ascontiguousarray(mesh.faces, np.uint32).ravel()
+    if textured:
+        values["vertex_texcoords"] = np.ascontiguousarray(coordinates, np.float32).ravel()
+    values.update()
+    return shape
+
+
+def _towards(elevation: float, azimuth: float):
+    e, a = np.radians(elevation), np.radians(azimuth)
+    return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])

@@ -1,0 +1,107 @@
+// Gradients of splats from gradients of pixels, front to back like the forward pass.
+//
+// A splat's alpha weighs its own colour and dims all that lies behind it:
+// dL/dalpha_i = T_i (f_i . g) - (sum over j > i of w_j (f_j . g) + T_end g_T) / (1 - alpha_i),
+// f: colour and depth, g: their pixel's gradient, g_T = -g_alpha. The bracket starts as the finished pixel's
+// C . g + T_end g_T and loses each splat's share as it is passed: nothing of the forward pass need be stored, and the
+// cost hardly grows with the number of channels.
+#include "blocks.h"
+#include "kernels.h"
+
+namespace raster {
+namespace ISA {
+
+template <int C, bool DEPTH> static void unblend_tile(const Splat* splats, const Tiles& tiles, const Images& images,
+                                                      const ImageGradients& gradients, float* records, int tile) {
+  constexpr int SIZE = MOMENTS + C + DEPTH;
+  const TileFrame frame(tile, tiles, images);
+  Lanes transmittance[BLOCKS], behind[BLOCKS], colour[C][BLOCKS], depth[DEPTH ? BLOCKS : 1];
+  for (int b = 0; b < BLOCKS; b++) {
+    behind[b] = all(0);
+    for (int c = 0; c < C; c++) colour[c][b] = all(0);
+    if (DEPTH) depth[b] = all(0);
+  }
+  frame.clear(transmittance);
+  frame.each_pixel([&](int b, int lane, size_t pixel) {
+    const size_t at = pixel * images.channels + images.channel;
+    float sum = 0;
+    for (int c = 0; c < C; c++) {
+      const float g = gradients.colour[at + c];
+      colour[c][b][lane] = g;
+      sum += g * images.colour[at + c];
+    }
+    if (DEPTH) {
+      depth[b][lane] = gradients.depth[pixel];
+      sum += gradients.depth[pixel] * images.depth[pixel];
+    }
+    if (gradients.alpha) sum -= gradients.alpha[pixel] * (1.f - images.alpha[pixel]);
+    behind[b][lane] = sum;
+  });
+
+  auto unblend = [&](uint32_t place, const Splat& s, Blocks blocks) {
+    const Brush brush(frame, s);
+    Lanes record[SIZE] = {};
+    for (; blocks; blocks &= blocks - 1) {
+      const int b = __builtin_ctzll(blocks);
+      const Lanes clear = transmittance[b];
+      Touch touch;
+      if (!lay(frame, brush, b, transmittance[b], touch)) continue;
+      Lanes share = colour[0][b] * s.colour[0];
+      for (int c = 1; c < C; c++) share += colour[c][b] * s.colour[c];
+      if (DEPTH) share += depth[b] * s.depth;
+      const Lanes rest = behind[b] - touch.weight * share;
+      behind[b] = rest;
+      const Lanes v = where(touch.on & touch.unclamped,
+                            touch.alpha * (clear * share - rest * reciprocal(1.f - touch.alpha)));
+      const Lanes vx = v * touch.dx, vy = v * touch.dy;
+      record[0] += v;
+      record[1] += vx;
+      record[2] += vy;
+      record[3] += vx * touch.dx;
+      record[4] += vx * touch.dy;
+      record[5] += vy * touch.dy;
+      for (int c = 0; c < C; c++) record[MOMENTS + c] += touch.weight * colour[c][b];
+      if (DEPTH) record[MOMENTS + C] += touch.weight * depth[b];
+    }
+    store_sums<SIZE>(records + (size_t)tiles.slot[place] * SIZE, record);
+  };
+  auto skip = [&](uint32_t place) { memset(records + (size_t)tiles.slot[place] * SIZE, 0, 4 * SIZE); };
+  walk(frame, splats, tiles, tile, transmittance, unblend, skip);
+}
+
+template <int C> static void unblend(const Splat* splats, const Tiles& tiles, const Images& images,
+                                     const ImageGradients& gradients, float* records, int threads) {
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 2)
+  for (int tile = 0; tile < tiles.columns * tiles.rows; tile++) {
+    if (gradients.depth) unblend_tile<C, true>(splats, tiles, images, gradients, records, tile);
+    else unblend_tile<C, false>(splats, tiles, images, gradients, records, tile);
+  }
+}
+
+void blend_backward(const Splat* splats, const Tiles& tiles, const Images& images, const ImageGradients& gradients,
+                    float* records, int threads) {
+  switch (images.group) {
+    case 1: return unblend<1>(splats, tiles, images, gradients, records, threads);
+    case 2: return unblend<2>(splats, tiles, images, gradients, records, threads);
+    case 3: return unblend<3>(splats, tiles, images, gradients, records, threads);
+    default: return unblend<4>(splats, tiles, images, gradients, records, threads);
+  }
+}
+
+void collect(const Tiles& tiles, size_t n, int channels, int channel, int group, bool depth, bool add,
+             const float* records, float* sums, float* colours, int threads) {
+  const int size = MOMENTS + group + depth;
+#pragma omp parallel for num_threads(threads) schedule(static)
+  for (ptrdiff_t i = 0; i < (ptrdiff_t)n; i++) {
+    float total[MOMENTS + GROUP + 1] = {};
+    for (size_t slot = tiles.slots[i]; slot < tiles.slots[i + 1]; slot++)
+      for (int k = 0; k < size; k++) total[k] += records[slot * size + k];
+    float* to = sums + i * (MOMENTS + 1);
+    for (int k = 0; k < MOMENTS; k++) to[k] = (add ? to[k] : 0) + total[k];
+    to[MOMENTS] = (add ? to[MOMENTS] : 0) + (depth ? total[MOMENTS + group] : 0);
+    for (int c = 0; c < group; c++) colours[i * channels + channel + c] = total[MOMENTS + c];
+  }
+}
+
+}  // namespace ISA
+}  // namespace raster

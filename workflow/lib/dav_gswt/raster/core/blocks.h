@@ -1,0 +1,145 @@
+// How a tile's pixels lie in lanes, and the walk over a tile's splats that the blending kernels share.
+//
+// A tile is cut into blocks of LANES pixels, near squares: a small splat fills their lanes better than those of a row.
+// A pixel whose transmittance is used up keeps it with the sign turned: it takes no more splats.
+#pragma once
+#include "lanes.h"
+
+namespace raster {
+namespace ISA {
+
+constexpr int BLOCK_WIDTH = LANES >= 16 ? 4 : LANES >= 8 ? 4 : 2;
+constexpr int BLOCK_HEIGHT = LANES / BLOCK_WIDTH;
+constexpr int BLOCKS_ACROSS = TILE / BLOCK_WIDTH;
+constexpr int BLOCKS_DOWN = TILE / BLOCK_HEIGHT;
+constexpr int BLOCKS = BLOCKS_ACROSS * BLOCKS_DOWN;
+constexpr int LOOK_AHEAD = 6;      // splats between the one that is blended and the one that is fetched
+constexpr int ROLL_CALL = 16;      // splats between two looks at which blocks are still alive
+
+// One bit a block. 256 pixels in blocks of 4 make 64 blocks.
+typedef uint64_t Blocks;
+
+static_assert(BLOCKS <= 64, "a bit a block");
+
+struct TileFrame {
+  int left, top;                        // pixels
+  const Images& images;
+  Lanes x[BLOCKS_ACROSS], y[BLOCKS_DOWN];  // pixel centres from the tile's corner
+  Blocks column[BLOCKS_ACROSS], row[BLOCKS_DOWN];
+
+  TileFrame(int tile, const Tiles& tiles, const Images& of)
+      : left(tile % tiles.columns * TILE), top(tile / tiles.columns * TILE), images(of) {
+    for (int c = 0; c < BLOCKS_ACROSS; c++)
+      for (int l = 0; l < LANES; l++) x[c][l] = c * BLOCK_WIDTH + l % BLOCK_WIDTH + 0.5f;
+    for (int r = 0; r < BLOCKS_DOWN; r++)
+      for (int l = 0; l < LANES; l++) y[r][l] = r * BLOCK_HEIGHT + l / BLOCK_WIDTH + 0.5f;
+    for (int c = 0; c < BLOCKS_ACROSS; c++) column[c] = 0;
+    for (int r = 0; r < BLOCKS_DOWN; r++) row[r] = 0;
+    for (int r = 0; r < BLOCKS_DOWN; r++)
+      for (int c = 0; c < BLOCKS_ACROSS; c++) {
+        const Blocks bit = Blocks(1) << (r * BLOCKS_ACROSS + c);
+        column[c] |= bit, row[r] |= bit;
+      }
+  }
+
+  // Calls f(block, lane, pixel) for every pixel of the tile that lies in the image.
+  template <class F> void each_pixel(F f) const {
+    const int width = images.width - left < TILE ? images.width - left : TILE;
+    const int height = images.height - top < TILE ? images.height - top : TILE;
+    for (int y = 0; y < height; y++)
+      for (int x = 0; x < width; x++)
+        f(y / BLOCK_HEIGHT * BLOCKS_ACROSS + x / BLOCK_WIDTH, y % BLOCK_HEIGHT * BLOCK_WIDTH + x % BLOCK_WIDTH,
+          (size_t)(top + y) * images.width + left + x);
+  }
+
+  // 1 within the image; used up from the start outside of it.
+  void clear(Lanes* transmittance) const {
+    for (int b = 0; b < BLOCKS; b++) transmittance[b] = all(-1);
+    each_pixel([&](int block, int lane, size_t) { transmittance[block][lane] = 1; });
+  }
+};
+
+static inline Blocks living(const Lanes* transmittance, Blocks among) {
+  Blocks found = 0;
+  for (Blocks left = among; left; left &= left - 1) {
+    const int b = __builtin_ctzll(left);
+    found |= Blocks(any(transmittance[b] > 0.f)) << b;
+  }
+  return found;
+}
+
+static inline int whole_within(float v, int last) {  // floor of v, brought into [-1, last]
+  v = v < -1 ? -1 : v > last ? last : v;
+  return (int)(v + 1) - 1;
+}
+
+// Blocks that a span [from, to] of pixel centres along one side touches, as first and last of `count`.
+struct Span { int first, last; };
+static inline Span span(float from, float to, int size, int count) {
+  const int first = whole_within(from + 0.5f, TILE) , last = whole_within(to - 0.5f, TILE - 1);
+  (void)count;
+  return {(first < 0 ? 0 : first) / size, last < 0 ? -1 : last / size};
+}
+
+static inline Blocks touched(const TileFrame& frame, const Splat& s) {
+  const float x = s.x - frame.left, y = s.y - frame.top;
+  const Span across = span(x - s.half_x, x + s.half_x, BLOCK_WIDTH, BLOCKS_ACROSS);
+  const Span down = span(y - s.half_y, y + s.half_y, BLOCK_HEIGHT, BLOCKS_DOWN);
+  Blocks columns = 0, rows = 0;
+  for (int c = across.first; c <= across.last; c++) columns |= frame.column[c];
+  for (int r = down.first; r <= down.last; r++) rows |= frame.row[r];
+  return columns & rows;
+}
+
+// A splat, made ready for one tile.
+struct Brush {
+  Lanes x, y, xx, xy, yy, log2_opacity;
+  Brush(const TileFrame& frame, const Splat& s)
+      : x(all(s.x - frame.left)), y(all(s.y - frame.top)), xx(all(s.xx)), xy(all(s.xy)), yy(all(s.yy)),
+        log2_opacity(all(s.log2_opacity)) {}
+};
+
+// What a splat does to a block: the pixels that take it (`on`), its alpha there, its blend weight (0 elsewhere).
+struct Touch {
+  Lanes dx, dy, alpha, weight;
+  Mask on, unclamped;
+};
+
+// Lays a splat over a block. Returns false, and changes nothing, where no pixel is reached.
+static inline bool lay(const TileFrame& frame, const Brush& s, int block, Lanes& transmittance, Touch& t) {
+  t.dx = frame.x[block % BLOCKS_ACROSS] - s.x;
+  t.dy = frame.y[block / BLOCKS_ACROSS] - s.y;
+  const Lanes log2_alpha = (s.xx * t.dx + s.xy * t.dy) * t.dx + (s.yy * t.dy * t.dy + s.log2_opacity);
+  const Lanes clear = transmittance;
+  const Mask reached = (log2_alpha >= -LOG2_255) & (clear > 0.f);
+  if (!any(reached)) return false;
+  const Lanes alpha = exp2(max(log2_alpha, all(-8)));
+  t.unclamped = alpha < ALPHA_MAX;
+  t.alpha = min(alpha, all(ALPHA_MAX));
+  const Lanes weight = t.alpha * clear, rest = clear - weight;
+  t.on = reached & (rest >= CLEAR_MIN);
+  t.weight = where(t.on, weight);
+  transmittance = select(t.on, rest, select(reached, -clear, clear));
+  return true;
+}
+
+// Walks over a tile's splats from front to back. at(place, splat, blocks) blends one over the blocks it touches;
+// skip(place) is called for the splats behind a tile whose pixels are all used up.
+template <class At, class Skip>
+static inline void walk(const TileFrame& frame, const Splat* splats, const Tiles& tiles, int tile,
+                        const Lanes* transmittance, At at, Skip skip) {
+  const uint32_t end = tiles.first[tile + 1];
+  uint32_t place = tiles.first[tile];
+  Blocks alive = living(transmittance, BLOCKS == 64 ? ~Blocks(0) : (Blocks(1) << (BLOCKS % 64)) - 1);
+  for (int count = 1; place < end && alive; place++, count++) {
+    const uint32_t ahead = place + LOOK_AHEAD < end ? place + LOOK_AHEAD : end - 1;
+    __builtin_prefetch(&splats[tiles.gaussian[ahead]]);
+    const Splat& s = splats[tiles.gaussian[place]];
+    at(place, s, touched(frame, s) & alive);
+    if (count % ROLL_CALL == 0) alive = living(transmittance, alive);
+  }
+  for (; place < end; place++) skip(place);
+}
+
+}  // namespace ISA
+}  // namespace raster

@@ -1,0 +1,77 @@
+// What each Gaussian gives to the picture: its blend weights' sum and maximum, and a map carried back by them.
+#include "blocks.h"
+#include "kernels.h"
+
+namespace raster {
+namespace ISA {
+
+static inline float largest(Lanes v) {
+  float found = v[0];
+  for (int l = 1; l < LANES; l++) found = v[l] > found ? v[l] : found;
+  return found;
+}
+
+template <int C> static void weigh_tile(const Splat* splats, const Tiles& tiles, const Images& map, float* records,
+                                        int tile) {
+  constexpr int SIZE = 2 + C;
+  const TileFrame frame(tile, tiles, map);
+  Lanes transmittance[BLOCKS], values[C ? C : 1][BLOCKS] = {};
+  frame.clear(transmittance);
+  frame.each_pixel([&](int b, int lane, size_t pixel) {
+    for (int c = 0; c < C; c++) values[c][b][lane] = map.colour[pixel * map.channels + map.channel + c];
+  });
+
+  auto weigh = [&](uint32_t place, const Splat& s, Blocks blocks) {
+    const Brush brush(frame, s);
+    Lanes sums[1 + C] = {}, maximum = {};
+    Touch touch;
+    for (; blocks; blocks &= blocks - 1) {
+      const int b = __builtin_ctzll(blocks);
+      if (!lay(frame, brush, b, transmittance[b], touch)) continue;
+      sums[0] += touch.weight;
+      maximum = max(maximum, touch.weight);
+      for (int c = 0; c < C; c++) sums[1 + c] += touch.weight * values[c][b];
+    }
+    float* record = records + (size_t)tiles.slot[place] * SIZE;
+    record[0] = largest(maximum);
+    store_sums<1 + C>(record + 1, sums);
+  };
+  auto skip = [&](uint32_t place) { memset(records + (size_t)tiles.slot[place] * SIZE, 0, 4 * SIZE); };
+  walk(frame, splats, tiles, tile, transmittance, weigh, skip);
+}
+
+template <int C> static void weigh(const Splat* splats, const Tiles& tiles, const Images& map, float* records,
+                                   int threads) {
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 2)
+  for (int tile = 0; tile < tiles.columns * tiles.rows; tile++) weigh_tile<C>(splats, tiles, map, records, tile);
+}
+
+void contribute(const Splat* splats, const Tiles& tiles, const Images& map, float* records, int threads) {
+  switch (map.group) {
+    case 0: return weigh<0>(splats, tiles, map, records, threads);
+    case 1: return weigh<1>(splats, tiles, map, records, threads);
+    case 2: return weigh<2>(splats, tiles, map, records, threads);
+    case 3: return weigh<3>(splats, tiles, map, records, threads);
+    default: return weigh<4>(splats, tiles, map, records, threads);
+  }
+}
+
+void collect_contributions(const Tiles& tiles, size_t n, int channels, int channel, int group, const float* records,
+                           float* total, float* maximum, float* mapped, int threads) {
+  const int size = 2 + group;
+#pragma omp parallel for num_threads(threads) schedule(static)
+  for (ptrdiff_t i = 0; i < (ptrdiff_t)n; i++) {
+    float most = 0, sums[1 + GROUP] = {};
+    for (size_t slot = tiles.slots[i]; slot < tiles.slots[i + 1]; slot++) {
+      const float* record = records + slot * size;
+      most = record[0] > most ? record[0] : most;
+      for (int k = 0; k <= group; k++) sums[k] += record[1 + k];
+    }
+    maximum[i] = most;
+    total[i] = sums[0];
+    for (int c = 0; c < group; c++) mapped[i * channels + channel + c] = sums[1 + c];
+  }
+}
+
+}  // namespace ISA
+}  // namespace raster

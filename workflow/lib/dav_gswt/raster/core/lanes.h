@@ -1,0 +1,136 @@
+// Vectors of LANES floats, and the few operations on them that the compilers' vector extension lacks.
+#pragma once
+#include "types.h"
+#include <string.h>
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+namespace raster {
+namespace ISA {
+
+typedef float Lanes __attribute__((vector_size(LANES * 4)));
+typedef int Mask __attribute__((vector_size(LANES * 4)));  // -1 where true, 0 where false
+
+static inline Lanes all(float value) { return Lanes{} + value; }
+
+static inline Lanes load(const float* from) {
+  Lanes v;
+  memcpy(&v, from, sizeof v);
+  return v;
+}
+
+static inline void store(float* to, Lanes v) { memcpy(to, &v, sizeof v); }
+
+#if LANES == 16 && defined(__AVX512F__)
+static inline bool any(Mask m) { return _mm512_test_epi32_mask((__m512i)m, (__m512i)m) != 0; }
+static inline Lanes max(Lanes a, Lanes b) { return (Lanes)_mm512_max_ps((__m512)a, (__m512)b); }
+static inline Lanes min(Lanes a, Lanes b) { return (Lanes)_mm512_min_ps((__m512)a, (__m512)b); }
+static inline Lanes sqrt(Lanes a) { return (Lanes)_mm512_sqrt_ps((__m512)a); }
+static inline Lanes reciprocal(Lanes a) {  // 14 bits and one Newton step: 2e-7
+  const Lanes r = (Lanes)_mm512_rcp14_ps((__m512)a);
+  return r * (2.f - a * r);
+}
+#elif LANES == 8 && defined(__AVX2__)
+static inline bool any(Mask m) { return !_mm256_testz_si256((__m256i)m, (__m256i)m); }
+static inline Lanes max(Lanes a, Lanes b) { return (Lanes)_mm256_max_ps((__m256)a, (__m256)b); }
+static inline Lanes min(Lanes a, Lanes b) { return (Lanes)_mm256_min_ps((__m256)a, (__m256)b); }
+static inline Lanes sqrt(Lanes a) { return (Lanes)_mm256_sqrt_ps((__m256)a); }
+static inline Lanes reciprocal(Lanes a) {  // 12 bits and one Newton step: 2e-7
+  const Lanes r = (Lanes)_mm256_rcp_ps((__m256)a);
+  return r * (2.f - a * r);
+}
+#else
+static inline bool any(Mask m) {
+  int found = 0;
+  for (int l = 0; l < LANES; l++) found |= m[l];
+  return found != 0;
+}
+static inline Lanes max(Lanes a, Lanes b) { return a > b ? a : b; }
+static inline Lanes min(Lanes a, Lanes b) { return a < b ? a : b; }
+static inline Lanes sqrt(Lanes a) {
+  for (int l = 0; l < LANES; l++) a[l] = __builtin_sqrtf(a[l]);
+  return a;
+}
+static inline Lanes reciprocal(Lanes a) { return 1.f / a; }
+#endif
+
+static inline Lanes clamp(Lanes v, float low, float high) { return min(max(v, all(low)), all(high)); }
+static inline Lanes select(Mask m, Lanes yes, Lanes no) { return m ? yes : no; }
+static inline Lanes where(Mask m, Lanes v) { return (Lanes)((Mask)v & m); }  // v or 0
+
+// 2^x for x in [-126, 126], relative error 2e-7. x = n + f, |f| <= 1/2: a polynomial for 2^f, n into the exponent.
+// Adding 1.5 2^23 rounds to a whole number and leaves it in the low bits.
+static inline Lanes exp2(Lanes x) {
+  const float round = 12582912.f;
+  const Lanes n = x + round;
+  const Lanes f = x - (n - round);
+  Lanes p = f * 1.3333558e-3f + 9.6181291e-3f;
+  p = p * f + 5.5504109e-2f;
+  p = p * f + 2.4022651e-1f;
+  p = p * f + 6.9314718e-1f;
+  p = p * f + 1.f;
+  return (Lanes)((Mask)p + ((Mask)n << 23));
+}
+
+static inline Lanes exp(Lanes x) { return exp2(clamp(x * LOG2_E, -126.f, 126.f)); }
+
+// log2 of a normal positive number, absolute error 1e-7 near 1. x = 2^n m with m in [sqrt(1/2), sqrt(2)), and
+// ln m = 2 atanh((m - 1) / (m + 1)) by its series.
+static inline Lanes log2(Lanes x) {
+  const Mask n = ((Mask)x - 0x3f3504f3) >> 23;
+  const Lanes m = (Lanes)((Mask)x - (n << 23));
+  const Lanes t = (m - 1.f) / (m + 1.f), tt = t * t;
+  const Lanes series = 1.f + tt * (1.f / 3 + tt * (1.f / 5 + tt * (1.f / 7 + tt * (1.f / 9))));
+  return __builtin_convertvector(n, Lanes) + 2.f * LOG2_E * (t * series);
+}
+
+// Folding: `u` and `v` hold segments of SEGMENT lanes to be summed; the result holds segments half as long, first
+// those of u, then those of v. log2(LANES) foldings turn LANES vectors into one vector of their sums.
+template <int SEGMENT> static inline Lanes fold(Lanes u, Lanes v) {
+  Mask low, high;
+  for (int l = 0; l < LANES; l++) {
+    const int half = SEGMENT / 2, segment = l / half, lane = l % half;
+    low[l] = segment * SEGMENT + lane;  // counts through u, then v
+    high[l] = low[l] + half;
+  }
+  return __builtin_shuffle(u, v, low) + __builtin_shuffle(u, v, high);
+}
+
+template <int SEGMENT> static inline Lanes fold_all(const Lanes* v) {
+  if constexpr (SEGMENT == LANES) return fold<SEGMENT>(v[0], v[1]);
+  else return fold<SEGMENT>(fold_all<SEGMENT * 2>(v), fold_all<SEGMENT * 2>(v + LANES / SEGMENT));
+}
+
+// to[i] = sum of the lanes of v[i], for `COUNT` vectors.
+template <int COUNT> static inline void store_sums(float* to, const Lanes* v) {
+  constexpr int batches = (COUNT + LANES - 1) / LANES;
+  Lanes padded[batches * LANES];
+  for (int i = 0; i < batches * LANES; i++) padded[i] = i < COUNT ? v[i] : Lanes{};
+  for (int b = 0; b < batches; b++) {
+    const Lanes sums = fold_all<2>(padded + b * LANES);
+    const int left = COUNT - b * LANES;
+    memcpy(to + b * LANES, &sums, 4 * (left < LANES ? left : LANES));
+  }
+}
+
+// Rows of `stride` floats: the first floats of rows `row`, `row + 1` ... as lanes, and back. With fewer than LANES
+// rows left the last one is repeated.
+static inline Lanes load_column(const float* column, int stride, size_t row, int rows) {
+  float buffer[LANES];
+  column += row * stride;
+  if (rows >= LANES) for (int l = 0; l < LANES; l++) buffer[l] = column[l * stride];
+  else for (int l = 0; l < LANES; l++) buffer[l] = column[(l < rows ? l : rows - 1) * stride];
+  return load(buffer);
+}
+
+static inline void store_column(float* column, int stride, size_t row, int rows, Lanes v) {
+  float buffer[LANES];
+  store(buffer, v);
+  column += row * stride;
+  if (rows >= LANES) for (int l = 0; l < LANES; l++) column[l * stride] = buffer[l];
+  else for (int l = 0; l < rows; l++) column[l * stride] = buffer[l];
+}
+
+}  // namespace ISA
+}  // namespace raster

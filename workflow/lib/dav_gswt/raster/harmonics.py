@@ -1,0 +1,48 @@
+"""Spherical harmonics up to degree 3: the colour of a Gaussian that depends on where it is seen from."""
+
+import numpy as np
+from jaxtyping import Float, Float32
+from numpy import ndarray as Array
+
+from dav_gswt.cameras import Camera
+
+
+def directions(means: Float[Array, "n 3"], camera: Camera) -> Float[Array, "n 3"]:
+    """Unit directions in which the camera looks at the Gaussians; that of a Gaussian in the camera's centre is forward."""
+    if camera.orthographic:
+        return np.broadcast_to(camera.forward, (len(means), 3))
+    to = means - camera.centre
+    length = np.linalg.norm(to, axis=1, keepdims=True)
+    return np.where(length > 0, to / np.where(length > 0, length, 1), camera.forward)
+
+
+def basis(directions: Float[Array, "n 3"], degree: int) -> Float[Array, "n k"]:
+    """The real spherical harmonics of 3DGS, k = (degree + 1)^2 of them, in its order and with its signs.
+
+    Orthonormal over the sphere.
+    """
+    x, y, z = np.asarray(directions, float).T
+    xx, yy, zz = x * x, y * y, z * z
+    one, pi = np.ones_like(x), np.pi
+    rows = [np.sqrt(1 / (4 * pi)) * one]
+    if degree >= 1:
+        rows += [np.sqrt(3 / (4 * pi)) * f for f in (-y, z, -x)]
+    if degree >= 2:
+        a, b = np.sqrt(15 / (4 * pi)), np.sqrt(5 / (16 * pi))
+        rows += [a * x * y, -a * y * z, b * (3 * zz - 1), -a * x * z, a / 2 * (xx - yy)]
+    if degree >= 3:
+        a, b, c, d = (np.sqrt(v / pi) for v in (35 / 32, 105 / 4, 21 / 32, 7 / 16))
+        rows += [-a * y * (3 * xx - yy), b * x * y * z, -c * y * (5 * zz - 1), d * z * (5 * zz - 3)]
+        rows += [-c * x * (5 * zz - 1), b / 2 * z * (xx - yy), -a * x * (xx - 3 * yy)]
+    return np.stack(rows, 1)
+
+
+def colours(sh: Float[Array, "n k 3"], directions: Float[Array, "n 3"]) -> Float32[Array, "n 3"]:
+    """max(0, 0.5 + sum over k of basis_k sh_k). Raises: ValueError: k is not 1, 4, 9 or 16."""
+    k = sh.shape[1]
+    if k not in (1, 4, 9, 16):
+        raise ValueError(f"sh has {k} coefficients; 1, 4, 9 or 16 make whole degrees")
+    if k == 1:
+        return np.maximum(0.5 + np.float32(np.sqrt(1 / (4 * np.pi))) * sh[:, 0], 0).astype(np.float32)
+    values = np.einsum("nk,nkc->nc", basis(directions, int(np.sqrt(k)) - 1), sh)
+    return np.maximum(0.5 + values, 0).astype(np.float32)

@@ -1,0 +1,1 @@
+"""The endless terrain: which tile lies where, stills of it, and the page to walk in."""

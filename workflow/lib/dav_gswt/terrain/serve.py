@@ -1,0 +1,97 @@
+"""Serve a page folder to browsers on this machine: `python -m dav_gswt.terrain.serve DIR [--port N]`."""
+
+import argparse
+import errno
+import sys
+from functools import partial
+from http import HTTPStatus
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+from dav_gswt.errors import InputError
+
+HOST = "127.0.0.1"  # nobody else on the network is served
+
+
+class _Handler(SimpleHTTPRequestHandler):
+    """Files of one folder: no listings, nothing that a link leads out to, and always the page as it is now."""
+
+    protocol_version = "HTTP/1.1"
+    # said here, since a machine's own MIME table may call .js text/plain, which browsers refuse to run as a module
+    extensions_map = {
+        "": "application/octet-stream",
+        ".html": "text/html; charset=utf-8",
+        ".css": "text/css; charset=utf-8",
+        ".js": "text/javascript; charset=utf-8",
+        ".json": "application/json",
+        ".bin": "application/octet-stream",
+        ".png": "image/png",
+    }
+
+    def send_head(self):
+        asked, root = Path(self.translate_path(self.path)).resolve(), Path(self.directory).resolve()
+        if not asked.is_relative_to(root):
+            self.send_error(HTTPStatus.NOT_FOUND, "File not found")
+            return None
+        return super().send_head()
+
+    def list_directory(self, path):
+        self.send_error(HTTPStatus.NOT_FOUND, "File not found")
+
+    def end_headers(self):
+        self.send_header("Cache-Control", "no-cache")
+        self.send_header("X-Content-Type-Options", "nosniff")
+        super().end_headers()
+
+    def log_message(self, format, *arguments):
+        """Say nothing: the terminal shows the address and what went wrong, not every chunk."""
+
+
+class _Server(ThreadingHTTPServer):
+    def handle_error(self, request, client_address):
+        """A browser that leaves in the middle of a chunk is no error; all else is shown."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
+
+
+def server(folder: Path | str, port: int) -> ThreadingHTTPServer:
+    """A server of a page folder, bound to this machine's loopback address; port 0 takes any free port.
+
+    Raises: InputError: the folder holds no page, or the port cannot be had.
+    """
+    folder = Path(folder)
+    for name in ("index.html", "davgswt.json"):
+        if not (folder / name).is_file():
+            raise InputError(f"{folder}: no page here ({name} is missing); `make run` makes one")
+    if not 0 <= port <= 65535:
+        raise InputError(f"--port {port}: ports go from 1 to 65535 (0: any free one)")
+    try:
+        return _Server((HOST, port), partial(_Handler, directory=str(folder)))
+    except OSError as error:
+        if error.errno == errno.EADDRINUSE:
+            why = "is taken; stop what uses it, or choose another"
+        else:
+            why = f"cannot be used ({error.strerror}); choose another"
+        raise InputError(f"port {port} {why} with --port N (`make view PORT=N`; 0: any free one)") from error
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Serve until Ctrl-C. Returns the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m dav_gswt.terrain.serve", description=__doc__)
+    parser.add_argument("dir", type=Path, help="a page folder, as make_page writes it")
+    parser.add_argument("--port", type=int, default=8000)
+    options = parser.parse_args(arguments)
+    try:
+        with server(options.dir, options.port) as http:
+            print(f"Open http://{HOST}:{http.server_address[1]}/ in a browser. Ctrl-C stops.", flush=True)
+            http.serve_forever()
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 0
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

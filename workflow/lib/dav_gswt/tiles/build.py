@@ -1,0 +1,152 @@
+"""The tile set of a field: trends out, places searched, strips and centres cut, every level composed."""
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+from numpy import ndarray as Array
+
+from dav_gswt.errors import InputError
+from dav_gswt.field import SH0, Field
+from dav_gswt.logs import progress
+from dav_gswt.tiles import compose, cuts, layout, membrane, patches, search, trends
+from dav_gswt.tiles.layout import EDGES, Exemplar, Layout
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Options:
+    """share: tile side over the exemplar's. strip: half-width of the strips over the tile's side, below 1/5.
+    variants: centres per edge colouring. trend: width of the low-pass in tile sides. candidates: places that a search
+    compares; tries: of them, how many are cut before the best is taken.
+    """
+
+    share: float = 0.5
+    strip: float = 0.125
+    variants: int = 1
+    trend: float = 0.2
+    candidates: int = 192
+    tries: int = 4
+
+
+@dataclass(frozen=True)
+class TileSet:
+    """16 C tiles at every level, in world units from each tile's south-western corner.
+
+    fields[level][tile]. labels: [tile, y, x], row 0 in the south. shifts: what to add to a cell (x, y) of a tile to
+    get the exemplar's cell, per label. uncertainty: mean over each tile's cells. seams: what was chosen and what it
+    cost, as JSON.
+    """
+
+    side: float
+    spacing: float
+    fields: list[list[Field]]
+    labels: UInt8[Array, "tiles n n"]
+    shifts: Int[Array, "tiles 9 2"]
+    uncertainty: Float[Array, "tiles"]
+    seams: dict
+
+    @property
+    def variants(self) -> int:
+        return len(self.labels) // EDGES
+
+
+def cut_tiles(
+    levels: list[Field],
+    exemplar: Exemplar,
+    colour: Float[Array, "m m 3"],
+    uncertainty: Float[Array, "m m"],
+    options: Options,
+    rng: np.random.Generator,
+) -> TileSet:
+    """Make the tile set of a field.
+
+    Args:
+        levels: finest first; level l's ground has cells of 2^l spacings from the exemplar's corner.
+        colour, uncertainty: seen from straight above, one value a finest cell, **row 0 in the south** (turn a top-down
+            camera's picture upside down). Uncertainty in [0, 1], NaN where nothing is known.
+    Raises: InputError: the exemplar is too small for a tile with these levels, or a level has no Gaussian in it.
+    """
+    shape = (exemplar.cells, exemplar.cells)
+    if colour.shape[:2] != shape or uncertainty.shape != shape:
+        raise ValueError(f"maps of {colour.shape[:2]} and {uncertainty.shape} cells for an exemplar of {shape}")
+    plan = layout.plan(exemplar.cells, len(levels), options.share, options.strip)
+    _, height = ground_maps(levels[0], exemplar)
+    trend = trends.trend_of(colour, height, exemplar, options.trend * plan.side)
+    colour = np.clip(np.nan_to_num(colour - trend.colour, nan=0.5), 0, 1).astype(float)
+    height = np.nan_to_num(height - trend.height, nan=float(np.nanmean(height)))
+    doubt = np.clip(np.nan_to_num(uncertainty, nan=1.0), 0, 1).astype(float)
+    sketch = search.sketch(plan, patches.guide(colour, height, doubt, plan), colour, options.candidates, options.tries)
+    found = search.search(sketch, options.variants, rng)
+    labels = found.labels
+    shifts = np.stack([layout.offsets(plan, found.places, tile) for tile in range(len(labels))])
+    corrections = _corrections(plan, found, shifts, membrane.ground(colour, height))
+    binned = [
+        _checked(compose.binned(trends.detrended(field, trend), exemplar, 2**number), number)
+        for number, field in enumerate(levels)
+    ]
+    tiles = [
+        [_tile(level, labels[tile], shifts[tile], corrections[tile]) for level in binned]
+        for tile in progress(range(len(labels)), "compose tiles")
+    ]
+    side = plan.side * exemplar.spacing
+    tiles, raised = compose.levelled(tiles, side)
+    seams = found.record() | {
+        "layout": {k: int(getattr(plan, k)) for k in ("exemplar", "levels", "side", "strip", "corner", "block")},
+        "raised": raised.tolist(),
+        "scales": {"difference": sketch.unit.difference, "gradient": sketch.unit.gradient, "eps": cuts.EPS},
+        "trend": {"colour": float(np.ptp(trend.colour)), "height": float(np.ptp(trend.height))},
+        "correction": np.abs(corrections).max((0, 1, 2)).tolist(),
+    }
+    shown = [doubt[layout.sources(labels[t], shifts[t])].mean() for t in range(len(labels))]
+    fields = [list(level) for level in zip(*tiles, strict=True)]
+    return TileSet(side, exemplar.spacing, fields, labels, shifts, np.array(shown), seams)
+
+
+def _corrections(plan: Layout, found: search.Found, shifts: Array, ground: membrane.Ground) -> Float[Array, "t n n 4"]:
+    """What every tile's cells are changed by so that no step is left along its seams; the strips' part first."""
+    strips = []
+    for upright, masks, places in (
+        (True, found.vertical, found.places.vertical),
+        (False, found.horizontal, found.places.horizontal),
+    ):
+        pair = [
+            layout.strip_labels(plan, mask, place, found.places.corner, upright)
+            for mask, place in zip(masks, places, strict=True)
+        ]
+        strips.append(np.stack([membrane.strip(labels, shift, plan, ground) for labels, shift in pair]))
+    out = []
+    for tile, (labels, shift) in enumerate(zip(found.labels, shifts, strict=True)):
+        out.append(membrane.tile(labels, shift, membrane.ring(plan, *strips, tile), plan, ground))
+    return np.stack(out)
+
+
+def _tile(level: compose.Binned, labels: Array, shift: Array, correction: Array) -> Field:
+    """One tile at one level, corrected; a coarser level follows the finest one's labels by majority."""
+    coarse = compose.coarser(labels, level.cell)
+    splats = compose.composed(level, coarse, shift)
+    change = membrane.coarser(correction, labels, coarse)
+    return membrane.applied(splats, change, level.cell * level.exemplar.spacing)
+
+
+def ground_maps(field: Field, exemplar: Exemplar) -> tuple[Float[Array, "m m 3"], Float[Array, "m m"]]:
+    """Mean colour and height of each finest cell's ground discs (all Gaussians', if none is ground); NaN for none."""
+    ground = field[field.ground] if field.ground.any() else field
+    level = compose.binned(ground, exemplar, 1)
+    count = np.diff(level.start)
+    cell = np.repeat(np.arange(len(count)), count)
+    values = [*level.field.sh[:, 0].T * SH0 + 0.5, level.field.means[:, 2]]
+    with np.errstate(invalid="ignore"):
+        maps = [(np.bincount(cell, v, len(count)) / count).reshape(exemplar.cells, exemplar.cells) for v in values]
+    return np.stack(maps[:3], -1), maps[3]
+
+
+def _checked(level: compose.Binned, number: int) -> compose.Binned:
+    if not len(level.field):
+        raise InputError(f"level {number}: no Gaussian lies over the exemplar; is its field from another ground.json?")
+    held = compose.discs(level)
+    if held.any() and (held != 1).any():
+        _log.warning("level %d: %d of %d cells do not hold one ground disc", number, (held != 1).sum(), held.size)
+    return level

@@ -1,0 +1,102 @@
+"""From label maps to the Gaussians of a tile: each Gaussian follows the label of the cell that its centre is in."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+from numpy import ndarray as Array
+
+from dav_gswt.field import Field
+from dav_gswt.tiles.layout import LABELS, Exemplar, sources
+
+
+@dataclass(frozen=True)
+class Binned:
+    """A level's Gaussians sorted by the exemplar's cells (row-major from the south-west): cell k holds
+    start[k]:start[k+1].
+    """
+
+    field: Field
+    exemplar: Exemplar
+    cell: int  # finest cells along one cell of this level
+    start: Int[Array, "k"]
+
+    @property
+    def cells(self) -> int:
+        return self.exemplar.cells // self.cell
+
+
+def binned(field: Field, exemplar: Exemplar, cell: int) -> Binned:
+    """Sort a level's Gaussians by cell; those outside the exemplar are left out."""
+    count = exemplar.cells // cell
+    size = exemplar.spacing * cell
+    column = np.floor((field.means[:, 0].astype(float) - exemplar.west) / size).astype(np.int64)
+    row = np.floor((field.means[:, 1].astype(float) - exemplar.south) / size).astype(np.int64)
+    inside = np.flatnonzero((column >= 0) & (row >= 0) & (column < count) & (row < count))
+    key = row[inside] * count + column[inside]
+    order = np.argsort(key, kind="stable")
+    start = np.searchsorted(key[order], np.arange(count * count + 1))
+    return Binned(field[inside[order]], exemplar, cell, start)
+
+
+def discs(level: Binned) -> Int[Array, "m m"]:
+    """How many ground discs each cell holds."""
+    total = np.concatenate([[0], np.cumsum(level.field.ground)])
+    return np.diff(total[level.start]).reshape(level.cells, level.cells)
+
+
+def coarser(labels: UInt8[Array, "n n"], factor: int) -> UInt8[Array, "k k"]:
+    """Labels of cells `factor` times as wide: the majority inside, of equal ones the first in LABELS."""
+    k = len(labels) // factor
+    blocks = labels.reshape(k, factor, k, factor)
+    counts = np.stack([(blocks == label).sum((1, 3)) for label in range(len(LABELS))])
+    return counts.argmax(0).astype(np.uint8)
+
+
+def composed(level: Binned, labels: UInt8[Array, "n n"], shift: Int[Array, "9 2"]) -> Field:
+    """A tile's Gaussians at one level, cell by cell from the south-west; x and y from its south-western corner, z kept.
+
+    labels: of this level's cells (see coarser); shift in finest cells.
+    """
+    row, column = sources(labels, shift, level.cell)
+    key = (row * level.cells + column).ravel()
+    first, count = level.start[key], level.start[key + 1] - level.start[key]
+    # the c-th Gaussian of a cell is the c-th after the first: positions within runs of varying length
+    within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    index = np.repeat(first, count) + within
+    tile = level.field[index]
+    move = (shift[labels.ravel()] * level.exemplar.spacing).repeat(count, axis=0)
+    means = tile.means.astype(float)
+    means[:, :2] -= move + [level.exemplar.west, level.exemplar.south]
+    side = len(labels) * level.cell * level.exemplar.spacing
+    means[:, :2] = np.clip(means[:, :2], 0, side)  # rounding in float32 may pass the border by a hair
+    return replace(tile, means=means.astype(np.float32))
+
+
+def bump(points: Float[Array, "n d"], side: float) -> Float[Array, "n"]:
+    """sin^2(pi x / side) sin^2(pi y / side): 1 in a tile's middle, 0 on its border in value and slope."""
+    s = np.sin(np.pi * points[:, :2].astype(float) / side) ** 2
+    return s[:, 0] * s[:, 1]
+
+
+def levelled(tiles: list[list[Field]], side: float) -> tuple[list[list[Field]], Float[Array, "tiles"]]:
+    """Give all tiles the same mean height at the finest level; tiles[t][l] is level l of tile t.
+
+    A rigid shift would tear borders apart, so a tile is raised by A_t bump(x, y) in all its levels alike; A_t makes
+    the mean over its finest Gaussians that of all tiles. Returns the tiles and the A_t.
+    """
+    heights = [float(levels[0].means[:, 2].astype(float).mean()) for levels in tiles]
+    goal = float(np.mean(heights))
+    raised, amounts = [], []
+    for levels, mean in zip(tiles, heights, strict=True):
+        share = bump(levels[0].means, side).mean()
+        amount = (goal - mean) / share if share > 0 else 0.0
+        raised.append([_raised(field, amount, side) for field in levels])
+        amounts.append(amount)
+    return raised, np.array(amounts)
+
+
+def _raised(field: Field, amount: float, side: float) -> Field:
+    means = field.means.copy()
+    means[:, 2] += (amount * bump(field.means, side)).astype(np.float32)
+    return replace(field, means=means)

@@ -1,0 +1,158 @@
+"""Where everything lies: the exemplar, a tile, its strips and corners, in cells of the finest ground grid.
+
+A tile of n x n cells shows nine pieces of the exemplar, its labels: the centre, half a strip along each side, and a
+quarter of the corner patch in each corner. A strip is centred on an edge: its right (upper) half lies in the tile to
+the right (above), its left (lower) half in the tile to the left (below), and the common corner patch is centred on
+the corners, so the exemplar goes on across every border. All places and half-widths are multiples of the coarsest
+level's cell, so the same patches are whole cells in every level.
+
+Arrays over cells are indexed [y, x], and **row 0 is the southern one**, as cell numbers grow to the north; pictures
+of maps have it at the bottom.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Int, Integer, UInt8
+from numpy import ndarray as Array
+
+from dav_gswt.errors import InputError
+
+LABELS = ("centre", "W", "E", "S", "N", "SW", "SE", "NW", "NE")  # a label's number is its index
+CENTRE, W, E, S, N, SW, SE, NW, NE = range(9)
+LEAST = 10  # blocks that a tile is wide at least: two corners, and something between them
+EDGES = 16  # tiles of one centre variant: two colours on each of four sides
+
+
+@dataclass(frozen=True)
+class Exemplar:
+    """A square of `cells` x `cells` ground cells of side `spacing`, from the corner (west, south), in world units."""
+
+    west: float
+    south: float
+    spacing: float
+    cells: int
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Sizes in finest cells; all but `levels` and `exemplar` are multiples of `block`.
+
+    side: of a tile. strip, corner: half-widths, strip < corner. block: the coarsest level's cell; the outermost `block`
+    cells of a tile always belong to its frame of strips and corners.
+    """
+
+    exemplar: int
+    levels: int
+    side: int
+    strip: int
+    corner: int
+
+    @property
+    def block(self) -> int:
+        return 2 ** (self.levels - 1)
+
+
+@dataclass(frozen=True)
+class Places:
+    """South-western cells (x, y) of the patches in the exemplar: a corner, two strips a direction, a centre a tile."""
+
+    corner: Int[Array, "2"]
+    vertical: Int[Array, "2 2"]
+    horizontal: Int[Array, "2 2"]
+    centres: Int[Array, "tiles 2"]
+
+
+def plan(exemplar: int, levels: int, share: float, strip: float) -> Layout:
+    """Sizes for an exemplar of `exemplar` cells: tiles `share` of it wide, strips `strip` of a tile to either side.
+
+    Args:   share: tile side as a share of the exemplar's side, in (0, 1]. strip: half-width as a share of the tile's
+    side.
+    Raises: InputError: the exemplar cannot hold a tile with that many levels; the message says how many it can.
+    """
+    block = 2 ** (levels - 1)
+    side = max(int(exemplar * share) // block, LEAST) * block
+    if side > exemplar:
+        fits = int(np.log2(exemplar / LEAST)) + 1 if exemplar >= LEAST else 0
+        advice = f"ask for at most {fits} levels, or " if fits else ""
+        raise InputError(
+            f"tiles: a tile with {levels} levels needs {side} ground cells a side and the exemplar has {exemplar}: "
+            f"{advice}use a finer quality or photos of a larger ground"
+        )
+    widest = side // 2 // block - 1  # of a corner, in blocks: a strip shows something between its two
+    half = min(max(2, round(side * strip / block)), widest - 1)
+    corner = min(half + max(1, half // 2), widest)
+    half, corner = half * block, corner * block
+    return Layout(exemplar, levels, side, half, corner)
+
+
+def colours(tile: int) -> tuple[int, int, int, int]:
+    """Edge colours (W, N, E, S) of a tile number 16 c + 8 W + 4 N + 2 E + S."""
+    return tile >> 3 & 1, tile >> 2 & 1, tile >> 1 & 1, tile & 1
+
+
+def offsets(layout: Layout, places: Places, tile: int) -> Int[Array, "9 2"]:
+    """What to add to a cell (x, y) of a tile to get the exemplar's cell that each label shows there."""
+    n, b, a = layout.side, layout.strip, layout.corner
+    west, north, east, south = colours(tile)
+    return np.array(
+        [
+            places.centres[tile],
+            places.vertical[west] + [b, 0],
+            places.vertical[east] + [b - n, 0],
+            places.horizontal[south] + [0, b],
+            places.horizontal[north] + [0, b - n],
+            places.corner + [a, a],
+            places.corner + [a - n, a],
+            places.corner + [a, a - n],
+            places.corner + [a - n, a - n],
+        ]
+    )
+
+
+def strip_shifts(layout: Layout, place: Int[Array, "2"], corner: Int[Array, "2"], upright: bool) -> Int[Array, "3 2"]:
+    """The same in a strip's own cells, for its labels 0 (strip), 1 and 2 (corner patch at its start and its end)."""
+    n, b, a = layout.side, layout.strip, layout.corner
+    ends = np.array([[a - b, a], [a - b, a - n]])
+    return np.concatenate([place[None], corner + (ends if upright else ends[:, ::-1])])
+
+
+def strip_labels(
+    layout: Layout, mask: Bool[Array, "h w"], place: Int[Array, "2"], corner: Int[Array, "2"], upright: bool
+) -> tuple[UInt8[Array, "h w"], Int[Array, "3 2"]]:
+    """A strip's label map and shifts, from where the corner patch lies in it."""
+    far = np.arange(layout.side) >= layout.side // 2
+    end = np.where(far, 2, 1)
+    return np.where(mask, end[:, None] if upright else end, 0).astype(np.uint8), strip_shifts(
+        layout, place, corner, upright
+    )
+
+
+def frame(
+    layout: Layout, vertical: Bool[Array, "2 side width"], horizontal: Bool[Array, "2 width side"], tile: int
+) -> UInt8[Array, "side side"]:
+    """Labels of a tile's frame, `strip` cells wide; the centre inside it.
+
+    vertical, horizontal: by edge colour, where the corner patch lies in a strip that is cut against it at both ends;
+    the first `strip` cells at each end are the corner's, so two strips never claim the same cell.
+    """
+    n, b = layout.side, layout.strip
+    west, north, east, south = colours(tile)
+    upper = np.arange(n) >= n // 2  # the farther of a strip's two corners
+    labels = np.full((n, n), CENTRE, np.uint8)
+    labels[:b] = np.where(horizontal[south][b:], np.where(upper, SE, SW), S)
+    labels[n - b :] = np.where(horizontal[north][:b], np.where(upper, NE, NW), N)
+    ends = slice(b, n - b)  # below and above lie the corner squares
+    rows = upper[ends, None]
+    labels[ends, :b] = np.where(vertical[west][ends, b:], np.where(rows, NW, SW), W)
+    labels[ends, n - b :] = np.where(vertical[east][ends, :b], np.where(rows, NE, SE), E)
+    return labels
+
+
+def sources(
+    labels: Integer[Array, "h w"], shift: Int[Array, "k 2"], cell: int = 1
+) -> tuple[Int[Array, "h w"], Int[Array, "h w"]]:
+    """Rows and columns of the exemplar's cells that a label map shows, on a grid whose cells are `cell` finest ones."""
+    y, x = np.mgrid[: labels.shape[0], : labels.shape[1]]
+    move = (shift // cell)[labels]
+    return y + move[..., 1], x + move[..., 0]

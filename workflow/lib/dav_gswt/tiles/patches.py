@@ -1,0 +1,145 @@
+"""Which places of the exemplar become patches: searched for cheap seams, sure ground and little repetition.
+
+Every search draws candidate places with the generator passed in, drops the doubtful ones where sure ones serve, and
+ranks the rest by the mean squared difference in the zone where the seam may run, in units of the candidates' median,
+plus a charge for showing ground that other patches show already.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray as Array
+from scipy.ndimage import gaussian_filter
+
+from dav_gswt.tiles.layout import Layout
+
+SURE = 0.05  # of mean uncertainty above the surest candidate's: still as good as sure
+REPEAT = 0.5  # charge for ground shown twice, a median seam's cost
+OUTLIER = 2.0  # times the mean squared distance from the median colour: more is no grain
+SAMPLES = 3000  # cells of a seam zone that are compared
+
+
+@dataclass(frozen=True)
+class Guide:
+    """What a search looks at, per finest cell of the exemplar: features to match, and uncertainty in [0, 1]."""
+
+    features: Float[Array, "m m k"]
+    uncertainty: Float[Array, "m m"]
+
+
+def guide(
+    colour: Float[Array, "m m 3"], height: Float[Array, "m m"], uncertainty: Float[Array, "m m"], layout: Layout
+) -> Guide:
+    """Features: colour, its average over a quarter strip (the eye finds a step of brightness before a broken grain),
+    and height over its own spread, as much as one channel of colour.
+    """
+    width = layout.strip / 4
+    soft = np.stack([gaussian_filter(colour[..., c], width, mode="nearest") for c in range(3)], -1)
+    spread = float(colour.std(axis=(0, 1)).mean())
+    relief = height - gaussian_filter(height, layout.side / 3, mode="nearest")
+    height = relief * (spread / (relief.std() or 1.0))
+    return Guide(np.concatenate([colour, 2 * soft, height[..., None]], -1), uncertainty)
+
+
+def candidates(layout: Layout, size: tuple[int, int], count: int, rng: np.random.Generator) -> Int[Array, "n 2"]:
+    """At most `count` different places (x, y) for a patch of `size` (width, height) cells, on the coarsest grid."""
+    columns, rows = ((layout.exemplar - s) // layout.block + 1 for s in size)
+    pick = rng.permutation(columns * rows)[:count] if columns * rows > count else np.arange(columns * rows)
+    return np.stack([pick % columns, pick // columns], 1) * layout.block
+
+
+def means(values: Float[Array, "m m"], places: Int[Array, "n 2"], size: tuple[int, int]) -> Float[Array, "n"]:
+    """Mean of a map over a patch of `size` at each place."""
+    total = np.zeros((values.shape[0] + 1, values.shape[1] + 1))
+    total[1:, 1:] = values.cumsum(0).cumsum(1)
+    x, y = places.T
+    width, height = size
+    box = total[y + height, x + width] - total[y, x + width] - total[y + height, x] + total[y, x]
+    return box / (width * height)
+
+
+def sure(guide: Guide, places: Int[Array, "n 2"], size: tuple[int, int]) -> Int[Array, "m 2"]:
+    """The places that are about as sure as the surest of them."""
+    doubt = means(guide.uncertainty, places, size)
+    return places[doubt <= doubt.min() + SURE]
+
+
+def overlap(
+    places: Int[Array, "n 2"], size: tuple[int, int], other: Int[Array, "2"], other_size: tuple[int, int]
+) -> Float[Array, "n"]:
+    """Ground that patches share with another one, as a share of the smaller of the two."""
+    low, high = np.maximum(places, other), np.minimum(places + size, np.asarray(other) + other_size)
+    return np.maximum(high - low, 0).prod(1) / min(np.prod(size), np.prod(other_size))
+
+
+def oddness(guide: Guide) -> Float[Array, "m m"]:
+    """How far each cell is from what is everywhere.
+
+    The squared distance of its soft colour from the median one, over that distance's mean, plus a quarter of its
+    square: one conspicuous bush weighs more than many pale shades. Grain does not count (among trees the blandest
+    ground is more trees, not the one bare spot) but for what is beyond OUTLIER times its mean: a white twig is a
+    landmark.
+    """
+
+    def away(values: Array) -> Array:
+        distance = ((values - np.median(values, axis=(0, 1))) ** 2).sum(-1)
+        return distance / (distance.mean() or 1.0)
+
+    grain, soft = away(guide.features[..., :3]), away(guide.features[..., 3:6])
+    return soft + 0.25 * soft**2 + 0.25 * np.maximum(grain - OUTLIER, 0) ** 2
+
+
+def blandest(guide: Guide, layout: Layout) -> Int[Array, "2"]:
+    """Place of the corner patch: it comes back at every corner, so it should show no landmark.
+
+    Every place on the coarsest grid is tried; of equal ones the most south-western.
+    """
+    size = (2 * layout.corner, 2 * layout.corner)
+    places = sure(guide, candidates(layout, size, layout.exemplar**2, np.random.default_rng(0)), size)
+    return places[np.argmin(means(oddness(guide), places, size))]
+
+
+def mismatch(
+    guide: Guide, zone: tuple[Array, Array], shown: tuple[Array, Array], places: Int[Array, "n 2"]
+) -> Float[Array, "n"]:
+    """What a seam against a patch at each place would cost at least: the squared feature difference, at its smallest
+    along each of many lines that the seam has to cross, in the mean over the lines.
+
+    A shrub that fills a line from end to end is dear, one that the seam can go around is not.
+    zone: cells (y, x) of the lines, [line, cell], in the patch's own coordinates. shown: the exemplar's cells (y, x)
+    that lie there now.
+    """
+    step = max(1, zone[0].size // SAMPLES)
+    y, x = (v[::step] for v in zone)
+    there = guide.features[shown[0][::step], shown[1][::step]]
+    away = [((guide.features[y + py, x + px] - there) ** 2).sum(-1).min(1).mean() for px, py in places]
+    return np.array(away)
+
+
+def relative(cost: Float[Array, "n"]) -> Float[Array, "n"]:
+    """Costs in units of their median; unchanged if that is 0."""
+    middle = np.median(cost)
+    return cost / middle if middle > 0 else cost
+
+
+def ranked(
+    places: Int[Array, "n 2"],
+    cost: Float[Array, "n"],
+    size: tuple[int, int],
+    used: list[tuple[Array, tuple[int, int]]],
+    taken: Int[Array, "k 2"],
+) -> Int[Array, "n 2"]:
+    """Candidate places from best to worst.
+
+    cost: relative. used: patches (place, size) seen beside this one. taken: places of this patch's siblings: nearly the
+    same place again is worth nothing.
+    """
+    score = cost.copy()
+    for place, other in used:
+        score += REPEAT * overlap(places, size, place, other)
+    for place in taken:
+        score += REPEAT * overlap(places, size, place, size) / len(taken)
+        near = np.abs(places - place).max(1) / (0.25 * min(size))
+        score += 10 * REPEAT * np.maximum(0, 1 - near)
+    return places[np.argsort(score, kind="stable")]

@@ -1,0 +1,80 @@
+"""A tile set on disk: lod{l}_tile_{TT}.ply and labels.npz in one folder, seams.json beside it.
+
+seams.json is written last and names the counts: whoever finds it finds the whole set.
+"""
+
+import shutil
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from dav_gswt import field
+from dav_gswt.errors import InputError
+from dav_gswt.files import read_json, write_json
+from dav_gswt.logs import progress
+from dav_gswt.tiles.build import TileSet
+
+STAMP = (1980, 1, 1, 0, 0, 0)  # NumPy's own npz carries no better time either
+
+
+def name(level: int, tile: int) -> str:
+    return f"lod{level}_tile_{tile:02d}.ply"
+
+
+def write(tiles: TileSet, folder: Path | str, seams: Path | str, provenance: dict) -> None:
+    """Write the set; `folder` and `seams` appear whole or not at all, the folder first."""
+    folder, seams = Path(folder), Path(seams)
+    part = folder.with_name(f".{folder.name}.part")
+    shutil.rmtree(part, ignore_errors=True)
+    part.mkdir(parents=True)
+    try:
+        for level, fields in enumerate(tiles.fields):
+            for tile, splats in enumerate(progress(fields, f"write tiles of level {level}")):
+                field.write(splats, part / name(level, tile))
+        _write_npz(part / "labels.npz", labels=tiles.labels, shifts=tiles.shifts)
+        seams.unlink(missing_ok=True)
+        if folder.exists():
+            shutil.rmtree(folder)
+        part.replace(folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    table = {
+        "side": tiles.side,
+        "spacing": tiles.spacing,
+        "levels": len(tiles.fields),
+        "tiles": len(tiles.labels),
+        "uncertainty": tiles.uncertainty.tolist(),
+        "counts": [[len(f) for f in fields] for fields in tiles.fields],
+    }
+    write_json(seams, table | {"seams": tiles.seams, "provenance": provenance})
+
+
+def read(folder: Path | str, seams: Path | str) -> TileSet:
+    """Read what `write` wrote. Raises: InputError: a file is missing or not what seams.json says."""
+    folder, table = Path(folder), read_json(seams)
+    try:
+        levels, count = table["levels"], table["tiles"]
+        values = table["side"], table["spacing"], np.array(table["uncertainty"]), table["seams"], table["counts"]
+    except (KeyError, TypeError) as error:
+        raise InputError(f"{seams}: {error} is missing; cut the tiles again") from None
+    side, spacing, uncertainty, chosen, counts = values
+    fields = [[field.read(folder / name(level, tile)) for tile in range(count)] for level in range(levels)]
+    if [[len(f) for f in level] for level in fields] != counts:
+        raise InputError(f"{folder}: the tiles are not those that {seams} tells of; cut them again")
+    try:
+        with np.load(folder / "labels.npz", allow_pickle=False) as arrays:
+            labels, shifts = arrays["labels"], arrays["shifts"]
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise InputError(f"{folder / 'labels.npz'}: not readable ({error}); cut the tiles again") from error
+    return TileSet(side, spacing, fields, labels, shifts, uncertainty, chosen)
+
+
+def _write_npz(path: Path, **arrays) -> None:
+    """Like np.savez_compressed, but the same arrays give the same bytes at any time of day."""
+    with zipfile.ZipFile(path, "w") as archive:
+        for key, value in arrays.items():
+            entry = zipfile.ZipInfo(f"{key}.npy", STAMP)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            with archive.open(entry, "w", force_zip64=True) as file:
+                np.lib.format.write_array(file, value, allow_pickle=False)

@@ -1,0 +1,109 @@
+"""Large-scale trends of brightness and height, taken out of an exemplar so that its tiles repeat without a pattern.
+
+The trend is a low-pass over the ground: a plane, and a Gaussian average of what is left. The average is robust, since
+a shrub or a boulder is a thing to keep, not a trend: cells far from their surroundings' mean lose weight and it is
+taken again.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray as Array
+from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.spatial.transform import Rotation
+
+from dav_gswt.field import SH0, Field
+from dav_gswt.tiles.layout import Exemplar
+
+ROUNDS = 3  # of reweighting
+STEEP = 0.01  # slope of a trend below which a Gaussian's shape is left alone
+
+
+@dataclass(frozen=True)
+class Trend:
+    """Maps over the exemplar's finest cells, row 0 in the south: what to subtract from colours and heights (mean
+    kept).
+    """
+
+    exemplar: Exemplar
+    colour: Float[Array, "m m 3"]
+    height: Float[Array, "m m"]
+
+    def at(self, points: Float[Array, "n d"]) -> tuple[Float[Array, "n 3"], Float[Array, "n"], Float[Array, "n 2"]]:
+        """Colour, height and the height's slopes (east, north) at points, bilinear; beyond the border its value goes
+        on.
+        """
+        step = self.exemplar.spacing
+        row = (points[:, 1] - self.exemplar.south) / step - 0.5
+        column = (points[:, 0] - self.exemplar.west) / step - 0.5
+
+        def sample(values: Array) -> Array:
+            return map_coordinates(values, [row, column], order=1, mode="nearest")
+
+        north, east = np.gradient(self.height, step)
+        colour = np.stack([sample(self.colour[..., c]) for c in range(3)], 1)
+        return colour, sample(self.height), np.stack([sample(east), sample(north)], 1)
+
+
+def low_pass(values: Float[Array, "m m"], known: Bool[Array, "m m"], width: float) -> Float[Array, "m m"]:
+    """Plane plus robust Gaussian average (standard deviation `width` cells) of the known cells.
+
+    The plane carries a slope right to the border, where a one-sided average would flatten it. Weights are
+    1 / (1 + (r / scale)^2), r the distance from the last average and scale twice its root mean square (all are kept
+    if it is 0). A value that is the same everywhere is its own trend.
+    """
+    rows, columns = values.shape
+    y, x = np.mgrid[-1 : 1 : rows * 1j, -1 : 1 : columns * 1j]
+    base = np.stack([np.ones(values.size), x.ravel(), y.ravel()], 1)
+    plane = (base @ np.linalg.lstsq(base[known.ravel()], values[known], rcond=None)[0]).reshape(values.shape)
+    rest = np.where(known, values - plane, 0)
+    weight, mean = known.astype(float), np.zeros_like(rest)
+    for _ in range(ROUNDS):
+        mass = gaussian_filter(weight, width, mode="constant", truncate=3.0)
+        mean = gaussian_filter(weight * rest, width, mode="constant", truncate=3.0) / np.maximum(mass, 1e-12)
+        away = np.where(known, rest - mean, 0)
+        scale = 2 * np.sqrt((away**2).sum() / known.sum())
+        weight = known / (1 + (away / scale) ** 2) if scale > 0 else known.astype(float)
+    return plane + mean
+
+
+def trend_of(colour: Float[Array, "m m 3"], height: Float[Array, "m m"], exemplar: Exemplar, width: float) -> Trend:
+    """The trend of an exemplar from its maps; NaN where a map knows nothing. Each part's mean is left to the field."""
+    parts = []
+    for values in (*np.moveaxis(colour, -1, 0), height):
+        known = np.isfinite(values)
+        trend = (
+            low_pass(np.where(known, values, 0).astype(float), known, width) if known.any() else np.zeros_like(values)
+        )
+        parts.append(trend - trend.mean())
+    return Trend(exemplar, np.stack(parts[:3], -1), parts[3])
+
+
+def detrended(field: Field, trend: Trend) -> Field:
+    """The field without the trend: ground and what stands on it move and change colour alike; local relief stays.
+
+    Gaussians follow the slope that is taken out (z' = z - h(x, y) shears their covariance), so that discs stay closed.
+    """
+    colour, height, slope = trend.at(field.means.astype(float))
+    sh = field.sh.copy()
+    sh[:, 0] -= (colour / SH0).astype(np.float32)
+    means = field.means.copy()
+    means[:, 2] -= height.astype(np.float32)
+    return sheared(replace(field, means=means, sh=sh), -slope)
+
+
+def sheared(field: Field, slope: Float[Array, "n 2"]) -> Field:
+    """Covariances under z' = z + slope . (x, y), for the Gaussians whose slope matters (STEEP)."""
+    steep = np.flatnonzero(np.linalg.norm(slope, axis=1) > STEEP)
+    if not len(steep):
+        return field
+    axes = Rotation.from_quat(field.quats[steep].astype(float), scalar_first=True).as_matrix()
+    half = axes * np.exp(field.log_scales[steep].astype(float))[:, None, :]
+    half[:, 2] += np.einsum("nk,nkj->nj", slope[steep], half[:, :2])
+    axes, size, _ = np.linalg.svd(half)  # of the root, not of the covariance: thin discs keep their thickness
+    axes[np.linalg.det(axes) < 0, :, 2] *= -1
+    log_scales, quats = field.log_scales.copy(), field.quats.copy()
+    log_scales[steep] = np.log(np.maximum(size, 1e-12))
+    quats[steep] = Rotation.from_matrix(axes).as_quat(scalar_first=True)
+    return replace(field, log_scales=log_scales, quats=quats)
