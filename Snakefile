@@ -46,4 +46,5 @@ wildcard_constraints:
 rule all:
     default_target: True
     input:
-        terrains(),
+        terrain_of(config["scene"]),
+        study_of(config["scene"]),

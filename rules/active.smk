@@ -116,7 +116,7 @@ rule capture_views:
     threads: 2
     params:
         scene=entry("scenes", "scene"),
-        source=source_of("active/capture", "photos/synthetic"),
+        source=source_of("active/agents", "active/candidates", "active/capture", "photos"),
     script:
         "../scripts/capture_views.py"
 

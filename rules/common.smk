@@ -79,10 +79,10 @@ def scenes_of(kind):
     return "|".join(n for n, s in config["scenes"].items() if s["kind"] == kind) or NEVER
 
 
-def terrain_of(scene, **axes):
-    """What a scene's terrain is made of: page and stills, at the config's parameters with axes laid over."""
+def values_of(scene):
+    """The wildcards of what is made of a scene at the config's parameters."""
     given = config["scenes"][scene]["kind"] == "field"
-    values = dict(
+    return dict(
         scene=scene,
         seed=config["seeds"],
         quality=config["scenes"][scene]["quality"],
@@ -95,11 +95,25 @@ def terrain_of(scene, **axes):
         seam=config["seam"],
         tau=spell(config["tau"]),
     )
-    return expand(rules.make_page.output.page + rules.render_terrain.output.stills, **(values | axes))
 
 
-def terrains():
-    return terrain_of(config["scene"])
+def terrain_of(scene):
+    """A scene's terrain: page and stills."""
+    return expand([rules.make_page.output.page, *rules.render_terrain.output.stills], **values_of(scene))
+
+
+def study_of(scene):
+    """What is known of each round: how well it shows the test photos, and what the last one is not sure of."""
+    if config["scenes"][scene]["kind"] == "field":
+        return []
+    values = values_of(scene)
+    rounds = [rules.evaluate_round.output.metrics] * bool(config["rounds"])
+    scored = rules.score_round.output if config["rounds"] else rules.score_coarse.output
+    return (
+        expand(rules.evaluate_coarse.output.metrics, **values)
+        + expand(rounds, **(values | {"t": range(1, config["rounds"] + 1)}))
+        + expand(list(scored), **values)
+    )
 
 
 def folder_of(scene):

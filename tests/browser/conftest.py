@@ -24,9 +24,9 @@ def chromium():
 def page_of(tmp_path_factory):
     """Make the page folder of a made-up ground."""
 
-    def make(ground: made_up.Ground) -> Path:
+    def make(ground: made_up.Ground, rows_of=None) -> Path:
         folder = tmp_path_factory.mktemp("page")
-        made_up.write_bundle(folder / "bundle", ground)
+        made_up.write_bundle(folder / "bundle", ground, rows_of)
         write_page(folder / "bundle", VIEWER, folder / "page")
         return folder / "page"
 

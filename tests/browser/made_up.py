@@ -41,10 +41,13 @@ def directions() -> Float[Array, "9 3"]:
     return listed / np.linalg.norm(listed, axis=1, keepdims=True)
 
 
-def write_bundle(folder: Path, ground: Ground) -> dict:
-    """Write davgswt.json and chunks/ of a made-up ground; returns the manifest."""
+def write_bundle(folder: Path, ground: Ground, rows_of=None) -> dict:
+    """Write davgswt.json and chunks/ of a made-up ground; returns the manifest.
+
+    `rows_of(ground, tile, level)` gives a chunk's records (default: `discs`).
+    """
     (folder / "chunks").mkdir(parents=True)
-    tiles = [_tile(folder, ground, tile) for tile in range(16 * ground.variants)]
+    tiles = [_tile(folder, ground, tile, rows_of or discs) for tile in range(16 * ground.variants)]
     spacing = ground.side / ground.discs
     levels = [
         {"level": lv, "mean_scale": spacing * 2**lv, "distance": 2 * ground.side * 2**lv, "band": 0.1 * ground.side}
@@ -69,10 +72,10 @@ def write_bundle(folder: Path, ground: Ground) -> dict:
     return manifest
 
 
-def _tile(folder: Path, ground: Ground, tile: int) -> dict:
+def _tile(folder: Path, ground: Ground, tile: int, rows_of) -> dict:
     chunks = []
     for level in range(ground.levels):
-        rows = _discs(ground, tile, level)
+        rows = rows_of(ground, tile, level)
         along = rows["position"] @ directions().T
         orders = np.argsort(-along, axis=0, kind="stable").T.astype("<u4")
         data = rows.tobytes() + orders.tobytes()
@@ -91,7 +94,7 @@ def _tile(folder: Path, ground: Ground, tile: int) -> dict:
     return {"tile": tile, "uncertainty": 0.0, "z": [0.0, 0.3 if ground.things else 0.0], "chunks": chunks}
 
 
-def _discs(ground: Ground, tile: int, level: int) -> Array:
+def discs(ground: Ground, tile: int, level: int) -> Array:
     """Overlapping flat discs on the grid of a level, and upright blobs among them."""
     random = np.random.default_rng([tile, level])
     n = ground.discs >> level

@@ -67,7 +67,8 @@ def test_merging_one_gaussian_gives_it_back():
 
 def test_merged_moments_are_those_of_the_mixture():
     a = things(2)
-    a = replace(a, means=np.array([[0.1, 0, 0], [0.3, 0, 0]], np.float32), quats=np.tile([1, 0, 0, 0], (2, 1)).astype("f4"))
+    upright = np.tile(np.array([1, 0, 0, 0], np.float32), (2, 1))
+    a = replace(a, means=np.array([[0.1, 0, 0], [0.3, 0, 0]], np.float32), quats=upright)
     a = replace(a, log_scales=np.full((2, 3), np.log(0.05), np.float32), opacity_logits=np.zeros(2, np.float32))
     back = merge.merged(a, voxel=1.0)
     np.testing.assert_allclose(back.means, [[0.2, 0, 0]], atol=1e-6)

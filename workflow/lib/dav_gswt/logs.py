@@ -11,6 +11,13 @@ from dav_gswt.errors import InputError
 _log = logging.getLogger("dav_gswt")
 
 
+class _Short(logging.Formatter):
+    """The message alone: the traceback is in the log file, and Python prints it anyway."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return f"  {record.getMessage()}"
+
+
 @contextmanager
 def logging_to(path):
     """Send messages, warnings and the traceback of a script to `path`, and a short form to the terminal.
@@ -20,8 +27,8 @@ def logging_to(path):
     file = logging.FileHandler(path, mode="w", encoding="utf-8")
     file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     terminal = logging.StreamHandler(sys.stderr)
-    terminal.setFormatter(logging.Formatter("  %(message)s"))
-    logging.basicConfig(level=logging.INFO, handlers=[file, terminal], force=True)
+    terminal.setFormatter(_Short())
+    logging.basicConfig(level=logging.INFO, handlers=[terminal, file], force=True)
     logging.captureWarnings(True)
     try:
         yield

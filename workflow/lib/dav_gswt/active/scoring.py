@@ -40,7 +40,7 @@ def score(
 def parts(
     field: Field, grid: Ground, scored: list[Scored], maps: dict[str, Float32[Array, "h w"]], others: int = 16
 ) -> dict[str, tuple[dict[str, Array], dict[str, str]]]:
-    """The maps to keep, as parts of an EXR: the ground from above (north on top), and candidates evenly over the ranking.
+    """The maps to keep, as parts of an EXR: the ground from above, and candidates evenly over the ranking.
 
     Each part's header says which pose it is of.
     """

@@ -24,8 +24,8 @@ def with_uncertainty(field: Field, views: list[View]) -> Field:
     raster = cpu.Rasterizer()
     for view in views:
         seen = raster.forward(**arrays(field), camera=view.camera)
-        maps = np.stack([view.weight * seen.alpha, view.weight, 0 * view.weight], -1)
-        opaque, weight, _ = raster.carried(np.ascontiguousarray(maps, np.float32)).T
+        maps = np.stack([view.weight * seen.alpha, view.weight], -1).astype(np.float32)
+        opaque, weight = raster.contributions(maps).mapped.T
         share = np.where(weight > SEEN, opaque / np.maximum(weight, SEEN), 0)
         known = np.maximum(known, share)
     return replace(field, uncertainty=np.clip(1 - known, 0, 1).astype(np.float32))
@@ -33,16 +33,16 @@ def with_uncertainty(field: Field, views: list[View]) -> Field:
 
 def uncertainty_map(field: Field, camera: Camera, raster: cpu.Rasterizer) -> Float32[Array, "h w"]:
     """Per pixel: blend-weighted uncertainty of what is seen, plus the transmittance (nothing at all is known there)."""
-    seen = raster.forward(**(arrays(field) | {"colours": field.uncertainty[:, None]}), camera=camera)
+    seen = raster.forward(**arrays(field, field.uncertainty[:, None]), camera=camera)
     return np.clip(seen.colour[..., 0] + 1 - seen.alpha, 0, 1)
 
 
-def arrays(field: Field) -> dict[str, Float[Array, "..."]]:
-    """A field's arrays as the rasterizer takes them."""
+def arrays(field: Field, colours: Float32[Array, "n c"] | None = None) -> dict[str, Float[Array, "..."]]:
+    """A field's arrays as the rasterizer takes them; colours: something else to draw than its base colours."""
     return {
         "means": field.means,
         "log_scales": field.log_scales,
         "quats": field.quats,
         "opacity_logits": field.opacity_logits,
-        "colours": np.ascontiguousarray(field.base_colours, np.float32),
+        "colours": np.ascontiguousarray(field.base_colours if colours is None else colours, np.float32),
     }

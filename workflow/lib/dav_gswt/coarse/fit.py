@@ -76,7 +76,7 @@ def _gradients(raster: cpu.Rasterizer, values: dict[str, Array], view: View, beh
     seen = raster.forward(**values, camera=view.camera)
     clear = (1 - seen.alpha)[..., None]
     image = seen.colour + clear * behind
-    _, grad = raster.loss(image, view.image, view.weight, STRUCTURE)
+    _, grad = cpu.loss(image, view.image, view.weight, STRUCTURE)
     return raster.backward(grad, -BACKDROP * (grad @ behind))
 
 

@@ -36,7 +36,7 @@ def from_above(field: Field, grid: Ground) -> Maps:
     camera = cameras.top_down(grid.west, grid.south, columns, rows, grid.spacing, top)
     raster = cpu.Rasterizer()
     seen = raster.forward(**arrays(field), camera=camera)
-    doubt = raster.forward(**(arrays(field) | {"colours": field.uncertainty[:, None]}), camera=camera)
+    doubt = raster.forward(**arrays(field, field.uncertainty[:, None]), camera=camera)
     solid = np.maximum(seen.alpha, 1e-6)
     maps = Maps(
         seen.colour / solid[..., None],

@@ -1,4 +1,4 @@
-"""A synthetic scene as a set of photos: start and test views rendered, and points triangulated from their exact poses."""
+"""A synthetic scene as photos: start and test views rendered, and points triangulated from their exact poses."""
 
 import tempfile
 from dataclasses import replace

@@ -58,7 +58,10 @@ class Scene:
 
 
 def make(family: str, seed: int, **options) -> Scene:
-    """A scene of a family. Raises: InputError: an unknown family, a negative seed, or an option that the family refuses."""
+    """A scene of a family.
+
+    Raises: InputError: an unknown family, a negative seed, or an option that the family refuses.
+    """
     if family not in FAMILIES:
         raise InputError(f"there is no synthetic family {family!r}; choose from {', '.join(FAMILIES)}")
     if seed < 0:

@@ -18,7 +18,10 @@ ROCK = np.array([[0.36, 0.28, 0.20], [0.22, 0.17, 0.13], [0.50, 0.40, 0.29], [0.
 
 @dataclass(frozen=True)
 class Mesh:
-    """Triangles; a colour a vertex, or none where a texture gives it. smooth: shaded with normals averaged over the faces that share a vertex."""
+    """Triangles; a colour a vertex, or none where a texture gives it.
+
+    smooth: shaded with normals averaged over the faces that share a vertex.
+    """
 
     vertices: Float32[Array, "v 3"]
     faces: Int[Array, "f 3"]

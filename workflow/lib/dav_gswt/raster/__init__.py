@@ -22,7 +22,7 @@ BACKENDS = ("cpu", "torch")
 def render(
     field: Field,
     camera: Camera,
-    background: Float[Array, "c"] | tuple[float, ...] = (0.0, 0.0, 0.0),
+    background: float | tuple[float | int, ...] | Float[Array, "c"] = 0.0,
     colours: Float[Array, "n c"] | None = None,
     backend: str = "cpu",
     threads: int | None = None,
@@ -47,10 +47,7 @@ def render(
     else:
         oracle = importlib.import_module("dav_gswt.raster.torch")  # only who asks for it waits for torch
         seen = oracle.rendered(*arrays, camera=camera, near=near, dilation=dilation)
-    behind = np.asarray(background, np.float32)
-    if behind.ndim > 1 or behind.size not in (1, seen.colour.shape[2]):
-        # black is the default for any number of channels
-        if behind.any() or background != (0.0, 0.0, 0.0):
-            raise ValueError(f"background has shape {behind.shape}, but the colours have {seen.colour.shape[2]} channels")
-        behind = np.zeros(1, np.float32)
+    behind, channels = np.asarray(background, np.float32), seen.colour.shape[2]
+    if behind.shape not in ((), (channels,)):
+        raise ValueError(f"background must have one value or {channels}, one a channel, not {behind.size}")
     return Rendering(seen.colour + (1 - seen.alpha)[..., None] * behind, seen.alpha, seen.depth)

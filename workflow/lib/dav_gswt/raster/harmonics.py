@@ -8,7 +8,7 @@ from dav_gswt.cameras import Camera
 
 
 def directions(means: Float[Array, "n 3"], camera: Camera) -> Float[Array, "n 3"]:
-    """Unit directions in which the camera looks at the Gaussians; that of a Gaussian in the camera's centre is forward."""
+    """Unit directions in which the camera sees the Gaussians; forward for one in the camera's very centre."""
     if camera.orthographic:
         return np.broadcast_to(camera.forward, (len(means), 3))
     to = means - camera.centre

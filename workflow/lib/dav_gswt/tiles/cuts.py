@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
-EPS = 0.1  # of the mean gradient: flat ground is not infinitely dear, and nothing is divided by zero
+EPS = 1.0  # of the mean gradient: with less, a cut through a bush (steep everywhere) is as cheap as one through sand
 QUANTA = 2.0**32  # capacities are whole numbers, the largest this big: the flow is exact and order-independent
 
 
@@ -100,7 +100,7 @@ def cut(
         flow += graph.maxflow()
         labels[node >= 0] = graph.get_grid_segments(nodes)
     cost = int(right[labels[:, 1:] != labels[:, :-1]].sum() + upper[labels[1:] != labels[:-1]].sum())
-    return Cut(labels, cost / unit, int(flow), cost)
+    return Cut(labels, float(cost / unit), int(flow), cost)
 
 
 def _to(terminal: int, tails: Array, heads: Array, costs: Array, free: int) -> Array:

@@ -117,6 +117,10 @@ def _centres(sketch: Sketch, places: Places, masks: list, rng) -> list[tuple[Arr
         beside += [(places.horizontal[c], (n, 2 * b)) for c in sorted({south, north})]
         taken = np.array([place for place, *_ in found], int).reshape(-1, 2)
         order = patches.ranked(choice, cost, size, beside, taken)
+        variants = {
+            tuple(place) for place, *_ in found[tile % EDGES :: EDGES]
+        }  # of the same edges: a centre of its own
+        order = np.array([place for place in order if tuple(place) not in variants] or order)
         place, seam = _best(sketch, shown, order, keep, take)
         found.append((place, np.where(seam.labels, CENTRE, around).astype(np.uint8), seam.energy))
     return found

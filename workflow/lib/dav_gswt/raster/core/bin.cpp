@@ -9,8 +9,10 @@ namespace raster {
 
 namespace {
 
-int clamped_floor(float v, int low, int high) {  // no NaN gets here: such splats are not drawn
-  v = std::min(std::max(v, float(low)), float(high));
+constexpr float FLAT = 1e-16f;  // a conic below this is constant over any picture, and its ratios mean nothing
+
+int clamped_floor(float v, int low, int high) {  // NaN gives low
+  v = std::min(float(high), std::max(float(low), v));
   const int truncated = int(v);
   return truncated - (v < truncated);
 }
@@ -34,7 +36,7 @@ template <class F> void each_tile(const Splat& s, int columns, int rows, F f) {
   const Range down(s.y - s.half_y, s.y + s.half_y, rows);
   const Range across(s.x - s.half_x, s.x + s.half_x, columns);
   if (across.first > across.last) return;
-  if (down.first == down.last || across.first == across.last) {
+  if (down.first == down.last || across.first == across.last || s.xx > -FLAT || s.yy > -FLAT) {
     for (int row = down.first; row <= down.last; row++)
       for (int column = across.first; column <= across.last; column++) f(row * columns + column);
     return;

@@ -207,8 +207,9 @@ static inline Three unplace(const Chain& c, const View& view, Lanes dx, Lanes dy
     const Lanes dslope_y = where(c.bound_y == c.slope_y, -c.jyy * djyz);
     camera_x += dslope_x * c.per_z;
     camera_y += dslope_y * c.per_z;
-    camera_z -= c.per_z * (c.jxx * djxx + c.jxz * djxz + c.jyy * djyy + c.jyz * djyz + c.slope_x * (c.jxx * dx + dslope_x) +
-                           c.slope_y * (c.jyy * dy + dslope_y));
+    const Lanes along_x = view.fx * dx + dslope_x, along_y = view.fy * dy + dslope_y;
+    camera_z -= c.per_z * (c.jxx * djxx + c.jxz * djxz + c.jyy * djyy + c.jyz * djyz + c.slope_x * along_x +
+                           c.slope_y * along_y);
   }
   Three out;
   for (int k = 0; k < 3; k++) out[k] = r[k] * camera_x + r[3 + k] * camera_y + r[6 + k] * camera_z;

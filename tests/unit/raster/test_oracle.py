@@ -1,0 +1,79 @@
+"""The core against the float64 oracle. Tolerances: some hundred float32 roundings a pixel (6e-8 each), 1e-5."""
+
+import numpy as np
+import pytest
+from raster_scenes import CAMERAS, NAMES, gaussians, image_gradients, oracle_answers, relative
+
+from dav_gswt.raster import cpu
+
+
+@pytest.mark.parametrize("view", CAMERAS)
+def test_images_and_gradients_are_the_oracles(raster, view):
+    arrays, camera = gaussians(300), CAMERAS[view]
+    gradients = image_gradients(camera, 3)
+    images, wanted = oracle_answers(arrays, camera, gradients)
+    seen = raster.forward(**arrays, camera=camera)
+    for found, image in zip((seen.colour, seen.alpha, seen.depth), images, strict=True):
+        np.testing.assert_allclose(found, image, atol=2e-5 * max(1, image.max()))
+    found = raster.backward(*gradients)
+    for name in NAMES:
+        assert relative(getattr(found, name), wanted[name]) < 1e-5, name
+
+
+@pytest.mark.parametrize("channels", [1, 2, 4, 5, 9])
+def test_any_number_of_channels_is_drawn_and_taken_back(raster, channels):
+    arrays, camera = gaussians(120, channels=channels), CAMERAS["pinhole"]
+    gradients = image_gradients(camera, channels)
+    images, wanted = oracle_answers(arrays, camera, gradients)
+    seen = raster.forward(**arrays, camera=camera)
+    for found, image in zip((seen.colour, seen.alpha, seen.depth), images, strict=True):
+        np.testing.assert_allclose(found, image, atol=2e-5 * max(1, image.max()))
+    found = raster.backward(*gradients)
+    for name in NAMES:
+        assert relative(getattr(found, name), wanted[name]) < 1e-5, name
+
+
+@pytest.mark.parametrize("given", [(True, False, False), (True, True, False), (True, False, True)])
+def test_a_gradient_left_out_counts_as_zero(given):
+    arrays, camera = gaussians(100), CAMERAS["pinhole"]
+    gradients = [g if ok else None for g, ok in zip(image_gradients(camera, 3), given, strict=True)]
+    _, wanted = oracle_answers(arrays, camera, gradients)
+    raster = cpu.Rasterizer()
+    raster.forward(**arrays, camera=camera)
+    found = raster.backward(*gradients)
+    for name in NAMES:
+        assert relative(getattr(found, name), wanted[name]) < 1e-5, name
+
+
+@pytest.mark.parametrize("scale, tolerance", [(1e-12, 1e-5), (1e6, 1e-5)])
+def test_scales_far_out_are_drawn_as_the_oracle_draws_them(raster, scale, tolerance):
+    arrays, camera = gaussians(60), CAMERAS["pinhole"]
+    arrays["log_scales"] += np.float32(np.log(scale)) - arrays["log_scales"].mean()
+    (colour, alpha, _), wanted = oracle_answers(arrays, camera, image_gradients(camera, 3))
+    seen = raster.forward(**arrays, camera=camera)
+    np.testing.assert_allclose(seen.colour, colour, atol=tolerance)
+    np.testing.assert_allclose(seen.alpha, alpha, atol=tolerance)
+    found = raster.backward(*image_gradients(camera, 3))
+    for name in ("colours", "opacity_logits"):
+        assert relative(getattr(found, name), wanted[name]) < 1e-4, name
+
+
+def test_a_needle_keeps_its_digits(raster):
+    """Along a needle terms of some 1e4 cancel in the exponent: 1e-7 of them is 1e-3 of alpha."""
+    arrays, camera = gaussians(40), CAMERAS["pinhole"]
+    arrays["log_scales"][:] = np.log([[1e3, 1e-3, 1e-3]])
+    gradients = image_gradients(camera, 3)
+    (colour, _, _), wanted = oracle_answers(arrays, camera, gradients)
+    seen = raster.forward(**arrays, camera=camera)
+    assert relative(seen.colour, colour) < 1e-3
+    found = raster.backward(*gradients)
+    for name in NAMES:
+        assert relative(getattr(found, name), wanted[name]) < 1e-2, name
+
+
+def test_the_dilation_is_the_variance_added_on_the_screen(raster, isa):
+    arrays, camera = gaussians(60), CAMERAS["pinhole"]
+    (colour, _, _), _ = oracle_answers(arrays, camera, image_gradients(camera, 3), dilation=2.0)
+    wide = cpu.Rasterizer(dilation=2.0, instruction_set=isa).forward(**arrays, camera=camera)
+    np.testing.assert_allclose(wide.colour, colour, atol=1e-5)
+    assert np.abs(raster.forward(**arrays, camera=camera).colour - wide.colour).max() > 0.01

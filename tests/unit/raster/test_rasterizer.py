@@ -1,0 +1,296 @@
+"""What one splat looks like, what may not matter, and the extremes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from raster_scenes import CAMERAS, NAMES, gaussians, image_gradients, map_camera, one, taken, together
+
+from dav_gswt import cameras
+from dav_gswt.raster import cpu
+
+
+def images_of(seen: cpu.Rendering) -> tuple[np.ndarray, ...]:
+    return seen.colour, seen.alpha, seen.depth
+
+
+def assert_same_bits(found, wanted):
+    for a, b in zip(vars(found).values(), vars(wanted).values(), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+# --- hand-worked values
+
+
+def test_one_splat_from_above_is_a_gaussian_of_its_variance_plus_the_dilation(raster):
+    # scale 0.1 at 10 pixels a unit: variance 1 + 0.3
+    seen = raster.forward(**one(), camera=map_camera())
+    assert seen.alpha[8, 8] == pytest.approx(0.5, abs=1e-6)
+    assert seen.alpha[8, 9] == pytest.approx(0.5 * np.exp(-0.5 / 1.3), rel=1e-5)
+    assert seen.alpha[10, 9] == pytest.approx(0.5 * np.exp(-0.5 * 5 / 1.3), rel=1e-5)
+    np.testing.assert_allclose(seen.colour[8, 8], [0.5, 0.25, 0.125], rtol=1e-5)
+    assert seen.depth[8, 8] == pytest.approx(0.5 * 2.0, rel=1e-5)
+
+
+def test_a_pinhole_sees_a_splat_smaller_with_distance(raster):
+    # 20 pixels of focal length, distance 4: scale 0.1 is 0.5 pixels, variance 0.25 + 0.3
+    camera = cameras.Camera(np.eye(3), np.array([0, 0, 4.0]), 20.0, 20.0, 8.5, 8.5, 16, 16)
+    seen = raster.forward(**one(x=0, y=0), camera=camera)
+    assert seen.alpha[8, 8] == pytest.approx(0.5, abs=1e-6)
+    assert seen.alpha[8, 9] == pytest.approx(0.5 * np.exp(-0.5 / 0.55), rel=1e-5)
+    assert seen.depth[8, 8] == pytest.approx(2.0, rel=1e-5)
+
+
+def test_a_splat_ends_where_alpha_is_below_one_in_255(raster):
+    # 0.5 exp(-r^2 / 2.6) = 1/255 at r = 3.55 pixels
+    alpha = raster.forward(**one(), camera=map_camera()).alpha
+    assert alpha[8, 11] == pytest.approx(0.5 * np.exp(-0.5 * 9 / 1.3), rel=1e-4)
+    assert alpha[8, 12] == 0
+    assert alpha[8, 4] == 0
+
+
+def test_what_is_behind_gets_what_the_front_leaves(raster):
+    front, back = one(z=1.0, colour=(1, 0, 0)), one(z=0.0, colour=(0, 1, 0))
+    for order in (together(front, back), together(back, front)):
+        seen = raster.forward(**order, camera=map_camera())
+        np.testing.assert_allclose(seen.colour[8, 8], [0.5, 0.25, 0], rtol=1e-5, atol=1e-7)
+        assert seen.alpha[8, 8] == pytest.approx(0.75, rel=1e-5)
+        assert seen.depth[8, 8] == pytest.approx(0.5 * 1 + 0.25 * 2, rel=1e-5)
+
+
+def test_gradients_of_one_pixel_are_those_worked_by_hand(raster):
+    # L = red of the pixel one to the right of the centre; alpha = o exp(-dx^2 / 2s) with s = 1.3, dx = 1
+    raster.forward(**one(), camera=map_camera())
+    grad = np.zeros((16, 16, 3), np.float32)
+    grad[8, 9, 0] = 1
+    found = raster.backward(grad)
+    alpha = 0.5 * np.exp(-0.5 / 1.3)
+    np.testing.assert_allclose(found.colours[0], [alpha, 0, 0], rtol=1e-5)
+    assert found.opacity_logits[0] == pytest.approx(alpha * 0.5, rel=1e-5)
+    np.testing.assert_allclose(found.means[0], [alpha / 1.3 * 10, 0, 0], rtol=1e-4, atol=1e-5)
+    # ds_xx / dlog_scale_x = 2 (10 scale)^2 = 2, dalpha/ds = alpha dx^2 / (2 s^2)
+    np.testing.assert_allclose(found.log_scales[0], [alpha / 1.3**2, 0, 0], rtol=1e-4, atol=1e-5)
+
+
+def test_contributions_are_blend_weights_worked_by_hand(raster):
+    arrays = together(one(z=0.0), one(z=1.0), one(z=-9.0, x=50.0))
+    raster.forward(**arrays, camera=map_camera())
+    pixel = np.zeros((16, 16, 2), np.float32)
+    pixel[8, 8] = 1, 10
+    found = raster.contributions(pixel)
+    np.testing.assert_allclose(found.maximum, [0.25, 0.5, 0], rtol=1e-5)
+    np.testing.assert_allclose(found.mapped, [[0.25, 2.5], [0.5, 5], [0, 0]], rtol=1e-5)
+
+
+# --- invariances
+
+
+def test_contributions_sum_to_alpha_and_a_map_of_ones_gives_them_back(raster):
+    seen = raster.forward(**gaussians(300), camera=CAMERAS["pinhole"])
+    found = raster.contributions(np.ones((*seen.alpha.shape, 5), np.float32))
+    assert found.total.sum() == pytest.approx(seen.alpha.sum(), rel=1e-5)  # 1e3 roundings, both ways
+    np.testing.assert_allclose(found.mapped, np.repeat(found.total[:, None], 5, 1), rtol=1e-6)
+    assert (found.maximum <= found.total).all()
+    assert raster.contributions().mapped.shape == (300, 0)
+
+
+@pytest.mark.parametrize("view", CAMERAS)
+def test_the_order_of_gaussians_changes_no_bit(raster, view):
+    arrays, camera = gaussians(300), CAMERAS[view]
+    order = np.random.default_rng(5).permutation(300)
+    gradients = image_gradients(camera, 3)
+    seen, found = raster.forward(**arrays, camera=camera), raster.backward(*gradients)
+    shuffled = raster.forward(**taken(arrays, order), camera=camera), raster.backward(*gradients)
+    assert_same_bits(shuffled[0], seen)
+    assert_same_bits(shuffled[1], cpu.Gradients(*(getattr(found, name)[order] for name in NAMES)))
+
+
+@pytest.mark.parametrize("view", CAMERAS)
+def test_moving_scene_and_camera_together_changes_nothing(raster, view):
+    arrays, camera = gaussians(200), CAMERAS[view]
+    turn, _ = cameras.look_at((0, 0, 0), (0.3, 0.5, 0.2))
+    shift = np.array([3.0, -2.0, 1.0])
+    w = 0.5 * np.sqrt(1 + np.trace(turn))
+    x, y, z = (turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]) / (4 * w)
+    left = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])  # quaternion product from the left
+    moved = arrays | {
+        "means": (arrays["means"] @ turn.T + shift).astype(np.float32),
+        "quats": (arrays["quats"] @ left.T).astype(np.float32),
+    }
+    rotation = camera.rotation @ turn.T
+    elsewhere = replace(camera, rotation=rotation, translation=camera.translation - rotation @ shift)
+    seen = images_of(raster.forward(**arrays, camera=camera))
+    for a, b in zip(images_of(raster.forward(**moved, camera=elsewhere)), seen, strict=True):
+        np.testing.assert_allclose(a, b, atol=2e-4)  # positions of some units move by 1e-5 pixels; 1/255 is a step
+
+
+@pytest.mark.parametrize("factor", [1e-3, 64.0, 1e3])
+def test_scaling_scene_and_camera_together_scales_only_depth(isa, factor):
+    arrays, camera = gaussians(200), CAMERAS["pinhole"]
+    scaled = arrays | {
+        "means": (arrays["means"] * factor).astype(np.float32),
+        "log_scales": (arrays["log_scales"] + np.log(factor)).astype(np.float32),
+    }
+    seen = cpu.Rasterizer(near=0.01, instruction_set=isa).forward(**arrays, camera=camera)
+    large = cpu.Rasterizer(near=0.01 * factor, instruction_set=isa).forward(
+        **scaled, camera=replace(camera, translation=camera.translation * factor)
+    )
+    # as above: a pixel at a splat's rim may lose its 1/255 of alpha
+    np.testing.assert_allclose(large.colour, seen.colour, atol=5e-3)
+    assert np.abs(large.colour - seen.colour).mean() < 1e-6
+    np.testing.assert_allclose(large.depth / factor, seen.depth, atol=2e-2)
+
+
+def test_a_crop_of_the_picture_is_the_picture_of_a_cropped_camera(raster):
+    """Where tiles begin must not matter."""
+    arrays, camera = gaussians(200), CAMERAS["orthographic"]
+    crop = replace(camera, cx=camera.cx - 5, cy=camera.cy - 3, width=camera.width - 20, height=camera.height - 10)
+    whole = raster.forward(**arrays, camera=camera)
+    part = raster.forward(**arrays, camera=crop)
+    # a pixel at a splat's rim may lose its 1/255 of alpha where centres round differently
+    np.testing.assert_allclose(part.colour, whole.colour[3 : 3 + crop.height, 5 : 5 + crop.width], atol=5e-3)
+
+
+def test_colours_of_one_give_alpha(raster):
+    arrays = gaussians(300) | {"colours": np.ones((300, 1), np.float32)}
+    seen = raster.forward(**arrays, camera=CAMERAS["pinhole"])
+    np.testing.assert_allclose(seen.colour[..., 0], seen.alpha, atol=3e-6)  # sum of w against 1 - T
+
+
+def test_a_quaternions_sign_and_length_do_not_matter(raster):
+    arrays, camera = gaussians(100), CAMERAS["pinhole"]
+    seen = raster.forward(**arrays, camera=camera)
+    assert_same_bits(raster.forward(**(arrays | {"quats": -arrays["quats"]}), camera=camera), seen)
+    assert_same_bits(raster.forward(**(arrays | {"quats": arrays["quats"] * 8}), camera=camera), seen)
+    for length in (7, 1e-30, 1e30):
+        other = raster.forward(**(arrays | {"quats": arrays["quats"] * np.float32(length)}), camera=camera)
+        np.testing.assert_allclose(other.colour, seen.colour, atol=1e-5)
+
+
+# --- the extremes
+
+
+@pytest.mark.parametrize("z, drawn", [(0.0, False), (1e-8, False), (0.495, False), (0.5, True), (0.505, True)])
+def test_the_near_plane_is_where_it_is_said_to_be(isa, z, drawn):
+    raster = cpu.Rasterizer(near=0.5, instruction_set=isa)
+    camera = cameras.Camera(np.eye(3), np.zeros(3), 20.0, 20.0, 8.0, 8.0, 16, 16)
+    seen = raster.forward(**one(z=z, x=0, y=0), camera=camera)
+    assert (seen.alpha.max() > 0) == drawn
+    assert all(np.isfinite(g).all() for g in vars(raster.backward(np.ones((16, 16, 3), np.float32))).values())
+
+
+def test_what_is_behind_the_camera_is_not_seen(raster):
+    arrays = gaussians(200)
+    for camera in CAMERAS.values():
+        away = replace(camera, translation=camera.translation - [0, 0, 100])
+        assert not any(image.any() for image in images_of(raster.forward(**arrays, camera=away)))
+        assert not any(g.any() for g in vars(raster.backward(*image_gradients(away, 3))).values())
+
+
+def test_opacity_zero_is_absence_to_the_bit(raster):
+    arrays, camera = gaussians(200), CAMERAS["pinhole"]
+    gone = np.arange(200) % 3 == 0
+    arrays["opacity_logits"][gone] = -200
+    seen = raster.forward(**arrays, camera=camera)
+    assert_same_bits(seen, raster.forward(**taken(arrays, ~gone), camera=camera))
+
+
+def test_opacity_one_stops_at_99_percent_and_takes_no_gradient_there(raster):
+    arrays = one() | {"opacity_logits": np.array([200], np.float32)}
+    seen = raster.forward(**arrays, camera=map_camera())
+    assert seen.alpha[8, 8] == pytest.approx(0.99, rel=1e-6)
+    grad = np.zeros((16, 16, 3), np.float32)
+    grad[8, 8] = 1
+    found = raster.backward(grad)
+    np.testing.assert_allclose(found.colours, 0.99, rtol=1e-6)
+    assert not found.means.any()
+
+
+def test_of_equal_depths_the_lower_index_is_in_front(raster):
+    red, green = one(opacity=0.9, colour=(1, 0, 0)), one(opacity=0.9, colour=(0, 1, 0))
+    for first, second in ((red, green), (green, red)):
+        seen = raster.forward(**together(first, second), camera=map_camera())
+        np.testing.assert_allclose(seen.colour[8, 8], (0.9 * first["colours"] + 0.09 * second["colours"])[0], rtol=1e-4)
+
+
+def test_nothing_leads_to_values_that_are_not_finite(raster):
+    rng = np.random.default_rng(2)
+    n = 2000
+    arrays = gaussians(n)
+    arrays["means"] *= 10 ** rng.uniform(-10, 8, (n, 1)).astype(np.float32)
+    arrays["log_scales"] = rng.uniform(-80, 60, (n, 3)).astype(np.float32)
+    arrays["quats"] *= 10 ** rng.uniform(-30, 30, (n, 1)).astype(np.float32)
+    arrays["opacity_logits"] = rng.choice(np.float32([-1e30, -100, -5.5, 0, 5, 100, 1e30]), n)
+    for camera in CAMERAS.values():
+        seen = raster.forward(**arrays, camera=camera)
+        assert all(np.isfinite(image).all() for image in images_of(seen))
+        found = raster.backward(*image_gradients(camera, 3))
+        assert all(np.isfinite(g).all() for g in vars(found).values())
+
+
+def test_no_gaussians_and_one_pixel_are_pictures_too(raster):
+    seen = raster.forward(**taken(one(), slice(0)), camera=map_camera())
+    assert not seen.alpha.any()
+    assert raster.backward(np.ones((16, 16, 3), np.float32)).means.shape == (0, 3)
+    dot = replace(map_camera(), width=1, height=1, cx=0.0, cy=1.0)
+    assert raster.forward(**one(), camera=dot).alpha[0, 0] == pytest.approx(0.5, rel=1e-5)
+
+
+# --- what is refused
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_a_value_that_is_not_finite_is_named_with_its_index(raster, name, value):
+    arrays = gaussians(40)
+    arrays[name][17] = value
+    with pytest.raises(ValueError, match=f"{name} of Gaussian 17 is not finite"):
+        raster.forward(**arrays, camera=CAMERAS["pinhole"])
+
+
+def test_a_zero_quaternion_is_named_with_its_index(raster):
+    arrays = gaussians(40)
+    arrays["quats"][5] = 0
+    with pytest.raises(ValueError, match="quaternion of Gaussian 5 is zero"):
+        raster.forward(**arrays, camera=CAMERAS["pinhole"])
+
+
+def test_arrays_that_do_not_fit_are_refused(raster):
+    with pytest.raises(ValueError, match="call forward first"):
+        raster.backward(np.zeros((52, 70, 3), np.float32))
+    arrays, camera = gaussians(40), CAMERAS["pinhole"]
+    with pytest.raises(ValueError, match="means must be C-contiguous"):
+        raster.forward(**(arrays | {"means": np.asfortranarray(arrays["means"])}), camera=camera)
+    with pytest.raises(ValueError, match="focal lengths must be positive"):
+        raster.forward(**arrays, camera=replace(camera, fx=-1.0))
+    with pytest.raises(ValueError, match="must have pixels"):
+        raster.forward(**arrays, camera=replace(camera, width=0))
+    raster.forward(**arrays, camera=camera)
+    with pytest.raises(ValueError, match=r"grad_colour must have shape \(52, 70, 3\)"):
+        raster.backward(np.zeros((70, 52, 3), np.float32))
+    with pytest.raises(ValueError, match="x must be an array of float32, not float64"):
+        cpu._check(np.zeros(3), "x", (3,))
+    with pytest.raises(ValueError, match=r"x must have shape \(3,\), not \(4,\)"):
+        cpu._check(np.zeros(4, np.float32), "x", (3,))
+
+
+def test_a_rendering_cannot_be_changed_since_backward_reads_it(raster):
+    seen = raster.forward(**one(), camera=map_camera())
+    with pytest.raises(ValueError, match="read-only"):
+        seen.colour[0, 0] = 1
+
+
+def test_an_instruction_set_that_is_not_there_is_refused(monkeypatch):
+    monkeypatch.setenv("DAV_GSWT_ISA", "v9")
+    with pytest.raises(ValueError, match="DAV_GSWT_ISA=v9: this processor has"):
+        cpu.Rasterizer()
+    monkeypatch.setenv("DAV_GSWT_ISA", cpu.instruction_sets()[-1])
+    assert cpu.instruction_set() == cpu.instruction_sets()[-1]
+
+
+def test_the_number_of_threads_can_be_set_from_outside(monkeypatch):
+    monkeypatch.setenv("DAV_GSWT_THREADS", "3")
+    assert cpu.Rasterizer().threads == 3
+    monkeypatch.setenv("DAV_GSWT_THREADS", "many")
+    with pytest.raises(ValueError, match="DAV_GSWT_THREADS=many"):
+        cpu.Rasterizer()

@@ -1,0 +1,94 @@
+"""The one interface: a field, a camera, a background."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from raster_scenes import CAMERAS, gaussians
+
+from dav_gswt import cameras
+from dav_gswt.field import Field, sh_of
+from dav_gswt.raster import harmonics, render
+
+
+def field(n: int = 100, degree: int = 0) -> Field:
+    arrays = gaussians(n)
+    sh = np.concatenate(
+        [
+            sh_of(arrays["colours"]),
+            0.2 * gaussians(n, channels=3 * ((degree + 1) ** 2 - 1))["colours"].reshape(n, -1, 3),
+        ],
+        axis=1,
+    )
+    names = ("means", "log_scales", "quats", "opacity_logits")
+    return Field(*(arrays[k] for k in names), sh.astype(np.float32), np.zeros(n, np.float32), np.zeros(n, bool))
+
+
+@pytest.mark.parametrize("view", CAMERAS)
+@pytest.mark.parametrize("degree", [0, 3])
+def test_both_backends_draw_the_same(view, degree):
+    core, oracle = (render(field(degree=degree), CAMERAS[view], (0.1, 0.5, 1), backend=b) for b in ("cpu", "torch"))
+    for a, b in zip(vars(core).values(), vars(oracle).values(), strict=True):
+        np.testing.assert_allclose(a, b, atol=2e-5 * max(1, b.max()))  # float32 sums, as in test_oracle
+
+
+def test_the_picture_is_linear_in_the_background():
+    camera = CAMERAS["pinhole"]
+    black, grey, red, both = (
+        render(field(), camera, background).colour for background in (0.0, 0.25, (1, 0, 0), (1.25, 0.25, 0.25))
+    )
+    np.testing.assert_allclose(grey + red - black, both, atol=1e-6)
+    alpha = render(field(), camera).alpha
+    np.testing.assert_allclose((red - black)[..., 0], 1 - alpha, atol=1e-6)
+
+
+def test_own_colours_may_have_any_number_of_channels():
+    given = gaussians(100, channels=6)["colours"]
+    seen = render(field(), CAMERAS["pinhole"], colours=given)
+    assert seen.colour.shape == (52, 70, 6)
+    np.testing.assert_array_equal(
+        seen.colour[..., 4], render(field(), CAMERAS["pinhole"], colours=given[:, 4:5]).colour[..., 0]
+    )
+    with pytest.raises(ValueError, match="one value or 6"):
+        render(field(), CAMERAS["pinhole"], (1, 0, 0), colours=given)
+
+
+def test_an_unknown_backend_is_refused():
+    with pytest.raises(ValueError, match="no backend 'gpu': choose from cpu, torch"):
+        render(field(), CAMERAS["pinhole"], backend="gpu")
+
+
+# --- spherical harmonics
+
+
+def test_harmonics_are_orthonormal_over_the_sphere():
+    # Gauss-Legendre in z, even steps in azimuth: exact for the products of degree 6
+    z, weight = np.polynomial.legendre.leggauss(8)
+    azimuth = np.arange(16) * np.pi / 8
+    r = np.sqrt(1 - z**2)
+    directions = np.stack([np.outer(r, np.cos(azimuth)), np.outer(r, np.sin(azimuth)), np.outer(z, np.ones(16))], -1)
+    values = harmonics.basis(directions.reshape(-1, 3), 3)
+    area = np.repeat(weight * np.pi / 8, 16)
+    np.testing.assert_allclose(values.T @ (area[:, None] * values), np.eye(16), atol=1e-12)
+
+
+def test_harmonics_have_the_signs_that_3dgs_gives_them():
+    # looking along +x, +y, +z: degree 1 is (-y, z, -x) sqrt(3 / 4 pi)
+    c = np.sqrt(3 / (4 * np.pi))
+    np.testing.assert_allclose(harmonics.basis(np.eye(3), 1)[:, 1:], [[0, 0, -c], [-c, 0, 0], [0, c, 0]], atol=1e-15)
+
+
+def test_degree_zero_looks_the_same_from_everywhere_and_colour_is_never_negative():
+    sh = np.array([[[-5.0, 0, 1]]], np.float32)
+    found = harmonics.colours(sh, np.array([[0.0, 0, 1]]))
+    np.testing.assert_allclose(found, [[0, 0.5, 0.5 + 0.28209479]], rtol=1e-6)
+    padded = np.concatenate([sh, np.zeros((1, 15, 3), np.float32)], 1)
+    np.testing.assert_allclose(harmonics.colours(padded, np.array([[0.6, 0, 0.8]])), found, rtol=1e-6)
+
+
+def test_directions_run_from_the_camera_to_the_gaussian():
+    camera = cameras.pinhole((0, 0, 4), (0, 0, 0), 8, 8, 60.0)
+    found = harmonics.directions(np.array([[0, 0, 1.0], [3, 0, 0], [0, 0, 4]]), camera)
+    np.testing.assert_allclose(found, [[0, 0, -1], [0.6, 0, -0.8], [0, 0, -1]], atol=1e-12)
+    parallel = harmonics.directions(np.eye(3), replace(camera, orthographic=True))
+    np.testing.assert_allclose(parallel, [[0, 0, -1]] * 3, atol=1e-12)

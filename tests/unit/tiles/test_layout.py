@@ -1,0 +1,74 @@
+"""Geometry of tiles, by hand."""
+
+import numpy as np
+import pytest
+
+from dav_gswt.errors import InputError
+from dav_gswt.tiles import layout
+from dav_gswt.tiles.layout import NE, NW, SE, SW, E, Layout, N, Places, S, W
+
+PLAN = Layout(exemplar=40, levels=1, side=10, strip=2, corner=3)
+PLACES = Places(
+    np.array([30, 20]),
+    np.array([[0, 1], [5, 2]]),
+    np.array([[3, 30], [4, 25]]),
+    np.tile([11, 12], (16, 1)),
+)
+
+
+def test_edge_colours_are_the_bits_of_the_tile_number():
+    # 16 c + 8 W + 4 N + 2 E + S, in the order W N E S
+    assert layout.colours(16 + 8 + 1) == (1, 0, 0, 1)
+    assert layout.colours(4 + 2) == (0, 1, 1, 0)
+
+
+@pytest.mark.parametrize("levels", [1, 2, 3, 4])
+@pytest.mark.parametrize("strip", [0.05, 0.16, 0.3])
+def test_every_size_is_a_multiple_of_the_coarsest_cell_and_leaves_room(levels, strip):
+    plan = layout.plan(200, levels, 0.5, strip)
+    assert not any(v % plan.block for v in (plan.side, plan.strip, plan.corner))
+    assert plan.block < plan.strip < plan.corner < plan.side / 2
+
+
+def test_a_tile_that_the_exemplar_cannot_hold_says_how_many_levels_it_can():
+    # 10 blocks are needed: 10 * 2^3 = 80 cells fit in 100, 160 do not
+    with pytest.raises(InputError, match="at most 4 levels"):
+        layout.plan(100, 5, 0.5, 0.16)
+    assert layout.plan(100, 4, 0.5, 0.16).side == 80
+
+
+def test_a_vertical_strip_goes_on_from_a_tile_into_its_right_neighbour():
+    left, right = layout.offsets(PLAN, PLACES, 2), layout.offsets(PLAN, PLACES, 8)
+    y, n = 4, PLAN.side
+    for step in (1, 2):  # cells from the border: strip columns 1, 0 on the left and 2, 3 on the right
+        np.testing.assert_array_equal(left[E] + [n - step, y], PLACES.vertical[1] + [2 - step, y])
+        np.testing.assert_array_equal(right[W] + [step - 1, y], PLACES.vertical[1] + [1 + step, y])
+
+
+def test_a_horizontal_strip_goes_on_from_a_tile_into_the_one_above():
+    below, above = layout.offsets(PLAN, PLACES, 4), layout.offsets(PLAN, PLACES, 1)
+    np.testing.assert_array_equal(below[N] + [3, PLAN.side - 1], PLACES.horizontal[1] + [3, 1])
+    np.testing.assert_array_equal(above[S] + [3, 0], PLACES.horizontal[1] + [3, 2])
+
+
+def test_the_corner_patch_is_whole_where_four_tiles_meet():
+    shift = layout.offsets(PLAN, PLACES, 0)
+    n, middle = PLAN.side, PLACES.corner + PLAN.corner
+    np.testing.assert_array_equal(shift[SW] + [0, 0], middle)
+    np.testing.assert_array_equal(shift[SE] + [n - 1, 0], middle + [-1, 0])
+    np.testing.assert_array_equal(shift[NW] + [0, n - 1], middle + [0, -1])
+    np.testing.assert_array_equal(shift[NE] + [n - 1, n - 1], middle - 1)
+
+
+def test_a_frame_holds_strips_at_its_sides_and_the_corner_patch_in_its_corners():
+    n, b = PLAN.side, PLAN.strip
+    mask = np.zeros((2, n, 2 * b), bool)
+    mask[:, :b] = mask[:, n - b :] = True
+    mask[1, b, b] = True  # colour 1: the corner patch reaches one cell further, right of the edge
+    labels = layout.frame(PLAN, mask, mask.swapaxes(1, 2), 8)
+    assert (labels[:b, :b] == SW).all() and (labels[:b, n - b :] == SE).all()
+    assert (labels[n - b :, :b] == NW).all() and (labels[n - b :, n - b :] == NE).all()
+    assert (labels[:b, b : n - b] == S).all() and (labels[n - b :, b : n - b] == N).all()
+    assert labels[b, 0] == SW and labels[b, 1] == W and (labels[b + 1 : n - b, :b] == W).all()
+    assert (labels[b : n - b, n - b :] == E).all()
+    assert (labels[b : n - b, b : n - b] == layout.CENTRE).all()

@@ -1,0 +1,107 @@
+"""Trends of known shape are taken out, and local relief is left."""
+
+import numpy as np
+import pytest
+
+from dav_gswt.levels.merge import covariances
+from dav_gswt.tiles import membrane, trends
+from dav_gswt.tiles.layout import Exemplar, Layout
+
+EXEMPLAR = Exemplar(0.0, 0.0, 0.5, 64)
+KNOWN = np.ones((64, 64), bool)
+
+
+def test_a_plane_is_its_own_trend():
+    y, x = np.mgrid[:64, :64]
+    plane = 0.3 * x - 0.2 * y + 5
+    # least squares in double precision over values around 20
+    np.testing.assert_allclose(trends.low_pass(plane, KNOWN, 8.0), plane, atol=1e-10)
+
+
+def test_grain_and_single_bushes_are_no_trend():
+    values = np.where(np.indices((64, 64)).sum(0) % 2, 1.0, -1.0)
+    assert np.abs(trends.low_pass(values, KNOWN, 6.0)).max() < 0.1  # a checkerboard's one-sided mean at the border
+    bush = np.zeros((64, 64))
+    bush[30:34, 30:34] = 1
+    # a plain average would take 16 / (2 pi 6^2) = 0.07 of it
+    assert trends.low_pass(bush, KNOWN, 6.0).max() < 0.01
+
+
+def test_unknown_cells_take_no_part():
+    values, known = np.full((64, 64), 2.0), KNOWN.copy()
+    values[:20], known[:20] = 99, False
+    np.testing.assert_allclose(trends.low_pass(values, known, 6.0), 2, atol=1e-9)
+
+
+def test_detrending_flattens_a_slope_and_keeps_mean_and_cover(made_up):
+    field = made_up.levels[0]
+    ground = field[field.ground]
+    e = made_up.exemplar
+    x = np.mgrid[: e.cells, : e.cells][1] * e.spacing
+    tilted = ground.means.copy()
+    tilted[:, 2] = 0.4 * x.ravel()
+    trend = trends.trend_of(np.full((e.cells, e.cells, 3), np.nan), 0.4 * x, e, 10.0)
+    flat = trends.detrended(type(ground)(**{**vars(ground), "means": tilted}), trend)
+    np.testing.assert_allclose(flat.means[:, 2], 0.4 * x.mean(), atol=1e-5)  # float32 heights up to 5
+    # z' = z - 0.4 x shears a flat disc: var z' = 0.16 var x + var z, cov = -0.4 var x
+    before, after = covariances(ground)[0], covariances(flat)[0]
+    np.testing.assert_allclose(after[0, 0], before[0, 0], rtol=1e-4)  # float32 logarithms
+    np.testing.assert_allclose(after[0, 2], -0.4 * before[0, 0], rtol=1e-4)
+    np.testing.assert_allclose(after[2, 2], 0.16 * before[0, 0] + before[2, 2], rtol=1e-4)
+    np.testing.assert_array_equal(flat.sh, ground.sh)
+
+
+PLAN = Layout(exemplar=64, levels=1, side=24, strip=6, corner=9)
+
+
+def flat_ground(step):
+    """An exemplar whose right half is brighter by `step`, far under the limit."""
+    values = np.full((64, 64, 4), 0.5)
+    values[:, 32:] += step
+    return membrane.Ground(values, np.full(4, 1e3))
+
+
+def patched():
+    """A square of the bright half in the middle of the dark one."""
+    labels = np.zeros((24, 24), np.uint8)
+    labels[8:16, 8:16] = 1
+    shift = np.zeros((9, 2), int)
+    shift[1] = [38, 0]
+    return labels, shift
+
+
+def test_a_bright_patch_in_a_dark_frame_is_darkened_by_the_step():
+    labels, shift = patched()
+    found = membrane.tile(labels, shift, np.zeros((24, 24, 4)), PLAN, flat_ground(0.1))
+    # the source is divergence of an exact gradient, so its solution is the step itself; limit 1e3 takes 1e-8 of it
+    np.testing.assert_allclose(found, np.where(labels[..., None], -0.1, 0) * np.ones(4), atol=1e-7)
+
+
+def test_equal_patches_are_not_corrected():
+    labels, shift = patched()
+    found = membrane.tile(labels, shift, np.zeros((24, 24, 4)), PLAN, flat_ground(0.0))
+    assert (found == 0).all()
+
+
+def test_a_tile_takes_the_correction_of_its_border():
+    ring = np.full((24, 24, 4), 0.25)
+    found = membrane.tile(np.zeros((24, 24), np.uint8), np.zeros((9, 2), int), ring, PLAN, flat_ground(0.1))
+    np.testing.assert_allclose(found, 0.25, atol=1e-12)  # Laplace's equation with a constant border
+
+
+@pytest.mark.parametrize("upright", [True, False])
+def test_a_strip_is_fitted_to_the_corner_patch_at_its_ends(upright):
+    labels = np.ones((24, 12), np.uint8)
+    labels[8:16] = 0
+    labels = labels if upright else np.ascontiguousarray(labels.T)
+    found = membrane.strip(labels, np.array([[38, 0], [0, 0]]), PLAN, flat_ground(0.1))
+    np.testing.assert_allclose(found, np.where(labels[..., None] == 0, -0.1, 0) * np.ones(4), atol=1e-7)
+
+
+def test_a_step_beyond_the_limit_counts_less():
+    labels, shift = patched()
+    ground = flat_ground(1.0)
+    weak = membrane.Ground(ground.values, np.full(4, 0.1))
+    found = membrane.tile(labels, shift, np.zeros((24, 24, 4)), PLAN, weak)
+    # J = 1 / (1 + (1 / 0.1)^2)
+    np.testing.assert_allclose(found[12, 12], -1 / 101, rtol=1e-9)
