@@ -92,7 +92,7 @@ def values_of(scene):
         lam="0",
         k=0 if given else config["k"],
         t=0 if given else config["rounds"],
-        seam=config["seam"],
+        seam=config["scenes"][scene]["seam"],
         tau=spell(config["tau"]),
     )
 

@@ -28,7 +28,7 @@ def test_the_configs_that_come_with_the_project_are_valid(config):
         pytest.param(["levels"], 0, "levels", id="no level"),
         pytest.param(["policy"], "nearest", "policy", id="an unknown policy"),
         pytest.param(["scene"], "moon", "moon", id="a scene that is not there"),
-        pytest.param(["seam"], "glue", "glue", id="a seam that is not there"),
+        pytest.param(["scenes", "desert", "seam"], "glue", "glue", id="a seam that is not there"),
         pytest.param(["scenes", "desert", "quality"], "best", "best", id="a quality that is not there"),
         pytest.param(["scenes", "desert", "famly"], "desert", "famly", id="a typo in a scene"),
         pytest.param(["scenes", "desert", "kind"], "video", "kind", id="a kind that is not there"),

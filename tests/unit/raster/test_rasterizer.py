@@ -232,7 +232,7 @@ def test_no_gaussians_and_one_pixel_are_pictures_too(raster):
     seen = raster.forward(**taken(one(), slice(0)), camera=map_camera())
     assert not seen.alpha.any()
     assert raster.backward(np.ones((16, 16, 3), np.float32)).means.shape == (0, 3)
-    dot = replace(map_camera(), width=1, height=1, cx=0.0, cy=1.0)
+    dot = replace(map_camera(), width=1, height=1, cx=0.0, cy=0.0)
     assert raster.forward(**one(), camera=dot).alpha[0, 0] == pytest.approx(0.5, rel=1e-5)
 
 

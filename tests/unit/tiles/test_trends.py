@@ -58,7 +58,7 @@ def flat_ground(step):
     """An exemplar whose right half is brighter by `step`, far under the limit."""
     values = np.full((64, 64, 4), 0.5)
     values[:, 32:] += step
-    return membrane.Ground(values, np.full(4, 1e3))
+    return membrane.Ground(values, 1e3)
 
 
 def patched():
@@ -101,7 +101,7 @@ def test_a_strip_is_fitted_to_the_corner_patch_at_its_ends(upright):
 def test_a_step_beyond_the_limit_counts_less():
     labels, shift = patched()
     ground = flat_ground(1.0)
-    weak = membrane.Ground(ground.values, np.full(4, 0.1))
+    weak = membrane.Ground(ground.values, 0.1)
     found = membrane.tile(labels, shift, np.zeros((24, 24, 4)), PLAN, weak)
-    # J = 1 / (1 + (1 / 0.1)^2)
-    np.testing.assert_allclose(found[12, 12], -1 / 101, rtol=1e-9)
+    # J = 1 / (1 + (1 / 0.1)^2) for colour; a step of height left in the ground would be a gap
+    np.testing.assert_allclose(found[12, 12], [-1 / 101] * 3 + [-1], rtol=1e-9)

@@ -18,10 +18,10 @@ def check(config: dict, schema: Path) -> None:
     if error := best_match(Draft202012Validator(rules).iter_errors(config)):
         key = ".".join(str(p) for p in error.absolute_path) or "config"
         raise InputError(f"config: {key}: {error.message} (config/README.md lists every key)")
-    for key, table in (("scene", "scenes"), ("seam", "seams")):
-        if config[key] not in config[table]:
-            raise InputError(f"config: {key}: there is no {config[key]!r}; {table} has {', '.join(config[table])}")
+    if config["scene"] not in config["scenes"]:
+        raise InputError(f"config: scene: there is no {config['scene']!r}; scenes has {', '.join(config['scenes'])}")
     for name, scene in config["scenes"].items():
-        if scene["quality"] not in config["qualities"]:
-            known = ", ".join(config["qualities"])
-            raise InputError(f"config: scenes.{name}.quality: there is no {scene['quality']!r}; qualities has {known}")
+        for key, table in (("quality", "qualities"), ("seam", "seams")):
+            if scene[key] not in config[table]:
+                known = ", ".join(config[table])
+                raise InputError(f"config: scenes.{name}.{key}: there is no {scene[key]!r}; {table} has {known}")

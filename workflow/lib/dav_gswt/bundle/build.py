@@ -28,7 +28,7 @@ class Options:
     unit: str = "metre"
     level_pixels: float = 1.0
     band: float = 0.1
-    floor_pixels: float = 8.0
+    floor_pixels: float = 12.0
     sky: dict = field(default_factory=lambda: {"zenith": [0.36, 0.55, 0.8], "horizon": [0.78, 0.84, 0.88]})
 
 

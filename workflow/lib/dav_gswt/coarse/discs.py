@@ -13,7 +13,7 @@ from dav_gswt.views import View
 WIDTH = 0.72  # standard deviation of a disc in spacings: neighbours overlap, the ground is opaque (docs/deviations.md)
 THICKNESS = 0.1  # of a disc, in spacings
 OPAQUE = 4.0  # opacity logit of a disc before the first step
-ALONE = 8.0  # spacings to its neighbours from which a point in the air is taken for a wrong match
+ALONE = 4.0  # spacings to its neighbours from which a point in the air is taken for a wrong match
 STANDS = 1.5  # a point this many spacings above the surface is a thing
 
 

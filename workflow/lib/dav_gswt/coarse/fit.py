@@ -104,7 +104,7 @@ def _constrain(values: dict[str, Array], grid: Ground, discs: int, band: float) 
     np.clip(logits[:discs], 2.5, 6.0, out=logits[:discs])
     if len(means) > discs:
         free = scales[discs:]
-        np.clip(free, np.log(0.2 * s), np.log(3.0 * s), out=free)
+        np.clip(free, np.log(0.2 * s), np.log(1.5 * s), out=free)
         np.maximum(free, free.max(1, keepdims=True) - ASPECT, out=free)
         above = means[discs:, 2] - surface.height_at(means[discs:])
         logits[discs:][(above < -s) | (above > band)] = -8.0

@@ -6,7 +6,8 @@ mapping uses one. So a run repeats to the bit.
 """
 
 import logging
-import sqlite3
+import subprocess
+import sys
 import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Callable
@@ -31,6 +32,7 @@ _log = logging.getLogger(__name__)
 pycolmap.logging.minloglevel = 2  # it reports every step of every photo on stderr; we report progress instead
 
 LEAST_PHOTOS = 3
+LOOK = 4.0  # seconds between two looks at how far a long step is
 GUESS = 1.2  # focal length in longer sides, where EXIF has none; then it is refined
 
 
@@ -286,7 +288,7 @@ def _watched(work: Callable, done: Callable[[], int], total: int, what: str):
     with ThreadPoolExecutor(1) as pool, progress(None, what, total=total) as bar:
         job = pool.submit(work, token)
         try:
-            while wait([job], timeout=0.5).not_done:
+            while wait([job], timeout=LOOK).not_done:
                 bar.update(max(0, done() - bar.n))
         except BaseException:
             token.cancel()
@@ -296,9 +298,12 @@ def _watched(work: Callable, done: Callable[[], int], total: int, what: str):
 
 
 def _rows(database: Path, table: str) -> int:
-    """Rows of a table that another thread is filling; 0 while it is locked."""
-    try:
-        with closing(sqlite3.connect(f"file:{database}?mode=ro", uri=True, timeout=0.1)) as connection:
-            return connection.execute(f"SELECT COUNT(*) FROM {table}").fetchone()[0]
-    except sqlite3.Error:
-        return 0
+    """Rows of a table that another thread is filling; 0 while it is locked.
+
+    Asked by another process: two copies of SQLite in one process, Python's and pycolmap's, drop each other's locks
+    when they close the file, and the writer dies of it.
+    """
+    ask = "import sqlite3, sys; print(*sqlite3.connect(sys.argv[1], uri=True).execute(sys.argv[2]).fetchone())"
+    words = [sys.executable, "-S", "-c", ask, f"file:{database}?mode=ro", f"SELECT COUNT(*) FROM {table}"]
+    told = subprocess.run(words, capture_output=True, text=True, check=False).stdout.strip()
+    return int(told) if told.isdecimal() else 0

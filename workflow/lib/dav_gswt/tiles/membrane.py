@@ -2,8 +2,8 @@
 
 Every tile gets a correction c per cell, smooth but at the seams, where it jumps against the step between the two
 patches: it minimises sum over neighbours s, t of |c_t - c_s + J_st|^2 (Poisson fusion with the step as its source).
-J_st is 0 inside a patch and on a seam the soft difference of the patches, limited, so that a shrub cut in two does not
-bleed over the sand. A strip's correction belongs to its colour and is 0 in the corner patch, and a tile's takes the
+J_st is 0 inside a patch and on a seam the soft difference of the patches: for colour limited, so that a shrub cut in two
+does not bleed over the sand; for height whole, since a step left in the ground is a gap that one sees through. A strip's correction belongs to its colour and is 0 in the corner patch, and a tile's takes the
 strips' values along its border: neighbours still continue one another. All levels take the same correction.
 """
 
@@ -18,32 +18,30 @@ from scipy.ndimage import gaussian_filter
 from dav_gswt.field import SH0, Field
 from dav_gswt.tiles.layout import Layout, colours
 
-SOFT = 2.0  # cells: grain is not a step
+SOFT = (2.0, 2.0, 2.0, 0.5)  # cells: grain is not a step; a surface is smooth already
 
 
 @dataclass(frozen=True)
 class Ground:
-    """Soft colour and height of the exemplar's cells, and how large a step may be before it counts less."""
+    """Soft colour and height of the exemplar's cells, and how large a step of colour may be before it counts less."""
 
     values: Float[Array, "m m 4"]
-    limit: Float[Array, "4"]
+    limit: float
 
 
 def ground(colour: Float[Array, "m m 3"], height: Float[Array, "m m"]) -> Ground:
-    """The limit is the exemplar's own standard deviation, one for all colour channels and one for height."""
+    """The limit is the exemplar's own standard deviation, one for all colour channels."""
     values = np.concatenate([colour, height[..., None]], -1)
-    spread = values.std((0, 1))
-    limit = np.array([spread[:3].mean()] * 3 + [spread[3]])
-    soft = np.stack([gaussian_filter(values[..., c], SOFT, mode="nearest") for c in range(4)], -1)
-    return Ground(soft, limit)
+    soft = np.stack([gaussian_filter(values[..., c], SOFT[c], mode="nearest") for c in range(4)], -1)
+    return Ground(soft, float(colour.std((0, 1)).mean()))
 
 
 def steps(labels: UInt8[Array, "h w"], shift: Int[Array, "k 2"], ground: Ground) -> Float[Array, "h w 4"]:
     """Sum over a cell's neighbours t of J_st, the step from its own patch to theirs.
 
-    shift[label] is what to add to a cell (x, y) for the exemplar's cell. J = d / (1 + |d / limit|^2) with d the mean
-    over both cells of the patches' difference: what lies beyond the limit is an object's edge, not a step of
-    brightness.
+    shift[label] is what to add to a cell (x, y) for the exemplar's cell. J = d for height and d / (1 + |d / limit|^2)
+    for colour, with d the mean over both cells of the patches' difference: what lies beyond the limit is an object's
+    edge, not a step of brightness.
     """
     total = np.zeros((*labels.shape, 4))
     last = np.array(ground.values.shape[:2]) - 1
@@ -56,9 +54,8 @@ def steps(labels: UInt8[Array, "h w"], shift: Int[Array, "k 2"], ground: Ground)
         for sy, sx in ((y, x), (y + dy, x + dx)):
             there, here = (tuple(np.clip([sy + m[:, 1], sx + m[:, 0]], 0, last[:, None])) for m in (other, own))
             d += 0.5 * (ground.values[there] - ground.values[here])
-        relative = d / np.where(ground.limit > 0, ground.limit, 1)
-        size = np.concatenate([np.repeat((relative[:, :3] ** 2).mean(1, keepdims=True), 3, 1), relative[:, 3:] ** 2], 1)
-        d /= 1 + size
+        relative = d[:, :3] / (ground.limit or 1.0)
+        d[:, :3] /= 1 + (relative**2).mean(1, keepdims=True)
         np.add.at(total, (y, x), d)
         np.add.at(total, (y + dy, x + dx), -d)
     return total

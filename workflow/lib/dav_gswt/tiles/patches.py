@@ -16,6 +16,7 @@ from dav_gswt.tiles.layout import Layout
 
 SURE = 0.05  # of mean uncertainty above the surest candidate's: still as good as sure
 REPEAT = 0.5  # charge for ground shown twice, a median seam's cost
+FITS = 1.5  # times the best seam's cost: as good as the best
 OUTLIER = 2.0  # times the mean squared distance from the median colour: more is no grain
 SAMPLES = 3000  # cells of a seam zone that are compared
 
@@ -115,6 +116,15 @@ def mismatch(
     there = guide.features[shown[0][::step], shown[1][::step]]
     away = [((guide.features[y + py, x + px] - there) ** 2).sum(-1).min(1).mean() for px, py in places]
     return np.array(away)
+
+
+def fitting(cost: Float[Array, "n"]) -> Int[Array, "k"]:
+    """Which places fit about as well as the best: variety is sought among these alone.
+
+    In a texture that is nearly all of them. Where the exemplar holds what cannot go on (a road that ends at a tile's
+    border), it is the rest: a centre that comes back is seen less than a road cut off.
+    """
+    return np.flatnonzero(cost <= FITS * np.quantile(cost, 0.02))
 
 
 def relative(cost: Float[Array, "n"]) -> Float[Array, "n"]:

@@ -85,7 +85,11 @@ def _strips(sketch: Sketch, corner: Array, upright: bool, used: list, rng) -> li
     zone = _end_lines(plan, upright)
     places = patches.sure(sketch.guide, patches.candidates(plan, size, sketch.candidates, rng), size)
     cost = patches.mismatch(sketch.guide, zone, tuple(v[zone] for v in shown), places)
-    cost = patches.relative(cost) + patches.relative(patches.means(patches.oddness(sketch.guide), places, size))
+    odd = patches.means(patches.oddness(sketch.guide), places, size)
+    fits = np.intersect1d(patches.fitting(cost), patches.fitting(odd))
+    if len(fits) > 1:  # else the best of both is all there is to choose from
+        places, cost, odd = places[fits], cost[fits], odd[fits]
+    cost = patches.relative(cost) + patches.relative(odd)
     found = []
     for _ in range(2):
         taken = np.array([place for place, _ in found], int).reshape(-1, 2)
@@ -112,11 +116,13 @@ def _centres(sketch: Sketch, places: Places, masks: list, rng) -> list[tuple[Arr
         shift = layout.offsets(plan, places, tile)
         # inside, where the centre is forced, the frame shows anything
         shown = tuple(np.clip(v, 0, plan.exemplar - 1) for v in layout.sources(around, shift))
-        cost = patches.relative(patches.mismatch(sketch.guide, zone, tuple(v[zone] for v in shown), choice))
+        cost = patches.mismatch(sketch.guide, zone, tuple(v[zone] for v in shown), choice)
+        fits = patches.fitting(cost)
+        cost = patches.relative(cost[fits])
         beside = [(places.vertical[c], (2 * b, n)) for c in sorted({west, east})]
         beside += [(places.horizontal[c], (n, 2 * b)) for c in sorted({south, north})]
         taken = np.array([place for place, *_ in found], int).reshape(-1, 2)
-        order = patches.ranked(choice, cost, size, beside, taken)
+        order = patches.ranked(choice[fits], cost, size, beside, taken)
         variants = {
             tuple(place) for place, *_ in found[tile % EDGES :: EDGES]
         }  # of the same edges: a centre of its own

@@ -69,11 +69,13 @@ bool Context::forward(const Scene& scene, const View& view, const Images& images
   splats_.resize(scene.n);
   if (!kernels_.project(scene, view, splats_.data(), threads)) return false;
   binning_.sort(splats_.data(), scene.n, view.width, view.height, threads);
+  bool valid = true;
   each_pass(scene.channels, [&](int channel, int group) {
-    kernels_.load_colours(scene, channel, group, splats_.data(), threads);
+    valid = valid && kernels_.load_colours(scene, channel, group, splats_.data(), threads);
+    if (!valid) return;
     kernels_.blend_forward(splats_.data(), binning_.tiles(), pass_of(images, channel, group), channel > 0, threads);
   });
-  return true;
+  return valid;
 }
 
 void Context::backward(const Scene& scene, const Images& images, const ImageGradients& gradients,

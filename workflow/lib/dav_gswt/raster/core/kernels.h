@@ -6,7 +6,7 @@ namespace raster {
 namespace ISA {
 
 bool project(const Scene&, const View&, Splat*, int threads);
-void load_colours(const Scene&, int channel, int group, Splat*, int threads);
+bool load_colours(const Scene&, int channel, int group, Splat*, int threads);
 void blend_forward(const Splat*, const Tiles&, const Images&, bool only_colour, int threads);
 void blend_backward(const Splat*, const Tiles&, const Images&, const ImageGradients&, float* records, int threads);
 void collect(const Tiles&, size_t n, int channels, int channel, int group, bool depth, bool add, const float* records,

@@ -24,11 +24,11 @@ static inline void store(float* to, Lanes v) { memcpy(to, &v, sizeof v); }
 
 #if LANES == 16 && defined(__AVX512F__)
 static inline bool any(Mask m) { return _mm512_test_epi32_mask((__m512i)m, (__m512i)m) != 0; }
-static inline Lanes max(Lanes a, Lanes b) { return (Lanes)_mm512_max_ps((__m512)a, (__m512)b); }
-static inline Lanes min(Lanes a, Lanes b) { return (Lanes)_mm512_min_ps((__m512)a, (__m512)b); }
-static inline Lanes sqrt(Lanes a) { return (Lanes)_mm512_sqrt_ps((__m512)a); }
+static inline Lanes max(Lanes a, Lanes b) { return (Lanes)_mm512_maskz_max_ps(0xffff, (__m512)a, (__m512)b); }
+static inline Lanes min(Lanes a, Lanes b) { return (Lanes)_mm512_maskz_min_ps(0xffff, (__m512)a, (__m512)b); }
+static inline Lanes sqrt(Lanes a) { return (Lanes)_mm512_maskz_sqrt_ps(0xffff, (__m512)a); }
 static inline Lanes reciprocal(Lanes a) {  // 14 bits and one Newton step: 2e-7
-  const Lanes r = (Lanes)_mm512_rcp14_ps((__m512)a);
+  const Lanes r = (Lanes)_mm512_maskz_rcp14_ps(0xffff, (__m512)a);
   return r * (2.f - a * r);
 }
 #elif LANES == 8 && defined(__AVX2__)
@@ -56,6 +56,7 @@ static inline Lanes reciprocal(Lanes a) { return 1.f / a; }
 #endif
 
 static inline Lanes clamp(Lanes v, float low, float high) { return min(max(v, all(low)), all(high)); }
+static inline Mask is_finite(Lanes v) { return ((Mask)v & 0x7f800000) != 0x7f800000; }
 static inline Lanes select(Mask m, Lanes yes, Lanes no) { return m ? yes : no; }
 static inline Lanes where(Mask m, Lanes v) { return (Lanes)((Mask)v & m); }  // v or 0
 

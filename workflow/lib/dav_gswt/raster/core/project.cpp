@@ -97,14 +97,13 @@ static inline Chain chain(const Scene& scene, const View& view, size_t i, int co
   for (int k = 0; k < 4; k++) c.quat[k] = load_column(scene.quats + k, 4, i, count);
   const Lanes logit = load_column(scene.opacity_logits, 1, i, count);
 
-  // anything times 0 is 0, unless it is infinite or no number
-  Lanes zero = logit * 0.f;
-  for (int k = 0; k < 3; k++) zero += c.mean[k] * 0.f + log_scale[k] * 0.f;
-  for (int k = 0; k < 4; k++) zero += c.quat[k] * 0.f;
+  c.valid = is_finite(logit);
+  for (int k = 0; k < 3; k++) c.valid &= is_finite(c.mean[k]) & is_finite(log_scale[k]);
+  for (int k = 0; k < 4; k++) c.valid &= is_finite(c.quat[k]);
   // a quaternion is first divided by its largest component: its square may be out of range
   Lanes largest = all(0);
   for (int k = 0; k < 4; k++) largest = max(largest, max(c.quat[k], -c.quat[k]));
-  c.valid = (zero == 0.f) & (largest > 1e-37f);
+  c.valid &= largest > 1e-37f;
   const Lanes per_largest = 1.f / largest;
   Lanes length = all(0);
   for (int k = 0; k < 4; k++) c.quat[k] *= per_largest, length += c.quat[k] * c.quat[k];
@@ -158,19 +157,26 @@ bool project(const Scene& scene, const View& view, Splat* splats, int threads) {
   return !invalid;
 }
 
-void load_colours(const Scene& scene, int channel, int group, Splat* splats, int threads) {
-#pragma omp parallel for num_threads(threads) schedule(static)
+bool load_colours(const Scene& scene, int channel, int group, Splat* splats, int threads) {
+  int invalid = 0;
+#pragma omp parallel for num_threads(threads) schedule(static) reduction(| : invalid)
   for (ptrdiff_t i = 0; i < (ptrdiff_t)scene.n; i++) {
-    if (splats[i].half_y < 0) continue;
     const float* from = scene.colours + i * scene.channels + channel;
-    for (int k = 0; k < GROUP; k++) splats[i].colour[k] = k < group ? from[k] : 0;
+    float colour[GROUP] = {};
+    for (int k = 0; k < group; k++) {
+      colour[k] = from[k];
+      invalid |= !__builtin_isfinite(from[k]);
+    }
+    if (splats[i].half_y >= 0) memcpy(splats[i].colour, colour, sizeof colour);
   }
+  return !invalid;
 }
 
 // dL/d(p, q) from the moments of v = dL / d ln alpha. With K = S^-1 and m the second moments,
-// dL/dc_k = K m (K c_k). K c_k is made of cross products again: it is tiny along a needle, where K and c_k are not.
+// dL/dc_k = K m (K c_k), and dL/dlog scale_k = c_k . dL/dc_k = (K c_k) . m (K c_k). K c_k is made of cross products
+// again: it is tiny along a needle, where K and c_k are not.
 static inline void unspread(const Chain& c, float dilation, const Lanes moments[MOMENTS], Lanes kxx, Lanes kxy,
-                            Lanes kyy, Lanes per_det, Three& dp, Three& dq) {
+                            Lanes kyy, Lanes per_det, Three& dp, Three& dq, Three& dlog_scale) {
   const Lanes xx = moments[3], xy = moments[4], yy = moments[5], *s = c.cxy;
   const Lanes px[3] = {c.q[1] * s[0] + c.q[2] * s[1], c.q[2] * s[2] - c.q[0] * s[0], -c.q[0] * s[1] - c.q[1] * s[2]};
   const Lanes py[3] = {-c.p[1] * s[0] - c.p[2] * s[1], c.p[0] * s[0] - c.p[2] * s[2], c.p[0] * s[1] + c.p[1] * s[2]};
@@ -179,6 +185,7 @@ static inline void unspread(const Chain& c, float dilation, const Lanes moments[
     const Lanes mx = xx * kcx + xy * kcy, my = xy * kcx + yy * kcy;
     dp[k] = kxx * mx + kxy * my;
     dq[k] = kxy * mx + kyy * my;
+    dlog_scale[k] = kcx * mx + kcy * my;
   }
 }
 
@@ -227,12 +234,10 @@ static void project_backward_group(const Scene& scene, const View& view, const S
   const Lanes per_det = 1.f / c.det;
   const Lanes kxx = c.syy * per_det, kxy = -c.sxy * per_det, kyy = c.sxx * per_det;
   Three dp, dq, du, dv, dlog_scale;
-  unspread(c, view.dilation, moments, kxx, kxy, kyy, per_det, dp, dq);
+  unspread(c, view.dilation, moments, kxx, kxy, kyy, per_det, dp, dq, dlog_scale);
   Lanes dturn[9], dquat[4];
-  for (int k = 0; k < 3; k++) {
-    dlog_scale[k] = dp[k] * c.p[k] + dq[k] * c.q[k];
+  for (int k = 0; k < 3; k++)
     for (int r = 0; r < 3; r++) dturn[3 * r + k] = c.scale[k] * (dp[k] * c.u[r] + dq[k] * c.v[r]);
-  }
   for (int r = 0; r < 3; r++) {
     du[r] = dp[0] * c.scale[0] * c.turn[3 * r] + dp[1] * c.scale[1] * c.turn[3 * r + 1] +
             dp[2] * c.scale[2] * c.turn[3 * r + 2];

@@ -101,7 +101,7 @@ struct Kernels {
   const char* name;
   // Returns false where an input is not finite or a quaternion is zero; what was written then means nothing.
   bool (*project)(const Scene&, const View&, Splat*, int threads);
-  void (*load_colours)(const Scene&, int channel, int group, Splat*, int threads);
+  bool (*load_colours)(const Scene&, int channel, int group, Splat*, int threads);
   void (*blend_forward)(const Splat*, const Tiles&, const Images&, bool only_colour, int threads);
   void (*blend_backward)(const Splat*, const Tiles&, const Images&, const ImageGradients&, float* records, int threads);
   // Sums records into `sums` (n x (MOMENTS + 1), added to if `add`) and colour gradients.
