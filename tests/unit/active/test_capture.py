@@ -12,7 +12,7 @@ def test_replay_takes_the_nearest_unseen_frame_once(tmp_path):
     pool = {f"{x}.png": cameras.pinhole([x, 0, 5.0], [x, 0, 0], 8, 8, 40.0) for x in (0, 1, 2)}
     for name in pool:
         (tmp_path / "images" / name).write_text(name)
-    asked = [(Pose(f"a{i}", 90, 0, 5), cameras.pinhole([0.9, 0, 5.0], [0.9, 0, 0], 8, 8, 40.0)) for i in range(4)]
+    asked = [(Pose(f"a{i}", 90.0, 0.0, 5.0), cameras.pinhole([0.9, 0, 5.0], [0.9, 0, 0], 8, 8, 40.0)) for i in range(4)]
     out = tmp_path / "capture"
     out.mkdir()
     shots = capture.replay(tmp_path, pool, asked, out, unit=5.0)

@@ -20,7 +20,12 @@ def test_farthest_takes_the_opposite_side_then_the_gaps():
     pool = scored(0, 90, 180, 270, 10)
     captured = np.array([[1.0, 0, 0]])
     names = [p.name for p in selection.select("farthest", pool, captured, 3, RNG(0))]
-    assert names == ["p2", "p1", "p3"]  # 180 is farthest from 0; then 90 and 270 are equal: ties by index
+    assert names[0] == "p2"  # 180 is farthest from 0; then come 90 and 270, equal but for rounding
+    assert set(names[1:]) == {"p1", "p3"}
+
+
+def test_equal_distances_go_by_index():
+    assert [p.name for p in selection.select("farthest", scored(90, 90), np.array([[1.0, 0, 0]]), 1, RNG(0))] == ["p0"]
 
 
 def test_farthest_does_not_take_a_pose_twice_when_all_coincide():

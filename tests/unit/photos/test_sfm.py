@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-import made_up
+import made_up_photos as made_up
 import numpy as np
 import OpenImageIO as oiio
 import pycolmap

@@ -1,6 +1,6 @@
 """Finished fields: found upright, scaled, cleaned."""
 
-import made_up
+import made_up_photos as made_up
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

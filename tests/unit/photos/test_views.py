@@ -1,6 +1,6 @@
 """Start views, pool and test views."""
 
-import made_up
+import made_up_photos as made_up
 import numpy as np
 import pytest
 

@@ -63,9 +63,7 @@ def triangulated(folder: Path, shots: list[tuple[str, Camera]], seed: int) -> Mo
             extraction_options=extraction,
             device=pycolmap.Device.cpu,
         )
-        pycolmap.match_exhaustive(
-            database, matching, verification_options=verification, device=pycolmap.Device.cpu
-        )
+        pycolmap.match_exhaustive(database, matching, verification_options=verification, device=pycolmap.Device.cpu)
         model.write(known, sparse)
         options = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=seed)
         stored = pycolmap.triangulate_points(

@@ -241,8 +241,8 @@ def _columns(array) -> int:
 
 
 def _size(camera: Camera) -> tuple[int, int]:
-    if camera.width < 1 or camera.height < 1:
-        raise ValueError(f"a camera's picture must have pixels, not {camera.width} x {camera.height}")
+    if not (0 < camera.width < 1 << 15 and 0 < camera.height < 1 << 15):
+        raise ValueError(f"a picture has 1 to 32767 pixels a side, not {camera.width} x {camera.height}")
     return camera.height, camera.width
 
 

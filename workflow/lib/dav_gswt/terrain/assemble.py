@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float32
+from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.cameras import Camera
@@ -62,7 +62,7 @@ def visible(terrain: Terrain, camera: Camera) -> list[tuple[int, int, int]]:
     return [(i, j, lv) for (_, i, j), lv in zip(found, level, strict=True)]
 
 
-def laid(terrain: Terrain, cells: list[tuple[int, int, int]], about: Float32[Array, "3"]) -> Field:
+def laid(terrain: Terrain, cells: list[tuple[int, int, int]], about: Float[Array, "3"]) -> Field:
     """The Gaussians of cells, placed relative to `about`: kilometres out float32 still resolves a disc.
 
     Tiles past MOST Gaussians are left out, farthest first.

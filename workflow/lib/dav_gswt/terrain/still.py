@@ -9,8 +9,12 @@ from numpy import ndarray as Array
 from dav_gswt import cameras
 from dav_gswt.cameras import Camera
 from dav_gswt.coarse.doubt import arrays
+from dav_gswt.field import Field, sh_of
 from dav_gswt.raster import cpu
 from dav_gswt.terrain.assemble import REACH, Terrain, laid, visible
+
+
+FADE = 0.5  # share of the reach from which tiles go over into the far ground
 
 
 @dataclass(frozen=True)
@@ -42,10 +46,20 @@ def camera_of(shot: Shot, side: float, floor: float, width: int, height: int) ->
 def draw(terrain: Terrain, camera: Camera, sky: dict, ground_colour) -> Float32[Array, "h w 3"]:
     """The terrain as this camera sees it; what no tile covers is sky above the horizon and far ground below it."""
     about = camera.centre
-    field = laid(terrain, visible(terrain, camera), about * [1, 1, 0])
+    field = faded(laid(terrain, visible(terrain, camera), about * [1, 1, 0]), REACH * terrain.side, ground_colour)
     near = replace(camera, translation=-camera.rotation @ (about * [0, 0, 1]))
     seen = cpu.Rasterizer().forward(**arrays(field), camera=near)
     return np.clip(seen.colour + (1 - seen.alpha)[..., None] * backdrop(near, terrain, sky, ground_colour), 0, 1)
+
+
+def faded(field: Field, reach: float, ground_colour) -> Field:
+    """The far end of what is laid goes over into the mean ground colour, so that no edge shows where tiles end."""
+    away = np.hypot(field.means[:, 0], field.means[:, 1]) / reach
+    share = np.clip((away - FADE) / (1 - FADE), 0, 1)[:, None]
+    share = share * share * (3 - 2 * share)
+    sh = field.sh.copy()
+    sh[:, 0] += share.astype(np.float32) * (sh_of(np.array([ground_colour]))[0] - sh[:, 0])
+    return replace(field, sh=sh)
 
 
 def backdrop(camera: Camera, terrain: Terrain, sky: dict, ground_colour) -> Float32[Array, "h w 3"]:

@@ -17,45 +17,33 @@ int clamped_floor(float v, int low, int high) {  // NaN gives low
   return truncated - (v < truncated);
 }
 
-// Pixel centres from `from` to `to`, as first and last tile of `count`; none if first > last.
-struct Range {
-  int first, last;
-  Range(float from, float to, int count) {
-    const int first_pixel = -clamped_floor(0.5f - from, -count * TILE, 0);
-    const int last_pixel = clamped_floor(to - 0.5f, -1, count * TILE - 1);
-    const bool none = first_pixel > last_pixel;
-    first = none ? 1 : first_pixel / TILE;
-    last = none ? 0 : last_pixel / TILE;
-  }
-};
-
 // Calls f(tile) for every tile with a pixel centre inside the ellipse alpha >= ALPHA_MIN, row of tiles by row.
 // Within a row, the ellipse's x at height dy are skew dy +- sqrt((reach - flat dy^2) / -xx); over an interval of dy
 // the extremes lie at its ends or at the ellipse's own rightmost and leftmost points.
-template <class F> void each_tile(const Splat& s, int columns, int rows, F f) {
-  const Range down(s.y - s.half_y, s.y + s.half_y, rows);
-  const Range across(s.x - s.half_x, s.x + s.half_x, columns);
-  if (across.first > across.last) return;
-  if (down.first == down.last || across.first == across.last || s.xx > -FLAT || s.yy > -FLAT) {
-    for (int row = down.first; row <= down.last; row++)
-      for (int column = across.first; column <= across.last; column++) f(row * columns + column);
+template <class F> void each_tile(const Splat& s, int columns, F f) {
+  const int left = s.left / TILE, right = s.right / TILE, top = s.top / TILE, bottom = s.bottom / TILE;
+  if (left == right || top == bottom || s.xx > -FLAT || s.yy > -FLAT) {
+    for (int row = top; row <= bottom; row++)
+      for (int column = left; column <= right; column++) f(row * columns + column);
     return;
   }
   const float reach = s.log2_opacity + LOG2_255, per_xx = -1 / s.xx;
   const float skew = 0.5f * s.xy * per_xx;
   const float flat = -s.yy - 0.25f * s.xy * s.xy * per_xx;
   const float rightmost = s.half_x * s.xy / (-2 * s.yy);  // its dy; the leftmost point's is the negative
-  for (int row = down.first; row <= down.last; row++) {
+  for (int row = top; row <= bottom; row++) {
     const float from = std::max(row * TILE + 0.5f - s.y, -s.half_y);
     const float to = std::min(row * TILE + (TILE - 0.5f) - s.y, s.half_y);
     const float wide_from = std::sqrt(std::max(0.f, (reach - flat * from * from) * per_xx));
     const float wide_to = std::sqrt(std::max(0.f, (reach - flat * to * to) * per_xx));
-    float right = std::max(skew * from + wide_from, skew * to + wide_to);
-    float left = std::min(skew * from - wide_from, skew * to - wide_to);
-    if (rightmost >= from && rightmost <= to) right = s.half_x;
-    if (-rightmost >= from && -rightmost <= to) left = -s.half_x;
-    const Range within(s.x + left, s.x + right, columns);
-    for (int column = within.first; column <= within.last; column++) f(row * columns + column);
+    float high = std::max(skew * from + wide_from, skew * to + wide_to);
+    float low = std::min(skew * from - wide_from, skew * to - wide_to);
+    if (rightmost >= from && rightmost <= to) high = s.half_x;
+    if (-rightmost >= from && -rightmost <= to) low = -s.half_x;
+    // pixel centres from s.x + low to s.x + high
+    const int first = std::max(left, -clamped_floor(0.5f - s.x - low, -columns * TILE, 0) / TILE);
+    const int beyond = (clamped_floor(s.x + high + 0.5f, 0, columns * TILE) + TILE - 1) / TILE;
+    for (int column = first; column <= right && column < beyond; column++) f(row * columns + column);
   }
 }
 
@@ -76,7 +64,7 @@ void Binning::count(const Splat* splats, size_t n, int threads) {
 #pragma omp parallel for num_threads(threads) schedule(static)
   for (ptrdiff_t i = 0; i < ptrdiff_t(n); i++) {
     uint32_t found = 0;
-    if (splats[i].half_y >= 0) each_tile(splats[i], columns_, rows_, [&](int) { found++; });
+    if (splats[i].drawn()) each_tile(splats[i], columns_, [&](int) { found++; });
     slots_[i + 1] = found;
   }
   keys_.clear();
@@ -137,7 +125,7 @@ void Binning::distribute(const Splat* splats, int threads) {
   for (ptrdiff_t i = 0; i < ptrdiff_t(n); i++)
     if (slots_[i + 1] > slots_[i]) {
       uint32_t* to = &tile_of_slot_[slots_[i]];
-      each_tile(splats[i], columns_, rows_, [&](int tile) { *to++ = uint32_t(tile); });
+      each_tile(splats[i], columns_, [&](int tile) { *to++ = uint32_t(tile); });
     }
   histogram_.assign(size_t(threads) * tiles, 0);
 #pragma omp parallel num_threads(threads)

@@ -45,7 +45,7 @@ template <int C, bool DEPTH> static void unblend_tile(const Splat* splats, const
       const int b = __builtin_ctzll(blocks);
       const Lanes clear = transmittance[b];
       Touch touch;
-      if (!lay(frame, brush, b, transmittance[b], touch)) continue;
+      lay(frame, brush, b, transmittance[b], touch);
       Lanes share = colour[0][b] * s.colour[0];
       for (int c = 1; c < C; c++) share += colour[c][b] * s.colour[c];
       if (DEPTH) share += depth[b] * s.depth;

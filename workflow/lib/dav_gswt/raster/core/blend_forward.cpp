@@ -20,7 +20,7 @@ template <int C> static void blend_tile(const Splat* splats, const Tiles& tiles,
     Touch touch;
     for (; blocks; blocks &= blocks - 1) {
       const int b = __builtin_ctzll(blocks);
-      if (!lay(frame, brush, b, transmittance[b], touch)) continue;
+      lay(frame, brush, b, transmittance[b], touch);
       for (int c = 0; c < C; c++) colour[c][b] += touch.weight * s.colour[c];
       depth[b] += touch.weight * s.depth;
     }

@@ -25,7 +25,6 @@ struct TileFrame {
   int left, top;                        // pixels
   const Images& images;
   Lanes x[BLOCKS_ACROSS], y[BLOCKS_DOWN];  // pixel centres from the tile's corner
-  Blocks column[BLOCKS_ACROSS], row[BLOCKS_DOWN];
 
   TileFrame(int tile, const Tiles& tiles, const Images& of)
       : left(tile % tiles.columns * TILE), top(tile / tiles.columns * TILE), images(of) {
@@ -33,13 +32,6 @@ struct TileFrame {
       for (int l = 0; l < LANES; l++) x[c][l] = c * BLOCK_WIDTH + l % BLOCK_WIDTH + 0.5f;
     for (int r = 0; r < BLOCKS_DOWN; r++)
       for (int l = 0; l < LANES; l++) y[r][l] = r * BLOCK_HEIGHT + l / BLOCK_WIDTH + 0.5f;
-    for (int c = 0; c < BLOCKS_ACROSS; c++) column[c] = 0;
-    for (int r = 0; r < BLOCKS_DOWN; r++) row[r] = 0;
-    for (int r = 0; r < BLOCKS_DOWN; r++)
-      for (int c = 0; c < BLOCKS_ACROSS; c++) {
-        const Blocks bit = Blocks(1) << (r * BLOCKS_ACROSS + c);
-        column[c] |= bit, row[r] |= bit;
-      }
   }
 
   // Calls f(block, lane, pixel) for every pixel of the tile that lies in the image.
@@ -63,32 +55,22 @@ static inline Blocks living(const Lanes* transmittance, Blocks among) {
   Blocks found = 0;
   for (Blocks left = among; left; left &= left - 1) {
     const int b = __builtin_ctzll(left);
-    found |= Blocks(any(transmittance[b] > 0.f)) << b;
+    found |= Blocks(any(at_least(transmittance[b], all(0)))) << b;
   }
   return found;
 }
 
-static inline int whole_within(float v, int last) {  // floor of v, brought into [-1, last]
-  v = v < -1 ? -1 : v > last ? last : v;
-  return (int)(v + 1) - 1;
-}
+static inline Blocks lowest(int count) { return count >= 64 ? ~Blocks(0) : (Blocks(1) << count) - 1; }
 
-// Blocks that a span [from, to] of pixel centres along one side touches, as first and last of `count`.
-struct Span { int first, last; };
-static inline Span span(float from, float to, int size, int count) {
-  const int first = whole_within(from + 0.5f, TILE) , last = whole_within(to - 0.5f, TILE - 1);
-  (void)count;
-  return {(first < 0 ? 0 : first) / size, last < 0 ? -1 : last / size};
-}
+static inline int within_tile(int pixel) { return pixel < 0 ? 0 : pixel > TILE - 1 ? TILE - 1 : pixel; }
 
+// The blocks that the splat's box meets; it meets the tile, or would not be in its list.
 static inline Blocks touched(const TileFrame& frame, const Splat& s) {
-  const float x = s.x - frame.left, y = s.y - frame.top;
-  const Span across = span(x - s.half_x, x + s.half_x, BLOCK_WIDTH, BLOCKS_ACROSS);
-  const Span down = span(y - s.half_y, y + s.half_y, BLOCK_HEIGHT, BLOCKS_DOWN);
-  Blocks columns = 0, rows = 0;
-  for (int c = across.first; c <= across.last; c++) columns |= frame.column[c];
-  for (int r = down.first; r <= down.last; r++) rows |= frame.row[r];
-  return columns & rows;
+  const int left = within_tile(s.left - frame.left) / BLOCK_WIDTH, right = within_tile(s.right - frame.left) / BLOCK_WIDTH;
+  const int top = within_tile(s.top - frame.top) / BLOCK_HEIGHT, bottom = within_tile(s.bottom - frame.top) / BLOCK_HEIGHT;
+  constexpr Blocks FIRST_COLUMN = ~Blocks(0) / ((Blocks(1) << BLOCKS_ACROSS) - 1);  // a bit every BLOCKS_ACROSS
+  const Blocks columns = (lowest(right + 1) & ~lowest(left)) * FIRST_COLUMN;
+  return columns & lowest((bottom + 1) * BLOCKS_ACROSS) & ~lowest(top * BLOCKS_ACROSS);
 }
 
 // A splat, made ready for one tile.
@@ -105,22 +87,21 @@ struct Touch {
   Mask on, unclamped;
 };
 
-// Lays a splat over a block. Returns false, and changes nothing, where no pixel is reached.
-static inline bool lay(const TileFrame& frame, const Brush& s, int block, Lanes& transmittance, Touch& t) {
+// Lays a splat over a block. A fifth of the blocks are not reached at all (a corner of the splat's box), but a branch
+// to leave them out is mispredicted too often to pay.
+static inline void lay(const TileFrame& frame, const Brush& s, int block, Lanes& transmittance, Touch& t) {
   t.dx = frame.x[block % BLOCKS_ACROSS] - s.x;
   t.dy = frame.y[block / BLOCKS_ACROSS] - s.y;
   const Lanes log2_alpha = (s.xx * t.dx + s.xy * t.dy) * t.dx + (s.yy * t.dy * t.dy + s.log2_opacity);
+  const Mask reached = at_least(log2_alpha, all(-LOG2_255));
   const Lanes clear = transmittance;
-  const Mask reached = (log2_alpha >= -LOG2_255) & (clear > 0.f);
-  if (!any(reached)) return false;
   const Lanes alpha = exp2(max(log2_alpha, all(-8)));
-  t.unclamped = alpha < ALPHA_MAX;
+  t.unclamped = below(alpha, all(ALPHA_MAX));
   t.alpha = min(alpha, all(ALPHA_MAX));
   const Lanes weight = t.alpha * clear, rest = clear - weight;
-  t.on = reached & (rest >= CLEAR_MIN);
+  t.on = reached & at_least(rest, all(CLEAR_MIN));  // never of a pixel that is used up: its rest is negative
   t.weight = where(t.on, weight);
-  transmittance = select(t.on, rest, select(reached, -clear, clear));
-  return true;
+  transmittance = select(t.on, rest, select(reached, negative(clear), clear));
 }
 
 // Walks over a tile's splats from front to back. at(place, splat, blocks) blends one over the blocks it touches;
@@ -130,7 +111,7 @@ static inline void walk(const TileFrame& frame, const Splat* splats, const Tiles
                         const Lanes* transmittance, At at, Skip skip) {
   const uint32_t end = tiles.first[tile + 1];
   uint32_t place = tiles.first[tile];
-  Blocks alive = living(transmittance, BLOCKS == 64 ? ~Blocks(0) : (Blocks(1) << (BLOCKS % 64)) - 1);
+  Blocks alive = living(transmittance, lowest(BLOCKS));
   for (int count = 1; place < end && alive; place++, count++) {
     const uint32_t ahead = place + LOOK_AHEAD < end ? place + LOOK_AHEAD : end - 1;
     __builtin_prefetch(&splats[tiles.gaussian[ahead]]);

@@ -27,7 +27,7 @@ template <int C> static void weigh_tile(const Splat* splats, const Tiles& tiles,
     Touch touch;
     for (; blocks; blocks &= blocks - 1) {
       const int b = __builtin_ctzll(blocks);
-      if (!lay(frame, brush, b, transmittance[b], touch)) continue;
+      lay(frame, brush, b, transmittance[b], touch);
       sums[0] += touch.weight;
       maximum = max(maximum, touch.weight);
       for (int c = 0; c < C; c++) sums[1 + c] += touch.weight * values[c][b];

@@ -10,7 +10,7 @@ namespace raster {
 namespace ISA {
 
 typedef float Lanes __attribute__((vector_size(LANES * 4)));
-typedef int Mask __attribute__((vector_size(LANES * 4)));  // -1 where true, 0 where false
+typedef int Whole __attribute__((vector_size(LANES * 4)));
 
 static inline Lanes all(float value) { return Lanes{} + value; }
 
@@ -22,8 +22,18 @@ static inline Lanes load(const float* from) {
 
 static inline void store(float* to, Lanes v) { memcpy(to, &v, sizeof v); }
 
+// A Mask says yes or no for every lane. AVX-512 has registers of its own for that; elsewhere it is -1 or 0 in a lane.
 #if LANES == 16 && defined(__AVX512F__)
-static inline bool any(Mask m) { return _mm512_test_epi32_mask((__m512i)m, (__m512i)m) != 0; }
+typedef __mmask16 Mask;
+static inline Mask at_least(Lanes a, Lanes b) { return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_GE_OQ); }
+static inline Mask below(Lanes a, Lanes b) { return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_LT_OQ); }
+static inline Mask mask_of(Whole lanes) { return _mm512_movepi32_mask((__m512i)lanes); }
+static inline bool any(Mask m) { return m != 0; }
+static inline bool every(Mask m) { return m == 0xffff; }
+static inline Lanes select(Mask m, Lanes yes, Lanes no) {
+  return (Lanes)_mm512_mask_mov_ps((__m512)no, m, (__m512)yes);
+}
+static inline Lanes where(Mask m, Lanes v) { return (Lanes)_mm512_maskz_mov_ps(m, (__m512)v); }  // v or 0
 static inline Lanes max(Lanes a, Lanes b) { return (Lanes)_mm512_maskz_max_ps(0xffff, (__m512)a, (__m512)b); }
 static inline Lanes min(Lanes a, Lanes b) { return (Lanes)_mm512_maskz_min_ps(0xffff, (__m512)a, (__m512)b); }
 static inline Lanes sqrt(Lanes a) { return (Lanes)_mm512_maskz_sqrt_ps(0xffff, (__m512)a); }
@@ -31,8 +41,17 @@ static inline Lanes reciprocal(Lanes a) {  // 14 bits and one Newton step: 2e-7
   const Lanes r = (Lanes)_mm512_maskz_rcp14_ps(0xffff, (__m512)a);
   return r * (2.f - a * r);
 }
-#elif LANES == 8 && defined(__AVX2__)
+#else
+typedef Whole Mask;
+static inline Mask at_least(Lanes a, Lanes b) { return a >= b; }
+static inline Mask below(Lanes a, Lanes b) { return a < b; }
+static inline Mask mask_of(Whole lanes) { return lanes; }
+static inline Lanes where(Mask m, Lanes v) { return (Lanes)((Whole)v & m); }  // v or 0
+#if LANES == 8 && defined(__AVX2__)
 static inline bool any(Mask m) { return !_mm256_testz_si256((__m256i)m, (__m256i)m); }
+static inline Lanes select(Mask m, Lanes yes, Lanes no) {
+  return (Lanes)_mm256_blendv_ps((__m256)no, (__m256)yes, (__m256)m);
+}
 static inline Lanes max(Lanes a, Lanes b) { return (Lanes)_mm256_max_ps((__m256)a, (__m256)b); }
 static inline Lanes min(Lanes a, Lanes b) { return (Lanes)_mm256_min_ps((__m256)a, (__m256)b); }
 static inline Lanes sqrt(Lanes a) { return (Lanes)_mm256_sqrt_ps((__m256)a); }
@@ -41,24 +60,35 @@ static inline Lanes reciprocal(Lanes a) {  // 12 bits and one Newton step: 2e-7
   return r * (2.f - a * r);
 }
 #else
+#if LANES == 4 && defined(__SSE4_1__)
+static inline bool any(Mask m) { return !_mm_testz_si128((__m128i)m, (__m128i)m); }
+static inline Lanes select(Mask m, Lanes yes, Lanes no) {
+  return (Lanes)_mm_blendv_ps((__m128)no, (__m128)yes, (__m128)m);
+}
+static inline Lanes max(Lanes a, Lanes b) { return (Lanes)_mm_max_ps((__m128)a, (__m128)b); }
+static inline Lanes min(Lanes a, Lanes b) { return (Lanes)_mm_min_ps((__m128)a, (__m128)b); }
+#else
 static inline bool any(Mask m) {
   int found = 0;
   for (int l = 0; l < LANES; l++) found |= m[l];
   return found != 0;
 }
+static inline Lanes select(Mask m, Lanes yes, Lanes no) { return m ? yes : no; }
 static inline Lanes max(Lanes a, Lanes b) { return a > b ? a : b; }
 static inline Lanes min(Lanes a, Lanes b) { return a < b ? a : b; }
+#endif
 static inline Lanes sqrt(Lanes a) {
   for (int l = 0; l < LANES; l++) a[l] = __builtin_sqrtf(a[l]);
   return a;
 }
 static inline Lanes reciprocal(Lanes a) { return 1.f / a; }
 #endif
+static inline bool every(Mask m) { return !any(~m); }
+#endif
 
 static inline Lanes clamp(Lanes v, float low, float high) { return min(max(v, all(low)), all(high)); }
-static inline Mask is_finite(Lanes v) { return ((Mask)v & 0x7f800000) != 0x7f800000; }
-static inline Lanes select(Mask m, Lanes yes, Lanes no) { return m ? yes : no; }
-static inline Lanes where(Mask m, Lanes v) { return (Lanes)((Mask)v & m); }  // v or 0
+static inline Whole finite_bits(Lanes v) { return ((Whole)v & 0x7f800000) != 0x7f800000; }  // -1 or 0
+static inline Lanes negative(Lanes v) { return (Lanes)((Whole)v | (int)0x80000000); }      // -|v|
 
 // 2^x for x in [-126, 126], relative error 2e-7. x = n + f, |f| <= 1/2: a polynomial for 2^f, n into the exponent.
 // Adding 1.5 2^23 rounds to a whole number and leaves it in the low bits.
@@ -71,7 +101,7 @@ static inline Lanes exp2(Lanes x) {
   p = p * f + 2.4022651e-1f;
   p = p * f + 6.9314718e-1f;
   p = p * f + 1.f;
-  return (Lanes)((Mask)p + ((Mask)n << 23));
+  return (Lanes)((Whole)p + ((Whole)n << 23));
 }
 
 static inline Lanes exp(Lanes x) { return exp2(clamp(x * LOG2_E, -126.f, 126.f)); }
@@ -79,8 +109,8 @@ static inline Lanes exp(Lanes x) { return exp2(clamp(x * LOG2_E, -126.f, 126.f))
 // log2 of a normal positive number, absolute error 1e-7 near 1. x = 2^n m with m in [sqrt(1/2), sqrt(2)), and
 // ln m = 2 atanh((m - 1) / (m + 1)) by its series.
 static inline Lanes log2(Lanes x) {
-  const Mask n = ((Mask)x - 0x3f3504f3) >> 23;
-  const Lanes m = (Lanes)((Mask)x - (n << 23));
+  const Whole n = ((Whole)x - 0x3f3504f3) >> 23;
+  const Lanes m = (Lanes)((Whole)x - (n << 23));
   const Lanes t = (m - 1.f) / (m + 1.f), tt = t * t;
   const Lanes series = 1.f + tt * (1.f / 3 + tt * (1.f / 5 + tt * (1.f / 7 + tt * (1.f / 9))));
   return __builtin_convertvector(n, Lanes) + 2.f * LOG2_E * (t * series);
@@ -89,7 +119,7 @@ static inline Lanes log2(Lanes x) {
 // Folding: `u` and `v` hold segments of SEGMENT lanes to be summed; the result holds segments half as long, first
 // those of u, then those of v. log2(LANES) foldings turn LANES vectors into one vector of their sums.
 template <int SEGMENT> static inline Lanes fold(Lanes u, Lanes v) {
-  Mask low, high;
+  Whole low, high;
   for (int l = 0; l < LANES; l++) {
     const int half = SEGMENT / 2, segment = l / half, lane = l % half;
     low[l] = segment * SEGMENT + lane;  // counts through u, then v
@@ -98,21 +128,31 @@ template <int SEGMENT> static inline Lanes fold(Lanes u, Lanes v) {
   return __builtin_shuffle(u, v, low) + __builtin_shuffle(u, v, high);
 }
 
-template <int SEGMENT> static inline Lanes fold_all(const Lanes* v) {
-  if constexpr (SEGMENT == LANES) return fold<SEGMENT>(v[0], v[1]);
-  else return fold<SEGMENT>(fold_all<SEGMENT * 2>(v), fold_all<SEGMENT * 2>(v + LANES / SEGMENT));
+// Lane i of the result: the sum of v[i], for i < COUNT <= LANES; the other lanes mean nothing.
+template <int SEGMENT, int COUNT> static inline Lanes fold_all(const Lanes* v) {
+  constexpr int HALF = LANES / SEGMENT;  // how many vectors go into the result's first half
+  if constexpr (SEGMENT == 2 * LANES) {
+    return *v;
+  } else {
+    const Lanes u = fold_all<2 * SEGMENT, (COUNT < HALF ? COUNT : HALF)>(v);
+    if constexpr (COUNT <= HALF) return fold<SEGMENT>(u, u);
+    else return fold<SEGMENT>(u, fold_all<2 * SEGMENT, COUNT - HALF>(v + HALF));
+  }
 }
 
-// to[i] = sum of the lanes of v[i], for `COUNT` vectors.
+template <int COUNT> __attribute__((noinline)) static void store_sums_of(float* to, const Lanes* v) {
+  constexpr int NOW = COUNT < LANES ? COUNT : LANES;
+  const Lanes sums = fold_all<2, NOW>(v);
+  memcpy(to, &sums, 4 * NOW);
+  if constexpr (COUNT > LANES) store_sums_of<COUNT - LANES>(to + LANES, v + LANES);
+}
+
+// to[i] = sum of the lanes of v[i], for COUNT vectors. The folding is not inlined, and gets a copy, so that the loop
+// before it may keep v in registers.
 template <int COUNT> static inline void store_sums(float* to, const Lanes* v) {
-  constexpr int batches = (COUNT + LANES - 1) / LANES;
-  Lanes padded[batches * LANES];
-  for (int i = 0; i < batches * LANES; i++) padded[i] = i < COUNT ? v[i] : Lanes{};
-  for (int b = 0; b < batches; b++) {
-    const Lanes sums = fold_all<2>(padded + b * LANES);
-    const int left = COUNT - b * LANES;
-    memcpy(to + b * LANES, &sums, 4 * (left < LANES ? left : LANES));
-  }
+  Lanes copy[COUNT];
+  for (int i = 0; i < COUNT; i++) copy[i] = v[i];
+  store_sums_of<COUNT>(to, copy);
 }
 
 // Rows of `stride` floats: the first floats of rows `row`, `row + 1` ... as lanes, and back. With fewer than LANES

@@ -42,7 +42,7 @@ struct Chain {
   Lanes cxy[3];              // p x q: components 01, 02, 12
   Lanes sxx, sxy, syy, det;
   Lanes opacity;
-  Mask valid;                // inputs are finite and the quaternion is not zero
+  bool valid;                // inputs are finite and no quaternion is zero
 };
 
 static inline void turn_of(const Lanes q[4], Lanes m[9]) {
@@ -97,13 +97,13 @@ static inline Chain chain(const Scene& scene, const View& view, size_t i, int co
   for (int k = 0; k < 4; k++) c.quat[k] = load_column(scene.quats + k, 4, i, count);
   const Lanes logit = load_column(scene.opacity_logits, 1, i, count);
 
-  c.valid = is_finite(logit);
-  for (int k = 0; k < 3; k++) c.valid &= is_finite(c.mean[k]) & is_finite(log_scale[k]);
-  for (int k = 0; k < 4; k++) c.valid &= is_finite(c.quat[k]);
+  Whole finite = finite_bits(logit);
+  for (int k = 0; k < 3; k++) finite &= finite_bits(c.mean[k]) & finite_bits(log_scale[k]);
+  for (int k = 0; k < 4; k++) finite &= finite_bits(c.quat[k]);
   // a quaternion is first divided by its largest component: its square may be out of range
   Lanes largest = all(0);
   for (int k = 0; k < 4; k++) largest = max(largest, max(c.quat[k], -c.quat[k]));
-  c.valid &= largest > 1e-37f;
+  c.valid = every(mask_of(finite) & at_least(largest, all(1e-37f)));
   const Lanes per_largest = 1.f / largest;
   Lanes length = all(0);
   for (int k = 0; k < 4; k++) c.quat[k] *= per_largest, length += c.quat[k] * c.quat[k];
@@ -119,20 +119,31 @@ static inline Chain chain(const Scene& scene, const View& view, size_t i, int co
   return c;
 }
 
+// ceil(v) of a number within [0, 32767], as pixels
+static inline Whole ceiling(Lanes v) {
+  const Whole truncated = __builtin_convertvector(v, Whole);
+  return truncated - (__builtin_convertvector(truncated, Lanes) < v);
+}
+
 static inline void store_splats(const Chain& c, const View& view, Splat* splats, int count) {
   const Lanes per_det = 1.f / c.det;
   const Lanes log2_opacity = log2(max(c.opacity, all(1e-37f)));
   const Lanes reach = 2 * LN2 * (log2_opacity + LOG2_255);  // the quadratic form at the rim
   const Lanes half_x = sqrt(max(reach * c.sxx, all(0))), half_y = sqrt(max(reach * c.syy, all(0)));
   const Lanes x = view.fx * c.slope_x + view.cx, y = view.fy * c.slope_y + view.cy;
-  const float nearest = view.orthographic ? 0 : view.near;
-  const Mask drawn = (c.z >= nearest) & (c.z > 0.f) & (reach >= 0.f) & (c.det > 1e-30f) & (x + half_x > 0.f) &
-                     (x - half_x < (float)view.width) & (y + half_y > 0.f) & (y - half_y < (float)view.height);
+  const Mask drawn = at_least(c.z, all(view.orthographic ? 1e-30f : view.near)) & at_least(reach, all(0)) &
+                     at_least(c.det, all(1e-30f));
+  // the first pixel whose centre lies in the box, and the first beyond it
+  const float width = view.width, height = view.height;
+  const Lanes end_x = clamp(x + half_x - 0.5f, 0, width), end_y = clamp(y + half_y - 0.5f, 0, height);
+  const Whole boxes[] = {ceiling(clamp(x - half_x - 0.5f, 0, width)), ceiling(clamp(y - half_y - 0.5f, 0, height)),
+                         ceiling(select(drawn, end_x, all(0))), ceiling(end_y)};
   const Lanes fields[] = {x, y, -0.5f * LOG2_E * (c.syy * per_det), LOG2_E * (c.sxy * per_det),
-                          -0.5f * LOG2_E * (c.sxx * per_det), log2_opacity, half_x, select(drawn, half_y, all(-1)),
-                          c.z};
+                          -0.5f * LOG2_E * (c.sxx * per_det), log2_opacity, half_x, half_y, c.z};
   float buffer[9][LANES];
+  int box[4][LANES];
   for (int f = 0; f < 9; f++) store(buffer[f], fields[f]);
+  memcpy(box, boxes, sizeof box);
   for (int l = 0; l < count; l++) {
     Splat& s = splats[l];
     s.x = buffer[0][l], s.y = buffer[1][l];
@@ -140,6 +151,9 @@ static inline void store_splats(const Chain& c, const View& view, Splat* splats,
     s.log2_opacity = buffer[5][l];
     s.half_x = buffer[6][l], s.half_y = buffer[7][l];
     s.depth = buffer[8][l];
+    const bool any_pixel = box[0][l] < box[2][l] && box[1][l] < box[3][l];
+    s.left = box[0][l], s.top = box[1][l];
+    s.right = any_pixel ? box[2][l] - 1 : -1, s.bottom = any_pixel ? box[3][l] - 1 : -1;
   }
 }
 
@@ -151,7 +165,7 @@ bool project(const Scene& scene, const View& view, Splat* splats, int threads) {
     const size_t i = g * LANES;
     const int count = scene.n - i < LANES ? scene.n - i : LANES;
     const Chain c = chain(scene, view, i, count);
-    invalid |= any(~c.valid);
+    invalid |= !c.valid;
     store_splats(c, view, splats + i, count);
   }
   return !invalid;
@@ -167,7 +181,7 @@ bool load_colours(const Scene& scene, int channel, int group, Splat* splats, int
       colour[k] = from[k];
       invalid |= !__builtin_isfinite(from[k]);
     }
-    if (splats[i].half_y >= 0) memcpy(splats[i].colour, colour, sizeof colour);
+    if (splats[i].drawn()) memcpy(splats[i].colour, colour, sizeof colour);
   }
   return !invalid;
 }
@@ -210,8 +224,8 @@ static inline Three unplace(const Chain& c, const View& view, Lanes dx, Lanes dy
   if (!view.orthographic) {
     const Lanes djxx = du[0] * r[0] + du[1] * r[1] + du[2] * r[2], djxz = du[0] * r[6] + du[1] * r[7] + du[2] * r[8];
     const Lanes djyy = dv[0] * r[3] + dv[1] * r[4] + dv[2] * r[5], djyz = dv[0] * r[6] + dv[1] * r[7] + dv[2] * r[8];
-    const Lanes dslope_x = where(c.bound_x == c.slope_x, -c.jxx * djxz);
-    const Lanes dslope_y = where(c.bound_y == c.slope_y, -c.jyy * djyz);
+    const Lanes dslope_x = where(mask_of(c.bound_x == c.slope_x), -c.jxx * djxz);
+    const Lanes dslope_y = where(mask_of(c.bound_y == c.slope_y), -c.jyy * djyz);
     camera_x += dslope_x * c.per_z;
     camera_y += dslope_y * c.per_z;
     const Lanes along_x = view.fx * dx + dslope_x, along_y = view.fy * dy + dslope_y;
@@ -226,8 +240,9 @@ static inline Three unplace(const Chain& c, const View& view, Lanes dx, Lanes dy
 static void project_backward_group(const Scene& scene, const View& view, const Splat* splats, const float* sums,
                                    const SceneGradients& out, size_t i, int count) {
   const Chain c = chain(scene, view, i, count);
-  Mask drawn = {};
-  for (int l = 0; l < count; l++) drawn[l] = splats[i + l].half_y >= 0 ? -1 : 0;
+  Whole seen = {};
+  for (int l = 0; l < count; l++) seen[l] = -(int)splats[i + l].drawn();
+  const Mask drawn = mask_of(seen);
   Lanes moments[MOMENTS + 1];
   for (int k = 0; k <= MOMENTS; k++) moments[k] = load_column(sums + k, MOMENTS + 1, i, count);
 

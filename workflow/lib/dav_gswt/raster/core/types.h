@@ -46,9 +46,12 @@ struct alignas(64) Splat {
   float x, y;            // pixels
   float xx, xy, yy;      // log2(e) times the conic: negative definite
   float log2_opacity;
-  float half_x, half_y;  // half sides of the box around alpha >= ALPHA_MIN; half_y < 0: not drawn
+  float half_x, half_y;  // half sides of the box around alpha >= ALPHA_MIN
   float depth;
   float colour[GROUP];
+  int16_t left, top, right, bottom;  // pixels of the picture in that box, the last ones included; none: right = -1
+
+  bool drawn() const { return right >= 0; }
 };
 
 // Who lies in which tile. An intersection has a place (in its tile's list, front to back) and a slot (a Gaussian's
