@@ -13,7 +13,6 @@ from dav_gswt.field import Field, sh_of
 from dav_gswt.raster import cpu
 from dav_gswt.terrain.assemble import REACH, Terrain, laid, visible
 
-
 FADE = 0.5  # share of the reach from which tiles go over into the far ground
 
 
