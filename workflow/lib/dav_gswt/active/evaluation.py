@@ -3,9 +3,8 @@
 import numpy as np
 
 from dav_gswt import metrics
-from dav_gswt.coarse.doubt import arrays
 from dav_gswt.field import Field
-from dav_gswt.raster import cpu
+from dav_gswt.raster import render
 from dav_gswt.views import View
 
 
@@ -14,11 +13,11 @@ def evaluate(field: Field, tests: list[View]) -> dict:
 
     Returns: null where there is no test view, or where pictures are equal and PSNR has no value.
     """
-    raster, rows = cpu.Rasterizer(), []
+    rows = []
     for view in tests:
         if not view.weight.any():
             continue
-        seen = np.clip(raster.forward(**arrays(field), camera=view.camera).colour, 0, 1)
+        seen = np.clip(render(field, view.camera).colour, 0, 1)
         level = np.clip(metrics.colour_corrected(seen, view.image, view.weight), 0, 1).astype(np.float32)
         rows.append(
             {

@@ -8,9 +8,8 @@ from numpy import ndarray as Array
 
 from dav_gswt import cameras
 from dav_gswt.cameras import Camera
-from dav_gswt.coarse.doubt import arrays
 from dav_gswt.field import Field, sh_of
-from dav_gswt.raster import cpu
+from dav_gswt.raster import render
 from dav_gswt.terrain.assemble import REACH, Terrain, laid, visible
 
 FADE = 0.5  # share of the reach from which tiles go over into the far ground
@@ -47,7 +46,7 @@ def draw(terrain: Terrain, camera: Camera, sky: dict, ground_colour) -> Float32[
     about = camera.centre
     field = faded(laid(terrain, visible(terrain, camera), about * [1, 1, 0]), REACH * terrain.side, ground_colour)
     near = replace(camera, translation=-camera.rotation @ (about * [0, 0, 1]))
-    seen = cpu.Rasterizer().forward(**arrays(field), camera=near)
+    seen = render(field, near)
     return np.clip(seen.colour + (1 - seen.alpha)[..., None] * backdrop(near, terrain, sky, ground_colour), 0, 1)
 
 
