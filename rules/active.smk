@@ -6,29 +6,6 @@ which round is asked for. Scoring keeps its terms apart: the policy and k enter 
 """
 
 
-def before_round(wildcards):
-    """What round t starts from: the coarse field and its scores, then those of round t - 1."""
-    last = f"<results>/<active>/iter{int(wildcards.t) - 1}"
-    if wildcards.t == "1":
-        last = "<results>/<coarse>"
-    scores = "<results>/<scored>" if wildcards.t == "1" else last
-    return {
-        "field": f"{last}/field.ply",
-        "ground": f"{last}/ground.exr",
-        "scores": f"{scores}/scores.csv",
-    }
-
-
-def captures_before(wildcards):
-    """The photos that rounds 1 to t - 1 took."""
-    return [f"<results>/<active>/iter{t}/capture" for t in range(1, int(wildcards.t))]
-
-
-def captures_until(wildcards):
-    """The photos that rounds 1 to t took."""
-    return [f"<results>/<active>/iter{t}/capture" for t in range(1, int(wildcards.t) + 1)]
-
-
 rule score_coarse:
     """Score every candidate pose by what the coarse field does not know there."""
     input:
@@ -45,6 +22,9 @@ rule score_coarse:
     benchmark:
         "<benchmarks>/<scored>/score_coarse.tsv"
     threads: 2
+    resources:
+        mem_mb=1000,
+        runtime="10m",
     params:
         scene=entry("scenes", "scene"),
         source=source_of("active", "raster", "coarse/doubt"),
@@ -114,6 +94,9 @@ rule capture_views:
     benchmark:
         "<benchmarks>/<round>/capture_views.tsv"
     threads: 2
+    resources:
+        mem_mb=2500,
+        runtime="30m",
     params:
         scene=entry("scenes", "scene"),
         source=source_of("active/agents", "active/candidates", "active/capture", "photos"),
@@ -141,6 +124,9 @@ rule update_field:
         policy="farthest|opacity|random",
         t=POSITIVE,
     threads: 2
+    resources:
+        mem_mb=2000,
+        runtime="60m",
     params:
         quality=entry("qualities", "quality"),
         seed=integer("seed"),

@@ -18,6 +18,9 @@ rule bundle_tiles:
         "<logs>/<bundle>/bundle_tiles.log",
     benchmark:
         "<benchmarks>/<bundle>/bundle_tiles.tsv"
+    resources:
+        mem_mb=1500,
+        runtime="10m",
     params:
         tau=real("tau"),
         seed=integer("seed"),

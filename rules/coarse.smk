@@ -19,6 +19,9 @@ rule fit_coarse:
     benchmark:
         "<benchmarks>/<coarse>/fit_coarse.tsv"
     threads: 2
+    resources:
+        mem_mb=2000,
+        runtime="60m",
     params:
         quality=entry("qualities", "quality"),
         seed=integer("seed"),
@@ -43,6 +46,9 @@ rule evaluate_coarse:
     benchmark:
         "<benchmarks>/<coarse>/evaluate_coarse.tsv"
     threads: 2
+    resources:
+        mem_mb=1500,
+        runtime="10m",
     params:
         quality=entry("qualities", "quality"),
         t=0,

@@ -130,3 +130,26 @@ def file_of(scene):
     if not file.is_file():
         raise WorkflowError(f"config: scenes.{scene}.field: there is no file {file}")
     return str(file)
+
+
+def before_round(wildcards):
+    """What round t starts from: the coarse field and its scores, then those of round t - 1."""
+    last = f"<results>/<active>/iter{int(wildcards.t) - 1}"
+    if wildcards.t == "1":
+        last = "<results>/<coarse>"
+    scores = "<results>/<scored>" if wildcards.t == "1" else last
+    return {
+        "field": f"{last}/field.ply",
+        "ground": f"{last}/ground.exr",
+        "scores": f"{scores}/scores.csv",
+    }
+
+
+def captures_before(wildcards):
+    """The photos that rounds 1 to t - 1 took."""
+    return [f"<results>/<active>/iter{t}/capture" for t in range(1, int(wildcards.t))]
+
+
+def captures_until(wildcards):
+    """The photos that rounds 1 to t took."""
+    return [f"<results>/<active>/iter{t}/capture" for t in range(1, int(wildcards.t) + 1)]

@@ -39,6 +39,9 @@ rule fit_level:
     wildcard_constraints:
         level=POSITIVE,
     threads: 2
+    resources:
+        mem_mb=2000,
+        runtime="30m",
     params:
         quality=entry("qualities", "quality"),
         seed=integer("seed"),

@@ -40,6 +40,9 @@ rule render_terrain:
     benchmark:
         "<benchmarks>/<terrain>/render_terrain.tsv"
     threads: 2
+    resources:
+        mem_mb=4000,
+        runtime="20m",
     params:
         size=lookup(dpath="stills", within=config),
         source=source_of("terrain", "raster"),

@@ -20,6 +20,9 @@ rule cut_tiles:
     benchmark:
         "<benchmarks>/<tiles>/cut_tiles.tsv"
     threads: 2
+    resources:
+        mem_mb=2000,
+        runtime="20m",
     params:
         seam=entry("seams", "seam"),
         seed=integer("seed"),

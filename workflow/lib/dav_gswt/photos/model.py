@@ -13,6 +13,8 @@ from dav_gswt import images
 from dav_gswt.cameras import Camera
 from dav_gswt.errors import InputError
 
+pycolmap.logging.minloglevel = 2  # it reports every step of every photo on stderr; we report progress instead
+
 WORST_ERROR = 4.0  # pixels: an observation farther from its point's projection is a wrong match
 LEAST_ANGLE = 1.5  # degrees between two rays, below which their crossing says nothing about depth
 

@@ -29,7 +29,6 @@ from dav_gswt.photos import exif, model
 from dav_gswt.photos.model import Model
 
 _log = logging.getLogger(__name__)
-pycolmap.logging.minloglevel = 2  # it reports every step of every photo on stderr; we report progress instead
 
 LEAST_PHOTOS = 3
 LOOK = 4.0  # seconds between two looks at how far a long step is

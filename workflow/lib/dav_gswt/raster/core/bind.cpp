@@ -1,6 +1,7 @@
 // The Python module. Shapes and types are checked in cpu.py; here arrays become pointers, without copies.
 #include "context.h"
 #include <cmath>
+#include <memory>
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
@@ -75,11 +76,13 @@ double loss(const std::string& isa, In image, In target, MaybeIn weight, float s
   const Kernels& kernels = kernels_of(isa);
   const int height = image.shape(0), width = image.shape(1), channels = image.shape(2);
   nb::gil_scoped_release release;
-  std::vector<float> scratch(3 * image.size());
+  LossTask task{width, height, channels, image.data(), target.data(), pointer(weight), structure, gradient.data(),
+                nullptr, nullptr};
+  const std::unique_ptr<float[]> scratch(new float[4 * size_t(height) * loss_stride(task)]);
   std::vector<double> rows(height);
-  kernels.loss({width, height, channels, image.data(), target.data(), pointer(weight), structure, gradient.data(),
-                scratch.data(), rows.data()},
-               threads);
+  task.scratch = scratch.get();
+  task.row_sums = rows.data();
+  kernels.loss(task, threads);
   double total = 0;
   for (double row : rows) total += row;
   return total / double(image.size());

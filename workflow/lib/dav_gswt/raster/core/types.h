@@ -84,9 +84,13 @@ struct LossTask {
   const float *image, *target, *weight;  // weight may be null: 1
   float structure;
   float* gradient;
-  float* scratch;     // 3 height width channels
+  float* scratch;     // 4 planes of height rows of loss_stride floats
   double* row_sums;   // height
 };
+
+// Floats from row to row of a plane: whole vectors of the widest kind, and an odd number of them, or the rows above
+// each other would fall into the same few sets of the cache.
+static inline int loss_stride(const LossTask& t) { return ((t.width * t.channels + 15) / 16 | 1) * 16; }
 
 struct AdamTask {
   size_t rows;
