@@ -37,7 +37,7 @@ wildcard_constraints:
     p_drop="0",
     lam="0",
     k=NATURAL,
-    t=POSITIVE,
+    t=NATURAL,
     level=NATURAL,
     seam=NAME,
     tau=FRACTION,

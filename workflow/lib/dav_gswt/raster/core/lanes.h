@@ -116,6 +116,17 @@ static inline Lanes log2(Lanes x) {
   return __builtin_convertvector(n, Lanes) + 2.f * LOG2_E * (t * series);
 }
 
+// Lanes `from` of u, then v, as if they followed each other.
+static inline Lanes shuffled(Lanes u, Lanes v, Whole from) {
+#if defined(__clang__)
+  Lanes out;
+  for (int l = 0; l < LANES; l++) out[l] = from[l] < LANES ? u[from[l]] : v[from[l] - LANES];
+  return out;
+#else
+  return __builtin_shuffle(u, v, from);
+#endif
+}
+
 // Folding: `u` and `v` hold segments of SEGMENT lanes to be summed; the result holds segments half as long, first
 // those of u, then those of v. log2(LANES) foldings turn LANES vectors into one vector of their sums.
 template <int SEGMENT> static inline Lanes fold(Lanes u, Lanes v) {
@@ -125,7 +136,7 @@ template <int SEGMENT> static inline Lanes fold(Lanes u, Lanes v) {
     low[l] = segment * SEGMENT + lane;  // counts through u, then v
     high[l] = low[l] + half;
   }
-  return __builtin_shuffle(u, v, low) + __builtin_shuffle(u, v, high);
+  return shuffled(u, v, low) + shuffled(u, v, high);
 }
 
 // Lane i of the result: the sum of v[i], for i < COUNT <= LANES; the other lanes mean nothing.
