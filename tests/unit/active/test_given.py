@@ -26,10 +26,10 @@ def test_the_surface_under_a_finished_field_is_found_and_what_lies_beyond_is_cut
         np.full(n, 3.0, np.float32),
         sh_of(np.full((n, 3), 0.5)),
         np.zeros(n, np.float32),
-        np.zeros(n, bool),
+        np.ones(n, bool),  # as if it came from a ground layer of ours
     )
     inside, grid = given.enter(field, FRAME, QUALITY)
-    assert 0 < len(inside) < n
+    assert 0 < len(inside) < n and not inside.ground.any()
     assert inside.means[:, :2].min() >= 0 and inside.means[:, :2].max() <= 4
     x = grid.centres[:, 0].reshape(grid.shape)
     # the topmost of overlapping round Gaussians is seen, up to a standard deviation above the surface

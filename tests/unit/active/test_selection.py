@@ -52,6 +52,7 @@ def test_a_pool_that_is_too_small_is_taken_whole_and_said_so(policy, caplog):
     assert len(selection.select(policy, pool, np.array([[1.0, 0, 0]]), 5, RNG(0))) == 2
     assert "only 2 candidates" in caplog.text
     assert selection.select(policy, [], np.zeros((0, 3)), 5, RNG(0)) == []
+    assert "no candidate pose is left" in caplog.text
 
 
 def test_scores_come_back_to_the_bit(tmp_path):

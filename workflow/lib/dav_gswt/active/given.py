@@ -27,6 +27,7 @@ def enter(field: Field, frame: dict, quality: Quality) -> tuple[Field, Ground]:
     none = np.zeros((0, 3))
     grid = ground.lay(frame, none, spacing, int(GROUND_SHARE * quality.cap), BLOCK, margin=0.0)
     inside = field[grid.contains(field.means)]
+    inside = replace(inside, ground=np.zeros(len(inside), bool))  # a field of ours has discs, but of another grid
     maps = from_above(inside, grid)
     solid = maps.alpha > OPAQUE
     rows, columns = np.nonzero(solid)
@@ -35,4 +36,5 @@ def enter(field: Field, frame: dict, quality: Quality) -> tuple[Field, Ground]:
     grid = replace(grid, seen=solid)
     heights = ground.surface(grid, points[:: max(1, len(points) // 50_000)])
     _log.info("finished field: %d Gaussians over %d x %d cells", len(inside), *grid.shape)
-    return inside, replace(grid, heights=heights)
+    # if its discs once lay on a grid, it was another one
+    return replace(inside, ground=np.zeros(len(inside), bool)), replace(grid, heights=heights)

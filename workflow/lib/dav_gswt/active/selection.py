@@ -44,6 +44,9 @@ def select(
     policy: str, scored: list[Scored], captured: Float[Array, "m 3"], k: int, rng: np.random.Generator
 ) -> list[Pose]:
     """The poses that a policy chooses. k greater than the pool takes all of it, and says so."""
+    if not scored:
+        _log.warning("no candidate pose is left: no photo is taken, the field stays as it is")
+        return []
     if k > len(scored):
         _log.warning("asked for %d poses; only %d candidates are left: all are taken", k, len(scored))
         k = len(scored)
