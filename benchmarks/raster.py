@@ -1,5 +1,6 @@
 """How long the rasterizer takes: forward and backward, by instruction set and number of threads."""
 
+import os
 import platform
 import time
 from functools import partial
@@ -56,9 +57,10 @@ def row(side: int, n: int, isa: str) -> list[float]:
     """Forward, backward and loss of one scene, for each number of threads."""
     arrays, camera = scene(n, side)
     gradient = np.random.default_rng(1).normal(size=(side, side, 3)).astype(np.float32)
+    os.environ["DAV_GSWT_ISA"] = isa
     cells = []
     for threads in THREADS:
-        raster = cpu.Rasterizer(threads=threads, instruction_set=isa)
+        raster = cpu.Rasterizer(threads=threads)
         cells.append(milliseconds(partial(raster.forward, **arrays, camera=camera)))
         cells.append(milliseconds(partial(raster.backward, gradient)))
         image = raster.forward(**arrays, camera=camera).colour

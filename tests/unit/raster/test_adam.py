@@ -49,3 +49,10 @@ def test_steps_count_from_one():
     zeros = np.zeros(3, np.float32)
     with pytest.raises(ValueError, match="counts from 1"):
         cpu.adam(zeros, zeros, zeros, zeros, rate=0.1, step=0)
+
+
+def test_values_that_cannot_be_changed_are_refused():
+    frozen, zeros = np.zeros(3, np.float32), np.zeros(3, np.float32)
+    frozen.flags.writeable = False
+    with pytest.raises(ValueError, match="values is read-only"):
+        cpu.adam(frozen, zeros, zeros, zeros, rate=0.1, step=1)

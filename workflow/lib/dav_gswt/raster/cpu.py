@@ -1,7 +1,7 @@
 """The rasterizer's C++ core as functions of NumPy arrays: float32, C-contiguous, never copied.
 
 Results have the same bits for any number of threads. They differ in the last bits between instruction sets
-(`instruction_set`), which the environment variable DAV_GSWT_ISA may fix, and DAV_GSWT_THREADS the number of threads.
+(`instruction_set`). The environment variable DAV_GSWT_ISA fixes that, DAV_GSWT_THREADS the number of threads.
 """
 
 import os
@@ -215,6 +215,8 @@ def adam(
         raise ValueError(f"step counts from 1, not {step}")
     for name, array in (("values", values), ("gradient", gradient), ("first", first), ("second", second)):
         _check(array, name, values.shape)
+        if array is not gradient and not array.flags.writeable:
+            raise ValueError(f"{name} is read-only, but is to be changed in place")
     if rows is not None:
         _check(rows, "rows", values.shape[:1], np.bool_)
     threads = 1 if values.size < TINY else threads or default_threads()

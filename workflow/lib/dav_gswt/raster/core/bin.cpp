@@ -9,6 +9,8 @@ namespace raster {
 
 namespace {
 
+constexpr size_t FEW = 1 << 16;  // keys below which a second thread costs more than it brings
+
 constexpr float FLAT = 1e-16f;  // a conic below this is constant over any picture, and its ratios mean nothing
 
 int clamped_floor(float v, int low, int high) {  // NaN gives low
@@ -85,6 +87,7 @@ void Binning::count(const Splat* splats, size_t n, int threads) {
 void Binning::order_by_depth(int threads) {
   constexpr int BITS = 11, DIGITS = 1 << BITS;
   const size_t n = keys_.size();
+  if (n < FEW) threads = 1;
   spare_keys_.resize(n);
   histogram_.resize(size_t(threads) * DIGITS);
   for (int shift = 32; shift < 64; shift += BITS) {

@@ -4,10 +4,10 @@
 #include <memory>
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 #include <optional>
-#include <nanobind/stl/optional.h>
 
 namespace nb = nanobind;
 using namespace raster;

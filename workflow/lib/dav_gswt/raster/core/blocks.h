@@ -13,16 +13,14 @@ constexpr int BLOCK_HEIGHT = LANES / BLOCK_WIDTH;
 constexpr int BLOCKS_ACROSS = TILE / BLOCK_WIDTH;
 constexpr int BLOCKS_DOWN = TILE / BLOCK_HEIGHT;
 constexpr int BLOCKS = BLOCKS_ACROSS * BLOCKS_DOWN;
-constexpr int LOOK_AHEAD = 6;      // splats between the one that is blended and the one that is fetched
-constexpr int ROLL_CALL = 16;      // splats between two looks at which blocks are still alive
+constexpr int LOOK_AHEAD = 6;  // splats between the one that is blended and the one that is fetched
+constexpr int ROLL_CALL = 16;  // splats between two looks at which blocks are still alive
 
-// One bit a block. 256 pixels in blocks of 4 make 64 blocks.
-typedef uint64_t Blocks;
-
-static_assert(BLOCKS <= 64, "a bit a block");
+typedef uint64_t Blocks;  // a bit for each
+static_assert(BLOCKS <= 64, "a bit for each");
 
 struct TileFrame {
-  int left, top;                        // pixels
+  int left, top;  // pixels
   const Images& images;
   Lanes x[BLOCKS_ACROSS], y[BLOCKS_DOWN];  // pixel centres from the tile's corner
 
@@ -51,6 +49,7 @@ struct TileFrame {
   }
 };
 
+// Those blocks that still have a pixel which takes splats.
 static inline Blocks living(const Lanes* transmittance, Blocks among) {
   Blocks found = 0;
   for (Blocks left = among; left; left &= left - 1) {
@@ -66,8 +65,10 @@ static inline int within_tile(int pixel) { return pixel < 0 ? 0 : pixel > TILE -
 
 // The blocks that the splat's box meets; it meets the tile, or would not be in its list.
 static inline Blocks touched(const TileFrame& frame, const Splat& s) {
-  const int left = within_tile(s.left - frame.left) / BLOCK_WIDTH, right = within_tile(s.right - frame.left) / BLOCK_WIDTH;
-  const int top = within_tile(s.top - frame.top) / BLOCK_HEIGHT, bottom = within_tile(s.bottom - frame.top) / BLOCK_HEIGHT;
+  const int left = within_tile(s.left - frame.left) / BLOCK_WIDTH;
+  const int right = within_tile(s.right - frame.left) / BLOCK_WIDTH;
+  const int top = within_tile(s.top - frame.top) / BLOCK_HEIGHT;
+  const int bottom = within_tile(s.bottom - frame.top) / BLOCK_HEIGHT;
   constexpr Blocks FIRST_COLUMN = ~Blocks(0) / ((Blocks(1) << BLOCKS_ACROSS) - 1);  // a bit every BLOCKS_ACROSS
   const Blocks columns = (lowest(right + 1) & ~lowest(left)) * FIRST_COLUMN;
   return columns & lowest((bottom + 1) * BLOCKS_ACROSS) & ~lowest(top * BLOCKS_ACROSS);
@@ -95,7 +96,7 @@ static inline void lay(const TileFrame& frame, const Brush& s, int block, Lanes&
   const Lanes log2_alpha = (s.xx * t.dx + s.xy * t.dy) * t.dx + (s.yy * t.dy * t.dy + s.log2_opacity);
   const Mask reached = at_least(log2_alpha, all(-LOG2_255));
   const Lanes clear = transmittance;
-  const Lanes alpha = exp2(max(log2_alpha, all(-8)));
+  const Lanes alpha = exp2(clamp(log2_alpha, -8, 0));  // above 0 only by cancellation, far out along a needle
   t.unclamped = below(alpha, all(ALPHA_MAX));
   t.alpha = min(alpha, all(ALPHA_MAX));
   const Lanes weight = t.alpha * clear, rest = clear - weight;

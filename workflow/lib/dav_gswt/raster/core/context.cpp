@@ -1,4 +1,5 @@
 #include "context.h"
+#include "keep_apart.h"
 #include <algorithm>
 #include <new>
 #include <stdexcept>
@@ -65,6 +66,7 @@ Images pass_of(const Images& images, int channel, int group) {
 }  // namespace
 
 bool Context::forward(const Scene& scene, const View& view, const Images& images, int threads) {
+  processor_ = keep_apart(threads, processor_);
   view_ = view;
   splats_.resize(scene.n);
   if (!kernels_.project(scene, view, splats_.data(), threads)) return false;
@@ -80,6 +82,7 @@ bool Context::forward(const Scene& scene, const View& view, const Images& images
 
 void Context::backward(const Scene& scene, const Images& images, const ImageGradients& gradients,
                        const SceneGradients& out, int threads) {
+  processor_ = keep_apart(threads, processor_);
   sums_.resize(scene.n * (MOMENTS + 1));
   each_pass(scene.channels, [&](int channel, int group) {
     const bool first = channel == 0, depth = first && gradients.depth;

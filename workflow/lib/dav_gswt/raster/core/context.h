@@ -41,6 +41,7 @@ class Context {
 
  private:
   const Kernels& kernels_;
+  int processor_ = -1;  // that the other threads keep off
   View view_{};
   SplatStore splats_;
   Binning binning_;
