@@ -16,7 +16,7 @@ from dav_gswt.tiles.layout import Layout
 
 SURE = 0.05  # of mean uncertainty above the surest candidate's: still as good as sure
 REPEAT = 0.5  # charge for ground shown twice, a median seam's cost
-FITS = 1.5  # times the best seam's cost: as good as the best
+FITS = 1.75  # times the best seam's cost: as good as the best
 OUTLIER = 2.0  # times the mean squared distance from the median colour: more is no grain
 SAMPLES = 3000  # cells of a seam zone that are compared
 
