@@ -5,7 +5,7 @@ PORT ?= 8000
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: run view test bench clean-venv
+.PHONY: run view test bench
 .DELETE_ON_ERROR:
 
 run: .venv/installed

@@ -47,6 +47,8 @@ use rule score_coarse as score_round with:
         "<logs>/<round>/score_round.log",
     benchmark:
         "<benchmarks>/<round>/score_round.tsv"
+    wildcard_constraints:
+        t=POSITIVE,
 
 
 rule select_poses:
@@ -68,6 +70,8 @@ rule select_poses:
         "<logs>/<round>/select_poses.log",
     benchmark:
         "<benchmarks>/<round>/select_poses.tsv"
+    wildcard_constraints:
+        t=POSITIVE,
     params:
         policy=lambda wildcards: wildcards.policy,
         k=integer("k"),
@@ -93,6 +97,8 @@ rule capture_views:
         "<logs>/<round>/capture_views.log",
     benchmark:
         "<benchmarks>/<round>/capture_views.tsv"
+    wildcard_constraints:
+        t=POSITIVE,
     threads: 2
     resources:
         mem_mb=2500,
@@ -194,6 +200,6 @@ rule enter_field:
     threads: 2
     params:
         quality=entry("qualities", "quality"),
-        source=source_of("coarse", "raster", "levels"),
+        source=source_of("active/given", "coarse", "raster"),
     script:
         "../scripts/enter_field.py"

@@ -65,9 +65,12 @@ def entry(table, wildcard):
 
 
 def source_of(*places):
-    """Digest of library modules and packages, for params: Snakemake follows a rule's script, not its imports."""
+    """Digest of library modules and packages, for params: Snakemake follows a rule's script, not its imports.
+
+    What all stages share (cameras, fields, images, views) is always part of it.
+    """
     files = []
-    for place in places:
+    for place in ("cameras", "field", "images", "views", *places):
         found = LIBRARY / place
         files += sorted(found.rglob("*.[pch]*")) if found.is_dir() else [found.with_suffix(".py")]
     files = [f for f in files if "__pycache__" not in f.parts]

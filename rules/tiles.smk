@@ -4,8 +4,6 @@ In: the levels. Out: labels.npz, lod{l}_tile_{TT}.ply and seams.json. The cut is
 levels follow it.
 """
 
-TILES = [f"{number:02d}" for number in range(16)]
-
 
 rule cut_tiles:
     """Cut sixteen tiles from the exemplar."""

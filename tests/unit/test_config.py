@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from dav_gswt.config import check
+from dav_gswt.config import check, read
 from dav_gswt.errors import InputError
 
 ROOT = Path(__file__).parents[2]
@@ -61,3 +61,26 @@ def test_every_key_of_the_schema_is_explained():
     for table in ("qualities", "seams"):
         keys |= set(schema["properties"][table]["additionalProperties"]["properties"])
     assert not [key for key in keys if f"`{key}`" not in text]
+
+
+def test_a_config_is_laid_over_another_key_by_key(tmp_path):
+    (tmp_path / "below.yaml").write_text("{k: 4, stills: {width: 2, height: 1}, seeds: [0, 1]}")
+    (tmp_path / "above.yaml").write_text("{stills: {width: 8}, seeds: [5]}")
+    files = [tmp_path / "below.yaml", tmp_path / "above.yaml"]
+    assert read(files, {"k": 2}) == {"k": 2, "stills": {"width": 8, "height": 1}, "seeds": [5]}
+
+
+def test_a_key_that_is_misspelt_comes_with_the_one_that_is_meant(config):
+    with pytest.raises(InputError, match="config: there is no key 'polcy'; is 'policy' meant?"):
+        check(config | {"polcy": "random"}, SCHEMA)
+
+
+@pytest.mark.parametrize(
+    "text, said",
+    [("a: [1", "not YAML .*line"), ("", "holds no keys"), ("- a", "holds no keys"), (None, "not readable")],
+)
+def test_a_config_file_that_cannot_be_read_is_named(tmp_path, text, said):
+    if text is not None:
+        (tmp_path / "a.yaml").write_text(text)
+    with pytest.raises(InputError, match=f"a.yaml: {said}"):
+        read([tmp_path / "a.yaml"])

@@ -29,3 +29,12 @@ def test_broken_json_is_named(tmp_path):
 def test_the_digest_is_that_of_the_bytes(tmp_path):
     (tmp_path / "a").write_bytes(b"abc")
     assert files.digest(tmp_path / "a").startswith("ba7816bf8f01cfea")  # FIPS 180-2, example B.1
+
+
+@pytest.mark.parametrize("write", [files.whole, files.whole_folder])
+def test_a_full_disk_is_told_with_the_name_of_what_was_written(tmp_path, write):
+    """The system's calls on open files know no name."""
+    with pytest.raises(OSError) as full, write(tmp_path / "field"):
+        raise OSError(28, "No space left on device")
+    assert full.value.filename == str(tmp_path / "field") and full.value.errno == 28
+    assert not list(tmp_path.iterdir())

@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import pytest
+from made_runs import TINY, USUAL
 
 ROUND = "results/desert/seed0/draft/active_{policy}_none_pdrop0_lam0_k{k}/iter{t}"
 BUNDLE = ROUND + "/tiles_colour/bundle_tau{tau}/davgswt.json"
@@ -52,20 +53,50 @@ def test_a_second_spelling_of_a_path_has_no_rule(snakemake, tmp_path, path):
     assert done.returncode != 0 and "MissingRule" in done.stdout
 
 
+def test_no_round_and_a_finished_field_go_from_field_to_terrain(planned, tmp_path):
+    without = planned(tmp_path, "--config", "rounds=0")
+    assert without["begin_active"] == without["make_page"] == 1 and not without["select_poses"]
+    (tmp_path / "finished.ply").touch()
+    given = planned(tmp_path, "--config", "scene=finished", configs=(USUAL, TINY))
+    assert given["import_field"] == given["enter_field"] == given["make_page"] == given["render_terrain"] == 1
+    assert not given["fit_coarse"] and not given["begin_active"]
+
+
 @pytest.mark.parametrize(
-    "setting, named",
-    [("tau=1.5", "tau"), ("polcy=random", "polcy"), ("scene=moon", "moon"), ("rounds=-1", "rounds")],
+    "wrong, said",
+    [
+        ("tau: 1.5", "config: tau: 1.5 is greater than the maximum of 1"),
+        ("polcy: random", "config: there is no key 'polcy'; is 'policy' meant?"),
+        ("scene: moon", "config: scene: there is no 'moon'; scenes has desert, copr_dunes, brighton_beach"),
+        ("rounds: -1", "config: rounds: -1 is less than the minimum of 0"),
+        ("scenes: {desert: {quality: best}}", "config: scenes.desert.quality: there is no 'best'; qualities has"),
+    ],
 )
-def test_a_config_that_is_wrong_stops_before_the_first_job(snakemake, tmp_path, setting, named):
-    done = snakemake(tmp_path, "--dry-run", "--config", setting, check=False)
-    assert done.returncode != 0
-    assert f"config: {named}" in done.stdout or named in done.stdout.split("config: ", 1)[1]
-    assert "Traceback" not in done.stdout
+def test_a_config_that_is_wrong_stops_before_the_first_job(snakemake, run, checkout, tmp_path, wrong, said):
+    """The same words through Snakemake and through `make run`, which needs no more than one line."""
+    (tmp_path / "wrong.yaml").write_text(wrong)
+    done = snakemake(tmp_path, "--cores", "1", configs=(USUAL, tmp_path / "wrong.yaml"), check=False)
+    assert done.returncode != 0 and said in done.stdout and "Traceback" not in done.stdout
+    done = run(checkout(tmp_path / "clone"), "--configfile", tmp_path / "wrong.yaml")
+    assert done.returncode == 1 and done.stdout.startswith(said) and done.stdout.count("\n") == 1
 
 
-def test_a_missing_folder_of_photos_is_named(snakemake, tmp_path):
-    done = snakemake(tmp_path, "--dry-run", "--config", "scene=copr_dunes", check=False)
-    assert done.returncode != 0 and "scenes.copr_dunes.folder" in done.stdout
+def test_a_config_that_is_not_yaml_is_named_with_its_line(run, checkout, tmp_path):
+    folder = checkout(tmp_path)
+    text = (folder / USUAL).read_text()
+    (folder / USUAL).write_text(text.replace("seeds: [0]", "seeds: [0"))
+    done = run(folder)
+    assert done.returncode == 1 and done.stdout.startswith("config/config.yaml: not YAML") and "line" in done.stdout
+    assert done.stdout.count("\n") == 1
+
+
+def test_a_missing_folder_of_photos_is_named(snakemake, run, checkout, tmp_path):
+    said = "config: scenes.copr_dunes.folder: there is no folder ../shared/data/copr_dunes/images"
+    folder = checkout(tmp_path / "no" / "photos")
+    done = snakemake(folder, "--dry-run", "--config", "scene=copr_dunes", check=False)
+    assert done.returncode != 0 and said in done.stdout
+    done = run(folder, "--scene", "copr_dunes")
+    assert done.returncode == 1 and said in done.stdout and len(done.stdout.splitlines()) <= 4, done.stdout
 
 
 def test_the_workflow_is_lint_clean_but_for_its_environment(snakemake, tmp_path):

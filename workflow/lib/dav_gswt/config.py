@@ -1,12 +1,50 @@
 """The config is closed: what is misspelt or out of range is named before the first job starts."""
 
+from difflib import get_close_matches
 from pathlib import Path
 
 import yaml
 from jsonschema import Draft202012Validator
-from jsonschema.exceptions import best_match
+from jsonschema.exceptions import ValidationError, best_match
 
 from dav_gswt.errors import InputError
+
+
+def read(files: list[Path], over: dict | None = None) -> dict:
+    """A config as Snakemake reads it: each file laid over the one before, key by key, and `over` on top.
+
+    Raises: InputError: a file is missing or not YAML (with the line), or does not hold keys.
+    """
+    config = {}
+    for file in files:
+        try:
+            given = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
+        except OSError as error:
+            raise InputError(f"{file}: not readable ({error.strerror})") from error
+        except (yaml.YAMLError, UnicodeDecodeError) as error:
+            raise InputError(f"{file}: not YAML ({' '.join(str(error).split())})") from error
+        if not isinstance(given, dict):
+            raise InputError(f"{file}: holds no keys; config/config.yaml is an example")
+        config = _laid_over(config, given)
+    return _laid_over(config, over or {})
+
+
+def _laid_over(below: dict, above: dict) -> dict:
+    both = {k: _laid_over(below[k], v) if _tables(below.get(k), v) else v for k, v in above.items()}
+    return below | both
+
+
+def _tables(*values) -> bool:
+    return all(isinstance(value, dict) for value in values)
+
+
+def _said(error: ValidationError) -> str:
+    if error.validator != "additionalProperties":
+        return error.message
+    known = error.schema["properties"]
+    unknown = next(key for key in error.instance if key not in known)
+    near = get_close_matches(str(unknown), known, 1)
+    return f"there is no key {unknown!r}" + (f"; is {near[0]!r} meant?" if near else f", only {', '.join(known)}")
 
 
 def check(config: dict, schema: Path) -> None:
@@ -16,8 +54,8 @@ def check(config: dict, schema: Path) -> None:
     """
     rules = yaml.safe_load(schema.read_text(encoding="utf-8"))
     if error := best_match(Draft202012Validator(rules).iter_errors(config)):
-        key = ".".join(str(p) for p in error.absolute_path) or "config"
-        raise InputError(f"config: {key}: {error.message} (config/README.md lists every key)")
+        key = ".".join(str(part) for part in error.absolute_path)
+        raise InputError(f"config: {key + ': ' if key else ''}{_said(error)} (config/README.md lists every key)")
     if config["scene"] not in config["scenes"]:
         raise InputError(f"config: scene: there is no {config['scene']!r}; scenes has {', '.join(config['scenes'])}")
     for name, scene in config["scenes"].items():

@@ -138,7 +138,7 @@ def _vertices(path: Path) -> Array:
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file") from None
     except (PlyParseError, ValueError, KeyError, UnicodeDecodeError, OSError) as error:
-        raise InputError(f"{path}: not a readable PLY ({error})") from error
+        raise InputError(f"{path}: not a readable PLY ({error}); export or copy it again") from error
 
 
 def _stack(rows: Array, names: list[str], path: Path) -> Float32[Array, "n m"]:

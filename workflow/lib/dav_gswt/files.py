@@ -12,7 +12,10 @@ from dav_gswt.errors import InputError
 
 @contextmanager
 def whole(path: Path | str):
-    """A path beside `path` to write to; it takes `path`'s place when the block ends well, and goes when it does not."""
+    """A path beside `path` to write to; it takes `path`'s place when the block ends well, and goes when it does not.
+
+    Raises: OSError: of the block or of writing, with `path` as its file name where it had none.
+    """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.part{path.suffix}")
@@ -21,6 +24,8 @@ def whole(path: Path | str):
         with part.open("rb") as file:
             os.fsync(file.fileno())
         part.replace(path)
+    except OSError as error:
+        raise _named(error, path) from error
     finally:
         part.unlink(missing_ok=True)
 
@@ -38,9 +43,18 @@ def whole_folder(path: Path | str):
         if path.exists():
             path.rename(old)
         part.rename(path)
+    except OSError as error:
+        raise _named(error, path) from error
     finally:
         for rest in (part, old):
             shutil.rmtree(rest, ignore_errors=True)
+
+
+def _named(error: OSError, path: Path) -> OSError:
+    """The error with the name of what was to be written: a full disk is reported by calls that know no name."""
+    if error.errno is None or error.filename not in (None, str(path)):
+        return error
+    return OSError(error.errno, error.strerror, str(path))
 
 
 def write_json(path: Path | str, value) -> None:

@@ -123,7 +123,10 @@ def write_exr_parts(path: Path | str, parts: dict[str, tuple[dict[str, Array], d
         fixed = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
         written.append(OpenEXR.Part(texts | fixed | window, own, name))
     with whole(path) as part:
-        OpenEXR.File(written).write(str(part))
+        try:
+            OpenEXR.File(written).write(str(part))
+        except RuntimeError as error:
+            raise OSError(f"{path}: not written ({_first_line(str(error))}); is the disk full?") from error
 
 
 def read_exr_parts(path: Path | str) -> dict[str, tuple[dict[str, Array], dict[str, str]]]:

@@ -1,31 +1,37 @@
 """What `make run` and `make view` do: run the workflow, say what was made and where, serve the page."""
 
 import argparse
+import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import psutil
-import yaml
 
+from dav_gswt import config
 from dav_gswt.errors import InputError
+from dav_gswt.narration import Narrator
 
 CONFIG = Path("config/config.yaml")
+SCHEMA = Path("workflow/schemas/config.schema.yaml")
 
 
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m dav_gswt.run", description=__doc__)
     parser.add_argument("--scene", help="an entry of scenes in config/config.yaml (default: its scene)")
     parser.add_argument("--cores", type=int, default=2)
+    parser.add_argument("--configfile", nargs="+", type=Path, default=[], help="laid over config/config.yaml in turn")
     parser.add_argument("--view", action="store_true", help="serve the scene's page on this machine")
     parser.add_argument("--port", type=int, default=8000)
     options = parser.parse_args(arguments)
     try:
-        scene = options.scene or yaml.safe_load(CONFIG.read_text(encoding="utf-8"))["scene"]
+        given = config.read([CONFIG, *options.configfile], {"scene": options.scene} if options.scene else {})
+        config.check(given, SCHEMA)
         if options.view:
-            return view(scene, options.port)
-        return run(scene, options.cores)
+            return view(given, options.port)
+        return run(given, options.cores, options.configfile)
     except InputError as error:
         print(error, file=sys.stderr)
         return 1
@@ -33,68 +39,120 @@ def main(arguments: list[str] | None = None) -> int:
         return 130
 
 
-def run(scene: str, cores: int) -> int:
-    """Run the workflow for one scene; a lock that a killed run left behind is taken away first."""
-    snakemake = [sys.executable, "-m", "snakemake", "--config", f"scene={scene}"]
-    if Path(".snakemake/locks").is_dir() and any(Path(".snakemake/locks").iterdir()):
+def run(given: dict, cores: int, overlays: list[Path]) -> int:
+    """Run the workflow for the config's scene; a lock that a killed run left behind is taken away first."""
+    snakemake = [sys.executable, "-m", "snakemake", "--config", f"scene={given['scene']}"]
+    if overlays:
+        snakemake += ["--configfile", *map(str, [CONFIG, *overlays])]
+    locks = Path(".snakemake/locks")
+    if locks.is_dir() and any(locks.iterdir()):
         if others := running():
             raise InputError(f"another run works in this folder (process {others[0]}): wait for it or stop it")
-        subprocess.run([*snakemake, "--unlock", "--quiet"], check=True, stdout=subprocess.DEVNULL)
+        print("The last run was cut short; going on where it stopped.")
+        subprocess.run([*snakemake, "--unlock"], check=False, capture_output=True)
     start = time.monotonic()
-    done = subprocess.run(
-        [*snakemake, "--cores", str(cores), "--rerun-incomplete", "--quiet", "rules", "host", "reason"], check=False
-    )
-    if done.returncode:
-        print("\nNot finished. What stands above says why; run the same command again to go on.", file=sys.stderr)
-        return done.returncode
-    tell(scene, time.monotonic() - start)
+    code, jobs = follow([*snakemake, "--cores", str(cores), "--rerun-incomplete", "--quiet", "host", "reason"])
+    if code < 0 or code == 130:
+        print("\nStopped. The same command goes on where this ended.", file=sys.stderr)
+        return 130
+    if code:
+        print("\nNot finished. What stands above says why; the same command goes on from here.", file=sys.stderr)
+        return code
+    seconds = time.monotonic() - start
+    tell(given, f"{jobs} jobs done in {seconds:.0f} s" if jobs else "Up to date, nothing to do", overlays)
     return 0
 
 
+def follow(command: list[str]) -> tuple[int, int]:
+    """Run Snakemake and retell its lines. Returns its exit status (130 after Ctrl-C), and the jobs it began."""
+    narrator = Narrator()
+    with (
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace") as job,
+        ending(job) as asked,
+    ):
+        for line in job.stdout:
+            text = narrator.short(line)
+            if text is not None and not asked:  # what jobs cry on their way out helps nobody
+                print(text, flush=True)
+        code = job.wait()
+    return (130 if asked and code else code), narrator.begun
+
+
+@contextmanager
+def ending(job: subprocess.Popen):
+    """On Ctrl-C or a request to end, let Snakemake tidy up and end first. Yields the list of signals that came.
+
+    A terminal sends Ctrl-C to Snakemake and its jobs as well; SIGTERM comes to this process alone and is passed on.
+    """
+    asked = []
+
+    def note(number, _):
+        asked.append(number)
+        if number == signal.SIGTERM:
+            job.terminate()
+
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def running() -> list[int]:
-    """Processes of Snakemake that work in this folder."""
+    """Processes that work in this folder: Snakemake, or a job that outlived it."""
     here, found = Path.cwd(), []
     for process in psutil.process_iter():
         try:
-            if any(part.endswith("snakemake") for part in process.cmdline()[:4]) and Path(process.cwd()) == here:
+            words = process.cmdline()[:4]
+            works = any(word.endswith("snakemake") or ".snakemake/scripts/" in word for word in words)
+            if works and Path(process.cwd()) == here:
                 found.append(process.pid)
         except (psutil.Error, OSError):
             continue
     return found
 
 
-def pages(scene: str) -> list[Path]:
-    """The scene's pages, newest first."""
-    found = Path("results", scene).rglob("terrain/page/index.html")
+def pages(given: dict) -> list[Path]:
+    """The pages of the config's scene, newest first; those made at its parameters, if there are any."""
+    scene = given["scenes"][given["scene"]]
+    views = ("given", 0, 0) if scene["kind"] == "field" else (given["policy"], given["k"], given["rounds"])
+    branch = "seed{}/{}/active_{}_*_k{}/iter{}/tiles_{}/bundle_tau{:g}".format(
+        given["seeds"][0], scene["quality"], *views, scene["seam"], given["tau"]
+    )
+    folder = Path("results", given["scene"])
+    found = list(folder.glob(f"{branch}/terrain/page/index.html")) or folder.rglob("terrain/page/index.html")
     return sorted((p.parent for p in found), key=lambda p: p.stat().st_mtime, reverse=True)
 
 
-def tell(scene: str, seconds: float) -> None:
+def tell(given: dict, done: str, overlays: list[Path]) -> None:
     """What was made, where it is, and what to type next."""
-    page = pages(scene)[0]
+    page = pages(given)[0]
     terrain, bundle, tiles = page.parent, page.parents[1], page.parents[2]
+    usual = given["scene"] == config.read([CONFIG])["scene"] and not overlays
     print(
         f"""
-Done in {seconds:.0f} s.
+{done}.
   stills   {terrain}/*.png
   page     {page}
-  tiles    {bundle}/gswt.zip (for the public GSWT renderer), {tiles}/tiles/*.ply (for any splat viewer)
+  tiles    {tiles}/tiles/*.ply (for any splat viewer)
+           {bundle}/gswt.zip (for the public GSWT renderer)
   field    {tiles.parent}/field.ply
 Next:
-  make view{"" if scene == default() else f" SCENE={scene}"}     walk over the terrain in a browser
-  make run SCENE=name    another scene of config/config.yaml; config/README.md says how to add your own photos"""
+  make view{"" if usual else f" SCENE={given['scene']}"}
+           walk over the terrain in a browser
+  make run SCENE=name
+           another scene of config/config.yaml; config/README.md says how to add your own photos""",
+        flush=True,
     )
 
 
-def default() -> str:
-    return yaml.safe_load(CONFIG.read_text(encoding="utf-8"))["scene"]
-
-
-def view(scene: str, port: int) -> int:
-    """Serve the newest page of a scene, on this machine only."""
+def view(given: dict, port: int) -> int:
+    """Serve the page of a scene, on this machine only."""
     from dav_gswt.terrain import serve
 
-    if not (found := pages(scene)):
+    if not (found := pages(given)):
+        scene = given["scene"]
         raise InputError(f"there is no page of {scene!r} yet: type `make run SCENE={scene}` first")
     return serve.main([str(found[0]), "--port", str(port)])
 

@@ -1,0 +1,154 @@
+"""What a user sees who gives what cannot be used: one message with the name, and nothing half made.
+
+Each case goes through what `make run` calls. Only the first job has to run for it.
+"""
+
+import re
+import shutil
+
+import numpy as np
+import pytest
+from made_runs import TINY, USUAL
+
+from dav_gswt import field, images
+from dav_gswt.files import read_json
+
+WIDTH, HEIGHT = 320, 240
+
+
+def noise(seed: int, height: int = HEIGHT, width: int = WIDTH):
+    return np.random.default_rng(seed).random((height, width, 3)).astype(np.float32)
+
+
+def noisy_photos(folder, count: int) -> None:
+    for number in range(count):
+        images.write(folder / f"{number}.png", noise(number))
+
+
+def one_that_is_text(folder) -> None:
+    noisy_photos(folder, 3)
+    (folder / "3.jpg").write_text("this is no photo")
+
+
+def one_cut_short(folder) -> None:
+    noisy_photos(folder, 3)
+    whole = (folder / "1.png").read_bytes()
+    (folder / "1.png").write_bytes(whole[: len(whole) // 2])
+
+
+@pytest.fixture
+def refused(run, checkout, tmp_path):
+    """Run a scene that must be refused; returns the lines that the user sees, without the count of jobs."""
+
+    def call(scene: str):
+        (tmp_path / "mine.yaml").write_text(f"scene: mine\nscenes: {{mine: {scene}}}\n")
+        checkout(tmp_path)
+        done = run(tmp_path, "--configfile", TINY, "mine.yaml")
+        assert done.returncode == 1 and "Traceback" not in done.stdout, done.stdout
+        rule, log = re.search(r"^(\w+) is not finished; its log: (\S+)$", done.stdout, re.M).groups()
+        lines = [line.strip() for line in done.stdout.splitlines() if line.startswith("  ")]
+        assert lines[-1] in (tmp_path / log).read_text()
+        assert done.stdout.splitlines()[-1].startswith("Not finished.")
+        left = (
+            [p for p in (tmp_path / "results/mine").rglob("*") if p.is_file()]
+            if (tmp_path / "results").exists()
+            else []
+        )
+        assert not left, f"{rule} left {left}"
+        return lines
+
+    return call
+
+
+PHOTOS = "{kind: photos, folder: photos, size: 320, start: 3, agent: replay, quality: draft, seam: colour}"
+
+
+@pytest.mark.parametrize(
+    "fill, said",
+    [
+        pytest.param(lambda folder: None, "photos: no photos in this folder; put .jpg", id="no photo"),
+        pytest.param(
+            lambda folder: noisy_photos(folder, 2), "photos: only 0.png and 1.png; at least 3", id="two photos"
+        ),
+        pytest.param(one_that_is_text, "photos/3.jpg: ", id="not an image"),
+        pytest.param(one_cut_short, "photos/1.png: damaged or cut short", id="cut short"),
+        pytest.param(lambda folder: noisy_photos(folder, 4), "photos: 0 of 4 photos could be placed", id="no overlap"),
+    ],
+)
+def test_photos_that_cannot_be_used_are_named(refused, tmp_path, fill, said):
+    (tmp_path / "photos").mkdir()
+    fill(tmp_path / "photos")
+    last = refused(PHOTOS)[-1]
+    assert last.startswith(said) and ("; " in last or ": " in last.removeprefix(said))
+
+
+def half(folder, good) -> None:
+    whole = good.read_bytes()
+    (folder / "given.ply").write_bytes(whole[: len(whole) // 2])
+
+
+def without_opacity(folder, good) -> None:
+    head, body = good.read_bytes().split(b"end_header\n", 1)
+    (folder / "given.ply").write_bytes(head.replace(b" opacity\n", b" density\n") + b"end_header\n" + body)
+
+
+def with_nan(folder, good) -> None:
+    whole = field.read(good)
+    whole.means[7, 2] = np.nan
+    field.write(whole, folder / "given.ply")
+
+
+def text(folder, good) -> None:
+    (folder / "given.ply").write_text("hello")
+
+
+@pytest.mark.parametrize(
+    "break_it, said",
+    [
+        pytest.param(half, "given.ply: not a readable PLY .*early end-of-file", id="cut short"),
+        pytest.param(without_opacity, "given.ply: property opacity is missing", id="a property is missing"),
+        pytest.param(with_nan, "given.ply: .*7.*", id="not a number"),
+        pytest.param(text, "given.ply: not a readable PLY", id="not a PLY"),
+    ],
+)
+def test_a_field_that_cannot_be_used_is_named(refused, tiny, tmp_path, break_it, said):
+    break_it(tmp_path, tiny.round / "field.ply")
+    last = refused("{kind: field, field: given.ply, up: [0, 0, 1], quality: draft, seam: colour}")[-1]
+    assert re.match(said, last)
+
+
+def test_a_field_on_its_side_says_what_to_give(refused, tiny, tmp_path):
+    shutil.copy(tiny.round / "field.ply", tmp_path / "given.ply")
+    last = refused("{kind: field, field: given.ply, up: [1, 0, 0], quality: draft, seam: colour}")[-1]
+    assert last.startswith("given.ply: ") and "up" in last
+
+
+@pytest.fixture
+def some_of_the_beach(shared, tmp_path):
+    """Ten photos of the beach, small, every other one of them smaller still."""
+    (tmp_path / "photos").mkdir()
+    for number, path in enumerate(images.listed(shared / "data/brighton_beach/images")[:10]):
+        photo = images.read(path)
+        share = (640 if number % 2 else 512) / max(photo.shape[:2])
+        small = images.resized(photo, round(photo.shape[1] * share), round(photo.shape[0] * share))
+        images.write(tmp_path / "photos" / f"{number}.png", small)
+    return tmp_path
+
+
+def test_photos_of_mixed_sizes_find_their_places(snakemake, some_of_the_beach):
+    scene = PHOTOS.replace("size: 320", "size: 640")
+    (some_of_the_beach / "mine.yaml").write_text(f"scene: mine\nscenes: {{mine: {scene}}}\n")
+    configs = (USUAL, TINY, some_of_the_beach / "mine.yaml")
+    snakemake(some_of_the_beach, "--cores", "2", "results/mine/photos/ground.json", configs=configs)
+    frame = read_json(some_of_the_beach / "results/mine/photos/ground.json")
+    assert frame["images"] == 10 and frame["registered"] >= 8
+    assert all(left["reason"] for left in frame["left_out"])
+
+
+def test_a_photo_cut_short_stops_before_any_is_used(refused, shared, tmp_path):
+    (tmp_path / "photos").mkdir()
+    for path in images.listed(shared / "data/brighton_beach/images")[:4]:
+        shutil.copy(path, tmp_path / "photos")
+    whole = path.read_bytes()
+    (tmp_path / "photos" / path.name).write_bytes(whole[: len(whole) // 3])
+    assert refused(PHOTOS)[-1].startswith(f"photos/{path.name}: damaged or cut short")

@@ -1,0 +1,30 @@
+"""The page that a run makes, opened in a browser as a visitor opens it."""
+
+import pytest
+from visiting import FLAGS, Visit, chromium_path, served
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    if not (path := chromium_path()):
+        pytest.skip("no chromium on this machine: apt-get install chromium")
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=path, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.mark.parametrize("made", ["tiny", "finished", "beach"])
+def test_a_made_page_shows_its_ground(chromium, made, request):
+    page = chromium.new_context(viewport={"width": 160, "height": 100}).new_page()
+    complaints = []
+    page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    with served(request.getfixturevalue(made).terrain / "page") as address:
+        visit = Visit(page).open(address)
+        picture = visit.picture()
+    below = picture[picture.shape[0] // 2 :]
+    assert not complaints and page.locator("#error").is_hidden()
+    assert below.mean() > 40 and below.std() > 2
+    assert (below.max(2) < 8).mean() < 0.01

@@ -1,0 +1,178 @@
+"""The smallest experiment, run through every stage: what is there, what it looks like, what a change makes anew."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import yaml
+from jsonschema import Draft202012Validator
+from made_runs import TINY, USUAL
+
+from dav_gswt import field, images
+from dav_gswt.coarse import ground
+from dav_gswt.files import digest, read_json
+from dav_gswt.photos import model
+from dav_gswt.terrain.still import SHOTS
+
+CONFIGS = (USUAL, TINY)
+RULES = {
+    "photos": ["render_photos", "split_views"],
+    "coarse": ["fit_coarse", "evaluate_coarse", "score_coarse"],
+    "active": ["select_poses", "capture_views", "update_field", "score_round", "evaluate_round"],
+    "levels": ["crop_level", "fit_level1"],
+    "tiles": ["cut_tiles", "bundle_tiles"],
+    "terrain": ["make_page", "render_terrain"],
+}
+AFTER_TAU = {"bundle_tiles", "make_page", "render_terrain", "all"}
+BEFORE_K = {*RULES["photos"], *RULES["coarse"]}
+
+
+@pytest.fixture(scope="module")
+def tiny_config(root):
+    return yaml.safe_load((root / TINY).read_text())
+
+
+def test_photos_and_their_cameras_are_there(tiny, tiny_config):
+    scene = tiny_config["scenes"]["desert"]
+    known, frame = model.read(tiny.photos / "sparse"), read_json(tiny.photos / "ground.json")
+    assert {p.name for p in (tiny.photos / "images").glob("[!.]*")} == set(known.names)
+    assert len(known.names) == scene["photos"] + scene["test"] and len(frame["test"]) == scene["test"]
+    for name in known.names:
+        assert images.size(tiny.photos / "images" / name) == (scene["size"], scene["size"])
+
+
+def test_no_photo_both_tests_and_is_fitted(tiny):
+    views = read_json(tiny.start / "views.json")
+    assert views["test"] and not set(views["test"]) & set(views["start"] + views["pool"])
+
+
+def test_fields_lie_on_their_grids(tiny):
+    """One disc a cell, first and in the grid's order: what levels and tiles rest on."""
+    levels = [(tiny.round / f"levels/level{level}.ply", tiny.round / f"levels/level{level}.exr") for level in (0, 1)]
+    pairs = [(stage / "field.ply", stage / "ground.exr") for stage in (tiny.coarse, tiny.round)]
+    for path, grid_path in pairs + levels:
+        fitted, grid = field.read(path), ground.read(grid_path)
+        cells = grid.shape[0] * grid.shape[1]
+        assert fitted.ground[:cells].all() and not fitted.ground[cells:].any()
+        assert (
+            np.abs(fitted.means[:cells, :2] - grid.centres[:, :2]).max() <= 0.51 * grid.spacing
+        )  # float32 at cell edges
+
+
+def test_the_round_adds_the_photos_that_were_asked_for(tiny, tiny_config):
+    asked = read_json(tiny.round / "poses.json")["poses"]
+    shots = read_json(tiny.round / "capture/capture.json")["shots"]
+    assert len(asked) == len(shots) == tiny_config["k"]
+    before, after = read_json(tiny.coarse / "metrics.json"), read_json(tiny.round / "metrics.json")
+    assert after["photos"] == before["photos"] + len(shots) and (before["round"], after["round"]) == (0, 1)
+
+
+def test_metrics_are_those_of_a_picture_of_the_place(tiny):
+    for stage in (tiny.coarse, tiny.round):
+        found = read_json(stage / "metrics.json")
+        for row in [found, *found["test_views"]]:
+            # A plain sand-coloured picture of this desert reaches 20 dB.
+            assert 20 < row["psnr"] < 60 and 0.3 < row["ssim"] <= 1
+
+
+def test_doubt_is_a_share(tiny):
+    for stage in (tiny.coarse / "scores_none_pdrop0", tiny.round):
+        for channels, _ in images.read_exr_parts(stage / "uncertainty.exr").values():
+            for values in channels.values():
+                seen = values[np.isfinite(values)]
+                assert len(seen) and seen.min() >= 0 and seen.max() <= 1
+    assert 0 <= field.read(tiny.round / "field.ply").uncertainty.min() <= 1
+
+
+def test_a_bundle_keeps_its_contract(tiny, root):
+    bundle = read_json(tiny.bundle / "davgswt.json")
+    Draft202012Validator(read_json(root / "workflow/schemas/davgswt.schema.json")).validate(bundle)
+    chunks = [chunk for tile in bundle["tiles"] for chunk in tile["chunks"]]
+    there = {f"chunks/{p.name}" for p in (tiny.bundle / "chunks").glob("[!.]*")}
+    assert len(chunks) == 32 and {chunk["file"] for chunk in chunks} == there
+    for chunk in chunks:
+        path = tiny.bundle / chunk["file"]
+        assert path.stat().st_size == chunk["bytes"] == chunk["count"] * (32 + 4 * len(chunk["orders"]))
+        assert digest(path) == chunk["sha256"]
+
+
+@pytest.mark.parametrize("made", ["tiny", "finished", "beach"])
+def test_the_public_renderers_checker_finds_no_fault(made, shared, request):
+    archive = request.getfixturevalue(made).bundle / "gswt.zip"
+    checker = [sys.executable, shared / "tools/check_gswt_zip.py", archive]
+    done = subprocess.run(checker, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and " 0 faults" in done.stdout, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("made", ["tiny", "finished", "beach"])
+def test_stills_show_ground_without_holes(made, tiny_config, request):
+    """Not black, not flat, no haze of one colour; and nothing darker than shade in a place that is lit."""
+    terrain, size = request.getfixturevalue(made).terrain, tiny_config["stills"]
+    for shot in SHOTS:
+        still = images.read(terrain / f"{shot.name}.png")
+        assert still.shape == (size["height"], size["width"], 3)
+        below = still[size["height"] // 2 :]
+        assert 0.15 < below.mean() < 0.9 and below.std() > 0.01, shot.name
+        assert (below.max(2) < 0.03).mean() < 0.01, shot.name
+
+
+@pytest.mark.parametrize("made", ["tiny", "finished", "beach"])
+def test_a_page_holds_all_that_it_needs(made, request):
+    made = request.getfixturevalue(made)
+    page = made.terrain / "page"
+    for chunk in (made.bundle / "chunks").glob("[!.]*"):
+        assert digest(page / "chunks" / chunk.name) == digest(chunk)
+    assert {"index.html", "main.js", "davgswt.json"} <= {p.name for p in page.iterdir()}
+
+
+def test_real_photos_find_their_places(beach, shared):
+    frame = read_json(beach.photos / "ground.json")
+    given = len(list((shared / "data/brighton_beach/images").glob("*.[jJ]*")))
+    assert frame["kind"] == "photos" and frame["images"] == given
+    assert frame["registered"] >= 0.9 * given and not [x for x in frame["left_out"] if not x["reason"]]
+
+
+def test_a_replayed_round_takes_photos_of_the_pool(beach):
+    views, shots = read_json(beach.start / "views.json"), read_json(beach.round / "capture/capture.json")["shots"]
+    assert len(views["start"]) == 8 and {s["name"] for s in shots} <= set(views["pool"]) and len(shots) == 2
+
+
+def test_every_rule_left_its_log_and_its_benchmark(tiny):
+    logs = sorted(p.stem for p in (tiny.folder / "results/logs").rglob("*.log"))
+    benchmarks = sorted((tiny.folder / "results/benchmarks").rglob("*.tsv"))
+    assert logs == [p.stem for p in sorted(benchmarks, key=lambda p: p.stem)] == sorted(sum(RULES.values(), []))
+    for path in benchmarks:
+        names, values = (line.split("\t") for line in path.read_text().splitlines())
+        assert float(values[names.index("s")]) > 0
+
+
+def test_nothing_but_results_is_written(tiny):
+    assert {p.name for p in tiny.folder.iterdir()} == {"results", ".snakemake"}
+    assert not [p for p in (tiny.folder / "results").rglob("*") if p.name.startswith(".") and ".part" in p.name]
+
+
+def test_a_second_run_plans_nothing(tiny, finished, planned):
+    assert not planned(tiny.folder, configs=CONFIGS)
+    assert not planned(finished.folder, "--config", "scene=finished", configs=CONFIGS)
+
+
+def test_another_tau_makes_only_the_bundle_and_what_follows(tiny, planned):
+    assert set(planned(tiny.folder, "--config", "tau=0.3", configs=CONFIGS)) == AFTER_TAU
+
+
+def test_another_k_keeps_the_coarse_field_and_its_scores(tiny, planned, tmp_path):
+    (tmp_path / "k.yaml").write_text("k: 3\n")  # in a file: --config takes no key of one letter
+    plan = planned(tiny.folder, configs=(*CONFIGS, tmp_path / "k.yaml"))
+    assert not BEFORE_K & set(plan) and plan["select_poses"] == plan["update_field"] == 1
+
+
+def test_another_round_goes_on_from_the_last_one(tiny, planned):
+    plan = planned(tiny.folder, "--config", "rounds=2", configs=CONFIGS)
+    assert not BEFORE_K & set(plan) and plan["update_field"] == plan["evaluate_round"] == 1
+
+
+def test_another_size_of_stills_makes_only_stills(tiny, planned, tmp_path):
+    (tmp_path / "size.yaml").write_text("stills: {width: 320, height: 180}\n")
+    plan = planned(tiny.folder, configs=(*CONFIGS, tmp_path / "size.yaml"))
+    assert set(plan) == {"render_terrain", "all"}
