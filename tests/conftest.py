@@ -1,8 +1,9 @@
-"""What all tests share: where the repository is, and the real photos where they are at hand."""
+"""What all tests share: where the repository is, the real photos where they are at hand, one headless Chromium."""
 
 from pathlib import Path
 
 import pytest
+from visiting import FLAGS, chromium_path
 
 ROOT = Path(__file__).parents[1]
 
@@ -19,3 +20,14 @@ def shared():
     if not (folder / "data").is_dir():
         pytest.skip(f"needs the real photos in {folder.name}/data beside the repository")
     return folder
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    if not (path := chromium_path()):
+        pytest.skip("no chromium on this machine: apt-get install chromium")
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=path, args=FLAGS)
+        yield browser
+        browser.close()

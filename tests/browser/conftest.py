@@ -1,23 +1,12 @@
-"""A headless Chromium, made-up bundles as served pages, and visits to them."""
+"""Made-up bundles as served pages, and visits to them."""
 
 from pathlib import Path
 
 import made_up
 import pytest
-from visiting import FLAGS, VIEWER, Visit, chromium_path, served
+from visiting import VIEWER, Visit, served
 
 from dav_gswt.terrain.page import write_page
-
-
-@pytest.fixture(scope="session")
-def chromium():
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    if not (path := chromium_path()):
-        pytest.skip("no chromium on this machine: apt-get install chromium")
-    with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=path, args=FLAGS)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="session")

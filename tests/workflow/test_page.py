@@ -1,18 +1,7 @@
 """The page that a run makes, opened in a browser as a visitor opens it."""
 
 import pytest
-from visiting import FLAGS, Visit, chromium_path, served
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    if not (path := chromium_path()):
-        pytest.skip("no chromium on this machine: apt-get install chromium")
-    with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=path, args=FLAGS)
-        yield browser
-        browser.close()
+from visiting import Visit, served
 
 
 @pytest.mark.parametrize("made", ["tiny", "finished", "beach"])

@@ -13,7 +13,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.terrain import serve
 
-VIEWER = Path(__file__).parents[2] / "workflow" / "viewer"
+VIEWER = Path(__file__).parents[1] / "workflow" / "viewer"
 FLAGS = [
     "--headless",
     "--no-sandbox",
