@@ -18,7 +18,7 @@ test: .venv/installed-test
 	@$(BIN)/python -m pytest $(TESTS)
 
 bench: .venv/installed-test
-	@for bench in benchmarks/*.py; do $(BIN)/python $$bench || exit 1; done
+	@for bench in benchmarks/*.py; do PYTHONPATH=tests:tests/browser $(BIN)/python $$bench || exit 1; done
 
 SOURCES := pyproject.toml requirements.lock $(wildcard workflow/lib/dav_gswt/raster/core/*)
 

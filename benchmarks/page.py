@@ -10,9 +10,6 @@ import tempfile
 import time
 from pathlib import Path
 
-TESTS = Path(__file__).parents[1] / "tests"
-sys.path[:0] = [str(TESTS), str(TESTS / "browser")]
-
 import made_up
 from visiting import FLAGS, VIEWER, chromium_path, served
 
