@@ -38,3 +38,22 @@ def test_a_full_disk_is_told_with_the_name_of_what_was_written(tmp_path, write):
         raise OSError(28, "No space left on device")
     assert full.value.filename == str(tmp_path / "field") and full.value.errno == 28
     assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_comes_back_if_its_replacement_cannot_be_moved_in(tmp_path):
+    target = tmp_path / "set"
+    target.mkdir()
+    (target / "a").write_text("old")
+    with pytest.raises(OSError), files.whole_folder(target) as part:
+        (part / "a").write_text("new")
+        part.rename(tmp_path / "gone")  # so that the last step fails, after the old folder was moved away
+    assert (target / "a").read_text() == "old"
+    assert not [p for p in tmp_path.iterdir() if p.name.startswith(".")]
+
+
+def test_a_folder_that_a_killed_run_had_moved_away_is_not_lost(tmp_path):
+    (tmp_path / ".set.old").mkdir()
+    (tmp_path / ".set.old" / "a").write_text("old")
+    with pytest.raises(RuntimeError), files.whole_folder(tmp_path / "set"):
+        raise RuntimeError
+    assert (tmp_path / "set" / "a").read_text() == "old"

@@ -32,11 +32,13 @@ def whole(path: Path | str):
 
 @contextmanager
 def whole_folder(path: Path | str):
-    """A folder beside `path` to fill; it takes `path`'s place when the block ends well, and goes when it does not."""
+    """A folder beside `path` to fill; it takes `path`'s place when the block ends well, and goes when it does not.
+
+    What stood at `path` stays until then, also if the last step fails.
+    """
     path = Path(path)
     part, old = path.with_name(f".{path.name}.part"), path.with_name(f".{path.name}.old")
-    for rest in (part, old):  # of a run that was killed
-        shutil.rmtree(rest, ignore_errors=True)
+    _settle(path, part, old)  # after a run that was killed
     part.mkdir(parents=True)
     try:
         yield part
@@ -46,8 +48,14 @@ def whole_folder(path: Path | str):
     except OSError as error:
         raise _named(error, path) from error
     finally:
-        for rest in (part, old):
-            shutil.rmtree(rest, ignore_errors=True)
+        _settle(path, part, old)
+
+
+def _settle(path: Path, part: Path, old: Path) -> None:
+    if old.exists() and not path.exists():
+        old.rename(path)
+    for rest in (part, old):
+        shutil.rmtree(rest, ignore_errors=True)
 
 
 def _named(error: OSError, path: Path) -> OSError:

@@ -5,7 +5,7 @@ import shutil
 from pathlib import Path, PurePosixPath
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import read_json
+from dav_gswt.files import read_json, whole_folder
 
 MANIFEST = "davgswt.json"
 FORMAT, VERSION = "davgswt", 1
@@ -25,20 +25,9 @@ def write_page(bundle_dir: Path | str, viewer_dir: Path | str, out_dir: Path | s
     copies = [(bundle / MANIFEST, MANIFEST)]
     copies += [(path, path.name) for path in sorted(viewer.iterdir()) if path.is_file()]
     copies += [(bundle / name, name) for name in chunk_names(bundle)]
-    part, old = (out.with_name(f".{out.name}.{word}") for word in ("part", "old"))
-    for left_behind in (part, old):
-        _remove(left_behind)
-    try:
+    with whole_folder(out) as part:
         for source, name in copies:
             _copy(source, part / name)
-        if out.exists():
-            out.replace(old)
-        part.replace(out)
-    finally:
-        if old.exists() and not out.exists():
-            old.replace(out)
-        _remove(part)
-        _remove(old)
 
 
 def chunk_names(bundle: Path) -> list[str]:
@@ -71,8 +60,3 @@ def _copy(source: Path, target: Path) -> None:
     shutil.copyfile(source, target)
     with target.open("rb") as file:
         os.fsync(file.fileno())
-
-
-def _remove(folder: Path) -> None:
-    if folder.exists():
-        shutil.rmtree(folder)

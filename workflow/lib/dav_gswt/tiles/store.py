@@ -3,7 +3,6 @@
 seams.json is written last and names the counts: whoever finds it finds the whole set.
 """
 
-import shutil
 import zipfile
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from dav_gswt import field
 from dav_gswt.errors import InputError
-from dav_gswt.files import read_json, write_json
+from dav_gswt.files import read_json, whole_folder, write_json
 from dav_gswt.logs import progress
 from dav_gswt.tiles.build import TileSet
 
@@ -25,20 +24,12 @@ def name(level: int, tile: int) -> str:
 def write(tiles: TileSet, folder: Path | str, seams: Path | str, provenance: dict) -> None:
     """Write the set; `folder` and `seams` appear whole or not at all, the folder first."""
     folder, seams = Path(folder), Path(seams)
-    part = folder.with_name(f".{folder.name}.part")
-    shutil.rmtree(part, ignore_errors=True)
-    part.mkdir(parents=True)
-    try:
+    seams.unlink(missing_ok=True)
+    with whole_folder(folder) as part:
         for level, fields in enumerate(tiles.fields):
             for tile, splats in enumerate(progress(fields, f"write tiles of level {level}")):
                 field.write(splats, part / name(level, tile))
         _write_npz(part / "labels.npz", labels=tiles.labels, shifts=tiles.shifts)
-        seams.unlink(missing_ok=True)
-        if folder.exists():
-            shutil.rmtree(folder)
-        part.replace(folder)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
     table = {
         "side": tiles.side,
         "spacing": tiles.spacing,
