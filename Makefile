@@ -5,7 +5,7 @@ PORT ?= 8000
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: run view test bench
+.PHONY: run view test bench compiler
 .DELETE_ON_ERROR:
 
 run: .venv/installed
@@ -21,17 +21,24 @@ bench: .venv/installed-test
 	@for bench in benchmarks/*.py; do PYTHONPATH=tests:tests/browser $(BIN)/python $$bench || exit 1; done
 
 SOURCES := pyproject.toml requirements.lock $(wildcard workflow/lib/dav_gswt/raster/core/*)
+# a set-up that had to do without a compiler is done again as soon as there is one
+AGAIN := $(if $(wildcard .venv/without-core),$(shell $(PYTHON) workflow/prepare.py core && echo compiler))
+INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check
 
 # torch first and alone: pinned, so that nothing that asks for a plain torch brings another build of it
-.venv/installed: $(SOURCES)
+.venv/installed: $(SOURCES) $(AGAIN)
 	@$(PYTHON) workflow/prepare.py
 	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	@echo "Setting up .venv (once; some minutes)"
-	@$(BIN)/pip install --quiet --disable-pip-version-check "$$(grep -m1 ^torch== requirements.lock)"
-	@$(BIN)/pip install --quiet --disable-pip-version-check -r requirements.lock
-	@$(BIN)/pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps --editable .
+	@$(INSTALL) "$$(grep -m1 ^torch== requirements.lock)"
+	@$(INSTALL) -r requirements.lock
+	@if $(PYTHON) workflow/prepare.py core; then \
+	  $(INSTALL) --no-build-isolation --no-deps --editable . && rm -f .venv/without-core; \
+	else \
+	  $(INSTALL) --no-build-isolation --no-deps --editable . --config-settings=wheel.cmake=false && touch .venv/without-core; \
+	fi
 	@touch $@
 
 .venv/installed-test: .venv/installed requirements-test.lock
-	@$(BIN)/pip install --quiet --disable-pip-version-check -r requirements-test.lock
+	@$(INSTALL) -r requirements-test.lock
 	@touch $@

@@ -24,6 +24,7 @@ include: "rules/levels.smk"
 include: "rules/tiles.smk"
 include: "rules/bundle.smk"
 include: "rules/terrain.smk"
+include: "rules/figures.smk"
 
 
 # Below the includes: Snakemake skips constraints on wildcards that reach an output through a pathvar unless they are

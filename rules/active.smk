@@ -122,6 +122,7 @@ rule update_field:
     output:
         field="<results>/<round>/field.ply",
         ground="<results>/<round>/ground.exr",
+        fit="<results>/<round>/fit.json",
     log:
         "<logs>/<round>/update_field.log",
     benchmark:
@@ -137,7 +138,8 @@ rule update_field:
         quality=entry("qualities", "quality"),
         seed=integer("seed"),
         t=integer("t"),
-        source=source_of("coarse", "raster"),
+        keep=SNAPSHOTS,
+        source=source_of("coarse", "fitting", "raster"),
     script:
         "../scripts/update_field.py"
 
@@ -146,6 +148,7 @@ use rule evaluate_coarse as evaluate_round with:
     input:
         field="<results>/<round>/field.ply",
         ground="<results>/<round>/ground.exr",
+        fit="<results>/<round>/fit.json",
         captures=captures_until,
         views="<results>/<start>/views.json",
         images="<results>/<photos>/images",

@@ -1,6 +1,7 @@
 """Coarse field: a ground layer through the start views' points and the things on it, fitted to the start views.
 
-In: photos, their model, views.json. Out: field.ply (standard 3DGS), ground.exr (height, seen or not), metrics.json.
+In: photos, their model, views.json. Out: field.ply (standard 3DGS), ground.exr (height, seen or not), fit.json
+(what the fit chose and why), metrics.json.
 """
 
 
@@ -14,6 +15,7 @@ rule fit_coarse:
     output:
         field="<results>/<coarse>/field.ply",
         ground="<results>/<coarse>/ground.exr",
+        fit="<results>/<coarse>/fit.json",
     log:
         "<logs>/<coarse>/fit_coarse.log",
     benchmark:
@@ -25,7 +27,8 @@ rule fit_coarse:
     params:
         quality=entry("qualities", "quality"),
         seed=integer("seed"),
-        source=source_of("coarse", "raster"),
+        keep=SNAPSHOTS,
+        source=source_of("coarse", "fitting", "raster"),
     script:
         "../scripts/fit_coarse.py"
 
@@ -35,6 +38,7 @@ rule evaluate_coarse:
     input:
         field="<results>/<coarse>/field.ply",
         ground="<results>/<coarse>/ground.exr",
+        fit="<results>/<coarse>/fit.json",
         views="<results>/<start>/views.json",
         images="<results>/<photos>/images",
         model="<results>/<photos>/sparse",

@@ -36,11 +36,12 @@ pathvars:
     terrain="<bundle>/terrain",
 
 
-NAME = r"(?!(?:logs|benchmarks|sweeps|tables|figures|tradeoff)(?:/|$))[a-z][a-z0-9_-]*"
+NAME = r"(?!(?:logs|benchmarks|snapshots|sweeps|tables|figures|tradeoff)(?:/|$))[a-z][a-z0-9_-]*"
 NATURAL = r"0|[1-9]\d*"
 POSITIVE = r"[1-9]\d*"
 FRACTION = r"0|1|0\.\d*[1-9]"
 NEVER = r"(?!)"  # a constraint that nothing meets
+SNAPSHOTS = "results/snapshots"  # of fits that run: outside the outputs, so that a killed fit can go on
 
 
 def spell(value):

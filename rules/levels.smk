@@ -28,7 +28,6 @@ rule fit_level:
     input:
         field=lambda wildcards: f"<results>/<levels>/level{int(wildcards.level) - 1}.ply",
         ground=lambda wildcards: f"<results>/<levels>/level{int(wildcards.level) - 1}.exr",
-        frame="<results>/<photos>/ground.json",
     output:
         field="<results>/<levels>/level{level}.ply",
         ground="<results>/<levels>/level{level}.exr",
@@ -46,6 +45,7 @@ rule fit_level:
         quality=entry("qualities", "quality"),
         seed=integer("seed"),
         level=integer("level"),
-        source=source_of("levels", "coarse", "raster"),
+        keep=SNAPSHOTS,
+        source=source_of("levels", "coarse", "fitting", "raster"),
     script:
         "../scripts/fit_level.py"

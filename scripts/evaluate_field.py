@@ -15,5 +15,6 @@ with logging_to(snakemake.log[0]):
     fitted, grid = field.read(given.field), ground.read(given.ground)
     result = evaluation.evaluate(fitted, build.modelled(tests, grid))
     result |= {"round": params.t, "photos": len(split["start"]) + shots, "gaussians": len(fitted)}
+    result |= {"fit": read_json(given.fit)}
     inputs = {"field": given.field, "ground": given.ground, "views": given.views}
     write_json(snakemake.output.metrics, result | {"provenance": provenance.of(inputs, dict(params.quality))})

@@ -4,7 +4,7 @@ import numpy as np
 
 from dav_gswt import field, views
 from dav_gswt.coarse import build, ground
-from dav_gswt.files import read_json
+from dav_gswt.files import read_json, write_json
 from dav_gswt.logs import logging_to
 from dav_gswt.photos import model
 
@@ -13,8 +13,8 @@ with logging_to(snakemake.log[0]):
     names = read_json(given.views)["start"]
     photos = views.taken(given.images, given.model, names, [], quality.size)
     points, colours = model.points_seen_by(model.read(given.model), names, given.images)
-    fitted, grid = build.coarse(
-        read_json(given.frame), photos, points, colours, quality, np.random.default_rng(snakemake.params.seed)
-    )
-    field.write(fitted, snakemake.output.field)
-    ground.write(grid, snakemake.output.ground)
+    rng = np.random.default_rng(snakemake.params.seed)
+    made = build.fit(read_json(given.frame), photos, points, colours, quality, rng, snakemake.params.keep)
+    field.write(made.field, snakemake.output.field)
+    ground.write(made.grid, snakemake.output.ground)
+    write_json(snakemake.output.fit, made.report)

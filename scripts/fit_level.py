@@ -3,8 +3,7 @@
 import numpy as np
 
 from dav_gswt import field
-from dav_gswt.coarse import build, ground
-from dav_gswt.files import read_json
+from dav_gswt.coarse import ground
 from dav_gswt.levels import build as levels
 from dav_gswt.logs import logging_to
 
@@ -13,9 +12,9 @@ with logging_to(snakemake.log[0]):
     level, grid = levels.coarser(
         field.read(given.field),
         ground.read(given.ground),
-        build.BAND * read_json(given.frame)["flying_height"],
         params.quality["level_steps"],
         np.random.default_rng([params.seed, params.level]),
+        params.keep,
     )
     field.write(level, snakemake.output.field)
     ground.write(grid, snakemake.output.ground)

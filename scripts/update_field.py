@@ -4,7 +4,7 @@ import numpy as np
 
 from dav_gswt import field, views
 from dav_gswt.coarse import build, ground
-from dav_gswt.files import read_json
+from dav_gswt.files import read_json, write_json
 from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):
@@ -14,14 +14,9 @@ with logging_to(snakemake.log[0]):
     captures = [given.captures] if isinstance(given.captures, str) else list(given.captures)
     before = views.taken(given.images, given.model, names, captures[:-1], quality.size)
     new = views.captured(captures[-1], quality.size)
-    refined, grid = build.update(
-        field.read(given.field),
-        ground.read(given.ground),
-        read_json(given.frame),
-        before,
-        new,
-        quality,
-        np.random.default_rng([params.seed, params.t]),
-    )
-    field.write(refined, snakemake.output.field)
-    ground.write(grid, snakemake.output.ground)
+    rng = np.random.default_rng([params.seed, params.t])
+    last = field.read(given.field), ground.read(given.ground), read_json(given.frame)
+    made = build.refine(*last, before, new, quality, rng, params.keep)
+    field.write(made.field, snakemake.output.field)
+    ground.write(made.grid, snakemake.output.ground)
+    write_json(snakemake.output.fit, made.report)

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from dav_gswt import cameras, views
-from dav_gswt.coarse import discs, ground
+from dav_gswt.coarse import discs, ground, underlay
+from dav_gswt.field import joined
 from dav_gswt.raster import render
 
 FRAME = {
@@ -28,8 +29,10 @@ def grid(spacing=0.1):
 
 
 def field(of=None):
+    """The discs and their underlay."""
     of = of or grid()
-    return discs.ground_discs(of, look(*of.centres[:, :2].T))
+    layer = discs.ground_discs(of, look(*of.centres[:, :2].T))
+    return joined([layer, underlay.beneath(of, layer)])
 
 
 def photos(count=3, size=48):

@@ -10,7 +10,7 @@ from dav_gswt.raster import render
 @pytest.fixture(scope="module")
 def levels():
     field, grid = merge.cropped(made.field(), made.grid(), 4)
-    coarse = build.coarser(field, grid, 0.5, 12, np.random.default_rng(0))
+    coarse = build.coarser(field, grid, 12, np.random.default_rng(0))
     return (field, grid), coarse
 
 

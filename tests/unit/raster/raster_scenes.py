@@ -4,7 +4,7 @@ import numpy as np
 import torch
 
 from dav_gswt import cameras
-from dav_gswt.raster import torch as oracle
+from dav_gswt.raster import oracle
 
 NAMES = ("means", "log_scales", "quats", "opacity_logits", "colours")
 

@@ -56,3 +56,29 @@ def test_values_that_cannot_be_changed_are_refused():
     frozen.flags.writeable = False
     with pytest.raises(ValueError, match="values is read-only"):
         cpu.adam(frozen, zeros, zeros, zeros, rate=0.1, step=1)
+
+
+@pytest.mark.parametrize("shape", [(3, 5), (100, 3), (700, 4, 3)])
+@pytest.mark.parametrize("some", [False, True])
+def test_a_column_with_a_rate_of_its_own_goes_as_if_all_had_that_rate(shape, some):
+    rng = np.random.default_rng(0)
+    columns = int(np.prod(shape[1:]))
+    rates = rng.uniform(0.01, 0.1, columns).astype(np.float32)
+    gradient, start = (rng.normal(size=shape).astype(np.float32) for _ in range(2))
+    rows = rng.uniform(size=shape[0]) < 0.5 if some else None
+
+    def moved(rate):
+        value, first, second = start.copy(), np.zeros(shape, np.float32), np.zeros(shape, np.float32)
+        cpu.adam(value, gradient, first, second, rate=rate, step=2, rows=rows)
+        return value.reshape(shape[0], -1)
+
+    found = moved(rates)
+    for column, rate in enumerate(rates):
+        # the same products; a compiler may fuse them otherwise
+        np.testing.assert_allclose(found[:, column], moved(float(rate))[:, column], rtol=1e-6, atol=1e-7)
+
+
+def test_rates_that_do_not_fit_are_refused():
+    arrays = [np.zeros((5, 3), np.float32) for _ in range(4)]
+    with pytest.raises(ValueError, match="one number or 3, one a column, not 5"):
+        cpu.adam(*arrays, rate=np.ones(5, np.float32), step=1)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from backend_scenes import SCENES, answers, blend_weights
 from raster_scenes import CAMERAS, NAMES, gaussians, image_gradients, oracle_answers, relative
 
 from dav_gswt.raster import cpu
@@ -77,3 +78,73 @@ def test_the_dilation_is_the_variance_added_on_the_screen(raster, isa):
     wide = cpu.Rasterizer(dilation=2.0, instruction_set=isa).forward(**arrays, camera=camera)
     np.testing.assert_allclose(wide.colour, colour, atol=1e-5)
     assert np.abs(raster.forward(**arrays, camera=camera).colour - wide.colour).max() > 0.01
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_instruction_set_draws_the_scenes_of_all_backends(isa, name):
+    """test_backends.py asks the best one only; tolerances as there."""
+    scene = SCENES[name]
+    pictures, shown, wanted = answers(name)
+    raster = cpu.Rasterizer(**scene.options, instruction_set=isa)
+    seen = raster.forward(**scene.arrays, camera=scene.camera)
+    for found, image in zip((seen.colour, seen.alpha, seen.depth, seen.features), pictures, strict=False):
+        np.testing.assert_allclose(found, image, atol=scene.image * max(1, np.abs(image).max()))
+    gradients = raster.backward(*shown)
+    for parameter, value in wanted.items():
+        assert relative(getattr(gradients, parameter), value) < scene.gradient, parameter
+
+
+@pytest.mark.parametrize("name", ["a cloud", "a ground seen from low down", "antialiased", "opacities up to 1"])
+def test_pairs_are_counted_where_a_pixel_takes_a_splat(raster, isa, name):
+    scene = SCENES[name]
+    wanted = (blend_weights(name) > 0).sum()
+    raster = cpu.Rasterizer(**scene.options, instruction_set=isa)
+    raster.forward(**scene.arrays, camera=scene.camera)
+    assert abs(raster.pairs() - wanted) <= 1e-4 * wanted + 1  # at a splat's rim 1/255 may be missed by a rounding
+
+
+@pytest.mark.parametrize("channels", [0, 3])
+def test_pictures_without_channels_have_alpha_and_depth(raster, channels):
+    arrays, camera = gaussians(120), CAMERAS["pinhole"]
+    gradients = image_gradients(camera, 3)
+    _, wanted = oracle_answers(arrays, camera, (np.zeros_like(gradients[0]), *gradients[1:]))
+    bare = arrays | {"colours": arrays["colours"][:, :channels].copy()}
+    raster.forward(**bare, camera=camera)
+    found = raster.backward(np.zeros((*gradients[1].shape, channels), np.float32), *gradients[1:])
+    for name in ("means", "log_scales", "quats", "opacity_logits"):
+        assert relative(getattr(found, name), wanted[name]) < 1e-5, name
+
+
+@pytest.mark.parametrize("features", [0, 1, 4, 7])
+def test_features_are_channels_of_a_picture_of_their_own(raster, features):
+    arrays, camera = gaussians(120), CAMERAS["pinhole"]
+    extra = gaussians(120, seed=3, channels=features)["colours"]
+    both = arrays | {"colours": np.concatenate([arrays["colours"], extra], 1)}
+    joined = raster.forward(**both, camera=camera).colour
+    grad = image_gradients(camera, 3 + features)[0]
+    wanted = raster.backward(grad)
+    seen = raster.forward(**arrays, camera=camera, features=extra)
+    np.testing.assert_array_equal(np.concatenate([seen.colour, seen.features], 2), joined)
+    found = raster.backward(grad[..., :3].copy(), None, None, grad[..., 3:].copy())
+    np.testing.assert_array_equal(np.concatenate([found.colours, found.features], 1), wanted.colours)
+    for name in ("means", "log_scales", "quats", "opacity_logits", "camera"):
+        assert relative(getattr(found, name), getattr(wanted, name)) < 1e-5, (
+            name
+        )  # other groups of channels, other sums
+
+
+@pytest.mark.parametrize("view", CAMERAS)
+@pytest.mark.parametrize("antialiased", [False, True])
+def test_splats_that_reach_in_from_outside_are_not_left_out(isa, view, antialiased):
+    arrays, camera = gaussians(400, seed=9), CAMERAS[view]
+    arrays["means"] *= 2.5
+    arrays["log_scales"] += 1
+    gradients = image_gradients(camera, 3)
+    images, wanted = oracle_answers(arrays, camera, gradients, antialiased=antialiased)
+    raster = cpu.Rasterizer(antialiased=antialiased, instruction_set=isa)
+    seen = raster.forward(**arrays, camera=camera)
+    for found, image in zip((seen.colour, seen.alpha, seen.depth), images, strict=True):
+        np.testing.assert_allclose(found, image, atol=2e-5 * max(1, image.max()))
+    found = raster.backward(*gradients)
+    for name in NAMES:
+        assert relative(getattr(found, name), wanted[name]) < 2e-5, name

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import dav_gswt
 from dav_gswt.files import digest
-from dav_gswt.raster import cpu
+from dav_gswt.raster import backends
 
 
 def of(inputs: dict[str, Path | str], parameters: dict) -> dict:
     """A JSON value that says what a result was made from and with."""
     return {
         "version": dav_gswt.__version__,
-        "renderer": {"backend": "cpu", "instruction_set": cpu.instruction_set()},
+        "renderer": backends.described(),
         "parameters": parameters,
         "inputs": {name: digest(path) for name, path in sorted(inputs.items())},
     }

@@ -13,8 +13,10 @@ import psutil
 from dav_gswt import config
 from dav_gswt.errors import InputError
 from dav_gswt.narration import Narrator
+from dav_gswt.raster import backends
 
 CONFIG = Path("config/config.yaml")
+SMALLER = Path("config/without_compiler.yaml")
 SCHEMA = Path("workflow/schemas/config.schema.yaml")
 
 
@@ -27,16 +29,27 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--port", type=int, default=8000)
     options = parser.parse_args(arguments)
     try:
-        given = config.read([CONFIG, *options.configfile], {"scene": options.scene} if options.scene else {})
+        overlays = smaller(options.view) + options.configfile
+        given = config.read([CONFIG, *overlays], {"scene": options.scene} if options.scene else {})
         config.check(given, SCHEMA)
         if options.view:
             return view(given, options.port)
-        return run(given, options.cores, options.configfile)
+        return run(given, options.cores, overlays)
     except InputError as error:
         print(error, file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         return 130
+
+
+def smaller(quietly: bool) -> list[Path]:
+    """What is laid over the config where PyTorch draws, below the user's own; said unless quietly."""
+    if backends.in_use() != "torch":
+        return []
+    if not quietly:
+        why = backends.lacking("cpu") or f"{backends.VARIABLE} asks for it"
+        print(f"PyTorch draws, many times slower, so at a smaller size ({SMALLER}): {why}", flush=True)
+    return [SMALLER]
 
 
 def run(given: dict, cores: int, overlays: list[Path]) -> int:
@@ -129,7 +142,7 @@ def tell(given: dict, done: str, overlays: list[Path]) -> None:
     """What was made, where it is, and what to type next."""
     page = pages(given)[0]
     terrain, bundle, tiles = page.parent, page.parents[1], page.parents[2]
-    usual = given["scene"] == config.read([CONFIG])["scene"] and not overlays
+    usual = given["scene"] == config.read([CONFIG])["scene"] and not set(overlays) - {SMALLER}
     print(
         f"""
 {done}.

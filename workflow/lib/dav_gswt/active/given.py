@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from dav_gswt.coarse import ground
-from dav_gswt.coarse.build import BLOCK, GROUND_SHARE, Quality
+from dav_gswt.coarse.build import BLOCK, Quality, most_discs
 from dav_gswt.coarse.discs import WIDTH
 from dav_gswt.coarse.ground import Ground
 from dav_gswt.coarse.maps import from_above
@@ -25,7 +25,7 @@ def enter(field: Field, frame: dict, quality: Quality) -> tuple[Field, Ground]:
     across = np.sort(np.exp(field.log_scales), 1)[:, 1]
     spacing = float(np.median(across)) / WIDTH
     none = np.zeros((0, 3))
-    grid = ground.lay(frame, none, spacing, int(GROUND_SHARE * quality.cap), BLOCK, margin=0.0)
+    grid = ground.lay(frame, none, spacing, most_discs(quality), BLOCK, margin=0.0)
     inside = field[grid.contains(field.means)]
     inside = replace(inside, ground=np.zeros(len(inside), bool))  # a field of ours has discs, but of another grid
     maps = from_above(inside, grid)

@@ -11,7 +11,7 @@ from dav_gswt.coarse.ground import Ground
 from dav_gswt.coarse.maps import from_above
 from dav_gswt.field import Field
 from dav_gswt.logs import progress
-from dav_gswt.raster import cpu
+from dav_gswt.raster import Rasterizer
 from dav_gswt.views import View, over_ground
 
 WIDTH = 96  # pixels of a picture that is only scored
@@ -24,7 +24,7 @@ def score(
 
     opacity: mean of the uncertainty map over the pixels that look at the modelled ground; 0 where none does.
     """
-    raster = cpu.Rasterizer()
+    raster = Rasterizer()
     west, south, side = grid.exemplar
     scored, maps = [], {}
     for pose, camera in progress(candidates, "score poses"):

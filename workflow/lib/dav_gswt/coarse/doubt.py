@@ -12,7 +12,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.cameras import Camera
 from dav_gswt.field import Field
-from dav_gswt.raster import cpu
+from dav_gswt.raster import Rasterizer
 from dav_gswt.views import View
 
 SEEN = 0.05  # pixels of blend weight from which a photo counts as seeing a Gaussian
@@ -21,7 +21,7 @@ SEEN = 0.05  # pixels of blend weight from which a photo counts as seeing a Gaus
 def with_uncertainty(field: Field, views: list[View]) -> Field:
     """The field with uncertainty u_i = 1 - max over views of (sum of w_i alpha / sum of w_i), 1 where none sees it."""
     known = np.zeros(len(field), np.float32)
-    raster = cpu.Rasterizer()
+    raster = Rasterizer()
     for view in views:
         seen = raster.forward(**arrays(field), camera=view.camera)
         maps = np.stack([view.weight * seen.alpha, view.weight], -1).astype(np.float32)
@@ -31,18 +31,18 @@ def with_uncertainty(field: Field, views: list[View]) -> Field:
     return replace(field, uncertainty=np.clip(1 - known, 0, 1).astype(np.float32))
 
 
-def uncertainty_map(field: Field, camera: Camera, raster: cpu.Rasterizer) -> Float32[Array, "h w"]:
+def uncertainty_map(field: Field, camera: Camera, raster: Rasterizer) -> Float32[Array, "h w"]:
     """Per pixel: blend-weighted uncertainty of what is seen, plus the transmittance (nothing at all is known there)."""
     seen = raster.forward(**arrays(field, field.uncertainty[:, None]), camera=camera)
     return np.clip(seen.colour[..., 0] + 1 - seen.alpha, 0, 1)
 
 
 def arrays(field: Field, colours: Float32[Array, "n c"] | None = None) -> dict[str, Float[Array, "..."]]:
-    """A field's arrays as the rasterizer takes them; colours: something else to draw than its base colours."""
+    """A field's arrays as the rasterizer takes them; colours: something else to draw than its spherical harmonics."""
     return {
         "means": field.means,
         "log_scales": field.log_scales,
         "quats": field.quats,
         "opacity_logits": field.opacity_logits,
-        "colours": np.ascontiguousarray(field.base_colours if colours is None else colours, np.float32),
+        "colours": np.ascontiguousarray(field.sh if colours is None else colours, np.float32),
     }

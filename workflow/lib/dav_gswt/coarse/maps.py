@@ -10,7 +10,7 @@ from dav_gswt import cameras
 from dav_gswt.coarse.doubt import arrays
 from dav_gswt.coarse.ground import Ground
 from dav_gswt.field import Field
-from dav_gswt.raster import cpu
+from dav_gswt.raster import Rasterizer
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ def from_above(field: Field, grid: Ground) -> Maps:
     rows, columns = grid.shape
     top = float(field.means[:, 2].max()) + 10 * grid.spacing
     camera = cameras.top_down(grid.west, grid.south, columns, rows, grid.spacing, top)
-    raster = cpu.Rasterizer()
+    raster = Rasterizer()
     seen = raster.forward(**arrays(field), camera=camera)
     doubt = raster.forward(**arrays(field, field.uncertainty[:, None]), camera=camera)
     solid = np.maximum(seen.alpha, 1e-6)

@@ -1,36 +1,44 @@
 """One level from its finer neighbour: merged, then fitted to the neighbour's pictures from above and from the side."""
 
 import logging
+from pathlib import Path
 
 import numpy as np
 
-from dav_gswt import cameras, images
+from dav_gswt import cameras, images, raster
 from dav_gswt.cameras import Camera
 from dav_gswt.coarse.build import modelled
 from dav_gswt.coarse.doubt import arrays
-from dav_gswt.coarse.fit import fit
 from dav_gswt.coarse.ground import Ground
+from dav_gswt.coarse.rules import OnGround
 from dav_gswt.errors import InputError
 from dav_gswt.field import Field
+from dav_gswt.fitting import trainer
+from dav_gswt.fitting.plan import Plan
 from dav_gswt.levels.merge import halved
-from dav_gswt.raster import cpu
 from dav_gswt.views import View
 
 _log = logging.getLogger(__name__)
 
 ELEVATIONS = (90.0, 60.0, 35.0)  # degrees: pictures the coarser level is fitted to
 AROUND = 6  # azimuths of each elevation but the zenith's
+CLEARANCE = 2.0  # discs that a thing may rise above the highest it starts from
 PIXELS = 2.0  # of a picture for one coarse disc: at the distance where a level is used a disc is about a pixel wide
 
 
-def coarser(field: Field, grid: Ground, band: float, steps: int, rng: np.random.Generator) -> tuple[Field, Ground]:
+def coarser(
+    field: Field, grid: Ground, steps: int, rng: np.random.Generator, keep: Path | None = None
+) -> tuple[Field, Ground]:
     """The next level: half the resolution, about a quarter of the Gaussians, fitted for `steps` steps.
 
     Raises: InputError: the mean scale does not rise (a field of things alone that did not merge).
     """
     start, coarse = halved(field, grid)
     views = modelled(neighbour_views(field, coarse), coarse)
-    level = fit(start, coarse, views, steps, band, rng, f"fit level of {len(start)} Gaussians")
+    stand = start[~start.ground]
+    top = float((stand.means[:, 2] - coarse.height_at(stand.means)).max()) + CLEARANCE * coarse.spacing
+    rules, plan = OnGround(coarse, np.full(coarse.shape, top)), Plan(steps, len(start))
+    level = trainer.fit(start, views, plan, rules, rng, f"fit level of {len(start)} Gaussians", keep).field
     before, after = (float(np.exp(f.log_scales).mean()) for f in (field, level))
     if not after > before:
         raise InputError(f"levels: the mean scale does not rise ({before:.4g} to {after:.4g}); ask for fewer levels")
@@ -40,10 +48,10 @@ def coarser(field: Field, grid: Ground, band: float, steps: int, rng: np.random.
 
 def neighbour_views(field: Field, coarse: Ground) -> list[View]:
     """Pictures of a field, PIXELS pixels a coarse disc, drawn at twice that and averaged so that they do not alias."""
-    raster, views = cpu.Rasterizer(), []
+    drawn, views = raster.Rasterizer(), []
     for number, camera in enumerate(_cameras(coarse)):
         fine = camera.resized(2 * camera.width, 2 * camera.height)
-        seen = raster.forward(**arrays(field), camera=fine)
+        seen = drawn.forward(**arrays(field), camera=fine)
         # what shines through is not the field's colour: divide it out
         colour = seen.colour / np.maximum(seen.alpha, 0.5)[..., None]
         image = images.resized(np.clip(colour, 0, 1).astype(np.float32), camera.width, camera.height)

@@ -7,7 +7,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 from scipy.spatial.transform import Rotation
 
-from dav_gswt.coarse import discs
+from dav_gswt.coarse import discs, underlay
 from dav_gswt.coarse.ground import Ground
 from dav_gswt.coarse.maps import from_above
 from dav_gswt.field import Field, joined, sh_of
@@ -15,6 +15,9 @@ from dav_gswt.field import Field, joined, sh_of
 
 def cropped(field: Field, grid: Ground, block: int) -> tuple[Field, Ground]:
     """Field and grid cut down to whole blocks of cells that start at the exemplar's corner."""
+    under = underlay.rows(field, grid)
+    had = under.stop > under.start
+    field = underlay.without(field, grid)
     rows, columns = grid.shape
     below, left = grid.first_row % block, grid.first_column % block
     ny, nx = (rows - below) // block * block, (columns - left) // block * block
@@ -31,7 +34,10 @@ def cropped(field: Field, grid: Ground, block: int) -> tuple[Field, Ground]:
     )
     stand = np.flatnonzero(~field.ground)
     stand = stand[small.contains(field.means[stand])]
-    return field[np.concatenate([keep, stand]).astype(int)], small
+    discs_alone, standing = field[np.asarray(keep, int)], field[stand]
+    return joined(
+        [discs_alone, underlay.beneath(small, discs_alone), standing] if had else [discs_alone, standing]
+    ), small
 
 
 def halved(field: Field, grid: Ground) -> tuple[Field, Ground]:
@@ -51,7 +57,7 @@ def halved(field: Field, grid: Ground) -> tuple[Field, Ground]:
     n = grid.heights.size
     if field.ground.any():
         colours = field.base_colours[:n].reshape(*grid.shape, 3)
-        doubt, things = field.uncertainty[:n].reshape(grid.shape), field[n:]
+        doubt, things = field.uncertainty[:n].reshape(grid.shape), underlay.without(field, grid)[n:]
     else:  # a finished field: its ground is what it shows from above, its things stand higher than the discs reach
         maps = from_above(field, grid)
         colours, doubt = maps.colour, maps.uncertainty
@@ -59,7 +65,7 @@ def halved(field: Field, grid: Ground) -> tuple[Field, Ground]:
         things = field[above > discs.STANDS * coarse.spacing]
     base = discs.ground_discs(coarse, _mean4(colours.astype(float)).reshape(-1, 3))
     base = replace(base, uncertainty=_mean4(doubt.astype(float)).ravel().astype(np.float32))
-    return joined([base, merged(things, coarse.spacing)]), coarse
+    return joined([base, underlay.beneath(coarse, base), merged(things, coarse.spacing)]), coarse
 
 
 def merged(field: Field, voxel: float) -> Field:

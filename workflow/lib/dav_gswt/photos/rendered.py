@@ -18,7 +18,7 @@ FEATURES = 4096
 
 
 def render_set(entry: dict, folder: Path) -> None:
-    """Fill a photos/ folder: images/, sparse/ (exact cameras, triangulated points), ground.json.
+    """Fill a photos/ folder: images/, sparse/ (exact cameras, triangulated points), ground.json with the test groups.
 
     entry: a synthetic scene of the config. Points come from the start views alone; test views are in the model, but
     observe nothing.
@@ -33,7 +33,9 @@ def render_set(entry: dict, folder: Path) -> None:
         images.write(folder / "images" / name, synthetic.render(scene, camera))
     found = triangulated(folder / "images", shots, entry["seed"])
     model.write(with_cameras(found, tests), folder / "sparse")
-    frame = scene.frame | {"test": [n for n, _ in tests], "images": len(shots), "registered": len(shots)}
+    named = [name for name, _ in tests]
+    groups = {group: [named[i] for i in part] for group, part in synthetic.test_groups(entry).items()}
+    frame = scene.frame | {"test": named, "test_groups": groups, "images": len(shots), "registered": len(shots)}
     write_json(folder / "ground.json", frame | {"left_out": [], "focal_ratio": None})
 
 

@@ -5,10 +5,12 @@ Elevation is measured from the ground up (90: straight above), azimuth from +x t
 
 import numpy as np
 
-from dav_gswt.cameras import Camera, look_at
+from dav_gswt.cameras import Camera, look_at, pinhole
 
 Place = tuple[float, float, float]  # elevation, azimuth, radius
+NEARER = 0.9  # radius of a test view, as a share of the others'
 GOLDEN = np.pi * (3.0 - 5.0**0.5)  # radians: the turn between neighbours of a Fibonacci lattice
+STRIDE = 12.0  # degrees below the horizon that a walker looks
 
 
 def orbit(elevation, azimuth, radius, target, width: int, height: int, fov) -> Camera:
@@ -33,7 +35,12 @@ def start_ring(n: int, elevation: float, radius: float) -> list[Place]:
     """n places: one straight above, the others evenly around at `elevation`. One alone is the one above."""
     if n < 1:
         raise ValueError(f"a ring has at least 1 place, not {n}")
-    return [(90.0, 0.0, radius)] + [(elevation, 360.0 * i / (n - 1), radius) for i in range(n - 1)]
+    return [(90.0, 0.0, radius)] + ring(n - 1, elevation, radius)
+
+
+def ring(n: int, elevation: float, radius: float, turn: float = 0.0) -> list[Place]:
+    """n places evenly around at `elevation`, the first at azimuth `turn`."""
+    return [(elevation, turn + 360.0 * i / n, radius) for i in range(n)]
 
 
 def hemisphere(n: int, lowest_elevation: float, radius: float, turn: float = 0.0) -> list[Place]:
@@ -53,7 +60,21 @@ def test_views(n: int, lowest_elevation: float, radius: float) -> list[Place]:
 
     The other radius keeps them distinct from every start view and candidate, whatever their number.
     """
-    return hemisphere(n, lowest_elevation, 0.9 * radius, turn=70.0)
+    return hemisphere(n, lowest_elevation, NEARER * radius, turn=70.0)
 
 
 test_views.__test__ = False  # not a test, whatever its name makes pytest think
+
+
+def walker(height: float, azimuth: float, away: float, target, width: int, rows: int, fov: float) -> Camera:
+    """The camera at a walker's eye: `height` above the target, `away` from it, looking past it to the horizon.
+
+    azimuth: where the walker stands, from the target. fov: of the picture's width, degrees.
+    Raises: ValueError: a height that is not positive.
+    """
+    if not height > 0:
+        raise ValueError(f"a walker's eye is above the ground, not at {height}")
+    a, down = np.radians(azimuth), np.radians(STRIDE)
+    out = np.array([np.cos(a), np.sin(a), 0.0])
+    eye = np.asarray(target, float) + away * out + [0.0, 0.0, height]
+    return pinhole(eye, eye - np.cos(down) * out - [0.0, 0.0, np.sin(down)], width, rows, fov)

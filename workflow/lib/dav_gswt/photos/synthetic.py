@@ -15,15 +15,18 @@ from numpy import ndarray as Array
 
 from dav_gswt.cameras import Camera
 from dav_gswt.errors import InputError
-from dav_gswt.photos import desert, rigs
+from dav_gswt.photos import desert, meadow, rigs
 
-FAMILIES = {"desert": desert}
+FAMILIES = {"desert": desert, "meadow": meadow}
 VARIANT = "scalar_rgb"  # runs wherever mitsuba does; the LLVM variant aborts the process under some LLVM versions
 EXEMPLAR = 6.0  # metres: side of the square of ground that the pictures are about
 RADIUS = 7.0  # metres from the middle of the ground to the cameras
 FIELD_OF_VIEW = 55.0  # degrees across the picture's width: 7.3 m of ground from straight above
 RING_ELEVATION = 65.0  # degrees: neighbours of the start ring overlap by most of the exemplar
-LOWEST_ELEVATION = 30.0  # degrees: the lowest candidate and test view
+LOWEST_ELEVATION = 30.0  # degrees: the lowest candidate and test view, where a scene does not say
+OBLIQUE_ELEVATION = 45.0  # degrees, of the views that test how a field looks away from its photos
+WALKERS = (0.8, 1.6, 3.2)  # metres above the mean ground: eye heights for stills
+WALKER_FIELD_OF_VIEW = 60.0  # degrees
 NEAR = 0.01  # metres: mitsuba's rays start at this depth
 SAMPLES = 20  # rays a pixel
 
@@ -34,7 +37,7 @@ class Scene:
 
     family: str
     seed: int
-    options: desert.Options
+    options: desert.Options | meadow.Options
     exemplar: float = EXEMPLAR
 
     @property
@@ -75,21 +78,67 @@ def of_config(entry: dict) -> Scene:
 
 
 def start_views(entry: dict, middle=(0.0, 0.0, 0.0)) -> list[Camera]:
-    """The cameras that the scene starts from."""
-    return _cameras(rigs.start_ring(entry["photos"], RING_ELEVATION, RADIUS), middle, entry["size"])
+    """The cameras that the scene starts from, as the entry's `rig` says.
+
+    ring: one straight above, the others around it. cap: spread evenly by area above the entry's lowest elevation.
+    """
+    if entry.get("rig", "ring") == "cap":
+        places = rigs.hemisphere(entry["photos"], _lowest(entry), RADIUS, turn=35.0)
+    else:
+        places = rigs.start_ring(entry["photos"], RING_ELEVATION, RADIUS)
+    return _cameras(places, middle, entry["size"])
 
 
 def test_views(entry: dict, middle=(0.0, 0.0, 0.0)) -> list[Camera]:
-    """The cameras that only test."""
-    return _cameras(rigs.test_views(entry["test"], LOWEST_ELEVATION, RADIUS), middle, entry["size"])
+    """The cameras that only test, group after group (`test_groups`)."""
+    places = [place for group in _test_places(entry).values() for place in group]
+    return _cameras(places, middle, entry["size"])
 
 
-test_views.__test__ = False  # not a test, whatever its name makes pytest think
+def test_groups(entry: dict) -> dict[str, list[int]]:
+    """Which of `test_views` belong together: a list of indices a group.
+
+    The first group is spread over the cap from which photos may be taken: `hemisphere`, or `high` where the photos are
+    taken by the rig `cap`. `oblique`: around at 45 degrees, if the entry has any.
+    """
+    found, count = {}, 0
+    for name, places in _test_places(entry).items():
+        found[name] = list(range(count, count + len(places)))
+        count += len(places)
+    return found
+
+
+test_views.__test__ = test_groups.__test__ = False  # not tests, whatever their names make pytest think
 
 
 def candidates(entry: dict, middle=(0.0, 0.0, 0.0)) -> list[Camera]:
     """The cameras that may be asked for."""
-    return _cameras(rigs.hemisphere(entry["candidates"], LOWEST_ELEVATION, RADIUS), middle, entry["size"])
+    return _cameras(rigs.hemisphere(entry["candidates"], _lowest(entry), RADIUS), middle, entry["size"])
+
+
+def walkers(entry: dict, middle=(0.0, 0.0, 0.0)) -> dict[str, Camera]:
+    """Cameras for stills from a walker's eye, by name (`walker_1.6`): over the exemplar to the horizon, 16 : 9.
+
+    They neither fit nor test. Each stands as far outside the exemplar as its eye is high, so that the nearest ground in
+    the picture is the exemplar's.
+    """
+    width, rows = entry["size"], round(entry["size"] * 9 / 16)
+    return {
+        f"walker_{h:g}": rigs.walker(h, 210.0, 0.5 * EXEMPLAR + h, middle, width, rows, WALKER_FIELD_OF_VIEW)
+        for h in WALKERS
+    }
+
+
+def _lowest(entry: dict) -> float:
+    return float(entry.get("lowest", LOWEST_ELEVATION))
+
+
+def _test_places(entry: dict) -> dict[str, list[rigs.Place]]:
+    all_over = "high" if entry.get("rig") == "cap" else "hemisphere"
+    groups = {all_over: rigs.test_views(entry["test"], _lowest(entry), RADIUS)}
+    if entry.get("oblique"):
+        groups["oblique"] = rigs.ring(entry["oblique"], OBLIQUE_ELEVATION, rigs.NEARER * RADIUS, turn=20.0)
+    return groups
 
 
 def _cameras(places: list[rigs.Place], middle, size: int) -> list[Camera]:
@@ -179,4 +228,4 @@ def _world(scene: Scene):
     from dav_gswt.photos import world
 
     mi.set_variant(VARIANT)
-    return world.build(FAMILIES[scene.family].grow(scene.options, scene.seed, scene.exemplar), scene.options)
+    return world.build(FAMILIES[scene.family].grow(scene.options, scene.seed, scene.exemplar))

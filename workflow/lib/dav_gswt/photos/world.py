@@ -1,55 +1,63 @@
-"""A desert as mitsuba holds it: meshes, instances, sand, sun and sky. The variant is set by the caller."""
+"""A piece of land as mitsuba holds it: meshes, instances, sun and sky. The variant is set by the caller."""
 
 import mitsuba as mi
 import numpy as np
 
-from dav_gswt.photos.desert import HORIZON, PERIOD, SAND, SUN, ZENITH, Desert, Options
+from dav_gswt.photos.land import Land, Light
 from dav_gswt.photos.things import Mesh
 
 BLOCK = 16  # pixels; fixed, since mitsuba's own choice follows the number of threads and the noise follows the blocks
 
 
-def build(desert: Desert, options: Options):
+def build(land: Land):
     """The mitsuba scene."""
-    sand = mi.load_dict({"type": "diffuse", "reflectance": _bitmap(desert.sand, "bilinear")})
+    bare = mi.load_dict({"type": "diffuse", "reflectance": _bitmap(land.albedo, "bilinear")})
     coloured = mi.load_dict({"type": "diffuse", "reflectance": {"type": "mesh_attribute", "name": "vertex_color"}})
     parts = {
         "type": "scene",
         "integrator": {"type": "path", "max_depth": 3, "rr_depth": 10, "block_size": BLOCK},
-        "ground": _mesh("ground", desert.ground, sand, desert.ground.vertices[:, :2] / PERIOD),
+        "ground": _mesh("ground", land.ground, bare, land.ground.vertices[:, :2] / land.period),
         "sun": {
             "type": "directional",
-            "direction": [-float(v) for v in _towards(options.sun_elevation, options.sun_azimuth)],
-            "irradiance": {"type": "rgb", "value": SUN.tolist()},
+            "direction": [-float(v) for v in _towards(land.light.elevation, land.light.azimuth)],
+            "irradiance": {"type": "rgb", "value": land.light.sun.tolist()},
             "sampling_weight": 0.6,
         },
-        "sky": _sky(),
+        "sky": _sky(land.light),
     }
-    if desert.stones is not None:
-        parts["stones"] = _mesh("stones", desert.stones, coloured)
-    return mi.load_dict(parts | _plants(desert))
+    if land.stones is not None:
+        parts["stones"] = _mesh("stones", land.stones, coloured)
+    return mi.load_dict(parts | _plants(land))
 
 
-def _plants(desert: Desert) -> dict:
+def _plants(land: Land) -> dict:
     """Every kind of plant once, and an instance wherever one stands."""
     kinds = {
-        f"kind{k}": {"type": "shapegroup", "plant": _painted(f"plant{k}", mesh)} for k, mesh in enumerate(desert.plants)
+        f"kind{k}": {"type": "shapegroup", "plant": _painted(f"plant{k}", mesh)} for k, mesh in enumerate(land.plants)
     }
     found = {}
-    for i, (kind, x, y, z, size, yaw) in enumerate(desert.plant_places):
-        stand = mi.ScalarTransform4f().translate([x, y, z]).rotate([0, 0, 1], float(np.degrees(yaw))).scale(float(size))
-        found[f"plant{i}"] = {"type": "instance", "group": {"type": "ref", "id": f"kind{int(kind)}"}, "to_world": stand}
+    for i, (kind, *stand) in enumerate(land.places):
+        group = {"type": "ref", "id": f"kind{int(kind)}"}
+        found[f"plant{i}"] = {"type": "instance", "group": group, "to_world": _standing(*stand)}
     return kinds | found
 
 
-def _sky() -> dict:
-    """A sky that brightens towards the horizon, as a small map of directions; below the horizon, light from sand."""
+def _standing(x, y, z, size, yaw, along_x, along_y):
+    """From a plant to where it stands: scaled, turned, sheared upwards as the ground slopes, and moved."""
+    stand = mi.ScalarTransform4f().rotate([0, 0, 1], float(np.degrees(yaw))).scale(float(size))
+    if along_x or along_y:
+        stand = mi.ScalarTransform4f([[1, 0, 0, 0], [0, 1, 0, 0], [along_x, along_y, 1, 0], [0, 0, 0, 1]]) @ stand
+    return mi.ScalarTransform4f().translate([x, y, z]) @ stand
+
+
+def _sky(light: Light) -> dict:
+    """A sky that brightens towards the horizon, as a small map of directions; below is the light of far ground."""
     rows = 33
     elevation = np.radians(90.0 - (np.arange(rows) + 0.5) / rows * 180.0)
     share = np.clip(1.0 - np.sin(np.maximum(elevation, 0)), 0, 1)[:, None] ** 2.5
-    light = ZENITH + (HORIZON - ZENITH) * share
-    light[elevation < 0] = 0.4 * SAND
-    image = np.repeat(light[:, None], 16, axis=1).astype(np.float32)
+    radiance = light.zenith + (light.horizon - light.zenith) * share
+    radiance[elevation < 0] = light.below
+    image = np.repeat(radiance[:, None], 16, axis=1).astype(np.float32)
     upright = mi.ScalarTransform4f().rotate([1, 0, 0], 90)
     return {"type": "envmap", "bitmap": mi.Bitmap(image), "to_world": upright, "sampling_weight": 0.4}
 

@@ -5,50 +5,19 @@ Results have the same bits for any number of threads. They differ in the last bi
 """
 
 import os
-from dataclasses import dataclass
+import weakref
 
 import numpy as np
 from jaxtyping import Bool, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.cameras import Camera
-from dav_gswt.raster.waiting import patiently
-
-with patiently():
-    from dav_gswt.raster import _core
+from dav_gswt.raster import _core, interface
+from dav_gswt.raster.interface import Contributions, Gradients, Rendering
 
 TINY = 1 << 15  # Gaussians plus pixels below which a second thread costs more than it brings
 MOST_THREADS = 16
-
-
-@dataclass(frozen=True)
-class Rendering:
-    """Sums over the splats of a pixel by blend weight w: of colours, of w itself, of depths. Read-only."""
-
-    colour: Float32[Array, "h w c"]
-    alpha: Float32[Array, "h w"]
-    depth: Float32[Array, "h w"]
-
-
-@dataclass(frozen=True)
-class Gradients:
-    """dL by each parameter; 0 for Gaussians that are not seen."""
-
-    means: Float32[Array, "n 3"]
-    log_scales: Float32[Array, "n 3"]
-    quats: Float32[Array, "n 4"]
-    opacity_logits: Float32[Array, "n"]
-    colours: Float32[Array, "n c"]
-
-
-@dataclass(frozen=True)
-class Contributions:
-    """What each Gaussian gives to a picture: the sum and the maximum over pixels of its blend weight w, and, of a map
-    m given for the pixels, the sum of w m."""
-
-    total: Float32[Array, "n"]
-    maximum: Float32[Array, "n"]
-    mapped: Float32[Array, "n c"]
+NAMES = ("means", "log_scales", "quats", "opacity_logits", "colours", "features")
 
 
 def instruction_sets() -> list[str]:
@@ -75,30 +44,26 @@ def default_threads() -> int:
     return min(mine, MOST_THREADS)
 
 
-class Rasterizer:
-    """Draws Gaussians and takes gradients back; its memory is kept from call to call. For one thread of Python at a
-    time: give each its own.
+class Rasterizer(interface.Rasterizer):
+    """See `interface.Rasterizer`. Its memory is kept from call to call, and that of gradients is used again once nobody
+    holds them any more.
 
-    near: a pinhole camera leaves out Gaussians whose centre is nearer, in units of the world (an orthographic camera
-    those with depth <= 0). dilation: variance added to every splat, in square pixels: no splat falls between pixels.
-    threads, instruction_set: see `default_threads`, `instruction_set`.
-
-    Of a Gaussian with peak opacity o, alpha at a pixel is min(.99, o exp(-q/2)), 0 where below 1/255; splats are
-    blended by depth of their centres, those of equal depth by index; a pixel takes no splat that would leave it less
-    than 1e-4 transmittance.
+    What a Gaussian costs that cannot have a pixel is a look at its mean and its scales: whether its other values are
+    finite is not looked at. threads, instruction_set: see `default_threads`, `instruction_set`.
     """
 
     def __init__(
-        self, near: float = 0.01, dilation: float = 0.3, threads: int | None = None, instruction_set: str | None = None
+        self,
+        near: float = 0.01,
+        dilation: float = 0.3,
+        antialiased: bool = False,
+        threads: int | None = None,
+        instruction_set: str | None = None,
     ):
-        if not near > 0 or not 0 <= dilation < np.inf:
-            raise ValueError(f"near must be positive and dilation not negative, not {near} and {dilation}")
-        if threads is not None and threads < 1:
-            raise ValueError(f"threads must be at least 1, not {threads}")
-        self.near, self.dilation = near, dilation
+        super().__init__(near, dilation, antialiased, threads)
         self.threads = threads or default_threads()
         self._core = _core.Context(instruction_set or globals()["instruction_set"]())
-        self._last = None  # of forward: arrays, images, threads
+        self._memory = _Memory()
 
     def forward(
         self,
@@ -106,28 +71,24 @@ class Rasterizer:
         log_scales: Float32[Array, "n 3"],
         quats: Float32[Array, "n 4"],
         opacity_logits: Float32[Array, "n"],
-        colours: Float32[Array, "n c"],
+        colours: Float32[Array, "n c"] | Float32[Array, "n k 3"],
         camera: Camera,
+        features: Float32[Array, "n f"] | None = None,
     ) -> Rendering:
-        """Draw Gaussians over black: log_scales are natural logarithms, quats w x y z of any length.
-
-        Raises: ValueError: an array's type, shape or layout, a value that is not finite, a zero quaternion (index).
-        """
-        n, c = _rows(means), _columns(colours)
-        arrays = {"means": means, "log_scales": log_scales, "quats": quats}
-        arrays |= {"opacity_logits": opacity_logits, "colours": colours}
-        for (name, array), shape in zip(arrays.items(), [(n, 3), (n, 3), (n, 4), (n,), (n, c)], strict=True):
-            _check(array, name, shape)
-        h, w = _size(camera)
-        images = np.empty((h, w, c), np.float32), np.empty((h, w), np.float32), np.empty((h, w), np.float32)
-        threads = 1 if n + h * w < TINY else self.threads
+        arrays = dict(zip(NAMES, (means, log_scales, quats, opacity_logits, colours, features), strict=True))
+        interface.check_camera(camera)
+        interface.check_shapes(arrays)
+        size = camera.height, camera.width
+        channels = [colours.shape[-1:], (), ()] + ([] if features is None else [features.shape[1:]])
+        images = [np.empty((*size, *c), np.float32) for c in channels] + [None] * (features is None)
+        threads = 1 if len(means) + size[0] * size[1] < TINY else self.threads
         self._last = None
-        view = _numbers(camera, self.near, self.dilation), w, h, bool(camera.orthographic)
+        view = _numbers(camera, self.near, self.dilation), *size[::-1], bool(camera.orthographic), self.antialiased
         if not self._core.forward(*arrays.values(), *view, *images, threads):
-            _find_invalid(arrays)
-        for image in images:  # backward needs them as they are
+            interface.find_invalid({name: array for name, array in arrays.items() if array is not None})
+        for image in images[: len(channels)]:  # backward needs them as they are
             image.flags.writeable = False
-        self._last = tuple(arrays.values()), images, threads
+        self._last = arrays, images, threads
         return Rendering(*images)
 
     def backward(
@@ -135,37 +96,58 @@ class Rasterizer:
         grad_colour: Float32[Array, "h w c"],
         grad_alpha: Float32[Array, "h w"] | None = None,
         grad_depth: Float32[Array, "h w"] | None = None,
+        grad_features: Float32[Array, "h w f"] | None = None,
     ) -> Gradients:
-        """Gradients of a loss at the last forward, from its gradients by the three images (None: zero).
-
-        The arrays given to forward must not have changed since. By alpha's clamp at .99, the gradient through a
-        clamped alpha is 0. Raises: ValueError: no forward yet, or an array's type, shape or layout.
-        """
         arrays, images, threads = self._forwarded()
-        for name, value, image in zip(
-            ("colour", "alpha", "depth"), (grad_colour, grad_alpha, grad_depth), images, strict=True
-        ):
+        given = (grad_colour, grad_alpha, grad_depth, grad_features)
+        if grad_features is not None and images[3] is None:
+            raise ValueError("grad_features is given, but forward was given no features")
+        for name, value, image in zip(("colour", "alpha", "depth", "features"), given, images, strict=True):
             if value is not None:
-                _check(value, f"grad_{name}", image.shape)
-        out = [np.empty(a.shape, np.float32) for a in arrays]
-        self._core.backward(*arrays, *images, grad_colour, grad_alpha, grad_depth, *out, threads)
-        return Gradients(*out)
+                interface.check(value, f"grad_{name}", image.shape)
+        out = {name: None if a is None else self._memory.of(name, a.shape) for name, a in arrays.items()}
+        out["camera"] = np.empty(6, np.float32)
+        self._core.backward(*arrays.values(), *images, *given, *out.values(), threads)
+        return Gradients(**out)
 
     def contributions(self, weights: Float32[Array, "h w c"] | None = None) -> Contributions:
-        """Blend weights of the last forward, and the map `weights` carried back onto the Gaussians by them."""
         arrays, images, threads = self._forwarded()
-        n, (h, w) = len(arrays[0]), images[1].shape
-        if weights is None:
-            weights = np.empty((h, w, 0), np.float32)
-        _check(weights, "weights", (h, w, _columns(weights)))
-        out = np.empty(n, np.float32), np.empty(n, np.float32), np.empty((n, weights.shape[2]), np.float32)
+        n, size = len(arrays["means"]), images[1].shape
+        weights = np.empty((*size, 0), np.float32) if weights is None else weights
+        interface.check(weights, "weights", (*size, interface.columns(weights)))
+        out = [np.empty(n, np.float32) for _ in range(3)] + [np.empty((n, weights.shape[2]), np.float32)]
         self._core.contributions(weights, *out, threads)
         return Contributions(*out)
 
-    def _forwarded(self):
-        if self._last is None:
-            raise ValueError("nothing was drawn yet: call forward first")
-        return self._last
+    @property
+    def drawn(self) -> Bool[Array, "n"]:
+        found = np.empty(len(self._forwarded()[0]["means"]), bool)
+        self._core.drawn(found)
+        return found
+
+    def pairs(self) -> int:
+        """Of the last forward: how many pixels take a splat (alpha at least 1/255, not used up), summed over splats."""
+        return int(self._core.pairs(self._forwarded()[2]))
+
+
+class _Memory:
+    """Arrays whose memory is used again when nobody holds them, nor a view of them: fresh memory costs a page fault
+    every 4 kB, more than what is written to it."""
+
+    def __init__(self):
+        self._kept = {}  # by name: memory, and a weak reference to the array that all views of it hold on to
+
+    def of(self, name: str, shape: tuple[int, ...]) -> Float32[Array, "..."]:
+        """An array of this shape; its values mean nothing."""
+        size = int(np.prod(shape))
+        if not size:
+            return np.empty(shape, np.float32)
+        memory, last = self._kept.get(name, (None, None))
+        if memory is None or len(memory) != size or last() is not None:
+            memory = memoryview(np.empty(size, np.float32))
+        root = np.frombuffer(memory, np.float32)  # its base is no array: views of it hold `root` itself
+        self._kept[name] = memory, weakref.ref(root)
+        return root.reshape(shape)
 
 
 def loss(
@@ -184,10 +166,10 @@ def loss(
     border have any influence, and a uniform weight w scales loss and gradient. Constants as usual for values in [0, 1]:
     C1 = .01^2, C2 = .03^2. Raises: ValueError: an array's type, shape or layout.
     """
-    _check(image, "image", (*image.shape[:2], _columns(image)))
-    _check(target, "target", image.shape)
+    interface.check(image, "image", (*image.shape[:2], interface.columns(image)))
+    interface.check(target, "target", image.shape)
     if weight is not None:
-        _check(weight, "weight", image.shape[:2])
+        interface.check(weight, "weight", image.shape[:2])
     gradient = np.empty(image.shape, np.float32)
     threads = 1 if image.size < TINY else threads or default_threads()
     return _core.loss(instruction_set(), image, target, weight, structure, gradient, threads), gradient
@@ -198,7 +180,7 @@ def adam(
     gradient: Float32[Array, "n ..."],
     first: Float32[Array, "n ..."],
     second: Float32[Array, "n ..."],
-    rate: float,
+    rate: float | Float32[Array, "columns"],
     step: int,
     betas: tuple[float, float] = (0.9, 0.999),
     epsilon: float = 1e-15,
@@ -208,60 +190,24 @@ def adam(
     """One step of Adam, in place: values, and the moments `first` and `second`, which start as zeros.
 
     values -= rate m / (sqrt(v) + epsilon) with m = first / (1 - beta1^step), v = second / (1 - beta2^step).
-    step: counts from 1. rows: only these move; the moments of the others stay.
-    Raises: ValueError: an array's type, shape or layout, or a step below 1.
+    rate: one for all, or one a column (values.size / n). step: counts from 1. rows: only these move; the moments of the
+    others stay. Raises: ValueError: an array's type, shape or layout, or a step below 1.
     """
     if step < 1:
         raise ValueError(f"step counts from 1, not {step}")
     for name, array in (("values", values), ("gradient", gradient), ("first", first), ("second", second)):
-        _check(array, name, values.shape)
+        interface.check(array, name, values.shape)
         if array is not gradient and not array.flags.writeable:
             raise ValueError(f"{name} is read-only, but is to be changed in place")
     if rows is not None:
-        _check(rows, "rows", values.shape[:1], np.bool_)
+        interface.check(rows, "rows", values.shape[:1], np.bool_)
+    rates, columns = np.asarray(rate, np.float32).reshape(-1), values.size // max(1, len(values))
+    if len(rates) not in (1, columns):
+        raise ValueError(f"rate must be one number or {columns}, one a column, not {len(rates)}")
     threads = 1 if values.size < TINY else threads or default_threads()
-    _core.adam(instruction_set(), values, gradient, first, second, rows, step, rate, *betas, epsilon, threads)
-
-
-def _check(array, name: str, shape: tuple[int, ...], dtype=np.float32) -> None:
-    if not isinstance(array, np.ndarray) or array.dtype != dtype:
-        kind = getattr(array, "dtype", type(array).__name__)
-        raise ValueError(f"{name} must be an array of {np.dtype(dtype).name}, not {kind}")
-    if array.shape != shape:
-        raise ValueError(f"{name} must have shape {shape}, not {array.shape}")
-    if not array.flags.c_contiguous:
-        raise ValueError(f"{name} must be C-contiguous: use numpy.ascontiguousarray")
-
-
-def _rows(means) -> int:
-    return len(means) if np.ndim(means) else 0
-
-
-def _columns(array) -> int:
-    """Values in the last axis, where there is one."""
-    return np.shape(array)[-1] if np.ndim(array) else 0
-
-
-def _size(camera: Camera) -> tuple[int, int]:
-    if not (0 < camera.width < 1 << 15 and 0 < camera.height < 1 << 15):
-        raise ValueError(f"a picture has 1 to 32767 pixels a side, not {camera.width} x {camera.height}")
-    return camera.height, camera.width
+    _core.adam(instruction_set(), values, gradient, first, second, rows, step, rates, *betas, epsilon, threads)
 
 
 def _numbers(camera: Camera, near: float, dilation: float) -> Float32[Array, "18"]:
     inner = [camera.fx, camera.fy, camera.cx, camera.cy, near, dilation]
-    values = np.concatenate([np.ravel(camera.rotation), np.ravel(camera.translation), inner]).astype(np.float32)
-    if values.shape != (18,) or not np.isfinite(values).all():
-        raise ValueError("a camera needs a 3 x 3 rotation and a translation of 3, all finite")
-    if not (camera.fx > 0 and camera.fy > 0):
-        raise ValueError(f"a camera's focal lengths must be positive, not {camera.fx} and {camera.fy}")
-    return values
-
-
-def _find_invalid(arrays: dict[str, Array]) -> None:
-    for name, array in arrays.items():
-        bad = np.flatnonzero(~np.isfinite(array.reshape(len(array), -1)).all(1))
-        if len(bad):
-            raise ValueError(f"{name} of Gaussian {bad[0]} is not finite ({len(bad)} such)")
-    zero = np.flatnonzero(np.abs(arrays["quats"]).max(1) < 1e-36)
-    raise ValueError(f"the quaternion of Gaussian {zero[0] if len(zero) else '?'} is zero")
+    return np.concatenate([np.ravel(camera.rotation), np.ravel(camera.translation), inner]).astype(np.float32)

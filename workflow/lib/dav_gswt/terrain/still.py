@@ -1,4 +1,4 @@
-"""Stills of the endless terrain, drawn by the same core that fitted it, over a sky and a far ground."""
+"""Stills of the endless terrain, drawn by the same rasterizer that fitted it, over a sky and a far ground."""
 
 from dataclasses import dataclass, replace
 

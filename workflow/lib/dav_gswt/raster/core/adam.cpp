@@ -4,33 +4,44 @@
 namespace raster {
 namespace ISA {
 
-static inline void step(const AdamTask& task, size_t first, size_t last) {
-  float* __restrict values = task.values;
-  float* __restrict m = task.first;
-  float* __restrict v = task.second;
-  const float* __restrict gradient = task.gradient;
-  const float beta1 = task.beta1, beta2 = task.beta2, rate = task.rate * task.correction1;
+// Elements first ... last - 1. With rates by column, `first` begins a row and they are at most a pattern's length.
+template <bool EACH> static inline void step(const AdamTask& task, size_t first, size_t last) {
+  float* __restrict values = task.values + first;
+  float* __restrict m = task.first + first;
+  float* __restrict v = task.second + first;
+  const float* __restrict gradient = task.gradient + first;
+  const float* __restrict rates = task.rates;
+  const float beta1 = task.beta1, beta2 = task.beta2, common = task.rate, correction1 = task.correction1;
   const float correction2 = task.correction2, epsilon = task.epsilon;
 #pragma omp simd
-  for (size_t i = first; i < last; i++) {
-    const float g = gradient[i];
+  for (size_t i = 0; i < last - first; i++) {
+    const float g = gradient[i], rate = (EACH ? rates[i] : common) * correction1;
     m[i] = beta1 * m[i] + (1 - beta1) * g;
     v[i] = beta2 * v[i] + (1 - beta2) * g * g;
     values[i] -= rate * m[i] / (__builtin_sqrtf(v[i] * correction2) + epsilon);
   }
 }
 
+static void step_rows(const AdamTask& task, size_t begin, size_t end) {
+  if (!task.rates) return step<false>(task, begin * task.columns, end * task.columns);
+  for (size_t row = begin; row < end; row += PATTERN)
+    step<true>(task, row * task.columns, (row + PATTERN < end ? row + PATTERN : end) * task.columns);
+}
+
 void adam(const AdamTask& task, int threads) {
-  const ptrdiff_t chunk = 4096, chunks = (task.rows + chunk - 1) / chunk;
+  const ptrdiff_t chunk = 1024, chunks = (task.rows + chunk - 1) / chunk;
 #pragma omp parallel for num_threads(threads) schedule(static)
   for (ptrdiff_t c = 0; c < chunks; c++) {
     const size_t begin = c * chunk, end = begin + chunk < task.rows ? begin + chunk : task.rows;
     if (!task.moved) {
-      step(task, begin * task.columns, end * task.columns);
+      step_rows(task, begin, end);
       continue;
     }
-    for (size_t row = begin; row < end; row++)
-      if (task.moved[row]) step(task, row * task.columns, (row + 1) * task.columns);
+    for (size_t row = begin; row < end; row++) {  // runs of rows that move
+      const size_t from = row;
+      while (row < end && task.moved[row]) row++;
+      if (row > from) step_rows(task, from, row);
+    }
   }
 }
 

@@ -59,7 +59,7 @@ void Binning::sort(const Splat* splats, size_t n, int width, int height, int thr
   distribute(splats, threads);
 }
 
-// Slots of every Gaussian, and a key for each that has any.
+// Slots of every splat, and a key for each that has any.
 void Binning::count(const Splat* splats, size_t n, int threads) {
   slots_.resize(n + 1);
   slots_[0] = 0;
@@ -83,7 +83,7 @@ void Binning::count(const Splat* splats, size_t n, int threads) {
   }
 }
 
-// Radix sort by depth, 11 bits at a time: stable, so Gaussians of equal depth keep their order.
+// Radix sort by depth, 11 bits at a time: stable, so splats of equal depth keep their order.
 void Binning::order_by_depth(int threads) {
   constexpr int BITS = 11, DIGITS = 1 << BITS;
   const size_t n = keys_.size();
@@ -116,12 +116,12 @@ void Binning::order_by_depth(int threads) {
   }
 }
 
-// Front to back, every Gaussian goes to the end of the lists of its tiles: a counting sort by tile, stable again.
+// Front to back, every splat goes to the end of the lists of its tiles: a counting sort by tile, stable again.
 void Binning::distribute(const Splat* splats, int threads) {
   const size_t n = slots_.size() - 1, visible = keys_.size(), tiles = size_t(columns_) * rows_;
   const size_t total = slots_[n];
   tile_of_slot_.resize(total);
-  gaussian_.resize(total);
+  splat_.resize(total);
   slot_.resize(total);
   first_.resize(tiles + 1);
 #pragma omp parallel for num_threads(threads) schedule(static)
@@ -159,7 +159,7 @@ void Binning::distribute(const Splat* splats, int threads) {
       const uint32_t g = uint32_t(keys_[i]);
       for (uint32_t slot = slots_[g]; slot < slots_[g + 1]; slot++) {
         const uint32_t place = next[tile_of_slot_[slot]]++;
-        gaussian_[place] = g;
+        splat_[place] = g;
         slot_[place] = slot;
       }
     }

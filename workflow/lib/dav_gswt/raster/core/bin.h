@@ -11,9 +11,9 @@ class Binning {
   // Lists the splats of every tile of a width x height picture. Throws std::length_error beyond 2^31 intersections.
   void sort(const Splat* splats, size_t n, int width, int height, int threads);
   Tiles tiles() const {
-    return {columns_, rows_, first_.data(), gaussian_.data(), slot_.data(), slots_.data()};
+    return {columns_, rows_, first_.data(), splat_.data(), slot_.data(), slots_.data()};
   }
-  size_t intersections() const { return gaussian_.size(); }
+  size_t intersections() const { return splat_.size(); }
 
  private:
   void count(const Splat* splats, size_t n, int threads);
@@ -21,9 +21,9 @@ class Binning {
   void distribute(const Splat* splats, int threads);
 
   int columns_ = 0, rows_ = 0;
-  std::vector<uint32_t> first_, gaussian_, slot_, slots_;
+  std::vector<uint32_t> first_, splat_, slot_, slots_;
   std::vector<uint32_t> tile_of_slot_;
-  std::vector<uint64_t> keys_, spare_keys_;  // depth above, Gaussian below
+  std::vector<uint64_t> keys_, spare_keys_;  // depth above, splat below
   std::vector<uint32_t> histogram_;
 };
 

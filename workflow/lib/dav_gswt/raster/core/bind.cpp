@@ -1,5 +1,7 @@
 // The Python module. Shapes and types are checked in cpu.py; here arrays become pointers, without copies.
 #include "context.h"
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <memory>
 #include <nanobind/nanobind.h>
@@ -15,61 +17,72 @@ using namespace raster;
 using In = nb::ndarray<const float, nb::c_contig, nb::device::cpu>;
 using Out = nb::ndarray<float, nb::c_contig, nb::device::cpu>;
 using Rows = nb::ndarray<const bool, nb::c_contig, nb::device::cpu>;
+using Flags = nb::ndarray<bool, nb::c_contig, nb::device::cpu>;
 using MaybeIn = std::optional<In>;
+using MaybeOut = std::optional<Out>;
 
 namespace {
 
 const float* pointer(const MaybeIn& a) { return a ? a->data() : nullptr; }
+float* pointer(const MaybeOut& a) { return a ? a->data() : nullptr; }
 
 // numbers: rotation (9), translation (3), fx, fy, cx, cy, near, dilation
-View view_of(const In& numbers, int width, int height, bool orthographic) {
+View view_of(const In& numbers, int width, int height, bool orthographic, bool antialiased) {
   View v;
   const float* from = numbers.data();
   std::copy(from, from + 9, v.rotation);
   std::copy(from + 9, from + 12, v.translation);
+  for (int k = 0; k < 3; k++) {
+    double centre = 0;
+    for (int r = 0; r < 3; r++) centre -= double(from[3 * r + k]) * from[9 + r];
+    v.centre[k] = float(centre);
+  }
   v.fx = from[12], v.fy = from[13], v.cx = from[14], v.cy = from[15], v.near = from[16], v.dilation = from[17];
-  v.width = width, v.height = height, v.orthographic = orthographic;
+  v.width = width, v.height = height, v.orthographic = orthographic, v.antialiased = antialiased;
   return v;
 }
 
-Scene scene_of(const In& means, const In& log_scales, const In& quats, const In& logits, const In& colours) {
+Scene scene_of(const In& means, const In& log_scales, const In& quats, const In& logits, const In& colours,
+               const MaybeIn& features) {
+  const bool harmonics = colours.ndim() == 3;
   return {means.shape(0), means.data(), log_scales.data(), quats.data(), logits.data(), colours.data(),
-          int(colours.shape(1))};
+          harmonics ? 3 : int(colours.shape(1)), harmonics ? int(colours.shape(1)) : 0, pointer(features),
+          features ? int(features->shape(1)) : 0};
 }
 
 // The kernels only read what they are not asked to write.
-Images images_of(const In& colour, const In& alpha, const In& depth) {
-  return {int(colour.shape(1)), int(colour.shape(0)), int(colour.shape(2)), 0, 0, const_cast<float*>(colour.data()),
-          const_cast<float*>(alpha.data()), const_cast<float*>(depth.data())};
-}
+float* unread(const In& a) { return const_cast<float*>(a.data()); }
 
-bool forward(Context& context, In means, In log_scales, In quats, In logits, In colours, In camera, int width,
-             int height, bool orthographic, Out colour, Out alpha, Out depth, int threads) {
-  const Images images{width, height, int(colour.shape(2)), 0, 0, colour.data(), alpha.data(), depth.data()};
-  const Scene scene = scene_of(means, log_scales, quats, logits, colours);
-  const View view = view_of(camera, width, height, orthographic);
+bool forward(Context& context, In means, In log_scales, In quats, In logits, In colours, MaybeIn features, In camera,
+             int width, int height, bool orthographic, bool antialiased, Out colour, Out alpha, Out depth,
+             MaybeOut features_seen, int threads) {
+  const Pictures pictures{width, height, colour.data(), alpha.data(), depth.data(), pointer(features_seen)};
+  const Scene scene = scene_of(means, log_scales, quats, logits, colours, features);
+  const View view = view_of(camera, width, height, orthographic, antialiased);
   nb::gil_scoped_release release;
-  return context.forward(scene, view, images, threads);
+  return context.forward(scene, view, pictures, threads);
 }
 
-void backward(Context& context, In means, In log_scales, In quats, In logits, In colours, In colour, In alpha,
-              In depth, In grad_colour, MaybeIn grad_alpha, MaybeIn grad_depth, Out d_means, Out d_log_scales,
-              Out d_quats, Out d_logits, Out d_colours, int threads) {
-  const Scene scene = scene_of(means, log_scales, quats, logits, colours);
-  const Images images = images_of(colour, alpha, depth);
-  const ImageGradients gradients{grad_colour.data(), pointer(grad_alpha), pointer(grad_depth)};
-  const SceneGradients out{d_means.data(), d_log_scales.data(), d_quats.data(), d_logits.data(), d_colours.data()};
+void backward(Context& context, In means, In log_scales, In quats, In logits, In colours, MaybeIn features, In colour,
+              In alpha, In depth, MaybeIn features_seen, In grad_colour, MaybeIn grad_alpha, MaybeIn grad_depth,
+              MaybeIn grad_features, Out d_means, Out d_log_scales, Out d_quats, Out d_logits, Out d_colours,
+              MaybeOut d_features, Out d_camera, int threads) {
+  const Scene scene = scene_of(means, log_scales, quats, logits, colours, features);
+  const Pictures pictures{int(colour.shape(1)), int(colour.shape(0)), unread(colour), unread(alpha), unread(depth),
+                          features_seen ? unread(*features_seen) : nullptr};
+  const PictureGradients given{grad_colour.data(), pointer(grad_alpha), pointer(grad_depth), pointer(grad_features)};
+  const SceneGradients out{d_means.data(), d_log_scales.data(), d_quats.data(), d_logits.data(), d_colours.data(),
+                           pointer(d_features), d_camera.data()};
   nb::gil_scoped_release release;
-  context.backward(scene, images, gradients, out, threads);
+  context.backward(scene, pictures, given, out, threads);
 }
 
-void contributions(Context& context, In map, Out total, Out maximum, Out mapped, int threads) {
+void contributions(Context& context, In map, Out total, Out squared, Out maximum, Out mapped, int threads) {
   Scene scene{};
   scene.n = total.shape(0);
-  const Images images{int(map.shape(1)), int(map.shape(0)), int(map.shape(2)), 0, 0,
-                      const_cast<float*>(map.data()), nullptr, nullptr};
+  const Images images{int(map.shape(1)), int(map.shape(0)), int(map.shape(2)), 0, 0, unread(map), nullptr, nullptr};
   nb::gil_scoped_release release;
-  context.contributions(scene, images, total.data(), maximum.data(), mapped.data(), threads);
+  context.contributions(scene, images, {total.data(), squared.data(), maximum.data(), mapped.data()}, threads);
 }
 
 double loss(const std::string& isa, In image, In target, MaybeIn weight, float structure, Out gradient, int threads) {
@@ -88,16 +101,39 @@ double loss(const std::string& isa, In image, In target, MaybeIn weight, float s
   return total / double(image.size());
 }
 
+// rates: one for all, or one a column
 void adam(const std::string& isa, Out values, In gradient, Out first, Out second, std::optional<Rows> moved, int step,
-          float rate, double beta1, double beta2, float epsilon, int threads) {
+          In rates, double beta1, double beta2, float epsilon, int threads) {
   const Kernels& kernels = kernels_of(isa);
   const size_t rows = values.ndim() ? values.shape(0) : 1;
   const int columns = rows ? int(values.size() / rows) : 0;
+  const bool each = rates.size() > 1;
   nb::gil_scoped_release release;
+  std::vector<float> pattern(each ? PATTERN * columns : 0);
+  for (size_t i = 0; i < pattern.size(); i++) pattern[i] = rates.data()[i % columns];
   kernels.adam({rows, columns, values.data(), gradient.data(), first.data(), second.data(),
-                moved ? moved->data() : nullptr, rate, float(beta1), float(beta2), epsilon,
-                float(1 / (1 - std::pow(beta1, step))), float(1 / (1 - std::pow(beta2, step)))},
+                moved ? moved->data() : nullptr, each ? 0 : rates.data()[0], each ? pattern.data() : nullptr,
+                float(beta1), float(beta2), epsilon, float(1 / (1 - std::pow(beta1, step))),
+                float(1 / (1 - std::pow(beta2, step)))},
                threads);
+}
+
+// Fused multiply-adds a second that threads do together, for about `seconds`; the best of some tries.
+double peak(const std::string& isa, double seconds, int threads) {
+  const Kernels& kernels = kernels_of(isa);
+  nb::gil_scoped_release release;
+  using Clock = std::chrono::steady_clock;
+  long rounds = 1 << 14;
+  double best = 0, spent = 0;
+  while (spent < seconds) {
+    const auto start = Clock::now();
+    const double done = kernels.peak(rounds, threads);
+    const double took = std::chrono::duration<double>(Clock::now() - start).count();
+    best = std::max(best, done / took);
+    spent += took;
+    if (took < seconds / 20) rounds *= 2;
+  }
+  return best;
 }
 
 }  // namespace
@@ -113,7 +149,10 @@ NB_MODULE(_core, m) {
       .def_prop_ro("intersections", &Context::intersections)
       .def("forward", &forward)
       .def("backward", &backward)
-      .def("contributions", &contributions);
+      .def("contributions", &contributions)
+      .def("drawn", [](const Context& context, Flags out) { context.drawn(out.size(), out.data()); })
+      .def("pairs", &Context::pairs);
   m.def("loss", &loss);
   m.def("adam", &adam);
+  m.def("peak", &peak);
 }

@@ -15,7 +15,7 @@ template <int C, bool DEPTH> static void unblend_tile(const Splat* splats, const
                                                       const ImageGradients& gradients, float* records, int tile) {
   constexpr int SIZE = MOMENTS + C + DEPTH;
   const TileFrame frame(tile, tiles, images);
-  Lanes transmittance[BLOCKS], behind[BLOCKS], colour[C][BLOCKS], depth[DEPTH ? BLOCKS : 1];
+  Lanes transmittance[BLOCKS], behind[BLOCKS], colour[C ? C : 1][BLOCKS], depth[DEPTH ? BLOCKS : 1];
   for (int b = 0; b < BLOCKS; b++) {
     behind[b] = all(0);
     for (int c = 0; c < C; c++) colour[c][b] = all(0);
@@ -46,7 +46,7 @@ template <int C, bool DEPTH> static void unblend_tile(const Splat* splats, const
       const Lanes clear = transmittance[b];
       Touch touch;
       lay(frame, brush, b, transmittance[b], touch);
-      Lanes share = colour[0][b] * s.colour[0];
+      Lanes share = C ? colour[0][b] * s.colour[0] : all(0);
       for (int c = 1; c < C; c++) share += colour[c][b] * s.colour[c];
       if (DEPTH) share += depth[b] * s.depth;
       const Lanes rest = behind[b] - touch.weight * share;
@@ -81,6 +81,7 @@ template <int C> static void unblend(const Splat* splats, const Tiles& tiles, co
 void blend_backward(const Splat* splats, const Tiles& tiles, const Images& images, const ImageGradients& gradients,
                     float* records, int threads) {
   switch (images.group) {
+    case 0: return unblend<0>(splats, tiles, images, gradients, records, threads);
     case 1: return unblend<1>(splats, tiles, images, gradients, records, threads);
     case 2: return unblend<2>(splats, tiles, images, gradients, records, threads);
     case 3: return unblend<3>(splats, tiles, images, gradients, records, threads);
@@ -88,18 +89,18 @@ void blend_backward(const Splat* splats, const Tiles& tiles, const Images& image
   }
 }
 
-void collect(const Tiles& tiles, size_t n, int channels, int channel, int group, bool depth, bool add,
-             const float* records, float* sums, float* colours, int threads) {
+void collect(const Tiles& tiles, size_t splats, const Values& values, int channel, int group, bool depth, bool add,
+             const float* records, float* sums, float* gradients, int threads) {
   const int size = MOMENTS + group + depth;
 #pragma omp parallel for num_threads(threads) schedule(static)
-  for (ptrdiff_t i = 0; i < (ptrdiff_t)n; i++) {
+  for (ptrdiff_t i = 0; i < (ptrdiff_t)splats; i++) {
     float total[MOMENTS + GROUP + 1] = {};
     for (size_t slot = tiles.slots[i]; slot < tiles.slots[i + 1]; slot++)
       for (int k = 0; k < size; k++) total[k] += records[slot * size + k];
     float* to = sums + i * (MOMENTS + 1);
     for (int k = 0; k < MOMENTS; k++) to[k] = (add ? to[k] : 0) + total[k];
     to[MOMENTS] = (add ? to[MOMENTS] : 0) + (depth ? total[MOMENTS + group] : 0);
-    for (int c = 0; c < group; c++) colours[i * channels + channel + c] = total[MOMENTS + c];
+    for (int c = 0; c < group; c++) gradients[values.row(i) * values.channels + channel + c] = total[MOMENTS + c];
   }
 }
 

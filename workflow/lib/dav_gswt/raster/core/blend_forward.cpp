@@ -8,7 +8,7 @@ namespace ISA {
 template <int C> static void blend_tile(const Splat* splats, const Tiles& tiles, const Images& images,
                                         bool only_colour, int tile) {
   const TileFrame frame(tile, tiles, images);
-  Lanes transmittance[BLOCKS], colour[C][BLOCKS], depth[BLOCKS];
+  Lanes transmittance[BLOCKS], colour[C ? C : 1][BLOCKS], depth[BLOCKS];
   for (int b = 0; b < BLOCKS; b++) {
     for (int c = 0; c < C; c++) colour[c][b] = all(0);
     depth[b] = all(0);
@@ -45,6 +45,7 @@ template <int C> static void blend(const Splat* splats, const Tiles& tiles, cons
 
 void blend_forward(const Splat* splats, const Tiles& tiles, const Images& images, bool only_colour, int threads) {
   switch (images.group) {
+    case 0: return blend<0>(splats, tiles, images, only_colour, threads);
     case 1: return blend<1>(splats, tiles, images, only_colour, threads);
     case 2: return blend<2>(splats, tiles, images, only_colour, threads);
     case 3: return blend<3>(splats, tiles, images, only_colour, threads);

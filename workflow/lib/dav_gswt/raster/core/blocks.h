@@ -115,8 +115,8 @@ static inline void walk(const TileFrame& frame, const Splat* splats, const Tiles
   Blocks alive = living(transmittance, lowest(BLOCKS));
   for (int count = 1; place < end && alive; place++, count++) {
     const uint32_t ahead = place + LOOK_AHEAD < end ? place + LOOK_AHEAD : end - 1;
-    __builtin_prefetch(&splats[tiles.gaussian[ahead]]);
-    const Splat& s = splats[tiles.gaussian[place]];
+    __builtin_prefetch(&splats[tiles.splat[ahead]]);
+    const Splat& s = splats[tiles.splat[place]];
     at(place, s, touched(frame, s) & alive);
     if (count % ROLL_CALL == 0) alive = living(transmittance, alive);
   }

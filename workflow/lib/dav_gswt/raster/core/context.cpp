@@ -1,6 +1,7 @@
 #include "context.h"
 #include "keep_apart.h"
 #include <algorithm>
+#include <cstring>
 #include <new>
 #include <stdexcept>
 
@@ -51,9 +52,11 @@ void SplatStore::resize(size_t n) {
 
 namespace {
 
-// Calls f(channel, group) for each pass over the channels.
+// Calls f(channel, group) for each pass over the channels: once even if there are none.
 template <class F> void each_pass(int channels, F f) {
-  for (int channel = 0; channel < channels; channel += GROUP) f(channel, std::min(GROUP, channels - channel));
+  int channel = 0;
+  do f(channel, std::min(GROUP, channels - channel));
+  while ((channel += GROUP) < channels);
 }
 
 Images pass_of(const Images& images, int channel, int group) {
@@ -63,51 +66,141 @@ Images pass_of(const Images& images, int channel, int group) {
   return pass;
 }
 
+// Zeroes the rows of those chunks that hold others than candidates; candidates' own rows are written later.
+void clear(float* array, size_t columns, size_t n, const std::vector<uint32_t>& counts, int threads) {
+#pragma omp parallel for num_threads(threads) schedule(static)
+  for (ptrdiff_t chunk = 0; chunk < ptrdiff_t(counts.size()); chunk++) {
+    const size_t begin = size_t(chunk) * CHUNK, rows = std::min<size_t>(CHUNK, n - begin);
+    if (counts[chunk] < rows) std::memset(array + begin * columns, 0, rows * columns * sizeof(float));
+  }
+}
+
+bool features_seen(const Scene& scene) { return scene.features && scene.feature_channels > 0; }
+
 }  // namespace
 
-bool Context::forward(const Scene& scene, const View& view, const Images& images, int threads) {
-  processor_ = keep_apart(threads, processor_);
-  view_ = view;
-  splats_.resize(scene.n);
-  if (!kernels_.project(scene, view, splats_.data(), threads)) return false;
-  binning_.sort(splats_.data(), scene.n, view.width, view.height, threads);
+Values Context::colours(const Scene& scene) const {
+  if (scene.coefficients) return {shown_.data(), nullptr, 3};
+  return {scene.colours, rows_.data(), scene.channels};
+}
+
+Values Context::features(const Scene& scene) const {
+  return {scene.features, rows_.data(), scene.feature_channels};
+}
+
+// The candidates of all chunks, behind each other.
+void Context::cull(const Scene& scene, int threads) {
+  const size_t chunks = (scene.n + CHUNK - 1) / CHUNK;
+  found_.resize(scene.n);
+  counts_.resize(chunks);
+  kernels_.cull(scene, view_, found_.data(), counts_.data(), threads);
+  size_t total = 0;
+  for (uint32_t count : counts_) total += count;
+  rows_.resize(total);
+  uint32_t* to = rows_.data();
+  for (size_t chunk = 0; chunk < chunks; chunk++) {
+    std::copy_n(&found_[chunk * CHUNK], counts_[chunk], to);
+    to += counts_[chunk];
+  }
+}
+
+bool Context::draw(const Values& values, Images images, bool only_colour, int threads) {
   bool valid = true;
-  each_pass(scene.channels, [&](int channel, int group) {
-    valid = valid && kernels_.load_colours(scene, channel, group, splats_.data(), threads);
+  images.channels = values.channels;
+  each_pass(values.channels, [&](int channel, int group) {
+    valid = valid && kernels_.load_values(values, rows_.size(), channel, group, splats_.data(), threads);
     if (!valid) return;
-    kernels_.blend_forward(splats_.data(), binning_.tiles(), pass_of(images, channel, group), channel > 0, threads);
+    kernels_.blend_forward(splats_.data(), binning_.tiles(), pass_of(images, channel, group),
+                           only_colour || channel > 0, threads);
   });
   return valid;
 }
 
-void Context::backward(const Scene& scene, const Images& images, const ImageGradients& gradients,
-                       const SceneGradients& out, int threads) {
+bool Context::forward(const Scene& scene, const View& view, const Pictures& pictures, int threads) {
   processor_ = keep_apart(threads, processor_);
-  sums_.resize(scene.n * (MOMENTS + 1));
-  each_pass(scene.channels, [&](int channel, int group) {
-    const bool first = channel == 0, depth = first && gradients.depth;
-    ImageGradients pass = gradients;
-    if (!first) pass.alpha = pass.depth = nullptr;  // they count once
-    records_.resize(binning_.intersections() * (MOMENTS + group + depth));
-    if (scene.channels > GROUP) kernels_.load_colours(scene, channel, group, splats_.data(), threads);
-    kernels_.blend_backward(splats_.data(), binning_.tiles(), pass_of(images, channel, group), pass, records_.data(),
-                            threads);
-    kernels_.collect(binning_.tiles(), scene.n, scene.channels, channel, group, depth, !first, records_.data(),
-                     sums_.data(), out.colours, threads);
-  });
-  kernels_.project_backward(scene, view_, splats_.data(), sums_.data(), out, threads);
+  view_ = view;
+  cull(scene, threads);
+  splats_.resize(rows_.size());
+  if (scene.coefficients) shown_.resize(3 * rows_.size());
+  if (!kernels_.project(scene, view, candidates(), splats_.data(), shown_.data(), threads)) return false;
+  binning_.sort(splats_.data(), rows_.size(), view.width, view.height, threads);
+  const Images images{view.width, view.height, 0, 0, 0, pictures.colour, pictures.alpha, pictures.depth};
+  if (!draw(colours(scene), images, false, threads)) return false;
+  if (!features_seen(scene)) return true;
+  Images second = images;
+  second.colour = pictures.features;
+  return draw(features(scene), second, true, threads);
 }
 
-void Context::contributions(const Scene& scene, const Images& map, float* total, float* maximum, float* mapped,
-                            int threads) {
-  auto pass = [&](int channel, int group) {
-    records_.resize(binning_.intersections() * (2 + group));
+void Context::take_back(const Values& values, Images images, ImageGradients given, bool first, bool reload,
+                        float* gradients, int threads) {
+  images.channels = values.channels;
+  each_pass(values.channels, [&](int channel, int group) {
+    if (!first || channel > 0) given.alpha = given.depth = nullptr;  // they count once
+    const bool depth = given.depth != nullptr;
+    records_.resize(binning_.intersections() * (MOMENTS + group + depth));
+    if (reload) kernels_.load_values(values, rows_.size(), channel, group, splats_.data(), threads);
+    kernels_.blend_backward(splats_.data(), binning_.tiles(), pass_of(images, channel, group), given,
+                            records_.data(), threads);
+    kernels_.collect(binning_.tiles(), rows_.size(), values, channel, group, depth, !first || channel > 0,
+                     records_.data(), sums_.data(), gradients, threads);
+  });
+}
+
+void Context::backward(const Scene& scene, const Pictures& pictures, const PictureGradients& given,
+                       const SceneGradients& out, int threads) {
+  processor_ = keep_apart(threads, processor_);
+  const size_t width = scene.coefficients ? 3 * scene.coefficients : scene.channels;
+  clear(out.means, 3, scene.n, counts_, threads);
+  clear(out.log_scales, 3, scene.n, counts_, threads);
+  clear(out.quats, 4, scene.n, counts_, threads);
+  clear(out.opacity_logits, 1, scene.n, counts_, threads);
+  clear(out.colours, width, scene.n, counts_, threads);
+  sums_.resize(rows_.size() * (MOMENTS + 1));
+  motions_.resize((rows_.size() + 3) / 4 * 6);
+  if (scene.coefficients) by_shown_.resize(3 * rows_.size());
+
+  const bool reload = scene.channels > GROUP || features_seen(scene);  // the splats hold what was drawn last
+  const Images images{view_.width, view_.height, 0, 0, 0, pictures.colour, pictures.alpha, pictures.depth};
+  take_back(colours(scene), images, {given.colour, given.alpha, given.depth}, true, reload,
+            scene.coefficients ? by_shown_.data() : out.colours, threads);
+  if (features_seen(scene) && given.features) {
+    clear(out.features, scene.feature_channels, scene.n, counts_, threads);
+    Images second = images;
+    second.colour = pictures.features;
+    take_back(features(scene), second, {given.features, nullptr, nullptr}, false, true, out.features, threads);
+  } else if (features_seen(scene)) {
+    std::memset(out.features, 0, scene.n * scene.feature_channels * sizeof(float));
+  }
+  kernels_.project_backward(scene, view_, candidates(), splats_.data(), sums_.data(), shown_.data(), by_shown_.data(),
+                            motions_.data(), out, threads);
+}
+
+void Context::contributions(const Scene& scene, const Images& map, const Shares& out, int threads) {
+  for (float* each : {out.total, out.squared, out.maximum}) clear(each, 1, scene.n, counts_, threads);
+  clear(out.mapped, map.channels, scene.n, counts_, threads);
+  each_pass(map.channels, [&](int channel, int group) {
+    records_.resize(binning_.intersections() * (3 + group));
     kernels_.contribute(splats_.data(), binning_.tiles(), pass_of(map, channel, group), records_.data(), threads);
-    kernels_.collect_contributions(binning_.tiles(), scene.n, map.channels, channel, group, records_.data(), total,
-                                   maximum, mapped, threads);
-  };
-  if (map.channels == 0) pass(0, 0);
-  each_pass(map.channels, pass);
+    kernels_.collect_contributions(binning_.tiles(), candidates(), map.channels, channel, group, records_.data(), out,
+                                   threads);
+  });
+}
+
+void Context::drawn(size_t n, bool* out) const {
+  std::memset(out, 0, n);
+  const uint32_t* slots = binning_.tiles().slots;
+  for (size_t i = 0; i < rows_.size(); i++) out[rows_[i]] = slots[i + 1] > slots[i];
+}
+
+double Context::pairs(int threads) {
+  const Tiles tiles = binning_.tiles();
+  by_tile_.resize(size_t(tiles.columns) * tiles.rows);
+  const Images images{view_.width, view_.height, 0, 0, 0, nullptr, nullptr, nullptr};
+  kernels_.count_pairs(splats_.data(), tiles, images, by_tile_.data(), threads);
+  double total = 0;
+  for (double each : by_tile_) total += each;
+  return total;
 }
 
 }  // namespace raster

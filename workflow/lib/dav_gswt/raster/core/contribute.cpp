@@ -1,4 +1,5 @@
-// What each Gaussian gives to the picture: its blend weights' sum and maximum, and a map carried back by them.
+// What each Gaussian gives to the picture: its blend weights' sum, sum of squares and maximum, and a map carried back by
+// them.
 #include "blocks.h"
 #include "kernels.h"
 
@@ -13,7 +14,7 @@ static inline float largest(Lanes v) {
 
 template <int C> static void weigh_tile(const Splat* splats, const Tiles& tiles, const Images& map, float* records,
                                         int tile) {
-  constexpr int SIZE = 2 + C;
+  constexpr int SIZE = 3 + C;
   const TileFrame frame(tile, tiles, map);
   Lanes transmittance[BLOCKS], values[C ? C : 1][BLOCKS] = {};
   frame.clear(transmittance);
@@ -23,18 +24,19 @@ template <int C> static void weigh_tile(const Splat* splats, const Tiles& tiles,
 
   auto weigh = [&](uint32_t place, const Splat& s, Blocks blocks) {
     const Brush brush(frame, s);
-    Lanes sums[1 + C] = {}, maximum = {};
+    Lanes sums[2 + C] = {}, maximum = {};
     Touch touch;
     for (; blocks; blocks &= blocks - 1) {
       const int b = __builtin_ctzll(blocks);
       lay(frame, brush, b, transmittance[b], touch);
       sums[0] += touch.weight;
+      sums[1] += touch.weight * touch.weight;
       maximum = max(maximum, touch.weight);
-      for (int c = 0; c < C; c++) sums[1 + c] += touch.weight * values[c][b];
+      for (int c = 0; c < C; c++) sums[2 + c] += touch.weight * values[c][b];
     }
     float* record = records + (size_t)tiles.slot[place] * SIZE;
     record[0] = largest(maximum);
-    store_sums<1 + C>(record + 1, sums);
+    store_sums<2 + C>(record + 1, sums);
   };
   auto skip = [&](uint32_t place) { memset(records + (size_t)tiles.slot[place] * SIZE, 0, 4 * SIZE); };
   walk(frame, splats, tiles, tile, transmittance, weigh, skip);
@@ -56,20 +58,45 @@ void contribute(const Splat* splats, const Tiles& tiles, const Images& map, floa
   }
 }
 
-void collect_contributions(const Tiles& tiles, size_t n, int channels, int channel, int group, const float* records,
-                           float* total, float* maximum, float* mapped, int threads) {
-  const int size = 2 + group;
+void collect_contributions(const Tiles& tiles, const Candidates& candidates, int channels, int channel, int group,
+                           const float* records, const Shares& out, int threads) {
+  const int size = 3 + group;
 #pragma omp parallel for num_threads(threads) schedule(static)
-  for (ptrdiff_t i = 0; i < (ptrdiff_t)n; i++) {
-    float most = 0, sums[1 + GROUP] = {};
+  for (ptrdiff_t i = 0; i < (ptrdiff_t)candidates.count; i++) {
+    float most = 0, sums[2 + GROUP] = {};
     for (size_t slot = tiles.slots[i]; slot < tiles.slots[i + 1]; slot++) {
       const float* record = records + slot * size;
       most = record[0] > most ? record[0] : most;
-      for (int k = 0; k <= group; k++) sums[k] += record[1 + k];
+      for (int k = 0; k < 2 + group; k++) sums[k] += record[1 + k];
     }
-    maximum[i] = most;
-    total[i] = sums[0];
-    for (int c = 0; c < group; c++) mapped[i * channels + channel + c] = sums[1 + c];
+    const size_t row = candidates.row[i];
+    out.maximum[row] = most;
+    out.total[row] = sums[0];
+    out.squared[row] = sums[1];
+    for (int c = 0; c < group; c++) out.mapped[row * channels + channel + c] = sums[2 + c];
+  }
+}
+
+void count_pairs(const Splat* splats, const Tiles& tiles, const Images& images, double* by_tile, int threads) {
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 2)
+  for (int tile = 0; tile < tiles.columns * tiles.rows; tile++) {
+    const TileFrame frame(tile, tiles, images);
+    Lanes transmittance[BLOCKS];
+    frame.clear(transmittance);
+    double pairs = 0;
+    auto count = [&](uint32_t, const Splat& s, Blocks blocks) {
+      const Brush brush(frame, s);
+      Lanes taken = all(0);
+      Touch touch;
+      for (; blocks; blocks &= blocks - 1) {
+        const int b = __builtin_ctzll(blocks);
+        lay(frame, brush, b, transmittance[b], touch);
+        taken += where(touch.on, all(1));
+      }
+      for (int l = 0; l < LANES; l++) pairs += taken[l];
+    };
+    walk(frame, splats, tiles, tile, transmittance, count, [](uint32_t) {});
+    by_tile[tile] = pairs;
   }
 }
 

@@ -4,9 +4,10 @@
 namespace raster {
 namespace ISA {
 
-extern const Kernels table;
-const Kernels table = {ISA_NAME,         project,    load_colours,          blend_forward, blend_backward, collect,
-                       project_backward, contribute, collect_contributions, loss,          adam};
+extern const Kernels table = {ISA_NAME,         cull,       project,
+                       load_values,      blend_forward, blend_backward, collect,
+                       project_backward, contribute,    collect_contributions,
+                       count_pairs,      loss,          adam,           peak};
 
 }  // namespace ISA
 }  // namespace raster

@@ -176,6 +176,20 @@ static inline Lanes load_column(const float* column, int stride, size_t row, int
   return load(buffer);
 }
 
+// The three columns of LANES rows of 3 floats that follow each other.
+static inline void load_triples(const float* rows, Lanes out[3]) {
+  const Lanes u = load(rows), v = load(rows + LANES), w = load(rows + 2 * LANES);
+  for (int k = 0; k < 3; k++) {
+    Whole early, late;  // from u and v; then what lies in w
+    for (int l = 0; l < LANES; l++) {
+      const int at = 3 * l + k;
+      early[l] = at < 2 * LANES ? at : 0;
+      late[l] = at < 2 * LANES ? l : at - LANES;
+    }
+    out[k] = shuffled(shuffled(u, v, early), w, late);
+  }
+}
+
 static inline void store_column(float* column, int stride, size_t row, int rows, Lanes v) {
   float buffer[LANES];
   store(buffer, v);

@@ -1,4 +1,8 @@
-"""Exposure of photos: gain and offset per photo and channel, anchored so that the set as a whole does not drift."""
+"""Exposure of photos: gain and offset per photo and channel, anchored so that the set as a whole does not drift.
+
+Twice: once before the fit, from what the photos say of the same points, and then at every step, from the picture that
+the field gives now. A test photo gets none.
+"""
 
 from dataclasses import replace
 
@@ -6,11 +10,15 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.coarse.discs import median_colours, sampled
+from dav_gswt.fitting.sampling import median_colours, sampled
 from dav_gswt.views import View
 
 GAIN = 1.6  # a photo brighter or darker than the set by more than this is left at the bound
+STEP_GAIN = 1.25  # the same for what is left to correct during the fit
+PRIOR = 1e-3  # variance of made-up pixels with gain 1: a picture without contrast says nothing of its gain
+TRIM = 3.0  # pixels further off than this many medians of the difference say nothing of the exposure
 ROUNDS = 3
+ENOUGH = 8000  # pixels, evenly over the picture, to know its exposure by
 
 
 def gain_offset(x: Float[Array, "n 3"], y: Float[Array, "n 3"]) -> tuple[Float32[Array, "3"], Float32[Array, "3"]]:
@@ -30,7 +38,7 @@ def gain_offset(x: Float[Array, "n 3"], y: Float[Array, "n 3"]) -> tuple[Float32
             b[c] = v.mean() - a[c] * u.mean()
             residual = np.abs(a[c] * x[:, c] + b[c] - y[:, c])
             with np.errstate(invalid="ignore"):
-                keep = residual < 3 * 1.4826 * np.nanmedian(residual) + 1e-3
+                keep = residual < TRIM * 1.4826 * np.nanmedian(residual) + 1e-3
     return a, b
 
 
@@ -56,3 +64,28 @@ def matched(view: View, points: Float[Array, "n 3"], colours: Float[Array, "n 3"
     seen, _ = sampled(points, view)
     a, b = gain_offset(seen, colours)
     return replace(view, image=(view.image * a + b).astype(np.float32))
+
+
+def towards(
+    picture: Float32[Array, "h w 3"], view: View, before: tuple[Float32[Array, "3"], Float32[Array, "3"]]
+) -> tuple[Float32[Array, "3"], Float32[Array, "3"]]:
+    """Gain a and offset b that bring a picture to its photo, least squares over the pixels that count and agree.
+
+    before: this photo's a and b of its last turn; pixels that differ by more than TRIM medians under them (things that
+    move, things that the field does not know yet) have no vote. a is held within 1 / STEP_GAIN .. STEP_GAIN by a prior
+    and a bound; no pixel that counts: unchanged.
+    """
+    stride = max(1, int(np.sqrt(view.weight.size / ENOUGH)))
+    some = np.s_[::stride, ::stride]
+    picture, image, weight = picture[some], view.image[some], view.weight[some]
+    counts = weight > 0
+    if not counts.any():
+        return before
+    apart = np.abs(picture * before[0] + before[1] - image).max(-1)
+    agrees = counts & (apart <= TRIM * np.median(apart[counts]))
+    w = weight[agrees][:, None].astype(float)
+    u, v, total = picture[agrees].astype(float), image[agrees].astype(float), float(w.sum()) + 1e-9
+    x, y = (w * u).sum(0) / total, (w * v).sum(0) / total
+    xx, xy = (w * u * u).sum(0) / total - x * x, (w * u * v).sum(0) / total - x * y
+    a = np.clip((xy + PRIOR) / (np.maximum(xx, 0) + PRIOR), 1 / STEP_GAIN, STEP_GAIN)
+    return a.astype(np.float32), (y - a * x).astype(np.float32)

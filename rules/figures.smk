@@ -1,0 +1,49 @@
+"""Figures of docs/: how soon a fit shows photos it has not seen, and what its field looks like from elsewhere.
+
+In: the photos of a scene. Out: docs/data/fit_{scene}.csv with the provenance beside it, stills, and the curves' plot.
+Not part of `all`: `snakemake docs/figures/fit_time.png` makes them. Seconds differ from machine to machine.
+"""
+
+CURVES = ["copr_dunes", "desert_high"]  # one real set, one synthetic
+
+
+rule watch_fit:
+    """Fit a scene while looking at its test photos."""
+    input:
+        frame="<results>/<photos>/ground.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+    output:
+        curve="docs/data/fit_{scene}.csv",
+        facts="docs/data/fit_{scene}.json",
+        oblique="docs/figures/{scene}_oblique.png",
+        low="docs/figures/{scene}_low.png",
+    log:
+        "<logs>/figures/watch_fit_{scene}.log",
+    benchmark:
+        "<benchmarks>/figures/watch_fit_{scene}.tsv"
+    threads: 2
+    resources:
+        mem_mb=3000,
+        runtime="30m",
+    params:
+        trial=lambda wildcards: lookup(dpath=f"trials/{wildcards.scene}", within=config),
+        source=source_of("coarse", "fitting", "raster"),
+    script:
+        "../scripts/watch_fit.py"
+
+
+rule plot_fits:
+    """PSNR of test photos against seconds."""
+    input:
+        curves=expand("docs/data/fit_{scene}.csv", scene=CURVES),
+    output:
+        plot="docs/figures/fit_time.png",
+    log:
+        "<logs>/figures/plot_fits.log",
+    benchmark:
+        "<benchmarks>/figures/plot_fits.tsv"
+    params:
+        source=source_of("figures"),
+    script:
+        "../scripts/plot_fits.py"

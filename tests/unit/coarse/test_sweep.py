@@ -1,0 +1,110 @@
+from dataclasses import replace
+
+import made_up_ground as made
+import numpy as np
+import pytest
+
+from dav_gswt import cameras, views
+from dav_gswt.coarse import sweep, things
+from dav_gswt.coarse.ground import Ground
+
+SIDE, TALL = 3.2, 0.5
+BOX = (1.2, 2.0)  # from, to, in x and y
+
+
+def texture(x, y, seed):
+    """A smooth random look of a plane."""
+    rng = np.random.default_rng(seed)
+    out = np.zeros((*np.shape(x), 3))
+    for _ in range(24):
+        k, phase, colour = rng.uniform(-14, 14, 2), rng.uniform(0, 7), rng.uniform(-0.12, 0.12, 3)
+        out += np.sin(k[0] * x + k[1] * y + phase)[..., None] * colour
+    return np.clip(0.5 + out, 0, 1)
+
+
+def photo(eye, size=96):
+    """A table of height TALL over textured ground, as rays see it from above."""
+    camera = cameras.pinhole(eye, [1.6, 1.6, 0.0], size, size, 50.0)
+    origin, step = camera.rays()
+
+    def at(z):
+        t = (z - origin[..., 2]) / step[..., 2]
+        return origin[..., 0] + t * step[..., 0], origin[..., 1] + t * step[..., 1]
+
+    x, y = at(TALL)
+    top = (x > BOX[0]) & (x < BOX[1]) & (y > BOX[0]) & (y < BOX[1])
+    image = np.where(top[..., None], texture(x, y, 1), texture(*at(0.0), 2)).astype(np.float32)
+    return views.View(str(eye), camera, image, np.ones((size, size), np.float32))
+
+
+@pytest.fixture(scope="module")
+def photos():
+    return [photo([1.6 + dx, 1.6 + dy, 4.0]) for dx, dy in [(0, 0), (0.9, 0), (-0.9, 0), (0, 0.9), (0, -0.9)]]
+
+
+@pytest.fixture(scope="module")
+def found(photos) -> sweep.Relief:
+    return sweep.sweep(made.grid(0.05), photos, flying_height=4.0, pixel=0.04)
+
+
+def inner(grid: Ground, low: float, high: float):
+    x, y = (grid.centres[:, k].reshape(grid.shape) for k in (0, 1))
+    return (x > low) & (x < high) & (y > low) & (y < high)
+
+
+def test_what_stands_is_found_where_it_stands_and_as_high_as_it_is(found):
+    top = inner(found.grid, BOX[0] + 0.1, BOX[1] - 0.1)
+    assert found.stands[top].mean() > 0.95
+    # a step of the sweep: half of it by the parabola, as much again by the window
+    assert np.median(np.abs(found.above[top] - TALL)) < found.step
+
+
+def test_the_ground_around_stays_ground(found):
+    around = inner(found.grid, 0.4, 2.8) & ~inner(found.grid, BOX[0] - 0.25, BOX[1] + 0.25)
+    assert found.stands[around].mean() < 0.01
+    assert np.abs(found.above[around]).max() <= 2 * found.step
+
+
+def test_ground_that_fewer_than_two_photos_see_is_not_known(photos):
+    alone = sweep.sweep(made.grid(0.1), photos[:1], flying_height=4.0, pixel=0.08)
+    assert not alone.known.any() and not alone.stands.any()
+    assert (alone.above == 0).all()
+
+
+def test_the_shell_closes_what_stands_down_to_the_ground(found, photos):
+    shell = things.shell(found, photos)
+    heights = shell.means[:, 2]
+    assert not shell.ground.any()
+    assert heights.max() == pytest.approx(TALL, abs=2 * found.step)
+    assert heights.min() < 0.2 * TALL  # walls reach down
+    ceiling = things.ceiling(made.grid(0.05), found, shell)
+    grid = made.grid(0.05)
+    assert ceiling[inner(grid, 0.3, 0.7)].max() < 0.3 * TALL  # free space over bare ground
+    assert ceiling[inner(grid, 1.4, 1.8)].min() > TALL
+
+
+def test_costs_without_steps_are_each_cells_own():
+    rng = np.random.default_rng(0)
+    costs = rng.uniform(0, 1, (5, 4, 6)).astype(np.float32)
+    free = sweep.aggregated(costs, 0.0, 0.0)
+    np.testing.assert_array_equal(free.argmin(0), costs.argmin(0))  # changes cost nothing
+
+
+def test_a_cell_that_says_nothing_takes_the_height_of_its_neighbours():
+    costs = np.full((5, 7, 7), 0.5, np.float32)
+    costs[3] = 0.1
+    costs[:, 3, 3] = 0.3
+    costs[1, 3, 3] = 0.29  # a little better elsewhere
+    assert costs.argmin(0)[3, 3] == 1
+    assert (sweep.aggregated(costs, 0.01, 0.06).argmin(0) == 3).all()
+
+
+def test_points_in_the_air_become_things_only_together_and_where_the_sweep_saw_nothing():
+    grid = made.grid()
+    flat = sweep.Relief(grid, np.zeros(grid.shape), np.zeros(grid.shape, bool), np.ones(grid.shape, bool), 0.1)
+    crowd = np.array([[1.0, 1.0, 0.5], [1.1, 1.0, 0.5], [1.0, 1.1, 0.5], [1.1, 1.1, 0.55]])
+    points = np.concatenate([crowd, [[2.5, 2.5, 0.5], [1.0, 1.05, 3.0], [1.0, 1.0, 0.05]]])
+    field = things.lone_points(grid, flat, points, np.full((7, 3), 0.5), band=1.0)
+    np.testing.assert_allclose(field.means, crowd, atol=1e-6)
+    taken = replace(flat, stands=inner(grid, 0.8, 1.3))
+    assert not len(things.lone_points(grid, taken, points, np.full((7, 3), 0.5), band=1.0))

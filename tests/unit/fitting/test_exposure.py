@@ -1,0 +1,70 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dav_gswt import cameras, views
+from dav_gswt.coarse import ground
+from dav_gswt.fitting import exposure
+from dav_gswt.fitting.sampling import median_colours
+
+FRAME = {
+    "exemplar": {"west": 0.0, "south": 0.0, "side": 4.0},
+    "extent": {"west": 0.0, "south": 0.0, "east": 4.0, "north": 4.0},
+}
+
+
+@pytest.fixture
+def grid():
+    return ground.lay(FRAME, np.zeros((0, 3)), spacing=0.1, cap=10**6, block=8, margin=0.0)
+
+
+def photo(colour, name="photo", eye=(2.0, 2, 6)):
+    camera = cameras.pinhole(eye, [eye[0], eye[1], 0], 40, 40, 60.0)
+    image = np.broadcast_to(np.asarray(colour, np.float32), (40, 40, 3)).copy()
+    return views.View(name, camera, image, np.ones((40, 40), np.float32))
+
+
+def test_the_median_ignores_one_photo_that_differs(grid):
+    three = [photo([0.2, 0.3, 0.4]), photo([0.2, 0.3, 0.4]), photo([0.9, 0.9, 0.9])]
+    colours, known = median_colours(grid.centres, three)
+    assert known.any()
+    np.testing.assert_allclose(colours[known], np.tile([0.2, 0.3, 0.4], (known.sum(), 1)), atol=1e-6)
+    assert np.isnan(colours[~known]).all()
+
+
+def test_the_median_of_two_photos_is_their_mean(grid):
+    colours, known = median_colours(grid.centres, [photo([0.2, 0.2, 0.2]), photo([0.4, 0.4, 0.4])])
+    np.testing.assert_allclose(colours[known], 0.3, atol=1e-6)
+
+
+def test_exposures_are_levelled_without_drift(grid):
+    rng = np.random.default_rng(0)
+    texture = rng.uniform(0.2, 0.7, (40, 40, 3)).astype(np.float32)
+    gains = [0.8, 1.0, 1.0, 1.25]
+    photos = [replace(photo([0, 0, 0], str(g)), image=(texture * g).astype(np.float32)) for g in gains]
+    levelled = exposure.levelled(photos, grid.centres)
+    for view in levelled:
+        np.testing.assert_allclose(view.image.mean((0, 1)), texture.mean((0, 1)), rtol=0.02)
+
+
+def test_a_pictures_exposure_is_found_beside_what_moves():
+    rng = np.random.default_rng(1)
+    picture = rng.uniform(0.2, 0.8, (40, 40, 3)).astype(np.float32)
+    image = (1.1 * picture - 0.03).astype(np.float32)
+    image[:6] = 1.0  # something else
+    none = np.ones(3, np.float32), np.zeros(3, np.float32)
+    a, b = exposure.towards(picture, replace(photo([0, 0, 0]), image=image), none)
+    # the prior's share: 1e-3 against the variance of the picture, 0.03
+    np.testing.assert_allclose(a, 1.1, atol=0.01)
+    np.testing.assert_allclose(b, -0.03, atol=0.01)
+
+
+def test_pixels_without_weight_and_flat_pictures_give_no_gain():
+    none = np.ones(3, np.float32), np.zeros(3, np.float32)
+    picture = np.full((40, 40, 3), 0.4, np.float32)
+    a, b = exposure.towards(picture, photo([0.5, 0.5, 0.5]), none)
+    np.testing.assert_allclose(a, 1, atol=1e-6)
+    np.testing.assert_allclose(b, 0.1, atol=1e-6)
+    blind = replace(photo([0.5, 0.5, 0.5]), weight=np.zeros((40, 40), np.float32))
+    assert exposure.towards(picture, blind, none) is none

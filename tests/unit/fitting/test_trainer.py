@@ -1,0 +1,144 @@
+from dataclasses import replace
+
+import made_up_ground as made
+import numpy as np
+import pytest
+
+from dav_gswt.active.evaluation import evaluate
+from dav_gswt.coarse import maps
+from dav_gswt.coarse.rules import OnGround
+from dav_gswt.coarse.things import blobs
+from dav_gswt.field import joined, sh_of
+from dav_gswt.fitting import held_out, snapshot, trainer
+from dav_gswt.fitting.plan import Plan
+
+
+def grey(field):
+    return replace(field, sh=sh_of(np.full((len(field), 3), 0.5)))
+
+
+def blotched(field):
+    noise = np.random.default_rng(3).normal(0, 0.15, (len(field), 3))
+    return replace(field, sh=sh_of(field.base_colours + noise))
+
+
+def fitted(field=None, plan=None, seed=0, photos=None, keep=None):
+    field = grey(made.field()) if field is None else field
+    grid = made.grid()
+    rules = OnGround(grid, np.full(grid.shape, 0.5))
+    plan = plan or Plan(60, len(field))
+    return trainer.fit(field, photos or made.photos(), plan, rules, np.random.default_rng(seed), "test", keep)
+
+
+def same(a, b):
+    for name, values in vars(a).items():
+        np.testing.assert_array_equal(values, getattr(b, name))
+
+
+def test_a_fit_finds_the_colours_that_the_photos_show():
+    photos = made.photos()
+    start = blotched(made.field())
+    before = evaluate(start, photos[:1])["psnr"]
+    assert evaluate(fitted(start).field, photos[:1])["psnr"] > before + 6
+
+
+def test_the_ground_stays_a_ground():
+    grid = made.grid()
+    field = fitted(made.field(), Plan(30, 1)).field
+    assert len(field) == len(made.field())
+    discs = field[field.ground]
+    assert len(discs) == grid.heights.size
+    assert np.abs(discs.means[:, :2] - grid.centres[:, :2]).max() <= 0.49 * grid.spacing + 1e-6
+    assert discs.opacity_logits.min() >= 2.5
+    assert maps.from_above(field, grid).alpha[2:-2, 2:-2].min() > 0.97  # closed, away from the border
+
+
+def test_the_same_seed_gives_the_same_bits_whatever_the_threads(monkeypatch):
+    found = []
+    for threads in ("1", "2"):
+        monkeypatch.setenv("DAV_GSWT_THREADS", threads)
+        found.append(fitted(plan=Plan(20, 1600), seed=7).field)
+    same(*found)
+
+
+def test_things_above_the_ceiling_go_and_the_rest_stays():
+    points = np.array([[1.6, 1.6, 3.0], [1.6, 1.6, 0.2]])
+    field = joined([made.field(), blobs(points, np.full((2, 3), 0.5), np.full(2, 0.05))])
+    found = fitted(field, Plan(12, 1)).field
+    assert len(found) == len(field) - 1
+    assert found.means[-1, 2] == pytest.approx(0.2, abs=0.1)
+
+
+def test_a_fit_grows_to_its_cap_and_no_further():
+    field = grey(made.field())
+    found = fitted(field, Plan(60, len(field) + 200))
+    assert len(field) < len(found.field) <= len(field) + 200
+    assert found.field.ground[: made.grid().heights.size].all()
+
+
+def test_a_photo_with_another_exposure_does_not_change_the_field():
+    photos = made.photos(3)
+    dark = [photos[0], photos[1], replace(photos[2], image=(0.85 * photos[2].image).astype(np.float32))]
+    plain, levelled = (fitted(photos=p, plan=Plan(90, 1)).field for p in (photos, dark))
+    gone = evaluate(plain, photos[:2])["psnr"] - evaluate(levelled, photos[:2])["psnr"]
+    assert gone < 3  # without levelling the common ground would be 5 % too dark: 26 dB at best, 8 dB lost
+
+
+class Killed(Exception):
+    pass
+
+
+@pytest.mark.parametrize("plan", [Plan(30, 1400, degree=1), Plan("auto", "auto", "auto")], ids=["numbers", "auto"])
+def test_a_killed_fit_goes_on_from_its_snapshot_and_ends_with_the_same_field(plan, tmp_path, monkeypatch):
+    monkeypatch.setattr(held_out, "GAIN", 10.0)  # nothing pays: the search is short
+    monkeypatch.setattr("dav_gswt.fitting.search.GAIN", 10.0)
+    monkeypatch.setattr("dav_gswt.fitting.search.WINDOW", 9)
+    monkeypatch.setattr("dav_gswt.fitting.search.LEAST_SETTLING", 6)
+    whole = fitted(plan=plan)
+    monkeypatch.setattr(snapshot, "EVERY", 0.0)  # after every step
+    advance, count = trainer._advance, [0]
+
+    def until(run, task):
+        if count[0] == 17:
+            raise Killed
+        count[0] += 1
+        advance(run, task)
+
+    monkeypatch.setattr(trainer, "_advance", until)
+    with pytest.raises(Killed):
+        fitted(plan=plan, keep=tmp_path)
+    assert len(list(tmp_path.iterdir())) == 1
+    monkeypatch.setattr(trainer, "_advance", advance)
+    again = fitted(plan=plan, keep=tmp_path)
+    same(whole.field, again.field)
+    assert whole.report == again.report
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_snapshot_that_is_none_costs_nothing(tmp_path, monkeypatch, caplog):
+    keeper = snapshot.Keeper(tmp_path, "x")
+    (tmp_path / "x.npz").write_bytes(b"no zip")
+    assert keeper.load() is None
+    assert "begins anew" in caplog.text
+
+
+def test_what_is_chosen_is_told_with_its_reason(monkeypatch):
+    monkeypatch.setattr("dav_gswt.fitting.search.WINDOW", 60)
+    monkeypatch.setattr("dav_gswt.fitting.search.MOST_STEPS", 600)
+    monkeypatch.setattr("dav_gswt.fitting.search.GAIN", 0.5)  # such short windows are noisy
+    found = fitted(plan=Plan("auto", "auto", "auto"))
+    report = found.report
+    assert {choice["what"] for choice in report.choices} >= {"steps", "cap", "degree"}
+    assert all("dB" in choice["why"] or "most" in choice["why"] for choice in report.choices)
+    assert report.steps == [c["value"] for c in report.choices if c["what"] == "steps"][0]
+    assert report.degree == [c["value"] for c in report.choices if c["what"] == "degree"][0]
+    assert found.field.sh.shape[1] == (report.degree + 1) ** 2
+
+
+def test_a_plan_refuses_what_makes_no_sense():
+    with pytest.raises(ValueError, match="degree is 4"):
+        Plan(10, 10, 4)
+    with pytest.raises(ValueError, match="half_share"):
+        Plan(10, 10, half_share=1.0)
+    with pytest.raises(ValueError, match="at least one view"):
+        trainer.fit(made.field(), [], Plan(1, 1), OnGround(made.grid(), np.zeros((32, 32))), np.random.default_rng(0))

@@ -1,0 +1,70 @@
+"""Autograd through the rasterizer, against autograd through the oracle."""
+
+import numpy as np
+import pytest
+import torch
+from backend_scenes import SCENES
+from raster_scenes import NAMES, relative
+
+from dav_gswt.raster import backends, oracle
+from dav_gswt.raster.autograd import rasterize
+
+THERE = [name for name in backends.NAMES if not backends.lacking(name)]
+
+
+def leaves_of(name: str, kind: torch.dtype) -> dict[str, torch.Tensor]:
+    arrays = SCENES[name].arrays | {"motion": np.zeros(6)}
+    return {k: torch.tensor(a, dtype=kind, requires_grad=True) for k, a in arrays.items()}
+
+
+def objective(images) -> torch.Tensor:
+    """Something that is not linear in any picture."""
+    return sum((image**2).mean() + torch.sin(3 * image).mean() for image in images)
+
+
+@pytest.mark.parametrize("backend", THERE)
+@pytest.mark.parametrize("name", ["a cloud", "features", "harmonics of degree 2", "harmonics on a map"])
+def test_gradients_of_an_objective_are_the_oracles(backend, name):
+    camera, leaves, twins = SCENES[name].camera, leaves_of(name, torch.float32), leaves_of(name, torch.float64)
+    found = objective(rasterize(**leaves, camera=camera, backend=backend))
+    wanted = objective(oracle.forward(**twins, camera=camera))
+    found.backward()
+    wanted.backward()
+    assert found.item() == pytest.approx(wanted.item(), rel=1e-5)
+    for parameter, twin in twins.items():
+        # float32 pictures of some hundred roundings, squared and summed
+        assert relative(leaves[parameter].grad.numpy(), twin.grad.numpy()) < 1e-4, parameter
+
+
+def test_tensors_keep_their_type_and_slopes_are_what_differences_say():
+    """By colours, where no step of 1/255 stands between: the objective is smooth, pictures are float32."""
+    leaves, camera = leaves_of("a cloud", torch.float64), SCENES["a cloud"].camera
+    objective(rasterize(**leaves, camera=camera, backend="torch")).backward()
+    slopes = leaves["colours"].grad
+    assert slopes.dtype == torch.float64
+    way = torch.as_tensor(np.random.default_rng(0).normal(size=slopes.shape))
+    ends = []
+    for step in (1e-2, -1e-2):
+        moved = leaves | {"colours": leaves["colours"].detach() + step * way}
+        ends.append(objective(rasterize(**moved, camera=camera, backend="torch")).item())
+    assert (ends[0] - ends[1]) / 2e-2 == pytest.approx((slopes * way).sum().item(), rel=1e-3)
+
+
+def test_two_pictures_before_one_backward_do_not_mix():
+    camera, leaves = SCENES["a cloud"].camera, leaves_of("a cloud", torch.float32)
+    motion = leaves.pop("motion")
+    together = sum(objective(rasterize(**leaves, camera=camera, motion=motion, dilation=d)) for d in (0.3, 1.0))
+    together.backward()
+    both = {name: leaf.grad.clone() for name, leaf in leaves.items()}
+    for leaf in leaves.values():
+        leaf.grad = None
+    for dilation in (0.3, 1.0):
+        objective(rasterize(**leaves, camera=camera, dilation=dilation)).backward()
+    for name in NAMES:
+        np.testing.assert_allclose(leaves[name].grad, both[name], rtol=1e-5, atol=1e-7)
+
+
+def test_a_motion_that_is_not_zero_is_refused():
+    leaves = leaves_of("a cloud", torch.float32) | {"motion": torch.ones(6)}
+    with pytest.raises(ValueError, match="move the camera itself"):
+        rasterize(**leaves, camera=SCENES["a cloud"].camera)

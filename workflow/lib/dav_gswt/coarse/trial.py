@@ -1,0 +1,156 @@
+"""A fit that is watched: how well it shows photos it has not seen, second by second, and what it looks like elsewhere.
+
+Of photos every tenth by name, from the sixth, is for testing; of synthetic scenes those that ground.json names, by
+group. Time spent on measuring is not counted.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float32
+from numpy import ndarray as Array
+from scipy.spatial import cKDTree
+
+from dav_gswt import cameras, images, metrics, raster
+from dav_gswt.coarse import build
+from dav_gswt.coarse.build import Made, Quality
+from dav_gswt.coarse.ground import Ground
+from dav_gswt.field import Field
+from dav_gswt.files import read_json
+from dav_gswt.photos import model as models
+from dav_gswt.views import View, of
+
+FIRST_TEST, EACH = 5, 10
+FREE = 0.1  # flying heights above the ground from which space is free
+NEAR = 3.0  # spacings to a matched point within which a Gaussian may stand in it
+WHOLE = 10.0  # margin, in exemplars: all ground that the photos see
+SKY = np.array([0.62, 0.75, 0.95], np.float32)
+
+
+@dataclass(frozen=True)
+class PhotoSet:
+    """A photos/ folder, split for a trial. tests: groups of test views by name."""
+
+    frame: dict
+    model: models.Model
+    train: list[View]
+    tests: dict[str, list[View]]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What came out. curve: rows of seconds, step, psnr, psnr_colour_corrected and Gaussians."""
+
+    made: Made
+    curve: list[dict]
+
+
+def opened(folder: Path | str, size: int) -> PhotoSet:
+    """Read a photos/ folder at a size, its test views apart."""
+    folder = Path(folder)
+    frame, model = read_json(folder / "ground.json"), models.read(folder / "sparse")
+    known = {
+        n: of(n, c, images.read(folder / "images" / n), size) for n, c in zip(model.names, model.cameras, strict=True)
+    }
+    names = sorted(known)
+    groups = frame.get("test_groups") or {"test": frame["test"] or names[FIRST_TEST::EACH]}
+    out = {name for group in groups.values() for name in group}
+    tests = {group: [known[n] for n in members] for group, members in groups.items()}
+    return PhotoSet(frame, model, [known[n] for n in names if n not in out], tests)
+
+
+def run(photos: PhotoSet, quality: Quality, seed: int = 0, every: int = 25, margin: float = WHOLE) -> Trial:
+    """Fit the training photos, looking at the first group of test views every so many steps."""
+    watched, measuring, start = next(iter(photos.tests.values())), 0.0, time.perf_counter()
+    curve: list[dict] = []
+    drawn = raster.Rasterizer()
+
+    def watch(step: int, state) -> None:
+        nonlocal measuring
+        if step % every:
+            return
+        begun = time.perf_counter()
+        row = {"seconds": begun - start - measuring, "step": step, "gaussians": len(state)}
+        curve.append(row | quality_of(lambda v: drawn.forward(**state.values, camera=v.camera).colour, watched))
+        measuring += time.perf_counter() - begun
+
+    rng = np.random.default_rng(seed)
+    points, colours = photos.model.points, photos.model.colours
+    made = build.fit(photos.frame, photos.train, points, colours, quality, rng, margin=margin, watch=watch)
+    seconds = time.perf_counter() - start - measuring
+    last = quality_of(lambda v: raster.render(made.field, v.camera).colour, watched)
+    curve.append({"seconds": seconds, "step": made.report["steps"], "gaussians": len(made.field)} | last)
+    return Trial(made, curve)
+
+
+def quality_of(draw: Callable[[View], Float32[Array, "h w 3"]], tests: list[View]) -> dict[str, float]:
+    """Mean PSNR of what is drawn, raw and colour-corrected, over the pixels of weight > 0."""
+    raw, level = [], []
+    for view in tests:
+        seen = np.clip(draw(view), 0, 1)
+        corrected = np.clip(metrics.colour_corrected(seen, view.image, view.weight), 0, 1).astype(np.float32)
+        raw.append(metrics.psnr(seen, view.image, view.weight))
+        level.append(metrics.psnr(corrected, view.image, view.weight))
+    return {"psnr": float(np.mean(raw)), "psnr_colour_corrected": float(np.mean(level))}
+
+
+def seconds_to(curve: list[dict], decibel: float) -> float | None:
+    """When the colour-corrected PSNR first reached so much; None: never."""
+    reached = [row["seconds"] for row in curve if row["psnr_colour_corrected"] >= decibel]
+    return reached[0] if reached else None
+
+
+def free_space_opacity(field: Field, grid: Ground, photos: PhotoSet) -> float:
+    """Mean accumulated alpha, over the test views, of what stands higher than FREE flying heights above the ground and
+    not at a matched point: the haze that photos from their own places reward."""
+    above = field.means[:, 2] - grid.height_at(field.means)
+    high = field[above > FREE * photos.frame["flying_height"]]
+    if len(high):
+        high = high[cKDTree(photos.model.points).query(high.means)[0] > NEAR * grid.spacing]
+    views = [view for group in photos.tests.values() for view in group]
+    return float(np.mean([raster.render(high, v.camera).alpha.mean() if len(high) else 0.0 for v in views]))
+
+
+def away(photos: PhotoSet, made: Made) -> dict[str, float]:
+    """Mean PSNR of each group of test views, over the pixels that look at the modelled ground."""
+    out = {}
+    for group, views in photos.tests.items():
+        seen = [v for v in build.modelled(views, made.grid) if v.weight.any()]
+        out[group] = quality_of(lambda v: raster.render(made.field, v.camera).colour, seen)["psnr"]
+    return out
+
+
+def stills(made: Made, frame: dict, width: int = 768, height: int = 512) -> dict[str, Float32[Array, "h w 3"]]:
+    """What nobody photographed: from 45 degrees at the flying height, and from as low as the photos' detail allows.
+
+    Low is where a disc in the lower third of the picture is two pixels wide.
+    """
+    square, up = frame["exemplar"], frame["flying_height"]
+    middle = np.array([square["west"], square["south"], 0.0]) + 0.5 * square["side"] * np.array([1, 1, 0.0])
+    middle[2] = float(made.grid.height_at(middle[None])[0])
+    low = 0.25 * width * made.grid.spacing
+    places = {
+        "oblique": (middle + up * np.array([0.0, -0.7, 0.7]), middle, 50.0),
+        "low": (middle + np.array([0.0, -0.35 * square["side"], low]), middle + [0.0, 0.0, 0.25 * low], 60.0),
+    }
+    out = {}
+    for name, (eye, at, angle) in places.items():
+        seen = raster.render(made.field, cameras.pinhole(eye, at, width, height, angle), antialiased=True)
+        out[name] = np.clip(seen.colour + (1 - seen.alpha)[..., None] * SKY, 0, 1)
+    return out
+
+
+def facts(found: Trial, photos: PhotoSet) -> dict:
+    """What a trial measured, in numbers."""
+    made, last = found.made, found.curve[-1]
+    return {
+        "photos": len(photos.train),
+        "last": last,
+        "seconds_to": {str(d): seconds_to(found.curve, d) for d in (30.0, 33.0, 34.0)},
+        "free_space_opacity": free_space_opacity(made.field, made.grid, photos),
+        "away_psnr": away(photos, made),
+        "choices": made.report["choices"],
+    }

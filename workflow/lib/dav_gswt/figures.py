@@ -1,0 +1,45 @@
+"""Plots for docs/, and the tables they are made of."""
+
+import csv
+from pathlib import Path
+
+from dav_gswt.files import whole
+
+
+def write_rows(path: Path | str, rows: list[dict]) -> None:
+    """Write rows of numbers under the names of the first one's keys; floats to five digits."""
+    with whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+        table = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        table.writeheader()
+        for row in rows:
+            table.writerow({k: f"{v:.5g}" if isinstance(v, float) else v for k, v in row.items()})
+
+
+def read_rows(path: Path | str) -> list[dict[str, float]]:
+    """Read what `write_rows` wrote."""
+    with Path(path).open(newline="", encoding="utf-8") as file:
+        return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
+
+
+def fit_time(curves: dict[str, list[dict[str, float]]], path: Path | str) -> None:
+    """PSNR of test photos (colour-corrected) against seconds of fitting, a line a scene."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 4.0), dpi=120, layout="constrained")
+    axes = figure.add_subplot()
+    for scene, rows in curves.items():
+        x, y = ([row[k] for row in rows] for k in ("seconds", "psnr_colour_corrected"))
+        (line,) = axes.plot(x, y, label=scene)
+        axes.annotate(
+            f"{y[-1]:.1f} dB", (x[-1], y[-1]), xytext=(4, 0), textcoords="offset points", color=line.get_color()
+        )
+    axes.set_xlabel("seconds of fitting (looking at the photos included)")
+    axes.set_ylabel("PSNR of test photos, colour-corrected (dB)")
+    axes.set_xlim(left=0)
+    axes.margins(x=0.12)
+    axes.grid(alpha=0.3)
+    axes.legend(frameon=False)
+    FigureCanvasAgg(figure)
+    with whole(path) as part:
+        figure.savefig(part, format="png", metadata={"Software": None})

@@ -1,0 +1,58 @@
+"""How long, how many, how rich: what a fit may spend, and what it found out that the scene requires."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+AUTO = "auto"
+Count = int | Literal["auto"]  # a number, or: as many as the photos ask for
+
+MOST_STEPS = 6000  # of a fit that finds its own number
+MOST_GAUSSIANS = 2_000_000  # of a fit that finds its own cap
+MOST_DEGREE = 3  # of the spherical harmonics that a PLY can hold
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a fit may spend.
+
+    steps: of the optimiser, one photo each. cap: most Gaussians; it grows towards it where the residual asks for more.
+    degree: of the spherical harmonics; reached one degree after the other. Each may be "auto": as much as makes a
+    held-out share of pixels better. half_share: share of the steps taken at half the resolution.
+    pose_rate: radians (and distances over the mean depth) that a camera may turn a step, at the start; 0: none moves.
+    """
+
+    steps: Count
+    cap: Count
+    degree: Count = 0
+    half_share: float = 0.0
+    pose_rate: float = 0.0
+
+    def __post_init__(self):
+        for name, most in (("steps", None), ("cap", None), ("degree", MOST_DEGREE)):
+            value = getattr(self, name)
+            if value != AUTO and (value < 0 or (most is not None and value > most)):
+                raise ValueError(
+                    f"{name} is {value}; give {AUTO!r} or a whole number" + (f" to {most}" if most else "")
+                )
+        if not 0 <= self.half_share < 1 or not self.pose_rate >= 0:
+            raise ValueError(f"half_share is {self.half_share}, pose_rate {self.pose_rate}: shares and rates from 0")
+
+    @property
+    def searching(self) -> bool:
+        """Something is to be found out: a share of the pixels is held out for that."""
+        return AUTO in (self.steps, self.cap, self.degree)
+
+
+@dataclass
+class Report:
+    """What a fit did and why; `choices` tells each thing decided with its reason."""
+
+    steps: int = 0
+    gaussians: int = 0
+    degree: int = 0
+    choices: list[dict] = field(default_factory=list)
+    held_out: list[dict] = field(default_factory=list)  # step, psnr
+
+    def chose(self, what: str, value, why: str) -> None:
+        """Note a choice."""
+        self.choices.append({"what": what, "value": value, "why": why})
