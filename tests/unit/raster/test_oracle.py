@@ -5,7 +5,7 @@ import pytest
 from backend_scenes import SCENES, answers, blend_weights
 from raster_scenes import CAMERAS, NAMES, gaussians, image_gradients, oracle_answers, relative
 
-from dav_gswt.raster import cpu
+from dav_gswt.raster import cpu, harmonics
 
 
 @pytest.mark.parametrize("view", CAMERAS)
@@ -92,6 +92,17 @@ def test_every_instruction_set_draws_the_scenes_of_all_backends(isa, name):
     gradients = raster.backward(*shown)
     for parameter, value in wanted.items():
         assert relative(getattr(gradients, parameter), value) < scene.gradient, parameter
+
+
+@pytest.mark.parametrize("view", CAMERAS)
+@pytest.mark.parametrize("degree", range(4))
+def test_harmonics_are_those_of_a_fields_colours(raster, view, degree):
+    arrays, camera = gaussians(200), CAMERAS[view]
+    sh = np.random.default_rng(4).normal(0, 0.5, (200, (degree + 1) ** 2, 3)).astype(np.float32)
+    plain = arrays | {"colours": harmonics.colours(sh, harmonics.directions(arrays["means"], camera))}
+    wanted = raster.forward(**plain, camera=camera).colour
+    found = raster.forward(**(arrays | {"colours": sh}), camera=camera).colour
+    np.testing.assert_allclose(found, wanted, atol=1e-5)  # sums of 16 products, then as many splats
 
 
 @pytest.mark.parametrize("name", ["a cloud", "a ground seen from low down", "antialiased", "opacities up to 1"])
