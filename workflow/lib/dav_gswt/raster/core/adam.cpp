@@ -1,5 +1,6 @@
 // Adam (Kingma & Ba 2015), one pass over an array: moments, bias correction and step together.
 #include "kernels.h"
+#include <string.h>
 
 namespace raster {
 namespace ISA {
@@ -37,10 +38,13 @@ void adam(const AdamTask& task, int threads) {
       step_rows(task, begin, end);
       continue;
     }
-    for (size_t row = begin; row < end; row++) {  // runs of rows that move
-      const size_t from = row;
-      while (row < end && task.moved[row]) row++;
-      if (row > from) step_rows(task, from, row);
+    const bool* at = task.moved + begin;
+    const bool* const last = task.moved + end;
+    while ((at = (const bool*)memchr(at, true, last - at))) {  // runs of rows that move
+      const bool* run_end = (const bool*)memchr(at, false, last - at);
+      if (!run_end) run_end = last;
+      step_rows(task, at - task.moved, run_end - task.moved);
+      if ((at = run_end) == last) break;
     }
   }
 }

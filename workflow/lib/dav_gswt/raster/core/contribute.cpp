@@ -1,5 +1,5 @@
-// What each Gaussian gives to the picture: its blend weights' sum, sum of squares and maximum, and a map carried back by
-// them.
+// What each Gaussian gives to the picture: its blend weights' sum, sum of squares and maximum, and a map carried back
+// by them.
 #include "blocks.h"
 #include "kernels.h"
 

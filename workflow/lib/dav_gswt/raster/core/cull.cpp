@@ -1,8 +1,8 @@
 // Which Gaussians may show in the picture, by a bound of their size: most of a large field's do not, and this is all
 // that they cost.
 //
-// Whatever way a splat's axes lie, S_xx <= s^2 |u|^2 + dilation with s the largest scale and u the first row of J R; and
-// alpha falls below 1/255 within sqrt(2 ln(255) S_xx) of the centre.
+// Whatever way a splat's axes lie, S_xx <= s^2 |u|^2 + dilation with s the largest scale and u the first row of J R;
+// and alpha falls below 1/255 within sqrt(2 ln(255) S_xx) of the centre.
 #include "chain.h"
 #include "kernels.h"
 

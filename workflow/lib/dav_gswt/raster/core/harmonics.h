@@ -6,11 +6,11 @@ namespace raster {
 namespace ISA {
 
 constexpr int COEFFICIENTS = 16;  // at most
-constexpr float SH0 = 0.28209479f, SH1 = 0.48860251f;                                               // sqrt(1, 3 / 4 pi)
-constexpr float SH2A = 1.09254843f, SH2B = 0.31539157f;                                             // sqrt(15 / 4, 5 / 16 pi)
-constexpr float SH3A = 0.59004359f, SH3B = 2.89061144f, SH3C = 0.45704580f, SH3D = 0.37317633f;  // sqrt(35/32 ...)
+// square roots of 1 / 4, 3 / 4, 15 / 4, 5 / 16, 35 / 32, 105 / 4, 21 / 32 and 7 / 16, all over pi
+constexpr float SH0 = 0.28209479f, SH1 = 0.48860251f, SH2A = 1.09254843f, SH2B = 0.31539157f;
+constexpr float SH3A = 0.59004359f, SH3B = 2.89061144f, SH3C = 0.45704580f, SH3D = 0.37317633f;
 
-// The direction in which the camera sees LANES Gaussians, and one over their distance (0 for a parallel view).
+// The direction in which the camera sees LANES Gaussians, and one over their distance (1 for a parallel view).
 struct Sight {
   Three to;
   Lanes per_length;
@@ -78,8 +78,8 @@ static inline Three shade(const Scene& scene, const View& view, const Rows& rows
   return colour;
 }
 
-// The way back from `by_colour`, 0 where the colour was cut off at 0: writes gradients by coefficients, returns those by
-// the place that the camera sees (a parallel view: by its direction).
+// The way back from `by_colour`, 0 where the colour was cut off at 0: writes gradients by coefficients, returns those
+// by the place that the camera sees (a parallel view: by its direction).
 static inline Three unshade(const Scene& scene, const View& view, const Rows& rows, const Three& mean,
                             const Three& by_colour, float* out) {
   const int count = scene.coefficients;
