@@ -21,12 +21,13 @@ from dav_gswt.coarse.ground import Ground
 from dav_gswt.field import Field
 from dav_gswt.files import read_json
 from dav_gswt.photos import model as models
-from dav_gswt.views import View, of
+from dav_gswt.views import View, of, over_ground
 
 FIRST_TEST, EACH = 5, 10
 FREE = 0.1  # flying heights above the ground from which space is free
 NEAR = 3.0  # spacings to a matched point within which a Gaussian may stand in it
 WHOLE = 10.0  # margin, in exemplars: all ground that the photos see
+LOW = 0.06  # discs that the low eye stands above the ground, over the picture's width
 SKY = np.array([0.62, 0.75, 0.95], np.float32)
 
 
@@ -63,8 +64,16 @@ def opened(folder: Path | str, size: int) -> PhotoSet:
 
 
 def run(photos: PhotoSet, quality: Quality, seed: int = 0, every: int = 25, margin: float = WHOLE) -> Trial:
-    """Fit the training photos, looking at the first group of test views every so many steps."""
-    watched, measuring, start = next(iter(photos.tests.values())), 0.0, time.perf_counter()
+    """Fit the training photos, looking at the first group of test views every so many steps.
+
+    All of their pixels count where all ground that photos see is modelled (margin WHOLE), else those of the exemplar.
+    """
+    watched, measuring = next(iter(photos.tests.values())), 0.0
+    if margin < WHOLE:  # elsewhere nothing is modelled
+        square = photos.frame["exemplar"]
+        west, south, side = square["west"], square["south"], square["side"]
+        watched = [over_ground(v, west, south, west + side, south + side) for v in watched]
+    start = time.perf_counter()
     curve: list[dict] = []
     drawn = raster.Rasterizer()
 
@@ -126,15 +135,15 @@ def away(photos: PhotoSet, made: Made) -> dict[str, float]:
 def stills(made: Made, frame: dict, width: int = 768, height: int = 512) -> dict[str, Float32[Array, "h w 3"]]:
     """What nobody photographed: from 45 degrees at the flying height, and from as low as the photos' detail allows.
 
-    Low is where a disc in the lower third of the picture is two pixels wide.
+    Low: a disc in the middle of the picture is some eight pixels wide, so all detail that there is shows, and no more.
     """
     square, up = frame["exemplar"], frame["flying_height"]
     middle = np.array([square["west"], square["south"], 0.0]) + 0.5 * square["side"] * np.array([1, 1, 0.0])
     middle[2] = float(made.grid.height_at(middle[None])[0])
-    low = 0.25 * width * made.grid.spacing
+    low = LOW * width * made.grid.spacing
     places = {
         "oblique": (middle + up * np.array([0.0, -0.7, 0.7]), middle, 50.0),
-        "low": (middle + np.array([0.0, -0.35 * square["side"], low]), middle + [0.0, 0.0, 0.25 * low], 60.0),
+        "low": (middle + [0.0, -2 * low, low], middle + [0.0, 2 * low, 0.5 * low], 60.0),
     }
     out = {}
     for name, (eye, at, angle) in places.items():
