@@ -88,3 +88,19 @@ def test_test_views_are_distinct_from_each_other_and_from_every_other_view():
     others = centres(rigs.start_ring(8, 65.0, 7.0) + rigs.hemisphere(250, 30.0, 7.0))
     assert np.linalg.norm(tests[:, None] - others, axis=-1).min() >= 0.7 - 1e-9  # a tenth of the radius
     assert np.linalg.norm(tests[:, None] - tests, axis=-1)[~np.eye(6, dtype=bool)].min() > 1.0
+
+
+def test_a_ring_is_even_and_turned():
+    assert rigs.ring(4, 45.0, 7.0, turn=20.0) == [(45, 20, 7), (45, 110, 7), (45, 200, 7), (45, 290, 7)]
+    assert rigs.ring(0, 45.0, 7.0) == []
+
+
+def test_a_walker_stands_away_from_the_target_and_looks_past_it_to_the_horizon():
+    camera = rigs.walker(1.6, 90.0, 4.0, (1.0, 2.0, 0.5), 160, 90, 60.0)
+    assert camera.centre == pytest.approx(np.array([1.0, 6.0, 2.1]))
+    horizon = camera.centre + np.array([[0.0, -1.0, 0.0]])
+    [pixel], _ = camera.project(horizon)
+    # 12 degrees above the middle: a focal length of 80 / tan 30 pixels times tan 12
+    assert pixel == pytest.approx([80, 45 - 80 * 3**0.5 * np.tan(np.radians(12))])
+    with pytest.raises(ValueError, match="above the ground"):
+        rigs.walker(0.0, 0.0, 4.0, (0.0, 0.0, 0.0), 160, 90, 60.0)

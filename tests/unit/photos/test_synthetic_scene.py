@@ -12,6 +12,7 @@ from dav_gswt.photos import desert, rigs, synthetic
 mi = pytest.importorskip("mitsuba")
 BARE = {"stones": 0, "pebbles": 0, "shrubs": 0, "tufts": 0}
 ENTRY = {"family": "desert", "seed": 0, "photos": 8, "test": 6, "size": 64, "candidates": 20}
+HIGH = ENTRY | {"rig": "cap", "lowest": 60, "photos": 24, "test": 12, "oblique": 8}
 
 
 @pytest.fixture(autouse=True)
@@ -31,7 +32,7 @@ def off_centre(width=96, height=64):
 @pytest.mark.parametrize(
     "family, seed, given, said",
     [
-        pytest.param("tundra", 0, {}, "tundra.*desert", id="family"),
+        pytest.param("tundra", 0, {}, "tundra.*desert, meadow", id="family"),
         pytest.param("desert", -1, {}, "seed", id="negative seed"),
         pytest.param("desert", 0, {"shrub": 3}, "'shrub'.*shrubs", id="misspelt option"),
         pytest.param("desert", 0, {"shrubs": 1e9}, "shrubs.*0.0 to", id="too many"),
@@ -148,6 +149,53 @@ def test_the_start_views_see_the_whole_exemplar_from_at_least_three_sides():
         pixels, depth = camera.project(ground)
         seen += ((pixels > 0) & (pixels < 64)).all(axis=1) & (depth > 0)
     assert seen.min() >= 3
+
+
+def elevations(cameras):
+    """In degrees, about the origin."""
+    return np.degrees([np.arcsin(c.centre[2] / np.linalg.norm(c.centre)) for c in cameras])
+
+
+def test_a_scene_that_says_nothing_else_is_photographed_from_a_ring_and_tested_on_the_hemisphere():
+    assert elevations(synthetic.start_views(ENTRY)) == pytest.approx([90] + 7 * [65])
+    assert elevations(synthetic.test_views(ENTRY)).min() >= 30
+    assert synthetic.test_groups(ENTRY) == {"hemisphere": [0, 1, 2, 3, 4, 5]}
+
+
+def test_a_cap_is_photographed_and_tested_evenly_from_above_its_lowest_elevation():
+    low = np.sin(np.radians(60))
+    for cameras, count in (
+        (synthetic.start_views(HIGH), 24),
+        (synthetic.test_views(HIGH)[:12], 12),
+        (synthetic.candidates(HIGH), 20),
+    ):
+        height = np.sort(np.sin(np.radians(elevations(cameras))))
+        # equal steps of height are equal areas of the sphere
+        assert height == pytest.approx(low + (np.arange(count) + 0.5) / count * (1 - low), abs=1e-9)
+
+
+def test_views_at_45_degrees_are_a_group_of_their_own():
+    groups = synthetic.test_groups(HIGH)
+    assert groups == {"high": list(range(12)), "oblique": list(range(12, 20))}
+    tests = synthetic.test_views(HIGH)
+    assert len(tests) == 20
+    assert elevations(tests[12:]) == pytest.approx(8 * [45])
+
+
+def test_no_view_of_a_cap_is_another():
+    cameras = synthetic.start_views(HIGH) + synthetic.test_views(HIGH) + synthetic.candidates(HIGH | {"candidates": 24})
+    at = np.array([c.centre for c in cameras])
+    assert np.linalg.norm(at[:, None] - at, axis=-1)[~np.eye(len(at), dtype=bool)].min() > 0.1
+
+
+def test_walkers_look_over_the_exemplar_at_their_eyes_heights():
+    found = synthetic.walkers(HIGH, (10.0, 0.0, 0.0))
+    assert list(found) == ["walker_0.8", "walker_1.6", "walker_3.2"]
+    for name, camera in found.items():
+        assert camera.centre[2] == pytest.approx(float(name.split("_")[1]))
+        assert (camera.width, camera.height) == (64, 36)
+        [pixel], _ = camera.project(np.array([[10.0, 0.0, 0.0]]))
+        assert pixel[0] == pytest.approx(32) and 0 < pixel[1] < 36
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
-from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.ndimage import gaussian_filter, label, map_coordinates
 
 from dav_gswt.coarse.ground import Ground
 from dav_gswt.views import View
@@ -24,6 +24,9 @@ ONE_STEP, MORE_STEPS = 0.01, 0.06  # what a change of height by one step, by mor
 AIR = 0.01  # what standing in the air costs: without a reason nothing does
 BETTER = 0.8  # of the surface's cost: what stands must agree at least so much better
 UNKNOWN = 0.3  # cost where fewer than two photos look
+SUPPORT = 0.7  # of the photos that see the surface must see a height above it
+WITNESSES = 3  # photos without which nothing stands: two agree anywhere along a stripe
+SLENDER = 4.0  # a thing is at most so much higher than wide: more is a mistaken match
 THREADS = 4  # at most; changes no result
 STANDS = 2.0  # steps above the surface from which a height is that of a thing
 
@@ -54,17 +57,27 @@ def sweep(grid: Ground, views: list[View], flying_height: float, pixel: float) -
     coarse = thinned(grid, stride)
     step = max(pixel, coarse.spacing / 2)
     heights = step * np.arange(np.floor(LOW * flying_height / step), np.ceil(HIGH * flying_height / step) + 1)
-    costs, known = disagreement(coarse, views, heights)
+    costs, photos = disagreement(coarse, views, heights)
+    known = photos >= 2
     surface = int(np.abs(heights).argmin())
     in_air = (np.abs(heights) > STANDS * step)[:, None, None] * np.float32(AIR)
     summed = aggregated(costs + in_air, ONE_STEP, MORE_STEPS)
     best = summed.argmin(0)
     cost = np.take_along_axis(costs, best[None], 0)[0]
-    sure = known & (cost <= BETTER * costs[surface])
+    sure = (photos >= WITNESSES) & (cost <= BETTER * costs[surface])
     above = np.where(known, _between(summed, best, heights), 0)
-    stands = sure & (above > STANDS * step)
+    stands = _stout(sure & (above > STANDS * step), above, coarse.spacing)
     near = np.abs(above) <= STANDS * step
     return Relief(coarse, np.where(stands | near, above, 0), stands, known, step)
+
+
+def _stout(
+    stands: Bool[Array, "rows columns"], above: Float[Array, "rows columns"], cell: float
+) -> Bool[Array, "rows columns"]:
+    """Those of the cells that are not a column in the air: no higher than SLENDER times their patch is wide."""
+    patch, count = label(stands, np.ones((3, 3)))
+    wide = cell * np.sqrt(np.bincount(patch.ravel(), minlength=count + 1))
+    return stands & (above <= SLENDER * wide[patch])
 
 
 def thinned(grid: Ground, stride: int) -> Ground:
@@ -77,28 +90,35 @@ def thinned(grid: Ground, stride: int) -> Ground:
 
 def disagreement(
     grid: Ground, views: list[View], heights: Float[Array, "h"]
-) -> tuple[Float32[Array, "h rows columns"], Bool[Array, "rows columns"]]:
+) -> tuple[Float32[Array, "h rows columns"], Float32[Array, "rows columns"]]:
     """Standard deviation of the photos' colours at each height over each cell, averaged over a window of cells.
 
-    Also: which cells at least two photos see, at every height.
+    Also: how many photos see each cell's surface. A height that far fewer photos see than the surface under it costs
+    UNKNOWN: two photos that share little agree somewhere.
     """
     places = grid.centres.astype(np.float32)
     starts = [
         (places @ v.camera.rotation.T.astype(np.float32) + v.camera.translation.astype(np.float32)) for v in views
     ]
 
-    def at(height: float) -> tuple[Array, Array]:
-        spread, seen = (a.reshape(grid.shape) for a in _spread(views, starts, np.float32(height)))
+    number = _spread(views, starts, np.float32(0))[1]
+    least = np.maximum(2, SUPPORT * number)
+
+    def at(height: float) -> Array:
+        spread, count = _spread(views, starts, np.float32(height))
+        spread, seen = (a.reshape(grid.shape) for a in (spread, count >= least))
         weight = gaussian_filter(seen.astype(np.float32), WINDOW, mode="nearest")
         mean = gaussian_filter(np.where(seen, spread, 0), WINDOW, mode="nearest") / np.maximum(weight, 1e-6)
-        return np.where(seen, mean, np.float32(UNKNOWN)), seen
+        return np.where(seen, mean, np.float32(UNKNOWN))
 
     with ThreadPoolExecutor(THREADS) as pool:  # NumPy works beside itself; each height is on its own
-        costs, seen = zip(*pool.map(at, heights), strict=True)
-    return np.stack(costs).astype(np.float32, copy=False), np.logical_and.reduce(seen)
+        costs = list(pool.map(at, heights))
+    return np.stack(costs).astype(np.float32, copy=False), number.reshape(grid.shape)
 
 
-def _spread(views: list[View], starts: list[Array], height: np.float32) -> tuple[Float32[Array, "n"], Bool[Array, "n"]]:
+def _spread(
+    views: list[View], starts: list[Array], height: np.float32
+) -> tuple[Float32[Array, "n"], Float32[Array, "n"]]:
     n = len(starts[0])
     total, squares, count = np.zeros((n, 3), np.float32), np.zeros(n, np.float32), np.zeros(n, np.float32)
     for view, start in zip(views, starts, strict=True):
@@ -106,10 +126,9 @@ def _spread(views: list[View], starts: list[Array], height: np.float32) -> tuple
         total[rows] += colours
         squares[rows] += np.einsum("nc,nc->n", colours, colours)
         count[rows] += 1
-    seen = count >= 2
     number = np.maximum(count, 2)
     variance = (squares - np.einsum("nc,nc->n", total, total) / number) / (number - 1)
-    return np.sqrt(np.maximum(variance, 0)), seen
+    return np.sqrt(np.maximum(variance, 0)), count
 
 
 def _bilinear(view: View, q: Float32[Array, "n 3"]) -> tuple[Array, Float32[Array, "m 3"]]:

@@ -1,0 +1,44 @@
+"""The photos/ folder of a synthetic scene: what ground.json says about its test views."""
+
+import numpy as np
+import pytest
+
+from dav_gswt.files import read_json
+from dav_gswt.photos import model, rendered, synthetic
+from dav_gswt.photos.model import Model
+
+ENTRY = {"family": "desert", "seed": 0, "photos": 3, "test": 2, "size": 64, "candidates": 0}
+
+
+@pytest.fixture(autouse=True)
+def dark(monkeypatch):
+    """Black photos, in which no point is found: only the record is looked at here."""
+
+    def nothing(folder, shots, seed):
+        names, cameras = (tuple(column) for column in zip(*shots, strict=True))
+        none = np.zeros(0, int)
+        return Model(names, cameras, np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2)))
+
+    monkeypatch.setattr(synthetic, "render", lambda scene, camera: np.zeros((64, 64, 3), np.float32))
+    monkeypatch.setattr(rendered, "triangulated", nothing)
+
+
+@pytest.mark.parametrize(
+    "given, groups",
+    [
+        pytest.param({}, {"hemisphere": ["test_00.png", "test_01.png"]}, id="ring"),
+        pytest.param(
+            {"rig": "cap", "lowest": 60, "oblique": 3},
+            {"high": ["test_00.png", "test_01.png"], "oblique": ["test_02.png", "test_03.png", "test_04.png"]},
+            id="cap",
+        ),
+    ],
+)
+def test_test_views_are_written_by_group(tmp_path, given, groups):
+    rendered.render_set(ENTRY | given, tmp_path)
+    frame = read_json(tmp_path / "ground.json")
+    assert frame["test_groups"] == groups
+    assert frame["test"] == [name for group in groups.values() for name in group]
+    stored = model.read(tmp_path / "sparse")
+    for name, camera in zip(frame["test"], synthetic.test_views(ENTRY | given), strict=True):
+        assert stored.cameras[stored.names.index(name)].centre == pytest.approx(camera.centre)
