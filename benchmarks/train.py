@@ -61,8 +61,8 @@ def offpath() -> dict[str, float]:
     """Fitted from above 60 degrees of elevation: PSNR of high test views less that of test views at 45 degrees."""
     out, losses = {}, []
     for scene in SCENES:
-        given = trial.opened(photos(scene), HIGH.size)
-        seen = trial.away(given, trial.run(given, HIGH, every=10**6, margin=0.15).made)
+        given = trial.opened(photos(scene), HIGH.size, 0.15)
+        seen = trial.away(given, trial.run(given, HIGH, every=10**6).made)
         losses.append(seen["high"] - seen["oblique"])
         out |= {f"offpath_{scene}_{group}_psnr": value for group, value in seen.items()}
         out[f"offpath_{scene}_loss_db"] = losses[-1]

@@ -11,8 +11,8 @@ with logging_to(snakemake.log[0]):
     out, settings = snakemake.output, dict(snakemake.params.trial)
     margin = settings.pop("margin")
     quality = build.Quality(**settings)
-    photos = trial.opened(Path(snakemake.input.frame).parent, quality.size)
-    found = trial.run(photos, quality, margin=margin)
+    photos = trial.opened(Path(snakemake.input.frame).parent, quality.size, margin)
+    found = trial.run(photos, quality)
     figures.write_rows(out.curve, found.curve)
     for name, picture in trial.stills(found.made, photos.frame).items():
         images.write(out[name], picture)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import made_up_ground as made
 import numpy as np
 import pytest
@@ -40,7 +42,7 @@ def test_the_sixth_photo_and_every_tenth_after_it_are_for_testing(tmp_path):
 
 def test_a_trial_tells_seconds_steps_and_quality_and_gives_the_field_that_a_fit_gives():
     photos = photo_set(made.photos(5)[4:])
-    found = trial.run(photos, QUALITY, every=5, margin=0.15)
+    found = trial.run(replace(photos, margin=0.15), QUALITY, every=5)
     assert [row["step"] for row in found.curve] == [5, 10, 12]
     assert all(row["seconds"] > 0 and row["psnr"] > 10 for row in found.curve)
     none = np.zeros((0, 3)), np.zeros((0, 3), np.float32)

@@ -68,3 +68,16 @@ def test_pixels_without_weight_and_flat_pictures_give_no_gain():
     np.testing.assert_allclose(b, 0.1, atol=1e-6)
     blind = replace(photo([0.5, 0.5, 0.5]), weight=np.zeros((40, 40), np.float32))
     assert exposure.towards(picture, blind, none) is none
+
+
+def test_the_level_of_the_typical_photo_is_taken_out():
+    rng = np.random.default_rng(2)
+    picture = rng.uniform(0.2, 0.8, (40, 40, 3)).astype(np.float32)
+    levels = exposure.Levels(4)
+    np.testing.assert_array_equal(levels.of(3), (np.ones(3), np.zeros(3)))
+    for index, gain in enumerate([0.9, 1.0, 1.1]):  # of a field that is too dark
+        image = (gain * (picture / 0.95 + 0.02)).astype(np.float32)
+        levels.look(index, picture, replace(photo([0, 0, 0]), image=image))
+    used = np.array([levels.of(i) for i in range(3)])
+    np.testing.assert_allclose(used[1], np.repeat([[1.0], [0.0]], 3, 1), atol=0.01)
+    np.testing.assert_allclose(used[:, 0], np.repeat([[0.9], [1.0], [1.1]], 3, 1), atol=0.02)

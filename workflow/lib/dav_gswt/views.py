@@ -14,12 +14,17 @@ from dav_gswt.files import read_json
 
 @dataclass(frozen=True)
 class View:
-    """A photo and its camera on the same pixel grid. weight: 1 where the photo counts, 0 where it is not fitted."""
+    """A photo and its camera on the same pixel grid.
+
+    weight: 1 where the photo counts, 0 where it is not fitted. behind: the colour behind all that can be modelled, NaN
+    where that is not known; None: nowhere.
+    """
 
     name: str
     camera: Camera
     image: Float32[Array, "h w 3"]
     weight: Float32[Array, "h w"]
+    behind: Float32[Array, "h w 3"] | None = None
 
 
 def of(name: str, camera: Camera, image: Float32[Array, "h w 3"], size: int) -> View:

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from dav_gswt import field as fields
 from dav_gswt import raster
-from dav_gswt.coarse import discs, distractors, ground, things, underlay
+from dav_gswt.coarse import discs, distractors, ground, sky, things, underlay
 from dav_gswt.coarse.doubt import arrays, with_uncertainty
 from dav_gswt.coarse.ground import Ground
 from dav_gswt.coarse.rules import OnGround
@@ -97,7 +97,7 @@ def fit(
     _log.info("things: %d Gaussians over %.1f %% of the ground", len(stand), 100 * scene.relief.stands.mean())
     rules = _rules(grid, scene.relief, stand, frame)
     plan = Plan(quality.steps, quality.cap, quality.degree, pose_rate=quality.pose_rate)
-    masked = modelled(scene.views, grid)
+    masked = sky.behind(scene.views, modelled(scene.views, grid))
     fitted = trainer.fit(start, masked, plan, rules, rng, "fit coarse field", keep, watch)
     return _made(fitted, grid, masked)
 
@@ -144,7 +144,7 @@ def refine(
     sh[: known.size, :1][fresh.ravel()] = fields.sh_of(colour[fresh.ravel()])
     grid = replace(grid, seen=known)
     rules = _rules(grid, scene.relief, there, frame)
-    masked = modelled(scene.views, grid)
+    masked = sky.behind(scene.views, modelled(scene.views, grid))
     return _made(trainer.fit(replace(field, sh=sh), masked, plan, rules, rng, what, keep), grid, masked)
 
 

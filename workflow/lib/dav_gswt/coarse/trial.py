@@ -39,6 +39,7 @@ class PhotoSet:
     model: models.Model
     train: list[View]
     tests: dict[str, list[View]]
+    margin: float = WHOLE
 
 
 @dataclass(frozen=True)
@@ -49,8 +50,12 @@ class Trial:
     curve: list[dict]
 
 
-def opened(folder: Path | str, size: int) -> PhotoSet:
-    """Read a photos/ folder at a size, its test views apart."""
+def opened(folder: Path | str, size: int, margin: float = WHOLE) -> PhotoSet:
+    """Read a photos/ folder at a size, its test views apart.
+
+    margin: see `build.fit`. Of the test views all pixels count where all ground that photos see is modelled (WHOLE);
+    else those that look at the exemplar: at the border of what is modelled relief hides and shows what is not.
+    """
     folder = Path(folder)
     frame, model = read_json(folder / "ground.json"), models.read(folder / "sparse")
     known = {
@@ -60,19 +65,20 @@ def opened(folder: Path | str, size: int) -> PhotoSet:
     groups = frame.get("test_groups") or {"test": frame["test"] or names[FIRST_TEST::EACH]}
     out = {name for group in groups.values() for name in group}
     tests = {group: [known[n] for n in members] for group, members in groups.items()}
-    return PhotoSet(frame, model, [known[n] for n in names if n not in out], tests)
+    if margin < WHOLE:
+        tests = {group: _over_exemplar(views, frame["exemplar"]) for group, views in tests.items()}
+    return PhotoSet(frame, model, [known[n] for n in names if n not in out], tests, margin)
 
 
-def run(photos: PhotoSet, quality: Quality, seed: int = 0, every: int = 25, margin: float = WHOLE) -> Trial:
-    """Fit the training photos, looking at the first group of test views every so many steps.
+def _over_exemplar(views: list[View], square: dict) -> list[View]:
+    west, south, side = square["west"], square["south"], square["side"]
+    seen = [over_ground(v, west, south, west + side, south + side) for v in views]
+    return [v for v in seen if v.weight.any()]
 
-    All of their pixels count where all ground that photos see is modelled (margin WHOLE), else those of the exemplar.
-    """
+
+def run(photos: PhotoSet, quality: Quality, seed: int = 0, every: int = 25) -> Trial:
+    """Fit the training photos, looking at the first group of test views every so many steps."""
     watched, measuring = next(iter(photos.tests.values())), 0.0
-    if margin < WHOLE:  # elsewhere nothing is modelled
-        square = photos.frame["exemplar"]
-        west, south, side = square["west"], square["south"], square["side"]
-        watched = [over_ground(v, west, south, west + side, south + side) for v in watched]
     start = time.perf_counter()
     curve: list[dict] = []
     drawn = raster.Rasterizer()
@@ -88,7 +94,7 @@ def run(photos: PhotoSet, quality: Quality, seed: int = 0, every: int = 25, marg
 
     rng = np.random.default_rng(seed)
     points, colours = photos.model.points, photos.model.colours
-    made = build.fit(photos.frame, photos.train, points, colours, quality, rng, margin=margin, watch=watch)
+    made = build.fit(photos.frame, photos.train, points, colours, quality, rng, margin=photos.margin, watch=watch)
     seconds = time.perf_counter() - start - measuring
     last = quality_of(lambda v: raster.render(made.field, v.camera).colour, watched)
     curve.append({"seconds": seconds, "step": made.report["steps"], "gaussians": len(made.field)} | last)
@@ -124,12 +130,9 @@ def free_space_opacity(field: Field, grid: Ground, photos: PhotoSet) -> float:
 
 
 def away(photos: PhotoSet, made: Made) -> dict[str, float]:
-    """Mean PSNR of each group of test views, over the pixels that look at the modelled ground."""
-    out = {}
-    for group, views in photos.tests.items():
-        seen = [v for v in build.modelled(views, made.grid) if v.weight.any()]
-        out[group] = quality_of(lambda v: raster.render(made.field, v.camera).colour, seen)["psnr"]
-    return out
+    """Mean PSNR of each group of test views, raw."""
+    seen = {g: quality_of(lambda v: raster.render(made.field, v.camera).colour, v) for g, v in photos.tests.items()}
+    return {group: quality["psnr"] for group, quality in seen.items()}
 
 
 def stills(made: Made, frame: dict, width: int = 768, height: int = 512) -> dict[str, Float32[Array, "h w 3"]]:

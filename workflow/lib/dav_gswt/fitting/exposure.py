@@ -66,6 +66,31 @@ def matched(view: View, points: Float[Array, "n 3"], colours: Float[Array, "n 3"
     return replace(view, image=(view.image * a + b).astype(np.float32))
 
 
+class Levels:
+    """Gain and offset of each photo against the picture that the field gave at its last turn.
+
+    What is used of them is anchored: the median over the photos seen so far is taken out, so that the field shows what
+    the typical photo shows. Without this a picture that is not yet sharp, whose gain least squares finds below 1, would
+    make the field's contrast and brightness grow at every step.
+    """
+
+    def __init__(self, views: int):
+        self.gains, self.offsets = np.ones((views, 3), np.float32), np.zeros((views, 3), np.float32)
+        self.known = np.zeros(views, bool)
+
+    def look(self, index: int, picture: Float32[Array, "h w 3"], view: View) -> None:
+        """Learn a photo's level from the picture of its place."""
+        self.gains[index], self.offsets[index] = towards(picture, view, (self.gains[index], self.offsets[index]))
+        self.known[index] = True
+
+    def of(self, index: int) -> tuple[Float32[Array, "3"], Float32[Array, "3"]]:
+        """Gain a and offset b that bring the picture x to the photo: a x + b; 1 and 0 of a photo not looked at."""
+        if not self.known[index]:
+            return np.ones(3, np.float32), np.zeros(3, np.float32)
+        a = self.gains[index] / np.median(self.gains[self.known], 0)
+        return a, self.offsets[index] - a * np.median(self.offsets[self.known], 0)
+
+
 def towards(
     picture: Float32[Array, "h w 3"], view: View, before: tuple[Float32[Array, "3"], Float32[Array, "3"]]
 ) -> tuple[Float32[Array, "3"], Float32[Array, "3"]]:

@@ -55,7 +55,7 @@ class Run:
     search: Search
     report: Report
     rng: np.random.Generator
-    levels: dict[int, tuple[Array, Array]]  # gain and offset of each photo's last turn
+    levels: exposure.Levels
     poses: poses.Poses
     turn: list[int]
     step: int = 0
@@ -116,7 +116,7 @@ def _begun(field: Field, views: list[View], plan: Plan, rng: np.random.Generator
     if plan.degree != "auto" and begun.degree > plan.degree:
         begun.bend_to(plan.degree)
     search = Search.of(plan, len(views), len(field))
-    return Run(begun, search, Report(), rng, {}, poses.Poses(len(views)), [])
+    return Run(begun, search, Report(), rng, exposure.Levels(len(views)), poses.Poses(len(views)), [])
 
 
 def _task(views: list[View], plan: Plan, rules: Rules, rng: np.random.Generator) -> Task:
@@ -128,8 +128,11 @@ def _task(views: list[View], plan: Plan, rules: Rules, rng: np.random.Generator)
 def _half(view: View) -> View:
     """A view at half its size."""
     half = photos.of(view.name, view.camera, view.image, max(view.camera.width, view.camera.height) // 2)
-    weight = images.resized(view.weight[..., None], half.camera.width, half.camera.height)[..., 0]
-    return replace(half, weight=np.ascontiguousarray(weight, np.float32))
+    width, height = half.camera.width, half.camera.height
+    weight = images.resized(view.weight[..., None], width, height)[..., 0]
+    rows, columns = ((np.arange(n) + 0.5) * of // n for n, of in zip((height, width), view.weight.shape, strict=True))
+    behind = None if view.behind is None else view.behind[rows.astype(int)][:, columns.astype(int)]
+    return replace(half, weight=np.ascontiguousarray(weight, np.float32), behind=behind)
 
 
 def _advance(run: Run, task: Task) -> None:
@@ -168,25 +171,36 @@ def _descend(run: Run, task: Task, index: int) -> None:
         view = replace(view, weight=weight)
     camera = run.poses.moved(index, view.camera)
     seen = task.raster.forward(**run.state.values, camera=camera)
-    behind = run.rng.uniform(0, 1, 3).astype(np.float32)
+    behind = _behind(view, run.rng)
     shown, gain = _exposed(run, index, seen, behind, view)
     if task.held is not None and not early:
         task.tally.note(index, shown, view.image, task.views[index].weight * task.held[index])
     _, gradient = raster.loss(shown, view.image, weight, STRUCTURE)
     gradient = np.ascontiguousarray(gradient * gain)
-    gradients = task.raster.backward(gradient, -BACKDROP * (gradient @ behind))
+    gradients = task.raster.backward(gradient, -BACKDROP * np.einsum("hwc,hwc->hw", gradient, behind))
     task.rules.guide(gradients)
     _adam(run, task, gradients)
     if task.plan.pose_rate:
         run.poses.descend(index, gradients.camera, task.plan.pose_rate * run.search.rate(run.step), camera)
 
 
-def _exposed(run: Run, index: int, seen, behind: Float32[Array, "3"], view: View):
+def _behind(view: View, rng: np.random.Generator) -> Float32[Array, "h w 3"]:
+    """A colour drawn for this step, and the sky where the photo shows it."""
+    drawn = rng.uniform(0, 1, 3).astype(np.float32)
+    if view.behind is None:
+        return np.broadcast_to(drawn, view.image.shape)
+    return np.where(np.isnan(view.behind), drawn, view.behind)
+
+
+def _over(seen, behind: Float32[Array, "h w 3"]) -> Float32[Array, "h w 3"]:
+    return seen.colour + (1 - seen.alpha)[..., None] * behind
+
+
+def _exposed(run: Run, index: int, seen, behind: Float32[Array, "h w 3"], view: View):
     """The picture over its background, brought to the photo's exposure, and the gain."""
-    image = seen.colour + (1 - seen.alpha)[..., None] * behind
-    before = run.levels.get(index, (np.ones(3, np.float32), np.zeros(3, np.float32)))
-    a, b = exposure.towards(image, view, before)
-    run.levels[index] = a, b
+    image = _over(seen, behind)
+    run.levels.look(index, image, view)
+    a, b = run.levels.of(index)
     return np.ascontiguousarray(image * a + b), a
 
 
@@ -213,8 +227,8 @@ def _errors(run: Run, task: Task) -> Float32[Array, "n"]:
     for index in map(int, run.rng.choice(len(task.views), count, replace=False)):
         view = task.views[index]
         seen = task.raster.forward(**run.state.values, camera=run.poses.moved(index, view.camera))
-        a, b = run.levels.get(index, (np.float32(1), np.float32(0)))
-        apart = ((seen.colour * a + b - view.image) ** 2).mean(-1) * view.weight
+        a, b = run.levels.of(index)
+        apart = ((_over(seen, _behind(view, run.rng)) * a + b - view.image) ** 2).mean(-1) * view.weight
         total += task.raster.contributions(np.ascontiguousarray(apart[..., None], np.float32)).mapped[:, 0]
     return total
 
@@ -246,7 +260,7 @@ def _ended(run: Run, task: Task, what: str) -> Fitted:
 
 
 def _key(field: Field, views: list[View], plan: Plan, rng: np.random.Generator) -> str:
-    arrays = [a for v in views for a in (v.image, v.weight, v.camera.rotation, v.camera.translation)]
+    arrays = [a for v in views for a in (v.image, v.weight, v.behind, v.camera.rotation, v.camera.translation)]
     numbers = [(v.camera.fx, v.camera.fy, v.camera.cx, v.camera.cy) for v in views]
     return snapshot.key(*vars(field).values(), *arrays, numbers, plan, rng.bit_generator.state)
 
@@ -255,13 +269,16 @@ def _kept(run: Run, task: Task) -> tuple[dict[str, Array], dict]:
     arrays = {f"{part}.{name}": a for part, of in vars(run.state).items() for name, a in of.items()}
     if run.before_trial is not None:
         arrays |= {f"trial.{part}.{k}": a for part, of in vars(run.before_trial).items() for k, a in of.items()}
-    for index, (a, b) in run.levels.items():
-        arrays[f"level.{index}"] = np.stack([a, b])
-    arrays |= {f"pose.{name}": a for name, a in vars(run.poses).items()}
-    arrays |= {f"tally.{name}": a for name, a in vars(task.tally).items()}
+    for prefix, part in _parts(run, task).items():
+        arrays |= {prefix + name: a for name, a in vars(part).items()}
     search = {k: v for k, v in vars(run.search).items() if k != "plan"}
     rest = {"search": search, "report": asdict(run.report), "rng": run.rng.bit_generator.state}
     return arrays, rest | {"turn": run.turn, "step": run.step}
+
+
+def _parts(run: Run, task: Task) -> dict:
+    """What is kept as it is, by the prefix of its names in a snapshot."""
+    return {"level.": run.levels, "pose.": run.poses, "tally.": task.tally}
 
 
 def _resume(run: Run, task: Task, arrays: dict[str, Array], rest: dict) -> None:
@@ -271,8 +288,7 @@ def _resume(run: Run, task: Task, arrays: dict[str, Array], rest: dict) -> None:
 
     run.state = state_of("")
     run.before_trial = state_of("trial.") if "trial.values.means" in arrays else None
-    run.levels = {int(k.split(".")[1]): tuple(v) for k, v in arrays.items() if k.startswith("level.")}
-    for part, prefix in ((run.poses, "pose."), (task.tally, "tally.")):
+    for prefix, part in _parts(run, task).items():
         for name in vars(part):
             setattr(part, name, arrays[prefix + name])
     run.search = replace(run.search, **rest["search"])
