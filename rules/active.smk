@@ -83,7 +83,7 @@ rule select_poses:
 
 
 rule capture_views:
-    """Have the scene's agent take the photos."""
+    """Have the scene's agent take the photos: at once, where the scene can be rendered or replayed."""
     input:
         poses="<results>/<round>/poses.json",
         views="<results>/<start>/views.json",
@@ -98,6 +98,7 @@ rule capture_views:
     benchmark:
         "<benchmarks>/<round>/capture_views.tsv"
     wildcard_constraints:
+        scene=scenes_by("render", "replay"),
         t=POSITIVE,
     threads: 2
     resources:
@@ -105,9 +106,32 @@ rule capture_views:
         runtime="30m",
     params:
         scene=entry("scenes", "scene"),
-        source=source_of("active/agents", "active/candidates", "active/capture", "photos"),
+        source=source_of("active/agents", "active/candidates", "photos"),
     script:
         "../scripts/capture_views.py"
+
+
+use rule capture_views as ask_for_views with:
+    input:
+        field=lambda wildcards: before_round(wildcards)["field"],
+        poses="<results>/<round>/poses.json",
+        views="<results>/<start>/views.json",
+        captures=captures_before,
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        lenses="<results>/<photos>/lenses.json",
+        frame="<results>/<photos>/ground.json",
+    log:
+        "<logs>/<round>/ask_for_views.log",
+    benchmark:
+        "<benchmarks>/<round>/ask_for_views.tsv"
+    wildcard_constraints:
+        scene=scenes_by("serial", "plan", "handheld"),
+        t=POSITIVE,
+
+
+localrules:
+    ask_for_views,  # the device, or the folder that people drop photos into, is here
 
 
 rule update_field:

@@ -83,6 +83,11 @@ def scenes_of(kind):
     return "|".join(n for n, s in config["scenes"].items() if s["kind"] == kind) or NEVER
 
 
+def scenes_by(*agents):
+    """A constraint: the names of the config's scenes that these agents photograph."""
+    return "|".join(n for n, s in config["scenes"].items() if s.get("agent") in agents) or NEVER
+
+
 def values_of(scene):
     """The wildcards of what is made of a scene at the config's parameters."""
     given = config["scenes"][scene]["kind"] == "field"
@@ -126,6 +131,15 @@ def folder_of(scene):
     if not folder.is_dir():
         raise WorkflowError(f"config: scenes.{scene}.folder: there is no folder {folder}")
     return sorted(str(p) for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
+
+
+def beside_photos(wildcards):
+    """What a scene's entry names beside its photos: masks, a model of another program."""
+    given = {key: config["scenes"][wildcards.scene].get(key) for key in ("masks", "model")}
+    for key, path in given.items():
+        if path and not Path(path).exists():
+            raise WorkflowError(f"config: scenes.{wildcards.scene}.{key}: there is no {path}")
+    return {key: path for key, path in given.items() if path}
 
 
 def file_of(scene):

@@ -5,13 +5,18 @@ and per seed views.json: which photos start, which may be asked for, which only 
 """
 
 
+REGISTERING = "build exif features focal folder gps ground imported lenses masks model pairs sfm".split()
+
+
 rule register_photos:
     """Structure from motion over a folder of photos; undistorted images and the ground frame."""
     input:
         lambda wildcards: folder_of(wildcards.scene),
+        unpack(beside_photos),
     output:
         images=directory("<results>/<photos>/images"),
         model=directory("<results>/<photos>/sparse"),
+        lenses="<results>/<photos>/lenses.json",
         frame="<results>/<photos>/ground.json",
     log:
         "<logs>/<photos>/register_photos.log",
@@ -25,9 +30,7 @@ rule register_photos:
         runtime="60m",
     params:
         scene=entry("scenes", "scene"),
-        source=source_of(
-            "photos/build", "photos/exif", "photos/folder", "photos/ground", "photos/model", "photos/sfm", "images"
-        ),
+        source=source_of(*(f"photos/{name}" for name in REGISTERING)),
     script:
         "../scripts/register_photos.py"
 

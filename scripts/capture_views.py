@@ -3,17 +3,16 @@
 from pathlib import Path
 
 from dav_gswt.active import agents
+from dav_gswt.active.agents.site import Site
+from dav_gswt.active.agents.store import Store
 from dav_gswt.files import read_json
 from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):
-    given = snakemake.input
-    agents.capture(
-        snakemake.params.scene,
-        read_json(given.frame),
-        read_json(given.views),
-        Path(given.images).parent,
-        list(given.captures) if not isinstance(given.captures, str) else [given.captures],
-        read_json(given.poses)["poses"],
-        Path(snakemake.output.capture),
-    )
+    given, name = snakemake.input, snakemake.wildcards.scene
+    store = Store(Path("captures") / name)
+    photos = Path(given.images).parent
+    site = Site(name, snakemake.params.scene, read_json(given.frame), photos, store, given.get("field"))
+    before = [given.captures] if isinstance(given.captures, str) else list(given.captures)
+    chosen = read_json(given.poses)["poses"]
+    agents.capture(site, read_json(given.views), before, chosen, Path(snakemake.output.capture))

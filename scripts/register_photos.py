@@ -7,5 +7,6 @@ from dav_gswt.photos import build, sfm
 
 with logging_to(snakemake.log[0]):
     scene = snakemake.params.scene
-    options = sfm.Options(size=min(1024, scene["size"]), side=scene["size"], threads=snakemake.threads)
-    build.from_photos(scene["folder"], Path(snakemake.output.frame).parent, options)
+    options = sfm.options_of(scene, snakemake.threads)
+    out = Path(snakemake.output.frame).parent
+    build.from_photos(scene["folder"], out, options, scene.get("model"), scene.get("masks"))

@@ -53,6 +53,11 @@ def read(path: Path | str) -> Float32[Array, "h w 3"]:
     Any bit depth; grey becomes three equal channels; alpha is left out and the colours stay as they are stored.
     Raises: InputError: missing, not an image, cut short (a decoder's warning is enough), or too large.
     """
+    return read_covered(path)[0]
+
+
+def read_covered(path: Path | str) -> tuple[Float32[Array, "h w 3"], Float32[Array, "h w"]]:
+    """A photo as `read` gives it, and its alpha: 0 where it is masked. Without alpha all counts."""
     file, spec = _opened(path)
     try:
         # one channel too many is read where there is alpha: reading a part of the channels is slower in many formats
@@ -63,16 +68,23 @@ def read(path: Path | str) -> Float32[Array, "h w 3"]:
     if pixels is None or trouble:
         raise InputError(f"{path}: damaged or cut short ({_first_line(trouble)}); copy it again or remove it")
     pixels = np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
+    alpha = pixels[..., spec.alpha_channel] if 0 <= spec.alpha_channel < pixels.shape[2] else None
     pixels = pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
+    alpha = np.ones(pixels.shape[:2], np.float32) if alpha is None else alpha
     if not np.isfinite(pixels).all():
         raise InputError(f"{path}: has pixels that are not finite; export it as 8 or 16 bit")
-    return np.ascontiguousarray(_upright(np.clip(pixels, 0, 1), _orientation(spec)))
+    upright = (_upright(np.clip(part, 0, 1), _orientation(spec)) for part in (pixels, alpha))
+    return tuple(map(np.ascontiguousarray, upright))
 
 
-def write(path: Path | str, image: Float[Array, "h w 3"]) -> None:
-    """Write a PNG of 8 bits a channel; values are clipped to [0, 1]. It appears whole or not at all."""
+def write(path: Path | str, image: Float[Array, "h w c"]) -> None:
+    """Write a PNG of 8 bits a channel; values are clipped to [0, 1]. It appears whole or not at all.
+
+    A fourth channel is alpha; the colours stay as they are under it.
+    """
     pixels = np.ascontiguousarray(np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8))
-    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, oiio.UINT8)
+    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], oiio.UINT8)
+    spec["oiio:UnassociatedAlpha"] = 1
     spec["oiio:ColorSpace"] = "srgb_rec709_scene"
     spec["compression"] = "zip:4"
     with whole(path) as part:
@@ -178,7 +190,7 @@ def _orientation(spec) -> int:
 def _upright(pixels: Array, orientation: int) -> Array:
     """Undo EXIF orientation: 5 to 8 are transposed, then rows and columns are mirrored as the number says."""
     if orientation >= 5:
-        pixels = pixels.transpose(1, 0, 2)
+        pixels = pixels.swapaxes(0, 1)
     if orientation in (3, 4, 7, 8):
         pixels = pixels[::-1]
     if orientation in (2, 3, 6, 7):

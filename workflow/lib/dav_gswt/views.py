@@ -11,6 +11,8 @@ from dav_gswt import cameras, images
 from dav_gswt.cameras import Camera
 from dav_gswt.files import read_json
 
+WHOLE = 0.99  # of a shrunk pixel that must not be masked for it to count
+
 
 @dataclass(frozen=True)
 class View:
@@ -27,20 +29,34 @@ class View:
     behind: Float32[Array, "h w 3"] | None = None
 
 
-def of(name: str, camera: Camera, image: Float32[Array, "h w 3"], size: int) -> View:
-    """A view at most `size` pixels wide or high; photos are never enlarged."""
+def of(
+    name: str,
+    camera: Camera,
+    image: Float32[Array, "h w 3"],
+    size: int,
+    cover: Float32[Array, "h w"] | None = None,
+) -> View:
+    """A view at most `size` pixels wide or high; photos are never enlarged. cover: 0 where the photo is masked."""
     share = min(1.0, size / max(camera.width, camera.height))
     width, height = max(1, round(camera.width * share)), max(1, round(camera.height * share))
     if (width, height) != (camera.width, camera.height):
         image, camera = images.resized(image, width, height), camera.resized(width, height)
-    return View(name, camera, image, np.ones(image.shape[:2], np.float32))
+        cover = cover if cover is None else images.resized(cover[..., None], width, height)[..., 0]
+    weight = np.ones(image.shape[:2]) if cover is None else cover > WHOLE
+    return View(name, camera, image, weight.astype(np.float32))
+
+
+def read(name: str, camera: Camera, path: Path | str, size: int) -> View:
+    """The view of a picture file; what its alpha masks does not count."""
+    image, cover = images.read_covered(path)
+    return of(name, camera, image, size, cover)
 
 
 def captured(folder: Path | str, size: int) -> list[View]:
     """The photos that one round's capture/ folder holds, in the order they were taken."""
     folder = Path(folder)
     shots = read_json(folder / "capture.json")["shots"]
-    return [of(s["name"], cameras.from_json(s["got"]), images.read(folder / s["name"]), size) for s in shots]
+    return [read(s["name"], cameras.from_json(s["got"]), folder / s["name"], size) for s in shots]
 
 
 def over_ground(view: View, west: float, south: float, east: float, north: float) -> View:
@@ -59,5 +75,5 @@ def taken(images_folder: Path | str, model: Path | str, names: list[str], captur
 
     known = models.read(model)
     at = {name: camera for name, camera in zip(known.names, known.cameras, strict=True)}
-    start = [of(name, at[name], images.read(Path(images_folder) / name), size) for name in names]
+    start = [read(name, at[name], Path(images_folder) / name, size) for name in names]
     return start + [view for folder in captures for view in captured(folder, size)]

@@ -1,5 +1,6 @@
 """The pool: where a photo could still be taken: on a hemisphere if a scene can be rendered, else at its frames."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,19 +11,24 @@ from dav_gswt import cameras
 from dav_gswt.active.poses import Pose, middle, of_camera
 from dav_gswt.cameras import Camera
 from dav_gswt.files import read_json
-from dav_gswt.photos import model, synthetic
+from dav_gswt.photos import model, rigs, synthetic
 
 Candidates = list[tuple[Pose, Camera]]
+
+AROUND, LOWEST = 250, 30.0  # poses that devices and people may be asked for, and their least elevation in degrees
 
 
 def left(scene: dict, frame: dict, model_folder: Path | str, split: dict, captures: list) -> Candidates:
     """Every pose that can still be captured: the scene's candidates less those that captures have used."""
-    if scene["agent"] == "replay":
+    if scene["agent"] == "render":
+        pool = hemisphere(scene, frame)
+    else:
         known = model.read(model_folder)
         at = dict(zip(known.names, known.cameras, strict=True))
-        pool = [(of_camera(name, at[name], frame), at[name]) for name in split["pool"]]
-    else:
-        pool = hemisphere(scene, frame)
+        if scene["agent"] == "replay":
+            pool = [(of_camera(name, at[name], frame), at[name]) for name in split["pool"]]
+        else:
+            pool = around(scene, frame, at[split["start"][0]])
     used = {name for folder in captures for name in _names(folder)}
     return [(pose, camera) for pose, camera in pool if pose.name not in used]
 
@@ -31,6 +37,15 @@ def hemisphere(scene: dict, frame: dict) -> Candidates:
     """Poses spread evenly over the hemisphere from which a synthetic scene can be photographed."""
     found = synthetic.candidates(scene, middle(frame))
     return [(of_camera(f"pose_{i:04d}", camera, frame), camera) for i, camera in enumerate(found)]
+
+
+def around(scene: dict, frame: dict, like: Camera) -> Candidates:
+    """Poses spread evenly over the hemisphere at the flying height, for devices and people. like: a camera whose lens
+    they have. `lowest`: the least elevation, degrees."""
+    places = rigs.hemisphere(scene.get("candidates", AROUND), scene.get("lowest", LOWEST), frame["flying_height"])
+    found = [rigs.orbit(*place, middle(frame), like.width, like.height, 60.0) for place in places]
+    lens = {name: getattr(like, name) for name in ("fx", "fy", "cx", "cy")}
+    return [(of_camera(f"pose_{i:04d}", camera, frame), replace(camera, **lens)) for i, camera in enumerate(found)]
 
 
 def places_taken(frame: dict, model_folder: Path | str, split: dict, captures: list) -> Float[Array, "m 3"]:

@@ -14,14 +14,14 @@ from jaxtyping import Float32
 from numpy import ndarray as Array
 from scipy.spatial import cKDTree
 
-from dav_gswt import cameras, images, metrics, raster
+from dav_gswt import cameras, metrics, raster
 from dav_gswt.coarse import build
 from dav_gswt.coarse.build import Made, Quality
 from dav_gswt.coarse.ground import Ground
 from dav_gswt.field import Field
 from dav_gswt.files import read_json
 from dav_gswt.photos import model as models
-from dav_gswt.views import View, of, over_ground
+from dav_gswt.views import View, over_ground, read
 
 FIRST_TEST, EACH = 5, 10
 FREE = 0.1  # flying heights above the ground from which space is free
@@ -58,9 +58,7 @@ def opened(folder: Path | str, size: int, margin: float = WHOLE) -> PhotoSet:
     """
     folder = Path(folder)
     frame, model = read_json(folder / "ground.json"), models.read(folder / "sparse")
-    known = {
-        n: of(n, c, images.read(folder / "images" / n), size) for n, c in zip(model.names, model.cameras, strict=True)
-    }
+    known = {n: read(n, c, folder / "images" / n, size) for n, c in zip(model.names, model.cameras, strict=True)}
     names = sorted(known)
     groups = frame.get("test_groups") or {"test": frame["test"] or names[FIRST_TEST::EACH]}
     out = {name for group in groups.values() for name in group}

@@ -1,6 +1,7 @@
-"""The focal length that a photo's EXIF claims, in pixels of the picture as it is."""
+"""What a photo's EXIF claims: focal length in pixels of the picture as it is, position, and time."""
 
 import struct
+from datetime import datetime
 from pathlib import Path
 
 import OpenImageIO as oiio
@@ -39,6 +40,33 @@ def focal_length(path: Path | str) -> float | None:
         return None
     # Beyond these the tag is a default or garbage: from a fisheye's 150 degrees to a long telescope.
     return pixels if 0.13 * width < pixels < 100 * width else None
+
+
+def position(path: Path | str) -> tuple[float, float, float] | None:
+    """Latitude and longitude in degrees and altitude in metres, or None where EXIF does not have all three."""
+    spec = oiio.ImageInput.open(str(path)).spec()
+    angles = []
+    for name, negative, most in (("Latitude", "S", 90.0), ("Longitude", "W", 180.0)):
+        parts = spec.getattribute(f"GPS:{name}")
+        if not isinstance(parts, tuple) or len(parts) != 3 or not all(isinstance(p, int | float) for p in parts):
+            return None
+        angle = float(parts[0] + parts[1] / 60 + parts[2] / 3600)
+        if not 0 <= angle <= most:
+            return None
+        angles.append(-angle if spec.getattribute(f"GPS:{name}Ref") == negative else angle)
+    altitude = spec.getattribute("GPS:Altitude")
+    if not isinstance(altitude, int | float) or not abs(altitude) < 1e5 or angles == [0.0, 0.0]:
+        return None
+    return angles[0], angles[1], -float(altitude) if spec.getattribute("GPS:AltitudeRef") == 1 else float(altitude)
+
+
+def taken(path: Path | str) -> str | None:
+    """When the photo was taken, ISO 8601 without a time zone, or None where EXIF does not say."""
+    text = oiio.ImageInput.open(str(path)).spec().getattribute("Exif:DateTimeOriginal")
+    try:
+        return datetime.strptime(str(text), "%Y:%m:%d %H:%M:%S").isoformat()
+    except ValueError:
+        return None
 
 
 def _number(value) -> float:

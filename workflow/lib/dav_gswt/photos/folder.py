@@ -1,23 +1,41 @@
 """The photos/ folder: pictures, sparse model and ground.json, there whole or not at all."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from jaxtyping import Float
+import numpy as np
+from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt import images
 from dav_gswt.files import whole_folder, write_json
+from dav_gswt.photos import lenses
 from dav_gswt.photos import model as models
+from dav_gswt.photos.lenses import Lens
 from dav_gswt.photos.model import Model
 
 
-def write(path: Path | str, model: Model, pictures: Iterable[tuple[str, Float[Array, "h w 3"]]], facts: dict) -> None:
-    """Write images/, sparse/ and ground.json into the folder `path`, which is replaced. pictures: by file name."""
+def write(
+    path: Path | str,
+    model: Model,
+    pictures: Iterable[tuple[str, Float[Array, "h w 3"]]],
+    facts: dict,
+    kinds: list[Lens] | None = None,
+    covers: Mapping[str, Float32[Array, "h w"]] | None = None,
+) -> None:
+    """Write images/, sparse/, lenses.json and ground.json into the folder `path`, which is replaced.
+
+    pictures: by file name. kinds: the lenses that they came through. covers: masks by the pictures' names, 0 where one
+    does not count: they become the pictures' alpha, and go with them wherever they go.
+    """
+    covers = covers or {}
     with whole_folder(path) as part:
         (part / "images").mkdir()
         for name, image in pictures:
-            images.write(part / "images" / name, image)
+            cover = covers.get(name)
+            images.write(part / "images" / name, image if cover is None else np.dstack([image, cover]))
         (part / "sparse").mkdir()
         models.write(model, part / "sparse")
+        if kinds:
+            lenses.write(part, kinds)
         write_json(part / "ground.json", facts)

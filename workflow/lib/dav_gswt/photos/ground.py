@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from dav_gswt.cameras import Camera
 from dav_gswt.errors import InputError
 from dav_gswt.photos import model as models
+from dav_gswt.photos.gps import Positions
 from dav_gswt.photos.model import Model
 
 _log = logging.getLogger(__name__)
@@ -34,17 +35,18 @@ class Coverage:
     counts: Int[Array, "rows columns"]
 
 
-def frame(model: Model, rng: np.random.Generator) -> tuple[Model, dict]:
+def frame(model: Model, rng: np.random.Generator, positions: Positions | None = None) -> tuple[Model, dict]:
     """The model in its ground frame, and what ground.json says about the ground.
 
     z points from the robust plane through all points to the cameras' side; the unit of length is the flying height, the
-    median height of the cameras; x and y run so that the well-seen square is as large as can be; the origin lies in the
-    middle of the ground that is seen well. Ground counts as seen well where at least 3 photos see it (2 of a set below
-    9) and structure from motion found a point within NEAR.
+    median height of the cameras, or the metre where the model is in metres about GPS `positions`. x and y run so that
+    the well-seen square is as large as can be; the origin lies in the middle of the ground that is seen well. Ground
+    counts as seen well where at least 3 photos see it (2 of a set below 9) and structure from motion found a point
+    within NEAR.
     The frame comes from all photos of the set: it says where the scene is, as a vehicle's own positioning would.
     Raises: InputError: cameras on both sides of the plane or on it, or no square of ground seen well enough.
     """
-    flat, relief = _levelled(model, rng)
+    flat, relief, height = _levelled(model, rng)
     need = 3 if len(flat.names) >= 9 else 2
     turns = np.arange(0.0, 90.0, TURN)
     flat = _turned(flat, turns[np.argmax([_square(_turned(flat, turn), need, COARSE_CELLS)[2] for turn in turns])])
@@ -56,16 +58,35 @@ def frame(model: Model, rng: np.random.Generator) -> tuple[Model, dict]:
     middle = np.array([grid.west, grid.south]) + grid.cell * (np.array([columns.mean(), rows.mean()]) + 0.5)
     flat = models.similar(flat, 1.0, np.eye(3), np.array([-middle[0], -middle[1], 0.0]))
     west, south, side = _square(flat, need)
+    unit = height if positions else 1.0  # of the world, in flying heights; below, lengths are brought to it
+    extent = _extent(coverage(flat.cameras, flat.points))
+    flat = models.similar(flat, unit, np.eye(3), np.zeros(3))
     facts = {
-        "unit": "flying height",
-        "flying_height": 1.0,
-        "exemplar": {"west": west, "south": south, "side": side},
-        "extent": _extent(coverage(flat.cameras, flat.points)),
+        "unit": "metre" if positions else "flying height",
+        "flying_height": unit,
+        "exemplar": {"west": unit * west, "south": unit * south, "side": unit * side},
+        "extent": {name: unit * value for name, value in extent.items()},
         "photos_per_cell": need,
         "relief": relief,
     }
     _log.info("well-seen square of ground: %.2f flying heights wide; relief %.3f", side, relief)
-    return flat, facts
+    return flat, facts | ({"georeference": _georeference(model, flat, positions)} if positions else {})
+
+
+def _georeference(east_north_up: Model, flat: Model, positions: Positions) -> dict[str, float]:
+    """Where the world's origin lies and how its +y is turned: from the move of one model to the other."""
+    old, new = east_north_up.cameras[0], flat.cameras[0]
+    turn = new.rotation.T @ old.rotation  # from east, north, up to the world; both in metres
+    place = positions.about.to_earth((old.centre - turn.T @ new.centre)[None])[0]
+    north = turn.T @ [0.0, 1.0, 0.0]
+    return {
+        "latitude": float(place[0]),
+        "longitude": float(place[1]),
+        "altitude": float(place[2]),
+        "north": float(np.degrees(np.arctan2(north[0], north[1])) % 360),  # of +y, clockwise from true north
+        "slope": float(np.degrees(np.arccos(np.clip(turn[2, 2], -1, 1)))),  # of the plane z = 0
+        "metres_per_unit": 1.0,
+    }
 
 
 def plane(
@@ -167,8 +188,9 @@ def largest_square(mask: Bool[Array, "rows columns"]) -> tuple[int, int, int]:
     return int(row), int(column), side
 
 
-def _levelled(model: Model, rng: np.random.Generator) -> tuple[Model, float]:
-    """The model with z up from its plane and the flying height as unit; and the points' spread about the plane."""
+def _levelled(model: Model, rng: np.random.Generator) -> tuple[Model, float, float]:
+    """The model with z up from its plane and the flying height as unit; the points' spread about the plane in it; and
+    the flying height in units of before."""
     normal, offset, spread = plane(model.points, rng)
     heights = np.array([camera.centre @ normal for camera in model.cameras]) - offset
     if np.median(heights) < 0:
@@ -183,7 +205,8 @@ def _levelled(model: Model, rng: np.random.Generator) -> tuple[Model, float]:
     first, mean = model.cameras[0].rotation, np.mean([camera.rotation[0] for camera in model.cameras], axis=0)
     east = next(v for v in (mean, first[0], first[1]) if np.linalg.norm(np.cross(v, normal)) > 0.3)
     turn = upright(normal, east)
-    return models.similar(model, 1 / height, turn, np.array([0.0, 0.0, -offset / height])), spread / height
+    level = models.similar(model, 1 / height, turn, np.array([0.0, 0.0, -offset / height]))
+    return level, spread / height, height
 
 
 def _turned(model: Model, degrees: float) -> Model:

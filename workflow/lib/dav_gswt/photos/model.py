@@ -42,6 +42,33 @@ class Model:
         return self.cameras[self.names.index(name)]
 
 
+def adjust(stored: pycolmap.Reconstruction, refine_focal_length: bool) -> None:
+    """Bundle adjustment in one thread, in place; the world's frame is held by two cameras."""
+    options, config = _adjustment(stored, refine_focal_length, lenses=True)
+    config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
+    pycolmap.create_default_bundle_adjuster(options, config, stored).solve()
+
+
+def adjust_with_priors(stored: pycolmap.Reconstruction, priors: list[pycolmap.PosePrior]) -> None:
+    """Bundle adjustment with positions of cameras, their outliers held back, in one thread, in place; lenses stay."""
+    options, config = _adjustment(stored, refine_focal_length=False, lenses=False)
+    robust = pycolmap.PosePriorBundleAdjustmentOptions()
+    robust.ceres.prior_position_loss_function_type = pycolmap.LossFunctionType.CAUCHY
+    robust.alignment_ransac.random_seed = 0
+    pycolmap.create_pose_prior_bundle_adjuster(options, robust, config, priors, stored).solve()
+
+
+def _adjustment(stored: pycolmap.Reconstruction, refine_focal_length: bool, lenses: bool):
+    options = pycolmap.BundleAdjustmentOptions(
+        refine_focal_length=refine_focal_length, refine_extra_params=lenses, print_summary=False
+    )
+    options.ceres.solver_options.num_threads = 1
+    config = pycolmap.BundleAdjustmentConfig()
+    for number in stored.reg_image_ids():
+        config.add_image(number)
+    return options, config
+
+
 def similar(model: Model, scale: float, rotation: Float[Array, "3 3"], shift: Float[Array, "3"]) -> Model:
     """The model in another world frame: p becomes scale * rotation @ p + shift; the pictures stay as they are."""
 
@@ -102,6 +129,11 @@ def triangulated(model: Model, names: Sequence[str], at_least: int = 2) -> Model
     good = spread >= 1 - np.cos(np.radians(LEAST_ANGLE))
     np.logical_and.at(good, part.point_of, errors(part) <= WORST_ERROR)
     return _with_points(part, good)
+
+
+def parallax(model: Model) -> Float[Array, "n"]:
+    """1 - cos of the angle under which each point is seen: see `_crossings`."""
+    return _crossings(model)[1]
 
 
 def _crossings(model: Model) -> tuple[Float[Array, "n 3"], Float[Array, "n"]]:

@@ -1,17 +1,13 @@
 """Structure from motion: a folder of overlapping photos becomes cameras, sparse points and undistorted pictures.
 
-pycolmap does it on the CPU: SIFT features, every photo matched with every other, incremental mapping. Features and
-matches may use several threads, since each photo and each pair stands alone and its random numbers start from the seed;
-mapping uses one. So a run repeats to the bit.
+pycolmap does it on the CPU: SIFT features, matches of photos that look alike, incremental or global mapping. Features
+and matches may use several threads, since each photo and each pair stands alone and its random numbers start from the
+seed; mapping uses one. So a run repeats to the bit.
 """
 
 import logging
-import subprocess
-import sys
 import tempfile
 from collections import Counter, defaultdict
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,51 +16,77 @@ import numpy as np
 import pycolmap
 from jaxtyping import Float32
 from numpy import ndarray as Array
-from scipy.ndimage import map_coordinates
 
 from dav_gswt import images
 from dav_gswt.errors import InputError
 from dav_gswt.logs import progress
-from dav_gswt.photos import exif, model
+from dav_gswt.photos import exif, features, focal, gps, lenses, model
+from dav_gswt.photos.focal import Focal
+from dav_gswt.photos.gps import Positions
 from dav_gswt.photos.model import Model
 
 _log = logging.getLogger(__name__)
 
 LEAST_PHOTOS = 3
-LOOK = 4.0  # seconds between two looks at how far a long step is
 GUESS = 1.2  # focal length in longer sides, where EXIF has none; then it is refined
+PRESETS = {
+    "quick": {"features": 4096, "neighbours": 12},
+    "careful": {"features": 8192, "neighbours": 40, "size": 2048},
+}
 
 
 @dataclass(frozen=True)
 class Options:
     """How structure from motion is run.
 
-    size: longer side at which features are looked for, pixels. features: most of them in a photo. side: longer side of
-    the undistorted pictures, pixels (photos are never enlarged). threads: for features and matches; changes no result.
+    size: longer side at which features are looked for, pixels. features: most of them in a photo. neighbours: photos
+    that each is matched with, 0 for all. mapper: incremental (one photo after the other) or global (all at once).
+    cameras: auto (one for all photos of equal size and EXIF focal length), one (for all of equal size), or each (photo
+    its own). focal: 35 mm equivalent where EXIF has none or is wrong. side: longer side of the undistorted pictures,
+    pixels (photos are never enlarged). threads: for features and matches; changes no result.
     """
 
     size: int = 1024
     features: int = 4096
+    neighbours: int = 12
+    mapper: str = "incremental"
+    cameras: str = "auto"
+    focal: float | None = None
     side: int = 1024
     threads: int = 1
     seed: int = 0
 
 
+def options_of(scene: dict, threads: int) -> Options:
+    """The options that a scene's entry of the config asks for."""
+    given = {"size": 1024} | PRESETS[scene.get("sfm", "quick")]
+    given |= {key: scene[key] for key in ("mapper", "cameras", "focal") if key in scene}
+    given["size"] = min(given["size"], max(1024, scene["size"]))
+    return Options(**given, side=scene["size"], threads=threads)
+
+
 @dataclass(frozen=True)
 class Registered:
-    """Photos that found their place. model: of the undistorted pictures, in an arbitrary world frame.
+    """Photos that found their place. model: of the undistorted pictures, in an arbitrary world frame; in metres east,
+    north and up of `positions` where the photos have any.
 
     sources, lenses: of each of the model's images the photo and its distorted camera at the size of the picture.
-    left_out: names and reasons. focal_ratio: final focal length over EXIF's, median; None where EXIF has none.
-    error: mean reprojection error at the size at which features were looked for, pixels.
+    left_out: names and reasons. focal: how the focal length was settled; None where the model was given. error: mean
+    reprojection error at the size at which features were looked for, pixels.
     """
 
     model: Model
     sources: tuple[Path, ...]
     lenses: tuple[pycolmap.Camera, ...]
     left_out: tuple[tuple[str, str], ...]
-    focal_ratio: float | None
+    focal: Focal | None
     error: float
+    positions: Positions | None = None
+
+    @property
+    def focal_ratio(self) -> float | None:
+        """Final focal length over EXIF's; None where EXIF has none."""
+        return self.focal.ratio if self.focal else None
 
 
 @dataclass(frozen=True)
@@ -79,22 +101,24 @@ class _Photo:
 def register(folder: Path | str, options: Options) -> Registered:
     """Register the photos that lie in a folder.
 
-    One camera with one radial distortion term for all photos of equal size and EXIF focal length. Where EXIF has a
-    focal length it is held: seen from straight above, flat ground hardly fixes it. Else it is refined.
-    Raises: InputError: no folder or no photos, fewer than three, one that cannot be read, or they do not overlap.
+    One radial distortion term a camera. Where EXIF has a focal length it is held, unless the photos fix it (see
+    `focal`). GPS positions give metres and north, where the photos have them and agree (see `gps`).
+    Raises: InputError: no folder or no photos, fewer than three, one that cannot be read, they do not overlap, or a
+    solution that is degenerate, with the reason.
     """
     paths = images.listed(folder)
     if len(paths) < LEAST_PHOTOS:
         names = " and ".join(p.name for p in paths)
         raise InputError(f"{folder}: only {names}; at least {LEAST_PHOTOS} overlapping photos are needed, better 20")
+    positions = gps.of_photos(paths)
     with tempfile.TemporaryDirectory(prefix="sfm-") as scratch:
         database = Path(scratch) / "database.db"
-        photos = [_described(p, key, options.size) for p, key in zip(paths, _keys(paths), strict=True)]
+        photos = [_described(p, key, options) for p, key in zip(paths, _keys(paths), strict=True)]
         _shrink(photos, Path(scratch))
         with closing(pycolmap.Database.open(database)) as store:
-            held = _enter(photos, store)
-        _find_features(len(photos), Path(scratch), database, options)
-        _match(len(photos), database, options)
+            held = _enter(photos, store, options)
+        features.find(len(photos), Path(scratch), database, options.size, options.features, options.threads)
+        features.match(len(photos), database, options.neighbours, options.threads, options.seed)
         found = _map(len(photos), held, database, Path(scratch), options)
         best = max(found.values(), key=lambda r: (r.num_reg_images(), r.num_points3D()), default=None)
         left_out = _left_out(photos, best, database)
@@ -106,21 +130,23 @@ def register(folder: Path | str, options: Options) -> Registered:
         )
     for name, reason in left_out:
         _log.warning("%s is left out: %s", name, reason)
-    return _undistortable(photos, best, left_out, options)
+    settled = focal.decided(best, held, np.random.default_rng(options.seed))
+    _log.info("focal length: %s", settled.decision)
+    if positions and not gps.enter(best, {p.key: at for p, at in zip(photos, positions.at, strict=True)}):
+        positions = None
+    made = _undistortable(photos, best, left_out, settled, options, positions)
+    focal.refuse_one_spot(model.parallax(made.model))
+    return made
 
 
 def undistorted(registered: Registered, index: int) -> Float32[Array, "h w 3"]:
     """The picture of the model's image `index`: the photo as a pinhole camera would have taken it.
 
-    The photo is shrunk by area means to the picture's resolution, then sampled by cubic splines, each channel alone.
+    The photo is shrunk by area means to the picture's resolution, then sampled (`lenses.undistorted`).
     """
     lens, camera = registered.lenses[index], registered.model.cameras[index]
     photo = images.resized(images.read(registered.sources[index]), lens.width, lens.height)
-    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    rays = np.stack([(x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, np.ones_like(x)], -1).reshape(-1, 3)
-    column, row = (lens.img_from_cam(rays) - 0.5).T.reshape(2, camera.height, camera.width)
-    planes = [map_coordinates(photo[..., c], [row, column], order=3, mode="nearest") for c in range(3)]
-    return np.clip(np.stack(planes, -1), 0, 1).astype(np.float32)
+    return lenses.undistorted(photo, lens, camera)
 
 
 def _keys(paths: list[Path]) -> list[str]:
@@ -134,18 +160,22 @@ def _fit(width: int, height: int, longest: int) -> tuple[int, int]:
     return max(1, round(width * share)), max(1, round(height * share))
 
 
-def _described(path: Path, key: str, longest: int) -> _Photo:
+def _described(path: Path, key: str, options: Options) -> _Photo:
     full = images.size(path)
-    width, height = _fit(*full, longest)
-    focal = exif.focal_length(path)
-    return _Photo(path, key, width, height, focal and focal * width / full[0])
+    width, height = _fit(*full, options.size)
+    if options.focal:
+        pixels = options.focal / exif.FILM_DIAGONAL * float(np.hypot(*full))
+    else:
+        pixels = exif.focal_length(path)
+    return _Photo(path, key, width, height, pixels and pixels * width / full[0])
 
 
-def _enter(photos: list[_Photo], store: pycolmap.Database) -> dict[int, float]:
+def _enter(photos: list[_Photo], store: pycolmap.Database, options: Options) -> dict[int, float]:
     """Enter cameras and images, numbered in the photos' order; returns EXIF's focal length of those that have one."""
     cameras, held = {}, {}
-    for photo in photos:
-        lens = (photo.width, photo.height, photo.focal)
+    for i, photo in enumerate(photos):
+        lens = {"auto": (photo.width, photo.height, photo.focal), "one": (photo.width, photo.height), "each": i}
+        lens = lens[options.cameras]
         if lens not in cameras:
             focal = photo.focal or GUESS * max(photo.width, photo.height)
             camera = pycolmap.Camera.create_from_model_name(1, "SIMPLE_RADIAL", focal, photo.width, photo.height)
@@ -172,48 +202,23 @@ def _shrink(photos: list[_Photo], folder: Path) -> None:
         images.write(folder / photo.key, np.repeat(grey[..., None], 3, axis=2))
 
 
-def _find_features(count: int, folder: Path, database: Path, options: Options) -> None:
-    """Find SIFT features in every photo."""
-    choice = pycolmap.FeatureExtractionOptions(num_threads=options.threads, use_gpu=False, max_image_size=options.size)
-    choice.sift.max_num_features = options.features
-    _watched(
-        lambda token: pycolmap.extract_features(
-            database, folder, extraction_options=choice, device=pycolmap.Device.cpu, cancellation_token=token
-        ),
-        lambda: _rows(database, "keypoints"),
-        count,
-        "find features",
-    )
-
-
-def _match(count: int, database: Path, options: Options) -> None:
-    """Match every photo with every other and keep what one rigid scene explains."""
-    matching = pycolmap.FeatureMatchingOptions(num_threads=options.threads, use_gpu=False)
-    verification = pycolmap.TwoViewGeometryOptions()
-    verification.ransac.random_seed = options.seed
-    _watched(
-        lambda token: pycolmap.match_exhaustive(
-            database, matching, verification_options=verification, device=pycolmap.Device.cpu, cancellation_token=token
-        ),
-        lambda: _rows(database, "two_view_geometries"),
-        count * (count - 1) // 2,
-        "match pairs of photos",
-    )
-
-
-def _map(count: int, held: dict[int, float], database: Path, scratch: Path, options: Options):
-    """Incremental mapping; where only some cameras have a known focal length, those stay as they are until the end."""
+def _map(
+    count: int, held: dict[int, float], database: Path, scratch: Path, options: Options
+) -> dict[int, pycolmap.Reconstruction]:
+    """Mapping; where only some cameras have a known focal length, those stay as they are until the end."""
+    with closing(pycolmap.Database.open(database)) as store:
+        mixed = 0 < len(held) < store.num_cameras()
+    if options.mapper == "global":
+        return _map_globally(bool(held), database, scratch, options)
     choice = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=options.seed, max_num_models=3)
     choice.mapper.num_threads = 1
     choice.mapper.random_seed = choice.triangulation.random_seed = options.seed
-    with closing(pycolmap.Database.open(database)) as store:
-        mixed = 0 < len(held) < store.num_cameras()
     if held and not mixed:
         choice.ba_refine_focal_length = choice.mapper.abs_pose_refine_focal_length = False
     if mixed:
         choice.constant_cameras = set(held)
     placed = []
-    found = _watched(
+    found = features.watched(
         lambda token: pycolmap.incremental_mapping(
             database,
             scratch,
@@ -227,11 +232,24 @@ def _map(count: int, held: dict[int, float], database: Path, scratch: Path, opti
         "place photos",
     )
     if mixed:
-        adjustment = pycolmap.BundleAdjustmentOptions(refine_focal_length=False, print_summary=False)
-        adjustment.ceres.solver_options.num_threads = 1
         for reconstruction in found.values():
-            pycolmap.bundle_adjustment(reconstruction, adjustment)
+            model.adjust(reconstruction, refine_focal_length=False)
     return found
+
+
+def _map_globally(known: bool, database: Path, scratch: Path, options: Options) -> dict[int, pycolmap.Reconstruction]:
+    """All photos at once. known: EXIF has focal lengths."""
+    choice = pycolmap.GlobalPipelineOptions(num_threads=1, random_seed=options.seed)
+    choice.mapper.num_threads = 1
+    choice.mapper.random_seed = options.seed
+    for part in (choice.mapper.rotation_averaging, choice.mapper.global_positioning):
+        part.random_seed = options.seed
+    choice.mapper.global_positioning.use_gpu = False
+    adjustment = choice.mapper.bundle_adjustment
+    adjustment.refine_focal_length = not known
+    adjustment.ceres.use_gpu = False
+    adjustment.ceres.solver_options.num_threads = 1
+    return pycolmap.global_mapping(database, scratch, scratch, choice)
 
 
 def _left_out(photos: list[_Photo], best: pycolmap.Reconstruction | None, database: Path) -> tuple:
@@ -253,56 +271,32 @@ def _left_out(photos: list[_Photo], best: pycolmap.Reconstruction | None, databa
 
 
 def _undistortable(
-    photos: list[_Photo], best: pycolmap.Reconstruction, left_out: tuple, options: Options
+    photos: list[_Photo],
+    best: pycolmap.Reconstruction,
+    left_out: tuple,
+    settled: Focal,
+    options: Options,
+    positions: Positions | None,
 ) -> Registered:
     """Bring cameras to the size of the pictures, and give each its pinhole."""
     by_key = {photo.key: photo for photo in photos}
-    error, ratios = best.compute_mean_reprojection_error(), []
-    lenses, pinholes = {}, {}
+    found, pinholes = {}, {}
     limits = pycolmap.UndistortCameraOptions(blank_pixels=0, max_image_size=options.side)
     for i in best.reg_image_ids():
         image = best.images[i]
-        photo, number = by_key[image.name], image.camera_id
-        if photo.focal:
-            ratios.append(image.camera.focal_length / photo.focal)
-        if number not in lenses:
+        number = image.camera_id
+        if number not in found:
             lens = pycolmap.Camera(image.camera.todict())
-            lens.rescale(*_fit(*images.size(photo.path), options.side))
-            lenses[number], pinholes[number] = lens, pycolmap.undistort_camera(limits, lens)
+            lens.rescale(*_fit(*images.size(by_key[image.name].path), options.side))
+            found[number], pinholes[number] = lens, pycolmap.undistort_camera(limits, lens)
     sparse = model.of(best, pinholes=pinholes)
     numbers = {best.images[i].name: best.images[i].camera_id for i in best.reg_image_ids()}
     return Registered(
         sparse,
         tuple(by_key[name].path for name in sparse.names),
-        tuple(lenses[numbers[name]] for name in sparse.names),
+        tuple(found[numbers[name]] for name in sparse.names),
         left_out,
-        float(np.median(ratios)) if ratios else None,
-        float(error),
+        settled,
+        float(best.compute_mean_reprojection_error()),
+        positions,
     )
-
-
-def _watched(work: Callable, done: Callable[[], int], total: int, what: str):
-    """Do a long piece of work in a thread and report meanwhile how much is done; Ctrl-C stops it."""
-    token = pycolmap.CancellationToken()
-    with ThreadPoolExecutor(1) as pool, progress(None, what, total=total) as bar:
-        job = pool.submit(work, token)
-        try:
-            while wait([job], timeout=LOOK).not_done:
-                bar.update(max(0, done() - bar.n))
-        except BaseException:
-            token.cancel()
-            raise
-        bar.update(max(0, total - bar.n))
-    return job.result()
-
-
-def _rows(database: Path, table: str) -> int:
-    """Rows of a table that another thread is filling; 0 while it is locked.
-
-    Asked by another process: two copies of SQLite in one process, Python's and pycolmap's, drop each other's locks
-    when they close the file, and the writer dies of it.
-    """
-    ask = "import sqlite3, sys; print(*sqlite3.connect(sys.argv[1], uri=True).execute(sys.argv[2]).fetchone())"
-    words = [sys.executable, "-S", "-c", ask, f"file:{database}?mode=ro", f"SELECT COUNT(*) FROM {table}"]
-    told = subprocess.run(words, capture_output=True, text=True, check=False).stdout.strip()
-    return int(told) if told.isdecimal() else 0

@@ -1,0 +1,59 @@
+"""How long photos take: structure from motion over 41 photos of dunes, and a view of each synthetic family.
+
+Every figure goes to results/bench.json.
+"""
+
+import time
+from pathlib import Path
+
+import numpy as np
+from record import record
+
+from dav_gswt.photos import rigs, sfm, synthetic
+
+COPR = Path("../shared/data/copr_dunes/images")
+SIDE = 256  # pixels
+VIEWS = 3  # of each family, from the side, where most is seen
+
+
+def copr() -> dict[str, float]:
+    """Quick structure from motion, from photos on disk to the undistorted model."""
+    if not COPR.is_dir():
+        print("sfm_copr: skipped, the photos of copr_dunes are not there")
+        return {}
+    start = time.perf_counter()
+    found = sfm.register(COPR, sfm.Options(threads=2))
+    seconds = time.perf_counter() - start
+    print(f"copr_dunes: {len(found.model.names)} of 41 photos placed, focal length {found.focal_ratio:.3f} of EXIF's")
+    return {"sfm_copr_seconds": seconds}
+
+
+def views() -> dict[str, float]:
+    """Seconds a view of each family, without the time to build the scene; the slowest is the figure."""
+    out = {}
+    for family in synthetic.FAMILIES:
+        scene = synthetic.make(family, 0)
+        places = rigs.ring(VIEWS + 1, 45.0, synthetic.RADIUS)
+        cameras = [rigs.orbit(*p, (0.0, 0.0, 0.0), SIDE, SIDE, synthetic.FIELD_OF_VIEW) for p in places]
+        synthetic.render(scene, cameras[0])  # builds the scene
+        times = []
+        for camera in cameras[1:]:
+            start = time.perf_counter()
+            synthetic.render(scene, camera)
+            times.append(time.perf_counter() - start)
+        out[f"synthetic_view_{family}_seconds"] = float(np.median(times))
+    return out | {"synthetic_view_seconds": max(out.values())}
+
+
+TARGETS = {"sfm_copr_seconds": "target 90", "synthetic_view_seconds": "the slowest family; target 2.5"}
+
+
+def main() -> None:
+    values = copr() | views()
+    for name, value in values.items():
+        print(f"{name}: {value:.3g}" + (f" ({TARGETS[name]})" if name in TARGETS else ""))
+    record(values)
+
+
+if __name__ == "__main__":
+    main()

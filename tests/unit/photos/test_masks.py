@@ -1,0 +1,58 @@
+from types import SimpleNamespace
+
+import made_up_photos as made_up
+import numpy as np
+import pycolmap
+import pytest
+
+from dav_gswt import images, views
+from dav_gswt.errors import InputError
+from dav_gswt.photos import folder, masks
+
+
+@pytest.fixture
+def found(tmp_path):
+    """One registered photo, photo.jpg, through a lens without distortion."""
+    camera = made_up.camera((0, 0, 1))
+    images.write(tmp_path / "photo.png", np.full((camera.height, camera.width, 3), 0.5))
+    params = [camera.fx, camera.fy, camera.cx, camera.cy]
+    lens = pycolmap.Camera(model="PINHOLE", width=camera.width, height=camera.height, params=params)
+    one = made_up.model([camera], np.zeros((1, 3)))
+    return SimpleNamespace(model=one, sources=(tmp_path / "photo.png",), lenses=(lens,))
+
+
+def masked(tmp_path, name="photo.png", shape=(120, 160)):
+    """A mask at half the photo's size whose left half is black."""
+    (tmp_path / "masks").mkdir()
+    mask = np.ones((*shape, 3), np.float32)
+    mask[:, : shape[1] // 2] = 0
+    images.write(tmp_path / "masks" / name, mask)
+    return tmp_path / "masks"
+
+
+@pytest.mark.parametrize("name", ["photo.png", "photo.png.png"])
+def test_black_does_not_count_nor_does_its_edge(found, tmp_path, name):
+    cover = masks.undistorted(found, masked(tmp_path, name))["000.png"]
+    assert not cover[:, : 160 + masks.MARGIN].any()
+    assert cover[:, 160 + masks.MARGIN + 1 :].all()
+
+
+def test_masks_go_with_the_pictures_as_their_alpha_and_views_do_not_count_them(found, tmp_path):
+    covers = masks.undistorted(found, masked(tmp_path))
+    picture = np.random.default_rng(0).uniform(0, 1, (240, 320, 3)).astype(np.float32)
+    folder.write(tmp_path / "photos", found.model, [("000.png", picture)], {}, None, covers)
+    path = tmp_path / "photos" / "images" / "000.png"
+    np.testing.assert_allclose(images.read(path), picture, atol=0.5 / 255 + 1e-6)  # also under the mask
+    for size in (320, 160):
+        view = views.read("000.png", found.model.cameras[0], path, size)
+        assert not view.weight[:, : size // 2].any() and view.weight[:, size // 2 + 3 :].all()
+
+
+def test_a_mask_of_another_shape_is_refused_by_name(found, tmp_path):
+    with pytest.raises(InputError, match=r"photo.png.*160 x 160"):
+        masks.undistorted(found, masked(tmp_path, shape=(160, 160)))
+
+
+def test_masks_of_no_photo_are_refused(found, tmp_path):
+    with pytest.raises(InputError, match="named like a photo"):
+        masks.undistorted(found, masked(tmp_path, "other.png"))

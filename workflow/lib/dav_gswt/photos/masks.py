@@ -1,0 +1,55 @@
+"""Masks: what of a photo is not to become ground, as cars, people, targets, one's own shadow.
+
+A folder of pictures named as their photos (any suffix that is read), white where the photo counts and black where it
+does not. What is masked in every photo is ground that nobody has seen: the field fills it from around, marks it as
+unsure, and no tile takes it where there is a choice. What moves between photos is found without masks, by the fit.
+"""
+
+import logging
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float32
+from numpy import ndarray as Array
+from scipy.ndimage import minimum_filter
+
+from dav_gswt import images
+from dav_gswt.errors import InputError
+from dav_gswt.photos import lenses
+
+_log = logging.getLogger(__name__)
+
+HALF = 0.5  # brightness from which a mask's pixel counts
+MARGIN = 2  # pixels around what is masked that do not count either: its blurred edge
+ASPECT = 0.01  # a mask whose sides differ more from its photo's is of another photo
+
+
+def undistorted(found, folder: Path | str) -> dict[str, Float32[Array, "h w"]]:
+    """Masks of a registration's pictures, by name: 1 where a picture counts, 0 where it does not.
+
+    found: an `sfm.Registered`. Raises: InputError: no folder, a mask of another shape than its photo, or none that
+    belongs to a photo.
+    """
+    listed = {path.stem: path for path in images.listed(folder)}
+    covers = {}
+    for i, (name, source) in enumerate(zip(found.model.names, found.sources, strict=True)):
+        path = listed.get(source.stem) or listed.get(source.name)  # as COLMAP names them: photo.jpg.png
+        if path is None:
+            continue
+        mask, (width, height) = images.read(path), images.size(source)
+        if abs(mask.shape[1] * height / (mask.shape[0] * width) - 1) > ASPECT:
+            raise InputError(f"{path}: is {mask.shape[1]} x {mask.shape[0]}, its photo {width} x {height}; same shape")
+        covers[name] = _cover(mask, found.lenses[i], found.model.cameras[i])
+    if not covers:
+        raise InputError(f"{folder}: no mask is named like a photo; name each as its photo, as IMG_1.png for IMG_1.jpg")
+    _log.info("masks: %d of %d photos have one", len(covers), len(found.model.names))
+    return covers
+
+
+def _cover(mask, lens, camera) -> Float32[Array, "h w"]:
+    """A mask as the pinhole camera would see it."""
+    rows = (np.arange(lens.height) + 0.5) * mask.shape[0] // lens.height
+    columns = (np.arange(lens.width) + 0.5) * mask.shape[1] // lens.width
+    there = (mask[rows.astype(int)][:, columns.astype(int)].mean(-1, keepdims=True) >= HALF).astype(np.float32)
+    seen = lenses.undistorted(np.repeat(there, 3, axis=2), lens, camera)[..., 0]
+    return minimum_filter((seen > HALF).astype(np.float32), 2 * MARGIN + 1)
