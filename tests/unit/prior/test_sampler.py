@@ -1,0 +1,91 @@
+import numpy as np
+import pytest
+import torch
+from diffusers import DDIMScheduler, UNet2DConditionModel
+
+from dav_gswt.prior import dropout, sampler
+
+SHAPE = (4, 8, 8)
+
+
+@pytest.fixture(scope="module")
+def network():
+    torch.manual_seed(0)
+    return UNet2DConditionModel(
+        sample_size=8,
+        in_channels=4,
+        out_channels=4,
+        down_block_types=("DownBlock2D", "CrossAttnDownBlock2D"),
+        up_block_types=("CrossAttnUpBlock2D", "UpBlock2D"),
+        block_out_channels=(16, 32),
+        layers_per_block=1,
+        cross_attention_dim=16,
+        attention_head_dim=8,
+        norm_num_groups=8,
+    ).eval()
+
+
+@pytest.fixture(scope="module")
+def layers(network):
+    return dropout.held(network)
+
+
+def drawn(network, layers, views=3, m=4, p=0.2, steps=3, seed=1, batch=8):
+    """Latents of views that differ by what they are told."""
+    told = torch.randn((views, 5, 16), generator=torch.Generator().manual_seed(9))
+
+    def denoise(latents, time, some):
+        each = len(latents) // (some.stop - some.start)
+        return network(latents, time, told[some].repeat_interleave(each, 0)).sample
+
+    schedule = DDIMScheduler(num_train_timesteps=100, prediction_type="v_prediction")
+    return sampler.sampled(denoise, layers, schedule, views, SHAPE, m, p, steps, seed, batch)
+
+
+def test_without_dropout_all_samples_are_equal_to_the_bit(network, layers):
+    found = drawn(network, layers, p=0.0)
+    assert found.shape == (3, 4, *SHAPE)
+    assert all(np.array_equal(found[:, 0], found[:, i]) for i in range(4))
+
+
+def test_dropout_makes_samples_differ_and_views_differ(network, layers):
+    found = drawn(network, layers)
+    assert found.var(axis=1).min() >= 0 and (found.var(axis=1).mean((1, 2, 3)) > 0).all()
+    assert not np.allclose(found[0], found[1])
+
+
+def test_a_view_does_not_depend_on_its_batch_nor_on_the_others(network, layers):
+    one = drawn(network, layers, batch=4)
+    for batch in (8, 64):
+        np.testing.assert_allclose(drawn(network, layers, batch=batch), one, atol=1e-5)
+    np.testing.assert_allclose(drawn(network, layers, views=1), one[:1], atol=1e-5)
+
+
+def test_the_seed_repeats_and_another_differs(network, layers):
+    np.testing.assert_array_equal(drawn(network, layers), drawn(network, layers))
+    assert not np.allclose(drawn(network, layers, seed=2), drawn(network, layers, seed=1))
+
+
+def test_one_mask_holds_for_a_whole_trajectory(network, layers):
+    seen = []
+    hook = layers[0].register_forward_hook(lambda layer, *_: seen.append(layer.mask))
+    drawn(network, layers, steps=4, views=1)
+    hook.remove()
+    assert len(seen) == 4 and all(mask is seen[0] for mask in seen)
+    share = float((seen[0] == 0).float().mean())
+    assert 0.1 < share < 0.3  # of 0.2
+    assert layers[0].mask is None and layers[0].p == 0.0  # nothing is left for the next caller
+
+
+@pytest.mark.parametrize("bad", [{"m": 0}, {"p": 1.0}, {"p": -0.1}, {"p": float("nan")}, {"steps": 0}])
+def test_what_makes_no_sense_is_refused_by_name(network, layers, bad):
+    with pytest.raises(ValueError, match="m is 0|p_drop is|steps is 0"):
+        drawn(network, layers, **bad)
+
+
+def test_latents_that_are_not_finite_are_refused_by_the_view(layers):
+    def denoise(latents, time, some):
+        return torch.full_like(latents, float("nan"))
+
+    with pytest.raises(ValueError, match="view 0"):
+        sampler.sampled(denoise, layers, DDIMScheduler(), 1, SHAPE, 2, 0.1, 2, 0)

@@ -1,0 +1,1 @@
+"""Generative priors: what a view may show that no photo has shown."""

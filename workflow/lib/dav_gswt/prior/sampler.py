@@ -1,0 +1,64 @@
+"""From noise to latents: DDIM without added noise (eta = 0), so that only dropout tells samples apart."""
+
+from collections.abc import Callable
+
+import numpy as np
+import torch
+from diffusers import DDIMScheduler
+from jaxtyping import Float, Float32
+from numpy import ndarray as Array
+from torch import Tensor
+
+from dav_gswt.prior import dropout
+from dav_gswt.prior.dropout import HeldDropout
+
+Denoise = Callable[[Tensor, Tensor, slice], Tensor]  # latents, time, which views: the network's prediction
+
+
+def sampled(
+    denoise: Denoise,
+    layers: list[HeldDropout],
+    schedule: DDIMScheduler,
+    views: int,
+    shape: tuple[int, ...],
+    m: int,
+    p_drop: float,
+    steps: int,
+    seed: int,
+    batch: int = 32,
+) -> Float32[Array, "b m c h w"]:
+    """Latents of `views` views, m of each: one common noise, one mask a sample and trajectory.
+
+    denoise: predicts for latents of whole views, m of each, one after the other. shape: of a latent. batch: latents at
+    a time; changes no result beyond rounding. p_drop = 0: one trajectory, m times the same bits.
+    Raises: ValueError: m < 1, steps < 1, p_drop outside [0, 1), or latents that are not finite, naming the view.
+    """
+    if steps < 1 or m < 1:
+        raise ValueError(f"steps is {steps} and m is {m}; there is at least one of each")
+    drawn = m if p_drop > 0 else 1
+    noise = torch.randn(shape, generator=torch.Generator().manual_seed(seed))
+    out = np.empty((views, drawn, *shape), np.float32)
+    each = max(1, batch // drawn)
+    with torch.inference_mode(), dropout.masks(layers, m, p_drop, seed):
+        for first in range(0, views, each):
+            some = slice(first, min(first + each, views))
+            count = some.stop - some.start
+            start = noise.expand(count * drawn, *shape).clone()
+            for layer in layers:
+                layer.m = drawn
+            found = _trajectory(denoise, schedule, start, steps, some)
+            out[some] = found.view(count, drawn, *shape).float().numpy()
+    bad = ~np.isfinite(out).reshape(views, -1).all(1)
+    if bad.any():
+        raise ValueError(f"the prior's latents of view {int(np.argmax(bad))} are not finite")
+    return np.repeat(out, m // drawn, axis=1)
+
+
+def _trajectory(
+    denoise: Denoise, schedule: DDIMScheduler, latents: Float[Tensor, "n c h w"], steps: int, some: slice
+) -> Float[Tensor, "n c h w"]:
+    schedule.set_timesteps(steps)
+    for time in schedule.timesteps:
+        predicted = denoise(latents, time, some)
+        latents = schedule.step(predicted, time, latents, eta=0.0).prev_sample
+    return latents
