@@ -1,0 +1,96 @@
+"""The project's own prior, with weights that learned nothing: what it promises holds whatever they are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from dav_gswt.errors import InputError
+from dav_gswt.prior import weights
+from dav_gswt.prior.interface import Condition, Prior
+from dav_gswt.prior.networks import CODE, SIZE, Network
+from dav_gswt.prior.terrain import Terrain
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    torch.manual_seed(5)
+    path = tmp_path_factory.mktemp("weights") / "terrain.safetensors"
+    weights.save(Network(), path, {"steps": "0"})
+    return path
+
+
+@pytest.fixture(scope="module")
+def prior(file):
+    return Terrain.open(file)
+
+
+def condition(count=3, seed=0):
+    rng = np.random.default_rng(seed)
+
+    def drawn(*shape):
+        return rng.uniform(0, 1, (count, *shape)).astype(np.float32)
+
+    pixels = (SIZE, SIZE)
+    return Condition(drawn(*pixels, 3), drawn(*pixels), drawn(*pixels), drawn(*pixels, 3), drawn(4))
+
+
+def test_it_is_a_prior_and_tells_what_its_file_says(prior, file):
+    assert isinstance(prior, Prior) and prior.facts == {"steps": "0"}
+    assert file.stat().st_size < 16 * 2**20
+
+
+def test_no_dropout_gives_equal_samples_and_dropout_others(prior):
+    still = prior.samples(condition(), 3, 0.0, 2, 0)
+    assert still.shape == (3, 3, *CODE) and np.ptp(still, axis=1).max() == 0
+    assert (prior.samples(condition(), 3, 0.3, 2, 0).var(axis=1).mean((1, 2, 3)) > 0).all()
+
+
+def test_a_view_does_not_depend_on_the_others(prior):
+    all_of_them, alone = prior.samples(condition(), 2, 0.2, 2, 0), prior.samples(condition()[1:2], 2, 0.2, 2, 0)
+    np.testing.assert_allclose(all_of_them[1], alone[0], atol=1e-5)
+
+
+def test_where_nothing_is_to_be_believed_the_render_has_no_say(prior):
+    one, two = condition(), replace(condition(seed=1), photo=condition().photo, relative=condition().relative)
+    nothing = np.zeros((3, *CODE[1:]), bool)
+    found = [prior.samples(c, 1, 0.0, 2, 0, nothing) for c in (one, two)]
+    np.testing.assert_allclose(*found, atol=1e-5)
+    assert not np.allclose(prior.samples(one, 1, 0.0, 2, 0), prior.samples(two, 1, 0.0, 2, 0))
+
+
+def test_pictures_of_latents_are_pictures(prior):
+    made = prior.decoded(np.random.default_rng(0).normal(size=(2, 3, *CODE)).astype(np.float32))
+    assert made.rgba.shape == (2, 3, SIZE, SIZE, 4) and made.inverse_depth.shape == (2, 3, SIZE, SIZE)
+    assert made.rgba.min() >= 0 and made.rgba.max() <= 1
+
+
+def test_a_condition_that_is_not_finite_is_refused_by_name(prior):
+    bad = condition()
+    bad.alpha[2, 0, 0] = np.nan
+    with pytest.raises(ValueError, match="alpha of view 2"):
+        prior.samples(bad, 2, 0.1, 2, 0)
+
+
+@pytest.mark.parametrize("damage", ["short", "pickle", "missing", "shape", "nan", "extra", "gone"])
+def test_damaged_weights_are_refused_by_name(file, tmp_path, damage):
+    path = tmp_path / "weights.safetensors"
+    network = Network()
+    values = network.state_dict()
+    if damage == "short":
+        path.write_bytes(file.read_bytes()[:-1000])
+    elif damage == "pickle":
+        torch.save(values, path)
+    elif damage != "gone":
+        name = "told.place"
+        change = {
+            "missing": {},
+            "shape": {name: values[name][:5]},
+            "nan": {name: values[name] * torch.nan},
+            "extra": {name: values[name], "another": torch.zeros(1)},
+        }[damage]
+        kept = {k: v.contiguous() for k, v in values.items() if k != name} | change
+        weights.save_file({k: v.contiguous() for k, v in kept.items()}, str(path))
+    with pytest.raises(InputError, match="weights.safetensors"):
+        Terrain.open(path)

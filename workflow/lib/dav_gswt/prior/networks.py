@@ -1,0 +1,100 @@
+"""The networks of the project's own prior: a coder of pictures, a denoiser of codes, and what tells it of a view.
+
+Pictures are 64 x 64 with five channels (colour, opacity, inverse depth); codes are 4 x 16 x 16. The denoiser sees the
+noisy code, the code of the field's render, its opacity, and where anything is known at all; the nearest photo and the
+relative pose reach it through attention.
+"""
+
+import torch
+from diffusers import AutoencoderKL, DDIMScheduler, UNet2DConditionModel
+from jaxtyping import Float
+from torch import Tensor, nn
+
+SIZE = 64  # pixels a side
+CODE = (4, 16, 16)
+PLANES = 5  # of a picture: red, green, blue, opacity, inverse depth
+PATCH = 2  # cells a side of the photo's code that make one token
+WIDTH = 64  # of a token
+TIMES = 1000
+
+
+class Network(nn.Module):
+    """Everything that is trained. The same shape serves the diffusion model and the regressor it is compared with."""
+
+    def __init__(self):
+        super().__init__()
+        self.coder = AutoencoderKL(
+            in_channels=PLANES,
+            out_channels=PLANES,
+            down_block_types=("DownEncoderBlock2D",) * 3,
+            up_block_types=("UpDecoderBlock2D",) * 3,
+            block_out_channels=(24, 48, 64),
+            layers_per_block=1,
+            latent_channels=CODE[0],
+            norm_num_groups=8,
+            sample_size=SIZE,
+        )
+        self.denoiser = UNet2DConditionModel(
+            sample_size=CODE[1],
+            in_channels=2 * CODE[0] + 2,
+            out_channels=CODE[0],
+            down_block_types=("DownBlock2D", "CrossAttnDownBlock2D", "CrossAttnDownBlock2D"),
+            up_block_types=("CrossAttnUpBlock2D", "CrossAttnUpBlock2D", "UpBlock2D"),
+            block_out_channels=(32, 64, 96),
+            layers_per_block=1,
+            cross_attention_dim=WIDTH,
+            attention_head_dim=8,
+            norm_num_groups=16,
+        )
+        self.told = Told()
+        self.register_buffer("scale", torch.ones(()))  # codes times it have unit variance
+
+    def encoded(self, planes: Float[Tensor, "n 5 s s"]) -> Float[Tensor, "n 4 h w"]:
+        """Codes of pictures, the mode of the coder's posterior, scaled."""
+        return self.coder.encode(2 * planes - 1).latent_dist.mode() * self.scale
+
+    def decoded(self, codes: Float[Tensor, "n 4 h w"]) -> Float[Tensor, "n 5 s s"]:
+        """Pictures of codes, in [0, 1]."""
+        return ((self.coder.decode(codes / self.scale).sample + 1) / 2).clamp(0, 1)
+
+    def denoised(
+        self,
+        noisy: Float[Tensor, "n 4 h w"],
+        time: Tensor,
+        render: Float[Tensor, "n 4 h w"],
+        known: Float[Tensor, "n 2 h w"],
+        tokens: Float[Tensor, "n t width"],
+    ) -> Float[Tensor, "n 4 h w"]:
+        """The denoiser's prediction (velocity). known: opacity of the render, and 1 where it is to be believed."""
+        return self.denoiser(torch.cat([noisy, render, known], 1), time, tokens).sample
+
+
+class Told(nn.Module):
+    """Tokens for the denoiser's attention: patches of the nearest photo's code, and the relative pose."""
+
+    def __init__(self):
+        super().__init__()
+        cells = CODE[1] // PATCH
+        self.photo = nn.Linear(CODE[0] * PATCH * PATCH, WIDTH)
+        self.place = nn.Parameter(0.02 * torch.randn(cells * cells, WIDTH))
+        self.pose = nn.Sequential(nn.Linear(4, WIDTH), nn.SiLU(), nn.Linear(WIDTH, WIDTH))
+
+    def forward(
+        self, photo: Float[Tensor, "n 4 h w"], relative: Float[Tensor, "n 4"]
+    ) -> Float[Tensor, "n tokens width"]:
+        """Every patch knows the pose too: where it lands in the view depends on it."""
+        patches = nn.functional.unfold(photo, PATCH, stride=PATCH).transpose(1, 2)
+        pose = self.pose(relative)[:, None]
+        return torch.cat([self.photo(patches) + self.place + pose, pose], 1)
+
+
+def schedule() -> DDIMScheduler:
+    """Velocity prediction on a cosine schedule that ends in pure noise, steps from there backwards."""
+    return DDIMScheduler(
+        num_train_timesteps=TIMES,
+        beta_schedule="squaredcos_cap_v2",
+        prediction_type="v_prediction",
+        rescale_betas_zero_snr=True,
+        timestep_spacing="trailing",
+        clip_sample=False,
+    )
