@@ -1,0 +1,367 @@
+"""Zero-1-to-3 with weights that learned nothing, tiny, in the layouts that the real ones are published in."""
+
+import json
+import shutil
+import socket
+import sys
+from dataclasses import replace
+
+import kornia
+import numpy as np
+import pytest
+import torch
+from diffusers import AutoencoderKL, DDIMScheduler, UNet2DConditionModel
+from safetensors.torch import load_file, save_file
+
+from dav_gswt.errors import InputError
+from dav_gswt.prior import dropout, zero123_folder
+from dav_gswt.prior.interface import Condition, Prior
+from dav_gswt.prior.zero123 import LATENT, SIZE, Zero123, for_clip, sized, without_white
+
+transformers = pytest.importorskip("transformers", reason="needs transformers: pip install transformers==5.23.0")
+
+WIDTH = 16
+UNET, CODER, EYE = ("diffusion_pytorch_model.safetensors",) * 2 + ("model.safetensors",)
+NEWER = {"to_q": "query", "to_k": "key", "to_v": "value", "to_out.0": "proj_attn"}
+
+
+def networks():
+    torch.manual_seed(7)
+    unet = UNet2DConditionModel(
+        sample_size=32,
+        in_channels=8,
+        out_channels=4,
+        down_block_types=("DownBlock2D", "CrossAttnDownBlock2D"),
+        up_block_types=("CrossAttnUpBlock2D", "UpBlock2D"),
+        block_out_channels=(16, 32),
+        layers_per_block=1,
+        cross_attention_dim=WIDTH,
+        attention_head_dim=8,
+        norm_num_groups=8,
+    )
+    coder = AutoencoderKL(
+        down_block_types=("DownEncoderBlock2D",) * 4,
+        up_block_types=("UpDecoderBlock2D",) * 4,
+        block_out_channels=(4, 4, 8, 8),
+        norm_num_groups=4,
+        sample_size=SIZE,
+    )
+    eye = transformers.CLIPVisionConfig(
+        hidden_size=16,
+        intermediate_size=32,
+        num_hidden_layers=1,
+        num_attention_heads=2,
+        image_size=28,
+        patch_size=14,
+        projection_dim=WIDTH,
+    )
+    return unet, coder, transformers.CLIPVisionModelWithProjection(eye), torch.nn.Linear(WIDTH + 4, WIDTH)
+
+
+def written(folder, place, pipeline):
+    """A folder as diffusers writes it, with the pose's layer in `place`."""
+    unet, coder, eye, projection = networks()
+    for part, name in ((unet, "unet"), (coder, "vae"), (eye, "image_encoder")):
+        part.save_pretrained(folder / name)
+    schedule = DDIMScheduler(1000, 0.00085, 0.012, "scaled_linear", set_alpha_to_one=False, steps_offset=1)
+    schedule.save_pretrained(folder / "scheduler")
+    (folder / place).mkdir()
+    prefix = zero123_folder.PROJECTIONS[place]
+    save_file({prefix + name: v for name, v in projection.state_dict().items()}, folder / place / UNET)
+    (folder / "model_index.json").write_text(json.dumps({"_class_name": pipeline, place: ["x", "y"]}))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The first layout, with the names that older versions gave to the coder's attention and to CLIP's constant."""
+    path = written(tmp_path_factory.mktemp("one") / "zero123-xl", "cc_projection", "Zero1to3StableDiffusionPipeline")
+    changed(path / "vae" / CODER, older)
+    changed(path / "image_encoder" / EYE, lambda v: v | {"vision_model.embeddings.position_ids": torch.arange(5)[None]})
+    return path
+
+
+@pytest.fixture(scope="module")
+def prior(folder):
+    return Zero123.open(folder)
+
+
+def changed(path, change):
+    values = change({name: v.clone() for name, v in load_file(path).items()})
+    save_file(values, path)
+
+
+def older(values):
+    for now, before in NEWER.items():
+        values = {n.replace(f".{now}.", f".{before}.") if "attentions" in n else n: v for n, v in values.items()}
+    assert any("proj_attn" in name for name in values)
+    return values
+
+
+def condition(count=2, side=64, seed=0):
+    rng = np.random.default_rng(seed)
+
+    def drawn(*shape):
+        return rng.uniform(0, 1, (count, *shape)).astype(np.float32)
+
+    pixels = (side, side)
+    return Condition(drawn(*pixels, 3), drawn(*pixels), drawn(*pixels), drawn(*pixels, 3), drawn(4))
+
+
+def test_it_is_a_prior_of_the_published_sizes(prior):
+    found = prior.samples(condition(), 3, 0.2, 2, 0)
+    assert isinstance(prior, Prior) and (prior.name, prior.size) == ("zero123", 256)
+    assert found.shape == (2, 3, 4, 32, 32) and found.dtype == np.float32
+    made = prior.decoded(found[:1])
+    assert made.rgba.shape == (1, 3, 256, 256, 4) and made.inverse_depth is None
+    assert made.rgba.min() >= 0 and made.rgba.max() <= 1
+
+
+def test_both_layouts_hold_the_same_prior(prior, tmp_path):
+    other = written(tmp_path / "other", "clip_camera_projection", "Zero123Pipeline")
+    for path in other.rglob("*.safetensors"):  # in half precision, under that variant's name
+        changed(path, lambda values: {name: v.half() for name, v in values.items()})
+        path.rename(path.with_suffix(".fp16.safetensors"))
+    found = Zero123.open(other).samples(condition(), 1, 0.0, 2, 0)
+    np.testing.assert_allclose(found, prior.samples(condition(), 1, 0.0, 2, 0), atol=0.05)  # halves have 3 digits
+
+
+def test_no_dropout_gives_samples_equal_to_the_bit_and_dropout_others(prior):
+    still = prior.samples(condition(), 3, 0.0, 2, 0)
+    assert all(np.array_equal(still[:, 0], still[:, i]) for i in range(3))
+    one, again = (prior.samples(condition(), 3, 0.3, 2, 0) for _ in range(2))
+    assert (one.var(axis=1).mean((1, 2, 3)) > 0).all()
+    np.testing.assert_array_equal(one, again)
+    assert not np.allclose(one, prior.samples(condition(), 3, 0.3, 2, 1))
+
+
+def test_a_view_does_not_depend_on_the_others(prior):
+    together = prior.samples(condition(5), 3, 0.2, 2, 0)
+    for i in (0, 4):
+        alone = prior.samples(condition(5)[i : i + 1], 3, 0.2, 2, 0)
+        np.testing.assert_allclose(together[i], alone[0], atol=1e-5)
+
+
+def test_photo_and_pose_have_a_say_and_the_render_has_none(prior):
+    told, other = condition(1), condition(1, seed=1)
+    found = prior.samples(told, 1, 0.0, 2, 0)
+    for name, matters in (("photo", True), ("relative", True), ("colour", False), ("alpha", False)):
+        changed_one = prior.samples(replace(told, **{name: getattr(other, name)}), 1, 0.0, 2, 0)
+        assert np.array_equal(found, changed_one) != matters, name
+
+
+def test_the_pose_is_told_as_in_training(prior):
+    seen = []
+    hook = prior.parts.projection.register_forward_pre_hook(lambda _, given: seen.append(given[0]))
+    up, right = np.radians(20), np.radians(90)
+    relative = np.float32([[up, np.sin(right), np.cos(right), 0.2]])  # higher up, a quarter round, farther away
+    prior.samples(replace(condition(1), relative=relative), 1, 0.0, 1, 0)
+    hook.remove()
+    np.testing.assert_allclose(seen[0][0, -4:], [-np.pi / 9, 1, 0, 0.2 * 1.85], atol=1e-6)
+
+
+def test_the_denoiser_sees_the_coders_mode_as_it_is_and_without_the_photo_nothing(prior):
+    told, seen = condition(1, side=SIZE), []
+    hook = prior.parts.unet.register_forward_pre_hook(lambda _, given: seen.append(given))
+    prior.samples(told, 1, 0.0, 1, 0)
+    hook.remove()
+    planes, _, tokens = seen[0]
+    with torch.inference_mode():
+        photo = torch.from_numpy(told.photo.transpose(0, 3, 1, 2).copy())
+        mode = prior.parts.coder.encode(2 * photo - 1).latent_dist.mode()
+    assert planes.shape == (2, 8, 32, 32) and tokens.shape == (2, 1, WIDTH)
+    assert torch.equal(planes[0, :4], planes[1, :4]) and not planes[0, 4:].any() and not tokens[0].any()
+    torch.testing.assert_close(planes[1, 4:], mode[0])
+
+
+def test_it_samples_as_the_authors_write_it_down(prior):
+    """The plain twin: their preparation by kornia, their loop over DDIM's formula, no sampler of ours."""
+    told, steps, parts = condition(1, side=SIZE), 3, prior.parts
+    photo = 2 * torch.from_numpy(told.photo.transpose(0, 3, 1, 2).copy()) - 1
+    seen = kornia.geometry.resize(photo, (28, 28), interpolation="bicubic", align_corners=True, antialias=False)
+    mean, spread = torch.tensor([0.48145466, 0.4578275, 0.40821073]), torch.tensor([0.26862954, 0.26130258, 0.27577711])
+    seen = kornia.enhance.normalize((seen + 1) / 2, mean, spread)
+    elevation, sine, cosine, radius = told.relative[0].tolist()
+    pose = torch.tensor([[-elevation, sine, cosine, 1.85 * radius]])
+    left = torch.linspace(0.00085**0.5, 0.012**0.5, 1000).square().neg().add(1).cumprod(0)
+    with torch.inference_mode():
+        token = parts.projection(torch.cat([parts.eye(seen).image_embeds, pose], 1))[:, None]
+        latent = parts.coder.encode(photo).latent_dist.mode()
+        x = torch.randn(LATENT, generator=torch.Generator().manual_seed(5))[None]
+        times = [1 + i * (1000 // steps) for i in range(steps)]
+        for i in reversed(range(steps)):
+            t = torch.tensor(times[i])
+            alone = parts.unet(torch.cat([x, 0 * latent], 1), t, 0 * token).sample
+            noise = alone + 3.0 * (parts.unet(torch.cat([x, latent], 1), t, token).sample - alone)
+            now, then = left[times[i]], left[times[i - 1]] if i else left[0]
+            x = then.sqrt() * (x - (1 - now).sqrt() * noise) / now.sqrt() + (1 - then).sqrt() * noise
+    np.testing.assert_allclose(prior.samples(told, 1, 0.0, steps, 5)[:, 0], x, rtol=1e-4, atol=1e-4)
+
+
+def test_latents_are_scaled(prior):
+    latents = np.random.default_rng(0).normal(size=(1, *LATENT)).astype(np.float32)
+    with torch.inference_mode():
+        painted = prior.parts.coder.decode(torch.from_numpy(latents) / 0.18215).sample / 2 + 0.5
+    expected = without_white(painted.clamp(0, 1).numpy().transpose(0, 2, 3, 1))
+    np.testing.assert_allclose(prior.decoded(latents).rgba, expected, atol=1e-6)
+
+
+def test_guidance_of_one_is_none(prior):
+    found = [Zero123(prior.parts, g).samples(condition(1), 2, 0.3, 2, 0) for g in (1.0, 1 + 1e-6, 3.0)]
+    np.testing.assert_allclose(found[1], found[0], atol=1e-4)
+    assert not np.allclose(found[2], found[0], atol=1e-3)
+
+
+def test_a_sample_has_one_mask_with_and_without_the_photo(prior):
+    """Told nothing, both passes are the same, so guidance must change nothing, whatever was dropped."""
+    noise = torch.randn((6, *LATENT), generator=torch.Generator().manual_seed(3))
+    nothing = torch.zeros_like(noise), torch.zeros(6, 1, WIDTH)
+    found = []
+    for guidance in (1.0, 3.0):
+        one = Zero123(prior.parts, guidance)
+        with torch.inference_mode(), dropout.masks(one.parts.layers, 3, 0.4, 0):
+            found.append(one._predicted(noise, torch.tensor(500), *nothing))
+    torch.testing.assert_close(*found, atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize("guidance", [0.5, float("nan"), float("inf")])
+def test_a_guidance_that_makes_no_sense_is_refused(prior, guidance):
+    with pytest.raises(ValueError, match="guidance is"):
+        Zero123(prior.parts, guidance)
+
+
+def test_what_is_not_finite_is_refused_by_name(prior):
+    told = condition()
+    told.photo[1, 0, 0] = np.nan
+    with pytest.raises(ValueError, match="photo of view 1"):
+        prior.samples(told, 2, 0.1, 2, 0)
+    with pytest.raises(ValueError, match="p_drop is 1"):
+        prior.samples(condition(), 2, 1.0, 2, 0)
+
+
+@pytest.mark.parametrize("side", [100, 256, 300])
+def test_photos_of_any_size_keep_their_colours(side):
+    grey = np.full((1, side, side, 3), 0.25, np.float32)
+    assert sized(grey).shape == (1, 3, SIZE, SIZE)
+    np.testing.assert_allclose(sized(grey), 0.25, atol=1e-6)
+    noisy = sized(np.random.default_rng(0).integers(0, 2, (1, side, side, 3)).astype(np.float32))
+    assert noisy.min() >= 0 and noisy.max() <= 1
+
+
+def test_clip_sees_corners_and_its_own_normalisation():
+    ramp = torch.linspace(0, 1, 9).expand(1, 3, 9, 9)
+    seen = for_clip(ramp, 5)
+    assert seen.shape == (1, 3, 5, 5)
+    np.testing.assert_allclose(seen[0, 0, 0, [0, -1]] * 0.26862954 + 0.48145466, [0, 1], atol=1e-6)
+
+
+def test_drawn_over_white_the_picture_is_what_was_painted():
+    painted = np.random.default_rng(0).uniform(0.8, 1, (2, 5, 5, 3)).astype(np.float32)
+    painted[0, 0, 0], painted[0, 0, 1], painted[0, 0, 2] = 1, (0.95, 1, 1), (0.9, 1, 1)
+    rgba = without_white(painted)
+    np.testing.assert_allclose(rgba[0, 0, :3, 3], [0, 0.5, 1], atol=1e-6)
+    np.testing.assert_allclose(rgba[..., :3] + (1 - rgba[..., 3:]), painted, atol=1e-6)
+
+
+def test_nothing_is_ever_fetched(folder, monkeypatch):
+    def refused(*_, **__):
+        raise AssertionError("a connection was tried")
+
+    monkeypatch.setattr(socket.socket, "connect", refused)
+    monkeypatch.setattr(socket, "getaddrinfo", refused)
+    Zero123.open(folder)
+    with pytest.raises(InputError, match="never fetched"):
+        Zero123.open("bennyguo/zero123-xl-diffusers")
+
+
+DAMAGES = {
+    "short": ("unet", f"{UNET}: not readable as safetensors"),
+    "disguised": ("vae", f"{CODER}: not readable as safetensors"),
+    "pickle": ("image_encoder", "pytorch_model.bin: a pickle.*docs/prior.md"),
+    "gone": ("unet", f"there is no {UNET}"),
+    "missing": ("unet", "conv_in.bias is missing"),
+    "extra": ("vae", "more is not of this network"),
+    "shape": ("cc_projection", r"projection.weight has the shape \(3, 3\), not \(16, 20\)"),
+    "nan": ("image_encoder", "visual_projection.weight holds numbers that are not finite"),
+    "whole": ("unet", "conv_in.bias is of the kind I32"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damaged_weights_are_refused_by_name(folder, tmp_path, damage):
+    part, message = DAMAGES[damage]
+    copied = shutil.copytree(folder, tmp_path / "copy")
+    path = next((copied / part).glob("*.safetensors"))
+    put = {
+        "extra": lambda v: {"more": torch.zeros(1)},
+        "shape": lambda v: {"projection.weight": torch.zeros(3, 3)},
+        "nan": lambda v: {"visual_projection.weight": v["visual_projection.weight"] * torch.nan},
+        "whole": lambda v: {"conv_in.bias": torch.zeros(16, dtype=torch.int32)},
+    }
+    if damage == "short":
+        path.write_bytes(path.read_bytes()[:-100])
+    elif damage == "disguised":
+        torch.save(load_file(path), path)
+    elif damage == "missing":
+        changed(path, lambda values: {name: v for name, v in values.items() if name != "conv_in.bias"})
+    elif damage in put:
+        changed(path, lambda values: values | put[damage](values))
+    else:
+        if damage == "pickle":
+            torch.save(load_file(path), path.with_name("pytorch_model.bin"))
+        path.unlink()
+    with pytest.raises(InputError, match=message):
+        Zero123.open(copied)
+
+
+def test_pickles_become_readable_as_the_documentation_says(folder, prior, root, tmp_path, monkeypatch):
+    copied = shutil.copytree(folder, tmp_path / "copy")
+    for path in list(copied.rglob("*.safetensors")):
+        clip = path.parent.name == "image_encoder"
+        torch.save(load_file(path), path.with_name("pytorch_model.bin" if clip else f"{path.stem}.bin"))
+        path.unlink()
+    told = (root / "docs" / "prior.md").read_text(encoding="utf-8").split("<<'END'\n")[1].split("\nEND\n")[0]
+    monkeypatch.setattr(sys, "argv", ["-", str(copied)])
+    exec(told, {})
+    found = Zero123.open(copied).samples(condition(1), 1, 0.0, 1, 0)
+    np.testing.assert_array_equal(found, prior.samples(condition(1), 1, 0.0, 1, 0))
+
+
+CONFIGS = {
+    "unet/config.json": ({"in_channels": 4}, "in_channels is 4, not 8"),
+    "vae/config.json": ({"latent_channels": 16}, "latent_channels is 16, not 4"),
+    "image_encoder/config.json": ({"projection_dim": 8}, "cross_attention_dim is 16, not 8"),
+    "scheduler/scheduler_config.json": ({"beta_schedule": "none"}, "no schedule"),
+}
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_a_config_of_another_model_is_refused_by_name(folder, tmp_path, name):
+    change, message = CONFIGS[name]
+    path = shutil.copytree(folder, tmp_path / "copy") / name
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    with pytest.raises(InputError, match=message):
+        Zero123.open(tmp_path / "copy")
+    path.write_text("{")
+    with pytest.raises(InputError, match="not readable as JSON"):
+        Zero123.open(tmp_path / "copy")
+
+
+def test_a_folder_of_something_else_is_refused_by_what_it_is(tmp_path):
+    with pytest.raises(InputError, match="no model of diffusers"):
+        Zero123.open(tmp_path)
+    (tmp_path / "model_index.json").write_text('{"_class_name": "StableDiffusionPipeline"}')
+    with pytest.raises(InputError, match="StableDiffusionPipeline, not Zero-1-to-3"):
+        Zero123.open(tmp_path)
+
+
+def test_too_many_bytes_are_refused_before_any_is_read(folder, monkeypatch):
+    monkeypatch.setattr(zero123_folder, "MOST_BYTES", 1000)
+    with pytest.raises(InputError, match="GiB of weights"):
+        Zero123.open(folder)
+
+
+def test_without_transformers_it_says_what_to_install(folder, monkeypatch):
+    monkeypatch.setitem(sys.modules, "transformers", None)
+    with pytest.raises(InputError, match="pip install 'transformers=="):
+        Zero123.open(folder)
