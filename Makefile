@@ -5,7 +5,7 @@ PORT ?= 8000
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: run view test bench compiler
+.PHONY: run view test bench prior compiler
 .DELETE_ON_ERROR:
 
 run: .venv/installed
@@ -19,6 +19,10 @@ test: .venv/installed-test
 
 bench: .venv/installed-test
 	@for bench in benchmarks/*.py; do PYTHONPATH=tests:tests/browser $(BIN)/python $$bench || exit 1; done
+
+# hours: the weights that come with the project were made so
+prior: .venv/installed
+	@$(BIN)/snakemake --cores $(CORES) -- results/prior/terrain.safetensors
 
 SOURCES := pyproject.toml requirements.lock $(wildcard workflow/lib/dav_gswt/raster/core/*)
 # a set-up that had to do without a compiler is done again as soon as there is one

@@ -12,6 +12,7 @@ from dav_gswt.prior import dropout, sampler, weights
 from dav_gswt.prior.interface import Condition, Imagined
 from dav_gswt.prior.networks import CODE, SIZE, Network, schedule
 
+NEARNESS = 0.5  # of an inverse depth: as a plane it is 1 at half a flying height, and no more
 AT_ONCE = 256  # pictures that are coded at a time
 
 
@@ -60,7 +61,7 @@ class Terrain:
         with torch.inference_mode():
             planes = torch.cat([self.network.decoded(part) for part in flat.split(AT_ONCE)])
         made = planes.numpy().transpose(0, 2, 3, 1).reshape(*latents.shape[:-3], SIZE, SIZE, -1)
-        return Imagined(np.ascontiguousarray(made[..., :4]), np.ascontiguousarray(made[..., 4]))
+        return Imagined(np.ascontiguousarray(made[..., :4]), made[..., 4] / np.float32(NEARNESS))
 
     def _told(self, condition: Condition) -> tuple[Tensor, Tensor, Tensor]:
         """Codes of the render, its opacity in the code's cells, and tokens."""
@@ -73,8 +74,15 @@ class Terrain:
 
 def planes_of_render(condition: Condition) -> Tensor:
     """The five planes of what the field shows."""
-    parts = [condition.colour, condition.alpha[..., None], condition.inverse_depth[..., None]]
-    return torch.from_numpy(np.concatenate(parts, -1).transpose(0, 3, 1, 2).copy())
+    parts = [condition.colour, condition.alpha[..., None], NEARNESS * condition.inverse_depth[..., None]]
+    return torch.from_numpy(np.concatenate(parts, -1).transpose(0, 3, 1, 2).clip(0, 1))
+
+
+def planes_of_truth(rgba: Float32[Array, "b s s 4"], inverse_depth: Float32[Array, "b s s"]) -> Tensor:
+    """The five planes of a view as it truly is."""
+    return torch.from_numpy(
+        np.concatenate([rgba, NEARNESS * inverse_depth[..., None]], -1).transpose(0, 3, 1, 2).clip(0, 1)
+    )
 
 
 def planes_of_photo(photo: Float32[Array, "b s s 3"]) -> Tensor:

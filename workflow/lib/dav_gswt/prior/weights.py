@@ -13,9 +13,9 @@ from dav_gswt.files import whole
 MOST_BYTES = 256 * 2**20
 
 
-def save(network: nn.Module, path: Path | str, facts: dict[str, str]) -> None:
-    """Write a network's weights in half precision, with facts about them in the header."""
-    values = {name: v.detach().to("cpu", torch.float16).contiguous() for name, v in network.state_dict().items()}
+def save(network: nn.Module, path: Path | str, facts: dict[str, str], kind: torch.dtype = torch.float16) -> None:
+    """Write a network's weights, in half precision if not told otherwise, with facts about them in the header."""
+    values = {name: v.detach().to("cpu", kind).contiguous() for name, v in network.state_dict().items()}
     with whole(path) as part:
         save_file(values, str(part), metadata=facts)
 

@@ -1,0 +1,23 @@
+"""A score that is not a number has no place in a ranking: it is refused, and the poses it is of are named."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray as Array
+
+NAMED = 5  # poses in a message; of more the number is said
+
+
+def refuse(bad: Bool[Array, "n"], what: str, names: Sequence[str] | None = None) -> None:
+    """Raises: ValueError: any is bad; says what they are, and of which poses: by name, or by index without names."""
+    if not bad.any():
+        return
+    found = [names[i] if names is not None else str(i) for i in np.flatnonzero(bad)]
+    more = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""
+    raise ValueError(f"{what} of pose {', '.join(found[:NAMED])}{more}")
+
+
+def require_finite(values: Float[Array, "n"], what: str, names: Sequence[str] | None = None) -> None:
+    """Raises: ValueError: a value that is NaN or infinite, naming the poses."""
+    refuse(~np.isfinite(values), f"not finite: {what}", names)
