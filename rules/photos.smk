@@ -4,7 +4,6 @@ In: a folder of photos, a synthetic family, or a finished field. Out: images/, s
 and per seed views.json: which photos start, which may be asked for, which only test.
 """
 
-
 REGISTERING = "build exif features focal folder gps ground imported lenses masks model pairs sfm".split()
 
 
@@ -36,9 +35,10 @@ rule register_photos:
 
 
 rule render_photos:
-    """The start views and the test views of a synthetic scene, with points triangulated from its exact poses."""
+    """The start and test views of a synthetic scene, what each shows, and points triangulated from its exact poses."""
     output:
         images=directory("<results>/<photos>/images"),
+        truth=directory("<results>/<photos>/truth"),
         model=directory("<results>/<photos>/sparse"),
         frame="<results>/<photos>/ground.json",
     log:
@@ -50,7 +50,7 @@ rule render_photos:
     threads: 2
     resources:
         mem_mb=2500,
-        runtime="20m",
+        runtime="60m",
     params:
         scene=entry("scenes", "scene"),
         source=source_of("photos"),

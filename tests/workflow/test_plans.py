@@ -67,7 +67,7 @@ def test_no_round_and_a_finished_field_go_from_field_to_terrain(planned, tmp_pat
     [
         ("tau: 1.5", "config: tau: 1.5 is greater than the maximum of 1"),
         ("polcy: random", "config: there is no key 'polcy'; is 'policy' meant?"),
-        ("scene: moon", "config: scene: there is no 'moon'; scenes has desert, copr_dunes, brighton_beach"),
+        ("scene: moon", "config: scene: there is no 'moon'; scenes has desert, flowers, grass, planet, meadow"),
         ("rounds: -1", "config: rounds: -1 is less than the minimum of 0"),
         ("scenes: {desert: {quality: best}}", "config: scenes.desert.quality: there is no 'best'; qualities has"),
     ],

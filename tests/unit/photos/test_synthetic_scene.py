@@ -20,7 +20,7 @@ def coarse_sand(monkeypatch):
     """Sand of few texels: quick to make, and otherwise the same."""
     monkeypatch.setattr(desert, "TEXELS", 256)
     yield
-    synthetic._world.cache_clear()
+    synthetic._world.cache_clear(), synthetic._alone.cache_clear()
 
 
 def off_centre(width=96, height=64):
@@ -119,6 +119,14 @@ def test_a_picture_repeats_to_the_byte_whatever_the_number_of_threads():
     assert one.min() >= 0 and one.max() <= 1 and one.std() > 0.02
 
 
+def test_photos_taken_again_differ_in_their_noise_alone():
+    scene, camera = synthetic.make("desert", 0, **BARE), off_centre(50, 38)
+    first, same, second = (synthetic.render(scene, camera, 4, again) for again in (0, 0, 1))
+    assert first.tobytes() == same.tobytes() != second.tobytes()
+    assert np.abs(first - second).mean() < 0.05
+    assert np.abs(first.mean() - second.mean()) < 0.01  # a mean over blocks of pixels whose noise goes together
+
+
 def test_another_seed_is_another_desert():
     camera = rigs.orbit(90, 0, 7.0, (0, 0, 0), 24, 24, 55.0)
     one, other = (synthetic.render_depth(synthetic.make("desert", seed), camera) for seed in (0, 1))
@@ -182,8 +190,32 @@ def test_views_at_45_degrees_are_a_group_of_their_own():
     assert elevations(tests[12:]) == pytest.approx(8 * [45])
 
 
-def test_no_view_of_a_cap_is_another():
-    cameras = synthetic.start_views(HIGH) + synthetic.test_views(HIGH) + synthetic.candidates(HIGH | {"candidates": 24})
+def test_a_paper_rig_is_tested_on_the_hemisphere():
+    entry = ENTRY | {"rig": "paper", "photos": 100}
+    assert (np.abs(elevations(synthetic.start_views(entry)) - 45) < 1e-9).sum() == 36
+    assert elevations(synthetic.start_views(entry)).min() > 30
+    assert synthetic.test_groups(entry) == {"hemisphere": list(range(6))}
+
+
+def test_walkers_are_a_group_of_their_own_and_look_over_the_exemplar_to_the_horizon():
+    entry = HIGH | {"walkers": 6}
+    groups, tests = synthetic.test_groups(entry), synthetic.test_views(entry, (10.0, 0.0, 0.0))
+    assert list(groups) == ["high", "oblique", "walker"] and groups["walker"] == list(range(20, 26))
+    own = [tests[i] for i in groups["walker"]]
+    assert [c.centre[2] for c in own] == pytest.approx([0.8, 1.6, 3.2, 0.8, 1.6, 3.2])
+    around = np.degrees(np.unwrap([np.arctan2(c.centre[1], c.centre[0] - 10.0) for c in own]))
+    assert np.diff(around) == pytest.approx(5 * [60.0])
+    for camera in own:
+        pixels, _ = camera.project(np.array([[10.0, 0.0, 0.0], camera.centre + 50 * camera.forward * [1, 1, 0]]))
+        assert (pixels > 0).all() and (pixels < 64).all()  # the middle of the exemplar and the horizon
+        assert pixels[1, 1] < pixels[0, 1]
+        assert camera.width == camera.height == 64
+
+
+@pytest.mark.parametrize("rig", ["cap", "paper"])
+def test_no_view_is_another(rig):
+    entry = HIGH | {"rig": rig, "candidates": 24, "walkers": 6}
+    cameras = synthetic.start_views(entry) + synthetic.test_views(entry) + synthetic.candidates(entry)
     at = np.array([c.centre for c in cameras])
     assert np.linalg.norm(at[:, None] - at, axis=-1)[~np.eye(len(at), dtype=bool)].min() > 0.1
 

@@ -48,7 +48,7 @@ def mat(rng: np.random.Generator, count: int, length: float, dry: float) -> Mesh
     lean = np.radians(rng.uniform(5, 70, count))
     heading = direction(lean, rng.uniform(0, 2 * np.pi, count))
     paths = grown(rng, root, heading, length * rng.uniform(0.5, 1.3, count), joints=3, bend=0.12, droop=0.35)
-    return _grass(rng, paths, [0.055 * length, 0.048 * length, 0.004 * length], dry)
+    return grass(rng, paths, [0.055 * length, 0.048 * length, 0.004 * length], dry)
 
 
 def tuft(rng: np.random.Generator) -> Mesh:
@@ -58,7 +58,7 @@ def tuft(rng: np.random.Generator) -> Mesh:
     lean = np.radians(rng.uniform(2, 48, count))
     length = rng.uniform(0.5, 1.2, count)
     paths = grown(rng, root, direction(lean, around(rng, count)), length, joints=6, bend=0.10, droop=0.20)
-    return _grass(rng, paths, [0.016, 0.019, 0.018, 0.015, 0.010, 0.001], dry=0.12)
+    return grass(rng, paths, [0.016, 0.019, 0.018, 0.015, 0.010, 0.001], dry=0.12)
 
 
 def in_seed(rng: np.random.Generator) -> Mesh:
@@ -71,7 +71,7 @@ def in_seed(rng: np.random.Generator) -> Mesh:
     ears = things.leaves(rng, stems[:, -2:], 26, straw)
     low = grown(rng, root, direction(2.2 * lean, around(rng, count)), rng.uniform(0.3, 0.6, count), 4, 0.10, droop=0.22)
     return merged(
-        [rods(stems, 0.005, 0.003, 0.8 * straw, rng), ears, _grass(rng, low, [0.012, 0.012, 0.009, 0.001], 0.15)]
+        [rods(stems, 0.005, 0.003, 0.8 * straw, rng), ears, grass(rng, low, [0.012, 0.012, 0.009, 0.001], 0.15)]
     )
 
 
@@ -105,14 +105,14 @@ def flower(rng: np.random.Generator, kind: Flower) -> Mesh:
     lie = direction(np.radians(rng.uniform(25, 75, len(foot))), around(rng, len(foot)))
     low = grown(rng, foot, lie, rng.uniform(0.15, 0.42, len(foot)), 4, 0.1, droop=0.12)
     parts = [rods(stems, 0.012, 0.008, green, rng), things.leaves(rng, stems, 9, green)]
-    parts.append(_grass(rng, low, [0.012, 0.026, 0.022, 0.002], dry=0.05))
+    parts.append(grass(rng, low, [0.012, 0.026, 0.022, 0.002], dry=0.05))
     for stem in stems:
         facing = unit(headings(stem[None])[0, -1] + [0, 0, 0.8] + rng.normal(0, 0.18, 3))
-        parts.append(_head(rng, stem[-1], facing, kind))
+        parts.append(head(rng, stem[-1], facing, kind))
     return merged(parts)
 
 
-def _head(rng, centre, facing, kind: Flower) -> Mesh:
+def head(rng, centre, facing, kind: Flower) -> Mesh:
     """Petals around a middle that stands out a little."""
     u = unit(np.cross(facing, rng.normal(0, 1, 3)))
     v = np.cross(facing, u)
@@ -135,7 +135,7 @@ def _head(rng, centre, facing, kind: Flower) -> Mesh:
     return merged([petals, Mesh(np.vstack([rim, top]).astype(np.float32), faces, eye)])
 
 
-def _grass(rng, paths: Float[Array, "n joints 3"], width: list[float], dry: float) -> Mesh:
+def grass(rng, paths: Float[Array, "n joints 3"], width: list[float], dry: float) -> Mesh:
     """Blades of grass along paths, a share of them `dry`."""
     n, joints = paths.shape[:2]
     side = unit(np.cross(headings(paths)[:, 0], rng.normal(0, 1, (n, 3))))

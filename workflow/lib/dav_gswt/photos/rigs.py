@@ -10,6 +10,7 @@ from dav_gswt.cameras import Camera, look_at, pinhole
 Place = tuple[float, float, float]  # elevation, azimuth, radius
 NEARER = 0.9  # radius of a test view, as a share of the others'
 GOLDEN = np.pi * (3.0 - 5.0**0.5)  # radians: the turn between neighbours of a Fibonacci lattice
+CIRCLE = 36  # views of the rig `paper` that stand on a circle: of 100, and of any number from twice as many on
 STRIDE = 12.0  # degrees below the horizon that a walker looks
 
 
@@ -53,6 +54,15 @@ def hemisphere(n: int, lowest_elevation: float, radius: float, turn: float = 0.0
     height = 1.0 - (np.arange(n) + 0.5) / max(n, 1) * (1.0 - low)
     azimuth = (np.degrees(np.arange(n) * GOLDEN) + turn) % 360.0
     return [(float(np.degrees(np.arcsin(h))), float(a), radius) for h, a in zip(height, azimuth, strict=True)]
+
+
+def paper(n: int, elevation: float, lowest_elevation: float, radius: float) -> list[Place]:
+    """n places as in the paper: a circle at `elevation`, the others uniform by area above `lowest_elevation`.
+
+    On the circle are 36, or 36 in 100 where n is below 72.
+    """
+    circle = CIRCLE if n >= 2 * CIRCLE else round(n * CIRCLE / 100)
+    return ring(circle, elevation, radius) + hemisphere(n - circle, lowest_elevation, radius, turn=35.0)
 
 
 def test_views(n: int, lowest_elevation: float, radius: float) -> list[Place]:

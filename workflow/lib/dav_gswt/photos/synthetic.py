@@ -2,7 +2,8 @@
 
 The world is in metres, z up, the mean ground of the exemplar at z = 0; cameras are COLMAP's. Everything reflects
 diffusely, under a sun and a sky, with one exposure a scene. Same scene, camera and samples: same bytes, on any number
-of threads (a box filter, so that no pixel is summed from two blocks).
+of threads (a box filter, so that no pixel is summed from two blocks); with a compiled variant of mitsuba, which one has
+to ask for (`variant`), up to the noise.
 """
 
 import zlib
@@ -15,17 +16,17 @@ from numpy import ndarray as Array
 
 from dav_gswt.cameras import Camera
 from dav_gswt.errors import InputError
-from dav_gswt.photos import desert, meadow, rigs
+from dav_gswt.photos import desert, flowers, grass, meadow, planet, rigs, variant
 
-FAMILIES = {"desert": desert, "meadow": meadow}
-VARIANT = "scalar_rgb"  # runs wherever mitsuba does; the LLVM variant aborts the process under some LLVM versions
+FAMILIES = {"desert": desert, "meadow": meadow, "flowers": flowers, "grass": grass, "planet": planet}
 EXEMPLAR = 6.0  # metres: side of the square of ground that the pictures are about
 RADIUS = 7.0  # metres from the middle of the ground to the cameras
 FIELD_OF_VIEW = 55.0  # degrees across the picture's width: 7.3 m of ground from straight above
 RING_ELEVATION = 65.0  # degrees: neighbours of the start ring overlap by most of the exemplar
 LOWEST_ELEVATION = 30.0  # degrees: the lowest candidate and test view, where a scene does not say
+CIRCLE_ELEVATION = 45.0  # degrees, of the rig `paper`
 OBLIQUE_ELEVATION = 45.0  # degrees, of the views that test how a field looks away from its photos
-WALKERS = (0.8, 1.6, 3.2)  # metres above the mean ground: eye heights for stills
+WALKERS = (0.8, 1.6, 3.2)  # metres above the mean ground: eye heights for stills and tests
 WALKER_FIELD_OF_VIEW = 60.0  # degrees
 NEAR = 0.01  # metres: mitsuba's rays start at this depth
 SAMPLES = 20  # rays a pixel
@@ -37,7 +38,7 @@ class Scene:
 
     family: str
     seed: int
-    options: desert.Options | meadow.Options
+    options: desert.Options | meadow.Options | flowers.Options | grass.Options | planet.Options
     exemplar: float = EXEMPLAR
 
     @property
@@ -81,9 +82,13 @@ def start_views(entry: dict, middle=(0.0, 0.0, 0.0)) -> list[Camera]:
     """The cameras that the scene starts from, as the entry's `rig` says.
 
     ring: one straight above, the others around it. cap: spread evenly by area above the entry's lowest elevation.
+    paper: some on a circle, the others as in a cap.
     """
-    if entry.get("rig", "ring") == "cap":
+    rig = entry.get("rig", "ring")
+    if rig == "cap":
         places = rigs.hemisphere(entry["photos"], _lowest(entry), RADIUS, turn=35.0)
+    elif rig == "paper":
+        places = rigs.paper(entry["photos"], CIRCLE_ELEVATION, _lowest(entry), RADIUS)
     else:
         places = rigs.start_ring(entry["photos"], RING_ELEVATION, RADIUS)
     return _cameras(places, middle, entry["size"])
@@ -91,20 +96,19 @@ def start_views(entry: dict, middle=(0.0, 0.0, 0.0)) -> list[Camera]:
 
 def test_views(entry: dict, middle=(0.0, 0.0, 0.0)) -> list[Camera]:
     """The cameras that only test, group after group (`test_groups`)."""
-    places = [place for group in _test_places(entry).values() for place in group]
-    return _cameras(places, middle, entry["size"])
+    return [camera for group in _test_cameras(entry, middle).values() for camera in group]
 
 
 def test_groups(entry: dict) -> dict[str, list[int]]:
     """Which of `test_views` belong together: a list of indices a group.
 
     The first group is spread over the cap from which photos may be taken: `hemisphere`, or `high` where the photos are
-    taken by the rig `cap`. `oblique`: around at 45 degrees, if the entry has any.
+    taken by the rig `cap`. `oblique`: around at 45 degrees, and `walker`: from a walker's eye, if the entry has any.
     """
     found, count = {}, 0
-    for name, places in _test_places(entry).items():
-        found[name] = list(range(count, count + len(places)))
-        count += len(places)
+    for name, cameras in _test_cameras(entry).items():
+        found[name] = list(range(count, count + len(cameras)))
+        count += len(cameras)
     return found
 
 
@@ -133,11 +137,17 @@ def _lowest(entry: dict) -> float:
     return float(entry.get("lowest", LOWEST_ELEVATION))
 
 
-def _test_places(entry: dict) -> dict[str, list[rigs.Place]]:
+def _test_cameras(entry: dict, middle=(0.0, 0.0, 0.0)) -> dict[str, list[Camera]]:
     all_over = "high" if entry.get("rig") == "cap" else "hemisphere"
-    groups = {all_over: rigs.test_views(entry["test"], _lowest(entry), RADIUS)}
+    size, count = entry["size"], entry.get("walkers", 0)
+    groups = {all_over: _cameras(rigs.test_views(entry["test"], _lowest(entry), RADIUS), middle, size)}
     if entry.get("oblique"):
-        groups["oblique"] = rigs.ring(entry["oblique"], OBLIQUE_ELEVATION, rigs.NEARER * RADIUS, turn=20.0)
+        around = rigs.ring(entry["oblique"], OBLIQUE_ELEVATION, rigs.NEARER * RADIUS, turn=20.0)
+        groups["oblique"] = _cameras(around, middle, size)
+    if count:
+        heights = [WALKERS[i % len(WALKERS)] for i in range(count)]
+        stands = [(h, 10.0 + 360.0 * i / count, 0.5 * EXEMPLAR + h) for i, h in enumerate(heights)]
+        groups["walker"] = [rigs.walker(*stand, middle, size, size, WALKER_FIELD_OF_VIEW) for stand in stands]
     return groups
 
 
@@ -145,27 +155,37 @@ def _cameras(places: list[rigs.Place], middle, size: int) -> list[Camera]:
     return [rigs.orbit(*place, middle, size, size, FIELD_OF_VIEW) for place in places]
 
 
-def render(scene: Scene, camera: Camera, samples: int = SAMPLES) -> Float32[Array, "h w 3"]:
+def render(scene: Scene, camera: Camera, samples: int = SAMPLES, again: int = 0) -> Float32[Array, "h w 3"]:
     """A photo: sRGB-encoded, in [0, 1].
 
-    Args:   samples: rays a pixel; taken up to the next number that a grid of strata can hold.
+    Args:   samples: rays a pixel; taken up to the next number that a grid of strata can hold. again: which of several
+            photos from one place, each with noise of its own.
     Raises: ValueError: a camera that mitsuba cannot hold (see `sensor`).
     """
-    import mitsuba as mi
-
-    world = _world(scene)
+    mi, world = variant.use(), _world(scene)
     view = mi.load_dict(sensor(camera, {"type": "multijitter", "sample_count": samples}))
-    light = mi.render(world, sensor=view, spp=view.sampler().sample_count(), seed=_noise_seed(scene, camera))
+    light = mi.render(world, sensor=view, spp=view.sampler().sample_count(), seed=_noise_seed(scene, camera, again))
     return encode(np.array(light, np.float32)[..., :3])
 
 
 def render_depth(scene: Scene, camera: Camera) -> Float32[Array, "h w"]:
     """Depth (camera z) along the ray through every pixel's centre; infinite where the sky is seen."""
-    import mitsuba as mi
+    return _depth(_world(scene), camera)
 
-    world = _world(scene)
+
+def render_alone(scene: Scene, camera: Camera) -> dict[str, Float32[Array, "h w"]]:
+    """Depths as `render_depth` gives them, of the `ground` alone and, if there are any, of the `stones` alone.
+
+    Things that are strewn as instances are not among them.
+    """
+    return {name: _depth(part, camera) for name, part in _alone(scene).items()}
+
+
+def _depth(world, camera: Camera) -> Float32[Array, "h w"]:
+    mi = variant.use()
     view = mi.load_dict(sensor(camera, {"type": "stratified", "sample_count": 1, "jitter": False}))
-    integrator = mi.load_dict({"type": "aov", "aovs": "t:depth", "block_size": 16})
+    # not mitsuba's map of depths beside the picture (`aov`): that lists all shapes anew for every pixel
+    integrator = mi.load_dict({"type": "depth", "block_size": 16})
     distance = np.array(mi.render(world, sensor=view, integrator=integrator, spp=1), np.float64)[..., 0]
     steps = np.linalg.norm(camera.rays()[1], axis=-1)
     return np.where(distance > 0, NEAR + distance / steps, np.inf).astype(np.float32)
@@ -185,9 +205,7 @@ def sensor(camera: Camera, sampler: dict) -> dict:
     principal point offset is in widths (heights) of the picture, and grows as the principal point moves left (up).
     Raises: ValueError: an orthographic camera, or pixels that are not square.
     """
-    import mitsuba as mi
-
-    mi.set_variant(VARIANT)
+    mi = variant.use()
     if camera.orthographic or not np.isclose(camera.fx, camera.fy, rtol=1e-9):
         raise ValueError("synthetic scenes are photographed by pinhole cameras with square pixels")
     pose = np.eye(4)
@@ -214,18 +232,23 @@ def sensor(camera: Camera, sampler: dict) -> dict:
     }
 
 
-def _noise_seed(scene: Scene, camera: Camera) -> int:
-    """Other noise in every picture, by what is photographed and from where."""
+def _noise_seed(scene: Scene, camera: Camera, again: int) -> int:
+    """Other noise in every picture, by what is photographed, from where, and how often before."""
     place = np.round(np.concatenate([camera.centre, camera.forward]), 6) + 0.0  # + 0.0: no negative zeros
-    return zlib.crc32(place.astype("<f8").tobytes(), scene.seed & 0xFFFFFFFF)
+    return zlib.crc32(place.astype("<f8").tobytes(), (scene.seed + again * 0x9E3779B1) & 0xFFFFFFFF)
 
 
 @lru_cache(maxsize=1)
 def _world(scene: Scene):
     """The scene as mitsuba holds it: built once, for as many pictures as are taken of it."""
-    import mitsuba as mi
-
+    variant.use()
     from dav_gswt.photos import world
 
-    mi.set_variant(VARIANT)
     return world.build(FAMILIES[scene.family].grow(scene.options, scene.seed, scene.exemplar))
+
+
+@lru_cache(maxsize=1)
+def _alone(scene: Scene) -> dict:
+    from dav_gswt.photos import world
+
+    return world.alone(_world(scene))

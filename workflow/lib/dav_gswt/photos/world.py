@@ -1,7 +1,13 @@
-"""A piece of land as mitsuba holds it: meshes, instances, sun and sky. The variant is set by the caller."""
+"""A piece of land as mitsuba holds it: meshes, instances, sun and sky. The variant is set by the caller (`variant`).
+
+Compiled variants trace their kernel through every instance, again for each picture (1600 instances: 100 s): there the
+plants of a kind are one mesh. Nor do they sum a pixel's rays in a fixed order.
+"""
 
 import mitsuba as mi
 import numpy as np
+from jaxtyping import Float, Float32
+from numpy import ndarray as Array
 
 from dav_gswt.photos.land import Land, Light
 from dav_gswt.photos.things import Mesh
@@ -27,7 +33,17 @@ def build(land: Land):
     }
     if land.stones is not None:
         parts["stones"] = _mesh("stones", land.stones, coloured)
-    return mi.load_dict(parts | _plants(land))
+    return mi.load_dict(parts | (_merged(land) if _compiled() else _plants(land)))
+
+
+def alone(world) -> dict:
+    """The world's ground and its stones, each as a scene of its own without light, if they are there."""
+    found = {shape.id(): shape for shape in world.shapes() if shape.id() in ("ground", "stones")}
+    return {name: mi.load_dict({"type": "scene", name: shape}) for name, shape in found.items()}
+
+
+def _compiled() -> bool:
+    return not mi.variant().startswith("scalar")
 
 
 def _plants(land: Land) -> dict:
@@ -40,6 +56,31 @@ def _plants(land: Land) -> dict:
         group = {"type": "ref", "id": f"kind{int(kind)}"}
         found[f"plant{i}"] = {"type": "instance", "group": group, "to_world": _standing(*stand)}
     return kinds | found
+
+
+def _merged(land: Land) -> dict:
+    """All plants of a kind as one mesh."""
+    found = {}
+    for k, mesh in enumerate(land.plants):
+        stands = land.places[land.places[:, 0] == k][:, 1:]
+        if len(stands):
+            first = len(mesh.vertices) * np.arange(len(stands))[:, None, None]
+            faces = (np.asarray(mesh.faces) + first).reshape(-1, 3)
+            colours = np.tile(mesh.colours, (len(stands), 1))
+            found[f"plants{k}"] = _painted(f"plants{k}", Mesh(placed(mesh, stands), faces, colours, mesh.smooth))
+    return found
+
+
+def placed(mesh: Mesh, stands: Float[Array, "n 7"]) -> Float32[Array, "nv 3"]:
+    """The vertices of a plant wherever one stands, one plant after the other: as `_standing` moves them."""
+    x, y, z, size, yaw, along_x, along_y = (column[:, None] for column in np.asarray(stands, float).T)
+    vx, vy, vz = np.asarray(mesh.vertices, float).T
+    right, up = size * np.cos(yaw), size * np.sin(yaw)
+    turned_x, turned_y = right * vx - up * vy, up * vx + right * vy
+    out = np.empty((len(stands), len(vx), 3), np.float32)
+    out[..., 0], out[..., 1] = turned_x + x, turned_y + y
+    out[..., 2] = size * vz + along_x * turned_x + along_y * turned_y + z
+    return out.reshape(-1, 3)
 
 
 def _standing(x, y, z, size, yaw, along_x, along_y):

@@ -1,4 +1,4 @@
-"""From files of examples to weights: the whole training of the project's prior, or of a regressor to compare it with."""
+"""From files of examples to weights: the whole training of the prior, or of a regressor to compare it with."""
 
 import json
 from dataclasses import dataclass

