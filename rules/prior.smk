@@ -50,6 +50,7 @@ rule make_examples:
             "prior/worlds_things",
             "prior/examples",
             "active/poses",
+            "photos/land",
             "photos/noise",
             "photos/rigs",
             "coarse",

@@ -2,6 +2,7 @@
 
 from dav_gswt import field, images
 from dav_gswt.active import candidates, poses, reach, scoring
+from dav_gswt.active.agents import rig
 from dav_gswt.coarse import ground
 from dav_gswt.files import read_json
 from dav_gswt.logs import logging_to
@@ -14,6 +15,7 @@ with logging_to(snakemake.log[0]):
     pool = candidates.left(scene, frame, given.model, read_json(given.views), captures)
     fitted, grid = field.read(given.field), ground.read(given.ground)
     if scene["agent"] != "replay":  # whose frames were all taken, wherever they stand
+        pool = rig.within(scene, frame, pool) if scene["agent"] == "serial" else pool
         pool = reach.kept(pool, grid, scene.get("reach"), reach.CLEARANCE * frame["flying_height"])
     scored, maps = scoring.score(fitted, grid, pool)
     poses.write_scores(snakemake.output.scores, scored)

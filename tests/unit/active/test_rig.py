@@ -378,3 +378,16 @@ def test_a_pan_goes_the_short_way_round_where_the_limits_let_it():
     there = reachable.reach({"pan": [-270, 270], "tilt": [0, 90], "radius": [1, 9]}, [], np.array([[-1e6, 1e6]] * 3))
     [stop] = reachable.route(there, np.array([-170.0, 45.0, 5.0]), np.array([170.0, 45.0, 5.0]))
     assert stop[0] == -190.0
+
+
+def test_only_poses_where_the_rig_may_stand_are_candidates():
+    pool = [posed(i, place) for i, place in enumerate([(60.0, 0.0, 5.0), (60.0, 90.0, 5.0), (5.0, 0.0, 5.0)])]
+    radius = 5.0 * RIG["millimetres"]
+    limits = RIG["limits"] | {"radius": [0.9 * radius, 1.1 * radius]}
+    zone = {"pan": [80, 100]}
+    scene = {"rig": RIG | {"limits": limits, "no_go": [zone]}}
+    assert [pose.name for pose, _ in rig.within(scene, FRAME, pool)] == ["pose_0000"]
+    scene["rig"]["limits"] = limits | {"radius": [1, 2]}
+    with pytest.raises(InputError, match="none of the candidate poses"):
+        rig.within(scene, FRAME, pool)
+    assert rig.within({}, FRAME, pool) == pool  # `take` says what is missing

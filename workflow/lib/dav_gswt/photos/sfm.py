@@ -163,10 +163,8 @@ def _fit(width: int, height: int, longest: int) -> tuple[int, int]:
 def _described(path: Path, key: str, options: Options) -> _Photo:
     full = images.size(path)
     width, height = _fit(*full, options.size)
-    if options.focal:
-        pixels = options.focal / exif.FILM_DIAGONAL * float(np.hypot(*full))
-    else:
-        pixels = exif.focal_length(path)
+    given = options.focal and options.focal / exif.FILM_DIAGONAL * float(np.hypot(*full))
+    pixels = given or exif.focal_length(path)
     return _Photo(path, key, width, height, pixels and pixels * width / full[0])
 
 

@@ -62,6 +62,31 @@ def take(site: Site, asked: list[Asked]) -> None:
         raise InputError(_rehearsed(site, stops))
 
 
+def within(scene: dict, frame: dict, pool: list[Asked]) -> list[Asked]:
+    """The poses where the rig may stand by the config's limits: it is asked for no others. Its own come with `take`.
+
+    Raises: InputError: there is none.
+    """
+    rig = DEFAULTS | scene.get("rig", {})
+    if "limits" not in rig:
+        return pool
+    mount = Mount(middle(frame), float(rig["millimetres"]), float(rig["pan_zero"]), float(rig["tilt_zero"]))
+    there = reachable.reach(rig["limits"], rig["no_go"], np.array([[-np.inf, np.inf]] * 3))
+
+    def stands(camera) -> bool:
+        places = reachable.turns(there, mount.axes(camera), 0.0)
+        return any(reachable.trouble(there, place) is None for place in places)
+
+    found = [(pose, camera) for pose, camera in pool if not mount.trouble(camera) and stands(camera)]
+    _log.info("the rig can stand at %d of %d candidate poses", len(found), len(pool))
+    if pool and not found:
+        raise InputError(
+            "the rig can stand at none of the candidate poses: their radius is the flying height, "
+            f"{frame['flying_height'] * rig['millimetres']:.0f} mm; check rig.limits and rig.millimetres"
+        )
+    return found
+
+
 def _checked(there: Reach, home: Axes, mount: Mount, asked: list[Asked]) -> list[tuple[str, list[Axes]]]:
     """The stops on the way to each pose by name, from home through all of them in order.
 
