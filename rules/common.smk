@@ -112,14 +112,15 @@ def terrain_of(scene):
 
 
 def study_of(scene):
-    """What is known of each round: how well it shows the test photos, and what the last one is not sure of."""
+    """What is known of the photos and of each round: how well it shows those that test, what the last is unsure of."""
     if config["scenes"][scene]["kind"] == "field":
         return []
     values = values_of(scene)
     rounds = [rules.evaluate_round.output.metrics] * bool(config["rounds"])
     scored = rules.score_round.output if config["rounds"] else rules.score_coarse.output
     return (
-        expand(rules.evaluate_coarse.output.metrics, **values)
+        expand(rules.report_photos.output.page, scene=scene)
+        + expand(rules.evaluate_coarse.output.metrics, **values)
         + expand(rounds, **(values | {"t": range(1, config["rounds"] + 1)}))
         + expand(list(scored), **values)
     )

@@ -95,3 +95,30 @@ rule split_views:
         source=source_of("photos/views", "photos/model"),
     script:
         "../scripts/split_views.py"
+
+
+REPORTING = "focal ground model report report_facts report_figures views".split()
+
+
+rule report_photos:
+    """A page that says how the photos fit together, what was left out, and what is weak."""
+    input:
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+        template=str(Path(workflow.basedir, "workflow/report/photos.html")),
+    output:
+        page=report("<results>/<photos>/report.html", category="Photos", labels={"scene": "{scene}"}),
+    log:
+        "<logs>/<photos>/report_photos.log",
+    benchmark:
+        "<benchmarks>/<photos>/report_photos.tsv"
+    wildcard_constraints:
+        scene=f"{scenes_of('photos')}|{scenes_of('synthetic')}",
+    resources:
+        mem_mb=2000,
+        runtime="10m",
+    params:
+        source=source_of(*(f"photos/{name}" for name in REPORTING)),
+    script:
+        "../scripts/report_photos.py"

@@ -72,6 +72,11 @@ class Found:
             return f"{of:.2f} flying heights"
         return f"{of:.0f} m" if abs(of) >= 20 else f"{of:.1f} m"
 
+    def range(self, low: float, high: float) -> str:
+        """A range of lengths, with their unit."""
+        first, last = self.length(low).split(" ", 1)[0], self.length(high)
+        return f"{first} to {last}"
+
 
 def read(folder: Path | str, scene: str) -> Found:
     """The facts of a photos/ folder. Raises: InputError: what it holds is not readable."""
@@ -81,10 +86,8 @@ def read(folder: Path | str, scene: str) -> Found:
     unit = float(frame["flying_height"])
     flat = models.similar(model, 1 / unit, np.eye(3), np.zeros(3))
     cameras = tuple(c for name, c in zip(model.names, flat.cameras, strict=True) if name not in tests)
-    if len(flat.points):
-        grid = ground.coverage(cameras, flat.points)
-    else:
-        grid = Coverage(0.0, 0.0, 1.0, np.zeros((1, 1), int))
+    empty = Coverage(0.0, 0.0, 1.0, np.zeros((1, 1), int))
+    grid = ground.coverage(cameras, flat.points) if len(flat.points) else empty
     cover = replace(grid, west=unit * grid.west, south=unit * grid.south, cell=unit * grid.cell)
     need = int(frame.get("photos_per_cell", 3 if len(cameras) >= 9 else 2))
     return Found(scene, frame, model, photos(model, tests), need, cover, geodesy.of_frame(frame))
@@ -156,7 +159,9 @@ def _left_out(found: Found) -> list[str]:
     if not out:
         return []
     are = "photo was" if total == 1 else "photos were"
-    return [f"{out} of {total} {are} left out: the reasons are below. More photos between them and the others can help."]
+    return [
+        f"{out} of {total} {are} left out: the reasons are below. More photos between them and the others can help."
+    ]
 
 
 def _thin(found: Found) -> list[str]:
@@ -215,6 +220,6 @@ def mean_error(found: Found) -> float | None:
     return float(off.mean()) if len(off) else None
 
 
-def spread(values: Float[Array, "n"]) -> tuple[float, float, float]:
+def spread(values: Float[Array, "n"] | Int[Array, "n"]) -> tuple[float, float, float]:
     """Least, median and greatest."""
     return tuple(float(v) for v in np.percentile(values, [0, 50, 100]))

@@ -18,18 +18,30 @@ from numpy import ndarray as Array
 
 from dav_gswt import images
 from dav_gswt.cameras import Camera
+from dav_gswt.logs import progress
 from dav_gswt.photos import ground, views
+from dav_gswt.photos.model import Model
 from dav_gswt.photos.report_facts import Found, Photo
 
 LONGER = 1000.0  # of a plan's sides, in its own units
 DOTS = 600  # pixels of the longer side of the points' picture
+DENSE = 10_000  # points, from which on each is drawn 3 pixels wide, else 5
 AROUND = 0.04  # margin of a plan, as a share of its longer side
 DOWN = 5.0  # degrees off straight down, within which a camera has no arrow
 THUMB, MANY, SMALLER = 240, 120, 160  # pixels of a thumbnail's longer side; from this many photos on they are smaller
-BINS = 12  # most colours of the coverage map
+BINS = 9  # most colours of the coverage map
 MASKED = np.array([0.85, 0.1, 0.5], np.float32)
 FEW = ("#b3471f", "#e08a3c")  # colours where too few photos see the ground
 STEPS = np.array([1, 2, 2.5, 5, 10])  # a scale bar's round lengths
+
+
+@dataclass(frozen=True)
+class Small:
+    """A photo in small. uri: with what is masked in pink. masked: the share that is."""
+
+    image: Float32[Array, "h w 3"]
+    uri: str
+    masked: float
 
 
 @dataclass(frozen=True)
@@ -61,12 +73,18 @@ def sheet(found: Found) -> Sheet:
     return Sheet(float(low[0]), float(high[1]), float(width), float(height), scale)
 
 
-def plan(found: Found) -> str:
+def plan(found: Found, smalls: list[Small]) -> str:
     """Cameras over the points, each with its footprint, as SVG."""
     on = sheet(found)
     shots = zip(found.photos, found.model.cameras, strict=True)
     drawn = [_shot(i, photo, camera, found, on) for i, (photo, camera) in enumerate(shots)]
-    layers = [_picture(dots(found, on), 0, 0, on.width, on.height), _exemplar(found, on), *drawn, _furniture(found, on)]
+    ground_picture = dots(found.model, colours(found.model, smalls), on)
+    layers = [
+        _picture(ground_picture, 0.0, 0.0, on.width, on.height),
+        _exemplar(found, on),
+        *drawn,
+        _furniture(found, on),
+    ]
     return _svg("Plan: cameras over the ground, seen from above", on, layers)
 
 
@@ -76,11 +94,15 @@ def coverage(found: Found) -> str:
     rows, columns = cover.counts.shape
     (x, y), *_ = on.at(np.array([[cover.west, cover.south + rows * cover.cell]]))
     size = columns * cover.cell * on.per_unit, rows * cover.cell * on.per_unit
-    colours = np.zeros((rows, columns, 4), np.uint8)
+    painted = np.zeros((rows, columns, 4), np.uint8)
     for low, high, colour in bins(found):
         mask = (cover.counts >= low) & (cover.counts <= high)
-        colours[mask] = [*(int(colour[k : k + 2], 16) for k in (1, 3, 5)), 255]
-    layers = [_picture(colours[::-1], float(x), float(y), *size), _exemplar(found, on), _furniture(found, on)]
+        painted[mask] = [*(int(colour[k : k + 2], 16) for k in (1, 3, 5)), 255]
+    layers = [
+        _picture(painted[::-1], float(x), float(y), *size, kind="cells"),
+        _exemplar(found, on),
+        _furniture(found, on),
+    ]
     return _svg("Coverage: how many photos see each place of the ground", on, layers)
 
 
@@ -110,30 +132,49 @@ def footprint(camera: Camera, reach: float, along: int = 8) -> Float[Array, "n 2
     return centre[:2] + np.minimum(far, reach)[:, None] * rays[:, :2]
 
 
-def dots(found: Found, on: Sheet) -> UInt8[Array, "h w 4"]:
-    """The sparse points in their colours, the higher over the lower, three pixels wide."""
+def colours(model: Model, smalls: list[Small]) -> Float32[Array, "n 3"]:
+    """The points' mean colours over the photos that see them: the model's own may be grey."""
+    total = np.zeros((len(model.points), 3))
+    for i, (camera, small) in enumerate(zip(model.cameras, smalls, strict=True)):
+        own = model.image_of == i
+        height, width = small.image.shape[:2]
+        at = (model.pixels[own] * [width / camera.width, height / camera.height]).astype(int)
+        column, row = np.clip(at, 0, [width - 1, height - 1]).T
+        np.add.at(total, model.point_of[own], small.image[row, column])
+    seen = np.bincount(model.point_of, minlength=len(model.points))
+    return (total / np.maximum(seen, 1)[:, None]).astype(np.float32)
+
+
+def dots(model: Model, colour: Float32[Array, "n 3"], on: Sheet) -> UInt8[Array, "h w 4"]:
+    """The sparse points, the higher over the lower."""
     scale = DOTS / LONGER
     width, height = (max(1, round(scale * side)) for side in (on.width, on.height))
-    picture = np.zeros((height + 2, width + 2, 4), np.uint8)
-    order = np.argsort(found.model.points[:, 2], kind="stable")
-    column, row = np.floor(on.at(found.model.points[order]) * scale).astype(int).T
+    wide = 3 if len(model.points) >= DENSE else 5
+    picture = np.zeros((height + wide - 1, width + wide - 1, 4), np.uint8)
+    order = np.argsort(model.points[:, 2], kind="stable")
+    column, row = np.floor(on.at(model.points[order]) * scale).astype(int).T
     inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
-    colour = np.c_[np.rint(255 * found.model.colours[order]), np.full(len(order), 255)].astype(np.uint8)
-    for i in range(3):
-        for j in range(3):
-            picture[row[inside] + i, column[inside] + j] = colour[inside]
-    return picture[1:-1, 1:-1]
+    painted = np.c_[np.rint(255 * colour[order]), np.full(len(order), 255)].astype(np.uint8)[inside]
+    for i in range(wide):
+        for j in range(wide):
+            picture[row[inside] + i, column[inside] + j] = painted
+    return picture[wide // 2 :, wide // 2 :][:height, :width]
 
 
-def thumbnail(path: Path, longer: int) -> tuple[str, int, int, float]:
-    """A picture in small as a data URI, its width and height, and the share of it that is masked."""
+def shrunk(path: Path, longer: int) -> Small:
+    """A picture at most `longer` pixels wide or high."""
     image, cover = images.read_covered(path)
     share = min(1.0, longer / max(image.shape[:2]))
     width, height = (max(1, round(share * side)) for side in (image.shape[1], image.shape[0]))
-    small = images.resized(image, width, height)
-    counts = images.resized(cover[..., None], width, height)
-    small = counts * small + (1 - counts) * (0.5 * small + 0.5 * MASKED)
-    return _uri(small, "jpeg"), width, height, float(1 - cover.mean())
+    small, counts = images.resized(image, width, height), images.resized(cover[..., None], width, height)
+    shown = counts * small + (1 - counts) * (0.5 * small + 0.5 * MASKED)
+    return Small(small, _uri(shown, "jpeg"), float(1 - cover.mean()))
+
+
+def all_shrunk(folder: Path, names: list[str]) -> list[Small]:
+    """Photos in small, smaller ones of many."""
+    longer = THUMB if len(names) < MANY else SMALLER
+    return [shrunk(folder / name, longer) for name in progress(names, "shrink photos")]
 
 
 def _uri(picture: Array, kind: str) -> str:
@@ -153,9 +194,11 @@ def _svg(label: str, on: Sheet, layers: list[str]) -> str:
     )
 
 
-def _picture(pixels: UInt8[Array, "h w 4"], x: float, y: float, width: float, height: float) -> str:
+def _picture(
+    pixels: UInt8[Array, "h w 4"], x: float, y: float, width: float, height: float, kind: str = "points"
+) -> str:
     place = f'x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}"'
-    return f'<image {place} preserveAspectRatio="none" href="{_uri(pixels, "png")}"/>'
+    return f'<image class="{kind}" {place} preserveAspectRatio="none" href="{_uri(pixels, "png")}"/>'
 
 
 def _exemplar(found: Found, on: Sheet) -> str:
@@ -213,9 +256,3 @@ def _furniture(found: Found, on: Sheet) -> str:
     needle = '<path class="needle" d="M0,-38 L12,14 L0,6 L-12,14 Z"/><text y="-46" text-anchor="middle">N</text>'
     turn = f"translate({on.width - 60:.1f} 90) rotate({-found.place.north:.1f})"
     return f'{bar}{text}<g transform="{turn}">{needle}</g>'
-
-
-def thumbnails(folder: Path, found: Found, said) -> list[tuple[str, int, int, float]]:
-    """Every photo in small. said: wraps the names, to tell how far it is."""
-    longer = THUMB if len(found.photos) < MANY else SMALLER
-    return [thumbnail(folder / photo.name, longer) for photo in said(found.photos)]

@@ -1,0 +1,10 @@
+"""Rule report_photos: a page that says how the photos fit together, and what is weak."""
+
+from pathlib import Path
+
+from dav_gswt.logs import logging_to
+from dav_gswt.photos import report
+
+with logging_to(snakemake.log[0]):
+    given = snakemake.input
+    report.write(Path(given.frame).parent, given.template, snakemake.wildcards.scene, snakemake.output.page)
