@@ -110,10 +110,10 @@ def register(folder: Path | str, options: Options) -> Registered:
     if len(paths) < LEAST_PHOTOS:
         names = " and ".join(p.name for p in paths)
         raise InputError(f"{folder}: only {names}; at least {LEAST_PHOTOS} overlapping photos are needed, better 20")
+    photos = [_described(p, key, options) for p, key in zip(paths, _keys(paths), strict=True)]
     positions = gps.of_photos(paths)
     with tempfile.TemporaryDirectory(prefix="sfm-") as scratch:
         database = Path(scratch) / "database.db"
-        photos = [_described(p, key, options) for p, key in zip(paths, _keys(paths), strict=True)]
         _shrink(photos, Path(scratch))
         with closing(pycolmap.Database.open(database)) as store:
             held = _enter(photos, store, options)
