@@ -17,7 +17,7 @@ from dav_gswt.terrain.still import SHOTS
 
 CONFIGS = (USUAL, TINY)
 RULES = {
-    "photos": ["render_photos", "split_views"],
+    "photos": ["render_photos", "report_photos", "split_views"],
     "coarse": ["fit_coarse", "evaluate_coarse", "score_coarse"],
     "active": ["select_poses", "capture_views", "update_field", "score_round", "evaluate_round"],
     "levels": ["crop_level", "fit_level1"],
