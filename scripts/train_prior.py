@@ -1,4 +1,4 @@
-"""Rule train_prior: the project's own prior, from examples to weights."""
+"""Rules train_prior and train_regressor: from examples to weights."""
 
 from pathlib import Path
 
@@ -8,9 +8,11 @@ from dav_gswt.prior import lesson
 from dav_gswt.prior.training import Plan
 
 with logging_to(snakemake.log[0]):
-    out, params = snakemake.output, snakemake.params
+    given, out, params = snakemake.input, snakemake.output, snakemake.params
     plans = Plan(**params.coder), Plan(**params.denoiser)
-    losses = lesson.learn(list(snakemake.input.examples), out.weights, *plans, Path(params.keep))
+    coded = given.get("coded")  # a regressor takes the prior's coder
+    keep = Path(params.keep)
+    losses = lesson.learn(given.examples, out.weights, *plans, keep, coded, regress=bool(coded))
     rows = [
         {"trained": what, "step": i + 1, "loss": value} for what, of in losses.items() for i, value in enumerate(of)
     ]

@@ -93,7 +93,7 @@ def train_coder(network: Network, pictures: Tensor, plan: Plan, keep: Path) -> l
     def loss(step: int, rng: torch.Generator) -> Tensor:
         rows = torch.randint(len(pictures), (plan.batch,), generator=rng)
         true = pictures[rows].float() / 255
-        posterior = network.coder.encode(2 * true - 1).latent_dist
+        posterior = network.posterior(true)
         code = posterior.mean + posterior.std * torch.randn(posterior.mean.shape, generator=rng)
         made = (network.coder.decode(code).sample + 1) / 2
         return _apart(made, true) + DIVERGENCE * posterior.kl().mean()
@@ -102,7 +102,7 @@ def train_coder(network: Network, pictures: Tensor, plan: Plan, keep: Path) -> l
     network.eval()
     with torch.inference_mode():
         some = pictures[:: max(1, len(pictures) // 2048)].float() / 255
-        network.scale.fill_(1 / network.coder.encode(2 * some - 1).latent_dist.mode().std())
+        network.scale.fill_(1 / network.posterior(some).mode().std())
     return losses
 
 
