@@ -1,48 +1,60 @@
 """Active views: score the candidate poses, choose k, capture them, refit, and again.
 
-In: the coarse field. Out, per round t: poses.json, capture/, field.ply, ground.exr, and of that new field scores.csv,
-uncertainty.exr and metrics.json. Round t starts from round t - 1, so T rounds are a prefix of T + 1, and T is only
+In: the coarse field. Out, per round t: poses.json and poses.exr, capture/, field.ply, ground.exr, and of that new field
+scores.csv and scores.json, maps.npz, uncertainty.exr and metrics.json. Round t starts from round t - 1, so T rounds are a prefix of T + 1, and T is only
 which round is asked for. Scoring keeps its terms apart: the policy and k enter when poses are chosen.
 """
 
 
 rule score_coarse:
-    """Score every candidate pose by what the coarse field does not know there."""
+    """Score every candidate pose by what the coarse field does not know there, and freeze the scales of the terms."""
     input:
+        unpack(prior_of),
         field="<results>/<coarse>/field.ply",
         ground="<results>/<coarse>/ground.exr",
         views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
         model="<results>/<photos>/sparse",
         frame="<results>/<photos>/ground.json",
     output:
         scores="<results>/<scored>/scores.csv",
-        maps="<results>/<scored>/uncertainty.exr",
+        facts="<results>/<scored>/scores.json",
+        maps="<results>/<scored>/maps.npz",
+        shown="<results>/<scored>/uncertainty.exr",
     log:
         "<logs>/<scored>/score_coarse.log",
     benchmark:
         "<benchmarks>/<scored>/score_coarse.tsv"
     threads: 2
     resources:
-        mem_mb=1000,
-        runtime="10m",
+        mem_mb=lambda wildcards: 1000 if wildcards.prior == "none" else 3000,
+        runtime="60m",
     params:
         scene=entry("scenes", "scene"),
-        source=source_of("active", "raster", "coarse/doubt"),
+        prior=lambda wildcards: config["priors"].get(wildcards.prior),
+        p_drop=real("p_drop"),
+        seed=integer("seed"),
+        source=source_of("active", "raster", "coarse/doubt", "prior", "perceptual"),
     script:
         "../scripts/score_poses.py"
 
 
 use rule score_coarse as score_round with:
     input:
+        unpack(prior_of),
         field="<results>/<round>/field.ply",
         ground="<results>/<round>/ground.exr",
+        frozen="<results>/<scored>/scores.json",
         views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
         model="<results>/<photos>/sparse",
         frame="<results>/<photos>/ground.json",
         captures=captures_until,
     output:
         scores="<results>/<round>/scores.csv",
-        maps="<results>/<round>/uncertainty.exr",
+        facts="<results>/<round>/scores.json",
+        maps="<results>/<round>/maps.npz",
+        shown="<results>/<round>/uncertainty.exr",
     log:
         "<logs>/<round>/score_round.log",
     benchmark:
@@ -52,7 +64,7 @@ use rule score_coarse as score_round with:
 
 
 rule select_poses:
-    """Choose the k poses that the policy expects most of."""
+    """Choose the k poses that the policy expects most of, and show what is not known there."""
     input:
         unpack(before_round),
         captures=captures_before,
@@ -66,6 +78,7 @@ rule select_poses:
             category="View selection",
             labels={"scene": "{scene}", "policy": "{policy}", "k": "{k}", "round": "{t}"},
         ),
+        shown="<results>/<round>/poses.exr",
     log:
         "<logs>/<round>/select_poses.log",
     benchmark:
@@ -74,10 +87,11 @@ rule select_poses:
         t=POSITIVE,
     params:
         policy=lambda wildcards: wildcards.policy,
+        lam=real("lam"),
         k=integer("k"),
         seed=integer("seed"),
         t=integer("t"),
-        source=source_of("active/selection", "active/poses"),
+        source=source_of("active/selection", "active/poses", "active/scores", "active/maps", "active/uncertainty"),
     script:
         "../scripts/select_poses.py"
 
@@ -152,7 +166,7 @@ rule update_field:
     benchmark:
         "<benchmarks>/<round>/update_field.tsv"
     wildcard_constraints:
-        policy="farthest|opacity|random",
+        policy=CHOOSING,
         t=POSITIVE,
     threads: 2
     resources:
@@ -207,7 +221,7 @@ rule begin_active:
     benchmark:
         "<benchmarks>/<active>/iter0/begin_active.tsv"
     wildcard_constraints:
-        policy="farthest|opacity|random",
+        policy=CHOOSING,
     script:
         "../scripts/begin_active.py"
 

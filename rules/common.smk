@@ -5,7 +5,7 @@ from hashlib import sha256
 from pathlib import Path
 
 import dav_gswt
-from dav_gswt.active.names import POLICIES
+from dav_gswt.active.names import GEOMETRIC, IMAGINING
 from dav_gswt.config import check
 from dav_gswt.errors import InputError
 
@@ -40,7 +40,13 @@ NAME = r"(?!(?:logs|benchmarks|snapshots|weights|prior|sweeps|tables|figures|tra
 NATURAL = r"0|[1-9]\d*"
 POSITIVE = r"[1-9]\d*"
 FRACTION = r"0|1|0\.\d*[1-9]"
+SHARE = r"0|0\.\d*[1-9]"
+NUMBER = r"0|[1-9]\d*|(?:0|[1-9]\d*)\.\d*[1-9]"
 NEVER = r"(?!)"  # a constraint that nothing meets
+# What reads no prior has one spelling of it: the names look at what follows them in a path.
+PRIOR = "|".join(["none(?=_pdrop0[_/])", *config["priors"]])
+CHOOSING = f"(?:{'|'.join(GEOMETRIC)})(?=_none_pdrop0_lam0_)|(?:{'|'.join(IMAGINING)})(?!_none_)"  # poses, by scores
+POLICY = f"{CHOOSING}|given"
 SNAPSHOTS = "results/snapshots"  # of fits that run: outside the outputs, so that a killed fit can go on
 
 
@@ -91,14 +97,15 @@ def scenes_by(*agents):
 def values_of(scene):
     """The wildcards of what is made of a scene at the config's parameters."""
     given = config["scenes"][scene]["kind"] == "field"
+    imagined = not given and config["policy"] in IMAGINING
     return dict(
         scene=scene,
         seed=config["seeds"],
         quality=config["scenes"][scene]["quality"],
         policy="given" if given else config["policy"],
-        prior="none",
-        p_drop="0",
-        lam="0",
+        prior=config["prior"] if imagined else "none",
+        p_drop=spell(config["p_drop"]) if imagined else "0",
+        lam=spell(config["lam"]) if imagined else "0",
         k=0 if given else config["k"],
         t=0 if given else config["rounds"],
         seam=config["scenes"][scene]["seam"],
@@ -161,7 +168,26 @@ def before_round(wildcards):
         "field": f"{last}/field.ply",
         "ground": f"{last}/ground.exr",
         "scores": f"{scores}/scores.csv",
+        "maps": f"{scores}/maps.npz",
     }
+
+
+def prior_of(wildcards):
+    """What the scoring of poses reads beside the field: the weights of the prior, those of LPIPS."""
+    if wildcards.prior == "none":
+        return {}
+    entry = config["priors"][wildcards.prior]
+    files = {"lpips": rules.fetch_lpips.output.weights} if entry.get("lpips", True) else {}
+    if entry["model"] == "terrain":
+        files["weights"] = entry.get("weights", str(LIBRARY / "prior/terrain.safetensors"))
+    return files
+
+
+def maps_of_round(wildcards):
+    """The maps of the scoring that followed a round, where a prior was asked: else the field says itself what is known."""
+    if wildcards.prior == "none":
+        return {}
+    return {"maps": f"<results>/{'<scored>' if wildcards.t == '0' else '<round>'}/maps.npz"}
 
 
 def captures_before(wildcards):

@@ -7,6 +7,7 @@ In: the last round's field and ground. Out: level{l}.ply and its grid level{l}.e
 rule crop_level:
     """The finest level: the field's exemplar and a margin, in whole blocks of the coarsest level's cells."""
     input:
+        unpack(maps_of_round),
         field="<results>/<round>/field.ply",
         ground="<results>/<round>/ground.exr",
     output:
@@ -18,7 +19,7 @@ rule crop_level:
         "<benchmarks>/<levels>/crop_level.tsv"
     params:
         levels=lookup(dpath="levels", within=config),
-        source=source_of("levels"),
+        source=source_of("levels", "active/maps"),
     script:
         "../scripts/crop_level.py"
 

@@ -1,22 +1,29 @@
 """Rules score_coarse and score_round: how much is not known yet at each candidate pose?"""
 
-from dav_gswt import field, images
-from dav_gswt.active import candidates, poses, reach, scoring
+from dav_gswt import field, images, views
+from dav_gswt.active import candidates, frozen, imagining, maps, reach, scores, scoring
 from dav_gswt.active.agents import rig
 from dav_gswt.coarse import ground
 from dav_gswt.files import read_json
 from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):
-    given = snakemake.input
+    given, out, params = snakemake.input, snakemake.output, snakemake.params
     captures = given.get("captures", [])
     captures = [captures] if isinstance(captures, str) else list(captures)
-    scene, frame = snakemake.params.scene, read_json(given.frame)
-    pool = candidates.left(scene, frame, given.model, read_json(given.views), captures)
+    scene, frame, split = params.scene, read_json(given.frame), read_json(given.views)
     fitted, grid = field.read(given.field), ground.read(given.ground)
+    pool = candidates.left(scene, frame, given.model, split, captures)
     if scene["agent"] != "replay":  # whose frames were all taken, wherever they stand
         pool = rig.within(scene, frame, pool) if scene["agent"] == "serial" else pool
         pool = reach.kept(pool, grid, scene.get("reach"), reach.CLEARANCE * frame["flying_height"])
-    scored, maps = scoring.score(fitted, grid, pool)
-    poses.write_scores(snakemake.output.scores, scored)
-    images.write_exr_parts(snakemake.output.maps, scoring.parts(fitted, grid, scored, maps))
+    taken = views.taken(given.images, given.model, split["start"], captures, scoring.PHOTO)
+    prior = imagining.asked(params.prior, params.p_drop, params.seed, given.get("lpips"))
+    first = frozen.read(given.frozen) if given.get("frozen") else None
+    found = scoring.score(fitted, grid, pool, taken, frame, prior, first)
+    scores.write(out.scores, found.scores)
+    maps.write(out.maps, found.maps, found.gaussians)
+    images.write_exr_parts(out.shown, scoring.parts(found, fitted, grid))
+    inputs = {name: given[name] for name in ("field", "ground", "views", "weights", "lpips") if given.get(name)}
+    about = {"prior": params.prior, "p_drop": params.p_drop, "seed": params.seed}
+    frozen.write(out.facts, found.frozen, found.facts(), inputs, about)

@@ -1,70 +1,105 @@
 import numpy as np
 import pytest
 
-from dav_gswt.active import poses, selection
-from dav_gswt.active.poses import Pose, Scored
+from dav_gswt.active import poses, scores, selection
+from dav_gswt.active.poses import Pose
+from dav_gswt.active.scores import Scores
+from dav_gswt.active.selection import Wanted
+from dav_gswt.active.uncertainty import Scales
 from dav_gswt.errors import InputError
 
-RNG = np.random.default_rng
 
-
-def scored(*places, opacity=None):
+def scored(*places, **terms):
     """Candidates at azimuths (degrees) on the horizon of a unit circle."""
-    return [
-        Scored(Pose(f"p{i}", 0.0, float(a), 1.0), float(o))
-        for i, (a, o) in enumerate(zip(places, opacity or [0.0] * len(places), strict=True))
-    ]
+    given = {"opacity": [0.0] * len(places)} | terms
+    columns = {name: np.array(values, float) for name, values in given.items()}
+    found = [Pose(f"p{i}", 0.0, float(a), 1.0) for i, a in enumerate(places)]
+    return Scores(found, columns, Scales(dict.fromkeys(columns, 2.0)), np.zeros(len(places), int))
+
+
+def chosen(policy, pool, k, captured=((1.0, 0, 0),), seed=0, lam=0.0):
+    wanted = Wanted(np.array(captured).reshape(-1, 3), k, np.random.default_rng(seed), lam)
+    return [pose.name for pose in selection.select(policy, pool, wanted)]
 
 
 def test_farthest_takes_the_opposite_side_then_the_gaps():
-    pool = scored(0, 90, 180, 270, 10)
-    captured = np.array([[1.0, 0, 0]])
-    names = [p.name for p in selection.select("farthest", pool, captured, 3, RNG(0))]
+    names = chosen("farthest", scored(0, 90, 180, 270, 10), 3)
     assert names[0] == "p2"  # 180 is farthest from 0; then come 90 and 270, equal but for rounding
     assert set(names[1:]) == {"p1", "p3"}
 
 
 def test_equal_distances_go_by_index():
-    assert [p.name for p in selection.select("farthest", scored(90, 90), np.array([[1.0, 0, 0]]), 1, RNG(0))] == ["p0"]
+    assert chosen("farthest", scored(90, 90), 1) == ["p0"]
 
 
 def test_farthest_does_not_take_a_pose_twice_when_all_coincide():
-    pool = scored(0, 0, 0)
-    names = [p.name for p in selection.select("farthest", pool, np.zeros((0, 3)), 3, RNG(0))]
-    assert sorted(names) == ["p0", "p1", "p2"]
+    assert sorted(chosen("farthest", scored(0, 0, 0), 3, captured=())) == ["p0", "p1", "p2"]
 
 
 def test_opacity_takes_the_most_unknown_and_ties_by_index():
-    pool = scored(0, 1, 2, 3, opacity=[0.1, 0.5, 0.5, 0.2])
-    assert [p.name for p in selection.select("opacity", pool, np.zeros((0, 3)), 3, RNG(0))] == ["p1", "p2", "p3"]
+    assert chosen("opacity", scored(0, 1, 2, 3, opacity=[0.1, 0.5, 0.5, 0.2]), 3) == ["p1", "p2", "p3"]
+
+
+def test_w2_lpips_weighs_lpips_by_lam_and_ties_go_by_index():
+    pool = scored(0, 1, 2, 3, w2_sq=[1.0, 3, 2, 3], lpips=[9.0, 0, 4, 0])
+    assert chosen("w2-lpips", pool, 2) == ["p1", "p3"]
+    assert chosen("w2-lpips", pool, 2, lam=1e6) == ["p0", "p2"]
+
+
+def test_w2_lpips_says_that_lpips_is_absent_and_needs_a_prior(caplog):
+    assert chosen("w2-lpips", scored(0, 1, w2_sq=[1.0, 2]), 1, lam=1.0) == ["p1"]
+    assert "its term is left out" in caplog.text
+    with pytest.raises(InputError, match="w2_sq: the poses were scored without it"):
+        chosen("w2-lpips", scored(0, 1), 1)
 
 
 def test_random_depends_on_its_generator_alone():
     pool = scored(*range(20))
-    draw = [[p.name for p in selection.select("random", pool, np.zeros((0, 3)), 5, RNG(s))] for s in (1, 1, 2)]
+    draw = [chosen("random", pool, 5, seed=s) for s in (1, 1, 2)]
     assert draw[0] == draw[1] != draw[2]
     assert len(set(draw[0])) == 5
 
 
-@pytest.mark.parametrize("policy", ["farthest", "opacity", "random"])
+@pytest.mark.parametrize("policy", selection.POLICIES)
 def test_a_pool_that_is_too_small_is_taken_whole_and_said_so(policy, caplog):
-    pool = scored(0, 90)
-    assert len(selection.select(policy, pool, np.array([[1.0, 0, 0]]), 5, RNG(0))) == 2
+    assert len(chosen(policy, scored(0, 90, w2_sq=[0.0, 1]), 5)) == 2
     assert "only 2 candidates" in caplog.text
-    assert selection.select(policy, [], np.zeros((0, 3)), 5, RNG(0)) == []
+    assert chosen(policy, scored(), 5) == []
     assert "no candidate pose is left" in caplog.text
 
 
+def test_spread_poses_are_far_apart_and_the_first_comes_first():
+    assert poses.spread(scored(0, 5, 180, 90).poses, 3) == [0, 2, 3]
+    assert poses.spread(scored(0, 0).poses, 5) == [0, 1]
+
+
 def test_scores_come_back_to_the_bit(tmp_path):
-    pool = scored(0.1, 33.3333333333, opacity=[1 / 3, 0.25])
-    poses.write_scores(tmp_path / "s.csv", pool)
-    assert poses.read_scores(tmp_path / "s.csv") == pool
+    pool = scored(0.1, 33.3333333333, opacity=[1 / 3, 0.25], w2_sq=[1e-30, 7e20])
+    scores.write(tmp_path / "s.csv", pool)
+    back = scores.read(tmp_path / "s.csv")
+    assert (back.poses, back.scales, list(back.terms)) == (pool.poses, pool.scales, ["opacity", "w2_sq"])
+    assert all(np.array_equal(back.terms[name], values) for name, values in pool.terms.items())
+    assert np.array_equal(back.steps, pool.steps)
+
+
+def test_no_candidate_left_is_a_table_without_rows(tmp_path):
+    scores.write(tmp_path / "s.csv", scored())
+    assert len(scores.read(tmp_path / "s.csv")) == 0
 
 
 def test_scores_that_are_not_finite_name_their_poses(tmp_path):
-    poses.write_scores(tmp_path / "s.csv", scored(0, 1, opacity=[float("nan"), 0]))
+    scores.write(tmp_path / "s.csv", scored(0, 1, opacity=[float("nan"), 0]))
     with pytest.raises(InputError, match="p0"):
-        poses.read_scores(tmp_path / "s.csv")
+        scores.read(tmp_path / "s.csv")
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"), [("p0,1,2", "not a table"), ("p0,1,2,x" + "," * 11, "could not convert")], ids=["short", "word"]
+)
+def test_a_table_of_something_else_is_refused(tmp_path, line, reason):
+    (tmp_path / "s.csv").write_text(",".join(scores.FIELDS) + "\n" + line + "\n")
+    with pytest.raises(InputError, match=reason):
+        scores.read(tmp_path / "s.csv")
 
 
 def test_a_pose_is_where_its_camera_is():

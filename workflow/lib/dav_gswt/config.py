@@ -58,6 +58,9 @@ def check(config: dict, schema: Path) -> None:
         raise InputError(f"config: {key + ': ' if key else ''}{_said(error)} (config/README.md lists every key)")
     if config["scene"] not in config["scenes"]:
         raise InputError(f"config: scene: there is no {config['scene']!r}; scenes has {', '.join(config['scenes'])}")
+    if config["prior"] not in config["priors"]:
+        known = ", ".join(config["priors"]) or "nothing"
+        raise InputError(f"config: prior: there is no {config['prior']!r}; priors has {known}")
     for name, scene in config["scenes"].items():
         for key, table in (("quality", "qualities"), ("seam", "seams")):
             if scene[key] not in config[table]:

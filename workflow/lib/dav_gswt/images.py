@@ -8,6 +8,7 @@ import OpenEXR
 import OpenImageIO as oiio
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
+from scipy.ndimage import map_coordinates
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import whole
@@ -119,6 +120,13 @@ def write_exr(path: Path | str, channels: dict[str, Array], header: dict[str, st
 def read_exr(path: Path | str) -> tuple[dict[str, Array], dict[str, str]]:
     """Channels by name and the header's texts of a file with one part. Raises: InputError: not readable."""
     return next(iter(read_exr_parts(path).values()))
+
+
+def enlarged(values: Float32[Array, "h w"], width: int, height: int) -> Float32[Array, "h2 w2"]:
+    """A map on a finer grid over the same area: linear between the cells' centres, constant beyond the outermost."""
+    rows, columns = ((np.arange(n) + 0.5) * old / n - 0.5 for n, old in zip((height, width), values.shape, strict=True))
+    at = np.stack(np.meshgrid(rows, columns, indexing="ij"))
+    return map_coordinates(values, at, order=1, mode="nearest")
 
 
 def write_exr_parts(path: Path | str, parts: dict[str, tuple[dict[str, Array], dict[str, str]]]) -> None:

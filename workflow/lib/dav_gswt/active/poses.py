@@ -1,16 +1,12 @@
 """Candidate poses: places on a hemisphere over the exemplar, as (elevation, azimuth, radius) and a camera each."""
 
-import csv
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.cameras import Camera
-from dav_gswt.errors import InputError
-from dav_gswt.files import whole
 
 
 @dataclass(frozen=True)
@@ -21,14 +17,6 @@ class Pose:
     elevation: float
     azimuth: float
     radius: float
-
-
-@dataclass(frozen=True)
-class Scored:
-    """A candidate pose and its terms of uncertainty, kept apart: they are weighed when poses are chosen."""
-
-    pose: Pose
-    opacity: float  # mean over the picture of what is not known to be opaque, 0 to 1
 
 
 def middle(frame: dict) -> Float[Array, "3"]:
@@ -51,27 +39,15 @@ def place(pose: Pose) -> Float[Array, "3"]:
     return pose.radius * np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
 
 
-def write_scores(path: Path | str, scored: list[Scored]) -> None:
-    """One row a candidate; numbers as they are, so that reading gives the same bits."""
-    with whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file)
-        table.writerow(["pose", "elevation", "azimuth", "radius", "opacity"])
-        for s in scored:
-            table.writerow(
-                [s.pose.name, repr(s.pose.elevation), repr(s.pose.azimuth), repr(s.pose.radius), repr(s.opacity)]
-            )
-
-
-def read_scores(path: Path | str) -> list[Scored]:
-    """The candidates that `write_scores` wrote. Raises: InputError: scores that are not finite, naming the poses."""
-    with Path(path).open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    if bad := [r["pose"] for r in rows if not np.isfinite(float(r["opacity"]))]:
-        raise InputError(f"{path}: the scores of {', '.join(bad[:5])} are not finite")
-    return [
-        Scored(Pose(r["pose"], float(r["elevation"]), float(r["azimuth"]), float(r["radius"])), float(r["opacity"]))
-        for r in rows
-    ]
+def spread(candidates: list[Pose], count: int) -> list[int]:
+    """`count` of the candidates, or all, evenly spread: each the farthest from those before; ties by index."""
+    places = np.array([place(p) for p in candidates]).reshape(-1, 3)
+    apart, chosen = np.full(len(places), np.inf), []
+    for _ in range(min(count, len(places))):
+        chosen.append(int(np.argmax(apart)))
+        apart = np.minimum(apart, np.linalg.norm(places - places[chosen[-1]], axis=1))
+        apart[chosen[-1]] = -np.inf
+    return chosen
 
 
 def to_json(chosen: list[Pose], policy: str, k: int) -> dict:

@@ -1,10 +1,20 @@
 """Scores of candidate poses: how much of what a camera would see there is not known yet."""
 
+from dataclasses import dataclass, replace
+
 import numpy as np
-from jaxtyping import Float32
+from jaxtyping import Float32, Float64
 from numpy import ndarray as Array
 
-from dav_gswt.active.poses import Pose, Scored
+from dav_gswt.active import conditions, fisher, imagining, outside
+from dav_gswt.active.candidates import Candidates
+from dav_gswt.active.frozen import Frozen
+from dav_gswt.active.imagining import Asking
+from dav_gswt.active.maps import Part, PoseMaps
+from dav_gswt.active.poses import spread
+from dav_gswt.active.scores import Scores
+from dav_gswt.active.uncertainty.carrying import carried
+from dav_gswt.active.uncertainty.weighing import Quantiles, Scales, normalised
 from dav_gswt.cameras import Camera
 from dav_gswt.coarse.doubt import uncertainty_map
 from dav_gswt.coarse.ground import Ground
@@ -15,42 +25,107 @@ from dav_gswt.raster import Rasterizer
 from dav_gswt.views import View, over_ground
 
 WIDTH = 96  # pixels of a picture that is only scored
+PHOTO = 256  # pixels across of a photo that priors are shown, before it is cut to its middle square and made smaller
+OTHERS = 16  # candidates whose maps are shown
+
+
+@dataclass(frozen=True)
+class Scored:
+    """All that scoring finds. gaussians: uncertainty of each of the field's Gaussians, in [0, 1]."""
+
+    scores: Scores
+    maps: PoseMaps
+    frozen: Frozen
+    gaussians: Float32[Array, "n"]
+
+    def facts(self) -> dict:
+        """What scores.json says beside the scales: how many poses rest on how many steps, and which terms there are."""
+        steps, count = np.unique(self.scores.steps, return_counts=True)
+        told = {str(s): int(n) for s, n in zip(steps, count, strict=True)}
+        return {"candidates": len(self.scores), "terms": list(self.scores.terms), "poses_by_steps": told}
+
+
+def parts(found: Scored, field: Field, grid: Ground) -> dict[str, Part]:
+    """The maps to show, as parts of an EXR: the ground from above, and candidates spread over the hemisphere."""
+    above = from_above(replace(field, uncertainty=found.gaussians), grid).uncertainty[::-1]
+    some = [found.scores.names[i] for i in spread(found.scores.poses, OTHERS)]
+    shown = found.maps.parts(found.scores, some)
+    return {"above": ({"uncertainty": above}, {"camera": "straight above"})} | shown
+
+
+def small(camera: Camera) -> Camera:
+    """A candidate's camera at the size at which poses are scored."""
+    return camera.resized(WIDTH, max(1, round(WIDTH * camera.height / camera.width)))
 
 
 def score(
-    field: Field, grid: Ground, candidates: list[tuple[Pose, Camera]]
-) -> tuple[list[Scored], dict[str, Float32[Array, "h w"]]]:
-    """Every candidate's scores, and its uncertainty map.
+    field: Field,
+    grid: Ground,
+    pool: Candidates,
+    taken: list[View],
+    frame: dict,
+    prior: Asking | None = None,
+    frozen: Frozen | None = None,
+) -> Scored:
+    """Every candidate's terms (opacity and Fisher gain; with a prior also how much its samples disagree) and its maps.
 
-    opacity: mean of the uncertainty map over the pixels that look at the modelled ground; 0 where none does.
+    taken: the photos so far. prior: None: geometry alone. frozen: of the first round; None: this is the first.
+    Raises: InputError: a candidate under the ground or inside of what stands on it, by name.
     """
+    outside.require(pool, field, grid)
+    terms, opacity = _geometric(field, grid, pool, [small(view.camera) for view in taken])
+    steps, w2_sq = np.zeros(len(pool), int), None
+    if prior is not None:
+        size = prior.model.size
+        known = conditions.taken(taken, frame, size)
+        told = conditions.condition(field, pool, known, frame["flying_height"], size)
+        found, steps = imagining.terms(prior, told, [pose.name for pose, _ in pool])
+        terms |= {name: values.astype(np.float64) for name, values in found.named().items()}
+        w2_sq = found.maps
+    poses, names = [pose for pose, _ in pool], [pose.name for pose, _ in pool]
+    frozen = frozen or _frozen(terms, w2_sq, names)
+    scores, maps = Scores(poses, terms, frozen.scales, steps), PoseMaps(names, opacity, w2_sq)
+    return Scored(scores, maps, frozen, _gaussians(field, pool, w2_sq, frozen))
+
+
+def _geometric(
+    field: Field, grid: Ground, pool: Candidates, taken: list[Camera]
+) -> tuple[dict[str, Float64[Array, "n"]], Float32[Array, "n h w"]]:
+    """opacity: mean of the opacity map over the pixels that look at the modelled ground; 0 where none does."""
     raster = Rasterizer()
+    already = fisher.known(field, taken, raster)
+    terms, maps = {"opacity": np.zeros(len(pool)), "fisher": np.zeros(len(pool))}, []
+    for i, (_, camera) in enumerate(progress(pool, "score poses")):
+        maps.append(uncertainty_map(field, small(camera), raster))
+        terms["fisher"][i] = fisher.gain(raster.contributions(), already)
+        weight = on_exemplar(grid, small(camera))
+        terms["opacity"][i] = float((maps[-1] * weight).sum() / max(1.0, weight.sum()))
+    shape = (0, 1, 1) if not maps else (len(maps), *np.max([m.shape for m in maps], axis=0))
+    out = np.full(shape, np.nan, np.float32)  # cameras of one pool may differ in their height
+    for row, m in zip(out, maps, strict=True):
+        row[: m.shape[0], : m.shape[1]] = m
+    return terms, out
+
+
+def on_exemplar(grid: Ground, camera: Camera) -> Float32[Array, "h w"]:
+    """1 for the pixels of a camera that look at the modelled ground."""
     west, south, side = grid.exemplar
-    scored, maps = [], {}
-    for pose, camera in progress(candidates, "score poses"):
-        small = camera.resized(WIDTH, max(1, round(WIDTH * camera.height / camera.width)))
-        doubt = uncertainty_map(field, small, raster)
-        blank = View(pose.name, small, np.zeros((*doubt.shape, 3), np.float32), np.ones(doubt.shape, np.float32))
-        weight = over_ground(blank, west, south, west + side, south + side).weight
-        scored.append(Scored(pose, float((doubt * weight).sum() / max(1.0, weight.sum()))))
-        maps[pose.name] = doubt
-    return scored, maps
+    shape = camera.height, camera.width
+    blank = View("", camera, np.zeros((*shape, 3), np.float32), np.ones(shape, np.float32))
+    return over_ground(blank, west, south, west + side, south + side).weight
 
 
-def parts(
-    field: Field, grid: Ground, scored: list[Scored], maps: dict[str, Float32[Array, "h w"]], others: int = 16
-) -> dict[str, tuple[dict[str, Array], dict[str, str]]]:
-    """The maps to keep, as parts of an EXR: the ground from above, and candidates evenly over the ranking.
+def _frozen(terms: dict[str, Float64[Array, "n"]], w2_sq: Float32[Array, "n h w"] | None, names: list[str]) -> Frozen:
+    pixels = None if w2_sq is None or not w2_sq.size else Quantiles.frozen(w2_sq.ravel())
+    return Frozen(Scales.frozen(terms, names), pixels)
 
-    Each part's header says which pose it is of.
-    """
-    ranked = sorted(scored, key=lambda s: -s.opacity)
-    kept = ranked[:: max(1, len(ranked) // others)][:others]
-    above = {"above": ({"uncertainty": from_above(field, grid).uncertainty[::-1]}, {"camera": "straight above"})}
-    return above | {
-        s.pose.name: (
-            {"uncertainty": maps[s.pose.name]},
-            {k: repr(getattr(s.pose, k)) for k in ("elevation", "azimuth", "radius")} | {"opacity": repr(s.opacity)},
-        )
-        for s in kept
-    }
+
+def _gaussians(
+    field: Field, pool: Candidates, w2_sq: Float32[Array, "n h w"] | None, frozen: Frozen
+) -> Float32[Array, "n"]:
+    """What the prior's maps say of each Gaussian; of those that no candidate sees, and without a prior, geometry."""
+    if w2_sq is None or frozen.pixels is None:
+        return field.uncertainty
+    cameras = [conditions.squared(camera) for _, camera in pool]
+    found = carried(field, cameras, normalised(w2_sq, frozen.pixels))
+    return np.where(np.isnan(found), field.uncertainty, found).astype(np.float32)

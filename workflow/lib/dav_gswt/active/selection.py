@@ -2,24 +2,38 @@
 
 import logging
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.active.poses import Pose, Scored, place
+from dav_gswt.active.poses import Pose, place
+from dav_gswt.active.scores import Scores
+from dav_gswt.active.uncertainty.weighing import combined
 
 _log = logging.getLogger(__name__)
 
 
-def farthest(scored: list[Scored], captured: Float[Array, "m 3"], k: int, rng: np.random.Generator) -> list[int]:
+@dataclass(frozen=True)
+class Wanted:
+    """What a policy goes by beside the scores. captured: where photos were taken, relative to the exemplar's middle.
+    k: poses to choose, at most as many as there are. lam: weight of LPIPS."""
+
+    captured: Float[Array, "m 3"]
+    k: int
+    rng: np.random.Generator
+    lam: float = 0.0
+
+
+def farthest(scores: Scores, wanted: Wanted) -> list[int]:
     """Greedily the candidate farthest from all views taken or chosen so far (farthest points); ties by index."""
-    places = np.array([place(s.pose) for s in scored]).reshape(-1, 3)
+    places = np.array([place(pose) for pose in scores.poses]).reshape(-1, 3)
     nearest = np.full(len(places), np.inf)
-    for view in captured:
+    for view in wanted.captured:
         nearest = np.minimum(nearest, np.linalg.norm(places - view, axis=1))
     chosen: list[int] = []
-    for _ in range(k):
+    for _ in range(wanted.k):
         best = int(np.argmax(nearest))
         chosen.append(best)
         nearest = np.minimum(nearest, np.linalg.norm(places - places[best], axis=1))
@@ -27,27 +41,41 @@ def farthest(scored: list[Scored], captured: Float[Array, "m 3"], k: int, rng: n
     return chosen
 
 
-def opacity(scored: list[Scored], captured: Float[Array, "m 3"], k: int, rng: np.random.Generator) -> list[int]:
-    """The k candidates whose pictures hold most that is not known to be opaque; ties by index."""
-    return [int(i) for i in np.argsort([-s.opacity for s in scored], kind="stable")[:k]]
+def opacity(scores: Scores, wanted: Wanted) -> list[int]:
+    """The k candidates whose pictures hold most that is not known to be opaque."""
+    return top(scores.term("opacity"), wanted.k)
 
 
-def random(scored: list[Scored], captured: Float[Array, "m 3"], k: int, rng: np.random.Generator) -> list[int]:
+def w2_lpips(scores: Scores, wanted: Wanted) -> list[int]:
+    """The k candidates of greatest u = W2 + lam LPIPS, each over its frozen scale: the paper's Algorithm 1."""
+    w2_sq, lpips = scores.term("w2_sq"), scores.terms.get("lpips")
+    return top(combined(w2_sq, lpips, wanted.lam, scores.scales, scores.names), wanted.k)
+
+
+def random(scores: Scores, wanted: Wanted) -> list[int]:
     """k candidates drawn without replacement."""
-    return [int(i) for i in rng.permutation(len(scored))[:k]]
+    return [int(i) for i in wanted.rng.permutation(len(scores))[: wanted.k]]
 
 
-POLICIES: dict[str, Callable[..., list[int]]] = {"farthest": farthest, "opacity": opacity, "random": random}
+def top(values: Float[Array, "n"], k: int) -> list[int]:
+    """The k largest; ties by index."""
+    return [int(i) for i in np.argsort(-values, kind="stable")[:k]]
 
 
-def select(
-    policy: str, scored: list[Scored], captured: Float[Array, "m 3"], k: int, rng: np.random.Generator
-) -> list[Pose]:
+POLICIES: dict[str, Callable[[Scores, Wanted], list[int]]] = {
+    "farthest": farthest,
+    "opacity": opacity,
+    "random": random,
+    "w2-lpips": w2_lpips,
+}
+
+
+def select(policy: str, scores: Scores, wanted: Wanted) -> list[Pose]:
     """The poses that a policy chooses. k greater than the pool takes all of it, and says so."""
-    if not scored:
+    if not len(scores):
         _log.warning("no candidate pose is left: no photo is taken, the field stays as it is")
         return []
-    if k > len(scored):
-        _log.warning("asked for %d poses; only %d candidates are left: all are taken", k, len(scored))
-        k = len(scored)
-    return [scored[i].pose for i in POLICIES[policy](scored, captured, k, rng)]
+    if wanted.k > len(scores):
+        _log.warning("asked for %d poses; only %d candidates are left: all are taken", wanted.k, len(scores))
+        wanted = replace(wanted, k=len(scores))
+    return [scores.poses[i] for i in POLICIES[policy](scores, wanted)]

@@ -10,6 +10,7 @@ from torch import nn
 from dav_gswt.errors import InputError
 from dav_gswt.files import whole
 
+TERRAIN = Path(__file__).with_name("terrain.safetensors")  # of the project's own prior
 MOST_BYTES = 256 * 2**20
 
 

@@ -1,0 +1,100 @@
+"""The terms of a pose's uncertainty that a prior gives: how much its samples disagree, in latents and in pictures."""
+
+import logging
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Int
+from numpy import ndarray as Array
+
+from dav_gswt.active.uncertainty import staging
+from dav_gswt.active.uncertainty.disagreement import w2_sq
+from dav_gswt.active.uncertainty.staging import Terms
+from dav_gswt.active.uncertainty.texture import image_gradient
+from dav_gswt.logs import progress
+from dav_gswt.perceptual import lpips
+from dav_gswt.perceptual.weights import Weights, read
+from dav_gswt.prior.interface import Condition, Prior
+
+_log = logging.getLogger(__name__)
+
+AT_ONCE = 16  # poses that are imagined at a time
+CHEAP = 2  # steps of denoising in the first of two stages
+
+
+@dataclass(frozen=True)
+class Asking:
+    """A prior and how it is asked. samples of each pose; steps of denoising; p_drop: of its attention; weights: of
+    LPIPS, None where they are not had; staged: cheaply first, in full where it matters; posterior: a sample is a
+    distribution, as wide as the coder says, instead of a point."""
+
+    model: Prior
+    samples: int
+    steps: int
+    p_drop: float
+    seed: int = 0
+    weights: Weights | None = None
+    staged: bool = True
+    posterior: bool = False
+
+
+def asked(entry: dict | None, p_drop: float, seed: int, lpips_file: Path | str | None) -> Asking | None:
+    """A config's entry of `priors`; None for none. Without LPIPS's weights its term is absent, and that is said.
+
+    Raises: InputError: the prior's weights, or LPIPS's, are missing or not what they should be.
+    """
+    if entry is None:
+        return None
+    if lpips_file is None:
+        _log.warning("LPIPS is switched off: scores have no such term")
+    weights = None if lpips_file is None else read(lpips_file)
+    how = {name: entry[name] for name in ("samples", "steps", "staged", "posterior") if name in entry}
+    return Asking(opened(entry), p_drop=p_drop, seed=seed, weights=weights, **how)
+
+
+def opened(entry: dict) -> Prior:
+    """The prior of a config's entry. Raises: InputError: its weights are missing or not to be trusted."""
+    if entry["model"] == "terrain":
+        from dav_gswt.prior.terrain import Terrain  # not above: diffusers takes seconds to load
+        from dav_gswt.prior.weights import TERRAIN
+
+        return Terrain.open(entry.get("weights", TERRAIN))
+    from dav_gswt.prior.zero123 import GUIDANCE, Zero123
+
+    return Zero123.open(entry["folder"], entry.get("guidance", GUIDANCE))
+
+
+def terms(prior: Asking, condition: Condition, names: list[str]) -> tuple[Terms, Int[Array, "n"]]:
+    """The terms of every pose, and the steps of denoising that they rest on.
+
+    Raises: ValueError: fewer than 2 samples, p_drop outside [0, 1), something not finite, naming the poses.
+    """
+    n = len(condition)
+
+    def of(rows: Int[Array, "k"], steps: int, what: str) -> Terms:
+        parts = [rows[i : i + AT_ONCE] for i in range(0, len(rows), AT_ONCE)]
+        return _joined([_some(prior, condition[r], [names[i] for i in r], steps) for r in progress(parts, what)])
+
+    if not prior.staged or n <= staging.TOP + staging.BATCH or prior.steps <= CHEAP:
+        return of(np.arange(n), prior.steps, "imagine poses"), np.full(n, prior.steps)
+    found, full = staging.settled(
+        n, lambda rows: of(rows, CHEAP, "imagine poses"), lambda rows: of(rows, prior.steps, "imagine best poses")
+    )
+    share = (n * CHEAP + int(full.sum()) * prior.steps) / (n * prior.steps)
+    _log.info("%d of %d poses were imagined in full: %.0f %% of the cost of all", full.sum(), n, 100 * share)
+    return found, np.where(full, prior.steps, CHEAP)
+
+
+def _some(prior: Asking, condition: Condition, names: list[str], steps: int) -> Terms:
+    latents = prior.model.samples(condition, prior.samples, prior.p_drop, steps, prior.seed)
+    wide = prior.model.variances(latents) if prior.posterior else None
+    disagreement, maps = w2_sq(latents, wide, names)
+    pictures = prior.model.decoded(latents).rgba[..., :3]
+    between = None if prior.weights is None else lpips.pairwise_mean(2 * pictures - 1, prior.weights)
+    return Terms(disagreement, between, image_gradient(pictures, names=names), maps)
+
+
+def _joined(parts: list[Terms]) -> Terms:
+    columns = zip(*(vars(p).values() for p in parts), strict=True)
+    return Terms(*(None if column[0] is None else np.concatenate(column) for column in columns))
