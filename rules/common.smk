@@ -180,6 +180,9 @@ def prior_of(wildcards):
     files = {"lpips": rules.fetch_lpips.output.weights} if entry.get("lpips", True) else {}
     if entry["model"] == "terrain":
         files["weights"] = entry.get("weights", str(LIBRARY / "prior/terrain.safetensors"))
+    for key in ("weights", "folder"):
+        if key in entry and not Path(entry[key]).exists():
+            raise WorkflowError(f"config: priors.{wildcards.prior}.{key}: there is no {entry[key]}; see docs/prior.md")
     return files
 
 

@@ -38,9 +38,40 @@ def test_the_default_target_makes_every_stage_once(planned, tmp_path):
     assert plan["evaluate_coarse"] == 1 and plan["evaluate_round"] == 2
 
 
+ASKED = "results/desert/seed0/draft/active_w2-lpips_terrain_pdrop{p_drop}_lam{lam}_k4/iter2/metrics.json"
+
+
+@pytest.mark.parametrize(
+    "axis, values, scorings",
+    [
+        pytest.param("lam", ("0", "0.1", "1"), 1, id="lam shares the scores"),
+        pytest.param("p_drop", ("0.05", "0.3"), 2, id="p_drop does not"),
+    ],
+)
+def test_a_prior_is_asked_once_for_every_lam(planned, tmp_path, axis, values, scorings):
+    targets = [ASKED.format(**({"lam": "0.1", "p_drop": "0.15"} | {axis: value})) for value in values]
+    plan = planned(tmp_path, *targets)
+    assert plan["score_coarse"] == scorings and plan["fit_coarse"] == 1
+    assert plan["select_poses"] == plan["update_field"] == 2 * len(values) and plan["fetch_lpips"] == 1
+
+
+def test_tiles_go_by_the_doubt_of_the_prior_that_was_asked(planned, tmp_path):
+    plan = planned(tmp_path, "--config", "policy=w2-lpips", configs=(USUAL, TINY))
+    assert plan["score_coarse"] == plan["score_round"] == plan["crop_level"] == 1 and not plan["fetch_lpips"]
+    tiles = "results/desert/seed0/draft/active_{}_k4/iter0/tiles_colour/seams.json"
+    for way, scored in (("w2-lpips_terrain_pdrop0.15_lam0", 1), ("random_none_pdrop0_lam0", 0)):
+        assert planned(tmp_path, tiles.format(way))["score_coarse"] == scored
+
+
 @pytest.mark.parametrize(
     "path",
     [
+        pytest.param(
+            ASKED.replace("_terrain_pdrop{p_drop}_lam{lam}", "_none_pdrop0_lam0"), id="w2-lpips without a prior"
+        ),
+        pytest.param(ASKED.format(p_drop="1", lam="0.1"), id="a share of dropout that leaves nothing"),
+        pytest.param(ASKED.format(p_drop="0.1", lam="0.10"), id="lam with a trailing zero"),
+        pytest.param("results/desert/seed0/draft/coarse/scores_none_pdrop0.1/scores.csv", id="dropout of no prior"),
         pytest.param(BUNDLE.format(**(DEFAULT | {"tau": "0.60"})), id="tau with a trailing zero"),
         pytest.param(BUNDLE.format(**(DEFAULT | {"k": "04"})), id="k with a leading zero"),
         pytest.param("results/Desert/seed0/views.json", id="a scene in capitals"),
@@ -68,6 +99,9 @@ def test_no_round_and_a_finished_field_go_from_field_to_terrain(planned, tmp_pat
         ("tau: 1.5", "config: tau: 1.5 is greater than the maximum of 1"),
         ("polcy: random", "config: there is no key 'polcy'; is 'policy' meant?"),
         ("scene: moon", "config: scene: there is no 'moon'; scenes has desert, flowers, grass, planet, meadow"),
+        ("p_drop: 1", "config: p_drop: 1 is greater than or equal to the maximum of 1"),
+        ("prior: zero", "config: prior: there is no 'zero'; priors has terrain"),
+        ("priors: {terrain: {samples: 1}}", "config: priors.terrain.samples: 1 is less than the minimum of 2"),
         ("rounds: -1", "config: rounds: -1 is less than the minimum of 0"),
         ("scenes: {desert: {quality: best}}", "config: scenes.desert.quality: there is no 'best'; qualities has"),
     ],

@@ -36,7 +36,7 @@ class Scored:
     scores: Scores
     maps: PoseMaps
     frozen: Frozen
-    gaussians: Float32[Array, "n"]
+    gaussians: Float32[Array, "gaussians"]
 
     def facts(self) -> dict:
         """What scores.json says beside the scales: how many poses rest on how many steps, and which terms there are."""
@@ -122,7 +122,7 @@ def _frozen(terms: dict[str, Float64[Array, "n"]], w2_sq: Float32[Array, "n h w"
 
 def _gaussians(
     field: Field, pool: Candidates, w2_sq: Float32[Array, "n h w"] | None, frozen: Frozen
-) -> Float32[Array, "n"]:
+) -> Float32[Array, "gaussians"]:
     """What the prior's maps say of each Gaussian; of those that no candidate sees, and without a prior, geometry."""
     if w2_sq is None or frozen.pixels is None:
         return field.uncertainty

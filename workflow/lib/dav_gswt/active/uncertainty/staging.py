@@ -79,7 +79,7 @@ def _may_rise(found: Terms, first: Terms, done: Bool[Array, "n"], top: int) -> b
     return False
 
 
-def _ratios(full: Float[Array, "k"], cheap: Float[Array, "k"]) -> Float64[Array, "k"]:
+def _ratios(full: Float[Array, "k"], cheap: Float[Array, "k"]) -> Float64[Array, "_"]:
     there = cheap > 0
     return full[there] / cheap[there] if there.any() else np.ones(1)
 
