@@ -79,7 +79,8 @@ def pools() -> dict[str, float]:
         start = time.perf_counter()
         told = conditions.condition(field, pool, known, FLYING_HEIGHT, model.size)
         ask = Asking(model, 5, 8, 0.15, weights=given, staged=staged)
-        terms, _ = imagining.terms(ask, told, [pose.name for pose, _ in pool])
+        everywhere = np.ones((count, model.size, model.size), np.float32)
+        terms, _ = imagining.terms(ask, told, [pose.name for pose, _ in pool], everywhere)
         return time.perf_counter() - start, uncertainty.combined(
             terms.w2_sq, terms.lpips, 0.1, uncertainty.Scales.frozen(terms.named())
         )

@@ -65,6 +65,19 @@ def test_a_prior_adds_what_its_samples_disagree_about():
     assert "lpips" not in doubting.scores.terms
 
 
+def test_a_latents_own_width_counts_where_it_is_asked_for():
+    """Here all are equally wide (0), so it changes nothing; a prior whose samples differ in width disagrees more."""
+
+    class Uneven(Doubting):
+        def variances(self, latents):
+            return np.arange(latents.shape[1], dtype=np.float32)[None, :, None, None, None] + np.zeros_like(latents)
+
+    point, posterior = (scored(Asking(Doubting(), 2, 4, 0.2, posterior=p)).scores.terms["w2_sq"] for p in (False, True))
+    assert np.array_equal(point, posterior)
+    wider = scored(Asking(Uneven(), 2, 4, 0.2, posterior=True)).scores.terms["w2_sq"]
+    np.testing.assert_allclose(wider - point, 4.0, rtol=1e-5)  # deviations 0 and 1, in four channels
+
+
 def test_later_rounds_keep_the_scales_of_the_first():
     first = Frozen(Scales(dict.fromkeys(scores.TERMS, 7.0)), Quantiles(0.0, 1.0))
     assert scored(Asking(Doubting(), 2, 4, 0.2), frozen=first).scores.scales == first.scales

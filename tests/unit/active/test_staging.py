@@ -11,6 +11,8 @@ from dav_gswt.active.uncertainty import staging
 from dav_gswt.active.uncertainty.staging import TOP, Terms
 from dav_gswt.prior.interface import Condition, Imagined
 
+ALL = np.ones((200, 32, 32), np.float32)  # every pixel counts
+
 
 def terms_of(w2, lpips=None):
     maps = np.broadcast_to(w2[:, None, None], (len(w2), 2, 2)).astype(np.float32)
@@ -91,6 +93,9 @@ class Counting:
         size = condition.relative[:, 0, None, None, None, None] * (1 + 0.01 * steps)
         return (size * signs * np.ones((1, m, 4, 32, 32))).astype(np.float32)
 
+    def variances(self, latents):
+        return np.zeros_like(latents)
+
     def decoded(self, latents):
         return Imagined(np.full((*latents.shape[:2], 32, 32, 4), 0.5, np.float32), None)
 
@@ -106,20 +111,27 @@ def test_imagining_in_stages_costs_less_and_says_how_much(caplog):
     n, names = 200, [f"p{i}" for i in range(200)]
     with caplog.at_level(logging.INFO):
         whole, staged = Counting(), Counting()
-        full, steps = imagining.terms(Asking(whole, 4, 8, 0.1, staged=False), condition(n), names)
-        some, spent = imagining.terms(Asking(staged, 4, 8, 0.1), condition(n), names)
+        full, steps = imagining.terms(Asking(whole, 4, 8, 0.1, staged=False), condition(n), names, ALL[:n])
+        some, spent = imagining.terms(Asking(staged, 4, 8, 0.1), condition(n), names, ALL[:n])
     assert whole.evaluations == n * 4 * 8 and (steps == 8).all()
     assert staged.evaluations == n * 4 * 2 + (spent == 8).sum() * 4 * 8 < 0.6 * whole.evaluations
     assert "of 200 poses were imagined in full" in caplog.text
     assert best(full.w2_sq) == best(some.w2_sq)
 
 
+def test_what_does_not_look_at_the_ground_does_not_count():
+    maps = np.arange(8, dtype=np.float32).reshape(2, 2, 2)
+    counts = np.zeros((2, 4, 4), np.float32)
+    counts[0, :2, :2] = counts[0, 3, 3] = 1  # a whole cell, and a quarter of another
+    np.testing.assert_allclose(imagining.over(maps, counts), [(0 * 1 + 3 * 0.25) / 1.25, 0])
+
+
 def test_few_poses_are_scored_in_full_at_once():
     prior = Counting()
-    _, steps = imagining.terms(Asking(prior, 2, 8, 0.1), condition(20), [f"p{i}" for i in range(20)])
+    _, steps = imagining.terms(Asking(prior, 2, 8, 0.1), condition(20), [f"p{i}" for i in range(20)], ALL[:20])
     assert prior.evaluations == 20 * 2 * 8 and (steps == 8).all()
 
 
 def test_one_sample_has_no_pair():
     with pytest.raises(ValueError, match="at least 2 samples"):
-        imagining.terms(Asking(Counting(), 1, 8, 0.1), condition(3), ["a", "b", "c"])
+        imagining.terms(Asking(Counting(), 1, 8, 0.1), condition(3), ["a", "b", "c"], ALL[:3])

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float32, Float64, Int
 from numpy import ndarray as Array
 
 from dav_gswt.active.uncertainty import staging
@@ -65,16 +65,21 @@ def opened(entry: dict) -> Prior:
     return Zero123.open(entry["folder"], entry.get("guidance", GUIDANCE))
 
 
-def terms(prior: Asking, condition: Condition, names: list[str]) -> tuple[Terms, Int[Array, "n"]]:
+def terms(
+    prior: Asking, condition: Condition, names: list[str], counts: Float32[Array, "n s s"]
+) -> tuple[Terms, Int[Array, "n"]]:
     """The terms of every pose, and the steps of denoising that they rest on.
 
+    counts: 1 for the pixels that matter, those that look at the modelled ground: w2_sq is the mean over these (0 where
+    there is none), and LPIPS sees no others; the maps and the gradient are of the whole picture.
     Raises: ValueError: fewer than 2 samples, p_drop outside [0, 1), something not finite, naming the poses.
     """
     n = len(condition)
 
     def of(rows: Int[Array, "k"], steps: int, what: str) -> Terms:
         parts = [rows[i : i + AT_ONCE] for i in range(0, len(rows), AT_ONCE)]
-        return _joined([_some(prior, condition[r], [names[i] for i in r], steps) for r in progress(parts, what)])
+        made = (_some(prior, condition[r], [names[i] for i in r], steps, counts[r]) for r in progress(parts, what))
+        return _joined(list(made))
 
     if not prior.staged or n <= staging.TOP + staging.BATCH or prior.steps <= CHEAP:
         return of(np.arange(n), prior.steps, "imagine poses"), np.full(n, prior.steps)
@@ -86,13 +91,22 @@ def terms(prior: Asking, condition: Condition, names: list[str]) -> tuple[Terms,
     return found, np.where(full, prior.steps, CHEAP)
 
 
-def _some(prior: Asking, condition: Condition, names: list[str], steps: int) -> Terms:
+def _some(prior: Asking, condition: Condition, names: list[str], steps: int, counts: Float32[Array, "k s s"]) -> Terms:
     latents = prior.model.samples(condition, prior.samples, prior.p_drop, steps, prior.seed)
     wide = prior.model.variances(latents) if prior.posterior else None
-    disagreement, maps = w2_sq(latents, wide, names)
+    _, maps = w2_sq(latents, wide, names)
     pictures = prior.model.decoded(latents).rgba[..., :3]
-    between = None if prior.weights is None else lpips.pairwise_mean(2 * pictures - 1, prior.weights)
-    return Terms(disagreement, between, image_gradient(pictures, names=names), maps)
+    between = None
+    if prior.weights is not None:
+        between = lpips.pairwise_mean((2 * pictures - 1) * counts[:, None, :, :, None], prior.weights)
+    return Terms(over(maps, counts), between, image_gradient(pictures, names=names), maps)
+
+
+def over(maps: Float32[Array, "n h w"], counts: Float32[Array, "n s s"]) -> Float64[Array, "n"]:
+    """Mean of each map over the pixels that count, those of a cell together; 0 where none does."""
+    n, h, w = maps.shape
+    cells = counts.reshape(n, h, counts.shape[1] // h, w, counts.shape[2] // w).mean((2, 4), dtype=np.float64)
+    return (maps * cells).sum((1, 2)) / np.maximum(cells.sum((1, 2)), 1e-9)
 
 
 def _joined(parts: list[Terms]) -> Terms:

@@ -75,11 +75,12 @@ def score(
     outside.require(pool, field, grid)
     terms, opacity = _geometric(field, grid, pool, [small(view.camera) for view in taken])
     steps, w2_sq = np.zeros(len(pool), int), None
-    if prior is not None:
-        size = prior.model.size
+    if prior is not None and pool:
+        size, squares = prior.model.size, [conditions.squared(camera) for _, camera in pool]
         known = conditions.taken(taken, frame, size)
         told = conditions.condition(field, pool, known, frame["flying_height"], size)
-        found, steps = imagining.terms(prior, told, [pose.name for pose, _ in pool])
+        counts = np.stack([on_exemplar(grid, c.resized(size, size)) for c in squares])
+        found, steps = imagining.terms(prior, told, [pose.name for pose, _ in pool], counts)
         terms |= {name: values.astype(np.float64) for name, values in found.named().items()}
         w2_sq = found.maps
     poses, names = [pose for pose, _ in pool], [pose.name for pose, _ in pool]
