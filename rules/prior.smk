@@ -2,7 +2,8 @@
 
 In: nothing of a scene. Out: weights/lpips_alexnet.safetensors, LPIPS's published weights, out of a package's source archive;
 prior/examples/part{part}.npz, what the project's own prior learns from: part p is of the made-up worlds 20 p to 20 p + 19;
-prior/terrain.safetensors, its weights; prior/regressor{member}.safetensors, a deterministic network of the same shape, as a control.
+prior/terrain.safetensors, its weights; prior/regressor{member}.safetensors, a deterministic network of the same shape, as a control;
+tables/prior_trial.csv and figures/prior_*.png, how good they are on worlds that they were not trained on.
 Not part of `all`: `snakemake results/weights/lpips_alexnet.safetensors` fetches them. Without them scores lack LPIPS, and say so.
 """
 
@@ -13,6 +14,9 @@ PARTS = 32  # of examples that the prior is trained on; later ones are for evalu
 CODER = dict(steps=3000, batch=16, rate=2e-3, seed=0)
 DENOISER = dict(steps=10_000, batch=24, rate=6e-4, seed=1)
 REGRESSOR = dict(steps=4000, batch=24, rate=6e-4)  # nothing random to learn: it is done sooner
+MEMBERS = 3  # regressors whose disagreement is one more control
+HELD_OUT = range(40, 44)  # parts of worlds that nothing was trained on
+TRIAL = dict(m=5, p_drop=0.15, steps=8, seed=0)  # as the config asks the prior
 
 
 rule fetch_lpips:
@@ -107,6 +111,39 @@ use rule train_prior as train_regressor with:
         denoiser=lambda wildcards: REGRESSOR | dict(seed=100 + int(wildcards.member)),
         keep=lambda wildcards: f"{SNAPSHOTS}/prior/regressor{wildcards.member}",
         source=source_of("prior/lesson", "prior/networks", "prior/training"),
+
+
+rule try_prior:
+    """How near the prior comes to the truth, and what its doubt is worth, on worlds that it was not trained on.
+
+    Columns on LPIPS are empty where its weights were not fetched.
+    """
+    input:
+        weights="<results>/prior/terrain.safetensors",
+        regressors=expand("<results>/prior/regressor{member}.safetensors", member=range(MEMBERS)),
+        losses=["<results>/prior/terrain_losses.csv"]
+        + expand("<results>/prior/regressor{member}_losses.csv", member=range(MEMBERS)),
+        examples=expand("<results>/prior/examples/part{part}.npz", part=HELD_OUT),
+        lpips=lambda wildcards: [f for f in rules.fetch_lpips.output if Path(f).exists()],
+    output:
+        table="<results>/tables/prior_trial.csv",
+        losses="<results>/figures/prior_losses.png",
+        samples="<results>/figures/prior_samples.png",
+    log:
+        "<logs>/prior/try_prior.log",
+    benchmark:
+        "<benchmarks>/prior/try_prior.tsv"
+    threads: 2
+    resources:
+        mem_mb=4000,
+        runtime="2h",
+    params:
+        setting=TRIAL,
+        views=640,  # of those held out, evenly
+        shown=8,
+        source=source_of("prior", "active/uncertainty", "perceptual", "metrics"),
+    script:
+        "../scripts/try_prior.py"
 
 
 localrules:

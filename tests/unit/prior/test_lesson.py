@@ -3,6 +3,7 @@ import numpy as np
 from dav_gswt.prior import examples, lesson, training
 from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.networks import SIZE
+from dav_gswt.prior.regressor import Regressor
 from dav_gswt.prior.terrain import Terrain
 from dav_gswt.prior.training import Plan
 
@@ -47,7 +48,7 @@ def test_a_regressor_takes_the_coder_that_is_there(tmp_path):
     lesson.learn(parts, tmp_path / "prior.safetensors", plan, plan, tmp_path / "a")
     given = tmp_path / "prior.safetensors"
     lesson.learn(parts, tmp_path / "regressor.safetensors", plan, plan, tmp_path / "b", given, regress=True)
-    one, two = Terrain.open(given).network, Terrain.open(tmp_path / "regressor.safetensors").network
+    one, two = Terrain.open(given).network, Regressor.open(tmp_path / "regressor.safetensors").network
     assert np.array_equal(one.coder.decoder.conv_out.weight, two.coder.decoder.conv_out.weight)
     assert not np.array_equal(one.told.place, two.told.place)
 

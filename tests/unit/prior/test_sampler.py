@@ -30,7 +30,7 @@ def layers(network):
     return dropout.held(network)
 
 
-def drawn(network, layers, views=3, m=4, p=0.2, steps=3, seed=1, batch=8):
+def drawn(network, layers, views=3, m=4, p=0.2, steps=3, seed=1, batch=8, common=True):
     """Latents of views that differ by what they are told."""
     told = torch.randn((views, 5, 16), generator=torch.Generator().manual_seed(9))
 
@@ -39,7 +39,7 @@ def drawn(network, layers, views=3, m=4, p=0.2, steps=3, seed=1, batch=8):
         return network(latents, time, told[some].repeat_interleave(each, 0)).sample
 
     schedule = DDIMScheduler(num_train_timesteps=100, prediction_type="v_prediction")
-    return sampler.sampled(denoise, layers, schedule, views, SHAPE, m, p, steps, seed, batch)
+    return sampler.sampled(denoise, layers, schedule, views, SHAPE, m, p, steps, seed, batch, common)
 
 
 def test_without_dropout_all_samples_are_equal_to_the_bit(network, layers):
@@ -75,6 +75,30 @@ def test_one_mask_holds_for_a_whole_trajectory(network, layers):
     share = float((seen[0] == 0).float().mean())
     assert 0.1 < share < 0.3  # of 0.2
     assert layers[0].mask is None and layers[0].p == 0.0  # nothing is left for the next caller
+
+
+def test_noises_of_their_own_make_samples_differ_without_dropout_and_the_first_is_the_common_one(network, layers):
+    own, common = drawn(network, layers, p=0.0, common=False), drawn(network, layers, p=0.0)
+    assert own.shape == common.shape
+    np.testing.assert_allclose(own[:, 0], common[:, 0], atol=1e-5)
+    apart = np.abs(own[:, :, None] - own[:, None, :]).mean((3, 4, 5))
+    assert (apart[:, ~np.eye(4, dtype=bool)] > 0.1).all()
+    np.testing.assert_allclose(drawn(network, layers, m=2, p=0.0, common=False), own[:, :2], atol=1e-5)
+
+
+@pytest.mark.parametrize("p", [0.0, 0.2])
+def test_a_view_does_not_depend_on_its_batch_with_noises_of_their_own_either(network, layers, p):
+    one = drawn(network, layers, p=p, batch=4, common=False)
+    for change in ({"batch": 64}, {"views": 2}, {}):
+        found = drawn(network, layers, **({"p": p, "batch": 4, "common": False} | change))
+        np.testing.assert_allclose(found, one[: len(found)], atol=1e-5)
+    assert not np.allclose(drawn(network, layers, p=p, common=False, seed=2), one)
+
+
+def test_dropout_and_noises_of_their_own_add_up(network, layers):
+    own = drawn(network, layers, p=0.2, common=False)
+    np.testing.assert_allclose(own[:, 0], drawn(network, layers, p=0.2)[:, 0], atol=1e-5)
+    assert not np.allclose(own, drawn(network, layers, p=0.0, common=False), atol=1e-3)
 
 
 @pytest.mark.parametrize("bad", [{"m": 0}, {"p": 1.0}, {"p": -0.1}, {"p": float("nan")}, {"steps": 0}])

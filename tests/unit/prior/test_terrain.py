@@ -47,6 +47,16 @@ def test_no_dropout_gives_equal_samples_and_dropout_others(prior):
     assert (prior.samples(condition(), 3, 0.3, 2, 0).var(axis=1).mean((1, 2, 3)) > 0).all()
 
 
+def test_a_latent_stands_for_as_much_as_the_coder_says(prior):
+    latents = prior.samples(condition(), 2, 0.3, 2, 0)
+    found = prior.variances(latents)
+    assert found.shape == latents.shape and (found > 0).all()
+    with torch.inference_mode():
+        pictures = prior.network.decoded(torch.from_numpy(latents[1]))
+        expected = prior.network.coder.encode(2 * pictures - 1).latent_dist.std * prior.network.scale
+    np.testing.assert_allclose(np.sqrt(found[1]), expected.numpy(), rtol=1e-4)
+
+
 def test_a_view_does_not_depend_on_the_others(prior):
     all_of_them, alone = prior.samples(condition(), 2, 0.2, 2, 0), prior.samples(condition()[1:2], 2, 0.2, 2, 0)
     np.testing.assert_allclose(all_of_them[1], alone[0], atol=1e-5)

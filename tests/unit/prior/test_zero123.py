@@ -206,6 +206,14 @@ def test_latents_are_scaled(prior):
     np.testing.assert_allclose(prior.decoded(latents).rgba, expected, atol=1e-6)
 
 
+def test_a_latent_stands_for_as_much_as_the_coder_says(prior):
+    latents = np.random.default_rng(0).normal(size=(1, 2, *LATENT)).astype(np.float32)
+    with torch.inference_mode():
+        painted = prior.parts.coder.decode(torch.from_numpy(latents[0]) / 0.18215).sample.clamp(-1, 1)
+        expected = prior.parts.coder.encode(painted).latent_dist.std * 0.18215
+    np.testing.assert_allclose(np.sqrt(prior.variances(latents)[0]), expected.numpy(), rtol=1e-4)
+
+
 def test_guidance_of_one_is_none(prior):
     found = [Zero123(prior.parts, g).samples(condition(1), 2, 0.3, 2, 0) for g in (1.0, 1 + 1e-6, 3.0)]
     np.testing.assert_allclose(found[1], found[0], atol=1e-4)

@@ -66,3 +66,7 @@ class Prior(Protocol):
 
     def decoded(self, latents: Float32[Array, "*n c hz wz"]) -> Imagined:
         """The pictures of latents."""
+
+    def variances(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n c hz wz"]:
+        """How wide a distribution each latent stands for, where it is not taken for a point: the variance that the
+        coder gives the code of its picture, in the latents' units."""

@@ -13,6 +13,7 @@ from dav_gswt.prior import dropout
 from dav_gswt.prior.dropout import HeldDropout
 
 Denoise = Callable[[Tensor, Tensor, slice], Tensor]  # latents, time, which views: the network's prediction
+Run = Callable[[Tensor, slice], Tensor]  # where latents start, which views: where they end
 
 
 def sampled(
@@ -26,28 +27,52 @@ def sampled(
     steps: int,
     seed: int,
     batch: int = 32,
+    common: bool = True,
 ) -> Float32[Array, "b m c h w"]:
     """Latents of `views` views, m of each: one common noise, one mask a sample and trajectory.
 
     denoise: predicts for latents of whole views, m of each, one after the other. shape: of a latent. batch: latents at
-    a time; changes no result beyond rounding. p_drop = 0: one trajectory, m times the same bits.
+    a time; changes no result beyond rounding. common: one noise for all samples; else one a sample, the same for every
+    view, the first of them the common one. p_drop = 0 with the common noise: one trajectory, m times the same bits.
     Raises: ValueError: m < 1, steps < 1, p_drop outside [0, 1), or latents that are not finite, naming the view.
     """
     if steps < 1 or m < 1:
         raise ValueError(f"steps is {steps} and m is {m}; there is at least one of each")
-    drawn = m if p_drop > 0 else 1
-    noise = torch.randn(shape, generator=torch.Generator().manual_seed(seed))
-    out = np.empty((views, drawn, *shape), np.float32)
-    each = max(1, batch // drawn)
+    generator = torch.Generator().manual_seed(seed)
+    noises = torch.stack([torch.randn(shape, generator=generator) for _ in range(1 if common else m)])
+
+    def run(start: Tensor, some: slice) -> Tensor:
+        return _trajectory(denoise, schedule, start, steps, some)
+
+    return masked(run, layers, noises, views, m, p_drop, seed, batch)
+
+
+def masked(
+    run: Run,
+    layers: list[HeldDropout],
+    starts: Float[Tensor, "k c h w"],
+    views: int,
+    m: int,
+    p_drop: float,
+    seed: int,
+    batch: int = 32,
+) -> Float32[Array, "b m c h w"]:
+    """Where m latents of each of `views` views end, each under a dropout mask of its own that it holds throughout.
+
+    starts: of the samples, m or one for all; one and p_drop = 0: it is run once, m times the same bits.
+    Raises: ValueError: m < 1, p_drop outside [0, 1), or latents that are not finite, naming the view.
+    """
     with torch.inference_mode(), dropout.masks(layers, m, p_drop, seed):
+        drawn = m if p_drop > 0 else len(starts)
+        out = np.empty((views, drawn, *starts.shape[1:]), np.float32)
+        each = max(1, batch // drawn)
         for first in range(0, views, each):
             some = slice(first, min(first + each, views))
             count = some.stop - some.start
-            start = noise.expand(count * drawn, *shape).clone()
             for layer in layers:
                 layer.m = drawn
-            found = _trajectory(denoise, schedule, start, steps, some)
-            out[some] = found.view(count, drawn, *shape).float().numpy()
+            found = run(starts.expand(drawn, -1, -1, -1).repeat(count, 1, 1, 1), some)
+            out[some] = found.view(count, drawn, *starts.shape[1:]).float().numpy()
     bad = ~np.isfinite(out).reshape(views, -1).all(1)
     if bad.any():
         raise ValueError(f"the prior's latents of view {int(np.argmax(bad))} are not finite")

@@ -8,52 +8,43 @@ from jaxtyping import Bool, Float32
 from numpy import ndarray as Array
 from torch import Tensor
 
+from dav_gswt.errors import InputError
 from dav_gswt.prior import dropout, sampler, weights
 from dav_gswt.prior.interface import Condition, Imagined
 from dav_gswt.prior.networks import CODE, SIZE, Network, schedule
+from dav_gswt.prior.sampler import Denoise
 
 NEARNESS = 0.5  # of an inverse depth: as a plane it is 1 at half a flying height, and no more
 AT_ONCE = 256  # pictures that are coded at a time
 
 
-class Terrain:
-    """A `Prior` from a file of weights. facts: what the file says of its training."""
+class Learned:
+    """What the prior and a regressor of its shape share: a network from a file, what it is told, pictures of codes.
 
-    name, size = "terrain", SIZE
+    facts: what the file says of its training.
+    """
+
+    size = SIZE
+    regresses = False  # what a file has to say of itself
 
     def __init__(self, network: Network, facts: dict[str, str] | None = None):
         self.network, self.facts = network.eval().requires_grad_(False), facts or {}
         self.layers = dropout.held(network.denoiser)
-        self.schedule = schedule()
 
     @classmethod
-    def open(cls, path: Path | str) -> "Terrain":
-        """Raises: InputError: see weights.load."""
+    def open(cls, path: Path | str) -> "Learned":
+        """Raises: InputError: see weights.load; or a regressor's weights where the prior's belong, or the reverse."""
         network = Network()
         facts = weights.load(network, path)
+        if facts.get("regressor", "False") != str(cls.regresses):
+            kinds = ("a regressor", "the prior") if cls.regresses else ("the prior", "a regressor")
+            raise InputError(f"{path}: not the weights of {kinds[0]} but of {kinds[1]}; they have the same shape")
         return cls(network, facts)
 
-    def samples(
-        self,
-        condition: Condition,
-        m: int,
-        p_drop: float,
-        steps: int,
-        seed: int,
-        known: Bool[Array, "b h w"] | None = None,
-    ) -> Float32[Array, "b m c hz wz"]:
-        """See `Prior`. known: cells of the code (16 x 16) where the render is to be believed; if left out, all."""
-        condition.check()
-        render, opacity, tokens = self._told(condition)
-        trusted = torch.ones_like(opacity) if known is None else torch.from_numpy(known).float()[:, None]
-        render, opacity = render * trusted, torch.cat([opacity * trusted, trusted], 1)
-
-        def denoise(latents: Tensor, time: Tensor, some: slice) -> Tensor:
-            each = len(latents) // (some.stop - some.start)
-            told = (part[some].repeat_interleave(each, 0) for part in (render, opacity, tokens))
-            return self.network.denoised(latents, time, *told)
-
-        return sampler.sampled(denoise, self.layers, self.schedule, len(condition), CODE, m, p_drop, steps, seed)
+    def encoded(self, planes: Tensor) -> Float32[Tensor, "n c hz wz"]:
+        """Codes of pictures; see `planes_of_render`."""
+        with torch.inference_mode():
+            return torch.cat([self.network.encoded(part) for part in planes.split(AT_ONCE)])
 
     def decoded(self, latents: Float32[Array, "*n c hz wz"]) -> Imagined:
         """See `Prior`."""
@@ -63,13 +54,54 @@ class Terrain:
         made = planes.numpy().transpose(0, 2, 3, 1).reshape(*latents.shape[:-3], SIZE, SIZE, -1)
         return Imagined(np.ascontiguousarray(made[..., :4]), made[..., 4] / np.float32(NEARNESS))
 
-    def _told(self, condition: Condition) -> tuple[Tensor, Tensor, Tensor]:
-        """Codes of the render, its opacity in the code's cells, and tokens."""
+    def variances(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n c hz wz"]:
+        """See `Prior`."""
+        flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *CODE)))
         with torch.inference_mode():
-            render = torch.cat([self.network.encoded(p) for p in planes_of_render(condition).split(AT_ONCE)])
-            photo = torch.cat([self.network.encoded(p) for p in planes_of_photo(condition.photo).split(AT_ONCE)])
+            made = [self.network.posterior(self.network.decoded(part)).var for part in flat.split(AT_ONCE)]
+            return (torch.cat(made) * self.network.scale**2).numpy().reshape(latents.shape)
+
+    def told(self, condition: Condition, known: Bool[Array, "b h w"] | None = None) -> Denoise:
+        """The denoiser, told of views. known: cells of the code (16 x 16) where the render is to be believed; None:
+        all. Raises: ValueError: a condition that is not finite, by name."""
+        condition.check()
+        render, photo = (self.encoded(p) for p in (planes_of_render(condition), planes_of_photo(condition.photo)))
+        opacity = pooled(torch.from_numpy(condition.alpha))
+        trusted = torch.ones_like(opacity) if known is None else torch.from_numpy(known).float()[:, None]
+        with torch.inference_mode():
             tokens = self.network.told(photo, torch.from_numpy(condition.relative))
-            return render, pooled(torch.from_numpy(condition.alpha)), tokens
+        everything = render * trusted, torch.cat([opacity * trusted, trusted], 1), tokens
+
+        def denoise(latents: Tensor, time: Tensor, some: slice) -> Tensor:
+            each = len(latents) // (some.stop - some.start)
+            told = (part[some].repeat_interleave(each, 0) for part in everything)
+            return self.network.denoised(latents, time, *told)
+
+        return denoise
+
+
+class Terrain(Learned):
+    """A `Prior` from a file of weights."""
+
+    name = "terrain"
+
+    def __init__(self, network: Network, facts: dict[str, str] | None = None):
+        super().__init__(network, facts)
+        self.schedule = schedule()
+
+    def samples(
+        self,
+        condition: Condition,
+        m: int,
+        p_drop: float,
+        steps: int,
+        seed: int,
+        known: Bool[Array, "b h w"] | None = None,
+        common: bool = True,
+    ) -> Float32[Array, "b m c hz wz"]:
+        """See `Prior`. known: see `told`. common: one initial noise for all m samples; else each has its own."""
+        how = len(condition), CODE, m, p_drop, steps, seed
+        return sampler.sampled(self.told(condition, known), self.layers, self.schedule, *how, common=common)
 
 
 def planes_of_render(condition: Condition) -> Tensor:

@@ -84,6 +84,15 @@ class Zero123:
         painted = ((torch.cat(made) + 1) / 2).clamp(0, 1).numpy().transpose(0, 2, 3, 1)
         return Imagined(without_white(painted).reshape(*latents.shape[:-3], SIZE, SIZE, 4), None)
 
+    def variances(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n c hz wz"]:
+        """See `Prior`."""
+        flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *LATENT))).to(self.device)
+        coder, scale = self.parts.coder, self.parts.coder.config.scaling_factor
+        with torch.inference_mode():
+            painted = (coder.decode(part / scale).sample for part in flat.split(AT_ONCE))
+            made = [coder.encode(picture.clamp(-1, 1)).latent_dist.var.cpu() for picture in painted]
+        return (torch.cat(made) * scale**2).numpy().reshape(latents.shape)
+
     def _told(self, condition: Condition) -> tuple[Tensor, Tensor]:
         """The photos' latents, and one token each."""
         photo = sized(condition.photo).to(self.device)

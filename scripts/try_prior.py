@@ -1,0 +1,19 @@
+"""Rule try_prior: how good is the prior on worlds it was not trained on, and is it better than what costs less?"""
+
+from dav_gswt import figures
+from dav_gswt.logs import logging_to
+from dav_gswt.perceptual import weights
+from dav_gswt.prior import examples, plots, trial
+from dav_gswt.prior.regressor import Regressor
+from dav_gswt.prior.terrain import Terrain
+
+with logging_to(snakemake.log[0]):
+    given, out, params = snakemake.input, snakemake.output, snakemake.params
+    setting = trial.Setting(**params.setting)
+    prior, regressors = Terrain.open(given.weights), [Regressor.open(path) for path in given.regressors]
+    made = examples.joined([examples.read(part) for part in given.examples])
+    perceptual = weights.read(*given.lpips) if given.lpips else None  # a list of none or one
+    rows = trial.tried(trial.evenly(made, params.views), prior, regressors, setting, perceptual)
+    figures.write_rows(out.table, rows)
+    plots.losses(plots.read_losses(given.losses), out.losses)
+    plots.samples(plots.gallery(trial.evenly(made, params.shown), prior, regressors[0], setting), out.samples)
