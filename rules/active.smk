@@ -206,6 +206,93 @@ use rule evaluate_coarse as evaluate_round with:
         source=source_of("metrics", "active/evaluation", "raster"),
 
 
+rule show_candidates:
+    """Draw what some candidates truly show, as small as they are scored: for those who judge scores, never for scores."""
+    input:
+        frame="<results>/<photos>/ground.json",
+    output:
+        truth=directory("<results>/<photos>/candidates"),
+    log:
+        "<logs>/<photos>/show_candidates.log",
+    benchmark:
+        "<benchmarks>/<photos>/show_candidates.tsv"
+    wildcard_constraints:
+        scene=scenes_by("render"),
+    threads: 2
+    resources:
+        mem_mb=2500,
+        runtime="60m",
+    params:
+        scene=entry("scenes", "scene"),
+        poses=lookup(dpath="calibration/poses", within=config),
+        source=source_of("active/candidates", "active/poses", "active/truth", "photos"),
+    script:
+        "../scripts/show_candidates.py"
+
+
+rule calibrate_coarse:
+    """Compare the scores of some candidates with the true error of the field there."""
+    input:
+        unpack(prior_of),
+        unpack(regressors_of),
+        unpack(truth_of),
+        field="<results>/<coarse>/field.ply",
+        ground="<results>/<coarse>/ground.exr",
+        scores="<results>/<scored>/scores.csv",
+        maps="<results>/<scored>/maps.npz",
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+    output:
+        found="<results>/<scored>/calibration.json",
+        poses="<results>/<scored>/calibration.csv",
+    log:
+        "<logs>/<scored>/calibrate_coarse.log",
+    benchmark:
+        "<benchmarks>/<scored>/calibrate_coarse.tsv"
+    threads: 2
+    resources:
+        mem_mb=3000,
+        runtime="60m",
+    params:
+        scene=entry("scenes", "scene"),
+        size=lambda wildcards: config["qualities"][wildcards.quality]["size"],
+        prior=lambda wildcards: config["priors"].get(wildcards.prior),
+        p_drop=real("p_drop"),
+        lam=lookup(dpath="lam", within=config),
+        seed=integer("seed"),
+        poses=lookup(dpath="calibration/poses", within=config),
+        source=source_of("active", "raster", "prior", "perceptual", "metrics"),
+    script:
+        "../scripts/calibrate_scores.py"
+
+
+use rule calibrate_coarse as calibrate_round with:
+    input:
+        unpack(prior_of),
+        unpack(regressors_of),
+        unpack(truth_of),
+        field="<results>/<round>/field.ply",
+        ground="<results>/<round>/ground.exr",
+        scores="<results>/<round>/scores.csv",
+        maps="<results>/<round>/maps.npz",
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+        captures=captures_until,
+    output:
+        found="<results>/<round>/calibration.json",
+        poses="<results>/<round>/calibration.csv",
+    log:
+        "<logs>/<round>/calibrate_round.log",
+    benchmark:
+        "<benchmarks>/<round>/calibrate_round.tsv"
+    wildcard_constraints:
+        t=POSITIVE,
+
+
 rule begin_active:
     """Round 0: no photo was asked for, the coarse field goes on as it is."""
     input:

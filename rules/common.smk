@@ -94,15 +94,15 @@ def scenes_by(*agents):
     return "|".join(n for n, s in config["scenes"].items() if s.get("agent") in agents) or NEVER
 
 
-def values_of(scene):
+def values_of(scene, policy=config["policy"]):
     """The wildcards of what is made of a scene at the config's parameters."""
     given = config["scenes"][scene]["kind"] == "field"
-    imagined = not given and config["policy"] in IMAGINING
+    imagined = not given and policy in IMAGINING
     return dict(
         scene=scene,
         seed=config["seeds"],
         quality=config["scenes"][scene]["quality"],
-        policy="given" if given else config["policy"],
+        policy="given" if given else policy,
         prior=config["prior"] if imagined else "none",
         p_drop=spell(config["p_drop"]) if imagined else "0",
         lam=spell(config["lam"]) if imagined else "0",
@@ -184,6 +184,21 @@ def prior_of(wildcards):
         if key in entry and not Path(entry[key]).exists():
             raise WorkflowError(f"config: priors.{wildcards.prior}.{key}: there is no {entry[key]}; see docs/prior.md")
     return files
+
+
+def regressors_of(wildcards):
+    """Networks without diffusion, to compare the project's own prior with."""
+    entry = config["priors"].get(wildcards.prior, {})
+    count = config["calibration"]["regressors"] if entry.get("model") == "terrain" else 0
+    files = expand("<results>/prior/regressor{member}.safetensors", member=range(count))
+    return {"regressors": files} if files else {}
+
+
+def truth_of(wildcards):
+    """What candidates truly show, where it is drawn; a replayed scene has its photos."""
+    if config["scenes"][wildcards.scene]["agent"] != "render":
+        return {}
+    return {"truth": "<results>/<photos>/candidates"}
 
 
 def maps_of_round(wildcards):

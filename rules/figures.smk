@@ -1,7 +1,9 @@
-"""Figures of docs/: how soon a fit shows photos it has not seen, and what its field looks like from elsewhere.
+"""Figures of docs/: how soon a fit shows photos it has not seen, what its field looks like from elsewhere, and whether
+scores of poses say where a field is wrong.
 
-In: the photos of a scene. Out: docs/data/fit_{scene}.csv with the provenance beside it, stills, and the curves' plot.
-Not part of `all`: `snakemake docs/figures/fit_time.png` makes them. Seconds differ from machine to machine.
+In: the photos of a scene; calibration.json of scenes and rounds. Out: tables in docs/data with their provenance, plots.
+Not part of `all`: `snakemake docs/figures/fit_time.png docs/figures/calibration.png` makes them. Seconds differ from
+machine to machine.
 """
 
 CURVES = ["copr_dunes", "desert_high"]  # one real set, one synthetic
@@ -47,3 +49,36 @@ rule plot_fits:
         source=source_of("figures"),
     script:
         "../scripts/plot_fits.py"
+
+
+def calibrations():
+    """The cells that are compared: the path of each one's calibration.json, and what tells it from the others."""
+    asked, found = config["calibration"], {}
+    for scene in asked["scenes"]:
+        values = values_of(scene, asked["policy"])
+        for seed in config["seeds"]:
+            for t in range(asked["rounds"] + 1):
+                made = rules.calibrate_round if t else rules.calibrate_coarse
+                (path,) = expand(made.output.found, **(values | {"seed": seed, "t": t}))
+                cell = {key: values[key] for key in ("scene", "quality", "policy", "prior", "p_drop")}
+                found[path] = cell | {"seed": seed, "round": t}
+    return found
+
+
+rule plot_calibration:
+    """Do scores say where a field is wrong? All scenes and rounds in one table and one figure."""
+    input:
+        cells=lambda wildcards: list(calibrations()),
+    output:
+        table="docs/data/calibration.csv",
+        facts="docs/data/calibration.json",
+        plot="docs/figures/calibration.png",
+    log:
+        "<logs>/figures/plot_calibration.log",
+    benchmark:
+        "<benchmarks>/figures/plot_calibration.tsv"
+    params:
+        cells=lambda wildcards: list(calibrations().values()),
+        source=source_of("active/calibration_report", "figures"),
+    script:
+        "../scripts/plot_calibration.py"

@@ -26,4 +26,5 @@ with logging_to(snakemake.log[0]):
     images.write_exr_parts(out.shown, scoring.parts(found, fitted, grid))
     inputs = {name: given[name] for name in ("field", "ground", "views", "weights", "lpips") if given.get(name)}
     about = {"prior": params.prior, "p_drop": params.p_drop, "seed": params.seed}
+    about["variance"] = "posterior" if prior and prior.posterior else "point"
     frozen.write(out.facts, found.frozen, found.facts(), inputs, about)

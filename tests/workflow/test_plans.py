@@ -55,6 +55,13 @@ def test_a_prior_is_asked_once_for_every_lam(planned, tmp_path, axis, values, sc
     assert plan["select_poses"] == plan["update_field"] == 2 * len(values) and plan["fetch_lpips"] == 1
 
 
+def test_scores_are_judged_by_truth_that_is_drawn_once_a_scene(planned, tmp_path):
+    (tmp_path / "few.yaml").write_text("calibration: {scenes: [desert, planet], rounds: 2, regressors: 1}")
+    plan = planned(tmp_path, "docs/figures/calibration.png", configs=(USUAL, tmp_path / "few.yaml"))
+    assert plan["show_candidates"] == plan["calibrate_coarse"] == 2 and plan["calibrate_round"] == 4
+    assert plan["train_regressor"] == plan["plot_calibration"] == 1
+
+
 def test_tiles_go_by_the_doubt_of_the_prior_that_was_asked(planned, tmp_path):
     plan = planned(tmp_path, "--config", "policy=w2-lpips", configs=(USUAL, TINY))
     assert plan["score_coarse"] == plan["score_round"] == plan["crop_level"] == 1 and not plan["fetch_lpips"]

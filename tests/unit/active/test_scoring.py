@@ -123,6 +123,7 @@ def test_a_prior_sees_the_middle_square_and_the_nearest_photo():
     picture = np.random.default_rng(0).random((40, 60, 3), np.float32)
     assert np.array_equal(conditions.middle_square(picture), picture[:, 10:50])
     photos = patch.photos()
+    assert conditions.taken(photos, patch.FRAME, 64).photos.shape == (3, 64, 64, 3)  # smaller photos are enlarged
     known = conditions.taken(photos, patch.FRAME, 24)
     near = photos[1].camera.centre + [0, 0, 0.1]
     told = conditions.condition(patch.field(), pool(near), known, 6.0, 24)

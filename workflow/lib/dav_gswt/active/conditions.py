@@ -27,8 +27,14 @@ class Taken:
 
 def taken(views: list[View], frame: dict, size: int) -> Taken:
     """Of photos at any size."""
-    small = [images.resized(middle_square(view.image), size, size) for view in views]
+    small = [_sized(middle_square(view.image), size) for view in views]
     return Taken([poses.of_camera(view.name, view.camera, frame) for view in views], np.stack(small))
+
+
+def _sized(square: Float32[Array, "s s 3"], size: int) -> Float32[Array, "{size} {size} 3"]:
+    if len(square) >= size:
+        return images.resized(square, size, size)
+    return np.stack([images.enlarged(square[..., c], size, size) for c in range(3)], -1)
 
 
 def condition(field: Field, pool: Candidates, known: Taken, flying_height: float, size: int) -> Condition:

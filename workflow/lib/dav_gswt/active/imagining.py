@@ -13,7 +13,6 @@ from dav_gswt.active.uncertainty.disagreement import w2_sq
 from dav_gswt.active.uncertainty.staging import Terms
 from dav_gswt.active.uncertainty.texture import image_gradient
 from dav_gswt.logs import progress
-from dav_gswt.perceptual import lpips
 from dav_gswt.perceptual.weights import Weights, read
 from dav_gswt.prior.interface import Condition, Prior
 
@@ -98,6 +97,8 @@ def _some(prior: Asking, condition: Condition, names: list[str], steps: int, cou
     pictures = prior.model.decoded(latents).rgba[..., :3]
     between = None
     if prior.weights is not None:
+        from dav_gswt.perceptual import lpips  # not above: torch takes seconds to load, and most scoring does without
+
         between = lpips.pairwise_mean((2 * pictures - 1) * counts[:, None, :, :, None], prior.weights)
     return Terms(over(maps, counts), between, image_gradient(pictures, names=names), maps)
 

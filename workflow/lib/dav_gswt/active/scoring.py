@@ -25,7 +25,7 @@ from dav_gswt.raster import Rasterizer
 from dav_gswt.views import View, over_ground
 
 WIDTH = 96  # pixels of a picture that is only scored
-PHOTO = 256  # pixels across of a photo that priors are shown, before it is cut to its middle square and made smaller
+PHOTO = 384  # pixels across of a photo that priors are shown, before it is cut to its middle square and made smaller
 OTHERS = 16  # candidates whose maps are shown
 
 
