@@ -5,6 +5,15 @@ scores.csv and scores.json, maps.npz, uncertainty.exr and metrics.json. Round t 
 which round is asked for. Scoring keeps its terms apart: the policy and k enter when poses are chosen.
 """
 
+SCORING = [
+    *(f"active/{name}" for name in ("scoring", "conditions", "fisher", "imagining", "maps", "outside", "reach")),
+    *(f"active/{name}" for name in ("candidates", "poses", "scores", "frozen", "uncertainty", "agents/rig")),
+    *(f"prior/{name}" for name in ("examples", "interface", "terrain", "sampler", "dropout", "networks", "zero123")),
+    "raster",
+    "coarse/doubt",
+    "perceptual",
+]
+
 
 rule score_coarse:
     """Score every candidate pose by what the coarse field does not know there, and freeze the scales of the terms."""
@@ -34,7 +43,7 @@ rule score_coarse:
         prior=lambda wildcards: config["priors"].get(wildcards.prior),
         p_drop=real("p_drop"),
         seed=integer("seed"),
-        source=source_of("active", "raster", "coarse/doubt", "prior", "perceptual"),
+        source=source_of(*SCORING),
     script:
         "../scripts/score_poses.py"
 
@@ -225,7 +234,7 @@ rule show_candidates:
     params:
         scene=entry("scenes", "scene"),
         poses=lookup(dpath="calibration/poses", within=config),
-        source=source_of("active/candidates", "active/poses", "active/truth", "photos"),
+        source=source_of("active/candidates", "active/poses", "active/calibration/truth", "photos"),
     script:
         "../scripts/show_candidates.py"
 

@@ -79,6 +79,6 @@ rule plot_calibration:
         "<benchmarks>/figures/plot_calibration.tsv"
     params:
         cells=lambda wildcards: list(calibrations().values()),
-        source=source_of("active/calibration_report", "figures"),
+        source=source_of("active/calibration/report", "figures"),
     script:
         "../scripts/plot_calibration.py"

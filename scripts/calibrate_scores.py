@@ -1,7 +1,8 @@
 """Rules calibrate_coarse and calibrate_round: do scores say where the field is wrong?"""
 
 from dav_gswt import field, figures, provenance, views
-from dav_gswt.active import candidates, controls, imagining, judging, maps, scores, scoring
+from dav_gswt.active import candidates, imagining, maps, scores, scoring
+from dav_gswt.active.calibration import controls, judging
 from dav_gswt.coarse import ground
 from dav_gswt.files import read_json, write_json
 from dav_gswt.logs import logging_to

@@ -1,7 +1,7 @@
 """Rule plot_calibration: which scores say where the field is wrong?"""
 
 from dav_gswt import figures, provenance
-from dav_gswt.active import calibration_report
+from dav_gswt.active.calibration import report
 from dav_gswt.files import read_json, write_json
 from dav_gswt.logs import logging_to
 
@@ -9,8 +9,8 @@ with logging_to(snakemake.log[0]):
     out, given = snakemake.output, snakemake.input.cells
     paths = [given] if isinstance(given, str) else given
     found = [read_json(path) for path in paths]
-    table = calibration_report.rows(snakemake.params.cells, found)
+    table = report.rows(snakemake.params.cells, found)
     figures.write_rows(out.table, table)
-    calibration_report.write_figure(out.plot, table, found[0]["level"])
+    report.write_figure(out.plot, table, found[0]["level"])
     about = {path: f["provenance"]["parameters"] for path, f in zip(paths, found, strict=True)}
     write_json(out.facts, provenance.of(dict(zip(paths, paths, strict=True)), about))

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from dav_gswt.active import candidates, truth
+from dav_gswt.active import candidates
+from dav_gswt.active.calibration import truth
 from dav_gswt.files import read_json
 from dav_gswt.logs import logging_to
 

@@ -1,4 +1,4 @@
-"""Scores of some candidates beside the true error there: what `calibrating` compares, gathered."""
+"""Scores of some candidates beside the true error there: what `measures` compares, gathered."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,8 @@ import numpy as np
 from jaxtyping import Float32, Float64
 from numpy import ndarray as Array
 
-from dav_gswt.active import calibrating, conditions, controls, imagining, truth
+from dav_gswt.active import conditions, imagining
+from dav_gswt.active.calibration import controls, measures, truth
 from dav_gswt.active.candidates import Candidates
 from dav_gswt.active.imagining import Asking
 from dav_gswt.active.maps import PoseMaps
@@ -64,12 +65,12 @@ def calibrated(
         shown |= others
         terms |= {name: imagining.over(m, counts) for name, m in others.items()}
     corrected = judged.scene["agent"] == "replay"  # photos change their exposure
-    error, error_maps = calibrating.errors(judged.field, judged.grid, views, judged.size, corrected)
+    error, error_maps = measures.errors(judged.field, judged.grid, views, judged.size, corrected)
     table = [
         {"pose": pose.name, "error": error[i]} | {name: values[i] for name, values in terms.items()}
         for i, (pose, _) in enumerate(some)
     ]
-    return calibrating.result(terms, shown, error, error_maps, seed), table
+    return measures.result(terms, shown, error, error_maps, seed), table
 
 
 def compared(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dav_gswt import cameras, images
-from dav_gswt.active import truth
+from dav_gswt.active.calibration import truth
 from dav_gswt.active.poses import Pose, place
 from dav_gswt.active.scoring import small
 from dav_gswt.errors import InputError

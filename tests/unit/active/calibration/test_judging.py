@@ -9,7 +9,8 @@ import pytest
 import torch
 
 from dav_gswt import cameras, images
-from dav_gswt.active import controls, imagining, judging, poses, scoring, truth
+from dav_gswt.active import imagining, poses, scoring
+from dav_gswt.active.calibration import controls, judging, truth
 from dav_gswt.active.imagining import Asking
 from dav_gswt.errors import InputError
 from dav_gswt.prior import weights

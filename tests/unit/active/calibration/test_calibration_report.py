@@ -5,7 +5,7 @@ import csv
 import pytest
 
 from dav_gswt import figures, images
-from dav_gswt.active import calibration_report as report
+from dav_gswt.active.calibration import report
 
 NONE = dict.fromkeys(report.MEASURES)
 
