@@ -171,7 +171,7 @@ def test_maps_of_lower_pictures_end_where_the_picture_does():
 def test_of_many_pixels_some_are_taken_evenly(monkeypatch):
     rng = np.random.default_rng(6)
     score, error = rng.uniform(size=(2, 4, 50, 50))
-    monkeypatch.setattr(calibrating, "PIXELS", 3000)
+    monkeypatch.setattr(measures, "PIXELS", 3000)
     found = measures.judged_pixels({"a": score}, score + error)["a"]["pixel_spearman"]
     assert found == pytest.approx(spearmanr(score.ravel()[::4], (score + error).ravel()[::4]).statistic)
 
