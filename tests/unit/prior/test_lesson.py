@@ -49,7 +49,7 @@ def test_a_regressor_takes_the_coder_that_is_there(tmp_path):
     given = tmp_path / "prior.safetensors"
     lesson.learn(parts, tmp_path / "regressor.safetensors", plan, plan, tmp_path / "b", given, regress=True)
     one, two = Terrain.open(given).network, Regressor.open(tmp_path / "regressor.safetensors").network
-    assert np.array_equal(one.coder.decoder.conv_out.weight, two.coder.decoder.conv_out.weight)
+    assert np.array_equal(one.coder.decoder[0].weight, two.coder.decoder[0].weight)
     assert not np.array_equal(one.told.place, two.told.place)
 
 

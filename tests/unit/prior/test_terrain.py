@@ -53,7 +53,7 @@ def test_a_latent_stands_for_as_much_as_the_coder_says(prior):
     assert found.shape == latents.shape and (found > 0).all()
     with torch.inference_mode():
         pictures = prior.network.decoded(torch.from_numpy(latents[1]))
-        expected = prior.network.coder.encode(2 * pictures - 1).latent_dist.std * prior.network.scale
+        expected = prior.network.posterior(pictures).std * prior.network.scale
     np.testing.assert_allclose(np.sqrt(found[1]), expected.numpy(), rtol=1e-4)
 
 

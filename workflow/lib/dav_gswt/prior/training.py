@@ -45,10 +45,10 @@ class Plan:
 class Codes:
     """Examples as the denoiser sees them. relative: see `Condition`."""
 
-    truth: Float[Tensor, "n 4 h w"]
-    render: Float[Tensor, "n 4 h w"]
+    truth: Float[Tensor, "n 8 h w"]
+    render: Float[Tensor, "n 8 h w"]
     opacity: Float[Tensor, "n 1 h w"]
-    photo: Float[Tensor, "n 4 h w"]
+    photo: Float[Tensor, "n 8 h w"]
     relative: Float[Tensor, "n 4"]
 
     def __len__(self) -> int:
@@ -87,7 +87,7 @@ def train(
 def train_coder(network: Network, pictures: Tensor, plan: Plan, keep: Path) -> list[float]:
     """Train the coder on pictures (n 5 s s, bytes), then set the scale of its codes.
 
-    Loss: absolute difference, of the picture and of its finite differences (edges count), and a little divergence.
+    Loss: absolute difference, and a little divergence.
     """
 
     def loss(step: int, rng: torch.Generator) -> Tensor:
@@ -95,8 +95,8 @@ def train_coder(network: Network, pictures: Tensor, plan: Plan, keep: Path) -> l
         true = pictures[rows].float() / 255
         posterior = network.posterior(true)
         code = posterior.mean + posterior.std * torch.randn(posterior.mean.shape, generator=rng)
-        made = (network.coder.decode(code).sample + 1) / 2
-        return _apart(made, true) + DIVERGENCE * posterior.kl().mean()
+        made = (network.coder.decode(code) + 1) / 2
+        return (made - true).abs().mean() + DIVERGENCE * posterior.kl().mean()
 
     losses = train(network.coder, loss, plan, keep, "train coder")
     network.eval()
@@ -104,13 +104,6 @@ def train_coder(network: Network, pictures: Tensor, plan: Plan, keep: Path) -> l
         some = pictures[:: max(1, len(pictures) // 2048)].float() / 255
         network.scale.fill_(1 / network.posterior(some).mode().std())
     return losses
-
-
-def _apart(made: Tensor, true: Tensor) -> Tensor:
-    value = (made - true).abs().mean()
-    for axis in (2, 3):
-        value = value + (made.diff(dim=axis) - true.diff(dim=axis)).abs().mean()
-    return value
 
 
 def train_denoiser(network: Network, codes: Codes, plan: Plan, keep: Path, regress: bool = False) -> list[float]:
