@@ -76,6 +76,7 @@ rule select_poses:
     """Choose the k poses that the policy expects most of, and show what is not known there."""
     input:
         unpack(before_round),
+        unpack(truth_for_oracle),
         captures=captures_before,
         views="<results>/<start>/views.json",
         model="<results>/<photos>/sparse",
@@ -95,12 +96,20 @@ rule select_poses:
     wildcard_constraints:
         t=POSITIVE,
     params:
+        scene=entry("scenes", "scene"),
+        size=lambda wildcards: config["qualities"][wildcards.quality]["size"],
         policy=lambda wildcards: wildcards.policy,
         lam=real("lam"),
         k=integer("k"),
         seed=integer("seed"),
         t=integer("t"),
-        source=source_of("active/selection", "active/poses", "active/scores", "active/maps", "active/uncertainty"),
+        source=source_of(
+            *(
+                f"active/{name}"
+                for name in ("selection", "policies", "facility", "fisher", "needs", "poses", "scores")
+            ),
+            *("active/maps", "active/uncertainty", "active/candidates", "active/calibration/measures"),
+        ),
     script:
         "../scripts/select_poses.py"
 

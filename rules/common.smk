@@ -45,7 +45,9 @@ NUMBER = r"0|[1-9]\d*|(?:0|[1-9]\d*)\.\d*[1-9]"
 NEVER = r"(?!)"  # a constraint that nothing meets
 # What reads no prior has one spelling of it: the names look at what follows them in a path.
 PRIOR = "|".join(["none(?=_pdrop0[_/])", *config["priors"]])
-CHOOSING = f"(?:{'|'.join(GEOMETRIC)})(?=_none_pdrop0_lam0_)|(?:{'|'.join(IMAGINING)})(?!_none_)"  # poses, by scores
+CHOOSING = "|".join(  # of poses, by their scores
+    [*(f"{name}(?=_none_pdrop0_lam0_)" for name in GEOMETRIC), *(f"{name}(?!_none_)" for name in IMAGINING)]
+).replace("|w2(?!", "|w2(?=[^/]*_lam0_)(?!")
 POLICY = f"{CHOOSING}|given"
 SNAPSHOTS = "results/snapshots"  # of fits that run: outside the outputs, so that a killed fit can go on
 
@@ -196,9 +198,18 @@ def regressors_of(wildcards):
 
 def truth_of(wildcards):
     """What candidates truly show, where it is drawn; a replayed scene has its photos."""
-    if config["scenes"][wildcards.scene]["agent"] != "render":
+    if config["scenes"][wildcards.scene].get("agent") != "render":
         return {}
     return {"truth": "<results>/<photos>/candidates"}
+
+
+def truth_for_oracle(wildcards):
+    """The one policy that sees the truth, where there is one."""
+    if wildcards.policy != "oracle":
+        return {}
+    if not (found := truth_of(wildcards)):
+        raise WorkflowError(f"policy oracle: what {wildcards.scene} truly shows is not known; it needs agent: render")
+    return found
 
 
 def maps_of_round(wildcards):

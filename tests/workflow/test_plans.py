@@ -6,6 +6,8 @@ import sys
 import pytest
 from made_runs import TINY, USUAL
 
+from dav_gswt.active.names import IMAGINING, POLICIES
+
 ROUND = "results/desert/seed0/draft/active_{policy}_none_pdrop0_lam0_k{k}/iter{t}"
 BUNDLE = ROUND + "/tiles_colour/bundle_tau{tau}/davgswt.json"
 DEFAULT = dict(policy="farthest", k=4, t=2, tau=0.6)
@@ -62,6 +64,27 @@ def test_scores_are_judged_by_truth_that_is_drawn_once_a_scene(planned, tmp_path
     assert plan["train_regressor"] == plan["plot_calibration"] == 1
 
 
+def test_every_policy_has_a_path(planned, tmp_path):
+    for policy in POLICIES[:-1]:
+        imagined = policy in IMAGINING
+        way = (
+            f"{policy}_terrain_pdrop0.15_lam{0 if policy == 'w2' else 0.1}"
+            if imagined
+            else f"{policy}_none_pdrop0_lam0"
+        )
+        plan = planned(tmp_path, f"results/desert/seed0/draft/active_{way}_k4/iter1/field.ply")
+        assert plan["update_field"] == plan["select_poses"] == 1
+        assert plan["show_candidates"] == (policy == "oracle") and plan["fetch_lpips"] == imagined
+
+
+def test_the_oracle_needs_a_scene_whose_truth_is_known(snakemake, shared, tmp_path):
+    path = "results/copr_dunes/seed0/standard/active_oracle_none_pdrop0_lam0_k4/iter1/poses.json"
+    config = tmp_path / "there.yaml"
+    config.write_text(f"scenes: {{copr_dunes: {{folder: {shared}/data/copr_dunes/images}}}}")
+    done = snakemake(tmp_path, path, "--dry-run", configs=(USUAL, config), check=False)
+    assert done.returncode != 0 and "policy oracle: what copr_dunes truly shows is not known" in done.stdout
+
+
 def test_tiles_go_by_the_doubt_of_the_prior_that_was_asked(planned, tmp_path):
     plan = planned(tmp_path, "--config", "policy=w2-lpips", configs=(USUAL, TINY))
     assert plan["score_coarse"] == plan["score_round"] == plan["crop_level"] == 1 and not plan["fetch_lpips"]
@@ -75,6 +98,9 @@ def test_tiles_go_by_the_doubt_of_the_prior_that_was_asked(planned, tmp_path):
     [
         pytest.param(
             ASKED.replace("_terrain_pdrop{p_drop}_lam{lam}", "_none_pdrop0_lam0"), id="w2-lpips without a prior"
+        ),
+        pytest.param(
+            ASKED.replace("w2-lpips", "w2").format(p_drop="0.1", lam="0.1"), id="lam for a policy without LPIPS"
         ),
         pytest.param(ASKED.format(p_drop="1", lam="0.1"), id="a share of dropout that leaves nothing"),
         pytest.param(ASKED.format(p_drop="0.1", lam="0.10"), id="lam with a trailing zero"),

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from dav_gswt.active import poses, scores, selection
+from dav_gswt.active.policies import POLICIES, Wanted
 from dav_gswt.active.poses import Pose
 from dav_gswt.active.scores import Scores
-from dav_gswt.active.selection import Wanted
 from dav_gswt.active.uncertainty import Scales
 from dav_gswt.errors import InputError
 
@@ -17,8 +17,24 @@ def scored(*places, **terms):
     return Scores(found, columns, Scales(dict.fromkeys(columns, 2.0)), np.zeros(len(places), int))
 
 
-def chosen(policy, pool, k, captured=((1.0, 0, 0),), seed=0, lam=0.0):
-    wanted = Wanted(np.array(captured).reshape(-1, 3), k, np.random.default_rng(seed), lam)
+class Sharing:
+    """Information that fades for the neighbours of what was taken, as that of overlapping photos does."""
+
+    def __init__(self, gains):
+        self.gains, self.looks = list(gains), 0
+
+    def gain(self, i):
+        self.looks += 1
+        return self.gains[i]
+
+    def take(self, i):
+        for j in (i - 1, i, i + 1):
+            if 0 <= j < len(self.gains):
+                self.gains[j] /= 10
+
+
+def chosen(policy, pool, k, captured=((1.0, 0, 0),), seed=0, lam=0.0, information=None, errors=None):
+    wanted = Wanted(np.array(captured).reshape(-1, 3), k, np.random.default_rng(seed), lam, information, errors)
     return [pose.name for pose in selection.select(policy, pool, wanted)]
 
 
@@ -53,6 +69,59 @@ def test_w2_lpips_says_that_lpips_is_absent_and_needs_a_prior(caplog):
         chosen("w2-lpips", scored(0, 1), 1)
 
 
+def test_w2_does_without_lpips_and_gradients_stand_in_for_it():
+    pool = scored(0, 1, 2, w2_sq=[1.0, 3, 2], lpips=[9.0, 0, 0], gradient=[1.0, 0, 3])
+    assert chosen("w2", pool, 2, lam=1e6) == ["p1", "p2"]
+    assert chosen("grad-lpips", pool, 1) == ["p2"] and chosen("grad-lpips", pool, 1, lam=1e6) == ["p0"]
+
+
+def test_doubt_and_diversity_share_the_choice():
+    """The most doubtful are neighbours: one photo tells about all of them."""
+    pool = scored(0, 3, 6, 120, 240, w2_sq=[1.0, 1.1, 1.0, 0.5, 0.4], lpips=[0.0] * 5)
+    assert chosen("w2-lpips", pool, 3, captured=()) == ["p1", "p0", "p2"]
+    assert chosen("w2-lpips-diverse", pool, 3, captured=()) == ["p1", "p3", "p4"]
+    assert set(chosen("diverse", pool, 3, captured=())) == set(chosen("w2-lpips-diverse", pool, 3, captured=()))
+
+
+def test_a_photo_taken_where_the_doubt_is_sends_the_next_elsewhere():
+    pool = scored(0, 3, 6, 120, 240, w2_sq=[1.0, 1.1, 1.0, 0.5, 0.4], lpips=[0.0] * 5)
+    assert chosen("w2-lpips-diverse", pool, 1, captured=((1.0, 0.05, 0),)) == ["p3"]
+
+
+def test_shuffled_doubt_is_dealt_by_the_generator():
+    pool = scored(*range(0, 360, 12), w2_sq=np.linspace(0, 1, 30) ** 4)
+    draws = [chosen("shuffled", pool, 3, captured=(), seed=s) for s in (1, 1, 2)]
+    assert draws[0] == draws[1] != draws[2] and draws[0] != chosen("w2-lpips-diverse", pool, 3, captured=())
+
+
+def test_a_ring_is_even_and_the_next_one_turned():
+    found = [
+        Pose(f"p{i}", e, float(a), 1.0)
+        for i, (e, a) in enumerate((e, a) for e in (45.0, 80.0) for a in range(0, 360, 5))
+    ]
+    pool = Scores(found, {"opacity": np.zeros(144)}, Scales({"opacity": 0.0}), np.zeros(144, int))
+    at = {pose.name: pose for pose in found}
+    first, second = (sorted(at[n].azimuth for n in chosen("ring", pool, 4, captured=c)) for c in ((), ((1.0, 0, 0),)))
+    assert first == [0, 90, 180, 270] and all(at[n].elevation == 45 for n in chosen("ring", pool, 4))
+    assert np.ptp(np.diff(second)) <= 5 and not set(first) & set(second)
+
+
+def test_fisher_is_greedy_with_update_and_looks_no_more_often_than_it_must():
+    gains = [5.0, 4.9, 4.8, 1.0, 3.0, *([0.5] * 40)]
+    sharing = Sharing(gains)
+    assert chosen("fisher", scored(*range(45), fisher=gains), 3, information=sharing) == ["p0", "p2", "p4"]
+    assert sharing.looks <= 5  # p0, p1 (fell), p2, p4, not all 45 each time
+
+
+def test_the_oracle_takes_the_worst_of_what_it_knows():
+    errors = np.array([0.1, np.nan, 0.5, 0.3])
+    assert chosen("oracle", scored(0, 1, 2, 3), 2, errors=errors) == ["p2", "p3"]
+
+
+def test_all_takes_all_whatever_k_is():
+    assert chosen("all", scored(0, 1, 2), 1) == ["p0", "p1", "p2"]
+
+
 def test_random_depends_on_its_generator_alone():
     pool = scored(*range(20))
     draw = [chosen("random", pool, 5, seed=s) for s in (1, 1, 2)]
@@ -60,9 +129,11 @@ def test_random_depends_on_its_generator_alone():
     assert len(set(draw[0])) == 5
 
 
-@pytest.mark.parametrize("policy", selection.POLICIES)
+@pytest.mark.parametrize("policy", POLICIES)
 def test_a_pool_that_is_too_small_is_taken_whole_and_said_so(policy, caplog):
-    assert len(chosen(policy, scored(0, 90, w2_sq=[0.0, 1]), 5)) == 2
+    terms = dict(w2_sq=[0.0, 1], gradient=[1.0, 2], fisher=[1.0, 2], lpips=[1.0, 1])
+    more = dict(information=Sharing([1.0, 2]), errors=np.array([0.5, np.nan]))
+    assert sorted(chosen(policy, scored(0, 90, **terms), 5, **more)) == ["p0", "p1"]
     assert "only 2 candidates" in caplog.text
     assert chosen(policy, scored(), 5) == []
     assert "no candidate pose is left" in caplog.text

@@ -48,12 +48,16 @@ def around(scene: dict, frame: dict, like: Camera) -> Candidates:
     return [(of_camera(f"pose_{i:04d}", camera, frame), replace(camera, **lens)) for i, camera in enumerate(found)]
 
 
-def places_taken(frame: dict, model_folder: Path | str, split: dict, captures: list) -> Float[Array, "m 3"]:
-    """Where the photos taken so far stand, relative to the exemplar's centre."""
+def taken(model_folder: Path | str, split: dict, captures: list) -> list[Camera]:
+    """The cameras of the photos taken so far."""
     known = model.read(model_folder)
     at = dict(zip(known.names, known.cameras, strict=True))
-    taken = [at[name] for name in split["start"]]
-    taken += [cameras.from_json(shot["got"]) for folder in captures for shot in _shots(folder)]
+    start = [at[name] for name in split["start"]]
+    return start + [cameras.from_json(shot["got"]) for folder in captures for shot in _shots(folder)]
+
+
+def places(taken: list[Camera], frame: dict) -> Float[Array, "m 3"]:
+    """Where cameras stand, relative to the exemplar's centre."""
     return np.array([camera.centre - middle(frame) for camera in taken]).reshape(-1, 3)
 
 

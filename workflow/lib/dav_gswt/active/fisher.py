@@ -33,3 +33,24 @@ def gain(seen: Contributions, already: Float64[Array, "n"]) -> float:
     Source: Jiang et al., FisherRF, ECCV 2024, of colours alone.
     """
     return float((seen.squared / already).sum())
+
+
+class Gathered:
+    """The information on a field that photos give, growing as candidates are chosen (`policies.Information`)."""
+
+    def __init__(self, field: Field, taken: list[Camera], candidates: list[Camera]):
+        """taken, candidates: cameras at the size at which poses are scored."""
+        self.field, self.candidates, self.raster = field, candidates, Rasterizer()
+        self.known = known(field, taken, self.raster)
+
+    def gain(self, i: int) -> float:
+        """Of a photo from candidate i, given all that was taken."""
+        return gain(self._seen(i), self.known)
+
+    def take(self, i: int) -> None:
+        """Candidate i is chosen."""
+        self.known = self.known + self._seen(i).squared
+
+    def _seen(self, i: int) -> Contributions:
+        self.raster.forward(**arrays(self.field), camera=self.candidates[i])
+        return self.raster.contributions()

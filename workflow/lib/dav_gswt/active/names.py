@@ -1,7 +1,7 @@
 """Names of the policies, apart from their code: the workflow reads them without loading the numerics."""
 
-GEOMETRIC = ("farthest", "opacity", "random")  # read no prior: they have one spelling of it
-IMAGINING = ("w2-lpips",)
+GEOMETRIC = ("random", "ring", "farthest", "diverse", "opacity", "fisher", "oracle", "all")  # read no prior
+IMAGINING = ("grad-lpips", "w2-lpips", "w2-lpips-diverse", "shuffled", "w2")  # w2 does without lam
 POLICIES = (*GEOMETRIC, *IMAGINING, "given")  # given: a finished field, no round of views
 
 # Agents that are devices or people, and the module that speaks to each.
