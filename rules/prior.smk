@@ -12,7 +12,7 @@ from dav_gswt.perceptual.archive import ARCHIVE_SHA256, MEMBER_SHA256, PACKAGE
 WORLDS_A_PART, VIEWS_A_WORLD = 20, 16
 PARTS = 32  # of examples that the prior is trained on; later ones are for evaluation
 CODER = dict(steps=6000, batch=16, rate=2e-3, seed=0)
-DENOISER = dict(steps=10_000, batch=24, rate=6e-4, seed=1)
+DENOISER = dict(steps=8000, batch=24, rate=6e-4, seed=1)
 REGRESSOR = dict(steps=4000, batch=24, rate=6e-4)  # nothing random to learn: it is done sooner
 MEMBERS = 3  # regressors whose disagreement is one more control
 HELD_OUT = range(40, 44)  # parts of worlds that nothing was trained on

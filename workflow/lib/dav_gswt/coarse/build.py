@@ -125,7 +125,7 @@ def refine(
     plan = Plan(
         AUTO if quality.steps_per_photo == AUTO else quality.steps_per_photo * len(new),
         quality.cap,
-        AUTO if quality.degree == AUTO else quality.degree,
+        quality.degree,
         pose_rate=quality.pose_rate,
     )
     what = f"fit {len(new)} new photos"
