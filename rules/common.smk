@@ -5,7 +5,7 @@ from hashlib import sha256
 from pathlib import Path
 
 import dav_gswt
-from dav_gswt.active.names import GEOMETRIC, IMAGINING
+from dav_gswt.active.names import AT_ZERO, GEOMETRIC, IMAGINING
 from dav_gswt.config import check
 from dav_gswt.errors import InputError
 
@@ -45,9 +45,17 @@ NUMBER = r"0|[1-9]\d*|(?:0|[1-9]\d*)\.\d*[1-9]"
 NEVER = r"(?!)"  # a constraint that nothing meets
 # What reads no prior has one spelling of it: the names look at what follows them in a path.
 PRIOR = "|".join(["none(?=_pdrop0[_/])", *config["priors"]])
-CHOOSING = "|".join(  # of poses, by their scores
-    [*(f"{name}(?=_none_pdrop0_lam0_)" for name in GEOMETRIC), *(f"{name}(?!_none_)" for name in IMAGINING)]
-).replace("|w2(?!", "|w2(?=[^/]*_lam0_)(?!")
+
+
+def way(policy):
+    """A constraint: the policy, followed by a spelling that it has of prior, p_drop and lam."""
+    if policy in GEOMETRIC:
+        return f"{policy}(?=_none_pdrop0_lam0_)"
+    p_drop, lam = ("0" if key in AT_ZERO.get(policy, ()) else "[^/_]+" for key in ("p_drop", "lam"))
+    return f"{policy}(?!_none_)(?=_[^/]+_pdrop{p_drop}_lam{lam}_)"
+
+
+CHOOSING = "|".join(way(policy) for policy in (*GEOMETRIC, *IMAGINING))  # of poses, by their scores
 POLICY = f"{CHOOSING}|given"
 SNAPSHOTS = "results/snapshots"  # of fits that run: outside the outputs, so that a killed fit can go on
 
@@ -99,15 +107,16 @@ def scenes_by(*agents):
 def values_of(scene, policy=config["policy"]):
     """The wildcards of what is made of a scene at the config's parameters."""
     given = config["scenes"][scene]["kind"] == "field"
-    imagined = not given and policy in IMAGINING
+    asked = {key: "0" if key in AT_ZERO.get(policy, ()) else spell(config[key]) for key in ("p_drop", "lam")}
+    if given or policy not in IMAGINING:
+        asked = {"p_drop": "0", "lam": "0"}
     return dict(
         scene=scene,
         seed=config["seeds"],
         quality=config["scenes"][scene]["quality"],
         policy="given" if given else policy,
-        prior=config["prior"] if imagined else "none",
-        p_drop=spell(config["p_drop"]) if imagined else "0",
-        lam=spell(config["lam"]) if imagined else "0",
+        prior="none" if given or policy not in IMAGINING else config["prior"],
+        **asked,
         k=0 if given else config["k"],
         t=0 if given else config["rounds"],
         seam=config["scenes"][scene]["seam"],

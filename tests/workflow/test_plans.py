@@ -6,7 +6,7 @@ import sys
 import pytest
 from made_runs import TINY, USUAL
 
-from dav_gswt.active.names import IMAGINING, POLICIES
+from dav_gswt.active.names import AT_ZERO, IMAGINING, POLICIES
 
 ROUND = "results/desert/seed0/draft/active_{policy}_none_pdrop0_lam0_k{k}/iter{t}"
 BUNDLE = ROUND + "/tiles_colour/bundle_tau{tau}/davgswt.json"
@@ -66,15 +66,15 @@ def test_scores_are_judged_by_truth_that_is_drawn_once_a_scene(planned, tmp_path
 
 def test_every_policy_has_a_path(planned, tmp_path):
     for policy in POLICIES[:-1]:
-        imagined = policy in IMAGINING
-        way = (
-            f"{policy}_terrain_pdrop0.15_lam{0 if policy == 'w2' else 0.1}"
-            if imagined
-            else f"{policy}_none_pdrop0_lam0"
-        )
+        spelled = {"prior": "none", "p_drop": "0", "lam": "0"}
+        if policy in IMAGINING:
+            spelled = {"prior": "terrain", "p_drop": "0.15", "lam": "0.1"} | dict.fromkeys(AT_ZERO.get(policy, ()), "0")
+        way = "{}_{prior}_pdrop{p_drop}_lam{lam}".format(policy, **spelled)
         plan = planned(tmp_path, f"results/desert/seed0/draft/active_{way}_k4/iter1/field.ply")
-        assert plan["update_field"] == plan["select_poses"] == 1
-        assert plan["show_candidates"] == (policy == "oracle") and plan["fetch_lpips"] == imagined
+        assert plan["update_field"] == plan["select_poses"] == 1, policy
+        assert plan["show_candidates"] == (policy == "oracle") and plan["fetch_lpips"] == (policy in IMAGINING)
+        default = planned(tmp_path, "--config", f"policy={policy}", configs=(USUAL, TINY))
+        assert default["make_page"] == 1 and default["select_poses"] == 1, policy
 
 
 def test_the_oracle_needs_a_scene_whose_truth_is_known(snakemake, shared, tmp_path):

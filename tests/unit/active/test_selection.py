@@ -131,7 +131,7 @@ def test_random_depends_on_its_generator_alone():
 
 @pytest.mark.parametrize("policy", POLICIES)
 def test_a_pool_that_is_too_small_is_taken_whole_and_said_so(policy, caplog):
-    terms = dict(w2_sq=[0.0, 1], gradient=[1.0, 2], fisher=[1.0, 2], lpips=[1.0, 1])
+    terms = dict(w2_sq=[0.0, 1], gradient=[1.0, 2], fisher=[1.0, 2], lpips=[1.0, 1], single=[0.1, 0])
     more = dict(information=Sharing([1.0, 2]), errors=np.array([0.5, np.nan]))
     assert sorted(chosen(policy, scored(0, 90, **terms), 5, **more)) == ["p0", "p1"]
     assert "only 2 candidates" in caplog.text

@@ -2,6 +2,7 @@
 
 import logging
 
+import made_up_weights
 import numpy as np
 import pytest
 
@@ -130,6 +131,19 @@ def test_few_poses_are_scored_in_full_at_once():
     prior = Counting()
     _, steps = imagining.terms(Asking(prior, 2, 8, 0.1), condition(20), [f"p{i}" for i in range(20)], ALL[:20])
     assert prior.evaluations == 20 * 2 * 8 and (steps == 8).all()
+
+
+def test_without_dropout_the_one_sample_is_compared_with_the_render():
+    prior, told = Counting(), condition(3)
+    some = imagining.terms(Asking(prior, 2, 2, 0.0, weights=made_up_weights.random()), told, ["a", "b", "c"], ALL[:3])[
+        0
+    ]
+    assert (some.single > 0).all()  # grey is not the black that the render shows
+    hidden = imagining.terms(Asking(prior, 2, 2, 0.0, weights=made_up_weights.random()), told, ["a"] * 3, 0 * ALL[:3])[
+        0
+    ]
+    assert not hidden.single.any()
+    assert imagining.terms(Asking(prior, 2, 2, 0.1), told, ["a", "b", "c"], ALL[:3])[0].single is None
 
 
 def test_one_sample_has_no_pair():

@@ -1,6 +1,6 @@
 """Weights of LPIPS: the published ones where they are at hand or can be fetched, and random ones of the same shapes."""
 
-import numpy as np
+import made_up_weights
 import pytest
 
 from dav_gswt.errors import InputError
@@ -26,13 +26,4 @@ def real_weights(root, request, tmp_path_factory):
 @pytest.fixture(scope="session")
 def random_weights():
     """Values of about the size that keeps features of unit size; heads not below 0, as LPIPS's are."""
-    rng = np.random.default_rng(0)
-
-    def drawn(shape, size):
-        return (size * rng.standard_normal(shape)).astype(np.float32)
-
-    return weights.Weights(
-        tuple(drawn(s, (2 / np.prod(s[1:])) ** 0.5) for s in weights.KERNELS),
-        tuple(drawn(s[:1], 0.1) for s in weights.KERNELS),
-        tuple(np.abs(drawn(s[:1], 0.3)) for s in weights.KERNELS),
-    )
+    return made_up_weights.random()

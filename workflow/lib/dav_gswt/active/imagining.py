@@ -95,12 +95,15 @@ def _some(prior: Asking, condition: Condition, names: list[str], steps: int, cou
     wide = prior.model.variances(latents) if prior.posterior else None
     _, maps = w2_sq(latents, wide, names)
     pictures = prior.model.decoded(latents).rgba[..., :3]
-    between = None
+    between = single = None
     if prior.weights is not None:
         from dav_gswt.perceptual import lpips  # not above: torch takes seconds to load, and most scoring does without
 
         between = lpips.pairwise_mean((2 * pictures - 1) * counts[:, None, :, :, None], prior.weights)
-    return Terms(over(maps, counts), between, image_gradient(pictures, names=names), maps)
+        if prior.p_drop == 0:
+            one, render = ((2 * p - 1) * counts[..., None] for p in (pictures[:, 0], condition.colour))
+            single = lpips.distance(one, render, prior.weights)
+    return Terms(over(maps, counts), between, image_gradient(pictures, names=names), maps, single)
 
 
 def over(maps: Float32[Array, "n h w"], counts: Float32[Array, "n s s"]) -> Float64[Array, "n"]:

@@ -1,7 +1,8 @@
 """Names of the policies, apart from their code: the workflow reads them without loading the numerics."""
 
 GEOMETRIC = ("random", "ring", "farthest", "diverse", "opacity", "fisher", "oracle", "all")  # read no prior
-IMAGINING = ("grad-lpips", "w2-lpips", "w2-lpips-diverse", "shuffled", "w2")  # w2 does without lam
+IMAGINING = ("grad-lpips", "w2-lpips", "w2-lpips-diverse", "shuffled", "w2", "single")
+AT_ZERO = {"w2": ("lam",), "single": ("p_drop", "lam")}  # what these of them do without
 POLICIES = (*GEOMETRIC, *IMAGINING, "given")  # given: a finished field, no round of views
 
 # Agents that are devices or people, and the module that speaks to each.

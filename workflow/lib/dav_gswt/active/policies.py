@@ -114,6 +114,11 @@ def w2(scores: Scores, wanted: Wanted) -> list[int]:
     return top(scores.term("w2_sq"), wanted.k)
 
 
+def single(scores: Scores, wanted: Wanted) -> list[int]:
+    """The k candidates whose one sample looks least like the render: a single forward pass, without dropout."""
+    return top(scores.term("single"), wanted.k)
+
+
 def w2_lpips(scores: Scores, wanted: Wanted) -> list[int]:
     """The k candidates of greatest u = W2 + lam LPIPS, each over its frozen scale: the paper's Algorithm 1."""
     return top(doubt(scores, wanted.lam), wanted.k)
@@ -163,6 +168,7 @@ POLICIES: dict[str, Callable[[Scores, Wanted], list[int]]] = {
     "fisher": fisher,
     "grad-lpips": grad_lpips,
     "w2": w2,
+    "single": single,
     "w2-lpips": w2_lpips,
     "w2-lpips-diverse": w2_lpips_diverse,
     "shuffled": shuffled,

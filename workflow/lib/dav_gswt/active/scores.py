@@ -16,7 +16,7 @@ from dav_gswt.active.uncertainty.weighing import Scales
 from dav_gswt.errors import InputError
 from dav_gswt.files import whole
 
-TERMS = ("opacity", "fisher", "w2_sq", "lpips", "gradient")
+TERMS = ("opacity", "fisher", "w2_sq", "lpips", "gradient", "single")
 FIELDS = ("pose", "elevation", "azimuth", "radius", *TERMS, "steps", *(f"{term}_scale" for term in TERMS))
 
 
@@ -40,8 +40,12 @@ class Scores:
     def term(self, name: str) -> Float64[Array, "n"]:
         """Raises: InputError: the term is absent."""
         if name not in self.terms:
-            raise InputError(f"{name}: the poses were scored without it; it needs a prior (docs/prior.md)")
+            raise InputError(f"{name}: the poses were scored without it; it needs {_needed(name)} (docs/prior.md)")
         return self.terms[name]
+
+
+def _needed(name: str) -> str:
+    return "a prior asked without dropout (p_drop 0), and LPIPS" if name == "single" else "a prior"
 
 
 def write(path: Path | str, scores: Scores) -> None:
