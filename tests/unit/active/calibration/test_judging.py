@@ -111,7 +111,7 @@ def test_controls_are_what_they_say(files):
     prior = Asking(Terrain.open(files["prior"]), 3, 2, 0.2, seed=4)
     one, two = controls.opened([files["regressor0"], files["regressor1"]])
     judged = judging.Judged(AGENT, patch.field(), patch.grid(), patch.FRAME, patch.photos(), 96)
-    condition, counts = judged.told(pool(2), 64)
+    condition, counts = scoring.told(judged.field, judged.grid, pool(2), judged.taken, judged.frame, 64)
     found = controls.maps(prior, [one, two], condition)
     codes = [r.predicted(condition) for r in (one, two)]
     np.testing.assert_allclose(found["ensemble"], ((codes[0] - codes[1]) ** 2).sum(1), rtol=1e-4, atol=1e-6)

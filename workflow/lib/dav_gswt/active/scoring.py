@@ -21,6 +21,7 @@ from dav_gswt.coarse.ground import Ground
 from dav_gswt.coarse.maps import from_above
 from dav_gswt.field import Field
 from dav_gswt.logs import progress
+from dav_gswt.prior.interface import Condition
 from dav_gswt.raster import Rasterizer
 from dav_gswt.views import View, over_ground
 
@@ -76,17 +77,24 @@ def score(
     terms, opacity = _geometric(field, grid, pool, [small(view.camera) for view in taken])
     steps, w2_sq = np.zeros(len(pool), int), None
     if prior is not None and pool:
-        size, squares = prior.model.size, [conditions.squared(camera) for _, camera in pool]
-        known = conditions.taken(taken, frame, size)
-        told = conditions.condition(field, pool, known, frame["flying_height"], size)
-        counts = np.stack([on_exemplar(grid, c.resized(size, size)) for c in squares])
-        found, steps = imagining.terms(prior, told, [pose.name for pose, _ in pool], counts)
+        condition, counts = told(field, grid, pool, taken, frame, prior.model.size)
+        found, steps = imagining.terms(prior, condition, [pose.name for pose, _ in pool], counts)
         terms |= {name: values.astype(np.float64) for name, values in found.named().items()}
         w2_sq = found.maps
     poses, names = [pose for pose, _ in pool], [pose.name for pose, _ in pool]
     frozen = frozen or _frozen(terms, w2_sq, names)
     scores, maps = Scores(poses, terms, frozen.scales, steps), PoseMaps(names, opacity, w2_sq)
     return Scored(scores, maps, frozen, _gaussians(field, pool, w2_sq, frozen))
+
+
+def told(
+    field: Field, grid: Ground, pool: Candidates, taken: list[View], frame: dict, size: int
+) -> tuple[Condition, Float32[Array, "n s s"]]:
+    """What a prior is told of candidates, and which of its pixels look at the modelled ground (1)."""
+    known = conditions.taken(taken, frame, size)
+    squares = [conditions.squared(camera).resized(size, size) for _, camera in pool]
+    counts = np.stack([on_exemplar(grid, camera) for camera in squares])
+    return conditions.condition(field, pool, known, frame["flying_height"], size), counts
 
 
 def _geometric(

@@ -7,18 +7,17 @@ import numpy as np
 from jaxtyping import Float32, Float64
 from numpy import ndarray as Array
 
-from dav_gswt.active import conditions, imagining
+from dav_gswt.active import imagining
 from dav_gswt.active.calibration import controls, measures, truth
 from dav_gswt.active.candidates import Candidates
 from dav_gswt.active.imagining import Asking
 from dav_gswt.active.maps import PoseMaps
 from dav_gswt.active.poses import Pose, of_camera, place
 from dav_gswt.active.scores import Scores
-from dav_gswt.active.scoring import on_exemplar
+from dav_gswt.active.scoring import told
 from dav_gswt.active.uncertainty import combined
 from dav_gswt.coarse.ground import Ground
 from dav_gswt.field import Field
-from dav_gswt.prior.interface import Condition
 from dav_gswt.views import View
 
 
@@ -32,13 +31,6 @@ class Judged:
     frame: dict
     taken: list[View]
     size: int
-
-    def told(self, pool: Candidates, size: int) -> tuple[Condition, Float32[Array, "n s s"]]:
-        """What a prior is told of candidates, and which of its pixels look at the modelled ground."""
-        known = conditions.taken(self.taken, self.frame, size)
-        squares = [conditions.squared(camera).resized(size, size) for _, camera in pool]
-        counts = np.stack([on_exemplar(self.grid, camera) for camera in squares])
-        return conditions.condition(self.field, pool, known, self.frame["flying_height"], size), counts
 
 
 def calibrated(
@@ -60,7 +52,8 @@ def calibrated(
     terms, shown = _scored(*scored, [row[pose.name] for pose, _ in some], lam)
     terms |= geometric([pose for pose, _ in some], [of_camera("", v.camera, judged.frame) for v in judged.taken])
     if prior is not None and some:
-        condition, counts = judged.told(some, prior.model.size)
+        given = judged.field, judged.grid, some, judged.taken, judged.frame
+        condition, counts = told(*given, prior.model.size)
         others = controls.maps(prior, regressors, condition)
         shown |= others
         terms |= {name: imagining.over(m, counts) for name, m in others.items()}
