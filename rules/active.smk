@@ -202,6 +202,7 @@ rule update_field:
 
 use rule evaluate_coarse as evaluate_round with:
     input:
+        unpack(lpips_if_fetched),
         field="<results>/<round>/field.ply",
         ground="<results>/<round>/ground.exr",
         fit="<results>/<round>/fit.json",
@@ -221,7 +222,7 @@ use rule evaluate_coarse as evaluate_round with:
     params:
         quality=entry("qualities", "quality"),
         t=integer("t"),
-        source=source_of("metrics", "active/evaluation", "raster"),
+        source=source_of("metrics", "active/evaluation", "perceptual", "raster"),
 
 
 rule show_candidates:

@@ -36,6 +36,7 @@ rule fit_coarse:
 rule evaluate_coarse:
     """Compare the coarse field with the test photos, which nothing else sees."""
     input:
+        unpack(lpips_if_fetched),
         field="<results>/<coarse>/field.ply",
         ground="<results>/<coarse>/ground.exr",
         fit="<results>/<coarse>/fit.json",
@@ -56,6 +57,6 @@ rule evaluate_coarse:
     params:
         quality=entry("qualities", "quality"),
         t=0,
-        source=source_of("metrics", "active/evaluation", "raster"),
+        source=source_of("metrics", "active/evaluation", "perceptual", "raster"),
     script:
         "../scripts/evaluate_field.py"

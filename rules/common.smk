@@ -51,8 +51,8 @@ def way(policy):
     """A constraint: the policy, followed by a spelling that it has of prior, p_drop and lam."""
     if policy in GEOMETRIC:
         return f"{policy}(?=_none_pdrop0_lam0_)"
-    p_drop, lam = ("0" if key in AT_ZERO.get(policy, ()) else "[^/_]+" for key in ("p_drop", "lam"))
-    return f"{policy}(?!_none_)(?=_[^/]+_pdrop{p_drop}_lam{lam}_)"
+    p_drop, lam = ("0" if key in AT_ZERO.get(policy, ()) else "[^_]+" for key in ("p_drop", "lam"))
+    return f"{policy}(?!_none_)(?=_[a-z0-9_-]+_pdrop{p_drop}_lam{lam}_)"
 
 
 CHOOSING = "|".join(way(policy) for policy in (*GEOMETRIC, *IMAGINING))  # of poses, by their scores
@@ -195,6 +195,12 @@ def prior_of(wildcards):
         if key in entry and not Path(entry[key]).exists():
             raise WorkflowError(f"config: priors.{wildcards.prior}.{key}: there is no {entry[key]}; see docs/prior.md")
     return files
+
+
+def lpips_if_fetched(wildcards):
+    """LPIPS's weights for what measures with them where they are, and says where they are not."""
+    path = Path(rules.fetch_lpips.output.weights)
+    return {"lpips": str(path)} if path.is_file() else {}
 
 
 def regressors_of(wildcards):

@@ -5,6 +5,7 @@ from dav_gswt.active import evaluation
 from dav_gswt.coarse import build, ground
 from dav_gswt.files import read_json, write_json
 from dav_gswt.logs import logging_to
+from dav_gswt.perceptual import weights
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
@@ -13,7 +14,9 @@ with logging_to(snakemake.log[0]):
     tests = views.taken(given.images, given.model, split["test"], [], params.quality["size"])
     shots = sum(len(read_json(f"{folder}/capture.json")["shots"]) for folder in captures)
     fitted, grid = field.read(given.field), ground.read(given.ground)
-    result = evaluation.evaluate(fitted, build.modelled(tests, grid))
+    perceptual = weights.read(given.lpips) if given.get("lpips") else None
+    groups = read_json(given.frame).get("test_groups")
+    result = evaluation.evaluate(fitted, build.modelled(tests, grid), groups, perceptual)
     result |= {"round": params.t, "photos": len(split["start"]) + shots, "gaussians": len(fitted)}
     result |= {"fit": read_json(given.fit)}
     inputs = {"field": given.field, "ground": given.ground, "views": given.views}
