@@ -144,6 +144,20 @@ def study_of(scene):
     )
 
 
+def calibrations():
+    """The cells that are compared: the path of each one's calibration.json, and what tells it from the others."""
+    asked, found = config["calibration"], {}
+    for scene in asked["scenes"]:
+        values = values_of(scene, asked["policy"])
+        for seed in config["seeds"]:
+            for t in range(asked["rounds"] + 1):
+                made = rules.calibrate_round if t else rules.calibrate_coarse
+                (path,) = expand(made.output.found, **(values | {"seed": seed, "t": t}))
+                cell = {key: values[key] for key in ("scene", "quality", "policy", "prior", "p_drop")}
+                found[path] = cell | {"seed": seed, "round": t}
+    return found
+
+
 def folder_of(scene):
     """A scene's photos, as inputs: a photo that comes or goes is noticed."""
     folder = Path(config["scenes"][scene]["folder"])

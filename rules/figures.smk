@@ -51,20 +51,6 @@ rule plot_fits:
         "../scripts/plot_fits.py"
 
 
-def calibrations():
-    """The cells that are compared: the path of each one's calibration.json, and what tells it from the others."""
-    asked, found = config["calibration"], {}
-    for scene in asked["scenes"]:
-        values = values_of(scene, asked["policy"])
-        for seed in config["seeds"]:
-            for t in range(asked["rounds"] + 1):
-                made = rules.calibrate_round if t else rules.calibrate_coarse
-                (path,) = expand(made.output.found, **(values | {"seed": seed, "t": t}))
-                cell = {key: values[key] for key in ("scene", "quality", "policy", "prior", "p_drop")}
-                found[path] = cell | {"seed": seed, "round": t}
-    return found
-
-
 rule plot_calibration:
     """Do scores say where a field is wrong? All scenes and rounds in one table and one figure."""
     input:
