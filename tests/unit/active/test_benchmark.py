@@ -34,9 +34,9 @@ def test_what_is_no_curve_is_refused(photos, psnr):
 
 def test_photos_to_reach_lie_between_rounds():
     photos, psnr = curve(8, 12, 16), curve(20, 24, 28)
-    assert benchmark.to_reach(photos, psnr, best=30, way=0.6) == pytest.approx(14)  # 26 dB
-    assert benchmark.to_reach(photos, psnr, best=40, way=0.95) is None
-    assert benchmark.to_reach(photos, psnr, best=20) == 8
+    assert benchmark.to_reach(photos, psnr, best=30.0, way=0.6) == pytest.approx(14)  # 26 dB
+    assert benchmark.to_reach(photos, psnr, best=40.0, way=0.95) is None
+    assert benchmark.to_reach(photos, psnr, best=20.0) == 8
 
 
 def test_an_interval_holds_the_truth_as_often_as_it_says(monkeypatch):
