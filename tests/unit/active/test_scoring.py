@@ -24,7 +24,7 @@ class Doubting:
 
     name, size = "doubting", 32
 
-    def samples(self, condition, m, p_drop, steps, seed):
+    def samples(self, condition, m, p_drop, steps, seed, common=True):
         blue = condition.colour[..., 2]
         signs = np.where(np.arange(m) % 2, -1.0, 1.0)[None, :, None, None, None]
         return (p_drop * signs * blue[:, None, None]).repeat(4, 2).astype(np.float32)
@@ -76,6 +76,15 @@ def test_a_latents_own_width_counts_where_it_is_asked_for():
     assert np.array_equal(point, posterior)
     wider = scored(Asking(Uneven(), 2, 4, 0.2, posterior=True)).scores.terms["w2_sq"]
     np.testing.assert_allclose(wider - point, 4.0, rtol=1e-5)  # deviations 0 and 1, in four channels
+
+
+def test_samples_may_start_from_noises_of_their_own():
+    class Noisy(Doubting):
+        def samples(self, condition, m, p_drop, steps, seed, common=True):
+            return super().samples(condition, m, 0.0 if common else 0.3, steps, seed)
+
+    common, own = (scored(Asking(Noisy(), 2, 4, 0.0, noises=n)).scores.terms["w2_sq"] for n in (False, True))
+    assert not common.any() and (own > 0).all()
 
 
 def test_later_rounds_keep_the_scales_of_the_first():

@@ -88,7 +88,7 @@ class Counting:
     def __init__(self):
         self.evaluations = 0
 
-    def samples(self, condition, m, p_drop, steps, seed):
+    def samples(self, condition, m, p_drop, steps, seed, common=True):
         self.evaluations += len(condition) * m * steps
         signs = np.where(np.arange(m) % 2, -1.0, 1.0)[None, :, None, None, None]
         size = condition.relative[:, 0, None, None, None, None] * (1 + 0.01 * steps)

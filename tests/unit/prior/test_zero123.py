@@ -206,6 +206,12 @@ def test_latents_are_scaled(prior):
     np.testing.assert_allclose(prior.decoded(latents).rgba, expected, atol=1e-6)
 
 
+def test_samples_may_start_from_noises_of_their_own(prior):
+    own = prior.samples(condition(1), 2, 0.0, 2, 0, common=False)
+    assert np.array_equal(own[:, 0], prior.samples(condition(1), 1, 0.0, 2, 0)[:, 0])
+    assert np.abs(own[:, 0] - own[:, 1]).mean() > 0.01
+
+
 def test_a_latent_stands_for_as_much_as_the_coder_says(prior):
     latents = np.random.default_rng(0).normal(size=(1, 2, *LATENT)).astype(np.float32)
     with torch.inference_mode():

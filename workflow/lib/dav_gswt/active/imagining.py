@@ -26,7 +26,7 @@ CHEAP = 2  # steps of denoising in the first of two stages
 class Asking:
     """A prior and how it is asked. samples of each pose; steps of denoising; p_drop: of its attention; weights: of
     LPIPS, None where they are not had; staged: cheaply first, in full where it matters; posterior: a sample is a
-    distribution, as wide as the coder says, instead of a point."""
+    distribution, as wide as the coder says, instead of a point; noises: each sample starts from its own."""
 
     model: Prior
     samples: int
@@ -36,6 +36,7 @@ class Asking:
     weights: Weights | None = None
     staged: bool = True
     posterior: bool = False
+    noises: bool = False
 
 
 def asked(entry: dict | None, p_drop: float, seed: int, lpips_file: Path | str | None) -> Asking | None:
@@ -48,7 +49,7 @@ def asked(entry: dict | None, p_drop: float, seed: int, lpips_file: Path | str |
     if lpips_file is None:
         _log.warning("LPIPS is switched off: scores have no such term")
     weights = None if lpips_file is None else read(lpips_file)
-    how = {name: entry[name] for name in ("samples", "steps", "staged", "posterior") if name in entry}
+    how = {name: entry[name] for name in ("samples", "steps", "staged", "posterior", "noises") if name in entry}
     return Asking(opened(entry), p_drop=p_drop, seed=seed, weights=weights, **how)
 
 
@@ -91,7 +92,8 @@ def terms(
 
 
 def _some(prior: Asking, condition: Condition, names: list[str], steps: int, counts: Float32[Array, "k s s"]) -> Terms:
-    latents = prior.model.samples(condition, prior.samples, prior.p_drop, steps, prior.seed)
+    asked = condition, prior.samples, prior.p_drop, steps, prior.seed
+    latents = prior.model.samples(*asked, common=not prior.noises)
     wide = prior.model.variances(latents) if prior.posterior else None
     _, maps = w2_sq(latents, wide, names)
     pictures = prior.model.decoded(latents).rgba[..., :3]
@@ -100,7 +102,7 @@ def _some(prior: Asking, condition: Condition, names: list[str], steps: int, cou
         from dav_gswt.perceptual import lpips  # not above: torch takes seconds to load, and most scoring does without
 
         between = lpips.pairwise_mean((2 * pictures - 1) * counts[:, None, :, :, None], prior.weights)
-        if prior.p_drop == 0:
+        if prior.p_drop == 0 and not prior.noises:
             one, render = ((2 * p - 1) * counts[..., None] for p in (pictures[:, 0], condition.colour))
             single = lpips.distance(one, render, prior.weights)
     return Terms(over(maps, counts), between, image_gradient(pictures, names=names), maps, single)

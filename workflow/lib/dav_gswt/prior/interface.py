@@ -56,9 +56,12 @@ class Prior(Protocol):
     size: int
 
     def samples(
-        self, condition: Condition, m: int, p_drop: float, steps: int, seed: int
+        self, condition: Condition, m: int, p_drop: float, steps: int, seed: int, common: bool = True
     ) -> Float32[Array, "b m c hz wz"]:
         """m latents of each view: the same initial noise and eta = 0 for all, other attention dropout for each.
+
+        common: False gives each of the m its own initial noise, the same for every view: what the prior holds for
+        possible, rather than how firm it is.
 
         One dropout mask holds for a whole trajectory. p_drop = 0 gives m equal latents, to the bit. A view's latents
         do not depend on its batch (to 1e-5). Raises: ValueError: m < 1, steps < 1, or p_drop outside [0, 1).

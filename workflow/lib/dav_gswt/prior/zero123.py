@@ -61,7 +61,7 @@ class Zero123:
         return cls(zero123_folder.opened(folder), guidance, device)
 
     def samples(
-        self, condition: Condition, m: int, p_drop: float, steps: int, seed: int
+        self, condition: Condition, m: int, p_drop: float, steps: int, seed: int, common: bool = True
     ) -> Float32[Array, "b m c hz wz"]:
         """See `Prior`. With guidance, a sample has one mask for the passes with and without the photo."""
         condition.check()
@@ -72,8 +72,8 @@ class Zero123:
             told = (part[some].repeat_interleave(each, 0) for part in (photo, tokens))
             return self._predicted(latents.to(self.device), time, *told).cpu()
 
-        schedule, views = self.parts.schedule, len(condition)
-        return sampler.sampled(denoise, self.parts.layers, schedule, views, LATENT, m, p_drop, steps, seed, BATCH)
+        how = len(condition), LATENT, m, p_drop, steps, seed, BATCH, common
+        return sampler.sampled(denoise, self.parts.layers, self.parts.schedule, *how)
 
     def decoded(self, latents: Float32[Array, "*n c hz wz"]) -> Imagined:
         """See `Prior`. Depth it knows none; opacity is what the white background leaves."""
