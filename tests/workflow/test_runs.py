@@ -1,5 +1,6 @@
 """The smallest experiment, run through every stage: what is there, what it looks like, what a change makes anew."""
 
+import shutil
 import subprocess
 import sys
 
@@ -10,6 +11,7 @@ from jsonschema import Draft202012Validator
 from made_runs import TINY, USUAL
 
 from dav_gswt import field, images
+from dav_gswt.active import maps, scores
 from dav_gswt.coarse import ground
 from dav_gswt.files import digest, read_json
 from dav_gswt.photos import model
@@ -83,6 +85,26 @@ def test_doubt_is_a_share(tiny):
                 seen = values[np.isfinite(values)]
                 assert len(seen) and seen.min() >= 0 and seen.max() <= 1
     assert 0 <= field.read(tiny.round / "field.ply").uncertainty.min() <= 1
+
+
+def test_a_round_may_go_by_what_the_prior_doubts(snakemake, tiny, tmp_path):
+    """From the tiny run's coarse field on: scored by the prior, chosen, captured, refitted, and on to the finest level."""
+    folder = shutil.copytree(tiny.folder, tmp_path / "run", symlinks=True)
+    way = folder / "results/desert/seed0/draft/active_w2-lpips_terrain_pdrop0.15_lam0.1_k2/iter1"
+    target = str((way / "levels/level0.ply").relative_to(folder))
+    snakemake(folder, "--cores", "2", target, configs=(USUAL, TINY))
+    first = scores.read(folder / "results/desert/seed0/draft/coarse/scores_terrain_pdrop0.15/scores.csv")
+    assert (first.term("w2_sq") > 0).all() and "lpips" not in first.terms and (first.steps == 2).all()
+    chosen = [pose["name"] for pose in read_json(way / "poses.json")["poses"]]
+    best = np.argsort(-first.term("w2_sq"), kind="stable")[:2]
+    assert chosen == [first.names[i] for i in best]
+    shown = images.read_exr_parts(way / "poses.exr")
+    assert set(shown) == set(chosen) and all(set(channels) == {"opacity", "w2_sq"} for channels, _ in shown.values())
+    later = scores.read(way / "scores.csv")
+    assert later.scales == first.scales and not set(later.names) & set(chosen)
+    doubt, level = maps.read(way / "maps.npz")[1], field.read(way / "levels/level0.ply")
+    assert len(doubt) == len(field.read(way / "field.ply")) and set(level.uncertainty) <= set(doubt)
+    assert not np.array_equal(level.uncertainty, field.read(tiny.round / "levels/level0.ply").uncertainty)
 
 
 def test_a_bundle_keeps_its_contract(tiny, root):
