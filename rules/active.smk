@@ -1,14 +1,16 @@
 """Active views: score the candidate poses, choose k, capture them, refit, and again.
 
 In: the coarse field. Out, per round t: poses.json and poses.exr, capture/, field.ply, ground.exr, and of that new field
-scores.csv and scores.json, maps.npz, uncertainty.exr and metrics.json. Round t starts from round t - 1, so T rounds are a prefix of T + 1, and T is only
-which round is asked for. Scoring keeps its terms apart: the policy and k enter when poses are chosen.
+scores.csv and scores.json, maps.npz, uncertainty.exr and metrics.json. Round t starts from round t - 1, so T rounds are
+a prefix of T + 1, and T is only which round is asked for. Scoring keeps its terms apart: the policy, lam and k enter
+when poses are chosen.
 """
 
 SCORING = [
     *(f"active/{name}" for name in ("scoring", "conditions", "fisher", "imagining", "maps", "outside", "reach")),
     *(f"active/{name}" for name in ("candidates", "poses", "scores", "frozen", "uncertainty", "agents/rig")),
-    *(f"prior/{name}" for name in ("examples", "interface", "terrain", "sampler", "dropout", "networks", "zero123")),
+    *(f"prior/{name}" for name in ("examples", "interface", "terrain", "sampler", "dropout", "networks", "weights")),
+    *("prior/zero123", "prior/zero123_folder"),
     "raster",
     "coarse/doubt",
     "perceptual",
@@ -106,9 +108,16 @@ rule select_poses:
         source=source_of(
             *(
                 f"active/{name}"
-                for name in ("selection", "policies", "facility", "fisher", "needs", "poses", "scores")
+                for name in ("selection", "policies", "greedy", "facility", "fisher", "needs", "poses", "scores")
             ),
-            *("active/maps", "active/uncertainty", "active/candidates", "active/calibration/measures"),
+            *(
+                "active/maps",
+                "active/uncertainty",
+                "active/candidates",
+                "active/calibration",
+                "raster",
+                "coarse/doubt",
+            ),
         ),
     script:
         "../scripts/select_poses.py"

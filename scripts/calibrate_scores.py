@@ -9,8 +9,7 @@ from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    captures = given.get("captures", [])
-    captures = [captures] if isinstance(captures, str) else list(captures)
+    captures = list(given.get("captures", []))
     frame, split = read_json(given.frame), read_json(given.views)
     taken = views.taken(given.images, given.model, split["start"], captures, scoring.PHOTO)
     fitted = field.read(given.field), ground.read(given.ground)

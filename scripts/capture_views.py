@@ -13,6 +13,6 @@ with logging_to(snakemake.log[0]):
     store = Store(Path("captures") / name)
     photos = Path(given.images).parent
     site = Site(name, snakemake.params.scene, read_json(given.frame), photos, store, given.get("field"))
-    before = [given.captures] if isinstance(given.captures, str) else list(given.captures)
+    before = list(given.captures)
     chosen = read_json(given.poses)["poses"]
     agents.capture(site, read_json(given.views), before, chosen, Path(snakemake.output.capture))

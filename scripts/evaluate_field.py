@@ -9,8 +9,7 @@ from dav_gswt.perceptual import weights
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    split, captures = read_json(given.views), given.get("captures", [])
-    captures = [captures] if isinstance(captures, str) else list(captures)
+    split, captures = read_json(given.views), list(given.get("captures", []))
     tests = views.taken(given.images, given.model, split["test"], [], params.quality["size"])
     shots = sum(len(read_json(f"{folder}/capture.json")["shots"]) for folder in captures)
     fitted, grid = field.read(given.field), ground.read(given.ground)

@@ -6,8 +6,7 @@ from dav_gswt.files import read_json, write_json
 from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):
-    out, given = snakemake.output, snakemake.input.cells
-    paths = [given] if isinstance(given, str) else given
+    out, paths = snakemake.output, snakemake.input.cells
     found = [read_json(path) for path in paths]
     table = report.rows(snakemake.params.cells, found)
     figures.write_rows(out.table, table)

@@ -9,8 +9,7 @@ from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
-    captures = given.get("captures", [])
-    captures = [captures] if isinstance(captures, str) else list(captures)
+    captures = list(given.get("captures", []))
     scene, frame, split = params.scene, read_json(given.frame), read_json(given.views)
     fitted, grid = field.read(given.field), ground.read(given.ground)
     pool = candidates.left(scene, frame, given.model, split, captures)

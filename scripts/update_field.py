@@ -11,7 +11,7 @@ with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     quality = build.Quality(**params.quality)
     names = read_json(given.views)["start"]
-    captures = [given.captures] if isinstance(given.captures, str) else list(given.captures)
+    captures = list(given.captures)
     before = views.taken(given.images, given.model, names, captures[:-1], quality.size)
     new = views.captured(captures[-1], quality.size)
     rng = np.random.default_rng([params.seed, params.t])

@@ -137,4 +137,4 @@ class Other(SimpleNamespace):
 def test_a_priors_weights_are_no_regressors(files):
     with pytest.raises(InputError, match=r"prior\.safetensors: not the weights of a regressor"):
         controls.opened([files["prior"]])
-    assert isinstance(controls.opened(str(files["regressor0"]))[0], Regressor)
+    assert isinstance(controls.opened([files["regressor0"]])[0], Regressor)

@@ -5,11 +5,11 @@ the greedy choice reaches 1 - 1/e of the best. u = 1 is plain coverage. (The pap
 alone, whose exact optimum is the top k: neighbours of the most doubtful pose, all alike.)
 """
 
-import heapq
-
 import numpy as np
 from jaxtyping import Float, Float64
 from numpy import ndarray as Array
+
+from dav_gswt.active.greedy import lazily
 
 REACH = 0.5  # median distances of candidates from the middle, over which a photo tells about its neighbours
 
@@ -36,8 +36,7 @@ def gains(near: Float64[Array, "n n"], covered: Float64[Array, "n"], u: Float64[
 
 
 def located(places: Float[Array, "n 3"], taken: Float[Array, "m 3"], u: Float[Array, "n"], k: int) -> list[int]:
-    """The k candidates that greedy chooses, lazily: a gain only falls as others are chosen, so one that is still the
-    largest after it was looked at again is the largest. Ties by index.
+    """The k candidates that greedy chooses, or all; ties by index.
 
     Raises: ValueError: u below 0 or not finite.
     """
@@ -47,15 +46,11 @@ def located(places: Float[Array, "n 3"], taken: Float[Array, "m 3"], u: Float[Ar
     near = similarity(places, places, reach)
     covered = similarity(places, taken, reach).max(1, initial=0.0)
     weight = u.astype(np.float64)
-    queue = [(-gain, i) for i, gain in enumerate(gains(near, covered, weight))]
-    heapq.heapify(queue)
-    chosen: list[int] = []
-    while len(chosen) < min(k, len(places)):
-        _, i = heapq.heappop(queue)
-        now = float(weight @ np.maximum(near[:, i] - covered, 0))
-        if queue and (-now, i) > queue[0]:
-            heapq.heappush(queue, (-now, i))
-            continue
-        chosen.append(i)
-        covered = np.maximum(covered, near[:, i])
-    return chosen
+
+    def look(i: int) -> float:
+        return float(weight @ np.maximum(near[:, i] - covered, 0))
+
+    def take(i: int) -> None:
+        np.maximum(covered, near[:, i], out=covered)
+
+    return lazily(gains(near, covered, weight), look, take, k)

@@ -1,6 +1,5 @@
 """Policies: which k of the scored candidates to capture next. Each is a function of the scores and what is wanted."""
 
-import heapq
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -10,7 +9,8 @@ from jaxtyping import Float, Float64
 from numpy import ndarray as Array
 
 from dav_gswt.active import facility
-from dav_gswt.active.poses import Pose, place
+from dav_gswt.active.greedy import lazily
+from dav_gswt.active.poses import Pose, place, spread
 from dav_gswt.active.scores import Scores
 from dav_gswt.active.uncertainty.weighing import combined, combined_image
 
@@ -62,16 +62,7 @@ def ring(scores: Scores, wanted: Wanted) -> list[int]:
 
 def farthest(scores: Scores, wanted: Wanted) -> list[int]:
     """Greedily the candidate farthest from all views taken or chosen so far (farthest points); ties by index."""
-    places, chosen = _places(scores.poses), []
-    nearest = np.full(len(places), np.inf)
-    for view in wanted.captured:
-        nearest = np.minimum(nearest, np.linalg.norm(places - view, axis=1))
-    for _ in range(wanted.k):
-        best = int(np.argmax(nearest))
-        chosen.append(best)
-        nearest = np.minimum(nearest, np.linalg.norm(places - places[best], axis=1))
-        nearest[best] = -np.inf
-    return chosen
+    return spread(scores.poses, wanted.k, wanted.captured)
 
 
 def diverse(scores: Scores, wanted: Wanted) -> list[int]:
@@ -85,22 +76,9 @@ def opacity(scores: Scores, wanted: Wanted) -> list[int]:
 
 
 def fisher(scores: Scores, wanted: Wanted) -> list[int]:
-    """Greedily the candidate of the largest gain of information, which every choice lowers for the others.
-
-    Lazy: a gain that is still the largest after it was looked at again is the largest. Ties by index.
-    """
-    queue = [(-gain, i) for i, gain in enumerate(scores.term("fisher"))]
-    heapq.heapify(queue)
-    chosen: list[int] = []
-    while len(chosen) < wanted.k:
-        _, i = heapq.heappop(queue)
-        now = wanted.information.gain(i)
-        if queue and (-now, i) > queue[0]:
-            heapq.heappush(queue, (-now, i))
-            continue
-        chosen.append(i)
-        wanted.information.take(i)
-    return chosen
+    """Greedily the candidate of the largest gain of information, which every choice lowers for the others."""
+    at = wanted.information
+    return lazily(scores.term("fisher"), at.gain, at.take, wanted.k)
 
 
 def grad_lpips(scores: Scores, wanted: Wanted) -> list[int]:

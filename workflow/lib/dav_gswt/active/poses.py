@@ -39,14 +39,19 @@ def place(pose: Pose) -> Float[Array, "3"]:
     return pose.radius * np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
 
 
-def spread(candidates: list[Pose], count: int) -> list[int]:
-    """`count` of the candidates, or all, evenly spread: each the farthest from those before; ties by index."""
+def spread(candidates: list[Pose], count: int, taken: Float[Array, "m 3"] | None = None) -> list[int]:
+    """`count` of the candidates, or all, each the farthest from those before and from the places taken; ties by index.
+
+    taken: relative to the exemplar's centre.
+    """
     places = np.array([place(p) for p in candidates]).reshape(-1, 3)
-    apart, chosen = np.full(len(places), np.inf), []
+    nearest, chosen = np.full(len(places), np.inf), []
+    for at in [] if taken is None else taken:
+        nearest = np.minimum(nearest, np.linalg.norm(places - at, axis=1))
     for _ in range(min(count, len(places))):
-        chosen.append(int(np.argmax(apart)))
-        apart = np.minimum(apart, np.linalg.norm(places - places[chosen[-1]], axis=1))
-        apart[chosen[-1]] = -np.inf
+        chosen.append(int(np.argmax(nearest)))
+        nearest = np.minimum(nearest, np.linalg.norm(places - places[chosen[-1]], axis=1))
+        nearest[chosen[-1]] = -np.inf
     return chosen
 
 

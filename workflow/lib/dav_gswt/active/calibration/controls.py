@@ -21,7 +21,7 @@ from dav_gswt.prior.terrain import Terrain, planes_of_render
 
 def opened(files: Sequence[Path | str]) -> list[Regressor]:
     """Raises: InputError: weights that are not a regressor's."""
-    return [Regressor.open(file) for file in ([files] if isinstance(files, str) else files)]
+    return [Regressor.open(file) for file in files]
 
 
 def maps(prior: Asking, regressors: Sequence[Regressor], condition: Condition) -> dict[str, Float32[Array, "n h w"]]:
