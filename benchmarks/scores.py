@@ -9,12 +9,12 @@ import time
 import numpy as np
 from record import record
 
-from dav_gswt.active import conditions, imagining, poses, uncertainty
+from dav_gswt.active import imagining, poses, uncertainty
 from dav_gswt.active.imagining import Asking
 from dav_gswt.active.uncertainty.staging import TOP
 from dav_gswt.perceptual import lpips, weights
 from dav_gswt.photos import rigs
-from dav_gswt.prior import examples
+from dav_gswt.prior import conditions, examples
 from dav_gswt.prior.worlds import FLYING_HEIGHT, world
 
 REPEATS = 7

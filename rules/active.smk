@@ -7,9 +7,9 @@ when poses are chosen.
 """
 
 SCORING = [
-    *(f"active/{name}" for name in ("scoring", "conditions", "fisher", "imagining", "maps", "outside", "reach")),
+    *(f"active/{name}" for name in ("scoring", "fisher", "imagining", "maps", "outside", "reach")),
     *(f"active/{name}" for name in ("candidates", "poses", "scores", "frozen", "uncertainty", "agents/rig")),
-    *(f"prior/{name}" for name in ("examples", "interface", "terrain", "sampler", "dropout", "networks", "weights")),
+    *(f"prior/{name}" for name in ("conditions", "interface", "terrain", "sampler", "dropout", "networks", "weights")),
     *("prior/zero123", "prior/zero123_folder"),
     "raster",
     "coarse/doubt",

@@ -57,6 +57,7 @@ rule make_examples:
             "prior/worlds_light",
             "prior/worlds_things",
             "prior/examples",
+            "prior/conditions",
             "active/poses",
             "photos/land",
             "photos/noise",

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from dav_gswt import cameras, images
-from dav_gswt.active import conditions, fisher, frozen, maps, outside, poses, scores, scoring
+from dav_gswt.active import fisher, frozen, maps, outside, poses, scores, scoring
 from dav_gswt.active.frozen import Frozen
 from dav_gswt.active.imagining import Asking
 from dav_gswt.active.uncertainty import Quantiles, Scales
 from dav_gswt.active.uncertainty.carrying import carried
 from dav_gswt.errors import InputError
+from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import Imagined
 from dav_gswt.raster import Rasterizer
 

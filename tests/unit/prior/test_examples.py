@@ -10,7 +10,7 @@ from dav_gswt.coarse.build import Quality
 from dav_gswt.errors import InputError
 from dav_gswt.field import Field, sh_of
 from dav_gswt.photos import rigs
-from dav_gswt.prior import examples
+from dav_gswt.prior import conditions, examples
 from dav_gswt.prior.interface import Condition
 
 SEED, COUNT = 4, 3
@@ -68,7 +68,7 @@ def test_depth_and_colour_of_a_disc_straight_below():
         np.zeros(1, np.float32),
         np.ones(1, bool),
     )
-    seen = examples.shown(disc, rigs.orbit(90, 0, 3.5, (0, 0, 0), 8, 8, 55), 7.0)
+    seen = conditions.shown(disc, rigs.orbit(90, 0, 3.5, (0, 0, 0), 8, 8, 55), 7.0)
     np.testing.assert_allclose(seen.inverse_depth, 2, rtol=1e-5)
     np.testing.assert_allclose(seen.alpha, 0.99, atol=1e-3)  # as opaque as one Gaussian gets
     np.testing.assert_allclose(seen.colour, np.broadcast_to(0.99 * np.array([0.2, 0.4, 0.6]), (8, 8, 3)), atol=2e-3)
@@ -76,20 +76,20 @@ def test_depth_and_colour_of_a_disc_straight_below():
 
 def test_where_nothing_is_inverse_depth_is_0(made):
     away = rigs.orbit(-90, 0, 5, (0, 0, 20), 8, 8, 55)
-    seen = examples.shown(examples.world(0).field, away, 7.0)
+    seen = conditions.shown(examples.world(0).field, away, 7.0)
     assert not seen.alpha.any() and not seen.inverse_depth.any()
 
 
 def test_the_relative_pose_is_from_the_photo_to_the_pose():
     photo, pose = Pose("photo", 60.0, 350.0, 7.0), Pose("pose", 30.0, 20.0, 3.5)
-    found = examples.relative(photo, pose, 7.0)
+    found = conditions.relative(photo, pose, 7.0)
     np.testing.assert_allclose(found, [-np.pi / 6, 0.5, np.sqrt(3) / 2, -0.5], rtol=1e-6)
 
 
 def test_the_nearest_photo_is_the_one_whose_camera_is_nearest():
     places = [Pose("above", 90.0, 0.0, 7.0), Pose("west", 20.0, 180.0, 7.0), Pose("east", 20.0, 0.0, 7.0)]
-    assert examples.nearest(Pose("", 30.0, 350.0, 6.0), places) == 2
-    assert examples.nearest(Pose("", 80.0, 180.0, 6.0), places) == 0
+    assert conditions.nearest(Pose("", 30.0, 350.0, 6.0), places) == 2
+    assert conditions.nearest(Pose("", 80.0, 180.0, 6.0), places) == 0
 
 
 def test_a_camera_inside_a_thing_is_known(made):

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float32, Float64
 from numpy import ndarray as Array
 
-from dav_gswt.active import conditions, fisher, imagining, outside
+from dav_gswt.active import fisher, imagining, outside
 from dav_gswt.active.candidates import Candidates
 from dav_gswt.active.frozen import Frozen
 from dav_gswt.active.imagining import Asking
@@ -21,6 +21,7 @@ from dav_gswt.coarse.ground import Ground
 from dav_gswt.coarse.maps import from_above
 from dav_gswt.field import Field
 from dav_gswt.logs import progress
+from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import Condition
 from dav_gswt.raster import Rasterizer
 from dav_gswt.views import View, over_ground

@@ -21,15 +21,14 @@ from dav_gswt.field import Field
 from dav_gswt.files import whole
 from dav_gswt.fitting.sampling import sampled
 from dav_gswt.photos import rigs
+from dav_gswt.prior.conditions import Shown, nearest, relative, shown
 from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.worlds import FLYING_HEIGHT, World, world
 from dav_gswt.raster import Rasterizer
 from dav_gswt.views import View
 
 SIZE = 64  # pixels a side of an example
-FINE = 2  # pictures are drawn so many times as large and averaged: edges are soft, as in a photo made smaller
 FIELD_OF_VIEW = 55.0  # degrees, as synthetic scenes have it
-CLEAR = 0.05  # opacity below which a pixel has no depth
 LEAST_SHOWN = 0.2  # share of the true picture that must not be sky
 NEAREST = 0.35  # metres from a camera to the middle of any Gaussian
 TRIES = 6  # poses drawn for each example that is asked for, at most
@@ -62,15 +61,6 @@ UNREADABLE = (  # what reading a damaged file may end in
 )
 MOST_EXAMPLES = 10_000  # in a file
 BYTES = "colour", "alpha", "photo", "rgba"  # all others are of half precision
-
-
-@dataclass(frozen=True)
-class Shown:
-    """A field seen from a pose; colours over black, inverse depth as in Condition."""
-
-    colour: Float32[Array, "h w 3"]
-    alpha: Float32[Array, "h w"]
-    inverse_depth: Float32[Array, "h w"]
 
 
 @dataclass(frozen=True)
@@ -107,34 +97,6 @@ def examples(seed: int, count: int) -> Examples:
             known = shown(field, camera, FLYING_HEIGHT)
             found.append(_one(known, small[at], relative(places[at], pose, FLYING_HEIGHT), truth))
     return joined([none(), *found])
-
-
-def shown(field: Field, camera: Camera, flying_height: float) -> Shown:
-    """What a field shows to a camera: the field's part of a Condition. All that asks a prior draws fields with this."""
-    large = camera.resized(FINE * camera.width, FINE * camera.height)
-    seen = Rasterizer().forward(**arrays(field), camera=large)
-    colour, alpha, depth = (pooled(a) for a in (seen.colour, seen.alpha, seen.depth))
-    there = alpha > CLEAR
-    inverse = np.where(there, flying_height * alpha / np.where(there, depth, 1), 0)
-    return Shown(np.clip(colour, 0, 1), np.clip(alpha, 0, 1), inverse.astype(np.float32))
-
-
-def pooled(image: Float32[Array, "h w *c"]) -> Float32[Array, "h2 w2 *c"]:
-    """Mean over blocks of FINE x FINE pixels."""
-    h, w, *rest = image.shape
-    return image.reshape(h // FINE, FINE, w // FINE, FINE, *rest).mean((1, 3), dtype=np.float32)
-
-
-def nearest(pose: Pose, places: list[Pose]) -> int:
-    """Which of the places is nearest to the pose."""
-    return int(np.argmin([np.linalg.norm(poses.place(p) - poses.place(pose)) for p in places]))
-
-
-def relative(photo: Pose, pose: Pose, flying_height: float) -> Float32[Array, "4"]:
-    """From a photo to a pose, as a Condition has it."""
-    turn = np.radians(pose.azimuth - photo.azimuth)
-    rise = np.radians(pose.elevation - photo.elevation)
-    return np.float32([rise, np.sin(turn), np.cos(turn), (pose.radius - photo.radius) / flying_height])
 
 
 def stands_free(field: Field, camera: Camera) -> bool:
