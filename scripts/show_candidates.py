@@ -1,14 +1,12 @@
 """Rule show_candidates: what do some candidates truly show?"""
 
-from pathlib import Path
-
 from dav_gswt.active import candidates
 from dav_gswt.active.calibration import truth
-from dav_gswt.files import read_json
+from dav_gswt.files import read_json, whole_folder
 from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):
-    scene, out = snakemake.params.scene, Path(snakemake.output.truth)
+    scene = snakemake.params.scene
     pool = candidates.hemisphere(scene, read_json(snakemake.input.frame))
-    out.mkdir(parents=True)
-    truth.write(out, truth.shown(scene, truth.spread(pool, snakemake.params.poses), ""))
+    with whole_folder(snakemake.output.truth) as folder:
+        truth.write(folder, truth.shown(scene, truth.spread(pool, snakemake.params.poses), ""))

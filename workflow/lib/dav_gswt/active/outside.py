@@ -7,12 +7,12 @@ from scipy.spatial.transform import Rotation
 from scipy.special import expit
 
 from dav_gswt.active.candidates import Candidates
+from dav_gswt.active.uncertainty.finite import named
 from dav_gswt.coarse.ground import Ground
 from dav_gswt.errors import InputError
 from dav_gswt.field import Field
 
 SOLID = 0.5  # opacity from which a Gaussian is something that one can be inside of
-NAMED = 5
 
 
 def require(pool: Candidates, field: Field, grid: Ground) -> None:
@@ -23,22 +23,16 @@ def require(pool: Candidates, field: Field, grid: Ground) -> None:
     checks = {"under the ground": under(centres, grid), "inside of what stands there": inside(centres, field)}
     for what, bad in checks.items():
         if bad.any():
-            names = [pool[i][0].name for i in np.flatnonzero(bad)]
-            more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+            names = named(bad, [pose.name for pose, _ in pool])
             raise InputError(
-                f"pose {', '.join(names[:NAMED])}{more}: {what}; no photo comes from there. Set `reach` or `lowest` of "
-                f"the scene, or look whether its ground is right"
+                f"pose {names}: {what}; no photo comes from there. Set `reach` or `lowest` of the scene, or look whether "
+                f"its ground is right"
             )
 
 
 def under(centres: Float[Array, "n 3"], grid: Ground) -> Bool[Array, "n"]:
     """Which places are at or below the surface; none beyond the grid, where there is no surface."""
-    rows, columns = grid.shape
-    i = np.floor((centres[:, 1] - grid.south) / grid.spacing).astype(int)
-    j = np.floor((centres[:, 0] - grid.west) / grid.spacing).astype(int)
-    over = (i >= 0) & (i < rows) & (j >= 0) & (j < columns)
-    height = grid.heights[np.clip(i, 0, rows - 1), np.clip(j, 0, columns - 1)]
-    return over & (centres[:, 2] <= height)
+    return grid.contains(centres) & (centres[:, 2] <= grid.height_at(centres))
 
 
 def inside(centres: Float[Array, "n 3"], field: Field) -> Bool[Array, "n"]:

@@ -11,11 +11,15 @@ NAMED = 5  # poses in a message; of more the number is said
 
 def refuse(bad: Bool[Array, "n"], what: str, names: Sequence[str] | None = None) -> None:
     """Raises: ValueError: any is bad; says what they are, and of which poses: by name, or by index without names."""
-    if not bad.any():
-        return
+    if bad.any():
+        raise ValueError(f"{what} of pose {named(bad, names)}")
+
+
+def named(bad: Bool[Array, "n"], names: Sequence[str] | None = None) -> str:
+    """The first few that are bad, by name, or by index without names, and how many more."""
     found = [names[i] if names is not None else str(i) for i in np.flatnonzero(bad)]
     more = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""
-    raise ValueError(f"{what} of pose {', '.join(found[:NAMED])}{more}")
+    return ", ".join(found[:NAMED]) + more
 
 
 def require_finite(values: Float[Array, "n"], what: str, names: Sequence[str] | None = None) -> None:
