@@ -25,8 +25,8 @@ def require(pool: Candidates, field: Field, grid: Ground) -> None:
         if bad.any():
             names = named(bad, [pose.name for pose, _ in pool])
             raise InputError(
-                f"pose {names}: {what}; no photo comes from there. Set `reach` or `lowest` of the scene, or look whether "
-                f"its ground is right"
+                f"pose {names}: {what}; no photo comes from there. Set `reach` or `lowest` of the scene, or look "
+                f"whether its ground is right"
             )
 
 
