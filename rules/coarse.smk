@@ -27,6 +27,7 @@ rule fit_coarse:
     params:
         quality=entry("qualities", "quality"),
         seed=integer("seed"),
+        whole=lambda wildcards: config["scenes"][wildcards.scene].get("whole", False),
         keep=SNAPSHOTS,
         source=source_of("coarse", "fitting", "raster"),
     script:

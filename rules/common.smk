@@ -236,9 +236,12 @@ def truth_for_oracle(wildcards):
     """The one policy that sees the truth, where there is one."""
     if wildcards.policy != "oracle":
         return {}
-    if not (found := truth_of(wildcards)):
-        raise WorkflowError(f"policy oracle: what {wildcards.scene} truly shows is not known; it needs agent: render")
-    return found
+    agent = config["scenes"][wildcards.scene].get("agent")
+    if agent not in ("render", "replay"):
+        raise WorkflowError(
+            f"policy oracle: what {wildcards.scene} truly shows is not known; it needs agent: render or replay"
+        )
+    return truth_of(wildcards) if agent == "render" else {"images": "<results>/<photos>/images"}
 
 
 def maps_of_round(wildcards):
@@ -256,3 +259,25 @@ def captures_before(wildcards):
 def captures_until(wildcards):
     """The photos that rounds 1 to t took."""
     return [f"<results>/<active>/iter{t}/capture" for t in range(1, int(wildcards.t) + 1)]
+
+
+def scores_that_chose(wildcards):
+    """The scores that rounds 1 to t chose by: each one's are those that the round before left."""
+    after = [f"<results>/<active>/iter{t}/scores.csv" for t in range(1, int(wildcards.t))]
+    return ["<results>/<scored>/scores.csv", *after]
+
+
+def poses_until(wildcards):
+    """The poses that rounds 1 to t chose."""
+    return [f"<results>/<active>/iter{t}/poses.json" for t in range(1, int(wildcards.t) + 1)]
+
+
+def shown_rounds(wildcards):
+    """The rounds of the figure of a cell's evolution: none, the first, and round t."""
+    return sorted({0, 1, int(wildcards.t)})
+
+
+def left_by(file, wildcards):
+    """A file as each of the shown rounds left it; round 0 is the coarse field."""
+    homes = [f"<active>/iter{t}" if t else "<coarse>" for t in shown_rounds(wildcards)]
+    return [f"<results>/{home}/{file}" for home in homes]

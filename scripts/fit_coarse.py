@@ -9,12 +9,13 @@ from dav_gswt.logs import logging_to
 from dav_gswt.photos import model
 
 with logging_to(snakemake.log[0]):
-    given, quality = snakemake.input, build.Quality(**snakemake.params.quality)
+    given, params = snakemake.input, snakemake.params
+    quality, margin = build.Quality(**params.quality), ground.WHOLE if params.whole else ground.MARGIN
     names = read_json(given.views)["start"]
     photos = views.taken(given.images, given.model, names, [], quality.size)
     points, colours = model.points_seen_by(model.read(given.model), names, given.images)
-    rng = np.random.default_rng(snakemake.params.seed)
-    made = build.fit(read_json(given.frame), photos, points, colours, quality, rng, snakemake.params.keep)
+    rng = np.random.default_rng(params.seed)
+    made = build.fit(read_json(given.frame), photos, points, colours, quality, rng, params.keep, margin)
     field.write(made.field, snakemake.output.field)
     ground.write(made.grid, snakemake.output.ground)
     write_json(snakemake.output.fit, made.report)

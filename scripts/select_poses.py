@@ -19,7 +19,7 @@ with logging_to(snakemake.log[0]):
         np.random.default_rng([params.seed, params.t]),
         params.lam,
         needs.information(params.policy, scored, pool, taken, given.field),
-        needs.errors(params.policy, scored, pool, given, params.size),
+        needs.errors(params.policy, scored, pool, given, params.scene, params.size),
     )
     chosen = selection.select(params.policy, scored, wanted)
     write_json(snakemake.output.poses, poses.to_json(chosen, policy=params.policy, k=params.k))

@@ -8,6 +8,7 @@ from dav_gswt.photos import model, views
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    start = params.scene.get("start") or params.scene["photos"]
-    found = views.split(model.read(given.model), read_json(given.frame), start, np.random.default_rng(params.seed))
+    start, whole = params.scene.get("start") or params.scene["photos"], params.scene.get("whole", False)
+    rng = np.random.default_rng(params.seed)
+    found = views.split(model.read(given.model), read_json(given.frame), start, rng, whole)
     write_json(snakemake.output.views, found)

@@ -25,6 +25,19 @@ def test_the_margin_ends_where_no_photo_sees():
     assert grid.south >= -1 - 1e-9 and grid.south + rows * grid.spacing <= 9 + 1e-9
 
 
+def test_judged_is_the_exemplar_unless_far_more_is_modelled():
+    usual = ground.lay(FRAME, np.zeros((0, 3)), spacing=0.1, cap=10**6, block=32, margin=ground.MARGIN)
+    west, south, side = usual.exemplar
+    assert usual.judged == pytest.approx((west, south, west + side, south + side))
+    wide = FRAME | {"extent": {"west": -20.0, "south": 0.0, "east": 10.0, "north": 9.0}}
+    whole = ground.lay(wide, np.zeros((0, 3)), spacing=0.1, cap=10**6, block=32, margin=ground.WHOLE)
+    west, south, side = whole.exemplar
+    rows, columns = whole.shape
+    assert whole.judged[0] == pytest.approx(whole.west + ground.MARGIN * side)
+    assert whole.judged[1] == pytest.approx(south) and whole.judged[3] >= south + side
+    assert whole.judged[2] <= whole.west + columns * whole.spacing
+
+
 def test_the_cap_widens_the_spacing():
     grid = ground.lay(FRAME, np.zeros((0, 3)), spacing=0.01, cap=10_000, block=32, margin=0.25)
     assert grid.heights.size <= 10_000

@@ -91,15 +91,15 @@ def test_photos_of_other_ground_take_no_part(flown):
     parts = split(flown, start=4, frame=frame)
     named = [name for part in parts.values() for name in part]
     assert 6 <= len(named) < 30
-    assert all(views.sight(flown.camera(name), frame["exemplar"]) >= views.LEAST_SIGHT for name in named)
+    assert all(views.sight(flown.camera(name), views.bounds(frame, whole=False)) >= views.LEAST_SIGHT for name in named)
 
 
 def test_sight_is_the_share_of_the_square_by_hand():
     # From height 1 the picture covers 320 / 300 by 240 / 300 of ground, centred under the camera.
     camera = made_up.camera((0, 0, 1))
-    assert views.sight(camera, {"west": -0.3, "south": -0.3, "side": 0.6}) == 1
-    assert views.sight(camera, {"west": 0.0, "south": -0.4, "side": 0.8}) == pytest.approx(160 / 300 / 0.8, abs=1 / 16)
-    assert views.sight(camera, {"west": 5.0, "south": 5.0, "side": 1.0}) == 0
+    assert views.sight(camera, (-0.3, -0.3, 0.3, 0.3)) == 1
+    assert views.sight(camera, (0.0, -0.4, 0.8, 0.4)) == pytest.approx(160 / 300 / 0.8, abs=1 / 16)
+    assert views.sight(camera, (5.0, 5.0, 6.0, 6.0)) == 0
 
 
 def test_the_test_views_that_ground_json_names_are_taken(flown):
@@ -113,3 +113,13 @@ def test_a_named_test_view_that_is_no_image_is_refused(flown):
         split(flown, frame=FRAME | {"test": ["nowhere.png"]})
     with pytest.raises(InputError, match="every image is a test view"):
         split(flown, frame=FRAME | {"test": list(flown.names)})
+
+
+def test_photos_of_all_ground_take_part_where_all_of_it_is_in_question(flown):
+    """The same corner, but every photo sees some of the whole; tests are spread over the whole, too."""
+    corner = {"exemplar": {"west": -0.9, "south": -0.9, "side": 0.6}, "test": None}
+    frame = corner | {"extent": {"west": -1.2, "south": -1.2, "east": 1.2, "north": 1.2}}
+    parts = views.split(flown, frame, 4, np.random.default_rng(0), whole=True)
+    assert sum(len(part) for part in parts.values()) == 30
+    aims = np.array([views.aim(flown.camera(name)) for name in parts["test"]])
+    assert np.ptp(aims[:, 0]) > 0.6

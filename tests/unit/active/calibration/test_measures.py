@@ -10,7 +10,7 @@ from scipy.stats import spearmanr
 
 from dav_gswt import cameras, images
 from dav_gswt.active.calibration import measures
-from dav_gswt.active.scoring import on_exemplar
+from dav_gswt.active.scoring import on_ground
 from dav_gswt.raster import render
 from dav_gswt.views import View
 
@@ -32,13 +32,13 @@ def test_a_field_has_no_error_against_its_own_pictures(views):
     error, maps = measures.errors(FIELD, GRID, views, SIDE)
     np.testing.assert_allclose(error, 0, atol=1e-6)
     for view, found in zip(views, maps, strict=True):
-        np.testing.assert_array_equal(np.isnan(found), on_exemplar(GRID, view.camera) == 0)
+        np.testing.assert_array_equal(np.isnan(found), on_ground(GRID, view.camera) == 0)
         assert 0 < np.isnan(found).sum() < found.size
 
 
 def test_an_error_is_the_root_mean_square_over_channels_and_the_pixels_that_count(views):
     view = views[0]
-    counts = on_exemplar(GRID, view.camera) > 0
+    counts = on_ground(GRID, view.camera) > 0
     columns = np.arange(SIDE) < 20
     off = np.where(counts & columns, np.float32(0.3), np.where(counts, np.float32(0), np.float32(0.7)))
     wrong = replace(view, image=view.image + off[..., None] * np.float32([0, 1, 0]))

@@ -15,6 +15,7 @@ from dav_gswt.active.scoring import small
 from dav_gswt.cameras import Camera
 from dav_gswt.coarse import ground
 from dav_gswt.errors import InputError
+from dav_gswt.files import read_json
 
 
 def information(
@@ -28,19 +29,24 @@ def information(
 
 
 def errors(
-    policy: str, scores: Scores, pool: Candidates, files: dict[str, Path | str], size: int
+    policy: str, scores: Scores, pool: Candidates, files: dict[str, Path | str], scene: dict, size: int
 ) -> Float64[Array, "n"] | None:
     """For `oracle`: the true error at each candidate, NaN where its truth was not drawn.
 
-    files: `field`, `ground`, and `truth`, the folder of what candidates truly show. size: see `measures.errors`.
+    files: `field`, `ground`, `frame`, and `truth`, the folder of what candidates truly show; `images`, the photos of a
+    scene that is replayed. size: see `measures.errors`.
     Raises: InputError: no candidate's truth is known.
     """
     if policy != "oracle":
         return None
     from dav_gswt.active.calibration import measures, truth
 
-    some, views = truth.kept(pool, files["truth"])
-    found, _ = measures.errors(field.read(files["field"]), ground.read(files["ground"]), views, size)
+    if scene["agent"] == "replay":
+        some, views = pool, list(truth.shown(scene, pool, files["images"]))
+    else:
+        some, views = truth.kept(pool, files["truth"])
+    corrected = read_json(files["frame"])["kind"] == "photos"  # which change their exposure
+    found, _ = measures.errors(field.read(files["field"]), ground.read(files["ground"]), views, size, corrected)
     known = {pose.name: error for (pose, _), error in zip(some, found, strict=True)}
     if not known:
         raise InputError(f"{files['truth']}: shows no candidate that is left; make it again with more of them")

@@ -94,7 +94,7 @@ def told(
     """What a prior is told of candidates, and which of its pixels look at the modelled ground (1)."""
     known = conditions.taken(taken, frame, size)
     squares = [conditions.squared(camera).resized(size, size) for _, camera in pool]
-    counts = np.stack([on_exemplar(grid, camera) for camera in squares])
+    counts = np.stack([on_ground(grid, camera) for camera in squares])
     return conditions.condition(field, pool, known, frame["flying_height"], size), counts
 
 
@@ -108,7 +108,7 @@ def _geometric(
     for i, (_, camera) in enumerate(progress(pool, "score poses")):
         maps.append(uncertainty_map(field, small(camera), raster))
         terms["fisher"][i] = fisher.gain(raster.contributions(), already)
-        weight = on_exemplar(grid, small(camera))
+        weight = on_ground(grid, small(camera))
         terms["opacity"][i] = float((maps[-1] * weight).sum() / max(1.0, weight.sum()))
     shape = (0, 1, 1) if not maps else (len(maps), *np.max([m.shape for m in maps], axis=0))
     out = np.full(shape, np.nan, np.float32)  # cameras of one pool may differ in their height
@@ -117,12 +117,11 @@ def _geometric(
     return terms, out
 
 
-def on_exemplar(grid: Ground, camera: Camera) -> Float32[Array, "h w"]:
+def on_ground(grid: Ground, camera: Camera) -> Float32[Array, "h w"]:
     """1 for the pixels of a camera that look at the modelled ground."""
-    west, south, side = grid.exemplar
     shape = camera.height, camera.width
     blank = View("", camera, np.zeros((*shape, 3), np.float32), np.ones(shape, np.float32))
-    return over_ground(blank, west, south, west + side, south + side).weight
+    return over_ground(blank, *grid.judged).weight
 
 
 def _frozen(terms: dict[str, Float64[Array, "n"]], w2_sq: Float32[Array, "n h w"] | None, names: list[str]) -> Frozen:

@@ -29,7 +29,6 @@ _log = logging.getLogger(__name__)
 
 LEAST_CEILING = 0.05  # flying heights above the surface where things may grow though the sweep saw none
 BAND = 0.1  # flying heights within which a point belongs to a ground with things on it
-MARGIN = 0.15  # ground modelled around the exemplar, as a share of its side
 BLOCK = 32  # the exemplar's side is a multiple of it, in cells: six levels halve it five times
 GROUND_SHARE = 0.9  # of the cap that the ground may take, its underlay included; things get the rest
 AROUND = 12  # neighbours of a point on the map
@@ -68,7 +67,7 @@ def fit(
     quality: Quality,
     rng: np.random.Generator,
     keep: Path | str | None = None,
-    margin: float = MARGIN,
+    margin: float = ground.MARGIN,
     watch: Callable[[int, State], None] | None = None,
 ) -> Made:
     """A field of the ground and the things on it, fitted to the start views.

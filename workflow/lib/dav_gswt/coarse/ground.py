@@ -18,6 +18,9 @@ from dav_gswt import images
 from dav_gswt.errors import InputError
 
 NODES = 96  # knots of the height surface along the longer side: what sparse points can carry
+MARGIN = 0.15  # ground modelled around what tiles are cut from, as a share of the exemplar's side
+FAR = 0.5  # beyond this share of it, ground is modelled for its own sake
+WHOLE = 10.0  # such a margin, where all ground that the photos see is modelled
 STIFFNESS = 0.05  # weight of the bending energy against one point a knot
 
 
@@ -58,6 +61,18 @@ class Ground:
             self.south + self.first_row * self.spacing,
             self.cells * self.spacing,
         )
+
+    @property
+    def judged(self) -> tuple[float, float, float, float]:
+        """West, south, east and north of the ground that scores and errors are about: the exemplar, or, where far more
+        than its margin is modelled, all but that margin at the border, which photos hardly see."""
+        west, south, side = self.exemplar
+        low, high = np.array([west, south]), np.array([west, south]) + side
+        first = np.array([self.west, self.south])
+        last = first + self.spacing * np.array(self.shape[::-1])
+        if max((low - first).max(), (last - high).max()) > FAR * side:
+            low, high = np.minimum(low, first + MARGIN * side), np.maximum(high, last - MARGIN * side)
+        return (*low.tolist(), *high.tolist())
 
     def slopes(self) -> tuple[Float[Array, "rows columns"], Float[Array, "rows columns"]]:
         """Rise of the surface to the east and to the north, by central differences."""

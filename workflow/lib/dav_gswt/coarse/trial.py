@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from dav_gswt import cameras, metrics, raster
 from dav_gswt.coarse import build
 from dav_gswt.coarse.build import Made, Quality
-from dav_gswt.coarse.ground import Ground
+from dav_gswt.coarse.ground import WHOLE, Ground
 from dav_gswt.field import Field
 from dav_gswt.files import read_json
 from dav_gswt.photos import model as models
@@ -26,7 +26,6 @@ from dav_gswt.views import View, over_ground, read
 FIRST_TEST, EACH = 5, 10
 FREE = 0.1  # flying heights above the ground from which space is free
 NEAR = 3.0  # spacings to a matched point within which a Gaussian may stand in it
-WHOLE = 10.0  # margin, in exemplars: all ground that the photos see
 LOW = 0.06  # discs that the low eye stands above the ground, over the picture's width
 SKY = np.array([0.62, 0.75, 0.95], np.float32)
 

@@ -109,7 +109,7 @@ def registration(found: Found) -> list[Fact]:
     counts = report_facts.over_exemplar(found)
     low, usual, high = report_facts.spread(counts.ravel()) if counts.size else (0, 0, 0)
     pairs = zip(found.photos, found.model.cameras, strict=True)
-    sights = [views.sight(camera, frame["exemplar"]) for photo, camera in pairs if not photo.tests]
+    sights = [views.sight(camera, views.bounds(frame, whole=False)) for photo, camera in pairs if not photo.tests]
     sees = sum(sight >= views.LEAST_SIGHT for sight in sights)
     rest = "all of them" if sees == len(sights) else "the others show too little of it to take part"
     if frame["kind"] == "synthetic":

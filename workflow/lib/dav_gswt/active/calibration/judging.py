@@ -57,7 +57,7 @@ def calibrated(
         others = controls.maps(prior, regressors, condition)
         shown |= others
         terms |= {name: imagining.over(m, counts) for name, m in others.items()}
-    corrected = judged.scene["agent"] == "replay"  # photos change their exposure
+    corrected = judged.frame["kind"] == "photos"  # which change their exposure
     error, error_maps = measures.errors(judged.field, judged.grid, views, judged.size, corrected)
     table = [
         {"pose": pose.name, "error": error[i]} | {name: values[i] for name, values in terms.items()}

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Float32, Float64
 from numpy import ndarray as Array
 
 from dav_gswt import images, metrics
-from dav_gswt.active.scoring import on_exemplar
+from dav_gswt.active.scoring import on_ground
 from dav_gswt.active.uncertainty import ause, calibrated, spearman
 from dav_gswt.cameras import Camera
 from dav_gswt.coarse.ground import Ground
@@ -39,7 +39,7 @@ def errors(
     """
     error, maps = np.full(len(views), np.nan), []
     for i, view in enumerate(views):
-        weight = view.weight * on_exemplar(grid, view.camera)
+        weight = view.weight * on_ground(grid, view.camera)
         counts = weight > 0
         squares = np.full(counts.shape, np.nan)
         if counts.any():
