@@ -21,6 +21,8 @@ include: "rules/photos.smk"
 include: "rules/coarse.smk"
 include: "rules/prior.smk"
 include: "rules/active.smk"
+include: "rules/benchmark.smk"
+include: "rules/views.smk"
 include: "rules/levels.smk"
 include: "rules/tiles.smk"
 include: "rules/bundle.smk"
@@ -39,6 +41,7 @@ wildcard_constraints:
     p_drop=SHARE,
     lam=NUMBER,
     k=NATURAL,
+    stop=STOP,
     t=NATURAL,
     level=NATURAL,
     seam=NAME,

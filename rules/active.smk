@@ -2,8 +2,8 @@
 
 In: the coarse field. Out, per round t: poses.json and poses.exr, capture/, field.ply, ground.exr, and of that new field
 scores.csv and scores.json, maps.npz, uncertainty.exr and metrics.json. Round t starts from round t - 1, so T rounds are
-a prefix of T + 1, and T is only which round is asked for. Scoring keeps its terms apart: the policy, lam and k enter
-when poses are chosen.
+a prefix of T + 1, and T is only which round is asked for. A round after the stop asks for no pose and hands the field on
+as it is. Scoring keeps its terms apart: the policy, lam and k enter when poses are chosen.
 """
 
 SCORING = [
@@ -14,6 +14,12 @@ SCORING = [
     "raster",
     "coarse/doubt",
     "perceptual",
+]
+CHOICE = [
+    *(f"active/{name}" for name in ("selection", "policies", "greedy", "facility", "fisher", "needs", "candidates")),
+    *(f"active/{name}" for name in ("stopping", "worth", "poses", "scores", "maps", "uncertainty", "calibration")),
+    "raster",
+    "coarse/doubt",
 ]
 
 
@@ -75,9 +81,10 @@ use rule score_coarse as score_round with:
 
 
 rule select_poses:
-    """Choose the k poses that the policy expects most of, and show what is not known there."""
+    """Choose the k poses that the policy expects most of, or none after a stop, and show what is not known there."""
     input:
         unpack(before_round),
+        unpack(decided_before),
         unpack(truth_for_oracle),
         captures=captures_before,
         views="<results>/<start>/views.json",
@@ -103,22 +110,10 @@ rule select_poses:
         policy=lambda wildcards: wildcards.policy,
         lam=real("lam"),
         k=integer("k"),
+        stop=lambda wildcards: read_stop(wildcards.stop),
         seed=integer("seed"),
         t=integer("t"),
-        source=source_of(
-            *(
-                f"active/{name}"
-                for name in ("selection", "policies", "greedy", "facility", "fisher", "needs", "poses", "scores")
-            ),
-            *(
-                "active/maps",
-                "active/uncertainty",
-                "active/candidates",
-                "active/calibration",
-                "raster",
-                "coarse/doubt",
-            ),
-        ),
+        source=source_of(*CHOICE),
     script:
         "../scripts/select_poses.py"
 
@@ -176,9 +171,10 @@ localrules:
 
 
 rule update_field:
-    """Refit the field with the photos of this round."""
+    """Refit the field with the photos of this round; without any it goes on as it is."""
     input:
         unpack(before_round),
+        unpack(fits_before),
         captures=captures_until,
         views="<results>/<start>/views.json",
         images="<results>/<photos>/images",
@@ -215,6 +211,7 @@ use rule evaluate_coarse as evaluate_round with:
         field="<results>/<round>/field.ply",
         ground="<results>/<round>/ground.exr",
         fit="<results>/<round>/fit.json",
+        poses="<results>/<round>/poses.json",
         captures=captures_until,
         views="<results>/<start>/views.json",
         images="<results>/<photos>/images",
@@ -231,7 +228,7 @@ use rule evaluate_coarse as evaluate_round with:
     params:
         quality=entry("qualities", "quality"),
         t=integer("t"),
-        source=source_of("metrics", "active/evaluation", "perceptual", "raster"),
+        source=source_of("metrics", "active/evaluation", "active/stopping", "perceptual", "raster"),
 
 
 rule show_candidates:

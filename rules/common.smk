@@ -1,13 +1,14 @@
 """Shared by all stages: the checked config, the result tree, one spelling a number, and what the targets are."""
 
-from decimal import Decimal
 from hashlib import sha256
+from itertools import product
 from pathlib import Path
 
 import dav_gswt
 from dav_gswt.active.names import AT_ZERO, GEOMETRIC, IMAGINING
 from dav_gswt.config import check
 from dav_gswt.errors import InputError
+from dav_gswt.spelling import read_stop, spell, spell_stop
 
 LIBRARY = Path(dav_gswt.__file__).parent
 VIEWER = sorted(str(p) for p in Path(workflow.basedir, "workflow/viewer").iterdir())
@@ -28,7 +29,7 @@ pathvars:
     fit="{scene}/seed{seed}/{quality}",
     coarse="<fit>/coarse",
     scored="<coarse>/scores_{prior}_pdrop{p_drop}",
-    active="<fit>/active_{policy}_{prior}_pdrop{p_drop}_lam{lam}_k{k}",
+    active="<fit>/active_{policy}_{prior}_pdrop{p_drop}_lam{lam}_k{k}{stop}",
     round="<active>/iter{t}",
     levels="<round>/levels",
     tiles="<round>/tiles_{seam}",
@@ -42,6 +43,7 @@ POSITIVE = r"[1-9]\d*"
 FRACTION = r"0|1|0\.\d*[1-9]"
 SHARE = r"0|0\.\d*[1-9]"
 NUMBER = r"0|[1-9]\d*|(?:0|[1-9]\d*)\.\d*[1-9]"
+STOP = rf"(?:_upto{POSITIVE})?(?:_worth(?!0/)(?:{NUMBER}))?"  # or nothing
 NEVER = r"(?!)"  # a constraint that nothing meets
 # What reads no prior has one spelling of it: the names look at what follows them in a path.
 PRIOR = "|".join(["none(?=_pdrop0[_/])", *config["priors"]])
@@ -56,14 +58,8 @@ def way(policy):
 
 
 CHOOSING = "|".join(way(policy) for policy in (*GEOMETRIC, *IMAGINING))  # of poses, by their scores
-POLICY = f"{CHOOSING}|given"
+POLICY = f"{CHOOSING}|given(?=_none_pdrop0_lam0_k0/)"
 SNAPSHOTS = "results/snapshots"  # of fits that run: outside the outputs, so that a killed fit can go on
-
-
-def spell(value):
-    """The one spelling of a number that the constraints accept: 0.1, never 0.10."""
-    text = f"{Decimal(str(value)).normalize():f}"
-    return "0" if text == "-0" else text
 
 
 def integer(wildcard):
@@ -118,6 +114,7 @@ def values_of(scene, policy=config["policy"]):
         prior="none" if given or policy not in IMAGINING else config["prior"],
         **asked,
         k=0 if given else config["k"],
+        stop="" if given else spell_stop(config["stop"]),
         t=0 if given else config["rounds"],
         seam=config["scenes"][scene]["seam"],
         tau=spell(config["tau"]),
@@ -156,6 +153,40 @@ def calibrations():
                 cell = {key: values[key] for key in ("scene", "quality", "policy", "prior", "p_drop")}
                 found[path] = cell | {"seed": seed, "round": t}
     return found
+
+
+def compared_cells():
+    """The cells of the config's `benchmark`: what tells each from the others, and the files that tell of its rounds."""
+    asked, cells = config["benchmark"], []
+    for group in asked["sets"]:
+        for scene, policy, seed, k in product(
+            group["scenes"], group.get("policies", asked["policies"]), asked["seeds"], group["k"]
+        ):
+            if policy != "all" or k == group["k"][0]:  # all of the pool is one round, whatever k is
+                cells.append(compared_cell(scene, policy, seed, k, group["photos"]))
+    return cells
+
+
+def compared_cell(scene, policy, seed, k, photos):
+    """One of them: rounds of k from the scene's start until there are so many photos."""
+    entry = config["scenes"][scene]
+    rounds = 1 if policy == "all" else (photos - entry["start"]) // k
+    values = values_of(scene, policy) | {"seed": seed, "k": k, "stop": ""}
+    before, after, made = range(1, rounds), range(1, rounds + 1), rules.score_round
+
+    def of(first, later, ts):
+        return expand(first, **values) + expand(later, **(values | {"t": ts}))
+
+    jobs = [of(rules.score_coarse.benchmark, rules.score_round.benchmark, before)]
+    jobs += [of([], job.benchmark, after) for job in (rules.select_poses, rules.capture_views, rules.update_field)]
+    prior = config["priors"].get(values["prior"], {"samples": 0})
+    return {key: values[key] for key in ("scene", "seed", "quality", "policy", "prior", "p_drop", "lam", "k")} | {
+        "corrected": entry["kind"] == "photos",
+        "samples": prior["samples"],
+        "metrics": of(rules.evaluate_coarse.output.metrics, rules.evaluate_round.output.metrics, after),
+        "facts": of(rules.score_coarse.output.facts, rules.score_round.output.facts, before),
+        "times": [list(of_round) for of_round in zip(*jobs, strict=True)],
+    }
 
 
 def folder_of(scene):
@@ -249,6 +280,18 @@ def maps_of_round(wildcards):
     if wildcards.prior == "none":
         return {}
     return {"maps": f"<results>/{'<scored>' if wildcards.t == '0' else '<round>'}/maps.npz"}
+
+
+def decided_before(wildcards):
+    """What the rounds 1 to t - 1 told about their photos, and whether the last of them still asked for any."""
+    rounds = [f"<results>/<active>/iter{t}" for t in range(1, int(wildcards.t))]
+    last = {"last": f"{rounds[-1]}/poses.json"} if rounds else {}
+    return fits_before(wildcards) | last
+
+
+def fits_before(wildcards):
+    """The reports of the updates of rounds 1 to t - 1."""
+    return {"fits": [f"<results>/<active>/iter{t}/fit.json" for t in range(1, int(wildcards.t))]}
 
 
 def captures_before(wildcards):

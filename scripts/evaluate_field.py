@@ -1,7 +1,7 @@
 """Rules evaluate_coarse and evaluate_round: what the test photos say about a field."""
 
 from dav_gswt import field, provenance, views
-from dav_gswt.active import evaluation
+from dav_gswt.active import evaluation, stopping
 from dav_gswt.coarse import build, ground
 from dav_gswt.files import read_json, write_json
 from dav_gswt.logs import logging_to
@@ -18,5 +18,6 @@ with logging_to(snakemake.log[0]):
     result = evaluation.evaluate(fitted, build.modelled(tests, grid), groups, perceptual)
     result |= {"round": params.t, "photos": len(split["start"]) + shots, "gaussians": len(fitted)}
     result |= {"fit": read_json(given.fit)}
+    result |= stopping.told_by(read_json(given.poses)) if given.get("poses") else {}
     inputs = {"field": given.field, "ground": given.ground, "views": given.views}
     write_json(snakemake.output.metrics, result | {"provenance": provenance.of(inputs, dict(params.quality))})

@@ -3,20 +3,19 @@
 import numpy as np
 
 from dav_gswt import field, views
-from dav_gswt.coarse import build, ground
+from dav_gswt.coarse import bounded, build, ground
 from dav_gswt.files import read_json, write_json
 from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    quality = build.Quality(**params.quality)
-    names = read_json(given.views)["start"]
-    captures = list(given.captures)
+    quality, captures = build.Quality(**params.quality), list(given.captures)
+    names, aside = read_json(given.views)["start"], bounded.set_aside(map(read_json, given.fits))
     before = views.taken(given.images, given.model, names, captures[:-1], quality.size)
     new = views.captured(captures[-1], quality.size)
     rng = np.random.default_rng([params.seed, params.t])
     last = field.read(given.field), ground.read(given.ground), read_json(given.frame)
-    made = build.refine(*last, before, new, quality, rng, params.keep)
+    made = build.refine(*last, [v for v in before if v.name not in aside], new, quality, rng, params.keep)
     field.write(made.field, snakemake.output.field)
     ground.write(made.grid, snakemake.output.ground)
     write_json(snakemake.output.fit, made.report)

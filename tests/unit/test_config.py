@@ -33,6 +33,12 @@ def test_the_configs_that_come_with_the_project_are_valid(config):
         pytest.param(["scenes", "desert", "famly"], "desert", "famly", id="a typo in a scene"),
         pytest.param(["scenes", "desert", "kind"], "video", "kind", id="a kind that is not there"),
         pytest.param(["qualities", "draft", "spacing"], 0, "spacing", id="discs without a distance"),
+        pytest.param(["stop", "photo"], 20, "photo", id="a typo in a stop"),
+        pytest.param(["stop", "photos"], 2, "stop.photos", id="fewer photos than any start"),
+        pytest.param(["stop", "photos"], 20.5, "stop.photos", id="half a photo"),
+        pytest.param(["stop", "worth"], 0, "stop.worth", id="a price of nothing"),
+        pytest.param(["stop", "worth"], "auto", "stop.worth", id="a price that is no number"),
+        pytest.param(["stop"], 20, "stop: 20", id="a stop without its key"),
         pytest.param(["seams", "colour", "tile"], 1.2, "tile", id="a tile larger than its exemplar"),
     ],
 )
@@ -46,6 +52,26 @@ def test_what_is_wrong_is_named(config, keys, value, named):
         check(broken, SCHEMA)
 
 
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        pytest.param({"baseline": "w2"}, "baseline: w2 is not among", id="a baseline that is not run"),
+        pytest.param(
+            {"sets": [{"scenes": ["desert"], "k": [4], "photos": 20}]}, "desert is no scene with", id="no pool"
+        ),
+        pytest.param({"sets": [{"scenes": ["moon"], "k": [4], "photos": 20}]}, "moon is no scene", id="no scene"),
+        pytest.param(
+            {"sets": [{"scenes": ["desert_pool"], "k": [4], "photos": 11}]}, "leave no round of 4", id="no room"
+        ),
+    ],
+)
+def test_a_comparison_that_cannot_be_made_is_refused(change, said):
+    config = yaml.safe_load((ROOT / "config/config.yaml").read_text())
+    check(config, SCHEMA)
+    with pytest.raises(InputError, match=said):
+        check(config | {"benchmark": config["benchmark"] | change}, SCHEMA)
+
+
 def test_a_missing_key_is_named(config):
     del config["qualities"]["draft"]["cap"]
     with pytest.raises(InputError, match="cap"):
@@ -55,7 +81,7 @@ def test_a_missing_key_is_named(config):
 def test_every_key_of_the_schema_is_explained():
     text = (ROOT / "config/README.md").read_text()
     schema = yaml.safe_load(SCHEMA.read_text())
-    keys = set(schema["properties"]) - {"stills"}
+    keys = (set(schema["properties"]) - {"stills"}) | set(schema["properties"]["stop"]["properties"])
     for kind in schema["properties"]["scenes"]["additionalProperties"]["allOf"]:
         keys |= set(kind["then"]["properties"])
     for table in ("qualities", "seams"):

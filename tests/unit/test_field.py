@@ -1,5 +1,7 @@
 """Fields on disk: ours come back to the bit, foreign ones are read, broken ones are refused by name."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from plyfile import PlyData, PlyElement
@@ -154,3 +156,22 @@ def test_colours_and_harmonics_are_each_others_inverse():
         field.ground,
     )
     assert again.base_colours == pytest.approx(colours, abs=1e-6)
+
+
+def test_what_was_imagined_comes_back_and_costs_a_field_without_it_no_byte(tmp_path):
+    field = made(6)
+    assert not field.imagined.any()
+    fields.write(field, tmp_path / "a.ply")
+    assert b"imagined" not in (tmp_path / "a.ply").read_bytes()
+    marked = np.arange(6) % 2 == 0
+    fields.write(replace(field, imagined=marked), tmp_path / "b.ply")
+    back = fields.read(tmp_path / "b.ply")
+    assert np.array_equal(back.imagined, marked) and np.array_equal(back[marked].imagined, np.ones(3, bool))
+    assert np.array_equal(fields.joined([back, field]).imagined, [*marked, *np.zeros(6, bool)])
+
+
+@pytest.mark.parametrize("value", [2, -1, 0.5, np.nan, np.inf])
+def test_a_flag_that_is_none_is_refused_with_its_index(tmp_path, value):
+    path = foreign(tmp_path / "a.ply", extra=["imagined"], change={(0, "imagined"): 0, (2, "imagined"): value})
+    with pytest.raises(InputError, match=r"a.ply.*imagined of Gaussian 2 "):
+        fields.read(path)

@@ -64,6 +64,18 @@ def test_scores_are_judged_by_truth_that_is_drawn_once_a_scene(planned, tmp_path
     assert plan["train_regressor"] == plan["plot_calibration"] == 1
 
 
+def test_policies_share_what_they_start_from(planned, tmp_path):
+    """Two scenes of three seeds; all photos are one round, whatever k is."""
+    (tmp_path / "few.yaml").write_text(
+        "benchmark: {policies: [farthest, random, all], sets: "
+        "[{scenes: [desert_pool, grass_pool], k: [4, 6], photos: 20}]}"
+    )
+    plan = planned(tmp_path, "view_benchmark", configs=(USUAL, tmp_path / "few.yaml"))
+    assert plan["render_photos"] == 2 and plan["fit_coarse"] == plan["score_coarse"] == 6
+    assert plan["update_field"] == plan["evaluate_round"] == 6 * (2 * (3 + 2) + 1)
+    assert plan["score_round"] == 6 * 2 * (2 + 1) and plan["compare_policies"] == plan["gather_curves"] == 1
+
+
 def test_every_policy_has_a_path(planned, tmp_path):
     for policy in POLICIES[:-1]:
         spelled = {"prior": "none", "p_drop": "0", "lam": "0"}
@@ -75,6 +87,19 @@ def test_every_policy_has_a_path(planned, tmp_path):
         assert plan["show_candidates"] == (policy == "oracle") and plan["fetch_lpips"] == (policy in IMAGINING)
         default = planned(tmp_path, "--config", f"policy={policy}", configs=(USUAL, TINY))
         assert default["make_page"] == 1 and default["select_poses"] == 1, policy
+
+
+STOP = "results/desert/seed0/draft/active_farthest_none_pdrop0_lam0_k4{}/iter3/metrics.json"
+
+
+def test_every_stop_has_a_branch_of_its_own_and_all_share_the_coarse_field(planned, tmp_path):
+    stops = ["", "_upto20", "_worth0.05", "_upto20_worth0.05"]
+    plan = planned(tmp_path, *map(STOP.format, stops))
+    assert plan["fit_coarse"] == plan["score_coarse"] == 1
+    assert plan["select_poses"] == plan["capture_views"] == plan["update_field"] == 3 * len(stops)
+    (tmp_path / "stop.yaml").write_text("stop: {worth: 0.050, photos: 20}")
+    default = planned(tmp_path, configs=(USUAL, TINY, tmp_path / "stop.yaml"))
+    assert default["select_poses"] == default["make_page"] == 1
 
 
 def test_the_oracle_needs_a_scene_whose_truth_is_known(snakemake, shared, tmp_path):
@@ -109,6 +134,14 @@ def test_tiles_go_by_the_doubt_of_the_prior_that_was_asked(planned, tmp_path):
         pytest.param("results/desert/seed0/draft/coarse/scores_none_pdrop0.1/scores.csv", id="dropout of no prior"),
         pytest.param(BUNDLE.format(**(DEFAULT | {"tau": "0.60"})), id="tau with a trailing zero"),
         pytest.param(BUNDLE.format(**(DEFAULT | {"k": "04"})), id="k with a leading zero"),
+        pytest.param(STOP.format("_worth0.05_upto20"), id="the price before the number of photos"),
+        pytest.param(STOP.format("_worth0"), id="a price of nothing"),
+        pytest.param(STOP.format("_upto020"), id="a number of photos with a leading zero"),
+        pytest.param(STOP.format("_worth0.050"), id="a price with a trailing zero"),
+        pytest.param(
+            "results/desert/seed0/draft/active_given_none_pdrop0_lam0_k0_upto9/iter0/levels/level0.ply",
+            id="a stop of a finished field",
+        ),
         pytest.param("results/Desert/seed0/views.json", id="a scene in capitals"),
         pytest.param(f"{LAM}/field.ply", id="lam for a policy without a prior"),
         pytest.param("results/moon/photos/ground.json", id="a scene that is not in the config"),
@@ -137,6 +170,7 @@ def test_no_round_and_a_finished_field_go_from_field_to_terrain(planned, tmp_pat
         ("p_drop: 1", "config: p_drop: 1 is greater than or equal to the maximum of 1"),
         ("prior: zero", "config: prior: there is no 'zero'; priors has terrain"),
         ("priors: {terrain: {samples: 1}}", "config: priors.terrain.samples: 1 is less than the minimum of 2"),
+        ("stop: {photos: 2}", "config: stop.photos: 2 is less than the minimum of 3"),
         ("rounds: -1", "config: rounds: -1 is less than the minimum of 0"),
         ("scenes: {desert: {quality: best}}", "config: scenes.desert.quality: there is no 'best'; qualities has"),
     ],

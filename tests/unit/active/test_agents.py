@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from dav_gswt import cameras, images
+from dav_gswt import cameras, images, views
 from dav_gswt.active import agents
 from dav_gswt.active.agents import dropped, render, replay, shots
 from dav_gswt.active.agents.site import Site
@@ -124,6 +124,23 @@ def test_what_the_store_holds_is_not_taken_again(site, tmp_path, monkeypatch):
     assert [shot.name for shot in found] == ["a0.png", "a1.png"]
     assert found[1].apart == pytest.approx(0.75 / 5) and found[1].taken == WHEN
     assert images.size(tmp_path / "a1.png") == (8, 8)
+
+
+@pytest.mark.parametrize("agent", ["render", "replay", "serial", "plan", "handheld"])
+def test_where_no_pose_was_chosen_nobody_is_asked_for_anything(agent, tmp_path, monkeypatch):
+    def no_one(*_):
+        raise AssertionError("somebody was asked for photos")
+
+    device(monkeypatch, no_one)
+    monkeypatch.setattr(render, "take", no_one)
+    monkeypatch.setattr(replay, "take", no_one)
+    monkeypatch.setattr(agents.candidates, "left", lambda *_: asked(0.0))
+    scene = {"agent": agent, "kind": "photos"}
+    site = Site("dune", scene, {"flying_height": 5.0}, tmp_path / "photos", Store(tmp_path / "captures"))
+    agents.capture(site, {}, [], [], tmp_path / "capture")
+    assert [path.name for path in (tmp_path / "capture").iterdir()] == ["capture.json"]
+    assert json.loads((tmp_path / "capture/capture.json").read_text()) == {"agent": agent, "shots": []}
+    assert views.captured(tmp_path / "capture", 8) == [] and not (tmp_path / "captures").exists()
 
 
 def test_what_was_taken_before_a_failure_stays(site, tmp_path, monkeypatch):

@@ -118,8 +118,10 @@ def test_the_oracle_takes_the_worst_of_what_it_knows():
     assert chosen("oracle", scored(0, 1, 2, 3), 2, errors=errors) == ["p2", "p3"]
 
 
-def test_all_takes_all_whatever_k_is():
-    assert chosen("all", scored(0, 1, 2), 1) == ["p0", "p1", "p2"]
+def test_all_asks_for_all_whatever_k_is_and_takes_what_a_budget_leaves():
+    assert selection.asked("all", 1, 3) == 3 and selection.asked("farthest", 1, 3) == 1
+    assert chosen("all", scored(0, 1, 2), 3) == ["p0", "p1", "p2"]
+    assert chosen("all", scored(0, 1, 2), 2) == ["p0", "p1"]
 
 
 def test_random_depends_on_its_generator_alone():

@@ -124,9 +124,8 @@ def test_a_snapshot_that_is_none_costs_nothing(tmp_path, monkeypatch, caplog):
 
 def test_what_is_chosen_is_told_with_its_reason(monkeypatch):
     monkeypatch.setattr("dav_gswt.fitting.search.WINDOW", 60)
-    monkeypatch.setattr("dav_gswt.fitting.search.MOST_STEPS", 600)
     monkeypatch.setattr("dav_gswt.fitting.search.GAIN", 0.5)  # such short windows are noisy
-    found = fitted(plan=Plan("auto", "auto", "auto"))
+    found = fitted(plan=Plan("auto", "auto", "auto", most_steps=600))
     report = found.report
     assert {choice["what"] for choice in report.choices} >= {"steps", "cap", "degree"}
     assert all("dB" in choice["why"] or "most" in choice["why"] for choice in report.choices)

@@ -66,3 +66,22 @@ def check(config: dict, schema: Path) -> None:
             if scene[key] not in config[table]:
                 known = ", ".join(config[table])
                 raise InputError(f"config: scenes.{name}.{key}: there is no {scene[key]!r}; {table} has {known}")
+    if "benchmark" in config:
+        _check_benchmark(config["benchmark"], config["scenes"])
+
+
+def _check_benchmark(asked: dict, scenes: dict) -> None:
+    """Policies can be compared where every scene starts from some of its photos and all cells take at least a round."""
+    if asked["baseline"] not in asked["policies"]:
+        raise InputError(f"config: benchmark.baseline: {asked['baseline']} is not among benchmark.policies")
+    for i, group in enumerate(asked["sets"]):
+        for name in group["scenes"]:
+            if "start" not in scenes.get(name, {}):
+                raise InputError(
+                    f"config: benchmark.sets.{i}.scenes: {name} is no scene with `start`, photos to start from"
+                )
+            if group["photos"] < scenes[name]["start"] + max(group["k"]):
+                raise InputError(
+                    f"config: benchmark.sets.{i}.photos: {group['photos']} leave no round of {max(group['k'])} after "
+                    f"the {scenes[name]['start']} that {name} starts from"
+                )

@@ -21,12 +21,25 @@ def read_rows(path: Path | str) -> list[dict[str, float]]:
         return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
 
 
+def blank(width: float, height: float):
+    """An empty figure, inches wide and high, 120 dots an inch."""
+    from matplotlib.figure import Figure  # here, not above: it takes a second to load, and most jobs draw nothing
+
+    return Figure(figsize=(width, height), dpi=120, layout="constrained")
+
+
+def save(figure, path: Path | str) -> None:
+    """A figure as a PNG: the same bytes each time."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    FigureCanvasAgg(figure)
+    with whole(path) as part:
+        figure.savefig(part, format="png", metadata={"Software": None})
+
+
 def fit_time(curves: dict[str, list[dict[str, float]]], path: Path | str) -> None:
     """PSNR of test photos (colour-corrected) against seconds of fitting, a line a scene."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6.4, 4.0), dpi=120, layout="constrained")
+    figure = blank(6.4, 4.0)
     axes = figure.add_subplot()
     for scene, rows in curves.items():
         x, y = ([row[k] for row in rows] for k in ("seconds", "psnr_colour_corrected"))
@@ -40,6 +53,4 @@ def fit_time(curves: dict[str, list[dict[str, float]]], path: Path | str) -> Non
     axes.margins(x=0.12)
     axes.grid(alpha=0.3)
     axes.legend(frameon=False)
-    FigureCanvasAgg(figure)
-    with whole(path) as part:
-        figure.savefig(part, format="png", metadata={"Software": None})
+    save(figure, path)

@@ -14,6 +14,7 @@ from dav_gswt import config
 from dav_gswt.errors import InputError
 from dav_gswt.narration import Narrator
 from dav_gswt.raster import backends
+from dav_gswt.spelling import spell, spell_stop
 
 CONFIG = Path("config/config.yaml")
 SMALLER = Path("config/without_compiler.yaml")
@@ -129,9 +130,10 @@ def running() -> list[int]:
 def pages(given: dict) -> list[Path]:
     """The pages of the config's scene, newest first; those made at its parameters, if there are any."""
     scene = given["scenes"][given["scene"]]
-    views = ("given", 0, 0) if scene["kind"] == "field" else (given["policy"], given["k"], given["rounds"])
-    branch = "seed{}/{}/active_{}_*_k{}/iter{}/tiles_{}/bundle_tau{:g}".format(
-        given["seeds"][0], scene["quality"], *views, scene["seam"], given["tau"]
+    stop = spell_stop(given["stop"])
+    views = ("given", "0", 0) if scene["kind"] == "field" else (given["policy"], f"{given['k']}{stop}", given["rounds"])
+    branch = "seed{}/{}/active_{}_*_k{}/iter{}/tiles_{}/bundle_tau{}".format(
+        given["seeds"][0], scene["quality"], *views, scene["seam"], spell(given["tau"])
     )
     folder = Path("results", given["scene"])
     found = list(folder.glob(f"{branch}/terrain/page/index.html")) or folder.rglob("terrain/page/index.html")

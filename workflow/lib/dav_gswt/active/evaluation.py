@@ -24,7 +24,7 @@ def evaluate(
 ) -> dict:
     """Mean PSNR (raw, colour-corrected), SSIM and LPIPS over the test views, over the pixels that look at the ground.
 
-    groups: names of views that are averaged by themselves, too (from low, from aside). weights: of LPIPS; without them
+    groups: names of views that are looked at by themselves, too (from low, from aside). weights: of LPIPS; without them
     it is null, and said. `worst_decile`: the mean of the worst tenth.
     Returns: null where there is no test view, or where pictures are equal and PSNR has no value.
     """
@@ -33,8 +33,11 @@ def evaluate(
     rows = [_row(field, view, weights) for view in tests if view.weight.any()]
     named = {row["view"]: row for row in rows}
     parts = {group: [named[name] for name in names if name in named] for group, names in (groups or {}).items()}
-    out = _means(rows) | {"worst_decile": _worst(rows)}
-    return out | {"groups": {group: _means(part) for group, part in parts.items()}, "test_views": rows}
+    return _summed(rows) | {"groups": {group: _summed(part) for group, part in parts.items()}, "test_views": rows}
+
+
+def _summed(rows: list[dict]) -> dict:
+    return _means(rows) | {"worst_decile": _worst(rows)}
 
 
 def _row(field: Field, view: View, weights: Weights | None) -> dict:

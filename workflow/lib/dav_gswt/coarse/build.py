@@ -12,15 +12,15 @@ from scipy.spatial import cKDTree
 
 from dav_gswt import field as fields
 from dav_gswt import raster
-from dav_gswt.coarse import discs, distractors, ground, sky, things, underlay
+from dav_gswt.coarse import bounded, discs, distractors, ground, sky, things, underlay
 from dav_gswt.coarse.doubt import arrays, with_uncertainty
 from dav_gswt.coarse.ground import Ground
 from dav_gswt.coarse.rules import OnGround
 from dav_gswt.coarse.sweep import Relief, sweep
 from dav_gswt.field import Field
 from dav_gswt.fitting import exposure, trainer
-from dav_gswt.fitting.plan import AUTO, MOST_GAUSSIANS, Count, Plan
-from dav_gswt.fitting.rules import Anywhere
+from dav_gswt.fitting.plan import AUTO, MOST_GAUSSIANS, MOST_STEPS_PER_PHOTO, Count, Plan
+from dav_gswt.fitting.rules import Anywhere, Rules
 from dav_gswt.fitting.sampling import median_colours
 from dav_gswt.fitting.state import State
 from dav_gswt.views import View, over_ground
@@ -115,23 +115,40 @@ def refine(
 
     Ground that only they see is coloured by them; what they show to stand where nothing stood gets its shell; then all
     is fitted on: steps_per_photo for each new one, transparent Gaussians moved to where the errors are, under the cap.
-    Without new photos the field is handed on unchanged.
+    New photos that contradict the earlier ones change nothing (`bounded`); without any the field is handed on as it is.
     """
     if not new:
-        return Made(field, grid, {})
-    views = before + new
-    pixel = min(frame["flying_height"] / view.camera.fx for view in views)
-    plan = Plan(
-        AUTO if quality.steps_per_photo == AUTO else quality.steps_per_photo * len(new),
-        quality.cap,
-        quality.degree,
-        pose_rate=quality.pose_rate,
-    )
-    what = f"fit {len(new)} new photos"
+        return Made(field, grid, bounded.unchanged(field))
+    begun = _begun(field, grid, frame, before + new, quality, rng)
+
+    def on(start: Field, plan: Plan) -> trainer.Fitted:
+        return trainer.fit(start, begun.views, plan, begun.rules, rng, f"fit {len(new)} new photos", keep)
+
+    n = len(before)
+    found = bounded.update(field, begun.field, begun.views[:n], begun.views[n:], _plan(quality, len(new)), on)
+    if not found.taken:
+        return Made(field, grid, found.report)
+    return replace(_finished(found.field, begun.grid, begun.views), report=found.report)
+
+
+@dataclass(frozen=True)
+class _Begun:
+    """What a refinement starts from. views: all photos, counting where they are fitted."""
+
+    field: Field
+    grid: Ground
+    views: list[View]
+    rules: Rules
+
+
+def _begun(
+    field: Field, grid: Ground, frame: dict, views: list[View], quality: Quality, rng: np.random.Generator
+) -> _Begun:
+    """The field with what photos show and it lacks; its first Gaussians are the grid's, as before."""
     if not field.ground.any():
         rules = Anywhere(float(np.exp(np.median(field.log_scales))), _extent(field.means))
-        return _made(trainer.fit(field, views, plan, rules, rng, what, keep), grid, views)
-    scene = _look(frame, grid, views, pixel)
+        return _Begun(field, grid, views, rules)
+    scene = _look(frame, grid, views, min(frame["flying_height"] / view.camera.fx for view in views))
     there = field[grid.heights.size + underlay.count(grid) :]
     stand = _unknown(things.shell(scene.relief, scene.views), there, scene.relief.grid.spacing)
     stand = _like(_some(stand, _most(quality) - len(field), rng), field)
@@ -142,9 +159,15 @@ def refine(
     sh = field.sh.copy()
     sh[: known.size, :1][fresh.ravel()] = fields.sh_of(colour[fresh.ravel()])
     grid = replace(grid, seen=known)
-    rules = _rules(grid, scene.relief, there, frame)
     masked = sky.behind(scene.views, modelled(scene.views, grid))
-    return _made(trainer.fit(replace(field, sh=sh), masked, plan, rules, rng, what, keep), grid, masked)
+    return _Begun(replace(field, sh=sh), grid, masked, _rules(grid, scene.relief, there, frame))
+
+
+def _plan(quality: Quality, new: int) -> Plan:
+    """What an update may spend: so many steps for each new photo."""
+    given, most = quality.steps_per_photo, MOST_STEPS_PER_PHOTO * new
+    steps = AUTO if given == AUTO else given * new
+    return Plan(steps, quality.cap, quality.degree, pose_rate=quality.pose_rate, most_steps=most)
 
 
 @dataclass(frozen=True)
@@ -191,8 +214,13 @@ def _without_ground(grid, views, points, colours, quality, rng, keep, watch) -> 
 
 
 def _made(fitted: trainer.Fitted, grid: Ground, views: list[View]) -> Made:
-    field = underlay.as_sure(with_uncertainty(fitted.field, views), grid)
-    return Made(field, surface_of(field, grid) if field.ground.any() else grid, vars(fitted.report))
+    return replace(_finished(fitted.field, grid, views), report=vars(fitted.report))
+
+
+def _finished(fitted: Field, grid: Ground, views: list[View]) -> Made:
+    """A field with its uncertainty, over the surface that its discs have."""
+    field = underlay.as_sure(with_uncertainty(fitted, views), grid)
+    return Made(field, surface_of(field, grid) if field.ground.any() else grid, {})
 
 
 def _explained(grid: Ground, points: Float[Array, "n 3"], frame: dict) -> float:

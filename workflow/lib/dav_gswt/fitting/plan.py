@@ -7,6 +7,7 @@ AUTO = "auto"
 Count = int | Literal["auto"]  # a number, or: as many as the photos ask for
 
 MOST_STEPS = 6000  # of a fit that finds its own number
+MOST_STEPS_PER_PHOTO = 1000  # the same, of an update, for each new photo; the paper takes 5000
 MOST_GAUSSIANS = 2_000_000  # of a fit that finds its own cap
 MOST_DEGREE = 3  # of the spherical harmonics that a PLY can hold
 
@@ -19,6 +20,7 @@ class Plan:
     degree: of the spherical harmonics; reached one degree after the other. Each may be "auto": as much as makes a
     held-out share of pixels better. half_share: share of the steps taken at half the resolution.
     pose_rate: radians (and distances over the mean depth) that a camera may turn a step, at the start; 0: none moves.
+    most_steps: where steps is "auto".
     """
 
     steps: Count
@@ -26,6 +28,7 @@ class Plan:
     degree: Count = 0
     half_share: float = 0.0
     pose_rate: float = 0.0
+    most_steps: int = MOST_STEPS
 
     def __post_init__(self):
         for name, most in (("steps", None), ("cap", None), ("degree", MOST_DEGREE)):

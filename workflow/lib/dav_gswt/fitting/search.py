@@ -8,7 +8,7 @@ and taken back if it does not pay. Then rates fall and the fit settles.
 from dataclasses import dataclass
 
 from dav_gswt.fitting.held_out import GAIN, WINDOW
-from dav_gswt.fitting.plan import AUTO, MOST_DEGREE, MOST_GAUSSIANS, MOST_STEPS, Plan, Report
+from dav_gswt.fitting.plan import AUTO, MOST_DEGREE, MOST_GAUSSIANS, Plan, Report
 
 SETTLING = 0.5  # of the steps so far are taken once more with falling rates
 LEAST_SETTLING = 100
@@ -48,7 +48,7 @@ class Search:
 
     def done(self, step: int) -> bool:
         """No step is left."""
-        return self.end is not None and step >= self.end
+        return step >= (self.plan.most_steps if self.end is None else self.end)
 
     def cap(self, step: int, now: int) -> int | None:
         """How many Gaussians there may be after growing at this step; None: this step does not grow."""
@@ -79,7 +79,7 @@ class Search:
             self.growing = False
             report.chose("cap", now, why)
             return None
-        if self.plan.degree == AUTO and degree < MOST_DEGREE and not self._decided("degree", report):
+        if self.plan.degree == AUTO and self._room(degree, step) and not self._decided("degree", report):
             self.trying = degree + 1
             return "enrich"
         if self.plan.steps == AUTO and self.settled_from is None:
@@ -88,18 +88,23 @@ class Search:
 
     def _judge_trial(self, gain: float, degree: int, step: int, why: str, report: Report) -> str | None:
         paid = gain >= GAIN
-        self.trying = degree + 1 if paid and degree < MOST_DEGREE else None
+        self.trying = degree + 1 if paid and self._room(degree, step) else None
         if self.trying is None:
             report.chose("degree", degree if paid else degree - 1, why)
         return ("enrich" if self.trying else None) if paid else "take back"
 
+    def _room(self, degree: int, step: int) -> bool:
+        """There is a next degree, and time to judge it and to settle."""
+        most = self.plan.most_steps if self.plan.steps == AUTO else self.end
+        return degree < MOST_DEGREE and step + 2 * self.window <= most
+
     def _bound(self, step: int, report: Report) -> None:
-        if self.settled_from is None and step >= MOST_STEPS * (1 - SETTLING):
-            self._settle(step, f"the most steps there are ({MOST_STEPS})", report)
+        if self.settled_from is None and step >= self.plan.most_steps * (1 - SETTLING):
+            self._settle(step, f"the most steps there are ({self.plan.most_steps})", report)
 
     def _settle(self, step: int, why: str, report: Report) -> None:
         self.settled_from = step
-        self.end = step + max(LEAST_SETTLING, int(SETTLING * step))
+        self.end = min(step + max(LEAST_SETTLING, int(SETTLING * step)), max(step, self.plan.most_steps))
         self.growing = False
         report.chose("steps", self.end, why)
 

@@ -22,16 +22,14 @@ LINK = 30  # points that a start view shares with one chosen before: enough to f
 Bounds = tuple[float, float, float, float]  # west, south, east, north
 
 
-def split(
-    model: Model, frame: dict, start: int, rng: np.random.Generator, whole: bool = False
-) -> dict[str, list[str]]:
+def split(model: Model, frame: dict, start: int, rng: np.random.Generator, whole: bool = False) -> dict[str, list[str]]:
     """Names of the start views, the pool and the test views.
 
     whole: all ground that the photos see is in question, not the exemplar alone.
     Only images that see at least LEAST_SIGHT of it take part: others show ground that no tile is made of. Where too few
     would remain, all take part.
     Test views are those that ground.json names; where it names none, about one photo in ten, at least two, spread over
-    the ground in question: the same whatever the seed. Start views are `start` others, fewer where there are not as many.
+    the ground in question: the same whatever the seed. Start views are `start` others, or as many as there are.
     Raises: InputError: ground.json names a test view that is no image, or no view is left to start from.
     """
     given = _given_test(model, frame)

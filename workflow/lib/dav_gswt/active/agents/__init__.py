@@ -19,13 +19,15 @@ from dav_gswt.photos import lenses, synthetic
 def capture(site: Site, split: dict, before: list, chosen: list[dict], folder: Path) -> None:
     """Fill `folder` with the photos of the chosen poses and capture.json, their record.
 
-    before: the capture folders of earlier rounds.
+    before: the capture folders of earlier rounds. Where no pose was chosen no agent is asked for anything.
     """
     pool = candidates.left(site.scene, site.frame, site.photos / "sparse", split, before)
     asked = candidates.as_asked(pool, chosen)
     folder.mkdir(parents=True, exist_ok=True)
     agent = site.scene["agent"]
-    if agent == "replay":
+    if not asked:
+        taken = []
+    elif agent == "replay":
         frames = {pose.name: camera for pose, camera in pool}
         taken = replay.take(site.photos, frames, asked, site.burst, folder, site.unit)
     elif agent == "render":

@@ -1,0 +1,90 @@
+"""How long a round of active views takes: choosing among 1000 candidates, and a whole round of the desert at `draft`.
+
+Every figure goes to results/bench.json. The round: scores with the prior, selection, four rendered photos, the update,
+as the workflow runs them, its own start included; then the same without a prior.
+"""
+
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from record import record
+
+from dav_gswt.active.policies import POLICIES, Wanted
+from dav_gswt.active.poses import Pose, place
+from dav_gswt.active.scores import TERMS, Scores
+from dav_gswt.active.uncertainty.weighing import Scales
+from dav_gswt.perceptual import weights
+from dav_gswt.photos import rigs
+
+ROOT = Path(__file__).resolve().parents[1]
+CANDIDATES, PHOTOS, CHOSEN = 1000, 28, 20
+NEEDY = {"fisher", "oracle"}  # policies that look at more than scores
+REPEATS = 5
+CELLS = {
+    "round_draft_seconds": ("scores_terrain_pdrop0.15", "active_w2-lpips-diverse_terrain_pdrop0.15_lam0.1_k4"),
+    "round_draft_geometric_seconds": ("scores_none_pdrop0", "active_farthest_none_pdrop0_lam0_k4"),
+}
+TARGETS = {"select_1000_seconds": 0.2, "round_draft_seconds": 45}
+
+
+def selection() -> dict[str, float]:
+    """The slowest policy that goes by scores alone, choosing as many as a round of the paper."""
+    places = rigs.hemisphere(CANDIDATES, 30.0, 7.0)
+    found = [Pose(f"pose_{i:04d}", *p) for i, p in enumerate(places)]
+    rng = np.random.default_rng(0)
+    terms = {name: rng.uniform(0, 1, CANDIDATES) for name in TERMS}
+    scores = Scores(found, terms, Scales.frozen(terms), np.full(CANDIDATES, 8))
+    captured = np.array([place(pose) for pose in found[:PHOTOS]])
+    out = {}
+    for name, policy in POLICIES.items():
+        if name in NEEDY:
+            continue
+        times = []
+        for _ in range(REPEATS):
+            start = time.perf_counter()
+            policy(scores, Wanted(captured, CHOSEN, np.random.default_rng(0), 0.1))
+            times.append(time.perf_counter() - start)
+        out[name] = min(times)
+    slowest = max(out, key=out.get)
+    print(f"the slowest policy is {slowest}")
+    return {"select_1000_seconds": out[slowest]}
+
+
+def rounds() -> dict[str, float]:
+    """Wall-clock seconds of round 1, from the coarse field to the updated one."""
+    if not (lpips := weights.found()):
+        print(f"round: skipped, LPIPS's weights are not there (snakemake {weights.PATH} fetches them)")
+        return {}
+    out = {}
+    with tempfile.TemporaryDirectory(prefix="round-") as folder:
+        there = Path(folder) / weights.PATH
+        there.parent.mkdir(parents=True)
+        there.write_bytes(Path(lpips).read_bytes())
+        fit = "results/desert/seed0/draft"
+        _made(folder, f"{fit}/coarse/field.ply")
+        for name, (scored, cell) in CELLS.items():
+            start = time.perf_counter()
+            _made(folder, f"{fit}/{cell}/iter1/field.ply", f"{fit}/coarse/{scored}/scores.csv")
+            out[name] = time.perf_counter() - start
+    return out
+
+
+def _made(folder: str, *targets: str) -> None:
+    options = ["--snakefile", ROOT / "Snakefile", "--directory", folder, "--cores", "2", "--quiet", "all"]
+    options += ["--configfile", ROOT / "config/config.yaml", "--"]
+    subprocess.run([sys.executable, "-m", "snakemake", *map(str, options), *targets], check=True)
+
+
+def main() -> None:
+    values = selection() | rounds()
+    for name, value in values.items():
+        print(f"{name}: {value:.3g}" + (f" (target {TARGETS[name]:g})" if name in TARGETS else ""))
+    record(values)
+
+
+if __name__ == "__main__":
+    main()

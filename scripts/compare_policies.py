@@ -1,0 +1,14 @@
+"""Rule compare_policies: from curves to tables and a figure."""
+
+from dav_gswt import figures
+from dav_gswt.active.benchmark import curves, plots, tables
+from dav_gswt.logs import logging_to
+
+with logging_to(snakemake.log[0]):
+    out, baseline = snakemake.output, snakemake.params.baseline
+    rounds = curves.read(snakemake.input.curves)
+    results = tables.results(rounds)
+    compared = tables.comparisons(results, baseline)
+    figures.write_rows(out.results, results)
+    figures.write_rows(out.compared, compared)
+    plots.write(out.plot, rounds, compared, baseline)

@@ -1,0 +1,9 @@
+"""Rule gather_curves: the cells' rounds, row by row, added to those of earlier runs."""
+
+from dav_gswt.active.benchmark import curves
+from dav_gswt.logs import logging_to
+
+with logging_to(snakemake.log[0]):
+    path = snakemake.output.curves
+    new = [row for cell in snakemake.params.cells for row in curves.rows(cell)]
+    curves.write(path, curves.merged(curves.read(path), new))

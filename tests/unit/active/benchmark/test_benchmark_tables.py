@@ -1,0 +1,111 @@
+"""From rounds to curves, from curves to results and comparisons: rows by hand, and what may not be paired."""
+
+import json
+
+import pytest
+
+from dav_gswt.active.benchmark import curves, plots, tables
+
+CELL = dict(scene="flowers", seed=0, quality="draft", policy="farthest", prior="none", p_drop="0", lam="0", k=4)
+
+
+def rounds(psnr, photos=(8, 12, 16), **cell):
+    rest = {"ssim": 0.8, "lpips": None, "worst_psnr": 20.0, "walker_psnr": None, "seconds": 2.0, "evaluations": 10}
+    about = {"version": "1", "renderer": "cpu", "field": "f"}
+    return [
+        CELL | cell | {"round": t, "photos": n, "psnr": float(p)} | rest | about
+        for t, (n, p) in enumerate(zip(photos, psnr, strict=True))
+    ]
+
+
+ALL = rounds([20, 26], (8, 48), policy="all")
+
+
+def metrics(folder, t, **groups):
+    mean = {"psnr": 20.0 + t, "psnr_colour_corrected": 21.0 + t, "ssim": 0.5, "lpips": 0.25}
+    told = mean | {"worst_decile": mean, "groups": groups, "photos": 8 + 4 * t}
+    told |= {"provenance": {"version": "0.1", "renderer": {"backend": "cpu"}, "inputs": {"field": 64 * "a"}}}
+    (path := folder / f"metrics{t}.json").write_text(json.dumps(told))
+    return str(path)
+
+
+def cell(folder, **given):
+    (facts := folder / "scores.json").write_text(json.dumps({"poses_by_steps": {"2": 30, "8": 10}}))
+    (time := folder / "job.tsv").write_text("s\th:m:s\n1.5\t0:00:01\n")
+    files = {"facts": [str(facts)], "times": [[str(time), str(time)]]}
+    return CELL | {"corrected": False, "samples": 5} | files | {"metrics": [metrics(folder, t) for t in (0, 1)]} | given
+
+
+def test_a_row_a_round_with_what_it_cost(tmp_path):
+    start, first = curves.rows(cell(tmp_path))
+    assert (start["round"], start["photos"], start["psnr"], start["seconds"], start["evaluations"]) == (0, 8, 20, 0, 0)
+    assert (first["round"], first["photos"], first["psnr"], first["seconds"]) == (1, 12, 21, 3)
+    assert first["evaluations"] == 5 * (2 * 30 + 8 * 10) and first["field"] == 12 * "a"
+    assert curves.rows(cell(tmp_path, corrected=True))[0]["psnr"] == 21
+
+
+def test_views_away_from_where_photos_may_be_taken_count_apart(tmp_path):
+    group = {"psnr": 30.0, "psnr_colour_corrected": 31.0, "ssim": 0.9, "lpips": 0.1, "worst_decile": {"psnr": 29.0}}
+    row = curves.rows(cell(tmp_path) | {"metrics": [metrics(tmp_path, 0, high=group, walker={"psnr": 10.0})]})[0]
+    assert (row["psnr"], row["worst_psnr"], row["walker_psnr"]) == (30, 29, 10)
+
+
+def test_a_job_without_a_benchmark_leaves_no_time(tmp_path):
+    assert curves.rows(cell(tmp_path, times=[[str(tmp_path / "none.tsv")]]))[1]["seconds"] is None
+
+
+def test_rows_survive_the_file_and_runs_add_up(tmp_path):
+    path = tmp_path / "curves.csv"
+    assert curves.read(path) == []
+    old, other = rounds([20, 21, 22]), rounds([19, 20, 21], seed=1)
+    curves.write(path, curves.merged(old, other))
+    assert curves.read(path) == old + other
+    again = curves.merged(curves.read(path), rounds([20, 23], (8, 12)))
+    assert [row["psnr"] for row in again if row["seed"] == 0] == [20, 23, 22] and len(again) == 6
+
+
+def test_results_by_hand():
+    (row,) = tables.results(rounds([20, 22, 24]) + ALL)
+    assert row["nauc"] == 22 and row["gap"] == 2 and row["photos"] == 16
+    assert row["to_reach"] is None and row["seconds"] == 4 and row["evaluations"] == 30
+    (near,) = tables.results(rounds([20, 25, 25.8]) + ALL)
+    assert near["to_reach"] == pytest.approx(12 + 4 * 0.7 / 0.8)
+    (alone,) = tables.results(rounds([20, 22, 24]))
+    assert alone["gap"] is None and alone["to_reach"] is None
+
+
+def test_all_photos_of_another_seed_are_no_goal():
+    (row,) = tables.results(rounds([20, 22, 24], seed=1) + ALL)
+    assert row["gap"] is None
+
+
+def test_policies_are_paired_with_the_baseline():
+    both = [rounds([20, 21, 22], seed=s) + rounds([20, 21 + s, 22], seed=s, policy="w2") for s in range(3)]
+    table = tables.results([row for rows in both for row in rows])
+    every, alone = tables.comparisons(table, "farthest")
+    assert every["scene"] == tables.EVERY and (alone["scene"], alone["k"]) == ("flowers", 4)
+    assert every["units"] == 3 and every["mean"] == pytest.approx(0.5)
+    assert (every["wins"], every["ties"], every["losses"]) == (2, 1, 0)
+    assert every["holm"] == every["p"] and alone["holm"] is None
+
+
+def test_cells_that_end_with_other_photos_or_start_elsewhere_are_not_paired():
+    base = rounds([20, 21, 22])
+    for other in (rounds([20, 21], (8, 12), policy="w2"), rounds([20, 21, 22], seed=1, policy="w2")):
+        assert tables.comparisons(tables.results(base + other), "farthest") == []
+    assert tables.comparisons(tables.results(rounds([20, 21, 22], policy="w2")), "farthest") == []
+
+
+def test_settings_of_a_policy_are_policies_of_their_own():
+    some = [rounds([20, 21, 22 + i], policy="w2-lpips", prior="terrain", lam=str(i)) for i in range(2)]
+    compared = tables.comparisons(tables.results(rounds([20, 21, 22]) + some[0] + some[1]), "farthest")
+    assert [(row["lam"], row["mean"]) for row in compared if row["scene"] == tables.EVERY] == [("0", 0), ("1", 0.25)]
+
+
+def test_the_figure_is_whole_and_the_same_twice(tmp_path):
+    table = rounds([20, 22, 24]) + rounds([20, 21, 22], policy="random") + rounds([20, 23, 25], policy="oracle") + ALL
+    compared = tables.comparisons(tables.results(table), "farthest")
+    for name in ("a.png", "b.png"):
+        plots.write(tmp_path / name, table, compared, "farthest")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")

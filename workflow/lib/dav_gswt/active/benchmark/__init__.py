@@ -1,0 +1,1 @@
+"""What policies are worth: curves of quality against photos, and paired comparisons with intervals."""
