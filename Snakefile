@@ -23,6 +23,7 @@ include: "rules/prior.smk"
 include: "rules/active.smk"
 include: "rules/benchmark.smk"
 include: "rules/views.smk"
+include: "rules/completion.smk"
 include: "rules/levels.smk"
 include: "rules/tiles.smk"
 include: "rules/bundle.smk"
@@ -43,6 +44,8 @@ wildcard_constraints:
     k=NATURAL,
     stop=STOP,
     t=NATURAL,
+    painter=PAINTER,
+    completed=COMPLETED,
     level=NATURAL,
     seam=NAME,
     tau=FRACTION,

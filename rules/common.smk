@@ -8,7 +8,7 @@ import dav_gswt
 from dav_gswt.active.names import AT_ZERO, GEOMETRIC, IMAGINING
 from dav_gswt.config import check
 from dav_gswt.errors import InputError
-from dav_gswt.spelling import read_stop, spell, spell_stop
+from dav_gswt.spelling import read_stop, spell, spell_completed, spell_stop
 
 LIBRARY = Path(dav_gswt.__file__).parent
 VIEWER = sorted(str(p) for p in Path(workflow.basedir, "workflow/viewer").iterdir())
@@ -31,8 +31,8 @@ pathvars:
     scored="<coarse>/scores_{prior}_pdrop{p_drop}",
     active="<fit>/active_{policy}_{prior}_pdrop{p_drop}_lam{lam}_k{k}{stop}",
     round="<active>/iter{t}",
-    levels="<round>/levels",
-    tiles="<round>/tiles_{seam}",
+    levels="<round>{completed}/levels",
+    tiles="<round>{completed}/tiles_{seam}",
     bundle="<tiles>/bundle_tau{tau}",
     terrain="<bundle>/terrain",
 
@@ -47,6 +47,8 @@ STOP = rf"(?:_upto{POSITIVE})?(?:_worth(?!0/)(?:{NUMBER}))?"  # or nothing
 NEVER = r"(?!)"  # a constraint that nothing meets
 # What reads no prior has one spelling of it: the names look at what follows them in a path.
 PRIOR = "|".join(["none(?=_pdrop0[_/])", *config["priors"]])
+PAINTER = "|".join(name for name, prior in config["priors"].items() if prior["model"] == "terrain") or NEVER
+COMPLETED = rf"(?:/completed_(?:{PAINTER}))?"  # or nothing
 
 
 def way(policy):
@@ -116,6 +118,8 @@ def values_of(scene, policy=config["policy"]):
         k=0 if given else config["k"],
         stop="" if given else spell_stop(config["stop"]),
         t=0 if given else config["rounds"],
+        painter=config["prior"],
+        completed="" if given else spell_completed(config["complete"], config["prior"]),
         seam=config["scenes"][scene]["seam"],
         tau=spell(config["tau"]),
     )
@@ -133,11 +137,13 @@ def study_of(scene):
     values = values_of(scene)
     rounds = [rules.evaluate_round.output.metrics] * bool(config["rounds"])
     scored = rules.score_round.output if config["rounds"] else rules.score_coarse.output
+    completed = [rules.evaluate_completed.output.metrics] * config["complete"]
     return (
         expand(rules.report_photos.output.page, scene=scene)
         + expand(rules.evaluate_coarse.output.metrics, **values)
         + expand(rounds, **(values | {"t": range(1, config["rounds"] + 1)}))
         + expand(list(scored), **values)
+        + expand(completed, **values)
     )
 
 
@@ -240,6 +246,14 @@ def prior_of(wildcards):
         if key in entry and not Path(entry[key]).exists():
             raise WorkflowError(f"config: priors.{wildcards.prior}.{key}: there is no {entry[key]}; see docs/prior.md")
     return files
+
+
+def painter_of(wildcards):
+    """The weights of the prior that paints what no photo saw."""
+    weights = config["priors"][wildcards.painter].get("weights", str(LIBRARY / "prior/terrain.safetensors"))
+    if not Path(weights).exists():
+        raise WorkflowError(f"config: priors.{wildcards.painter}.weights: there is no {weights}; see docs/prior.md")
+    return {"weights": weights}
 
 
 def lpips_if_fetched(wildcards):

@@ -1,6 +1,6 @@
 """Levels of detail: ever coarser fields of the exemplar, each fitted to what its finer neighbour shows.
 
-In: the last round's field and ground. Out: level{l}.ply and its grid level{l}.exr, from fine to coarse.
+In: the last round's field and ground, completed or not. Out: level{l}.ply and its grid level{l}.exr, from fine to coarse.
 """
 
 
@@ -8,8 +8,8 @@ rule crop_level:
     """The finest level: the field's exemplar and a margin, in whole blocks of the coarsest level's cells."""
     input:
         unpack(maps_of_round),
-        field="<results>/<round>/field.ply",
-        ground="<results>/<round>/ground.exr",
+        field="<results>/<round>{completed}/field.ply",
+        ground="<results>/<round>{completed}/ground.exr",
     output:
         field="<results>/<levels>/level0.ply",
         ground="<results>/<levels>/level0.exr",

@@ -1,11 +1,8 @@
 """Rule begin_active: round 0 is the coarse field."""
 
-from shutil import copyfile
-
-from dav_gswt.files import whole
+from dav_gswt.files import copied
 from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):
     for source, target in zip(snakemake.input, snakemake.output, strict=True):
-        with whole(target) as part:
-            copyfile(source, part)
+        copied(source, target)

@@ -61,6 +61,8 @@ def check(config: dict, schema: Path) -> None:
     if config["prior"] not in config["priors"]:
         known = ", ".join(config["priors"]) or "nothing"
         raise InputError(f"config: prior: there is no {config['prior']!r}; priors has {known}")
+    if config["complete"]:
+        _check_complete(config)
     for name, scene in config["scenes"].items():
         for key, table in (("quality", "qualities"), ("seam", "seams")):
             if scene[key] not in config[table]:
@@ -68,6 +70,21 @@ def check(config: dict, schema: Path) -> None:
                 raise InputError(f"config: scenes.{name}.{key}: there is no {scene[key]!r}; {table} has {known}")
     if "benchmark" in config:
         _check_benchmark(config["benchmark"], config["scenes"])
+
+
+def _check_complete(config: dict) -> None:
+    """What no photo saw can be completed where there are photos, by a prior that knows depth."""
+    if config["scenes"][config["scene"]]["kind"] == "field":
+        raise InputError(
+            f"config: complete: {config['scene']} is a finished field: without photos nothing tells what they did not "
+            "see, and there is nothing to complete; set complete: false"
+        )
+    if config["priors"][config["prior"]]["model"] != "terrain":
+        able = ", ".join(name for name, prior in config["priors"].items() if prior["model"] == "terrain") or "none is"
+        raise InputError(
+            f"config: complete: the prior {config['prior']} knows neither depth nor what is known already; set prior "
+            f"to one of model terrain ({able} in priors), or complete: false"
+        )
 
 
 def _check_benchmark(asked: dict, scenes: dict) -> None:

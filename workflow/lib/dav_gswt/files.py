@@ -30,6 +30,12 @@ def whole(path: Path | str):
         part.unlink(missing_ok=True)
 
 
+def copied(source: Path | str, target: Path | str) -> None:
+    """A file's bytes at another path, whole or not at all."""
+    with whole(target) as part:
+        shutil.copyfile(source, part)
+
+
 @contextmanager
 def whole_folder(path: Path | str):
     """A folder beside `path` to fill; it takes `path`'s place when the block ends well, and goes when it does not.

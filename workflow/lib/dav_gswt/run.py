@@ -14,7 +14,7 @@ from dav_gswt import config
 from dav_gswt.errors import InputError
 from dav_gswt.narration import Narrator
 from dav_gswt.raster import backends
-from dav_gswt.spelling import spell, spell_stop
+from dav_gswt.spelling import spell, spell_completed, spell_stop
 
 CONFIG = Path("config/config.yaml")
 SMALLER = Path("config/without_compiler.yaml")
@@ -132,8 +132,9 @@ def pages(given: dict) -> list[Path]:
     scene = given["scenes"][given["scene"]]
     stop = spell_stop(given["stop"])
     views = ("given", "0", 0) if scene["kind"] == "field" else (given["policy"], f"{given['k']}{stop}", given["rounds"])
-    branch = "seed{}/{}/active_{}_*_k{}/iter{}/tiles_{}/bundle_tau{}".format(
-        given["seeds"][0], scene["quality"], *views, scene["seam"], spell(given["tau"])
+    completed = "" if scene["kind"] == "field" else spell_completed(given["complete"], given["prior"])
+    branch = "seed{}/{}/active_{}_*_k{}/iter{}{}/tiles_{}/bundle_tau{}".format(
+        given["seeds"][0], scene["quality"], *views, completed, scene["seam"], spell(given["tau"])
     )
     folder = Path("results", given["scene"])
     found = list(folder.glob(f"{branch}/terrain/page/index.html")) or folder.rglob("terrain/page/index.html")

@@ -17,6 +17,11 @@ def spell_stop(stop: dict) -> str:
     return "".join(f"{mark}{spell(stop[key])}" for key, mark in STOPS.items() if key in stop)
 
 
+def spell_completed(complete: bool, prior: str) -> str:
+    """The directory level of a completed field, as it follows its round's; empty where none is asked for."""
+    return f"/completed_{prior}" if complete else ""
+
+
 def read_stop(spelled: str) -> dict:
     """The config's `stop` that a branch's name spells. Raises: ValueError: it is none."""
     pattern = "".join(rf"(?:{mark}(?P<{key}>[\d.]+))?" for key, mark in STOPS.items())

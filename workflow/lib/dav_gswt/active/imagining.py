@@ -53,6 +53,11 @@ def asked(entry: dict | None, p_drop: float, seed: int, lpips_file: Path | str |
     return Asking(opened(entry), p_drop=p_drop, seed=seed, weights=weights, **how)
 
 
+def painter(entry: dict, seed: int) -> Asking:
+    """A config's entry of `priors`, to be asked for pictures, without dropout."""
+    return Asking(opened(entry), entry["samples"], entry["steps"], 0.0, seed)
+
+
 def opened(entry: dict) -> Prior:
     """The prior of a config's entry. Raises: InputError: its weights are missing or not to be trusted."""
     if entry["model"] == "terrain":

@@ -1,7 +1,7 @@
 """Maps of candidate poses: kept for all of them in one file, shown for some as parts of an EXR."""
 
 import zipfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.active.scores import Scores
 from dav_gswt.errors import InputError
+from dav_gswt.field import Field
 from dav_gswt.files import whole
 from dav_gswt.images import enlarged
 
@@ -50,6 +51,14 @@ def _over(square: Float32[Array, "s s"], shape: tuple[int, int]) -> Float32[Arra
     out = np.full(shape, np.nan, np.float32)
     out[top : top + side, left : left + side] = enlarged(square, side, side)
     return out
+
+
+def doubted(field: Field, gaussians: Float32[Array, "g"]) -> Field:
+    """The field with the uncertainty that maps gave its first Gaussians. What was imagined since stays as it is, in
+    full doubt: the maps are of the field before."""
+    doubt = field.uncertainty.copy()
+    doubt[: len(gaussians)] = np.where(field.imagined[: len(gaussians)], doubt[: len(gaussians)], gaussians)
+    return replace(field, uncertainty=doubt)
 
 
 def write(path: Path | str, maps: PoseMaps, gaussians: Float32[Array, "g"]) -> None:
