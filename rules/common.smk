@@ -168,17 +168,21 @@ def compared_cells():
         for scene, policy, seed, k in product(
             group["scenes"], group.get("policies", asked["policies"]), asked["seeds"], group["k"]
         ):
-            if policy != "all" or k == group["k"][0]:  # all of the pool is one round, whatever k is
+            policy = {"policy": policy} if isinstance(policy, str) else policy
+            if policy["policy"] != "all" or k == group["k"][0]:  # all of the pool is one round, whatever k is
                 cells.append(compared_cell(scene, policy, seed, k, group["photos"]))
     return cells
 
 
-def compared_cell(scene, policy, seed, k, photos):
+def compared_cell(scene, asked, seed, k, photos):
     """One of them: rounds of k from the scene's start until there are so many photos."""
-    entry = config["scenes"][scene]
+    entry, policy = config["scenes"][scene], asked["policy"]
     rounds = 1 if policy == "all" else (photos - entry["start"]) // k
-    values = values_of(scene, policy) | {"seed": seed, "k": k, "stop": ""}
-    before, after, made = range(1, rounds), range(1, rounds + 1), rules.score_round
+    own = {
+        key: asked[key] if key == "prior" else spell(asked[key]) for key in ("prior", "p_drop", "lam") if key in asked
+    }
+    values = values_of(scene, policy) | own | {"seed": seed, "k": k, "stop": ""}
+    before, after = range(1, rounds), range(1, rounds + 1)
 
     def of(first, later, ts):
         return expand(first, **values) + expand(later, **(values | {"t": ts}))

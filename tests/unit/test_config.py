@@ -59,6 +59,7 @@ def test_what_is_wrong_is_named(config, keys, value, named):
         pytest.param(
             {"sets": [{"scenes": ["desert"], "k": [4], "photos": 20}]}, "desert is no scene with", id="no pool"
         ),
+        pytest.param({"policies": ["farthest", {"policy": "w2", "prior": "x"}]}, "no prior 'x'", id="no such prior"),
         pytest.param({"sets": [{"scenes": ["moon"], "k": [4], "photos": 20}]}, "moon is no scene", id="no scene"),
         pytest.param(
             {"sets": [{"scenes": ["desert_pool"], "k": [4], "photos": 11}]}, "leave no round of 4", id="no room"

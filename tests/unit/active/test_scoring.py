@@ -30,6 +30,9 @@ class Doubting:
         signs = np.where(np.arange(m) % 2, -1.0, 1.0)[None, :, None, None, None]
         return (p_drop * signs * blue[:, None, None]).repeat(4, 2).astype(np.float32)
 
+    def shown(self, condition):
+        return 0.5 * condition.colour[..., 2:].repeat(4, -1).transpose(0, 3, 1, 2)
+
     def variances(self, latents):
         return np.zeros_like(latents)
 
@@ -77,6 +80,13 @@ def test_a_latents_own_width_counts_where_it_is_asked_for():
     assert np.array_equal(point, posterior)
     wider = scored(Asking(Uneven(), 2, 4, 0.2, posterior=True)).scores.terms["w2_sq"]
     np.testing.assert_allclose(wider - point, 4.0, rtol=1e-5)  # deviations 0 and 1, in four channels
+
+
+def test_the_residual_is_how_far_the_mean_of_the_samples_lies_from_the_render():
+    """Samples to either side of nothing: their mean stays, whatever they differ by."""
+    little, much = (scored(Asking(Doubting(), 2, 4, p)).scores.terms["residual"] for p in (0.1, 0.4))
+    np.testing.assert_allclose(little, much, rtol=1e-6)
+    np.testing.assert_allclose(little[0], 4 * (0.5 * 0.4) ** 2, rtol=0.2)
 
 
 def test_samples_may_start_from_noises_of_their_own():

@@ -75,6 +75,12 @@ def test_w2_does_without_lpips_and_gradients_stand_in_for_it():
     assert chosen("grad-lpips", pool, 1) == ["p2"] and chosen("grad-lpips", pool, 1, lam=1e6) == ["p0"]
 
 
+def test_the_expected_error_ranks_alone_or_weighs_what_is_to_have_a_photo_near():
+    pool = scored(0, 3, 6, 120, 240, residual=[1.0, 1.1, 1.0, 0.5, 0.1])
+    assert chosen("residual", pool, 3, captured=()) == ["p1", "p0", "p2"]
+    assert chosen("residual-diverse", pool, 2, captured=()) == ["p1", "p3"]
+
+
 def test_doubt_and_diversity_share_the_choice():
     """The most doubtful are neighbours: one photo tells about all of them."""
     pool = scored(0, 3, 6, 120, 240, w2_sq=[1.0, 1.1, 1.0, 0.5, 0.4], lpips=[0.0] * 5)
@@ -133,7 +139,7 @@ def test_random_depends_on_its_generator_alone():
 
 @pytest.mark.parametrize("policy", POLICIES)
 def test_a_pool_that_is_too_small_is_taken_whole_and_said_so(policy, caplog):
-    terms = dict(w2_sq=[0.0, 1], gradient=[1.0, 2], fisher=[1.0, 2], lpips=[1.0, 1], single=[0.1, 0])
+    terms = dict(w2_sq=[0.0, 1], gradient=[1.0, 2], fisher=[1.0, 2], lpips=[1.0, 1], single=[0.1, 0], residual=[0.1, 0])
     more = dict(information=Sharing([1.0, 2]), errors=np.array([0.5, np.nan]))
     assert sorted(chosen(policy, scored(0, 90, **terms), 5, **more)) == ["p0", "p1"]
     assert "only 2 candidates" in caplog.text

@@ -10,7 +10,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.prior import weights
 from dav_gswt.prior.interface import Condition, Prior
 from dav_gswt.prior.networks import CODE, SIZE, Network
-from dav_gswt.prior.terrain import Terrain
+from dav_gswt.prior.terrain import Terrain, planes_of_render
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +55,15 @@ def test_a_latent_stands_for_as_much_as_the_coder_says(prior):
         pictures = prior.network.decoded(torch.from_numpy(latents[1]))
         expected = prior.network.posterior(pictures).std * prior.network.scale
     np.testing.assert_allclose(np.sqrt(found[1]), expected.numpy(), rtol=1e-4)
+
+
+def test_what_the_field_shows_is_the_code_of_its_render(prior):
+    given = condition()
+    shown = prior.shown(given)
+    assert shown.shape == (3, *CODE)
+    np.testing.assert_array_equal(shown, prior.encoded(planes_of_render(given)).numpy())
+    other = replace(given, photo=given.photo[::-1].copy(), relative=given.relative[::-1].copy())
+    np.testing.assert_array_equal(prior.shown(other), shown)
 
 
 def test_a_view_does_not_depend_on_the_others(prior):

@@ -206,6 +206,16 @@ def test_latents_are_scaled(prior):
     np.testing.assert_allclose(prior.decoded(latents).rgba, expected, atol=1e-6)
 
 
+def test_what_the_field_shows_is_a_latent_too(prior):
+    """The render stands over white, as the pictures that it paints do."""
+    given = condition(1)
+    clear = replace(given, colour=np.zeros_like(given.colour), alpha=np.zeros_like(given.alpha))
+    with torch.inference_mode():
+        expected = prior.parts.coder.encode(torch.ones(1, 3, SIZE, SIZE)).latent_dist.mode() * 0.18215
+    np.testing.assert_allclose(prior.shown(clear), expected.numpy(), atol=1e-5)
+    assert np.abs(prior.shown(given) - expected.numpy()).max() > 1e-3
+
+
 def test_samples_may_start_from_noises_of_their_own(prior):
     own = prior.samples(condition(1), 2, 0.0, 2, 0, common=False)
     np.testing.assert_allclose(own[:, 0], prior.samples(condition(1), 1, 0.0, 2, 0)[:, 0], atol=1e-4)

@@ -69,7 +69,7 @@ def check(config: dict, schema: Path) -> None:
                 known = ", ".join(config[table])
                 raise InputError(f"config: scenes.{name}.{key}: there is no {scene[key]!r}; {table} has {known}")
     if "benchmark" in config:
-        _check_benchmark(config["benchmark"], config["scenes"])
+        _check_benchmark(config["benchmark"], config["scenes"], config["priors"])
 
 
 def _check_complete(config: dict) -> None:
@@ -87,11 +87,15 @@ def _check_complete(config: dict) -> None:
         )
 
 
-def _check_benchmark(asked: dict, scenes: dict) -> None:
+def _check_benchmark(asked: dict, scenes: dict, priors: dict) -> None:
     """Policies can be compared where every scene starts from some of its photos and all cells take at least a round."""
     if asked["baseline"] not in asked["policies"]:
         raise InputError(f"config: benchmark.baseline: {asked['baseline']} is not among benchmark.policies")
     for i, group in enumerate(asked["sets"]):
+        for policy in group.get("policies", asked["policies"]):
+            if not isinstance(policy, str) and policy.get("prior", next(iter(priors), None)) not in priors:
+                known = ", ".join(priors) or "nothing"
+                raise InputError(f"config: benchmark: there is no prior {policy['prior']!r}; priors has {known}")
         for name in group["scenes"]:
             if "start" not in scenes.get(name, {}):
                 raise InputError(

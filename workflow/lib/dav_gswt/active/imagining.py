@@ -110,7 +110,8 @@ def _some(prior: Asking, condition: Condition, names: list[str], steps: int, cou
         if prior.p_drop == 0 and not prior.noises:
             one, render = ((2 * p - 1) * counts[..., None] for p in (pictures[:, 0], condition.colour))
             single = lpips.distance(one, render, prior.weights)
-    return Terms(over(maps, counts), between, image_gradient(pictures, names=names), maps, single)
+    apart = ((latents.mean(1) - prior.model.shown(condition)) ** 2).sum(1)
+    return Terms(over(maps, counts), between, image_gradient(pictures, names=names), maps, single, over(apart, counts))
 
 
 def over(maps: Float32[Array, "n h w"], counts: Float32[Array, "n s s"]) -> Float64[Array, "n"]:

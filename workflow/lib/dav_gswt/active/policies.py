@@ -97,6 +97,16 @@ def single(scores: Scores, wanted: Wanted) -> list[int]:
     return top(scores.term("single"), wanted.k)
 
 
+def residual(scores: Scores, wanted: Wanted) -> list[int]:
+    """The k candidates whose picture the prior expects to differ most from the render."""
+    return top(scores.term("residual"), wanted.k)
+
+
+def residual_diverse(scores: Scores, wanted: Wanted) -> list[int]:
+    """Facility location weighed by the same: where the render looks wrong a photo is to be near."""
+    return facility.located(_places(scores.poses), wanted.captured, scores.term("residual"), wanted.k)
+
+
 def w2_lpips(scores: Scores, wanted: Wanted) -> list[int]:
     """The k candidates of greatest u = W2 + lam LPIPS, each over its frozen scale: the paper's Algorithm 1."""
     return top(doubt(scores, wanted.lam), wanted.k)
@@ -147,6 +157,8 @@ POLICIES: dict[str, Callable[[Scores, Wanted], list[int]]] = {
     "grad-lpips": grad_lpips,
     "w2": w2,
     "single": single,
+    "residual": residual,
+    "residual-diverse": residual_diverse,
     "w2-lpips": w2_lpips,
     "w2-lpips-diverse": w2_lpips_diverse,
     "shuffled": shuffled,

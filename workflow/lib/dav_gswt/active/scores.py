@@ -16,7 +16,7 @@ from dav_gswt.active.uncertainty.weighing import Scales
 from dav_gswt.errors import InputError
 from dav_gswt.files import whole
 
-TERMS = ("opacity", "fisher", "w2_sq", "lpips", "gradient", "single")
+TERMS = ("opacity", "fisher", "w2_sq", "lpips", "gradient", "single", "residual")
 FIELDS = ("pose", "elevation", "azimuth", "radius", *TERMS, "steps", *(f"{term}_scale" for term in TERMS))
 
 

@@ -70,6 +70,9 @@ class Prior(Protocol):
     def decoded(self, latents: Float32[Array, "*n c hz wz"]) -> Imagined:
         """The pictures of latents."""
 
+    def shown(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
+        """The latents of what the field itself shows: what samples are, where it shows what the prior expects."""
+
     def variances(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n c hz wz"]:
         """How wide a distribution each latent stands for, where it is not taken for a point: the variance that the
         coder gives the code of its picture, in the latents' units."""

@@ -54,6 +54,10 @@ class Learned:
         made = planes.numpy().transpose(0, 2, 3, 1).reshape(*latents.shape[:-3], SIZE, SIZE, -1)
         return Imagined(np.ascontiguousarray(made[..., :4]), made[..., 4] / np.float32(NEARNESS))
 
+    def shown(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
+        """See `Prior`."""
+        return self.encoded(planes_of_render(condition)).numpy()
+
     def variances(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n c hz wz"]:
         """See `Prior`."""
         flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *CODE)))

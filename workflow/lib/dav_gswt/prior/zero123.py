@@ -84,6 +84,14 @@ class Zero123:
         painted = ((torch.cat(made) + 1) / 2).clamp(0, 1).numpy().transpose(0, 2, 3, 1)
         return Imagined(without_white(painted).reshape(*latents.shape[:-3], SIZE, SIZE, 4), None)
 
+    def shown(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
+        """See `Prior`: the render over white, as its pictures are."""
+        over_white = np.clip(condition.colour + (1 - condition.alpha)[..., None], 0, 1)
+        coder, parts = self.parts.coder, sized(over_white).to(self.device).split(AT_ONCE)
+        with torch.inference_mode():
+            made = [coder.encode(2 * part - 1).latent_dist.mode().cpu() for part in parts]
+        return (torch.cat(made) * coder.config.scaling_factor).numpy()
+
     def variances(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n c hz wz"]:
         """See `Prior`."""
         flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *LATENT))).to(self.device)

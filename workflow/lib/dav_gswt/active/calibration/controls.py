@@ -16,7 +16,7 @@ from dav_gswt.active.imagining import Asking
 from dav_gswt.active.uncertainty import w2_sq
 from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.regressor import Regressor
-from dav_gswt.prior.terrain import Terrain, planes_of_render
+from dav_gswt.prior.terrain import Terrain
 
 
 def opened(files: Sequence[Path | str]) -> list[Regressor]:
@@ -28,7 +28,7 @@ def maps(prior: Asking, regressors: Sequence[Regressor], condition: Condition) -
     """Each estimate's map of every view, in cells of the latents; those of the project's own prior alone."""
     if not isinstance(prior.model, Terrain):
         return {}
-    render = prior.model.encoded(planes_of_render(condition)).numpy()
+    render = prior.model.shown(condition)
     drawn = prior.model.samples(condition, prior.samples, 0.0, prior.steps, prior.seed, common=False)
     found = {"spread": w2_sq(drawn)[1], "residual": _apart(drawn.mean(1), render)}
     if regressors:

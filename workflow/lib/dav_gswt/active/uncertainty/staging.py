@@ -12,23 +12,26 @@ from dav_gswt.active.uncertainty.weighing import robust_scale
 TOP = 20  # poses whose order matters: as many as a round may take
 BATCH = 16  # poses scored in full before looking again
 REACH = 0.95  # quantile of full over cheap, of the poses scored both ways: more is not expected of the others
-RANKING = ("w2_sq", "lpips", "single")  # terms by which policies rank; and their sum
+RANKING = ("w2_sq", "lpips", "single", "residual")  # terms by which policies rank; and their sum
 
 
 @dataclass(frozen=True)
 class Terms:
     """Of n poses. lpips: None without its weights. single: LPIPS between the one sample that there is without dropout
-    and the render itself; None with dropout. maps: of w2_sq, in cells of the latents."""
+    and the render itself; None with dropout. maps: of w2_sq, in cells of the latents. residual: squared distance of the
+    samples' mean from the latents of the render itself."""
 
     w2_sq: Float64[Array, "n"]
     lpips: Float64[Array, "n"] | None
     gradient: Float64[Array, "n"]
     maps: Float32[Array, "n h w"]
     single: Float64[Array, "n"] | None = None
+    residual: Float64[Array, "n"] | None = None
 
     def named(self) -> dict[str, Float64[Array, "n"]]:
         """The terms that there are, by name."""
-        found = {"w2_sq": self.w2_sq, "lpips": self.lpips, "gradient": self.gradient, "single": self.single}
+        found = {"w2_sq": self.w2_sq, "lpips": self.lpips, "gradient": self.gradient}
+        found |= {"single": self.single, "residual": self.residual}
         return {name: values for name, values in found.items() if values is not None}
 
 
