@@ -111,3 +111,24 @@ def test_a_config_file_that_cannot_be_read_is_named(tmp_path, text, said):
         (tmp_path / "a.yaml").write_text(text)
     with pytest.raises(InputError, match=f"a.yaml: {said}"):
         read([tmp_path / "a.yaml"])
+
+
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        pytest.param({"scene": "given"}, "complete: given is a finished field.*set complete: false", id="no photos"),
+        pytest.param(
+            {"prior": "other"}, r"complete: the prior other knows neither .*\(terrain in priors\)", id="no depth"
+        ),
+        pytest.param({"prior": "none"}, "prior: there is no 'none'", id="no prior"),
+        pytest.param({"complete": "yes"}, "complete: 'yes' is not of type 'boolean'", id="no boolean"),
+    ],
+)
+def test_what_cannot_be_completed_is_refused_and_why(config, change, said):
+    given = {"kind": "field", "field": "a.ply", "quality": "draft", "seam": "colour"}
+    other = {"model": "zero123", "folder": "a", "samples": 2, "steps": 2}
+    config["scenes"]["given"], config["priors"]["other"] = given, other
+    check(config | {"complete": True}, SCHEMA)
+    check(config | {"scene": "given"}, SCHEMA)
+    with pytest.raises(InputError, match=said):
+        check(config | {"complete": True} | change, SCHEMA)

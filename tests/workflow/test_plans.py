@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from collections import Counter
 
 import pytest
 from made_runs import TINY, USUAL
@@ -11,6 +12,8 @@ from dav_gswt.active.names import AT_ZERO, IMAGINING, POLICIES
 ROUND = "results/desert/seed0/draft/active_{policy}_none_pdrop0_lam0_k{k}/iter{t}"
 BUNDLE = ROUND + "/tiles_colour/bundle_tau{tau}/davgswt.json"
 DEFAULT = dict(policy="farthest", k=4, t=2, tau=0.6)
+FARTHEST = ROUND.format(policy="farthest", k=4, t=1)
+GIVEN = "results/finished/seed0/draft/active_given_none_pdrop0_lam0_k0/iter0"
 LAM = ROUND.format(policy="farthest", k=4, t=1).replace("lam0", "lam0.1")
 
 
@@ -144,12 +147,31 @@ def test_tiles_go_by_the_doubt_of_the_prior_that_was_asked(planned, tmp_path):
         ),
         pytest.param("results/Desert/seed0/views.json", id="a scene in capitals"),
         pytest.param(f"{LAM}/field.ply", id="lam for a policy without a prior"),
+        pytest.param(f"{FARTHEST}/completed_none/levels/level0.ply", id="completed by no prior"),
+        pytest.param(f"{FARTHEST}/completed_/levels/level0.ply", id="completed by nobody"),
+        pytest.param(GIVEN + "/completed_terrain/field.ply", id="a finished field, completed"),
         pytest.param("results/moon/photos/ground.json", id="a scene that is not in the config"),
     ],
 )
 def test_a_second_spelling_of_a_path_has_no_rule(snakemake, tmp_path, path):
     done = snakemake(tmp_path, path, "--dry-run", check=False)
     assert done.returncode != 0 and "MissingRule" in done.stdout
+
+
+@pytest.mark.parametrize("policy", ["farthest", "w2-lpips"])
+def test_a_completed_field_lies_between_the_round_and_its_levels(planned, tmp_path, policy):
+    without, made = (
+        planned(tmp_path, "--config", f"policy={policy}", f"complete={on}", configs=(USUAL, TINY))
+        for on in (False, True)
+    )
+    assert not without["complete_field"] and not without["evaluate_completed"]
+    assert made == without + Counter(complete_field=1, evaluate_completed=1, total=2)
+
+
+def test_a_round_can_be_tiled_as_it_is_and_completed(planned, tmp_path):
+    tiles = ROUND.format(policy="farthest", k=4, t=1) + "{}/tiles_colour/seams.json"
+    plan = planned(tmp_path, tiles.format(""), tiles.format("/completed_terrain"))
+    assert plan["crop_level"] == plan["cut_tiles"] == 2 and plan["complete_field"] == plan["update_field"] == 1
 
 
 def test_no_round_and_a_finished_field_go_from_field_to_terrain(planned, tmp_path):

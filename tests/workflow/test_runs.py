@@ -217,3 +217,23 @@ def test_another_size_of_stills_makes_only_stills(tiny, planned, tmp_path):
     (tmp_path / "size.yaml").write_text("stills: {width: 320, height: 180}\n")
     plan = planned(tiny.folder, configs=(*CONFIGS, tmp_path / "size.yaml"))
     assert set(plan) == {"render_terrain", "all"}
+
+
+def test_a_field_is_completed_beside_its_round_and_levels_go_on_from_it(tiny, snakemake, tmp_path):
+    folder = tmp_path / "completed"
+    shutil.copytree(tiny.folder, folder)
+    made = tiny.round.relative_to(tiny.folder) / "completed_terrain"
+    snakemake(folder, "--cores", "2", made / "metrics.json", made / "levels/level0.ply", configs=CONFIGS)
+    facts, found = read_json(folder / made / "completion.json"), read_json(folder / made / "metrics.json")
+    before, after = (field.read(path / "field.ply") for path in (tiny.round, folder / made))
+    assert facts["painted"] <= facts["unseen"] < facts["cells"] and facts["changed"] == bool(after.imagined.any())
+    assert facts["changed"] or digest(tiny.round / "field.ply") == digest(folder / made / "field.ply")
+    assert digest(tiny.round / "ground.exr") == digest(folder / made / "ground.exr")
+    known = ~after.imagined[: len(before)]
+    assert (
+        np.array_equal(before.sh[known], after[: len(before)].sh[known])
+        and (after.uncertainty[after.imagined] == 1).all()
+    )
+    assert found["gaussians"]["imagined"] == after.imagined.sum() and found["all"]["before"]["psnr"] > 10
+    level = field.read(folder / made / "levels/level0.ply")
+    assert len(level) and level.imagined.any() <= after.imagined.any()

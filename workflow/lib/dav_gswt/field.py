@@ -21,7 +21,8 @@ class Field:
     log_scales: natural logarithm of the standard deviations along the axes of `quats` (w x y z, any length but 0).
     opacity_logits: peak opacity is expit of it. sh: colour coefficients, degree 0 first:
     colour = 0.5 + SH0 sh[:, 0] + ...
-    uncertainty: 0 (sure) to 1 (nothing is known). ground: the Gaussian is a disc of the ground layer.
+    uncertainty: 0 (sure) to 1 (nothing is known). ground: the Gaussian is a disc of the ground layer. imagined: a prior
+    painted it, no photo saw it; left out: none.
     """
 
     means: Float32[Array, "n 3"]
@@ -31,6 +32,11 @@ class Field:
     sh: Float32[Array, "n k 3"]
     uncertainty: Float32[Array, "n"]
     ground: Bool[Array, "n"]
+    imagined: Bool[Array, "n"] = None
+
+    def __post_init__(self):
+        if self.imagined is None:
+            object.__setattr__(self, "imagined", np.zeros(len(self.means), bool))
 
     def __len__(self) -> int:
         return len(self.means)
@@ -68,7 +74,8 @@ def _columns(k: int) -> dict[str, list[str]]:
 
 
 def write(field: Field, path: Path | str) -> None:
-    """Write a standard 3DGS PLY; `uncertainty` and `ground` follow as two more properties, which viewers ignore."""
+    """Write a standard 3DGS PLY; `uncertainty` and `ground` follow as two more properties, which viewers ignore, and
+    `imagined` as a third where there is such a Gaussian."""
     n, k = field.sh.shape[:2]
     names = _columns(k)
     order = ["means", "normals", "dc", "rest", "opacity_logits", "log_scales", "quats"]
@@ -83,19 +90,23 @@ def write(field: Field, path: Path | str) -> None:
     }
     names["normals"] = ["nx", "ny", "nz"]
     columns = [(name, "<f4") for key in order for name in names[key]] + [("uncertainty", "<f4"), ("ground", "u1")]
+    columns += [("imagined", "u1")] * bool(field.imagined.any())
     rows = np.empty(n, dtype=columns)
     for key in order:
         for j, name in enumerate(names[key]):
             rows[name] = values[key][:, j]
     rows["uncertainty"], rows["ground"] = field.uncertainty, field.ground
+    if field.imagined.any():
+        rows["imagined"] = field.imagined
     with whole(path) as part:
         PlyData([PlyElement.describe(rows, "vertex")], byte_order="<").write(str(part))
 
 
 def read(path: Path | str) -> Field:
-    """Read a 3DGS PLY: ours, or anybody's (then nothing is uncertain and nothing is known to be ground).
+    """Read a 3DGS PLY: ours, or anybody's (then nothing is uncertain, imagined, or known to be ground).
 
-    Raises: InputError: not a PLY, a property is missing, or a value is not finite (with its index).
+    Raises: InputError: not a PLY, a property is missing, a value is not finite, or `imagined` is neither 0 nor 1 (with
+    its index).
     """
     path = Path(path)
     rows = _vertices(path)
@@ -109,7 +120,10 @@ def read(path: Path | str) -> Field:
         raise InputError(f"{path}: Gaussian {zero[0]} has a zero quaternion; remove it and try again")
     n = len(rows)
     shs = np.concatenate([columns["dc"][:, None], columns["rest"].reshape(n, 3, k - 1).transpose(0, 2, 1)], 1)
-    extra = {name: rows[name] if name in rows.dtype.names else np.zeros(n) for name in ("uncertainty", "ground")}
+    own = ("uncertainty", "ground", "imagined")
+    extra = {name: rows[name] if name in rows.dtype.names else np.zeros(n) for name in own}
+    if len(bad := np.flatnonzero((extra["imagined"] != 0) & (extra["imagined"] != 1))):
+        raise InputError(f"{path}: imagined of Gaussian {bad[0]} is neither 0 nor 1; write the field again")
     return Field(
         columns["means"],
         columns["log_scales"],
@@ -118,6 +132,7 @@ def read(path: Path | str) -> Field:
         np.ascontiguousarray(shs, np.float32),
         _finite(np.asarray(extra["uncertainty"], np.float32), "uncertainty", path),
         np.asarray(extra["ground"]).astype(bool),
+        np.asarray(extra["imagined"]).astype(bool),
     )
 
 

@@ -20,7 +20,7 @@ from dav_gswt.views import View
 _log = logging.getLogger(__name__)
 
 # dB that the earlier photos may lose on average. A field fitted to 8 photos shows those better than one fitted to 12
-# or 48: ordinary updates (desert, planet, meadow, flowers, two sets of drone photos; draft and standard) lost up to 1.6.
+# or 48: ordinary updates (four synthetic scenes, two sets of drone photos; draft, standard) lost up to 1.6.
 # Desert photos with wrong poses lost 2.4 to 2.8 at first, and 1.5 to 2.3 after three fits: harm is bounded, and where
 # it is less than this a wrong photo passes.
 BOUND = 2.0
