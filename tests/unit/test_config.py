@@ -118,7 +118,7 @@ def test_a_config_file_that_cannot_be_read_is_named(tmp_path, text, said):
     [
         pytest.param({"scene": "given"}, "complete: given is a finished field.*set complete: false", id="no photos"),
         pytest.param(
-            {"prior": "other"}, r"complete: the prior other knows neither .*\(terrain in priors\)", id="no depth"
+            {"prior": "other"}, r"complete: the prior other knows neither .*\(terrain.* in priors\)", id="no depth"
         ),
         pytest.param({"prior": "none"}, "prior: there is no 'none'", id="no prior"),
         pytest.param({"complete": "yes"}, "complete: 'yes' is not of type 'boolean'", id="no boolean"),

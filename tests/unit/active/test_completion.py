@@ -177,6 +177,9 @@ def test_what_a_known_thing_covers_is_not_painted():
     assert covered.any() and not made.field.imagined[: grid.heights.size][covered].any()
     assert not made.painted.ravel()[covered].any() and made.unseen.ravel()[covered].all()
     assert same(made.field[len(field) : len(field) + 1], lid)
+    roof = fields.joined([field, blob([2.6, 1.6, 0.3], [2.0, 3.0, 0.02], [0.1, 0.9, 0.1])])
+    hidden = completed(roof, grid)
+    assert hidden.field is roof and hidden.unseen.any() and not hidden.facts(grid)["changed"]
 
 
 @pytest.mark.parametrize("plane", [0, 3, 4], ids=["colour", "opacity", "depth"])
