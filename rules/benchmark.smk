@@ -21,7 +21,7 @@ rule gather_curves:
         table="views|development",
     params:
         cells=lambda wildcards: compared_cells(),
-        source=source_of("active/benchmark/curves"),
+        source=source_of("active/comparison/curves"),
     script:
         "../scripts/gather_curves.py"
 
@@ -42,7 +42,7 @@ rule compare_policies:
         table="views|development",
     params:
         baseline=lambda wildcards: config["benchmark"]["baseline"],
-        source=source_of("active/benchmark", "figures"),
+        source=source_of("active/comparison", "figures"),
     script:
         "../scripts/compare_policies.py"
 

@@ -1,7 +1,7 @@
 """Rule compare_policies: from curves to tables and a figure."""
 
 from dav_gswt import figures
-from dav_gswt.active.benchmark import curves, plots, tables
+from dav_gswt.active.comparison import curves, plots, tables
 from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):

@@ -1,6 +1,6 @@
 """Rule gather_curves: the cells' rounds, row by row, added to those of earlier runs."""
 
-from dav_gswt.active.benchmark import curves
+from dav_gswt.active.comparison import curves
 from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from dav_gswt.active.benchmark import curves, plots, tables
+from dav_gswt.active.comparison import curves, plots, tables
 
 CELL = dict(scene="flowers", seed=0, quality="draft", policy="farthest", prior="none", p_drop="0", lam="0", k=4)
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dav_gswt.active.benchmark import stats
+from dav_gswt.active.comparison import stats
 
 
 def curve(*values):

@@ -4,8 +4,8 @@ from dataclasses import asdict
 
 import numpy as np
 
-from dav_gswt.active.benchmark.curves import CELL
-from dav_gswt.active.benchmark.stats import compared, holm, nauc, to_reach
+from dav_gswt.active.comparison.curves import CELL
+from dav_gswt.active.comparison.stats import compared, holm, nauc, to_reach
 
 EVERYTHING = "all"  # the policy that takes the whole pool: what there is to reach, and no curve
 EVERY = "every"  # scene, in the rows over all of them

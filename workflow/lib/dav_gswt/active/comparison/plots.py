@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from dav_gswt import figures
-from dav_gswt.active.benchmark.tables import EVERY, EVERYTHING
+from dav_gswt.active.comparison.tables import EVERY, EVERYTHING
 
 PANEL = 3.3, 3.4  # inches
 FOREST = 0.34  # inches a policy
