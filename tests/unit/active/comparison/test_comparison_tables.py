@@ -89,6 +89,13 @@ def test_policies_are_paired_with_the_baseline():
     assert every["holm"] == every["p"] and alone["holm"] is None
 
 
+def test_one_cell_alone_has_no_interval():
+    table = tables.results(rounds([20, 21, 22]) + rounds([20, 22, 22], policy="w2"))
+    for row in tables.comparisons(table, "farthest"):
+        assert row["mean"] == 0.5 and row["wins"] == 1
+        assert row["low"] is row["high"] is row["p"] is row["holm"] is None
+
+
 def test_cells_that_end_with_other_photos_or_start_elsewhere_are_not_paired():
     base = rounds([20, 21, 22])
     for other in (rounds([20, 21], (8, 12), policy="w2"), rounds([20, 21, 22], seed=1, policy="w2")):

@@ -25,7 +25,7 @@ def write(path: Path | str, curves: list[dict], compared: list[dict], baseline: 
     }
     columns = min(3, len(panels))
     above = -(-len(panels) // columns)
-    figure = figures.blank(PANEL[0] * columns, PANEL[1] * above + FOREST * len(policies) + 1.3)
+    figure = figures.blank(PANEL[0] * 3, PANEL[1] * above + FOREST * len(policies) + 1.3)
     top, bottom = figure.subfigures(2, 1, height_ratios=[PANEL[1] * above, FOREST * len(policies) + 1.3])
     grid = top.subplots(above, columns, squeeze=False).ravel()
     for axes, (scene, k) in zip(grid, panels, strict=False):
@@ -75,7 +75,8 @@ def _forest(axes, compared: list[dict], baseline: str) -> None:
     """A bar a policy, its 95 % interval over all scenes, and a dot a scene."""
     ranked = _ranked(compared)
     for place, row in enumerate(ranked):
-        axes.plot([row["low"], row["high"]], [place, place], color="0.25", linewidth=2)
+        if row["low"] is not None:
+            axes.plot([row["low"], row["high"]], [place, place], color="0.25", linewidth=2)
         axes.plot(row["mean"], place, "s", color="0.25", markersize=6)
         alone = [r["mean"] for r in compared if r["policy"] == row["policy"] and r["scene"] != EVERY]
         axes.plot(alone, [place] * len(alone), "o", color=COLOURS[0], markersize=4, alpha=0.7)

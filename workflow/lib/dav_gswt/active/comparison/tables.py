@@ -39,7 +39,7 @@ def comparisons(table: list[dict], baseline: str) -> list[dict]:
     """Every policy less the baseline, in dB of nAUC: over all scenes, and of each scene and k alone.
 
     Cells are paired by scene, quality, seed, k and the photos that they end with. holm: p values over all scenes,
-    raised by how many policies were compared.
+    raised by how many policies were compared. One cell alone has neither interval nor p.
     """
     units = [(*(row[key] for key in UNIT), row["photos"]) for row in table]
     cells = {(unit, _policy(row)): row["nauc"] for unit, row in zip(units, table, strict=True)}
@@ -52,17 +52,19 @@ def comparisons(table: list[dict], baseline: str) -> list[dict]:
         rows.append(_compared(policy, EVERY, "", pairs))
         for scene, k in sorted({(unit[0], unit[3]) for unit in pairs}):
             rows.append(_compared(policy, scene, k, {u: v for u, v in pairs.items() if (u[0], u[3]) == (scene, k)}))
-    raised = holm({" ".join(_policy(row)): row["p"] for row in rows if row["scene"] == EVERY})
-    return [row | {"holm": raised[" ".join(_policy(row))] if row["scene"] == EVERY else None} for row in rows]
+    raised = holm({" ".join(_policy(row)): row["p"] for row in rows if row["scene"] == EVERY and row["p"] is not None})
+    return [row | {"holm": raised.get(" ".join(_policy(row))) if row["scene"] == EVERY else None} for row in rows]
 
 
 def _compared(policy: tuple[str, ...], scene: str, k: int | str, pairs: dict[tuple, float]) -> dict:
     by_scene: dict[str, list[float]] = {}
     for unit, value in pairs.items():
         by_scene.setdefault(unit[0], []).append(value)
-    found = compared({name: np.array(values) for name, values in by_scene.items()}, BOOTSTRAP)
+    found = asdict(compared({name: np.array(values) for name, values in by_scene.items()}, BOOTSTRAP))
+    if len(pairs) < 2:  # nothing tells how far another cell would be from this one
+        found |= dict.fromkeys(("low", "high", "p"))
     named = dict(zip(("policy", "prior", "p_drop", "lam"), policy, strict=True))
-    return named | {"scene": scene, "k": k, "units": len(pairs)} | asdict(found)
+    return named | {"scene": scene, "k": k, "units": len(pairs)} | found
 
 
 def _policy(row: dict) -> tuple[str, ...]:
