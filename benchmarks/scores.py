@@ -7,7 +7,7 @@ import resource
 import time
 
 import numpy as np
-from record import record
+from record import tell
 
 from dav_gswt.active import imagining, poses, uncertainty
 from dav_gswt.active.imagining import Asking
@@ -99,10 +99,7 @@ def pools() -> dict[str, float]:
 
 
 def main() -> None:
-    values = w2() | perceptual() | pools()
-    for name, value in values.items():
-        print(f"{name}: {value:.3g}" + (f" (target {TARGETS[name]:g})" if name in TARGETS else ""))
-    record(values)
+    tell(w2() | perceptual() | pools(), TARGETS)
 
 
 if __name__ == "__main__":

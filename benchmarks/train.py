@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from record import record
+from record import tell
 
 from dav_gswt.coarse import trial
 from dav_gswt.coarse.build import Quality
@@ -70,20 +70,16 @@ def offpath() -> dict[str, float]:
 
 
 TARGETS = {
-    "train_copr_seconds_to_33": "target 8",
-    "train_copr_seconds_to_34": "target 25",
-    "train_copr_final_ccpsnr": "target 34.5",
-    "train_copr_free_space_opacity": "target 0.005",
-    "offpath_loss_db": "the worse scene; target 2",
+    "train_copr_seconds_to_33": 8,
+    "train_copr_seconds_to_34": 25,
+    "train_copr_final_ccpsnr": 34.5,
+    "train_copr_free_space_opacity": 0.005,
+    "offpath_loss_db": 2,  # the worse scene
 }
 
 
 def main() -> None:
-    values = copr() | offpath()
-    for name, value in values.items():
-        told = "never" if value is None else f"{value:.4g}"
-        print(f"{name}: {told}" + (f" ({TARGETS[name]})" if name in TARGETS else ""))
-    record(values)
+    tell(copr() | offpath(), TARGETS)
 
 
 if __name__ == "__main__":

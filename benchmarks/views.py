@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from record import record
+from record import tell
 
 from dav_gswt.active.policies import POLICIES, Wanted
 from dav_gswt.active.poses import Pose, place
@@ -80,10 +80,7 @@ def _made(folder: str, *targets: str) -> None:
 
 
 def main() -> None:
-    values = selection() | rounds()
-    for name, value in values.items():
-        print(f"{name}: {value:.3g}" + (f" (target {TARGETS[name]:g})" if name in TARGETS else ""))
-    record(values)
+    tell(selection() | rounds(), TARGETS)
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ rule gather_curves:
         table="views|development",
     params:
         cells=lambda wildcards: compared_cells(),
-        source=source_of("active/comparison/curves"),
+        source=source_of("active/comparison/curves", "figures"),
     script:
         "../scripts/gather_curves.py"
 

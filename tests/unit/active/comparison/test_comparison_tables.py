@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from dav_gswt import figures
 from dav_gswt.active.comparison import curves, plots, tables
 
 CELL = dict(scene="flowers", seed=0, quality="draft", policy="farthest", prior="none", p_drop="0", lam="0", k=4)
@@ -58,7 +59,7 @@ def test_rows_survive_the_file_and_runs_add_up(tmp_path):
     path = tmp_path / "curves.csv"
     assert curves.read(path) == []
     old, other = rounds([20, 21, 22]), rounds([19, 20, 21], seed=1)
-    curves.write(path, curves.merged(old, other))
+    figures.write_rows(path, curves.merged(old, other))
     assert curves.read(path) == old + other
     again = curves.merged(curves.read(path), rounds([20, 23], (8, 12)))
     assert [row["psnr"] for row in again if row["seed"] == 0] == [20, 23, 22] and len(again) == 6

@@ -20,6 +20,7 @@ _log = logging.getLogger(__name__)
 
 AT_ONCE = 16  # poses that are imagined at a time
 CHEAP = 2  # steps of denoising in the first of two stages
+FEW = 2 * (staging.TOP + staging.BATCH)  # poses of which so many would be imagined in full that one stage costs less
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ def terms(
         made = (_some(prior, condition[r], [names[i] for i in r], steps, counts[r]) for r in progress(parts, what))
         return _joined(list(made))
 
-    if not prior.staged or n <= staging.TOP + staging.BATCH or prior.steps <= CHEAP:
+    if not prior.staged or n <= FEW or prior.steps <= CHEAP:
         return of(np.arange(n), prior.steps, "imagine poses"), np.full(n, prior.steps)
     found, full = staging.settled(
         n, lambda rows: of(rows, CHEAP, "imagine poses"), lambda rows: of(rows, prior.steps, "imagine best poses")

@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
+from dav_gswt import figures
 from dav_gswt.active.uncertainty import w2_sq
-from dav_gswt.files import whole
 from dav_gswt.prior.examples import Examples
 from dav_gswt.prior.regressor import Regressor
 from dav_gswt.prior.terrain import Terrain
@@ -41,7 +41,7 @@ def smoothed(values: Float[Array, "n"]) -> tuple[Float[Array, "k"], Float[Array,
 
 def losses(curves: dict[str, Float[Array, "_"]], path: Path | str) -> None:
     """Loss against step, a line for each thing that was trained; they are of different kinds, so only falls compare."""
-    figure = _figure(7.2, 4.2)
+    figure = figures.blank(7.2, 4.2)
     axes = figure.add_subplot()
     for name, values in curves.items():
         axes.plot(*smoothed(values), label=name, linewidth=1.2)
@@ -50,7 +50,7 @@ def losses(curves: dict[str, Float[Array, "_"]], path: Path | str) -> None:
     axes.set_ylabel(f"loss, mean over {100 * WIDE:.0f} % of the steps")
     axes.grid(alpha=0.3, which="both")
     axes.legend(frameon=False)
-    _save(figure, path)
+    figures.save(figure, path)
 
 
 def gallery(made: Examples, prior: Terrain, regressor: Regressor | None, setting: Setting) -> dict[str, Array]:
@@ -80,7 +80,7 @@ def over_grey(rgba: Float32[Array, "n s s 4"]) -> Float32[Array, "n s s 3"]:
 def samples(columns: dict[str, Array], path: Path | str) -> None:
     """A view a row, a picture or map a column, with the colours' range of a map in its title."""
     count = len(next(iter(columns.values())))
-    figure = _figure(INCH * len(columns), INCH * count + 0.5)
+    figure = figures.blank(INCH * len(columns), INCH * count + 0.5)
     grid = figure.subplots(count, len(columns), squeeze=False)
     for column, (title, values) in zip(grid.T, columns.items(), strict=True):
         how = {}
@@ -91,18 +91,4 @@ def samples(columns: dict[str, Array], path: Path | str) -> None:
         for axes, value in zip(column, values, strict=True):
             axes.imshow(value, interpolation="nearest", **how)
             axes.set_axis_off()
-    _save(figure, path)
-
-
-def _figure(width: float, height: float):
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), dpi=120, layout="constrained")
-
-
-def _save(figure, path: Path | str) -> None:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    FigureCanvasAgg(figure)
-    with whole(path) as part:
-        figure.savefig(part, format="png", metadata={"Software": None})
+    figures.save(figure, path)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt.files import whole
+from dav_gswt import figures
 
 CELL = ("scene", "seed", "quality", "policy", "prior", "p_drop", "round")
 MEASURES = ("spearman", "ause", "ause_chance", "coverage", "width", "pixel_spearman", "pixel_ause", "pixel_ause_chance")
@@ -41,24 +41,17 @@ def rows(cells: list[dict], results: list[dict]) -> list[dict]:
 
 def write_figure(path: Path | str, table: list[dict], level: float) -> None:
     """The figure of `rows`, as a PNG. level: of the intervals."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    figure = drawn(table, level)
-    FigureCanvasAgg(figure)
-    with whole(path) as part:
-        figure.savefig(part, format="png", metadata={"Software": None})
+    figures.save(drawn(table, level), path)
 
 
 def drawn(table: list[dict], level: float):
     """A panel a measure, of poses above and (where there are any) of pixels below: a row a score, the best on top; a
     dot a cell, its colour the scene, its shape the round; a black bar at the mean, a grey one at chance."""
-    from matplotlib.figure import Figure
-
     poses, pixels = _panels(level)
     layers = [(poses, _ranked(table, "spearman")), (pixels, _ranked(table, "pixel_spearman", known=True))]
     layers = [(panels, names) for panels, names in layers if names]
     tall = [AROUND + ROW * len(names) for _, names in layers]
-    figure = Figure(figsize=(WIDE, sum(tall) + 0.4), dpi=120, layout="constrained")
+    figure = figures.blank(WIDE, sum(tall) + 0.4)
     figure.get_layout_engine().set(w_pad=0.08, h_pad=0.1)
     grid = figure.subplots(len(layers), 3, squeeze=False, height_ratios=tall)
     looks = _looks(table)

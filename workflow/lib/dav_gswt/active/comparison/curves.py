@@ -7,11 +7,10 @@ round that was measured again replaces what it was.
 import csv
 from pathlib import Path
 
-from dav_gswt.files import read_json, whole
+from dav_gswt.files import read_json
 
 CELL = ("scene", "seed", "quality", "policy", "prior", "p_drop", "lam", "k")
 MEASURES = ("psnr", "ssim", "lpips", "worst_psnr", "walker_psnr")
-FIELDS = (*CELL, "round", "photos", *MEASURES, "seconds", "evaluations", "version", "renderer", "field")
 ASIDE = ("oblique", "walker")  # groups of test views away from where photos may be taken
 WORK = ("score", "select", "capture", "update")  # a round's jobs whose time counts; measuring does not
 
@@ -42,17 +41,8 @@ def merged(before: list[dict], new: list[dict]) -> list[dict]:
     return [at[key] for key in sorted(at)]
 
 
-def write(path: Path | str, table: list[dict]) -> None:
-    """Write rows; floats to five digits, empty where there is no value."""
-    with whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
-        out = csv.DictWriter(file, FIELDS, lineterminator="\n")
-        out.writeheader()
-        for row in table:
-            out.writerow({k: f"{v:.5g}" if isinstance(v, float) else v for k, v in row.items()})
-
-
 def read(path: Path | str) -> list[dict]:
-    """What `write` wrote; no rows where there is no file yet."""
+    """What `figures.write_rows` wrote of them; no rows where there is no file yet."""
     if not Path(path).is_file():
         return []
     with Path(path).open(newline="", encoding="utf-8") as file:
