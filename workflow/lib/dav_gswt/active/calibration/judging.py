@@ -56,6 +56,7 @@ def calibrated(
         condition, counts = told(*given, prior.model.size)
         others = controls.maps(prior, regressors, condition)
         shown |= others
+        # `residual` takes the place of the scores' term: that of samples from other noises, whatever was asked for them
         terms |= {name: imagining.over(m, counts) for name, m in others.items()}
     corrected = judged.frame["kind"] == "photos"  # which change their exposure
     error, error_maps = measures.errors(judged.field, judged.grid, views, judged.size, corrected)
