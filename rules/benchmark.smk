@@ -1,7 +1,8 @@
 """What policies are worth: the same scenes, photos to start from and pools for each, compared photo by photo.
 
 In: what the cells of the config's `benchmark` left, each a scene, a seed, a policy and k; a cell is restarted by itself.
-Out: docs/data/{table}_curves.csv, where runs add up, a row a round of a cell; {table}_benchmark.csv, a row a cell;
+Out: docs/data/{table}_curves.csv, where runs add up, a row a round of a cell; {table}_benchmark.csv, a row a cell, also
+under results/tables;
 {table}_comparison.csv, every policy less the baseline; docs/figures/{table}_budget.png, PSNR against photos.
 Not part of `all`: `snakemake view_benchmark` makes them.
 """
@@ -18,7 +19,7 @@ rule gather_curves:
     benchmark:
         "<benchmarks>/benchmark/gather_{table}.tsv"
     wildcard_constraints:
-        table="views|development",
+        table="view|development",
     params:
         cells=lambda wildcards: compared_cells(),
         source=source_of("active/comparison/curves", "figures"),
@@ -31,7 +32,8 @@ rule compare_policies:
     input:
         curves="docs/data/{table}_curves.csv",
     output:
-        results="docs/data/{table}_benchmark.csv",
+        results="results/tables/{table}_benchmark.csv",
+        kept="docs/data/{table}_benchmark.csv",
         compared="docs/data/{table}_comparison.csv",
         plot="docs/figures/{table}_budget.png",
     log:
@@ -39,7 +41,7 @@ rule compare_policies:
     benchmark:
         "<benchmarks>/benchmark/compare_{table}.tsv"
     wildcard_constraints:
-        table="views|development",
+        table="view|development",
     params:
         baseline=lambda wildcards: config["benchmark"]["baseline"],
         source=source_of("active/comparison", "figures"),

@@ -5,7 +5,7 @@ from itertools import product
 from pathlib import Path
 
 import dav_gswt
-from dav_gswt.active.names import AT_ZERO, GEOMETRIC, IMAGINING
+from dav_gswt.active.names import AT_ZERO, GEOMETRIC, IMAGINING, ORACLES
 from dav_gswt.config import check
 from dav_gswt.errors import InputError
 from dav_gswt.spelling import read_stop, spell, spell_completed, spell_stop
@@ -282,13 +282,13 @@ def truth_of(wildcards):
 
 
 def truth_for_oracle(wildcards):
-    """The one policy that sees the truth, where there is one."""
-    if wildcards.policy != "oracle":
+    """For the policies that see the truth, where there is one."""
+    if wildcards.policy not in ORACLES:
         return {}
     agent = config["scenes"][wildcards.scene].get("agent")
     if agent not in ("render", "replay"):
         raise WorkflowError(
-            f"policy oracle: what {wildcards.scene} truly shows is not known; it needs agent: render or replay"
+            f"policy {wildcards.policy}: what {wildcards.scene} truly shows is not known; it needs agent: render or replay"
         )
     return truth_of(wildcards) if agent == "render" else {"images": "<results>/<photos>/images"}
 

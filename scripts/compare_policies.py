@@ -9,6 +9,7 @@ with logging_to(snakemake.log[0]):
     rounds = curves.read(snakemake.input.curves)
     results = tables.results(rounds)
     compared = tables.comparisons(results, baseline)
-    figures.write_rows(out.results, results)
+    for path in (out.results, out.kept):
+        figures.write_rows(path, results)
     figures.write_rows(out.compared, compared)
     plots.write(out.plot, rounds, compared, baseline)

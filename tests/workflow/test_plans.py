@@ -7,7 +7,7 @@ from collections import Counter
 import pytest
 from made_runs import TINY, USUAL
 
-from dav_gswt.active.names import AT_ZERO, IMAGINING, POLICIES
+from dav_gswt.active.names import AT_ZERO, IMAGINING, ORACLES, POLICIES
 
 ROUND = "results/desert/seed0/draft/active_{policy}_none_pdrop0_lam0_k{k}/iter{t}"
 BUNDLE = ROUND + "/tiles_colour/bundle_tau{tau}/davgswt.json"
@@ -87,7 +87,7 @@ def test_every_policy_has_a_path(planned, tmp_path):
         way = "{}_{prior}_pdrop{p_drop}_lam{lam}".format(policy, **spelled)
         plan = planned(tmp_path, f"results/desert/seed0/draft/active_{way}_k4/iter1/field.ply")
         assert plan["update_field"] == plan["select_poses"] == 1, policy
-        assert plan["show_candidates"] == (policy == "oracle") and plan["fetch_lpips"] == (policy in IMAGINING)
+        assert plan["show_candidates"] == (policy in ORACLES) and plan["fetch_lpips"] == (policy in IMAGINING)
         default = planned(tmp_path, "--config", f"policy={policy}", configs=(USUAL, TINY))
         assert default["make_page"] == 1 and default["select_poses"] == 1, policy
 

@@ -52,6 +52,7 @@ def errors(files, agent, policy="oracle"):
 def test_of_a_replayed_scene_every_photo_tells_in_the_order_of_the_scores(files):
     found = errors(files, "replay")
     assert np.isfinite(found).all() and found[0] > 2 * found[1:].max()
+    assert np.array_equal(found, errors(files, "replay", "oracle-diverse"))
 
 
 def test_of_a_rendered_scene_only_what_was_drawn_is_known(files):

@@ -50,7 +50,7 @@ def test_ordinary_photos_are_taken_and_both_sides_are_told(frame):
     found = refined(photos[:1], photos[1:], frame=frame)
     earlier, new = found.report["earlier_views"], found.report["new_views"]
     assert new["taken"] and earlier["handed_on"] == "the field of fit 1" and found.report["steps"] == 36
-    assert (earlier["photos"], earlier["bound"], new["photos"]) == (1, bounded.BOUND, 3)
+    assert (earlier["photos"], earlier["bound"], new["photos"]) == (1, bounded.bound(1, 3), 3)
     assert [row["view"] for row in new["views"]] == ["photo_1", "photo_2", "photo_3"]
     if frame is SYNTHETIC:  # real photos are first brought to one exposure
         masked = build.modelled(photos, made.grid())
@@ -66,7 +66,7 @@ def test_photos_that_contradict_the_others_change_nothing(wrong, frame, caplog):
     photos = grained(4)
     found = refined(photos[:1], [wrong(view) for view in photos[1:]], frame=frame)
     earlier, new = found.report["earlier_views"], found.report["new_views"]
-    assert max(earlier["psnr_of_fits"]) < earlier["psnr_before"] - bounded.BOUND
+    assert max(earlier["psnr_of_fits"]) < earlier["psnr_before"] - earlier["bound"]
     assert not new["taken"] and earlier["psnr_after"] == earlier["psnr_before"]
     assert earlier["handed_on"] == "the field from before, after 3 fits" and len(earlier["psnr_of_fits"]) == 3
     assert found.report["steps"] == 3 * 36 and found.report["gaussians"] == len(made.field())
@@ -79,7 +79,7 @@ def test_photos_that_contradict_the_others_change_nothing(wrong, frame, caplog):
 def test_one_wrong_photo_among_good_ones_costs_no_more_than_the_bound():
     photos = grained(4)
     found = refined(photos[:1], [upside_down(photos[1]), *photos[2:]]).report["earlier_views"]
-    assert found["psnr_after"] >= found["psnr_before"] - bounded.BOUND
+    assert found["psnr_after"] >= found["psnr_before"] - found["bound"]
 
 
 def test_the_same_seed_gives_the_same_field_and_report(monkeypatch):
@@ -171,6 +171,11 @@ def test_where_no_earlier_photo_counts_there_is_nothing_to_lose():
         made.field(), made.field(), blind, photos[2:], build._plan(QUALITY, 1), lambda *_: Fitted(spoilt(0.3), Report())
     )
     assert found.taken and found.report["earlier_views"]["psnr_before"] is None
+
+
+def test_what_may_be_lost_grows_with_every_doubling_of_the_photos():
+    more = [bounded.bound(*of) - bounded.BOUND for of in ((8, 0), (8, 8), (8, 24), (0, 5))]
+    assert more == [0, bounded.DOUBLED, 2 * bounded.DOUBLED, 0]
 
 
 def test_steps_are_bounded_for_each_new_photo():

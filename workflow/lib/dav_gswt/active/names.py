@@ -1,6 +1,7 @@
 """Names of the policies, apart from their code: the workflow reads them without loading the numerics."""
 
-GEOMETRIC = ("random", "ring", "farthest", "diverse", "opacity", "fisher", "oracle", "all")  # read no prior
+ORACLES = ("oracle", "oracle-diverse")  # that see the truth: what a perfect score would be worth
+GEOMETRIC = ("random", "ring", "farthest", "diverse", "opacity", "fisher", *ORACLES, "all")  # read no prior
 IMAGINING = ("grad-lpips", "w2-lpips", "w2-lpips-diverse", "shuffled", "w2", "single", "residual", "residual-diverse")
 AT_ZERO = {  # what these of them do without
     "w2": ("lam",),

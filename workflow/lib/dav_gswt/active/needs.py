@@ -9,6 +9,7 @@ from numpy import ndarray as Array
 from dav_gswt import field
 from dav_gswt.active import fisher
 from dav_gswt.active.candidates import Candidates
+from dav_gswt.active.names import ORACLES
 from dav_gswt.active.policies import Information
 from dav_gswt.active.scores import Scores
 from dav_gswt.active.scoring import small
@@ -31,13 +32,13 @@ def information(
 def errors(
     policy: str, scores: Scores, pool: Candidates, files: dict[str, Path | str], scene: dict, size: int
 ) -> Float64[Array, "n"] | None:
-    """For `oracle`: the true error at each candidate, NaN where its truth was not drawn.
+    """For oracles: the true error at each candidate, NaN where its truth was not drawn.
 
     files: `field`, `ground`, `frame`, and `truth`, the folder of what candidates truly show; `images`, the photos of a
     scene that is replayed. size: see `measures.errors`.
     Raises: InputError: no candidate's truth is known.
     """
-    if policy != "oracle":
+    if policy not in ORACLES:
         return None
     from dav_gswt.active.calibration import measures, truth
 

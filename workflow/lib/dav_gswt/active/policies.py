@@ -33,7 +33,7 @@ class Information(Protocol):
 class Wanted:
     """What a policy goes by beside the scores. captured: where photos were taken, relative to the exemplar's middle.
     k: poses to choose, at most as many as there are. lam: weight of LPIPS. information: for `fisher`. errors: true ones
-    of the candidates, NaN where not known, for `oracle`."""
+    of the candidates, NaN where not known, for oracles."""
 
     captured: Float[Array, "m 3"]
     k: int
@@ -128,6 +128,11 @@ def oracle(scores: Scores, wanted: Wanted) -> list[int]:
     return top(np.where(np.isnan(wanted.errors), -np.inf, wanted.errors), wanted.k)
 
 
+def oracle_diverse(scores: Scores, wanted: Wanted) -> list[int]:
+    """Facility location weighed by the true error, 0 where it is not known: a perfect score and diversity."""
+    return facility.located(_places(scores.poses), wanted.captured, np.nan_to_num(wanted.errors), wanted.k)
+
+
 def everything(scores: Scores, wanted: Wanted) -> list[int]:
     """The whole pool, whatever k is."""
     return list(range(len(scores)))
@@ -163,5 +168,6 @@ POLICIES: dict[str, Callable[[Scores, Wanted], list[int]]] = {
     "w2-lpips-diverse": w2_lpips_diverse,
     "shuffled": shuffled,
     "oracle": oracle,
+    "oracle-diverse": oracle_diverse,
     "all": everything,
 }

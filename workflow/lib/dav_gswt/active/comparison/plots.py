@@ -7,11 +7,12 @@ import numpy as np
 
 from dav_gswt import figures
 from dav_gswt.active.comparison.tables import EVERY, EVERYTHING
+from dav_gswt.active.names import ORACLES
 
 PANEL = 3.3, 3.4  # inches
 FOREST = 0.34  # inches a policy
-SHOWN = 6  # curves that a panel holds legibly: the baseline, the oracle and the best
-DRAWN = {"baseline": {"color": "black", "linewidth": 2.4}, "oracle": {"color": "0.55", "linestyle": "--"}}
+SHOWN = 6  # curves that a panel holds legibly: the baseline, an oracle and the best
+BASE, TRUTH = {"color": "black", "linewidth": 2.4}, {"color": "0.55", "linestyle": "--"}
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito: told apart by everybody
 
 
@@ -19,10 +20,12 @@ def write(path: Path | str, curves: list[dict], compared: list[dict], baseline: 
     """Above a panel a scene (and k): PSNR against photos, means over seeds; below every policy less the baseline."""
     panels = sorted({(row["scene"], row["k"]) for row in curves if row["policy"] == baseline})
     policies = [row["policy"] for row in _ranked(compared)]
-    best = [p for p in policies if p != "oracle"][: SHOWN - 2]
-    looks = {baseline: DRAWN["baseline"], "oracle": DRAWN["oracle"]} | {
-        policy: {"color": colour, "linewidth": 1.6} for policy, colour in zip(best, COLOURS, strict=False)
-    }
+    best = [p for p in policies if p not in ORACLES][: SHOWN - 2]
+    looks = (
+        {baseline: BASE}
+        | {p: TRUTH for p in [p for p in policies if p in ORACLES][:1]}
+        | {policy: {"color": colour, "linewidth": 1.6} for policy, colour in zip(best, COLOURS, strict=False)}
+    )
     columns = min(3, len(panels))
     above = -(-len(panels) // columns)
     figure = figures.blank(PANEL[0] * 3, PANEL[1] * above + FOREST * len(policies) + 1.3)
