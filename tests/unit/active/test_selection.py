@@ -128,8 +128,8 @@ def test_the_oracle_takes_the_worst_of_what_it_knows():
 
 def test_the_diverse_oracle_takes_one_of_two_neighbours_that_are_both_wrong():
     errors = np.array([0.5, 0.5, 0.0, 0.3, np.nan])
-    near, far, away = Pose("p0", 45, 0, 1), Pose("p3", 45, 180, 1), Pose("p4", 45, 90, 1)
-    pool = [near, replace(near, name="p1", azimuth=1), replace(near, name="p2", azimuth=90), far, away]
+    near, far, away = Pose("p0", 45.0, 0.0, 1.0), Pose("p3", 45.0, 180.0, 1.0), Pose("p4", 45.0, 90.0, 1.0)
+    pool = [near, replace(near, name="p1", azimuth=1.0), replace(near, name="p2", azimuth=90.0), far, away]
     told = Scores(pool, {"opacity": np.zeros(5)}, Scales({"opacity": 0.0}), np.zeros(5, int))
     assert chosen("oracle", told, 2, errors=errors) == ["p0", "p1"]
     assert sorted(chosen("oracle-diverse", told, 2, errors=errors, captured=())) in (["p0", "p3"], ["p1", "p3"])
