@@ -2,8 +2,8 @@
 
 In: what the cells of the config's `benchmark` left, each a scene, a seed, a policy and k; a cell is restarted by itself.
 Out: docs/data/{table}_curves.csv, where runs add up, a row a round of a cell; {table}_benchmark.csv, a row a cell, also
-under results/tables;
-{table}_comparison.csv, every policy less the baseline; docs/figures/{table}_budget.png, PSNR against photos.
+under results/tables; {table}_comparison.csv, every policy less the baseline; {table}_worth.csv, what rounds gained
+against what was expected of them; docs/figures/{table}_budget.png, PSNR against photos.
 Not part of `all`: `snakemake view_benchmark` makes them.
 """
 
@@ -22,7 +22,7 @@ rule gather_curves:
         table="view|development",
     params:
         cells=lambda wildcards: compared_cells(),
-        source=source_of("active/comparison/curves", "figures"),
+        source=source_of("active/comparison/curves", "active/worth", "figures"),
     script:
         "../scripts/gather_curves.py"
 
@@ -35,6 +35,7 @@ rule compare_policies:
         results="results/tables/{table}_benchmark.csv",
         kept="docs/data/{table}_benchmark.csv",
         compared="docs/data/{table}_comparison.csv",
+        worth="docs/data/{table}_worth.csv",
         plot="docs/figures/{table}_budget.png",
     log:
         "<logs>/benchmark/compare_{table}.log",

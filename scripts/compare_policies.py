@@ -12,4 +12,5 @@ with logging_to(snakemake.log[0]):
     for path in (out.results, out.kept):
         figures.write_rows(path, results)
     figures.write_rows(out.compared, compared)
+    figures.write_rows(out.worth, tables.worth(rounds))
     plots.write(out.plot, rounds, compared, baseline)

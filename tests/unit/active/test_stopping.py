@@ -10,17 +10,19 @@ from hypothesis import strategies as st
 
 from dav_gswt.active import stopping
 from dav_gswt.active.stopping import Known, decide
+from dav_gswt.active.worth import SHARE
 from dav_gswt.files import write_json
 
 
 def fit(*unseen, taken=True):
     rows = [{"view": f"v{i}", "psnr_before": float(v), "psnr_after": 0.0} for i, v in enumerate(unseen)]
-    return {"new_views": {"photos": len(rows), "taken": taken, "views": rows}}
+    new = {"photos": len(rows), "taken": taken, "views": rows}
+    return {"new_views": new, "earlier_views": {"psnr_before": 25.0}}
 
 
-def rising(gain):
-    """Reports of two rounds of two photos each after 8: the second two were shown better by `gain` dB."""
-    return [fit(20.0, 20.1), fit(20.0 + gain, 20.1 + gain)]
+def behind(gap):
+    """Reports of two rounds of two photos each after 8, all shown worse than the others: by gap, and gap 8 / 10 dB."""
+    return [fit(25 - gap, 25 - gap), fit(25 - 0.8 * gap, 25 - 0.8 * gap)]
 
 
 def known(taken=8, fits=(), left=100, last=None, start=8):
@@ -64,7 +66,7 @@ def test_the_last_round_takes_fewer_and_then_no_more():
 
 def test_a_stop_stays_with_its_reason():
     last = {"stopped": "after 16 photos: enough", "expected": None}
-    found = decide({"worth": 0.01}, 4, 1, known(16, rising(3.0), last=last))
+    found = decide({"worth": 0.01}, 4, 1, known(16, behind(3.0), last=last))
     assert found.poses == 0 and found.stopped == "after 16 photos: enough"
 
 
@@ -72,35 +74,36 @@ def test_an_empty_pool_stops():
     assert decide({}, 4, 1, known(left=0)).stopped == "after 8 photos: no candidate pose is left"
 
 
-@pytest.mark.parametrize("worth, stops", [(0.1, False), (0.12, False), (0.13, True), (5, True)])
+@pytest.mark.parametrize("worth, stops", [(0.05, False), (0.11, False), (0.115, True), (5, True)])
 def test_a_price_above_what_the_next_photos_are_worth_stops(worth, stops, caplog):
-    """Two photos took unseen ones from 20.05 to 20.75 dB: 0.7 / ln(10 / 8) ln(14 / 12) / 2 = 0.242 for each of two."""
+    """A gap of 10 dB at 8 photos is 80 / n; two after 12 close 80 (1 / 12 - 1 / 14) = 0.952 dB: a share is won."""
+    each, total = SHARE * 0.952 / 2, f"{SHARE * 0.952:.2f}"
     with caplog.at_level(logging.INFO):
-        found = decide({"worth": 2 * worth}, 2, 1, known(12, rising(0.7)))
-    assert found.expected.each == pytest.approx(0.242, abs=5e-4) and (found.stopped is not None) == stops
-    assert "the next 2 photos are worth about 0.48 dB (" in caplog.text
+        found = decide({"worth": 2 * worth}, 2, 1, known(12, behind(10.0)))
+    assert found.expected.each == pytest.approx(each, abs=5e-4) and (found.stopped is not None) == stops
+    assert f"the next 2 photos are worth about {total} dB (" in caplog.text
     told = json.loads(json.dumps(found.to_json(), allow_nan=False))
-    assert told["expected"]["gain_per_photo"] == pytest.approx(0.242, abs=5e-4) and told["expected"]["photos"] == 2
+    assert told["expected"]["gain_per_photo"] == pytest.approx(each, abs=5e-4) and told["expected"]["photos"] == 2
     if stops:
-        assert told["stopped"].startswith("after 12 photos: the next 2 photos are worth about 0.48 dB")
+        assert told["stopped"].startswith(f"after 12 photos: the next 2 photos are worth about {total} dB")
         assert told["stopped"].endswith(f"less than {2 * worth:g} (stop.worth)") and found.poses == 0
 
 
-def test_before_two_rounds_nothing_stops_and_that_is_said(caplog):
+def test_before_three_new_photos_nothing_stops_and_that_is_said(caplog):
     with caplog.at_level(logging.INFO):
-        found = decide({"worth": 100}, 2, 1, known(10, [fit(20.0, 30.0, 25.0)]))
+        found = decide({"worth": 100}, 2, 1, known(10, [fit(20.0, 30.0)]))
     assert found.stopped is None and found.poses == 2 and found.expected is None
     assert "cannot be said yet" in caplog.text
 
 
 def test_what_comes_counts_bursts_the_budget_and_the_pool():
-    assert decide({}, 4, 3, known(12, rising(1.0))).expected.photos == 12
-    assert decide({"photos": 15}, 4, 1, known(12, rising(1.0))).expected.photos == 3
-    assert decide({}, 4, 1, known(12, rising(1.0), left=2)).expected.photos == 2
+    assert decide({}, 4, 3, known(12, behind(1.0))).expected.photos == 12
+    assert decide({"photos": 15}, 4, 1, known(12, behind(1.0))).expected.photos == 3
+    assert decide({}, 4, 1, known(12, behind(1.0), left=2)).expected.photos == 2
 
 
 def test_a_budget_that_is_spent_is_told_with_what_more_would_be_worth():
-    found = decide({"photos": 12, "worth": 0.001}, 4, 1, known(12, rising(1.0)))
+    found = decide({"photos": 12, "worth": 0.001}, 4, 1, known(12, behind(1.0)))
     assert "stop.photos" in found.stopped and found.expected.photos == 4
 
 

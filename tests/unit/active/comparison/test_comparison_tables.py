@@ -2,9 +2,11 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from dav_gswt import figures
+from dav_gswt.active import worth
 from dav_gswt.active.comparison import curves, plots, tables
 
 CELL = dict(scene="flowers", seed=0, quality="draft", policy="farthest", prior="none", p_drop="0", lam="0", k=4)
@@ -12,7 +14,7 @@ CELL = dict(scene="flowers", seed=0, quality="draft", policy="farthest", prior="
 
 def rounds(psnr, photos=(8, 12, 16), **cell):
     rest = {"ssim": 0.8, "lpips": None, "worst_psnr": 20.0, "walker_psnr": None, "seconds": 2.0, "evaluations": 10}
-    about = {"version": "1", "renderer": "cpu", "field": "f"}
+    about = {"version": "1", "renderer": "cpu", "field": "f"} | dict.fromkeys(curves.EXPECTED)
     return [
         CELL | cell | {"round": t, "photos": n, "psnr": float(p)} | rest | about
         for t, (n, p) in enumerate(zip(photos, psnr, strict=True))
@@ -22,19 +24,26 @@ def rounds(psnr, photos=(8, 12, 16), **cell):
 ALL = rounds([20, 26], (8, 48), policy="all")
 
 
+def fit(gap, photos=4):
+    rows = [{"psnr_before": 20.0 - gap} for _ in range(photos)]
+    new = {"photos": photos, "taken": True, "views": rows}
+    return {"new_views": new, "earlier_views": {"psnr_before": 20.0}}
+
+
 def metrics(folder, t, **groups):
     mean = {"psnr": 20.0 + t, "psnr_colour_corrected": 21.0 + t, "ssim": 0.5, "lpips": 0.25}
-    told = mean | {"worst_decile": mean, "groups": groups, "photos": 8 + 4 * t}
+    told = mean | {"worst_decile": mean, "groups": groups, "photos": 8 + 4 * t, "fit": fit(5.0) if t else {}}
     told |= {"provenance": {"version": "0.1", "renderer": {"backend": "cpu"}, "inputs": {"field": 64 * "a"}}}
     (path := folder / f"metrics{t}.json").write_text(json.dumps(told))
     return str(path)
 
 
-def cell(folder, **given):
+def cell(folder, rounds=2, **given):
     (facts := folder / "scores.json").write_text(json.dumps({"poses_by_steps": {"2": 30, "8": 10}}))
     (time := folder / "job.tsv").write_text("s\th:m:s\n1.5\t0:00:01\n")
-    files = {"facts": [str(facts)], "times": [[str(time), str(time)]]}
-    return CELL | {"corrected": False, "samples": 5} | files | {"metrics": [metrics(folder, t) for t in (0, 1)]} | given
+    files = {"facts": [str(facts)] * (rounds - 1), "times": [[str(time), str(time)]] * (rounds - 1)}
+    files |= {"metrics": [metrics(folder, t) for t in range(rounds)]}
+    return CELL | {"corrected": False, "samples": 5} | files | given
 
 
 def test_a_row_a_round_with_what_it_cost(tmp_path):
@@ -43,6 +52,33 @@ def test_a_row_a_round_with_what_it_cost(tmp_path):
     assert (first["round"], first["photos"], first["psnr"], first["seconds"]) == (1, 12, 21, 3)
     assert first["evaluations"] == 5 * (2 * 30 + 8 * 10) and first["field"] == 12 * "a"
     assert curves.rows(cell(tmp_path, corrected=True))[0]["psnr"] == 21
+
+
+def test_what_a_round_was_expected_to_gain_rests_on_the_rounds_before_it_alone(tmp_path):
+    start, first, second = curves.rows(cell(tmp_path, rounds=3))
+    assert start["expected"] is first["expected"] is None
+    assert second["closes"] == pytest.approx(8 * 5.0 * (1 / 12 - 1 / 16))
+    assert second["expected"] == pytest.approx(worth.SHARE * second["closes"])
+    assert second["expected_low"] < second["expected"] < second["expected_high"]
+
+
+def test_gains_are_checked_against_what_was_expected_of_them():
+    told = rounds([20.0, 21.0, 21.4, 21.5], (8, 12, 16, 20)) + rounds([20.0, 23.0, 25.0], scene="grass") + ALL
+    for row, (low, high) in zip((told[2], told[3], told[6]), ((0.2, 0.8), (0.2, 0.8), (1, 3)), strict=True):
+        row |= {"closes": 1.0, "expected": 0.5, "expected_low": low, "expected_high": high}
+    every, flowers, grass = tables.worth(told)
+    assert [row["scene"] for row in (every, flowers, grass)] == ["every", "flowers", "grass"]
+    assert (every["rounds"], flowers["rounds"], grass["rounds"]) == (3, 2, 1)
+    assert flowers["gained"] == pytest.approx(0.25) and flowers["apart"] == pytest.approx(0.25)
+    assert (flowers["covered"], grass["covered"]) == (0.5, 1) and grass["off"] is None
+    assert flowers["share"] == pytest.approx(0.2) and flowers["off"] == pytest.approx(np.log(4) / 2**0.5)
+
+
+def test_rounds_that_gain_nothing_count_for_the_interval_alone():
+    told = rounds([20.0, 21.0, 20.9])
+    told[2] |= {"closes": 1.0, "expected": 0.5, "expected_low": 0.2, "expected_high": 1.0}
+    (every, _) = tables.worth(told)
+    assert every["covered"] == 0 and every["share"] is every["off"] is None
 
 
 def test_views_away_from_where_photos_may_be_taken_count_apart(tmp_path):

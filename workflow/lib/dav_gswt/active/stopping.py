@@ -57,7 +57,7 @@ def decide(stop: dict, k: int, burst: int, known: Known) -> Decision:
     if found is not None:
         _log.info("%s", told(found))
     elif "worth" in stop:
-        _log.info("what the next photos are worth cannot be said yet: that takes two rounds, and three photos in them")
+        _log.info("what the next photos are worth cannot be said yet: that takes three new photos")
     stopped = known.last["stopped"] if known.last else None
     stopped = stopped or _spent(stop, burst, known, poses) or _poor(stop, known.taken, found)
     if stopped:

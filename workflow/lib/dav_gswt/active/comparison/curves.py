@@ -7,11 +7,13 @@ round that was measured again replaces what it was.
 import csv
 from pathlib import Path
 
+from dav_gswt.active import worth
 from dav_gswt.files import read_json
 
 CELL = ("scene", "seed", "quality", "policy", "prior", "p_drop", "lam", "k")
 MEASURES = ("psnr", "ssim", "lpips", "worst_psnr", "walker_psnr")
 ASIDE = ("oblique", "walker")  # groups of test views away from where photos may be taken
+EXPECTED = ("closes", "expected", "expected_low", "expected_high")  # of a round, before it: see `worth`
 WORK = ("score", "select", "capture", "update")  # a round's jobs whose time counts; measuring does not
 
 
@@ -22,11 +24,13 @@ def rows(cell: dict) -> list[dict]:
     start's first; `facts`, scores.json of what rounds 1 to T chose by; `times`, for each of these rounds its jobs'
     benchmarks; `samples` that the prior draws of a pose.
     """
-    found = []
+    found, fits = [], []
     for t, path in enumerate(cell["metrics"]):
         told = read_json(path)
         row = {key: cell[key] for key in CELL} | {"round": t, "photos": told["photos"]}
         row |= _measured(told, "psnr_colour_corrected" if cell["corrected"] else "psnr")
+        row |= _expected(found, fits, told["photos"])
+        fits += [told["fit"]] * (t > 0)
         row |= {"seconds": _seconds(cell["times"][t - 1]) if t else 0.0}
         row |= {"evaluations": _evaluations(cell["facts"][t - 1], cell["samples"]) if t else 0}
         about = told["provenance"]
@@ -51,7 +55,7 @@ def read(path: Path | str) -> list[dict]:
 
 def _typed(row: dict[str, str]) -> dict:
     whole_numbers = ("seed", "k", "round", "photos", "evaluations")
-    numbers = (*MEASURES, "seconds")
+    numbers = (*MEASURES, *EXPECTED, "seconds")
     out = row | {key: int(row[key]) for key in whole_numbers}
     return out | {key: float(row[key]) if row[key] else None for key in numbers}
 
@@ -67,6 +71,16 @@ def _measured(told: dict, psnr: str) -> dict:
     found = {"psnr": mine[psnr], "ssim": mine["ssim"], "lpips": mine["lpips"]}
     found |= {"worst_psnr": mine["worst_decile"][psnr]}
     return found | {"walker_psnr": groups["walker"][psnr] if "walker" in groups else None}
+
+
+def _expected(before: list[dict], fits: list[dict], photos: int) -> dict:
+    """What could be said of a round's gain beforehand. before: rows of the rounds before it; fits: their reports."""
+    if not before:
+        return dict.fromkeys(EXPECTED)
+    history = worth.history(fits, before[0]["photos"], photos - before[-1]["photos"])
+    found = worth.expected(history)
+    values = (worth.closing(history), found.gain, found.low, found.high) if found else (None,) * len(EXPECTED)
+    return dict(zip(EXPECTED, values, strict=True))
 
 
 def _seconds(files: list[str]) -> float | None:

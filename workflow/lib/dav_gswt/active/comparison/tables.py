@@ -1,6 +1,7 @@
 """From curves to results: a row a cell, and every policy less the baseline, paired, with intervals."""
 
 from dataclasses import asdict
+from itertools import pairwise
 
 import numpy as np
 
@@ -54,6 +55,36 @@ def comparisons(table: list[dict], baseline: str) -> list[dict]:
             rows.append(_compared(policy, scene, k, {u: v for u, v in pairs.items() if (u[0], u[3]) == (scene, k)}))
     raised = holm({" ".join(_policy(row)): row["p"] for row in rows if row["scene"] == EVERY and row["p"] is not None})
     return [row | {"holm": raised.get(" ".join(_policy(row))) if row["scene"] == EVERY else None} for row in rows]
+
+
+def worth(curves: list[dict]) -> list[dict]:
+    """What rounds gained against what was expected of them, over all scenes and of each: see `active.worth`.
+
+    share: of the gap that closes, what test views gained (geometric mean), off: standard deviation of its logarithm,
+    both over rounds that gained something; covered: share of all rounds whose gain lies in the interval.
+    """
+    checked: dict[str, list[tuple[dict, float]]] = {}
+    for _, policy, rounds in _cells(curves):
+        for before, row in pairwise(rounds):
+            if row["expected"] is not None and policy[0] != EVERYTHING:
+                gained = row["psnr"] - before["psnr"]
+                for name in (EVERY, row["scene"]):
+                    checked.setdefault(name, []).append((row, gained))
+    return [{"scene": name} | _checked(found) for name, found in sorted(checked.items(), key=lambda i: i[0] != EVERY)]
+
+
+def _checked(found: list[tuple[dict, float]]) -> dict:
+    logs = np.array([np.log(gain / row["closes"]) for row, gain in found if gain > 0 and row["closes"] > 0])
+    inside = [row["expected_low"] <= gain <= row["expected_high"] for row, gain in found]
+    return {
+        "rounds": len(found),
+        "gained": float(np.mean([gain for _, gain in found])),
+        "expected": float(np.mean([row["expected"] for row, _ in found])),
+        "apart": float(np.mean([abs(gain - row["expected"]) for row, gain in found])),
+        "covered": float(np.mean(inside)),
+        "share": float(np.exp(logs.mean())) if len(logs) else None,
+        "off": float(logs.std(ddof=1)) if len(logs) > 1 else None,
+    }
 
 
 def _compared(policy: tuple[str, ...], scene: str, k: int | str, pairs: dict[tuple, float]) -> dict:
