@@ -28,6 +28,9 @@ class Learned:
     regresses = False  # what a file has to say of itself
 
     def __init__(self, network: Network, facts: dict[str, str] | None = None):
+        network.denoiser.to(
+            memory_format=torch.channels_last
+        )  # a fifth faster on processors, the same but for rounding
         self.network, self.facts = network.eval().requires_grad_(False), facts or {}
         self.layers = dropout.held(network.denoiser)
 
