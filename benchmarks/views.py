@@ -1,7 +1,7 @@
 """How long a round of active views takes: choosing among 1000 candidates, and a whole round of the desert at `draft`.
 
-Every figure goes to results/bench.json. The round: scores with the prior, selection, four rendered photos, the update,
-as the workflow runs them, its own start included; then the same without a prior.
+Every figure goes to results/bench.json. The round: scores, selection by the default policy, four rendered photos, the
+update, as the workflow runs them, its own start included; then the same with the prior's scores.
 """
 
 import subprocess
@@ -24,9 +24,9 @@ ROOT = Path(__file__).resolve().parents[1]
 CANDIDATES, PHOTOS, CHOSEN = 1000, 28, 20
 NEEDY = {"fisher", "oracle"}  # policies that look at more than scores
 REPEATS = 5
-CELLS = {
-    "round_draft_seconds": ("scores_terrain_pdrop0.15", "active_w2-lpips-diverse_terrain_pdrop0.15_lam0.1_k4"),
-    "round_draft_geometric_seconds": ("scores_none_pdrop0", "active_farthest_none_pdrop0_lam0_k4"),
+CELLS = {  # the default policy first
+    "round_draft_seconds": ("scores_none_pdrop0", "active_farthest_none_pdrop0_lam0_k4"),
+    "round_draft_prior_seconds": ("scores_terrain_pdrop0.15", "active_w2-lpips-diverse_terrain_pdrop0.15_lam0.1_k4"),
 }
 TARGETS = {"select_1000_seconds": 0.2, "round_draft_seconds": 45}
 
