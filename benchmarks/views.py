@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from record import tell
 
+from dav_gswt.active.names import ORACLES
 from dav_gswt.active.policies import POLICIES, Wanted
 from dav_gswt.active.poses import Pose, place
 from dav_gswt.active.scores import TERMS, Scores
@@ -22,7 +23,7 @@ from dav_gswt.photos import rigs
 
 ROOT = Path(__file__).resolve().parents[1]
 CANDIDATES, PHOTOS, CHOSEN = 1000, 28, 20
-NEEDY = {"fisher", "oracle"}  # policies that look at more than scores
+NEEDY = {"fisher", *ORACLES}  # policies that look at more than scores
 REPEATS = 5
 CELLS = {  # the default policy first
     "round_draft_seconds": ("scores_none_pdrop0", "active_farthest_none_pdrop0_lam0_k4"),

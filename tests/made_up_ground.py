@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from dav_gswt import cameras, views
+from dav_gswt.active import poses
 from dav_gswt.coarse import discs, ground, underlay
 from dav_gswt.field import joined
 from dav_gswt.raster import render
@@ -33,6 +34,16 @@ def field(of=None):
     of = of or grid()
     layer = discs.ground_discs(of, look(*of.centres[:, :2].T))
     return joined([layer, underlay.beneath(of, layer)])
+
+
+def pool(count, turn):
+    """Candidate poses around the patch, `turn` radians from one to the next."""
+    found = []
+    for i in range(count):
+        eye = [1.6 + 2.5 * np.cos(turn * i), 1.6 + 2.5 * np.sin(turn * i), 3.0]
+        camera = cameras.pinhole(eye, [1.6, 1.6, 0.0], 96, 96, 45.0)
+        found.append((poses.of_camera(f"p{i}.png", camera, FRAME), camera))
+    return found
 
 
 def photos(count=3, size=48):

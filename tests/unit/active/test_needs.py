@@ -6,8 +6,8 @@ import made_up_ground as patch
 import numpy as np
 import pytest
 
-from dav_gswt import cameras, field, images
-from dav_gswt.active import needs, poses
+from dav_gswt import field, images
+from dav_gswt.active import needs
 from dav_gswt.active.calibration import truth
 from dav_gswt.active.scores import Scores
 from dav_gswt.active.uncertainty.weighing import Scales
@@ -19,12 +19,7 @@ from dav_gswt.views import View
 
 
 def pool():
-    found = []
-    for i in range(3):
-        eye = [1.6 + 2.5 * np.cos(2.0 * i), 1.6 + 2.5 * np.sin(2.0 * i), 3.0]
-        camera = cameras.pinhole(eye, [1.6, 1.6, 0.0], 96, 96, 45.0)
-        found.append((poses.of_camera(f"p{i}.png", camera, patch.FRAME), camera))
-    return found
+    return patch.pool(3, turn=2.0)
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ def test_the_law_is_found_whatever_the_rounds_and_goes_on_falling(sizes):
     rounds = by_law(40.0, sizes, 3)
     found = expected(History(rounds, 20, 4))
     assert found.gain == pytest.approx(SHARE * 40 * (1 / 20 - 1 / 24)) and found.photos == 4
-    assert worth.closing(History(rounds, 20, 4)) == pytest.approx(40 * (1 / 20 - 1 / 24))
+    assert found.closes == pytest.approx(40 * (1 / 20 - 1 / 24))
     later, more = expected(History(rounds, 40, 4)), expected(History(rounds, 20, 8))
     assert later.each < found.each and found.gain < more.gain < 2 * found.gain
 
@@ -42,7 +42,7 @@ def test_the_interval_holds_what_is_drawn_as_often_as_it_says():
 
 def test_photos_that_are_shown_as_well_as_the_others_promise_nothing():
     found = expected(History([Round(8, [-0.5, -0.4, -0.6])], 12, 4))
-    assert (found.gain, found.low, found.high, found.each) == (0, 0, 0, 0)
+    assert (found.gain, found.low, found.high, found.each, found.closes) == (0, 0, 0, 0, 0)
     unsure = expected(History([Round(8, [-3.0, 2.0, 0.9])], 12, 4))
     assert unsure.gain == unsure.low == 0 < unsure.high
 
@@ -57,7 +57,7 @@ def test_photos_that_are_shown_as_well_as_the_others_promise_nothing():
     ],
 )
 def test_where_nothing_can_be_said_nothing_is(rounds, coming):
-    assert expected(History(rounds, 12, coming)) is None is worth.closing(History(rounds, 12, coming))
+    assert expected(History(rounds, 12, coming)) is None
 
 
 def report(*unseen, taken=True, level=25.0):

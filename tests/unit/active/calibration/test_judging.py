@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from dav_gswt import cameras, images
+from dav_gswt import images
 from dav_gswt.active import imagining, poses, scoring
 from dav_gswt.active.calibration import controls, judging, truth
 from dav_gswt.active.imagining import Asking
@@ -37,12 +37,7 @@ def files(tmp_path_factory):
 
 
 def pool(count=12):
-    found = []
-    for i in range(count):
-        eye = [1.6 + 2.5 * np.cos(0.9 * i), 1.6 + 2.5 * np.sin(0.9 * i), 3.0]
-        camera = cameras.pinhole(eye, [1.6, 1.6, 0.0], 96, 96, 45.0)
-        found.append((poses.of_camera(f"p{i}.png", camera, patch.FRAME), camera))
-    return found
+    return patch.pool(count, turn=0.9)
 
 
 @pytest.fixture

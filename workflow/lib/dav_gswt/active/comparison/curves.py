@@ -30,7 +30,8 @@ def rows(cell: dict) -> list[dict]:
         row = {key: cell[key] for key in CELL} | {"round": t, "photos": told["photos"]}
         row |= _measured(told, "psnr_colour_corrected" if cell["corrected"] else "psnr")
         row |= _expected(found, fits, told["photos"])
-        fits += [told["fit"]] * (t > 0)
+        if t:
+            fits.append(told["fit"])
         row |= {"seconds": _seconds(cell["times"][t - 1]) if t else 0.0}
         row |= {"evaluations": _evaluations(cell["facts"][t - 1], cell["samples"]) if t else 0}
         about = told["provenance"]
@@ -77,9 +78,8 @@ def _expected(before: list[dict], fits: list[dict], photos: int) -> dict:
     """What could be said of a round's gain beforehand. before: rows of the rounds before it; fits: their reports."""
     if not before:
         return dict.fromkeys(EXPECTED)
-    history = worth.history(fits, before[0]["photos"], photos - before[-1]["photos"])
-    found = worth.expected(history)
-    values = (worth.closing(history), found.gain, found.low, found.high) if found else (None,) * len(EXPECTED)
+    found = worth.expected(worth.history(fits, before[0]["photos"], photos - before[-1]["photos"]))
+    values = (found.closes, found.gain, found.low, found.high) if found else (None,) * len(EXPECTED)
     return dict(zip(EXPECTED, values, strict=True))
 
 
