@@ -56,7 +56,7 @@ def _curves(axes, rows: list[dict], k: int, looks: dict[str, dict]) -> None:
             f"all {photos} photos",
             (0.03, _mean(everything, lambda row: True)),
             xycoords=("axes fraction", "data"),
-            xytext=(0, 3),
+            xytext=(0, -10),  # under the line: above it is the frame
             textcoords="offset points",
             fontsize=8,
         )
