@@ -126,8 +126,9 @@ def values_of(scene, policy=config["policy"]):
 
 
 def terrain_of(scene):
-    """A scene's terrain: page and stills."""
-    return expand([rules.make_page.output.page, *rules.render_terrain.output.stills], **values_of(scene))
+    """A scene's terrain: page, stills and, where the config asks for one, a flight."""
+    flight = [rules.render_flight.output.frames] if config["flight"] else []
+    return expand([rules.make_page.output.page, *rules.render_terrain.output.stills, *flight], **values_of(scene))
 
 
 def study_of(scene):
@@ -205,6 +206,14 @@ def folder_of(scene):
     if not folder.is_dir():
         raise WorkflowError(f"config: scenes.{scene}.folder: there is no folder {folder}")
     return sorted(str(p) for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
+
+
+def height_map(wildcards):
+    """The image that the terrain's surface is read from, where the config names one."""
+    path = config["heights"].get("file")
+    if path and not Path(path).is_file():
+        raise WorkflowError(f"config: heights.file: there is no file {path}")
+    return {"map": path} if path else {}
 
 
 def beside_photos(wildcards):

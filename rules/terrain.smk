@@ -1,6 +1,6 @@
-"""Terrain: the tiles laid without end, as a page to walk in and as stills.
+"""Terrain: the tiles laid without end, as a page to walk in, as stills and, where the config asks, as a flight.
 
-In: the bundle and the tiles. Out: page/ (open it with `make view`), walker.png, oblique.png, above.png.
+In: the bundle and the tiles. Out: page/ (open it with `make view`), walker.png, oblique.png, above.png, flight/.
 """
 
 
@@ -25,6 +25,7 @@ rule make_page:
 rule render_terrain:
     """Stills of the endless terrain: walking, from a hill, and from above."""
     input:
+        unpack(height_map),
         manifest="<results>/<bundle>/davgswt.json",
         seams="<results>/<tiles>/seams.json",
         tiles="<results>/<tiles>/tiles",
@@ -45,6 +46,33 @@ rule render_terrain:
         runtime="20m",
     params:
         size=lookup(dpath="stills", within=config),
-        source=source_of("terrain", "raster"),
+        heights=lookup(dpath="heights", within=config),
+        source=source_of("terrain", "bundle/orders", "raster"),
     script:
         "../scripts/render_terrain.py"
+
+
+rule render_flight:
+    """A walk over the endless terrain, frame by frame: does anything flicker, tear or jump?"""
+    input:
+        unpack(height_map),
+        manifest="<results>/<bundle>/davgswt.json",
+        seams="<results>/<tiles>/seams.json",
+        tiles="<results>/<tiles>/tiles",
+    output:
+        frames=directory("<results>/<terrain>/flight"),
+    log:
+        "<logs>/<terrain>/render_flight.log",
+    benchmark:
+        "<benchmarks>/<terrain>/render_flight.tsv"
+    threads: 2
+    resources:
+        mem_mb=4000,
+        runtime="4h",
+    params:
+        size=lookup(dpath="stills", within=config),
+        heights=lookup(dpath="heights", within=config),
+        flight=lookup(dpath="flight", within=config),
+        source=source_of("terrain", "bundle/orders", "raster"),
+    script:
+        "../scripts/render_flight.py"

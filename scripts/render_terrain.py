@@ -9,11 +9,9 @@ from dav_gswt.terrain import assemble, still
 from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
-    given, size = snakemake.input, snakemake.params.size
+    given, params = snakemake.input, snakemake.params
     bundle = read_json(given.manifest)
-    terrain = assemble.of_tiles(store.read(given.tiles, given.seams), bundle)
+    terrain = assemble.of_tiles(store.read(given.tiles, given.seams), bundle, params.heights)
     targets = {Path(path).stem: path for path in snakemake.output.stills}
     for shot in progress(still.SHOTS, "render stills"):
-        camera = still.camera_of(shot, terrain.side, bundle["eye_floor"], size["width"], size["height"])
-        picture = still.draw(terrain, camera, bundle["sky"], bundle["ground_colour"])
-        images.write(targets[shot.name], picture)
+        images.write(targets[shot.name], still.taken(terrain, shot, bundle, **params.size))

@@ -39,6 +39,13 @@ def test_the_configs_that_come_with_the_project_are_valid(config):
         pytest.param(["stop", "worth"], 0, "stop.worth", id="a price of nothing"),
         pytest.param(["stop", "worth"], "auto", "stop.worth", id="a price that is no number"),
         pytest.param(["stop"], 20, "stop: 20", id="a stop without its key"),
+        pytest.param(["heights", "kind"], "fractal", "heights.kind", id="a surface that is not there"),
+        pytest.param(["heights", "height"], 2, "height", id="a plain that is high"),
+        pytest.param(["heights"], {"kind": "hills", "height": 1}, "wavelength", id="hills without width"),
+        pytest.param(["heights"], {"kind": "hills", "height": 1, "wavelength": 0.5}, "wavelength", id="spikes"),
+        pytest.param(["heights"], {"kind": "image", "file": "a.exr", "width": 0, "height": 1}, "width", id="a point"),
+        pytest.param(["flight"], {"frames": 1, "length": 1, "height": 1}, "flight.frames", id="a flight of one frame"),
+        pytest.param(["flight"], {"frames": 8, "length": 1}, "'height'", id="a flight at no height"),
         pytest.param(["seams", "colour", "tile"], 1.2, "tile", id="a tile larger than its exemplar"),
     ],
 )
@@ -82,7 +89,11 @@ def test_a_missing_key_is_named(config):
 def test_every_key_of_the_schema_is_explained():
     text = (ROOT / "config/README.md").read_text()
     schema = yaml.safe_load(SCHEMA.read_text())
-    keys = (set(schema["properties"]) - {"stills"}) | set(schema["properties"]["stop"]["properties"])
+    keys = set(schema["properties"]) - {"stills"}
+    for table in ("stop", "flight"):
+        keys |= set(schema["properties"][table]["properties"])
+    for kind in schema["properties"]["heights"]["allOf"]:
+        keys |= set(kind["then"]["properties"])
     for kind in schema["properties"]["scenes"]["additionalProperties"]["allOf"]:
         keys |= set(kind["then"]["properties"])
     for table in ("qualities", "seams"):

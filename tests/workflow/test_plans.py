@@ -224,6 +224,19 @@ def test_a_missing_folder_of_photos_is_named(snakemake, run, checkout, tmp_path)
     assert done.returncode == 1 and said in done.stdout and len(done.stdout.splitlines()) <= 4, done.stdout
 
 
+def test_a_flight_is_planned_where_the_config_asks_for_one(planned, tmp_path):
+    assert "render_flight" not in planned(tmp_path)
+    (tmp_path / "flight.yaml").write_text("flight: {frames: 8, length: 1, height: 1}\n")
+    plan = planned(tmp_path, configs=(USUAL, tmp_path / "flight.yaml"))
+    assert plan["render_flight"] == plan["render_terrain"] == 1
+
+
+def test_a_missing_height_map_is_named(snakemake, tmp_path):
+    (tmp_path / "map.yaml").write_text("heights: {kind: image, file: no.exr, width: 10, height: 1}\n")
+    done = snakemake(tmp_path, "--dry-run", configs=(USUAL, tmp_path / "map.yaml"), check=False)
+    assert done.returncode != 0 and "config: heights.file: there is no file no.exr" in done.stdout
+
+
 def test_the_workflow_is_lint_clean_but_for_its_environment(snakemake, tmp_path):
     """One pip environment serves all rules, so lint's wish for a conda or container directive a rule is not met."""
     done = snakemake(tmp_path, "--lint", check=False)

@@ -213,9 +213,16 @@ def test_another_round_goes_on_from_the_last_one(tiny, planned):
     assert not BEFORE_K & set(plan) and plan["update_field"] == plan["evaluate_round"] == 1
 
 
-def test_another_size_of_stills_makes_only_stills(tiny, planned, tmp_path):
-    (tmp_path / "size.yaml").write_text("stills: {width: 320, height: 180}\n")
-    plan = planned(tiny.folder, configs=(*CONFIGS, tmp_path / "size.yaml"))
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param("stills: {width: 320, height: 180}", id="another size"),
+        pytest.param("heights: {kind: hills, height: 2, wavelength: 20}", id="another surface"),
+    ],
+)
+def test_another_look_makes_only_stills(tiny, planned, tmp_path, change):
+    (tmp_path / "look.yaml").write_text(change + "\n")
+    plan = planned(tiny.folder, configs=(*CONFIGS, tmp_path / "look.yaml"))
     assert set(plan) == {"render_terrain", "all"}
 
 

@@ -60,15 +60,8 @@ def read(path: Path | str) -> Float32[Array, "h w 3"]:
 def read_covered(path: Path | str) -> tuple[Float32[Array, "h w 3"], Float32[Array, "h w"]]:
     """A photo as `read` gives it, and its alpha: 0 where it is masked. Without alpha all counts."""
     file, spec = _opened(path)
-    try:
-        # one channel too many is read where there is alpha: reading a part of the channels is slower in many formats
-        pixels = file.read_image(0, 0, 0, min(spec.nchannels, 4), oiio.FLOAT)
-        trouble = file.geterror() if file.has_error else ""
-    finally:
-        file.close()
-    if pixels is None or trouble:
-        raise InputError(f"{path}: damaged or cut short ({_first_line(trouble)}); copy it again or remove it")
-    pixels = np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
+    # one channel too many is read where there is alpha: reading a part of the channels is slower in many formats
+    pixels = _pixels(file, path, min(spec.nchannels, 4))
     alpha = pixels[..., spec.alpha_channel] if 0 <= spec.alpha_channel < pixels.shape[2] else None
     pixels = pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
     alpha = np.ones(pixels.shape[:2], np.float32) if alpha is None else alpha
@@ -76,6 +69,15 @@ def read_covered(path: Path | str) -> tuple[Float32[Array, "h w 3"], Float32[Arr
         raise InputError(f"{path}: has pixels that are not finite; export it as 8 or 16 bit")
     upright = (_upright(np.clip(part, 0, 1), _orientation(spec)) for part in (pixels, alpha))
     return tuple(map(np.ascontiguousarray, upright))
+
+
+def read_channel(path: Path | str) -> Float32[Array, "h w"]:
+    """The first channel as it is stored, integers over their largest value; upright, and neither clipped nor checked.
+
+    Raises: InputError: missing, not an image, cut short, or too large.
+    """
+    file, spec = _opened(path)
+    return np.ascontiguousarray(_upright(_pixels(file, path, 1)[..., 0], _orientation(spec)))
 
 
 def write(path: Path | str, image: Float[Array, "h w c"]) -> None:
@@ -188,6 +190,19 @@ def _opened(path: Path | str):
         most = MOST_PIXELS // 10**6
         raise InputError(f"{path}: {spec.width} x {spec.height} pixels; at most {most} megapixels are read: shrink it")
     return file, spec
+
+
+def _pixels(file, path: Path | str, channels: int) -> Float32[Array, "h w c"]:
+    """The first channels of an open image as they are stored; closes it."""
+    spec = file.spec()
+    try:
+        pixels = file.read_image(0, 0, 0, channels, oiio.FLOAT)
+        trouble = file.geterror() if file.has_error else ""
+    finally:
+        file.close()
+    if pixels is None or trouble:
+        raise InputError(f"{path}: damaged or cut short ({_first_line(trouble)}); copy it again or remove it")
+    return np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
 
 
 def _orientation(spec) -> int:

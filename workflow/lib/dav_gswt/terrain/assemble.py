@@ -1,77 +1,197 @@
-"""The endless terrain as one field for one camera: the tiles in sight, each at the level its distance asks for."""
+"""The endless terrain for one eye: which cells it may see, and the Gaussians of each as they are to be drawn there."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int64
 from numpy import ndarray as Array
 
+from dav_gswt.bundle.orders import back_to_front
 from dav_gswt.cameras import Camera
 from dav_gswt.field import Field, joined
-from dav_gswt.terrain.choice import tile_at
+from dav_gswt.terrain import order, weights
+from dav_gswt.terrain.choice import tiles_at
+from dav_gswt.terrain.drape import lifted
+from dav_gswt.terrain.heights import Flat, Heights, of_config
 from dav_gswt.tiles.build import TileSet
 
-REACH = 48  # tiles to the horizon at most: beyond it the ground proxy has the terrain's mean colour
 MOST = 10_000_000  # Gaussians in one picture
+RIM = 3.33  # standard deviations at which an opaque Gaussian ends: exp(-RIM^2 / 2) = 1/255
+PAD = 2.0  # pixels, rounded up, by which the rasterizer's widening of splats reaches into the picture
+NEAR = 0.1  # Gaussians nearer than this share of the eye floor are left out
 
 
 @dataclass(frozen=True)
 class Terrain:
-    """A tile set ready to be laid: fields by level and tile number, and how far each level is used."""
+    """A tile set ready to be laid.
 
-    tiles: dict[tuple[int, int], Field]  # (level, tile number), positions in [0, side]
+    tiles: by (level, tile number), positions in [0, side], sorted in no way. switches, bands: where a level gives way
+    to the next, and half the width of that (`weights.of_levels`, smooth or not); the last switch is infinite.
+    directions, kept: along which orders are sorted, and which of these each tile has. heights: what it all is draped
+    over. near: what is nearer is left out. overhang: how far a Gaussian may reach over the edges of its tile. reach:
+    tile sides to the end of what is laid; beyond it the far ground has the terrain's mean colour.
+    """
+
+    tiles: dict[tuple[int, int], Field]
     side: float
-    distances: list[float]  # level l is used nearer than distances[l]; the last is infinite
+    switches: list[float]
+    bands: list[float]
+    directions: Float[Array, "d 3"]
+    kept: list[list[int]]
+    z: tuple[float, float]
+    overhang: float
     variants: int
     salt: int
+    near: float
+    heights: Heights = Flat()
+    smooth: bool = False
+    reach: int = 48
+
+    def height_range(self, x: Float[Array, "n"], y: Float[Array, "n"]) -> tuple[Float[Array, "n"], Float[Array, "n"]]:
+        """Between which heights the Gaussians of cells with these centres show, the surface included."""
+        half = (0.5 * self.side + self.overhang) * 2**0.5
+        middle, _ = self.heights.at(x, y)
+        most = self.heights.steepest * half
+        low = np.maximum(middle - most, self.heights.low) + self.z[0]
+        return low, np.minimum(middle + most, self.heights.high) + self.z[1]
 
 
-def of_tiles(tiles: TileSet, manifest: dict) -> Terrain:
-    """A tile set laid as a bundle's manifest says."""
-    fields = {(level, tile): f for level, row in enumerate(tiles.fields) for tile, f in enumerate(row)}
-    far = [np.inf if level["distance"] is None else level["distance"] for level in manifest["levels"]]
-    return Terrain(fields, tiles.side, far, tiles.variants, manifest["salt"])
-
-
-def visible(terrain: Terrain, camera: Camera) -> list[tuple[int, int, int]]:
-    """Cells (i, j) that the camera may see, with their level, nearest first."""
-    eye, side = camera.centre, terrain.side
-    i0, j0 = int(np.floor(eye[0] / side)), int(np.floor(eye[1] / side))
-    found = []
-    for j in range(j0 - REACH, j0 + REACH + 1):
-        for i in range(i0 - REACH, i0 + REACH + 1):
-            corners = np.array([[x, y, z] for x in (i, i + 1) for y in (j, j + 1) for z in (-0.2, 0.2)], float) * [
-                side,
-                side,
-                side,
-            ]
-            pixel, depth = camera.project(corners)
-            ahead = depth > 0.01 * side
-            if not ahead.any():
-                continue
-            outside = (pixel[ahead] < [-0.2 * camera.width, -0.2 * camera.height]).all(0) | (
-                pixel[ahead] > [1.2 * camera.width, 1.2 * camera.height]
-            ).all(0)
-            if ahead.all() and outside.any():
-                continue
-            nearest = np.clip(eye[:2] / side, [i, j], [i + 1, j + 1]) * side
-            distance = float(np.linalg.norm([*(nearest - eye[:2]), eye[2]]))
-            found.append((distance, i, j))
-    found.sort()
-    level = [int(np.searchsorted(terrain.distances[:-1], d, side="right")) for d, _, _ in found]
-    return [(i, j, lv) for (_, i, j), lv in zip(found, level, strict=True)]
-
-
-def laid(terrain: Terrain, cells: list[tuple[int, int, int]], about: Float[Array, "3"]) -> Field:
-    """The Gaussians of cells, placed relative to `about`: kilometres out float32 still resolves a disc.
-
-    Tiles past MOST Gaussians are left out, farthest first.
+@dataclass(frozen=True)
+class Cells:
+    """Cells to be drawn, back to front. close: of the 3 x 3 about the eye. nearest, farthest: distances from the eye
+    between which all Gaussians of a cell have their centres.
     """
-    parts, count = [], 0
-    for i, j, level in cells:
-        tile = terrain.tiles[level, tile_at(i, j, terrain.salt, terrain.variants)]
-        if (count := count + len(tile)) > MOST:
-            break
-        offset = np.array([i * terrain.side - about[0], j * terrain.side - about[1], -about[2]], np.float32)
-        parts.append(replace(tile, means=tile.means + offset))
-    return joined(parts)
+
+    i: Int64[Array, "n"]
+    j: Int64[Array, "n"]
+    tile: Int64[Array, "n"]
+    close: Bool[Array, "n"]
+    nearest: Float[Array, "n"]
+    farthest: Float[Array, "n"]
+
+    def __len__(self) -> int:
+        return len(self.i)
+
+    def __getitem__(self, index) -> "Cells":
+        return Cells(*(getattr(self, f.name)[index] for f in fields(self)))
+
+
+def of_tiles(tiles: TileSet, manifest: dict, surface: dict) -> Terrain:
+    """A tile set laid as a bundle's manifest says, over the surface that the config's `heights` asks for.
+
+    Raises: InputError: as `heights.of_config`.
+    """
+    levels, listed = manifest["levels"], manifest["tiles"]
+    largest = max(float(np.exp(f.log_scales.max(initial=-np.inf))) for row in tiles.fields for f in row)
+    thin = (RIM - 3) * largest  # what the manifest's heights, three deviations around the centres, leave out
+    return Terrain(
+        tiles={(level, tile): f for level, row in enumerate(tiles.fields) for tile, f in enumerate(row)},
+        side=tiles.side,
+        switches=[np.inf if level["distance"] is None else level["distance"] for level in levels],
+        bands=[level["band"] for level in levels],
+        directions=np.array(manifest["directions"], float),
+        kept=[tile["chunks"][0]["orders"] for tile in listed],
+        z=(min(tile["z"][0] for tile in listed) - thin, max(tile["z"][1] for tile in listed) + thin),
+        overhang=RIM * largest,
+        variants=tiles.variants,
+        salt=manifest["salt"],
+        near=NEAR * manifest["eye_floor"],
+        heights=of_config(surface, tiles.side),
+    )
+
+
+def visible(terrain: Terrain, camera: Camera) -> Cells:
+    """The cells within reach of the eye that a pinhole camera may see, back to front.
+
+    A cell is left out where its box (its square and the overhang, between the heights that its Gaussians may have)
+    lies wholly beyond the near plane or one side of the picture: never one of which anything shows.
+    """
+    eye, side = camera.centre, terrain.side
+    at = tuple(int(v) for v in np.floor(eye[:2] / side))
+    steps = np.arange(-terrain.reach, terrain.reach + 1, dtype=np.int64)
+    i, j = (v.ravel() for v in np.meshgrid(at[0] + steps, at[1] + steps))
+    x, y = (i + 0.5) * side, (j + 0.5) * side
+    low, high = terrain.height_range(x, y)
+    middle = np.stack([x, y, 0.5 * (low + high)], 1) - eye
+    half = np.stack([np.full(len(x), 0.5 * side), np.full(len(x), 0.5 * side), 0.5 * (high - low)], 1)
+    nearest = np.linalg.norm(np.maximum(np.abs(middle) - half, 0), axis=1)
+    farthest = np.linalg.norm(np.abs(middle) + half, axis=1)
+    wider = np.array([terrain.overhang, terrain.overhang, 0])
+    seen = (nearest < terrain.reach * side) & ~_outside(camera, terrain.near, middle, half + wider)
+    sequence, _ = order.back_to_front(i, j, at)
+    sequence = sequence[seen[sequence]]
+    tile = tiles_at(i, j, terrain.salt, terrain.variants)
+    return Cells(i, j, tile, order.around(i, j, at), nearest, farthest)[sequence]
+
+
+def _outside(camera: Camera, near: float, middle: Float[Array, "n 3"], half: Float[Array, "n 3"]) -> Bool[Array, "n"]:
+    """Which boxes, given from the eye, lie wholly on the outer side of one of the frustum's planes."""
+    right, down, ahead = camera.rotation
+    planes = np.array(
+        [
+            [*ahead, -near],
+            [*(camera.fx * right + (camera.cx + PAD) * ahead), 0],
+            [*((camera.width - camera.cx + PAD) * ahead - camera.fx * right), 0],
+            [*(camera.fy * down + (camera.cy + PAD) * ahead), 0],
+            [*((camera.height - camera.cy + PAD) * ahead - camera.fy * down), 0],
+        ]
+    )
+    most = middle @ planes[:, :3].T + half @ np.abs(planes[:, :3]).T + planes[:, 3]
+    return (most < 0).any(1)
+
+
+def active(terrain: Terrain, cells: Cells) -> Bool[Array, "levels n"]:
+    """Which levels have a weight somewhere in each cell."""
+    switch, band = np.array(terrain.switches)[:, None], np.array(terrain.bands)[:, None]
+    begin = np.concatenate([[[-np.inf]], (switch - band)[:-1]])
+    return (cells.nearest <= switch + band) & (cells.farthest >= begin)
+
+
+def within_budget(terrain: Terrain, cells: Cells, budget: int = MOST) -> Cells:
+    """The cells without those, farthest first, that would bring more than so many Gaussians into the picture."""
+    sizes = np.array([[len(terrain.tiles[level, t]) for t in cells.tile] for level in range(len(terrain.switches))])
+    nearest_first = np.argsort(cells.nearest, kind="stable")
+    count = np.cumsum((sizes * active(terrain, cells)).sum(0)[nearest_first])
+    return cells[np.sort(nearest_first[count <= budget])]
+
+
+def laid(terrain: Terrain, cell: Cells, eye: Float[Array, "3"]) -> tuple[Field, Float[Array, "n 2"]]:
+    """The Gaussians of one cell, placed relative to the eye, and the surface's slope at each (`drape.axes`).
+
+    So float32 still resolves a disc kilometres out. They are cross-faded between levels by their own distances, and
+    stand back to front in the pre-sorted order that serves best. Where two levels are drawn their pre-sorted orders
+    are merged: Gaussians of both levels stand at their own depths, and neither level covers the other.
+    """
+    (i,), (j,), (tile,) = cell.i.tolist(), cell.j.tolist(), cell.tile.tolist()
+    levels = np.flatnonzero(active(terrain, cell)[:, 0])
+    parts = [terrain.tiles[level, tile] for level in levels]
+    level, flat = np.repeat(levels, [len(part) for part in parts]), joined(parts)
+    sequence = back_to_front(flat.means, _along(terrain, i, j, tile, eye))
+    corner = np.array([i * terrain.side, j * terrain.side, 0.0])
+    field, slope = lifted(flat[sequence], terrain.heights, corner, eye)
+    level, distance = level[sequence], np.linalg.norm(field.means.astype(float), axis=1)
+    shares = weights.of_levels(distance, terrain.switches, terrain.bands, terrain.smooth)
+    weight = shares[level, np.arange(len(level))]
+    drawn = weight > 0
+    return _faded(field[drawn], weight[drawn]), slope[drawn]
+
+
+def _along(terrain: Terrain, i: int, j: int, tile: int, eye: Float[Array, "3"]) -> Float[Array, "3"]:
+    """The direction whose pre-sorted order a cell is drawn in."""
+    x, y = (i + 0.5) * terrain.side, (j + 0.5) * terrain.side
+    height, slope = terrain.heights.at(np.array([x]), np.array([y]))
+    to = np.array([x, y, height[0] + 0.5 * sum(terrain.z)]) - eye
+    kept = terrain.kept[tile]
+    return terrain.directions[kept[order.nearest(terrain.directions, kept, to, slope[0])]]
+
+
+def _faded(field: Field, weight: Float[Array, "n"]) -> Field:
+    """Opacities of Gaussians that are drawn with a weight; a whole one keeps its bits."""
+    partly = weight < 1
+    if not partly.any():
+        return field
+    opacity = 1 / (1 + np.exp(-field.opacity_logits[partly].astype(float)))
+    left = np.maximum(weights.crossfaded(opacity, weight[partly]), 1e-30)
+    logits = field.opacity_logits.copy()
+    logits[partly] = np.log(left) - np.log1p(-left)
+    return replace(field, opacity_logits=logits)

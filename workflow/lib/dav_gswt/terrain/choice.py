@@ -4,18 +4,21 @@ The page's `choice.js` computes the same integers; tests/golden/tile_choice.json
 """
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Int64
 from numpy import ndarray as Array
 
 WEST, SOUTH, CENTRE = 0, 1, 2  # what a hash is for: the colour of the west edge, of the south edge, the centre variant
 _MASK = 0xFFFFFFFF
 
 
-def hashed(i: int, j: int, axis: int, salt: int) -> int:
+def hashed(
+    i: int | Int64[Array, "*cells"], j: int | Int64[Array, "*cells"], axis: int, salt: int
+) -> int | Int64[Array, "*cells"]:
     """32 well mixed bits for cell (i, j): multiply the coordinates apart, then the finaliser of MurmurHash3.
 
     h = i 0x8da6b343 ^ j 0xd8163841 ^ axis 0xcb1ab31f ^ salt, all modulo 2^32: negative coordinates count in two's
-    complement, and cells 2^32 apart are the same cell. No edge cases: every integer is allowed.
+    complement, and cells 2^32 apart are the same cell. No edge cases: every integer is allowed. Products of arrays
+    wrap at 2^64, which leaves their low 32 bits as they are.
     """
     h = (i * 0x8DA6B343 ^ j * 0xD8163841 ^ axis * 0xCB1AB31F ^ salt) & _MASK
     h = (h ^ h >> 16) * 0x85EBCA6B & _MASK
@@ -29,13 +32,22 @@ def tile_at(i: int, j: int, salt: int, variants: int) -> int:
     A cell's east edge is its neighbour's west edge, its north edge the south edge of the cell above: each edge has one
     colour, whoever asks. `variants` is C >= 1, the number of centres, so T is in [0, 16 C).
     """
-    i, j = int(i), int(j)
+    return _tile(int(i), int(j), salt, variants)
+
+
+def tiles_at(i: Int64[Array, "*cells"], j: Int64[Array, "*cells"], salt: int, variants: int) -> Int64[Array, "*cells"]:
+    """`tile_at` of many cells."""
+    return _tile(i, j, salt, variants)
+
+
+def tiles_in(west: int, south: int, shape: tuple[int, int], salt: int, variants: int) -> Int64[Array, "h w"]:
+    """Tile numbers of a window of cells: row 0 holds cells (west, south), (west + 1, south), ..."""
+    height, width = shape
+    i, j = np.meshgrid(west + np.arange(width, dtype=np.int64), south + np.arange(height, dtype=np.int64))
+    return tiles_at(i, j, salt, variants)
+
+
+def _tile(i, j, salt: int, variants: int):
     west, east = (hashed(i + step, j, WEST, salt) & 1 for step in (0, 1))
     south, north = (hashed(i, j + step, SOUTH, salt) & 1 for step in (0, 1))
     return 16 * ((hashed(i, j, CENTRE, salt) >> 1) % variants) + 8 * west + 4 * north + 2 * east + south
-
-
-def tiles_in(west: int, south: int, shape: tuple[int, int], salt: int, variants: int) -> Int[Array, "h w"]:
-    """Tile numbers of a window of cells: row 0 holds cells (west, south), (west + 1, south), ..."""
-    height, width = shape
-    return np.array([[tile_at(west + i, south + j, salt, variants) for i in range(width)] for j in range(height)], int)

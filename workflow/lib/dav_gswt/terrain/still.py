@@ -1,4 +1,4 @@
-"""Stills of the endless terrain, drawn by the same rasterizer that fitted it, over a sky and a far ground."""
+"""Pictures of the endless terrain, drawn tile by tile as the page draws it, over a sky and a far ground."""
 
 from dataclasses import dataclass, replace
 
@@ -8,16 +8,14 @@ from numpy import ndarray as Array
 
 from dav_gswt import cameras
 from dav_gswt.cameras import Camera
-from dav_gswt.field import Field, sh_of
-from dav_gswt.raster import render
-from dav_gswt.terrain.assemble import REACH, Terrain, laid, visible
-
-FADE = 0.5  # share of the reach from which tiles go over into the far ground
+from dav_gswt.terrain import splats
+from dav_gswt.terrain.assemble import Terrain, laid, visible, within_budget
+from dav_gswt.terrain.backdrop import Backdrop
 
 
 @dataclass(frozen=True)
 class Shot:
-    """A still to take: where the eye is, in tiles and eye heights, and how it looks."""
+    """A still to take: where the eye is, in tiles and, above the surface there, in eye floors, and how it looks."""
 
     name: str
     at: tuple[float, float]  # tiles
@@ -33,41 +31,47 @@ SHOTS = (
 )
 
 
-def camera_of(shot: Shot, side: float, floor: float, width: int, height: int) -> Camera:
+def flight(frames: int, length: float, height: float) -> list[Shot]:
+    """A walk straight on from the walker's place, `length` tiles long, always so many eye floors above the surface."""
+    walker = SHOTS[0]
+    yaw = np.radians(walker.yaw)
+    way = np.linspace(0, length, frames)[:, None] * [np.cos(yaw), np.sin(yaw)] + walker.at
+    return [replace(walker, name=f"{k:04d}", at=tuple(at), height=float(height)) for k, at in enumerate(way.tolist())]
+
+
+def camera_of(shot: Shot, terrain: Terrain, floor: float, width: int, height: int) -> Camera:
     """The shot's camera, 60 degrees wide."""
-    eye = np.array([shot.at[0] * side, shot.at[1] * side, shot.height * floor])
+    x, y = (v * terrain.side for v in shot.at)
+    ground, _ = terrain.heights.at(np.array([x]), np.array([y]))
+    eye = np.array([x, y, ground[0] + shot.height * floor])
     down, yaw = np.radians(min(shot.pitch, 89.99)), np.radians(shot.yaw)
     ahead = np.array([np.cos(down) * np.cos(yaw), np.cos(down) * np.sin(yaw), -np.sin(down)])
     return cameras.pinhole(eye, eye + ahead, width, height, 60.0)
 
 
-def draw(terrain: Terrain, camera: Camera, sky: dict, ground_colour) -> Float32[Array, "h w 3"]:
-    """The terrain as this camera sees it; what no tile covers is sky above the horizon and far ground below it."""
-    about = camera.centre
-    field = faded(laid(terrain, visible(terrain, camera), about * [1, 1, 0]), REACH * terrain.side, ground_colour)
-    near = replace(camera, translation=-camera.rotation @ (about * [0, 0, 1]))
-    seen = render(field, near)
-    return np.clip(seen.colour + (1 - seen.alpha)[..., None] * backdrop(near, terrain, sky, ground_colour), 0, 1)
+def taken(terrain: Terrain, shot: Shot, manifest: dict, width: int, height: int) -> Float32[Array, "h w 3"]:
+    """A shot's picture, with the eye floor, the sky and the far ground of the bundle's manifest."""
+    camera = camera_of(shot, terrain, manifest["eye_floor"], width, height)
+    return draw(terrain, camera, manifest["sky"], manifest["ground_colour"])
 
 
-def faded(field: Field, reach: float, ground_colour) -> Field:
-    """The far end of what is laid goes over into the mean ground colour, so that no edge shows where tiles end."""
-    away = np.hypot(field.means[:, 0], field.means[:, 1]) / reach
-    share = np.clip((away - FADE) / (1 - FADE), 0, 1)[:, None]
-    share = share * share * (3 - 2 * share)
-    sh = field.sh.copy()
-    sh[:, 0] += share.astype(np.float32) * (sh_of(np.array([ground_colour]))[0] - sh[:, 0])
-    return replace(field, sh=sh)
+def draw(terrain: Terrain, camera: Camera, sky: dict, ground_colour, exact: bool = False) -> Float32[Array, "h w 3"]:
+    """The terrain as this camera sees it; what no tile covers is sky above the horizon and far ground below it.
 
-
-def backdrop(camera: Camera, terrain: Terrain, sky: dict, ground_colour) -> Float32[Array, "h w 3"]:
-    """Sky by elevation, and ground of the mean colour that pales to the horizon beyond the last tiles."""
-    _, step = camera.rays()
-    rise = step[..., 2] / np.linalg.norm(step, axis=-1)
-    zenith, horizon, ground = (np.asarray(c, np.float32) for c in (sky["zenith"], sky["horizon"], ground_colour))
-    up = np.clip(rise, 0, 1)[..., None] ** 0.5
-    above = horizon + (zenith - horizon) * up
-    far = camera.centre[2] / (REACH * terrain.side)  # sine at which the last tiles end
-    pale = np.exp(np.clip(rise, -1, 0) / (0.3 * far))[..., None]
-    below = ground + (horizon - ground) * pale
-    return np.where(rise[..., None] > 0, above, below).astype(np.float32)
+    Tiles are drawn back to front, each in a pre-sorted order, the 3 x 3 about the eye last and sorted together.
+    exact: all Gaussians are sorted together, by depth: what that order is compared with.
+    Raises: ValueError: an orthographic camera, whose rays do not start from one eye.
+    """
+    if camera.orthographic:
+        raise ValueError("the terrain is drawn for a pinhole camera")
+    eye, here = camera.centre, replace(camera, translation=np.zeros(3))
+    cells = within_budget(terrain, visible(terrain, camera))
+    behind = Backdrop.of(terrain, eye, sky, ground_colour)
+    far, close = [splats.NONE], [splats.NONE]
+    for k in range(len(cells)):
+        field, slope = laid(terrain, cells[k : k + 1], eye)
+        part = splats.projected(behind.over(field), slope, here, terrain.near)
+        (close if exact or cells.close[k] else far).append(part)
+    ordered = splats.joined([*far, splats.sorted_by_depth(splats.joined(close))])
+    seen = splats.blended(ordered, here)
+    return np.clip(seen.colour + (1 - seen.alpha)[..., None] * behind.seen_along(here.rays()[1]), 0, 1)

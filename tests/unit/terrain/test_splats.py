@@ -1,0 +1,125 @@
+"""Splats in a given order: against the rasterizer that sorts, against a slow twin that does not, by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dav_gswt import cameras
+from dav_gswt.field import Field, sh_of
+from dav_gswt.raster import render
+from dav_gswt.terrain import splats
+from dav_gswt.terrain.drape import axes
+
+CAMERA = cameras.pinhole([0.0, 0, 0], [1, 0.2, -0.3], 64, 40, 60.0)
+
+
+def made(n, seed=0, coefficients=1):
+    """Gaussians 4 to 9 units away in all of the picture and beyond its rim."""
+    rng = np.random.default_rng(seed)
+    means = np.stack([rng.uniform(4, 9, n), rng.uniform(-4, 5, n), rng.uniform(-5, 3, n)], 1)
+    sh = np.concatenate([sh_of(rng.uniform(size=(n, 3))), rng.normal(0, 0.2, (n, coefficients - 1, 3))], 1)
+    return Field(
+        means.astype(np.float32),
+        np.log(rng.uniform(0.01, 0.4, (n, 3))).astype(np.float32),
+        rng.normal(size=(n, 4)).astype(np.float32),
+        rng.normal(1, 2, n).astype(np.float32),
+        sh.astype(np.float32),
+        np.zeros(n, np.float32),
+        np.zeros(n, bool),
+    )
+
+
+def level(field):
+    return np.zeros((len(field), 2))
+
+
+def twin(field, camera) -> np.ndarray:
+    """Colour of every pixel, one Gaussian after another from the first (the farthest): EWA and "over", no sorting."""
+    u, v = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
+    picture = np.zeros((camera.height, camera.width, 3))
+    for k in range(len(field)):
+        q = camera.rotation @ field.means[k].astype(float) + camera.translation
+        slope = np.array([q[0] / q[2], q[1] / q[2]])
+        rim = np.array([0.65 * camera.width / camera.fx, 0.65 * camera.height / camera.fy])
+        bound = np.clip(slope, -rim, rim)
+        jacobian = camera.fx / q[2] * np.array([[1, 0, -bound[0]], [0, 1, -bound[1]]])
+        spread = jacobian @ camera.rotation @ axes(field[k : k + 1], np.zeros((1, 2)))[0]
+        inverse = np.linalg.inv(spread @ spread.T + 0.3 * np.eye(2))
+        d = np.stack([u, v], -1) - (camera.fx * slope + [camera.cx, camera.cy])
+        alpha = np.exp(-0.5 * np.einsum("hwi,ij,hwj->hw", d, inverse, d)) / (1 + np.exp(-field.opacity_logits[k]))
+        alpha = np.where(alpha < 1 / 255, 0, np.minimum(alpha, 0.99))[..., None]
+        picture += alpha * (np.maximum(field.base_colours[k], 0) - picture)
+    return picture
+
+
+@pytest.mark.parametrize("coefficients", [1, 4])
+def test_sorted_by_depth_it_is_the_rasterizer_s_picture(coefficients):
+    field = made(300, coefficients=coefficients)
+    seen = splats.blended(splats.sorted_by_depth(splats.projected(field, level(field), CAMERA, 0.01)), CAMERA)
+    expected = render(field, CAMERA)
+    # both in float32; a pixel where an alpha is 1/255 to the last bits may take it in one of them: one or two do
+    difference = np.abs(seen.colour - expected.colour)
+    assert np.quantile(difference, 0.999) < 2e-4 and difference.max() < 2 / 255
+    assert np.quantile(np.abs(seen.alpha - expected.alpha), 0.999) < 2e-4
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_given_order_is_kept_however_wrong_it_is(seed):
+    field = made(40, seed)
+    expected = twin(field, CAMERA)
+    seen = splats.blended(splats.projected(field, level(field), CAMERA, 0.01), CAMERA).colour
+    assert np.abs(seen - expected).max() < 2e-3  # a pixel takes no splat that leaves it less than 1e-4; 1/255's edge
+    exact = render(field, CAMERA).colour
+    assert np.abs(exact - expected).max() > 0.1, "the order matters"
+
+
+def test_the_last_of_two_covers_the_first():
+    one = made(2)
+    ends = np.array([[5, 1, -1.5], [7, 1.4, -2.1]], np.float32)  # on one ray, the nearer first
+    pair = replace(one, means=ends, log_scales=np.full((2, 3), -0.5, np.float32))
+    pair = replace(pair, opacity_logits=np.full(2, 9, np.float32), sh=sh_of(np.array([[1.0, 0, 0], [0, 1.0, 0]])))
+    pixel = CAMERA.project(ends[:1].astype(float))[0][0].astype(int)
+    red, green = (
+        splats.blended(splats.projected(part, level(part), CAMERA, 0.01), CAMERA).colour[pixel[1], pixel[0]]
+        for part in (pair[::-1], pair)
+    )
+    # opacities are held below .99; a pixel's centre is up to half a pixel off
+    np.testing.assert_allclose(red, [0.99, 0.0099, 0], atol=0.01)
+    np.testing.assert_allclose(green, [0.0099, 0.99, 0], atol=0.01)
+
+
+def test_what_is_behind_or_too_near_or_out_of_sight_is_left_out():
+    field = made(4)
+    means = np.array([[-5, 0, 0], [0.5, 0, 0], [6, 90, 0], [6, 1, -1]], np.float32)
+    seen = splats.projected(replace(field, means=means), level(field), CAMERA, 1.0)
+    assert seen.depths == pytest.approx([(CAMERA.rotation @ means[3])[2]])
+
+
+def test_what_reaches_into_the_picture_from_beside_it_is_kept():
+    big = replace(made(1), means=np.array([[6, 5.5, 0]], np.float32), log_scales=np.zeros((1, 3), np.float32))
+    big = replace(big, opacity_logits=np.full(1, 5, np.float32))
+    seen = splats.projected(big, level(big), CAMERA, 0.01)
+    assert seen.centres[0, 0] < 0 and splats.blended(seen, CAMERA).alpha.max() > 0.05
+
+
+def test_discs_underfoot_fade_instead_of_rising_over_the_horizon():
+    """A disc one deviation below the eye is drawn by no plane through its centre; one far off keeps its bits."""
+    two = replace(made(2), means=np.array([[1, 0, -0.5], [8, 0, -2]], np.float32))
+    two = replace(two, log_scales=np.zeros((2, 3), np.float32), opacity_logits=np.array([3, 3], np.float32))
+    seen = splats.projected(two, level(two), CAMERA, 0.01)
+    assert seen.opacity_logits.tolist() == [3] and seen.depths[0] > 7
+
+
+def test_nothing_is_drawn_of_nothing():
+    field = made(3)[:0]
+    seen = splats.blended(splats.joined([splats.NONE, splats.projected(field, level(field), CAMERA, 0.01)]), CAMERA)
+    assert not seen.alpha.any() and not len(splats.sorted_by_depth(splats.NONE))
+
+
+def test_needles_keep_their_width():
+    """A ratio of 1e6: the picture's determinant is a sum of squares, a difference would be noise."""
+    needle = replace(made(1), means=np.array([[5, 0, 0]], np.float32))
+    scales = np.log(np.array([[1.0, 1e-6, 1e-6]], np.float32))
+    seen = splats.projected(replace(needle, log_scales=scales), level(needle), CAMERA, 0.01)
+    assert np.exp(seen.log_scales[0, 0]) > 1 and 1e-6 < np.exp(seen.log_scales[0, 1]) < 1e-4
