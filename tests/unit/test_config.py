@@ -39,7 +39,10 @@ def test_the_configs_that_come_with_the_project_are_valid(config):
         pytest.param(["stop", "worth"], 0, "stop.worth", id="a price of nothing"),
         pytest.param(["stop", "worth"], "auto", "stop.worth", id="a price that is no number"),
         pytest.param(["stop"], 20, "stop: 20", id="a stop without its key"),
-        pytest.param(["seams", "colour", "tile"], 1.2, "tile", id="a tile larger than its exemplar"),
+        pytest.param(["seams", "semantic", "tile"], 1.2, "tile", id="a tile larger than its exemplar"),
+        pytest.param(["seams", "semantic", "energy"], "semantics", "energy", id="a way to cut that is not there"),
+        pytest.param(["seams", "semantic", "slope"], 0, "slope", id="a gamma that never falls"),
+        pytest.param(["seams", "semantic", "sam"], "folder", "is .sam2. meant", id="a typo in a seam"),
     ],
 )
 def test_what_is_wrong_is_named(config, keys, value, named):
@@ -125,7 +128,7 @@ def test_a_config_file_that_cannot_be_read_is_named(tmp_path, text, said):
     ],
 )
 def test_what_cannot_be_completed_is_refused_and_why(config, change, said):
-    given = {"kind": "field", "field": "a.ply", "quality": "draft", "seam": "colour"}
+    given = {"kind": "field", "field": "a.ply", "quality": "draft", "seam": "semantic"}
     other = {"model": "zero123", "folder": "a", "samples": 2, "steps": 2}
     config["scenes"]["given"], config["priors"]["other"] = given, other
     check(config | {"complete": True}, SCHEMA)
