@@ -275,6 +275,19 @@ def lpips_if_fetched(wildcards):
     return {"lpips": str(path)} if path.is_file() else {}
 
 
+def describing(wildcards):
+    """What tells cuts what the ground is, beside its colours: AlexNet where it was fetched, a segmenter in a folder."""
+    seam = config["seams"][wildcards.seam]
+    if seam.get("energy") == "colour":
+        return {}
+    if "sam2" not in seam:
+        return lpips_if_fetched(wildcards)
+    weights = Path(seam["sam2"], "model.safetensors")
+    if not weights.is_file():
+        raise WorkflowError(f"config: seams.{wildcards.seam}.sam2: there is no {weights}; see config/README.md")
+    return lpips_if_fetched(wildcards) | {"sam2": str(weights)}
+
+
 def regressors_of(wildcards):
     """Networks without diffusion, to compare the project's own prior with."""
     entry = config["priors"].get(wildcards.prior, {})

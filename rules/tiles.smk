@@ -8,6 +8,7 @@ levels follow it.
 rule cut_tiles:
     """Cut sixteen tiles from the exemplar."""
     input:
+        unpack(describing),
         fields=[f"<results>/<levels>/level{level}.ply" for level in range(config["levels"])],
         grounds=[f"<results>/<levels>/level{level}.exr" for level in range(config["levels"])],
     output:
@@ -24,6 +25,6 @@ rule cut_tiles:
     params:
         seam=entry("seams", "seam"),
         seed=integer("seed"),
-        source=source_of("tiles", "raster"),
+        source=source_of("tiles", "raster", "perceptual", "threads", "active/uncertainty"),
     script:
         "../scripts/cut_tiles.py"

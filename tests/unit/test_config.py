@@ -46,7 +46,10 @@ def test_the_configs_that_come_with_the_project_are_valid(config):
         pytest.param(["heights"], {"kind": "image", "file": "a.exr", "width": 0, "height": 1}, "width", id="a point"),
         pytest.param(["flight"], {"frames": 1, "length": 1, "height": 1}, "flight.frames", id="a flight of one frame"),
         pytest.param(["flight"], {"frames": 8, "length": 1}, "'height'", id="a flight at no height"),
-        pytest.param(["seams", "colour", "tile"], 1.2, "tile", id="a tile larger than its exemplar"),
+        pytest.param(["seams", "semantic", "tile"], 1.2, "tile", id="a tile larger than its exemplar"),
+        pytest.param(["seams", "semantic", "energy"], "semantics", "energy", id="a way to cut that is not there"),
+        pytest.param(["seams", "semantic", "slope"], 0, "slope", id="a gamma that never falls"),
+        pytest.param(["seams", "semantic", "sam"], "folder", "is .sam2. meant", id="a typo in a seam"),
     ],
 )
 def test_what_is_wrong_is_named(config, keys, value, named):
@@ -136,7 +139,7 @@ def test_a_config_file_that_cannot_be_read_is_named(tmp_path, text, said):
     ],
 )
 def test_what_cannot_be_completed_is_refused_and_why(config, change, said):
-    given = {"kind": "field", "field": "a.ply", "quality": "draft", "seam": "colour"}
+    given = {"kind": "field", "field": "a.ply", "quality": "draft", "seam": "semantic"}
     other = {"model": "zero123", "folder": "a", "samples": 2, "steps": 2}
     config["scenes"]["given"], config["priors"]["other"] = given, other
     check(config | {"complete": True}, SCHEMA)

@@ -81,7 +81,7 @@ scenes:
     start: 8
     agent: replay
     quality: reduced
-    seam: colour
+    seam: semantic
 qualities:
   reduced: {{size: 256, spacing: 1.5, cap: 40000, steps: 80, steps_per_photo: 5, level_steps: 10}}
 """)

@@ -10,7 +10,7 @@ from made_runs import TINY, USUAL
 from dav_gswt.active.names import AT_ZERO, IMAGINING, ORACLES, POLICIES
 
 ROUND = "results/desert/seed0/draft/active_{policy}_none_pdrop0_lam0_k{k}/iter{t}"
-BUNDLE = ROUND + "/tiles_colour/bundle_tau{tau}/davgswt.json"
+BUNDLE = ROUND + "/tiles_semantic/bundle_tau{tau}/davgswt.json"
 DEFAULT = dict(policy="farthest", k=4, t=2, tau=0.6)
 FARTHEST = ROUND.format(policy="farthest", k=4, t=1)
 GIVEN = "results/finished/seed0/draft/active_given_none_pdrop0_lam0_k0/iter0"
@@ -118,9 +118,28 @@ def test_the_oracle_needs_a_scene_whose_truth_is_known(snakemake, shared, tmp_pa
 def test_tiles_go_by_the_doubt_of_the_prior_that_was_asked(planned, tmp_path):
     plan = planned(tmp_path, "--config", "policy=w2-lpips", configs=(USUAL, TINY))
     assert plan["score_coarse"] == plan["score_round"] == plan["crop_level"] == 1 and not plan["fetch_lpips"]
-    tiles = "results/desert/seed0/draft/active_{}_k4/iter0/tiles_colour/seams.json"
+    tiles = "results/desert/seed0/draft/active_{}_k4/iter0/tiles_semantic/seams.json"
     for way, scored in (("w2-lpips_terrain_pdrop0.15_lam0", 1), ("random_none_pdrop0_lam0", 0)):
         assert planned(tmp_path, tiles.format(way))["score_coarse"] == scored
+
+
+def test_cuts_read_what_is_at_hand_to_tell_things_apart(snakemake, tmp_path):
+    tiles = ROUND.format(policy="farthest", k=4, t=1) + "/tiles_{}/seams.json"
+    alexnet, folder = tmp_path / "results/weights/lpips_alexnet.safetensors", tmp_path / "sam2"
+    config = tmp_path / "sam2.yaml"
+    config.write_text(f"seams: {{none: {{sam2: {folder}}}}}")
+
+    def planned(seam):
+        return snakemake(tmp_path, tiles.format(seam), "--dry-run", configs=(USUAL, config), check=False).stdout
+
+    assert alexnet.name not in planned("semantic")
+    alexnet.parent.mkdir(parents=True)
+    alexnet.touch()
+    assert alexnet.name in planned("semantic") and alexnet.name not in planned("colour")
+    assert f"seams.none.sam2: there is no {folder}/model.safetensors" in planned("none")
+    folder.mkdir()
+    (folder / "model.safetensors").touch()
+    assert f"{folder}/model.safetensors" in planned("none") and alexnet.name in planned("none")
 
 
 @pytest.mark.parametrize(
@@ -169,7 +188,7 @@ def test_a_completed_field_lies_between_the_round_and_its_levels(planned, tmp_pa
 
 
 def test_a_round_can_be_tiled_as_it_is_and_completed(planned, tmp_path):
-    tiles = ROUND.format(policy="farthest", k=4, t=1) + "{}/tiles_colour/seams.json"
+    tiles = ROUND.format(policy="farthest", k=4, t=1) + "{}/tiles_semantic/seams.json"
     plan = planned(tmp_path, tiles.format(""), tiles.format("/completed_terrain"))
     assert plan["crop_level"] == plan["cut_tiles"] == 2 and plan["complete_field"] == plan["update_field"] == 1
 

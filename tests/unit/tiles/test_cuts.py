@@ -1,69 +1,10 @@
-"""Seam weights by hand, and cuts against all partitions of small grids."""
-
-from itertools import product
+"""Cuts against all partitions of small grids."""
 
 import numpy as np
 import pytest
+from made_up_seams import cheapest
 
 from dav_gswt.tiles import cuts
-from dav_gswt.tiles.cuts import Scales
-
-UNIT = Scales(1.0, 1.0)
-
-
-def weights(a, b, unit=UNIT):
-    return cuts.weights(a, b, cuts.gradients(a), cuts.gradients(b), unit)
-
-
-def cheapest(right, upper, first, second):
-    """Slow twin of cuts.cut: every labelling of the free cells."""
-    free = np.argwhere(~(first | second))
-    best = np.inf
-    for bits in product([False, True], repeat=len(free)):
-        labels = second.copy()
-        labels[tuple(free.T)] = bits
-        cost = right[labels[:, 1:] != labels[:, :-1]].sum() + upper[labels[1:] != labels[:-1]].sum()
-        best = min(best, cost)
-    return best
-
-
-def test_weight_of_two_flat_patches_is_their_difference_over_eps():
-    # d = 0.1 at both cells, no gradient: D / (0 + EPS) = 0.2 / 0.1
-    right, upper = weights(np.full((2, 2, 1), 0.5), np.full((2, 2, 1), 0.6))
-    np.testing.assert_allclose(right, 0.2 / cuts.EPS, rtol=1e-12)
-    np.testing.assert_allclose(upper, 0.2 / cuts.EPS, rtol=1e-12)
-
-
-def test_a_gradient_across_an_edge_makes_only_that_edge_cheaper():
-    ramp = np.broadcast_to(np.arange(3.0)[None, :, None], (3, 3, 1))
-    right, upper = weights(ramp, ramp + 0.1)
-    # four gradients of 1 along x, none along y
-    np.testing.assert_allclose(right, 0.2 / (4 + cuts.EPS), rtol=1e-12)
-    np.testing.assert_allclose(upper, 0.2 / cuts.EPS, rtol=1e-12)
-
-
-def test_equal_patches_cost_nothing_and_no_scale_is_zero():
-    flat = np.full((3, 3, 3), 0.4)
-    right, upper = weights(flat, flat, cuts.scales(flat))
-    assert (right == 0).all() and (upper == 0).all()
-
-
-def test_weights_are_symmetric_finite_and_not_negative():
-    rng = np.random.default_rng(0)
-    a, b = rng.random((2, 5, 6, 3))
-    unit = cuts.scales(a)
-    for there, back in zip(weights(a, b, unit), weights(b, a, unit), strict=True):
-        np.testing.assert_array_equal(there, back)
-        assert np.isfinite(there).all() and (there >= 0).all()
-
-
-def test_weights_do_not_depend_on_the_unit_of_colour():
-    a, b = np.random.default_rng(1).random((2, 5, 5, 3))
-    both = np.concatenate([a, b])
-    for small, large in zip(
-        weights(a, b, cuts.scales(both)), weights(9 * a, 9 * b, cuts.scales(9 * both)), strict=True
-    ):
-        np.testing.assert_allclose(small, large, rtol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -108,3 +49,27 @@ def test_cut_refuses_a_cell_that_is_forced_both_ways():
     every = np.ones((2, 2), bool)
     with pytest.raises(ValueError, match="both"):
         cuts.cut(np.ones((2, 1)), np.ones((1, 2)), every, every)
+
+
+@pytest.mark.parametrize("value", [0.0, 0.3])
+@pytest.mark.parametrize("forced", [0, 1])
+def test_where_only_one_patch_is_forced_all_is_that_patch_and_there_is_no_seam(value, forced):
+    sides = [np.zeros((3, 4), bool), np.zeros((3, 4), bool)]
+    sides[forced][0] = True
+    found = cuts.cut(np.full((3, 3), value), np.full((2, 4), value), *sides)
+    # where nothing costs anything, free cells may show either
+    assert found.energy == 0 and (value == 0 or (found.labels == bool(forced)).all())
+
+
+def test_a_straight_seam_costs_what_it_crosses_and_no_less_than_the_cut():
+    rng = np.random.default_rng(3)
+    right, upper = rng.random((5, 5)), rng.random((4, 6))
+    half = np.arange(6) >= 3
+    labels = np.broadcast_to(half, (5, 6))
+    straight = cuts.straight(right, upper, labels)
+    assert straight.energy == pytest.approx(right[:, 2].sum(), abs=5 * 2.0**-32)
+    first, second = np.zeros((5, 6), bool), np.zeros((5, 6), bool)
+    first[:, 0], second[:, -1] = True, True
+    assert cuts.cut(right, upper, first, second).energy < straight.energy
+    with pytest.raises(ValueError, match="finite"):
+        cuts.straight(np.full((5, 5), np.nan), upper, labels)

@@ -12,6 +12,8 @@ from dav_gswt.coarse.ground import Ground
 from dav_gswt.field import Field
 from dav_gswt.raster import Rasterizer
 
+LEAST = 1e-6  # alpha of what is there
+
 
 @dataclass(frozen=True)
 class Maps:
@@ -21,6 +23,10 @@ class Maps:
     height: Float32[Array, "rows columns"]
     alpha: Float32[Array, "rows columns"]
     uncertainty: Float32[Array, "rows columns"]
+
+    def known_colour(self) -> Float32[Array, "rows columns 3"]:
+        """colour, NaN where nothing is."""
+        return np.where(self.alpha[..., None] > LEAST, self.colour, np.float32(np.nan))
 
 
 def over_exemplar(field: Field, grid: Ground) -> Maps:
@@ -37,10 +43,10 @@ def from_above(field: Field, grid: Ground) -> Maps:
     raster = Rasterizer()
     seen = raster.forward(**arrays(field), camera=camera)
     doubt = raster.forward(**arrays(field, field.uncertainty[:, None]), camera=camera)
-    solid = np.maximum(seen.alpha, 1e-6)
+    solid = np.maximum(seen.alpha, LEAST)
     maps = Maps(
         seen.colour / solid[..., None],
-        np.where(seen.alpha > 1e-6, top - seen.depth / solid, 0),
+        np.where(seen.alpha > LEAST, top - seen.depth / solid, 0),
         seen.alpha,
         np.clip(doubt.colour[..., 0] + 1 - seen.alpha, 0, 1),
     )

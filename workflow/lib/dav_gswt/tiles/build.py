@@ -6,21 +6,25 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 from numpy import ndarray as Array
+from scipy.ndimage import distance_transform_edt
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import SH0, Field
 from dav_gswt.logs import progress
-from dav_gswt.tiles import compose, cuts, layout, membrane, patches, search, trends
+from dav_gswt.tiles import compose, energy, layout, membrane, patches, search, semantics, trends
 from dav_gswt.tiles.layout import EDGES, Exemplar, Layout
 
 _log = logging.getLogger(__name__)
+
+DOUBTFUL = 0.5  # mean uncertainty of a tile that is said
 
 
 @dataclass(frozen=True)
 class Options:
     """share: tile side over the exemplar's. strip: half-width of the strips over the tile's side, below 1/5.
     variants: centres per edge colouring. trend: width of the low-pass in tile sides. candidates: places that a search
-    compares; tries: of them, how many are cut before the best is taken.
+    compares; tries: of them, how many are cut before the best is taken. kind: one of energy.KINDS; slope: of gamma;
+    source: what the semantics are made of.
     """
 
     share: float = 0.5
@@ -29,6 +33,16 @@ class Options:
     trend: float = 0.2
     candidates: int = 192
     tries: int = 4
+    kind: str = "semantic"
+    slope: float = 2.0
+    source: semantics.Source = semantics.Source()
+
+    @classmethod
+    def of(cls, seam: dict, source: semantics.Source) -> "Options":
+        """Of an entry of the config's `seams`."""
+        own = {"share": "tile", "kind": "energy"}
+        given = {key: seam[name] for key in vars(cls()) if (name := own.get(key, key)) in seam}
+        return cls(**given, source=source)
 
 
 @dataclass(frozen=True)
@@ -66,27 +80,32 @@ def cut_tiles(
     Args:
         levels: finest first; level l's ground has cells of 2^l spacings from the exemplar's corner.
         colour, uncertainty: seen from straight above, one value a finest cell, **row 0 in the south** (turn a top-down
-            camera's picture upside down). Uncertainty in [0, 1], NaN where nothing is known.
-    Raises: InputError: the exemplar is too small for a tile with these levels, or a level has no Gaussian in it.
+            camera's picture upside down). Uncertainty in [0, 1]; NaN where nothing is known: a hole takes the colour of
+            the nearest cell, and is shown only where nothing better serves.
+    Raises: InputError: the exemplar is too small for a tile with these levels, a level has no Gaussian in it, or
+        nothing is known of any cell.
     """
     shape = (exemplar.cells, exemplar.cells)
     if colour.shape[:2] != shape or uncertainty.shape != shape:
         raise ValueError(f"maps of {colour.shape[:2]} and {uncertainty.shape} cells for an exemplar of {shape}")
     plan = layout.plan(exemplar.cells, len(levels), options.share, options.strip)
+    known, doubt = _without_holes(colour, uncertainty)
     _, height = ground_maps(levels[0], exemplar)
     trend = trends.trend_of(colour, height, exemplar, options.trend * plan.side)
-    colour = np.clip(np.nan_to_num(colour - trend.colour, nan=0.5), 0, 1).astype(float)
-    height = np.nan_to_num(height - trend.height, nan=float(np.nanmean(height)))
-    doubt = np.clip(np.nan_to_num(uncertainty, nan=1.0), 0, 1).astype(float)
-    sketch = search.sketch(plan, patches.guide(colour, height, doubt, plan), colour, options.candidates, options.tries)
-    found = search.search(sketch, options.variants, rng)
-    labels = found.labels
-    shifts = np.stack([layout.offsets(plan, found.places, tile) for tile in range(len(labels))])
-    corrections = _corrections(plan, found, shifts, membrane.ground(colour, height))
     binned = [
         _checked(compose.binned(trends.detrended(field, trend), exemplar, 2**number), number)
         for number, field in enumerate(levels)
     ]
+    colour = np.clip(known - trend.colour, 0, 1).astype(float)
+    height = np.nan_to_num(height - trend.height, nan=float(np.nanmean(height)))
+    meant = None if options.kind == "colour" else semantics.semantics(colour, options.source)
+    priced = energy.Energy(options.kind, options.slope, energy.colours(colour), meant)
+    guide = patches.guide(colour, height, doubt, plan)
+    sketch = search.Sketch(plan, guide, priced, options.candidates, options.tries)
+    found = search.search(sketch, options.variants, rng)
+    labels = found.labels
+    shifts = np.stack([layout.offsets(plan, found.places, tile) for tile in range(len(labels))])
+    corrections = _corrections(plan, found, shifts, membrane.ground(colour, height))
     tiles = [
         [_tile(level, labels[tile], shifts[tile], corrections[tile]) for level in binned]
         for tile in progress(range(len(labels)), "compose tiles")
@@ -96,13 +115,39 @@ def cut_tiles(
     seams = found.record() | {
         "layout": {k: int(getattr(plan, k)) for k in ("exemplar", "levels", "side", "strip", "corner", "block")},
         "raised": raised.tolist(),
-        "scales": {"difference": sketch.unit.difference, "gradient": sketch.unit.gradient, "eps": cuts.EPS},
+        "energy": priced.record(),
         "trend": {"colour": float(np.ptp(trend.colour)), "height": float(np.ptp(trend.height))},
         "correction": np.abs(corrections).max((0, 1, 2)).tolist(),
     }
     shown = [doubt[layout.sources(labels[t], shifts[t])].mean() for t in range(len(labels))]
+    if max(shown) > DOUBTFUL:
+        _log.warning(
+            "the tiles show ground in doubt (mean uncertainty %.2f to %.2f): a smaller `tile` in the config's seams "
+            "would show surer ground, or more photos",
+            min(shown),
+            max(shown),
+        )
     fields = [list(level) for level in zip(*tiles, strict=True)]
     return TileSet(side, exemplar.spacing, fields, labels, shifts, np.array(shown), seams)
+
+
+def _without_holes(colour: Array, uncertainty: Array) -> tuple[Float[Array, "m m 3"], Float[Array, "m m"]]:
+    """Colours where all are known, and uncertainties in [0, 1]; a hole has the nearest cell's colour and is in doubt.
+
+    Raises: InputError: there is nothing but holes, or nothing but ground in doubt.
+    """
+    known = np.isfinite(colour).all(-1)
+    doubt = np.where(known, np.clip(np.nan_to_num(uncertainty, nan=1.0), 0, 1), 1.0).astype(float)
+    if not (doubt < 1).any():
+        raise InputError(
+            "tiles: nothing is known of the exemplar: no photo shows its ground, or all of it is masked; take photos "
+            "of it, or leave `masks` out of the scene"
+        )
+    if not known.all():
+        _log.warning("%d of %d cells of the exemplar are holes", (~known).sum(), known.size)
+        rows, columns = distance_transform_edt(~known, return_distances=False, return_indices=True)
+        colour = colour[rows, columns]
+    return colour, doubt
 
 
 def _corrections(plan: Layout, found: search.Found, shifts: Array, ground: membrane.Ground) -> Float[Array, "t n n 4"]:

@@ -1,9 +1,4 @@
-"""Exact binary cuts between two patches: where the eye is least likely to find the seam.
-
-The cost of a seam between neighbouring cells s and t is Eq. (graphcut_main) of the paper for colour alone (gamma =
-1), in the main text's form D/G: a difference is cheap where both patches have a strong gradient anyway. D(s, t) =
-d(s) + d(t) with d = |A - B|, G(s, t) = the four gradients along the edge; both over scales frozen for the exemplar.
-"""
+"""Exact binary cuts between two patches: where the eye is least likely to find the seam, at the prices of `energy`."""
 
 from dataclasses import dataclass
 
@@ -12,22 +7,24 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
-EPS = 1.0  # of the mean gradient: with less, a cut through a bush (steep everywhere) is as cheap as one through sand
 QUANTA = 2.0**32  # capacities are whole numbers, the largest this big: the flow is exact and order-independent
 
 
 @dataclass(frozen=True)
-class Scales:
-    """Units of difference and gradient, frozen once for an exemplar."""
+class Zone:
+    """Where two patches lie over one another. keep, take: cells that must show the first and the second patch; a seam
+    runs through the others. straight: what shows the second patch where none is cut, to the middle of the overlap.
+    """
 
-    difference: float
-    gradient: float
+    keep: Bool[Array, "h w"]
+    take: Bool[Array, "h w"]
+    straight: Bool[Array, "h w"]
 
 
 @dataclass(frozen=True)
 class Cut:
     """labels: which cells show the second patch. energy: the seam's cost. flow, cost: the same in whole quanta, both
-    ways.
+    ways; equal where the seam is the cheapest one.
     """
 
     labels: Bool[Array, "h w"]
@@ -36,40 +33,10 @@ class Cut:
     cost: int
 
 
-def gradients(colour: Float[Array, "h w c"]) -> Float[Array, "h w 2"]:
-    """Colour change per cell along x and along y (central differences, 2-norm over channels)."""
-    return np.stack([np.linalg.norm(np.gradient(colour, axis=axis), axis=-1) for axis in (1, 0)], -1)
-
-
-def scales(colour: Float[Array, "h w c"]) -> Scales:
-    """Scales of an exemplar: the root mean square of D between two places drawn at random, and the mean of G."""
-    spread = float(np.sqrt(2 * colour.reshape(-1, colour.shape[-1]).var(0).sum()))
-    slope = float(gradients(colour).mean())
-    return Scales(2 * spread or 1.0, 4 * slope or 1.0)
-
-
-def weights(
-    a: Float[Array, "h w c"],
-    b: Float[Array, "h w c"],
-    gradients_a: Float[Array, "h w 2"],
-    gradients_b: Float[Array, "h w 2"],
-    unit: Scales,
-) -> tuple[Float[Array, "h w1"], Float[Array, "h1 w"]]:
-    """Cost of a seam between every cell and its right neighbour, and between every cell and its upper one.
-
-    W = (D / unit.difference) / (G / unit.gradient + EPS): symmetric in the patches, finite, and 0 where they are equal.
-    """
-    d = np.linalg.norm(a - b, axis=-1)
-    g = gradients_a + gradients_b
-    right = (d[:, :-1] + d[:, 1:]) / unit.difference / ((g[:, :-1, 0] + g[:, 1:, 0]) / unit.gradient + EPS)
-    upper = (d[:-1] + d[1:]) / unit.difference / ((g[:-1, :, 1] + g[1:, :, 1]) / unit.gradient + EPS)
-    return right, upper
-
-
 def cut(
     right: Float[Array, "h w1"], upper: Float[Array, "h1 w"], first: Bool[Array, "h w"], second: Bool[Array, "h w"]
 ) -> Cut:
-    """The cheapest partition of a grid into two patches, exactly (max-flow).
+    """The cheapest partition of a grid into two patches, exactly (max-flow). All of it may be one patch.
 
     right, upper: costs of parting a cell from its right and its upper neighbour. first, second: cells that must show
     the first and the second patch; the others are free. Only free cells become nodes, so a wide forced region costs
@@ -78,11 +45,7 @@ def cut(
     """
     if (first & second).any():
         raise ValueError("a cell is forced to both patches")
-    largest = max(right.max(initial=0), upper.max(initial=0))
-    if not (np.isfinite(largest) and min(right.min(initial=0), upper.min(initial=0)) >= 0):
-        raise ValueError("seam costs must be finite and not negative")
-    unit = QUANTA / largest if largest > 0 else 1.0
-    right, upper = (np.rint(w * unit).astype(np.int64) for w in (right, upper))
+    right, upper, unit = _whole(right, upper)
     node = np.cumsum(~(first | second)).reshape(first.shape) - 1
     free = int(node[-1, -1]) + 1
     node[first], node[second] = -1, -2
@@ -99,8 +62,28 @@ def cut(
         graph.add_grid_tedges(nodes, _to(-1, tails, heads, costs, free), _to(-2, tails, heads, costs, free))
         flow += graph.maxflow()
         labels[node >= 0] = graph.get_grid_segments(nodes)
-    cost = int(right[labels[:, 1:] != labels[:, :-1]].sum() + upper[labels[1:] != labels[:-1]].sum())
+    cost = _along(labels, right, upper)
     return Cut(labels, float(cost / unit), int(flow), cost)
+
+
+def straight(right: Float[Array, "h w1"], upper: Float[Array, "h1 w"], labels: Bool[Array, "h w"]) -> Cut:
+    """What a seam that is there already costs. Raises: ValueError: a cost is negative or not finite."""
+    right, upper, unit = _whole(right, upper)
+    cost = _along(labels, right, upper)
+    return Cut(labels, float(cost / unit), cost, cost)
+
+
+def _whole(right: Array, upper: Array) -> tuple[Array, Array, float]:
+    """Costs in whole quanta, and how many of them one is."""
+    largest = max(right.max(initial=0), upper.max(initial=0))
+    if not (np.isfinite(largest) and min(right.min(initial=0), upper.min(initial=0)) >= 0):
+        raise ValueError("seam costs must be finite and not negative")
+    unit = QUANTA / largest if largest > 0 else 1.0
+    return *(np.rint(w * unit).astype(np.int64) for w in (right, upper)), unit
+
+
+def _along(labels: Array, right: Array, upper: Array) -> int:
+    return int(right[labels[:, 1:] != labels[:, :-1]].sum() + upper[labels[1:] != labels[:-1]].sum())
 
 
 def _to(terminal: int, tails: Array, heads: Array, costs: Array, free: int) -> Array:

@@ -149,6 +149,25 @@ def frame(
     return labels
 
 
+def reach(layout: Layout) -> Bool[Array, "9 n n"]:
+    """Where each label's patch may come to lie in a tile: the centre anywhere, a strip along its side but for the
+    corners, a corner patch in its corner. The outermost `block` cells are the frame's: their neighbours are in other
+    tiles.
+    """
+    n, b, a = layout.side, layout.strip, layout.corner
+    low, high = np.arange(n) < a, np.arange(n) >= n - a
+    side = (np.arange(n) >= b) & (np.arange(n) < n - b)
+    inner = (np.arange(n) >= layout.block) & (np.arange(n) < n - layout.block)
+    out = np.zeros((len(LABELS), n, n), bool)
+    out[CENTRE] = True
+    for label, ys, xs in ((W, side, slice(b)), (E, side, slice(n - b, n))):
+        out[label, ys, xs] = True
+        out[(S, N)[label - W]] = out[label].T
+    for label, ys, xs in ((SW, low, low), (SE, low, high), (NW, high, low), (NE, high, high)):
+        out[label] = ys[:, None] & xs
+    return out & inner[:, None] & inner
+
+
 def sources(
     labels: Integer[Array, "h w"], shift: Int[Array, "k 2"], cell: int = 1
 ) -> tuple[Int[Array, "h w"], Int[Array, "h w"]]:

@@ -3,53 +3,83 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Bool, Int, UInt8
 from numpy import ndarray as Array
 
 from dav_gswt.logs import progress
-from dav_gswt.tiles import cuts, layout, patches
-from dav_gswt.tiles.layout import CENTRE, EDGES, Layout, Places
+from dav_gswt.tiles import cuts, expansion, layout, patches
+from dav_gswt.tiles.energy import Energy, weights
+from dav_gswt.tiles.layout import CENTRE, EDGES, LABELS, Layout, Places
 
 
 @dataclass(frozen=True)
 class Sketch:
-    """An exemplar as the search sees it: cuts use its colours under one frozen pair of scales."""
+    """An exemplar as the search sees it: places by the guide, cuts by the energy."""
 
     plan: Layout
     guide: patches.Guide
-    colour: Float[Array, "m m c"]
-    gradient: Float[Array, "m m 2"]
-    unit: cuts.Scales
+    energy: Energy
     candidates: int
     tries: int
 
-    def cut(self, first: tuple, second: tuple, keep: Bool[Array, "h w"], take: Bool[Array, "h w"]) -> cuts.Cut:
-        """Cut two patches, given by the exemplar's cells (rows, columns) they show. keep, take: forced to either."""
-        a, b = (self.colour[where] for where in (first, second))
-        g, h = (self.gradient[where] for where in (first, second))
-        return cuts.cut(*cuts.weights(a, b, g, h, self.unit), keep, take)
+    def gamma(self, place: Int[Array, "2"], size: tuple[int, int]) -> float:
+        """Weight of colour in the seams of a patch: by its mean uncertainty."""
+        return self.energy.gamma(float(patches.means(self.guide.uncertainty, place[None], size)[0]))
+
+    def cut(self, first: tuple, second: tuple, gamma: float, zone: cuts.Zone) -> cuts.Cut:
+        """Cut two patches, given by the exemplar's cells (rows, columns) that they show."""
+        costs = weights(self.energy.terms(gamma), first, second)
+        if self.energy.kind == "none":
+            return cuts.straight(*costs, zone.straight)
+        return cuts.cut(*costs, zone.keep, zone.take)
+
+
+@dataclass(frozen=True)
+class Laid:
+    """A patch in its place, what its seam looks like, and the weight that colour had in it."""
+
+    place: Int[Array, "2"]
+    seam: cuts.Cut
+    gamma: float
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A tile's label map. expanded: what alpha-expansion did to it, as JSON, where it was asked for."""
+
+    centre: Laid
+    labels: UInt8[Array, "n n"]
+    expanded: dict | None
 
 
 @dataclass(frozen=True)
 class Found:
-    """Places and cuts. vertical, horizontal: by colour, where the corner lies in a strip; energies of all cuts."""
+    """Places and cuts. vertical, horizontal: by colour, where the corner lies in a strip. strips: vertical 0, 1, then
+    horizontal 0, 1.
+    """
 
     places: Places
     vertical: Bool[Array, "2 n w"]
     horizontal: Bool[Array, "2 w n"]
-    labels: UInt8[Array, "tiles n n"]
-    strip_energy: list[float]
-    tile_energy: list[float]
+    strips: list[Laid]
+    tiles: list[Tile]
+
+    @property
+    def labels(self) -> UInt8[Array, "tiles n n"]:
+        return np.stack([tile.labels for tile in self.tiles])
 
     def record(self) -> dict:
         """What was chosen and what it cost, as JSON; strips are vertical 0, 1, then horizontal 0, 1."""
         names = ("corner", "vertical", "horizontal", "centres")
-        places = {name: getattr(self.places, name).tolist() for name in names}
-        return {"places": places, "strip_energy": self.strip_energy, "tile_energy": self.tile_energy}
-
-
-def sketch(plan: Layout, guide: patches.Guide, colour: Float[Array, "m m c"], candidates: int, tries: int) -> Sketch:
-    return Sketch(plan, guide, colour, cuts.gradients(colour), cuts.scales(colour), candidates, tries)
+        out = {
+            "places": {name: getattr(self.places, name).tolist() for name in names},
+            "strip_energy": [strip.seam.energy for strip in self.strips],
+            "strip_gamma": [strip.gamma for strip in self.strips],
+            "tile_energy": [tile.centre.seam.energy for tile in self.tiles],
+            "tile_gamma": [tile.centre.gamma for tile in self.tiles],
+        }
+        expanded = [tile.expanded for tile in self.tiles if tile.expanded]
+        return out | ({"expansion": expanded} if expanded else {})
 
 
 def search(sketch: Sketch, variants: int, rng: np.random.Generator) -> Found:
@@ -57,28 +87,23 @@ def search(sketch: Sketch, variants: int, rng: np.random.Generator) -> Found:
     corner = patches.blandest(sketch.guide, sketch.plan)
     used = [(corner, (2 * sketch.plan.corner, 2 * sketch.plan.corner))]
     upright, flat = (_strips(sketch, corner, way, used, rng) for way in (True, False))
-    sides = [[place for place, _ in pair] for pair in (upright, flat)]
-    masks = [np.stack([~seam.labels for _, seam in pair]) for pair in (upright, flat)]
-    places = Places(corner, *(np.stack(s) for s in sides), np.zeros((EDGES * variants, 2), int))
-    centres = _centres(sketch, places, masks, rng)
-    return Found(
-        Places(places.corner, places.vertical, places.horizontal, np.stack([place for place, *_ in centres])),
-        *masks,
-        np.stack([labels for _, labels, _ in centres]),
-        [seam.energy for _, seam in upright + flat],
-        [energy for *_, energy in centres],
-    )
+    sides = [np.stack([strip.place for strip in pair]) for pair in (upright, flat)]
+    masks = [np.stack([~strip.seam.labels for strip in pair]) for pair in (upright, flat)]
+    places = Places(corner, *sides, np.zeros((EDGES * variants, 2), int))
+    tiles = _tiles(sketch, places, masks, rng)
+    places = Places(corner, *sides, np.stack([tile.centre.place for tile in tiles]))
+    return Found(places, *masks, upright + flat, tiles)
 
 
-def _strips(sketch: Sketch, corner: Array, upright: bool, used: list, rng) -> list[tuple[Array, cuts.Cut]]:
+def _strips(sketch: Sketch, corner: Array, upright: bool, used: list, rng) -> list[Laid]:
     """Two strips of one direction, each with its cut against the corner patch; they join the patches `used`."""
     plan = sketch.plan
     n, b, a = plan.side, plan.strip, plan.corner
     size = (2 * b, n) if upright else (n, 2 * b)
     y, x = np.mgrid[: size[1], : size[0]]
     along = y if upright else x
-    keep = (along < b) | (along >= n - b)
-    take = (along >= a) & (along < n - a)
+    depth = np.minimum(along, n - 1 - along)
+    free = cuts.Zone(depth < b, depth >= a, depth >= (a + b) // 2)
     ends = np.where(along < n // 2, 1, 2)
     shift = layout.strip_shifts(plan, np.zeros(2, int), corner, upright)
     shown = tuple(np.clip(v, 0, plan.exemplar - 1) for v in layout.sources(ends, shift))
@@ -92,20 +117,20 @@ def _strips(sketch: Sketch, corner: Array, upright: bool, used: list, rng) -> li
     cost = patches.relative(cost) + patches.relative(odd)
     found = []
     for _ in range(2):
-        taken = np.array([place for place, _ in found], int).reshape(-1, 2)
+        taken = np.array([strip.place for strip in found], int).reshape(-1, 2)
         order = patches.ranked(places, cost, size, used, taken)
-        found.append(_best(sketch, shown, order, keep, take))
-    used += [(place, size) for place, _ in found]
+        found.append(_best(sketch, shown, order, size, free))
+    used += [(strip.place, size) for strip in found]
     return found
 
 
-def _centres(sketch: Sketch, places: Places, masks: list, rng) -> list[tuple[Array, Array, float]]:
-    """A centre for every tile: place, label map, energy."""
+def _tiles(sketch: Sketch, places: Places, masks: list, rng) -> list[Tile]:
+    """Every tile with a centre of its own."""
     plan = sketch.plan
     n, b = plan.side, plan.strip
     y, x = np.mgrid[:n, :n]
     depth = np.minimum(np.minimum(x, n - 1 - x), np.minimum(y, n - 1 - y))
-    keep, take = depth < plan.block, depth >= b
+    free = cuts.Zone(depth < plan.block, depth >= b, depth >= (plan.block + b) // 2)
     zone = _ring_lines(plan)
     size = (n, n)
     choice = patches.sure(sketch.guide, patches.candidates(plan, size, sketch.candidates, rng), size)
@@ -121,15 +146,28 @@ def _centres(sketch: Sketch, places: Places, masks: list, rng) -> list[tuple[Arr
         cost = patches.relative(cost[fits])
         beside = [(places.vertical[c], (2 * b, n)) for c in sorted({west, east})]
         beside += [(places.horizontal[c], (n, 2 * b)) for c in sorted({south, north})]
-        taken = np.array([place for place, *_ in found], int).reshape(-1, 2)
+        taken = np.array([tile.centre.place for tile in found], int).reshape(-1, 2)
         order = patches.ranked(choice[fits], cost, size, beside, taken)
-        variants = {
-            tuple(place) for place, *_ in found[tile % EDGES :: EDGES]
-        }  # of the same edges: a centre of its own
+        variants = {tuple(other.centre.place) for other in found[tile % EDGES :: EDGES]}  # a centre of its own
         order = np.array([place for place in order if tuple(place) not in variants] or order)
-        place, seam = _best(sketch, shown, order, keep, take)
-        found.append((place, np.where(seam.labels, CENTRE, around).astype(np.uint8), seam.energy))
+        centre = _best(sketch, shown, order, size, free)
+        labels = np.where(centre.seam.labels, CENTRE, around).astype(np.uint8)
+        shift[CENTRE] = centre.place
+        found.append(_expanded(sketch, centre, labels, shift))
     return found
+
+
+def _expanded(sketch: Sketch, centre: Laid, labels: UInt8[Array, "n n"], shift: Int[Array, "9 2"]) -> Tile:
+    """The tile; where expansion is asked for, all its patches are expanded from the exact cuts on."""
+    if sketch.energy.kind != "expansion":
+        return Tile(centre, labels, None)
+    whole = [np.full(labels.shape, label) for label in range(len(LABELS))]
+    # where a patch may not lie, it shows anything
+    shown = np.stack([np.clip(layout.sources(one, shift), 0, sketch.plan.exemplar - 1) for one in whole], 1)
+    found = expansion.expanded(
+        labels, expansion.Patches(*shown, layout.reach(sketch.plan)), sketch.energy.terms(centre.gamma)
+    )
+    return Tile(centre, found.labels, found.record())
 
 
 def _end_lines(plan: Layout, upright: bool) -> tuple[Array, Array]:
@@ -153,8 +191,11 @@ def _ring_lines(plan: Layout) -> tuple[Array, Array]:
     return y, x
 
 
-def _best(sketch: Sketch, shown: tuple, order: Int[Array, "n 2"], keep, take) -> tuple[Array, cuts.Cut]:
+def _best(sketch: Sketch, shown: tuple, order: Int[Array, "n 2"], size: tuple[int, int], zone: cuts.Zone) -> Laid:
     """Of the first `tries` places the one whose seam is cheapest."""
-    y, x = np.mgrid[: keep.shape[0], : keep.shape[1]]
-    seams = [(place, sketch.cut(shown, (y + place[1], x + place[0]), keep, take)) for place in order[: sketch.tries]]
-    return min(seams, key=lambda found: found[1].energy)
+    y, x = np.mgrid[: size[1], : size[0]]
+    found = []
+    for place in order[: sketch.tries]:
+        gamma = sketch.gamma(place, size)
+        found.append(Laid(place, sketch.cut(shown, (y + place[1], x + place[0]), gamma, zone), gamma))
+    return min(found, key=lambda laid: laid.seam.energy)

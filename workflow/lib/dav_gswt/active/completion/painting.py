@@ -1,6 +1,5 @@
 """What a prior paints where no photo looked, brought to the level of what is known around it."""
 
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -11,6 +10,7 @@ from scipy.ndimage import gaussian_filter
 
 from dav_gswt.active.imagining import Asking
 from dav_gswt.prior.interface import Condition, Prior
+from dav_gswt.threads import one_thread
 
 CELL = 4  # pixels a side of a cell of the code: what a prior believes or not
 SPREAD = 0.1  # pictures: how far a difference of colour at the border of the unknown reaches into it
@@ -53,7 +53,7 @@ def painted(asked: Asking, condition: Condition, unseen: Bool[Array, "b s s"], g
     """
     b, size = len(condition), condition.colour.shape[1]
     known = ~unseen.reshape(b, size // CELL, CELL, size // CELL, CELL).any((2, 4))
-    with _one_thread():
+    with one_thread():
         latents = asked.model.samples(condition, asked.samples, 0.0, asked.steps, asked.seed, known=known, common=False)
         made = asked.model.decoded(latents)
     if made.inverse_depth is None:
@@ -66,19 +66,6 @@ def painted(asked: Asking, condition: Condition, unseen: Bool[Array, "b s s"], g
     sure = ~unseen & (condition.alpha > 0.9)
     each = zip(colour, condition.colour, sure, unseen, strict=True)
     return Painted(np.stack([levelled(*one, ground) for one in each]), alpha, inverse_depth)
-
-
-@contextmanager
-def _one_thread():
-    """PyTorch on one thread: on several it sums in another order, and the field's bytes would tell how many."""
-    import torch  # here, not above: it takes seconds to load, and most fields have nothing to paint
-
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
 
 
 def levelled(

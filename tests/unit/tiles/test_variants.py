@@ -1,0 +1,141 @@
+"""The ways to cut a tile set, and exemplars that are hardly one."""
+
+import logging
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dav_gswt.errors import InputError
+from dav_gswt.tiles import build, energy, layout
+from dav_gswt.tiles.layout import CENTRE
+
+NO_DOUBT = np.zeros((96, 96))
+FEW = build.Options(share=0.5, strip=0.17, candidates=20, tries=1)
+
+
+def cut(made_up, kind, colour=None, doubt=NO_DOUBT, options=FEW):
+    colour, rng = made_up.colour if colour is None else colour, np.random.default_rng(2)
+    return build.cut_tiles(made_up.levels, made_up.exemplar, colour, doubt, replace(options, kind=kind), rng)
+
+
+@pytest.fixture(scope="module")
+def every(made_up):
+    return {kind: cut(made_up, kind) for kind in energy.KINDS}
+
+
+def test_every_way_says_what_it_used(every):
+    for kind, found in every.items():
+        told = found.seams["energy"]
+        assert told["kind"] == kind and told["eps"] == energy.EPS
+        assert ("semantics" in told["scales"]) == ("semantics" in told) == (kind != "colour")
+        assert len(found.seams["tile_energy"]) == len(found.seams["tile_gamma"]) == 16
+        assert ("expansion" in found.seams) == (kind == "expansion")
+        gamma = {"colour": 1.0, "semantic-nogamma": 0.5}.get(kind, 0.7310585786)  # of no doubt: 1 / (1 + exp(-1))
+        assert found.seams["tile_gamma"] + found.seams["strip_gamma"] == pytest.approx([gamma] * 20)
+
+
+def test_a_straight_seam_costs_more_than_the_cheapest_one_between_the_same_patches(every):
+    # the first strips were chosen before anything was cut
+    for k in (0, 2):
+        assert every["none"].seams["strip_energy"][k] > every["semantic"].seams["strip_energy"][k]
+    assert every["none"].seams["places"]["vertical"] == every["semantic"].seams["places"]["vertical"]
+
+
+def test_without_a_cut_seams_are_straight_and_in_the_middle_of_the_overlap(every):
+    plan = layout.plan(96, 3, 0.5, 0.17)
+    depth = (plan.block + plan.strip) // 2
+    for labels in every["none"].labels:
+        inner = np.zeros_like(labels, bool)
+        inner[depth:-depth, depth:-depth] = True
+        np.testing.assert_array_equal(labels == CENTRE, inner)
+
+
+def test_expansion_starts_at_the_exact_cuts_and_never_costs_more(every):
+    exact, moved = every["semantic"], every["expansion"]
+    assert exact.seams["places"] == moved.seams["places"]
+    assert exact.seams["tile_energy"] == moved.seams["tile_energy"]
+    for told in moved.seams["expansion"]:
+        assert told["after"] <= told["before"] and 0 <= told["triangles_broken"] <= told["triangles_tested"]
+        assert (told["moves"] > 0) == (told["after"] < told["before"])
+    assert any(told["moves"] for told in moved.seams["expansion"])
+    block = 4
+    np.testing.assert_array_equal(exact.labels[:, :block], moved.labels[:, :block])
+    np.testing.assert_array_equal(exact.labels[:, :, -block:], moved.labels[:, :, -block:])
+
+
+def test_after_an_expansion_every_patch_lies_within_its_reach(every):
+    reach = layout.reach(layout.plan(96, 3, 0.5, 0.17))
+    for labels in every["expansion"].labels:
+        for label in range(9):
+            assert not (labels[4:-4, 4:-4] == label)[~reach[label][4:-4, 4:-4]].any()
+
+
+def test_what_is_doubted_is_cut_by_semantics_more_than_by_colour(made_up):
+    doubted = cut(made_up, "semantic", doubt=np.full((96, 96), 0.75)).seams
+    assert doubted["tile_gamma"] == pytest.approx([1 / (1 + np.exp(0.5))] * 16)
+    steep = cut(made_up, "semantic", doubt=np.full((96, 96), 0.75), options=replace(FEW, slope=8.0)).seams
+    assert steep["tile_gamma"] == pytest.approx([1 / (1 + np.exp(2))] * 16)
+
+
+@pytest.mark.parametrize("kind", energy.KINDS)
+def test_patches_that_are_all_the_same_cost_nothing(made_up, kind):
+    found = cut(made_up, kind, colour=np.full((96, 96, 3), 0.5))
+    # colours without their trend differ by rounding
+    assert found.seams["tile_energy"] + found.seams["strip_energy"] == pytest.approx([0] * 20, abs=1e-9)
+    assert np.isfinite(found.fields[0][0].means).all()
+
+
+@pytest.mark.parametrize("kind", ["colour", "semantic"])
+def test_tiles_go_around_holes_where_they_can(made_up, kind, caplog):
+    colour = made_up.colour.copy()
+    colour[30:44, 0:50] = np.nan
+    options = replace(FEW, candidates=400)
+    with caplog.at_level(logging.WARNING):
+        found = cut(made_up, kind, colour=colour, options=options)
+    assert "700 of 9216 cells of the exemplar are holes" in caplog.text
+    # a patch may be up to 0.05 more doubtful than the surest one
+    assert found.uncertainty.max() < 0.1
+    assert all(np.isfinite(field.sh).all() for level in found.fields for field in level)
+
+
+def test_unknown_uncertainty_is_doubt(made_up):
+    doubt = np.zeros((96, 96))
+    doubt[:, :30] = np.nan
+    assert cut(made_up, "semantic", doubt=doubt, options=replace(FEW, candidates=400)).uncertainty.max() < 0.1
+
+
+@pytest.mark.parametrize(
+    "colour, doubt",
+    [
+        pytest.param(np.full((96, 96, 3), np.nan), NO_DOUBT, id="holes only"),
+        pytest.param(None, np.ones((96, 96)), id="all of it masked"),
+        pytest.param(None, np.full((96, 96), np.nan), id="nothing known"),
+    ],
+)
+def test_an_exemplar_of_which_nothing_is_known_is_refused(made_up, colour, doubt):
+    with pytest.raises(InputError, match="nothing is known of the exemplar.*masks"):
+        cut(made_up, "semantic", colour=colour, doubt=doubt)
+
+
+def test_ground_in_doubt_that_cannot_be_avoided_is_said(made_up, caplog):
+    doubt = np.ones((96, 96))
+    doubt[40:50, 40:50] = 0
+    with caplog.at_level(logging.WARNING):
+        cut(made_up, "semantic", doubt=doubt)
+    assert "a smaller `tile`" in caplog.text
+
+
+def test_a_finest_level_from_elsewhere_is_refused(made_up):
+    levels = [replace(f, means=f.means + np.float32(1000)) for f in made_up.levels]
+    with pytest.raises(InputError, match=r"level 0.*ground\.json"):
+        build.cut_tiles(levels, made_up.exemplar, made_up.colour, NO_DOUBT, FEW, np.random.default_rng(0))
+
+
+def test_options_are_those_of_the_configs_entry():
+    seam = {"tile": 0.4, "strip": 0.1, "candidates": 7, "variants": 3, "energy": "expansion", "slope": 4.0, "sam2": "a"}
+    found = build.Options.of(seam, FEW.source)
+    assert (found.share, found.strip, found.candidates, found.variants) == (0.4, 0.1, 7, 3)
+    assert (found.kind, found.slope) == ("expansion", 4.0)
+    older = build.Options.of({key: seam[key] for key in ("tile", "strip", "candidates", "variants")}, FEW.source)
+    assert (older.kind, older.slope) == ("semantic", 2.0)

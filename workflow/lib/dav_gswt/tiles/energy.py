@@ -1,0 +1,157 @@
+"""What a seam costs: Eq. (graphcut_main) of the paper, made safe.
+
+The cost of a seam between neighbouring cells s and t is
+
+    W(s, t) = (gamma D_I + (1 - gamma) D_S) / (gamma G_I + (1 - gamma) G_S + EPS):
+
+a difference is cheap where both patches have a strong gradient anyway. I is colour, S is what the ground is
+(`semantics`). D(s, t) = d(s) + d(t), d the distance between what the two patches show in a cell; G(s, t) = the four
+gradients along the edge, two of each patch; every D and G over its scale, frozen for the exemplar. gamma is high where
+the ground is sure, low where it is doubted. W is symmetric in the patches, finite, not negative, and 0 where they are
+equal.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray as Array
+
+from dav_gswt.active.uncertainty import gamma
+
+KINDS = ("none", "colour", "semantic", "semantic-nogamma", "expansion")
+EPS = 1.0  # of the mean gradient: with less, a cut through a bush (steep everywhere) is as cheap as one through sand
+ROUNDING = 1e-9  # of colours, which are about 1
+
+Cells = tuple[Array, Array]  # rows and columns of the exemplar's cells, of any one shape
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Units of difference and gradient, frozen once for an exemplar."""
+
+    difference: float
+    gradient: float
+
+
+@runtime_checkable
+class Layer(Protocol):
+    """A way to look at an exemplar: how far apart cells are, and how steep it is along x and along y in each."""
+
+    slope: Float[Array, "h w 2"]
+    unit: Scales
+
+    def apart(self, first: Cells, second: Cells) -> Float[Array, "..."]: ...
+
+
+@dataclass(frozen=True)
+class Colours:
+    """Colours of the exemplar's cells, and their gradients; cells are as far apart as their colours (2-norm)."""
+
+    values: Float[Array, "h w c"]
+    slope: Float[Array, "h w 2"]
+    unit: Scales
+
+    def apart(self, first: Cells, second: Cells) -> Float[Array, "..."]:
+        return np.linalg.norm(self.values[first] - self.values[second], axis=-1)
+
+
+def colours(values: Float[Array, "h w c"]) -> Colours:
+    return Colours(values, gradients(values), scales(values))
+
+
+def gradients(values: Float[Array, "h w c"]) -> Float[Array, "h w 2"]:
+    """Change per cell along x and along y (central differences, 2-norm over channels)."""
+    return np.stack([np.linalg.norm(np.gradient(values, axis=axis), axis=-1) for axis in (1, 0)], -1)
+
+
+def scales(values: Float[Array, "h w c"]) -> Scales:
+    """Scales of an exemplar: the root mean square of D between two places drawn at random, and the mean of G."""
+    spread = float(np.sqrt(2 * values.reshape(-1, values.shape[-1]).var(0).sum()))
+    return frozen(spread, gradients(values))
+
+
+def frozen(spread: float, slope: Float[Array, "h w 2"]) -> Scales:
+    """spread: root mean square distance of two cells."""
+    return Scales(scale(2 * spread), scale(4 * float(slope.mean())))
+
+
+def scale(value: float) -> float:
+    """A unit to measure by; what is the same everywhere, but for rounding, has none: 1 then."""
+    return value if value > ROUNDING else 1.0
+
+
+@dataclass(frozen=True)
+class Energy:
+    """How seams are cut (one of KINDS), and the layers that they are priced by; semantics are None for colour alone.
+
+    slope: of gamma; 2 is the paper's.
+    """
+
+    kind: str
+    slope: float
+    colours: Layer
+    semantics: Layer | None
+
+    def gamma(self, doubt: float) -> float:
+        """Weight of colour in the seams of a patch whose mean uncertainty (of 0 to 1) is `doubt`.
+
+        Without semantics 1, `semantic-nogamma` 1/2. Raises: ValueError: doubt is NaN.
+        """
+        found = float(gamma(np.array([doubt], float), self.slope)[0])
+        if self.semantics is None:
+            return 1.0
+        return 0.5 if self.kind == "semantic-nogamma" else found
+
+    def terms(self, share: float) -> list[tuple[float, Layer]]:
+        """The layers with their weights, at a weight of colour of `share`; one that weighs nothing is left out."""
+        both = (share, self.colours), (1 - share, self.semantics)
+        return [(weight, layer) for weight, layer in both if weight > 0]
+
+    def record(self) -> dict:
+        """What seams were priced by, as JSON."""
+        used = {"colour": self.colours} | ({"semantics": self.semantics} if self.semantics is not None else {})
+        out = {"kind": self.kind, "scales": {name: vars(layer.unit) for name, layer in used.items()}, "eps": EPS}
+        if self.semantics is None:
+            return out
+        gamma = {"gamma": 0.5} if self.kind == "semantic-nogamma" else {"slope": self.slope}
+        return out | gamma | {"semantics": self.semantics.said}
+
+
+def weights(
+    terms: Sequence[tuple[float, Layer]], first: Cells, second: Cells
+) -> tuple[Float[Array, "h w1"], Float[Array, "h1 w"]]:
+    """W between every cell of a grid and its right neighbour, and between every cell and its upper one.
+
+    first, second: the exemplar's cells that the two patches show there.
+    """
+    right, upper = [], []
+    for share, layer in terms:
+        d = layer.apart(first, second) * share
+        g = (layer.slope[first] + layer.slope[second]) * share
+        right.append((d[:, :-1] + d[:, 1:], g[:, :-1, 0] + g[:, 1:, 0], layer.unit))
+        upper.append((d[:-1] + d[1:], g[:-1, :, 1] + g[1:, :, 1], layer.unit))
+    return _ratio(right), _ratio(upper)
+
+
+def along(
+    terms: Sequence[tuple[float, Layer]],
+    tails: tuple[Cells, Cells],
+    heads: tuple[Cells, Cells],
+    axis: Int[Array, "edges"],
+) -> Float[Array, "edges"]:
+    """W of single edges: what the first and the second patch show at each one's tail and head; axis 0 is along x."""
+    parts = []
+    for share, layer in terms:
+        d = (layer.apart(*tails) + layer.apart(*heads)) * share
+        (a, b), (e, f) = ([layer.slope[(*cells, axis)] for cells in end] for end in (tails, heads))
+        parts.append((d, ((a + b) + (e + f)) * share, layer.unit))
+    return _ratio(parts)
+
+
+def _ratio(parts: list[tuple[Array, Array, Scales]]) -> Array:
+    """Eq. (graphcut_main) from each layer's weighed D and G."""
+    difference = sum(d / unit.difference for d, _, unit in parts)
+    return difference / (sum(g / unit.gradient for _, g, unit in parts) + EPS)

@@ -1,0 +1,163 @@
+"""What the ground is, cell by cell: features of the segments that an exemplar falls into, seen from above.
+
+A segment (a superpixel, or an object that a segmenter masks) has one vector of features: its mean colour and, where
+LPIPS's weights are at hand, the mean of what AlexNet sees there. Two cells are as far apart as their segments'
+features. A segment's number says nothing and is never compared: other numbers for the same segments change nothing.
+"""
+
+import logging
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Float32, Int, Integer
+from numpy import ndarray as Array
+from scipy.sparse import csr_array
+from scipy.spatial.distance import pdist, squareform
+
+from dav_gswt.perceptual import weights
+from dav_gswt.threads import one_thread
+from dav_gswt.tiles.energy import Cells, Scales, frozen, scale
+
+_log = logging.getLogger(__name__)
+
+PIECES = 2000  # superpixels of an exemplar: their distances are a table
+LEAST = 6.0  # cells that they are wide at least
+KIND = 0.75  # of neighbouring segments are taken to be of one kind of ground
+LAYERS = 2  # of AlexNet, the finest first: the others see more than a bush at a time
+ENLARGED = 2  # pixels a cell that AlexNet looks at: its second layer has a value every 8 pixels
+MARGIN = 32  # pixels of mirrored picture around, for AlexNet takes what is beyond for black
+
+
+@dataclass(frozen=True)
+class Source:
+    """What describes an exemplar beside its colours: AlexNet (LPIPS's weights), the folder of a segmenter; or None."""
+
+    alexnet: weights.Weights | None = None
+    sam2: Path | str | None = None
+
+
+@dataclass(frozen=True)
+class Semantics:
+    """An energy.Layer. distance: between the features of two segments. said: what they are made of, as JSON."""
+
+    segments: Int[Array, "m m"]
+    distance: Float32[Array, "s s"]
+    slope: Float[Array, "m m 2"]
+    unit: Scales
+    said: dict
+
+    def apart(self, first: Cells, second: Cells) -> Float[Array, "..."]:
+        return self.distance[self.segments[first], self.segments[second]].astype(float)
+
+
+def semantics(colour: Float[Array, "m m 3"], source: Source) -> Semantics:
+    """Describe an exemplar. colour: in [0, 1].
+
+    Raises: InputError: see sam2.opened.
+    """
+    segments = superpixels(colour, max(LEAST, len(colour) / PIECES**0.5))
+    said = {"alexnet": source.alexnet is not None, "segments": "slic"}
+    if source.sam2 is not None:
+        from dav_gswt.tiles import sam2
+
+        with one_thread():
+            masks = sam2.masks(sam2.opened(source.sam2), colour)
+        segments, said = covered(segments, masks), said | {"segments": "sam2 and slic", "masks": len(masks)}
+    if source.alexnet is None:
+        _log.info("LPIPS's weights are not at hand: seams know colours and superpixels, not what AlexNet sees")
+    return of_segments(segments, colour, source.alexnet, said)
+
+
+def superpixels(colour: Float[Array, "m m 3"], side: float) -> Int[Array, "m m"]:
+    """SLIC (Achanta et al. 2012): segments of about side x side cells that keep to the edges of things.
+
+    The picture is softened by a cell: single grains would tear segments, and the torn ones are merged into huge ones.
+    """
+    from skimage.segmentation import slic  # here, not above: it takes half a second to load
+
+    return slic(colour, n_segments=max(1, round((len(colour) / side) ** 2)), start_label=0, sigma=1)
+
+
+def covered(segments: Integer[Array, "m m"], masks: list[Array]) -> Int[Array, "m m"]:
+    """Segments with masks laid over them, larger ones first: where two overlap, the smaller is the thing on top."""
+    out = np.array(segments, np.int64)
+    for mask in sorted(masks, key=lambda mask: -mask.sum()):
+        out[mask] = out.max() + 1
+    return out
+
+
+def of_segments(
+    segments: Integer[Array, "m m"], colour: Float[Array, "m m 3"], alexnet: weights.Weights | None, said: dict
+) -> Semantics:
+    """Describe an exemplar that has been segmented; the segments may have any numbers.
+
+    Colour and AlexNet's features count alike: each over the root mean square distance of two cells drawn at random.
+    """
+    index, count = _in_order(segments)
+    mean = csr_array((1 / count[index.ravel()], (index.ravel(), np.arange(index.size))))
+    parts = [mean @ colour.reshape(-1, 3)] + ([_seen(mean, colour, alexnet)] if alexnet else [])
+    parts = [part / scale(_spread(part, count)) for part in parts]
+    distance = _beyond_kind(squareform(pdist(np.concatenate(parts, 1))), index).astype(np.float32)
+    slope = np.stack([_slope(index.T, distance).T, _slope(index, distance)], -1)
+    share = count / count.sum()
+    spread = float(np.sqrt(share @ distance.astype(float) ** 2 @ share))
+    return Semantics(index, distance, slope, frozen(spread, slope), said | {"count": len(count)})
+
+
+def _beyond_kind(distance: Float[Array, "s s"], index: Int[Array, "m m"]) -> Float[Array, "s s"]:
+    """Distances less what two segments of one kind of ground differ by: sqrt(max(0, d^2 - d0^2)).
+
+    Features are many, and grain makes any two segments of the same sand differ in some of them. d0 is what KIND of
+    the neighbouring segments stay below: most neighbours are of one kind.
+    """
+    sides = [(index[:, :-1], index[:, 1:]), (index[:-1], index[1:])]
+    pairs = np.concatenate([np.stack([a.ravel(), b.ravel()], 1) for a, b in sides])
+    pairs = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], 1), axis=0)
+    near = distance[pairs[:, 0], pairs[:, 1]]
+    return np.sqrt(np.maximum(0, distance**2 - (np.quantile(near, KIND) ** 2 if len(near) else 0.0)))
+
+
+def _in_order(segments: Integer[Array, "m m"]) -> tuple[Int[Array, "m m"], Int[Array, "s"]]:
+    """Segments numbered as they come, and how many cells each has: whatever they were called, sums run the same way."""
+    _, first, index, count = np.unique(segments, return_index=True, return_inverse=True, return_counts=True)
+    order = np.argsort(first)
+    return np.argsort(order)[index].reshape(segments.shape), count[order]
+
+
+def _spread(features: Float[Array, "s k"], count: Int[Array, "s"]) -> float:
+    """Root mean square distance of two cells drawn at random; count: cells of each segment."""
+    away = features - count @ features / count.sum()
+    return float(np.sqrt(2 * (count @ away**2).sum() / count.sum()))
+
+
+def _slope(index: Int[Array, "n m"], distance: Float32[Array, "s s"]) -> Float[Array, "n m"]:
+    """Change of the features per cell along the first axis, central differences as numpy.gradient's."""
+    after, before = np.concatenate([index[1:], index[-1:]]), np.concatenate([index[:1], index[:-1]])
+    steps = np.full(len(index), 2.0)
+    steps[[0, -1]] = 1
+    return distance[after, before] / steps[:, None]
+
+
+def _seen(mean: csr_array, colour: Float[Array, "m m 3"], alexnet: weights.Weights) -> Float[Array, "s k"]:
+    """Mean over each segment of AlexNet's features, of unit length and weighed by channel as LPIPS does."""
+    from dav_gswt.perceptual import lpips  # here, not above: PyTorch takes seconds to load
+
+    m = len(colour)
+    with one_thread():
+        large = lpips.resized(2 * colour[None].astype(np.float32) - 1, ENLARGED * m)[0]
+        framed = np.pad(large, ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)), mode="symmetric")
+        layers = lpips.layers(framed[None], alexnet)[:LAYERS]
+    middle = MARGIN + ENLARGED * (np.arange(m) + 0.5) - 0.5  # of each cell, in pixels
+    parts = []
+    for number, (layer, head) in enumerate(zip(layers, alexnet.heads, strict=False)):
+        stride = 4 * 2**number
+        size = layer.shape[-1]
+        # value k is centred at pixel stride (k + 1) - 1
+        near = np.clip(np.rint((middle + 1) / stride - 1), 0, size - 1).astype(int)
+        values = layer[0].reshape(len(head), -1).T.astype(float)
+        values /= np.linalg.norm(values, axis=1, keepdims=True) + 1e-10
+        pick = (near[:, None] * size + near).ravel()
+        share = mean @ csr_array((np.ones(m * m), (np.arange(m * m), pick)), shape=(m * m, size * size))
+        parts.append(share @ (values * np.sqrt(np.maximum(head, 0))))
+    return np.concatenate(parts, 1)
