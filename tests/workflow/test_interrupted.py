@@ -94,7 +94,7 @@ def test_ctrl_c_leaves_what_is_whole_and_nothing_half_made(story):
 
 def test_a_stopped_run_goes_on_where_it_was(story):
     assert "render_photos" not in story.killed.out and "split_views" not in story.killed.out
-    assert "[1 of 14] fit_coarse" in story.killed.out
+    assert re.search(r"\[1 of \d+\] fit_coarse\n", story.killed.out)
 
 
 def test_a_killed_run_leaves_no_capture_that_looks_whole(story):
