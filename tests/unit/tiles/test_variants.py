@@ -14,9 +14,9 @@ NO_DOUBT = np.zeros((96, 96))
 FEW = build.Options(share=0.5, strip=0.17, candidates=20, tries=1)
 
 
-def cut(made_up, kind, colour=None, doubt=NO_DOUBT, options=FEW):
+def cut(made_up, kind, colour=None, doubt=NO_DOUBT, options=FEW, levels=None):
     colour, rng = made_up.colour if colour is None else colour, np.random.default_rng(2)
-    return build.cut_tiles(made_up.levels, made_up.exemplar, colour, doubt, replace(options, kind=kind), rng)
+    return build.cut_tiles(levels or made_up.levels, made_up.exemplar, colour, doubt, replace(options, kind=kind), rng)
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +30,7 @@ def test_every_way_says_what_it_used(every):
         assert told["kind"] == kind and told["eps"] == energy.EPS
         assert ("semantics" in told["scales"]) == ("semantics" in told) == (kind != "colour")
         assert len(found.seams["tile_energy"]) == len(found.seams["tile_gamma"]) == 16
+        assert told["standing"] == energy.STAND
         assert ("expansion" in found.seams) == (kind == "expansion")
         gamma = {"colour": 1.0, "semantic-nogamma": 0.5}.get(kind, 0.7310585786)  # of no doubt: 1 / (1 + exp(-1))
         assert found.seams["tile_gamma"] + found.seams["strip_gamma"] == pytest.approx([gamma] * 20)
@@ -80,7 +81,8 @@ def test_what_is_doubted_is_cut_by_semantics_more_than_by_colour(made_up):
 
 @pytest.mark.parametrize("kind", energy.KINDS)
 def test_patches_that_are_all_the_same_cost_nothing(made_up, kind):
-    found = cut(made_up, kind, colour=np.full((96, 96, 3), 0.5))
+    bare = [level[level.ground] for level in made_up.levels]
+    found = cut(made_up, kind, colour=np.full((96, 96, 3), 0.5), levels=bare)
     # colours without their trend differ by rounding
     assert found.seams["tile_energy"] + found.seams["strip_energy"] == pytest.approx([0] * 20, abs=1e-9)
     assert np.isfinite(found.fields[0][0].means).all()

@@ -11,7 +11,7 @@ from scipy.ndimage import distance_transform_edt
 from dav_gswt.errors import InputError
 from dav_gswt.field import SH0, Field
 from dav_gswt.logs import progress
-from dav_gswt.tiles import compose, energy, layout, membrane, patches, search, semantics, trends
+from dav_gswt.tiles import compose, energy, layout, membrane, patches, search, semantics, standing, trends
 from dav_gswt.tiles.layout import EDGES, Exemplar, Layout
 
 _log = logging.getLogger(__name__)
@@ -96,10 +96,11 @@ def cut_tiles(
         _checked(compose.binned(trends.detrended(field, trend), exemplar, 2**number), number)
         for number, field in enumerate(levels)
     ]
+    stands = energy.standing(standing.cover(levels[0], exemplar, height))
     colour = np.clip(known - trend.colour, 0, 1).astype(float)
     height = np.nan_to_num(height - trend.height, nan=float(np.nanmean(height)))
     meant = None if options.kind == "colour" else semantics.semantics(colour, options.source)
-    priced = energy.Energy(options.kind, options.slope, energy.colours(colour), meant)
+    priced = energy.Energy(options.kind, options.slope, energy.colours(colour), meant, stands)
     guide = patches.guide(colour, height, doubt, plan)
     sketch = search.Sketch(plan, guide, priced, options.candidates, options.tries)
     found = search.search(sketch, options.variants, rng)

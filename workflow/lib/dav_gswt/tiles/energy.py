@@ -7,7 +7,9 @@ The cost of a seam between neighbouring cells s and t is
 a difference is cheap where both patches have a strong gradient anyway. I is colour, S is what the ground is
 (`semantics`). D(s, t) = d(s) + d(t), d the distance between what the two patches show in a cell; G(s, t) = the four
 gradients along the edge, two of each patch; every D and G over its scale, frozen for the exemplar. gamma is high where
-the ground is sure, low where it is doubted. W is symmetric in the patches, finite, not negative, and 0 where they are
+the ground is sure, low where it is doubted. What stands on the ground (`standing`) has a D of its own, and no G that
+would make a cut through a shrub cheap: from above it looks like any dark ground, from the side half a shrub does not.
+W is symmetric in the patches, finite, not negative, and 0 where they are
 equal.
 """
 
@@ -22,6 +24,7 @@ from numpy import ndarray as Array
 from dav_gswt.active.uncertainty import gamma
 
 KINDS = ("none", "colour", "semantic", "semantic-nogamma", "expansion")
+STAND = 2.0  # D of a thing that hides the ground, beside bare ground; in units of two random colours
 EPS = 1.0  # of the mean gradient: with less, a cut through a bush (steep everywhere) is as cheap as one through sand
 ROUNDING = 1e-9  # of colours, which are about 1
 
@@ -62,6 +65,13 @@ def colours(values: Float[Array, "h w c"]) -> Colours:
     return Colours(values, gradients(values), scales(values))
 
 
+def standing(cover: Float[Array, "h w"]) -> Colours | None:
+    """How much of each cell is hidden, in [0, 1], as a layer without gradient; None where nothing stands."""
+    if not cover.any():
+        return None
+    return Colours(cover[..., None], np.zeros((*cover.shape, 2)), Scales(1.0, 1.0))
+
+
 def gradients(values: Float[Array, "h w c"]) -> Float[Array, "h w 2"]:
     """Change per cell along x and along y (central differences, 2-norm over channels)."""
     return np.stack([np.linalg.norm(np.gradient(values, axis=axis), axis=-1) for axis in (1, 0)], -1)
@@ -87,13 +97,15 @@ def scale(value: float) -> float:
 class Energy:
     """How seams are cut (one of KINDS), and the layers that they are priced by; semantics are None for colour alone.
 
-    slope: of gamma; 2 is the paper's.
+    slope: of gamma; 2 is the paper's. standing: how much of each cell is hidden by what stands over it;
+    None for nothing.
     """
 
     kind: str
     slope: float
     colours: Layer
     semantics: Layer | None
+    standing: Layer | None = None
 
     def gamma(self, doubt: float) -> float:
         """Weight of colour in the seams of a patch whose mean uncertainty (of 0 to 1) is `doubt`.
@@ -106,14 +118,19 @@ class Energy:
         return 0.5 if self.kind == "semantic-nogamma" else found
 
     def terms(self, share: float) -> list[tuple[float, Layer]]:
-        """The layers with their weights, at a weight of colour of `share`; one that weighs nothing is left out."""
+        """The layers with their weights, at a weight of colour of `share`; one that weighs nothing is left out.
+
+        What stands weighs the same however sure the ground is.
+        """
         both = (share, self.colours), (1 - share, self.semantics)
-        return [(weight, layer) for weight, layer in both if weight > 0]
+        stand = [(STAND, self.standing)] if self.standing is not None else []
+        return [(weight, layer) for weight, layer in both if weight > 0] + stand
 
     def record(self) -> dict:
         """What seams were priced by, as JSON."""
         used = {"colour": self.colours} | ({"semantics": self.semantics} if self.semantics is not None else {})
         out = {"kind": self.kind, "scales": {name: vars(layer.unit) for name, layer in used.items()}, "eps": EPS}
+        out |= {"standing": STAND} if self.standing is not None else {}
         if self.semantics is None:
             return out
         gamma = {"gamma": 0.5} if self.kind == "semantic-nogamma" else {"slope": self.slope}

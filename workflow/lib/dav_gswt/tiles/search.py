@@ -7,9 +7,11 @@ from jaxtyping import Bool, Int, UInt8
 from numpy import ndarray as Array
 
 from dav_gswt.logs import progress
-from dav_gswt.tiles import cuts, expansion, layout, patches
+from dav_gswt.tiles import cuts, expansion, layout, patches, repeats
 from dav_gswt.tiles.energy import Energy, weights
 from dav_gswt.tiles.layout import CENTRE, EDGES, LABELS, Layout, Places
+
+PERIODIC = 2.0  # charge for what comes back with every tile, where a median seam costs 1
 
 
 @dataclass(frozen=True)
@@ -115,11 +117,13 @@ def _strips(sketch: Sketch, corner: Array, upright: bool, used: list, rng) -> li
     if len(fits) > 1:  # else the best of both is all there is to choose from
         places, cost, odd = places[fits], cost[fits], odd[fits]
     cost = patches.relative(cost) + patches.relative(odd)
+    seen = repeats.nothing(sketch.guide.features[..., :3], n, depth >= (a + b) // 2)
     found = []
     for _ in range(2):
         taken = np.array([strip.place for strip in found], int).reshape(-1, 2)
-        order = patches.ranked(places, cost, size, used, taken)
+        order = patches.ranked(places, cost + PERIODIC * seen.charge(places), size, used, taken)
         found.append(_best(sketch, shown, order, size, free))
+        seen = seen.plus(found[-1].place)
     used += [(strip.place, size) for strip in found]
     return found
 
@@ -134,6 +138,7 @@ def _tiles(sketch: Sketch, places: Places, masks: list, rng) -> list[Tile]:
     zone = _ring_lines(plan)
     size = (n, n)
     choice = patches.sure(sketch.guide, patches.candidates(plan, size, sketch.candidates, rng), size)
+    seen = repeats.nothing(sketch.guide.features[..., :3], n, free.straight)
     found = []
     for tile in progress(range(len(places.centres)), "cut tiles"):
         west, north, east, south = layout.colours(tile)
@@ -143,7 +148,7 @@ def _tiles(sketch: Sketch, places: Places, masks: list, rng) -> list[Tile]:
         shown = tuple(np.clip(v, 0, plan.exemplar - 1) for v in layout.sources(around, shift))
         cost = patches.mismatch(sketch.guide, zone, tuple(v[zone] for v in shown), choice)
         fits = patches.fitting(cost)
-        cost = patches.relative(cost[fits])
+        cost = patches.relative(cost[fits]) + PERIODIC * seen.charge(choice[fits])
         beside = [(places.vertical[c], (2 * b, n)) for c in sorted({west, east})]
         beside += [(places.horizontal[c], (n, 2 * b)) for c in sorted({south, north})]
         taken = np.array([tile.centre.place for tile in found], int).reshape(-1, 2)
@@ -154,6 +159,7 @@ def _tiles(sketch: Sketch, places: Places, masks: list, rng) -> list[Tile]:
         labels = np.where(centre.seam.labels, CENTRE, around).astype(np.uint8)
         shift[CENTRE] = centre.place
         found.append(_expanded(sketch, centre, labels, shift))
+        seen = seen.plus(centre.place)
     return found
 
 

@@ -1,0 +1,64 @@
+"""What comes back with every tile, against the variance of the tiles' mean picture worked out in full."""
+
+import numpy as np
+import pytest
+
+from dav_gswt.tiles import repeats
+
+
+def exemplar(seed=0, m=40):
+    return np.random.default_rng(seed).random((m, m, 3))
+
+
+def test_ground_has_mean_zero_and_variance_one():
+    shown = repeats.nothing(exemplar(), 16, np.ones((16, 16), bool))
+    np.testing.assert_allclose(shown.ground.mean((0, 1)), 0, atol=1e-12)
+    assert (shown.ground**2).sum(-1).mean() == pytest.approx(1)
+
+
+def test_charges_sum_to_the_power_of_what_comes_back():
+    shown = repeats.nothing(exemplar(), 16, np.ones((16, 16), bool))
+    places, total = np.array([[0, 0], [8, 4], [20, 24]]), 0.0
+    for place in places:
+        total += shown.charge(place[None])[0]
+        shown = shown.plus(place)
+    tiles = [shown.ground[y : y + 16, x : x + 16] for x, y in places]
+    assert total == pytest.approx((np.sum(tiles, 0) ** 2).sum(-1).mean())
+
+
+def test_a_patch_taken_away_again_leaves_nothing():
+    empty = repeats.nothing(exemplar(), 16, np.ones((16, 16), bool))
+    place = np.array([3, 5])
+    np.testing.assert_allclose(empty.plus(place).plus(place, -1).total, 0, atol=1e-12)
+
+
+def test_only_what_shows_counts():
+    inside = np.zeros((16, 16), bool)
+    inside[4:12, 4:12] = True
+    colour = exemplar()
+    shown = repeats.nothing(colour, 16, inside)
+    other = repeats.nothing(colour, 16, np.ones((16, 16), bool))
+    x, y = place = np.array([8, 4])
+    expected = (other.ground[y + 4 : y + 12, x + 4 : x + 12] ** 2).sum(-1).mean()
+    assert shown.charge(place[None])[0] == pytest.approx(expected)
+
+
+def test_the_same_landmark_at_the_same_place_is_dearer_than_at_another():
+    """A dot on plain ground: a second tile that shows it there, beside there, or not at all."""
+    colour = np.full((60, 60, 3), 0.5)
+    colour[30:34, 30:34] = 0
+    shown = repeats.nothing(colour, 20, np.ones((20, 20), bool)).plus(np.array([22, 22]))
+    there, beside, none = shown.charge(np.array([[22, 22], [14, 26], [0, 0]]))
+    assert there > 2 * beside > 2 * none
+
+
+@pytest.mark.parametrize("value", [0.0, 0.3])
+def test_ground_of_one_colour_costs_nothing(value):
+    shown = repeats.nothing(np.full((30, 30, 3), value), 16, np.ones((16, 16), bool))
+    assert shown.charge(np.array([[0, 0], [3, 3]])).tolist() == pytest.approx([0, 0], abs=1e-12)
+
+
+def test_large_tiles_are_sampled_more_coarsely():
+    inside = np.ones((200, 200), bool)
+    shown = repeats.nothing(exemplar(m=400), 200, inside)
+    assert shown.sample == 3 and shown.crop(np.array([100, 100])).shape == (66 * 66, 3)
