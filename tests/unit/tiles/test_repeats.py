@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dav_gswt.tiles import repeats
+from dav_gswt.tiles import patches, repeats
 
 
 def exemplar(seed=0, m=40):
@@ -62,3 +62,12 @@ def test_large_tiles_are_sampled_more_coarsely():
     inside = np.ones((200, 200), bool)
     shown = repeats.nothing(exemplar(m=400), 200, inside)
     assert shown.sample == 3 and shown.crop(np.array([100, 100])).shape == (66 * 66, 3)
+
+
+def test_two_strips_of_a_direction_never_show_nearly_the_same():
+    places = np.array([[0, 0], [3, 0], [8, 1], [9, 40]])
+    size, taken = (12, 80), np.array([[0, 0]])
+    # nearer than a quarter of the shorter side is the same
+    assert patches.elsewhere(places, size, taken).tolist() == [[3, 0], [8, 1], [9, 40]]
+    assert patches.elsewhere(places[:1], size, taken).tolist() == [[0, 0]]  # rather than none
+    assert patches.elsewhere(places, size, np.zeros((0, 2), int)).tolist() == places.tolist()

@@ -18,6 +18,7 @@ SURE = 0.05  # of mean uncertainty above the surest candidate's: still as good a
 REPEAT = 0.5  # charge for ground shown twice, a median seam's cost
 FITS = 1.75  # times the best seam's cost: as good as the best
 OUTLIER = 2.0  # times the mean squared distance from the median colour: more is no grain
+NEAR = 0.25  # of a patch's shorter side: nearer places show nearly the same
 SAMPLES = 3000  # cells of a seam zone that are compared
 
 
@@ -150,6 +151,12 @@ def ranked(
         score += REPEAT * overlap(places, size, place, other)
     for place in taken:
         score += REPEAT * overlap(places, size, place, size) / len(taken)
-        near = np.abs(places - place).max(1) / (0.25 * min(size))
-        score += 10 * REPEAT * np.maximum(0, 1 - near)
+        score += 10 * REPEAT * np.maximum(0, 1 - np.abs(places - place).max(1) / (NEAR * min(size)))
     return places[np.argsort(score, kind="stable")]
+
+
+def elsewhere(places: Int[Array, "n 2"], size: tuple[int, int], taken: Int[Array, "k 2"]) -> Int[Array, "m 2"]:
+    """The places that are not nearly one of those taken, in their order; all of them if none is left."""
+    away = np.abs(places[:, None] - taken[None]).max(2)
+    far = (away >= NEAR * min(size)).all(1)
+    return places[far] if far.any() else places

@@ -11,6 +11,7 @@ from dav_gswt.tiles import cuts, expansion, layout, patches, repeats
 from dav_gswt.tiles.energy import Energy, weights
 from dav_gswt.tiles.layout import CENTRE, EDGES, LABELS, Layout, Places
 
+FEW = 4  # times as many places as are tried: among fewer there is no choice
 PERIODIC = 2.0  # charge for what comes back with every tile, where a median seam costs 1
 
 
@@ -114,14 +115,16 @@ def _strips(sketch: Sketch, corner: Array, upright: bool, used: list, rng) -> li
     cost = patches.mismatch(sketch.guide, zone, tuple(v[zone] for v in shown), places)
     odd = patches.means(patches.oddness(sketch.guide), places, size)
     fits = np.intersect1d(patches.fitting(cost), patches.fitting(odd))
-    if len(fits) > 1:  # else the best of both is all there is to choose from
-        places, cost, odd = places[fits], cost[fits], odd[fits]
     cost = patches.relative(cost) + patches.relative(odd)
+    if len(fits) < FEW * sketch.tries:  # the best of both is all there is to choose from
+        fits = np.argsort(cost, kind="stable")[: FEW * sketch.tries]
+    places, cost = places[fits], cost[fits]
     seen = repeats.nothing(sketch.guide.features[..., :3], n, depth >= (a + b) // 2)
     found = []
     for _ in range(2):
         taken = np.array([strip.place for strip in found], int).reshape(-1, 2)
         order = patches.ranked(places, cost + PERIODIC * seen.charge(places), size, used, taken)
+        order = patches.elsewhere(order, size, taken)  # two colours that show the same are one
         found.append(_best(sketch, shown, order, size, free))
         seen = seen.plus(found[-1].place)
     used += [(strip.place, size) for strip in found]
