@@ -31,7 +31,7 @@ COARSE, PLACES = (
 )  # a block is at most COARSE cells, or a tile's side over PLACES: patches need places to choose from
 AUTO = "auto"
 MOST = 6  # levels, where it is left to the tile
-SMALLEST = 4  # cells of the coarsest level that a tile is wide at least then: fewer are never drawn (docs/deviations.md)
+SMALLEST = 4  # cells of the coarsest level that a tile is wide at least then: a coarser one is never drawn
 NARROWEST = 2  # and in any case: the least that has a slope
 EDGES = 16  # tiles of one centre variant: two colours on each of four sides
 
