@@ -46,7 +46,6 @@ wildcard_constraints:
     t=NATURAL,
     painter=PAINTER,
     completed=COMPLETED,
-    level=NATURAL,
     seam=NAME,
     tau=FRACTION,
 

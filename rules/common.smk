@@ -148,6 +148,17 @@ def study_of(scene):
     )
 
 
+def levels_measured():
+    """The tables of levels that are gathered: the path of each one's lod.csv, and what tells it from the others."""
+    found = {}
+    for scene in config["lod"]["scenes"]:
+        for seed in config["seeds"]:
+            values = values_of(scene) | {"seed": seed}
+            (path,) = expand(rules.measure_levels.output.table, **values)
+            found[path] = {key: values[key] for key in ("scene", "seed", "quality", "seam")}
+    return found
+
+
 def calibrations():
     """The cells that are compared: the path of each one's calibration.json, and what tells it from the others."""
     asked, found = config["calibration"], {}

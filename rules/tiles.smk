@@ -9,8 +9,7 @@ rule cut_tiles:
     """Cut sixteen tiles from the exemplar."""
     input:
         unpack(describing),
-        fields=[f"<results>/<levels>/level{level}.ply" for level in range(config["levels"])],
-        grounds=[f"<results>/<levels>/level{level}.exr" for level in range(config["levels"])],
+        levels="<results>/<levels>",
     output:
         seams="<results>/<tiles>/seams.json",
         tiles=directory("<results>/<tiles>/tiles"),
@@ -25,6 +24,6 @@ rule cut_tiles:
     params:
         seam=entry("seams", "seam"),
         seed=integer("seed"),
-        source=source_of("tiles", "raster", "perceptual", "threads", "active/uncertainty"),
+        source=source_of("tiles", "levels", "raster", "perceptual", "threads", "active/uncertainty"),
     script:
         "../scripts/cut_tiles.py"

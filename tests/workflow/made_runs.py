@@ -34,7 +34,7 @@ class Made:
 
     @property
     def tiles(self) -> Path:
-        return self.round / "tiles_colour"
+        return self.round / "tiles_semantic"
 
     @property
     def bundle(self) -> Path:

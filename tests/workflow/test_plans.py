@@ -37,9 +37,9 @@ def test_shared_stages_are_planned_once(planned, tmp_path, axis, values, jobs):
 
 def test_the_default_target_makes_every_stage_once(planned, tmp_path):
     plan = planned(tmp_path)
-    once = ["render_photos", "split_views", "fit_coarse", "score_coarse", "crop_level", "cut_tiles", "bundle_tiles"]
+    once = ["render_photos", "split_views", "fit_coarse", "score_coarse", "make_levels", "cut_tiles", "bundle_tiles"]
     assert all(plan[rule] == 1 for rule in [*once, "make_page", "render_terrain"])
-    assert plan["fit_level"] == 2 and plan["update_field"] == plan["capture_views"] == 2
+    assert plan["update_field"] == plan["capture_views"] == 2
     assert plan["evaluate_coarse"] == 1 and plan["evaluate_round"] == 2
 
 
@@ -117,7 +117,7 @@ def test_the_oracle_needs_a_scene_whose_truth_is_known(snakemake, shared, tmp_pa
 
 def test_tiles_go_by_the_doubt_of_the_prior_that_was_asked(planned, tmp_path):
     plan = planned(tmp_path, "--config", "policy=w2-lpips", configs=(USUAL, TINY))
-    assert plan["score_coarse"] == plan["score_round"] == plan["crop_level"] == 1 and not plan["fetch_lpips"]
+    assert plan["score_coarse"] == plan["score_round"] == plan["make_levels"] == 1 and not plan["fetch_lpips"]
     tiles = "results/desert/seed0/draft/active_{}_k4/iter0/tiles_semantic/seams.json"
     for way, scored in (("w2-lpips_terrain_pdrop0.15_lam0", 1), ("random_none_pdrop0_lam0", 0)):
         assert planned(tmp_path, tiles.format(way))["score_coarse"] == scored
@@ -161,13 +161,13 @@ def test_cuts_read_what_is_at_hand_to_tell_things_apart(snakemake, tmp_path):
         pytest.param(STOP.format("_upto020"), id="a number of photos with a leading zero"),
         pytest.param(STOP.format("_worth0.050"), id="a price with a trailing zero"),
         pytest.param(
-            "results/desert/seed0/draft/active_given_none_pdrop0_lam0_k0_upto9/iter0/levels/level0.ply",
+            "results/desert/seed0/draft/active_given_none_pdrop0_lam0_k0_upto9/iter0/levels",
             id="a stop of a finished field",
         ),
         pytest.param("results/Desert/seed0/views.json", id="a scene in capitals"),
         pytest.param(f"{LAM}/field.ply", id="lam for a policy without a prior"),
-        pytest.param(f"{FARTHEST}/completed_none/levels/level0.ply", id="completed by no prior"),
-        pytest.param(f"{FARTHEST}/completed_/levels/level0.ply", id="completed by nobody"),
+        pytest.param(f"{FARTHEST}/completed_none/levels", id="completed by no prior"),
+        pytest.param(f"{FARTHEST}/completed_/levels", id="completed by nobody"),
         pytest.param(GIVEN + "/completed_terrain/field.ply", id="a finished field, completed"),
         pytest.param("results/moon/photos/ground.json", id="a scene that is not in the config"),
     ],
@@ -190,7 +190,7 @@ def test_a_completed_field_lies_between_the_round_and_its_levels(planned, tmp_pa
 def test_a_round_can_be_tiled_as_it_is_and_completed(planned, tmp_path):
     tiles = ROUND.format(policy="farthest", k=4, t=1) + "{}/tiles_semantic/seams.json"
     plan = planned(tmp_path, tiles.format(""), tiles.format("/completed_terrain"))
-    assert plan["crop_level"] == plan["cut_tiles"] == 2 and plan["complete_field"] == plan["update_field"] == 1
+    assert plan["make_levels"] == plan["cut_tiles"] == 2 and plan["complete_field"] == plan["update_field"] == 1
 
 
 def test_no_round_and_a_finished_field_go_from_field_to_terrain(planned, tmp_path):

@@ -1,5 +1,6 @@
 """The smallest experiment, run through every stage: what is there, what it looks like, what a change makes anew."""
 
+import csv
 import shutil
 import subprocess
 import sys
@@ -22,7 +23,7 @@ RULES = {
     "photos": ["render_photos", "report_photos", "split_views"],
     "coarse": ["fit_coarse", "evaluate_coarse", "score_coarse"],
     "active": ["select_poses", "capture_views", "update_field", "score_round", "evaluate_round"],
-    "levels": ["crop_level", "fit_level1"],
+    "levels": ["make_levels"],
     "tiles": ["cut_tiles", "bundle_tiles"],
     "terrain": ["make_page", "render_terrain"],
 }
@@ -91,7 +92,7 @@ def test_a_round_may_go_by_what_the_prior_doubts(snakemake, tiny, tmp_path):
     """From the tiny run's coarse field on: scored by the prior, chosen, captured, refitted, and to the finest level."""
     folder = shutil.copytree(tiny.folder, tmp_path / "run", symlinks=True)
     way = folder / "results/desert/seed0/draft/active_w2-lpips_terrain_pdrop0.15_lam0.1_k2/iter1"
-    target = str((way / "levels/level0.ply").relative_to(folder))
+    target = str((way / "levels").relative_to(folder))
     snakemake(folder, "--cores", "2", target, configs=(USUAL, TINY))
     first = scores.read(folder / "results/desert/seed0/draft/coarse/scores_terrain_pdrop0.15/scores.csv")
     assert (first.term("w2_sq") > 0).all() and "lpips" not in first.terms and (first.steps == 2).all()
@@ -131,7 +132,7 @@ def test_a_bundle_keeps_its_contract(tiny, root):
     Draft202012Validator(read_json(root / "workflow/schemas/davgswt.schema.json")).validate(bundle)
     chunks = [chunk for tile in bundle["tiles"] for chunk in tile["chunks"]]
     there = {f"chunks/{p.name}" for p in (tiny.bundle / "chunks").glob("[!.]*")}
-    assert len(chunks) == 32 and {chunk["file"] for chunk in chunks} == there
+    assert len(chunks) == 16 * len(bundle["levels"]) and {chunk["file"] for chunk in chunks} == there
     for chunk in chunks:
         path = tiny.bundle / chunk["file"]
         assert path.stat().st_size == chunk["bytes"] == chunk["count"] * (32 + 4 * len(chunk["orders"]))
@@ -230,7 +231,7 @@ def test_a_field_is_completed_beside_its_round_and_levels_go_on_from_it(tiny, sn
     folder = tmp_path / "completed"
     shutil.copytree(tiny.folder, folder)
     made = tiny.round.relative_to(tiny.folder) / "completed_terrain"
-    snakemake(folder, "--cores", "2", made / "metrics.json", made / "levels/level0.ply", configs=CONFIGS)
+    snakemake(folder, "--cores", "2", made / "metrics.json", made / "levels", configs=CONFIGS)
     facts, found = read_json(folder / made / "completion.json"), read_json(folder / made / "metrics.json")
     before, after = (field.read(path / "field.ply") for path in (tiny.round, folder / made))
     assert facts["painted"] <= facts["unseen"] < facts["cells"] and facts["changed"] == bool(after.imagined.any())
@@ -244,3 +245,16 @@ def test_a_field_is_completed_beside_its_round_and_levels_go_on_from_it(tiny, sn
     assert found["gaussians"]["imagined"] == after.imagined.sum() and found["all"]["before"]["psnr"] > 10
     level = field.read(folder / made / "levels/level0.ply")
     assert len(level) and level.imagined.any() <= after.imagined.any()
+
+
+def test_every_level_of_every_tile_is_measured(tiny, snakemake, tmp_path):
+    folder = shutil.copytree(tiny.folder, tmp_path / "measured")
+    snakemake(folder, "--cores", "2", "lod_table", configs=CONFIGS)
+    with (folder / "results/tables/lod.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    levels = len(read_json(tiny.bundle / "davgswt.json")["levels"])
+    assert {(int(r["tile"]), int(r["level"])) for r in rows} == {(t, lv) for t in range(16) for lv in range(levels)}
+    assert all(r["scene"] == "desert" and (r["oblique_db"] == "") == (r["level"] == "0") for r in rows)
+    for tile in range(16):
+        own = [r for r in rows if int(r["tile"]) == tile]
+        assert [float(r["mean_scale"]) for r in own] == sorted(float(r["mean_scale"]) for r in own)

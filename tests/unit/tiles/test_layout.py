@@ -30,11 +30,44 @@ def test_every_size_is_a_multiple_of_the_coarsest_cell_and_leaves_room(levels, s
     assert plan.block < plan.strip < plan.corner < plan.side / 2
 
 
-def test_a_tile_that_the_exemplar_cannot_hold_says_how_many_levels_it_can():
-    # 10 blocks are needed: 10 * 2^3 = 80 cells fit in 100, 160 do not
-    with pytest.raises(InputError, match="at most 4 levels"):
-        layout.plan(100, 5, 0.5, 0.16)
-    assert layout.plan(100, 4, 0.5, 0.16).side == 80
+@pytest.mark.parametrize("levels", [1, 3, 6, 8, layout.AUTO])
+@pytest.mark.parametrize("exemplar", [32, 64, 100, 224, 448, 1000])
+@pytest.mark.parametrize("share", [0.3, 0.5])
+def test_a_tile_is_whole_in_the_cells_of_every_level(exemplar, levels, share):
+    plan = layout.plan(exemplar, levels, share, 0.125, fitted=3)
+    assert plan.side <= exemplar and plan.side % 2 ** (plan.levels - 1) == 0
+    assert plan.laid <= 3 and plan.block == 2 ** (plan.laid - 1) and plan.side >= layout.LEAST * plan.block
+    assert not any(v % plan.block for v in (plan.strip, plan.corner))
+    assert plan.laid > 1 or plan.levels == 1 or plan.side < 2 * layout.LEAST  # the first coarser level is laid
+
+
+def test_coarse_levels_do_not_make_tiles_large():
+    # 224 / 2 = 112 cells: three and a half of 32; the nearest whole number is four
+    assert layout.plan(224, 6, 0.5, 0.125).side == 128
+    assert layout.plan(224, 3, 0.5, 0.125).side == 112
+    assert layout.plan(224, 6, 0.5, 0.125).block == layout.plan(224, 3, 0.5, 0.125).block == 4
+
+
+@pytest.mark.parametrize("side, levels", [(128, 6), (112, 6), (96, 5), (60, 5), (32, 4), (20, 3)])
+def test_auto_makes_the_levels_that_are_ever_drawn(side, levels):
+    # at least 3.5 cells of the coarsest level, rounded to four: 112 / 32 = 3.5, 96 / 32 = 3
+    plan = layout.plan(4 * side, layout.AUTO, 0.25, 0.125)
+    assert plan.levels == levels and abs(plan.side - side) <= 2 ** (levels - 2)
+
+
+def test_levels_that_the_ground_does_not_hold_are_left_out_with_a_warning(caplog):
+    with caplog.at_level("WARNING"):
+        plan = layout.plan(40, 8, 0.5, 0.16)
+    assert plan.levels == 5 and plan.side == 32
+    assert "the exemplar's 40 cells a side hold tiles with 5 levels, not 8" in caplog.text
+    caplog.clear()
+    layout.plan(40, layout.AUTO, 0.5, 0.16)
+    assert not caplog.text
+
+
+def test_an_exemplar_smaller_than_any_tile_is_refused():
+    with pytest.raises(InputError, match="needs 10 ground cells a side and the exemplar has 9"):
+        layout.plan(9, 3, 0.5, 0.16)
 
 
 def test_a_vertical_strip_goes_on_from_a_tile_into_its_right_neighbour():

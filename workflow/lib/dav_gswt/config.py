@@ -68,6 +68,9 @@ def check(config: dict, schema: Path) -> None:
             if scene[key] not in config[table]:
                 known = ", ".join(config[table])
                 raise InputError(f"config: scenes.{name}.{key}: there is no {scene[key]!r}; {table} has {known}")
+    for name in config.get("lod", {}).get("scenes", []):
+        if name not in config["scenes"]:
+            raise InputError(f"config: lod.scenes: there is no {name!r}; scenes has {', '.join(config['scenes'])}")
     if "benchmark" in config:
         _check_benchmark(config["benchmark"], config["scenes"], config["priors"])
 

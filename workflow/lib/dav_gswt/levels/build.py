@@ -1,6 +1,12 @@
-"""One level from its finer neighbour: merged, then fitted to the neighbour's pictures from above and from the side."""
+"""The levels of a field: each its finer neighbour merged, then fitted to the neighbour's pictures from above, from the
+side and as a walker sees them.
+
+What a level may change is what those pictures show of it: colours, sizes and things. Heights stay the means of the
+cells they cover: fitted from above they come out rough, and low over the ground one disc then hides the next.
+"""
 
 import logging
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,34 +21,99 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import Field
 from dav_gswt.fitting import trainer
 from dav_gswt.fitting.plan import Plan
-from dav_gswt.levels.merge import halved
+from dav_gswt.levels.merge import cropped, halved
+from dav_gswt.raster import Gradients
 from dav_gswt.views import View
 
 _log = logging.getLogger(__name__)
 
-ELEVATIONS = (90.0, 60.0, 35.0)  # degrees: pictures the coarser level is fitted to
+AUTO = "auto"
+MOST = 6  # levels, where the config leaves it to the scene
+ROOM = 32  # cells that the exemplar is wide at least at a level that is fitted: coarser ones are made tile by tile
+SAVES = 0.5  # of a level's Gaussians that the next one must do without, or it is not worth having
+ELEVATIONS = (90.0, 50.0, 20.0, 6.0)  # degrees: pictures the coarser level is fitted to, down to a walker's
 AROUND = 6  # azimuths of each elevation but the zenith's
 CLEARANCE = 2.0  # discs that a thing may rise above the highest it starts from
 PIXELS = 2.0  # of a picture for one coarse disc: at the distance where a level is used a disc is about a pixel wide
 
 
-def coarser(
-    field: Field, grid: Ground, steps: int, rng: np.random.Generator, keep: Path | None = None
-) -> tuple[Field, Ground]:
-    """The next level: half the resolution, about a quarter of the Gaussians, fitted for `steps` steps.
+@dataclass(frozen=True)
+class Levels:
+    """A field's levels with their grids, finest first. wanted: how many its tiles are to have, a number or AUTO.
+    stopped: why none coarser than these was fitted."""
 
-    Raises: InputError: the mean scale does not rise (a field of things alone that did not merge).
+    fields: list[Field]
+    grids: list[Ground]
+    wanted: int | str
+    stopped: str
+
+
+class Still(OnGround):
+    """A ground with things on it whose discs keep their heights."""
+
+    def guide(self, gradients: Gradients) -> None:
+        super().guide(gradients)
+        gradients.means[: self.discs, 2] = 0
+
+
+def fitted(
+    field: Field, grid: Ground, asked: int | str, steps: int, seed: int, keep: Path | str | None = None
+) -> Levels:
+    """The field and as many coarser levels as are asked for and as its exemplar has room for.
+
+    Tiles make those beyond from their own cells (`tiles.coarse`), so a level is fitted only where at least ROOM of its
+    cells lie across the exemplar, but for the first, which gives every field a ground. With AUTO a level that saves
+    nothing is not made.
+    Args: steps: of each fit. keep: see `trainer.fit`.
+    Raises: InputError: so many levels were asked for, and the mean scale of one does not rise.
     """
-    start, coarse = halved(field, grid)
+    fields, grids = [field], [grid]
+    most, stopped = (MOST if asked == AUTO else asked), "no more are wanted"
+    for number in range(1, most):
+        finer, laid = fields[-1], grids[-1]
+        if laid.cells % 2 or (number > 1 and laid.cells // 2 < ROOM):
+            stopped = f"level {number} would be {laid.cells / 2:g} cells wide; tiles make it from their own cells"
+            break
+        level, coarse = coarser(finer, laid, steps, np.random.default_rng([seed, number]), keep)
+        if asked == AUTO and (fault := _useless(finer, level)):
+            asked, stopped = number, f"level {number}: {fault}"
+            break
+        if not mean_scale(level) > mean_scale(finer):
+            raise InputError(f"levels: the mean scale does not rise from level {number - 1} to {number}; ask for fewer")
+        fields.append(level)
+        grids.append(coarse)
+    _log.info("%d levels: %s", len(fields), stopped)
+    return Levels(fields, grids, asked, stopped)
+
+
+def _useless(finer: Field, level: Field) -> str | None:
+    """Why a level is not worth having, if it is not."""
+    if not mean_scale(level) > mean_scale(finer):
+        return "its mean scale does not rise"
+    if len(level) > SAVES * len(finer):
+        return f"it saves too little ({len(finer)} to {len(level)} Gaussians)"
+    return None
+
+
+def mean_scale(field: Field) -> float:
+    """Mean standard deviation over all axes of all Gaussians."""
+    return float(np.exp(field.log_scales.astype(float)).mean())
+
+
+def coarser(
+    field: Field, grid: Ground, steps: int, rng: np.random.Generator, keep: Path | str | None = None
+) -> tuple[Field, Ground]:
+    """The next level: half the resolution, about a quarter of the Gaussians, fitted for `steps` steps."""
+    start, coarse = halved(*cropped(field, grid, 2))
     views = modelled(neighbour_views(field, coarse), coarse)
     stand = start[~start.ground]
-    top = float((stand.means[:, 2] - coarse.height_at(stand.means)).max()) + CLEARANCE * coarse.spacing
-    rules, plan = OnGround(coarse, np.full(coarse.shape, top)), Plan(steps, len(start))
+    top = CLEARANCE * coarse.spacing
+    if len(stand):
+        top += float((stand.means[:, 2] - coarse.height_at(stand.means)).max())
+    rules, plan = Still(coarse, np.full(coarse.shape, top)), Plan(steps, len(start))
     level = trainer.fit(start, views, plan, rules, rng, f"fit level of {len(start)} Gaussians", keep).field
-    before, after = (float(np.exp(f.log_scales).mean()) for f in (field, level))
-    if not after > before:
-        raise InputError(f"levels: the mean scale does not rise ({before:.4g} to {after:.4g}); ask for fewer levels")
-    _log.info("mean scale %.4g to %.4g, %d to %d Gaussians", before, after, len(field), len(level))
+    scales = mean_scale(field), mean_scale(level)
+    _log.info("mean scale %.4g to %.4g, %d to %d Gaussians", *scales, len(field), len(level))
     return level, coarse
 
 

@@ -11,7 +11,7 @@ from scipy.ndimage import distance_transform_edt
 from dav_gswt.errors import InputError
 from dav_gswt.field import SH0, Field
 from dav_gswt.logs import progress
-from dav_gswt.tiles import compose, energy, layout, membrane, patches, search, semantics, standing, trends
+from dav_gswt.tiles import coarse, compose, energy, layout, membrane, patches, search, semantics, standing, trends
 from dav_gswt.tiles.layout import EDGES, Exemplar, Layout
 
 _log = logging.getLogger(__name__)
@@ -24,7 +24,7 @@ class Options:
     """share: tile side over the exemplar's. strip: half-width of the strips over the tile's side, below 1/5.
     variants: centres per edge colouring. trend: width of the low-pass in tile sides. candidates: places that a search
     compares; tries: of them, how many are cut before the best is taken. kind: one of energy.KINDS; slope: of gamma;
-    source: what the semantics are made of.
+    source: what the semantics are made of. levels: of the tiles, a number or layout.AUTO; None: as many as are given.
     """
 
     share: float = 0.5
@@ -36,13 +36,14 @@ class Options:
     kind: str = "semantic"
     slope: float = 2.0
     source: semantics.Source = semantics.Source()
+    levels: int | str | None = None
 
     @classmethod
-    def of(cls, seam: dict, source: semantics.Source) -> "Options":
+    def of(cls, seam: dict, source: semantics.Source, levels: int | str | None = None) -> "Options":
         """Of an entry of the config's `seams`."""
         own = {"share": "tile", "kind": "energy"}
         given = {key: seam[name] for key in vars(cls()) if (name := own.get(key, key)) in seam}
-        return cls(**given, source=source)
+        return cls(**given, source=source, levels=levels)
 
 
 @dataclass(frozen=True)
@@ -78,23 +79,24 @@ def cut_tiles(
     """Make the tile set of a field.
 
     Args:
-        levels: finest first; level l's ground has cells of 2^l spacings from the exemplar's corner.
+        levels: finest first; level l's ground has cells of 2^l spacings from the exemplar's corner. Those whose cells
+            are wider than a block are left aside: such levels are merged from each tile's own cells.
         colour, uncertainty: seen from straight above, one value a finest cell, **row 0 in the south** (turn a top-down
             camera's picture upside down). Uncertainty in [0, 1]; NaN where nothing is known: a hole takes the colour of
             the nearest cell, and is shown only where nothing better serves.
-    Raises: InputError: the exemplar is too small for a tile with these levels, a level has no Gaussian in it, or
-        nothing is known of any cell.
+    Raises: InputError: the exemplar is too small for a tile, a level has no Gaussian in it, or nothing is known of any
+        cell.
     """
     shape = (exemplar.cells, exemplar.cells)
     if colour.shape[:2] != shape or uncertainty.shape != shape:
         raise ValueError(f"maps of {colour.shape[:2]} and {uncertainty.shape} cells for an exemplar of {shape}")
-    plan = layout.plan(exemplar.cells, len(levels), options.share, options.strip)
+    plan = layout.plan(exemplar.cells, options.levels or len(levels), options.share, options.strip, len(levels))
     known, doubt = _without_holes(colour, uncertainty)
     _, height = ground_maps(levels[0], exemplar)
     trend = trends.trend_of(colour, height, exemplar, options.trend * plan.side)
     binned = [
         _checked(compose.binned(trends.detrended(field, trend), exemplar, 2**number), number)
-        for number, field in enumerate(levels)
+        for number, field in enumerate(levels[: plan.laid])
     ]
     stands = energy.standing(standing.cover(levels[0], exemplar, height))
     colour = np.clip(known - trend.colour, 0, 1).astype(float)
@@ -113,8 +115,11 @@ def cut_tiles(
     ]
     side = plan.side * exemplar.spacing
     tiles, raised = compose.levelled(tiles, side)
+    tiles = [_merged(tile, plan, exemplar.spacing) for tile in tiles]
     seams = found.record() | {
-        "layout": {k: int(getattr(plan, k)) for k in ("exemplar", "levels", "side", "strip", "corner", "block")},
+        "layout": {
+            k: int(getattr(plan, k)) for k in ("exemplar", "levels", "laid", "side", "strip", "corner", "block")
+        },
         "raised": raised.tolist(),
         "energy": priced.record(),
         "trend": {"colour": float(np.ptp(trend.colour)), "height": float(np.ptp(trend.height))},
@@ -171,10 +176,18 @@ def _corrections(plan: Layout, found: search.Found, shifts: Array, ground: membr
 
 def _tile(level: compose.Binned, labels: Array, shift: Array, correction: Array) -> Field:
     """One tile at one level, corrected; a coarser level follows the finest one's labels by majority."""
-    coarse = compose.coarser(labels, level.cell)
-    splats = compose.composed(level, coarse, shift)
-    change = membrane.coarser(correction, labels, coarse)
+    majority = compose.coarser(labels, level.cell)
+    splats = compose.composed(level, majority, shift)
+    change = membrane.coarser(correction, labels, majority)
     return membrane.applied(splats, change, level.cell * level.exemplar.spacing)
+
+
+def _merged(tile: list[Field], plan: Layout, spacing: float) -> list[Field]:
+    """A tile's levels with those that are coarser than a block."""
+    for number in range(len(tile), plan.levels):
+        cell = 2 ** (number - 1)
+        tile = [*tile, coarse.coarser(tile[-1], plan.side // cell, cell * spacing)]
+    return tile
 
 
 def ground_maps(field: Field, exemplar: Exemplar) -> tuple[Float[Array, "m m 3"], Float[Array, "m m"]]:

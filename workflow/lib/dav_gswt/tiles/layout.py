@@ -3,13 +3,15 @@
 A tile of n x n cells shows nine pieces of the exemplar, its labels: the centre, half a strip along each side, and a
 quarter of the corner patch in each corner. A strip is centred on an edge: its right (upper) half lies in the tile to
 the right (above), its left (lower) half in the tile to the left (below), and the common corner patch is centred on
-the corners, so the exemplar goes on across every border. All places and half-widths are multiples of the coarsest
-level's cell, so the same patches are whole cells in every level.
+the corners, so the exemplar goes on across every border. All places and half-widths are multiples of a block, the
+coarsest cell that patches are laid by, so the same patches are whole cells in every level up to it. Coarser levels are
+merged from the cells of each tile (`coarse`), so a tile is a whole number of the coarsest level's cells wide.
 
 Arrays over cells are indexed [y, x], and **row 0 is the southern one**, as cell numbers grow to the north; pictures
 of maps have it at the bottom.
 """
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,9 +20,19 @@ from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 
+_log = logging.getLogger(__name__)
+
 LABELS = ("centre", "W", "E", "S", "N", "SW", "SE", "NW", "NE")  # a label's number is its index
 CENTRE, W, E, S, N, SW, SE, NW, NE = range(9)
 LEAST = 10  # blocks that a tile is wide at least: two corners, and something between them
+COARSE, PLACES = (
+    4,
+    32,
+)  # a block is at most COARSE cells, or a tile's side over PLACES: patches need places to choose from
+AUTO = "auto"
+MOST = 6  # levels, where it is left to the tile
+SMALLEST = 4  # cells of the coarsest level that a tile is wide at least then: a coarser one is never drawn
+NARROWEST = 2  # and in any case: the least that has a slope
 EDGES = 16  # tiles of one centre variant: two colours on each of four sides
 
 
@@ -38,8 +50,9 @@ class Exemplar:
 class Layout:
     """Sizes in finest cells; all but `levels` and `exemplar` are multiples of `block`.
 
-    side: of a tile. strip, corner: half-widths, strip < corner. block: the coarsest level's cell; the outermost `block`
-    cells of a tile always belong to its frame of strips and corners.
+    side: of a tile, a multiple of the coarsest level's cell. strip, corner: half-widths, strip < corner. block: the
+    coarsest cell that patches are laid by; the outermost `block` cells of a tile always belong to its frame of strips
+    and corners.
     """
 
     exemplar: int
@@ -47,10 +60,12 @@ class Layout:
     side: int
     strip: int
     corner: int
+    block: int = 1
 
     @property
-    def block(self) -> int:
-        return 2 ** (self.levels - 1)
+    def laid(self) -> int:
+        """How many levels are composed of patches; the others are merged from the tile's own cells."""
+        return self.block.bit_length()
 
 
 @dataclass(frozen=True)
@@ -63,27 +78,45 @@ class Places:
     centres: Int[Array, "tiles 2"]
 
 
-def plan(exemplar: int, levels: int, share: float, strip: float) -> Layout:
-    """Sizes for an exemplar of `exemplar` cells: tiles `share` of it wide, strips `strip` of a tile to either side.
+def plan(exemplar: int, levels: int | str, share: float, strip: float, fitted: int = MOST) -> Layout:
+    """Sizes for an exemplar of `exemplar` cells: tiles about `share` of it wide, strips `strip` of a tile either side.
 
-    Args:   share: tile side as a share of the exemplar's side, in (0, 1]. strip: half-width as a share of the tile's
-    side.
-    Raises: InputError: the exemplar cannot hold a tile with that many levels; the message says how many it can.
+    Args:   levels: of the tiles, or AUTO: as many as are ever drawn (see SMALLEST), at most MOST. share: tile side as a
+    share of the exemplar's side, in (0, 1]. strip: half-width as a share of the tile's side. fitted: levels that the
+    exemplar has.
+    Where the exemplar holds no tile with so many levels there are fewer, and a warning says so.
+    Raises: InputError: the exemplar cannot hold any tile.
     """
-    block = 2 ** (levels - 1)
-    side = max(int(exemplar * share) // block, LEAST) * block
-    if side > exemplar:
-        fits = int(np.log2(exemplar / LEAST)) + 1 if exemplar >= LEAST else 0
-        advice = f"ask for at most {fits} levels, or " if fits else ""
+    most = _drawn(exemplar * share) if levels == AUTO else levels
+    sizes = ((number, _side(exemplar, number, share)) for number in range(most, 0, -1))
+    number, side = next(((n, s) for n, s in sizes if s <= exemplar), (0, 0))
+    if not number:
         raise InputError(
-            f"tiles: a tile with {levels} levels needs {side} ground cells a side and the exemplar has {exemplar}: "
-            f"{advice}use a finer quality or photos of a larger ground"
+            f"tiles: a tile needs {LEAST} ground cells a side and the exemplar has {exemplar}: use a finer quality or "
+            "photos of a larger ground"
         )
+    if levels not in (AUTO, number):
+        _log.warning("the exemplar's %d cells a side hold tiles with %d levels, not %d", exemplar, number, levels)
+    block = 2 ** (min(number, fitted) - 1)
+    while block > 1 and (block > max(COARSE, side // PLACES) or side < LEAST * block):
+        block //= 2
     widest = side // 2 // block - 1  # of a corner, in blocks: a strip shows something between its two
     half = min(max(2, round(side * strip / block)), widest - 1)
     corner = min(half + max(1, half // 2), widest)
-    half, corner = half * block, corner * block
-    return Layout(exemplar, levels, side, half, corner)
+    return Layout(exemplar, number, side, half * block, corner * block, block)
+
+
+def _drawn(side: float) -> int:
+    """How many levels of tiles about so many cells wide are ever drawn, at most MOST."""
+    return max([1, *(n for n in range(1, MOST + 1) if side / 2 ** (n - 1) >= SMALLEST - 0.5)])
+
+
+def _side(exemplar: int, levels: int, share: float) -> int:
+    """The tile's side nearest to `share` of the exemplar's that is a whole number of the coarsest level's cells."""
+    cell = 2 ** (levels - 1)
+    least = max(min(cell, NARROWEST), -(-LEAST * min(cell, 2) // cell))  # a level beside the finest needs blocks of two
+    most = max(least, exemplar // cell)
+    return min(max(int(exemplar * share / cell + 0.5), least), most) * cell
 
 
 def colours(tile: int) -> tuple[int, int, int, int]:
