@@ -6,7 +6,7 @@ from pathlib import Path
 
 import dav_gswt
 from dav_gswt.active.names import AT_ZERO, GEOMETRIC, IMAGINING, ORACLES
-from dav_gswt.config import check
+from dav_gswt.config import REFINED, check
 from dav_gswt.errors import InputError
 from dav_gswt.spelling import read_stop, spell, spell_completed, spell_stop
 
@@ -49,6 +49,7 @@ NEVER = r"(?!)"  # a constraint that nothing meets
 PRIOR = "|".join(["none(?=_pdrop0[_/])", *config["priors"]])
 PAINTER = "|".join(name for name, prior in config["priors"].items() if prior["model"] == "terrain") or NEVER
 COMPLETED = rf"(?:/completed_(?:{PAINTER}))?"  # or nothing
+CUT = rf"{NAME}(?<!{REFINED})"  # an entry of `seams`; with the ending its tiles are those of the entry, refined
 
 
 def way(policy):
@@ -274,10 +275,35 @@ def prior_of(wildcards):
 
 def painter_of(wildcards):
     """The weights of the prior that paints what no photo saw."""
-    weights = config["priors"][wildcards.painter].get("weights", str(LIBRARY / "prior/terrain.safetensors"))
+    return {"weights": weights_of(wildcards.painter)}
+
+
+def refiner_of(wildcards):
+    """The weights of the prior that repairs cuts."""
+    return {"weights": weights_of(refining(wildcards)["prior"])}
+
+
+def weights_of(prior):
+    """The file of weights of an entry of `priors` of model terrain."""
+    weights = config["priors"][prior].get("weights", str(LIBRARY / "prior/terrain.safetensors"))
     if not Path(weights).exists():
-        raise WorkflowError(f"config: priors.{wildcards.painter}.weights: there is no {weights}; see docs/prior.md")
-    return {"weights": weights}
+        raise WorkflowError(f"config: priors.{prior}.weights: there is no {weights}; see docs/prior.md")
+    return weights
+
+
+def cutting(wildcards):
+    """A params function: how tiles are cut. How they are refined is no part of it: all refinements share the cut."""
+    return {key: value for key, value in config["seams"][wildcards.seam].items() if key != "refine"}
+
+
+def refining(wildcards):
+    """A params function: how the tiles of an entry of `seams` are refined."""
+    entry = config["seams"].get(wildcards.seam, {})
+    if "refine" not in entry:
+        raise WorkflowError(
+            f"config: seams.{wildcards.seam}.refine: is missing; it says how {wildcards.seam}{REFINED} is made"
+        )
+    return entry["refine"]
 
 
 def lpips_if_fetched(wildcards):

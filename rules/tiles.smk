@@ -1,7 +1,8 @@
 """Wang tiles: a centre, two strips per direction and one corner, joined along cuts that nobody should find.
 
 In: the levels. Out: labels.npz, lod{l}_tile_{TT}.ply and seams.json. The cut is made on the finest level; coarser
-levels follow it.
+levels follow it. Where the config asks for it (`refine`), a prior repairs what lies beside the cuts: the same files again,
+in tiles_{seam}-refined.
 """
 
 
@@ -17,13 +18,45 @@ rule cut_tiles:
         "<logs>/<tiles>/cut_tiles.log",
     benchmark:
         "<benchmarks>/<tiles>/cut_tiles.tsv"
+    wildcard_constraints:
+        seam=CUT,
     threads: 2
     resources:
         mem_mb=2000,
         runtime="20m",
     params:
-        seam=entry("seams", "seam"),
+        seam=cutting,
         seed=integer("seed"),
         source=source_of("tiles", "levels", "raster", "perceptual", "threads", "active/uncertainty"),
     script:
         "../scripts/cut_tiles.py"
+
+
+rule refine_tiles:
+    """Repair pictures of the cuts by a prior, and refit the Gaussians beside them, within bounds."""
+    input:
+        unpack(refiner_of),
+        seams="<results>/<tiles>/seams.json",
+        tiles="<results>/<tiles>/tiles",
+        field="<results>/<levels>/level0.ply",
+        ground="<results>/<levels>/level0.exr",
+    output:
+        seams="<results>/<tiles>-refined/seams.json",
+        tiles=directory("<results>/<tiles>-refined/tiles"),
+    log:
+        "<logs>/<tiles>-refined/refine_tiles.log",
+    benchmark:
+        "<benchmarks>/<tiles>-refined/refine_tiles.tsv"
+    wildcard_constraints:
+        seam=CUT,
+    threads: 2
+    resources:
+        mem_mb=3000,
+        runtime="30m",
+    params:
+        refine=refining,
+        prior=lambda wildcards: config["priors"][refining(wildcards)["prior"]],
+        seed=integer("seed"),
+        source=source_of("refine", "tiles", "prior", "raster", "levels", "coarse/doubt", "threads"),
+    script:
+        "../scripts/refine_tiles.py"

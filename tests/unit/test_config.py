@@ -50,6 +50,17 @@ def test_the_configs_that_come_with_the_project_are_valid(config):
         pytest.param(["seams", "semantic", "energy"], "semantics", "energy", id="a way to cut that is not there"),
         pytest.param(["seams", "semantic", "slope"], 0, "slope", id="a gamma that never falls"),
         pytest.param(["seams", "semantic", "sam"], "folder", "is .sam2. meant", id="a typo in a seam"),
+        pytest.param(["scenes", "desert", "seam"], "glue-refined", "glue-refined", id="refined, but not cut"),
+        pytest.param(["seams", "semantic", "refine"], {"prior": "terrain"}, "strength", id="a repair without strength"),
+        pytest.param(
+            ["seams", "semantic", "refine"], {"prior": "terrain", "strength": 2}, "strength", id="more than noise"
+        ),
+        pytest.param(
+            ["seams", "semantic", "refine"],
+            {"prior": "moon", "strength": 0.2},
+            "refine.prior: moon",
+            id="no such prior",
+        ),
     ],
 )
 def test_what_is_wrong_is_named(config, keys, value, named):
@@ -146,3 +157,18 @@ def test_what_cannot_be_completed_is_refused_and_why(config, change, said):
     check(config | {"scene": "given"}, SCHEMA)
     with pytest.raises(InputError, match=said):
         check(config | {"complete": True} | change, SCHEMA)
+
+
+def test_refined_tiles_have_a_name_of_their_own_where_it_is_said_how(config):
+    refine = {"prior": "terrain", "strength": 0.2}
+    config["seams"] = {"plain": {"tile": 0.5, "strip": 0.125, "candidates": 24, "variants": 1}}
+    for scene in config["scenes"].values():
+        scene["seam"] = "plain"
+    config["scenes"][config["scene"]]["seam"] = "plain-refined"
+    with pytest.raises(InputError, match="there is no 'plain-refined'; seams has plain$"):
+        check(config, SCHEMA)
+    config["seams"]["plain"]["refine"] = refine
+    check(config, SCHEMA)
+    config["seams"]["plain-refined"] = config["seams"]["plain"]
+    with pytest.raises(InputError, match="seams.plain-refined: names that end in -refined"):
+        check(config, SCHEMA)

@@ -123,6 +123,33 @@ def test_tiles_go_by_the_doubt_of_the_prior_that_was_asked(planned, tmp_path):
         assert planned(tmp_path, tiles.format(way))["score_coarse"] == scored
 
 
+def test_refined_tiles_share_the_cut_and_go_on_as_the_others_do(planned, tmp_path):
+    cut = ROUND.format(policy="farthest", k=4, t=1) + "/{}/bundle_tau0.6/davgswt.json"
+    plan = planned(tmp_path, cut.format("tiles_semantic-refined"), cut.format("tiles_semantic"))
+    assert plan["cut_tiles"] == plan["refine_tiles"] == 1 and plan["bundle_tiles"] == 2
+    assert planned(tmp_path, cut.format("tiles_semantic"))["refine_tiles"] == 0
+    scene = planned(tmp_path, "--config", "scenes={desert: {seam: semantic-refined}}")
+    assert scene["refine_tiles"] == scene["cut_tiles"] == scene["make_page"] == 1
+
+
+def test_a_refinement_needs_to_be_asked_for_and_the_weights_of_its_prior(snakemake, tmp_path):
+    (tmp_path / "other.yaml").write_text(
+        "seams: {plain: {tile: 0.5, strip: 0.125, candidates: 24, variants: 1},"
+        " semantic: {refine: {prior: mine}}}\n"
+        "priors: {mine: {model: terrain, samples: 2, steps: 2, weights: mine.safetensors}}\n"
+    )
+    tiles = ROUND.format(policy="farthest", k=4, t=1) + "/tiles_{}-refined/seams.json"
+
+    def said(seam):
+        target = tiles.format(seam)
+        done = snakemake(tmp_path, target, "--dry-run", configs=(USUAL, tmp_path / "other.yaml"), check=False)
+        assert done.returncode
+        return done.stdout
+
+    assert "seams.plain.refine: is missing" in said("plain")
+    assert "priors.mine.weights: there is no mine.safetensors" in said("semantic")
+
+
 def test_cuts_read_what_is_at_hand_to_tell_things_apart(snakemake, tmp_path):
     tiles = ROUND.format(policy="farthest", k=4, t=1) + "/tiles_{}/seams.json"
     alexnet, folder = tmp_path / "results/weights/lpips_alexnet.safetensors", tmp_path / "sam2"

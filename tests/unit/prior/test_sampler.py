@@ -113,3 +113,51 @@ def test_latents_that_are_not_finite_are_refused_by_the_view(layers):
 
     with pytest.raises(ValueError, match="view 0"):
         sampler.sampled(denoise, layers, DDIMScheduler(), 1, SHAPE, 2, 0.1, 2, 0)
+
+
+def exact(latents, time, some):
+    """The velocity of latents whose clean form is 0: all that is left is noise."""
+    kept = DDIM.alphas_cumprod[int(time)]
+    return latents * (kept / (1 - kept)).sqrt()
+
+
+DDIM = DDIMScheduler(prediction_type="v_prediction", timestep_spacing="trailing", clip_sample=False)
+
+
+def test_a_repair_without_strength_is_the_code_itself_and_a_perfect_denoiser_undoes_the_noise(layers):
+    codes = torch.zeros(3, *SHAPE)
+    codes[1] += 1
+    np.testing.assert_array_equal(sampler.repaired(exact, layers, DDIM, codes, 0.0, 2, 0), codes.numpy())
+    found = sampler.repaired(exact, layers, DDIM, torch.zeros(3, *SHAPE), 0.3, 3, 0)
+    np.testing.assert_allclose(found, 0, atol=1e-5)  # float32 over three steps
+
+
+def test_a_repair_starts_at_its_share_of_the_schedule_with_one_noise_for_all_views(layers):
+    asked = []
+
+    def listen(latents, time, some):
+        asked.append((int(time), latents.clone()))
+        return latents
+
+    sampler.repaired(listen, layers, DDIM, torch.zeros(4, *SHAPE), 0.2, 2, 0, batch=3)
+    assert [time for time, _ in asked] == [199, 99] * 2
+    first = asked[0][1]
+    assert torch.equal(first[0], first[1]) and torch.equal(first[0], asked[2][1][0])
+    expected = float((1 - DDIM.alphas_cumprod[199]).sqrt())
+    assert float(first[0].std()) == pytest.approx(expected, rel=0.15)  # of 256 numbers
+
+
+@pytest.mark.parametrize("strength, steps", [(-0.1, 2), (1.5, 2), (0.2, 0)])
+def test_a_repair_that_cannot_be_is_refused(layers, strength, steps):
+    with pytest.raises(ValueError, match="strength"):
+        sampler.repaired(exact, layers, DDIM, torch.zeros(1, *SHAPE), strength, steps, 0)
+
+
+def test_a_repair_that_is_not_finite_names_its_view(layers):
+    def spoiled(latents, time, some):
+        latents = latents.clone()
+        latents[1] = torch.nan
+        return latents
+
+    with pytest.raises(ValueError, match="view 1"):
+        sampler.repaired(spoiled, layers, DDIM, torch.zeros(3, *SHAPE), 0.2, 2, 0)

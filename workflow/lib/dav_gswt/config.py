@@ -9,6 +9,8 @@ from jsonschema.exceptions import ValidationError, best_match
 
 from dav_gswt.errors import InputError
 
+REFINED = "-refined"  # after a seam's name: its tiles, refined as its `refine` says
+
 
 def read(files: list[Path], over: dict | None = None) -> dict:
     """A config as Snakemake reads it: each file laid over the one before, key by key, and `over` on top.
@@ -63,16 +65,32 @@ def check(config: dict, schema: Path) -> None:
         raise InputError(f"config: prior: there is no {config['prior']!r}; priors has {known}")
     if config["complete"]:
         _check_complete(config)
+    _check_refinements(config["seams"], config["priors"])
+    seams = [*config["seams"], *(name + REFINED for name, seam in config["seams"].items() if "refine" in seam)]
     for name, scene in config["scenes"].items():
-        for key, table in (("quality", "qualities"), ("seam", "seams")):
-            if scene[key] not in config[table]:
-                known = ", ".join(config[table])
-                raise InputError(f"config: scenes.{name}.{key}: there is no {scene[key]!r}; {table} has {known}")
+        for key, table, known in (("quality", "qualities", config["qualities"]), ("seam", "seams", seams)):
+            if scene[key] not in known:
+                raise InputError(
+                    f"config: scenes.{name}.{key}: there is no {scene[key]!r}; {table} has {', '.join(known)}"
+                )
     for name in config.get("lod", {}).get("scenes", []):
         if name not in config["scenes"]:
             raise InputError(f"config: lod.scenes: there is no {name!r}; scenes has {', '.join(config['scenes'])}")
     if "benchmark" in config:
         _check_benchmark(config["benchmark"], config["scenes"], config["priors"])
+
+
+def _check_refinements(seams: dict, priors: dict) -> None:
+    """Tiles are refined by a prior that takes pictures with a little noise, and no entry has a refinement's name."""
+    able = [name for name, prior in priors.items() if prior["model"] == "terrain"]
+    for name, seam in seams.items():
+        if name.endswith(REFINED):
+            raise InputError(f"config: seams.{name}: names that end in {REFINED} are those of refined tiles; rename it")
+        if "refine" in seam and seam["refine"]["prior"] not in able:
+            raise InputError(
+                f"config: seams.{name}.refine.prior: {seam['refine']['prior']} is no prior of model terrain "
+                f"({', '.join(able) or 'none is'} in priors)"
+            )
 
 
 def _check_complete(config: dict) -> None:

@@ -47,6 +47,43 @@ def sampled(
     return masked(run, layers, noises, views, m, p_drop, seed, batch)
 
 
+def repaired(
+    denoise: Denoise,
+    layers: list[HeldDropout],
+    schedule: DDIMScheduler,
+    codes: Float[Tensor, "b c h w"],
+    strength: float,
+    steps: int,
+    seed: int,
+    batch: int = 32,
+) -> Float32[Array, "b c h w"]:
+    """Codes to which a little noise is added, the same to all, and which are denoised from there (SDEdit).
+
+    strength: the share of the schedule to go back by; 0: the codes themselves, 1: from noise alone. Without dropout
+    and added noise (eta = 0), in `steps` steps, the last ones of a schedule with steps / strength of them.
+    Raises: ValueError: steps < 1, strength outside [0, 1], or latents that are not finite, naming the view.
+    Source: Meng et al., SDEdit, 2022.
+    """
+    if steps < 1 or not 0 <= strength <= 1:
+        raise ValueError(f"steps is {steps} and strength {strength}; at least one step, a strength from 0 to 1")
+    if strength == 0:
+        return codes.numpy()
+    noise = torch.randn(codes.shape[1:], generator=torch.Generator().manual_seed(seed))
+    out = []
+    with torch.inference_mode(), dropout.masks(layers, 1, 0.0, seed):
+        for first in range(0, len(codes), batch):
+            some = slice(first, min(first + batch, len(codes)))
+            schedule.set_timesteps(round(steps / strength))
+            times = schedule.timesteps[-steps:]
+            latents = schedule.add_noise(codes[some], noise[None], times[:1])
+            out.append(_denoised(denoise, schedule, latents, times, some))
+    found = torch.cat(out).numpy()
+    bad = ~np.isfinite(found).reshape(len(found), -1).all(1)
+    if bad.any():
+        raise ValueError(f"the prior's latents of view {int(np.argmax(bad))} are not finite")
+    return found
+
+
 def masked(
     run: Run,
     layers: list[HeldDropout],
@@ -83,7 +120,13 @@ def _trajectory(
     denoise: Denoise, schedule: DDIMScheduler, latents: Float[Tensor, "n c h w"], steps: int, some: slice
 ) -> Float[Tensor, "n c h w"]:
     schedule.set_timesteps(steps)
-    for time in schedule.timesteps:
+    return _denoised(denoise, schedule, latents, schedule.timesteps, some)
+
+
+def _denoised(
+    denoise: Denoise, schedule: DDIMScheduler, latents: Float[Tensor, "n c h w"], times: Tensor, some: slice
+) -> Float[Tensor, "n c h w"]:
+    for time in times:
         predicted = denoise(latents, time, some)
         latents = schedule.step(predicted, time, latents, eta=0.0).prev_sample
     return latents

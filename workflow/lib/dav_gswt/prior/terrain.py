@@ -110,6 +110,18 @@ class Terrain(Learned):
         how = len(condition), CODE, m, p_drop, steps, seed
         return sampler.sampled(self.told(condition, known), self.layers, self.schedule, *how, common=common)
 
+    def repaired(
+        self,
+        condition: Condition,
+        strength: float,
+        steps: int,
+        seed: int,
+        known: Bool[Array, "b h w"] | None = None,
+    ) -> Float32[Array, "b c hz wz"]:
+        """What the field shows, with a little noise that is then taken away; see `sampler.repaired` and `told`."""
+        codes = self.encoded(planes_of_render(condition))
+        return sampler.repaired(self.told(condition, known), self.layers, self.schedule, codes, strength, steps, seed)
+
 
 def planes_of_render(condition: Condition) -> Tensor:
     """The five planes of what the field shows."""
