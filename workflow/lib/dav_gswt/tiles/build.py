@@ -24,7 +24,7 @@ class Options:
     """share: tile side over the exemplar's. strip: half-width of the strips over the tile's side, below 1/5.
     variants: centres per edge colouring. trend: width of the low-pass in tile sides. candidates: places that a search
     compares; tries: of them, how many are cut before the best is taken. kind: one of energy.KINDS; slope: of gamma;
-    source: what the semantics are made of.
+    source: what the semantics are made of. corrected: steps across seams are spread out (`membrane`).
     """
 
     share: float = 0.5
@@ -36,6 +36,7 @@ class Options:
     kind: str = "semantic"
     slope: float = 2.0
     source: semantics.Source = semantics.Source()
+    corrected: bool = True
 
     @classmethod
     def of(cls, seam: dict, source: semantics.Source) -> "Options":
@@ -106,6 +107,7 @@ def cut_tiles(
     labels = found.labels
     shifts = np.stack([layout.offsets(plan, found.places, tile) for tile in range(len(labels))])
     corrections = _corrections(plan, found, shifts, membrane.ground(colour, height))
+    corrections *= options.corrected
     tiles = [
         [_tile(level, labels[tile], shifts[tile], corrections[tile]) for level in binned]
         for tile in progress(range(len(labels)), "compose tiles")
