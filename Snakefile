@@ -28,6 +28,7 @@ include: "rules/levels.smk"
 include: "rules/tiles.smk"
 include: "rules/bundle.smk"
 include: "rules/terrain.smk"
+include: "rules/seams.smk"
 include: "rules/figures.smk"
 
 

@@ -35,6 +35,7 @@ pathvars:
     tiles="<round>{completed}/tiles_{seam}",
     bundle="<tiles>/bundle_tau{tau}",
     terrain="<bundle>/terrain",
+    seams="<bundle>/seams",
 
 
 NAME = r"(?!(?:logs|benchmarks|snapshots|weights|prior|sweeps|tables|figures|tradeoff)(?:/|$))[a-z][a-z0-9_-]*"

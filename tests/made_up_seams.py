@@ -34,3 +34,13 @@ def cost(terms, labels, rows, columns):
                     below += share * (layer.slope[a][0, axis] + layer.slope[b][0, axis]) / layer.unit.gradient
             total += above / (below + energy.EPS)
     return total
+
+
+def halves(step=0.0):
+    """A crop of two halves, as `crops.Shown` holds it: patch 0 to the west, patch 1 to the east, both one texture."""
+    rng = np.random.default_rng(4)
+    texture = np.clip(0.5 + 0.1 * rng.normal(size=(48, 48, 3)), 0, 1).astype(np.float32)
+    patch = (np.arange(48) >= 24)[None].repeat(48, 0).astype(int)
+    picture = texture.copy()
+    picture[:, 24:] += np.float32(step)
+    return texture, np.clip(picture, 0, 1), patch

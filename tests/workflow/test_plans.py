@@ -301,3 +301,13 @@ def test_the_workflow_is_lint_clean_but_for_its_environment(snakemake, tmp_path)
 def test_the_code_is_formatted(root, tool):
     done = subprocess.run([sys.executable, "-m", *tool], cwd=root, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_seams_are_measured_by_cells_that_share_the_levels(planned, tmp_path):
+    """Two ways to cut besides the scene's own, which is one of them or not."""
+    for own, cells in (("colour", 2), ("small", 3)):
+        study = "seam_study: {scenes: [desert], seams: [colour, semantic], baseline: colour}"
+        (tmp_path / "few.yaml").write_text(f"{study}\nscenes: {{desert: {{seam: {own}}}}}")
+        plan = planned(tmp_path, "seams", configs=(USUAL, TINY, tmp_path / "few.yaml"))
+        assert plan["measure_seams"] == plan["measure_repetition"] == plan["cut_tiles"] == cells
+        assert plan["crop_level"] == plan["draw_grid"] == plan["show_cuts"] == plan["gather_seams"] == 1

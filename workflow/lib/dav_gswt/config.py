@@ -78,6 +78,8 @@ def check(config: dict, schema: Path) -> None:
             raise InputError(f"config: lod.scenes: there is no {name!r}; scenes has {', '.join(config['scenes'])}")
     if "benchmark" in config:
         _check_benchmark(config["benchmark"], config["scenes"], config["priors"])
+    if "seam_study" in config:
+        _check_seam_study(config["seam_study"], config["scenes"], config["seams"])
 
 
 def _check_refinements(seams: dict, priors: dict) -> None:
@@ -106,6 +108,16 @@ def _check_complete(config: dict) -> None:
             f"config: complete: the prior {config['prior']} knows neither depth nor what is known already; set prior "
             f"to one of model terrain ({able} in priors), or complete: false"
         )
+
+
+def _check_seam_study(asked: dict, scenes: dict, seams: dict) -> None:
+    """What is measured is there, and so is what the others are compared with."""
+    for key, table in (("scenes", scenes), ("seams", seams)):
+        for name in asked[key]:
+            if name not in table:
+                raise InputError(f"config: seam_study.{key}: there is no {name!r}; {key} has {', '.join(table)}")
+    if asked["baseline"] not in asked["seams"]:
+        raise InputError(f"config: seam_study.baseline: {asked['baseline']} is not among seam_study.seams")
 
 
 def _check_benchmark(asked: dict, scenes: dict, priors: dict) -> None:

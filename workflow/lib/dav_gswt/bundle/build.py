@@ -75,12 +75,12 @@ def _tile(tiles: TileSet, tile: int, tau: float, part: Path) -> dict:
     for level, fields in enumerate(tiles.fields):
         name = f"chunks/lod{level}_tile_{tile:02d}.bin"
         found.append({"level": level, "file": name} | chunks.write(fields[tile], kept, part / name))
-    reach = [_heights(fields[tile]) for fields in tiles.fields]
+    reach = [heights_of(fields[tile]) for fields in tiles.fields]
     low, high = min(r[0] for r in reach), max(r[1] for r in reach)
     return {"tile": tile, "uncertainty": doubt, "z": [low, high], "chunks": found}
 
 
-def _heights(field: Field) -> tuple[float, float]:
+def heights_of(field: Field) -> tuple[float, float]:
     """Lowest and highest z of the splats, three of their largest standard deviations around the centres included."""
     if not len(field):
         raise InputError("a tile has no splat; the field has a hole as wide as a tile")

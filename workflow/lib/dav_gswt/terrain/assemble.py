@@ -163,11 +163,21 @@ def laid(terrain: Terrain, cell: Cells, eye: Float[Array, "3"]) -> tuple[Field, 
     are merged: Gaussians of both levels stand at their own depths, and neither level covers the other.
     """
     (i,), (j,), (tile,) = cell.i.tolist(), cell.j.tolist(), cell.tile.tolist()
-    levels = np.flatnonzero(active(terrain, cell)[:, 0])
-    parts = [terrain.tiles[level, tile] for level in levels]
-    level, flat = np.repeat(levels, [len(part) for part in parts]), joined(parts)
-    sequence = back_to_front(flat.means, _along(terrain, i, j, tile, eye))
+    parts = {int(level): terrain.tiles[level, tile] for level in np.flatnonzero(active(terrain, cell)[:, 0])}
     corner = np.array([i * terrain.side, j * terrain.side, 0.0])
+    return placed(terrain, parts, corner, along(terrain, i, j, tile, eye), eye)
+
+
+def placed(
+    terrain: Terrain,
+    parts: dict[int, Field],
+    corner: Float[Array, "3"],
+    direction: Float[Array, "3"],
+    eye: Float[Array, "3"],
+) -> tuple[Field, Float[Array, "n 2"]]:
+    """`laid` of any Gaussians: those of each level, counted from a corner in the world, in the order of a direction."""
+    level, flat = np.repeat(list(parts), [len(part) for part in parts.values()]), joined(list(parts.values()))
+    sequence = back_to_front(flat.means, direction)
     field, slope = lifted(flat[sequence], terrain.heights, corner, eye)
     level, distance = level[sequence], np.linalg.norm(field.means.astype(float), axis=1)
     shares = weights.of_levels(distance, terrain.switches, terrain.bands, terrain.smooth)
@@ -176,7 +186,7 @@ def laid(terrain: Terrain, cell: Cells, eye: Float[Array, "3"]) -> tuple[Field, 
     return _faded(field[drawn], weight[drawn]), slope[drawn]
 
 
-def _along(terrain: Terrain, i: int, j: int, tile: int, eye: Float[Array, "3"]) -> Float[Array, "3"]:
+def along(terrain: Terrain, i: int, j: int, tile: int, eye: Float[Array, "3"]) -> Float[Array, "3"]:
     """The direction whose pre-sorted order a cell is drawn in."""
     x, y = (i + 0.5) * terrain.side, (j + 0.5) * terrain.side
     height, slope = terrain.heights.at(np.array([x]), np.array([y]))

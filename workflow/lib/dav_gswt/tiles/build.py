@@ -25,6 +25,7 @@ class Options:
     variants: centres per edge colouring. trend: width of the low-pass in tile sides. candidates: places that a search
     compares; tries: of them, how many are cut before the best is taken. kind: one of energy.KINDS; slope: of gamma;
     source: what the semantics are made of. levels: of the tiles, a number or layout.AUTO; None: as many as are given.
+    corrected: steps across seams are spread out (`membrane`).
     """
 
     share: float = 0.5
@@ -37,6 +38,7 @@ class Options:
     slope: float = 2.0
     source: semantics.Source = semantics.Source()
     levels: int | str | None = None
+    corrected: bool = True
 
     @classmethod
     def of(cls, seam: dict, source: semantics.Source, levels: int | str | None = None) -> "Options":
@@ -109,6 +111,7 @@ def cut_tiles(
     labels = found.labels
     shifts = np.stack([layout.offsets(plan, found.places, tile) for tile in range(len(labels))])
     corrections = _corrections(plan, found, shifts, membrane.ground(colour, height))
+    corrections *= options.corrected
     tiles = [
         [_tile(level, labels[tile], shifts[tile], corrections[tile]) for level in binned]
         for tile in progress(range(len(labels)), "compose tiles")

@@ -1,0 +1,170 @@
+"""Seams measured: does anybody find the borders and the cuts? And does the terrain repeat?
+
+In: the levels and the tiles. Out, per cell (a scene, a seed, a variant of `seams`; restarted by itself): crops.csv,
+facts.json (with the share of cuts through strong gradients), repetition.csv, repetition.png; of each scene's own seam
+20 x 20 tiles from above and walking, flat and hilly; seam_cuts.png, where colour and semantics cut. Gathered:
+results/tables/seams.csv (every crop), seam_summary.csv, seam_ablation.csv and repetition.csv; the last three also in
+docs/data, where runs add up; docs/figures/seam_ablation.png.
+Not part of `all`: `snakemake seams` makes them, for the scenes of the config's `seam_study`.
+"""
+
+MEASURING = ("seams", "terrain", "bundle", "tiles", "raster", "perceptual", "metrics", "threads", "active/uncertainty")
+
+
+def seam_values(scene, variant=None):
+    """The wildcards of a scene's tiles as they are measured: cut as its own entry says, or as another one."""
+    values = values_of(scene)
+    return values | ({"seam": variant} if variant else {})
+
+
+def seam_cells():
+    """What tells each cell from the others, and its files; a scene's own seam is always among its variants."""
+    asked, cells = config["seam_study"], []
+    for scene in asked["scenes"]:
+        variants = dict.fromkeys([*asked["seams"], config["scenes"][scene]["seam"]])
+        for variant, seed in product(variants, config["seeds"]):
+            values = seam_values(scene, variant) | {"seed": seed}
+            files = {"table": rules.measure_seams.output.crops, "facts": rules.measure_seams.output.facts}
+            files |= {"repeats": rules.measure_repetition.output.table}
+            (cell,) = [{name: expand(path, **values)[0] for name, path in files.items()}]
+            cells.append({key: values[key] for key in ("scene", "seed", "quality")} | {"variant": variant} | cell)
+    return cells
+
+
+rule measure_seams:
+    """Crops on borders and cuts, beside the same of uncut patches and of tiles cut straight."""
+    input:
+        unpack(describing),
+        unpack(lpips_if_fetched),
+        fields=[f"<results>/<levels>/level{level}.ply" for level in range(config["levels"])],
+        grounds=[f"<results>/<levels>/level{level}.exr" for level in range(config["levels"])],
+        seams="<results>/<tiles>/seams.json",
+        tiles="<results>/<tiles>/tiles",
+    output:
+        crops="<results>/<seams>/crops.csv",
+        facts="<results>/<seams>/facts.json",
+    log:
+        "<logs>/<seams>/measure_seams.log",
+    benchmark:
+        "<benchmarks>/<seams>/measure_seams.tsv"
+    threads: 2
+    resources:
+        mem_mb=4000,
+        runtime="20m",
+    params:
+        seam=entry("seams", "seam"),
+        seed=integer("seed"),
+        tau=real("tau"),
+        source=source_of(*MEASURING),
+    script:
+        "../scripts/measure_seams.py"
+
+
+rule measure_repetition:
+    """Autocorrelation of a large top view and of the exemplar."""
+    input:
+        fields=[f"<results>/<levels>/level{level}.ply" for level in range(config["levels"])],
+        grounds=[f"<results>/<levels>/level{level}.exr" for level in range(config["levels"])],
+        seams="<results>/<tiles>/seams.json",
+        tiles="<results>/<tiles>/tiles",
+    output:
+        table="<results>/<seams>/repetition.csv",
+        plot="<results>/<seams>/repetition.png",
+    log:
+        "<logs>/<seams>/measure_repetition.log",
+    benchmark:
+        "<benchmarks>/<seams>/measure_repetition.tsv"
+    threads: 2
+    resources:
+        mem_mb=4000,
+        runtime="10m",
+    params:
+        seam=entry("seams", "seam"),
+        seed=integer("seed"),
+        source=source_of(*MEASURING, "figures"),
+    script:
+        "../scripts/measure_repetition.py"
+
+
+rule draw_grid:
+    """Twenty by twenty tiles, from above and at a walker's height: is there a grid?"""
+    input:
+        manifest="<results>/<bundle>/davgswt.json",
+        seams="<results>/<tiles>/seams.json",
+        tiles="<results>/<tiles>/tiles",
+    output:
+        pictures=expand(
+            "<results>/<seams>/{shot}_{surface}.png",
+            shot=["grid", "walker"],
+            surface=["flat", "hilly"],
+            allow_missing=True,
+        ),
+    log:
+        "<logs>/<seams>/draw_grid.log",
+    benchmark:
+        "<benchmarks>/<seams>/draw_grid.tsv"
+    threads: 2
+    resources:
+        mem_mb=6000,
+        runtime="20m",
+    params:
+        size=lookup(dpath="stills", within=config),
+        source=source_of(*MEASURING),
+    script:
+        "../scripts/draw_grid.py"
+
+
+rule gather_seams:
+    """Every crop of every cell in one table; what follows from them, added to what earlier runs found."""
+    input:
+        measured=lambda wildcards: [cell[name] for cell in seam_cells() for name in ("table", "facts", "repeats")],
+    output:
+        crops="results/tables/seams.csv",
+        summary="results/tables/seam_summary.csv",
+        ablation="results/tables/seam_ablation.csv",
+        repetition="results/tables/repetition.csv",
+        kept=update(expand("docs/data/{table}.csv", table=["seam_summary", "seam_ablation", "repetition"])),
+        plot="docs/figures/seam_ablation.png",
+    log:
+        "<logs>/seams/gather_seams.log",
+    benchmark:
+        "<benchmarks>/seams/gather_seams.tsv"
+    params:
+        cells=lambda wildcards: seam_cells(),
+        study=lambda wildcards: config["seam_study"],
+        source=source_of("seams", "figures"),
+    script:
+        "../scripts/gather_seams.py"
+
+
+rule show_cuts:
+    """Cuts by colour alone beside those by what the ground is, drawn into the same tiles."""
+    input:
+        seams=[f"<results>/<round>{{completed}}/tiles_{kind}/seams.json" for kind in ("colour", "semantic")],
+        tiles=[f"<results>/<round>{{completed}}/tiles_{kind}/tiles" for kind in ("colour", "semantic")],
+    output:
+        plot="<results>/<round>{completed}/seam_cuts.png",
+    log:
+        "<logs>/<round>{completed}/show_cuts.log",
+    benchmark:
+        "<benchmarks>/<round>{completed}/show_cuts.tsv"
+    params:
+        source=source_of("seams", "tiles", "raster", "figures"),
+    script:
+        "../scripts/show_cuts.py"
+
+
+rule seams:
+    """Measure the seams of the config's `seam_study`, and draw what is to be looked at."""
+    input:
+        lambda wildcards: list(rules.gather_seams.output),
+        lambda wildcards: [
+            path
+            for scene in config["seam_study"]["scenes"]
+            for rule in (rules.draw_grid, rules.show_cuts)
+            for path in expand(list(rule.output), **seam_values(scene))
+        ],
+
+
+localrules:
+    seams,

@@ -1,0 +1,138 @@
+"""Crops: drawn as the terrain is, patches that continue across borders, what a broken border does to psnr and jump."""
+
+from dataclasses import replace
+
+import made_up_seams
+import numpy as np
+import pytest
+
+from dav_gswt import metrics
+from dav_gswt.errors import InputError
+from dav_gswt.seams import crops, drawing, measure, places
+from dav_gswt.terrain import heights, still
+
+HILLS = {"kind": "hills", "height": 1.0, "wavelength": 8.0}
+
+
+def first_of(laid, terrain, view, kind, rng, border=False):
+    for place in kind(laid, rng):
+        crop = crops.crop(laid, terrain, view, place.at)
+        if crop and (met := crops.meeting(laid, crop)) and (border or len(met) > 1):
+            return crops.shown(laid, terrain, crop, met, border)
+    raise AssertionError("no crop")
+
+
+@pytest.mark.parametrize("view", crops.VIEWS, ids=lambda view: view.name)
+@pytest.mark.parametrize("surface", [{"kind": "flat"}, HILLS], ids=lambda entry: entry["kind"])
+def test_a_crop_is_the_terrain_s_own_picture(laid, view, surface, rng):
+    terrain = replace(laid.terrain, heights=heights.of_config(surface, laid.terrain.side))
+    shown = first_of(laid, terrain, view, places.cuts, rng)
+    np.testing.assert_array_equal(shown.picture, still.draw(terrain, shown.crop.camera, drawing.SKY, laid.colour))
+
+
+def test_across_every_border_the_patch_is_the_same(laid):
+    n = laid.plan.side
+    edges = np.arange(n, len(laid.patch), n)
+    np.testing.assert_array_equal(laid.patch[:, edges - 1], laid.patch[:, edges])
+    np.testing.assert_array_equal(laid.patch[edges - 1], laid.patch[edges])
+
+
+def test_the_exemplar_laid_whole_shows_what_a_tile_of_one_patch_shows(laid, rng):
+    """A crop on a border far from any cut: tiles and exemplar hold the same Gaussians, but for the corrections."""
+    shown = first_of(laid, laid.terrain, crops.VIEWS[2], places.borders, rng, border=True)
+    assert len(shown.patches) == 1 and set(np.unique(shown.tile)) > {int(shown.tile[0, 0])}
+    weight = np.ones(shown.picture.shape[:2])
+    assert metrics.psnr(shown.picture, shown.own[0], weight) > 33  # what of a correction varies within the crop
+
+
+def broken(laid, change):
+    """The terrain with every tile changed in the cells within 3 cells of its western border."""
+    out = {}
+    for key, field in laid.terrain.tiles.items():
+        out[key] = change(field, field.means[:, 0] < 3 * laid.spacing)
+    return replace(laid.terrain, tiles=out)
+
+
+def brighter(field, which):
+    sh = field.sh.copy()
+    sh[which, 0] += 0.5
+    return replace(field, sh=sh)
+
+
+def moved(field, which):
+    means = field.means.copy()
+    means[which, 1] += np.float32(0.25)  # two cells
+    return replace(field, means=means)
+
+
+@pytest.mark.parametrize("change", [brighter, moved, lambda field, which: field[~which]], ids=["step", "shift", "gap"])
+def test_a_border_broken_on_purpose_is_found(laid, change, rng):
+    view = crops.VIEWS[2]
+    upright = [p for p in places.borders(laid, rng) if p.cluster.startswith("v")][:6]
+    for place in upright:
+        crop = crops.crop(laid, laid.terrain, view, place.at)
+        met = crops.meeting(laid, crop)
+        if not met:
+            continue
+        whole, bad = (
+            crops.shown(laid, terrain, crop, met, border=True) for terrain in (laid.terrain, broken(laid, change))
+        )
+        weight = np.ones(whole.picture.shape[:2])
+        psnr = [metrics.psnr(each.picture, whole.own[0], weight) for each in (whole, bad)]
+        assert psnr[1] < psnr[0] - 2
+        jumps = [measure.jump(each.picture, each.tile, each.patch >= 0) for each in (whole, bad)]
+        assert change is not brighter or jumps[1] > 1.3 * jumps[0]
+        return
+    raise AssertionError("no border could be looked at")
+
+
+def test_a_jump_is_1_without_a_seam_and_as_high_as_the_step_makes_it():
+    """Texture noise of deviation s in 3 channels: neighbours differ by RMS sqrt(6) s; a step d adds 3 d^2 across."""
+    known = np.ones((48, 48), bool)
+    for step in (0.0, 0.1, 0.2):
+        texture, picture, patch = made_up_seams.halves(step)
+        found = measure.jump(picture, patch, known)
+        expected = np.sqrt((6 * 0.1**2 + 3 * step**2) / (6 * 0.1**2))
+        assert found == pytest.approx(expected, rel=0.15)  # 48 pairs across: their variance has 10 %, and values clip
+        assert found == measure.jump(picture[:, ::-1], patch[:, ::-1], known)
+
+
+def test_a_jump_needs_two_sides():
+    texture, picture, patch = made_up_seams.halves()
+    assert measure.jump(picture, np.zeros_like(patch), np.ones(patch.shape, bool)) is None
+    assert measure.jump(np.zeros_like(picture), patch, np.ones(patch.shape, bool)) is None
+
+
+def test_a_hill_before_a_point_hides_it(laid):
+    steep = replace(laid.terrain, heights=heights.Hills(40 * laid.terrain.side, 8 * laid.terrain.side, 1, 0))
+    found = [
+        crops.crop(laid, steep, crops.VIEWS[1], place.at)
+        for place in places.borders(laid, np.random.default_rng(1))[:40]
+    ]
+    assert None in found
+
+
+def test_ceilings_lie_in_the_tile_of_their_cuts(laid, straight, rng):
+    n = laid.plan.side
+    for place in places.cuts(laid, rng)[:20]:
+        twin = places.beside(straight, place)
+        assert [v // n for v in twin.at] == [v // n for v in place.at] and twin.cluster == place.cluster
+
+
+def test_tiles_without_cuts_are_named(laid, straight, rng):
+    bare = replace(laid, patch=np.zeros_like(laid.patch), origins=laid.origins[:1])
+    with pytest.raises(InputError, match="only 0 of .* cuts could be taken"):
+        measure._cuts(bare, laid.terrain, (straight, straight.terrain), crops.VIEWS[2], rng)
+
+
+def test_the_same_crops_are_drawn_by_any_number_of_threads(laid, straight, monkeypatch):
+    monkeypatch.setattr(measure, "BORDERS", 2)
+    monkeypatch.setattr(measure, "CUTS", 2)
+    monkeypatch.setattr(crops, "VIEWS", crops.VIEWS[2:])
+    found = []
+    for threads in ("1", "2"):
+        monkeypatch.setenv("DAV_GSWT_THREADS", threads)
+        found.append(measure.measured(laid, straight, None, 0))
+    assert found[0] == found[1]
+    assert [row["seam_lpips"] for row in found[0]] == [None] * len(found[0])  # no weights: absent, never made up
+    assert {row["place"] for row in found[0]} == {"border", "cut", "floor", "ceiling"}

@@ -1,0 +1,129 @@
+"""A tile set laid as terrain, beside the exemplar that it was cut from: which patch lies in every ground cell.
+
+A patch that lies in the terrain is the whole exemplar, moved so that the cell (x, y) of the exemplar comes to the
+terrain's cell origin + (x, y): both halves of a strip have the same origin, so across a border nothing changes.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray as Array
+
+from dav_gswt.bundle import lod, orders
+from dav_gswt.bundle.build import Options as Bundled
+from dav_gswt.bundle.build import heights_of
+from dav_gswt.field import Field
+from dav_gswt.terrain import assemble
+from dav_gswt.terrain.choice import tiles_in
+from dav_gswt.tiles import build, layout, trends
+from dav_gswt.tiles.layout import Exemplar, Layout
+
+WINDOW = 8  # tiles a side of the terrain that crops are taken from, around its origin
+REACH = 16  # tile sides that are laid
+
+
+@dataclass(frozen=True)
+class Source:
+    """The exemplar that tiles were cut from, at every level, its trend taken out, and the mean colour and height of
+    its cells' ground.
+    """
+
+    exemplar: Exemplar
+    levels: list[Field]
+    ground: Float[Array, "m m 4"]
+
+
+@dataclass(frozen=True)
+class Laid:
+    """terrain: the tiles, laid. eye_floor: lowest eye height. colour: of the far ground.
+
+    Maps of the window's cells, row 0 in the south; cell (0, 0) of the terrain is at [-first, -first]. patch: a number
+    for each patch and place, an index into `origins`. tile: number of the tile. label: of the cell in it.
+    correction: of a tile's cells, what they are changed by against the exemplar (colour, height); NaN if unknown.
+    """
+
+    source: Source
+    plan: Layout
+    terrain: assemble.Terrain
+    eye_floor: float
+    colour: list[float]
+    first: int
+    patch: Int[Array, "w w"]
+    tile: Int[Array, "w w"]
+    label: Int[Array, "w w"]
+    origins: Int[Array, "patches 2"]
+    correction: Float[Array, "tiles n n 4"]
+
+    @property
+    def spacing(self) -> float:
+        return self.source.exemplar.spacing
+
+
+def source_of(levels: list[Field], exemplar: Exemplar, colour: Float[Array, "m m 3"], width: float) -> Source:
+    """The exemplar as `build.cut_tiles` sees it. colour: NaN for holes. width: of the low-pass, in cells."""
+    _, height = build.ground_maps(levels[0], exemplar)
+    trend = trends.trend_of(colour, height, exemplar, width)
+    flat = [trends.detrended(field, trend) for field in levels]
+    corner = np.float32([exemplar.west, exemplar.south, 0])
+    home = replace(exemplar, west=0.0, south=0.0)
+    flat = [replace(field, means=field.means - corner) for field in flat]
+    return Source(home, flat, _cell_means(flat[0], home))
+
+
+def laid(tiles: build.TileSet, source: Source, salt: int, tau: float) -> Laid:
+    """The tile set as the bundle of this tau lays it, on level ground."""
+    described = _manifest(tiles, salt, tau)
+    terrain = replace(assemble.of_tiles(tiles, described, {"kind": "flat"}), reach=REACH)
+    plan = Layout(**{k: v for k, v in tiles.seams["layout"].items() if k != "block"})
+    first = -(WINDOW // 2)
+    numbers = tiles_in(first, first, (WINDOW, WINDOW), salt, tiles.variants)
+    n = plan.side
+    label = np.block([[tiles.labels[t] for t in row] for row in numbers]).astype(int)
+    tile = np.kron(numbers, np.ones((n, n), int))
+    cell = n * (np.arange(WINDOW) + first).repeat(n)  # of the tiles' south-western corners
+    origin = np.stack(np.meshgrid(cell, cell), -1) - tiles.shifts[tile, label]
+    origins, patch = np.unique(origin.reshape(-1, 2), axis=0, return_inverse=True)
+    return Laid(
+        source,
+        plan,
+        terrain,
+        described["eye_floor"],
+        described["ground_colour"],
+        first * n,
+        patch.reshape(label.shape),
+        tile,
+        label,
+        origins,
+        np.stack([_correction(tiles, source, number) for number in range(len(tiles.labels))]),
+    )
+
+
+def _correction(tiles: build.TileSet, source: Source, number: int) -> Float[Array, "n n 4"]:
+    labels, shift = tiles.labels[number], tiles.shifts[number]
+    own = _cell_means(tiles.fields[0][number], Exemplar(0.0, 0.0, tiles.spacing, len(labels)))
+    return own - source.ground[layout.sources(labels, shift)]
+
+
+def _cell_means(field: Field, cells: Exemplar) -> Float[Array, "m m 4"]:
+    colour, height = build.ground_maps(field, cells)
+    return np.concatenate([colour, height[..., None]], -1)
+
+
+def _manifest(tiles: build.TileSet, salt: int, tau: float) -> dict:
+    """What `assemble.of_tiles` reads of a bundle's manifest."""
+    options = Bundled(tau=tau, salt=salt)
+    scales = [lod.mean_scale(level) for level in tiles.fields]
+    listed = []
+    for number, doubt in enumerate(np.clip(tiles.uncertainty, 0, 1)):
+        reach = [heights_of(fields[number]) for fields in tiles.fields]
+        z = [min(low for low, _ in reach), max(high for _, high in reach)]
+        listed.append({"z": z, "chunks": [{"orders": orders.kept(float(doubt), tau)}]})
+    return {
+        "levels": lod.level_table(scales, options.level_pixels, options.band),
+        "tiles": listed,
+        "directions": orders.directions().tolist(),
+        "salt": salt,
+        "eye_floor": lod.eye_floor(tiles.spacing, options.floor_pixels),
+        "ground_colour": np.concatenate([f.base_colours for f in tiles.fields[-1]]).astype(float).mean(0).tolist(),
+    }
