@@ -1,7 +1,6 @@
 """Shared by all stages: the checked config, the result tree, one spelling a number, and what the targets are."""
 
 from hashlib import sha256
-from itertools import product
 from pathlib import Path
 
 import dav_gswt
@@ -150,69 +149,6 @@ def study_of(scene):
     )
 
 
-def levels_measured():
-    """The tables of levels that are gathered: the path of each one's lod.csv, and what tells it from the others."""
-    found = {}
-    for scene in config["lod"]["scenes"]:
-        for seed in config["seeds"]:
-            values = values_of(scene) | {"seed": seed}
-            (path,) = expand(rules.measure_levels.output.table, **values)
-            found[path] = {key: values[key] for key in ("scene", "seed", "quality", "seam")}
-    return found
-
-
-def calibrations():
-    """The cells that are compared: the path of each one's calibration.json, and what tells it from the others."""
-    asked, found = config["calibration"], {}
-    for scene in asked["scenes"]:
-        values = values_of(scene, asked["policy"])
-        for seed in config["seeds"]:
-            for t in range(asked["rounds"] + 1):
-                made = rules.calibrate_round if t else rules.calibrate_coarse
-                (path,) = expand(made.output.found, **(values | {"seed": seed, "t": t}))
-                cell = {key: values[key] for key in ("scene", "quality", "policy", "prior", "p_drop")}
-                found[path] = cell | {"seed": seed, "round": t}
-    return found
-
-
-def compared_cells():
-    """The cells of the config's `benchmark`: what tells each from the others, and the files that tell of its rounds."""
-    asked, cells = config["benchmark"], []
-    for group in asked["sets"]:
-        for scene, policy, seed, k in product(
-            group["scenes"], group.get("policies", asked["policies"]), asked["seeds"], group["k"]
-        ):
-            policy = {"policy": policy} if isinstance(policy, str) else policy
-            if policy["policy"] != "all" or k == group["k"][0]:  # all of the pool is one round, whatever k is
-                cells.append(compared_cell(scene, policy, seed, k, group["photos"]))
-    return cells
-
-
-def compared_cell(scene, asked, seed, k, photos):
-    """One of them: rounds of k from the scene's start until there are so many photos."""
-    entry, policy = config["scenes"][scene], asked["policy"]
-    rounds = 1 if policy == "all" else (photos - entry["start"]) // k
-    own = {
-        key: asked[key] if key == "prior" else spell(asked[key]) for key in ("prior", "p_drop", "lam") if key in asked
-    }
-    values = values_of(scene, policy) | own | {"seed": seed, "k": k, "stop": ""}
-    before, after = range(1, rounds), range(1, rounds + 1)
-
-    def of(first, later, ts):
-        return expand(first, **values) + expand(later, **(values | {"t": ts}))
-
-    jobs = [of(rules.score_coarse.benchmark, rules.score_round.benchmark, before)]
-    jobs += [of([], job.benchmark, after) for job in (rules.select_poses, rules.capture_views, rules.update_field)]
-    prior = config["priors"].get(values["prior"], {"samples": 0})
-    return {key: values[key] for key in ("scene", "seed", "quality", "policy", "prior", "p_drop", "lam", "k")} | {
-        "corrected": entry["kind"] == "photos",
-        "samples": prior["samples"],
-        "metrics": of(rules.evaluate_coarse.output.metrics, rules.evaluate_round.output.metrics, after),
-        "facts": of(rules.score_coarse.output.facts, rules.score_round.output.facts, before),
-        "times": [list(of_round) for of_round in zip(*jobs, strict=True)],
-    }
-
-
 def folder_of(scene):
     """A scene's photos, as inputs: a photo that comes or goes is noticed."""
     folder = Path(config["scenes"][scene]["folder"])
@@ -294,7 +230,8 @@ def weights_of(prior):
 
 def cutting(wildcards):
     """A params function: how tiles are cut. How they are refined is no part of it: all refinements share the cut."""
-    return {key: value for key, value in config["seams"][wildcards.seam].items() if key != "refine"}
+    entry = config["seams"][wildcards.seam.removesuffix(REFINED)]
+    return {key: value for key, value in entry.items() if key != "refine"}
 
 
 def refining(wildcards):
@@ -315,7 +252,7 @@ def lpips_if_fetched(wildcards):
 
 def describing(wildcards):
     """What tells cuts what the ground is, beside its colours: AlexNet where it was fetched, a segmenter in a folder."""
-    seam = config["seams"][wildcards.seam]
+    seam = config["seams"][wildcards.seam.removesuffix(REFINED)]
     if seam.get("energy") == "colour":
         return {}
     if "sam2" not in seam:

@@ -8,27 +8,18 @@ docs/data, where runs add up; docs/figures/seam_ablation.png.
 Not part of `all`: `snakemake seams` makes them, for the scenes of the config's `seam_study`.
 """
 
-MEASURING = ("seams", "terrain", "bundle", "tiles", "raster", "perceptual", "metrics", "threads", "active/uncertainty")
-
-
-def seam_values(scene, variant=None):
-    """The wildcards of a scene's tiles as they are measured: cut as its own entry says, or as another one."""
-    values = values_of(scene)
-    return values | ({"seam": variant} if variant else {})
-
-
-def seam_cells():
-    """What tells each cell from the others, and its files; a scene's own seam is always among its variants."""
-    asked, cells = config["seam_study"], []
-    for scene in asked["scenes"]:
-        variants = dict.fromkeys([*asked["seams"], config["scenes"][scene]["seam"]])
-        for variant, seed in product(variants, config["seeds"]):
-            values = seam_values(scene, variant) | {"seed": seed}
-            files = {"table": rules.measure_seams.output.crops, "facts": rules.measure_seams.output.facts}
-            files |= {"repeats": rules.measure_repetition.output.table}
-            (cell,) = [{name: expand(path, **values)[0] for name, path in files.items()}]
-            cells.append({key: values[key] for key in ("scene", "seed", "quality")} | {"variant": variant} | cell)
-    return cells
+MEASURING = (
+    "seams",
+    "terrain",
+    "bundle",
+    "tiles",
+    "levels",
+    "raster",
+    "perceptual",
+    "metrics",
+    "threads",
+    "active/uncertainty",
+)
 
 
 rule measure_seams:
@@ -36,8 +27,7 @@ rule measure_seams:
     input:
         unpack(describing),
         unpack(lpips_if_fetched),
-        fields=[f"<results>/<levels>/level{level}.ply" for level in range(config["levels"])],
-        grounds=[f"<results>/<levels>/level{level}.exr" for level in range(config["levels"])],
+        levels="<results>/<levels>",
         seams="<results>/<tiles>/seams.json",
         tiles="<results>/<tiles>/tiles",
     output:
@@ -52,7 +42,7 @@ rule measure_seams:
         mem_mb=4000,
         runtime="20m",
     params:
-        seam=entry("seams", "seam"),
+        seam=cutting,
         seed=integer("seed"),
         tau=real("tau"),
         source=source_of(*MEASURING),
@@ -63,8 +53,7 @@ rule measure_seams:
 rule measure_repetition:
     """Autocorrelation of a large top view and of the exemplar."""
     input:
-        fields=[f"<results>/<levels>/level{level}.ply" for level in range(config["levels"])],
-        grounds=[f"<results>/<levels>/level{level}.exr" for level in range(config["levels"])],
+        levels="<results>/<levels>",
         seams="<results>/<tiles>/seams.json",
         tiles="<results>/<tiles>/tiles",
     output:
@@ -79,7 +68,7 @@ rule measure_repetition:
         mem_mb=4000,
         runtime="10m",
     params:
-        seam=entry("seams", "seam"),
+        seam=cutting,
         seed=integer("seed"),
         source=source_of(*MEASURING, "figures"),
     script:

@@ -38,8 +38,7 @@ rule refine_tiles:
         unpack(refiner_of),
         seams="<results>/<tiles>/seams.json",
         tiles="<results>/<tiles>/tiles",
-        field="<results>/<levels>/level0.ply",
-        ground="<results>/<levels>/level0.exr",
+        levels="<results>/<levels>",
     output:
         seams="<results>/<tiles>-refined/seams.json",
         tiles=directory("<results>/<tiles>-refined/tiles"),

@@ -1,14 +1,14 @@
 """Rule measure_repetition: does a large top view repeat at the tiles' period?"""
 
-from dav_gswt import field, figures
-from dav_gswt.coarse import ground
+from dav_gswt import figures
+from dav_gswt.levels import store as levels
 from dav_gswt.logs import logging_to
 from dav_gswt.seams import exemplar, plots, repetition
 from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
-    known = exemplar.Known.of([field.read(path) for path in given.fields], ground.read(given.grounds[0]))
+    known = exemplar.Known.of(levels.read(given.levels))
     tiles = store.read(given.tiles, given.seams)
     source = known.flattened(tiles, params.seam)
     found = repetition.repeats(tiles, source.levels, source.exemplar.cells * tiles.spacing, params.seed)

@@ -1,10 +1,12 @@
 """Rule measure_seams: crops on borders and cuts, their floors and ceilings."""
 
+from pathlib import Path
+
 import numpy as np
 
-from dav_gswt import field, figures, provenance
-from dav_gswt.coarse import ground
+from dav_gswt import figures, provenance
 from dav_gswt.files import write_json
+from dav_gswt.levels import store as levels
 from dav_gswt.logs import logging_to
 from dav_gswt.perceptual import weights
 from dav_gswt.seams import density, exemplar, measure
@@ -13,7 +15,7 @@ from dav_gswt.tiles import semantics, store
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    known = exemplar.Known.of([field.read(path) for path in given.fields], ground.read(given.grounds[0]))
+    known = exemplar.Known.of(levels.read(given.levels))
     alexnet = weights.read(given.lpips) if given.get("lpips") else None
     tiles = store.read(given.tiles, given.seams)
     rng, source = np.random.default_rng(params.seed), semantics.Source(alexnet, given.get("sam2"))
@@ -21,6 +23,8 @@ with logging_to(snakemake.log[0]):
     patches = known.flattened(tiles, params.seam)
     laid = [terrain.laid(each, patches, params.seed, params.tau) for each in both]
     figures.write_rows(snakemake.output.crops, measure.measured(*laid, alexnet, params.seed))
-    inputs = {"seams": given.seams, "level0": given.fields[0]} | ({"lpips": given.lpips} if alexnet else {})
+    inputs = {"seams": given.seams, "level0": Path(given.levels, "level0.ply")} | (
+        {"lpips": given.lpips} if alexnet else {}
+    )
     found = {"dense": density.of_tiles(tiles, patches), "provenance": provenance.of(inputs, dict(params.seam))}
     write_json(snakemake.output.facts, found)

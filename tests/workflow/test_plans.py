@@ -310,4 +310,4 @@ def test_seams_are_measured_by_cells_that_share_the_levels(planned, tmp_path):
         (tmp_path / "few.yaml").write_text(f"{study}\nscenes: {{desert: {{seam: {own}}}}}")
         plan = planned(tmp_path, "seams", configs=(USUAL, TINY, tmp_path / "few.yaml"))
         assert plan["measure_seams"] == plan["measure_repetition"] == plan["cut_tiles"] == cells
-        assert plan["crop_level"] == plan["draw_grid"] == plan["show_cuts"] == plan["gather_seams"] == 1
+        assert plan["make_levels"] == plan["draw_grid"] == plan["show_cuts"] == plan["gather_seams"] == 1

@@ -81,7 +81,7 @@ def test_a_border_broken_on_purpose_is_found(laid, change, rng):
         psnr = [metrics.psnr(each.picture, whole.own[0], weight) for each in (whole, bad)]
         assert psnr[1] < psnr[0] - 2
         jumps = [measure.jump(each.picture, each.tile, each.patch >= 0) for each in (whole, bad)]
-        assert change is not brighter or jumps[1] > 1.3 * jumps[0]
+        assert change is not brighter or jumps[1] > 1.1 * jumps[0]  # a texture has jumps of its own
         return
     raise AssertionError("no border could be looked at")
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import splats
+from made_up_tiles import splats
 
 from dav_gswt import cameras
 from dav_gswt.coarse import discs, underlay

@@ -73,7 +73,7 @@ def of_patch(levels: list[Field], corner: Float[Array, "3"], like: Piece, change
     """The exemplar with its corner there, where it may show over a box; colours and heights changed throughout."""
     parts = {}
     for level in like.parts:
-        part = near_box(levels[level], corner, box)
+        part = near_box(levels[min(level, len(levels) - 1)], corner, box)  # coarser ones are the tiles' own
         sh = part.sh.copy()
         sh[:, 0] += (change[:3] / SH0).astype(np.float32)
         parts[level] = replace(part, sh=sh)

@@ -7,8 +7,8 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.coarse import maps
-from dav_gswt.coarse.ground import Ground
 from dav_gswt.field import Field
+from dav_gswt.levels.build import Levels
 from dav_gswt.seams.ground import Source, source_of
 from dav_gswt.tiles import build, semantics
 from dav_gswt.tiles.layout import Exemplar
@@ -18,19 +18,24 @@ BLIND = 40  # places: enough that sixteen centres differ
 
 @dataclass(frozen=True)
 class Known:
-    """The levels, finest first, and maps of the finest cells from above, row 0 in the south; NaN for holes."""
+    """The levels, finest first, how many the tiles want, and maps of the finest cells from above, row 0 in the south;
+    NaN for holes.
+    """
 
     levels: list[Field]
+    wanted: int | str
     exemplar: Exemplar
     colour: Float[Array, "m m 3"]
     uncertainty: Float[Array, "m m"]
 
     @classmethod
-    def of(cls, levels: list[Field], grid: Ground) -> "Known":
-        above = maps.over_exemplar(levels[0], grid)
+    def of(cls, made: Levels) -> "Known":
+        grid = made.grids[0]
+        above = maps.over_exemplar(made.fields[0], grid)
         west, south, _ = grid.exemplar
         return cls(
-            levels,
+            made.fields,
+            made.wanted,
             Exemplar(west, south, grid.spacing, grid.cells),
             above.known_colour().astype(float),
             above.uncertainty,
@@ -42,7 +47,7 @@ class Known:
         Straight seams where patches happen to lie (the first of BLIND places), and steps of brightness and height left
         as they are: with the search and the corrections straight seams are hardly worse than cut ones.
         """
-        options = build.Options.of(dict(seam) | {"energy": "none", "candidates": BLIND}, source)
+        options = build.Options.of(dict(seam) | {"energy": "none", "candidates": BLIND}, source, self.wanted)
         options = replace(options, tries=1, corrected=False)
         return build.cut_tiles(self.levels, self.exemplar, self.colour, self.uncertainty, options, rng)
 

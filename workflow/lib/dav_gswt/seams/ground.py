@@ -75,7 +75,7 @@ def laid(tiles: build.TileSet, source: Source, salt: int, tau: float) -> Laid:
     """The tile set as the bundle of this tau lays it, on level ground."""
     described = _manifest(tiles, salt, tau)
     terrain = replace(assemble.of_tiles(tiles, described, {"kind": "flat"}), reach=REACH)
-    plan = Layout(**{k: v for k, v in tiles.seams["layout"].items() if k != "block"})
+    plan = Layout.of(tiles.seams["layout"])
     first = -(WINDOW // 2)
     numbers = tiles_in(first, first, (WINDOW, WINDOW), salt, tiles.variants)
     n = plan.side

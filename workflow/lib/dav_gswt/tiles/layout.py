@@ -12,7 +12,7 @@ of maps have it at the bottom.
 """
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from jaxtyping import Bool, Int, Integer, UInt8
@@ -61,6 +61,11 @@ class Layout:
     strip: int
     corner: int
     block: int = 1
+
+    @classmethod
+    def of(cls, told: dict) -> "Layout":
+        """Of what seams.json says of it."""
+        return cls(**{own.name: told[own.name] for own in fields(cls)})
 
     @property
     def laid(self) -> int:

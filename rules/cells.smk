@@ -1,0 +1,86 @@
+"""What is compared: the cells of the config's `lod`, `calibration`, `benchmark` and `seam_study`, and the files of each."""
+
+from itertools import product
+
+
+def levels_measured():
+    """The tables of levels that are gathered: the path of each one's lod.csv, and what tells it from the others."""
+    found = {}
+    for scene in config["lod"]["scenes"]:
+        for seed in config["seeds"]:
+            values = values_of(scene) | {"seed": seed}
+            (path,) = expand(rules.measure_levels.output.table, **values)
+            found[path] = {key: values[key] for key in ("scene", "seed", "quality", "seam")}
+    return found
+
+
+def calibrations():
+    """The cells that are compared: the path of each one's calibration.json, and what tells it from the others."""
+    asked, found = config["calibration"], {}
+    for scene in asked["scenes"]:
+        values = values_of(scene, asked["policy"])
+        for seed in config["seeds"]:
+            for t in range(asked["rounds"] + 1):
+                made = rules.calibrate_round if t else rules.calibrate_coarse
+                (path,) = expand(made.output.found, **(values | {"seed": seed, "t": t}))
+                cell = {key: values[key] for key in ("scene", "quality", "policy", "prior", "p_drop")}
+                found[path] = cell | {"seed": seed, "round": t}
+    return found
+
+
+def compared_cells():
+    """The cells of the config's `benchmark`: what tells each from the others, and the files that tell of its rounds."""
+    asked, cells = config["benchmark"], []
+    for group in asked["sets"]:
+        for scene, policy, seed, k in product(
+            group["scenes"], group.get("policies", asked["policies"]), asked["seeds"], group["k"]
+        ):
+            policy = {"policy": policy} if isinstance(policy, str) else policy
+            if policy["policy"] != "all" or k == group["k"][0]:  # all of the pool is one round, whatever k is
+                cells.append(compared_cell(scene, policy, seed, k, group["photos"]))
+    return cells
+
+
+def compared_cell(scene, asked, seed, k, photos):
+    """One of them: rounds of k from the scene's start until there are so many photos."""
+    entry, policy = config["scenes"][scene], asked["policy"]
+    rounds = 1 if policy == "all" else (photos - entry["start"]) // k
+    own = {
+        key: asked[key] if key == "prior" else spell(asked[key]) for key in ("prior", "p_drop", "lam") if key in asked
+    }
+    values = values_of(scene, policy) | own | {"seed": seed, "k": k, "stop": ""}
+    before, after = range(1, rounds), range(1, rounds + 1)
+
+    def of(first, later, ts):
+        return expand(first, **values) + expand(later, **(values | {"t": ts}))
+
+    jobs = [of(rules.score_coarse.benchmark, rules.score_round.benchmark, before)]
+    jobs += [of([], job.benchmark, after) for job in (rules.select_poses, rules.capture_views, rules.update_field)]
+    prior = config["priors"].get(values["prior"], {"samples": 0})
+    return {key: values[key] for key in ("scene", "seed", "quality", "policy", "prior", "p_drop", "lam", "k")} | {
+        "corrected": entry["kind"] == "photos",
+        "samples": prior["samples"],
+        "metrics": of(rules.evaluate_coarse.output.metrics, rules.evaluate_round.output.metrics, after),
+        "facts": of(rules.score_coarse.output.facts, rules.score_round.output.facts, before),
+        "times": [list(of_round) for of_round in zip(*jobs, strict=True)],
+    }
+
+
+def seam_values(scene, variant=None):
+    """The wildcards of a scene's tiles as they are measured: cut as its own entry says, or as another one."""
+    values = values_of(scene)
+    return values | ({"seam": variant} if variant else {})
+
+
+def seam_cells():
+    """What tells each cell from the others, and its files; a scene's own seam is always among its variants."""
+    asked, cells = config["seam_study"], []
+    for scene in asked["scenes"]:
+        variants = dict.fromkeys([*asked["seams"], config["scenes"][scene]["seam"]])
+        for variant, seed in product(variants, config["seeds"]):
+            values = seam_values(scene, variant) | {"seed": seed}
+            files = {"table": rules.measure_seams.output.crops, "facts": rules.measure_seams.output.facts}
+            files |= {"repeats": rules.measure_repetition.output.table}
+            (cell,) = [{name: expand(path, **values)[0] for name, path in files.items()}]
+            cells.append({key: values[key] for key in ("scene", "seed", "quality")} | {"variant": variant} | cell)
+    return cells
