@@ -4,11 +4,11 @@ Cells stand back to front, each in its pre-sorted order, those about the eye are
 whole is drawn in the order of the cell that the crop's middle lies in: what orders do to a picture is in both.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.cameras import Camera
@@ -21,7 +21,7 @@ SLOPES = 1.5  # how much further than on level ground a ray may go above the sur
 SKY = {"zenith": [0.0, 0.0, 0.0], "horizon": [0.0, 0.0, 0.0]}  # crops see none
 
 Box = Float[Array, "2 2"]  # south-western and north-eastern corner, in world units
-Look = Callable[[Field, Float[Array, "3"]], Field]
+Look = Callable[[Field, Float[Array, "3"]], Float32[Array, "n 3"]]  # colours of Gaussians counted from the eye
 
 
 @dataclass(frozen=True)
@@ -80,17 +80,30 @@ def of_patch(levels: list[Field], corner: Float[Array, "3"], like: Piece, change
     return replace(like, parts=parts, corner=corner + [0, 0, change[3]])
 
 
-def drawn(terrain: Terrain, pieces: list[Piece], camera: Camera, ground, look: Look | None = None):
-    """The picture of pieces that stand back to front. ground: colour of what lies behind. look: other colours."""
+def drawn(
+    terrain: Terrain, pieces: list[Piece], camera: Camera, ground, looks: Sequence[Look] = ()
+) -> list[Float32[Array, "h w 3"]]:
+    """The picture of pieces that stand back to front, and the same in other colours, over black, for each look.
+
+    ground: colour of what lies behind.
+    """
     eye, here = camera.centre, replace(camera, translation=np.zeros(3))
     behind = Backdrop.of(terrain, eye, SKY, ground)
-    far, close = [splats.NONE], [splats.NONE]
+    none = [splats.NONE, *(np.zeros((0, 3), np.float32) for _ in looks)]
+    far, close = [none], [none]
     for piece in pieces:
         field, slope = assemble.placed(terrain, piece.parts, piece.corner, piece.direction, eye)
-        field = look(field, eye) if look else behind.over(field)
-        (close if piece.close else far).append(splats.projected(field, slope, here, terrain.near))
-    ordered = splats.joined([*far, splats.sorted_by_depth(splats.joined(close))])
-    seen = splats.blended(ordered, here)
-    if look:
-        return seen.colour
-    return np.clip(seen.colour + (1 - seen.alpha)[..., None] * behind.seen_along(here.rays()[1]), 0, 1)
+        part, which = splats.indexed(behind.over(field), slope, here, terrain.near)
+        (close if piece.close else far).append([part, *(look(field, eye)[which] for look in looks)])
+    far, close = ([splats.joined([g[0] for g in group]), *_columns(group)] for group in (far, close))
+    last = splats.by_depth(close[0])
+    stand, *colours = [splats.joined([far[0], close[0][last]])] + [
+        np.concatenate([a, b[last]]) for a, b in zip(far[1:], close[1:], strict=True)
+    ]
+    seen = splats.blended(stand, here)
+    picture = np.clip(seen.colour + (1 - seen.alpha)[..., None] * behind.seen_along(here.rays()[1]), 0, 1)
+    return [picture, *(splats.blended(replace(stand, colours=own), here).colour for own in colours)]
+
+
+def _columns(group: list[list]) -> list[Float32[Array, "n 3"]]:
+    return [np.concatenate(own) for own in list(zip(*group, strict=True))[1:]]
