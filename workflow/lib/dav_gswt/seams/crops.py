@@ -132,8 +132,7 @@ def shown(laid: Laid, terrain: Terrain, crop: Crop, patches: list[int], border: 
 
     border: also tell which of the terrain's tiles each pixel shows.
     """
-    box = drawing.reaching(terrain, crop.camera, (crop.box + [[-1], [2]]) * laid.spacing)
-    pieces = drawing.of_terrain(terrain, crop.camera, box)
+    pieces = drawing.of_terrain(terrain, crop.camera, _seen(laid, crop), laid.extents)
 
     looks = [lambda field, eye: _painted(_patch_at(laid, field, eye)[:, None] == patches)]
     looks += [lambda field, eye: _painted(_cells_of(field, eye, terrain.side) % 2 == 1)] * border
@@ -153,13 +152,17 @@ def whole(
     pieces: list[drawing.Piece] | None = None,
 ) -> Float32[Array, "h w 3"]:
     """The exemplar in the crop's place, with its corner in that cell of the terrain; pieces: the terrain's there."""
-    box = drawing.reaching(terrain, crop.camera, (crop.box + [[-1], [2]]) * laid.spacing)
-    pieces = pieces or drawing.of_terrain(terrain, crop.camera, box)
+    seen = _seen(laid, crop)
+    pieces = pieces or drawing.of_terrain(terrain, crop.camera, seen, laid.extents)
     middle = tuple(v // laid.plan.side for v in crop.at)
     (like,) = [piece for piece in pieces if piece.cell == middle]
     corner = np.array([*(origin * laid.spacing), 0.0])
-    piece = drawing.of_patch(laid.source.levels, corner, like, change, box)
+    piece = drawing.of_patch(laid.source.levels, corner, like, change, seen)
     return drawing.drawn(terrain, [piece], crop.camera, laid.colour)[0]
+
+
+def _seen(laid: Laid, crop: Crop) -> drawing.Seen:
+    return drawing.Seen.of(crop.camera, (crop.box + [[-1], [2]]) * laid.spacing)
 
 
 def _change(laid: Laid, crop: Crop, patch: int) -> Float[Array, "4"]:

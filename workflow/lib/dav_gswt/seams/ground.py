@@ -14,6 +14,7 @@ from dav_gswt.bundle import lod, orders
 from dav_gswt.bundle.build import Options as Bundled
 from dav_gswt.bundle.build import heights_of
 from dav_gswt.field import Field
+from dav_gswt.seams.drawing import Extent
 from dav_gswt.terrain import assemble
 from dav_gswt.terrain.choice import tiles_in
 from dav_gswt.tiles import build, layout, trends
@@ -46,6 +47,7 @@ class Laid:
     source: Source
     plan: Layout
     terrain: assemble.Terrain
+    extents: list[Extent]
     eye_floor: float
     colour: list[float]
     first: int
@@ -88,6 +90,7 @@ def laid(tiles: build.TileSet, source: Source, salt: int, tau: float) -> Laid:
         source,
         plan,
         terrain,
+        [Extent.of(level) for level in tiles.fields],
         described["eye_floor"],
         described["ground_colour"],
         first * n,
