@@ -8,7 +8,7 @@ import numpy as np
 
 from dav_gswt.bundle import chunks, gswt, lod, manifest, orders
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field
+from dav_gswt.field import Field, mean_scale
 from dav_gswt.files import write_json
 from dav_gswt.logs import progress
 from dav_gswt.tiles.build import TileSet
@@ -44,7 +44,7 @@ def write_bundle(tiles: TileSet, out_dir: Path | str, options: Options, schema: 
     shutil.rmtree(part, ignore_errors=True)
     (part / "chunks").mkdir(parents=True)
     try:
-        table = lod.level_table([lod.mean_scale(level) for level in tiles.fields], options.level_pixels, options.band)
+        table = lod.level_table([mean_scale(level) for level in tiles.fields], options.level_pixels, options.band)
         gswt.write(tiles.fields, tiles.side, part / "gswt.zip")
         value = {
             "format": "davgswt",

@@ -13,8 +13,9 @@ from numpy import ndarray as Array
 
 from dav_gswt.cameras import Camera
 from dav_gswt.field import SH0, Field
+from dav_gswt.raster.interface import RIM
 from dav_gswt.terrain import assemble, splats
-from dav_gswt.terrain.assemble import RIM, Terrain
+from dav_gswt.terrain.assemble import Terrain
 from dav_gswt.terrain.backdrop import Backdrop
 
 SLOPES = 1.5  # how much more ground than where it is level a thing may hide behind it
@@ -62,10 +63,9 @@ class Seen:
 
     def holds(self, corner: Float[Array, "3"], side: float, extent: "Extent") -> bool:
         """Whether anything of a cell may show whose Gaussians have this extent."""
-        z = np.array([extent.low, extent.high])[:, None]
-        behind = SLOPES * z * self.per_height
-        low, high = np.minimum(behind.min(0), 0) - extent.reach, np.maximum(behind.max(0), 0) + extent.reach
-        return bool(((corner[:2] + side + high > self.box[0]) & (corner[:2] + low < self.box[1])).all())
+        low, high = self._hidden(np.array([extent.low, extent.high]))
+        first, last = corner[:2] - extent.reach, corner[:2] + side + extent.reach
+        return bool(((last + high > self.box[0]) & (first + low < self.box[1])).all())
 
     @classmethod
     def of(cls, camera: Camera, box: Box) -> "Seen":
@@ -73,17 +73,20 @@ class Seen:
         return cls(box, ahead[:2] / abs(ahead[2]))
 
     def shows(self, field: Field, corner: Float[Array, "3"]) -> Bool[Array, "n"]:
-        """Gaussians, counted from a corner, of which some part may show over the box.
-
-        One at a height z hides the ground up to SLOPES times z per_height behind it: on a slope up it is less, on a
-        slope down more. A patch that is laid higher or lower as a whole takes its ground along.
-        """
+        """Gaussians, counted from a corner, of which some part may show over the box."""
         reach = RIM * np.exp(field.log_scales.max(1, initial=-np.inf))[:, None]
-        z = np.stack([field.means[:, 2] - reach[:, 0], field.means[:, 2] + reach[:, 0]])[..., None]
-        behind = SLOPES * z * self.per_height
-        low, high = np.minimum(behind.min(0), 0), np.maximum(behind.max(0), 0)
+        low, high = self._hidden(field.means[:, 2] + reach.T * [[-1], [1]])
         places = field.means[:, :2] + corner[:2]
         return ((places + reach + high > self.box[0]) & (places - reach + low < self.box[1])).all(1)
+
+    def _hidden(self, z: Float[Array, "2 *n"]) -> tuple[Float[Array, "*n 2"], Float[Array, "*n 2"]]:
+        """From where to where, counted from their places, things between two heights may hide the ground.
+
+        One at a height z hides it up to SLOPES times z per_height behind itself: on a slope up it is less, on a slope
+        down more. A patch that is laid higher or lower as a whole takes its ground along.
+        """
+        behind = SLOPES * z[..., None] * self.per_height
+        return np.minimum(behind.min(0), 0), np.maximum(behind.max(0), 0)
 
 
 def of_terrain(terrain: Terrain, camera: Camera, seen: Seen, extents: list[Extent]) -> list[Piece]:
@@ -128,21 +131,17 @@ def drawn(
     """
     eye, here = camera.centre, replace(camera, translation=np.zeros(3))
     behind = Backdrop.of(terrain, eye, SKY, ground)
-    none = [splats.NONE, *(np.zeros((0, 3), np.float32) for _ in looks)]
-    far, close = [none], [none]
+    found = []  # of each piece: its splats, their colours by every look, whether it is about the eye
     for piece in pieces:
         field, slope = assemble.placed(terrain, piece.parts, piece.corner, piece.direction, eye)
         part, which = splats.indexed(behind.over(field), slope, here, terrain.near)
-        (close if piece.close else far).append([part, *(look(field, eye)[which] for look in looks)])
-    far, close = ([splats.joined([g[0] for g in group]), *_columns(group)] for group in (far, close))
-    last = splats.by_depth(close[0])
-    stand, *colours = [splats.joined([far[0], close[0][last]])] + [
-        np.concatenate([a, b[last]]) for a, b in zip(far[1:], close[1:], strict=True)
-    ]
+        found.append((part, [look(field, eye)[which] for look in looks], piece.close))
+    found.sort(key=lambda each: each[2])  # those about the eye come last
+    stand = splats.joined([splats.NONE, *(part for part, _, _ in found)])
+    first = sum(len(part) for part, _, close in found if not close)
+    order = np.concatenate([np.arange(first), first + splats.by_depth(stand[first:])])
+    stand = stand[order]
     seen = splats.blended(stand, here)
     picture = np.clip(seen.colour + (1 - seen.alpha)[..., None] * behind.seen_along(here.rays()[1]), 0, 1)
-    return [picture, *(splats.blended(replace(stand, colours=own), here).colour for own in colours)]
-
-
-def _columns(group: list[list]) -> list[Float32[Array, "n 3"]]:
-    return [np.concatenate(own) for own in list(zip(*group, strict=True))[1:]]
+    painted = (np.concatenate([own[k] for _, own, _ in found])[order] for k in range(len(looks)))
+    return [picture, *(splats.blended(replace(stand, colours=own), here).colour for own in painted)]
