@@ -61,6 +61,7 @@ def _curves(axes, rows: list[dict], k: int, looks: dict[str, dict]) -> None:
             fontsize=8,
         )
     axes.set_xlabel("photos", fontsize=9)
+    axes.xaxis.get_major_locator().set_params(integer=True)
     axes.set_ylabel("PSNR of test views (dB)", fontsize=9)
     axes.tick_params(labelsize=8)
     axes.grid(alpha=0.3)
