@@ -27,7 +27,7 @@ def drawn(rows: list[dict]):
         if row["printed_share_of_tolerance"]:
             x = _place(row["printed_share_of_tolerance"])
             axes.plot(x, i, marker="x", markersize=6, markeredgewidth=2, **look)
-            note = f"gives {float(row['printed_gives']):.4g} for {float(row['printed_right']):.4g}"
+            note = f"gives {float(row['printed_gives']):.6g} for {float(row['printed_right']):.4g}"
             side = {"xytext": (-8, 0), "ha": "right"} if x > 1e10 else {"xytext": (8, 0), "ha": "left"}
             axes.annotate(note, (x, i), textcoords="offset points", va="center", fontsize=7, **side)
     axes.axvline(1, color="black", linewidth=1)
