@@ -31,6 +31,7 @@ include: "rules/bundle.smk"
 include: "rules/terrain.smk"
 include: "rules/seams.smk"
 include: "rules/figures.smk"
+include: "rules/stability.smk"
 
 
 # Below the includes: Snakemake skips constraints on wildcards that reach an output through a pathvar unless they are

@@ -75,6 +75,12 @@ def test_a_field_has_its_underlay_after_its_discs_and_no_thing_is_lost_with_it()
     assert underlay.rows(alone, grid).stop == grid.heights.size
 
 
+def test_a_finished_field_with_fewer_gaussians_than_cells_has_no_underlay_to_lose():
+    grid, field = made.grid(), made.field()
+    few = replace(field, ground=np.zeros(len(field), bool))[: grid.heights.size // 2]
+    assert underlay.without(few, grid) is few
+
+
 def test_no_sky_shines_through_the_ground_between_shrunken_discs():
     grid, field = made.grid(), made.field()
     scales = field.log_scales.copy()

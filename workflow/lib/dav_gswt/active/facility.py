@@ -16,6 +16,7 @@ REACH = 0.5  # median distances of candidates from the middle, over which a phot
 
 def similarity(a: Float[Array, "n 3"], b: Float[Array, "m 3"], reach: float) -> Float64[Array, "n m"]:
     """exp(-d^2 / 2 reach^2) of places: 1 where they coincide, 0 far apart."""
+    a, b = a.astype(np.float64), b.astype(np.float64)
     squares = (a**2).sum(1)[:, None] + (b**2).sum(1) - 2 * a @ b.T
     return np.exp(-np.maximum(squares, 0) / (2 * reach**2))
 

@@ -36,7 +36,8 @@ def rows(field: Field, side: float) -> Float32[Array, "n 62"]:
     out[:, 6:9] = field.sh[:, 0]
     out[:, 54] = field.opacity_logits
     out[:, 55:58] = field.log_scales + np.log(scale)
-    out[:, 58:] = field.quats / np.linalg.norm(field.quats, axis=1, keepdims=True)
+    quats = field.quats.astype(float)  # a length that float32 cannot square must not overflow on the way
+    out[:, 58:] = quats / np.linalg.norm(quats, axis=1, keepdims=True)
     return out
 
 

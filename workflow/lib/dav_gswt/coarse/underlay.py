@@ -37,8 +37,10 @@ def rows(field: Field, grid: Ground) -> slice:
 
 
 def without(field: Field, grid: Ground) -> Field:
-    """The field without its underlay: the discs, then what stands on them."""
+    """The field without its underlay: the discs, then what stands on them. All of one that has none."""
     under = rows(field, grid)
+    if under.start == under.stop:  # perhaps beyond the end: a finished field may have fewer Gaussians than cells
+        return field
     return field[np.r_[0 : under.start, under.stop : len(field)]]
 
 
