@@ -44,8 +44,8 @@ rule score_coarse:
         "<benchmarks>/<scored>/score_coarse.tsv"
     threads: 2
     resources:
-        mem_mb=lambda wildcards: 1000 if wildcards.prior == "none" else 3000,
-        runtime="60m",
+        mem_mb=lambda wildcards, attempt: (1000 if wildcards.prior == "none" else 3000) * attempt,
+        runtime=growing("60m"),
     params:
         scene=entry("scenes", "scene"),
         prior=lambda wildcards: config["priors"].get(wildcards.prior),
@@ -138,8 +138,8 @@ rule capture_views:
         t=POSITIVE,
     threads: 2
     resources:
-        mem_mb=2500,
-        runtime="30m",
+        mem_mb=growing(2500),
+        runtime=growing("30m"),
     params:
         scene=entry("scenes", "scene"),
         source=source_of("active/agents", "active/candidates", "photos"),
@@ -164,6 +164,7 @@ use rule capture_views as ask_for_views with:
     wildcard_constraints:
         scene=scenes_by("serial", "plan", "handheld"),
         t=POSITIVE,
+    retries: 0  # whatever a profile says: nothing is taken twice
 
 
 localrules:
@@ -193,8 +194,8 @@ rule update_field:
         t=POSITIVE,
     threads: 2
     resources:
-        mem_mb=2000,
-        runtime="60m",
+        mem_mb=growing(2000),
+        runtime=growing("60m"),
     params:
         quality=entry("qualities", "quality"),
         seed=integer("seed"),
@@ -245,8 +246,8 @@ rule show_candidates:
         scene=scenes_by("render"),
     threads: 2
     resources:
-        mem_mb=2500,
-        runtime="60m",
+        mem_mb=growing(2500),
+        runtime=growing("60m"),
     params:
         scene=entry("scenes", "scene"),
         poses=lookup(dpath="calibration/poses", within=config),
@@ -278,8 +279,8 @@ rule calibrate_coarse:
         "<benchmarks>/<scored>/calibrate_coarse.tsv"
     threads: 2
     resources:
-        mem_mb=3000,
-        runtime="60m",
+        mem_mb=growing(3000),
+        runtime=growing("60m"),
     params:
         scene=entry("scenes", "scene"),
         size=lambda wildcards: config["qualities"][wildcards.quality]["size"],
@@ -336,6 +337,10 @@ rule begin_active:
         policy=CHOOSING,
     script:
         "../scripts/begin_active.py"
+
+
+localrules:
+    begin_active,  # copies three files
 
 
 rule enter_field:

@@ -21,8 +21,8 @@ rule bundle_tiles:
     benchmark:
         "<benchmarks>/<bundle>/bundle_tiles.tsv"
     resources:
-        mem_mb=1500,
-        runtime="10m",
+        mem_mb=growing(1500),
+        runtime=growing("10m"),
     params:
         tau=real("tau"),
         seed=integer("seed"),
@@ -45,8 +45,8 @@ rule measure_levels:
         "<benchmarks>/<tiles>/measure_levels.tsv"
     threads: 2
     resources:
-        mem_mb=4000,
-        runtime="20m",
+        mem_mb=growing(4000),
+        runtime=growing("20m"),
     params:
         source=source_of("bundle", "tiles/layout", "raster"),
     script:

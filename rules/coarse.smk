@@ -22,8 +22,8 @@ rule fit_coarse:
         "<benchmarks>/<coarse>/fit_coarse.tsv"
     threads: 2
     resources:
-        mem_mb=2000,
-        runtime="60m",
+        mem_mb=growing(2000),
+        runtime=growing("60m"),
     params:
         quality=entry("qualities", "quality"),
         seed=integer("seed"),
@@ -53,8 +53,8 @@ rule evaluate_coarse:
         "<benchmarks>/<coarse>/evaluate_coarse.tsv"
     threads: 2
     resources:
-        mem_mb=1500,
-        runtime="10m",
+        mem_mb=growing(1500),
+        runtime=growing("10m"),
     params:
         quality=entry("qualities", "quality"),
         t=0,

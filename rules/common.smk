@@ -1,5 +1,6 @@
 """Shared by all stages: the checked config, the result tree, one spelling a number, and what the targets are."""
 
+import re
 from hashlib import sha256
 from pathlib import Path
 
@@ -78,6 +79,15 @@ def real(wildcard):
 def entry(table, wildcard):
     """A params function: the config's entry of a table that a wildcard names."""
     return lambda wildcards: config[table][wildcards[wildcard]]
+
+
+def growing(need):
+    """A resources function: so much at the first attempt, twice as much at the second, and so on; 2000, or "60m".
+
+    A job that ran out of memory or time and is tried again (`retries` of a profile) would else run out of it again.
+    """
+    amount, unit = re.fullmatch(r"(\d+)([mh]?)", str(need)).groups()
+    return lambda wildcards, attempt: f"{int(amount) * attempt}{unit}" if unit else int(amount) * attempt
 
 
 def source_of(*places):

@@ -29,8 +29,8 @@ rule complete_field:
         policy=CHOOSING,
     threads: 2
     resources:
-        mem_mb=3000,
-        runtime="30m",
+        mem_mb=growing(3000),
+        runtime=growing("30m"),
     params:
         prior=entry("priors", "painter"),
         seed=integer("seed"),
@@ -59,8 +59,8 @@ rule evaluate_completed:
         policy=CHOOSING,
     threads: 2
     resources:
-        mem_mb=1500,
-        runtime="10m",
+        mem_mb=growing(1500),
+        runtime=growing("10m"),
     params:
         quality=entry("qualities", "quality"),
         source=source_of("active/completion", "active/evaluation", "metrics", "perceptual", "raster"),

@@ -26,8 +26,8 @@ rule watch_fit:
         "<benchmarks>/figures/watch_fit_{scene}.tsv"
     threads: 2
     resources:
-        mem_mb=3000,
-        runtime="30m",
+        mem_mb=growing(3000),
+        runtime=growing("30m"),
     params:
         trial=lambda wildcards: lookup(dpath=f"trials/{wildcards.scene}", within=config),
         source=source_of("coarse", "fitting", "raster"),

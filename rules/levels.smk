@@ -19,8 +19,8 @@ rule make_levels:
         "<benchmarks>/<levels>/make_levels.tsv"
     threads: 2
     resources:
-        mem_mb=2000,
-        runtime="30m",
+        mem_mb=growing(2000),
+        runtime=growing("30m"),
     params:
         levels=lookup(dpath="levels", within=config),
         quality=entry("qualities", "quality"),

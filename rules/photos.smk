@@ -25,8 +25,8 @@ rule register_photos:
         scene=scenes_of("photos"),
     threads: 2
     resources:
-        mem_mb=3000,
-        runtime="60m",
+        mem_mb=growing(3000),
+        runtime=growing("60m"),
     params:
         scene=entry("scenes", "scene"),
         source=source_of(*(f"photos/{name}" for name in REGISTERING)),
@@ -49,8 +49,8 @@ rule render_photos:
         scene=scenes_of("synthetic"),
     threads: 2
     resources:
-        mem_mb=2500,
-        runtime="60m",
+        mem_mb=growing(2500),
+        runtime=growing("60m"),
     params:
         scene=entry("scenes", "scene"),
         source=source_of("photos"),
@@ -97,6 +97,10 @@ rule split_views:
         "../scripts/split_views.py"
 
 
+localrules:
+    split_views,  # done sooner than a cluster would begin it
+
+
 REPORTING = "focal ground model report report_facts report_figures views".split()
 
 
@@ -116,8 +120,8 @@ rule report_photos:
     wildcard_constraints:
         scene=f"{scenes_of('photos')}|{scenes_of('synthetic')}",
     resources:
-        mem_mb=2000,
-        runtime="10m",
+        mem_mb=growing(2000),
+        runtime=growing("10m"),
     params:
         source=source_of(*(f"photos/{name}" for name in REPORTING)),
     script:

@@ -48,8 +48,8 @@ rule make_examples:
     wildcard_constraints:
         part=NATURAL,
     resources:
-        mem_mb=600,
-        runtime="10m",
+        mem_mb=growing(600),
+        runtime=growing("10m"),
     params:
         seeds=lambda wildcards: [int(wildcards.part) * WORLDS_A_PART + i for i in range(WORLDS_A_PART)],
         views=VIEWS_A_WORLD,
@@ -85,8 +85,8 @@ rule train_prior:
         "<benchmarks>/prior/train_prior.tsv"
     threads: 2
     resources:
-        mem_mb=4000,
-        runtime="4h",
+        mem_mb=growing(4000),
+        runtime=growing("4h"),
     params:
         coder=CODER,
         denoiser=DENOISER,
@@ -138,8 +138,8 @@ rule try_prior:
         "<benchmarks>/prior/try_prior.tsv"
     threads: 2
     resources:
-        mem_mb=4000,
-        runtime="2h",
+        mem_mb=growing(4000),
+        runtime=growing("2h"),
     params:
         setting=TRIAL,
         views=320,  # of those held out, evenly

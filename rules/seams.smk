@@ -38,8 +38,8 @@ rule measure_seams:
         "<benchmarks>/<seams>/measure_seams.tsv"
     threads: 2
     resources:
-        mem_mb=4000,
-        runtime="20m",
+        mem_mb=growing(4000),
+        runtime=growing("20m"),
     params:
         seam=cutting,
         seed=integer("seed"),
@@ -64,8 +64,8 @@ rule measure_repetition:
         "<benchmarks>/<seams>/measure_repetition.tsv"
     threads: 2
     resources:
-        mem_mb=4000,
-        runtime="10m",
+        mem_mb=growing(4000),
+        runtime=growing("10m"),
     params:
         seam=cutting,
         seed=integer("seed"),
@@ -93,8 +93,8 @@ rule draw_grid:
         "<benchmarks>/<seams>/draw_grid.tsv"
     threads: 2
     resources:
-        mem_mb=6000,
-        runtime="20m",
+        mem_mb=growing(6000),
+        runtime=growing("20m"),
     params:
         size=lookup(dpath="stills", within=config),
         source=source_of(*MEASURING),

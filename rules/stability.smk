@@ -23,8 +23,8 @@ rule measure_formulas:
     benchmark:
         "<benchmarks>/stability/measure_formulas.tsv"
     resources:
-        mem_mb=2000,
-        runtime="10m",
+        mem_mb=growing(2000),
+        runtime=growing("10m"),
     params:
         source=source_of("."),
     script:
@@ -46,8 +46,8 @@ rule run_extreme:
         extreme="|".join(map(re.escape, EXTREMES)),
     threads: 2
     resources:
-        mem_mb=8000,
-        runtime="60m",
+        mem_mb=growing(8000),
+        runtime=growing("60m"),
     params:
         root=workflow.basedir,
         source=source_of(*RUNNING, "stability/extremes", "stability/running"),

@@ -22,6 +22,10 @@ rule make_page:
         "../scripts/make_page.py"
 
 
+localrules:
+    make_page,  # copies files
+
+
 rule render_terrain:
     """Stills of the endless terrain: walking, from a hill, and from above."""
     input:
@@ -42,8 +46,8 @@ rule render_terrain:
         "<benchmarks>/<terrain>/render_terrain.tsv"
     threads: 2
     resources:
-        mem_mb=4000,
-        runtime="20m",
+        mem_mb=growing(4000),
+        runtime=growing("20m"),
     params:
         size=lookup(dpath="stills", within=config),
         heights=lookup(dpath="heights", within=config),
@@ -67,8 +71,8 @@ rule render_flight:
         "<benchmarks>/<terrain>/render_flight.tsv"
     threads: 2
     resources:
-        mem_mb=4000,
-        runtime="4h",
+        mem_mb=growing(4000),
+        runtime=growing("4h"),
     params:
         size=lookup(dpath="stills", within=config),
         heights=lookup(dpath="heights", within=config),

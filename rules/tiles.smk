@@ -22,8 +22,8 @@ rule cut_tiles:
         seam=CUT,
     threads: 2
     resources:
-        mem_mb=2000,
-        runtime="20m",
+        mem_mb=growing(2000),
+        runtime=growing("20m"),
     params:
         seam=cutting,
         seed=integer("seed"),
@@ -50,8 +50,8 @@ rule refine_tiles:
         seam=CUT,
     threads: 2
     resources:
-        mem_mb=3000,
-        runtime="30m",
+        mem_mb=growing(3000),
+        runtime=growing("30m"),
     params:
         refine=refining,
         prior=lambda wildcards: config["priors"][refining(wildcards)["prior"]],

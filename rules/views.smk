@@ -64,8 +64,8 @@ rule plot_evolution:
         policy=CHOOSING,
         t=POSITIVE,
     resources:
-        mem_mb=1500,
-        runtime="10m",
+        mem_mb=growing(1500),
+        runtime=growing("10m"),
     params:
         size=lambda wildcards: config["qualities"][wildcards.quality]["size"],
         rounds=shown_rounds,

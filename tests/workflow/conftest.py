@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 from made_runs import TINY, USUAL, Made
 
-COPIED = ["Snakefile", "rules", "scripts", "config", "workflow/schemas", "workflow/viewer", "workflow/report"]
+COPIED = ["Snakefile", "rules", "scripts", "config", "profiles"]  # the last is a link
+COPIED += [f"workflow/{name}" for name in ("profiles", "report", "schemas", "viewer")]
 
 
 @pytest.fixture(scope="session")
@@ -96,8 +97,10 @@ def checkout(root) -> Callable[[Path], Path]:
     def copy(folder: Path) -> Path:
         for name in COPIED:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            whole = (root / name).is_dir()
-            (shutil.copytree if whole else shutil.copy)(root / name, folder / name)
+            if (root / name).is_dir() and not (root / name).is_symlink():
+                shutil.copytree(root / name, folder / name)
+            else:
+                shutil.copy(root / name, folder / name, follow_symlinks=False)
         return folder
 
     return copy

@@ -10,7 +10,7 @@ _KILLED = re.compile(r"died with <Signals\.(SIG\w+)")
 _NOISE = re.compile(
     r"""
     $ | \[\w{3}\ \w{3}\ +\d+\ [\d:]+\ \d+\]$                        # blank, or the time of day
-    | Config\ file\ .*\ is\ extended
+    | Using\ (?:profile|workflow\ specific\ profile) | Config\ file\ .*\ is\ extended
     | Assuming\ unrestricted\ shared | Building\ DAG | Using\ shell | Provided\ cores | Rules\ claiming\ more
     | Select\ jobs\ to\ execute | Execute\ \d+\ jobs | Finished\ jobid | \d+\ of\ \d+\ steps | Reasons?:
     | Job\ stats: | job\ +count$ | -{3,}[\ -]*$

@@ -54,7 +54,10 @@ def smaller(quietly: bool) -> list[Path]:
 
 
 def run(given: dict, cores: int, overlays: list[Path]) -> int:
-    """Run the workflow for the config's scene; a lock that a killed run left behind is taken away first."""
+    """Run the workflow for the config's scene; a lock that a killed run left behind is taken away first.
+
+    Snakemake finds profiles/default beside the Snakefile: by it, what a killed run left half made is made again.
+    """
     snakemake = [sys.executable, "-m", "snakemake", "--config", f"scene={given['scene']}"]
     if overlays:
         snakemake += ["--configfile", *map(str, [CONFIG, *overlays])]
@@ -65,7 +68,7 @@ def run(given: dict, cores: int, overlays: list[Path]) -> int:
         print("The last run was cut short; going on where it stopped.")
         subprocess.run([*snakemake, "--unlock"], check=False, capture_output=True)
     start = time.monotonic()
-    code, jobs = follow([*snakemake, "--cores", str(cores), "--rerun-incomplete", "--quiet", "host", "reason"])
+    code, jobs = follow([*snakemake, "--cores", str(cores), "--quiet", "host", "reason"])
     if code < 0 or code == 130:
         print("\nStopped. The same command goes on where this ended.", file=sys.stderr)
         return 130

@@ -1,0 +1,129 @@
+"""The profiles are found and read, and ask for what their comments say."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+import yaml
+from made_runs import TINY, USUAL
+
+from dav_gswt import run as make_run
+
+PROFILES = "workflow/profiles"
+ROUND = "results/desert/seed0/draft/active_farthest_none_pdrop0_lam0_k2{stop}/iter{t}"
+
+
+@pytest.fixture
+def read_as():
+    """What Snakemake makes of a command line, profiles included, in the folder where it is typed."""
+    parse_args = pytest.importorskip("snakemake.cli").parse_args
+    return lambda *arguments: parse_args(list(arguments))[1]
+
+
+@pytest.fixture
+def clone(checkout, tmp_path, monkeypatch):
+    monkeypatch.delenv("SNAKEMAKE_PROFILE", raising=False)
+    monkeypatch.chdir(checkout(tmp_path / "clone"))
+
+
+@pytest.fixture
+def asked(snakemake, root, tmp_path):
+    """Per rule, the resources that a plan's jobs ask for at an attempt, under the profiles that are named."""
+
+    def call(attempt, *targets, profiles=("slurm",), study="rounds: 1"):
+        (tmp_path / "study.yaml").write_text(study)
+        named = [f"--profile={root / PROFILES / name}" for name in profiles]
+        arguments = [*named, "--dry-run", f"--attempt={attempt}", *targets]
+        out = snakemake(tmp_path, *arguments, configs=(USUAL, TINY, tmp_path / "study.yaml")).stdout
+        jobs = re.findall(r"^ *(?:local)?rule (\w+):\n(?: .+\n)*? +resources: (.+)$", out, re.M)
+        return {rule: dict(item.split("=", 1) for item in said.split(", ")) for rule, said in jobs}
+
+    return call
+
+
+def test_plain_snakemake_reads_the_default_profile(clone, read_as):
+    args = read_as("--cores", "2")
+    assert args.scheduler == "greedy" and args.rerun_incomplete and len(args.rerun_triggers) == 4
+    assert read_as("--cores", "2", "--workflow-profile", "none").scheduler != "greedy"
+
+
+def test_make_run_reads_the_default_profile(clone, read_as, monkeypatch):
+    commands = []
+    monkeypatch.setattr(make_run, "follow", lambda command: commands.append(command) or (1, 0))
+    assert make_run.main(["--cores", "2"]) == 1
+    args = read_as(*commands[0][commands[0].index("snakemake") + 1 :])
+    assert args.scheduler == "greedy" and args.rerun_incomplete
+
+
+def test_make_run_does_not_tell_which_profile_it_reads(run, checkout, tmp_path):
+    (tmp_path / "tiny.yaml").write_text("rounds: 0")
+    done = run(checkout(tmp_path / "clone"), "--scene", "copr_dunes", "--configfile", tmp_path / "tiny.yaml")
+    assert "no folder" in done.stdout and "profile" not in done.stdout
+
+
+def test_a_cluster_adds_to_the_default_profile(clone, read_as):
+    args = read_as(f"--profile={PROFILES}/slurm", f"--profile={PROFILES}/gpu")
+    assert args.executor == "slurm" and args.keep_going and args.retries == 2
+    assert args.scheduler == "greedy" and args.rerun_incomplete
+
+
+def test_every_further_attempt_asks_for_more(asked):
+    """Of rules that state what they need, and of those that leave it to the profile."""
+    targets = ["all", "seams", "lod_table", "results/desert/photos/candidates"]
+    first, second = (asked(n, *targets, study="seam_study: {scenes: [desert]}") for n in (1, 2))
+    assert len(first) > 20 and first["fit_coarse"] != first["select_poses"]
+    work = set(first) - {"all", "seams", "lod_table"}
+    for rule in work:
+        for key in ("mem_mb", "runtime"):
+            assert int(second[rule][key]) == 2 * int(first[rule][key]) > 0, (rule, key)
+    assert (first["fit_coarse"]["mem_mb"], second["fit_coarse"]["runtime"]) == ("2000", "120")
+
+
+def test_no_rule_states_memory_or_time_that_does_not_grow(root):
+    """Also of rules that no target above plans."""
+    for path in (root / "rules").glob("*.smk"):
+        assert not re.findall(r"\b(?:mem_mb|runtime)=(?!growing\(|lambda wildcards, attempt:).*", path.read_text()), (
+            path
+        )
+
+
+def test_a_gpu_is_asked_for_by_rules_that_are_there(asked, root):
+    named = yaml.safe_load((root / PROFILES / "gpu/config.yaml").read_text())["set-resources"]
+    there = re.findall(r"^rule (\w+):", "".join(p.read_text() for p in (root / "rules").glob("*.smk")), re.M)
+    assert set(named) <= set(there)
+    jobs = asked(1, profiles=("slurm", "gpu"))
+    assert {rule for rule, needs in jobs.items() if needs.get("gpu") == "1"} == set(named) & set(jobs) != set()
+    assert jobs["fit_coarse"]["mem_mb"] == "2000"
+
+
+@pytest.mark.parametrize("stop", ["", "_upto9"])
+def test_a_round_is_one_submission(snakemake, root, tmp_path, stop):
+    """Of its own: two rounds in one job would wait for the scoring between them, which waits for the first."""
+    target = ROUND.format(stop=stop, t=2) + "/field.ply"
+    arguments = [f"--profile={root / PROFILES}/slurm", "--dry-run", target]
+    out = snakemake(tmp_path, *arguments, configs=(USUAL, TINY)).stdout
+    groups = re.findall(r"Group job (\S+) .+?:\n(.+?)(?=^\S)", out, re.M | re.S)
+    assert [name[-1] for name, _ in groups] == ["1", "2"]
+    for _, jobs in groups:
+        assert sorted(re.findall(r"^ +rule (\w+):", jobs, re.M)) == ["capture_views", "select_poses", "update_field"]
+
+
+def test_who_asks_people_or_devices_stays_here_and_asks_once(checkout, tmp_path):
+    """On a cluster, too. All that the rule reads is empty, so it fails; the profile would have it tried twice more."""
+    photos, capture = "results/mine/photos", ROUND.format(stop="", t=1).replace("desert", "mine") + "/capture"
+    folder = checkout(tmp_path / "clone")
+    scene = "kind: photos, folder: mine, size: 64, start: 3, agent: handheld, quality: draft, seam: semantic"
+    (folder / "mine.yaml").write_text(f"scenes: {{mine: {{{scene}}}}}")
+    for place in ("mine", f"{photos}/images", f"{photos}/sparse"):
+        (folder / place).mkdir(parents=True)
+    read = [f"{photos}/lenses.json", f"{photos}/ground.json", "results/mine/seed0/views.json"]
+    read += ["results/mine/seed0/draft/coarse/field.ply", capture.replace("capture", "poses.json")]
+    for place in read:
+        (folder / place).parent.mkdir(parents=True, exist_ok=True)
+        (folder / place).touch()
+    command = [sys.executable, "-m", "snakemake", "--profile", f"{PROFILES}/slurm"]
+    command += ["--configfile", USUAL, TINY, "mine.yaml", "--", capture]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 1 and "localrule ask_for_views" in done.stderr, done.stderr
+    assert done.stderr.count("Error in rule ask_for_views") == 1 and "Trying to restart" not in done.stderr
