@@ -136,3 +136,22 @@ def test_the_same_crops_are_drawn_by_any_number_of_threads(laid, straight, monke
     assert found[0] == found[1]
     assert [row["seam_lpips"] for row in found[0]] == [None] * len(found[0])  # no weights: absent, never made up
     assert {row["place"] for row in found[0]} == {"border", "cut", "floor", "ceiling"}
+
+
+def test_crops_that_are_hidden_altogether_are_passed_over(laid, straight, monkeypatch, rng):
+    shown, seen = crops.shown, []
+
+    def every_other(*args, **kwargs):
+        found = shown(*args, **kwargs)
+        seen.append(found)
+        return replace(found, patch=np.full_like(found.patch, -1)) if len(seen) % 3 == 0 else found
+
+    monkeypatch.setattr(crops, "shown", every_other)
+    monkeypatch.setattr(measure, "BORDERS", 4)
+    monkeypatch.setattr(measure, "CUTS", 4)
+    view = crops.VIEWS[2]
+    borders = measure._borders(laid, laid.terrain, view, rng)
+    cuts = measure._cuts(laid, laid.terrain, (straight, straight.terrain), view, rng)
+    assert len(seen) > 12 and all(each.shown.any for each in (*borders, *cuts))
+    assert [each.number for each in borders] == [0, 1, 2, 3]
+    assert [each.number for each in cuts] == [4, 8, 5, 9, 6, 10, 7, 11]

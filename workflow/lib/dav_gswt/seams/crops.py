@@ -73,6 +73,11 @@ class Shown:
     sources: Int[Array, "k 2 2"]
 
     @property
+    def any(self) -> bool:
+        """Whether it shows any of the patches: what stands between may hide them all."""
+        return bool((self.patch >= 0).any())
+
+    @property
     def masks(self) -> Float32[Array, "k h w"]:
         """Of each patch; a pixel that shows none of them counts for all by their share. They sum to 1."""
         mine = (self.patch == np.arange(len(self.patches))[:, None, None]).astype(np.float32)

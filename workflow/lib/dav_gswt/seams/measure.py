@@ -73,7 +73,8 @@ def _borders(laid: Laid, terrain: Terrain, view: View, rng) -> list[Taken]:
     for place in places.borders(laid, rng):
         if (crop := crops.crop(laid, terrain, view, place.at)) and (met := crops.meeting(laid, crop)):
             shown = crops.shown(laid, terrain, crop, met, border=True)
-            found.append(Taken("border", len(found), place.cluster, shown))
+            if shown.any:
+                found.append(Taken("border", len(found), place.cluster, shown))
         if len(found) == BORDERS:
             return found
     return _enough(found, BORDERS, "borders")
@@ -89,9 +90,10 @@ def _cuts(laid: Laid, terrain: Terrain, straight: tuple[Laid, Terrain], view: Vi
         met = [crops.meeting(who, crop) if crop else None for who, _, crop in both]
         if met and all(patches and len(patches) > 1 for patches in met):  # else a seam ran beside the crop's middle
             number = BORDERS + len(found) // 2  # of the cut; its ceiling's is CUTS more
-            for name, (who, on, crop), patches in zip(("cut", "ceiling"), both, met, strict=True):
-                number += CUTS * (name == "ceiling")
-                found.append(Taken(name, number, place.cluster, crops.shown(who, on, crop, patches)))
+            cut, ceiling = (crops.shown(*each, patches) for each, patches in zip(both, met, strict=True))
+            if cut.any and ceiling.any:
+                found.append(Taken("cut", number, place.cluster, cut))
+                found.append(Taken("ceiling", number + CUTS, place.cluster, ceiling))
         if len(found) == 2 * CUTS:
             return found
     return _enough(found, 2 * CUTS, "cuts")
