@@ -8,7 +8,7 @@ of what it loses.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.stats import norm, t
 
 LEVEL = 0.95  # of the interval
 LEAST = 3  # new photos, without which nothing can be said
@@ -16,6 +16,7 @@ LEAST = 3  # new photos, without which nothing can be said
 # rounds on development scenes (desert, grass, flowers, caliterra_earthworks; draft, `farthest`, four photos a round).
 # How they do on others: docs/data/view_worth.csv.
 SHARE, OFF = 0.5, 0.4
+SCENES = 4  # that these two are from: few, so another scene may be farther off than a normal law says
 
 
 @dataclass(frozen=True)
@@ -57,8 +58,9 @@ def expected(history: History) -> Worth | None:
     """The gain that a field fitted to n photos has to expect of k more.
 
     Model: the gap is c / n, c its mean over all new photos so far; k photos close c (1 / n - 1 / (n + k)) of it, and
-    other views gain SHARE of that. The interval is log-normal: of c, from photo to photo, and of SHARE (OFF). Where new
-    photos are shown no worse than old ones the gain is 0, and may be what c's own interval allows.
+    other views gain SHARE of that. The interval is of the logarithm: normal of c, from photo to photo, and of SHARE
+    Student's t for one scene more than SCENES, t_(SCENES - 1) OFF sqrt(1 + 1 / SCENES). Where new photos are shown no
+    worse than old ones the gain is 0, and may be what c's own interval allows.
     Returns: None where nothing can be said: fewer than LEAST new photos so far, or none to come.
     """
     found = np.array([r.fitted * gap for r in history.rounds for gap in r.gaps])
@@ -69,7 +71,8 @@ def expected(history: History) -> Worth | None:
     c, error = float(found.mean()), float(found.std(ddof=1) / np.sqrt(len(found)))
     if not c > 0:
         return Worth(k, 0.0, 0.0, SHARE * part * max(0.0, c + reach * error), 0.0)
-    gain, wide = SHARE * part * c, float(np.exp(reach * np.hypot(OFF, error / c)))
+    scene = float(t.ppf((1 + LEVEL) / 2, SCENES - 1)) * OFF * np.sqrt(1 + 1 / SCENES)
+    gain, wide = SHARE * part * c, float(np.exp(np.hypot(scene, reach * error / c)))
     return Worth(k, gain, gain / wide, gain * wide, part * c)
 
 
