@@ -31,6 +31,9 @@ include: "rules/bundle.smk"
 include: "rules/terrain.smk"
 include: "rules/seams.smk"
 include: "rules/figures.smk"
+include: "rules/sweeps.smk"
+include: "rules/tables.smk"
+include: "rules/study.smk"
 
 
 # Below the includes: Snakemake skips constraints on wildcards that reach an output through a pathvar unless they are
@@ -50,6 +53,7 @@ wildcard_constraints:
     completed=COMPLETED,
     seam=NAME,
     tau=FRACTION,
+    sweep=NAME,
 
 
 rule all:
