@@ -96,7 +96,7 @@ rule tabulate_ablation:
     benchmark:
         "<benchmarks>/tables/ablation.tsv"
     params:
-        baselines=lambda wildcards: config["study"]["ablation"],
+        baselines=lambda wildcards: {name: config["sweeps"][name]["baseline"] for name in config["study"]["ablation"]},
         source=source_of("tables", "sweeps", "active/comparison/stats", "figures"),
     script:
         "../scripts/tabulate_ablation.py"

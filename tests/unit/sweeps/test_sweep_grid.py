@@ -74,7 +74,7 @@ def test_a_row_that_makes_no_sense_is_named(row, said):
     "change, said",
     [
         ({"timing": "speed"}, "there is no sweep 'speed'"),
-        ({"ablation": {"estimators": "oracle"}}, "oracle is not varied there; that sweep has w2-lpips, w2"),
+        ({"ablation": ["k"]}, "sweeps.k.baseline: must be one of 2, 4, 8"),
         ({"figures": {"scenes": ["moon"]}}, "study.figures.scenes: moon is no scene"),
     ],
 )

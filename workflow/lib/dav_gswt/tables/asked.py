@@ -1,6 +1,7 @@
 """Whether the config's `study` asks for sweeps, baselines and scenes that are there; loads no numerics."""
 
 from dav_gswt.errors import InputError
+from dav_gswt.sweeps.grid import named
 
 
 def sweeps_of(study: dict) -> list[str]:
@@ -17,16 +18,12 @@ def check(config: dict) -> None:
     for name in sweeps_of(study):
         if name not in sweeps:
             raise InputError(f"config: study: there is no sweep {name!r}; sweeps has {', '.join(sweeps) or 'nothing'}")
-    for name, baseline in study["ablation"].items():
-        values = [str(_named(value)) for value in next(iter(sweeps[name]["vary"].values()))]
-        if baseline not in values:
+    for name in study["ablation"]:
+        values = [str(named(value)) for value in next(iter(sweeps[name]["vary"].values()))]
+        if sweeps[name].get("baseline") not in values:
             raise InputError(
-                f"config: study.ablation.{name}: {baseline} is not varied there; that sweep has {', '.join(values)}"
+                f"config: sweeps.{name}.baseline: must be one of {', '.join(values)}; study.ablation compares them"
             )
     for name in study["figures"]["scenes"]:
         if config["scenes"].get(name, {"kind": "field"})["kind"] == "field":
             raise InputError(f"config: study.figures.scenes: {name} is no scene with photos")
-
-
-def _named(value):
-    return value["policy"] if isinstance(value, dict) else value

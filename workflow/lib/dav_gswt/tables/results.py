@@ -160,6 +160,7 @@ def _slips() -> str:
     )
     taken = start + k * rounds
     return (
-        f"Not copied from the paper: its t = {t:g} with {df:.0f} degrees of freedom is p = {two_sided(t, int(df)):.3f}, "
-        f"not p < 0.01; {taken:.0f} of {views:.0f} views are {views / taken:.1f} times fewer, not ten."
+        f"Not copied from the paper: its t = {t:g} with {df:.0f} degrees of freedom is p = "
+        f"{two_sided(t, int(df)):.3f}, not p < 0.01; {taken:.0f} of {views:.0f} views are "
+        f"{views / taken:.1f} times fewer, not ten."
     )
