@@ -21,6 +21,7 @@ from dav_gswt.views import View
 
 WIDE = 9.0  # inches of the figure
 HEAD, LABEL, FOOT, KEY = 0.25, 0.25, 0.5, 0.85  # inches: titles, a line under maps, two under all, the colours' scale
+NOTE = 0.2  # inches: a line more under all
 GREY = 0.75  # of what does not count
 FADED = 0.8  # how grey a picture becomes where it does not count
 HIGHEST = 0.99  # quantile of all errors at which their colours end
@@ -138,9 +139,10 @@ def drawn(found: list[Strip], rounds: list[Round], key: str):
     columns = 1 + len(rounds)
     side = WIDE / columns
     tall = [side * strip.photo.shape[0] / strip.photo.shape[1] for strip in found for _ in range(2)]
-    figure = figures.blank(WIDE, sum(tall) + HEAD + LABEL * len(found) + FOOT + KEY)
+    foot = FOOT + NOTE * any(one.note for one in rounds)
+    figure = figures.blank(WIDE, sum(tall) + HEAD + LABEL * len(found) + foot + KEY)
     figure.get_layout_engine().set(w_pad=0.02, h_pad=0.02, hspace=0.0, wspace=0.0)
-    grid = figure.subplots(len(tall) + 2, columns, squeeze=False, height_ratios=[HEAD, *tall, FOOT])
+    grid = figure.subplots(len(tall) + 2, columns, squeeze=False, height_ratios=[HEAD, *tall, foot])
     colours = {"norm": Normalize(0, highest(found)), "cmap": colormaps[MAP].with_extremes(bad=str(GREY))}
     for axes in grid.flat:
         axes.set(xticks=[], yticks=[])
@@ -172,7 +174,7 @@ def _foot(row, rounds: list[Round], key: str) -> None:
     corrected = ",\nPSNR colour-corrected" if key == "psnr_colour_corrected" else ""
     _say(row[0], (f"mean of {count} test views" if count > 1 else "the one test view") + corrected)
     for axes, one in zip(row[1:], rounds, strict=True):
-        _say(axes, f"{one.metrics['photos']} photos{one.note}\n{_measured(one.metrics, key)}", weight="bold")
+        _say(axes, f"{one.metrics['photos']} photos\n{_measured(one.metrics, key)}{one.note}", weight="bold")
 
 
 def _say(axes, text: str, **how) -> None:

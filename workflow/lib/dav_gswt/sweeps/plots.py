@@ -6,6 +6,7 @@ import numpy as np
 
 from dav_gswt import figures
 from dav_gswt.active.comparison.plots import COLOURS
+from dav_gswt.sweeps.grid import EVERYTHING
 
 PANELS = {
     "psnr": "PSNR of test views (dB)",
@@ -69,7 +70,8 @@ def _panel(panel, axis: str, key: str, rows: list[dict], scenes: list[str]) -> N
         known = {v: [x for x in each if x is not None] for v, each in found.items()}
         at = [i for i, v in enumerate(values) if known[v]]
         means = [float(np.mean(known[values[i]])) for i in at]
-        panel.plot(at, means, marker="_", markersize=12, color=colour, linewidth=1.2, label=scene)
+        line = 1.2 if all(map(_number, values)) else 0  # between names there is nothing
+        panel.plot(at, means, marker="_", markersize=14, markeredgewidth=2, color=colour, linewidth=line, label=scene)
         for i in at:
             panel.plot([i] * len(known[values[i]]), known[values[i]], "o", color=colour, markersize=3.5, alpha=0.6)
     askew = {"rotation": 30, "ha": "right"} if max(map(len, values)) > LONG else {}
@@ -79,12 +81,19 @@ def _panel(panel, axis: str, key: str, rows: list[dict], scenes: list[str]) -> N
     _dress(panel, PANELS[key])
 
 
+def _number(text: str) -> bool:
+    return text.replace(".", "", 1).isdigit()
+
+
 def _curves(panel, rows: list[dict]) -> None:
     for value, colour in zip(dict.fromkeys(row["varied_0"] for row in rows), COLOURS * len(rows), strict=False):
         mine = [row for row in rows if row["varied_0"] == value and row["psnr"] is not None]
         photos = sorted({row["photos"] for row in mine})
         means = [float(np.mean([row["psnr"] for row in mine if row["photos"] == n])) for n in photos]
-        panel.plot(photos, means, marker="o", markersize=3.5, linewidth=1.4, color=colour, label=value)
+        if value == EVERYTHING:  # what there is to reach, and no curve
+            panel.axhline(means[-1], color="0.6", linewidth=1.2, linestyle=":", label=f"all {photos[-1]:.0f} photos")
+        else:
+            panel.plot(photos, means, marker="o", markersize=3.5, linewidth=1.4, color=colour, label=value)
     panel.set_xlabel("photos", fontsize=9)
     _dress(panel, PANELS["psnr"])
 

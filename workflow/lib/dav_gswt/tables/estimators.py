@@ -13,4 +13,4 @@ def note(crops: Path | str) -> str:
     if not sums:
         return ""
     value, _, _ = summary.interval(summary.drawn(sums)[0][:, 0])
-    return f", Seam-LPIPS {value:+.3f}"
+    return f"\nSeam-LPIPS {value:+.3f}"

@@ -39,12 +39,15 @@ def write_figure(path: Path | str, manifest: dict, tau: float, length: float) ->
     (west, south), (east, north) = np.floor(way.min(0)).astype(int) - AROUND, np.floor(way.max(0)).astype(int) + AROUND
     shape = int(north - south + 1), int(east - west + 1)
     doubt, deep = cells_of(manifest, int(west), int(south), shape)
-    figure = figures.blank(9.0, 9.0 * shape[0] / shape[1] + 1.0)
+    figure = figures.blank(9.0, 7.2 * shape[0] / shape[1] + 0.9)
     axes = figure.subplots()
     extent = (west, east + 1, south, north + 1)
     seen = axes.imshow(doubt, origin="lower", extent=extent, cmap="inferno", interpolation="none")
     rows, columns = np.nonzero(deep)
-    axes.plot(columns + west + 0.5, rows + south + 0.5, "o", color="#56b4e9", markersize=4, label="keeps all orders")
+    if deep.any():
+        axes.plot(
+            columns + west + 0.5, rows + south + 0.5, "o", color="#56b4e9", markersize=4, label="keeps all orders"
+        )
     axes.plot(*way.T, color="white", linewidth=3.5)
     axes.plot(*way.T, color="#0072b2", linewidth=1.8, label="walk")
     axes.plot(*way[-1], ">", color="#0072b2", markeredgecolor="white", markersize=10)
