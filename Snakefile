@@ -18,6 +18,7 @@ report: "workflow/report/workflow.rst"
 
 include: "rules/common.smk"
 include: "rules/cells.smk"
+include: "rules/shown.smk"
 include: "rules/photos.smk"
 include: "rules/coarse.smk"
 include: "rules/prior.smk"
@@ -31,7 +32,10 @@ include: "rules/bundle.smk"
 include: "rules/terrain.smk"
 include: "rules/seams.smk"
 include: "rules/figures.smk"
+include: "rules/sweeps.smk"
+include: "rules/tables.smk"
 include: "rules/stability.smk"
+include: "rules/study.smk"
 
 
 # Below the includes: Snakemake skips constraints on wildcards that reach an output through a pathvar unless they are
@@ -51,6 +55,7 @@ wildcard_constraints:
     completed=COMPLETED,
     seam=NAME,
     tau=FRACTION,
+    sweep=NAME,
 
 
 rule all:

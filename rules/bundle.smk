@@ -58,7 +58,12 @@ rule gather_lod:
     input:
         tables=lambda wildcards: list(levels_measured()),
     output:
-        table="results/tables/lod.csv",
+        table=report(
+            "results/tables/lod.csv",
+            caption="../workflow/report/lod.rst",
+            category="Tables",
+            labels={"table": "levels of detail"},
+        ),
     log:
         "<logs>/tables/gather_lod.log",
     benchmark:

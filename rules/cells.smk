@@ -1,14 +1,19 @@
-"""What is compared: the cells of the config's `lod`, `calibration`, `benchmark` and `seam_study`, and the files of each."""
+"""What is compared: the cells of the config's `lod`, `calibration`, `benchmark`, `seam_study` and `sweeps`, with the files
+of each."""
 
 from itertools import product
+
+from dav_gswt.sweeps import grid
 
 
 def levels_measured():
     """The tables of levels that are gathered: the path of each one's lod.csv, and what tells it from the others."""
     found = {}
-    for scene in config["lod"]["scenes"]:
-        for seed in config["seeds"]:
-            values = values_of(scene) | {"seed": seed}
+    asked = config["lod"]
+    for scene in asked["scenes"]:
+        chosen = chosen_values(scene, asked["fixed"]) if "fixed" in asked else values_of(scene)
+        for seed in asked.get("seeds", config["seeds"]):
+            values = chosen | {"seed": seed}
             (path,) = expand(rules.measure_levels.output.table, **values)
             found[path] = {key: values[key] for key in ("scene", "seed", "quality", "seam")}
     return found
@@ -84,3 +89,59 @@ def seam_cells():
             (cell,) = [{name: expand(path, **values)[0] for name, path in files.items()}]
             cells.append({key: values[key] for key in ("scene", "seed", "quality")} | {"variant": variant} | cell)
     return cells
+
+
+def sweep_cells(name):
+    """The cells of a row of the config's `sweeps`: what tells each from the others, what it varied, and its files."""
+    asked, cells = config["sweeps"][name], {}
+    for chosen in grid.combinations(asked["vary"], asked.get("fixed", {})):
+        for scene, seed in product(asked["scenes"], grid.seeds_of(asked["measure"])):
+            values = chosen_values(scene, chosen) | {"seed": seed}
+            measured = [key for key, seeds in asked["measure"].items() if seed in seeds]
+            cell = sweep_cell(values, measured) | {"sweep": name, "varied": chosen["shown"]}
+            cells.setdefault(tuple(cell[key] for key in grid.CELL), cell)
+    return list(cells.values())
+
+
+def chosen_values(scene, chosen):
+    """The wildcards of a cell of settings of its own, which stops nowhere before its last round and paints nothing."""
+    entry, over = config["scenes"][scene], {key: value for key, value in chosen.items() if key != "shown"}
+    asked = config | over
+    rounds = grid.rounds_of(over, asked["policy"], grid.start_of(entry), asked["k"], asked["rounds"])
+    return values_of(scene, over=over | {"rounds": rounds}) | {"stop": "", "completed": ""}
+
+
+def sweep_cell(values, measured):
+    """One of them. measured: keys of `measure` that hold for it."""
+    rounds, scene = values["t"], config["scenes"][values["scene"]]
+
+    def of(found, ts=None):
+        return expand(found, **(values if ts is None else values | {"t": list(ts)}))
+
+    tested = rules.evaluate_round if rounds else rules.evaluate_coarse
+    files = {
+        "views": {"metrics": tested.output.metrics},
+        "tiles": {"manifest": rules.bundle_tiles.output.manifest},
+        "seams": {"crops": rules.measure_seams.output.crops, "facts": rules.measure_seams.output.facts},
+        "stills": {"still": rules.render_terrain.output.stills[0]},
+    }
+    rounds_before, after = range(1, rounds), range(1, rounds + 1)
+    times = {"coarse": of(rules.fit_coarse.benchmark)}
+    times["score"] = (of(rules.score_coarse.benchmark) if rounds else []) + of(
+        rules.score_round.benchmark, rounds_before
+    )
+    for key, job in (("select", rules.select_poses), ("capture", rules.capture_views), ("update", rules.update_field)):
+        times[key] = of(job.benchmark, after)
+    if {"tiles", "seams", "stills"} & set(measured):
+        times |= {"levels": of(rules.make_levels.benchmark), "cut": of(rules.cut_tiles.benchmark)}
+    times |= {"bundle": of(rules.bundle_tiles.benchmark)} if {"tiles", "stills"} & set(measured) else {}
+    times |= {"stills": of(rules.render_terrain.benchmark)} if "stills" in measured else {}
+    prior = config["priors"].get(values["prior"], {"samples": 0, "steps": 0})
+    told = {key: values[key] for key in grid.CELL if key != "rounds"} | {"rounds": rounds}
+    return told | {
+        "corrected": scene["kind"] == "photos",
+        "samples": prior["samples"],
+        "steps": prior["steps"],
+        "files": {key: of(path)[0] for part in measured for key, path in files[part].items()},
+        "times": times,
+    }

@@ -113,26 +113,27 @@ def scenes_by(*agents):
     return "|".join(n for n, s in config["scenes"].items() if s.get("agent") in agents) or NEVER
 
 
-def values_of(scene, policy=config["policy"]):
-    """The wildcards of what is made of a scene at the config's parameters."""
-    given = config["scenes"][scene]["kind"] == "field"
-    asked = {key: "0" if key in AT_ZERO.get(policy, ()) else spell(config[key]) for key in ("p_drop", "lam")}
+def values_of(scene, policy=None, over=None):
+    """The wildcards of what is made of a scene at the config's parameters, or at those that are laid over them."""
+    asked = config | (over or {})
+    given, policy = config["scenes"][scene]["kind"] == "field", policy or asked["policy"]
+    told = {key: "0" if key in AT_ZERO.get(policy, ()) else spell(asked[key]) for key in ("p_drop", "lam")}
     if given or policy not in IMAGINING:
-        asked = {"p_drop": "0", "lam": "0"}
+        told = {"p_drop": "0", "lam": "0"}
     return dict(
         scene=scene,
         seed=config["seeds"],
-        quality=config["scenes"][scene]["quality"],
+        quality=asked.get("quality", config["scenes"][scene]["quality"]),
         policy="given" if given else policy,
-        prior="none" if given or policy not in IMAGINING else config["prior"],
-        **asked,
-        k=0 if given else config["k"],
+        prior="none" if given or policy not in IMAGINING else asked["prior"],
+        **told,
+        k=0 if given else asked["k"],
         stop="" if given else spell_stop(config["stop"]),
-        t=0 if given else config["rounds"],
+        t=0 if given else asked["rounds"],
         painter=config["prior"],
         completed="" if given else spell_completed(config["complete"], config["prior"]),
-        seam=config["scenes"][scene]["seam"],
-        tau=spell(config["tau"]),
+        seam=asked.get("seam", config["scenes"][scene]["seam"]),
+        tau=spell(asked["tau"]),
     )
 
 

@@ -131,7 +131,12 @@ rule show_cuts:
         seams=[f"<results>/<round>{{completed}}/tiles_{kind}/seams.json" for kind in ("colour", "semantic")],
         tiles=[f"<results>/<round>{{completed}}/tiles_{kind}/tiles" for kind in ("colour", "semantic")],
     output:
-        plot="<results>/<round>{completed}/seam_cuts.png",
+        plot=report(
+            "<results>/<round>{completed}/seam_cuts.png",
+            caption="../workflow/report/cuts.rst",
+            category="Figures",
+            labels={"figure": "cuts by colour and by kind of ground", "scene": "{scene}"},
+        ),
     log:
         "<logs>/<round>{completed}/show_cuts.log",
     benchmark:

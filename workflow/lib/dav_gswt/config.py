@@ -8,6 +8,8 @@ from jsonschema import Draft202012Validator
 from jsonschema.exceptions import ValidationError, best_match
 
 from dav_gswt.errors import InputError
+from dav_gswt.sweeps import grid
+from dav_gswt.tables import asked as tables
 
 REFINED = "-refined"  # after a seam's name: its tiles, refined as its `refine` says
 
@@ -80,6 +82,8 @@ def check(config: dict, schema: Path) -> None:
         _check_benchmark(config["benchmark"], config["scenes"], config["priors"])
     if "seam_study" in config:
         _check_seam_study(config["seam_study"], config["scenes"], config["seams"])
+    grid.check(config)
+    tables.check(config)
 
 
 def _check_refinements(seams: dict, priors: dict) -> None:

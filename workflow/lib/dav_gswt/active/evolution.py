@@ -21,6 +21,7 @@ from dav_gswt.views import View
 
 WIDE = 9.0  # inches of the figure
 HEAD, LABEL, FOOT, KEY = 0.25, 0.25, 0.5, 0.85  # inches: titles, a line under maps, two under all, the colours' scale
+NOTE = 0.2  # inches: a line more under all
 GREY = 0.75  # of what does not count
 FADED = 0.8  # how grey a picture becomes where it does not count
 HIGHEST = 0.99  # quantile of all errors at which their colours end
@@ -29,12 +30,18 @@ MAP = "magma"
 
 @dataclass(frozen=True)
 class Round:
-    """What a round ended with. metrics: its metrics.json."""
+    """What a round ended with. metrics: its metrics.json. title: what stands over it; note: and under its measures."""
 
     number: int
     field: Field
     grid: Ground
     metrics: dict
+    title: str = ""
+    note: str = ""
+
+    @property
+    def named(self) -> str:
+        return self.title or f"round {self.number}"
 
 
 @dataclass(frozen=True)
@@ -62,8 +69,8 @@ def measure(frame: dict) -> str:
     return "psnr_colour_corrected" if frame["kind"] == "photos" else "psnr"
 
 
-def shown(first: dict, key: str) -> dict[str, str]:
-    """The test views to show, by name, and why: the worst and the median one by PSNR. first: metrics.json of round 0.
+def shown(first: dict, key: str, named: str = "round 0") -> dict[str, str]:
+    """The test views to show, by name, and why: the worst and the median one by PSNR. first: metrics.json of `named`.
 
     Of an even number the better one of the middle two; one test view is shown alone.
     Raises: InputError: there is no test view.
@@ -73,7 +80,7 @@ def shown(first: dict, key: str) -> dict[str, str]:
         raise InputError("metrics.json of round 0: has no test view, so there is none to show; give the scene some")
     if len(rows) == 1:
         return {rows[0]["view"]: "the only test view"}
-    whys = {0: f"the worst of {len(rows)}\ntest views at round 0", len(rows) // 2: "the median one\nat round 0"}
+    whys = {0: f"the worst of {len(rows)}\ntest views at {named}", len(rows) // 2: f"the median one\nat {named}"}
     return {rows[i]["view"]: why for i, why in whys.items()}
 
 
@@ -84,7 +91,7 @@ def strips(rounds: list[Round], tests: list[View], key: str) -> list[Strip]:
     """
     views = {view.name: view for view in tests}
     found = []
-    for name, why in shown(rounds[0].metrics, key).items():
+    for name, why in shown(rounds[0].metrics, key, rounds[0].named).items():
         looks = [look(one, views[name], key) for one in rounds]
         counts = np.isfinite(looks[0].error)
         found.append(Strip(name, why, faded(views[name].image, counts), looks))
@@ -132,14 +139,15 @@ def drawn(found: list[Strip], rounds: list[Round], key: str):
     columns = 1 + len(rounds)
     side = WIDE / columns
     tall = [side * strip.photo.shape[0] / strip.photo.shape[1] for strip in found for _ in range(2)]
-    figure = figures.blank(WIDE, sum(tall) + HEAD + LABEL * len(found) + FOOT + KEY)
+    foot = FOOT + NOTE * any(one.note for one in rounds)
+    figure = figures.blank(WIDE, sum(tall) + HEAD + LABEL * len(found) + foot + KEY)
     figure.get_layout_engine().set(w_pad=0.02, h_pad=0.02, hspace=0.0, wspace=0.0)
-    grid = figure.subplots(len(tall) + 2, columns, squeeze=False, height_ratios=[HEAD, *tall, FOOT])
+    grid = figure.subplots(len(tall) + 2, columns, squeeze=False, height_ratios=[HEAD, *tall, foot])
     colours = {"norm": Normalize(0, highest(found)), "cmap": colormaps[MAP].with_extremes(bad=str(GREY))}
     for axes in grid.flat:
         axes.set(xticks=[], yticks=[])
         axes.spines[:].set_visible(False)
-    for axes, title in zip(grid[0], ["photo", *(f"round {one.number}" for one in rounds)], strict=True):
+    for axes, title in zip(grid[0], ["photo", *(one.named for one in rounds)], strict=True):
         _say(axes, title, size=12)
     for strip, pictures, maps in zip(found, grid[1:-1:2], grid[2:-1:2], strict=True):
         _strip(strip, pictures, maps, colours, key)
@@ -166,7 +174,7 @@ def _foot(row, rounds: list[Round], key: str) -> None:
     corrected = ",\nPSNR colour-corrected" if key == "psnr_colour_corrected" else ""
     _say(row[0], (f"mean of {count} test views" if count > 1 else "the one test view") + corrected)
     for axes, one in zip(row[1:], rounds, strict=True):
-        _say(axes, f"{one.metrics['photos']} photos\n{_measured(one.metrics, key)}", weight="bold")
+        _say(axes, f"{one.metrics['photos']} photos\n{_measured(one.metrics, key)}{one.note}", weight="bold")
 
 
 def _say(axes, text: str, **how) -> None:

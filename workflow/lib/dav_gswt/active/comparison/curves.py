@@ -28,7 +28,7 @@ def rows(cell: dict) -> list[dict]:
     for t, path in enumerate(cell["metrics"]):
         told = read_json(path)
         row = {key: cell[key] for key in CELL} | {"round": t, "photos": told["photos"]}
-        row |= _measured(told, "psnr_colour_corrected" if cell["corrected"] else "psnr")
+        row |= measured(told, "psnr_colour_corrected" if cell["corrected"] else "psnr")
         row |= _expected(found, fits, told["photos"])
         if t:
             fits.append(told["fit"])
@@ -65,8 +65,9 @@ def _key(row: dict) -> tuple:
     return tuple(row[key] for key in CELL) + (row["round"],)
 
 
-def _measured(told: dict, psnr: str) -> dict:
-    """Over the test views from where photos may be taken, if they are a group of their own, else over all."""
+def measured(told: dict, psnr: str) -> dict:
+    """MEASURES of a metrics.json, PSNR by its key: over the test views from where photos may be taken, if they are a
+    group of their own, else over all."""
     groups = told["groups"]
     mine = next((groups[name] for name in groups if name not in ASIDE), told)
     found = {"psnr": mine[psnr], "ssim": mine["ssim"], "lpips": mine["lpips"]}

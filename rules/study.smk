@@ -1,0 +1,46 @@
+"""The study: all tables and figures of the paper from our own runs, and docs/results.md, which shows them.
+
+In: what the config's `study` names. Out: results/tables/{timing,lod,sensitivity,ablation}.csv, results/sweeps/*.png,
+results/figures/, figures beside what they show; docs/results.md with docs/figures/study_*.png. Not part of `all`:
+`snakemake study` makes it, `snakemake study --report page.html` a page of it.
+"""
+
+
+rule write_results:
+    """The study's tables and figures as a page of docs/."""
+    input:
+        **{name: f"results/tables/{name}.csv" for name in TABLES},
+        figures=lambda wildcards: list(study_figures().values()),
+    output:
+        page="docs/results.md",
+        lod="docs/data/lod.csv",
+        figures=[f"docs/figures/study_{name}.png" for name in study_figures()],
+    log:
+        "<logs>/study/write_results.log",
+    benchmark:
+        "<benchmarks>/study/write_results.tsv"
+    params:
+        shown=lambda wildcards: captions(),
+        source=source_of("tables/results", "tables/paper", "tables/paired"),
+    script:
+        "../scripts/write_results.py"
+
+
+# What `snakemake study` makes: functions that give paths. Other stages add theirs.
+STUDY = [
+    lambda wildcards: [f"results/tables/{name}.csv" for name in TABLES],
+    lambda wildcards: [f"results/sweeps/{name}.png" for name in sweeps_of(config["study"])],
+    lambda wildcards: list(study_figures().values()),
+    lambda wildcards: [rules.write_results.output.page],
+    lambda wildcards: [rules.show_stability.output.page],
+]
+
+
+rule study:
+    """All tables and figures of the paper, from our own runs."""
+    input:
+        *STUDY,
+
+
+localrules:
+    study,

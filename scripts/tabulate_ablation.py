@@ -1,0 +1,14 @@
+"""Rule tabulate_ablation: estimators, policies and ways to cut, each less the baseline of its sweep."""
+
+from dav_gswt import figures
+from dav_gswt.logs import logging_to
+from dav_gswt.sweeps import tables
+from dav_gswt.tables import ablation, spread
+
+with logging_to(snakemake.log[0]):
+    given, params = snakemake.input, snakemake.params
+    viewer = spread.read_viewer(given.get("viewer"))
+    sweeps = [spread.with_viewer(tables.read(path), viewer) for path in given.sweeps]
+    rows = ablation.rows(dict(zip(params.baselines, sweeps, strict=True)), params.baselines)
+    for path in (snakemake.output.table, snakemake.output.kept):
+        figures.write_rows(path, rows)
