@@ -49,7 +49,7 @@ rule run_extreme:
         mem_mb=growing(8000),
         runtime=growing("60m"),
     params:
-        root=workflow.basedir,
+        root=lambda wildcards: workflow.basedir,
         source=source_of(*RUNNING, "stability/extremes", "stability/running"),
     script:
         "../scripts/run_extreme.py"
