@@ -9,8 +9,10 @@ the finest there. `snakemake lod_table` gathers those of the scenes that the con
 rule bundle_tiles:
     """Pack the tiles with their pre-sorted orders."""
     input:
+        unpack(photos_behind),
         seams="<results>/<tiles>/seams.json",
         tiles="<results>/<tiles>/tiles",
+        levels="<results>/<levels>",
         frame="<results>/<photos>/ground.json",
     output:
         manifest="<results>/<bundle>/davgswt.json",
@@ -20,14 +22,15 @@ rule bundle_tiles:
         "<logs>/<bundle>/bundle_tiles.log",
     benchmark:
         "<benchmarks>/<bundle>/bundle_tiles.tsv"
+    threads: 2
     resources:
-        mem_mb=1500,
+        mem_mb=2500,
         runtime="10m",
     params:
         tau=real("tau"),
         seed=integer("seed"),
-        schema=str(Path(workflow.basedir, "workflow/schemas/davgswt.schema.json")),
-        source=source_of("bundle"),
+        schema=BUNDLE_SCHEMA,
+        source=source_of("bundle", "raster"),
     script:
         "../scripts/bundle_tiles.py"
 

@@ -1,6 +1,6 @@
 """Terrain: the tiles laid without end, as a page to walk in, as stills and, where the config asks, as a flight.
 
-In: the bundle and the tiles. Out: page/ (open it with `make view`), walker.png, oblique.png, above.png, flight/.
+In: the bundle. Out: page/ (open it with `make view`), walker.png, oblique.png, above.png, flight/.
 """
 
 
@@ -17,7 +17,7 @@ rule make_page:
     benchmark:
         "<benchmarks>/<terrain>/make_page.tsv"
     params:
-        source=source_of("terrain/page"),
+        source=source_of("terrain/page", "bundle/manifest"),
     script:
         "../scripts/make_page.py"
 
@@ -27,8 +27,7 @@ rule render_terrain:
     input:
         unpack(height_map),
         manifest="<results>/<bundle>/davgswt.json",
-        seams="<results>/<tiles>/seams.json",
-        tiles="<results>/<tiles>/tiles",
+        chunks="<results>/<bundle>/chunks",
     output:
         stills=report(
             expand("<results>/<terrain>/{shot}.png", shot=["walker", "oblique", "above"], allow_missing=True),
@@ -47,7 +46,8 @@ rule render_terrain:
     params:
         size=lookup(dpath="stills", within=config),
         heights=lookup(dpath="heights", within=config),
-        source=source_of("terrain", "bundle/orders", "raster"),
+        schema=BUNDLE_SCHEMA,
+        source=source_of("terrain", "bundle", "raster"),
     script:
         "../scripts/render_terrain.py"
 
@@ -57,8 +57,7 @@ rule render_flight:
     input:
         unpack(height_map),
         manifest="<results>/<bundle>/davgswt.json",
-        seams="<results>/<tiles>/seams.json",
-        tiles="<results>/<tiles>/tiles",
+        chunks="<results>/<bundle>/chunks",
     output:
         frames=directory("<results>/<terrain>/flight"),
     log:
@@ -73,6 +72,7 @@ rule render_flight:
         size=lookup(dpath="stills", within=config),
         heights=lookup(dpath="heights", within=config),
         flight=lookup(dpath="flight", within=config),
-        source=source_of("terrain", "bundle/orders", "raster"),
+        schema=BUNDLE_SCHEMA,
+        source=source_of("terrain", "bundle", "raster"),
     script:
         "../scripts/render_flight.py"

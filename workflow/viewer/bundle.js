@@ -1,7 +1,8 @@
 // The bundle: davgswt.json, checked before anything is drawn, and its chunks, fetched coarse level first.
 
-const FORMAT = "davgswt", VERSION = 1;
-const RECORD = 32; // bytes of a Gaussian
+import { RECORD, indexType, sizeOf, sound } from "./encoding.js";
+
+const FORMAT = "davgswt", VERSION = 2;
 const AT_ONCE = 6; // requests under way
 const AGAIN = "Make the page again with “make run”.";
 
@@ -37,6 +38,7 @@ export function faultOf(m) {
   if (!Number.isInteger(m.salt) || m.salt < 0 || m.salt > 0xffffffff) return broken("salt");
   if (!vector(m.ground_colour)) return broken("ground_colour");
   if (!vector(m.sky?.zenith) || !vector(m.sky?.horizon)) return broken("sky");
+  if (!sound(m.encoding)) return broken("encoding");
   if (!filled(m.directions) || !m.directions.every(vector)) return broken("directions");
   const levels = m.levels;
   if (!filled(levels) || !levels.every((level, l) => level?.level === l && rises(levels, l))) return broken("levels");
@@ -54,10 +56,10 @@ function tileFault(m, tile, t) {
     return `tile ${t} does not have one chunk for each of ${m.levels.length} levels. ${AGAIN}`;
   }
   for (const chunk of tile.chunks) {
-    const sound = natural(chunk.level) && chunk.level < m.levels.length && natural(chunk.count) && filled(chunk.orders)
+    const fits = natural(chunk.level) && chunk.level < m.levels.length && natural(chunk.count) && filled(chunk.orders)
       && chunk.orders.every((d) => natural(d) && d < m.directions.length)
-      && chunk.bytes === chunk.count * (RECORD + 4 * chunk.orders.length) && inside(chunk.file);
-    if (!sound) return `the entry of chunk “${chunk.file}” contradicts itself. ${AGAIN}`;
+      && chunk.bytes === sizeOf(chunk.count, chunk.orders.length) && inside(chunk.file);
+    if (!fits) return `the entry of chunk “${chunk.file}” contradicts itself. ${AGAIN}`;
   }
   return null;
 }
@@ -112,7 +114,7 @@ export async function readChunks(manifest, base, { take, onProgress, signal }) {
 /** A chunk's records and orders: views of its bytes, nothing is copied. */
 function parts(buffer, entry) {
   const records = new Uint32Array(buffer, 0, (entry.count * RECORD) / 4);
-  const orders = new Uint32Array(buffer, entry.count * RECORD);
+  const orders = new (indexType(entry.count))(buffer, entry.count * RECORD);
   return { count: entry.count, directions: entry.orders, records, orders };
 }
 

@@ -25,7 +25,7 @@ if (still) page.pace.budget = BUDGET.still;
 /** Make what draws; again after the graphics context was lost. */
 function raise() {
   page.sky = createSky(page.gl, page.manifest);
-  page.splats = createSplats(page.gl);
+  page.splats = createSplats(page.gl, page.manifest.encoding);
   for (const chunk of page.chunks) page.splats.add(chunk);
   page.preview = { fence: null, start: 0, next: 0, due: false };
 }

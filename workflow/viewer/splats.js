@@ -1,9 +1,10 @@
-// Gaussians on the GPU. A chunk's bytes go up as they are: 32-byte records into an integer texture (two texels a
-// Gaussian), the orders into one buffer; a draw call takes one tile in one order, each instance one Gaussian.
+// Gaussians on the GPU. A chunk's bytes go up as they are: 16-byte records into an integer texture (a texel each), the
+// orders into one buffer; a draw call takes one tile in one order, each instance one Gaussian.
 
+import { DECODED, setEncoding } from "./encoding.js";
 import { program } from "./gl.js";
 
-const TEXELS = 2048; // width of a record texture: 1024 Gaussians a row
+const TEXELS = 2048; // width of a record texture
 
 const VERTEX = `#version 300 es
 precision highp float;
@@ -21,10 +22,9 @@ out vec4 colour;
 
 const vec4 NOWHERE = vec4(2.0, 2.0, 2.0, 1.0);
 
-vec4 bytes(uint word) { return vec4(word & 255u, word >> 8 & 255u, word >> 16 & 255u, word >> 24); }
+${DECODED}
 
-mat3 rotation(vec4 q) { // w x y z
-  q /= max(length(q), 1e-6);
+mat3 rotation(vec4 q) { // w x y z, of length 1
   float w = q.x, x = q.y, y = q.z, z = q.w;
   return mat3(
     1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y),
@@ -36,19 +36,18 @@ void main() {
   gl_Position = NOWHERE;
   at = vec2(0.0);
   colour = vec4(0.0);
-  ivec2 texel = ivec2(int(index & ${TEXELS / 2 - 1}u) * 2, int(index >> ${Math.log2(TEXELS / 2)}u));
-  uvec4 first = texelFetch(records, texel, 0), second = texelFetch(records, texel + ivec2(1, 0), 0);
-  vec3 seen = uintBitsToFloat(first.xyz) + offset;
+  ivec2 texel = ivec2(int(index & ${TEXELS - 1}u), int(index >> ${Math.log2(TEXELS)}u));
+  Gaussian gaussian = decoded(texelFetch(records, texel, 0));
+  vec3 seen = gaussian.position + offset;
   vec3 p = vec3(dot(right, seen), dot(up, seen), dot(ahead, seen));
   if (!(p.z > near)) return;
-  vec4 paint = bytes(second.z) / 255.0;
-  float opacity = paint.a * (1.0 - smoothstep(fade.x, fade.y, length(seen)));
+  float opacity = gaussian.paint.a * (1.0 - smoothstep(fade.x, fade.y, length(seen)));
   if (opacity * 255.0 <= 1.0) return;
 
   // EWA: covariance J R S S^T R^T J^T of the picture, with a pixel's own width of 0.3 added. J is taken at a point
   // inside a somewhat wider picture, or splats at its edges would be drawn out to needles.
-  mat3 axes = rotation((bytes(second.w) - 128.0) / 127.0);
-  vec3 deviation = vec3(uintBitsToFloat(first.w), uintBitsToFloat(second.x), uintBitsToFloat(second.y));
+  mat3 axes = rotation(gaussian.turn);
+  vec3 deviation = gaussian.deviation;
   mat3 turned = mat3(right, up, ahead);
   mat3 shape = transpose(turned) * mat3(axes[0] * deviation.x, axes[1] * deviation.y, axes[2] * deviation.z);
   vec2 slope = clamp(p.xy / p.z, -1.3 * halfSize / focal, 1.3 * halfSize / focal);
@@ -68,7 +67,7 @@ void main() {
   float reach = sqrt(2.0 * log(255.0 * opacity)); // beyond it the Gaussian is fainter than 1/255
   at = (vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0) * reach;
   vec2 pixel = focal * p.xy / p.z + at.x * lengths.x * major + at.y * lengths.y * vec2(-major.y, major.x);
-  colour = vec4(paint.rgb, opacity);
+  colour = vec4(gaussian.paint.rgb, opacity);
   gl_Position = vec4(pixel / halfSize, 0.0, 1.0);
 }`;
 
@@ -83,7 +82,7 @@ void main() {
   painted = vec4(colour.rgb * alpha, alpha);
 }`;
 
-export function createSplats(gl) {
+export function createSplats(gl, encoding) {
   const { use, uniforms } = program(gl, VERTEX, FRAGMENT);
   const stored = new Map(); // "tile/level" -> on the GPU
   const instances = gl.createVertexArray();
@@ -98,12 +97,14 @@ export function createSplats(gl) {
       const orders = gl.createBuffer();
       gl.bindBuffer(gl.ARRAY_BUFFER, orders);
       gl.bufferData(gl.ARRAY_BUFFER, chunk.orders, gl.STATIC_DRAW);
-      stored.set(`${chunk.tile}/${chunk.level}`, { texture: recordTexture(gl, chunk), orders, count: chunk.count });
+      stored.set(`${chunk.tile}/${chunk.level}`, { texture: recordTexture(gl, chunk), orders, count: chunk.count,
+        bytes: chunk.orders.BYTES_PER_ELEMENT });
     },
 
     /** Draw tiles, given back to front, over what the picture already shows. */
     draw(camera, tiles, { near, fade }) {
       use();
+      setEncoding(gl, uniforms, encoding);
       gl.enable(gl.BLEND);
       gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
       for (const axis of ["right", "up", "ahead"]) gl.uniform3fv(uniforms[axis], camera[axis]);
@@ -117,7 +118,8 @@ export function createSplats(gl) {
         if (!chunk?.count) continue;
         gl.bindTexture(gl.TEXTURE_2D, chunk.texture);
         gl.bindBuffer(gl.ARRAY_BUFFER, chunk.orders);
-        gl.vertexAttribIPointer(0, 1, gl.UNSIGNED_INT, 4, 4 * chunk.count * order);
+        const type = chunk.bytes === 2 ? gl.UNSIGNED_SHORT : gl.UNSIGNED_INT;
+        gl.vertexAttribIPointer(0, 1, type, chunk.bytes, chunk.bytes * chunk.count * order);
         gl.uniform3fv(uniforms.offset, offset);
         gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, chunk.count);
       }
@@ -126,15 +128,15 @@ export function createSplats(gl) {
   };
 }
 
-/** The records of a chunk as they are, two texels of four 32-bit words a Gaussian. */
+/** The records of a chunk as they are, a texel of four 32-bit words a Gaussian. */
 function recordTexture(gl, { records, count }) {
-  const perRow = TEXELS / 2, rows = Math.floor(count / perRow), rest = count % perRow;
+  const rows = Math.floor(count / TEXELS), rest = count % TEXELS;
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, texture);
   gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32UI, TEXELS, Math.max(1, rows + (rest > 0)));
   for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, side, gl.NEAREST);
   const [format, type] = [gl.RGBA_INTEGER, gl.UNSIGNED_INT];
   if (rows) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, TEXELS, rows, format, type, records);
-  if (rest) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, rows, rest * 2, 1, format, type, records, rows * TEXELS * 4);
+  if (rest) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, rows, rest, 1, format, type, records, rows * TEXELS * 4);
   return texture;
 }

@@ -28,7 +28,7 @@ def bundle(tmp_path):
     return folder
 
 
-def rewrite(folder, chunk, version=1):
+def rewrite(folder, chunk, version=2):
     manifest = {"format": "davgswt", "version": version, "tiles": [{"tile": 0, "chunks": [chunk]}]}
     (folder / "davgswt.json").write_text(json.dumps(manifest))
 
@@ -94,8 +94,8 @@ def test_an_unsound_chunk_is_refused_by_name(tmp_path, viewer, bundle, chunk, me
 
 
 def test_another_version_is_refused(tmp_path, viewer, bundle):
-    rewrite(bundle, {"file": "chunks/a.bin", "bytes": 4}, version=2)
-    with pytest.raises(InputError, match=r"davgswt\.json: not a bundle of format 'davgswt', version 1"):
+    rewrite(bundle, {"file": "chunks/a.bin", "bytes": 4}, version=1)
+    with pytest.raises(InputError, match=r"davgswt\.json: not a bundle of format 'davgswt', version 2"):
         write_page(bundle, viewer, tmp_path / "page")
 
 

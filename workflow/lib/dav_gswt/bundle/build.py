@@ -1,12 +1,15 @@
 """A bundle from a tile set: chunks, zip and manifest, which appear together or not at all."""
 
 import shutil
-from dataclasses import dataclass, field
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from dav_gswt.bundle import chunks, gswt, lod, manifest, orders
+from dav_gswt.bundle import chunks, gswt, ladder, lod, manifest, orders, sights
+from dav_gswt.bundle.encoding import Encoding, Errors
+from dav_gswt.bundle.ladder import Measured
 from dav_gswt.errors import InputError
 from dav_gswt.field import Field
 from dav_gswt.files import write_json
@@ -20,7 +23,8 @@ class Options:
 
     unit: of lengths, for people. level_pixels: mean standard deviation of a level in pixels where it takes over from
     its finer neighbour. band: half the width of that fade, as a share of the distance. floor_pixels: width of a finest
-    disc in the nearest ground that the lowest eye sees. sky: sRGB colours behind everything.
+    disc in the nearest ground that the lowest eye sees. decibels: PSNR from which drawing in a neighbour's order is not
+    seen. threads: that sort tiles; they change no byte. sky: sRGB colours behind everything.
     """
 
     tau: float
@@ -29,6 +33,8 @@ class Options:
     level_pixels: float = 1.0
     band: float = 0.1
     floor_pixels: float = 12.0
+    decibels: float = 40.0
+    threads: int = 1
     sky: dict = field(default_factory=lambda: {"zenith": [0.36, 0.55, 0.8], "horizon": [0.78, 0.84, 0.88]})
 
 
@@ -46,18 +52,25 @@ def write_bundle(tiles: TileSet, out_dir: Path | str, options: Options, schema: 
     try:
         table = lod.level_table([lod.mean_scale(level) for level in tiles.fields], options.level_pixels, options.band)
         gswt.write(tiles.fields, tiles.side, part / "gswt.zip")
+        pixel = tiles.spacing / options.floor_pixels
+        encoding = Encoding.of([f for level in tiles.fields for f in level], tiles.side, pixel)
+        climbed = ladder.climbed(tiles.fields[0], tiles.side, options.decibels)
+        listed, errors = _tiles(tiles, encoding, climbed.rings, options, part)
         value = {
-            "format": "davgswt",
-            "version": 1,
+            "format": manifest.FORMAT,
+            "version": manifest.VERSION,
             "unit": options.unit,
             "tile_side": tiles.side,
             "salt": options.salt,
             "eye_floor": lod.eye_floor(tiles.spacing, options.floor_pixels),
             "ground_colour": _mean_colour(tiles.fields[-1]),
             "sky": options.sky,
-            "directions": orders.directions().tolist(),
+            "encoding": encoding.json() | {"sh_degree": 0},
+            "error": asdict(errors) | {f"{k}_db": v for k, v in _picture(tiles, encoding, pixel).items()},
+            "directions": climbed.rings.directions().tolist(),
+            "orders": _told(climbed, options),
             "levels": table,
-            "tiles": [_tile(tiles, t, options.tau, part) for t in progress(range(len(tiles.labels)), "sort tiles")],
+            "tiles": listed,
             "provenance": provenance,
         }
         manifest.check(value, schema)
@@ -68,16 +81,48 @@ def write_bundle(tiles: TileSet, out_dir: Path | str, options: Options, schema: 
     return value
 
 
-def _tile(tiles: TileSet, tile: int, tau: float, part: Path) -> dict:
-    doubt = float(np.clip(tiles.uncertainty[tile], 0, 1))
-    kept = orders.kept(doubt, tau)
-    found = []
-    for level, fields in enumerate(tiles.fields):
-        name = f"chunks/lod{level}_tile_{tile:02d}.bin"
-        found.append({"level": level, "file": name} | chunks.write(fields[tile], kept, part / name))
-    reach = [heights_of(fields[tile]) for fields in tiles.fields]
-    low, high = min(r[0] for r in reach), max(r[1] for r in reach)
-    return {"tile": tile, "uncertainty": doubt, "z": [low, high], "chunks": found}
+def _tiles(
+    tiles: TileSet, encoding: Encoding, rings: orders.Rings, options: Options, part: Path
+) -> tuple[list[dict], Errors]:
+    """The manifest's tiles, whose chunks are written, and by how much their Gaussians are wrong at most."""
+    along, doubts = rings.directions(), np.clip(tiles.uncertainty, 0, 1).tolist()
+    kept = [rings.kept(doubt, options.tau) for doubt in doubts]
+    errors, pixel = Errors(), tiles.spacing / options.floor_pixels
+
+    def chunk(tile: int, level: int) -> tuple[dict, Errors]:
+        source, name = tiles.fields[level][tile], f"chunks/lod{level}_tile_{tile:02d}.bin"
+        rows, order = encoding.encoded(source), orders.presorted(source.means, along[kept[tile]])
+        entry = {"level": level, "file": name} | chunks.write(rows, order, part / name) | {"orders": kept[tile]}
+        return entry, Errors.of(encoding, source, rows, pixel)
+
+    listed = []
+    with ThreadPoolExecutor(options.threads) as pool:
+        for tile in progress(range(len(doubts)), "sort tiles"):
+            found = list(pool.map(lambda level: chunk(tile, level), range(len(tiles.fields))))  # noqa: B023
+            reach = [heights_of(fields[tile]) for fields in tiles.fields]
+            heights = [min(low for low, _ in reach), max(high for _, high in reach)]
+            listed.append({"tile": tile, "uncertainty": doubts[tile], "z": heights, "chunks": [e for e, _ in found]})
+            for _, more in found:
+                errors = errors.joined(more)
+    return listed, errors
+
+
+def _picture(tiles: TileSet, encoding: Encoding, pixel: float) -> dict[str, float | None]:
+    """By elevation, the PSNR of rounded tiles against tiles, both as near as the lowest eye sees them."""
+    found = {}
+    for view, down in sights.ELEVATIONS.items():
+        pairs = []
+        for sight in sights.spread(len(tiles.labels), down):
+            source = tiles.fields[0][sight.tile]
+            pair = (encoding.decoded(encoding.encoded(source)), source)
+            pairs.append(tuple(sights.drawn(f, tiles.side, sight.direction, pixel) for f in pair))
+        found[view] = sights.decibels(pairs)
+    return found
+
+
+def _told(climbed: Measured, options: Options) -> dict:
+    rings = {"elevations": list(climbed.rings.elevations), "azimuths": climbed.rings.azimuths, "tau": options.tau}
+    return rings | {"wanted_db": options.decibels} | {f"{view}_db": v for view, v in climbed.decibels.items()}
 
 
 def heights_of(field: Field) -> tuple[float, float]:

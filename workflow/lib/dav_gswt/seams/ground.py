@@ -74,7 +74,7 @@ def source_of(levels: list[Field], exemplar: Exemplar, colour: Float[Array, "m m
 def laid(tiles: build.TileSet, source: Source, salt: int, tau: float) -> Laid:
     """The tile set as the bundle of this tau lays it, on level ground."""
     described = _manifest(tiles, salt, tau)
-    terrain = replace(assemble.of_tiles(tiles, described, {"kind": "flat"}), reach=REACH)
+    terrain = replace(assemble.of_fields(tiles.fields, described, {"kind": "flat"}), reach=REACH)
     plan = Layout.of(tiles.seams["layout"])
     first = -(WINDOW // 2)
     numbers = tiles_in(first, first, (WINDOW, WINDOW), salt, tiles.variants)
@@ -111,18 +111,19 @@ def _cell_means(field: Field, cells: Exemplar) -> Float[Array, "m m 4"]:
 
 
 def _manifest(tiles: build.TileSet, salt: int, tau: float) -> dict:
-    """What `assemble.of_tiles` reads of a bundle's manifest."""
+    """What `assemble.of_fields` reads of a bundle's manifest."""
     options = Bundled(tau=tau, salt=salt)
     scales = [lod.mean_scale(level) for level in tiles.fields]
     listed = []
     for number, doubt in enumerate(np.clip(tiles.uncertainty, 0, 1)):
         reach = [heights_of(fields[number]) for fields in tiles.fields]
         z = [min(low for low, _ in reach), max(high for _, high in reach)]
-        listed.append({"z": z, "chunks": [{"orders": orders.kept(float(doubt), tau)}]})
+        listed.append({"z": z, "chunks": [{"orders": orders.Rings().kept(float(doubt), tau)}]})
     return {
         "levels": lod.level_table(scales, options.level_pixels, options.band),
         "tiles": listed,
-        "directions": orders.directions().tolist(),
+        "directions": orders.Rings().directions().tolist(),
+        "tile_side": tiles.side,
         "salt": salt,
         "eye_floor": lod.eye_floor(tiles.spacing, options.floor_pixels),
         "ground_colour": np.concatenate([f.base_colours for f in tiles.fields[-1]]).astype(float).mean(0).tolist(),

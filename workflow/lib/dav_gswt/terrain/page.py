@@ -4,11 +4,10 @@ import os
 import shutil
 from pathlib import Path, PurePosixPath
 
+from dav_gswt.bundle.manifest import FORMAT, VERSION
+from dav_gswt.bundle.manifest import NAME as MANIFEST
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json, whole_folder
-
-MANIFEST = "davgswt.json"
-FORMAT, VERSION = "davgswt", 1
 
 
 def write_page(bundle_dir: Path | str, viewer_dir: Path | str, out_dir: Path | str) -> None:
