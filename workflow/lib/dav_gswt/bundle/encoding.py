@@ -10,12 +10,15 @@ import numpy as np
 from jaxtyping import Float, Float64, Int
 from numpy import ndarray as Array
 from scipy.spatial.transform import Rotation
+from scipy.special import expit
 
+from dav_gswt.errors import InputError
 from dav_gswt.field import Field, sh_of
 
 RECORD = np.dtype([("position", "<u2", 3), ("scale", "u1", 3), ("turn", "u1", 3), ("rgba", "u1", 4)])
 assert RECORD.itemsize == 16
 PLACES = 65535  # steps of the grid along an axis
+LEAST = 1024  # of them a tile's side is wide
 SIZES = 255  # steps of a logarithm of a standard deviation
 STEEPEST = np.sin(np.pi / 8)  # of the smallest of the 24 turns, the largest component beside w
 TURNS = 127  # steps of it either way
@@ -38,20 +41,24 @@ class Encoding:
 
     @classmethod
     def of(cls, parts: list[Field], side: float, pixel: float) -> "Encoding":
-        """The finest grid that holds all these Gaussians; pixel: the width of one on the nearest ground in sight."""
+        """The finest grid that holds all these Gaussians; pixel: the width of one on the nearest ground in sight.
+
+        Raises: InputError: they spread over so many tile sides that a side has less than LEAST steps.
+        """
         places = [f.means.astype(float) for f in parts if len(f)]
-        low = np.minimum(np.min([p.min(0) for p in places], 0), [0, 0, np.inf])
-        high = np.maximum(np.max([p.max(0) for p in places], 0), [side, side, -np.inf])
-        outside = int((low[:2] < 0).any()) + int((high[:2] > side).any())  # each end is rounded outwards
-        many = np.floor((PLACES - outside) * side / (high - low)[:2].max())
-        step, below = side / many, np.ceil(-low[:2].min() / (side / many))
+        low, high = np.min([p.min(0) for p in places], 0), np.max([p.max(0) for p in places], 0)
+        west, east = min(0.0, float(low[:2].min())), max(side, float(high[:2].max()))
+        many = np.floor((PLACES - (west < 0)) * side / (east - west))  # one more where the rim is rounded outwards
+        if many < LEAST:
+            raise InputError(f"tiles: a splat lies {(east - west) / side:.0f} tile sides from another; cut them again")
+        step = float(side / many)
+        west = -float(np.ceil(-west / step)) * step if west < 0 else 0.0
         rise = float(high[2] - low[2]) / PLACES
         sizes = np.concatenate([f.log_scales.ravel() for f in parts]).astype(float)
         sizes = np.clip(sizes, np.log(SLIGHTEST * pixel), np.log(WIDEST * side))
         least = float(sizes.min())
-        west = float(0.0 - below * step)
         ladder = [least, float(sizes.max() - least) / SIZES]
-        return cls([west, west, float(low[2])], [float(step), float(step), rise], ladder)
+        return cls([west, west, float(low[2])], [step, step, rise], ladder)
 
     def encoded(self, field: Field) -> Array:
         """The records of a field; what lies outside of the grid goes to its rim."""
@@ -63,7 +70,7 @@ class Encoding:
         sizes = np.take_along_axis(field.log_scales.astype(float), axes, 1)
         rows["scale"] = np.clip(np.rint((sizes - self.log_scale[0]) / (self.log_scale[1] or 1)), 0, SIZES)
         rows["turn"] = TURNS + np.clip(np.rint(turn[:, 1:] * (TURNS / STEEPEST)), -TURNS, TURNS)
-        opacity = 1 / (1 + np.exp(-field.opacity_logits.astype(float)))
+        opacity = expit(field.opacity_logits.astype(float))
         rgba = np.concatenate([field.base_colours.astype(float), opacity[:, None]], 1)
         rows["rgba"] = np.rint(255 * np.clip(rgba, 0, 1))
         return rows
@@ -145,7 +152,7 @@ class Errors:
         inside = (sizes >= low - 1e-6) & (sizes <= high + 1e-6)
         grown = np.abs(back.log_scales - sizes)[inside]
         half = np.linalg.norm(_product(turn * [1, -1, -1, -1], back.quats.astype(float))[:, 1:], axis=1)
-        opacity = 1 / (1 + np.exp(-field.opacity_logits.astype(float)))
+        opacity = expit(field.opacity_logits.astype(float))
         return cls(
             position=away,
             position_pixels=away / pixel,
