@@ -7,7 +7,7 @@ by depth, draws any order if each Gaussian is moved to the depth of its place in
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.bundle import lod, orders
@@ -50,14 +50,25 @@ def drawn(
 ) -> Float32[Array, "h w 3"]:
     """The middle of a tile seen along a direction, in the order of another one, pixels `pixel` wide; black behind."""
     middle = np.array([side / 2, side / 2, np.median(field.means[:, 2])])
+    camera = _camera(along, pixel)
+    field = field[_shown(field, middle, camera)]
     means = field.means.astype(float) - middle
     place = np.empty(len(field))
     place[orders.back_to_front(field.means, along if order is None else order)] = np.arange(len(field), 0, -1)
-    depth = side * (1 + place / len(field))
+    depth = side * (1 + place / max(len(field), 1))
     means += (depth - means @ along)[:, None] * along
-    camera = _camera(along, pixel)
     moved = replace(field, means=means.astype(np.float32))
     return Rasterizer(near=1e-6).forward(**arrays(moved), camera=camera).colour
+
+
+def _shown(field: Field, middle: Float[Array, "3"], camera: Camera) -> Bool[Array, "n"]:
+    """Which Gaussians reach into the picture, four deviations about their centres."""
+    x, y, z = (field.means - middle.astype(np.float32)).T
+    a, b, c = field.log_scales.T
+    reach, shown = 4 * np.exp(np.maximum(np.maximum(a, b), c)), np.ones(len(field), bool)
+    for axis, half in zip(camera.rotation.astype(np.float32), (WIDTH, HEIGHT), strict=False):
+        shown &= np.abs(x * axis[0] + y * axis[1] + z * axis[2]) - reach < 0.5 * half / np.float32(camera.fx)
+    return shown
 
 
 def decibels(pairs: list[tuple[Float32[Array, "h w 3"], Float32[Array, "h w 3"]]]) -> float | None:
