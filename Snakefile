@@ -50,6 +50,7 @@ wildcard_constraints:
     completed=COMPLETED,
     seam=NAME,
     tau=FRACTION,
+    kind="spz|sog",
 
 
 rule all:

@@ -1,8 +1,8 @@
 """How long the pre-sorting of a tile set takes, and what pre-sorted orders do to a walker's picture.
 
-A made-up set of 16 tiles at 6 levels, about 1.5 million Gaussians: a rough ground of discs with stones on it. Pre-sorting
-is what a bundle does: the search for the directions, and every order of every tile at every level. The walker's picture is
-drawn as the page draws it, from the bundle's rounded Gaussians, against all of these sorted exactly.
+A made-up set of 16 tiles at 6 levels, 1.5 million Gaussians: a rough ground of discs with stones on it. Pre-sorting is
+what a bundle does: the search for the directions, and every order of every tile at every level. The walker's picture
+is drawn as the page draws it, from the bundle's rounded Gaussians, against all of these sorted exactly.
 """
 
 import sys
@@ -37,7 +37,8 @@ def presorting(tiles: TileSet, threads: int) -> tuple[float, float, int]:
     rings = ladder.climbed(tiles.fields[0], tiles.side, build.Options.decibels).rings
     searched = time.perf_counter() - start
     along = rings.directions()
-    jobs = [(f.means, along[rings.kept(u, 0.5)]) for row in tiles.fields for f, u in zip(row, tiles.uncertainty)]
+    kept = [along[rings.kept(doubt, 0.5)] for doubt in tiles.uncertainty]
+    jobs = [(f.means, kept[tile]) for row in tiles.fields for tile, f in enumerate(row)]
     start = time.perf_counter()
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(lambda job: orders.presorted(*job), jobs))
@@ -61,7 +62,9 @@ def main() -> int:
     count = sum(len(f) for row in tiles.fields for f in row)
     found = [presorting(tiles, threads=2) for _ in range(3)]
     searched, sorting, directions = min(found)
-    print(f"{count:,} Gaussians, {directions} directions: found in {searched:.2f} s, sorted in {sorting:.2f} s, 2 threads")
+    print(
+        f"{count:,} Gaussians, {directions} directions: found in {searched:.2f} s, sorted in {sorting:.2f} s, 2 threads"
+    )
     tell({"presort_seconds": searched + sorting, "terrain_presort_psnr": walker(tile_set(CELLS // 2, 4))}, TARGETS)
     return 0
 

@@ -3,13 +3,13 @@
 from itertools import product
 
 
-def levels_measured():
-    """The tables of levels that are gathered: the path of each one's lod.csv, and what tells it from the others."""
+def measured_of_tiles(made):
+    """The tables of levels or orders that are gathered: the path of each one's, and what tells it from the others."""
     found = {}
     for scene in config["lod"]["scenes"]:
         for seed in config["seeds"]:
             values = values_of(scene) | {"seed": seed}
-            (path,) = expand(rules.measure_levels.output.table, **values)
+            (path,) = expand(made.output.table, **values)
             found[path] = {key: values[key] for key in ("scene", "seed", "quality", "seam")}
     return found
 

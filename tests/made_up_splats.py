@@ -6,7 +6,7 @@ from dav_gswt.field import Field, sh_of
 
 
 def rough_ground(tile: int, cells: int, side: float, stones: float = 0.3) -> Field:
-    """cells x cells discs that rise and fall by a tenth of their spacing, and a stone on some; any tile by its number."""
+    """cells x cells discs that rise and fall by a tenth of their spacing, and a stone on some; its own by tile."""
     rng = np.random.default_rng([tile, cells])
     spacing = side / cells
     x, y = (v.ravel() for v in np.meshgrid(*[(np.arange(cells) + 0.5) * spacing] * 2))

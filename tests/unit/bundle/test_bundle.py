@@ -124,6 +124,63 @@ def test_the_zip_holds_what_the_public_renderer_reads(bundle, tiles):
     assert (values[:, 9:54] == 0).all() and (values[:, 3:6] == 0).all()
 
 
+def test_the_zip_reads_back_as_the_tiles(bundle, tiles):
+    fields = gswt.read(bundle[0] / "gswt.zip", SIDE)
+    assert [len(level) for level in fields] == [16, 16]
+    for mine, source in zip(fields[1], tiles.fields[1], strict=True):
+        np.testing.assert_allclose(mine.means, source.means, atol=1e-6)
+        np.testing.assert_allclose(mine.log_scales, source.log_scales, atol=1e-6)
+        np.testing.assert_allclose(mine.sh[:, 0], source.sh[:, 0], atol=1e-6)
+        np.testing.assert_allclose(mine.opacity_logits, source.opacity_logits)
+
+
+def rezipped(path, change):
+    """The archive with other entries: a list of (name, bytes), changed."""
+    with zipfile.ZipFile(path) as archive:
+        entries = [(name, archive.read(name)) for name in archive.namelist()]
+    change(entries)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in entries:
+            archive.writestr(name, data)
+
+
+def first(change):
+    return lambda entries: entries.__setitem__(0, (entries[0][0], change(entries[0][1])))
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        pytest.param(first(lambda d: d[:-4]), "lod0_tile_00.ply: 60 splats in", id="cut short"),
+        pytest.param(first(lambda d: d + bytes(10**6)), "lod0_tile_00.ply: 60 splats in", id="longer than it says"),
+        pytest.param(
+            first(lambda d: d.replace(b"vertex 60", b"vertex 99999999")), "99999999 splats in", id="a huge count"
+        ),
+        pytest.param(first(lambda d: b"ply\n" + bytes(2000)), "not a tile of the GSWT renderer", id="no such PLY"),
+        pytest.param(first(lambda d: d[:-4] + b"\xff\xff\xff\x7f"), "a value is not finite", id="not finite"),
+        pytest.param(lambda entries: entries.pop(), "not a whole set", id="a tile is missing"),
+        pytest.param(lambda entries: entries.append(("up/../lod0_tile_00.ply", entries[0][1])), "twice", id="twice"),
+        pytest.param(lambda entries: entries.clear(), "not a whole set", id="empty"),
+    ],
+)
+def test_an_archive_that_is_no_tile_set_is_refused(copy_of, change, message):
+    rezipped(copy_of / "gswt.zip", change)
+    with pytest.raises(InputError, match=message):
+        gswt.read(copy_of / "gswt.zip", SIDE)
+
+
+def test_a_damaged_archive_is_refused_by_name(copy_of):
+    path = copy_of / "gswt.zip"
+    path.write_bytes(path.read_bytes()[:-50])
+    with pytest.raises(InputError, match=r"gswt\.zip: not readable"):
+        gswt.read(path, SIDE)
+
+
+def test_entries_with_other_names_are_skipped(copy_of):
+    rezipped(copy_of / "gswt.zip", lambda entries: entries.append(("notes.txt", b"x")))
+    assert len(gswt.read(copy_of / "gswt.zip", SIDE)) == 2
+
+
 def test_a_tile_without_splats_is_refused_and_nothing_is_left(tiles, tmp_path):
     fields = [list(level) for level in tiles.fields]
     fields[0][3] = fields[0][3][:0]

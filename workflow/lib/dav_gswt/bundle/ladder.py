@@ -6,14 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from dav_gswt.bundle import sights
+from dav_gswt.bundle.chunks import size_of
 from dav_gswt.bundle.orders import Rings
 from dav_gswt.bundle.sights import Sight
 from dav_gswt.field import Field
+from dav_gswt.logs import progress
+from dav_gswt.tiles.build import TileSet
 
 _log = logging.getLogger(__name__)
 
 MOST = 33  # orders of a tile that is not deep: with its record, 82 bytes a Gaussian
 FEWEST = 4  # azimuths
+AZIMUTHS = (4, 8, 16, 32, 64)  # of the table
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,30 @@ def climbed(fields: list[Field], side: float, wanted: float, most: int = MOST) -
 def by_elevation(fields: list[Field], side: float, elevations: tuple[float, ...], kept: int) -> dict[str, float | None]:
     """The PSNR half-way between azimuths, at the elevations looked at."""
     return {view: in_between(fields, side, elevations, kept, down) for view, down in sights.ELEVATIONS.items()}
+
+
+def rows(tiles: TileSet, wanted: float) -> list[dict]:
+    """One row a tile and number of azimuths, at the elevations that the set needs: what more orders are worth.
+
+    `doubtful`: of the half of the tiles that are most in doubt. `orders`, `bytes` a Gaussian with its record.
+    `{view}_db`: PSNR half-way between azimuths against the exact order; None: no difference.
+    """
+    elevations = climbed(tiles.fields[0], tiles.side, wanted).rings.elevations
+    doubt, found = np.argsort(np.argsort(-tiles.uncertainty, kind="stable")), []
+    for tile, field in enumerate(progress(tiles.fields[0], "measure orders")):
+        for azimuths in AZIMUTHS:
+            count = len(elevations) * azimuths + 1
+            told = {
+                "tile": tile,
+                "uncertainty": float(tiles.uncertainty[tile]),
+                "doubtful": int(doubt[tile] < len(doubt) // 2),
+                "azimuths": azimuths,
+                "orders": count,
+                "bytes": size_of(len(field), count) / len(field),
+            }
+            errors = by_elevation([field], tiles.side, elevations, azimuths)
+            found.append(told | {f"{view}_db": value for view, value in errors.items()})
+    return found
 
 
 def in_between(
