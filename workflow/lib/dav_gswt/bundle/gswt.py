@@ -110,8 +110,10 @@ def _field(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, side: float, room: 
         n, width = int(count[1]), 4 * len(PROPERTIES)
         if not 0 < n <= room or entry.file_size != len(header) + n * width:
             raise InputError(f"{name}: {n} splats in {entry.file_size} bytes; make the bundle again")
-        data = head[len(header) :] + file.read(n * width)
-    values = np.frombuffer(data[: n * width], "<f4").reshape(n, len(PROPERTIES)).astype(np.float32)
+        data = (head[len(header) :] + file.read(n * width))[: n * width]
+    if len(data) != n * width:
+        raise InputError(f"{name}: cut short; make the bundle again")
+    values = np.frombuffer(data, "<f4").reshape(n, len(PROPERTIES)).astype(np.float32)
     if not np.isfinite(values).all():
         raise InputError(f"{name}: a value is not finite; make the bundle again")
     scale = WIDTH / side
