@@ -3,6 +3,7 @@
 import shutil
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -89,21 +90,24 @@ def _tiles(
     kept = [rings.kept(doubt, options.tau) for doubt in doubts]
     errors, pixel = Errors(), tiles.spacing / options.floor_pixels
 
-    def chunk(tile: int, level: int) -> tuple[dict, Errors]:
+    def chunk(place: tuple[int, int]) -> tuple[dict, Errors]:
+        tile, level = place
         source, name = tiles.fields[level][tile], f"chunks/lod{level}_tile_{tile:02d}.bin"
         rows, order = encoding.encoded(source), orders.presorted(source.means, along[kept[tile]])
         entry = {"level": level, "file": name} | chunks.write(rows, order, part / name) | {"orders": kept[tile]}
         return entry, Errors.of(encoding, source, rows, pixel)
 
+    places = list(product(range(len(doubts)), range(len(tiles.fields))))
     listed = []
+    for tile, doubt in enumerate(doubts):
+        reach = [heights_of(fields[tile]) for fields in tiles.fields]
+        heights = [min(low for low, _ in reach), max(high for _, high in reach)]
+        listed.append({"tile": tile, "uncertainty": doubt, "z": heights, "chunks": []})
     with ThreadPoolExecutor(options.threads) as pool:
-        for tile in progress(range(len(doubts)), "sort tiles"):
-            found = list(pool.map(lambda level: chunk(tile, level), range(len(tiles.fields))))  # noqa: B023
-            reach = [heights_of(fields[tile]) for fields in tiles.fields]
-            heights = [min(low for low, _ in reach), max(high for _, high in reach)]
-            listed.append({"tile": tile, "uncertainty": doubts[tile], "z": heights, "chunks": [e for e, _ in found]})
-            for _, more in found:
-                errors = errors.joined(more)
+        made = zip(progress(places, "sort tiles"), pool.map(chunk, places), strict=True)
+        for (tile, _), (entry, more) in made:
+            listed[tile]["chunks"].append(entry)
+            errors = errors.joined(more)
     return listed, errors
 
 
