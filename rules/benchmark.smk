@@ -2,8 +2,8 @@
 
 In: what the cells of the config's `benchmark` left, each a scene, a seed, a policy and k; a cell is restarted by itself.
 Out: docs/data/{table}_curves.csv, where runs add up, a row a round of a cell; {table}_benchmark.csv, a row a cell, also
-under results/tables; {table}_comparison.csv, every policy less the baseline; {table}_worth.csv, what rounds gained
-against what was expected of them; docs/figures/{table}_budget.png, PSNR against photos.
+under results/tables; {table}_comparison.csv and .md, every policy less the baseline; {table}_worth.csv, what rounds
+gained against what was expected of them; docs/figures/{table}_budget.png, PSNR against photos.
 Not part of `all`: `snakemake view_benchmark` makes them.
 """
 
@@ -35,6 +35,7 @@ rule compare_policies:
         results="results/tables/{table}_benchmark.csv",
         kept="docs/data/{table}_benchmark.csv",
         compared="docs/data/{table}_comparison.csv",
+        text="docs/data/{table}_comparison.md",
         worth="docs/data/{table}_worth.csv",
         plot="docs/figures/{table}_budget.png",
     log:

@@ -26,6 +26,6 @@ rule make_levels:
         quality=entry("qualities", "quality"),
         seed=integer("seed"),
         keep=SNAPSHOTS,
-        source=source_of("levels", "active/maps", "coarse", "fitting", "raster"),
+        source=source_of("levels", "tiles/layout", "active/maps", "coarse", "fitting", "raster"),
     script:
         "../scripts/make_levels.py"

@@ -25,8 +25,7 @@ MEASURING = (
 rule measure_seams:
     """Crops on borders and cuts, beside the same of uncut patches and of tiles cut straight."""
     input:
-        unpack(describing),
-        unpack(lpips_if_fetched),
+        unpack(lambda wildcards: describing(wildcards) | lpips_if_fetched(wildcards)),
         levels="<results>/<levels>",
         seams="<results>/<tiles>/seams.json",
         tiles="<results>/<tiles>/tiles",

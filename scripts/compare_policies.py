@@ -1,7 +1,7 @@
 """Rule compare_policies: from curves to tables and a figure."""
 
 from dav_gswt import figures
-from dav_gswt.active.comparison import curves, plots, tables
+from dav_gswt.active.comparison import curves, markdown, plots, tables
 from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):
@@ -12,5 +12,6 @@ with logging_to(snakemake.log[0]):
     for path in (out.results, out.kept):
         figures.write_rows(path, results)
     figures.write_rows(out.compared, compared)
+    markdown.write(out.text, compared, baseline)
     figures.write_rows(out.worth, tables.worth(rounds))
     plots.write(out.plot, rounds, compared, baseline)

@@ -44,7 +44,7 @@ def test_levels_are_fitted_while_the_exemplar_has_room():
     widths = [g.cells for g in made_levels.grids]
     assert widths == [grid.cells >> number for number in range(len(widths))] and len(widths) > 1
     assert widths[-1] < 2 * build.ROOM and made_levels.wanted == build.AUTO
-    scales = [build.mean_scale(f) for f in made_levels.fields]
+    scales = [field_module.mean_scale([f]) for f in made_levels.fields]
     assert scales == sorted(scales) and "tiles make it" in made_levels.stopped
     two = build.fitted(field, grid, 2, 3, seed=0)
     assert len(two.fields) == 2 and two.wanted == 2

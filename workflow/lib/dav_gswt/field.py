@@ -56,6 +56,11 @@ def joined(parts: list[Field]) -> Field:
     return Field(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Field)))
 
 
+def mean_scale(fields: list[Field]) -> float:
+    """Mean standard deviation over all axes of all splats: how the GSWT renderer measures a level."""
+    return float(np.mean(np.concatenate([np.exp(f.log_scales.astype(float)).mean(1) for f in fields])))
+
+
 def sh_of(colours: Float[Array, "n 3"]) -> Float32[Array, "n 1 3"]:
     """Degree-0 coefficients of a colour that is the same from all sides."""
     return ((colours - 0.5) / SH0).astype(np.float32)[:, None]

@@ -12,7 +12,7 @@ from dav_gswt.bundle import chunks, gswt, ladder, lod, manifest, orders, sights
 from dav_gswt.bundle.encoding import Encoding, Errors
 from dav_gswt.bundle.ladder import Measured
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field
+from dav_gswt.field import Field, mean_scale
 from dav_gswt.files import write_json
 from dav_gswt.logs import progress
 from dav_gswt.tiles.build import TileSet
@@ -51,7 +51,7 @@ def write_bundle(tiles: TileSet, out_dir: Path | str, options: Options, schema: 
     shutil.rmtree(part, ignore_errors=True)
     (part / "chunks").mkdir(parents=True)
     try:
-        table = lod.level_table([lod.mean_scale(level) for level in tiles.fields], options.level_pixels, options.band)
+        table = lod.level_table([mean_scale(level) for level in tiles.fields], options.level_pixels, options.band)
         gswt.write(tiles.fields, tiles.side, part / "gswt.zip")
         pixel = tiles.spacing / options.floor_pixels
         encoding = Encoding.of([f for level in tiles.fields for f in level], tiles.side, pixel)

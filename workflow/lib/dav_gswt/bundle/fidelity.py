@@ -17,7 +17,7 @@ from dav_gswt import cameras, images
 from dav_gswt.bundle import lod
 from dav_gswt.cameras import Camera
 from dav_gswt.coarse.doubt import arrays
-from dav_gswt.field import Field, joined
+from dav_gswt.field import Field, joined, mean_scale
 from dav_gswt.logs import progress
 from dav_gswt.raster import Rasterizer
 from dav_gswt.tiles.build import TileSet
@@ -37,13 +37,13 @@ def rows(tiles: TileSet, pixels: float, band: float) -> list[dict]:
     equal pictures, and of a tile that no pixel looks at.
     Args: pixels, band: see `bundle.build.Options`.
     """
-    table = lod.level_table([lod.mean_scale(level) for level in tiles.fields], pixels, band)
+    table = lod.level_table([mean_scale(level) for level in tiles.fields], pixels, band)
     found = []
     for level, fields in enumerate(progress(tiles.fields, "measure levels")):
         distance = table[level - 1]["distance"] if level else 0.0
         errors = errors_of(tiles, level, distance) if level else {}
         for tile, field in enumerate(fields):
-            row = {"tile": tile, "level": level, "mean_scale": lod.mean_scale([field]), "count": len(field)}
+            row = {"tile": tile, "level": level, "mean_scale": mean_scale([field]), "count": len(field)}
             told = {
                 f"{view}_{key}": errors.get((tile, view), {}).get(key)
                 for view in ELEVATIONS

@@ -6,16 +6,10 @@ The reference picture is 1920 pixels and 60 degrees wide, its focal length f = 9
 import numpy as np
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field
 
 WIDTH, FOV = 1920, 60.0
 FOCAL = 0.5 * WIDTH / np.tan(np.radians(FOV / 2))  # pixels
 ASPECT = 9 / 16
-
-
-def mean_scale(fields: list[Field]) -> float:
-    """Mean standard deviation over all axes of all splats: how the GSWT renderer measures a level."""
-    return float(np.mean(np.concatenate([np.exp(f.log_scales.astype(float)).mean(1) for f in fields])))
 
 
 def level_table(scales: list[float], pixels: float, band: float) -> list[dict]:

@@ -18,17 +18,16 @@ from dav_gswt.coarse.doubt import arrays
 from dav_gswt.coarse.ground import Ground
 from dav_gswt.coarse.rules import OnGround
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field
+from dav_gswt.field import Field, mean_scale
 from dav_gswt.fitting import trainer
 from dav_gswt.fitting.plan import Plan
 from dav_gswt.levels.merge import cropped, halved
 from dav_gswt.raster import Gradients
+from dav_gswt.tiles.layout import AUTO, MOST
 from dav_gswt.views import View
 
 _log = logging.getLogger(__name__)
 
-AUTO = "auto"
-MOST = 6  # levels, where the config leaves it to the scene
 ROOM = 32  # cells that the exemplar is wide at least at a level that is fitted: coarser ones are made tile by tile
 SAVES = 0.5  # of a level's Gaussians that the next one must do without, or it is not worth having
 ELEVATIONS = (90.0, 50.0, 20.0, 6.0)  # degrees: pictures the coarser level is fitted to, down to a walker's
@@ -78,7 +77,7 @@ def fitted(
         if asked == AUTO and (fault := _useless(finer, level)):
             asked, stopped = number, f"level {number}: {fault}"
             break
-        if not mean_scale(level) > mean_scale(finer):
+        if not mean_scale([level]) > mean_scale([finer]):
             raise InputError(f"levels: the mean scale does not rise from level {number - 1} to {number}; ask for fewer")
         fields.append(level)
         grids.append(coarse)
@@ -88,16 +87,11 @@ def fitted(
 
 def _useless(finer: Field, level: Field) -> str | None:
     """Why a level is not worth having, if it is not."""
-    if not mean_scale(level) > mean_scale(finer):
+    if not mean_scale([level]) > mean_scale([finer]):
         return "its mean scale does not rise"
     if len(level) > SAVES * len(finer):
         return f"it saves too little ({len(finer)} to {len(level)} Gaussians)"
     return None
-
-
-def mean_scale(field: Field) -> float:
-    """Mean standard deviation over all axes of all Gaussians."""
-    return float(np.exp(field.log_scales.astype(float)).mean())
 
 
 def coarser(
@@ -112,7 +106,7 @@ def coarser(
         top += float((stand.means[:, 2] - coarse.height_at(stand.means)).max())
     rules, plan = Still(coarse, np.full(coarse.shape, top)), Plan(steps, len(start))
     level = trainer.fit(start, views, plan, rules, rng, f"fit level of {len(start)} Gaussians", keep).field
-    scales = mean_scale(field), mean_scale(level)
+    scales = mean_scale([field]), mean_scale([level])
     _log.info("mean scale %.4g to %.4g, %d to %d Gaussians", *scales, len(field), len(level))
     return level, coarse
 

@@ -5,8 +5,9 @@ from pathlib import Path
 from dav_gswt import field
 from dav_gswt.coarse import ground
 from dav_gswt.errors import InputError
+from dav_gswt.field import mean_scale
 from dav_gswt.files import read_json, whole_folder, write_json
-from dav_gswt.levels.build import Levels, mean_scale
+from dav_gswt.levels.build import Levels
 
 
 def write(levels: Levels, folder: Path | str, provenance: dict) -> None:
@@ -16,7 +17,7 @@ def write(levels: Levels, folder: Path | str, provenance: dict) -> None:
             field.write(fitted, part / f"level{number}.ply")
             ground.write(grid, part / f"level{number}.exr")
         table = [
-            {"level": number, "spacing": grid.spacing, "gaussians": len(f), "mean_scale": mean_scale(f)}
+            {"level": number, "spacing": grid.spacing, "gaussians": len(f), "mean_scale": mean_scale([f])}
             for number, (f, grid) in enumerate(zip(levels.fields, levels.grids, strict=True))
         ]
         told = {"wanted": levels.wanted, "levels": table, "stopped": levels.stopped, "provenance": provenance}

@@ -14,6 +14,8 @@ from numpy import ndarray as Array
 from dav_gswt.cameras import Camera
 from dav_gswt.raster import backends
 
+RIM = 3.33  # standard deviations at which an opaque Gaussian ends: exp(-RIM^2 / 2) = 1/255
+
 
 @dataclass(frozen=True)
 class Rendering:

@@ -14,9 +14,8 @@ from scipy.ndimage import distance_transform_edt
 
 from dav_gswt.field import Field
 from dav_gswt.levels.merge import covariances
+from dav_gswt.raster.interface import RIM
 from dav_gswt.tiles.layout import CENTRE
-
-RIM = 3.33  # standard deviations at which an opaque Gaussian ends: exp(-RIM^2 / 2) = 1/255
 
 
 @dataclass(frozen=True)

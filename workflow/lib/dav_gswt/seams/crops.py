@@ -8,7 +8,7 @@ from numpy import ndarray as Array
 
 from dav_gswt import cameras
 from dav_gswt.cameras import Camera
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import Field
 from dav_gswt.seams import drawing
 from dav_gswt.seams.ground import Laid
 from dav_gswt.terrain.assemble import Terrain
@@ -132,20 +132,15 @@ def shown(laid: Laid, terrain: Terrain, crop: Crop, patches: list[int], border: 
 
     border: also tell which of the terrain's tiles each pixel shows.
     """
-    box = drawing.reaching(terrain, crop.camera, (crop.box + [[-1], [2]]) * laid.spacing)
-    pieces = drawing.of_terrain(terrain, crop.camera, box)
+    pieces = drawing.of_terrain(terrain, crop.camera, _seen(laid, crop), laid.extents)
 
-    def seen(look=None):
-        return drawing.drawn(terrain, pieces, crop.camera, laid.colour, look)
-
-    codes = seen(lambda field, eye: _painted(field, _patch_at(laid, field, eye)[:, None] == patches))
+    looks = [lambda field, eye: _painted(_patch_at(laid, field, eye)[:, None] == patches)]
+    looks += [lambda field, eye: _painted(_cells_of(field, eye, terrain.side) % 2 == 1)] * border
+    picture, codes, *sides = drawing.drawn(terrain, pieces, crop.camera, laid.colour, looks)
     patch = np.where(codes.max(-1) > SEEN, codes.argmax(-1), -1)
-    tile = np.zeros_like(patch)
-    if border:
-        sides = seen(lambda field, eye: _painted(field, _cells_of(field, eye, terrain.side) % 2 == 1))
-        tile = (sides[..., :2] > 0.5) @ np.array([1, 2])
+    tile = (sides[0][..., :2] > 0.5) @ np.array([1, 2]) if border else np.zeros_like(patch)
     own = [whole(laid, terrain, crop, laid.origins[p], _change(laid, crop, p), pieces) for p in patches]
-    return Shown(crop, seen(), patches, patch, tile, np.stack(own), crop.box - laid.origins[patches][:, None])
+    return Shown(crop, picture, patches, patch, tile, np.stack(own), crop.box - laid.origins[patches][:, None])
 
 
 def whole(
@@ -157,13 +152,17 @@ def whole(
     pieces: list[drawing.Piece] | None = None,
 ) -> Float32[Array, "h w 3"]:
     """The exemplar in the crop's place, with its corner in that cell of the terrain; pieces: the terrain's there."""
-    box = drawing.reaching(terrain, crop.camera, (crop.box + [[-1], [2]]) * laid.spacing)
-    pieces = pieces or drawing.of_terrain(terrain, crop.camera, box)
+    seen = _seen(laid, crop)
+    pieces = pieces or drawing.of_terrain(terrain, crop.camera, seen, laid.extents)
     middle = tuple(v // laid.plan.side for v in crop.at)
     (like,) = [piece for piece in pieces if piece.cell == middle]
     corner = np.array([*(origin * laid.spacing), 0.0])
-    piece = drawing.of_patch(laid.source.levels, corner, like, change, box)
-    return drawing.drawn(terrain, [piece], crop.camera, laid.colour)
+    piece = drawing.of_patch(laid.source.levels, corner, like, change, seen)
+    return drawing.drawn(terrain, [piece], crop.camera, laid.colour)[0]
+
+
+def _seen(laid: Laid, crop: Crop) -> drawing.Seen:
+    return drawing.Seen.of(crop.camera, (crop.box + [[-1], [2]]) * laid.spacing)
 
 
 def _change(laid: Laid, crop: Crop, patch: int) -> Float[Array, "4"]:
@@ -187,7 +186,7 @@ def _patch_at(laid: Laid, field: Field, eye: Float[Array, "3"]) -> Int[Array, "n
     return np.where(inside, laid.patch[row * inside, column * inside], -1)
 
 
-def _painted(field: Field, channels: Array) -> Field:
-    colours = np.zeros((len(field), 3))
+def _painted(channels: Array) -> Float32[Array, "n 3"]:
+    colours = np.zeros((len(channels), 3), np.float32)
     colours[:, : channels.shape[1]] = channels
-    return replace(field, sh=sh_of(colours))
+    return colours

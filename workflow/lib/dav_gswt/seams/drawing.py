@@ -4,24 +4,25 @@ Cells stand back to front, each in its pre-sorted order, those about the eye are
 whole is drawn in the order of the cell that the crop's middle lies in: what orders do to a picture is in both.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.cameras import Camera
 from dav_gswt.field import SH0, Field
+from dav_gswt.raster.interface import RIM
 from dav_gswt.terrain import assemble, splats
-from dav_gswt.terrain.assemble import RIM, Terrain
+from dav_gswt.terrain.assemble import Terrain
 from dav_gswt.terrain.backdrop import Backdrop
 
-SLOPES = 1.5  # how much further than on level ground a ray may go above the surface
+SLOPES = 1.5  # how much more ground than where it is level a thing may hide behind it
 SKY = {"zenith": [0.0, 0.0, 0.0], "horizon": [0.0, 0.0, 0.0]}  # crops see none
 
 Box = Float[Array, "2 2"]  # south-western and north-eastern corner, in world units
-Look = Callable[[Field, Float[Array, "3"]], Field]
+Look = Callable[[Field, Float[Array, "3"]], Float32[Array, "n 3"]]  # colours of Gaussians counted from the eye
 
 
 @dataclass(frozen=True)
@@ -37,60 +38,110 @@ class Piece:
     cell: tuple[int, int]
 
 
-def reaching(terrain: Terrain, camera: Camera, box: Box) -> Box:
-    """The ground whose Gaussians may show over a box: things before it, and what lies lower behind it."""
-    ahead = camera.forward
-    per_height = SLOPES * ahead[:2] / abs(ahead[2])
-    ends = [box + per_height * -max(terrain.z[1], 0.0), box + per_height * max(-terrain.z[0], 0.0), box]
-    return np.stack([np.min(ends, (0, 1)), np.max(ends, (0, 1))])
+@dataclass(frozen=True)
+class Extent:
+    """Of a level: its lowest and highest point, and how far a Gaussian reaches from its centre at most."""
+
+    low: float
+    high: float
+    reach: float
+
+    @classmethod
+    def of(cls, fields: list[Field]) -> "Extent":
+        reach = [RIM * np.exp(field.log_scales.max(1, initial=-np.inf)) for field in fields]
+        low = min((f.means[:, 2] - r).min(initial=np.inf) for f, r in zip(fields, reach, strict=True))
+        high = max((f.means[:, 2] + r).max(initial=-np.inf) for f, r in zip(fields, reach, strict=True))
+        return cls(float(low), float(high), float(max(r.max(initial=0) for r in reach)))
 
 
-def near_box(field: Field, corner: Float[Array, "_"], box: Box) -> Field:
-    """Gaussians of which some part lies over a box."""
-    x, y = field.means[:, 0] + corner[0], field.means[:, 1] + corner[1]
-    reach = RIM * np.exp(field.log_scales.max(1, initial=-np.inf))
-    (west, south), (east, north) = box
-    return field[(x + reach > west) & (x - reach < east) & (y + reach > south) & (y - reach < north)]
+@dataclass(frozen=True)
+class Seen:
+    """The ground that a crop looks at, and how far a ray that hits level ground comes from per unit of height."""
+
+    box: Box
+    per_height: Float[Array, "2"]
+
+    def holds(self, corner: Float[Array, "3"], side: float, extent: "Extent") -> bool:
+        """Whether anything of a cell may show whose Gaussians have this extent."""
+        low, high = self._hidden(np.array([extent.low, extent.high]))
+        first, last = corner[:2] - extent.reach, corner[:2] + side + extent.reach
+        return bool(((last + high > self.box[0]) & (first + low < self.box[1])).all())
+
+    @classmethod
+    def of(cls, camera: Camera, box: Box) -> "Seen":
+        ahead = camera.forward
+        return cls(box, ahead[:2] / abs(ahead[2]))
+
+    def shows(self, field: Field, corner: Float[Array, "3"]) -> Bool[Array, "n"]:
+        """Gaussians, counted from a corner, of which some part may show over the box."""
+        reach = RIM * np.exp(field.log_scales.max(1, initial=-np.inf))[:, None]
+        low, high = self._hidden(field.means[:, 2] + reach.T * [[-1], [1]])
+        places = field.means[:, :2] + corner[:2]
+        return ((places + reach + high > self.box[0]) & (places - reach + low < self.box[1])).all(1)
+
+    def _hidden(self, z: Float[Array, "2 *n"]) -> tuple[Float[Array, "*n 2"], Float[Array, "*n 2"]]:
+        """From where to where, counted from their places, things between two heights may hide the ground.
+
+        One at a height z hides it up to SLOPES times z per_height behind itself: on a slope up it is less, on a slope
+        down more. A patch that is laid higher or lower as a whole takes its ground along.
+        """
+        behind = SLOPES * z[..., None] * self.per_height
+        return np.minimum(behind.min(0), 0), np.maximum(behind.max(0), 0)
 
 
-def of_terrain(terrain: Terrain, camera: Camera, box: Box) -> list[Piece]:
-    """What of the terrain may show over a box, cell by cell from back to front."""
+def of_terrain(terrain: Terrain, camera: Camera, seen: Seen, extents: list[Extent]) -> list[Piece]:
+    """What of the terrain may show, cell by cell from back to front. extents: of its levels."""
     eye, side, found = camera.centre, terrain.side, []
     cells = assemble.visible(terrain, camera)
     active = assemble.active(terrain, cells)
     for k in range(len(cells)):
         i, j, tile = int(cells.i[k]), int(cells.j[k]), int(cells.tile[k])
         corner = np.array([i * side, j * side, 0.0])
-        levels = np.flatnonzero(active[:, k])
-        parts = {int(level): near_box(terrain.tiles[level, tile], corner, box) for level in levels}
+        levels = [int(level) for level in np.flatnonzero(active[:, k])]
+        if not any(seen.holds(corner, side, extents[level]) for level in levels):
+            continue
+        fields = {level: terrain.tiles[level, tile] for level in levels}
+        parts = {level: field[seen.shows(field, corner)] for level, field in fields.items()}
         if any(len(part) for part in parts.values()):
             direction = assemble.along(terrain, i, j, tile, eye)
             found.append(Piece(parts, corner, direction, bool(cells.close[k]), (i, j)))
     return found
 
 
-def of_patch(levels: list[Field], corner: Float[Array, "3"], like: Piece, change: Float[Array, "4"], box: Box) -> Piece:
-    """The exemplar with its corner there, where it may show over a box; colours and heights changed throughout."""
+def of_patch(
+    levels: list[Field], corner: Float[Array, "3"], like: Piece, change: Float[Array, "4"], seen: Seen
+) -> Piece:
+    """The exemplar with its corner there, where it may show; colours and heights changed throughout."""
     parts = {}
     for level in like.parts:
-        part = near_box(levels[min(level, len(levels) - 1)], corner, box)  # coarser ones are the tiles' own
+        field = levels[min(level, len(levels) - 1)]  # coarser ones are the tiles' own
+        part = field[seen.shows(field, corner)]
         sh = part.sh.copy()
         sh[:, 0] += (change[:3] / SH0).astype(np.float32)
         parts[level] = replace(part, sh=sh)
     return replace(like, parts=parts, corner=corner + [0, 0, change[3]])
 
 
-def drawn(terrain: Terrain, pieces: list[Piece], camera: Camera, ground, look: Look | None = None):
-    """The picture of pieces that stand back to front. ground: colour of what lies behind. look: other colours."""
+def drawn(
+    terrain: Terrain, pieces: list[Piece], camera: Camera, ground, looks: Sequence[Look] = ()
+) -> list[Float32[Array, "h w 3"]]:
+    """The picture of pieces that stand back to front, and the same in other colours, over black, for each look.
+
+    ground: colour of what lies behind.
+    """
     eye, here = camera.centre, replace(camera, translation=np.zeros(3))
     behind = Backdrop.of(terrain, eye, SKY, ground)
-    far, close = [splats.NONE], [splats.NONE]
+    found = []  # of each piece: its splats, their colours by every look, whether it is about the eye
     for piece in pieces:
         field, slope = assemble.placed(terrain, piece.parts, piece.corner, piece.direction, eye)
-        field = look(field, eye) if look else behind.over(field)
-        (close if piece.close else far).append(splats.projected(field, slope, here, terrain.near))
-    ordered = splats.joined([*far, splats.sorted_by_depth(splats.joined(close))])
-    seen = splats.blended(ordered, here)
-    if look:
-        return seen.colour
-    return np.clip(seen.colour + (1 - seen.alpha)[..., None] * behind.seen_along(here.rays()[1]), 0, 1)
+        part, which = splats.indexed(behind.over(field), slope, here, terrain.near)
+        found.append((part, [look(field, eye)[which] for look in looks], piece.close))
+    found.sort(key=lambda each: each[2])  # those about the eye come last
+    stand = splats.joined([splats.NONE, *(part for part, _, _ in found)])
+    first = sum(len(part) for part, _, close in found if not close)
+    order = np.concatenate([np.arange(first), first + splats.by_depth(stand[first:])])
+    stand = stand[order]
+    seen = splats.blended(stand, here)
+    picture = np.clip(seen.colour + (1 - seen.alpha)[..., None] * behind.seen_along(here.rays()[1]), 0, 1)
+    painted = (np.concatenate([own[k] for _, own, _ in found])[order] for k in range(len(looks)))
+    return [picture, *(splats.blended(replace(stand, colours=own), here).colour for own in painted)]

@@ -13,7 +13,8 @@ from numpy import ndarray as Array
 from dav_gswt.bundle import lod, orders
 from dav_gswt.bundle.build import Options as Bundled
 from dav_gswt.bundle.build import heights_of
-from dav_gswt.field import Field
+from dav_gswt.field import Field, mean_scale
+from dav_gswt.seams.drawing import Extent
 from dav_gswt.terrain import assemble
 from dav_gswt.terrain.choice import tiles_in
 from dav_gswt.tiles import build, layout, trends
@@ -46,6 +47,7 @@ class Laid:
     source: Source
     plan: Layout
     terrain: assemble.Terrain
+    extents: list[Extent]
     eye_floor: float
     colour: list[float]
     first: int
@@ -88,6 +90,7 @@ def laid(tiles: build.TileSet, source: Source, salt: int, tau: float) -> Laid:
         source,
         plan,
         terrain,
+        [Extent.of(level) for level in tiles.fields],
         described["eye_floor"],
         described["ground_colour"],
         first * n,
@@ -113,7 +116,7 @@ def _cell_means(field: Field, cells: Exemplar) -> Float[Array, "m m 4"]:
 def _manifest(tiles: build.TileSet, salt: int, tau: float) -> dict:
     """What `assemble.of_fields` reads of a bundle's manifest."""
     options = Bundled(tau=tau, salt=salt)
-    scales = [lod.mean_scale(level) for level in tiles.fields]
+    scales = [mean_scale(level) for level in tiles.fields]
     listed = []
     for number, doubt in enumerate(np.clip(tiles.uncertainty, 0, 1)):
         reach = [heights_of(fields[number]) for fields in tiles.fields]

@@ -24,7 +24,7 @@ from dav_gswt.seams.ground import Laid
 from dav_gswt.terrain import heights
 from dav_gswt.terrain.assemble import Terrain
 
-BORDERS, CUTS = 64, 96  # crops of each, view and ground: patches differ more where they are cut than along a border
+BORDERS, CUTS = 64, 64  # crops of each, view and ground
 BANK = 160  # crops of the exemplar in a view
 COLUMNS = ("place", "view", "ground", "crop", "cluster", "seam_lpips", "psnr", "jump")
 BEST = 80.0  # dB, of pictures that are as good as equal

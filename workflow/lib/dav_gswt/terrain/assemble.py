@@ -10,13 +10,13 @@ from dav_gswt.bundle.orders import back_to_front
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.cameras import Camera
 from dav_gswt.field import Field, joined
+from dav_gswt.raster.interface import RIM
 from dav_gswt.terrain import order, weights
 from dav_gswt.terrain.choice import tiles_at
 from dav_gswt.terrain.drape import lifted
 from dav_gswt.terrain.heights import Flat, Heights, of_config
 
 MOST = 10_000_000  # Gaussians in one picture
-RIM = 3.33  # standard deviations at which an opaque Gaussian ends: exp(-RIM^2 / 2) = 1/255
 PAD = 2.0  # pixels, rounded up, by which the rasterizer's widening of splats reaches into the picture
 NEAR = 0.1  # Gaussians nearer than this share of the eye floor are left out
 

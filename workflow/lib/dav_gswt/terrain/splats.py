@@ -8,7 +8,7 @@ the rasterizer would draw if it took orders, and every backend can draw it.
 from dataclasses import dataclass, fields
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float, Float32, Int
 from numpy import ndarray as Array
 
 from dav_gswt.cameras import Camera
@@ -51,18 +51,28 @@ def joined(parts: list[Splats]) -> Splats:
 
 def sorted_by_depth(splats: Splats) -> Splats:
     """Exactly sorted, back to front; of equal depths the later one comes first, as in the rasterizer."""
-    return splats[np.argsort(splats.depths, kind="stable")[::-1]]
+    return splats[by_depth(splats)]
+
+
+def by_depth(splats: Splats) -> Int[Array, "n"]:
+    """Indices of the splats back to front."""
+    return np.argsort(splats.depths, kind="stable")[::-1]
 
 
 def projected(field: Field, slope: Float[Array, "n 2"], camera: Camera, near: float) -> Splats:
-    """The Gaussians, on a surface of these slopes, that may show in a pinhole camera's picture; in their order.
+    """The Gaussians, on a surface of these slopes, that may show in a pinhole camera's picture; in their order."""
+    return indexed(field, slope, camera, near)[0]
+
+
+def indexed(field: Field, slope: Float[Array, "n 2"], camera: Camera, near: float) -> tuple[Splats, Int[Array, "k"]]:
+    """The Gaussians that may show, and which they are.
 
     S = (J W A)(J W A)^T with A of `drape.axes` (EWA), its determinant by Lagrange's identity |p x q|^2. A Gaussian
     that is nearly as deep as it is far fades: a plane through its centre says nothing about its rim, and discs
     underfoot would be drawn up over the horizon as haze. The page does the same.
     """
     q = field.means.astype(float) @ camera.rotation.T + camera.translation
-    ahead = q[:, 2] > near
+    ahead = np.flatnonzero(q[:, 2] > near)
     field, q = field[ahead], q[ahead]
     seen = camera.rotation @ axes(field, slope[ahead])
     x, y = q[:, 0] / q[:, 2], q[:, 1] / q[:, 2]
@@ -79,7 +89,7 @@ def projected(field: Field, slope: Float[Array, "n 2"], camera: Camera, near: fl
     shown = ((centres + extents > 0) & (centres - extents < [camera.width, camera.height])).all(1) & (share > 0)
     log_scales, angles = _ellipses(across[shown], along[shown])
     towards = harmonics.directions(field.means[shown].astype(float), camera)
-    return Splats(
+    found = Splats(
         centres[shown].astype(np.float32),
         log_scales,
         angles,
@@ -87,6 +97,7 @@ def projected(field: Field, slope: Float[Array, "n 2"], camera: Camera, near: fl
         harmonics.colours(field.sh[shown], towards),
         q[shown, 2].astype(np.float32),
     )
+    return found, ahead[shown]
 
 
 def blended(splats: Splats, camera: Camera) -> Rendering:

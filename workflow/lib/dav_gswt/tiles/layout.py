@@ -25,10 +25,7 @@ _log = logging.getLogger(__name__)
 LABELS = ("centre", "W", "E", "S", "N", "SW", "SE", "NW", "NE")  # a label's number is its index
 CENTRE, W, E, S, N, SW, SE, NW, NE = range(9)
 LEAST = 10  # blocks that a tile is wide at least: two corners, and something between them
-COARSE, PLACES = (
-    4,
-    32,
-)  # a block is at most COARSE cells, or a tile's side over PLACES: patches need places to choose from
+COARSE, PLACES = 4, 32  # a block is at most so many cells, or a tile's side over so many: patches need places
 AUTO = "auto"
 MOST = 6  # levels, where it is left to the tile
 SMALLEST = 4  # cells of the coarsest level that a tile is wide at least then: a coarser one is never drawn
