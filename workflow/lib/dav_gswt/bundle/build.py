@@ -3,7 +3,6 @@
 import shutil
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -51,27 +50,20 @@ def write_bundle(tiles: TileSet, out_dir: Path | str, options: Options, schema: 
     shutil.rmtree(part, ignore_errors=True)
     (part / "chunks").mkdir(parents=True)
     try:
-        table = lod.level_table([mean_scale(level) for level in tiles.fields], options.level_pixels, options.band)
         gswt.write(tiles.fields, tiles.side, part / "gswt.zip")
+        climbed = ladder.climbed(tiles.fields[0], tiles.side, options.decibels)
+        value = laying(tiles, options, climbed.rings)
         pixel = tiles.spacing / options.floor_pixels
         encoding = Encoding.of([f for level in tiles.fields for f in level], tiles.side, pixel)
-        climbed = ladder.climbed(tiles.fields[0], tiles.side, options.decibels)
-        listed, errors = _tiles(tiles, encoding, climbed.rings, options, part)
-        value = {
+        errors = _write_chunks(tiles, encoding, value, options, part)
+        value |= {
             "format": manifest.FORMAT,
             "version": manifest.VERSION,
             "unit": options.unit,
-            "tile_side": tiles.side,
-            "salt": options.salt,
-            "eye_floor": lod.eye_floor(tiles.spacing, options.floor_pixels),
-            "ground_colour": _mean_colour(tiles.fields[-1]),
             "sky": options.sky,
             "encoding": encoding.json() | {"sh_degree": 0},
             "error": asdict(errors) | {f"{k}_db": v for k, v in _picture(tiles, encoding, pixel).items()},
-            "directions": climbed.rings.directions().tolist(),
             "orders": _told(climbed, options),
-            "levels": table,
-            "tiles": listed,
             "provenance": provenance,
         }
         manifest.check(value, schema)
@@ -82,33 +74,46 @@ def write_bundle(tiles: TileSet, out_dir: Path | str, options: Options, schema: 
     return value
 
 
-def _tiles(
-    tiles: TileSet, encoding: Encoding, rings: orders.Rings, options: Options, part: Path
-) -> tuple[list[dict], Errors]:
-    """The manifest's tiles, whose chunks are written, and by how much their Gaussians are wrong at most."""
-    along, doubts = rings.directions(), np.clip(tiles.uncertainty, 0, 1).tolist()
-    kept = [rings.kept(doubt, options.tau) for doubt in doubts]
-    errors, pixel = Errors(), tiles.spacing / options.floor_pixels
+def laying(tiles: TileSet, options: Options, rings: orders.Rings) -> dict:
+    """What of a manifest says how its tiles are laid and drawn: all that `terrain.assemble.of_fields` reads.
 
-    def chunk(place: tuple[int, int]) -> tuple[dict, Errors]:
-        tile, level = place
-        source, name = tiles.fields[level][tile], f"chunks/lod{level}_tile_{tile:02d}.bin"
-        rows, order = encoding.encoded(source), orders.presorted(source.means, along[kept[tile]])
-        entry = {"level": level, "file": name} | chunks.write(rows, order, part / name) | {"orders": kept[tile]}
-        return entry, Errors.of(encoding, source, rows, pixel)
-
-    places = list(product(range(len(doubts)), range(len(tiles.fields))))
+    Raises: InputError: mean scales that do not rise, an empty tile.
+    """
+    table = lod.level_table([mean_scale(level) for level in tiles.fields], options.level_pixels, options.band)
     listed = []
-    for tile, doubt in enumerate(doubts):
+    for tile, doubt in enumerate(np.clip(tiles.uncertainty, 0, 1).tolist()):
         reach = [heights_of(fields[tile]) for fields in tiles.fields]
         heights = [min(low for low, _ in reach), max(high for _, high in reach)]
-        listed.append({"tile": tile, "uncertainty": doubt, "z": heights, "chunks": []})
+        kept = rings.kept(doubt, options.tau)
+        chunks_of = [{"level": level, "orders": kept} for level in range(len(tiles.fields))]
+        listed.append({"tile": tile, "uncertainty": doubt, "z": heights, "chunks": chunks_of})
+    return {
+        "tile_side": tiles.side,
+        "salt": options.salt,
+        "eye_floor": lod.eye_floor(tiles.spacing, options.floor_pixels),
+        "ground_colour": _mean_colour(tiles.fields[-1]),
+        "directions": rings.directions().tolist(),
+        "levels": table,
+        "tiles": listed,
+    }
+
+
+def _write_chunks(tiles: TileSet, encoding: Encoding, value: dict, options: Options, part: Path) -> Errors:
+    """Write the chunks and say of their files in the manifest; by how much their Gaussians are wrong at most."""
+    along, errors, pixel = np.array(value["directions"]), Errors(), tiles.spacing / options.floor_pixels
+
+    def write(place: tuple[dict, dict]) -> Errors:
+        tile, entry = place[0]["tile"], place[1]
+        source, name = tiles.fields[entry["level"]][tile], f"chunks/lod{entry['level']}_tile_{tile:02d}.bin"
+        rows, order = encoding.encoded(source), orders.presorted(source.means, along[entry["orders"]])
+        entry |= {"file": name} | chunks.write(rows, order, part / name)
+        return Errors.of(encoding, source, rows, pixel)
+
+    places = [(tile, entry) for tile in value["tiles"] for entry in tile["chunks"]]
     with ThreadPoolExecutor(options.threads) as pool:
-        made = zip(progress(places, "sort tiles"), pool.map(chunk, places), strict=True)
-        for (tile, _), (entry, more) in made:
-            listed[tile]["chunks"].append(entry)
+        for _, more in zip(progress(places, "sort tiles"), pool.map(write, places), strict=True):
             errors = errors.joined(more)
-    return listed, errors
+    return errors
 
 
 def _picture(tiles: TileSet, encoding: Encoding, pixel: float) -> dict[str, float | None]:
