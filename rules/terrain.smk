@@ -5,8 +5,9 @@ In: the bundle and the tiles. Out: page/ (open it with `make view`), walker.png,
 
 
 rule make_page:
-    """A page that needs nothing else: viewer, manifest and chunks in one folder."""
+    """A page that needs nothing else: viewer, manifest, surface and chunks in one folder."""
     input:
+        unpack(height_map),
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
         viewer=VIEWER,
@@ -17,7 +18,8 @@ rule make_page:
     benchmark:
         "<benchmarks>/<terrain>/make_page.tsv"
     params:
-        source=source_of("terrain/page"),
+        heights=lookup(dpath="heights", within=config),
+        source=source_of("terrain/page", "terrain/heights", "terrain/choice"),
     script:
         "../scripts/make_page.py"
 
