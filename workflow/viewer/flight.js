@@ -1,5 +1,6 @@
 // A fly path: places with the seconds at which they were passed. Recorded while walking, played, kept as a file.
 
+import { PageError } from "./source.js";
 import { put } from "./walk.js";
 
 const EVERY = 0.1; // seconds between recorded places
@@ -24,12 +25,12 @@ export function createFlight() {
     stop() {
       mode = "rest";
     },
-    /** Take a path from a file. Raises: Error: it is none. */
+    /** Take a path from a file. Raises: PageError: it is none. */
     load(value) {
       const sound = value?.format === "davgswt-flight" && Array.isArray(value.path) && value.path.length > 0
         && value.path.every((p, k) => ["seconds", ...KEYS].every((key) => Number.isFinite(p?.[key]))
           && (k === 0 || p.seconds >= value.path[k - 1].seconds));
-      if (!sound) throw new Error("no fly path");
+      if (!sound) throw new PageError("The dropped file is not a fly path. Drop one that “Save path” has saved.");
       [path, mode] = [value.path, "rest"];
     },
     file: () => ({ format: "davgswt-flight", version: 1, path }),

@@ -20,6 +20,7 @@ export function createHud(document) {
     showHelp(false);
     remember();
   });
+  part.error.addEventListener("click", () => (part.error.hidden = true));
   part.place.parentElement.hidden = part.tools.hidden = true;
 
   return {

@@ -98,7 +98,6 @@ function loop() {
   let last = performance.now(), drew = false;
   const next = (now) => {
     requestAnimationFrame(next);
-    if (!page.walker) return;
     const gap = now - last;
     last = now;
     const flown = page.flight.step(page.walker, gap / 1000);
@@ -152,7 +151,7 @@ function keepLink() {
 /** A picture is due: at the next frame of the loop, or now and again when the worker has answered. */
 function redraw() {
   page.dirty = page.stale = true;
-  if (still) settle();
+  if (still) settle().catch(fail);
 }
 
 function surviveLoss() {
@@ -185,7 +184,7 @@ const told = {
     if (seen.wanting) page.stale = true;
     if (page.loaded) fetchMissing(seen.missing);
   },
-  failed: (error) => fail(Object.assign(new Error(error.message), { name: error.name })),
+  failed: fail,
 };
 
 /** Chunks that a set larger than the cache lacks here. */
@@ -201,21 +200,30 @@ function fetchMissing(missing) {
   });
 }
 
-/** Open a bundle: the page's own, or one that was dropped onto it. */
+/** Open a bundle: the page's own, or one that was dropped onto it. What is shown stays until the manifest is read. */
 async function open(source) {
-  page.stop?.abort();
-  const stop = (page.stop = new AbortController());
   const manifest = await readManifest(source), pixels = await readHeights(manifest, source);
+  page.stop?.abort();
   page.pictures?.end();
-  const heights = createHeights(manifest.heights, pixels), walker = createWalker(manifest, page.walker ? {} : fromHash(location.hash));
-  Object.assign(page, { manifest, heights, source, loaded: false, error: null, seen: null, coarse: 0, coming: new Set() });
+  page.splats?.end();
+  const stop = (page.stop = new AbortController());
+  const walker = createWalker(manifest, page.walker ? {} : fromHash(location.hash));
+  Object.assign(page, { manifest, source, loaded: false, error: null, seen: null, coarse: 0, coming: new Set() });
   page.walker = Object.assign(page.walker ?? walker, walker);
+  page.heights = createHeights(manifest.heights, pixels);
   page.pictures = createPictures(manifest, pixels, told);
   raise();
+  page.begin?.();
+  page.begin = null;
   hud.started();
   frame(); // sky and far ground at once
   const take = (chunk) => page.pictures.add(chunk);
-  await readChunks(firstChunks(manifest), source, { take, onProgress: hud.progress, signal: stop.signal });
+  try {
+    await readChunks(firstChunks(manifest), source, { take, onProgress: hud.progress, signal: stop.signal });
+  } catch (error) {
+    if (stop.signal.aborted) return; // another bundle was dropped meanwhile
+    throw error;
+  }
   page.loaded = true;
   await settle();
   hud.loaded(still);
@@ -223,25 +231,23 @@ async function open(source) {
 
 async function start() {
   page.gl = context(canvas);
-  surviveLoss();
-  const opened = open(fromWeb(new URL(".", location.href)));
-  while (!page.walker) await Promise.race([opened, new Promise((done) => setTimeout(done, 5))]);
-  listen(page.walker, canvas, document.getElementById("pad"), redraw);
-  new ResizeObserver(redraw).observe(canvas);
-  listenToTools(document, page, { redraw, picture, cycle });
-  listenToDrops(document, { open: (source) => reopen(source), flight: (value) => page.flight.load(value), fail });
-  if (!still) {
+  page.begin = () => {
+    listen(page.walker, canvas, document.getElementById("pad"), redraw);
+    new ResizeObserver(redraw).observe(canvas);
+    listenToTools(document, page, { redraw, picture, cycle });
+    if (still) return;
     loop();
     keepLink();
-  }
-  await opened;
+  };
+  surviveLoss();
+  listenToDrops(document, { open: reopen, flight: (value) => page.flight.load(value), fail });
+  await open(fromWeb(new URL(".", location.href)));
   return state();
 }
 
-async function reopen(source) {
+function reopen(source) {
   hud.opening();
-  page.ready = open(source);
-  await page.ready;
+  return open(source);
 }
 
 /** Keep what is on the screen as a file. */
@@ -284,10 +290,6 @@ window.davgswt = {
   },
   get stats() {
     return page.stats.summary();
-  },
-  /** Resolves when a dropped bundle is loaded. */
-  get reopened() {
-    return page.ready;
   },
   flight: page.flight,
   set(place) {

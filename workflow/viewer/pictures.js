@@ -5,8 +5,14 @@ const WIDER = 1.25; // of the picture on all sides together, so that a turn find
 /** told: { records, refused, frame, failed } are called with what the worker says. */
 export function createPictures(manifest, pixels, told) {
   const worker = new Worker(new URL("./worker.js", import.meta.url), { type: "module" });
-  let id = 0, answered = 0, busy = false, waiting = [];
+  let id = 0, answered = 0, busy = false, ended = false, waiting = [];
+  const failed = (error) => {
+    for (const { no } of waiting.splice(0)) no(error);
+    told.failed(error);
+  };
   worker.addEventListener("message", ({ data }) => {
+    if (ended) return;
+    if (data.kind === "failed") return failed(Object.assign(new Error(data.message), { name: data.name }));
     if (data.kind === "frame") {
       answered = data.frame.id;
       busy = answered < id;
@@ -20,7 +26,7 @@ export function createPictures(manifest, pixels, told) {
   });
   worker.addEventListener("error", (event) => {
     event.preventDefault();
-    told.failed({ name: "Error", message: event.message || "the worker did not start" });
+    failed(new Error(event.message || "the worker did not start"));
   });
   worker.postMessage({ kind: "begin", manifest, pixels });
   return {
@@ -37,7 +43,10 @@ export function createPictures(manifest, pixels, told) {
       worker.postMessage({ kind: "view", id: ++id, camera: wider, budget, patient });
     },
     /** Resolves when the last question so far is answered. */
-    answered: () => (answered >= id ? Promise.resolve() : new Promise((done) => waiting.push({ id, done }))),
-    end: () => worker.terminate(),
+    answered: () => (answered >= id ? Promise.resolve() : new Promise((done, no) => waiting.push({ id, done, no }))),
+    end() {
+      ended = true;
+      worker.terminate();
+    },
   };
 }

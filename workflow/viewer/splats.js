@@ -7,14 +7,19 @@ import { huesOf } from "./overlay.js";
 import { TEXELS } from "./records.js";
 import { PAGE } from "./runs.js";
 import { FRAGMENT, MOST_LEVELS, PAGES_A_ROW, vertexShader } from "./shader.js";
+import { PageError } from "./source.js";
 import { ROW, rowsFor } from "./store.js";
 import { NEAR } from "./terrain.js";
 import { BLOCK, pagesFor } from "./update.js";
 
+const FULL = "The terrain does not fit into this machine's graphics memory. Close other pages, make one with larger tiles "
+  + "or fewer variants, or open it on a larger machine.";
 const WIDTH = PAGE * PAGES_A_ROW; // of the order textures
 
 export function createSplats(gl, manifest, heights) {
   const { use, uniforms } = program(gl, vertexShader(heights.kind), FRAGMENT);
+  const most = gl.getParameter(gl.MAX_TEXTURE_SIZE), tallest = Math.max(rowsFor(manifest), pagesFor(manifest) / PAGES_A_ROW);
+  if (tallest > most) throw new PageError(FULL);
   const records = texture(gl, gl.RGBA32UI, TEXELS * ROW, rowsFor(manifest));
   const entries = texture(gl, gl.R32UI, WIDTH, pagesFor(manifest) / PAGES_A_ROW);
   const far = createBlocks(gl), close = createBlocks(gl);
@@ -43,6 +48,7 @@ export function createSplats(gl, manifest, heights) {
   const relief = heights.kind === "image" ? reliefTexture(gl, heights) : null;
   const hues = texture(gl, gl.RGBA8, 256, 1);
   let shown = -1;
+  if (gl.getError() === gl.OUT_OF_MEMORY) throw new PageError(FULL);
 
   function bind(unit, which) {
     gl.activeTexture(gl.TEXTURE0 + unit);
@@ -116,6 +122,11 @@ export function createSplats(gl, manifest, heights) {
       close.draw();
       gl.activeTexture(gl.TEXTURE0);
       gl.bindVertexArray(null);
+    },
+
+    /** Give the memory back. */
+    end() {
+      for (const made of [records, entries, nearEntries, hues, relief]) gl.deleteTexture(made);
     },
   };
 }
