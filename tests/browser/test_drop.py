@@ -10,6 +10,7 @@ import made_up
 import numpy as np
 import pytest
 from made_up import Ground
+from visiting import served
 
 from dav_gswt.bundle import chunks, gswt
 
@@ -51,12 +52,10 @@ def test_a_dropped_bundle_takes_the_place_of_the_pages_own(visit, plain, page_of
     seen = visit(160, 100).open(f"{plain}?still")
     before = seen.at(**OBLIQUE)
     drop(seen, "bundle.zip", zipped(files_of(other, "folder/"), method))
-    seen.until("davgswt.state.loaded && davgswt.state.drawn.length > 0")
+    seen.until("davgswt.state.opened === 2")
     after = seen.at(**OBLIQUE)
     assert (after != before).any()
     assert not seen.page.locator("#error").is_visible()
-    from visiting import served  # a page made of the same bundle
-
     with served(page_of(OTHER)) as address:
         assert (visit(160, 100).open(f"{address}?still").at(**OBLIQUE) == after).all()
 
@@ -67,8 +66,7 @@ def test_a_gswt_zip_of_the_public_renderer_is_shown(visit, plain, other, tmp_pat
     gswt.write(fields, OTHER.side, tmp_path / "gswt.zip")
     seen = visit(160, 100).open(f"{plain}?still")
     drop(seen, "gswt.zip", (tmp_path / "gswt.zip").read_bytes())
-    seen.until("davgswt.state.loaded && davgswt.state.salt !== 7 && davgswt.state.under.tile >= 0")
-    seen.until("document.getElementById('loading').hidden")
+    seen.until("davgswt.state.opened === 2")
     picture = seen.at(x=2.0, y=2.0, eye=1.5, yaw=90, pitch=-90)
     tile = seen.state["under"]["tile"]
     # one tile fills the picture; opacities and colours were rounded to bytes twice

@@ -27,7 +27,7 @@ document.documentElement.classList.add("running"); // takes the hint away that n
 const still = new URLSearchParams(location.search).has("still");
 const canvas = document.getElementById("picture");
 const hud = createHud(document);
-const page = { loaded: false, error: null, dirty: true, stale: true, walker: null, overlay: 0, fresh: false, milliseconds: 0 };
+const page = { loaded: false, error: null, dirty: true, stale: true, walker: null, overlay: 0, fresh: false, opened: 0, milliseconds: 0 };
 page.pace = createPace();
 page.stats = createStats();
 page.flight = createFlight();
@@ -81,7 +81,7 @@ async function settle() {
 
 /** What is on the screen, in plain values. */
 function state() {
-  const { walker, seen, manifest, loaded, error, overlay, pace: { budget } } = page;
+  const { walker, seen, manifest, loaded, opened, error, overlay, pace: { budget } } = page;
   const place = walker && { x: walker.x, y: walker.y, eye: walker.eye, yaw: walker.yaw, pitch: walker.pitch };
   const drawn = [];
   for (let k = 0; seen && k < seen.drawn.length; k += 6) {
@@ -90,7 +90,7 @@ function state() {
   }
   const under = walker && tileUnder(manifest, walker.x, walker.y);
   const { count = 0, reach, shrink, bytes = 0 } = seen ?? {};
-  return { ...place, under, drawn, count, reach, shrink, bytes, budget, loaded, error, overlay: OVERLAYS[overlay] };
+  return { ...place, under, drawn, count, reach, shrink, bytes, budget, loaded, opened, error, overlay: OVERLAYS[overlay] };
 }
 
 /** Keep drawing while something changes; hold the frame rate by drawing fewer Gaussians, never fewer frames. */
@@ -226,6 +226,7 @@ async function open(source) {
   }
   page.loaded = true;
   await settle();
+  page.opened += 1;
   hud.loaded(still);
 }
 
