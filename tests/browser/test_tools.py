@@ -75,7 +75,7 @@ def test_a_walk_is_recorded_played_and_saved(visit, plain):
     assert seen.state["x"] == pytest.approx(end["x"]) and seen.state["yaw"] == pytest.approx(20.0)
     with seen.page.expect_download() as download:
         seen.page.locator("#save").dispatch_event("click")
-    saved = json.loads(open(download.value.path()).read())
+    saved = json.loads(download.value.path().read_text())
     assert saved["path"][0]["x"] == pytest.approx(3.0) and saved["path"][-1] == end
 
 
@@ -98,7 +98,7 @@ def test_a_picture_is_kept_as_a_file(visit, plain):
     with seen.page.expect_download() as download:
         seen.page.keyboard.press("c")
     assert download.value.suggested_filename == "terrain.png"
-    assert open(download.value.path(), "rb").read(8) == b"\x89PNG\r\n\x1a\n"
+    assert download.value.path().read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
 def test_the_page_says_how_long_render_sort_and_update_take(visit, plain):

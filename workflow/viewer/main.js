@@ -27,7 +27,7 @@ document.documentElement.classList.add("running"); // takes the hint away that n
 const still = new URLSearchParams(location.search).has("still");
 const canvas = document.getElementById("picture");
 const hud = createHud(document);
-const page = { loaded: false, error: null, dirty: true, stale: true, walker: null, overlay: 0, fresh: false, opened: 0, milliseconds: 0 };
+const page = { loaded: false, opened: 0, error: null, dirty: true, stale: true, fresh: false, overlay: 0, milliseconds: 0 };
 page.pace = createPace();
 page.stats = createStats();
 page.flight = createFlight();
@@ -60,7 +60,8 @@ function frame() {
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
   gl.viewport(0, 0, width, height);
   const end = seen?.reach ?? REACH * manifest.tile_side;
-  const behind = { end, low: Math.max(FEWEST_DOWN, (camera.eye[2] - heights.low) / end), overlay: page.overlay };
+  const low = Math.max(FEWEST_DOWN, (camera.eye[2] - heights.low) / (REACH * manifest.tile_side));
+  const behind = { end, low, overlay: page.overlay };
   page.sky.draw(camera, behind);
   page.splats.draw(camera, behind);
   if (page.preview.due) page.preview.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);

@@ -173,7 +173,8 @@ void main() {
   float going = 1.0 - clamp(2.0 - 2.0 * distance / end, 0.0, 1.0); // smoothstep from half the reach to its end
   vec3 paint = mix(one.paint.rgb, backdrop(seen.z / distance), going * going * (3.0 - 2.0 * going));
   if (overlay > 0) {
-    uint number = overlay == 1 ? mark & 255u : overlay == 2 ? uint(level) * 32u : overlay == 3 ? mark >> 10u & 63u : mark >> 16u & 255u;
+    uint numbers[4] = uint[4](mark & 255u, uint(level) * 32u, mark >> 10u & 63u, mark >> 16u & 255u);
+    uint number = numbers[overlay - 1];
     paint = mix(vec3(dot(paint, vec3(0.3, 0.6, 0.1))), texelFetch(hues, ivec2(int(number), 0), 0).rgb, 0.7);
   }
   colour = vec4(paint, opacity);

@@ -10,6 +10,7 @@ const RIM = 3.33; // standard deviations at which an opaque Gaussian ends
 const PAD = 2; // pixels by which the widening of splats reaches into the picture
 const RING = 128; // cells along a side of the cache of surfaces: more than 2 REACH + 1
 const COARSEST = 1 / 64; // by how much level distances may shrink to keep within the budget
+const CLOSE = 3, PARTS = 8; // cells so near are measured at (PARTS + 1)^2 points: their levels follow from heights
 const HALVINGS = 10; // steps of the search for that factor
 
 /** Sizes and counts of a manifest in tables; `arrived` grows with its chunks, `largest` with their Gaussians. */
@@ -38,7 +39,10 @@ export function tileUnder({ tile_side: side, salt, tiles }, x, y) {
 
 function createRing() {
   const n = RING * RING, doubles = () => new Float64Array(n);
-  return { i: doubles().fill(NaN), j: doubles(), tile: new Uint16Array(n), h: doubles(), east: doubles(), north: doubles() };
+  return {
+    i: doubles().fill(NaN), j: doubles(), tile: new Uint16Array(n), h: doubles(), east: doubles(), north: doubles(),
+    low: doubles(), high: doubles(),
+  };
 }
 
 /** Where the ring holds a cell's tile and the surface at its middle; they are worked out when the cell comes in sight. */
@@ -52,8 +56,25 @@ export function lookUp({ ring, side, salt, variants, heights }, i, j) {
     ring.h[at] = h;
     ring.east[at] = east;
     ring.north[at] = north;
+    ring.low[at] = NaN;
   }
   return at;
+}
+
+/** Bounds of the surface within a cell, from its heights on a grid and the steepest slope between its points. */
+function measure({ ring, side, heights }, at) {
+  if (!Number.isNaN(ring.low[at])) return;
+  const slack = (heights.steepest * side * Math.SQRT1_2) / PARTS;
+  let low = Infinity, high = -Infinity;
+  for (let b = 0; b <= PARTS; b++) {
+    for (let a = 0; a <= PARTS; a++) {
+      const [h] = heights.at((ring.i[at] + a / PARTS) * side, (ring.j[at] + b / PARTS) * side);
+      low = Math.min(low, h);
+      high = Math.max(high, h);
+    }
+  }
+  ring.low[at] = low - slack;
+  ring.high[at] = high + slack;
 }
 
 /**
@@ -100,9 +121,15 @@ function inSight(terrain, camera, reach) {
     if (dx * dx + dy * dy >= reach * reach) return;
     const at = lookUp(terrain, i0 + di, j0 + dj), h = ring.h[at];
     const low = Math.max(h - most, heights.low) + z[0] - thin, high = Math.min(h + most, heights.high) + z[1] + thin;
-    const up = 0.5 * (low + high) - height, tall = 0.5 * (high - low);
-    const nearest = Math.hypot(dx, dy, Math.max(Math.abs(up) - tall, 0));
+    let up = 0.5 * (low + high) - height, tall = 0.5 * (high - low);
+    let nearest = Math.hypot(dx, dy, Math.max(Math.abs(up) - tall, 0));
     if (nearest >= reach || outside(planes, east, north, up, wide, tall)) return;
+    if (heights.steepest && Math.abs(di) <= CLOSE && Math.abs(dj) <= CLOSE) {
+      measure(terrain, at);
+      up = 0.5 * (ring.low[at] + ring.high[at] + z[0] + z[1]) - height;
+      tall = 0.5 * (ring.high[at] - ring.low[at] + z[1] - z[0]) + thin;
+      nearest = Math.hypot(dx, dy, Math.max(Math.abs(up) - tall, 0));
+    }
     const farthest = Math.hypot(Math.abs(east) + half, Math.abs(north) + half, Math.abs(up) + tall);
     found.push({ di, dj, at, tile: ring.tile[at], close: around(di, dj), nearest, farthest, lo: 0, hi: 0, whole: false, lacking: 0, count: 0, order: 0 });
   });

@@ -24,7 +24,7 @@ def write_page(
     pixels of a height map are heights.bin, float32, little-endian, rows from the north.
 
     Raises: InputError: the manifest is missing or of another version, a chunk is missing, has another size than the
-        manifest says, or lies outside of the bundle; the viewer is incomplete; the height map is larger than MOST_PIXELS on a side.
+        manifest says, or lies outside of the bundle; the viewer is incomplete; a height map is too large (`described`).
     """
     bundle, viewer, out = Path(bundle_dir), Path(viewer_dir), Path(out_dir)
     if not (viewer / "index.html").is_file():
