@@ -118,15 +118,16 @@ def test_the_budget_takes_fewer_splats_and_still_draws_near_tiles_back_to_front(
     result = seen.page.evaluate(
         """async () => {
           const { createTerrain, visible } = await import("./terrain.js");
+          const { createHeights } = await import("./heights.js");
           const { cameraOf, createWalker } = await import("./walk.js");
           const manifest = await (await fetch("davgswt.json")).json();
-          const terrain = createTerrain(manifest);
-          terrain.arrived.forEach(levels => manifest.levels.forEach(({ level }) => levels.add(level)));
+          const terrain = createTerrain(manifest, createHeights());
+          for (const tile of terrain.tiles) tile.arrived = (1 << manifest.levels.length) - 1;
           const camera = cameraOf(createWalker(manifest, { eye: 1, pitch: -10 }), 1280, 720);
           return [1e9, 20000, 5000, 300].map(budget => {
-            const { tiles, count, reach } = visible(terrain, camera, budget);
-            return { budget, count, reach, cells: tiles.map(({ i, j }) => [i, j]),
-              steps: tiles.map(({ i, j }) => Math.abs(i) + Math.abs(j)) };
+            const { cells, count, reach } = visible(terrain, camera, budget);
+            return { budget, count, reach, cells: cells.map(({ di, dj }) => [di, dj]),
+              steps: cells.map(({ di, dj }) => Math.abs(di) + Math.abs(dj)) };
           });
         }"""
     )
