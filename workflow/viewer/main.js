@@ -75,8 +75,10 @@ function frame() {
 
 /** The picture of this place exactly, however long the worker takes: for pictures that are kept and compared. */
 async function settle() {
+  const { splats } = page;
   ask(true);
   await page.pictures.answered();
+  if (splats && page.splats && splats !== page.splats) return settle(); // the context was lost and came back meanwhile
   frame();
 }
 
