@@ -5,8 +5,9 @@ In: the bundle. Out: page/ (open it with `make view`), walker.png, oblique.png, 
 
 
 rule make_page:
-    """A page that needs nothing else: viewer, manifest and chunks in one folder."""
+    """A page that needs nothing else: viewer, manifest, surface and chunks in one folder."""
     input:
+        unpack(height_map),
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
         viewer=VIEWER,
@@ -17,7 +18,8 @@ rule make_page:
     benchmark:
         "<benchmarks>/<terrain>/make_page.tsv"
     params:
-        source=source_of("terrain/page", "bundle/manifest"),
+        heights=lookup(dpath="heights", within=config),
+        source=source_of("terrain/page", "terrain/heights", "terrain/choice", "bundle/manifest"),
     script:
         "../scripts/make_page.py"
 

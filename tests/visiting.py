@@ -26,8 +26,8 @@ FLAGS = [
     "--disable-component-update",
     "--disable-sync",
 ]
-PIXELS = """() => {
-  davgswt.frame();
+PIXELS = """async () => {
+  await davgswt.settle();
   const gl = document.getElementById("picture").getContext("webgl2");
   const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
   const bytes = new Uint8Array(4 * width * height);
