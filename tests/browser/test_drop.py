@@ -13,7 +13,9 @@ from made_up import Ground
 from visiting import served
 
 from dav_gswt.bundle import gswt
+from dav_gswt.bundle.encoding import Encoding
 from dav_gswt.bundle.store import Bundle
+from dav_gswt.field import Field, sh_of
 
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
 OTHER = Ground(discs=8, salt=99, speckle=20)
@@ -71,6 +73,53 @@ def test_a_gswt_zip_of_the_public_renderer_is_shown(visit, plain, other, tmp_pat
     # the set's own eye floor keeps the eye so high that hundreds of tiles are in the picture: it has their mean colour
     assert np.abs(picture.mean((0, 1)) - np.mean([made_up.colour_of(t) for t in range(16)], 0)).max() < 4
     assert picture.std() > 5
+
+
+def test_the_page_rounds_a_set_as_the_library_does(visit, plain):
+    rng = np.random.default_rng(4)
+    fields = [rounded_before(rng, n) for n in (40, 300)]
+    encoding = Encoding.of(fields, 4.0, 0.01)
+    lists = [[bytes_of(f), *(v.ravel().tolist() for v in (f.means, f.log_scales, f.quats))] for f in fields]
+    page = visit(160, 100).open(f"{plain}?still").page
+    told, found = page.evaluate(
+        """async sets => {
+          const { encodingOf, writeRecords } = await import("./rounding.js");
+          const made = sets.map(([paint, ...rest]) => {
+            const [centres, logScales, turns] = rest.map(list => new Float32Array(list));
+            return { count: paint.length / 4, paint: new Uint8Array(paint), centres, logScales, turns };
+          });
+          const encoding = encodingOf(made, 4, 0.01);
+          return [encoding, made.map(one => {
+            const out = new ArrayBuffer(16 * one.count);
+            writeRecords(out, one, encoding);
+            return [...new Uint8Array(out)];
+          })];
+        }""",
+        lists,
+    )
+    for key, values in encoding.json().items():
+        np.testing.assert_allclose(told[key], values, rtol=1e-12, err_msg=key)
+    for field, own in zip(fields, found, strict=True):
+        assert bytes(own) == encoding.encoded(field).tobytes()
+
+
+def rounded_before(rng, n: int) -> Field:
+    """Gaussians whose colours and opacities are bytes already."""
+    opacity = np.clip(rng.integers(1, 255, n) / 255, 1e-6, 1)
+    return Field(
+        rng.uniform(-0.2, 4.3, (n, 3)).astype(np.float32),
+        rng.uniform(-12, 3, (n, 3)).astype(np.float32),  # some are cut, below and above
+        rng.normal(size=(n, 4)).astype(np.float32),
+        np.log(opacity / (1 - opacity)).astype(np.float32),
+        sh_of((rng.integers(0, 256, (n, 3)) / 255).astype(np.float32)),
+        np.zeros(n, np.float32),
+        np.zeros(n, bool),
+    )
+
+
+def bytes_of(field: Field) -> list[int]:
+    opacity = 1 / (1 + np.exp(-field.opacity_logits.astype(float)))
+    return np.rint(255 * np.concatenate([field.base_colours, opacity[:, None]], 1)).astype(int).ravel().tolist()
 
 
 def test_a_folder_is_found_wherever_its_manifest_lies(visit, plain):

@@ -80,6 +80,18 @@ def test_the_ground_has_no_holes(visit, behind_magenta, place):
     assert through(picture).max() < 0.03
 
 
+@pytest.mark.parametrize("budget", [2_500, 1_500, 1_000])
+def test_a_small_budget_draws_coarser_ground_and_no_holes(visit, behind_magenta, budget):
+    seen = visit().open(f"{behind_magenta}?still")
+    seen.page.evaluate("place => davgswt.set(place)", dict(x=2.0, y=2.0, eye=1.0, yaw=60, pitch=-25))
+    picture = seen.picture(budget)
+    state = seen.state
+    assert 0.3 * budget < state["count"] <= budget
+    # the lower half of the picture is less than two tile sides away
+    assert through(picture[100:]).max() < 0.03
+    assert state["reach"] > 3 * SIDE
+
+
 def test_the_hole_test_would_see_a_hole(visit, page_of):
     folder = page_of(Ground())
     manifest = json.loads((folder / "davgswt.json").read_text())

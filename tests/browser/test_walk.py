@@ -113,11 +113,29 @@ def test_a_lost_context_comes_back_with_the_same_picture(visit, plain):
     assert (seen.picture() == before).all()
 
 
+@pytest.mark.parametrize("overlay", ["picture", "level"])
+def test_a_picture_waits_for_a_context_that_is_lost_meanwhile(visit, plain, overlay):
+    seen = visit(160, 100).open(f"{plain}?still")
+    seen.page.evaluate("name => davgswt.overlay(name)", overlay)
+    before = seen.at(**OBLIQUE)
+    seen.page.evaluate(
+        """() => {
+          const gl = document.getElementById("picture").getContext("webgl2");
+          const loss = gl.getExtension("WEBGL_lose_context");
+          davgswt.settle(); // under way when the context goes
+          loss.loseContext();
+          setTimeout(() => loss.restoreContext(), 200);
+        }"""
+    )
+    assert (seen.picture() == before).all()
+
+
 def test_the_budget_takes_fewer_splats_and_still_draws_near_tiles_back_to_front(visit, plain):
     seen = visit(160, 100).open(f"{plain}?still")
     result = seen.page.evaluate(
         """async () => {
-          const { createTerrain, visible } = await import("./terrain.js");
+          const { createTerrain } = await import("./terrain.js");
+          const { visible } = await import("./budget.js");
           const { createHeights } = await import("./heights.js");
           const { cameraOf, createWalker } = await import("./walk.js");
           const manifest = await (await fetch("davgswt.json")).json();

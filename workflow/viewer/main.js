@@ -21,6 +21,7 @@ const SHARPEST = 1.5; // device pixels a CSS pixel at most: splats are soft, pix
 const LONGEST_STEP = 250; // milliseconds of walking a frame makes up for at most
 const PREVIEW_SHARE = 5; // while loading, this many times a picture's own time passes before the next
 const LINK_EVERY = 500; // milliseconds between updates of the address
+const PATIENCE = 50; // milliseconds until a lost graphics context is asked for again
 const FEWEST_DOWN = 1e-4; // sine: the far ground pales within no less
 
 document.documentElement.classList.add("running"); // takes the hint away that nothing happens
@@ -48,9 +49,8 @@ function cameraNow() {
 }
 
 /** Ask the worker what to draw for where the walker is now. */
-function ask(patient = false) {
+function ask(budget, patient) {
   page.stale = false;
-  const budget = patient ? BUDGET.still : page.loaded ? page.pace.budget : BUDGET.least;
   page.pictures.ask(cameraNow(), budget, patient);
 }
 
@@ -76,12 +76,17 @@ function frame() {
 }
 
 /** The picture of this place exactly, however long the worker takes: for pictures that are kept and compared. */
-async function settle() {
+async function settle(budget = BUDGET.most) {
+  await page.lost;
   const { splats } = page;
-  ask(true);
+  ask(budget, true);
   await page.pictures.answered();
-  if (splats && page.splats && splats !== page.splats) return settle(); // the context was lost and came back meanwhile
   frame();
+  // the context may be lost without a word having been said of it yet, or have come back with nothing in it
+  if (page.gl.isContextLost() || splats !== page.splats) {
+    await new Promise((done) => setTimeout(done, PATIENCE));
+    return settle(budget);
+  }
 }
 
 /** What is on the screen, in plain values. */
@@ -109,7 +114,7 @@ function loop() {
     const flown = page.flight.step(page.walker, gap / 1000);
     if (step(page.walker, Math.min(gap, LONGEST_STEP) / 1000) || flown) page.dirty = page.stale = true;
     const may = page.loaded || mayPreview(now);
-    if (page.stale && may && page.pictures.idle) ask();
+    if (page.stale && may && page.pictures.idle) ask(page.loaded ? page.pace.budget : BUDGET.least, false);
     const draw = page.dirty && may;
     if (!draw || !drew) page.pace.rest();
     else if (page.pace.frame(gap, page.seen?.count ?? 0)) page.stale = true;
@@ -164,11 +169,13 @@ function surviveLoss() {
   canvas.addEventListener("webglcontextlost", (event) => {
     event.preventDefault();
     page.splats = null;
+    page.lost = new Promise((done) => (page.regained = done));
     hud.error("The graphics driver took the picture away; it comes back as soon as the driver does.");
   });
   canvas.addEventListener("webglcontextrestored", () => {
     raise();
     page.pictures.restore();
+    page.regained();
     hud.recovered();
     redraw();
   });
@@ -231,7 +238,7 @@ async function open(source) {
     throw error;
   }
   page.loaded = true;
-  await settle();
+  await settle(still ? BUDGET.most : page.pace.budget);
   page.opened += 1;
   hud.loaded(still);
 }

@@ -26,9 +26,9 @@ export function createNear(store, terrain) {
     return lift;
   }
 
-  /** Entries of the close cells' Gaussians with a weight, back to front along `ahead`. */
-  return function nearOrder(cells, { eye, ahead }, shrink) {
-    const { side, near, switches, bands } = terrain;
+  /** Entries of the close cells' Gaussians with a weight, back to front along `ahead`; level distances of budget.js. */
+  return function nearOrder(cells, { eye, ahead }, { switches, bands }) {
+    const { side, near } = terrain;
     const most = cells.reduce((sum, cell) => sum + cell.count, 0);
     if (depths.length < most) [depths, found] = [new Float32Array(2 * most), new Uint32Array(2 * most)];
     const i0 = Math.floor(eye[0] / side), j0 = Math.floor(eye[1] / side);
@@ -38,8 +38,8 @@ export function createNear(store, terrain) {
       for (let level = lo; level <= hi; level++) {
         const chunk = store.get(tile, level), { centres, entries, count } = chunk;
         const lift = liftOf(i0 + di, j0 + dj, level, chunk);
-        const begin = whole || !level ? 0 : Math.max(0, shrink * (switches[level - 1] - bands[level - 1]));
-        const end = whole ? Infinity : shrink * (switches[level] + bands[level]);
+        const begin = whole || !level ? 0 : Math.max(0, switches[level - 1] - bands[level - 1]);
+        const end = whole ? Infinity : switches[level] + bands[level];
         for (let k = 0; k < count; k++) {
           const x = centres[3 * k] + west, y = centres[3 * k + 1] + south;
           const z = centres[3 * k + 2] - eye[2] + (lift ? lift[k] : 0);

@@ -1,7 +1,7 @@
 // How many Gaussians a picture may have: fewer where frames come slowly, more where they come fast. Few at first, so
 // that the first picture is quick everywhere.
 
-export const BUDGET = { least: 20_000, first: 100_000, most: 6_000_000, still: 2_000_000 };
+export const BUDGET = { least: 20_000, first: 100_000, most: 6_000_000 };
 const SLOW = 24, GOAL = 21, FAST = 19; // milliseconds a frame: above the first shrink to the next, below the last grow
 const GROW = 1.6, RELAX = 1.01;
 const RECKON = 300, FRAMES = 3; // a verdict needs so many milliseconds and frames

@@ -44,8 +44,10 @@ export function createPictures(manifest, pixels, told) {
     },
     /** Resolves when the last question so far is answered. */
     answered: () => (answered >= id ? Promise.resolve() : new Promise((done, no) => waiting.push({ id, done, no }))),
+    /** Nothing more is answered; whoever waits goes on. */
     end() {
       ended = true;
+      for (const { done } of waiting.splice(0)) done();
       worker.terminate();
     },
   };

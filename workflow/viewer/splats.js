@@ -96,15 +96,14 @@ export function createSplats(gl, manifest, heights) {
       gl.enable(gl.BLEND);
       gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
       for (const axis of ["right", "up", "ahead"]) gl.uniform3fv(uniforms[axis], camera[axis]);
-      const [x, y, z] = camera.eye, { i0, j0, shrink } = frame, side = manifest.tile_side;
+      const [x, y, z] = camera.eye, { i0, j0, switches, bands } = frame, side = manifest.tile_side;
       gl.uniform3f(uniforms.corner, i0 * side - x, j0 * side - y, -z);
       gl.uniform2f(uniforms.halfSize, camera.width / 2, camera.height / 2);
       gl.uniform1f(uniforms.focal, camera.focal);
       gl.uniform1f(uniforms.end, end);
       gl.uniform1f(uniforms.low, low);
-      const levels = manifest.levels.slice(0, -1);
-      gl.uniform1fv(uniforms["changes[0]"], padded(levels.map(({ distance }) => shrink * distance), LEVELS));
-      gl.uniform1fv(uniforms["bands[0]"], padded(levels.map(({ band }) => shrink * (band ?? 0)), LEVELS));
+      gl.uniform1fv(uniforms["changes[0]"], padded(switches.slice(0, -1), LEVELS));
+      gl.uniform1fv(uniforms["bands[0]"], padded(bands, LEVELS));
       gl.uniform1uiv(uniforms["marks[0]"], frame.marks);
       gl.uniform1i(uniforms.overlay, overlay);
       bind(3, hues);

@@ -1,11 +1,12 @@
 // One update: from a view to what the GPU draws. Pure of the page and of messages, so the worker, tests and benchmarks
 // share it.
 
+import { visible } from "./budget.js";
 import { createNear } from "./near.js";
 import { nearest } from "./order.js";
 import { createRuns, NO_ORDER, PAGE } from "./runs.js";
 import { createStore, rowsFor } from "./store.js";
-import { createTerrain, visible } from "./terrain.js";
+import { createTerrain } from "./terrain.js";
 
 export const BLOCK = 3; // words of a block: page of entries; cell and count; tile, direction, doubt and whole (aboutOf)
 const PATIENCE = 4; // milliseconds of making runs in an update that somebody waits for
@@ -83,7 +84,7 @@ export function createUpdate(manifest, heights) {
         n += pages.length;
       }
       const uploads = runs.uploads(), updated = performance.now();
-      const near = nearOrder(close, camera, seen.shrink);
+      const near = nearOrder(close, camera, seen);
       return {
         ...seen, i0, j0, near, marks, uploads, wanting, blocks: blocks.slice(0, BLOCK * n),
         milliseconds: { update: updated - start, sort: performance.now() - updated },
