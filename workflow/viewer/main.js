@@ -9,6 +9,7 @@ import { createHud } from "./hud.js";
 import { OVERLAYS } from "./overlay.js";
 import { BUDGET, createPace } from "./pace.js";
 import { createPictures } from "./pictures.js";
+import { createRest } from "./rest.js";
 import { createSky } from "./sky.js";
 import { fromWeb, PageError } from "./source.js";
 import { createSplats } from "./splats.js";
@@ -39,6 +40,7 @@ page.flight = createFlight();
 function raise() {
   page.sky = createSky(page.gl, page.manifest);
   page.splats = createSplats(page.gl, page.manifest, page.heights);
+  page.rest = createRest(page.gl);
   page.preview = { fence: null, start: 0, next: 0, due: false };
 }
 
@@ -114,15 +116,21 @@ function loop() {
     const flown = page.flight.step(page.walker, gap / 1000);
     if (step(page.walker, Math.min(gap, LONGEST_STEP) / 1000) || flown) page.dirty = page.stale = true;
     const may = page.loaded || mayPreview(now);
+    if (page.stale) page.rest.moved(now, page.pace.budget);
     if (page.stale && may && page.pictures.idle) ask(page.loaded ? page.pace.budget : BUDGET.least, false);
+    else if (page.loaded && !page.dirty && page.pictures.idle) {
+      const more = page.rest.next(now, page.seen?.shrink === 1);
+      if (more) ask(more, true);
+    }
     const draw = page.dirty && may;
     if (!draw || !drew) page.pace.rest();
     else if (page.pace.frame(gap, page.seen?.count ?? 0)) page.stale = true;
     if (draw) {
       page.preview.due = !page.loaded;
       frame();
+      page.rest.drawn(now);
     }
-    drew = draw;
+    drew = draw && !page.seen?.patient; // a picture at rest may take its time
   };
   requestAnimationFrame(next);
 }
