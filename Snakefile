@@ -56,6 +56,7 @@ wildcard_constraints:
     seam=NAME,
     tau=FRACTION,
     sweep=NAME,
+    kind="spz|sog",
 
 
 rule all:

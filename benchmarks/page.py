@@ -1,7 +1,7 @@
-"""How long the page takes to load and order a made-up bundle of 200k Gaussians, and to choose and draw a picture.
+"""How long the page takes to load and order a made-up bundle of 200k Gaussians, and to update, sort and draw a picture.
 
 In headless Chromium with software rendering; prints a table, asserts nothing. Drawing in software is slow by nature:
-the numbers that carry over to other machines are those of loading and of choosing tiles.
+the numbers that carry over to other machines are those of loading, and of updating and sorting (the worker's part).
 """
 
 import statistics
@@ -22,23 +22,31 @@ LOAD = """async () => {
   await davgswt.ready;
   return performance.now();
 }"""
-CHOOSE = """async () => {
-  const { createTerrain, visible } = await import("./terrain.js");
+UPDATE = """async hills => {
+  // what the worker does for each view, timed here: a walk on a fixed path, 97 x 97 cells about the eye
+  const { createUpdate } = await import("./update.js");
+  const { createHeights } = await import("./heights.js");
   const { cameraOf, createWalker } = await import("./walk.js");
   const manifest = await (await fetch("davgswt.json")).json();
-  const terrain = createTerrain(manifest);
-  terrain.arrived.forEach(levels => manifest.levels.forEach(({ level }) => levels.add(level)));
-  const times = [];
-  let seen;
-  for (let k = 0; k < 60; k++) {
-    const camera = cameraOf(createWalker(manifest, { eye: 1, pitch: -8, yaw: 6 * k }), 1920, 1080);
-    const start = performance.now();
-    seen = visible(terrain, camera, 1e6);
-    times.push(performance.now() - start);
+  const side = manifest.tile_side;
+  const surface = { kind: "hills", height: 3 * side, wavelength: 20 * side, octaves: 4, salt: 1 };
+  const heights = createHeights(hills ? surface : undefined), update = createUpdate(manifest, heights);
+  for (const { tile, chunks } of manifest.tiles) for (const { level, count, file } of chunks) {
+    update.add({ tile, level, count, buffer: await (await fetch(file)).arrayBuffer() });
   }
-  return { times: times.slice(20), tiles: seen.tiles.length, count: seen.count };
+  const times = { update: [], sort: [], both: [] };
+  let seen;
+  for (let k = 0; k < 160; k++) {
+    const place = { eye: 1, pitch: -8, yaw: 30 * Math.sin(k / 20), x: 0.05 * k * side, y: 0.02 * k * side };
+    seen = update.update(cameraOf(createWalker(manifest, place), 1920, 1080, heights), 1e6, false);
+    if (k < 40) continue;
+    const { update: chosen, sort } = seen.milliseconds;
+    for (const [name, t] of [["update", chosen], ["sort", sort], ["both", chosen + sort]]) times[name].push(t);
+  }
+  return { times, tiles: seen.cells.length, count: seen.count, near: seen.near.length };
 }"""
-DRAW = """() => {
+DRAW = """async () => {
+  await davgswt.settle();
   const gl = document.getElementById("picture").getContext("webgl2"), pixel = new Uint8Array(4);
   const start = performance.now();
   davgswt.frame();
@@ -78,14 +86,20 @@ def measure(browser, address: str) -> None:
             tab.goto(f"{address}?still#2,2,1,60,-20", wait_until="domcontentloaded")
             loads.append(tab.evaluate(LOAD))
             draws.append(tab.evaluate(DRAW))
-            chosen = tab.evaluate(CHOOSE)
+    with browser.new_context(viewport={"width": 160, "height": 100}) as context:
+        tab = context.new_page()
+        tab.goto(f"{address}?still")
+        made = {hills: tab.evaluate(UPDATE, hills) for hills in (False, True)}
     report("all tiles ready, s after the request", [ms / 1e3 for ms in loads])
     report(f"one picture 480 x 270 in software, {draws[0][1]:,} splats, ms", [ms for ms, _ in draws])
-    report(f"choose and order {chosen['tiles']} tiles, 1920 x 1080, ms", chosen["times"])
+    for hills, found in made.items():
+        where = f"{'hills' if hills else 'level'}, {found['tiles']} of 97 x 97 tiles, {found['count']:,} splats"
+        for name, times in found["times"].items():
+            report(f"{name} ({found['near']:,} sorted), {where}, ms", times)
 
 
 def report(what: str, values: list[float]) -> None:
-    print(f"  {what:64} {statistics.mean(values):8.2f} (sd {statistics.stdev(values):.2f}, max {max(values):.2f})")
+    print(f"  {what:84} {statistics.mean(values):8.2f} (sd {statistics.stdev(values):.2f}, max {max(values):.2f})")
 
 
 if __name__ == "__main__":

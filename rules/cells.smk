@@ -6,15 +6,15 @@ from itertools import product
 from dav_gswt.sweeps import grid
 
 
-def levels_measured():
-    """The tables of levels that are gathered: the path of each one's lod.csv, and what tells it from the others."""
+def measured_of_tiles(made):
+    """The tables of levels or orders that are gathered: the path of each one's, and what tells it from the others."""
     found = {}
     asked = config["lod"]
     for scene in asked["scenes"]:
         chosen = chosen_values(scene, asked["fixed"]) if "fixed" in asked else values_of(scene)
         for seed in asked.get("seeds", config["seeds"]):
             values = chosen | {"seed": seed}
-            (path,) = expand(rules.measure_levels.output.table, **values)
+            (path,) = expand(made.output.table, **values)
             found[path] = {key: values[key] for key in ("scene", "seed", "quality", "seam")}
     return found
 

@@ -11,6 +11,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.spelling import read_stop, spell, spell_completed, spell_stop
 
 LIBRARY = Path(dav_gswt.__file__).parent
+BUNDLE_SCHEMA = str(Path(workflow.basedir, "workflow/schemas/davgswt.schema.json"))
 VIEWER = sorted(str(p) for p in Path(workflow.basedir, "workflow/viewer").iterdir())
 
 try:
@@ -328,6 +329,13 @@ def captures_before(wildcards):
 def captures_until(wildcards):
     """The photos that rounds 1 to t took."""
     return [f"<results>/<active>/iter{t}/capture" for t in range(1, int(wildcards.t) + 1)]
+
+
+def photos_behind(wildcards):
+    """All photos that a round's field was made of: those of the start, and captured ones; or the finished field."""
+    if config["scenes"][wildcards.scene]["kind"] == "field":
+        return {"photos": "<results>/<photos>/field.ply"}
+    return {"photos": ["<results>/<photos>/images", *captures_until(wildcards)]}
 
 
 def scores_that_chose(wildcards):

@@ -1,12 +1,13 @@
 """Terrain: the tiles laid without end, as a page to walk in, as stills and, where the config asks, as a flight.
 
-In: the bundle and the tiles. Out: page/ (open it with `make view`), walker.png, oblique.png, above.png, flight/.
+In: the bundle. Out: page/ (open it with `make view`), walker.png, oblique.png, above.png, flight/.
 """
 
 
 rule make_page:
-    """A page that needs nothing else: viewer, manifest and chunks in one folder."""
+    """A page that needs nothing else: viewer, manifest, surface and chunks in one folder."""
     input:
+        unpack(height_map),
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
         viewer=VIEWER,
@@ -17,7 +18,8 @@ rule make_page:
     benchmark:
         "<benchmarks>/<terrain>/make_page.tsv"
     params:
-        source=source_of("terrain/page"),
+        heights=lookup(dpath="heights", within=config),
+        source=source_of("terrain/page", "terrain/heights", "terrain/choice", "bundle/manifest"),
     script:
         "../scripts/make_page.py"
 
@@ -31,8 +33,7 @@ rule render_terrain:
     input:
         unpack(height_map),
         manifest="<results>/<bundle>/davgswt.json",
-        seams="<results>/<tiles>/seams.json",
-        tiles="<results>/<tiles>/tiles",
+        chunks="<results>/<bundle>/chunks",
     output:
         stills=report(
             expand("<results>/<terrain>/{shot}.png", shot=["walker", "oblique", "above"], allow_missing=True),
@@ -51,7 +52,8 @@ rule render_terrain:
     params:
         size=lookup(dpath="stills", within=config),
         heights=lookup(dpath="heights", within=config),
-        source=source_of("terrain", "bundle/orders", "raster"),
+        schema=BUNDLE_SCHEMA,
+        source=source_of("terrain", "bundle", "raster"),
     script:
         "../scripts/render_terrain.py"
 
@@ -61,8 +63,7 @@ rule render_flight:
     input:
         unpack(height_map),
         manifest="<results>/<bundle>/davgswt.json",
-        seams="<results>/<tiles>/seams.json",
-        tiles="<results>/<tiles>/tiles",
+        chunks="<results>/<bundle>/chunks",
     output:
         frames=directory("<results>/<terrain>/flight"),
     log:
@@ -77,6 +78,7 @@ rule render_flight:
         size=lookup(dpath="stills", within=config),
         heights=lookup(dpath="heights", within=config),
         flight=lookup(dpath="flight", within=config),
-        source=source_of("terrain", "bundle/orders", "raster"),
+        schema=BUNDLE_SCHEMA,
+        source=source_of("terrain", "bundle", "raster"),
     script:
         "../scripts/render_flight.py"

@@ -10,11 +10,13 @@ from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
     given, params, frame = snakemake.input, snakemake.params, read_json(snakemake.input.frame)
-    source = provenance.of({"seams": given.seams, "frame": given.frame}, {"tau": params.tau, "seed": params.seed})
+    inputs = {name: given[name] for name in ("seams", "frame", "tiles", "levels", "photos")}
+    told = {"tiles": read_json(given.seams), "levels": read_json(Path(given.levels, "levels.json"))}
+    source = provenance.of(inputs, {"tau": params.tau, "seed": params.seed})
     build.write_bundle(
         store.read(given.tiles, given.seams),
         Path(snakemake.output.manifest).parent,
-        build.Options(tau=params.tau, salt=params.seed, unit=frame["unit"]),
+        build.Options(tau=params.tau, salt=params.seed, unit=frame["unit"], threads=snakemake.threads),
         params.schema,
-        source | {"tiles": read_json(given.seams)["provenance"]},
+        source | {name: table["provenance"] for name, table in told.items()},
     )

@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
+from dav_gswt.files import read_json
 from dav_gswt.logs import logging_to
-from dav_gswt.terrain import page
+from dav_gswt.terrain import heights, page
 
 with logging_to(snakemake.log[0]):
     bundle, viewer = Path(snakemake.input.manifest).parent, Path(snakemake.input.viewer[0]).parent
-    page.write_page(bundle, viewer, snakemake.output.page)
+    surface = heights.of_config(snakemake.params.heights, read_json(snakemake.input.manifest)["tile_side"])
+    page.write_page(bundle, viewer, snakemake.output.page, surface)

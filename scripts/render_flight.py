@@ -1,15 +1,17 @@
 """Rule render_flight: a walk over the endless terrain, frame by frame."""
 
+from pathlib import Path
+
 from dav_gswt import images
-from dav_gswt.files import read_json, whole_folder
+from dav_gswt.bundle import store
+from dav_gswt.files import whole_folder
 from dav_gswt.logs import logging_to, progress
 from dav_gswt.terrain import assemble, still
-from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
-    given, params = snakemake.input, snakemake.params
-    bundle = read_json(given.manifest)
-    terrain = assemble.of_tiles(store.read(given.tiles, given.seams), bundle, params.heights)
+    params = snakemake.params
+    bundle = store.read(Path(snakemake.input.manifest).parent, params.schema)
+    terrain = assemble.of_bundle(bundle, params.heights)
     with whole_folder(snakemake.output.frames) as folder:
         for shot in progress(still.flight(**params.flight), "render flight"):
-            images.write(folder / f"{shot.name}.png", still.taken(terrain, shot, bundle, **params.size))
+            images.write(folder / f"{shot.name}.png", still.taken(terrain, shot, bundle.manifest, **params.size))

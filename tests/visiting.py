@@ -26,12 +26,15 @@ FLAGS = [
     "--disable-component-update",
     "--disable-sync",
 ]
-PIXELS = """() => {
-  davgswt.frame();
+PIXELS = """async budget => {
   const gl = document.getElementById("picture").getContext("webgl2");
-  const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
-  const bytes = new Uint8Array(4 * width * height);
-  gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+  let width, height, bytes;
+  do { // again if the driver took the context away meanwhile
+    await davgswt.settle(budget ?? undefined);
+    [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+    bytes = new Uint8Array(4 * width * height);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+  } while (gl.isContextLost());
   let text = "";
   for (let k = 0; k < bytes.length; k += 4096) text += String.fromCharCode(...bytes.subarray(k, k + 4096));
   return [width, height, btoa(text)];
@@ -85,7 +88,8 @@ class Visit:
         self.page.evaluate("place => davgswt.set(place)", place)
         return self.picture()
 
-    def picture(self) -> Int[Array, "h w 3"]:
-        width, height, text = self.page.evaluate(PIXELS)
+    def picture(self, budget: int | None = None) -> Int[Array, "h w 3"]:
+        """What is to be seen here; budget: of Gaussians (default: all)."""
+        width, height, text = self.page.evaluate(PIXELS, budget)
         pixels = np.frombuffer(base64.b64decode(text), np.uint8).reshape(height, width, 4)
         return pixels[::-1, :, :3].astype(int)

@@ -13,10 +13,10 @@ from dav_gswt.terrain.page import write_page
 def page_of(tmp_path_factory):
     """Make the page folder of a made-up ground."""
 
-    def make(ground: made_up.Ground, rows_of=None) -> Path:
+    def make(ground: made_up.Ground, rows_of=None, surface=None) -> Path:
         folder = tmp_path_factory.mktemp("page")
         made_up.write_bundle(folder / "bundle", ground, rows_of)
-        write_page(folder / "bundle", VIEWER, folder / "page")
+        write_page(folder / "bundle", VIEWER, folder / "page", surface)
         return folder / "page"
 
     return make

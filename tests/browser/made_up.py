@@ -9,8 +9,12 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray as Array
 
-RECORD = np.dtype([("position", "<f4", 3), ("deviation", "<f4", 3), ("paint", "u1", 4), ("turn", "u1", 4)])
-UPRIGHT = (255, 128, 128, 128)  # the quaternion 1 0 0 0 as bytes
+from dav_gswt.bundle.encoding import Encoding
+from dav_gswt.bundle.orders import index_type, presorted
+from dav_gswt.field import Field, sh_of
+
+LOOK = np.dtype([("position", "<f4", 3), ("deviation", "<f4", 3), ("paint", "u1", 4), ("turn", "<f4", 4)])
+UPRIGHT = (1, 0, 0, 0)
 SKY = {"zenith": [0.25, 0.45, 0.8], "horizon": [0.8, 0.85, 0.95]}
 
 
@@ -44,10 +48,13 @@ def directions() -> Float[Array, "9 3"]:
 def write_bundle(folder: Path, ground: Ground, rows_of=None) -> dict:
     """Write davgswt.json and chunks/ of a made-up ground; returns the manifest.
 
-    `rows_of(ground, tile, level)` gives a chunk's records (default: `discs`).
+    `rows_of(ground, tile, level)` gives how a chunk's Gaussians look (default: `discs`).
     """
     (folder / "chunks").mkdir(parents=True)
-    tiles = [_tile(folder, ground, tile, rows_of or discs) for tile in range(16 * ground.variants)]
+    looks = [[(rows_of or discs)(ground, t, lv) for lv in range(ground.levels)] for t in range(16 * ground.variants)]
+    fields = [[field_of(rows) for rows in levels] for levels in looks]
+    encoding = Encoding.of([f for levels in fields for f in levels], ground.side, ground.eye_floor / 1000)
+    tiles = [_tile(folder, ground, tile, levels, encoding) for tile, levels in enumerate(fields)]
     spacing = ground.side / ground.discs
     levels = [
         {"level": lv, "mean_scale": spacing * 2**lv, "distance": 2 * ground.side * 2**lv, "band": 0.1 * ground.side}
@@ -56,13 +63,14 @@ def write_bundle(folder: Path, ground: Ground, rows_of=None) -> dict:
     levels[-1]["distance"] = None
     manifest = {
         "format": "davgswt",
-        "version": 1,
+        "version": 2,
         "unit": "metre",
         "tile_side": ground.side,
         "salt": ground.salt,
         "eye_floor": ground.eye_floor,
         "ground_colour": np.mean([colour_of(t["tile"]) for t in tiles], 0).__truediv__(255).tolist(),
         "sky": SKY,
+        "encoding": encoding.json() | {"sh_degree": 0},
         "directions": directions().tolist(),
         "levels": levels,
         "tiles": tiles,
@@ -72,13 +80,25 @@ def write_bundle(folder: Path, ground: Ground, rows_of=None) -> dict:
     return manifest
 
 
-def _tile(folder: Path, ground: Ground, tile: int, rows_of) -> dict:
+def field_of(rows: Array) -> Field:
+    """Gaussians as they look: records of LOOK, paint with opacity, turns as quaternions w x y z."""
+    opacity = np.clip(rows["paint"][:, 3] / 255, 1e-6, 1 - 1e-6)
+    return Field(
+        rows["position"].astype(np.float32),
+        np.log(rows["deviation"]).astype(np.float32),
+        rows["turn"].astype(np.float32),
+        np.log(opacity / (1 - opacity)).astype(np.float32),
+        sh_of((rows["paint"][:, :3] / 255).astype(np.float32)),
+        np.zeros(len(rows), np.float32),
+        np.zeros(len(rows), bool),
+    )
+
+
+def _tile(folder: Path, ground: Ground, tile: int, fields: list[Field], encoding: Encoding) -> dict:
     chunks = []
-    for level in range(ground.levels):
-        rows = rows_of(ground, tile, level)
-        along = rows["position"] @ directions().T
-        orders = np.argsort(-along, axis=0, kind="stable").T.astype("<u4")
-        data = rows.tobytes() + orders.tobytes()
+    for level, field in enumerate(fields):
+        orders = presorted(field.means, directions())
+        data = encoding.encoded(field).tobytes() + orders.astype(index_type(len(field))).tobytes()
         name = f"chunks/lod{level}_tile_{tile:02d}.bin"
         (folder / name).write_bytes(data)
         chunks.append(
@@ -87,7 +107,7 @@ def _tile(folder: Path, ground: Ground, tile: int, rows_of) -> dict:
                 "file": name,
                 "bytes": len(data),
                 "sha256": hashlib.sha256(data).hexdigest(),
-                "count": len(rows),
+                "count": len(field),
                 "orders": list(range(len(orders))),
             }
         )
@@ -99,7 +119,7 @@ def discs(ground: Ground, tile: int, level: int) -> Array:
     random = np.random.default_rng([tile, level])
     n = ground.discs >> level
     spacing = ground.side / n
-    rows = np.zeros(n * n + ground.things, RECORD)
+    rows = np.zeros(n * n + ground.things, LOOK)
     grid = (np.arange(n) + 0.5) * spacing
     flat, things = rows[: n * n], rows[n * n :]
     flat["position"][:, 0], flat["position"][:, 1] = np.tile(grid, n), np.repeat(grid, n)

@@ -26,7 +26,7 @@ def test_progress_is_said_in_bytes_and_coarse_levels_come_first(visit, plain):
     status = seen.page.get_by_role("status")
     while len(asked) < 32:
         seen.page.wait_for_timeout(20)
-    assert re.fullmatch(r"Loading the terrain: \d+\.\d of 0\.3 MB, \d+ of 32 pieces ready", status.inner_text())
+    assert re.fullmatch(r"Loading the terrain: \d+\.\d of 0\.2 MB, \d+ of 32 pieces ready", status.inner_text())
     assert seen.page.evaluate("bar.value") < 1
     assert all(name.startswith("lod1") for name in asked[:16])
     held[0].continue_()
@@ -82,13 +82,14 @@ def point_outside(folder):
         pytest.param(
             lambda f: (f / "chunks/lod0_tile_02.bin").unlink(), "lod0_tile_02.bin is not there", id="no chunk"
         ),
-        pytest.param(spoil_manifest(version=2), "version 2, this page reads version 1", id="version"),
+        pytest.param(spoil_manifest(version=1), "version 1, this page reads version 2", id="version"),
         pytest.param(spoil_manifest(format="ply"), "not a terrain", id="format"),
         pytest.param(lambda f: (f / "davgswt.json").write_text("{"), "davgswt.json is not readable", id="not JSON"),
         pytest.param(spoil_manifest(tile_side=0), "“tile_side” is missing or makes no sense", id="tile side"),
+        pytest.param(spoil_manifest(encoding={}), "“encoding” is missing or makes no sense", id="encoding"),
         pytest.param(spoil_manifest(tiles=[]), "“tiles” is missing or makes no sense", id="no tiles"),
         pytest.param(spoil_manifest(levels=[None]), "“levels” is missing or makes no sense", id="levels"),
-        pytest.param(cut, "lod1_tile_03.bin is cut short: 4", id="cut short"),
+        pytest.param(cut, "lod1_tile_03.bin is cut short: 2", id="cut short"),
         pytest.param(lengthen, "lod1_tile_03.bin is too long", id="too long"),
         pytest.param(damage, "lod0_tile_07.bin is damaged", id="damaged"),
         pytest.param(point_outside, "“https://example.org/x.bin” contradicts itself", id="points outside"),

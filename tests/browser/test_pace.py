@@ -1,5 +1,24 @@
 """The splat budget: fewer splats where frames come slowly, more where they come fast, and no to and fro."""
 
+REST = """async ([cost, all]) => {
+  // budgets of the pictures at rest, where a Gaussian costs so many milliseconds and there are `all` of them
+  const { createRest } = await import("./rest.js");
+  let now = 0, done = 0;
+  const gl = { fenceSync: () => 1, deleteSync: () => {}, SIGNALED: 1, getSyncParameter: () => Number(now >= done) };
+  const rest = createRest(gl), budgets = [];
+  let used = 20000;
+  const draw = () => (rest.drawn(now), (done = now + cost * used));
+  rest.moved(now, used);
+  draw();
+  for (; now < 20000; now += 16) {
+    const more = rest.next(now, used === all);
+    if (!more) continue;
+    budgets.push([now, more]);
+    used = Math.min(more, all);
+    draw();
+  }
+  return budgets;
+}"""
 PACE = """async ([frames, cost]) => {
   // `cost(budget)`: milliseconds a frame with that many splats, at least one refresh of 60 Hz
   const { createPace } = await import("./pace.js");
@@ -32,3 +51,19 @@ def test_a_machine_in_between_comes_to_rest_below_what_it_can_do(visit, plain):
 
 def test_few_frames_say_nothing(visit, plain):
     assert set(budgets(visit, plain, 2, 1)) == {100_000}
+
+
+def pictures_at_rest(visit, plain, cost, all_):
+    return visit(160, 100).open(f"{plain}?still").page.evaluate(REST, [cost, all_])
+
+
+def test_at_rest_the_picture_gets_all_there_is_after_a_while(visit, plain):
+    found = pictures_at_rest(visit, plain, 1e-5, 1_000_000)
+    assert [budget for _, budget in found] == [80_000, 320_000, 1_280_000]
+    assert found[0][0] >= 500
+
+
+def test_at_rest_a_slow_machine_is_not_kept_busy_for_long(visit, plain):
+    # 400 ms for 20,000: four times as many would take longer than somebody who walks on may wait
+    assert pictures_at_rest(visit, plain, 400 / 20_000, 1_000_000) == []
+    assert [budget for _, budget in pictures_at_rest(visit, plain, 100 / 20_000, 1_000_000)] == [80_000]

@@ -5,47 +5,55 @@ import json
 import made_up
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from visiting import served
 
 from dav_gswt import cameras
+from dav_gswt.bundle import store
+from dav_gswt.field import Field
 
 AT, DEVIATION, PAINT = np.array([3.0, 1.0, 0.1]), np.array([0.3, 0.05, 0.02]), np.array([230, 40, 90, 200])
-TURN = np.array([250, 134, 116, 161])  # any quaternion, as its bytes
+TURN = np.array([0.96, 0.05, -0.09, 0.26])  # any quaternion
 BACK = np.array([0.5, 0.75, 0.25])
 
 
 def one(ground, tile, level):
-    row = np.zeros(1, made_up.RECORD)
+    row = np.zeros(1, made_up.LOOK)
     row["position"], row["deviation"], row["paint"], row["turn"] = AT, DEVIATION, PAINT, TURN
     return row
 
 
 @pytest.fixture(scope="module")
-def lonely(page_of):
-    """One turned, drawn-out Gaussian a tile of 40 units before one plain colour."""
+def seen_as(lonely_folder):
+    """The Gaussian as it was rounded."""
+    return store.Bundle(lonely_folder, json.loads((lonely_folder / "davgswt.json").read_text())).chunk(0, 0)[0]
+
+
+@pytest.fixture(scope="module")
+def lonely_folder(page_of):
+    """A page with one turned, drawn-out Gaussian a tile of 40 units before one plain colour."""
     folder = page_of(made_up.Ground(side=40.0, levels=1, eye_floor=0.5), one)
     manifest = json.loads((folder / "davgswt.json").read_text())
     plain = {"ground_colour": BACK.tolist(), "sky": {"zenith": BACK.tolist(), "horizon": BACK.tolist()}}
     (folder / "davgswt.json").write_text(json.dumps(manifest | plain))
-    with served(folder) as address:
+    return folder
+
+
+@pytest.fixture(scope="module")
+def lonely(lonely_folder):
+    with served(lonely_folder) as address:
         yield address
 
 
-def expected(camera: cameras.Camera) -> np.ndarray:
+def expected(camera: cameras.Camera, field: Field) -> np.ndarray:
     """The picture of the one Gaussian: J W S W^T J^T + 0.3 px^2, cut below 1/255."""
-    w, x, y, z = (v := (TURN - 128.0) / 127) / np.linalg.norm(v)
-    axes = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    q = camera.rotation @ AT + camera.translation
+    at = field.means[0].astype(float)
+    axes = Rotation.from_quat(field.quats[0].astype(float), scalar_first=True).as_matrix()
+    q = camera.rotation @ at + camera.translation
     jacobian = camera.fx / q[2] * np.array([[1, 0, -q[0] / q[2]], [0, 1, -q[1] / q[2]]])
-    spread = jacobian @ camera.rotation @ axes * DEVIATION
+    spread = jacobian @ camera.rotation @ axes * np.exp(field.log_scales[0].astype(float))
     inverse = np.linalg.inv(spread @ spread.T + 0.3 * np.eye(2))
-    centre = camera.project(AT[None])[0][0]
+    centre = camera.project(at[None])[0][0]
     u, v = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     d = np.stack([u, v], -1) - centre
     alpha = PAINT[3] / 255 * np.exp(-0.5 * np.einsum("hwi,ij,hwj->hw", d, inverse, d))
@@ -62,12 +70,12 @@ def expected(camera: cameras.Camera) -> np.ndarray:
         pytest.param(dict(x=4.0, y=1.6, eye=0.8, yaw=205.0, pitch=-38.0), id="low, from the north-east"),
     ],
 )
-def test_a_gaussian_looks_as_the_formula_says(visit, lonely, place):
+def test_a_gaussian_looks_as_the_formula_says(visit, lonely, seen_as, place):
     seen = visit().open(f"{lonely}?still").at(**place)
     yaw, pitch = np.radians(place["yaw"]), np.radians(place["pitch"])
     eye = np.array([place["x"], place["y"], place["eye"]])
     ahead = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
-    formula = expected(cameras.pinhole(eye, eye + ahead, 320, 200, 60.0))
+    formula = expected(cameras.pinhole(eye, eye + ahead, 320, 200, 60.0), seen_as)
     assert np.abs(formula - 255 * BACK).max() > 60, "the Gaussian is in the picture"
     # rounding to 8 bits: half a step for the back, half for the sum; one more where the rim is cut at 1/255
     assert np.abs(seen - formula).max() <= 2.01

@@ -57,9 +57,9 @@ def test_the_eye_stays_above_its_floor(visit, plain):
 def test_dragging_turns_the_view_as_if_the_picture_were_held(visit, plain):
     seen = visit().open(f"{plain}?still")
     seen.at(**OBLIQUE)
-    seen.page.mouse.move(100, 80)
+    seen.page.mouse.move(100, 20)  # above the tools
     seen.page.mouse.down()
-    seen.page.mouse.move(140, 100)
+    seen.page.mouse.move(140, 40)
     seen.page.mouse.up()
     # 320 pixels are 60 degrees: 40 pixels to the right are 7.5 degrees to the left, 20 down are 3.75 up
     assert (seen.state["yaw"], seen.state["pitch"]) == (pytest.approx(27.5), pytest.approx(-26.25))
@@ -113,20 +113,39 @@ def test_a_lost_context_comes_back_with_the_same_picture(visit, plain):
     assert (seen.picture() == before).all()
 
 
+@pytest.mark.parametrize("overlay", ["picture", "level"])
+def test_a_picture_waits_for_a_context_that_is_lost_meanwhile(visit, plain, overlay):
+    seen = visit(160, 100).open(f"{plain}?still")
+    seen.page.evaluate("name => davgswt.overlay(name)", overlay)
+    before = seen.at(**OBLIQUE)
+    seen.page.evaluate(
+        """() => {
+          const gl = document.getElementById("picture").getContext("webgl2");
+          const loss = gl.getExtension("WEBGL_lose_context");
+          davgswt.settle(); // under way when the context goes
+          loss.loseContext();
+          setTimeout(() => loss.restoreContext(), 200);
+        }"""
+    )
+    assert (seen.picture() == before).all()
+
+
 def test_the_budget_takes_fewer_splats_and_still_draws_near_tiles_back_to_front(visit, plain):
     seen = visit(160, 100).open(f"{plain}?still")
     result = seen.page.evaluate(
         """async () => {
-          const { createTerrain, visible } = await import("./terrain.js");
+          const { createTerrain } = await import("./terrain.js");
+          const { visible } = await import("./budget.js");
+          const { createHeights } = await import("./heights.js");
           const { cameraOf, createWalker } = await import("./walk.js");
           const manifest = await (await fetch("davgswt.json")).json();
-          const terrain = createTerrain(manifest);
-          terrain.arrived.forEach(levels => manifest.levels.forEach(({ level }) => levels.add(level)));
+          const terrain = createTerrain(manifest, createHeights());
+          for (const tile of terrain.tiles) tile.arrived = (1 << manifest.levels.length) - 1;
           const camera = cameraOf(createWalker(manifest, { eye: 1, pitch: -10 }), 1280, 720);
           return [1e9, 20000, 5000, 300].map(budget => {
-            const { tiles, count, reach } = visible(terrain, camera, budget);
-            return { budget, count, reach, cells: tiles.map(({ i, j }) => [i, j]),
-              steps: tiles.map(({ i, j }) => Math.abs(i) + Math.abs(j)) };
+            const { cells, count, reach } = visible(terrain, camera, budget);
+            return { budget, count, reach, cells: cells.map(({ di, dj }) => [di, dj]),
+              steps: cells.map(({ di, dj }) => Math.abs(di) + Math.abs(dj)) };
           });
         }"""
     )

@@ -135,8 +135,24 @@ def test_a_bundle_keeps_its_contract(tiny, root):
     assert len(chunks) == 16 * len(bundle["levels"]) and {chunk["file"] for chunk in chunks} == there
     for chunk in chunks:
         path = tiny.bundle / chunk["file"]
-        assert path.stat().st_size == chunk["bytes"] == chunk["count"] * (32 + 4 * len(chunk["orders"]))
+        assert path.stat().st_size == chunk["bytes"] == chunk["count"] * (16 + 2 * len(chunk["orders"]))
         assert digest(path) == chunk["sha256"]
+    source = bundle["provenance"]
+    assert {"frame", "levels", "photos", "seams", "tiles"} == set(source["inputs"]) and "level0" in source["tiles"][
+        "inputs"
+    ]
+    assert {"field", "ground"} == set(source["levels"]["inputs"]) and source["parameters"]["tau"] == 0.6
+
+
+def test_levels_leave_as_patches_for_other_viewers(tiny, snakemake, tmp_path):
+    folder = shutil.copytree(tiny.folder, tmp_path / "exported")
+    plys = tiny.bundle.relative_to(tiny.folder) / "exports/ply"
+    snakemake(folder, "--cores", "2", str(plys), configs=CONFIGS)
+    bundle = read_json(tiny.bundle / "davgswt.json")
+    for level in range(len(bundle["levels"])):
+        patch = field.read(folder / plys / f"level{level}.ply")
+        assert len(patch) == sum(tile["chunks"][level]["count"] for tile in bundle["tiles"])
+        assert np.ptp(patch.means[:, 0]) == pytest.approx(4 * bundle["tile_side"], rel=0.2)
 
 
 @pytest.mark.parametrize("made", ["tiny", "finished", "beach"])

@@ -1,6 +1,6 @@
 // The few WebGL2 calls that sky and splats share.
 
-import { PageError } from "./bundle.js";
+import { PageError } from "./source.js";
 
 /** A context of the canvas, opaque and without depth (splats are drawn in order). Raises: PageError: no WebGL2. */
 export function context(canvas) {

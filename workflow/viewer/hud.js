@@ -3,7 +3,8 @@
 const OFTEN = 250; // milliseconds between updates of the numbers
 
 export function createHud(document) {
-  const ids = ["status", "bar", "loading", "error", "place", "speed", "help", "helpButton", "helpClose"];
+  const ids = ["status", "bar", "loading", "error", "place", "speed", "help", "helpButton",
+    "helpClose", "tools", "times"];
   const part = Object.fromEntries(ids.map((id) => [id, document.getElementById(id)]));
   let told = -Infinity, numbered = -Infinity;
   const due = () => { // a screen reader reads every change of the status aloud
@@ -20,7 +21,8 @@ export function createHud(document) {
     showHelp(false);
     remember();
   });
-  part.place.parentElement.hidden = true;
+  part.error.addEventListener("click", () => (part.error.hidden = true));
+  part.place.parentElement.hidden = part.tools.hidden = true;
 
   return {
     /** Bytes and tiles so far. */
@@ -45,11 +47,18 @@ export function createHud(document) {
     recovered() {
       part.error.hidden = true;
     },
+    /** Another bundle was dropped. */
+    opening() {
+      part.error.hidden = true;
+      part.loading.hidden = false;
+      part.bar.value = 0;
+      part.status.textContent = "Reading what was dropped";
+    },
     started() {
-      part.place.parentElement.hidden = false;
+      part.place.parentElement.hidden = part.tools.hidden = false;
     },
     /** Where the walker is and what it costs; a few times a second at most. */
-    numbers(now, state, { fps, milliseconds }, unit, force) {
+    numbers(now, state, stats, fps, unit, force) {
       if (now - numbered < OFTEN && !force) return;
       numbered = now;
       const { x, y, eye, under, count, drawn } = state();
@@ -57,7 +66,12 @@ export function createHud(document) {
       part.place.textContent = `tile ${under.tile} at (${under.i}, ${under.j}) · ${where}`;
       const rate = fps ? `${Math.round(fps)} fps, ` : "";
       const shown = `${count.toLocaleString("en")} splats in ${drawn.length} tiles`;
-      part.speed.textContent = `${rate}${milliseconds.toFixed(1)} ms · ${shown}`;
+      part.speed.textContent = `${rate}${shown}`;
+      const times = ["render", "sort", "update"].filter((name) => stats[name]).map((name) => {
+        const { mean, sd } = stats[name];
+        return `${name} ${mean.toFixed(1)} ± ${sd.toFixed(1)} ms`;
+      });
+      part.times.textContent = `${times.join(" · ")} · worker in ${Math.round(100 * stats.share)} % of frames`;
     },
   };
 }

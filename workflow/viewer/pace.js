@@ -1,8 +1,8 @@
 // How many Gaussians a picture may have: fewer where frames come slowly, more where they come fast. Few at first, so
 // that the first picture is quick everywhere.
 
-export const BUDGET = { least: 20_000, first: 100_000, most: 6_000_000, still: 2_000_000 };
-const SLOW = 24, GOAL = 21, FAST = 19; // milliseconds a frame: above the first shrink to the second, below the third grow
+export const BUDGET = { least: 20_000, first: 100_000, most: 6_000_000 };
+const SLOW = 24, GOAL = 21, FAST = 19; // milliseconds a frame: above the first shrink to the next, below the last grow
 const GROW = 1.6, RELAX = 1.01;
 const RECKON = 300, FRAMES = 3; // a verdict needs so many milliseconds and frames
 
@@ -15,7 +15,7 @@ export function createPace() {
     rest() {
       time = frames = 0;
     },
-    /** A frame came `gap` milliseconds after the one before; the last had `used` Gaussians. Returns: may more be drawn? */
+    /** A frame came `gap` milliseconds after the last, which had `used` Gaussians. Returns: may more be drawn? */
     frame(gap, used) {
       time += gap;
       frames += 1;

@@ -1,8 +1,8 @@
-// What lies behind the tiles: a sky without a sun, and below the horizon a far ground of the terrain's mean colour.
+// What lies behind the tiles: a sky, with a sun where the manifest names one, and below the horizon a far ground of the
+// terrain's mean colour. The same colours as dav_gswt/terrain/backdrop.py.
 
 import { program } from "./gl.js";
-
-const HAZE = 4; // the far ground pales from this many times the tiles' reach on: the tiles themselves stay clear
+import { BACKDROP } from "./shader.js";
 
 const VERTEX = `#version 300 es
 out vec2 at;
@@ -15,34 +15,36 @@ const FRAGMENT = `#version 300 es
 precision highp float;
 in vec2 at;
 out vec4 colour;
-uniform vec3 right, up, ahead, zenith, horizon, ground;
+uniform vec3 right, up, ahead, sun, sunColour; // sun: where it stands; of length 0: none
 uniform vec2 halfTangent; // tangents of half the field of view
-uniform float pixel, far; // angle of a pixel; sine below the horizon at which haze begins
+${BACKDROP}
 void main() {
-  vec3 ray = ahead + at.x * halfTangent.x * right + at.y * halfTangent.y * up;
-  float rise = ray.z / length(ray);
-  vec3 above = mix(horizon, zenith, sqrt(clamp(rise, 0.0, 1.0)));
-  vec3 below = mix(ground, horizon, 0.8 * exp(min(rise, 0.0) / far));
-  colour = vec4(mix(below, above, clamp(rise / pixel + 0.5, 0.0, 1.0)), 1.0);
+  vec3 ray = normalize(ahead + at.x * halfTangent.x * right + at.y * halfTangent.y * up);
+  vec3 seen = backdrop(ray.z);
+  float close = dot(ray, sun);
+  float disc = ray.z > 0.0 ? smoothstep(0.99988, 0.99996, close) + 0.25 * pow(max(close, 0.0), 350.0) : 0.0;
+  colour = vec4(mix(seen, sunColour, clamp(disc, 0.0, 1.0)), 1.0);
 }`;
 
-export function createSky(gl, manifest) {
-  const { use, uniforms } = program(gl, VERTEX, FRAGMENT);
-  const empty = gl.createVertexArray();
+export function createSky(gl, { sky, ground_colour: ground }) {
+  const { use, uniforms } = program(gl, VERTEX, FRAGMENT), empty = gl.createVertexArray();
+  const long = sky.sun ? Math.hypot(...sky.sun.direction) : 1;
   return {
-    /** Fill the picture; `reach` is how far tiles are drawn. */
-    draw(camera, reach) {
+    /** Fill the picture; `low`: sine of the angle below the horizon at which tiles end. */
+    draw(camera, { low }) {
       use();
       gl.bindVertexArray(empty);
       gl.disable(gl.BLEND);
       for (const axis of ["right", "up", "ahead"]) gl.uniform3fv(uniforms[axis], camera[axis]);
-      gl.uniform3fv(uniforms.zenith, manifest.sky.zenith);
-      gl.uniform3fv(uniforms.horizon, manifest.sky.horizon);
-      gl.uniform3fv(uniforms.ground, manifest.ground_colour);
+      gl.uniform3fv(uniforms.zenith, sky.zenith);
+      gl.uniform3fv(uniforms.horizon, sky.horizon);
+      gl.uniform3fv(uniforms.ground, ground);
+      gl.uniform3fv(uniforms.sun, sky.sun ? sky.sun.direction.map((v) => v / long) : [0, 0, 0]);
+      gl.uniform3fv(uniforms.sunColour, sky.sun?.colour ?? [1, 1, 1]);
       gl.uniform2f(uniforms.halfTangent, camera.width / 2 / camera.focal, camera.height / 2 / camera.focal);
-      gl.uniform1f(uniforms.pixel, 1 / camera.focal);
-      gl.uniform1f(uniforms.far, camera.eye[2] / (HAZE * reach));
+      gl.uniform1f(uniforms.low, low);
       gl.drawArrays(gl.TRIANGLES, 0, 3);
+      gl.bindVertexArray(null);
     },
   };
 }

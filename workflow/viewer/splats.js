@@ -1,140 +1,196 @@
-// Gaussians on the GPU. A chunk's bytes go up as they are: 32-byte records into an integer texture (two texels a
-// Gaussian), the orders into one buffer; a draw call takes one tile in one order, each instance one Gaussian.
+// Gaussians on the GPU: all records in one texture, orders in pages of another, and two instanced draws a picture, one
+// for all far tiles and one for the 3 x 3 about the eye. A block of instances is a page of entries in one cell.
 
 import { program } from "./gl.js";
+import { MOST_OCTAVES } from "./heights.js";
+import { huesOf } from "./overlay.js";
+import { setEncoding } from "./records.js";
+import { LEVELS, PAGE } from "./runs.js";
+import { FRAGMENT, PAGES_A_ROW, vertexShader } from "./shader.js";
+import { PageError } from "./source.js";
+import { ROW, rowsFor } from "./store.js";
+import { NEAR } from "./terrain.js";
+import { BLOCK, pagesFor } from "./update.js";
 
-const TEXELS = 2048; // width of a record texture: 1024 Gaussians a row
+const FULL = "The terrain does not fit into this machine's graphics memory. Close other pages, make one with larger "
+  + "tiles or fewer variants, or open it on a larger machine.";
+const WIDTH = PAGE * PAGES_A_ROW; // of the order textures
 
-const VERTEX = `#version 300 es
-precision highp float;
-precision highp int;
-precision highp usampler2D;
-layout(location = 0) in uint index;
-uniform usampler2D records;
-uniform vec3 right, up, ahead;  // camera axes in the world
-uniform vec3 offset;            // the tile's south-west corner, seen from the eye
-uniform vec2 halfSize;          // half the picture, in pixels
-uniform vec2 fade;              // distances between which the last tiles give way to the far ground
-uniform float focal, near;
-out vec2 at;                    // in standard deviations from the centre
-out vec4 colour;
+export function createSplats(gl, manifest, heights) {
+  const { use, uniforms } = program(gl, vertexShader(heights.kind), FRAGMENT);
+  const tallest = Math.max(rowsFor(manifest), pagesFor(manifest) / PAGES_A_ROW);
+  if (tallest > gl.getParameter(gl.MAX_TEXTURE_SIZE)) throw new PageError(FULL);
+  const records = texture(gl, gl.RGBA32UI, ROW, rowsFor(manifest));
+  const entries = texture(gl, gl.R32UI, WIDTH, pagesFor(manifest) / PAGES_A_ROW);
+  const far = createBlocks(gl), close = createBlocks(gl);
+  let nearEntries = texture(gl, gl.R32UI, WIDTH, 1), nearRows = 1, frame = null;
+  const constants = () => {
+    setEncoding(gl, uniforms, manifest.encoding);
+    gl.uniform1i(uniforms.records, 0);
+    gl.uniform1i(uniforms.entries, 1);
+    gl.uniform1i(uniforms.hues, 3);
+    gl.uniform1i(uniforms.levels, manifest.levels.length);
+    gl.uniform1f(uniforms.side, manifest.tile_side);
+    gl.uniform1f(uniforms.near, NEAR * manifest.eye_floor);
+    gl.uniform3fv(uniforms.zenith, manifest.sky.zenith);
+    gl.uniform3fv(uniforms.horizon, manifest.sky.horizon);
+    gl.uniform3fv(uniforms.ground, manifest.ground_colour);
+    if (heights.kind === "hills") {
+      gl.uniform1i(uniforms.octaves, heights.amplitudes.length);
+      gl.uniform1ui(uniforms.salt, heights.salt);
+      gl.uniform1fv(uniforms["amplitude[0]"], padded(heights.amplitudes, MOST_OCTAVES));
+      gl.uniform1fv(uniforms["scale[0]"], padded(heights.scales, MOST_OCTAVES));
+    } else if (heights.kind === "image") {
+      gl.uniform1i(uniforms.relief, 2);
+      gl.uniform1i(uniforms.mirrored, heights.mirrored);
+      gl.uniform1fv(uniforms["scale[0]"], [heights.perUnit]);
+    }
+  };
+  const relief = heights.kind === "image" ? reliefTexture(gl, heights) : null;
+  const hues = texture(gl, gl.RGBA8, 256, 1);
+  let shown = -1;
+  if (gl.getError() === gl.OUT_OF_MEMORY) throw new PageError(FULL);
 
-const vec4 NOWHERE = vec4(2.0, 2.0, 2.0, 1.0);
-
-vec4 bytes(uint word) { return vec4(word & 255u, word >> 8 & 255u, word >> 16 & 255u, word >> 24); }
-
-mat3 rotation(vec4 q) { // w x y z
-  q /= max(length(q), 1e-6);
-  float w = q.x, x = q.y, y = q.z, z = q.w;
-  return mat3(
-    1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y),
-    2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x),
-    2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y));
-}
-
-void main() {
-  gl_Position = NOWHERE;
-  at = vec2(0.0);
-  colour = vec4(0.0);
-  ivec2 texel = ivec2(int(index & ${TEXELS / 2 - 1}u) * 2, int(index >> ${Math.log2(TEXELS / 2)}u));
-  uvec4 first = texelFetch(records, texel, 0), second = texelFetch(records, texel + ivec2(1, 0), 0);
-  vec3 seen = uintBitsToFloat(first.xyz) + offset;
-  vec3 p = vec3(dot(right, seen), dot(up, seen), dot(ahead, seen));
-  if (!(p.z > near)) return;
-  vec4 paint = bytes(second.z) / 255.0;
-  float opacity = paint.a * (1.0 - smoothstep(fade.x, fade.y, length(seen)));
-  if (opacity * 255.0 <= 1.0) return;
-
-  // EWA: covariance J R S S^T R^T J^T of the picture, with a pixel's own width of 0.3 added. J is taken at a point
-  // inside a somewhat wider picture, or splats at its edges would be drawn out to needles.
-  mat3 axes = rotation((bytes(second.w) - 128.0) / 127.0);
-  vec3 deviation = vec3(uintBitsToFloat(first.w), uintBitsToFloat(second.x), uintBitsToFloat(second.y));
-  mat3 turned = mat3(right, up, ahead);
-  mat3 shape = transpose(turned) * mat3(axes[0] * deviation.x, axes[1] * deviation.y, axes[2] * deviation.z);
-  vec2 slope = clamp(p.xy / p.z, -1.3 * halfSize / focal, 1.3 * halfSize / focal);
-  vec3 depth = vec3(shape[0].z, shape[1].z, shape[2].z);
-  vec3 across = (vec3(shape[0].x, shape[1].x, shape[2].x) - slope.x * depth) * (focal / p.z);
-  vec3 along = (vec3(shape[0].y, shape[1].y, shape[2].y) - slope.y * depth) * (focal / p.z);
-  // Where a splat is nearly as deep as it is far, a plane through its centre says nothing about its rim: discs underfoot
-  // would be drawn up over the horizon as haze.
-  opacity *= smoothstep(1.8, 3.2, p.z / max(length(depth), 1e-9));
-  if (opacity * 255.0 <= 1.0) return;
-  float a = dot(across, across) + 0.3, b = dot(across, along), c = dot(along, along) + 0.3;
-
-  float mean = 0.5 * (a + c), lean = 0.5 * (a - c), spread = length(vec2(lean, b));
-  vec2 major = lean > 0.0 ? vec2(lean + spread, b) : vec2(b, spread - lean);
-  major = spread < 1e-6 * mean ? vec2(1.0, 0.0) : normalize(major);
-  vec2 lengths = sqrt(vec2(mean + spread, max((a * c - b * b) / (mean + spread), 0.3)));
-  float reach = sqrt(2.0 * log(255.0 * opacity)); // beyond it the Gaussian is fainter than 1/255
-  at = (vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0) * reach;
-  vec2 pixel = focal * p.xy / p.z + at.x * lengths.x * major + at.y * lengths.y * vec2(-major.y, major.x);
-  colour = vec4(paint.rgb, opacity);
-  gl_Position = vec4(pixel / halfSize, 0.0, 1.0);
-}`;
-
-const FRAGMENT = `#version 300 es
-precision highp float;
-in vec2 at;
-in vec4 colour;
-out vec4 painted;
-void main() {
-  float alpha = min(0.99, colour.a * exp(-0.5 * dot(at, at)));
-  if (alpha < 1.0 / 255.0) discard;
-  painted = vec4(colour.rgb * alpha, alpha);
-}`;
-
-export function createSplats(gl) {
-  const { use, uniforms } = program(gl, VERTEX, FRAGMENT);
-  const stored = new Map(); // "tile/level" -> on the GPU
-  const instances = gl.createVertexArray();
-  gl.bindVertexArray(instances);
-  gl.enableVertexAttribArray(0);
-  gl.vertexAttribDivisor(0, 1);
-  gl.bindVertexArray(null);
+  function bind(unit, which) {
+    gl.activeTexture(gl.TEXTURE0 + unit);
+    gl.bindTexture(gl.TEXTURE_2D, which);
+  }
 
   return {
-    /** Bring a chunk to the GPU. */
-    add(chunk) {
-      const orders = gl.createBuffer();
-      gl.bindBuffer(gl.ARRAY_BUFFER, orders);
-      gl.bufferData(gl.ARRAY_BUFFER, chunk.orders, gl.STATIC_DRAW);
-      stored.set(`${chunk.tile}/${chunk.level}`, { texture: recordTexture(gl, chunk), orders, count: chunk.count });
+    /** Bring a chunk's records to their rows. */
+    add({ rows, records: words }) {
+      bind(0, records);
+      const wordsARow = 4 * ROW;
+      for (let k = 0; k < rows.length; k++) {
+        const texels = Math.min(ROW, (words.length - k * wordsARow) / 4);
+        const layout = [gl.RGBA_INTEGER, gl.UNSIGNED_INT];
+        gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, rows[k], texels, 1, ...layout, words, k * wordsARow);
+      }
     },
 
-    /** Draw tiles, given back to front, over what the picture already shows. */
-    draw(camera, tiles, { near, fade }) {
+    /** Bring what the worker made of a view: new pages of orders, the blocks, and the near order. */
+    take(made) {
+      bind(1, entries);
+      uploadPages(gl, made.uploads);
+      far.fill(made.blocks);
+      const pages = Math.ceil(made.near.length / PAGE), rows = Math.ceil(pages / PAGES_A_ROW);
+      if (rows > nearRows) {
+        gl.deleteTexture(nearEntries);
+        nearEntries = texture(gl, gl.R32UI, WIDTH, (nearRows = 2 * rows));
+      }
+      if (rows) {
+        const data = new Uint32Array(rows * WIDTH);
+        data.set(made.near);
+        bind(1, nearEntries);
+        gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, WIDTH, rows, gl.RED_INTEGER, gl.UNSIGNED_INT, data);
+      }
+      close.fill(nearBlocks(pages, made.near.length));
+      frame = made;
+    },
+
+    /** Draw what was last taken, as the camera sees it now, over what the picture already shows. */
+    draw(camera, { end, low, overlay }) {
+      if (!frame) return;
       use();
+      constants();
       gl.enable(gl.BLEND);
       gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
       for (const axis of ["right", "up", "ahead"]) gl.uniform3fv(uniforms[axis], camera[axis]);
+      const [x, y, z] = camera.eye, { i0, j0, switches, bands } = frame, side = manifest.tile_side;
+      gl.uniform3f(uniforms.corner, i0 * side - x, j0 * side - y, -z);
       gl.uniform2f(uniforms.halfSize, camera.width / 2, camera.height / 2);
-      gl.uniform2fv(uniforms.fade, fade);
       gl.uniform1f(uniforms.focal, camera.focal);
-      gl.uniform1f(uniforms.near, near);
-      gl.bindVertexArray(instances);
-      for (const { tile, level, order, offset } of tiles) {
-        const chunk = stored.get(`${tile}/${level}`);
-        if (!chunk?.count) continue;
-        gl.bindTexture(gl.TEXTURE_2D, chunk.texture);
-        gl.bindBuffer(gl.ARRAY_BUFFER, chunk.orders);
-        gl.vertexAttribIPointer(0, 1, gl.UNSIGNED_INT, 4, 4 * chunk.count * order);
-        gl.uniform3fv(uniforms.offset, offset);
-        gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, chunk.count);
+      gl.uniform1f(uniforms.end, end);
+      gl.uniform1f(uniforms.low, low);
+      gl.uniform1fv(uniforms["changes[0]"], padded(switches.slice(0, -1), LEVELS));
+      gl.uniform1fv(uniforms["bands[0]"], padded(bands, LEVELS));
+      gl.uniform1uiv(uniforms["marks[0]"], frame.marks);
+      gl.uniform1i(uniforms.overlay, overlay);
+      bind(3, hues);
+      if (shown !== overlay) {
+        const colours = huesOf((shown = overlay), manifest);
+        gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 256, 1, gl.RGBA, gl.UNSIGNED_BYTE, colours);
       }
+      if (heights.under) {
+        const { cells, places } = heights.under(x, y);
+        gl.uniform2iv(uniforms["cellUnder[0]"], cells);
+        gl.uniform2fv(uniforms["placeUnder[0]"], places);
+      }
+      bind(0, records);
+      if (relief) bind(2, relief);
+      bind(1, entries);
+      far.draw();
+      bind(1, nearEntries);
+      close.draw();
+      gl.activeTexture(gl.TEXTURE0);
       gl.bindVertexArray(null);
+    },
+
+    /** Give the memory back. */
+    end() {
+      for (const made of [records, entries, nearEntries, hues, relief]) gl.deleteTexture(made);
     },
   };
 }
 
-/** The records of a chunk as they are, two texels of four 32-bit words a Gaussian. */
-function recordTexture(gl, { records, count }) {
-  const perRow = TEXELS / 2, rows = Math.floor(count / perRow), rest = count % perRow;
-  const texture = gl.createTexture();
-  gl.bindTexture(gl.TEXTURE_2D, texture);
-  gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32UI, TEXELS, Math.max(1, rows + (rest > 0)));
+const padded = (list, length) => Float32Array.from({ length }, (_, k) => list[k] ?? 0);
+
+function texture(gl, format, width, height) {
+  const made = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_2D, made);
+  gl.texStorage2D(gl.TEXTURE_2D, 1, format, width, height);
   for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, side, gl.NEAREST);
-  const [format, type] = [gl.RGBA_INTEGER, gl.UNSIGNED_INT];
-  if (rows) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, TEXELS, rows, format, type, records);
-  if (rest) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, rows, rest * 2, 1, format, type, records, rows * TEXELS * 4);
-  return texture;
+  return made;
+}
+
+function reliefTexture(gl, { pixels, columns, rows }) {
+  const made = texture(gl, gl.R32F, columns, rows);
+  gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, columns, rows, gl.RED, gl.FLOAT, pixels);
+  return made;
+}
+
+/** Pages one after the other in a row of the texture go up together. */
+function uploadPages(gl, { numbers, data }) {
+  for (let k = 0; k < numbers.length;) {
+    const first = numbers[k], place = first % PAGES_A_ROW;
+    let n = 1;
+    while (k + n < numbers.length && numbers[k + n] === first + n && place + n < PAGES_A_ROW) n += 1;
+    const [column, row] = [place * PAGE, Math.floor(first / PAGES_A_ROW)];
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, column, row, n * PAGE, 1, gl.RED_INTEGER, gl.UNSIGNED_INT, data, k * PAGE);
+    k += n;
+  }
+}
+
+/** Blocks for an instanced draw: each serves PAGE instances. */
+function createBlocks(gl) {
+  const array = gl.createVertexArray(), buffer = gl.createBuffer();
+  let count = 0;
+  gl.bindVertexArray(array);
+  gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+  gl.enableVertexAttribArray(0);
+  gl.vertexAttribIPointer(0, 3, gl.UNSIGNED_INT, 4 * BLOCK, 0);
+  gl.vertexAttribDivisor(0, PAGE);
+  gl.bindVertexArray(null);
+  return {
+    fill(words) {
+      count = words.length / BLOCK;
+      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+      gl.bufferData(gl.ARRAY_BUFFER, words, gl.DYNAMIC_DRAW);
+    },
+    draw() {
+      if (!count) return;
+      gl.bindVertexArray(array);
+      gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, count * PAGE);
+    },
+  };
+}
+
+/** Pages 0, 1, ... of the near order; entries name their cells themselves. */
+function nearBlocks(pages, count) {
+  const words = new Uint32Array(BLOCK * pages);
+  for (let k = 0; k < pages; k++) {
+    words[BLOCK * k] = k;
+    words[BLOCK * k + 1] = (Math.min(PAGE, count - k * PAGE) - 1) << 16;
+  }
+  return words;
 }

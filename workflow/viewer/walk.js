@@ -49,12 +49,12 @@ export function step(walker, seconds) {
   return true;
 }
 
-/** The camera of a walker for a picture of so many pixels. */
-export function cameraOf(walker, width, height) {
+/** The camera of a walker, so high above the surface, for a picture of so many pixels. */
+export function cameraOf(walker, width, height, heights) {
   const yaw = (walker.yaw * Math.PI) / 180, pitch = (walker.pitch * Math.PI) / 180;
   const [c, s, p, q] = [Math.cos(yaw), Math.sin(yaw), Math.cos(pitch), Math.sin(pitch)];
   return {
-    eye: [walker.x, walker.y, walker.eye],
+    eye: [walker.x, walker.y, walker.eye + (heights ? heights.at(walker.x, walker.y)[0] : 0)],
     right: [s, -c, 0], up: [-q * c, -q * s, p], ahead: [p * c, p * s, q],
     width, height, focal: Math.max(width, height) / 2 / Math.tan((WIDE * Math.PI) / 360),
   };

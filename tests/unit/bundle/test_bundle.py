@@ -1,16 +1,19 @@
 """Bundles: values by hand, round trips, refusals, and the public renderer's rules."""
 
 import copy
+import hashlib
 import json
+import shutil
 import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from dav_gswt.bundle import build, chunks, gswt, lod, manifest, orders
+from dav_gswt.bundle import build, gswt, lod, manifest, store
 from dav_gswt.errors import InputError
 from dav_gswt.field import Field, sh_of
+from dav_gswt.terrain import assemble, still
 from dav_gswt.tiles.build import TileSet
 
 SCHEMA = Path(__file__).parents[3] / "workflow/schemas/davgswt.schema.json"
@@ -43,48 +46,6 @@ def bundle(tiles, tmp_path_factory):
     return folder, build.write_bundle(tiles, folder, build.Options(tau=0.5, salt=7), SCHEMA, {"from": "a test"})
 
 
-def test_a_splat_is_stored_as_its_32_bytes():
-    field = Field(
-        np.float32([[1, 2, 3]]),
-        np.log(np.float32([[0.5, 0.25, 2]])),
-        np.float32([[-2, 0, 0, 2]]),  # length 2.83, w < 0: stored as (0.707, 0, 0, -0.707)
-        np.float32([0]),
-        sh_of(np.float32([[1, 0.5, 0]])),
-        np.float32([0]),
-        np.array([True]),
-    )
-    expected = np.float32([1, 2, 3, 0.5, 0.25, 2]).astype("<f4").tobytes()
-    # 255, 127.5 to even, 0, opacity 0.5 likewise; 128 +- 0.707 * 128 = 218.5, 37.5
-    expected += bytes([255, 128, 0, 128]) + bytes([219, 128, 128, 37])
-    assert chunks.records(field).tobytes() == expected
-
-
-def test_directions_start_in_the_east_go_north_and_end_straight_down():
-    found = orders.directions()
-    down = np.radians(20)
-    np.testing.assert_allclose(found[0], [np.cos(down), 0, -np.sin(down)], atol=1e-15)
-    np.testing.assert_allclose(found[4], [0, np.cos(down), -np.sin(down)], atol=1e-15)
-    np.testing.assert_allclose(found[-1], [0, 0, -1])
-    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1, rtol=1e-15)
-
-
-def test_order_runs_from_back_to_front_and_is_stable():
-    means = np.float32([[0, 0, 0], [2, 0, 5], [1, 0, 0], [2, 9, 0]])
-    # looking east the largest x is at the back; 1 and 3 are equally deep
-    assert orders.back_to_front(means, np.array([1.0, 0, 0])).tolist() == [1, 3, 2, 0]
-    assert orders.back_to_front(means, np.array([0, 0, -1.0])).tolist() == [0, 2, 3, 1]
-
-
-def test_tau_zero_keeps_every_tile_deep_tau_one_none_and_it_never_rises():
-    for u in (0.0, 0.3, 1.0):
-        assert len(orders.kept(u, 0.0)) == 17 and len(orders.kept(u, 1.0)) == 9
-        counts = [len(orders.kept(u, tau)) for tau in (0.0, 0.2, 0.3, 0.31, 0.9, 1.0)]
-        assert counts == sorted(counts, reverse=True)
-    assert orders.kept(0.1, 0.5) == [0, 2, 4, 6, 8, 10, 12, 14, 16]
-    with pytest.raises(ValueError, match="uncertainty"):
-        orders.kept(float("nan"), 0.5)
-
-
 def test_a_level_ends_where_the_next_one_has_its_size_in_pixels():
     # f = 960 / tan 30 degrees = 1662.77 px: 0.3 units cover 2 px at 249.4 units
     table = lod.level_table([0.1, 0.3], pixels=2.0, band=0.1)
@@ -107,29 +68,52 @@ def test_eye_floor_shows_the_nearest_disc_at_the_size_asked_for():
 
 def test_a_bundle_reads_back_as_the_tiles_it_was_made_of(bundle, tiles):
     folder, written = bundle
-    value = manifest.read(folder, SCHEMA)
-    assert value == json.loads(json.dumps(written))
-    along = orders.directions()
-    for tile in value["tiles"]:
+    read = store.read(folder, SCHEMA)
+    assert read.manifest == json.loads(json.dumps(written))
+    error, along = written["error"], np.array(written["directions"])
+    for number, tile in enumerate(read.manifest["tiles"]):
         for entry in tile["chunks"]:
-            source = tiles.fields[entry["level"]][tile["tile"]]
-            field, order = chunks.read(folder, entry)
-            np.testing.assert_array_equal(field.means, source.means)
-            np.testing.assert_allclose(field.base_colours, source.base_colours, atol=0.5 / 255 + 1e-6)  # 8 bits
-            turned = source.quats * np.where(source.quats[:, :1] < 0, -1, 1)
-            turned /= np.linalg.norm(turned, axis=1, keepdims=True)
-            # half a step of 1/128 while writing, 127 for 128 while reading: 0.5 / 128 + 1 / 127
-            np.testing.assert_allclose(field.quats, turned, atol=0.012)
+            source = tiles.fields[entry["level"]][number]
+            field, order = read.chunk(number, entry["level"])
+            # what the manifest states; a float32's last digits on top
+            away = np.linalg.norm(field.means.astype(float) - source.means, axis=1).max()
+            assert 0 < away <= error["position"] * (1 + 1e-6)
+            assert np.abs(field.base_colours - source.base_colours).max() <= error["colour"] + 1e-6
             assert field.means[:, 2].min() >= tile["z"][0] and field.means[:, 2].max() <= tile["z"][1]
             for direction, row in zip(entry["orders"], order, strict=True):
                 depth = source.means[row].astype(float) @ along[direction]
-                assert (np.diff(depth) <= 0).all()
-        assert len(tile["chunks"][0]["orders"]) == (17 if tile["uncertainty"] >= 0.5 else 9)
+                # depths are sorted in 65535 steps of what the tile spans, at most its diagonal
+                assert (np.diff(depth) <= 2 * SIDE / 65535).all()
+    deep = [len(tile["chunks"][0]["orders"]) for tile in written["tiles"] if tile["uncertainty"] >= 0.5]
+    plain = [len(tile["chunks"][0]["orders"]) for tile in written["tiles"] if tile["uncertainty"] < 0.5]
+    assert set(deep) == {len(along)} and set(plain) == {(len(along) + 1) // 2}
 
 
-def test_the_same_tiles_give_the_same_bytes(bundle, tiles, tmp_path):
+def test_the_terrain_of_a_bundle_is_that_of_its_tiles_but_for_the_rounding(bundle, tiles):
+    read = store.read(bundle[0], SCHEMA)
+    rounded = assemble.of_bundle(read, {"kind": "flat"})
+    exact = assemble.of_fields(tiles.fields, read.manifest, {"kind": "flat"})
+    assert (rounded.side, rounded.kept, rounded.z[0]) == (exact.side, exact.kept, pytest.approx(exact.z[0], abs=0.01))
+    pictures = [still.taken(terrain, still.SHOTS[1], read.manifest, 64, 36) for terrain in (rounded, exact)]
+    assert 0 < np.abs(pictures[0] - pictures[1]).max() < 0.05
+
+
+def test_the_errors_stated_are_those_of_16_bytes(bundle):
+    error = bundle[1]["error"]
+    # half a step of 2 / 65535 along x and y, of 0.2 / 65535 along z
+    assert error["position"] <= np.hypot(np.hypot(1, 1), 0.1) / 65535 * 1.001
+    assert error["position_pixels"] == pytest.approx(error["position"] / (0.1 / 12))
+    # sizes span a factor of 6: half a step of ln 6 / 255
+    assert error["scale_percent"] <= 100 * np.expm1(np.log(6) / 510) * 1.001 and error["clipped"] == 0
+    assert error["angle_degrees"] <= 0.37 and error["opacity"] <= 0.5 / 255 + 1e-9
+    assert min(error["walker_db"], error["oblique_db"]) > 40
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_the_same_tiles_give_the_same_bytes_whatever_the_threads(bundle, tiles, tmp_path, threads):
     folder, _ = bundle
-    build.write_bundle(tiles, tmp_path / "again", build.Options(tau=0.5, salt=7), SCHEMA, {"from": "a test"})
+    options = build.Options(tau=0.5, salt=7, threads=threads)
+    build.write_bundle(tiles, tmp_path / "again", options, SCHEMA, {"from": "a test"})
     names = sorted(p.relative_to(folder) for p in folder.rglob("*.*"))
     assert len(names) == 2 + 32
     for name in names:
@@ -148,6 +132,63 @@ def test_the_zip_holds_what_the_public_renderer_reads(bundle, tiles):
     np.testing.assert_allclose(values[:, :3], 2 * source.means, rtol=1e-6)  # 2 wide to 4 wide, float32
     np.testing.assert_allclose(values[:, 55:58], source.log_scales + np.log(2), atol=1e-6)
     assert (values[:, 9:54] == 0).all() and (values[:, 3:6] == 0).all()
+
+
+def test_the_zip_reads_back_as_the_tiles(bundle, tiles):
+    fields = gswt.read(bundle[0] / "gswt.zip", SIDE)
+    assert [len(level) for level in fields] == [16, 16]
+    for mine, source in zip(fields[1], tiles.fields[1], strict=True):
+        np.testing.assert_allclose(mine.means, source.means, atol=1e-6)
+        np.testing.assert_allclose(mine.log_scales, source.log_scales, atol=1e-6)
+        np.testing.assert_allclose(mine.sh[:, 0], source.sh[:, 0], atol=1e-6)
+        np.testing.assert_allclose(mine.opacity_logits, source.opacity_logits)
+
+
+def rezipped(path, change):
+    """The archive with other entries: a list of (name, bytes), changed."""
+    with zipfile.ZipFile(path) as archive:
+        entries = [(name, archive.read(name)) for name in archive.namelist()]
+    change(entries)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in entries:
+            archive.writestr(name, data)
+
+
+def first(change):
+    return lambda entries: entries.__setitem__(0, (entries[0][0], change(entries[0][1])))
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        pytest.param(first(lambda d: d[:-4]), "lod0_tile_00.ply: 60 splats in", id="cut short"),
+        pytest.param(first(lambda d: d + bytes(10**6)), "lod0_tile_00.ply: 60 splats in", id="longer than it says"),
+        pytest.param(
+            first(lambda d: d.replace(b"vertex 60", b"vertex 99999999")), "99999999 splats in", id="a huge count"
+        ),
+        pytest.param(first(lambda d: b"ply\n" + bytes(2000)), "not a tile of the GSWT renderer", id="no such PLY"),
+        pytest.param(first(lambda d: d[:-4] + b"\xff\xff\xff\x7f"), "a value is not finite", id="not finite"),
+        pytest.param(lambda entries: entries.pop(), "not a whole set", id="a tile is missing"),
+        pytest.param(lambda entries: entries.append(("up/../lod0_tile_00.ply", entries[0][1])), "twice", id="twice"),
+        pytest.param(lambda entries: entries.clear(), "not a whole set", id="empty"),
+    ],
+)
+def test_an_archive_that_is_no_tile_set_is_refused(copy_of, change, message):
+    rezipped(copy_of / "gswt.zip", change)
+    with pytest.raises(InputError, match=message):
+        gswt.read(copy_of / "gswt.zip", SIDE)
+
+
+def test_a_damaged_archive_is_refused_by_name(copy_of):
+    path = copy_of / "gswt.zip"
+    path.write_bytes(path.read_bytes()[:-50])
+    with pytest.raises(InputError, match=r"gswt\.zip: not readable"):
+        gswt.read(path, SIDE)
+
+
+def test_entries_with_other_names_are_skipped(copy_of):
+    rezipped(copy_of / "gswt.zip", lambda entries: entries.append(("notes.txt", b"x")))
+    assert len(gswt.read(copy_of / "gswt.zip", SIDE)) == 2
 
 
 def test_a_tile_without_splats_is_refused_and_nothing_is_left(tiles, tmp_path):
@@ -177,14 +218,82 @@ def test_a_new_bundle_replaces_the_old_one_and_leaves_its_neighbours(tiles, tmp_
     assert not (out / "chunks" / "stale.bin").exists()
 
 
-@pytest.mark.parametrize("damage", [lambda d: d[:-4], lambda d: bytes([d[0] ^ 1]) + d[1:]], ids=["short", "flipped"])
-def test_a_damaged_chunk_is_named(bundle, tmp_path, damage):
-    folder, value = bundle
-    entry = value["tiles"][0]["chunks"][0]
-    (tmp_path / "chunks").mkdir()
-    (tmp_path / entry["file"]).write_bytes(damage((folder / entry["file"]).read_bytes()))
-    with pytest.raises(InputError, match="lod0_tile_00.bin"):
-        chunks.read(tmp_path, entry)
+@pytest.fixture
+def copy_of(bundle, tmp_path):
+    """The bundle in a folder of its own, to be spoilt."""
+    shutil.copytree(bundle[0], tmp_path / "copy")
+    return tmp_path / "copy"
+
+
+def rewritten(folder, change):
+    value = json.loads((folder / manifest.NAME).read_text())
+    change(value)
+    (folder / manifest.NAME).write_text(json.dumps(value))
+
+
+def swapped(folder):
+    one, other = (folder / f"chunks/lod0_tile_0{t}.bin" for t in (0, 1))
+    data = one.read_bytes()
+    one.write_bytes(other.read_bytes())
+    other.write_bytes(data)
+
+
+def twice(folder):
+    """An order that holds one splat twice, with a digest that fits."""
+    path = folder / "chunks/lod0_tile_00.bin"
+    data = bytearray(path.read_bytes())
+    data[-2:] = data[-4:-2]
+    path.write_bytes(data)
+    sha = hashlib.sha256(data).hexdigest()
+    rewritten(folder, lambda m: m["tiles"][0]["chunks"][0].update(sha256=sha))
+
+
+def outwards(folder):
+    """A chunk that is a link to somewhere else."""
+    path = folder / "chunks/lod0_tile_00.bin"
+    path.rename(folder.parent / "elsewhere.bin")
+    path.symlink_to(folder.parent / "elsewhere.bin")
+
+
+def huge(value):
+    """2^40 Gaussians, of which the bytes are told in agreement."""
+    chunk = value["tiles"][0]["chunks"][0]
+    chunk.update(count=2**40, bytes=2**40 * (16 + 4 * len(chunk["orders"])))
+
+
+@pytest.mark.parametrize(
+    "spoil, message",
+    [
+        pytest.param(lambda f: cut(f, -4), "lod0_tile_00.bin: .* bytes where the manifest says", id="cut short"),
+        pytest.param(lambda f: cut(f, None, b"more"), "lod0_tile_00.bin: .* bytes where", id="too long"),
+        pytest.param(swapped, "lod0_tile_00.bin: its digest is not", id="swapped"),
+        pytest.param(twice, "lod0_tile_00.bin: an order does not hold every splat", id="no permutation"),
+        pytest.param(
+            lambda f: (f / "chunks/lod0_tile_00.bin").unlink(), "lod0_tile_00.bin: not readable", id="missing"
+        ),
+        pytest.param(outwards, "lod0_tile_00.bin: lies outside of the bundle", id="a link outwards"),
+        pytest.param(lambda f: rewritten(f, huge), "lod0_tile_00.bin: .* bytes where the manifest says", id="huge"),
+        pytest.param(lambda f: rewritten(f, lambda m: m.update(version=1)), "version 2; make", id="another version"),
+        pytest.param(lambda f: rewritten(f, lambda m: m.update(format="x")), "format 'davgswt'", id="another format"),
+        pytest.param(lambda f: (f / "davgswt.json").write_text("{"), "not readable as JSON", id="no JSON"),
+        pytest.param(lambda f: (f / "davgswt.json").write_text("[]"), "format 'davgswt'", id="no manifest"),
+    ],
+)
+def test_a_spoilt_bundle_is_refused_by_name(copy_of, spoil, message):
+    spoil(copy_of)
+    with pytest.raises(InputError, match=message):
+        store.read(copy_of, SCHEMA).chunk(0, 0)
+
+
+def cut(folder, end, more=b""):
+    path = folder / "chunks/lod0_tile_00.bin"
+    path.write_bytes(path.read_bytes()[:end] + more)
+
+
+def test_a_manifest_as_large_as_no_manifest_is_not_read(copy_of, monkeypatch):
+    monkeypatch.setattr(manifest, "LARGEST", 1000)
+    with pytest.raises(InputError, match="bytes are no manifest"):
+        store.read(copy_of, SCHEMA)
 
 
 @pytest.mark.parametrize(
@@ -198,6 +307,9 @@ def test_a_damaged_chunk_is_named(bundle, tmp_path, damage):
         ("file", lambda m: m["tiles"][0]["chunks"][0].update(file="../secret.bin")),
         ("bytes", lambda m: m["tiles"][0]["chunks"][0].update(count=5)),
         ("direction", lambda m: m["directions"].pop()),
+        ("step", lambda m: m["encoding"]["step"].__setitem__(0, -1)),
+        ("log_scale", lambda m: m["encoding"].update(log_scale=[0])),
+        ("sh_degree", lambda m: m["encoding"].update(sh_degree=1)),
     ],
 )
 def test_a_manifest_that_contradicts_itself_or_its_schema_is_refused(bundle, key, change):

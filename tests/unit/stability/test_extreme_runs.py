@@ -1,5 +1,6 @@
 """Extreme runs: what is laid over the config is allowed, and what came of a run is told rightly."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from dav_gswt import config, field, images
 from dav_gswt.bundle import chunks
+from dav_gswt.bundle.encoding import Encoding
 from dav_gswt.errors import InputError
 from dav_gswt.files import write_json
 from dav_gswt.stability import extremes, running, tables
@@ -76,17 +78,26 @@ def test_a_number_that_is_not_finite_is_found_in_a_table(tmp_path, bad):
     assert not running.finite(path)
 
 
-def test_a_number_that_is_not_finite_is_found_in_a_field_and_in_a_chunk(tmp_path):
+def test_a_number_that_is_not_finite_is_found_in_a_field(tmp_path):
+    given, path = ground(3, 1.0), tmp_path / "a.ply"
+    field.write(given, path)
+    assert running.finite(path)
+    given.means[4, 1] = np.nan
+    field.write(given, path)
+    assert not running.finite(path)
+
+
+def test_a_number_that_is_not_finite_is_found_in_a_chunk(tmp_path):
     given, path = ground(3, 1.0), tmp_path / "chunks/lod0_tile_00.bin"
     path.parent.mkdir()
-    entry = chunks.write(given, [0], path) | {"file": "chunks/lod0_tile_00.bin"}
-    write_json(tmp_path / "davgswt.json", {"tiles": [{"chunks": [entry]}]})
-    field.write(given, tmp_path / "a.ply")
-    assert running.finite(tmp_path / "a.ply") and running.finite(path)
-    given.means[4, 1] = np.nan
-    chunks.write(given, [0], path)
-    field.write(given, tmp_path / "a.ply")
-    assert not running.finite(tmp_path / "a.ply") and not running.finite(path)
+    code = Encoding.of([given], 1.0, 0.01)
+    entry = chunks.write(code.encoded(given), np.arange(len(given))[None], path)
+    tiles = [{"chunks": [entry | {"file": "chunks/lod0_tile_00.bin", "orders": [0]}]}]
+    write_json(tmp_path / "davgswt.json", {"tiles": tiles, "encoding": code.json()})
+    assert running.finite(path)
+    beyond = replace(code, log_scale=[1000.0, 1.0])  # the exponential of it is no number
+    write_json(tmp_path / "davgswt.json", {"tiles": tiles, "encoding": beyond.json()})
+    assert not running.finite(path)
 
 
 def made(folder: Path, name: str, picture, **more) -> None:

@@ -45,7 +45,7 @@ def terrain_of(tiles, switches=(20.0, np.inf), bands=(2.0, 0.0), **more):
         side=SIDE,
         switches=list(switches),
         bands=list(bands),
-        directions=orders.directions(),
+        directions=orders.Rings().directions(),
         kept=[[*range(0, 16, 2), 16]] * 16,
         z=(-0.2, 0.6),
         overhang=0.7,

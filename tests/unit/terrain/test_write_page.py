@@ -2,10 +2,12 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from dav_gswt.errors import InputError
 from dav_gswt.terrain import page
+from dav_gswt.terrain.heights import Hills, Relief
 from dav_gswt.terrain.page import write_page
 
 
@@ -28,7 +30,7 @@ def bundle(tmp_path):
     return folder
 
 
-def rewrite(folder, chunk, version=1):
+def rewrite(folder, chunk, version=2):
     manifest = {"format": "davgswt", "version": version, "tiles": [{"tile": 0, "chunks": [chunk]}]}
     (folder / "davgswt.json").write_text(json.dumps(manifest))
 
@@ -94,8 +96,8 @@ def test_an_unsound_chunk_is_refused_by_name(tmp_path, viewer, bundle, chunk, me
 
 
 def test_another_version_is_refused(tmp_path, viewer, bundle):
-    rewrite(bundle, {"file": "chunks/a.bin", "bytes": 4}, version=2)
-    with pytest.raises(InputError, match=r"davgswt\.json: not a bundle of format 'davgswt', version 1"):
+    rewrite(bundle, {"file": "chunks/a.bin", "bytes": 4}, version=1)
+    with pytest.raises(InputError, match=r"davgswt\.json: not a bundle of format 'davgswt', version 2"):
         write_page(bundle, viewer, tmp_path / "page")
 
 
@@ -103,3 +105,32 @@ def test_a_viewer_without_its_page_is_refused(tmp_path, viewer, bundle):
     (viewer / "index.html").unlink()
     with pytest.raises(InputError, match="no viewer here"):
         write_page(bundle, viewer, tmp_path / "page")
+
+
+def surface_of(folder):
+    return json.loads((folder / "davgswt.json").read_text())["heights"]
+
+
+def test_the_page_knows_the_surface_and_the_bundle_does_not(tmp_path, viewer, bundle):
+    write_page(bundle, viewer, tmp_path / "flat")
+    write_page(bundle, viewer, tmp_path / "hilly", Hills(0.5, 3.0, 2, 9))
+    assert surface_of(tmp_path / "flat") == {"kind": "flat"}
+    hills = {"kind": "hills", "height": 0.5, "wavelength": 3.0, "octaves": 2, "salt": 9}
+    assert surface_of(tmp_path / "hilly") == hills
+    assert "heights" not in json.loads((bundle / "davgswt.json").read_text())
+
+
+def test_a_height_map_comes_with_its_pixels(tmp_path, viewer, bundle):
+    pixels = np.arange(6, dtype=np.float32).reshape(2, 3)
+    write_page(bundle, viewer, tmp_path / "page", Relief(pixels, 7.5, "clamp"))
+    entry = surface_of(tmp_path / "page")
+    stored = np.frombuffer((tmp_path / "page" / entry["file"]).read_bytes(), "<f4").reshape(2, 3)
+    assert (stored == pixels).all() and entry["bytes"] == 24
+    assert (entry["rows"], entry["columns"], entry["width"], entry["beyond"]) == (2, 3, 7.5, "clamp")
+
+
+def test_a_height_map_that_graphics_cards_refuse_is_named(tmp_path, viewer, bundle, monkeypatch):
+    monkeypatch.setattr(page, "MOST_PIXELS", 2)
+    with pytest.raises(InputError, match="heights: 3 x 2 pixels; the page takes 2 a side"):
+        write_page(bundle, viewer, tmp_path / "page", Relief(np.zeros((2, 3), np.float32), 7.5))
+    assert not (tmp_path / "page").exists()

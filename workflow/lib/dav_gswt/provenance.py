@@ -7,11 +7,18 @@ from dav_gswt.files import digest
 from dav_gswt.raster import backends
 
 
-def of(inputs: dict[str, Path | str], parameters: dict) -> dict:
-    """A JSON value that says what a result was made from and with."""
+def of(inputs: dict[str, Path | str | list], parameters: dict) -> dict:
+    """A JSON value that says what a result was made from and with. Inputs: files, folders, or lists of both."""
     return {
         "version": dav_gswt.__version__,
         "renderer": backends.described(),
         "parameters": parameters,
-        "inputs": {name: digest(path) for name, path in sorted(inputs.items())},
+        "inputs": {name: digest(*_files(given)) for name, given in sorted(inputs.items())},
     }
+
+
+def _files(given: Path | str | list) -> list[Path]:
+    """All files, those of a folder by name, none hidden."""
+    paths = [Path(path) for path in ([given] if isinstance(given, Path | str) else given)]
+    found = [sorted(p for p in path.rglob("[!.]*") if p.is_file()) if path.is_dir() else [path] for path in paths]
+    return [file for files in found for file in files]

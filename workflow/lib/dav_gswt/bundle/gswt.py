@@ -3,7 +3,10 @@
 Its loader never reads property names and crashes on one header line too many, so nothing here is optional.
 """
 
+import re
 import zipfile
+import zlib
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +19,7 @@ from dav_gswt.logs import progress
 
 WIDTH = 4.0
 MOST = 8_388_608
+NAMED = re.compile(r"lod(\d{1,3})_tile_(\d{1,4}).*\.ply")  # as the renderer looks for them
 STAMP = (1980, 1, 1, 0, 0, 0)  # the earliest a zip knows: the same tiles give the same bytes
 PROPERTIES = [
     *("x", "y", "z", "nx", "ny", "nz"),
@@ -67,3 +71,59 @@ def write(fields: list[list[Field]], side: float, path: Path) -> None:
             entry = zipfile.ZipInfo(f"lod{level}_tile_{tile:02d}.ply", STAMP)
             entry.compress_type = zipfile.ZIP_DEFLATED
             archive.writestr(entry, ply(values), compresslevel=1)
+
+
+def read(path: Path | str, side: float) -> list[list[Field]]:
+    """fields[level][tile] of an archive that `write` made, or anybody else, for tiles `side` wide.
+
+    What an entry says of its size is compared with its header before it is unpacked, and all of it with the most that
+    the renderer takes. Only base names count, so nothing is written anywhere; other entries are skipped.
+    Raises: InputError: no zip, a damaged entry, a header that is not the renderer's, sizes that do not agree, levels or
+    tiles that do not count up from 0, a value that is not finite.
+    """
+    found = {}
+    try:
+        with zipfile.ZipFile(path) as archive:
+            for entry in archive.infolist():
+                if match := NAMED.search(Path(entry.filename).name):
+                    key = int(match[1]), int(match[2])
+                    if key in found:
+                        raise InputError(f"{path}: {entry.filename} is there twice")
+                    found[key] = _field(archive, entry, side, MOST - sum(map(len, found.values())))
+    except (OSError, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
+        raise InputError(f"{path}: not readable ({error}); make the bundle again") from error
+    levels, tiles = ({key[axis] for key in found} for axis in (0, 1))
+    if not found or len(tiles) % 16 or set(found) != set(product(range(len(levels)), range(len(tiles)))):
+        raise InputError(f"{path}: not a whole set of 16 tiles at each level; make the bundle again")
+    return [[found[level, tile] for tile in range(len(tiles))] for level in range(len(levels))]
+
+
+def _field(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, side: float, room: int) -> Field:
+    """An entry's Gaussians; room: how many are left of MOST."""
+    name = f"{archive.filename}: {entry.filename}"
+    none = ply(np.zeros((0, len(PROPERTIES)), np.float32))
+    with archive.open(entry) as file:
+        head = file.read(len(none) + 8)
+        count = re.match(rb"ply\nformat binary_little_endian 1\.0\nelement vertex (\d{1,8})\n", head)
+        header = none.replace(b"vertex 0", b"vertex " + count[1]) if count else none
+        if not count or not head.startswith(header):
+            raise InputError(f"{name}: not a tile of the GSWT renderer; make the bundle again")
+        n, width = int(count[1]), 4 * len(PROPERTIES)
+        if not 0 < n <= room or entry.file_size != len(header) + n * width:
+            raise InputError(f"{name}: {n} splats in {entry.file_size} bytes; make the bundle again")
+        data = (head[len(header) :] + file.read(n * width))[: n * width]
+    if len(data) != n * width:
+        raise InputError(f"{name}: cut short; make the bundle again")
+    values = np.frombuffer(data, "<f4").reshape(n, len(PROPERTIES)).astype(np.float32)
+    if not np.isfinite(values).all():
+        raise InputError(f"{name}: a value is not finite; make the bundle again")
+    scale = WIDTH / side
+    return Field(
+        (values[:, :3] / scale).astype(np.float32),
+        (values[:, 55:58] - np.log(scale)).astype(np.float32),
+        values[:, 58:],
+        values[:, 54],
+        values[:, None, 6:9],
+        np.zeros(n, np.float32),
+        np.zeros(n, bool),
+    )

@@ -6,10 +6,13 @@ from pathlib import Path
 from jsonschema import Draft202012Validator
 from jsonschema.exceptions import best_match
 
+from dav_gswt.bundle.chunks import size_of
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
 
 NAME = "davgswt.json"
+FORMAT, VERSION = "davgswt", 2
+LARGEST = 1 << 26  # bytes of a manifest
 
 
 def check(manifest, schema: Path | str, name: Path | str = NAME) -> None:
@@ -41,15 +44,23 @@ def _faults(manifest: dict):
         if [chunk["level"] for chunk in tile["chunks"]] != list(range(len(levels))):
             yield f"tile {tile['tile']}: one chunk a level is needed, in order"
         for chunk in tile["chunks"]:
-            if chunk["bytes"] != chunk["count"] * (32 + 4 * len(chunk["orders"])):
+            if chunk["bytes"] != size_of(chunk["count"], len(chunk["orders"])):
                 yield f"{chunk['file']}: bytes do not fit count and orders"
             if max(chunk["orders"]) >= len(manifest["directions"]):
                 yield f"{chunk['file']}: an order of a direction that is not there"
 
 
 def read(folder: Path | str, schema: Path | str) -> dict:
-    """Read and check a bundle's manifest. Raises: InputError."""
+    """Read and check a bundle's manifest.
+
+    Raises: InputError: missing, too large, no JSON, of another format or version, or see `check`.
+    """
     path = Path(folder) / NAME
+    if path.is_file() and path.stat().st_size > LARGEST:
+        raise InputError(f"{path}: {path.stat().st_size} bytes are no manifest; make the bundle again")
     manifest = read_json(path)
+    known = isinstance(manifest, dict) and (manifest.get("format"), manifest.get("version"))
+    if known != (FORMAT, VERSION):
+        raise InputError(f"{path}: not a bundle of format {FORMAT!r}, version {VERSION}; make the bundle again")
     check(manifest, schema, path)
     return manifest

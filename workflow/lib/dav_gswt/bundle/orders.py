@@ -1,38 +1,75 @@
 """Pre-sorted orders: the splats of a tile from back to front, for a few viewing directions.
 
-A viewer takes the order whose direction is nearest to its own and sorts nothing. Tiles in doubt keep twice as many
-azimuths ("uncertainty-guided caching"): where the field is unsure its splats overlap more, and a wrong order shows.
+A viewer takes the order whose direction is nearest to its own and sorts nothing. How many directions that takes is
+measured (`ladder`). Tiles in doubt keep twice as many azimuths ("uncertainty-guided caching").
 """
 
+from dataclasses import dataclass
+
 import numpy as np
-from jaxtyping import Float, Float32, UInt32
+from jaxtyping import Float, Float32, UInt16, UInt32
 from numpy import ndarray as Array
 
-AZIMUTHS = 16  # of a deep tile; the others keep every second one
-DOWN = 20.0  # degrees below the horizon: how a walker looks at the ground around
+KEYS = (
+    65535  # steps of depth across a tile: a sixteen-bit key is sorted by its digits, in time that grows with the count
+)
+WIDE = 65536  # from so many splats on an index takes four bytes
 
 
-def directions() -> Float[Array, "d 3"]:
-    """Unit viewing directions: AZIMUTHS around from east to north, all DOWN degrees down, then straight down."""
-    azimuth = 2 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
-    down = np.radians(DOWN)
-    flat = np.stack([np.cos(azimuth), np.sin(azimuth)], 1) * np.cos(down)
-    around = np.concatenate([flat, np.full((AZIMUTHS, 1), -np.sin(down))], 1)
-    return np.concatenate([around, [[0.0, 0.0, -1.0]]])
+@dataclass(frozen=True)
+class Rings:
+    """Viewing directions: rings of `azimuths` each, at elevations in degrees below the horizon, and straight down.
 
-
-def kept(uncertainty: float, tau: float) -> list[int]:
-    """Indices into directions() that a tile keeps: all if it is deep, else every second azimuth and straight down.
-
-    Deep is u >= tau for tau < 1: at tau = 0 every tile is, at tau = 1 none, and a larger tau never adds one.
-    Raises: ValueError: u or tau is not in [0, 1].
+    Only deep tiles keep all; the others keep every second azimuth.
     """
-    if not (0 <= uncertainty <= 1 and 0 <= tau <= 1):
-        raise ValueError(f"uncertainty {uncertainty} and tau {tau} must lie in [0, 1]")
-    deep = uncertainty >= tau and tau < 1
-    return [*range(0, AZIMUTHS, 1 if deep else 2), AZIMUTHS]
+
+    elevations: tuple[float, ...] = (20.0,)
+    azimuths: int = 16
+
+    def directions(self) -> Float[Array, "d 3"]:
+        """Unit vectors, ring after ring, each from the east to the north; straight down comes last."""
+        azimuth = 2 * np.pi * np.arange(self.azimuths) / self.azimuths
+        rings = [towards(azimuth, np.radians(down)) for down in self.elevations]
+        return np.concatenate([*rings, [[0.0, 0.0, -1.0]]])
+
+    def kept(self, uncertainty: float, tau: float) -> list[int]:
+        """Indices into directions() that a tile keeps: all if it is deep, else every second azimuth and straight down.
+
+        Deep is u >= tau for tau < 1: at tau = 0 every tile is, at tau = 1 none, and a larger tau never adds one.
+        Raises: ValueError: u or tau is not in [0, 1].
+        """
+        if not (0 <= uncertainty <= 1 and 0 <= tau <= 1):
+            raise ValueError(f"uncertainty {uncertainty} and tau {tau} must lie in [0, 1]")
+        step = 1 if uncertainty >= tau and tau < 1 else 2
+        last = self.azimuths * len(self.elevations)
+        return [*(r + k for r in range(0, last, self.azimuths) for k in range(0, self.azimuths, step)), last]
+
+
+def towards(azimuth: Float[Array, "n"], down: float) -> Float[Array, "n 3"]:
+    """Unit vectors at azimuths from the east to the north, so far below the horizon; in radians."""
+    flat = np.stack([np.cos(azimuth), np.sin(azimuth)], 1) * np.cos(down)
+    return np.concatenate([flat, np.full((len(azimuth), 1), -np.sin(down))], 1)
+
+
+def index_type(count: int) -> np.dtype:
+    """How an order's indices are stored: two bytes each where that is enough."""
+    return np.dtype("<u2" if count < WIDE else "<u4")
 
 
 def back_to_front(means: Float32[Array, "n 3"], along: Float[Array, "3"]) -> UInt32[Array, "n"]:
     """Indices by falling depth along a viewing direction; of equal depths the smaller index comes first."""
     return np.argsort(-(means.astype(float) @ along), kind="stable").astype(np.uint32)
+
+
+def presorted(means: Float32[Array, "n 3"], along: Float[Array, "d 3"]) -> UInt16[Array, "d n"] | UInt32[Array, "d n"]:
+    """The order of each direction as it is stored: `back_to_front`, but that depths within a KEYS-th of all the tile's
+    count as equal. So it is ten times as fast.
+    """
+    x, y, z = means.T.copy()
+    found = np.empty((len(along), len(means)), index_type(len(means)))
+    for order, (right, ahead, up) in zip(found, along.astype(np.float32), strict=True):
+        depth = x * right + y * ahead + z * up
+        top, low = depth.max(initial=-np.inf), depth.min(initial=np.inf)
+        key = (top - depth) / (top - low) * KEYS if top > low else np.zeros_like(depth)
+        order[:] = np.argsort(key.astype(np.uint16), kind="stable")
+    return found

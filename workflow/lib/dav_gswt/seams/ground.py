@@ -10,10 +10,10 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray as Array
 
-from dav_gswt.bundle import lod, orders
+from dav_gswt.bundle import ladder
 from dav_gswt.bundle.build import Options as Bundled
-from dav_gswt.bundle.build import heights_of
-from dav_gswt.field import Field, mean_scale
+from dav_gswt.bundle.build import laying
+from dav_gswt.field import Field
 from dav_gswt.seams.drawing import Extent
 from dav_gswt.terrain import assemble
 from dav_gswt.terrain.choice import tiles_in
@@ -74,9 +74,13 @@ def source_of(levels: list[Field], exemplar: Exemplar, colour: Float[Array, "m m
 
 
 def laid(tiles: build.TileSet, source: Source, salt: int, tau: float) -> Laid:
-    """The tile set as the bundle of this tau lays it, on level ground."""
-    described = _manifest(tiles, salt, tau)
-    terrain = replace(assemble.of_tiles(tiles, described, {"kind": "flat"}), reach=REACH)
+    """The tile set as its bundle of this tau lays it, on level ground. Gaussians are not rounded: patches of the
+    exemplar, which lie beside them, are not either.
+    """
+    options = Bundled(tau=tau, salt=salt)
+    rings = ladder.climbed(tiles.fields[0], tiles.side, options.decibels).rings
+    described = laying(tiles, options, rings)
+    terrain = replace(assemble.of_fields(tiles.fields, described, {"kind": "flat"}), reach=REACH)
     plan = Layout.of(tiles.seams["layout"])
     first = -(WINDOW // 2)
     numbers = tiles_in(first, first, (WINDOW, WINDOW), salt, tiles.variants)
@@ -111,22 +115,3 @@ def _correction(tiles: build.TileSet, source: Source, number: int) -> Float[Arra
 def _cell_means(field: Field, cells: Exemplar) -> Float[Array, "m m 4"]:
     colour, height = build.ground_maps(field, cells)
     return np.concatenate([colour, height[..., None]], -1)
-
-
-def _manifest(tiles: build.TileSet, salt: int, tau: float) -> dict:
-    """What `assemble.of_tiles` reads of a bundle's manifest."""
-    options = Bundled(tau=tau, salt=salt)
-    scales = [mean_scale(level) for level in tiles.fields]
-    listed = []
-    for number, doubt in enumerate(np.clip(tiles.uncertainty, 0, 1)):
-        reach = [heights_of(fields[number]) for fields in tiles.fields]
-        z = [min(low for low, _ in reach), max(high for _, high in reach)]
-        listed.append({"z": z, "chunks": [{"orders": orders.kept(float(doubt), tau)}]})
-    return {
-        "levels": lod.level_table(scales, options.level_pixels, options.band),
-        "tiles": listed,
-        "directions": orders.directions().tolist(),
-        "salt": salt,
-        "eye_floor": lod.eye_floor(tiles.spacing, options.floor_pixels),
-        "ground_colour": np.concatenate([f.base_colours for f in tiles.fields[-1]]).astype(float).mean(0).tolist(),
-    }

@@ -19,7 +19,7 @@ def drawn(tiles: TileSet, manifest: dict, shot: str, surface: str, size: dict) -
 
     size: of the walker's picture. From above the eye is so high that a picture 60 degrees wide shows that many tiles.
     """
-    terrain = assemble.of_tiles(tiles, manifest, GROUNDS[surface])
+    terrain = assemble.of_fields(tiles.fields, manifest, GROUNDS[surface])
     if shot == "walker":
         return still.taken(terrain, still.SHOTS[0], manifest, **size)
     high = 0.5 * TILES * tiles.side / np.tan(np.radians(30.0)) / manifest["eye_floor"]

@@ -13,6 +13,7 @@ import yaml
 from plyfile import PlyData
 
 from dav_gswt.bundle import chunks
+from dav_gswt.bundle.encoding import Encoding
 from dav_gswt.files import read_json, whole_folder, write_json
 from dav_gswt.narration import Narrator
 from dav_gswt.perceptual.weights import PATH as LPIPS
@@ -101,12 +102,14 @@ def finite(path: Path) -> bool:
 
 
 def _records_finite(path: Path) -> bool:
-    """Of a chunk: its manifest says how many of its bytes are records."""
+    """Of a chunk: its manifest says how to read it."""
     manifest = read_json(path.parents[1] / "davgswt.json")
     entries = [chunk for tile in manifest["tiles"] for chunk in tile["chunks"]]
-    count = next(entry["count"] for entry in entries if entry["file"] == f"chunks/{path.name}")
-    rows = np.frombuffer(path.read_bytes(), chunks.RECORD, count)
-    return bool(np.isfinite(rows["position"]).all() and np.isfinite(rows["sigma"]).all() and (rows["sigma"] > 0).all())
+    entry = next(entry for entry in entries if entry["file"] == f"chunks/{path.name}")
+    field, _ = chunks.read(path.parents[1], entry, Encoding.of_json(manifest["encoding"]))
+    with np.errstate(over="ignore"):
+        deviations = np.exp(field.log_scales)
+    return all(np.isfinite(part).all() for part in (field.means, deviations, field.quats, field.opacity_logits))
 
 
 def gaussians(folder: Path) -> int | None:

@@ -5,7 +5,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.active import uncertainty as un
 from dav_gswt.active.uncertainty.weighing import Quantiles, Scales
-from dav_gswt.bundle import orders
+from dav_gswt.bundle.orders import Rings
 from dav_gswt.stability.formula import LAW, SINGLE, Formula, Point, Tolerance
 
 SIZES = tuple(10.0**power for power in range(-12, 7, 2))
@@ -136,7 +136,7 @@ def _thresholds() -> list[Point]:
 
 
 def _kept(u: Array, tau: float) -> Array:
-    return np.array([len(orders.kept(float(x), tau)) for x in u])
+    return np.array([len(Rings().kept(float(x), tau)) for x in u])
 
 
 def _kept_slowly(u: Array, tau: float) -> Array:

@@ -10,7 +10,7 @@ from scipy.special import expit
 
 from dav_gswt.active import maps
 from dav_gswt.active.maps import PoseMaps
-from dav_gswt.bundle import chunks, gswt, orders
+from dav_gswt.bundle import chunks, encoding, gswt, orders
 from dav_gswt.field import Field, sh_of
 from dav_gswt.stability.formula import LAW, SINGLE, Formula, Point, Tolerance
 from dav_gswt.stability.scoring import EXACT
@@ -18,15 +18,21 @@ from dav_gswt.stability.scoring import EXACT
 COUNT = 200
 
 
+PIXELS = 128  # of the nearest ground in sight, along a tile's side
+SIDES = (1e-12, 1e-3, 1.0, 1e6)
+
+
 @cache
-def splats() -> Field:
-    """Positions and scales from 1e-12 to 1e6, opacities 0 to 1, colours beyond both ends, quaternions of any length."""
+def splats(side: float = 1.0) -> Field:
+    """Over a tile of that side and half of its neighbours: opacities 0 to 1, colours beyond both ends, quaternions of
+    any length, deviations of all that a record tells apart.
+    """
     rng = np.random.default_rng(0)
-    powers = np.linspace(-12, 6, COUNT)
-    sign = rng.choice([-1, 1], (COUNT, 3))
+    thinnest, widest = np.log(encoding.SLIGHTEST * side / PIXELS), np.log(encoding.WIDEST * side)
+    sizes = np.linspace(thinnest, widest, COUNT)
     return Field(
-        (sign * 10.0 ** powers[:, None]).astype(np.float32),
-        (np.log(10) * np.column_stack([powers, powers[::-1], rng.permutation(powers)])).astype(np.float32),
+        (rng.uniform(-0.5, 1.5, (COUNT, 3)) * side).astype(np.float32),
+        np.column_stack([sizes, sizes[::-1], rng.permutation(sizes)]).astype(np.float32),
         (rng.standard_normal((COUNT, 4)) * 10 ** rng.uniform(-25, 25, (COUNT, 1))).astype(np.float32),
         np.concatenate([[-1e4, 1e4], np.linspace(-20, 20, COUNT - 2)]).astype(np.float32),
         sh_of(rng.uniform(-0.2, 1.2, (COUNT, 3))),
@@ -36,20 +42,26 @@ def splats() -> Field:
 
 
 @cache
-def read_back() -> Field:
+def read_back(side: float = 1.0) -> Field:
     """The same from a bundle's chunk."""
+    field = splats(side)
+    code = encoding.Encoding.of([field], side, side / PIXELS)
     with TemporaryDirectory() as folder:
-        file = "chunk.bin"
-        entry = chunks.write(splats(), orders.kept(1.0, 0.5), Path(folder, file))
-        return chunks.read(folder, entry | {"file": file})[0]
+        entry = chunks.write(code.encoded(field), np.empty((0, COUNT), np.uint16), Path(folder, "chunk.bin"))
+        return chunks.read(folder, entry | {"file": "chunk.bin", "orders": []}, code)[0]
 
 
 def _all(along: Array | None = None, at: str = "all splats") -> list[Point]:
     return [Point(at, (), along)]
 
 
-def _powers() -> Array:
-    return np.repeat(np.linspace(-12, 6, COUNT)[:, None], 3, 1)
+def _sides() -> list[Point]:
+    return [Point(f"tiles {side:g} wide", (side,)) for side in SIDES]
+
+
+def _deviations(field: Field) -> Array:
+    """Of each splat from its longest axis to its shortest: a record may name the axes anew."""
+    return -np.sort(-np.exp(field.log_scales.astype(np.float64)), 1)
 
 
 def _unit(quats: Array) -> Array:
@@ -60,8 +72,8 @@ def _unit(quats: Array) -> Array:
 
 
 def _sines() -> Array:
-    """Of half the angle between what was stored and what came back."""
-    a, b = _unit(splats().quats), _unit(read_back().quats)
+    """Of half the angle between what was stored, its axes named as a record names them, and what came back."""
+    a, b = encoding.smallest_turns(splats().quats)[0], _unit(read_back().quats)
     return np.sqrt(np.clip(1 - (a * b).sum(1) ** 2, 0, None))
 
 
@@ -99,7 +111,7 @@ def _depths() -> list[Point]:
     for size in (1e-12, 1.0, 1e6):
         means = (rng.uniform(-1, 1, (300, 3)) * size).astype(np.float32)
         means[100:200] = means[:100]  # equal depths: the smaller index first
-        found.append(Point(f"splats {size:g} apart", (means, orders.directions()[3])))
+        found.append(Point(f"splats {size:g} apart", (means, orders.Rings().directions()[3])))
     return found
 
 
@@ -108,7 +120,9 @@ def _order_slowly(means: Array, along: Array) -> list[int]:
     return sorted(range(len(means)), key=lambda i: (-depth[i], i))
 
 
-RECORD, SUMS = "a bundle's record, 32 bytes", "sums"
+SIZE = float(np.expm1(np.log(encoding.WIDEST * PIXELS / encoding.SLIGHTEST) / (2 * encoding.SIZES) + 4 * SINGLE))
+TURN = float(np.sqrt(3) * encoding.STEEPEST / (2 * encoding.TURNS) / np.sqrt(1 - 3 * encoding.STEEPEST**2))
+RECORD, SUMS = "a bundle's record, 16 bytes", "sums"
 FORMULAS = [
     Formula(
         SUMS,
@@ -135,25 +149,25 @@ FORMULAS = [
     ),
     Formula(
         "storage",
-        "positions",
+        "positions, in tile sides",
         RECORD,
-        "1e-12 to 1e6",
-        "float32",
-        _all,
-        lambda: read_back().means,
-        lambda: splats().means,
-        EXACT,
+        "tiles 1e-12 to 1e6 wide, splats half a side beyond",
+        "16 bits",
+        _sides,
+        lambda side: read_back(side).means.astype(np.float64) / side,
+        lambda side: splats(side).means.astype(np.float64) / side,
+        Tolerance(SINGLE, 2 / encoding.PLACES, "a step of 16 bits over two sides: the outermost are moved to the rim"),
     ),
     Formula(
         "storage",
-        "standard deviations",
+        "standard deviations, in tile sides",
         RECORD,
-        "1e-12 to 1e6",
-        "float32",
-        lambda: _all(_powers(), "splats of 10 to the "),
-        lambda: chunks.records(splats())["sigma"],
-        lambda: np.exp(splats().log_scales.astype(np.float64)),
-        Tolerance(4 * SINGLE, 0.0, "exp of a float32 rounds two bits"),
+        "1 / 64 of a pixel to 4 sides of tiles 1e-12 to 1e6 wide",
+        "8 bits",
+        _sides,
+        lambda side: _deviations(read_back(side)) / side,
+        lambda side: _deviations(splats(side)) / side,
+        Tolerance(SIZE, 0.0, "half a step of 8 bits of the logarithm"),
     ),
     Formula(
         "storage",
@@ -186,7 +200,7 @@ FORMULAS = [
         _all,
         _sines,
         lambda: np.zeros(COUNT),
-        Tolerance(0.0, 1 / 128, "four components, each half a step of 1/128 off"),
+        Tolerance(0.0, TURN, "three components, each half a step of sin(22.5 degrees) / 127 off, over the least w"),
     ),
     Formula(
         "storage",

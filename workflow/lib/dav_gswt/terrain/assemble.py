@@ -7,6 +7,7 @@ from jaxtyping import Bool, Float, Int64
 from numpy import ndarray as Array
 
 from dav_gswt.bundle.orders import back_to_front
+from dav_gswt.bundle.store import Bundle
 from dav_gswt.cameras import Camera
 from dav_gswt.field import Field, joined
 from dav_gswt.raster.interface import RIM
@@ -14,7 +15,6 @@ from dav_gswt.terrain import order, weights
 from dav_gswt.terrain.choice import tiles_at
 from dav_gswt.terrain.drape import lifted
 from dav_gswt.terrain.heights import Flat, Heights, of_config
-from dav_gswt.tiles.build import TileSet
 
 MOST = 10_000_000  # Gaussians in one picture
 PAD = 2.0  # pixels, rounded up, by which the rasterizer's widening of splats reaches into the picture
@@ -76,27 +76,35 @@ class Cells:
         return Cells(*(getattr(self, f.name)[index] for f in fields(self)))
 
 
-def of_tiles(tiles: TileSet, manifest: dict, surface: dict) -> Terrain:
-    """A tile set laid as a bundle's manifest says, over the surface that the config's `heights` asks for.
+def of_bundle(bundle: Bundle, surface: dict) -> Terrain:
+    """A bundle's Gaussians, as they were rounded, laid over the surface that the config's `heights` asks for.
+
+    Raises: InputError: see `bundle.chunks.read`, `heights.of_config`.
+    """
+    return of_fields(bundle.fields(), bundle.manifest, surface)
+
+
+def of_fields(tiles: list[list[Field]], manifest: dict, surface: dict) -> Terrain:
+    """tiles[level][tile] laid as a bundle's manifest says, over the surface that the config's `heights` asks for.
 
     Raises: InputError: as `heights.of_config`.
     """
-    levels, listed = manifest["levels"], manifest["tiles"]
-    largest = max(float(np.exp(f.log_scales.max(initial=-np.inf))) for row in tiles.fields for f in row)
+    levels, listed, side = manifest["levels"], manifest["tiles"], manifest["tile_side"]
+    largest = max(float(np.exp(f.log_scales.max(initial=-np.inf))) for row in tiles for f in row)
     thin = (RIM - 3) * largest  # what the manifest's heights, three deviations around the centres, leave out
     return Terrain(
-        tiles={(level, tile): f for level, row in enumerate(tiles.fields) for tile, f in enumerate(row)},
-        side=tiles.side,
+        tiles={(level, tile): f for level, row in enumerate(tiles) for tile, f in enumerate(row)},
+        side=side,
         switches=[np.inf if level["distance"] is None else level["distance"] for level in levels],
         bands=[level["band"] for level in levels],
         directions=np.array(manifest["directions"], float),
         kept=[tile["chunks"][0]["orders"] for tile in listed],
         z=(min(tile["z"][0] for tile in listed) - thin, max(tile["z"][1] for tile in listed) + thin),
         overhang=RIM * largest,
-        variants=tiles.variants,
+        variants=len(tiles[0]) // 16,
         salt=manifest["salt"],
         near=NEAR * manifest["eye_floor"],
-        heights=of_config(surface, tiles.side),
+        heights=of_config(surface, side),
     )
 
 

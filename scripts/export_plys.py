@@ -1,0 +1,10 @@
+"""Rule export_plys: a patch of terrain at each level."""
+
+from pathlib import Path
+
+from dav_gswt.bundle import exports, manifest
+from dav_gswt.logs import logging_to
+
+with logging_to(snakemake.log[0]):
+    told = manifest.read(Path(snakemake.input.manifest).parent, snakemake.params.schema)
+    exports.write_plys(snakemake.input.archive, told["tile_side"], snakemake.output.plys)

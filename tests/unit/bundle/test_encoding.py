@@ -1,0 +1,143 @@
+"""Sixteen bytes: values by hand, errors as stated for any field, equal places across borders, smallest turns."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from dav_gswt.bundle.encoding import SIZES, STEEPEST, Encoding, Errors, smallest_turns
+from dav_gswt.errors import InputError
+from dav_gswt.field import Field, sh_of
+
+SIDE, PIXEL = 2.0, 1e-3
+
+
+def field_of(means, deviations, quats=None, opacities=0.5, colours=0.5):
+    n = len(means)
+    opacities = np.broadcast_to(np.asarray(opacities, float), n)
+    with np.errstate(divide="ignore"):
+        logits = np.clip(np.log(opacities) - np.log1p(-opacities), -1e3, 1e3)
+    return Field(
+        np.float32(means),
+        np.log(np.float32(deviations)),
+        np.float32(np.tile([1, 0, 0, 0], (n, 1)) if quats is None else quats),
+        logits.astype(np.float32),
+        sh_of(np.broadcast_to(np.float32(colours), (n, 3))),
+        np.zeros(n, np.float32),
+        np.zeros(n, bool),
+    )
+
+
+def covariance(quats, log_scales):
+    axes = Rotation.from_quat(quats.astype(float), scalar_first=True).as_matrix()
+    axes = axes * np.exp(log_scales.astype(float))[:, None]
+    return axes @ axes.transpose(0, 2, 1)
+
+
+def test_a_splat_is_stored_as_its_16_bytes():
+    # a quarter turn about z is none with x and y swapped
+    turned = field_of([[0.5, 2, 3]], [[np.exp(-2), 1, np.exp(-1)]], [[-2, 0, 0, 2]], 0.5, [[1, 0.5, 0]])
+    corners = field_of([[0, 0, 1], [2, 2, 5]], np.exp([[-2.0] * 3, [0.0] * 3]))
+    coding = Encoding.of([turned, corners], SIDE, PIXEL)
+    assert coding.origin == [0, 0, 1] and coding.step == [2 / 65535, 2 / 65535, pytest.approx(4 / 65535)]
+    assert coding.log_scale == [pytest.approx(-2), pytest.approx(2 / 255)]
+    # 0.5 of 2: 16383.75, the top, half-way up (to even); 0, -2, -1 of -2 to 0; no turn; 255, 127.5 to even, 0, 127.5
+    expected = np.uint16([16384, 65535, 32768]).astype("<u2").tobytes() + bytes([255, 0, 128])
+    expected += bytes([127, 127, 127]) + bytes([255, 128, 0, 128])
+    assert coding.encoded(turned).tobytes() == expected
+    back = coding.decoded(coding.encoded(turned))
+    np.testing.assert_allclose(
+        covariance(back.quats, back.log_scales)[0], np.diag([1, np.exp(-4), np.exp(-2)]), rtol=0.01
+    )
+
+
+@settings(deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_the_smallest_turn_is_the_same_ellipsoid_within_an_eighth_of_a_turn(seed):
+    rng = np.random.default_rng(seed)
+    quats, sizes = rng.normal(size=(20, 4)), rng.normal(size=(20, 3))
+    turn, axes = smallest_turns(quats)
+    np.testing.assert_allclose(
+        covariance(turn, np.take_along_axis(sizes, axes, 1)), covariance(quats, sizes), rtol=1e-9
+    )
+    assert (turn[:, 0] > 0).all() and np.abs(turn[:, 1:]).max() <= STEEPEST + 1e-9
+    same, _ = smallest_turns(-7 * quats)
+    np.testing.assert_allclose(same, turn, atol=1e-12)
+
+
+def test_no_turn_has_no_axes():
+    with pytest.raises(ValueError, match="quaternion 1 has length 0"):
+        smallest_turns(np.array([[1.0, 0, 0, 0], [0, 0, 0, 0]]))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.integers(0, 2**32 - 1),
+    st.integers(1, 40),
+    st.sampled_from([0.0, 1e-6, 1.0, 1e3]),
+    st.sampled_from([(-12, -12), (-12, 6), (-2, 0), (6, 6)]),
+)
+def test_what_is_read_back_errs_no_more_than_is_stated(seed, count, height, sizes):
+    """Heights that are all equal or kilometres, sizes from 1e-12 to 1e6, opacities 0 and 1 included."""
+    rng = np.random.default_rng(seed)
+    means = rng.uniform(-0.1, 1.1, (count, 3)) * [SIDE, SIDE, height]
+    deviations = 10 ** rng.uniform(*sizes, (count, 3))
+    opacities = rng.choice([0.0, 1.0, 0.3, rng.random()], count)
+    field = field_of(means, deviations, rng.normal(size=(count, 4)), opacities, rng.uniform(-0.2, 1.2, (count, 3)))
+    coding = Encoding.of([field], SIDE, PIXEL)
+    rows = coding.encoded(field)
+    told, back = Errors.of(coding, field, rows, PIXEL), coding.decoded(rows)
+    assert all(
+        np.isfinite(getattr(back, name)).all() for name in ("means", "log_scales", "quats", "opacity_logits", "sh")
+    )
+    # half a step of the grid either way, and a float32's last digit
+    room = 0.5 * np.array(coding.step) + 1e-7 * np.abs(field.means).max(0) + 1e-12
+    away = np.abs(back.means.astype(float) - field.means)
+    assert (away <= room).all() and np.linalg.norm(away, axis=1).max() <= told.position * (1 + 1e-9)
+    turn, axes = smallest_turns(field.quats)
+    exact, read = (Rotation.from_quat(q.astype(float), scalar_first=True) for q in (turn, back.quats))
+    assert np.degrees((exact.inv() * read).magnitude()).max() <= told.angle_degrees + 1e-5 <= 0.38
+    wanted = np.take_along_axis(field.log_scales.astype(float), axes, 1)
+    low, high = np.log(PIXEL / 64), np.log(4 * SIDE)
+    inside = (wanted > low) & (wanted < high)
+    grown = np.expm1(np.abs(back.log_scales - wanted))[inside].max(initial=0)
+    assert 100 * grown <= told.scale_percent * (1 + 1e-6) + 1e-4
+    assert (np.clip(wanted, low, high) - back.log_scales <= 0.5 * coding.log_scale[1] + 1e-5).all()
+    assert told.clipped == ((wanted < low - 1e-6) | (wanted > high + 1e-6)).sum()
+    assert told.colour <= 0.5 / 255 + 1e-6 and told.opacity <= 0.5 / 255 + 1e-6
+
+
+def test_gaussians_that_meet_across_a_border_are_moved_alike():
+    """A Gaussian that sticks out of a tile, and its neighbours', are on one grid of which a side is a whole part."""
+    rng = np.random.default_rng(3)
+    means = rng.uniform(-0.2, SIDE + 0.3, (500, 3))
+    here = field_of(means, np.full((500, 3), 0.1))
+    beside = field_of(means - [SIDE, 0, 0], np.full((500, 3), 0.1))
+    coding = Encoding.of([here, beside], SIDE, PIXEL)
+    assert SIDE / coding.step[0] == pytest.approx(round(SIDE / coding.step[0]), abs=1e-9)
+    left, right = (coding.decoded(coding.encoded(field)).means.astype(float) for field in (here, beside))
+    moved = np.abs(left - [SIDE, 0, 0] - right).max(1)
+    # equal but where float32 rounds the source to the other side of half a step
+    assert (moved < 1e-6).mean() > 0.98 and moved.max() <= coding.step[0] + 1e-6
+
+
+def test_a_side_s_both_ends_are_places_of_the_grid():
+    field = field_of([[0, 0, 0], [SIDE, SIDE, 0], [-0.3, 1, 0]], np.full((3, 3), 0.1))
+    coding = Encoding.of([field], SIDE, PIXEL)
+    np.testing.assert_allclose(coding.decoded(coding.encoded(field)).means[:2], field.means[:2], atol=1e-7)
+
+
+def test_a_ladder_of_one_size_has_one_rung():
+    field = field_of([[1, 1, 0]], [[0.1] * 3])
+    coding = Encoding.of([field], SIDE, PIXEL)
+    assert coding.log_scale[1] == 0 and coding.step[2] == 0
+    back = coding.decoded(coding.encoded(field))
+    np.testing.assert_allclose(back.log_scales, field.log_scales, atol=1e-6)
+    assert SIZES == 255
+
+
+def test_a_splat_miles_from_its_tile_is_refused():
+    field = field_of([[1, 1, 0], [1e4, 1, 0]], np.full((2, 3), 0.1))
+    with pytest.raises(InputError, match="5000 tile sides"):
+        Encoding.of([field], SIDE, PIXEL)

@@ -1,0 +1,70 @@
+"""Ways out to other viewers: a patch of terrain at each level as PLY, and from that SPZ and SOG.
+
+The patch is the sixteen tiles laid four by four with every pair of neighbours once (as many of these side by side as
+there are variants): all tiles can be seen, no border shows inside it, and it closes on itself, so copies of it lie side
+by side without a seam. The tiles one by one are in gswt.zip. z is up, in the bundle's unit.
+"""
+
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from dav_gswt import field
+from dav_gswt.bundle import gswt
+from dav_gswt.bundle.fidelity import laid
+from dav_gswt.errors import InputError
+from dav_gswt.field import Field, joined
+from dav_gswt.files import whole_folder
+from dav_gswt.logs import progress
+from dav_gswt.tiles.layout import EDGES
+
+PACKAGE = "@playcanvas/splat-transform@2.7.1"
+ROW = 4  # tiles
+
+
+def patch(fields: list[Field], side: float) -> Field:
+    """One level's tiles, side by side; the south-western corner is the origin."""
+    parts = []
+    for variant in range(len(fields) // EDGES):
+        for (row, column), tile in np.ndenumerate(laid(variant)[1:-1, 1:-1]):
+            corner = np.array([(ROW * variant + column) * side, row * side, 0.0], np.float32)
+            parts.append(replace(fields[tile], means=fields[tile].means + corner))
+    return joined(parts)
+
+
+def write_plys(archive: Path | str, side: float, out: Path | str) -> None:
+    """Write level{l}.ply of every level of a gswt.zip to a folder. Raises: InputError: see `gswt.read`."""
+    fields = gswt.read(archive, side)
+    with whole_folder(out) as folder:
+        for level, tiles in enumerate(progress(fields, "write patches")):
+            field.write(patch(tiles, side), folder / f"level{level}.ply")
+
+
+def convert(plys: Path | str, kind: str, out: Path | str) -> None:
+    """Convert a folder of level{l}.ply: spz gives level{l}.spz, sog a set that streams its levels, lod-meta.json.
+
+    By PACKAGE, which npx fetches the first time. Raises: InputError: no Node.js, or what the program complains of.
+    """
+    names = sorted(Path(plys).glob("level*.ply"), key=lambda path: int(path.stem.removeprefix("level")))
+    with whole_folder(out) as folder:
+        if kind == "sog":
+            tagged = [word for level, name in enumerate(names) for word in (str(name), "-l", str(level))]
+            _run([*tagged, str(folder / "lod-meta.json"), "-g", "cpu"], kind)
+        else:
+            for name in names:
+                _run([str(name), str(folder / f"{name.stem}.spz"), "--spz-version", "3"], kind)
+
+
+def _run(arguments: list[str], kind: str) -> None:
+    npx = shutil.which("npx")
+    if npx is None:
+        raise InputError(
+            f"exports/{kind}: needs Node.js 20 or newer with npx, which is not here; exports/ply needs neither"
+        )
+    done = subprocess.run([npx, "--yes", PACKAGE, "-w", "-q", *arguments], capture_output=True, text=True, check=False)
+    if done.returncode:
+        told = (done.stderr or done.stdout).strip().splitlines()[-3:]
+        raise InputError(f"exports/{kind}: {PACKAGE} failed: {' '.join(told) or done.returncode}")
