@@ -33,6 +33,7 @@ include: "rules/seams.smk"
 include: "rules/figures.smk"
 include: "rules/sweeps.smk"
 include: "rules/tables.smk"
+include: "rules/tradeoff.smk"
 include: "rules/study.smk"
 
 
@@ -54,6 +55,7 @@ wildcard_constraints:
     seam=NAME,
     tau=FRACTION,
     sweep=NAME,
+    size=POSITIVE,
 
 
 rule all:

@@ -8,12 +8,14 @@ from dav_gswt.active.names import AT_ZERO, GEOMETRIC, IMAGINING, ORACLES
 from dav_gswt.config import REFINED, check
 from dav_gswt.errors import InputError
 from dav_gswt.spelling import read_stop, spell, spell_completed, spell_stop
+from dav_gswt.tradeoff import settings
 
 LIBRARY = Path(dav_gswt.__file__).parent
 VIEWER = sorted(str(p) for p in Path(workflow.basedir, "workflow/viewer").iterdir())
 
 try:
     check(config, Path(workflow.basedir) / "workflow/schemas/config.schema.yaml")
+    config.update(settings.entries(config))
 except InputError as error:
     raise WorkflowError(str(error)) from None
 

@@ -1,5 +1,7 @@
 """Where a result comes from: the code, the parameters, the bytes of every input. Times stand in benchmarks only."""
 
+import os
+import platform
 from pathlib import Path
 
 import dav_gswt
@@ -15,3 +17,11 @@ def of(inputs: dict[str, Path | str], parameters: dict) -> dict:
         "parameters": parameters,
         "inputs": {name: digest(path) for name, path in sorted(inputs.items())},
     }
+
+
+def machine() -> dict:
+    """The processor's name and how many cores it has: what seconds are to be read with."""
+    info = Path("/proc/cpuinfo")
+    lines = info.read_text(encoding="utf-8").splitlines() if info.exists() else []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return {"processor": names[0] if names else platform.processor() or platform.machine(), "cores": os.cpu_count()}
