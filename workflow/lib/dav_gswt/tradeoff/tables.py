@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt import images, metrics, provenance
+from dav_gswt import images, provenance
 from dav_gswt.sweeps import tables as sweeps
 from dav_gswt.tradeoff.front import front, rivals
 
@@ -23,7 +23,7 @@ def rows(cells: list[dict]) -> list[dict]:
     seconds: of all jobs from the start views to the bundle, but the taking of photos; what cells share counts for each.
     own_seconds: of those that the knob can change: all of them where views tell its accuracy, else the jobs on tiles.
     loss: of PSNR in dB (views), of Seam-LPIPS over its floor (seams), or the root mean square difference of the stills
-    in levels of grey (stills); 0 for the base, below 0 where a setting is better than it. stills_psnr: empty where equal.
+    in grey levels (stills); 0 for the base, below 0 where a setting is better than it. stills_psnr: empty where equal.
     cells: what `sweeps.tables.row` reads, with `knob`, `setting`, `most`, `measure` and the paths of `stills`.
     """
     found, base = [], {}
@@ -67,11 +67,8 @@ def _difference(a: float | None, b: float | None) -> float | None:
 
 def mean_square(mine: list[str], others: list[str]) -> float:
     """Mean squared difference of pictures, pair by pair, over all their pixels; 0 where they are equal."""
-    found = []
-    for a, b in zip(mine, others, strict=True):
-        first, second = images.read(a), images.read(b)
-        found.append(10 ** (-(metrics.psnr(first, second, np.ones(first.shape[:2])) or np.inf) / 10))
-    return float(np.mean(found))
+    found = [(images.read(a).astype(float) - images.read(b)) ** 2 for a, b in zip(mine, others, strict=True)]
+    return float(np.mean([difference.mean() for difference in found]))
 
 
 def pareto(table: list[dict]) -> list[dict]:
@@ -94,5 +91,3 @@ def read(path: Path | str) -> list[dict]:
     """A table of the trade-off as it was written: numbers as floats, None where one is empty, texts as they are."""
     with Path(path).open(newline="", encoding="utf-8") as file:
         return [{k: v if k in TEXTS else float(v) if v else None for k, v in r.items()} for r in csv.DictReader(file)]
-
-
