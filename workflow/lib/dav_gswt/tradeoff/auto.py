@@ -81,8 +81,8 @@ def text(rows: list[dict]) -> str:
         "# Only what the scene requires",
         "Made by `snakemake docs/auto.md` from `docs/data/auto.csv`; do not edit. What `auto` chose instead of fixed "
         f"settings, seed {first['seed']:.0f}, on {first['cores']:.0f} cores of {first['processor']}: seconds of whole "
-        "jobs from the start views to the bundle, without the taking of photos. Wanted is at least a third less time for "
-        f"at most {MOST_DB:g} dB and {MOST_LPIPS:g} LPIPS. How many candidates are scored is not chosen by itself.",
+        "jobs from the start views to the bundle, without the taking of photos. Wanted is at least a third less time "
+        f"for at most {MOST_DB:g} dB and {MOST_LPIPS:g} LPIPS. How many candidates are scored is not chosen by itself.",
         _reached(rows),
         *(part for scene in dict.fromkeys(row["scene"] for row in rows) for part in _scene(scene, rows)),
     ]
