@@ -60,7 +60,7 @@ def test_a_finished_run_is_measured_drawn_and_told(snakemake, tiny, tmp_path):
     folder = shutil.copytree(tiny.folder, tmp_path / "run", symlinks=True)
     configs = small(tmp_path, "tau")
     done = snakemake(folder, "--cores", "2", "--scheduler", "greedy", "docs/tradeoff.md", configs=configs)
-    assert "9 of 9 steps (100%) done" in done.stdout  # metrics, two bundles with their stills, 0.6's, table, plot, page
+    assert "8 of 8 steps (100%) done" in done.stdout  # metrics, two bundles and their stills, table, plot, page
     with (folder / "results/tradeoff/tradeoff.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [(row["knob"], row["setting"]) for row in rows] == [

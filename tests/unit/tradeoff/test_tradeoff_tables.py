@@ -12,11 +12,11 @@ SECONDS = dict(coarse=40.0, score=0.0, select=1.0, update=19.0, levels=5.0, cut=
 ORIGIN = {"version": "1", "renderer": {"backend": "cpu"}, "inputs": {"field": "f" * 64}}
 
 
-def cell(folder, setting, psnr, faster=1.0, grey=0.5, measure="views", most=False, knob="cap", **more):
+def cell(folder, setting, psnr, faster=1.0, grey=0.5, measure="views", most=False, knob="cap", size=1.0, **more):
     (place := folder / f"{knob}-{setting}").mkdir(exist_ok=True)
     mean = {"psnr": psnr, "ssim": 0.5, "lpips": 1 - psnr / 100, "worst_decile": {"psnr": psnr}, "groups": {}}
     told = {"metrics.json": mean | {"photos": 12, "gaussians": 9, "provenance": ORIGIN}}
-    chunk = {"count": 5, "bytes": 250_000, "orders": [0]}
+    chunk = {"count": 5, "bytes": int(250_000 * size), "orders": [0]}
     tile = {"uncertainty": 0.5, "chunks": [chunk]}
     told["davgswt.json"] = {"tiles": [tile], "levels": [{}], "directions": [0], "provenance": ORIGIN}
     told["fit.json"] = {"degree": 1, "steps": 300}
@@ -27,7 +27,16 @@ def cell(folder, setting, psnr, faster=1.0, grey=0.5, measure="views", most=Fals
     for job, seconds in SECONDS.items():
         (place / f"{job}.tsv").write_text(f"s\tmax_rss\n{seconds / faster}\t800.0\n")
         times[job] = [str(place / f"{job}.tsv")]
-    wildcards = dict(scene="desert", seed=0, quality="q", policy="farthest", prior="none", p_drop="0", lam="0", k=4)
+    wildcards = dict(
+        scene="desert",
+        seed=0,
+        quality="q" if most else f"{knob}-{setting}",
+        policy="farthest",
+        prior="none",
+        p_drop="0",
+        lam="0",
+        k=4,
+    )
     wildcards |= dict(rounds=1, seam="semantic", tau="0", sweep="tradeoff", samples=0, steps=0, corrected=False)
     files = {"metrics": str(place / "metrics.json"), "manifest": str(place / "davgswt.json")}
     about = {"knob": knob, "setting": setting, "most": most, "measure": measure, "varied": {}, "times": times}
@@ -44,7 +53,7 @@ def table(tmp_path):
         cell(tmp_path, "70000", 29.8, faster=2.0),
         cell(tmp_path, "100", 29.0, faster=0.5),
         cell(tmp_path, "0", 30.0, knob="tau", measure="stills", most=True),
-        cell(tmp_path, "1", 30.0, knob="tau", measure="stills", grey=0.6, faster=2.0),
+        cell(tmp_path, "1", 30.0, knob="tau", measure="stills", grey=0.6, faster=2.0, size=0.5),
     ]
     return tables.rows(cells)
 
@@ -77,6 +86,7 @@ def test_a_job_that_left_no_benchmark_leaves_the_seconds_empty(tmp_path):
 def test_the_front_says_who_is_better_and_by_how_much(table):
     found = {(row["knob"], row["setting"]): row for row in tables.pareto(table)}
     assert ("tau", "1") not in found
+    assert ("cap", "1000000") not in found  # the cell of the preset: one point
     assert [found[key]["front"] for key in (("preset", "reference"), ("cap", "70000"), ("preset", "draft"))] == [
         1,
         1,
@@ -94,6 +104,7 @@ def test_the_page_says_what_the_table_says(table, tmp_path):
     text = page.text(rows, pareto)
     assert "`cap` 70000 instead of 1000000: is 2.00 times as fast but costs 0.20 dB." in text
     assert "`cap` 100 instead of 1000000: takes 2.00 times as long and costs 1.00 dB." in text
+    assert "costs 25.00 grey levels; the bundle is 0.50 times as large." in text
     assert "`draft` lies 1.80 dB behind the front: cap 70000 is as fast and better by that." in text
     assert "`reference` lies on the front" in text and "| `draft` | 35 | 28.00 |" in text
     assert "The base is not the most accurate" not in text and "None" not in text and "nan" not in text
@@ -110,8 +121,8 @@ def test_the_page_says_what_the_table_says(table, tmp_path):
     ],
 )
 def test_advice_is_time_and_loss_in_words(own, loss, said):
-    base = {"setting": "8", "own_seconds": 100.0}
-    row = {"knob": "cap", "setting": "4", "measure": "views", "own_seconds": own, "loss": loss}
+    base = {"setting": "8", "own_seconds": 100.0, "bundle_mb": 1.0}
+    row = {"knob": "cap", "setting": "4", "measure": "views", "own_seconds": own, "loss": loss, "bundle_mb": 1.0}
     assert page.advice(row, base) == f"`cap` 4 instead of 8: {said}."
 
 

@@ -66,7 +66,14 @@ def advice(row: dict, base: dict) -> str:
     lost = row["loss"] if abs(row["loss"]) >= TOLD[unit] else 0.0
     amount = f"{abs(lost):.{DIGITS[unit]}f} {unit}"
     value = {1: f"costs {amount}", 0: "costs nothing", -1: f"is better by {amount}"}[(lost > 0) - (lost < 0)]
-    return f"{said}{_pace(own / other)} {'but' if (own > other) == (lost < 0) and lost else 'and'} {value}."
+    joined = "but" if (own > other) == (lost < 0) and lost else "and"
+    return f"{said}{_pace(own / other)} {joined} {value}{_bytes(row, base)}."
+
+
+def _bytes(row: dict, base: dict) -> str:
+    if None in (row["bundle_mb"], base["bundle_mb"]) or abs(row["bundle_mb"] / base["bundle_mb"] - 1) <= SAME:
+        return ""
+    return f"; the bundle is {row['bundle_mb'] / base['bundle_mb']:.2f} times as large"
 
 
 def _pace(share: float) -> str:

@@ -30,6 +30,7 @@ def fronts(pareto: list[dict]):
             axes.annotate(row["setting"], (row["seconds"], row["psnr"]), fontsize=9, **at)
     axes.set_xlabel("seconds from the start views to the bundle")
     axes.set_ylabel(AXES["views"][1])
+    axes.margins(0.08)
     axes.set_xlim(left=0)
     axes.grid(alpha=0.3)
     figure.legend(loc="outside right upper", frameon=False, fontsize=8)

@@ -7,6 +7,7 @@ import numpy as np
 
 from dav_gswt import images, provenance
 from dav_gswt.sweeps import tables as sweeps
+from dav_gswt.sweeps.grid import CELL
 from dav_gswt.tradeoff.front import front, rivals
 
 KEY = ("scene", "seed", "knob", "setting", "quality", "seam", "prior", "tau", "processor", "cores")  # tells rows apart
@@ -74,7 +75,14 @@ def mean_square(mine: list[str], others: list[str]) -> float:
 def pareto(table: list[dict]) -> list[dict]:
     """The rows that test views tell apart: `front`, 1 where nothing is as fast and better (or as good and faster);
     else by how many dB (`behind`) the best that is as fast (`rival_knob`, `rival_setting`) is better."""
-    known = [row for row in table if row["measure"] == "views" and None not in (row["seconds"], row["psnr"])]
+    cells = {
+        tuple(row[key] for key in CELL): row for row in reversed(table)
+    }  # knobs share a base: its first row counts
+    known = [
+        row
+        for row in reversed(cells.values())
+        if row["measure"] == "views" and None not in (row["seconds"], row["psnr"])
+    ]
     if not known:
         return []
     cost, worth = (np.array([row[key] for row in known], float) for key in ("seconds", "psnr"))
