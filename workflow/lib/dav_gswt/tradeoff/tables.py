@@ -75,14 +75,11 @@ def mean_square(mine: list[str], others: list[str]) -> float:
 def pareto(table: list[dict]) -> list[dict]:
     """The rows that test views tell apart: `front`, 1 where nothing is as fast and better (or as good and faster);
     else by how many dB (`behind`) the best that is as fast (`rival_knob`, `rival_setting`) is better."""
-    cells = {
-        tuple(row[key] for key in CELL): row for row in reversed(table)
-    }  # knobs share a base: its first row counts
-    known = [
-        row
-        for row in reversed(cells.values())
-        if row["measure"] == "views" and None not in (row["seconds"], row["psnr"])
-    ]
+    cells = {}
+    for row in table:
+        cells.setdefault(tuple(row[key] for key in CELL), row)  # knobs share a base: it is one point
+    views = [row for row in cells.values() if row["measure"] == "views"]
+    known = [row for row in views if None not in (row["seconds"], row["psnr"])]
     if not known:
         return []
     cost, worth = (np.array([row[key] for row in known], float) for key in ("seconds", "psnr"))
