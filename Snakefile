@@ -18,6 +18,7 @@ report: "workflow/report/workflow.rst"
 
 include: "rules/common.smk"
 include: "rules/cells.smk"
+include: "rules/shown.smk"
 include: "rules/photos.smk"
 include: "rules/coarse.smk"
 include: "rules/prior.smk"

@@ -5,41 +5,6 @@ results/figures/, figures beside what they show; docs/results.md with docs/figur
 `snakemake study` makes it, `snakemake study --report page.html` a page of it.
 """
 
-from dav_gswt.tables.asked import sweeps_of
-
-TABLES = ("timing", "lod", "sensitivity", "ablation")
-
-
-def study_figures():
-    """The paper's figures: the path of each, by its name in docs/figures; they are of scenes, seed and policy of `study`."""
-    asked, found = config["study"]["figures"], {}
-    for scene in asked["scenes"]:
-        values = shown_estimator(scene, asked["policy"])
-        shown = {
-            "sphere": rules.plot_sphere.output.plot,
-            "evolution": rules.plot_evolution.output.plot,
-            "estimators": rules.plot_estimators.output.plot,
-            "cuts": rules.show_cuts.output.plot,
-            "doubt": rules.plot_doubt.output.plot,
-        }
-        found |= {f"{name}_{scene}": expand(path, **values)[0] for name, path in shown.items()}
-    return found | {"budget": "results/sweeps/budget.png"}
-
-
-def captions():
-    """What the figures of the study show, in their order."""
-    about = {
-        "sphere": "candidates by what scores said of them, and what was chosen",
-        "evolution": "two test views after the first rounds",
-        "estimators": "test views after as many photos, chosen by each estimator",
-        "cuts": "cuts by colours and by what the ground is",
-        "doubt": "uncertainty of tiles, and a walk over them",
-    }
-    return [
-        f"{name.partition('_')[2]}: {about[name.partition('_')[0]]}" if "_" in name else "quality against photos"
-        for name in study_figures()
-    ]
-
 
 rule write_results:
     """The study's tables and figures as a page of docs/."""

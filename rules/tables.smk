@@ -5,28 +5,6 @@ seed, quality, seam, tau) with milliseconds a frame. Out: results/tables/timing.
 docs/data; results/figures/estimators_{scene}.png; doubt.png beside a bundle.
 """
 
-VIEWER = "results/tables/viewer.csv"
-
-
-def viewer_if_measured(wildcards):
-    """What a browser measured of bundles, where that was done; else these columns stay empty."""
-    return {"viewer": VIEWER} if Path(VIEWER).is_file() else {}
-
-
-def swept(table):
-    """An input function: the sweeps that one of the study's tables is made from."""
-    return lambda wildcards: [f"results/sweeps/{name}.csv" for name in config["study"][table]]
-
-
-def setting_of(sweep):
-    """What a sweep varies."""
-    return next(iter(config["sweeps"][sweep]["vary"]))
-
-
-def default_of(sweep):
-    """The value that a setting has where it is not varied, as tables spell it."""
-    return str(config.get(setting_of(sweep), ""))
-
 
 rule tabulate_timing:
     """What each stage took in our runs, and what a frame of the viewer takes."""
@@ -100,20 +78,6 @@ rule tabulate_ablation:
         source=source_of("tables", "sweeps", "active/comparison/stats", "figures"),
     script:
         "../scripts/tabulate_ablation.py"
-
-
-def shown_estimator(scene, policy):
-    """The wildcards of what the study's figures show of a scene after a policy chose."""
-    asked = config["study"]["figures"]
-    return chosen_values(scene, {"policy": policy, "rounds": asked["rounds"]}) | {"seed": asked["seed"]}
-
-
-def of_estimators(output):
-    """An input function: a file of each estimator that the study's figure shows."""
-    return lambda wildcards: [
-        expand(output, **shown_estimator(wildcards.scene, policy))[0]
-        for policy in config["study"]["figures"]["estimators"]
-    ]
 
 
 rule plot_estimators:
