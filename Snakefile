@@ -35,6 +35,7 @@ include: "rules/figures.smk"
 include: "rules/sweeps.smk"
 include: "rules/tables.smk"
 include: "rules/stability.smk"
+include: "rules/tradeoff.smk"
 include: "rules/study.smk"
 
 
@@ -57,6 +58,7 @@ wildcard_constraints:
     tau=FRACTION,
     sweep=NAME,
     kind="spz|sog",
+    size=POSITIVE,
 
 
 rule all:

@@ -1,9 +1,10 @@
-"""What is compared: the cells of the config's `lod`, `calibration`, `benchmark`, `seam_study` and `sweeps`, with the files
-of each."""
+"""What is compared: the cells of the config's `lod`, `calibration`, `benchmark`, `seam_study`, `sweeps`, `tradeoff` and
+`auto`, with the files of each."""
 
 from itertools import product
 
 from dav_gswt.sweeps import grid
+from dav_gswt.tradeoff import settings
 
 
 def measured_of_tiles(made):
@@ -145,3 +146,54 @@ def sweep_cell(values, measured):
         "files": {key: of(path)[0] for part in measured for key, path in files[part].items()},
         "times": times,
     }
+
+
+def tradeoff_cells():
+    """A cell for every setting of every knob, each knob's most accurate first."""
+    asked = config["tradeoff"]
+    size = config["qualities"][asked["base"]["quality"]]["size"]
+    return [
+        {"knob": s.knob, "setting": s.shown, "most": s.most, "measure": s.measure}
+        | tradeoff_cell(asked["scene"], asked["seed"], s.chosen, size, s.measure)
+        for s in settings.settings(config)
+    ]
+
+
+def auto_cells():
+    """Of each scene of `auto`: the base, then with each of what is chosen by itself alone, then with all of them."""
+    asked = config["auto"]
+    chosen, size = asked["auto"], config["qualities"][asked["base"]["quality"]]["size"]
+    parts = {
+        "base": {},
+        "fit": {"quality": chosen["quality"]},
+        "rounds": {"stop": {"worth": chosen["worth"]}},
+        "orders": {"tau": chosen["tau"]},
+    }
+    parts["all"] = {key: value for part in parts.values() for key, value in part.items()}
+    return [
+        {"part": part} | tradeoff_cell(scene, asked["seed"], asked["base"] | own, size, "stills")
+        for scene in asked["scenes"]
+        for part, own in parts.items()
+    ]
+
+
+def tradeoff_cell(scene, seed, chosen, size, measure):
+    """One of them. size: of the photos that all are tested on, whatever they were fitted to."""
+    stop = chosen.get("stop", {})
+    others = {key: value for key, value in chosen.items() if key != "stop"}
+    values = chosen_values(scene, others) | {"seed": seed, "stop": spell_stop(stop)}
+    cell = sweep_cell(values, ["views", "tiles", measure])
+    (metrics,) = expand(rules.evaluate_at.output.metrics, size=size, **values)
+    rounds = expand(rules.update_field.output.fit, **(values | {"t": range(1, values["t"] + 1)}))
+    return cell | {
+        "sweep": "tradeoff",
+        "varied": {},
+        "files": cell["files"] | {"metrics": metrics},
+        "fits": expand(rules.fit_coarse.output.fit, **values) + rounds,
+        "stills": expand(rules.render_terrain.output.stills, **values) if measure == "stills" else [],
+    }
+
+
+def files_of(cells):
+    """Everything that cells are read from, but for benchmarks."""
+    return [path for cell in cells for path in [*cell["files"].values(), *cell["fits"], *cell["stills"]]]

@@ -9,6 +9,7 @@ from dav_gswt.active.names import AT_ZERO, GEOMETRIC, IMAGINING, ORACLES
 from dav_gswt.config import REFINED, check
 from dav_gswt.errors import InputError
 from dav_gswt.spelling import read_stop, spell, spell_completed, spell_stop
+from dav_gswt.tradeoff import settings
 
 LIBRARY = Path(dav_gswt.__file__).parent
 BUNDLE_SCHEMA = str(Path(workflow.basedir, "workflow/schemas/davgswt.schema.json"))
@@ -16,6 +17,7 @@ VIEWER = sorted(str(p) for p in Path(workflow.basedir, "workflow/viewer").iterdi
 
 try:
     check(config, Path(workflow.basedir) / "workflow/schemas/config.schema.yaml")
+    config.update(settings.entries(config))
 except InputError as error:
     raise WorkflowError(str(error)) from None
 

@@ -22,7 +22,7 @@ rule make_levels:
         mem_mb=growing(2000),
         runtime=growing("30m"),
     params:
-        levels=lookup(dpath="levels", within=config),
+        levels=lambda wildcards: config["qualities"][wildcards.quality].get("levels", config["levels"]),
         quality=entry("qualities", "quality"),
         seed=integer("seed"),
         keep=SNAPSHOTS,

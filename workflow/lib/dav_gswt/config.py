@@ -10,6 +10,7 @@ from jsonschema.exceptions import ValidationError, best_match
 from dav_gswt.errors import InputError
 from dav_gswt.sweeps import grid
 from dav_gswt.tables import asked as tables
+from dav_gswt.tradeoff import settings
 
 REFINED = "-refined"  # after a seam's name: its tiles, refined as its `refine` says
 
@@ -57,9 +58,7 @@ def check(config: dict, schema: Path) -> None:
     Raises: InputError: the key, what is wrong with it, and what it may be.
     """
     rules = yaml.safe_load(schema.read_text(encoding="utf-8"))
-    if error := best_match(Draft202012Validator(rules).iter_errors(config)):
-        key = ".".join(str(part) for part in error.absolute_path)
-        raise InputError(f"config: {key + ': ' if key else ''}{_said(error)} (config/README.md lists every key)")
+    _check_keys(config, rules)
     if config["scene"] not in config["scenes"]:
         raise InputError(f"config: scene: there is no {config['scene']!r}; scenes has {', '.join(config['scenes'])}")
     if config["prior"] not in config["priors"]:
@@ -84,6 +83,14 @@ def check(config: dict, schema: Path) -> None:
         _check_seam_study(config["seam_study"], config["scenes"], config["seams"])
     grid.check(config)
     tables.check(config)
+    settings.check(config)
+    _check_keys(settings.entries(config), rules)  # a knob's values are in range where the entries it makes are
+
+
+def _check_keys(config: dict, rules: dict) -> None:
+    if error := best_match(Draft202012Validator(rules).iter_errors(config)):
+        key = ".".join(str(part) for part in error.absolute_path)
+        raise InputError(f"config: {key + ': ' if key else ''}{_said(error)} (config/README.md lists every key)")
 
 
 def _check_refinements(seams: dict, priors: dict) -> None:

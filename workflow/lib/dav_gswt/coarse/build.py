@@ -48,6 +48,7 @@ class Quality:
     level_steps: int  # of the fit of a coarser level
     degree: Count = 0  # of the spherical harmonics
     pose_rate: float = 0.0  # radians a step that cameras may turn
+    levels: Count | None = None  # of detail, where not as many as elsewhere
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,127 @@
+"""Settings as named entries: one spelling, in range, nothing twice, and what makes no sense is named."""
+
+from copy import deepcopy
+from pathlib import Path
+
+import pytest
+import yaml
+
+from dav_gswt.config import check
+from dav_gswt.errors import InputError
+from dav_gswt.tradeoff import settings
+
+ROOT = Path(__file__).parents[3]
+SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
+
+
+@pytest.fixture
+def config():
+    return yaml.safe_load((ROOT / "config/config.yaml").read_text())
+
+
+@pytest.mark.parametrize(
+    "value, spelled",
+    [
+        (70000, "reference-cap-70000"),
+        (70000.0, "reference-cap-70000"),
+        (7e4, "reference-cap-70000"),
+        (1.25, "reference-cap-1_25"),
+        (1.250, "reference-cap-1_25"),
+        (0.5, "reference-cap-0_5"),
+        ("auto", "reference-cap-auto"),
+    ],
+)
+def test_a_setting_has_one_name(value, spelled):
+    assert settings.name("reference", "cap", value) == spelled
+
+
+def test_every_setting_is_an_entry_that_differs_in_one_key(config):
+    made = settings.entries(config)
+    new = set(made["qualities"]) - set(config["qualities"])
+    assert {"reference-size-192", "reference-spacing-1_25", "reference-cap-auto"} < new
+    for entry in new:
+        differing = {
+            key
+            for key in made["qualities"][entry]
+            if made["qualities"][entry][key] != made["qualities"]["reference"].get(key)
+        }
+        assert len(differing) == 1 and f"-{differing.pop()}-" in entry
+    assert made["priors"]["reference-steps-8"]["steps"] == 8
+    assert made["seams"]["reference-variants-2"]["candidates"] == config["seams"]["reference"]["candidates"]
+
+
+def test_the_entries_are_valid_and_making_them_again_changes_nothing(config):
+    made = settings.entries(config)
+    check(made, SCHEMA)
+    assert settings.entries(made) == made
+    assert all(len(made[table]) > len(config[table]) for table in settings.CALLED)
+
+
+def test_a_config_without_a_trade_off_stays_as_it_is(config):
+    del config["tradeoff"]
+    assert settings.entries(config) == config and settings.settings(config) == []
+
+
+def test_each_knob_starts_with_its_base_and_no_setting_comes_twice(config):
+    config["tradeoff"]["knobs"]["steps"]["values"] = [250, 1000]  # the second is the base's own
+    found = settings.settings(config)
+    knobs = [settings.PRESET, *config["tradeoff"]["knobs"]]
+    assert list(dict.fromkeys(s.knob for s in found)) == knobs
+    for knob in knobs:
+        mine = [s for s in found if s.knob == knob]
+        assert [s.most for s in mine] == [True] + [False] * (len(mine) - 1)
+        assert len({s.shown for s in mine}) == len(mine)
+    assert [(s.shown, s.chosen["quality"]) for s in found if s.knob == "steps"] == [
+        ("1000", "reference"),
+        ("250", "reference-steps-250"),
+    ]
+    assert [s.shown for s in found if s.knob == "levels"][0] == "auto"
+    assert {s.chosen["policy"] for s in found if s.knob == "denoising"} == {"w2-lpips-diverse"}
+    assert {s.chosen["tau"] for s in found if s.knob == "tau"} == {0, 0.6, 1}
+
+
+def test_only_the_knobs_that_are_asked_for_are_turned(config):
+    config["tradeoff"]["only"] = ["tau"]
+    check(config, SCHEMA)
+    assert {s.knob for s in settings.settings(config)} == {settings.PRESET, "tau"}
+
+
+def changed(config, path, value):
+    out = deepcopy(config)
+    *folders, last = path.split(".")
+    at = out
+    for key in folders:
+        at = at[key]
+    at[last] = value
+    return out
+
+
+@pytest.mark.parametrize(
+    "path, value, said",
+    [
+        pytest.param("tradeoff.scene", "moon", "tradeoff: moon is no scene", id="no such scene"),
+        pytest.param("auto.scenes", ["moon"], "auto: moon is no scene", id="no such scene of auto"),
+        pytest.param("tradeoff.knob", {}, "tradeoff: there is no key 'knob'; is 'knobs' meant", id="a typo"),
+        pytest.param("tradeoff.base.quality", "best", "tradeoff.base: there is no quality 'best'", id="no such base"),
+        pytest.param("tradeoff.base.rounds", 0, "tradeoff.base.rounds: 0 is less", id="no round"),
+        pytest.param("tradeoff.presets", ["best"], "tradeoff.presets: there is no quality 'best'", id="no such preset"),
+        pytest.param("tradeoff.only", ["caps"], "tradeoff.only: there is no knob 'caps'", id="no such knob"),
+        pytest.param("auto.auto.quality", "best", "auto.auto: there is no quality 'best'", id="no such auto"),
+        pytest.param("tradeoff.knobs.cap.values", [5], "reference-cap-5.*: 5 is less", id="out of range"),
+        pytest.param("tradeoff.knobs.degree.values", [9], "reference-degree-9", id="a degree too many"),
+        pytest.param("tradeoff.knobs.cap.key", "cup", "there is no key 'cup'", id="a key that entries have not"),
+        pytest.param("tradeoff.knobs.tau.values", [1.5], "1.5 is greater", id="tau above 1"),
+        pytest.param("tradeoff.knobs.samples.base", {}, "samples: makes no difference to the policy", id="no prior"),
+        pytest.param("qualities.reference-cap-70000", {}, "qualities.reference-cap-70000", id="an empty entry"),
+    ],
+)
+def test_what_makes_no_sense_is_named(config, path, value, said):
+    check(config, SCHEMA)
+    with pytest.raises(InputError, match=f"config: .*{said}"):
+        check(changed(config, path, value), SCHEMA)
+
+
+def test_an_entry_of_ones_own_must_not_have_the_name_of_a_setting(config):
+    mine = config["qualities"]["draft"]
+    with pytest.raises(InputError, match="qualities.reference-cap-70000: `tradeoff` makes an entry of this name"):
+        check(changed(config, "qualities.reference-cap-70000", mine), SCHEMA)

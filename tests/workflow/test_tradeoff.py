@@ -1,0 +1,77 @@
+"""Settings of the trade-off share what they have in common; a finished run makes tables, figures and pages."""
+
+import csv
+import shutil
+
+from made_runs import TINY, USUAL
+
+from dav_gswt import images
+
+SMALL = """
+tradeoff:
+  scene: desert
+  base: {quality: draft, seam: semantic, prior: terrain}
+  presets: [draft]
+  only: [%s]
+  knobs:
+    cap: {values: [10000]}
+    candidates: {values: [6]}
+    level_steps: {values: [5]}
+auto:
+  scenes: [desert]
+  base: {quality: draft, rounds: 1, prior: terrain}
+qualities:
+  auto: {size: 128, spacing: 1.5, cap: auto, steps: 60, steps_per_photo: 10, degree: 0, level_steps: 10}
+"""
+
+
+def small(folder, *knobs):
+    (path := folder / "small.yaml").write_text(SMALL % ", ".join(knobs))
+    return USUAL, TINY, path
+
+
+def test_settings_share_what_they_have_in_common(planned, tmp_path):
+    plan = planned(
+        tmp_path, "results/tradeoff/tradeoff.csv", configs=small(tmp_path, "cap", "level_steps", "tau", "candidates")
+    )
+    wanted = dict(
+        render_photos=1,
+        fit_coarse=3,  # the base, the cap, and the level's steps, as these belong to a quality
+        update_field=3,
+        make_levels=3,
+        cut_tiles=4,  # and the other candidates
+        bundle_tiles=6,  # and two other taus
+        render_terrain=4,  # the level's steps, tau and what they are compared with
+        measure_seams=2,
+        evaluate_at=3,
+        evaluate_round=0,
+    )
+    assert {rule: plan[rule] for rule in wanted} == wanted
+
+
+def test_what_auto_chose_needs_no_more_than_its_own_cells(planned, tmp_path):
+    plan = planned(tmp_path, "docs/auto.md", configs=small(tmp_path, "tau"))
+    # fixed, stopping, with other orders; the coarse field of the fixed settings serves all three
+    assert (plan["fit_coarse"], plan["update_field"], plan["bundle_tiles"], plan["gather_auto"]) == (2, 4, 5, 1)
+
+
+def test_a_finished_run_is_measured_drawn_and_told(snakemake, tiny, tmp_path):
+    """What the tiny run made is there already: the settings are tau 0 (the base), 0.6 and 1 of its tiles."""
+    folder = shutil.copytree(tiny.folder, tmp_path / "run", symlinks=True)
+    configs = small(tmp_path, "tau")
+    done = snakemake(folder, "--cores", "2", "--scheduler", "greedy", "docs/tradeoff.md", configs=configs)
+    assert "8 of 8 steps (100%) done" in done.stdout  # metrics, two bundles and their stills, table, plot, page
+    with (folder / "results/tradeoff/tradeoff.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["knob"], row["setting"]) for row in rows] == [
+        ("preset", "draft"),
+        ("tau", "0"),
+        ("tau", "0.6"),
+        ("tau", "1"),
+    ]
+    assert all(float(row[key]) > 0 for row in rows for key in ("seconds", "own_seconds", "psnr", "bundle_mb"))
+    assert all(float(row["loss"]) == 0 for row in rows if row["base"] == "1")
+    assert "`draft` lies on the front" in (folder / "docs/tradeoff.md").read_text()
+    assert (folder / "docs/data/tradeoff.csv").read_text().count("\n") == len(rows) + 1
+    for path in ("results/tradeoff/pareto.png", "results/tradeoff/knobs.png", "docs/figures/tradeoff_knobs.png"):
+        assert images.size(folder / path)[0] > 300
