@@ -1,6 +1,7 @@
 """Terrain: the tiles laid without end, as a page to walk in, as stills and, where the config asks, as a flight.
 
-In: the bundle. Out: page/ (open it with `make view`), walker.png, oblique.png, above.png, flight/.
+In: the bundle. Out: page/ (open it with `make view`), walker.png, oblique.png, above.png, flight/; beside the bundle, where asked
+for, presort.csv: what the page's shortcuts do to a picture. `snakemake presort_table` gathers those of the config's `lod`.
 """
 
 
@@ -82,3 +83,68 @@ rule render_flight:
         source=source_of("terrain", "bundle", "raster"),
     script:
         "../scripts/render_flight.py"
+
+
+rule measure_shortcuts:
+    """What pre-sorted orders, levels and rounding do to a picture, against all Gaussians sorted exactly."""
+    input:
+        manifest="<results>/<bundle>/davgswt.json",
+        chunks="<results>/<bundle>/chunks",
+        seams="<results>/<tiles>/seams.json",
+        tiles="<results>/<tiles>/tiles",
+    output:
+        table="<results>/<bundle>/presort.csv",
+    log:
+        "<logs>/<bundle>/measure_shortcuts.log",
+    benchmark:
+        "<benchmarks>/<bundle>/measure_shortcuts.tsv"
+    threads: 2
+    resources:
+        mem_mb=growing(4000),
+        runtime=growing("20m"),
+    params:
+        schema=BUNDLE_SCHEMA,
+        source=source_of("terrain", "bundle", "raster"),
+    script:
+        "../scripts/measure_shortcuts.py"
+
+
+use rule gather_lod as gather_presort with:
+    input:
+        tables=lambda wildcards: list(measured_of_tiles(rules.measure_shortcuts)),
+    output:
+        table="results/tables/presort.csv",
+    log:
+        "<logs>/tables/gather_presort.log",
+    benchmark:
+        "<benchmarks>/tables/gather_presort.tsv"
+    params:
+        cells=lambda wildcards: list(measured_of_tiles(rules.measure_shortcuts).values()),
+        source=source_of("figures"),
+
+
+rule plot_presort:
+    """The same as a figure."""
+    input:
+        table=rules.gather_presort.output.table,
+    output:
+        plot="results/figures/presort.png",
+    log:
+        "<logs>/figures/plot_presort.log",
+    benchmark:
+        "<benchmarks>/figures/plot_presort.tsv"
+    params:
+        source=source_of("terrain/shortcuts", "figures"),
+    script:
+        "../scripts/plot_presort.py"
+
+
+rule presort_table:
+    """What the page's shortcuts cost: table and figure."""
+    input:
+        rules.gather_presort.output.table,
+        rules.plot_presort.output.plot,
+
+
+localrules:
+    presort_table,

@@ -231,16 +231,18 @@ def test_another_round_goes_on_from_the_last_one(tiny, planned):
 
 
 @pytest.mark.parametrize(
-    "change",
+    "change, made",
     [
-        pytest.param("stills: {width: 320, height: 180}", id="another size"),
-        pytest.param("heights: {kind: hills, height: 2, wavelength: 20}", id="another surface"),
+        pytest.param("stills: {width: 320, height: 180}", {"render_terrain"}, id="another size"),
+        pytest.param(
+            "heights: {kind: hills, height: 2, wavelength: 20}", {"render_terrain", "make_page"}, id="another surface"
+        ),
     ],
 )
-def test_another_look_makes_only_stills(tiny, planned, tmp_path, change):
+def test_another_look_makes_only_what_shows_it(tiny, planned, tmp_path, change, made):
     (tmp_path / "look.yaml").write_text(change + "\n")
     plan = planned(tiny.folder, configs=(*CONFIGS, tmp_path / "look.yaml"))
-    assert set(plan) == {"render_terrain", "all"}
+    assert set(plan) == made | {"all"}
 
 
 def test_a_field_is_completed_beside_its_round_and_levels_go_on_from_it(tiny, snakemake, tmp_path):
@@ -261,6 +263,16 @@ def test_a_field_is_completed_beside_its_round_and_levels_go_on_from_it(tiny, sn
     assert found["gaussians"]["imagined"] == after.imagined.sum() and found["all"]["before"]["psnr"] > 10
     level = field.read(folder / made / "levels/level0.ply")
     assert len(level) and level.imagined.any() <= after.imagined.any()
+
+
+def test_what_the_page_s_shortcuts_cost_is_measured_and_drawn(tiny, snakemake, tmp_path):
+    folder = shutil.copytree(tiny.folder, tmp_path / "measured")
+    snakemake(folder, "--cores", "2", "presort_table", configs=CONFIGS)
+    with (folder / "results/tables/presort.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 12 and {r["scene"] for r in rows} == {"desert"}
+    assert all(float(r["psnr"] or "inf") > 25 for r in rows if r["shortcut"] != "levels")
+    assert (folder / "results/figures/presort.png").stat().st_size > 5000
 
 
 def test_every_level_of_every_tile_is_measured(tiny, snakemake, tmp_path):
