@@ -41,7 +41,9 @@ pathvars:
     seams="<bundle>/seams",
 
 
-NAME = r"(?!(?:logs|benchmarks|snapshots|weights|prior|sweeps|tables|figures|tradeoff|stability)(?:/|$))[a-z][a-z0-9_-]*"
+NAME = (
+    r"(?!(?:logs|benchmarks|snapshots|weights|prior|sweeps|tables|figures|tradeoff|stability)(?:/|$))[a-z][a-z0-9_-]*"
+)
 NATURAL = r"0|[1-9]\d*"
 POSITIVE = r"[1-9]\d*"
 FRACTION = r"0|1|0\.\d*[1-9]"
