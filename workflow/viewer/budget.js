@@ -8,7 +8,9 @@
 import { inSight } from "./sight.js";
 import { REACH } from "./terrain.js";
 
-const NEARER = 1 / 5; // exponent: the reach shrinks by the factor's fifth root; of 1/2, 1/3 and 1/5 the best PSNR
+// Exponent: the reach shrinks by the factor's fifth root. On one scene, 20k to 100k Gaussians, against 1/2: a walker's
+// picture gains 0.2 to 0.7 dB, one from a hill loses up to 0.25 dB.
+const NEARER = 1 / 5;
 const HALVINGS = 12; // steps of the search for the factor
 const NEVER = -1; // distance to which a level is drawn that is not drawn
 
