@@ -2,8 +2,9 @@
 
 In: the tiles. Out: davgswt.json (the only contract with the viewer), its chunks, and gswt.zip for the public renderer.
 exports/ply, exports/spz and exports/sog, only where asked for: a patch of terrain at each level for other viewers.
-Beside the tiles, whatever tau is: orders.csv, what more directions are worth; lod.csv, how coarse each level is, from where it is used and how well it stands in for
-the finest there. `snakemake lod_table orders_table` gathers those of the scenes that the config's `lod` names.
+Beside the tiles, whatever tau is: orders.csv, what more directions are worth; lod.csv, how coarse each level is, from
+where it is used and how well it stands in for the finest there. `snakemake lod_table orders_table` gathers those of
+the scenes that the config's `lod` names.
 """
 
 
