@@ -11,10 +11,32 @@ export function hashed(i, j, axis, salt) {
   return (h ^ (h >>> 16)) >>> 0;
 }
 
-/** Number of the tile in cell (i, j): T = 16 c + 8 W + 4 N + 2 E + S, with `variants` centres. */
+/**
+ * Number of the tile in cell (i, j): T = 16 c + 8 W + 4 N + 2 E + S, with `variants` centres. The centre is the hash's, but where
+ * i + j is odd the next one that makes the tile equal to none of its neighbours, which are even: no tile lies beside itself.
+ */
 export function tileAt(i, j, salt, variants) {
+  const edges = edgesOf(i, j, salt), centre = centreOf(i, j, salt, variants);
+  if (variants === 1 || (i + j) % 2 === 0) return 16 * centre + edges;
+  let taken = 0; // a bit for each centre that a neighbour with the same edges has
+  const across = edges >> 3 === (edges >> 1 & 1), along = (edges >> 2 & 1) === (edges & 1);
+  for (const step of [-1, 1]) { // only a tile with equal sides can lie beside itself
+    if (across && edgesOf(i + step, j, salt) === edges) taken |= 1 << centreOf(i + step, j, salt, variants);
+    if (along && edgesOf(i, j + step, salt) === edges) taken |= 1 << centreOf(i, j + step, salt, variants);
+  }
+  for (let step = 0; step < variants; step++) {
+    const other = (centre + step) % variants;
+    if (!(taken >> other & 1)) return 16 * other + edges;
+  }
+  return 16 * centre + edges;
+}
+
+function edgesOf(i, j, salt) {
   const west = hashed(i, j, WEST, salt) & 1, east = hashed(i + 1, j, WEST, salt) & 1;
   const south = hashed(i, j, SOUTH, salt) & 1, north = hashed(i, j + 1, SOUTH, salt) & 1;
-  const centre = (hashed(i, j, CENTRE, salt) >>> 1) % variants;
-  return 16 * centre + 8 * west + 4 * north + 2 * east + south;
+  return 8 * west + 4 * north + 2 * east + south;
+}
+
+function centreOf(i, j, salt, variants) {
+  return (hashed(i, j, CENTRE, salt) >>> 1) % variants;
 }

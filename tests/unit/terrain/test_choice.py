@@ -70,6 +70,30 @@ def test_the_world_repeats_only_after_two_to_the_32_cells(i, j, salt):
     assert tile_at(i + 2**32, j - 2**32, salt, 3) == tile_at(i, j, salt, 3)
 
 
+@pytest.mark.parametrize("variants", [1, 2, 3, 16])
+@pytest.mark.parametrize("salt", [0, 7, 2**32 - 1])
+def test_no_tile_lies_beside_itself_where_another_centre_is_free(variants, salt):
+    window = tiles_in(-50, -20, (101, 100), salt, variants)
+    beside = np.pad(window, 1, constant_values=-1)
+    around = np.stack([beside[1:-1, 2:], beside[1:-1, :-2], beside[2:, 1:-1], beside[:-2, 1:-1]])
+    odd = np.add.outer(np.arange(101) - 20, np.arange(100) - 50) % 2 == 1
+    repeats = (around == window).any(axis=0) & odd
+    repeats[[0, -1]] = repeats[:, [0, -1]] = False  # their neighbours were not asked for
+    used = [len({t // 16 for t in around[:, j, i] if t % 16 == window[j, i] % 16}) for j, i in np.argwhere(repeats)]
+    assert all(count == variants for count in used)
+    # equal edges: 1 in 16 of neighbours to either side, and their centres must be all that there are
+    assert len(used) <= {1: 2400, 2: 400, 3: 20, 16: 0}[variants]
+    assert (len(used) > 500) == (variants == 1)
+
+
+@pytest.mark.parametrize("variants", [1, 2, 3])
+def test_even_cells_take_what_the_hash_says(variants):
+    window = tiles_in(0, 0, (20, 20), 5, variants)
+    for j, i in np.ndindex(20, 20):
+        if (i + j) % 2 == 0 or variants == 1:
+            assert window[j, i] // 16 == (hashed(i, j, CENTRE, 5) >> 1) % variants
+
+
 def test_a_window_names_the_same_tiles_as_its_cells_and_uses_them_all():
     window = tiles_in(-32, 10, (64, 64), 7, 2)
     assert window[3, 5] == tile_at(-27, 13, 7, 2)

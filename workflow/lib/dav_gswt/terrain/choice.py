@@ -31,8 +31,12 @@ def tile_at(i: int, j: int, salt: int, variants: int) -> int:
 
     A cell's east edge is its neighbour's west edge, its north edge the south edge of the cell above: each edge has one
     colour, whoever asks. `variants` is C >= 1, the number of centres, so T is in [0, 16 C).
+
+    A tile beside itself is what the eye finds first: where there are two centres or more, cells whose i + j is odd take
+    the next centre that makes them equal to none of their four neighbours, which are even and take what the hash
+    says; so no choice waits for another. Where neighbours have used every centre, the hash has the last word.
     """
-    return _tile(int(i), int(j), salt, variants)
+    return int(_tile(int(i), int(j), salt, variants))
 
 
 def tiles_at(i: Int64[Array, "*cells"], j: Int64[Array, "*cells"], salt: int, variants: int) -> Int64[Array, "*cells"]:
@@ -48,6 +52,23 @@ def tiles_in(west: int, south: int, shape: tuple[int, int], salt: int, variants:
 
 
 def _tile(i, j, salt: int, variants: int):
+    edges, centre = _edges(i, j, salt), _centre(i, j, salt, variants)
+    taken = 0  # a bit for each centre that a neighbour with the same edges has
+    for east, north in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+        same = _edges(i + east, j + north, salt) == edges
+        taken = taken | np.where(same, 1, 0) << _centre(i + east, j + north, salt, variants)
+    free = centre
+    for step in reversed(range(variants)):
+        other = (centre + step) % variants
+        free = np.where(taken >> other & 1, free, other)
+    return 16 * np.where((i + j) % 2 == 1, free, centre) + edges
+
+
+def _edges(i, j, salt: int):
     west, east = (hashed(i + step, j, WEST, salt) & 1 for step in (0, 1))
     south, north = (hashed(i, j + step, SOUTH, salt) & 1 for step in (0, 1))
-    return 16 * ((hashed(i, j, CENTRE, salt) >> 1) % variants) + 8 * west + 4 * north + 2 * east + south
+    return 8 * west + 4 * north + 2 * east + south
+
+
+def _centre(i, j, salt: int, variants: int):
+    return (hashed(i, j, CENTRE, salt) >> 1) % variants
