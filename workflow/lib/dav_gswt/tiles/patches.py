@@ -115,8 +115,14 @@ def mismatch(
     step = max(1, zone[0].size // SAMPLES)
     y, x = (v[::step] for v in zone)
     there = guide.features[shown[0][::step], shown[1][::step]]
-    away = [((guide.features[y + py, x + px] - there) ** 2).sum(-1).min(1).mean() for px, py in places]
-    return np.array(away)
+    columns = guide.features.shape[1]
+    features, cells = guide.features.reshape(-1, there.shape[-1]), y * columns + x
+
+    def cost(shift: int) -> float:
+        off = features.take(cells + shift, axis=0) - there
+        return float(np.einsum("lck,lck->lc", off, off).min(1).mean())
+
+    return np.array([cost(int(py * columns + px)) for px, py in places])
 
 
 def fitting(cost: Float[Array, "n"]) -> Int[Array, "k"]:
