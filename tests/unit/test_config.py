@@ -94,6 +94,22 @@ def test_a_comparison_that_cannot_be_made_is_refused(change, said):
         check(config | {"benchmark": config["benchmark"] | change}, SCHEMA)
 
 
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        pytest.param({"scenes": ["moon"]}, "seam_study.scenes: there is no 'moon'", id="no such scene"),
+        pytest.param({"seams": ["glue", "colour"]}, "seam_study.seams: there is no 'glue'", id="no such seam"),
+        pytest.param({"baseline": "none", "seams": ["colour"]}, "none is not among", id="a baseline that is not cut"),
+        pytest.param({"seams": []}, "seam_study.seams", id="nothing to compare"),
+        pytest.param({"scenes": "desert"}, "seam_study.scenes", id="a name where a list belongs"),
+    ],
+)
+def test_seams_that_cannot_be_compared_are_refused(change, said):
+    config = yaml.safe_load((ROOT / "config/config.yaml").read_text())
+    with pytest.raises(InputError, match=said):
+        check(config | {"seam_study": config["seam_study"] | change}, SCHEMA)
+
+
 def test_a_missing_key_is_named(config):
     del config["qualities"]["draft"]["cap"]
     with pytest.raises(InputError, match="cap"):

@@ -7,6 +7,7 @@ trace of a border cost. jump: RMS colour difference of neighbouring pixels acros
 1 is no jump.
 """
 
+import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -17,12 +18,14 @@ from numpy import ndarray as Array
 from dav_gswt import metrics
 from dav_gswt.errors import InputError
 from dav_gswt.logs import progress
-from dav_gswt.perceptual.weights import Weights
+from dav_gswt.perceptual.weights import PATH, Weights
 from dav_gswt.seams import crops, likeness, places
 from dav_gswt.seams.crops import Crop, Shown, View
 from dav_gswt.seams.ground import Laid
 from dav_gswt.terrain import heights
 from dav_gswt.terrain.assemble import Terrain
+
+_log = logging.getLogger(__name__)
 
 BORDERS, CUTS = 64, 64  # crops of each, view and ground
 BANK = 160  # crops of the exemplar in a view
@@ -55,6 +58,8 @@ def measured(laid: Laid, straight: Laid, weights: Weights | None, seed: int) -> 
     straight: the tiles of the same exemplar and size that were laid without looking.
     Raises: InputError: fewer than half of the crops of a place can be taken.
     """
+    if weights is None:
+        _log.warning("crops are compared without LPIPS: its weights were not fetched (snakemake %s)", PATH)
     rows = []
     views = [(ground, view) for ground in GROUNDS for view in crops.VIEWS]
     for ground, view in progress(views, "measure seams"):
