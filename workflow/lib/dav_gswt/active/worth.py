@@ -8,7 +8,7 @@ of what it loses.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm, t
+from scipy.special import ndtri, stdtrit  # scipy.stats has them too, but loads for longer than most jobs take
 
 LEVEL = 0.95  # of the interval
 LEAST = 3  # new photos, without which nothing can be said
@@ -66,12 +66,12 @@ def expected(history: History) -> Worth | None:
     found = np.array([r.fitted * gap for r in history.rounds for gap in r.gaps])
     if len(found) < LEAST or history.coming < 1:
         return None
-    n, k, reach = history.fitted, history.coming, float(norm.ppf((1 + LEVEL) / 2))
+    n, k, reach = history.fitted, history.coming, float(ndtri((1 + LEVEL) / 2))
     part = 1 / n - 1 / (n + k)
     c, error = float(found.mean()), float(found.std(ddof=1) / np.sqrt(len(found)))
     if not c > 0:
         return Worth(k, 0.0, 0.0, SHARE * part * max(0.0, c + reach * error), 0.0)
-    scene = float(t.ppf((1 + LEVEL) / 2, SCENES - 1)) * OFF * np.sqrt(1 + 1 / SCENES)
+    scene = float(stdtrit(SCENES - 1, (1 + LEVEL) / 2)) * OFF * np.sqrt(1 + 1 / SCENES)
     gain, wide = SHARE * part * c, float(np.exp(np.hypot(scene, reach * error / c)))
     return Worth(k, gain, gain / wide, gain * wide, part * c)
 
