@@ -62,7 +62,7 @@ def measured(laid: Laid, straight: Laid, weights: Weights | None, seed: int) -> 
         draped, twin = (replace(each.terrain, heights=surface) for each in (laid, straight))
         rng = np.random.default_rng([seed, 7])
         taken = [*_borders(laid, draped, view, rng), *_cuts(laid, draped, (straight, twin), view, rng)]
-        like = _likeness(laid, draped, view, taken, weights, rng) if weights else [(None, None)] * len(taken)
+        like = likeness_of(laid, draped, view, taken, weights, rng) if weights else [(None, None)] * len(taken)
         for each, (own, floor) in zip(taken, like, strict=True):
             rows += [{key: row[key] for key in COLUMNS} for row in _rows(each, view.name, ground, own, floor)]
     return rows
@@ -108,7 +108,9 @@ def _enough(found: list[Taken], asked: int, what: str) -> list[Taken]:
     return found
 
 
-def _likeness(laid: Laid, terrain: Terrain, view: View, taken: list[Taken], weights: Weights, rng):
+def likeness_of(
+    laid: Laid, terrain: Terrain, view: View, taken: list[Taken], weights: Weights, rng: np.random.Generator
+) -> Iterator[tuple[float, float]]:
     """Seam-LPIPS of every crop, and its floor: that of its patches, by their share."""
     bank = exemplar_bank(laid, terrain, view, [each.shown.crop for each in taken], weights, rng)
     pictures = [np.stack([each.shown.picture, *each.shown.own]) for each in taken]
