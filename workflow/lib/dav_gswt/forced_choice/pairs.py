@@ -160,14 +160,18 @@ def _spoilt(picture: Float32[Array, "h w 3"], other: Float32[Array, "h w 3"], up
 
 
 def _judged(look: Look, items: list[Item], weights: Weights, rng: np.random.Generator) -> list[Item]:
-    """The items with how much farther the middle of each crop is from the exemplar than its patches are."""
-    over: dict[tuple[int, int], float] = {}
-    for name, (laid, terrain) in look.laid.items():
-        mine = [(i, k) for i, item in enumerate(items) for k in (0, 1) if item.halves[k].name == name]
-        taken = [measure.Taken("cut", i, items[i].cluster, items[i].halves[k].shown) for i, k in mine]
-        if taken:
-            values = measure.likeness_of(laid, terrain, look.view, taken, weights, rng)
-            over |= {at: own - floor for at, (own, floor) in zip(mine, values, strict=True)}
+    """The items with how much farther the middle of each crop is from the exemplar than its patches are.
+
+    One bank of the exemplar's crops serves all tile sets, so that both of a pair are compared with the same.
+    """
+    at = [(i, k) for i, item in enumerate(items) for k in (0, 1) if item.halves[k].shown]
+    taken = [measure.Taken("cut", i, items[i].cluster, items[i].halves[k].shown) for i, k in at]
+    if not taken:
+        return items
+    seen = [each.shown.crop for each in taken]
+    bank = measure.exemplar_bank(*next(iter(look.laid.values())), seen, weights, rng)
+    values = measure.likeness_of(taken, bank, weights)
+    over = {place: own - floor for place, (own, floor) in zip(at, values, strict=True)}
     return [
         replace(item, over=tuple(over.get((i, k), _seamless(item.halves[k].name)) for k in (0, 1)))
         for i, item in enumerate(items)
