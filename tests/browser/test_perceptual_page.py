@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import made_up_answers
 import pytest
-from visiting import served
+from visiting import Visit, served
 
 from dav_gswt.files import read_json
 from dav_gswt.forced_choice import answers, results
@@ -56,6 +56,11 @@ def begin(page):
     page.click("#begin")
 
 
+def reached(page, number):
+    """Wait until that pair's turn has come."""
+    Visit(page).until(f"document.getElementById('number').textContent.startsWith('{number} ')")
+
+
 def shown(page):
     """Wait for the next pair; the names of both pictures."""
     page.wait_for_selector("#pair:not(.away)")
@@ -77,7 +82,7 @@ def answer_all(page, key, listed, first, upto=None):
     """By a rule, from where the page is. first: of a pair, whether its first crop is chosen."""
     start = int(page.inner_text("#number").split()[0]) - 1
     for number, (name, left, right) in list(enumerate(listed))[start:upto]:
-        page.wait_for_function(f"document.getElementById('number').textContent.startsWith('{number + 1} ')")
+        reached(page, number + 1)
         assert shown(page) == [left, right]
         item = key["items"][name]
         chosen = item["pictures"][0 if first(item) else 1]
@@ -123,7 +128,7 @@ def test_a_page_that_is_loaded_again_goes_on_and_says_what_was_seen_twice(person
     with person(query="?list=2") as page:
         begin(page)
         answer_all(page, key, key["lists"][2], semantic_or_floor, upto=3)
-        page.wait_for_function("document.getElementById('number').textContent.startsWith('4 ')")
+        reached(page, 4)
         shown(page)
         before = page.evaluate(f"JSON.parse(localStorage.getItem({STORED!r} + STUDY.study))")
         page.reload()
@@ -140,10 +145,10 @@ def test_a_page_that_is_loaded_again_goes_on_and_says_what_was_seen_twice(person
 def test_pictures_go_after_their_time_and_may_be_answered_then(person, brief):
     with person(kit=brief) as page:
         begin(page)
-        page.wait_for_function("shown && shown.gone")
+        Visit(page).until("shown && shown.gone")
         assert not page.locator("#leftPicture").is_visible() and page.locator("#question").is_visible()
         page.keyboard.press("ArrowLeft")
-        page.wait_for_function("document.getElementById('number').textContent.startsWith('2 ')")
+        reached(page, 2)
         (one,) = page.evaluate("session.answers")
     assert one["gone"] and one["ms"] >= 1000 * BRIEF - 20 and one["choice"] == "left"
 
@@ -156,7 +161,7 @@ def test_keys_between_pairs_and_keys_held_down_answer_nothing(person):
         page.keyboard.down("ArrowRight")
         for _ in range(5):
             page.keyboard.down("ArrowRight")
-        page.wait_for_function("document.getElementById('number').textContent.startsWith('2 ')")
+        reached(page, 2)
         shown(page)
         page.keyboard.down("ArrowRight")
         assert page.evaluate("session.answers.length") == 1
@@ -177,7 +182,7 @@ def test_who_stops_leaves_nothing_and_the_next_is_another_participant(person):
 def test_lists_are_drawn_where_none_is_asked_for_or_the_one_asked_for_is_not_there(person):
     with person(query="?list=9999") as page:
         lists = set()
-        for _ in range(12):
+        for _ in range(6):
             begin(page)
             lists.add(page.evaluate("session.list"))
             page.click("#stop")
