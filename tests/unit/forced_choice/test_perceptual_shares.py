@@ -41,6 +41,7 @@ def test_the_plain_binomial_is_the_exact_one():
     assert p == pytest.approx(2 * (45 + 10 + 1) / 1024)
     assert binomtest(8, 10, low, "greater").pvalue == pytest.approx(0.025)
     assert binomtest(8, 10, high, "less").pvalue == pytest.approx(0.025)
+    assert shares.binomial(0, 10)[0] == 0 and shares.binomial(10, 10)[1] == 1
 
 
 @pytest.mark.parametrize("chosen, asked", [([], []), ([1.0], [0.0]), ([3.0], [2.0]), ([-1.0], [2.0])])

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
-from scipy.stats import binomtest
+from scipy.stats import beta, binomtest
 from scipy.stats import t as student
 
 LEVEL = 0.95
@@ -68,6 +68,7 @@ def wilson(share: float, n: float, z: float) -> tuple[float, float]:
 
 def binomial(chosen: int, answers: int) -> tuple[float, float, float]:
     """The exact interval (Clopper and Pearson) and p of a plain binomial: what the paper used. Too sure, see above."""
-    test = binomtest(chosen, answers)
-    ends = test.proportion_ci(LEVEL)
-    return float(ends.low), float(ends.high), float(test.pvalue)
+    tail = (1 - LEVEL) / 2
+    low = float(beta.ppf(tail, chosen, answers - chosen + 1)) if chosen else 0.0
+    high = float(beta.ppf(1 - tail, chosen + 1, answers - chosen)) if chosen < answers else 1.0
+    return low, high, float(binomtest(chosen, answers).pvalue)
