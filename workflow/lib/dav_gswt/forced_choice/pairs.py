@@ -18,7 +18,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.logs import progress
 from dav_gswt.perceptual.weights import Weights
 from dav_gswt.seams import crops, measure, places
-from dav_gswt.seams.crops import Shown, View
+from dav_gswt.seams.crops import Crop, Shown, View
 from dav_gswt.seams.ground import Laid
 from dav_gswt.seams.measure import GROUNDS
 from dav_gswt.seams.places import Place
@@ -26,6 +26,7 @@ from dav_gswt.terrain import heights
 from dav_gswt.terrain.assemble import Terrain
 
 PLAIN, CHECK = "plain", "check"  # of an attention check: the right answer and the wrong one
+TRIED = 300  # places of a comparison in a look, before there are too few
 DARK = 0.6  # brightness of the half of a check that is not to be overlooked
 
 
@@ -59,6 +60,15 @@ class Look:
     ground: str
     size: int
     laid: dict[str, tuple[Laid, Terrain]]
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A place that can be shown: what is judged, what people see, the patches that meet in the former."""
+
+    small: Crop
+    large: Crop
+    met: list[int]
 
 
 def drawn(sets: dict[str, Laid], asked: dict, weights: Weights | None) -> list[Item]:
@@ -99,42 +109,50 @@ def _enough(found: Iterator[Item], asked: int, what: str) -> list[Item]:
 
 
 def _fresh(laid: Laid, used: set[str], rng: np.random.Generator) -> list[Place]:
-    """Places on cuts: first those of clusters that were not shown."""
-    return sorted(places.cuts(laid, rng), key=lambda place: place.cluster in used)
+    """Some places on cuts: first those of clusters that were not shown."""
+    return sorted(places.cuts(laid, rng), key=lambda place: place.cluster in used)[:TRIED]
 
 
 def _compared(look: Look, a: str, b: str, used: set[str], rng: np.random.Generator) -> Iterator[Item]:
     """Crops of the cuts of `a`, each beside the nearest cut of `b` in the same tile, or the same ground whole."""
     for place in _fresh(look.laid[a][0], used, rng):
-        twin = place if b == FLOOR else places.beside(look.laid[b][0], place)
-        if not twin or not (first := _cut(look, a, place)):
+        if not (spot := _spot(look, a, place)):
             continue
-        second = _whole(look, a, place, first.shown) if b == FLOOR else _cut(look, b, twin)
-        if second:
+        twin = None if b == FLOOR else places.beside(look.laid[b][0], place)
+        other = _covering(look.laid[a][0], spot) if b == FLOOR else twin and _spot(look, b, twin)
+        if other is None or not (first := _cut(look, a, spot)):
+            continue
+        if second := _whole(look, a, spot, other) if b == FLOOR else _cut(look, b, other):
             used.add(place.cluster)
             yield Item((first, second), look.view.name, look.ground, place.cluster)
 
 
-def _cut(look: Look, name: str, place: Place) -> Half | None:
-    """A crop with a cut in its middle; None where it cannot be judged."""
+def _spot(look: Look, name: str, place: Place) -> Spot | None:
+    """Where a cut can be looked at, before anything is drawn; None where it cannot be judged."""
     laid, terrain = look.laid[name]
-    small, large = (crops.crop(laid, terrain, look.view, place.at, side) for side in (crops.SIDE, look.size))
-    met = crops.meeting(laid, small) if small and large else None
-    if not met or len(met) < 2:
-        return None
-    shown = crops.shown(laid, terrain, small, met)
-    return Half(name, crops.picture(laid, terrain, large), shown) if shown.any else None
+    small = crops.crop(laid, terrain, look.view, place.at)
+    met = crops.meeting(laid, small) if small else None
+    large = crops.crop(laid, terrain, look.view, place.at, look.size) if met and len(met) > 1 else None
+    return Spot(small, large, met) if large else None
 
 
-def _whole(look: Look, name: str, place: Place, shown: Shown) -> Half | None:
-    """The crop with one of its patches laid whole: the first that covers all that it shows."""
+def _covering(laid: Laid, spot: Spot) -> int | None:
+    """The first of the patches that can be laid whole over all that the crop shows."""
+    return next((patch for patch in spot.met if crops.inside(laid, spot.large, laid.origins[patch])), None)
+
+
+def _cut(look: Look, name: str, spot: Spot) -> Half | None:
+    """A crop with a cut in its middle; None where things that stand hide it."""
     laid, terrain = look.laid[name]
-    large = crops.crop(laid, terrain, look.view, place.at, look.size)
-    for patch in shown.patches:
-        if crops.inside(laid, large, laid.origins[patch]):
-            changed = crops.change(laid, shown.crop, patch)
-            return Half(FLOOR, crops.whole(laid, terrain, large, laid.origins[patch], changed))
-    return None
+    shown = crops.shown(laid, terrain, spot.small, spot.met)
+    return Half(name, crops.picture(laid, terrain, spot.large), shown) if shown.any else None
+
+
+def _whole(look: Look, name: str, spot: Spot, patch: int) -> Half:
+    """The crop with that patch laid whole."""
+    laid, terrain = look.laid[name]
+    changed = crops.change(laid, spot.small, patch)
+    return Half(FLOOR, crops.whole(laid, terrain, spot.large, laid.origins[patch], changed))
 
 
 def _checks(look: Look, used: set[str], rng: np.random.Generator) -> Iterator[Item]:
