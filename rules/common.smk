@@ -6,7 +6,7 @@ from pathlib import Path
 
 import dav_gswt
 from dav_gswt.active.names import AT_ZERO, GEOMETRIC, IMAGINING, ORACLES
-from dav_gswt.config import REFINED, check
+from dav_gswt.config import FLOOR, REFINED, check
 from dav_gswt.errors import InputError
 from dav_gswt.spelling import read_stop, spell, spell_completed, spell_stop
 from dav_gswt.tradeoff import settings
@@ -41,9 +41,7 @@ pathvars:
     seams="<bundle>/seams",
 
 
-NAME = (
-    r"(?!(?:logs|benchmarks|snapshots|weights|prior|sweeps|tables|figures|tradeoff|stability)(?:/|$))[a-z][a-z0-9_-]*"
-)
+NAME = r"(?!(?:logs|benchmarks|snapshots|weights|prior|sweeps|tables|figures|tradeoff|stability|perceptual)(?:/|$))[a-z][a-z0-9_-]*"
 NATURAL = r"0|[1-9]\d*"
 POSITIVE = r"[1-9]\d*"
 FRACTION = r"0|1|0\.\d*[1-9]"

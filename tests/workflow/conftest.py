@@ -13,7 +13,7 @@ import pytest
 from made_runs import TINY, USUAL, Made
 
 COPIED = ["Snakefile", "rules", "scripts", "config", "profiles"]  # the last is a link
-COPIED += [f"workflow/{name}" for name in ("profiles", "report", "schemas", "viewer")]
+COPIED += [f"workflow/{name}" for name in ("profiles", "report", "schemas", "viewer", "forced_choice")]
 
 
 @pytest.fixture(scope="session")

@@ -12,6 +12,7 @@ from dav_gswt.sweeps import grid
 from dav_gswt.tables import asked as tables
 from dav_gswt.tradeoff import settings
 
+FLOOR = "floor"  # in a pair of the perceptual study: the same place without a seam
 REFINED = "-refined"  # after a seam's name: its tiles, refined as its `refine` says
 
 
@@ -81,6 +82,8 @@ def check(config: dict, schema: Path) -> None:
         _check_benchmark(config["benchmark"], config["scenes"], config["priors"])
     if "seam_study" in config:
         _check_seam_study(config["seam_study"], config["scenes"], config["seams"])
+    if "perceptual_study" in config:
+        _check_perceptual_study(config["perceptual_study"], config["scenes"], config["seams"])
     grid.check(config)
     tables.check(config)
     settings.check(config)
@@ -129,6 +132,22 @@ def _check_seam_study(asked: dict, scenes: dict, seams: dict) -> None:
                 raise InputError(f"config: seam_study.{key}: there is no {name!r}; {key} has {', '.join(table)}")
     if asked["baseline"] not in asked["seams"]:
         raise InputError(f"config: seam_study.baseline: {asked['baseline']} is not among seam_study.seams")
+
+
+def _check_perceptual_study(asked: dict, scenes: dict, seams: dict) -> None:
+    """The scenes are there, and both of every pair, of which only the second may be the floor."""
+    for name in asked["scenes"]:
+        if name not in scenes:
+            raise InputError(f"config: perceptual_study.scenes: there is no {name!r}; scenes has {', '.join(scenes)}")
+    used = list(dict.fromkeys(name for pair in asked["pairs"] for name in pair))
+    if any(pair[0] == FLOOR for pair in asked["pairs"]):
+        raise InputError(f"config: perceptual_study.pairs: {FLOOR} is the same place without a seam: name it second")
+    for name in used:
+        if name not in seams and name != FLOOR:
+            raise InputError(
+                f"config: perceptual_study.pairs: there is no {name!r}; seams has {', '.join(seams)}; "
+                f"there is {FLOOR}, too"
+            )
 
 
 def _check_benchmark(asked: dict, scenes: dict, priors: dict) -> None:

@@ -90,15 +90,18 @@ class Shown:
         return counts / counts.sum() if counts.sum() else np.full(len(counts), 1 / len(counts))
 
 
-def crop(laid: Laid, terrain: Terrain, view: View, at: tuple[int, int]) -> Crop | None:
-    """The crop around a point; None where a hill hides it, or it is seen at too flat an angle to be judged."""
+def crop(laid: Laid, terrain: Terrain, view: View, at: tuple[int, int], side: int = SIDE) -> Crop | None:
+    """The crop around a point; None where a hill hides it, or it is seen at too flat an angle to be judged.
+
+    side: in pixels; a larger one shows the same in its middle, and what lies around it.
+    """
     spot = np.array(at, float) * laid.spacing
     (height,), (slope,) = terrain.heights.at(spot[:1], spot[1:])
     middle = np.array([*spot, height])
     down, yaw = np.radians(view.down), np.radians(view.yaw)
     ahead = np.array([np.cos(down) * np.cos(yaw), np.cos(down) * np.sin(yaw), -np.sin(down)])
     far = view.floors * laid.eye_floor / np.sin(down)
-    camera = cameras.pinhole(middle - far * ahead, middle, SIDE, SIDE, 60.0)
+    camera = cameras.pinhole(middle - far * ahead, middle, side, side, 60.0)
     focal = view.pixels * far / laid.spacing
     camera = replace(camera, fx=focal, fy=focal)
     normal = np.array([-slope[0], -slope[1], 1.0]) / np.hypot(1.0, np.linalg.norm(slope))
@@ -132,6 +135,12 @@ def meeting(laid: Laid, crop: Crop) -> list[int] | None:
     return patches if all(inside(laid, crop, laid.origins[p]) for p in patches) else None
 
 
+def picture(laid: Laid, terrain: Terrain, crop: Crop) -> Float32[Array, "h w 3"]:
+    """The crop as the terrain shows it, and nothing more."""
+    pieces = drawing.of_terrain(terrain, crop.camera, _seen(laid, crop), laid.extents)
+    return drawing.drawn(terrain, pieces, crop.camera, laid.colour)[0]
+
+
 def shown(laid: Laid, terrain: Terrain, crop: Crop, patches: list[int], border: bool = False) -> Shown:
     """The crop as the terrain shows it, and its patches whole, each with the mean change that its cells have there.
 
@@ -144,7 +153,7 @@ def shown(laid: Laid, terrain: Terrain, crop: Crop, patches: list[int], border: 
     picture, codes, *sides = drawing.drawn(terrain, pieces, crop.camera, laid.colour, looks)
     patch = np.where(codes.max(-1) > SEEN, codes.argmax(-1), -1)
     tile = (sides[0][..., :2] > 0.5) @ np.array([1, 2]) if border else np.zeros_like(patch)
-    own = [whole(laid, terrain, crop, laid.origins[p], _change(laid, crop, p), pieces) for p in patches]
+    own = [whole(laid, terrain, crop, laid.origins[p], change(laid, crop, p), pieces) for p in patches]
     return Shown(crop, picture, patches, patch, tile, np.stack(own), crop.box - laid.origins[patches][:, None])
 
 
@@ -153,16 +162,19 @@ def whole(
     terrain: Terrain,
     crop: Crop,
     origin: Int[Array, "2"],
-    change: Float[Array, "4"],
+    changed: Float[Array, "4"],
     pieces: list[drawing.Piece] | None = None,
 ) -> Float32[Array, "h w 3"]:
-    """The exemplar in the crop's place, with its corner in that cell of the terrain; pieces: the terrain's there."""
+    """The exemplar in the crop's place, with its corner in that cell of the terrain.
+
+    changed: its colours and heights, by so much throughout. pieces: the terrain's there.
+    """
     seen = _seen(laid, crop)
     pieces = pieces or drawing.of_terrain(terrain, crop.camera, seen, laid.extents)
     middle = tuple(v // laid.plan.side for v in crop.at)
     (like,) = [piece for piece in pieces if piece.cell == middle]
     corner = np.array([*(origin * laid.spacing), 0.0])
-    piece = drawing.of_patch(laid.source.levels, corner, like, change, seen)
+    piece = drawing.of_patch(laid.source.levels, corner, like, changed, seen)
     return drawing.drawn(terrain, [piece], crop.camera, laid.colour)[0]
 
 
@@ -170,7 +182,7 @@ def _seen(laid: Laid, crop: Crop) -> drawing.Seen:
     return drawing.Seen.of(crop.camera, (crop.box + [[-1], [2]]) * laid.spacing)
 
 
-def _change(laid: Laid, crop: Crop, patch: int) -> Float[Array, "4"]:
+def change(laid: Laid, crop: Crop, patch: int) -> Float[Array, "4"]:
     """Mean correction of a patch's cells in the crop; 0 where none of them is known."""
     x, y = np.moveaxis(crop.cells - laid.first, -1, 0)
     mine = laid.patch[y, x] == patch

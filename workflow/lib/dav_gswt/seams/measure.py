@@ -67,7 +67,10 @@ def measured(laid: Laid, straight: Laid, weights: Weights | None, seed: int) -> 
         draped, twin = (replace(each.terrain, heights=surface) for each in (laid, straight))
         rng = np.random.default_rng([seed, 7])
         taken = [*_borders(laid, draped, view, rng), *_cuts(laid, draped, (straight, twin), view, rng)]
-        like = _likeness(laid, draped, view, taken, weights, rng) if weights else [(None, None)] * len(taken)
+        like = [(None, None)] * len(taken)
+        if weights:
+            seen = [each.shown.crop for each in taken]
+            like = likeness_of(taken, exemplar_bank(laid, draped, seen, weights, rng), weights)
         for each, (own, floor) in zip(taken, like, strict=True):
             rows += [{key: row[key] for key in COLUMNS} for row in _rows(each, view.name, ground, own, floor)]
     return rows
@@ -113,9 +116,8 @@ def _enough(found: list[Taken], asked: int, what: str) -> list[Taken]:
     return found
 
 
-def _likeness(laid: Laid, terrain: Terrain, view: View, taken: list[Taken], weights: Weights, rng):
-    """Seam-LPIPS of every crop, and its floor: that of its patches, by their share."""
-    bank = exemplar_bank(laid, terrain, view, [each.shown.crop for each in taken], weights, rng)
+def likeness_of(taken: list[Taken], bank: Bank, weights: Weights) -> Iterator[tuple[float, float]]:
+    """Seam-LPIPS of every crop, and its floor: that of its patches, by their share. bank: of the view and ground."""
     pictures = [np.stack([each.shown.picture, *each.shown.own]) for each in taken]
     vectors, shapes = likeness.embedded(np.concatenate(pictures), weights)
     apart = likeness.distances(vectors, bank.vectors)
@@ -126,7 +128,7 @@ def _likeness(laid: Laid, terrain: Terrain, view: View, taken: list[Taken], weig
         yield float(far[0, near[0]].mean()), likeness.floor(mine[1:], like, likeness.where(each.shown.masks, shapes))
 
 
-def exemplar_bank(laid: Laid, terrain: Terrain, view: View, seen: list[Crop], weights: Weights, rng) -> Bank:
+def exemplar_bank(laid: Laid, terrain: Terrain, seen: list[Crop], weights: Weights, rng: np.random.Generator) -> Bank:
     """BANK crops of the exemplar, drawn at random, each laid under one of the crops in turn: on hills it has slopes
     as theirs.
     """

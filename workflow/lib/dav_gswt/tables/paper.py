@@ -1,6 +1,7 @@
 """The paper's values, as printed there: paper.csv, a row a value, by table, row and column.
 
-Source: DAV-GSWT, the tables of timing, levels, sensitivity and ablation. Its text has slips; `results` says which.
+Source: DAV-GSWT, the tables of timing, levels, sensitivity, ablation and preferences. Its text has slips; `results`
+says which.
 """
 
 import csv

@@ -11,6 +11,7 @@ from pathlib import Path
 from dav_gswt.errors import InputError
 
 HOST = "127.0.0.1"  # nobody else on the network is served
+CONTENT = ("davgswt.json", "trials.js")  # what a page shows: a terrain, or trials of the perceptual study
 
 
 class _Handler(SimpleHTTPRequestHandler):
@@ -60,9 +61,9 @@ def server(folder: Path | str, port: int) -> ThreadingHTTPServer:
     Raises: InputError: the folder holds no page, or the port cannot be had.
     """
     folder = Path(folder)
-    for name in ("index.html", "davgswt.json"):
-        if not (folder / name).is_file():
-            raise InputError(f"{folder}: no page here ({name} is missing); `make run` makes one")
+    for names in (("index.html",), CONTENT):
+        if not any((folder / name).is_file() for name in names):
+            raise InputError(f"{folder}: no page here ({names[0]} is missing); `make run` makes one")
     if not 0 <= port <= 65535:
         raise InputError(f"--port {port}: ports go from 1 to 65535 (0: any free one)")
     try:

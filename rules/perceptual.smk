@@ -1,0 +1,128 @@
+"""The perceptual study: which of two crops has the less visible seam? A kit for people, and what follows from answers.
+
+In: the levels and, of each seam that is compared, the tiles; the files that people saved, in the folder `answers` of the
+config's `perceptual_study`. Out, per scene: perceptual/{scene}/pairs, the crops; for all: perceptual/kit/page, a page that works
+offline and does not say which crop is which, perceptual/kit/key.json, which does; results/tables/perceptual.csv,
+results/figures/perceptual.png and perceptual/participants.json, who was counted.
+Not part of `all`: `snakemake perceptual_kit` and `snakemake perceptual_results`; docs/perceptual.md says how to run it.
+"""
+
+TRIALS = sorted(str(p) for p in Path(workflow.basedir, "workflow/forced_choice").iterdir())
+ANSWERS_SCHEMA = str(Path(workflow.basedir, "workflow/schemas/answers.schema.json"))
+
+
+def perceptual_seams():
+    """The entries of `seams` that are compared, by name: of other sizes, tiles have no place in common."""
+    names = dict.fromkeys(name for pair in config["perceptual_study"]["pairs"] for name in pair)
+    found = {name: config["seams"][name] for name in names if name != FLOOR}
+    if len({tuple(entry[key] for key in ("tile", "strip", "variants")) for entry in found.values()}) > 1:
+        raise WorkflowError(
+            "config: perceptual_study.pairs: seams of other `tile`, `strip` or `variants` have no place in common; "
+            f"name such that are only cut in other ways ({', '.join(found)} are not)"
+        )
+    return found
+
+
+def perceptual_inputs(wildcards):
+    """A scene's levels, its tiles of each seam, LPIPS's weights where they are."""
+    values = seam_values(wildcards.scene) | {"seed": config["seeds"][0]}
+    made, names = rules.cut_tiles.output, list(perceptual_seams())
+    found = {"levels": expand(rules.make_levels.output.levels, **values)[0]}
+    found |= {"seams": expand(made.seams, **(values | {"seam": names}))}
+    found |= {"tiles": expand(made.tiles, **(values | {"seam": names}))}
+    return found | lpips_if_fetched(wildcards)
+
+
+def answers_given(wildcards):
+    """The files of answers, where there are any yet."""
+    folder = Path(config["perceptual_study"]["answers"])
+    found = sorted(str(p) for p in folder.glob("*.json") if p.is_file() and not p.name.startswith("."))
+    return {"answers": found} if found else {}
+
+
+rule draw_pairs:
+    """A scene's crops, two of a place: cut in two ways, or cut and whole; and attention checks."""
+    input:
+        unpack(perceptual_inputs),
+    output:
+        pairs=directory("<results>/perceptual/{scene}/pairs"),
+    log:
+        "<logs>/perceptual/{scene}/draw_pairs.log",
+    benchmark:
+        "<benchmarks>/perceptual/{scene}/draw_pairs.tsv"
+    threads: 2
+    resources:
+        mem_mb=growing(6000),
+        runtime=growing("30m"),
+    params:
+        seams=lambda wildcards: perceptual_seams(),
+        study=lambda wildcards: {
+            key: config["perceptual_study"][key] for key in ("pairs", "crops", "checks", "size", "seed")
+        },
+        salt=lambda wildcards: config["seeds"][0],
+        tau=lambda wildcards: float(config["tau"]),
+        source=source_of("forced_choice/pairs", "forced_choice/store", "tiles", "levels", *MEASURING),
+    script:
+        "../scripts/draw_pairs.py"
+
+
+rule make_kit:
+    """All pairs as a page with trial lists, and the key to it."""
+    input:
+        pairs=lambda wildcards: expand(rules.draw_pairs.output.pairs, scene=config["perceptual_study"]["scenes"]),
+        parts=TRIALS,
+    output:
+        page=directory("<results>/perceptual/kit/page"),
+        key="<results>/perceptual/kit/key.json",
+    log:
+        "<logs>/perceptual/make_kit.log",
+    benchmark:
+        "<benchmarks>/perceptual/make_kit.tsv"
+    params:
+        scenes=lambda wildcards: config["perceptual_study"]["scenes"],
+        seed=lambda wildcards: config["perceptual_study"]["seed"],
+        source=source_of("forced_choice/trials", "forced_choice/kit", "forced_choice/store"),
+    script:
+        "../scripts/make_kit.py"
+
+
+rule gather_answers:
+    """How often people chose which, clustered by participant; and the model observer, in rows of its own."""
+    input:
+        unpack(answers_given),
+        key=rules.make_kit.output.key,
+        schema=ANSWERS_SCHEMA,
+    output:
+        table="results/tables/perceptual.csv",
+        plot=report(
+            "results/figures/perceptual.png",
+            caption="../workflow/report/perceptual.rst",
+            category="Figures",
+            labels={"figure": "which seams are harder to see"},
+        ),
+        facts="results/perceptual/participants.json",
+    log:
+        "<logs>/perceptual/gather_answers.log",
+    benchmark:
+        "<benchmarks>/perceptual/gather_answers.tsv"
+    params:
+        source=source_of("forced_choice", "tables/paper", "figures"),
+    script:
+        "../scripts/gather_answers.py"
+
+
+rule perceptual_kit:
+    """The page to be answered."""
+    input:
+        rules.make_kit.output,
+
+
+rule perceptual_results:
+    """What was answered."""
+    input:
+        rules.gather_answers.output,
+
+
+localrules:
+    perceptual_kit,
+    perceptual_results,
