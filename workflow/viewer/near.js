@@ -3,8 +3,10 @@
 
 import { createSorter } from "./order.js";
 import { SLOT_SHIFT } from "./runs.js";
+import { planesOf, RIM } from "./sight.js";
 
 const KEPT = 64; // surfaces of cells and levels that are remembered
+const BOUND = 0.65; // of the picture's side from its middle: where the camera is linearised for what is further out
 
 export function createNear(store, terrain) {
   const sorted = createSorter(), lifts = new Map();
@@ -26,9 +28,13 @@ export function createNear(store, terrain) {
     return lift;
   }
 
-  /** Entries of the close cells' Gaussians with a weight, back to front along `ahead`; level distances of budget.js. */
-  return function nearOrder(cells, { eye, ahead }, { switches, bands }) {
-    const { side, near } = terrain;
+  /**
+   * Entries of the close cells' Gaussians that have a weight and may reach into the picture, back to front along
+   * `ahead`; level distances of budget.js.
+   */
+  return function nearOrder(cells, camera, { switches, bands }) {
+    const { side, near } = terrain, { eye, ahead } = camera, walls = wallsOf(camera, terrain);
+    const [a0, b0, c0, d0, a1, b1, c1, d1, a2, b2, c2, d2, a3, b3, c3, d3] = walls;
     const most = cells.reduce((sum, cell) => sum + cell.count, 0);
     if (depths.length < most) [depths, found] = [new Float32Array(2 * most), new Uint32Array(2 * most)];
     const i0 = Math.floor(eye[0] / side), j0 = Math.floor(eye[1] / side);
@@ -45,6 +51,8 @@ export function createNear(store, terrain) {
           const z = centres[3 * k + 2] - eye[2] + (lift ? lift[k] : 0);
           const depth = ahead[0] * x + ahead[1] * y + ahead[2] * z, square = x * x + y * y + z * z;
           if (depth <= 0.5 * near || square < begin * begin || square > end * end) continue;
+          if (a0 * x + b0 * y + c0 * z < d0 || a1 * x + b1 * y + c1 * z < d1) continue;
+          if (a2 * x + b2 * y + c2 * z < d2 || a3 * x + b3 * y + c3 * z < d3) continue;
           depths[n] = depth;
           found[n++] = ((entries[k] & 0x0fffffff) | (slot << SLOT_SHIFT)) >>> 0;
         }
@@ -54,4 +62,18 @@ export function createNear(store, terrain) {
     for (let k = 0; k < n; k++) out[k] = found[sequence[k]];
     return out;
   };
+}
+
+/**
+ * The frustum's four sides, moved out by as much as the largest Gaussian may reach: normals, and where along them nothing
+ * that shows has its centre. A splat's extent in the picture is that of x - s z, with a slope s of at most BOUND of the
+ * picture's side over its focal length (shader.js): sqrt(1 + s^2) times a deviation, which the surface's slope shears by
+ * less than 1 + slope.
+ */
+function wallsOf(camera, { largest, heights: { steepest } }) {
+  const { focal, width, height } = camera, sizes = [width, width, height, height];
+  return planesOf(camera, 0).slice(1).flatMap(([a, b, c], k) => {
+    const reach = RIM * largest * (1 + steepest) * Math.hypot(1, (BOUND * sizes[k]) / focal);
+    return [a, b, c, -focal * reach];
+  });
 }
