@@ -1,7 +1,7 @@
 // What the worker knows of a terrain: its tables, and of each cell the tile and the surface.
 
 import { tileAt } from "./choice.js";
-import { largestOf } from "./records.js";
+import { deviationOf, largestOf } from "./records.js";
 
 export const REACH = 48; // tile sides to the end of what is laid: 97 x 97 cells
 export const NEAR = 0.1; // Gaussians nearer than this share of the eye floor are left out
@@ -21,6 +21,7 @@ export function createTerrain(manifest, heights) {
   return {
     side, salt, directions, heights, tiles, variants: tiles.length / 16, levels: levels.length,
     largest: largestOf(manifest.encoding),
+    deviations: Float64Array.from({ length: 256 }, (_, byte) => deviationOf(manifest.encoding, byte)),
     switches: levels.map(({ distance }) => distance ?? Infinity), bands: levels.map(({ band }) => band ?? 0),
     z: [Math.min(...tiles.map((tile) => tile.z[0])), Math.max(...tiles.map((tile) => tile.z[1]))],
     near: NEAR * manifest.eye_floor, ring: createRing(), cells: [],
