@@ -13,8 +13,9 @@ from pathlib import Path
 
 import made_up
 from record import tell
-from visiting import FLAGS, VIEWER, chromium_path, served
+from visiting import VIEWER
 
+from dav_gswt.terrain.browser import FLAGS, chromium_path, served
 from dav_gswt.terrain.page import write_page
 
 GROUND = made_up.Ground(discs=100, levels=3, speckle=20)  # 16 tiles x (100^2 + 50^2 + 25^2) = 210,000
