@@ -2,6 +2,7 @@
 
 In headless Chromium with software rendering; prints a table, asserts nothing. Drawing in software is slow by nature:
 the numbers that carry over to other machines are those of loading, and of updating and sorting (the worker's part).
+Recorded is the median of update and sort together over hills: other work of the machine lengthens some frames.
 """
 
 import statistics
@@ -11,12 +12,15 @@ import time
 from pathlib import Path
 
 import made_up
-from visiting import FLAGS, VIEWER, chromium_path, served
+from record import tell
+from visiting import VIEWER
 
+from dav_gswt.terrain.browser import FLAGS, chromium_path, served
 from dav_gswt.terrain.page import write_page
 
 GROUND = made_up.Ground(discs=100, levels=3, speckle=20)  # 16 tiles x (100^2 + 50^2 + 25^2) = 210,000
 VISITS = 5
+TARGETS = {"terrain_update_ms": 4.0}
 LOAD = """async () => {
   while (!window.davgswt) await new Promise(done => setTimeout(done, 5));
   await davgswt.ready;
@@ -96,10 +100,12 @@ def measure(browser, address: str) -> None:
         where = f"{'hills' if hills else 'level'}, {found['tiles']} of 97 x 97 tiles, {found['count']:,} splats"
         for name, times in found["times"].items():
             report(f"{name} ({found['near']:,} sorted), {where}, ms", times)
+    tell({"terrain_update_ms": statistics.median(made[True]["times"]["both"])}, TARGETS)
 
 
 def report(what: str, values: list[float]) -> None:
-    print(f"  {what:84} {statistics.mean(values):8.2f} (sd {statistics.stdev(values):.2f}, max {max(values):.2f})")
+    mean, middle, sd = statistics.mean(values), statistics.median(values), statistics.stdev(values)
+    print(f"  {what:84} {mean:8.2f} (sd {sd:.2f}, median {middle:.2f}, max {max(values):.2f})")
 
 
 if __name__ == "__main__":

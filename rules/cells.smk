@@ -7,16 +7,17 @@ from dav_gswt.sweeps import grid
 from dav_gswt.tradeoff import settings
 
 
-def measured_of_tiles(made):
-    """The tables of levels or orders that are gathered: the path of each one's, and what tells it from the others."""
+def measured_of_tiles(made, entry="lod"):
+    """The tables of levels, orders or frames that are gathered: the path of each one's, and what tells it from the others."""
     found = {}
-    asked = config["lod"]
+    asked = config[entry]
+    told = ("scene", "seed", "quality", "seam") + (("tau",) if "tau" in made.output.table else ())
     for scene in asked["scenes"]:
         chosen = chosen_values(scene, asked["fixed"]) if "fixed" in asked else values_of(scene)
         for seed in asked.get("seeds", config["seeds"]):
             values = chosen | {"seed": seed}
             (path,) = expand(made.output.table, **values)
-            found[path] = {key: values[key] for key in ("scene", "seed", "quality", "seam")}
+            found[path] = {key: values[key] for key in told}
     return found
 
 

@@ -11,6 +11,11 @@ def viewer_if_measured(wildcards):
     return {"viewer": FRAMES} if Path(FRAMES).is_file() else {}
 
 
+def walked_over(wildcards):
+    """A params function: what of the config's `frames` a walk is measured by, whichever the scene."""
+    return {key: config["frames"][key] for key in ("heights", "flight", "width", "height", "budgets")}
+
+
 def swept(table):
     """An input function: the sweeps that one of the study's tables is made from."""
     return lambda wildcards: [f"results/sweeps/{name}.csv" for name in config["study"][table]]

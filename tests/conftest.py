@@ -3,7 +3,8 @@
 from pathlib import Path
 
 import pytest
-from visiting import FLAGS, chromium_path
+
+from dav_gswt.terrain.browser import FLAGS, chromium_path
 
 ROOT = Path(__file__).parents[1]
 

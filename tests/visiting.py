@@ -1,31 +1,14 @@
 """Visits to served pages in a headless Chromium: how it is started, what is served, what a visit sees."""
 
 import base64
-import shutil
-import threading
 import time
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Int
 from numpy import ndarray as Array
 
-from dav_gswt.terrain import serve
-
 VIEWER = Path(__file__).parents[1] / "workflow" / "viewer"
-FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
 PIXELS = """async budget => {
   const gl = document.getElementById("picture").getContext("webgl2");
   let width, height, bytes;
@@ -39,25 +22,6 @@ PIXELS = """async budget => {
   for (let k = 0; k < bytes.length; k += 4096) text += String.fromCharCode(...bytes.subarray(k, k + 4096));
   return [width, height, btoa(text)];
 }"""
-
-
-def chromium_path() -> str | None:
-    """The system's Chromium, if there is one."""
-    return shutil.which("chromium") or shutil.which("chromium-browser")
-
-
-@contextmanager
-def served(folder: Path):
-    """The address of a page folder while the block runs."""
-    http = serve.server(folder, 0)
-    thread = threading.Thread(target=http.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
-    thread.start()
-    try:
-        yield f"http://127.0.0.1:{http.server_address[1]}/"
-    finally:
-        http.shutdown()
-        http.server_close()
-        thread.join()
 
 
 class Visit:

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import made_up
 import pytest
-from visiting import VIEWER, Visit, served
+from visiting import VIEWER, Visit
 
+from dav_gswt.terrain.browser import served
 from dav_gswt.terrain.page import write_page
 
 

@@ -10,12 +10,12 @@ import made_up
 import numpy as np
 import pytest
 from made_up import Ground
-from visiting import served
 
 from dav_gswt.bundle import gswt
 from dav_gswt.bundle.encoding import Encoding
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.field import Field, sh_of
+from dav_gswt.terrain.browser import served
 
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
 OTHER = Ground(discs=8, salt=99, speckle=20)

@@ -5,7 +5,8 @@ import re
 
 import pytest
 from made_up import Ground
-from visiting import served
+
+from dav_gswt.terrain.browser import served
 
 
 def test_progress_is_said_in_bytes_and_coarse_levels_come_first(visit, plain):

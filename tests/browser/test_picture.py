@@ -6,8 +6,8 @@ import made_up
 import numpy as np
 import pytest
 from made_up import Ground, colour_of
-from visiting import served
 
+from dav_gswt.terrain.browser import served
 from dav_gswt.terrain.choice import tile_at
 
 SIDE, SALT = Ground().side, Ground().salt

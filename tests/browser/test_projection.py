@@ -6,11 +6,11 @@ import made_up
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from visiting import served
 
 from dav_gswt import cameras
 from dav_gswt.bundle import store
 from dav_gswt.field import Field
+from dav_gswt.terrain.browser import served
 
 AT, DEVIATION, PAINT = np.array([3.0, 1.0, 0.1]), np.array([0.3, 0.05, 0.02]), np.array([230, 40, 90, 200])
 TURN = np.array([0.96, 0.05, -0.09, 0.26])  # any quaternion

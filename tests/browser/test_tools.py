@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 from made_up import Ground
-from visiting import served
+
+from dav_gswt.terrain.browser import served
 
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
 

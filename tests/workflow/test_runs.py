@@ -16,6 +16,7 @@ from dav_gswt.active import maps, scores
 from dav_gswt.coarse import ground
 from dav_gswt.files import digest, read_json
 from dav_gswt.photos import model
+from dav_gswt.tables import spread
 from dav_gswt.terrain.still import SHOTS
 
 CONFIGS = (USUAL, TINY)
@@ -273,6 +274,21 @@ def test_what_the_page_s_shortcuts_cost_is_measured_and_drawn(tiny, snakemake, t
     assert len(rows) == 12 and {r["scene"] for r in rows} == {"desert"}
     assert all(float(r["psnr"] or "inf") > 25 for r in rows if r["shortcut"] != "levels")
     assert (folder / "results/figures/presort.png").stat().st_size > 5000
+
+
+def test_frames_of_the_library_and_of_the_page_are_timed(tiny, chromium, snakemake, tmp_path):
+    """The budgets that were asked for, and what the study's tables join; no time is asserted but that there is one."""
+    folder = shutil.copytree(tiny.folder, tmp_path / "timed")
+    snakemake(folder, "--cores", "2", "frame_times", configs=CONFIGS)
+    with (folder / "results/tables/frames.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [(r["renderer"], r["budget"]) for r in rows] == [
+        (n, b) for n in ("library", "page") for b in ("2000", "1000")
+    ]
+    assert all(0 < float(r["splats"]) <= float(r["budget"]) and float(r["render_ms"]) > 0 for r in rows)
+    (joined,) = spread.read_viewer(folder / "results/tables/viewer.csv")
+    assert (joined["scene"], joined["tau"]) == ("desert", "0.6") and 0 < joined["update_share"] <= 1
+    assert (folder / "docs/figures/frames.png").stat().st_size > 5000
 
 
 def test_every_level_of_every_tile_is_measured(tiny, snakemake, tmp_path):

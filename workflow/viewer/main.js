@@ -1,4 +1,5 @@
-// The page: load the terrain beside it, draw it, let people walk. `?still` draws only when asked (tests, screenshots).
+// The page: load the terrain beside it, draw it, let people walk. `?still` draws only when asked (tests, screenshots);
+// `?still=N`: the first picture has N Gaussians at most.
 
 import { firstChunks, readChunks, readHeights, readManifest } from "./bundle.js";
 import { listenToDrops } from "./drop.js";
@@ -26,7 +27,7 @@ const PATIENCE = 50; // milliseconds until a lost graphics context is asked for 
 const FEWEST_DOWN = 1e-4; // sine: the far ground pales within no less
 
 document.documentElement.classList.add("running"); // takes the hint away that nothing happens
-const still = new URLSearchParams(location.search).has("still");
+const asked = new URLSearchParams(location.search).get("still"), still = asked !== null;
 const canvas = document.getElementById("picture");
 const hud = createHud(document);
 const page = {
@@ -246,7 +247,7 @@ async function open(source) {
     throw error;
   }
   page.loaded = true;
-  await settle(still ? BUDGET.most : page.pace.budget);
+  await settle(still ? Number(asked) || BUDGET.most : page.pace.budget);
   page.opened += 1;
   hud.loaded(still);
 }
@@ -304,7 +305,7 @@ const ready = start().catch((error) => {
 });
 ready.catch(() => {}); // shown above; whoever waits for `ready` still learns of it
 
-/** For tests and screenshots: window.davgswt. */
+/** For tests, screenshots and measurements: window.davgswt. */
 window.davgswt = {
   ready,
   get state() {
@@ -321,4 +322,10 @@ window.davgswt = {
   overlay: (name) => cycle(OVERLAYS.indexOf(name)),
   settle,
   frame,
+  /** As the loop asks: unless the worker is still busy with the last place. */
+  ask: (budget) => page.pictures.idle && ask(budget, false),
+  /** What the worker said last. */
+  get answer() {
+    return page.seen;
+  },
 };

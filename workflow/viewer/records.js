@@ -18,21 +18,23 @@ export function isEncoding(told) {
   return numbers(told?.origin, 3) && numbers(told.step, 3) && numbers(told.log_scale, 2) && told.sh_degree === 0;
 }
 
-/** The largest deviation of a bundle's Gaussians. */
-export const largestOf = ({ log_scale: [least, rise] }) => Math.exp(least + 255 * rise);
+/** The deviation that a byte of a record stands for, and the largest of a bundle's Gaussians. */
+export const deviationOf = ({ log_scale: [least, rise] }, byte) => Math.exp(least + rise * byte);
+export const largestOf = (encoding) => deviationOf(encoding, 255);
 
-/** A chunk's parts: records as words, orders as one list, and of each Gaussian its centre. */
+/** A chunk's parts: records as words, orders as one list, and of each Gaussian its centre and the largest deviation's byte. */
 export function parts(buffer, count, { origin, step }) {
   const records = new Uint32Array(buffer, 0, (count * RECORD) / 4);
   const orders = new (indexType(count))(buffer, count * RECORD);
-  const centres = new Float32Array(3 * count);
+  const centres = new Float32Array(3 * count), sizes = new Uint8Array(count);
   for (let k = 0; k < count; k++) {
     const first = records[4 * k], second = records[4 * k + 1];
     centres[3 * k] = origin[0] + step[0] * (first & 65535);
     centres[3 * k + 1] = origin[1] + step[1] * (first >>> 16);
     centres[3 * k + 2] = origin[2] + step[2] * (second & 65535);
+    sizes[k] = Math.max((second >>> 16) & 255, second >>> 24, records[4 * k + 2] & 255);
   }
-  return { records, orders, centres };
+  return { records, orders, centres, sizes };
 }
 
 /** Tell a program that holds DECODE how a bundle's Gaussians were rounded. */

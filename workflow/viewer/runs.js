@@ -44,11 +44,11 @@ export function createRuns(store, terrain, capacity) {
   }
 
   return {
-    /** Pages of a run, made now if need be; null: there is no room. late: take another direction's if there is one. */
+    /** Pages of a run, made now if need be; null: there is no room. late(): take another direction's if there is one? */
     get(tile, lo, hi, order, stamp, late) {
       const key = keyOf(tile, lo, hi, order), there = pages.use(key, stamp);
       if (there) return there;
-      if (late) {
+      if (late()) {
         const kept = terrain.tiles[tile].orders[lo].length;
         for (let step = 1; step < kept; step++) {
           const other = pages.use(keyOf(tile, lo, hi, (order + step) % kept), stamp);

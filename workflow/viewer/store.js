@@ -41,11 +41,11 @@ export function createStore(terrain, { encoding }, rows, onEvict) {
       while (bytes + buffer.byteLength > BOUND && evictOldest(stamp));
       const key = keyOf(tile, level), room = pages.take(key, Math.ceil(count / ROW), stamp);
       if (!room) return null;
-      const { orders, centres, records } = parts(buffer, count, encoding);
+      const { orders, centres, sizes, records } = parts(buffer, count, encoding);
       const mark = ((NO_SLOT << SLOT_SHIFT) | (level << LEVEL_SHIFT)) >>> 0;
       const entries = new Uint32Array(count); // of each Gaussian: where it is on the GPU, and its level
       for (let k = 0; k < count; k++) entries[k] = (mark | (room[k >> 10] * ROW + (k & (ROW - 1)))) >>> 0;
-      chunks.set(key, { tile, level, count, buffer, records, orders, centres, entries, rows: room, stamp });
+      chunks.set(key, { tile, level, count, buffer, records, orders, centres, sizes, entries, rows: room, stamp });
       bytes += buffer.byteLength;
       terrain.tiles[tile].arrived |= 1 << level;
       return room;

@@ -1,14 +1,14 @@
 // What the worker knows of a terrain: its tables, and of each cell the tile and the surface.
 
 import { tileAt } from "./choice.js";
-import { largestOf } from "./records.js";
+import { deviationOf, largestOf } from "./records.js";
 
 export const REACH = 48; // tile sides to the end of what is laid: 97 x 97 cells
 export const NEAR = 0.1; // Gaussians nearer than this share of the eye floor are left out
 const PARTS = 8; // a cell is measured at (PARTS + 1)^2 points
-const RING = 128; // cells along a side of the cache of surfaces: more than 2 REACH + 1
+const RING = 128; // cells along a side of the cache of surfaces: a power of 2, more than 2 REACH + 1
 
-/** Sizes and counts of a manifest in tables; `arrived` grows with its chunks. */
+/** Sizes and counts of a manifest in tables; `arrived` grows with its chunks, `cells` are used again by each view. */
 export function createTerrain(manifest, heights) {
   const { tile_side: side, salt, levels, directions } = manifest;
   const tiles = manifest.tiles.map(({ z, chunks, uncertainty }) => {
@@ -21,9 +21,10 @@ export function createTerrain(manifest, heights) {
   return {
     side, salt, directions, heights, tiles, variants: tiles.length / 16, levels: levels.length,
     largest: largestOf(manifest.encoding),
+    deviations: Float64Array.from({ length: 256 }, (_, byte) => deviationOf(manifest.encoding, byte)),
     switches: levels.map(({ distance }) => distance ?? Infinity), bands: levels.map(({ band }) => band ?? 0),
     z: [Math.min(...tiles.map((tile) => tile.z[0])), Math.max(...tiles.map((tile) => tile.z[1]))],
-    near: NEAR * manifest.eye_floor, ring: createRing(),
+    near: NEAR * manifest.eye_floor, ring: createRing(), cells: [],
   };
 }
 
@@ -43,7 +44,7 @@ function createRing() {
 
 /** Where the ring holds a cell's tile and the surface at its middle; both are worked out when it comes in sight. */
 export function lookUp({ ring, side, salt, variants, heights }, i, j) {
-  const at = (((j % RING) + RING) % RING) * RING + (((i % RING) + RING) % RING);
+  const at = (j & (RING - 1)) * RING + (i & (RING - 1));
   if (ring.i[at] !== i || ring.j[at] !== j) {
     const [h, east, north] = heights.at((i + 0.5) * side, (j + 0.5) * side);
     ring.i[at] = i;

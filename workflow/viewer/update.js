@@ -24,6 +24,7 @@ export function createUpdate(manifest, heights) {
   const terrain = createTerrain(manifest, heights);
   const store = createStore(terrain, manifest, rowsFor(manifest), (tile) => runs.forget(tile));
   const runs = createRuns(store, terrain, pagesFor(manifest)), nearOrder = createNear(store, terrain);
+  const levels = new Uint16Array(terrain.tiles.length); // bits
   let stamp = 0, blocks = new Uint32Array(BLOCK * 4096);
 
   /** The order of a cell's run: position among those that its finest drawn level keeps, which all its levels do. */
@@ -34,6 +35,15 @@ export function createUpdate(manifest, heights) {
       ring.h[at] + 0.5 * (z[0] + z[1]) - eye[2],
     ];
     return nearest(directions, tiles[cell.tile].orders[cell.lo], to, ring.east[at], ring.north[at]);
+  }
+
+  /** Chunks that are drawn stay: each is told once, however many cells show it. */
+  function touch(cells) {
+    levels.fill(0);
+    for (const { tile, lo, hi } of cells) levels[tile] |= (2 << hi) - (1 << lo);
+    for (let tile = 0; tile < levels.length; tile++) {
+      for (let level = 0; levels[tile] >> level; level++) if ((levels[tile] >> level) & 1) store.touch(tile, level, stamp);
+    }
   }
 
   function add(cell, pages, n) {
@@ -62,10 +72,13 @@ export function createUpdate(manifest, heights) {
       stamp += 1;
       const { eye } = camera, i0 = Math.floor(eye[0] / terrain.side), j0 = Math.floor(eye[1] / terrain.side);
       const seen = visible(terrain, camera, budget), close = [];
-      let n = 0, late = false, wanting = false;
-      for (const cell of seen.cells) {
-        for (let level = cell.lo; level <= cell.hi; level++) store.touch(cell.tile, level, stamp);
-      }
+      let n = 0, wanting = false;
+      const late = () => {
+        const now = !patient && performance.now() - start > PATIENCE;
+        wanting ||= now;
+        return now;
+      };
+      touch(seen.cells);
       const marks = new Uint32Array(9);
       for (const cell of seen.cells) {
         if (cell.close) {
@@ -76,8 +89,6 @@ export function createUpdate(manifest, heights) {
         }
         const order = orderOf(cell, eye, i0, j0);
         cell.direction = terrain.tiles[cell.tile].orders[cell.lo][order];
-        late ||= !patient && performance.now() - start > PATIENCE;
-        wanting ||= late;
         const pages = runs.get(cell.tile, cell.lo, cell.hi, order, stamp, late);
         if (!pages) continue;
         add(cell, pages, n);

@@ -14,6 +14,7 @@ from dav_gswt.field import joined
 from dav_gswt.terrain import assemble, order, still
 from dav_gswt.terrain.choice import tile_at
 from dav_gswt.terrain.heights import Hills
+from dav_gswt.terrain.meter import Meter
 
 SKY = {"zenith": [0.3, 0.5, 0.9], "horizon": [0.8, 0.85, 0.9]}
 PINK = [1.0, 0.0, 1.0]
@@ -282,3 +283,11 @@ def test_a_flight_goes_straight_on_at_one_height_over_hills(hilly):
 def test_a_camera_without_an_eye_is_refused(terrain):
     with pytest.raises(ValueError, match="pinhole"):
         still.draw(terrain, cameras.top_down(0.0, 0.0, 8, 8, 1.0, 5.0), SKY, PINK)
+
+
+def test_a_picture_is_the_same_measured_or_not_and_keeps_to_its_budget(terrain):
+    camera, whole, least = walking(terrain), Meter(), Meter()
+    plain, told = (still.draw(terrain, camera, SKY, PINK, meter=meter) for meter in (None, whole))
+    assert (plain == told).all() and set(whole.milliseconds) == {"update", "sort", "render"}
+    still.draw(terrain, camera, SKY, PINK, budget=whole.gaussians // 2, meter=least)
+    assert 0 < least.gaussians <= whole.gaussians // 2

@@ -75,9 +75,11 @@ def check(config: dict, schema: Path) -> None:
                 raise InputError(
                     f"config: scenes.{name}.{key}: there is no {scene[key]!r}; {table} has {', '.join(known)}"
                 )
-    for name in config.get("lod", {}).get("scenes", []):
-        if name not in config["scenes"]:
-            raise InputError(f"config: lod.scenes: there is no {name!r}; scenes has {', '.join(config['scenes'])}")
+    for entry in ("lod", "frames"):
+        for name in config.get(entry, {}).get("scenes", []):
+            if name not in config["scenes"]:
+                known = ", ".join(config["scenes"])
+                raise InputError(f"config: {entry}.scenes: there is no {name!r}; scenes has {known}")
     if "benchmark" in config:
         _check_benchmark(config["benchmark"], config["scenes"], config["priors"])
     if "seam_study" in config:

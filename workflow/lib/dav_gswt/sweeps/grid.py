@@ -55,8 +55,9 @@ def check(config: dict) -> None:
 
     Raises: InputError: the row and key, what is wrong with it, and what it may be.
     """
-    if "fixed" in config.get("lod", {}):
-        _check_names("config: lod", {"vary": {}} | config["lod"], config)
+    for entry in ("lod", "frames"):
+        if "fixed" in config.get(entry, {}):
+            _check_names(f"config: {entry}", {"vary": {}} | config[entry], config)
     for name, asked in config.get("sweeps", {}).items():
         where = f"config: sweeps.{name}"
         if both := [key for key in asked["vary"] if key in asked.get("fixed", {})]:

@@ -9,8 +9,9 @@ from numpy import ndarray as Array
 from dav_gswt import cameras
 from dav_gswt.cameras import Camera
 from dav_gswt.terrain import splats
-from dav_gswt.terrain.assemble import Terrain, laid, visible, within_budget
+from dav_gswt.terrain.assemble import MOST, Terrain, laid, visible, within_budget
 from dav_gswt.terrain.backdrop import Backdrop
+from dav_gswt.terrain.meter import Meter
 
 
 @dataclass(frozen=True)
@@ -55,23 +56,40 @@ def taken(terrain: Terrain, shot: Shot, manifest: dict, width: int, height: int)
     return draw(terrain, camera, manifest["sky"], manifest["ground_colour"])
 
 
-def draw(terrain: Terrain, camera: Camera, sky: dict, ground_colour, exact: bool = False) -> Float32[Array, "h w 3"]:
+def draw(
+    terrain: Terrain,
+    camera: Camera,
+    sky: dict,
+    ground_colour,
+    exact: bool = False,
+    budget: int = MOST,
+    meter: Meter | None = None,
+) -> Float32[Array, "h w 3"]:
     """The terrain as this camera sees it; what no tile covers is sky above the horizon and far ground below it.
 
     Tiles are drawn back to front, each in a pre-sorted order, the 3 x 3 about the eye last and sorted together.
-    exact: all Gaussians are sorted together, by depth: what that order is compared with.
+    exact: all Gaussians are sorted together, by depth: what that order is compared with. budget: of Gaussians, the
+    farthest cells are left out. meter: is told what it took: `update` (which cells, and their Gaussians placed in
+    their orders), `sort`, `render`.
     Raises: ValueError: an orthographic camera, whose rays do not start from one eye.
     """
     if camera.orthographic:
         raise ValueError("the terrain is drawn for a pinhole camera")
+    meter = meter or Meter()
     eye, here = camera.centre, replace(camera, translation=np.zeros(3))
-    cells = within_budget(terrain, visible(terrain, camera))
+    with meter.of("update"):
+        cells = within_budget(terrain, visible(terrain, camera), budget)
     behind = Backdrop.of(terrain, eye, sky, ground_colour)
     far, close = [splats.NONE], [splats.NONE]
     for k in range(len(cells)):
-        field, slope = laid(terrain, cells[k : k + 1], eye)
-        part = splats.projected(behind.over(field), slope, here, terrain.near)
+        with meter.of("update"):
+            field, slope = laid(terrain, cells[k : k + 1], eye)
+        with meter.of("render"):
+            part = splats.projected(behind.over(field), slope, here, terrain.near)
         (close if exact or cells.close[k] else far).append(part)
-    ordered = splats.joined([*far, splats.sorted_by_depth(splats.joined(close))])
-    seen = splats.blended(ordered, here)
-    return np.clip(seen.colour + (1 - seen.alpha)[..., None] * behind.seen_along(here.rays()[1]), 0, 1)
+        meter.gaussians += len(field)
+    with meter.of("sort"):
+        ordered = splats.joined([*far, splats.sorted_by_depth(splats.joined(close))])
+    with meter.of("render"):
+        seen = splats.blended(ordered, here)
+        return np.clip(seen.colour + (1 - seen.alpha)[..., None] * behind.seen_along(here.rays()[1]), 0, 1)
