@@ -153,12 +153,16 @@ def write_exr_parts(path: Path | str, parts: dict[str, tuple[dict[str, Array], d
 
 
 def read_exr_parts(path: Path | str) -> dict[str, tuple[dict[str, Array], dict[str, str]]]:
-    """The parts of a file by name: channels, and the header's texts. Raises: InputError: not readable."""
+    """The parts of a file by name: channels, and the header's texts. Raises: InputError: not readable, or too large."""
     if not Path(path).is_file():
         raise InputError(f"{path}: there is no such file")
     try:
         with OpenEXR.File(str(path), header_only=True) as file:
             promised = len(file.parts)
+            for part in file.parts:
+                low, high = (np.asarray(corner, np.int64) for corner in part.header["dataWindow"])
+                if np.prod(high - low + 1) > MOST_PIXELS:
+                    raise ValueError(f"a part of {' x '.join(map(str, high - low + 1))} pixels is more than is read")
         with OpenEXR.File(str(path), separate_channels=True) as file:
             if len(file.parts) < promised:  # the library drops damaged parts with a mere warning
                 raise ValueError("damaged or cut short")

@@ -211,13 +211,15 @@ def write(grid: Ground, path: Path | str) -> None:
 
 
 def read(path: Path | str) -> Ground:
-    """Read what `write` wrote; heights come back as stored, in float32."""
+    """Read what `write` wrote; heights come back as stored, in float32.
+
+    Raises: InputError: not readable, or another program's.
+    """
     channels, header = images.read_exr(path)
-    number = {k: float(header[f"ground_{k}"]) for k in ("west", "south", "spacing")}
-    count = {k: int(header[f"ground_{k}"]) for k in ("first_row", "first_column", "cells")}
-    return Ground(
-        **number,
-        **count,
-        heights=channels["Z"][::-1].astype(float),
-        seen=channels["seen"][::-1] > 0.5,
-    )
+    try:
+        number = {k: float(header[f"ground_{k}"]) for k in ("west", "south", "spacing")}
+        count = {k: int(header[f"ground_{k}"]) for k in ("first_row", "first_column", "cells")}
+        heights, seen = channels["Z"][::-1].astype(float), channels["seen"][::-1] > 0.5
+    except (KeyError, ValueError) as error:
+        raise InputError(f"{path}: not the grid of a ground ({error}); fit the field again") from error
+    return Ground(**number, **count, heights=heights, seen=seen)

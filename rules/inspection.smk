@@ -1,0 +1,52 @@
+"""Pictures of docs/inspect.md: what `dav-gswt inspect` shows of a round of the config's scene.
+
+In: photos, scores, poses, field, levels, tiles and maps of the scene's last round. Out: docs/figures/inspect_{shown}.png.
+Not part of `all`: `snakemake --cores 2 --config policy=w2-lpips-diverse rounds=1 -- inspection` makes them. Needs the extra
+`inspect`.
+"""
+
+INSPECTED = {  # by the name of the picture: what is opened, and how
+    "field": (rules.update_field.output.field, {}),
+    "doubt": (rules.score_round.output.maps, {}),
+    "levels": (rules.make_levels.output.levels, {"colour": "level"}),
+    "poses": (rules.select_poses.output.poses, {}),
+    "photos": (rules.split_views.output.views, {}),
+    "tiles": (rules.cut_tiles.output.seams, {}),
+    "patches": (rules.cut_tiles.output.seams, {"colour": "patch"}),
+    "maps": (rules.score_round.output.shown, {"channel": "w2_sq"}),
+    "ground": (rules.score_round.output.shown, {"part": "above"}),
+}
+
+
+def inspected(wildcards):
+    """What a picture of docs/inspect.md shows: a file or folder of the config's scene."""
+    values = values_of(config["scene"]) | {"seed": config["seeds"][0]}
+    return expand(INSPECTED[wildcards.shown][0], **values)
+
+
+rule inspect_artefact:
+    """Draw an artefact as `dav-gswt inspect --save` does."""
+    input:
+        inspected,
+    output:
+        picture="docs/figures/inspect_{shown}.png",
+    log:
+        "<logs>/figures/inspect_{shown}.log",
+    benchmark:
+        "<benchmarks>/figures/inspect_{shown}.tsv"
+    wildcard_constraints:
+        shown="|".join(INSPECTED),
+    resources:
+        mem_mb=growing(3000),
+        runtime=growing("10m"),
+    params:
+        asked=lambda wildcards: INSPECTED[wildcards.shown][1],
+        source=source_of("inspect"),
+    script:
+        "../scripts/inspect_artefact.py"
+
+
+rule inspection:
+    """All pictures of docs/inspect.md."""
+    input:
+        expand("docs/figures/inspect_{shown}.png", shown=INSPECTED),

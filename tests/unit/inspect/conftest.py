@@ -1,0 +1,24 @@
+"""A made-up scene, and whether this machine draws off screen."""
+
+import made_up_tree
+import pytest
+
+from dav_gswt.errors import InputError
+from dav_gswt.inspect import saving
+
+
+@pytest.fixture(scope="session")
+def drawable():
+    """Skips where nothing can be drawn: without PyVista, or without a way to draw off screen."""
+    pytest.importorskip("pyvista", reason="the extra inspect is not installed")
+    pytest.importorskip("trame_vtk", reason="the extra inspect is not installed")
+    try:
+        saving.prepare()
+    except InputError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture(scope="session")
+def tree(tmp_path_factory) -> made_up_tree.Tree:
+    """Tests leave it as it is."""
+    return made_up_tree.write(tmp_path_factory.mktemp("inspect") / "results" / "made_up")

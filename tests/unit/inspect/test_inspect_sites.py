@@ -1,0 +1,58 @@
+"""Cameras over the ground: what they look at, what they are for."""
+
+import made_up_tree
+import numpy as np
+import pytest
+
+from dav_gswt.errors import InputError
+from dav_gswt.files import write_json
+from dav_gswt.inspect import beside, sites
+from dav_gswt.inspect.asked import Asked
+
+
+def test_a_camera_is_a_pyramid_whose_base_fills_its_picture():
+    camera = made_up_tree.camera(made_up_tree.poses()[3])
+    (layer,) = sites.looking(camera, 0.5, (1, 2, 3), None)
+    np.testing.assert_allclose(layer.points[0], camera.centre, atol=1e-5)
+    pixels, depth = camera.project(layer.points[1:].astype(float))
+    np.testing.assert_allclose(pixels, [[0, 0], [24, 0], [24, 16], [0, 16]], atol=1e-3)
+    np.testing.assert_allclose(depth, 0.5, atol=1e-5)
+
+
+def test_photos_hang_in_their_pyramids_with_the_points_and_the_exemplar(tree):
+    shown = sites.show(tree.photos, Asked())
+    hung = [layer for layer in shown.layers if layer.picture is not None]
+    assert [int(layer.picture[0, 0, 0]) for layer in hung] == [204, 51, 128]  # test_00, view_00, view_01
+    points = next(layer for layer in shown.layers if layer.kind == "points")
+    np.testing.assert_array_equal(points.colours, 255 * np.eye(3))
+    assert {"start", "test", "exemplar"} <= set(shown.legend[0].named)
+    assert "3 cameras, 3 points; unit: metre" in shown.notes
+
+
+def test_the_photos_of_a_round_join_those_of_the_scene(tree):
+    shown = sites.show_captured(tree.round / "capture/capture.json", Asked())
+    assert "taken for a round" in shown.legend[0].named
+    assert sum(layer.picture is not None for layer in shown.layers) == 5
+
+
+def test_names_that_lead_out_of_the_folder_are_refused(tree, tmp_path):
+    shot = {"name": "../../secret.png", "got": {}}
+    write_json(tmp_path / "capture.json", {"shots": [shot]})
+    with pytest.raises(InputError, match="not as the workflow writes it"):
+        beside.shots_of(tmp_path / "capture.json")
+    from dav_gswt import cameras
+
+    shot["got"] = cameras.to_json(made_up_tree.camera(made_up_tree.poses()[0]))
+    write_json(tree.start / "capture.json", {"shots": [shot]})
+    try:
+        with pytest.raises(InputError, match="is no file's name"):
+            sites.show_captured(tree.start / "capture.json", Asked())
+    finally:
+        (tree.start / "capture.json").unlink()
+
+
+def test_a_frame_without_a_square_is_refused(tmp_path):
+    for frame in ({}, {"exemplar": 3}, made_up_tree.FRAME | {"exemplar": {"west": 0, "south": 0, "side": -1}}):
+        write_json(tmp_path / "ground.json", frame)
+        with pytest.raises(InputError, match="ground.json: not as the workflow writes it"):
+            beside.frame_of(tmp_path / "ground.json")

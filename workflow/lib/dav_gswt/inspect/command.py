@@ -1,0 +1,80 @@
+"""`dav-gswt inspect PATH`: open what the workflow writes, in a window, as a picture or as a page."""
+
+import argparse
+import importlib.util
+import re
+from pathlib import Path
+
+from dav_gswt.errors import InputError
+from dav_gswt.inspect.asked import MOST, Asked
+
+NEEDED = ("pyvista", "trame_vtk")
+FORMATS = (".png", ".html")
+SIZE = (1280, 800)
+MOST_PIXELS = 8192  # of a picture's side
+
+
+def add(commands) -> None:
+    """Add the command to a parser's commands."""
+    about = "a field, poses, photos, tiles or maps in three dimensions (docs/inspect.md)"
+    parser = commands.add_parser("inspect", help=about, description=__doc__)
+    parser.add_argument("path", type=Path, help="a file or folder of results/, or a 3D Gaussian .ply of anybody's")
+    parser.add_argument(
+        "--save", type=Path, metavar="FILE", help="a picture (.png) or a page (.html), without a window"
+    )
+    parser.add_argument(
+        "--colour", help="fields, levels: colour, uncertainty, level; tiles: also patch; scores: a column of theirs"
+    )
+    parser.add_argument("--level", type=int, help="of levels and tiles")
+    parser.add_argument("--part", help="of an .exr of several or of maps.npz: its name, such as above or pose_0010")
+    parser.add_argument("--channel", help="of maps, such as Z or w2_sq")
+    parser.add_argument(
+        "--poses", type=Path, metavar="FILE", help="with scores.csv: the poses.json whose poses are marked"
+    )
+    parser.add_argument(
+        "--size", type=_size, default=SIZE, metavar="WxH", help="of window and picture (default: 1280x800)"
+    )
+    parser.add_argument(
+        "--most", type=_natural, default=MOST, metavar="N", help=f"Gaussians that are drawn (default: {MOST})"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Show or save; the exit status. Raises: InputError: whatever stands in the way."""
+    asked = Asked(**{name: getattr(options, name) for name in vars(Asked())})
+    if options.save is not None and options.save.suffix not in FORMATS:
+        raise InputError(f"--save {options.save}: pictures end in .png and pages in .html")
+    require()
+    from dav_gswt.inspect import kinds, saving  # below the check: they load what is drawn with
+
+    if options.save is None and not saving.has_display():
+        raise InputError("there is no display for a window here: add --save FILE.png or --save FILE.html")
+    scene = kinds.scene_of(options.path, asked)
+    if options.save is None:
+        saving.window(scene, options.size)
+    else:
+        saving.prepare()
+        saving.save(scene, options.save, options.size)
+        print(options.save)
+    return 0
+
+
+def require() -> None:
+    """Raises: InputError: the extra is not installed."""
+    if missing := [name for name in NEEDED if importlib.util.find_spec(name) is None]:
+        how = '.venv/bin/pip install --no-build-isolation -e ".[inspect]"'
+        raise InputError(f"inspect: {', '.join(missing)} is not installed: {how}")
+
+
+def _size(text: str) -> tuple[int, int]:
+    found = re.fullmatch(r"([1-9]\d{1,3})x([1-9]\d{1,3})", text)
+    if not found or max(size := (int(found[1]), int(found[2]))) > MOST_PIXELS:
+        raise argparse.ArgumentTypeError(f"{text!r} is no size like 1280x800, at most {MOST_PIXELS} a side")
+    return size
+
+
+def _natural(text: str) -> int:
+    if not re.fullmatch(r"[1-9]\d{0,8}", text):
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of at least 1")
+    return int(text)

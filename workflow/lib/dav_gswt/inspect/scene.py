@@ -1,0 +1,127 @@
+"""What there is to see, as plain arrays: layers, words, and what the colours mean."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from jaxtyping import Float, Float32, Int, UInt8
+from numpy import ndarray as Array
+
+DOUBT = "coolwarm"  # blue where all is known, red where nothing is
+UNKNOWN = (150, 150, 150)  # the colour of what is NaN
+INK = (25, 25, 25)
+LARGE = 4096  # entries of a colour map: more steps than eight bits tell apart
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Things of one kind. kind: faces (rows of `cells` are corners), lines (rows are both ends), points (no cells), or
+    picture (cells is one quad, its corners from the top left clockwise). colours: of a cell, of a point where there are
+    none, or one for all. width: pixels of a line or a point. picture: rows from the top."""
+
+    kind: str
+    points: Float32[Array, "n 3"]
+    cells: Int[Array, "m k"] | None = None
+    colours: UInt8[Array, "m 3"] | tuple[int, int, int] = INK
+    width: float = 2.0
+    picture: UInt8[Array, "h w 3"] | None = None
+
+
+@dataclass(frozen=True)
+class Word:
+    """Letters in the scene, `height` world units tall, centred at a place. standing: upright, towards the viewer that
+    the scene starts with; else they lie on the ground."""
+
+    text: str
+    place: tuple[float, float, float]
+    height: float
+    standing: bool = True
+
+
+@dataclass(frozen=True)
+class Bar:
+    """Colours that stand for numbers, from `low` to `high`."""
+
+    title: str
+    low: float
+    high: float
+    colours: str = DOUBT
+
+
+@dataclass(frozen=True)
+class Keys:
+    """Colours that stand for names."""
+
+    named: dict[str, tuple[int, int, int]]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """title: a line that says what it is. notes: lines below it. seen_from: the direction in which the viewer stands at
+    first. low, high: the box that is to be seen whole at first. flat: pictures side by side, seen straight on."""
+
+    title: str
+    layers: list[Layer]
+    low: Float[Array, "3"]
+    high: Float[Array, "3"]
+    notes: list[str] = field(default_factory=list)
+    words: list[Word] = field(default_factory=list)
+    legend: list[Bar | Keys] = field(default_factory=list)
+    seen_from: tuple[float, float, float] = (-0.45, -1.0, 0.75)
+    flat: bool = False
+
+
+def bytes_of(colours: Float[Array, "*n 3"]) -> UInt8[Array, "*n 3"]:
+    """Colours in [0, 1] as bytes; beyond they are clipped."""
+    return np.rint(np.clip(colours, 0, 1) * 255).astype(np.uint8)
+
+
+def coloured(values: Float[Array, "*n"], bar: Bar) -> UInt8[Array, "*n 3"]:
+    """The bar's colours of values; UNKNOWN where they are NaN."""
+    from matplotlib import colormaps
+
+    known = np.isfinite(values)
+    span = bar.high - bar.low
+    share = (np.where(known, values, bar.low) - bar.low) / (span if span > 0 else 1.0)
+    table = bytes_of(colormaps[bar.colours].resampled(LARGE)(np.arange(LARGE))[:, :3])
+    found = table[np.rint(np.clip(share, 0, 1) * (LARGE - 1)).astype(int)]
+    found[~known] = UNKNOWN
+    return found
+
+
+def bar_over(title: str, values: Float[Array, "*n"], colours: str = DOUBT, most: float = 1.0) -> Bar:
+    """A bar from the least value to the quantile `most`; of a constant or of nothing one unit wide."""
+    known = values[np.isfinite(values)]
+    low, high = (float(known.min()), float(np.quantile(known, most))) if known.size else (0.0, 1.0)
+    return Bar(title, low, high if high > low else low + 1.0, colours)
+
+
+def moved(layer: Layer, by: Float[Array, "3"]) -> Layer:
+    """The layer elsewhere."""
+    return replace(layer, points=(layer.points + by).astype(np.float32))
+
+
+def outline(west: float, south: float, east: float, north: float, z: float, colour: tuple[int, int, int]) -> Layer:
+    """A level rectangle's border."""
+    corners = np.float32([[west, south, z], [east, south, z], [east, north, z], [west, north, z]])
+    return Layer("lines", corners, np.array([[0, 1], [1, 2], [2, 3], [3, 0]]), colour, 3.0)
+
+
+def balls(centres: Float[Array, "n 3"], radius: float, colours: UInt8[Array, "n 3"]) -> Layer:
+    """A ball at each place."""
+    from trimesh.creation import icosphere
+
+    shape = icosphere(subdivisions=2, radius=radius)
+    return copies(np.asarray(shape.vertices)[None] + centres[:, None], np.asarray(shape.faces), colours)
+
+
+def copies(points: Float[Array, "n v 3"], faces: Int[Array, "f k"], colours: UInt8[Array, "n 3"]) -> Layer:
+    """One shape many times over: its corners in each copy, its faces, a colour a copy."""
+    n, v = points.shape[:2]
+    cells = (faces[None] + v * np.arange(n)[:, None, None]).reshape(-1, faces.shape[1])
+    return Layer("faces", points.reshape(-1, 3).astype(np.float32), cells, np.repeat(colours, len(faces), 0))
+
+
+def hung(picture: UInt8[Array, "h w 3"], corner: Float[Array, "3"], right: Float[Array, "3"], down: Float[Array, "3"]):
+    """A picture on a parallelogram, from its top left corner along its upper and its left border."""
+    points = np.array([corner, corner + right, corner + right + down, corner + down])
+    return Layer("picture", points.astype(np.float32), np.array([[0, 1, 2, 3]]), picture=picture)

@@ -1,0 +1,154 @@
+"""Tile sets: the sixteen laid so that every pair of neighbours meets, with their cuts; sets of a bundle without."""
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Integer
+from numpy import ndarray as Array
+
+from dav_gswt.bundle import store as bundles
+from dav_gswt.bundle.exports import ROW
+from dav_gswt.bundle.fidelity import laid
+from dav_gswt.errors import InputError
+from dav_gswt.field import Field
+from dav_gswt.inspect import beside
+from dav_gswt.inspect.asked import Asked
+from dav_gswt.inspect.fields import LEVELS, NAMES, colours, level_colour, shaded, solid, thinned
+from dav_gswt.inspect.scene import Bar, Keys, Layer, Scene, Word, moved
+from dav_gswt.tiles import store
+from dav_gswt.tiles.build import TileSet
+from dav_gswt.tiles.layout import EDGES, LABELS
+
+GAP, LETTER = 0.2, 0.1  # tile sides
+WIDE, LEAST, LIFT = 0.35, 0.012, 0.6  # a cut's width in finest cells, and at least in tiles; its height in a level's
+CUT = (255, 214, 10)
+PATCHES = [(187, 187, 187), *LEVELS[:4], (102, 204, 238), (170, 51, 119), (153, 102, 51), (0, 0, 0)]
+SCHEMA = Path(__file__).parents[3] / "schemas" / "davgswt.schema.json"
+
+
+def show(path: Path, asked: Asked) -> Scene:
+    """A folder of tiles, or its seams.json."""
+    seams = path / "seams.json"
+    with beside.told_by(seams):
+        found = store.read(path / "tiles", seams)
+        _check(found, seams)
+    return of_tiles(str(path), found.fields, found.side, found, asked)
+
+
+def show_bundle(path: Path, asked: Asked) -> Scene:
+    """A bundle's folder: the tiles as they were rounded; it keeps no cuts."""
+    if not SCHEMA.is_file():
+        raise InputError(f"{path}: bundles are read by {SCHEMA}, which is not there; install from a checkout")
+    found = bundles.read(path, SCHEMA)
+    with beside.told_by(path / "davgswt.json"):
+        side = float(found.manifest["tile_side"])
+    return of_tiles(str(path), found.fields(), side, None, asked)
+
+
+def _check(found: TileSet, seams: Path) -> None:
+    labels = found.labels
+    fits = labels.ndim == 3 and labels.shape[1] == labels.shape[2] and labels.dtype.kind in "ui"
+    if not fits or len(labels) % EDGES or labels.max(initial=0) >= len(LABELS):
+        raise InputError(f"{seams}: labels.npz is not a map of each of its tiles; cut them again")
+    if not (0 < found.side < np.inf and abs(labels.shape[1] * found.spacing - found.side) < 1e-6 * found.side):
+        raise InputError(f"{seams}: its tiles are {found.side} wide and their maps are not; cut them again")
+
+
+def of_tiles(title: str, found: list[list[Field]], side: float, cut: TileSet | None, asked: Asked) -> Scene:
+    """All tiles of a level, or at `level` all levels in a row, the finest in the west. cut: where seams run."""
+    by = asked.one_of((*NAMES, "patch") if cut else NAMES, title)
+    numbers = asked.levels_of(len(found), Path(title))
+    if asked.level is None and by != "level":
+        numbers = numbers[:1]
+    step, tall = side * (1 + GAP), ROW * side * (1 + GAP)
+    wide = tall * (len(found[0]) // EDGES)
+    layers, words = [], []
+    for place, number in enumerate(numbers):
+        for tile, corner in placed(len(found[0]), step):
+            corner = corner + [place * (wide + 2 * GAP * side), 0.0, 0.0]
+            some = thinned(found[number][tile], asked.most // len(found[0]) // len(numbers))
+            layers += [moved(layer, corner) for layer in _drawn(some, by, number, tile, cut)]
+            if cut and by != "patch":
+                layers.append(moved(cuts(cut, tile, number), corner))
+            if place == 0:
+                middle = float(np.median(some.means[:, 2])) if len(some) else 0.0
+                at = corner + [0.5 * side, -0.6 * GAP * side, middle]
+                words.append(Word(f"{tile}", tuple(at), LETTER * side, standing=False))
+    low = np.array([0.0, -GAP * side, 0.0])
+    high = np.array([wide + (len(numbers) - 1) * (wide + 2 * GAP * side), tall - GAP * side, 0.2 * side])
+    about = f"{len(found[0])} tiles, {len(found)} levels, {side:.4g} wide; by {by}"
+    shown = "levels " + ", ".join(map(str, numbers)) if len(numbers) > 1 else f"level {numbers[0]}"
+    return Scene(title, layers, low, high, [about, shown], words, _legend(by, numbers, cut), (-0.25, -1.0, 1.3))
+
+
+def placed(count: int, step: float) -> list[tuple[int, Float[Array, "3"]]]:
+    """Tiles and their south-western corners: each variant's sixteen four by four, neighbours' edges of one colour."""
+    return [
+        (int(tile), np.array([(ROW * variant + column) * step, row * step, 0.0]))
+        for variant in range(count // EDGES)
+        for (row, column), tile in np.ndenumerate(laid(variant)[1:-1, 1:-1])
+    ]
+
+
+def _drawn(some: Field, by: str, level: int, tile: int, cut: TileSet | None) -> list[Layer]:
+    if not len(some):
+        return []
+    if by != "patch":
+        return solid(some, colours(some, by, level))
+    return solid(some, shaded(np.array(PATCHES)[patch_of(some, cut, tile)], some))
+
+
+def patch_of(some: Field, cut: TileSet, tile: int) -> Integer[Array, "n"]:
+    """The label of the cell that each Gaussian lies over; of the nearest one, beyond the tile."""
+    last = cut.labels.shape[1] - 1
+    column, row = np.clip(some.means[:, :2] / cut.spacing, 0, last).astype(int).T
+    return cut.labels[tile][row, column]
+
+
+def cuts(cut: TileSet, tile: int, level: int) -> Layer:
+    """Where a tile's labels change, as ribbons a little above the highest ground of the two cells that part there.
+
+    Ribbons, not lines: browsers draw lines one pixel wide.
+    """
+    labels, spacing = cut.labels[tile], cut.spacing
+    height = heights(cut.fields[level][tile], len(labels), spacing)
+    rows, columns = np.nonzero(labels[:, 1:] != labels[:, :-1])  # a border that runs north
+    upright = np.stack([columns + 1.0, rows + 0.0, np.maximum(height[rows, columns], height[rows, columns + 1])], -1)
+    rows, columns = np.nonzero(labels[1:] != labels[:-1])  # one that runs east
+    eastward = np.stack([columns + 0.0, rows + 1.0, np.maximum(height[rows, columns], height[rows + 1, columns])], -1)
+    half = 0.5 * max(WIDE, LEAST * len(labels))
+    tall = np.array([[-half, -half], [half, -half], [half, 1 + half], [-half, 1 + half]])
+    corners = [_ribbons(upright, tall, spacing), _ribbons(eastward, tall[:, ::-1], spacing)]
+    points = np.concatenate(corners).reshape(-1, 3).astype(np.float32)
+    points[:, 2] += LIFT * spacing * 2**level
+    return Layer("faces", points, np.arange(len(points)).reshape(-1, 4), CUT)
+
+
+def _ribbons(starts: Float[Array, "n 3"], shape: Float[Array, "4 2"], spacing: float) -> Float[Array, "n 4 3"]:
+    points = np.repeat(starts[:, None], 4, 1)
+    points[..., :2] = (points[..., :2] + shape) * spacing
+    return points
+
+
+def heights(some: Field, cells: int, spacing: float) -> Float[Array, "cells cells"]:
+    """The ground's height over a tile's finest cells: the highest disc's, of the nearest cell where there is none."""
+    from scipy.ndimage import distance_transform_edt
+
+    ground = some[some.ground] if some.ground.any() else some
+    out = np.full((cells, cells), -np.inf)
+    if not len(ground):
+        return np.zeros_like(out)
+    column, row = np.clip(ground.means[:, :2] / spacing, 0, cells - 1).astype(int).T
+    np.maximum.at(out, (row, column), ground.means[:, 2].astype(float))
+    nearest = distance_transform_edt(np.isinf(out), return_distances=False, return_indices=True)
+    return out[tuple(nearest)]
+
+
+def _legend(by: str, numbers: list[int], cut: TileSet | None) -> list[Bar | Keys]:
+    if by == "uncertainty":
+        bars = [Bar("uncertainty", 0.0, 1.0)]
+    elif by == "level":
+        bars = [Keys({f"level {n}": level_colour(n) for n in numbers})]
+    else:
+        bars = [Keys(dict(zip(LABELS, PATCHES, strict=True)))] * (by == "patch")
+    return bars + [Keys({"cut": CUT})] * (cut is not None and by != "patch")
