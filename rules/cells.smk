@@ -1,5 +1,5 @@
-"""What is compared: the cells of the config's `lod`, `calibration`, `benchmark`, `seam_study`, `sweeps`, `tradeoff` and
-`auto`, with the files of each."""
+"""What is compared: the cells of the config's `lod`, `calibration`, `benchmark`, `seam_study`, `perceptual_study`, `sweeps`,
+`tradeoff` and `auto`, with the files of each."""
 
 from itertools import product
 
@@ -91,6 +91,35 @@ def seam_cells():
             (cell,) = [{name: expand(path, **values)[0] for name, path in files.items()}]
             cells.append({key: values[key] for key in ("scene", "seed", "quality")} | {"variant": variant} | cell)
     return cells
+
+
+def perceptual_seams():
+    """The entries of `seams` that are compared, by name: of other sizes, tiles have no place in common."""
+    names = dict.fromkeys(name for pair in config["perceptual_study"]["pairs"] for name in pair)
+    found = {name: config["seams"][name] for name in names if name != FLOOR}
+    if len({tuple(entry[key] for key in ("tile", "strip", "variants")) for entry in found.values()}) > 1:
+        raise WorkflowError(
+            "config: perceptual_study.pairs: seams of other `tile`, `strip` or `variants` have no place in common; "
+            f"name such that are only cut in other ways ({', '.join(found)} are not)"
+        )
+    return found
+
+
+def perceptual_inputs(wildcards):
+    """A scene's levels, its tiles of each seam, LPIPS's weights where they are."""
+    values = seam_values(wildcards.scene) | {"seed": config["seeds"][0]}
+    made, names = rules.cut_tiles.output, list(perceptual_seams())
+    found = {"levels": expand(rules.make_levels.output.levels, **values)[0]}
+    found |= {"seams": expand(made.seams, **(values | {"seam": names}))}
+    found |= {"tiles": expand(made.tiles, **(values | {"seam": names}))}
+    return found | lpips_if_fetched(wildcards)
+
+
+def answers_given(wildcards):
+    """The files of answers, where there are any yet."""
+    folder = Path(config["perceptual_study"]["answers"])
+    found = sorted(str(p) for p in folder.glob("*.json") if p.is_file() and not p.name.startswith("."))
+    return {"answers": found} if found else {}
 
 
 def sweep_cells(name):
