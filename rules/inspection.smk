@@ -18,16 +18,12 @@ INSPECTED = {  # by the name of the picture: what is opened, and how
 }
 
 
-def inspected(wildcards):
-    """What a picture of docs/inspect.md shows: a file or folder of the config's scene."""
-    values = values_of(config["scene"]) | {"seed": config["seeds"][0]}
-    return expand(INSPECTED[wildcards.shown][0], **values)
-
-
 rule inspect_artefact:
     """Draw an artefact as `dav-gswt inspect --save` does."""
     input:
-        inspected,
+        lambda wildcards: expand(
+            INSPECTED[wildcards.shown][0], **(values_of(config["scene"]) | {"seed": config["seeds"][0]})
+        ),
     output:
         picture="docs/figures/inspect_{shown}.png",
     log:
