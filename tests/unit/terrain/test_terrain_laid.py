@@ -285,9 +285,11 @@ def test_a_camera_without_an_eye_is_refused(terrain):
         still.draw(terrain, cameras.top_down(0.0, 0.0, 8, 8, 1.0, 5.0), SKY, PINK)
 
 
-def test_a_picture_is_the_same_measured_or_not_and_keeps_to_its_budget(terrain):
+def test_a_picture_is_the_same_measured_or_not_and_coarser_within_a_budget(terrain):
     camera, whole, least = walking(terrain), Meter(), Meter()
     plain, told = (still.draw(terrain, camera, SKY, PINK, meter=meter) for meter in (None, whole))
     assert (plain == told).all() and set(whole.milliseconds) == {"update", "sort", "render"}
-    still.draw(terrain, camera, SKY, PINK, budget=whole.gaussians // 2, meter=least)
-    assert 0 < least.gaussians <= whole.gaussians // 2
+    budget = 3 * whole.gaussians // 4  # the coarsest level alone has half
+    still.draw(assemble.coarsened(terrain, camera, budget), camera, SKY, PINK, meter=least)
+    assert whole.gaussians // 2 < least.gaussians <= budget
+    assert assemble.coarsened(terrain, camera, 10**6) is terrain

@@ -18,6 +18,7 @@ from dav_gswt.terrain.heights import Flat, Heights, of_config
 
 MOST = 10_000_000  # Gaussians in one picture
 PAD = 2.0  # pixels, rounded up, by which the rasterizer's widening of splats reaches into the picture
+LEAST_SHRINK, HALVINGS = 1e-5, 16  # of the search for a factor on level distances
 NEAR = 0.1  # Gaussians nearer than this share of the eye floor are left out
 
 
@@ -157,10 +158,35 @@ def active(terrain: Terrain, cells: Cells) -> Bool[Array, "levels n"]:
 
 def within_budget(terrain: Terrain, cells: Cells, budget: int = MOST) -> Cells:
     """The cells without those, farthest first, that would bring more than so many Gaussians into the picture."""
-    sizes = np.array([[len(terrain.tiles[level, t]) for t in cells.tile] for level in range(len(terrain.switches))])
     nearest_first = np.argsort(cells.nearest, kind="stable")
-    count = np.cumsum((sizes * active(terrain, cells)).sum(0)[nearest_first])
+    count = np.cumsum(sizes(terrain, cells)[nearest_first])
     return cells[np.sort(nearest_first[count <= budget])]
+
+
+def sizes(terrain: Terrain, cells: Cells) -> Int64[Array, "n"]:
+    """How many Gaussians each cell has at the levels that have a weight in it."""
+    levels = range(len(terrain.switches))
+    all_ = np.array([[len(terrain.tiles[level, t]) for t in cells.tile] for level in levels], np.int64)
+    return (all_ * active(terrain, cells)).sum(0)
+
+
+def coarsened(terrain: Terrain, camera: Camera, budget: int) -> Terrain:
+    """The same with all level distances shrunk by one factor, the largest with which a picture has so many Gaussians at
+    most; as the page does, which also brings the end of the ground nearer. Where the coarsest level alone has more:
+    that level."""
+    cells, low, high = visible(terrain, camera), LEAST_SHRINK, 1.0
+
+    def shrunk(factor: float) -> Terrain:
+        return replace(
+            terrain, switches=[factor * s for s in terrain.switches], bands=[factor * b for b in terrain.bands]
+        )
+
+    if sizes(terrain, cells).sum() <= budget:
+        return terrain
+    for _ in range(HALVINGS):
+        middle = float(np.sqrt(low * high))
+        low, high = (middle, high) if sizes(shrunk(middle), cells).sum() <= budget else (low, middle)
+    return shrunk(low)
 
 
 def laid(terrain: Terrain, cell: Cells, eye: Float[Array, "3"]) -> tuple[Field, Float[Array, "n 2"]]:

@@ -74,7 +74,9 @@ def of_library(bundle: Bundle, asked: Asked) -> list[dict]:
         for shot in asked.shots():
             meters.append(Meter())
             camera = still.camera_of(shot, terrain, told["eye_floor"], asked.width, asked.height)
-            still.draw(terrain, camera, told["sky"], told["ground_colour"], budget=budget, meter=meters[-1])
+            with meters[-1].of("update"):
+                coarser = assemble.coarsened(terrain, camera, budget)
+            still.draw(coarser, camera, told["sky"], told["ground_colour"], meter=meters[-1])
         times = {part: [meter.milliseconds[part] for meter in meters] for part in PARTS}
         rows.append(
             _row(asked, budget, times, [meter.gaussians for meter in meters], len(meters)) | _about(LIBRARY, "")

@@ -9,7 +9,7 @@ from numpy import ndarray as Array
 from dav_gswt import cameras
 from dav_gswt.cameras import Camera
 from dav_gswt.terrain import splats
-from dav_gswt.terrain.assemble import MOST, Terrain, laid, visible, within_budget
+from dav_gswt.terrain.assemble import Terrain, laid, visible, within_budget
 from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.meter import Meter
 
@@ -62,15 +62,13 @@ def draw(
     sky: dict,
     ground_colour,
     exact: bool = False,
-    budget: int = MOST,
     meter: Meter | None = None,
 ) -> Float32[Array, "h w 3"]:
     """The terrain as this camera sees it; what no tile covers is sky above the horizon and far ground below it.
 
     Tiles are drawn back to front, each in a pre-sorted order, the 3 x 3 about the eye last and sorted together.
-    exact: all Gaussians are sorted together, by depth: what that order is compared with. budget: of Gaussians, the
-    farthest cells are left out. meter: is told what it took: `update` (which cells, and their Gaussians placed in
-    their orders), `sort`, `render`.
+    exact: all Gaussians are sorted together, by depth: what that order is compared with. meter: is told what it took:
+    `update` (which cells, and their Gaussians placed in their orders), `sort`, `render`.
     Raises: ValueError: an orthographic camera, whose rays do not start from one eye.
     """
     if camera.orthographic:
@@ -78,7 +76,7 @@ def draw(
     meter = meter or Meter()
     eye, here = camera.centre, replace(camera, translation=np.zeros(3))
     with meter.of("update"):
-        cells = within_budget(terrain, visible(terrain, camera), budget)
+        cells = within_budget(terrain, visible(terrain, camera))
     behind = Backdrop.of(terrain, eye, sky, ground_colour)
     far, close = [splats.NONE], [splats.NONE]
     for k in range(len(cells)):
