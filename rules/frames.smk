@@ -73,10 +73,11 @@ rule measure_steadiness:
     params:
         heights=lambda wildcards: config["frames"]["heights"],
         walk=lambda wildcards: {
-            "count": 16,
+            "count": config["frames"]["pairs"],
             "length": config["frames"]["flight"]["length"],
             "width": config["frames"]["width"],
             "height": config["frames"]["height"],
+            "budget": max(config["frames"]["budgets"]),
         },
         schema=BUNDLE_SCHEMA,
         source=source_of("terrain", "bundle", "raster"),

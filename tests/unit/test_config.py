@@ -177,7 +177,7 @@ def test_what_cannot_be_completed_is_refused_and_why(config, change, said):
 
 def test_refined_tiles_have_a_name_of_their_own_where_it_is_said_how(config):
     refine = {"prior": "terrain", "strength": 0.2}
-    for key in ("seam_study", "sweeps", "study", "tradeoff", "auto"):
+    for key in ("seam_study", "perceptual_study", "sweeps", "study", "tradeoff", "auto"):
         config.pop(key, None)
     config["seams"] = {"plain": {"tile": 0.5, "strip": 0.125, "candidates": 24, "variants": 1}}
     for scene in config["scenes"].values():

@@ -6,6 +6,7 @@ from test_terrain_laid import PINK, SIDE, SKY, terrain_of, tile_of
 
 from dav_gswt.terrain import order, steadiness
 
+BUDGET = 10**6
 TOLD = {"eye_floor": 1.0, "sky": SKY, "ground_colour": PINK}
 
 
@@ -23,7 +24,7 @@ def test_every_second_pair_of_frames_lies_across_a_border():
 
 
 def test_a_slow_walk_in_pre_sorted_orders_jumps_no_more_than_twice_as_far(stony):
-    found = steadiness.rows(stony, TOLD, 6, 2.0, 96, 54)
+    found = steadiness.rows(stony, TOLD, 6, 2.0, 96, 54, BUDGET)
     assert all(row["exact_largest"] > 0 for row in found)
     assert steadiness.worst(found) < steadiness.MOST
 
@@ -32,9 +33,9 @@ def test_a_jump_is_found(stony, monkeypatch):
     """Orders that turn about from one frame to the next."""
     turns = iter(range(10**6))
     monkeypatch.setattr(order, "nearest", lambda directions, kept, *_: next(turns) * 5 % len(kept))
-    assert steadiness.worst(steadiness.rows(stony, TOLD, 2, 1.0, 96, 54)) > steadiness.MOST
+    assert steadiness.worst(steadiness.rows(stony, TOLD, 2, 1.0, 96, 54, BUDGET)) > steadiness.MOST
 
 
 def test_the_way_is_counted_in_tiles(stony):
-    (first, *_) = steadiness.rows(stony, TOLD, 2, 1.0, 16, 9)
+    (first, *_) = steadiness.rows(stony, TOLD, 2, 1.0, 16, 9, BUDGET)
     assert (first["east"], first["north"]) == (0.5, 0.5) and stony.side == SIDE

@@ -14,7 +14,7 @@ from numpy import ndarray as Array
 from dav_gswt.cameras import Camera
 from dav_gswt.logs import progress
 from dav_gswt.terrain import still
-from dav_gswt.terrain.assemble import Terrain
+from dav_gswt.terrain.assemble import Terrain, coarsened
 from dav_gswt.terrain.still import Shot
 
 STEP = 0.02  # eye floors from a frame to the next: the page's walking pace, 1.2 eye heights a second, at 60 frames
@@ -41,15 +41,18 @@ def _to_border(at: Float[Array, "2"], ahead: Float[Array, "2"]) -> float:
     return float(min((np.floor(p) + 1 - p) / a for p, a in zip(at, ahead, strict=True) if a > 0))
 
 
-def rows(terrain: Terrain, manifest: dict, count: int, length: float, width: int, height: int) -> list[dict]:
+def rows(
+    terrain: Terrain, manifest: dict, count: int, length: float, width: int, height: int, budget: int
+) -> list[dict]:
     """A row a pair of frames: the largest and the mean difference of a pixel, in 8-bit steps, in pre-sorted orders
     (`largest`, `mean`) and sorted exactly (`exact_largest`, `exact_mean`); border: between its frames the eye enters
-    another cell."""
+    another cell. budget: at most so many Gaussians are in view, in both frames at one coarseness."""
     floor, found = manifest["eye_floor"], []
     for k, shots in enumerate(progress(pairs(count, length, STEP * floor / terrain.side), "measure steadiness")):
         cameras = [still.camera_of(shot, terrain, floor, width, height) for shot in shots]
         row = {"pair": k, "east": shots[0].at[0], "north": shots[0].at[1], "border": k % 2}
-        found.append(row | _changes(terrain, manifest, cameras, False) | _changes(terrain, manifest, cameras, True))
+        coarser = coarsened(terrain, cameras[0], budget)
+        found.append(row | _changes(coarser, manifest, cameras, False) | _changes(coarser, manifest, cameras, True))
     return found
 
 
