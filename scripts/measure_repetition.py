@@ -11,6 +11,7 @@ with logging_to(snakemake.log[0]):
     known = exemplar.Known.of(levels.read(given.levels))
     tiles = store.read(given.tiles, given.seams)
     source = known.flattened(tiles, params.seam)
-    found = repetition.repeats(tiles, source.levels, source.exemplar.cells * tiles.spacing, params.seed)
+    fields = [shelf.field for shelf in source.levels]
+    found = repetition.repeats(tiles, fields, source.exemplar.cells * tiles.spacing, params.seed)
     figures.write_rows(out.table, repetition.rows(found))
     plots.write_repeats(out.plot, found)

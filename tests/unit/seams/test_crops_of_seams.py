@@ -155,3 +155,17 @@ def test_crops_that_are_hidden_altogether_are_passed_over(laid, straight, monkey
     assert len(seen) > 12 and all(each.shown.any for each in (*borders, *cuts))
     assert [each.number for each in borders] == [0, 1, 2, 3]
     assert [each.number for each in cuts] == [4, 8, 5, 9, 6, 10, 7, 11]
+
+
+def test_the_few_gaussians_of_the_exemplar_that_may_show_are_found_among_all(source, rng):
+    for shelf in source.levels:
+        size = np.ptp(shelf.field.means[:, :2], axis=0).min()
+        for _ in range(20):
+            west, south = rng.uniform(-0.2, 1.0, 2) * size
+            box = np.array([[west, south], [west + 0.2 * size, south + 0.1 * size]])
+            seen = drawing.Seen(box, rng.normal(0, 2, 2))
+            corner = np.array([*rng.uniform(-size, size, 2) * 0.1, 0.0])
+            found, wanted = shelf.near(seen, corner), shelf.field[seen.shows(shelf.field, corner)]
+            np.testing.assert_array_equal(found.means, wanted.means)
+            np.testing.assert_array_equal(found.sh, wanted.sh)
+    assert len(wanted) < len(shelf.field)

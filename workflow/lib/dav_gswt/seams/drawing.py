@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32
+from jaxtyping import Bool, Float, Float32, Int
 from numpy import ndarray as Array
 
 from dav_gswt.cameras import Camera
@@ -63,9 +63,14 @@ class Seen:
 
     def holds(self, corner: Float[Array, "3"], side: float, extent: "Extent") -> bool:
         """Whether anything of a cell may show whose Gaussians have this extent."""
-        low, high = self._hidden(np.array([extent.low, extent.high]))
-        first, last = corner[:2] - extent.reach, corner[:2] + side + extent.reach
+        low, high = self.margin(extent)
+        first, last = corner[:2], corner[:2] + side
         return bool(((last + high > self.box[0]) & (first + low < self.box[1])).all())
+
+    def margin(self, extent: "Extent") -> tuple[Float[Array, "2"], Float[Array, "2"]]:
+        """From where to where, counted from its place, a Gaussian of this extent may show at most."""
+        low, high = self._hidden(np.array([extent.low, extent.high]))
+        return low - extent.reach, high + extent.reach
 
     @classmethod
     def of(cls, camera: Camera, box: Box) -> "Seen":
@@ -89,6 +94,30 @@ class Seen:
         return np.minimum(behind.min(0), 0), np.maximum(behind.max(0), 0)
 
 
+@dataclass(frozen=True)
+class Shelf:
+    """A level of the exemplar, and its Gaussians from west to east: of many a crop shows few."""
+
+    field: Field
+    order: Int[Array, "n"]
+    east: Float[Array, "n"]  # of each in that order
+    extent: Extent
+
+    @classmethod
+    def of(cls, field: Field) -> "Shelf":
+        east = field.means[:, 0].astype(float)
+        order = np.argsort(east, kind="stable")
+        return cls(field, order, east[order], Extent.of([field]))
+
+    def near(self, seen: Seen, corner: Float[Array, "3"]) -> Field:
+        """Those that may show (`Seen.shows`), in the field's own order."""
+        low, high = seen.margin(self.extent)
+        first, last = seen.box[:, 0] - corner[0] - [high[0], low[0]]
+        among = np.sort(self.order[np.searchsorted(self.east, first) : np.searchsorted(self.east, last, side="right")])
+        part = self.field[among]
+        return part[seen.shows(part, corner)]
+
+
 def of_terrain(terrain: Terrain, camera: Camera, seen: Seen, extents: list[Extent]) -> list[Piece]:
     """What of the terrain may show, cell by cell from back to front. extents: of its levels."""
     eye, side, found = camera.centre, terrain.side, []
@@ -109,13 +138,12 @@ def of_terrain(terrain: Terrain, camera: Camera, seen: Seen, extents: list[Exten
 
 
 def of_patch(
-    levels: list[Field], corner: Float[Array, "3"], like: Piece, change: Float[Array, "4"], seen: Seen
+    levels: list[Shelf], corner: Float[Array, "3"], like: Piece, change: Float[Array, "4"], seen: Seen
 ) -> Piece:
     """The exemplar with its corner there, where it may show; colours and heights changed throughout."""
     parts = {}
     for level in like.parts:
-        field = levels[min(level, len(levels) - 1)]  # coarser ones are the tiles' own
-        part = field[seen.shows(field, corner)]
+        part = levels[min(level, len(levels) - 1)].near(seen, corner)  # coarser ones are the tiles' own
         sh = part.sh.copy()
         sh[:, 0] += (change[:3] / SH0).astype(np.float32)
         parts[level] = replace(part, sh=sh)

@@ -14,7 +14,7 @@ from dav_gswt.bundle import ladder
 from dav_gswt.bundle.build import Options as Bundled
 from dav_gswt.bundle.build import laying
 from dav_gswt.field import Field
-from dav_gswt.seams.drawing import Extent
+from dav_gswt.seams.drawing import Extent, Shelf
 from dav_gswt.terrain import assemble
 from dav_gswt.terrain.choice import tiles_in
 from dav_gswt.tiles import build, layout, trends
@@ -31,7 +31,7 @@ class Source:
     """
 
     exemplar: Exemplar
-    levels: list[Field]
+    levels: list[Shelf]
     ground: Float[Array, "m m 4"]
 
 
@@ -70,7 +70,7 @@ def source_of(levels: list[Field], exemplar: Exemplar, colour: Float[Array, "m m
     corner = np.float32([exemplar.west, exemplar.south, 0])
     home = replace(exemplar, west=0.0, south=0.0)
     flat = [replace(field, means=field.means - corner) for field in flat]
-    return Source(home, flat, _cell_means(flat[0], home))
+    return Source(home, [Shelf.of(field) for field in flat], _cell_means(flat[0], home))
 
 
 def laid(tiles: build.TileSet, source: Source, salt: int, tau: float) -> Laid:
