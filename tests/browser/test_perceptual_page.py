@@ -5,10 +5,11 @@ from contextlib import contextmanager
 
 import made_up_answers
 import pytest
-from visiting import Visit, served
+from visiting import Visit
 
 from dav_gswt.files import read_json
 from dav_gswt.forced_choice import answers, results
+from dav_gswt.terrain.browser import served
 
 BRIEF = 0.3  # seconds, instead of five
 STORED = "davgswt-2afc-"

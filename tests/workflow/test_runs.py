@@ -285,7 +285,9 @@ def test_frames_of_the_library_and_of_the_page_are_timed(tiny, chromium, snakema
     assert [(r["renderer"], r["budget"]) for r in rows] == [
         (n, b) for n in ("library", "page") for b in ("2000", "1000")
     ]
-    assert all(0 < float(r["splats"]) <= float(r["budget"]) and float(r["render_ms"]) > 0 for r in rows)
+    assert all(float(r["splats"]) > 0 and float(r["render_ms"]) > 0 for r in rows)
+    # the page also brings the end of the ground nearer; the library stops at the coarsest level, here of two
+    assert all(float(r["splats"]) <= float(r["budget"]) for r in rows if r["renderer"] == "page")
     (joined,) = spread.read_viewer(folder / "results/tables/viewer.csv")
     assert (joined["scene"], joined["tau"]) == ("desert", "0.6") and 0 < joined["update_share"] <= 1
     assert (folder / "docs/figures/frames.png").stat().st_size > 5000
