@@ -2,13 +2,11 @@
 
 from dav_gswt import figures
 from dav_gswt.logs import logging_to
-from dav_gswt.sweeps import tables
 from dav_gswt.tables import ablation, spread
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    viewer = spread.read_viewer(given.get("viewer"))
-    sweeps = [spread.with_viewer(tables.read(path), viewer) for path in given.sweeps]
+    sweeps = spread.read_sweeps(given.sweeps, given.get("viewer"))
     rows = ablation.rows(dict(zip(params.baselines, sweeps, strict=True)), params.baselines)
     for path in (snakemake.output.table, snakemake.output.kept):
         figures.write_rows(path, rows)

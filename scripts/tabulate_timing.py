@@ -2,12 +2,11 @@
 
 from dav_gswt import figures
 from dav_gswt.logs import logging_to
-from dav_gswt.sweeps import tables
 from dav_gswt.tables import spread, timing
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    cells = spread.with_viewer(tables.read(given.sweep), spread.read_viewer(given.get("viewer")))
+    (cells,) = spread.read_sweeps([given.sweep], given.get("viewer"))
     rows = timing.rows(timing.at_setting(cells, params.value), params.families)
     for path in (snakemake.output.table, snakemake.output.kept):
         figures.write_rows(path, rows)

@@ -5,21 +5,12 @@ import torch
 
 from dav_gswt import cameras
 from dav_gswt.raster import oracle
+from dav_gswt.stability.drawing import cloud
 
 NAMES = ("means", "log_scales", "quats", "opacity_logits", "colours")
 
 
-def gaussians(n: int, seed: int = 0, channels: int = 3) -> dict[str, np.ndarray]:
-    """A cloud of radius 1 around the origin, of all opacities, anisotropic."""
-    rng = np.random.default_rng(seed)
-    arrays = {
-        "means": rng.normal(0, 1, (n, 3)),
-        "log_scales": rng.normal(-2, 0.7, (n, 3)),
-        "quats": rng.normal(size=(n, 4)),
-        "opacity_logits": rng.normal(0, 2, n),
-        "colours": rng.uniform(0, 1, (n, channels)),
-    }
-    return {name: np.ascontiguousarray(a, np.float32) for name, a in arrays.items()}
+gaussians = cloud  # as the page of extremes draws
 
 
 def one(z: float = 0.0, scale=0.1, opacity: float = 0.5, x: float = 0.05, y: float = -0.05, colour=(1.0, 0.5, 0.25)):

@@ -18,14 +18,15 @@ RIM = 1 / 255  # what alpha jumps by where a splat ends
 Arrays = dict[str, Array]
 
 
-def cloud(n: int, seed: int = 0, **more) -> Arrays:
+def cloud(n: int, seed: int = 0, channels: int = 3, **more) -> Arrays:
+    """A cloud of radius 1 around the origin, of all opacities, anisotropic; `more` replaces arrays by name."""
     rng = np.random.default_rng(seed)
     arrays = {
         "means": rng.normal(0, 1, (n, 3)),
         "log_scales": rng.normal(-2, 0.7, (n, 3)),
         "quats": rng.normal(size=(n, 4)),
         "opacity_logits": rng.normal(0, 2, n),
-        "colours": rng.uniform(0, 1, (n, 3)),
+        "colours": rng.uniform(0, 1, (n, channels)),
     }
     return {name: np.ascontiguousarray(a, np.float32) for name, a in (arrays | more).items()}
 

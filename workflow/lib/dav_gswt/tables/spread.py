@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from dav_gswt.sweeps import tables as sweep
+
 VIEWER = (
     *("render_ms", "render_ms_sd", "sort_ms", "sort_ms_sd", "sort_share"),
     *("update_ms", "update_ms_sd", "update_share"),
@@ -43,6 +45,12 @@ def with_viewer(rows: list[dict], viewer: list[dict]) -> list[dict]:
     at = {tuple(str(row[key]) for key in CELL): row for row in viewer}
     found = [at.get(tuple(str(row[key]) for key in CELL), {}) for row in rows]
     return [row | {key: seen.get(key) for key in VIEWER} for row, seen in zip(rows, found, strict=True)]
+
+
+def read_sweeps(paths: list[Path | str], viewer: Path | str | None) -> list[list[dict]]:
+    """The rows of each sweep's table, with what the viewer measured of their bundles."""
+    measured = read_viewer(viewer)
+    return [with_viewer(sweep.read(path), measured) for path in paths]
 
 
 def read_viewer(path: Path | str | None) -> list[dict]:
