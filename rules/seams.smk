@@ -36,7 +36,7 @@ rule measure_seams:
         "<logs>/<seams>/measure_seams.log",
     benchmark:
         "<benchmarks>/<seams>/measure_seams.tsv"
-    threads: 2
+    threads: 1 # crops are small: two cells beside each other take half the time
     resources:
         mem_mb=growing(4000),
         runtime=growing("20m"),

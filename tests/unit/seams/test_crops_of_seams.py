@@ -8,7 +8,9 @@ import pytest
 
 from dav_gswt import metrics
 from dav_gswt.errors import InputError
+from dav_gswt.raster.interface import RIM
 from dav_gswt.seams import crops, drawing, measure, places
+from dav_gswt.seams.shelf import SLOPES, Seen, Shelf
 from dav_gswt.terrain import heights, still
 
 HILLS = {"kind": "hills", "height": 1.0, "wavelength": 8.0}
@@ -46,11 +48,11 @@ def test_the_exemplar_laid_whole_shows_what_a_tile_of_one_patch_shows(laid, rng)
 
 
 def broken(laid, change):
-    """The terrain with every tile changed in the cells within 3 cells of its western border."""
+    """The same with every tile changed in the cells within 3 cells of its western border."""
     out = {}
     for key, field in laid.terrain.tiles.items():
         out[key] = change(field, field.means[:, 0] < 3 * laid.spacing)
-    return replace(laid.terrain, tiles=out)
+    return replace(laid, tiles={key: Shelf.of(field) for key, field in out.items()})
 
 
 def brighter(field, which):
@@ -74,9 +76,7 @@ def test_a_border_broken_on_purpose_is_found(laid, change, rng):
         met = crops.meeting(laid, crop)
         if not met:
             continue
-        whole, bad = (
-            crops.shown(laid, terrain, crop, met, border=True) for terrain in (laid.terrain, broken(laid, change))
-        )
+        whole, bad = (crops.shown(each, each.terrain, crop, met, border=True) for each in (laid, broken(laid, change)))
         weight = np.ones(whole.picture.shape[:2])
         psnr = [metrics.psnr(each.picture, whole.own[0], weight) for each in (whole, bad)]
         assert psnr[1] < psnr[0] - 2
@@ -163,9 +163,26 @@ def test_the_few_gaussians_of_the_exemplar_that_may_show_are_found_among_all(sou
         for _ in range(20):
             west, south = rng.uniform(-0.2, 1.0, 2) * size
             box = np.array([[west, south], [west + 0.2 * size, south + 0.1 * size]])
-            seen = drawing.Seen(box, rng.normal(0, 2, 2))
+            seen = Seen(box, rng.normal(0, 2, 2))
             corner = np.array([*rng.uniform(-size, size, 2) * 0.1, 0.0])
-            found, wanted = shelf.near(seen, corner), shelf.field[seen.shows(shelf.field, corner)]
+            found, wanted = shelf.near(seen, corner), shelf.field[_shows(seen, shelf.field, corner)]
             np.testing.assert_array_equal(found.means, wanted.means)
             np.testing.assert_array_equal(found.sh, wanted.sh)
     assert len(wanted) < len(shelf.field)
+
+
+def _shows(seen, field, corner):
+    """Each Gaussian asked for itself, as docs of `Seen.hidden` say it."""
+    shown = []
+    reaches = RIM * np.exp(field.log_scales.astype(float).max(1))
+    for place, reach in zip(field.means.astype(float), reaches, strict=True):
+        behind = [SLOPES * (place[2] + up) * seen.per_height for up in (-reach, reach)] + [np.zeros(2)]
+        low = place[:2] + corner[:2] - reach + np.min(behind, 0)
+        high = place[:2] + corner[:2] + reach + np.max(behind, 0)
+        shown.append(bool((high > seen.box[0]).all() and (low < seen.box[1]).all()))
+    return np.array(shown)
+
+
+def test_an_empty_shelf_shows_nothing(source):
+    empty = Shelf.of(source.levels[0].field[:0])
+    assert len(empty.near(Seen(np.array([[0.0, 0], [1, 1]]), np.ones(2)), np.zeros(3))) == 0

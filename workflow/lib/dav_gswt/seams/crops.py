@@ -11,6 +11,7 @@ from dav_gswt.cameras import Camera
 from dav_gswt.field import Field
 from dav_gswt.seams import drawing
 from dav_gswt.seams.ground import Laid
+from dav_gswt.seams.shelf import Seen
 from dav_gswt.terrain.assemble import Terrain
 
 SIDE = 48  # pixels of a crop
@@ -137,7 +138,7 @@ def meeting(laid: Laid, crop: Crop) -> list[int] | None:
 
 def picture(laid: Laid, terrain: Terrain, crop: Crop) -> Float32[Array, "h w 3"]:
     """The crop as the terrain shows it, and nothing more."""
-    pieces = drawing.of_terrain(terrain, crop.camera, _seen(laid, crop), laid.extents)
+    pieces = drawing.of_terrain(terrain, crop.camera, _seen(laid, crop), laid.tiles)
     return drawing.drawn(terrain, pieces, crop.camera, laid.colour)[0]
 
 
@@ -146,7 +147,7 @@ def shown(laid: Laid, terrain: Terrain, crop: Crop, patches: list[int], border: 
 
     border: also tell which of the terrain's tiles each pixel shows.
     """
-    pieces = drawing.of_terrain(terrain, crop.camera, _seen(laid, crop), laid.extents)
+    pieces = drawing.of_terrain(terrain, crop.camera, _seen(laid, crop), laid.tiles)
 
     looks = [lambda field, eye: _painted(_patch_at(laid, field, eye)[:, None] == patches)]
     looks += [lambda field, eye: _painted(_cells_of(field, eye, terrain.side) % 2 == 1)] * border
@@ -170,7 +171,7 @@ def whole(
     changed: its colours and heights, by so much throughout. pieces: the terrain's there.
     """
     seen = _seen(laid, crop)
-    pieces = pieces or drawing.of_terrain(terrain, crop.camera, seen, laid.extents)
+    pieces = pieces or drawing.of_terrain(terrain, crop.camera, seen, laid.tiles)
     middle = tuple(v // laid.plan.side for v in crop.at)
     (like,) = [piece for piece in pieces if piece.cell == middle]
     corner = np.array([*(origin * laid.spacing), 0.0])
@@ -178,8 +179,8 @@ def whole(
     return drawing.drawn(terrain, [piece], crop.camera, laid.colour)[0]
 
 
-def _seen(laid: Laid, crop: Crop) -> drawing.Seen:
-    return drawing.Seen.of(crop.camera, (crop.box + [[-1], [2]]) * laid.spacing)
+def _seen(laid: Laid, crop: Crop) -> Seen:
+    return Seen.of(crop.camera, (crop.box + [[-1], [2]]) * laid.spacing)
 
 
 def change(laid: Laid, crop: Crop, patch: int) -> Float[Array, "4"]:

@@ -14,7 +14,7 @@ from dav_gswt.bundle import ladder
 from dav_gswt.bundle.build import Options as Bundled
 from dav_gswt.bundle.build import laying
 from dav_gswt.field import Field
-from dav_gswt.seams.drawing import Extent, Shelf
+from dav_gswt.seams.shelf import Shelf
 from dav_gswt.terrain import assemble
 from dav_gswt.terrain.choice import tiles_in
 from dav_gswt.tiles import build, layout, trends
@@ -37,7 +37,8 @@ class Source:
 
 @dataclass(frozen=True)
 class Laid:
-    """terrain: the tiles, laid. eye_floor: lowest eye height. colour: of the far ground.
+    """terrain: the tiles, laid. tiles: by (level, number), as they lie there, on shelves. eye_floor: lowest eye height.
+    colour: of the far ground.
 
     Maps of the window's cells, row 0 in the south; cell (0, 0) of the terrain is at [-first, -first]. patch: a number
     for each patch and place, an index into `origins`. tile: number of the tile. label: of the cell in it.
@@ -47,7 +48,7 @@ class Laid:
     source: Source
     plan: Layout
     terrain: assemble.Terrain
-    extents: list[Extent]
+    tiles: dict[tuple[int, int], Shelf]
     eye_floor: float
     colour: list[float]
     first: int
@@ -94,7 +95,7 @@ def laid(tiles: build.TileSet, source: Source, salt: int, tau: float) -> Laid:
         source,
         plan,
         terrain,
-        [Extent.of(level) for level in tiles.fields],
+        {which: Shelf.of(field) for which, field in terrain.tiles.items()},
         described["eye_floor"],
         described["ground_colour"],
         first * n,
