@@ -5,6 +5,7 @@ terrain's cell origin + (x, y): both halves of a strip have the same origin, so 
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -62,6 +63,15 @@ class Laid:
     def spacing(self) -> float:
         return self.source.exemplar.spacing
 
+    @cached_property
+    def corners(self) -> Int[Array, "n 3"]:
+        """Corners (x, y) of cells where patches meet in one tile, and whether a centre is one of them."""
+        n, patches = self.plan.side, _around(self.patch)
+        y, x = np.nonzero((patches != patches[0]).any(0))
+        keep = ((x + 1) % n != 0) & ((y + 1) % n != 0)
+        x, y = x[keep], y[keep]
+        return np.stack([x + 1, y + 1, (_around(self.label)[:, y, x] == layout.CENTRE).any(0)], 1)
+
 
 def source_of(levels: list[Field], exemplar: Exemplar, colour: Float[Array, "m m 3"], width: float) -> Source:
     """The exemplar as `build.cut_tiles` sees it. colour: NaN for holes. width: of the low-pass, in cells."""
@@ -105,6 +115,11 @@ def laid(tiles: build.TileSet, source: Source, salt: int, tau: float) -> Laid:
         origins,
         np.stack([_correction(tiles, source, number) for number in range(len(tiles.labels))]),
     )
+
+
+def _around(cells: Int[Array, "w w"]) -> Int[Array, "4 v v"]:
+    """The four cells that meet at each corner within."""
+    return np.stack([cells[:-1, :-1], cells[:-1, 1:], cells[1:, :-1], cells[1:, 1:]])
 
 
 def _correction(tiles: build.TileSet, source: Source, number: int) -> Float[Array, "n n 4"]:

@@ -4,8 +4,6 @@ from dataclasses import dataclass
 from zlib import crc32
 
 import numpy as np
-from jaxtyping import Int
-from numpy import ndarray as Array
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from dav_gswt.seams.ground import Laid
@@ -48,7 +46,7 @@ def cuts(laid: Laid, rng: np.random.Generator) -> list[Place]:
     places.
     """
     n, found = laid.plan.side, []
-    for x, y, centre in _corners(laid).tolist():
+    for x, y, centre in laid.corners.tolist():
         tile = int(laid.tile[y, x])
         if centre:
             name = f"t{tile}:{x % n // BIN}:{y % n // BIN}"
@@ -66,22 +64,10 @@ def cuts(laid: Laid, rng: np.random.Generator) -> list[Place]:
     return [drawn[k] for k in sorted(range(len(drawn)), key=rounds.__getitem__)]
 
 
-def _corners(laid: Laid) -> Int[Array, "n 3"]:
-    """Corners (x, y) of cells where patches meet in one tile, and whether a centre is one of them."""
-    p, n = laid.patch, laid.plan.side
-    four = np.stack([p[:-1, :-1], p[:-1, 1:], p[1:, :-1], p[1:, 1:]])
-    labels = laid.label
-    centre = np.stack([labels[:-1, :-1], labels[:-1, 1:], labels[1:, :-1], labels[1:, 1:]]) == CENTRE
-    y, x = np.nonzero((four != four[0]).any(0))
-    keep = ((x + 1) % n != 0) & ((y + 1) % n != 0)
-    x, y = x[keep], y[keep]
-    return np.stack([x + 1, y + 1, centre[:, y, x].any(0)], 1)
-
-
 def beside(laid: Laid, place: Place) -> Place | None:
     """The cut of a tile set that is nearest to a place of another one: in the same tile, and of the same kind."""
     x, y = place.at[0] - laid.first, place.at[1] - laid.first
-    corners, n = _corners(laid), laid.plan.side
+    corners, n = laid.corners, laid.plan.side
     kind = place.cluster.startswith("t")
     near = corners[(corners[:, 0] // n == x // n) & (corners[:, 1] // n == y // n) & (corners[:, 2] == kind)]
     if not len(near):

@@ -27,16 +27,15 @@ class Seen:
         ahead = camera.forward
         return cls(box, ahead[:2] / abs(ahead[2]))
 
-    def hidden(
-        self, low: Float[Array, "n"], high: Float[Array, "n"]
-    ) -> tuple[Float[Array, "n 2"], Float[Array, "n 2"]]:
-        """From where to where, counted from their places, things between two heights may hide the ground.
+    def hidden(self, axis: int, low: Float[Array, "n"], high: Float[Array, "n"]) -> tuple[Float[Array, "n"], ...]:
+        """From where to where along an axis, counted from their places, things between two heights may hide the ground.
 
         One at a height z hides it up to SLOPES times z per_height behind itself: on a slope up it is less, on a slope
         down more. A patch that is laid higher or lower as a whole takes its ground along.
         """
-        behind = [SLOPES * z[:, None] * self.per_height for z in (low, high)]
-        return np.minimum(np.minimum(*behind), 0), np.maximum(np.maximum(*behind), 0)
+        far = SLOPES * self.per_height[axis]
+        first, last = (far * low, far * high) if far > 0 else (far * high, far * low)
+        return np.minimum(first, 0), np.maximum(last, 0)
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class Shelf:
 
     field: Field
     order: Int[Array, "n"]
-    places: Float[Array, "n 2"]
+    places: Float[Array, "2 n"]
     reach: Float[Array, "n"]
     low: Float[Array, "n"]
     high: Float[Array, "n"]
@@ -60,20 +59,21 @@ class Shelf:
         reach = RIM * np.exp(field.log_scales.max(1, initial=-np.inf)[order].astype(float))
         low, high = means[:, 2] - reach, means[:, 2] + reach
         most = reach.max(initial=0), low.min(initial=np.inf), high.max(initial=-np.inf)
-        return cls(field, order, means[:, :2], reach, low, high, tuple(float(v) for v in most))
+        return cls(field, order, np.ascontiguousarray(means[:, :2].T), reach, low, high, tuple(float(v) for v in most))
 
     def near(self, seen: Seen, corner: Float[Array, "3"]) -> Field:
         """Those that may show over the ground that is seen, counted from a corner; in the field's own order."""
         box = seen.box - corner[:2]
-        some = self._between(seen, *box[:, 0])
-        low, high = seen.hidden(self.low[some], self.high[some])
-        places, reach = self.places[some], self.reach[some, None]
-        shown = ((places + reach + high > box[0]) & (places - reach + low < box[1])).all(1)
+        some, shown = self._between(seen, *box[:, 0]), True
+        for axis in (0, 1):
+            low, high = seen.hidden(axis, self.low[some], self.high[some])
+            places, reach = self.places[axis, some], self.reach[some]
+            shown &= (places + reach + high > box[0, axis]) & (places - reach + low < box[1, axis])
         return self.field[np.sort(self.order[some][shown])]
 
     def _between(self, seen: Seen, west: float, east: float) -> slice:
         """Where on the shelf those stand that may show between west and east: by `most`."""
         widest, lowest, highest = self.most
-        (low,), (high,) = seen.hidden(np.array([lowest]), np.array([highest]))
-        first, last = west - high[0] - widest, east - low[0] + widest
-        return slice(np.searchsorted(self.places[:, 0], first), np.searchsorted(self.places[:, 0], last, side="right"))
+        (low,), (high,) = seen.hidden(0, np.array([lowest]), np.array([highest]))
+        first, last = west - high - widest, east - low + widest
+        return slice(np.searchsorted(self.places[0], first), np.searchsorted(self.places[0], last, side="right"))
