@@ -6,62 +6,80 @@ import pytest
 from dav_gswt.tiles import patches, repeats
 
 
+@pytest.fixture
+def rng():
+    return np.random.default_rng(2)
+
+
 def exemplar(seed=0, m=40):
     return np.random.default_rng(seed).random((m, m, 3))
 
 
 def test_ground_has_mean_zero_and_variance_one():
-    shown = repeats.nothing(exemplar(), 16, np.ones((16, 16), bool))
+    shown = repeats.nothing(exemplar(), 16, (16, 16))
     np.testing.assert_allclose(shown.ground.mean((0, 1)), 0, atol=1e-12)
     assert (shown.ground**2).sum(-1).mean() == pytest.approx(1)
 
 
+def power(picture):
+    """Of a mean tile, per sample: its squares, and those of its rows' and columns' means, LINES times."""
+    squares = [(part**2).sum(-1).mean() for part in (picture, picture.mean(0), picture.mean(1))]
+    return squares[0] + repeats.LINES * (squares[1] + squares[2])
+
+
 def test_charges_sum_to_the_power_of_what_comes_back():
-    shown = repeats.nothing(exemplar(), 16, np.ones((16, 16), bool))
+    shown = repeats.nothing(exemplar(), 16, (16, 16))
     places, total = np.array([[0, 0], [8, 4], [20, 24]]), 0.0
     for place in places:
         total += shown.charge(place[None])[0]
         shown = shown.plus(place)
     tiles = [shown.ground[y : y + 16, x : x + 16] for x, y in places]
-    assert total == pytest.approx((np.sum(tiles, 0) ** 2).sum(-1).mean())
+    assert total == pytest.approx(power(np.sum(tiles, 0)))
 
 
 def test_a_patch_taken_away_again_leaves_nothing():
-    empty = repeats.nothing(exemplar(), 16, np.ones((16, 16), bool))
+    empty = repeats.nothing(exemplar(), 16, (16, 16))
     place = np.array([3, 5])
     np.testing.assert_allclose(empty.plus(place).plus(place, -1).total, 0, atol=1e-12)
 
 
 def test_only_what_shows_counts():
-    inside = np.zeros((16, 16), bool)
-    inside[4:12, 4:12] = True
-    colour = exemplar()
-    shown = repeats.nothing(colour, 16, inside)
-    other = repeats.nothing(colour, 16, np.ones((16, 16), bool))
+    shown = repeats.nothing(exemplar(), 16, (16, 12), (4, 3))
     x, y = place = np.array([8, 4])
-    expected = (other.ground[y + 4 : y + 12, x + 4 : x + 12] ** 2).sum(-1).mean()
-    assert shown.charge(place[None])[0] == pytest.approx(expected)
+    tile = np.zeros((16, 16, 3))  # what does not show adds nothing to a row's mean
+    tile[:6, :8] = shown.ground[y + 3 : y + 9, x + 4 : x + 12]
+    assert shown.charge(place[None])[0] == pytest.approx(power(tile) * 16 * 16 / (6 * 8))
+
+
+@pytest.mark.parametrize("upright", [True, False])
+def test_what_adds_up_to_a_line_is_dearer_than_the_same_strewn_about(rng, upright):
+    colour = np.zeros((64, 64, 3))
+    dots = colour[:, :32] if upright else colour[:32].swapaxes(0, 1)  # [along, across]: a line, and as much at random
+    dots[:, 2] = 1
+    dots[np.arange(64), 12 + rng.integers(0, 8, 64)] = 1
+    shown = repeats.nothing(colour, 64, (8, 64) if upright else (64, 8))
+    line, strewn = shown.charge(np.array([[0, 0], [12, 0]]) if upright else np.array([[0, 0], [0, 12]]))
+    assert line > 1.3 * strewn > 0
 
 
 def test_the_same_landmark_at_the_same_place_is_dearer_than_at_another():
     """A dot on plain ground: a second tile that shows it there, beside there, or not at all."""
     colour = np.full((60, 60, 3), 0.5)
     colour[30:34, 30:34] = 0
-    shown = repeats.nothing(colour, 20, np.ones((20, 20), bool)).plus(np.array([22, 22]))
+    shown = repeats.nothing(colour, 20, (20, 20)).plus(np.array([22, 22]))
     there, beside, none = shown.charge(np.array([[22, 22], [14, 26], [0, 0]]))
     assert there > 2 * beside > 2 * none
 
 
 @pytest.mark.parametrize("value", [0.0, 0.3])
 def test_ground_of_one_colour_costs_nothing(value):
-    shown = repeats.nothing(np.full((30, 30, 3), value), 16, np.ones((16, 16), bool))
+    shown = repeats.nothing(np.full((30, 30, 3), value), 16, (16, 16))
     assert shown.charge(np.array([[0, 0], [3, 3]])).tolist() == pytest.approx([0, 0], abs=1e-12)
 
 
 def test_large_tiles_are_sampled_more_coarsely():
-    inside = np.ones((200, 200), bool)
-    shown = repeats.nothing(exemplar(m=400), 200, inside)
-    assert shown.sample == 3 and shown.crop(np.array([100, 100])).shape == (66 * 66, 3)
+    shown = repeats.nothing(exemplar(m=400), 200, (200, 200))
+    assert shown.sample == 3 and shown.crop(np.array([100, 100])).shape == (66, 66, 3)
 
 
 def test_two_strips_of_a_direction_never_show_nearly_the_same():

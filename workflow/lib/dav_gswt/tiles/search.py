@@ -119,7 +119,8 @@ def _strips(sketch: Sketch, corner: Array, upright: bool, used: list, rng) -> li
     if len(fits) < FEW * sketch.tries:  # the best of both is all there is to choose from
         fits = np.argsort(cost, kind="stable")[: FEW * sketch.tries]
     places, cost = places[fits], cost[fits]
-    seen = repeats.nothing(sketch.guide.features[..., :3], n, depth >= (a + b) // 2)
+    left = (a + b) // 2  # of the ends: about where the cut runs
+    seen = repeats.nothing(sketch.guide.features[..., :3], n, size, (0, left) if upright else (left, 0))
     found = []
     for _ in range(2):
         taken = np.array([strip.place for strip in found], int).reshape(-1, 2)
@@ -141,7 +142,7 @@ def _tiles(sketch: Sketch, places: Places, masks: list, rng) -> list[Tile]:
     zone = _ring_lines(plan)
     size = (n, n)
     choice = patches.sure(sketch.guide, patches.candidates(plan, size, sketch.candidates, rng), size)
-    seen = repeats.nothing(sketch.guide.features[..., :3], n, free.straight)
+    seen = repeats.nothing(sketch.guide.features[..., :3], n, size, ((plan.block + b) // 2,) * 2)
     found = []
     for tile in progress(range(len(places.centres)), "cut tiles"):
         west, north, east, south = layout.colours(tile)

@@ -1,0 +1,74 @@
+"""How much memory the page takes for a made-up set of 1.5M Gaussians, all read and drawn, beyond an empty tab's.
+
+In headless Chromium with software rendering, where what a graphics card would hold lies in memory, too: the sum over
+the tab's process and the one that draws, of pages that no other process shares. Prints figures, asserts nothing.
+"""
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import made_up
+import psutil
+from record import tell
+from visiting import VIEWER
+
+from dav_gswt.terrain.browser import FLAGS, chromium_path, served
+from dav_gswt.terrain.page import write_page
+
+GROUND = made_up.Ground(discs=264, levels=6, speckle=20)
+TARGETS = {"page_memory_mb": 300.0}
+KINDS = {"renderer": "the tab", "gpu-process": "what draws"}
+SHOW = """async () => {
+  while (!window.davgswt) await new Promise(done => setTimeout(done, 5));
+  await davgswt.ready;
+  for (const yaw of [60, 150, 240, 330]) {
+    davgswt.set({ yaw });
+    await davgswt.settle();
+  }
+  return davgswt.state.count;
+}"""
+
+
+def main() -> int:
+    path = chromium_path()
+    if path is None:
+        print("memory: no chromium on this machine, nothing measured")
+        return 0
+    from playwright.sync_api import sync_playwright
+
+    with tempfile.TemporaryDirectory() as folder:
+        bundle, page = Path(folder) / "bundle", Path(folder) / "page"
+        manifest = made_up.write_bundle(bundle, GROUND)
+        write_page(bundle, VIEWER, page)
+        chunks = [chunk for tile in manifest["tiles"] for chunk in tile["chunks"]]
+        count, size = (sum(chunk[key] for chunk in chunks) for key in ("count", "bytes"))
+        with sync_playwright() as playwright, served(page) as address:
+            empty = measured(playwright, path, "about:blank")
+            full = measured(playwright, path, f"{address}?still#2,2,1,60,-20", SHOW)
+    print(f"page of {count:,} Gaussians, {size / 1e6:.1f} MB of chunks")
+    for kind, name in KINDS.items():
+        print(f"  {name}: {full[kind]:.0f} MB, empty {empty[kind]:.0f} MB")
+    tell({"page_memory_mb": sum(full.values()) - sum(empty.values())}, TARGETS)
+    return 0
+
+
+def measured(playwright, path: str, address: str, script: str = "() => 0") -> dict[str, float]:
+    """Megabytes that only these processes of a new browser hold, a while after the page has run a script."""
+    browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
+    tab = browser.new_page(viewport={"width": 480, "height": 270})
+    tab.goto(address)
+    tab.evaluate(script)
+    time.sleep(3)
+    found = dict.fromkeys(KINDS, 0.0)
+    for process in psutil.Process().children(recursive=True):
+        kind = next((kind for kind in KINDS if f"--type={kind}" in process.cmdline()), None)
+        if kind:
+            found[kind] += process.memory_full_info().uss / 1e6
+    browser.close()
+    return found
+
+
+if __name__ == "__main__":
+    sys.exit(main())
