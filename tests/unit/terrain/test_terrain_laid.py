@@ -196,6 +196,14 @@ def test_too_many_gaussians_go_farthest_first(terrain):
     assert (np.diff(np.abs(few.i) + np.abs(few.j)) <= 0).all(), "and the order stays"
 
 
+def test_a_picture_of_too_many_gaussians_is_coarser_and_has_no_less_ground(terrain, monkeypatch):
+    above = cameras.pinhole(np.array([1.0, 2, 15]), np.array([1.0, 2.001, 0]), 48, 48, 60.0)
+    count = assemble.sizes(terrain, assemble.visible(terrain, above)).sum()
+    monkeypatch.setattr(still, "MOST", int(count // 3))
+    picture = still.draw(terrain, above, SKY, PINK)
+    assert np.abs(picture - PINK).sum(-1).min() > 0.3
+
+
 @pytest.mark.parametrize("shot", still.SHOTS, ids=lambda shot: shot.name)
 @pytest.mark.parametrize("surface", ["terrain", "hilly"])
 def test_stills_have_ground_below_and_sky_above(request, surface, shot):
