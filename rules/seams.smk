@@ -91,7 +91,7 @@ rule draw_grid:
         "<logs>/<seams>/draw_grid.log",
     benchmark:
         "<benchmarks>/<seams>/draw_grid.tsv"
-    threads: 2
+    threads: 1 # most of it places Gaussians, one cell after another
     resources:
         mem_mb=growing(6000),
         runtime=growing("20m"),

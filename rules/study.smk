@@ -1,8 +1,9 @@
 """The study: all tables and figures of the paper from our own runs, and docs/results.md, which shows them.
 
 In: what the config's `study` names. Out: results/tables/{timing,lod,sensitivity,ablation}.csv, results/sweeps/*.png,
-results/figures/, figures beside what they show; docs/results.md with docs/figures/study_*.png. Not part of `all`:
-`snakemake study` makes it, `snakemake study --report page.html` a page of it.
+results/figures/, figures beside what they show; docs/results.md with docs/figures/study_*.png; the pages of
+`stability` and `tradeoff`. Not part of `all`: `snakemake study` makes it, `snakemake study --report page.html` a page
+of it.
 """
 
 
@@ -26,13 +27,14 @@ rule write_results:
         "../scripts/write_results.py"
 
 
-# What `snakemake study` makes: functions that give paths. Other stages add theirs.
+# What `snakemake study` makes: functions that give paths.
 STUDY = [
     lambda wildcards: [f"results/tables/{name}.csv" for name in TABLES],
     lambda wildcards: [f"results/sweeps/{name}.png" for name in sweeps_of(config["study"])],
     lambda wildcards: list(study_figures().values()),
     lambda wildcards: [rules.write_results.output.page],
     lambda wildcards: [rules.show_stability.output.page],
+    lambda wildcards: [rules.write_tradeoff.output.page, rules.gather_auto.output.page],
 ]
 
 

@@ -2,7 +2,7 @@
 
 In: what each cell left, and its jobs' benchmarks; a cell is restarted by itself, and what cells have in common is made
 once. Out: results/tradeoff/{tradeoff,pareto,auto}.csv, {pareto,knobs}.png; docs/data/tradeoff.csv and auto.csv, where runs
-add up; docs/tradeoff.md and docs/auto.md. Not part of `all`: `snakemake tradeoff` makes it. Seconds differ from machine
+add up; docs/tradeoff.md and docs/auto.md. Not part of `all`: `snakemake tradeoff` makes it, or `study`. Seconds differ from machine
 to machine: one that is otherwise idle is to run all of it.
 """
 
