@@ -5,17 +5,14 @@ the tab's process and the one that draws, of pages that no other process shares.
 """
 
 import sys
-import tempfile
 import time
-from pathlib import Path
 
 import made_up
 import psutil
+from pages import page_of
 from record import tell
-from visiting import VIEWER
 
-from dav_gswt.terrain.browser import FLAGS, chromium_path, served
-from dav_gswt.terrain.page import write_page
+from dav_gswt.terrain.browser import FLAGS, chromium_path
 
 GROUND = made_up.Ground(discs=264, levels=6, speckle=20)
 TARGETS = {"page_memory_mb": 300.0}
@@ -38,16 +35,9 @@ def main() -> int:
         return 0
     from playwright.sync_api import sync_playwright
 
-    with tempfile.TemporaryDirectory() as folder:
-        bundle, page = Path(folder) / "bundle", Path(folder) / "page"
-        manifest = made_up.write_bundle(bundle, GROUND)
-        write_page(bundle, VIEWER, page)
-        chunks = [chunk for tile in manifest["tiles"] for chunk in tile["chunks"]]
-        count, size = (sum(chunk[key] for chunk in chunks) for key in ("count", "bytes"))
-        with sync_playwright() as playwright, served(page) as address:
-            empty = measured(playwright, path, "about:blank")
-            full = measured(playwright, path, f"{address}?still#2,2,1,60,-20", SHOW)
-    print(f"page of {count:,} Gaussians, {size / 1e6:.1f} MB of chunks")
+    with page_of(GROUND) as address, sync_playwright() as playwright:
+        empty = measured(playwright, path, "about:blank")
+        full = measured(playwright, path, f"{address}?still#2,2,1,60,-20", SHOW)
     for kind, name in KINDS.items():
         print(f"  {name}: {full[kind]:.0f} MB, empty {empty[kind]:.0f} MB")
     tell({"page_memory_mb": sum(full.values()) - sum(empty.values())}, TARGETS)

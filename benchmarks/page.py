@@ -7,16 +7,12 @@ Recorded is the median of update and sort together over hills: other work of the
 
 import statistics
 import sys
-import tempfile
-import time
-from pathlib import Path
 
 import made_up
+from pages import page_of
 from record import tell
-from visiting import VIEWER
 
-from dav_gswt.terrain.browser import FLAGS, chromium_path, served
-from dav_gswt.terrain.page import write_page
+from dav_gswt.terrain.browser import FLAGS, chromium_path
 
 GROUND = made_up.Ground(discs=100, levels=3, speckle=20)  # 16 tiles x (100^2 + 50^2 + 25^2) = 210,000
 VISITS = 5
@@ -66,19 +62,10 @@ def main() -> int:
         return 0
     from playwright.sync_api import sync_playwright
 
-    with tempfile.TemporaryDirectory() as folder:
-        bundle, page = Path(folder) / "bundle", Path(folder) / "page"
-        manifest = made_up.write_bundle(bundle, GROUND)
-        start = time.perf_counter()
-        write_page(bundle, VIEWER, page)
-        written = time.perf_counter() - start
-        chunks = [chunk for tile in manifest["tiles"] for chunk in tile["chunks"]]
-        count, size = (sum(chunk[key] for chunk in chunks) for key in ("count", "bytes"))
-        print(f"page of {count:,} Gaussians, {size / 1e6:.1f} MB, {len(chunks)} chunks; written in {written:.2f} s")
-        with sync_playwright() as playwright, served(page) as address:
-            browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
-            measure(browser, address)
-            browser.close()
+    with page_of(GROUND) as address, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
+        measure(browser, address)
+        browser.close()
     return 0
 
 
