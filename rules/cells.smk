@@ -93,6 +93,12 @@ def seam_cells():
     return cells
 
 
+def seam_pictures():
+    """What rule draw_grid draws of each scene, in the order of its shots."""
+    drawn = list(rules.draw_grid.output.pictures)
+    return {scene: expand(drawn, **seam_values(scene)) for scene in config["seam_study"]["scenes"]}
+
+
 def perceptual_seams():
     """The entries of `seams` that are compared, by name: of other sizes, tiles have no place in common."""
     names = dict.fromkeys(name for pair in config["perceptual_study"]["pairs"] for name in pair)

@@ -4,7 +4,7 @@ In: the levels and the tiles. Out, per cell (a scene, a seed, a variant of `seam
 facts.json (with the share of cuts through strong gradients), repetition.csv, repetition.png; of each scene's own seam
 20 x 20 tiles from above and walking, flat and hilly; seam_cuts.png, where colour and semantics cut. Gathered:
 results/tables/seams.csv (every crop), seam_summary.csv, seam_ablation.csv and repetition.csv; the last three also in
-docs/data, where runs add up; docs/figures/seam_ablation.png.
+docs/data, where runs add up; docs/figures/seam_ablation.png, seam_sheet.png and the page docs/seams.md.
 Not part of `all`: `snakemake seams` makes them, for the scenes of the config's `seam_study`.
 """
 
@@ -125,6 +125,27 @@ rule gather_seams:
         "../scripts/gather_seams.py"
 
 
+rule write_seams:
+    """What was found, as a page to read, and all that was drawn on one sheet."""
+    input:
+        tables=list(rules.gather_seams.output.kept),
+        ablation=rules.gather_seams.output.plot,
+        drawn=lambda wildcards: [path for paths in seam_pictures().values() for path in paths],
+    output:
+        page="docs/seams.md",
+        sheet="docs/figures/seam_sheet.png",
+    log:
+        "<logs>/seams/write_seams.log",
+    benchmark:
+        "<benchmarks>/seams/write_seams.tsv"
+    params:
+        pictures=lambda wildcards: seam_pictures(),
+        own=lambda wildcards: {scene: config["scenes"][scene]["seam"] for scene in config["seam_study"]["scenes"]},
+        source=source_of("seams", "figures", "images", "markdown"),
+    script:
+        "../scripts/write_seams.py"
+
+
 rule show_cuts:
     """Cuts by colour alone beside those by what the ground is, drawn into the same tiles."""
     input:
@@ -151,11 +172,11 @@ rule seams:
     """Measure the seams of the config's `seam_study`, and draw what is to be looked at."""
     input:
         lambda wildcards: list(rules.gather_seams.output),
+        lambda wildcards: list(rules.write_seams.output),
         lambda wildcards: [
             path
             for scene in config["seam_study"]["scenes"]
-            for rule in (rules.draw_grid, rules.show_cuts)
-            for path in expand(list(rule.output), **seam_values(scene))
+            for path in expand(list(rules.show_cuts.output), **seam_values(scene))
         ],
 
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from dav_gswt.files import whole
+from dav_gswt.markdown import table
 
 
 def write(path: Path | str, template: Path | str, formulas: list[dict], runs: list[dict], facts: dict) -> None:
@@ -30,10 +31,9 @@ def write(path: Path | str, template: Path | str, formulas: list[dict], runs: li
 def formula_tables(rows: list[dict]) -> str:
     """A table for each group."""
     parts = []
+    head = ("formula", "range", "kept or computed in", "worst error", "relative", "where", "of its tolerance")
     for group in dict.fromkeys(row["group"] for row in rows):
-        lines = [("formula", "range", "kept or computed in", "worst error", "relative", "where", "of its tolerance")]
-        lines += [_formula(row) for row in rows if row["group"] == group]
-        parts.append(f"### {group}\n\n{table(lines)}")
+        parts.append(f"### {group}\n\n{table(head, [_formula(row) for row in rows if row['group'] == group])}")
     return "\n".join(parts)
 
 
@@ -47,23 +47,23 @@ def _formula(row: dict) -> tuple[str, ...]:
 
 def printed_table(rows: list[dict]) -> str:
     """What the forms give that are not used."""
-    lines = [("formula", "at", "gives", "right is", "ours is off by, at worst")]
+    lines = []
     for row in rows:
         if row["printed_share_of_tolerance"]:
             values = (number(row["printed_gives"]), number(row["printed_right"]), number(row["absolute_error"]))
             lines.append((row["formula"], row["printed_at"], *values))
-    return table(lines)
+    return table(("formula", "at", "gives", "right is", "ours is off by, at worst"), lines)
 
 
 def run_table(rows: list[dict]) -> str:
     """What came of each run."""
-    lines = [("run", "what came of it", "as expected", "Gaussians", "seconds", "MB")]
+    lines = []
     for row in rows:
         good = "yes" if row["as_expected"] == "True" else "**no**"
         lines.append(
             (row["about"], _outcome(row), good, row["gaussians"], f"{float(row['seconds']):.0f}", row["peak_mb"])
         )
-    return table(lines)
+    return table(("run", "what came of it", "as expected", "Gaussians", "seconds", "MB"), lines)
 
 
 def _outcome(row: dict) -> str:
@@ -79,9 +79,3 @@ def number(text: str) -> str:
     """A number to two digits, longer where it is whole and short."""
     value = float(text)
     return f"{value:.0f}" if value.is_integer() and abs(value) < 1e7 else f"{value:.2g}"
-
-
-def table(lines: list[tuple[str, ...]]) -> str:
-    """Markdown, the first line the heads."""
-    lines = [lines[0], ("---",) * len(lines[0]), *lines[1:]]
-    return "".join("| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |\n" for line in lines)

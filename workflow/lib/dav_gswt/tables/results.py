@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from dav_gswt.files import whole
+from dav_gswt.markdown import table
 from dav_gswt.tables import paper
 from dav_gswt.tables.paired import two_sided
 
@@ -60,36 +61,31 @@ def text(tables: dict[str, list[dict]], figures: dict[str, str]) -> str:
         "“paper” repeat what is printed there, of other scenes, photos and machines: they stand beside ours for "
         "orientation, not for comparison.",
         "## Timing",
-        _table(["scene", *_heads(TIMING)], [[row["scene"], *_cells(row, TIMING)] for row in tables["timing"]]),
+        table(["scene", *_heads(TIMING)], [[row["scene"], *_cells(row, TIMING)] for row in tables["timing"]]),
         "Reconstruction is scoring, choosing and fitting, without the taking of photos; render, sort and update are "
         "the viewer's, empty where it was not measured. The paper's percentages are left out: it does not say of what "
         "they are.",
         "## Levels of detail",
-        _table(*_levels(tables["lod"])),
+        table(*_levels(tables["lod"])),
         "## Sensitivity",
-        _table(
+        table(
             ["setting", "value", "paper's value", *_heads(SENSITIVITY)],
             [[r["setting"], _bold(r), r["paper_value"], *_cells(r, SENSITIVITY)] for r in tables["sensitivity"]],
         ),
         "In bold the value that is not varied elsewhere.",
         "## Ablation",
-        _table(
+        table(
             ["sweep", "variant", *_heads(ABLATION)],
             [[row["sweep"], f"`{row['variant']}`", *_cells(row, ABLATION)] for row in tables["ablation"]],
         ),
         "Differences from the baseline, paired by scene and seed: mean, 95 % bootstrap interval, t (degrees of "
         "freedom), p, and p raised for how many variants were compared (Holm).",
-        _table(*_tested(tables["ablation"])),
+        table(*_tested(tables["ablation"])),
         _slips(),
         "## Figures",
         *(f"![{shown}]({path})\n\n{shown}" for shown, path in figures.items()),
     ]
     return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
-
-
-def _table(header: list[str], rows: list[list[str]]) -> str:
-    lines = [header, ["---"] * len(header), *rows]
-    return "".join("| " + " | ".join(line) + " |\n" for line in lines)
 
 
 def _heads(columns: dict) -> list[str]:

@@ -2,7 +2,8 @@
 
 from dav_gswt import provenance
 from dav_gswt.files import read_json
-from dav_gswt.tradeoff.page import number, table
+from dav_gswt.markdown import table
+from dav_gswt.tradeoff.page import number
 from dav_gswt.tradeoff.tables import mean_square, measured, total
 
 KEY = ("scene", "seed", "part", "processor", "cores")  # what tells rows apart

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from dav_gswt.files import whole
+from dav_gswt.markdown import table
 from dav_gswt.tradeoff.settings import PRESET
 from dav_gswt.tradeoff.tables import UNITS
 
@@ -81,12 +82,6 @@ def _pace(share: float) -> str:
     if abs(share - 1) <= SAME:
         return "is as fast"
     return f"is {1 / share:.2f} times as fast" if share < 1 else f"takes {share:.2f} times as long"
-
-
-def table(header: list[str], rows: list[list[str]]) -> str:
-    """A table of Markdown."""
-    lines = [header, ["---"] * len(header), *rows]
-    return "".join("| " + " | ".join(line) + " |\n" for line in lines)
 
 
 def number(value: float | None, digits: int) -> str:

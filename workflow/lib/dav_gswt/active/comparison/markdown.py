@@ -4,6 +4,7 @@ from pathlib import Path
 
 from dav_gswt.active.comparison.tables import EVERY
 from dav_gswt.files import whole
+from dav_gswt.markdown import table
 
 
 def write(path: Path | str, compared: list[dict], baseline: str) -> None:
@@ -20,11 +21,11 @@ def text(compared: list[dict], baseline: str) -> str:
     named = ["all" if scene == EVERY else f"{scene.removesuffix('_pool')}, {k} a round" for scene, k in columns]
     found = {(row["policy"], row["scene"], row["k"]): row for row in compared}
     best = sorted((row for row in compared if row["scene"] == EVERY), key=lambda row: -row["mean"])
-    lines = [["less `" + baseline + "`, dB", *named, "wins, ties, losses"], ["---"] * (len(columns) + 2)]
+    lines = []
     for row in best:
         cells = [_cell(found.get((row["policy"], *column))) for column in columns]
         lines.append([f"`{row['policy']}`", *cells, f"{row['wins']}, {row['ties']}, {row['losses']}"])
-    return "".join("| " + " | ".join(line) + " |\n" for line in lines)
+    return table(["less `" + baseline + "`, dB", *named, "wins, ties, losses"], lines)
 
 
 def _cell(row: dict | None) -> str:
