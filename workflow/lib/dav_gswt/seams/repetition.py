@@ -17,7 +17,7 @@ from dav_gswt.raster import render
 from dav_gswt.terrain.choice import tiles_in
 from dav_gswt.tiles.build import TileSet
 
-TILES = 12  # a side of the top view
+TILES, WINDOWS = 12, 4  # a side of a top view, and how many there are
 LAGS = ((1, 0), (0, 1), (1, 1), (2, 0), (0, 2))  # in tiles, east and north
 AROUND = 0.25  # of a tile: what is that near to a lag, and not at it, is around it
 AT = 0.04  # of a tile: what is that near is at it
@@ -33,17 +33,23 @@ class Repeats:
 
 
 def repeats(tiles: TileSet, exemplar: list[Field], side: float, salt: int) -> Repeats:
-    """exemplar: its levels, trend out, from (0, 0), `side` wide. From above, a pixel a cell of the second level."""
+    """exemplar: its levels, trend out, from (0, 0), `side` wide. From above, a pixel a cell of the second level.
+
+    The terrain is seen in WINDOWS places: in one of them equal tiles lie two apart half as often again, or
+    half as often, as they do on the whole, by chance.
+    """
     level = min(1, len(tiles.fields) - 1)
     pixel = tiles.spacing * 2**level
-    numbers = tiles_in(0, 0, (TILES, TILES), salt, tiles.variants)
-    laid = [
-        _moved(tiles.fields[level][number], i * tiles.side, j * tiles.side)
-        for j, row in enumerate(numbers.tolist())
-        for i, number in enumerate(row)
-    ]
-    seen = [_above(joined(laid), TILES * tiles.side, pixel), _above(exemplar[level], side, pixel)]
-    return Repeats(*(autocorrelation(picture) for picture in seen), round(tiles.side / pixel))
+    laid = [_laid(tiles, level, TILES * k, salt) for k in range(WINDOWS)]
+    terrain = np.mean([autocorrelation(_above(part, TILES * tiles.side, pixel)) for part in laid], 0)
+    return Repeats(terrain, autocorrelation(_above(exemplar[level], side, pixel)), round(tiles.side / pixel))
+
+
+def _laid(tiles: TileSet, level: int, first: int, salt: int) -> Field:
+    """The terrain's tiles from (first, 0) on, from the origin on."""
+    numbers = tiles_in(first, 0, (TILES, TILES), salt, tiles.variants)
+    at = [(number, i, j) for j, row in enumerate(numbers.tolist()) for i, number in enumerate(row)]
+    return joined([_moved(tiles.fields[level][number], i * tiles.side, j * tiles.side) for number, i, j in at])
 
 
 def _moved(field: Field, east: float, north: float) -> Field:
