@@ -33,10 +33,14 @@ def test_a_crop_is_the_terrain_s_own_picture(laid, view, surface, rng):
 
 
 def test_across_every_border_the_patch_is_the_same(laid):
-    n = laid.plan.side
-    edges = np.arange(n, len(laid.patch), n)
-    np.testing.assert_array_equal(laid.patch[:, edges - 1], laid.patch[:, edges])
-    np.testing.assert_array_equal(laid.patch[edges - 1], laid.patch[edges])
+    """But where a strip's cut against its corner happens to run along the border for some cells."""
+    n, a = laid.plan.side, laid.plan.corner
+    edges, along = np.arange(n, len(laid.patch), n), np.arange(len(laid.patch)) % n
+    strip = (along >= a) & (along < n - a)
+    for patch in (laid.patch, laid.patch.T):
+        before, after = patch[edges - 1], patch[edges]
+        np.testing.assert_array_equal(before[:, strip], after[:, strip])
+        assert (before == after)[:, ~strip].mean() > 0.9
 
 
 def test_the_exemplar_laid_whole_shows_what_a_tile_of_one_patch_shows(laid, rng):
