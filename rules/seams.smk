@@ -4,7 +4,7 @@ In: the levels and the tiles. Out, per cell (a scene, a seed, a variant of `seam
 facts.json (with the share of cuts through strong gradients), repetition.csv, repetition.png; of each scene's own seam
 20 x 20 tiles from above and walking, flat and hilly; seam_cuts.png, where colour and semantics cut. Gathered:
 results/tables/seams.csv (every crop), seam_summary.csv, seam_ablation.csv and repetition.csv; the last three also in
-docs/data, where runs add up; docs/figures/seam_ablation.png, seam_sheet.png and the page docs/seams.md.
+docs/data, where runs add up; docs/figures/seam_ablation.png, seam_sheet.jpg and the page docs/seams.md.
 Not part of `all`: `snakemake seams` makes them, for the scenes of the config's `seam_study`.
 """
 
@@ -133,7 +133,7 @@ rule write_seams:
         drawn=lambda wildcards: [path for paths in seam_pictures().values() for path in paths],
     output:
         page="docs/seams.md",
-        sheet="docs/figures/seam_sheet.png",
+        sheet="docs/figures/seam_sheet.jpg",
     log:
         "<logs>/seams/write_seams.log",
     benchmark:
