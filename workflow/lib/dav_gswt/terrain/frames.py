@@ -23,6 +23,7 @@ from dav_gswt.terrain.still import Shot
 
 PARTS = ("render", "sort", "update")
 LIBRARY, PAGE = "library", "page"
+LEAST = 0.1  # milliseconds: what is less is not drawn
 BEFORE = 4  # frames at the walk's start that are not counted: orders are made, shaders compiled
 VISIT = """async ({ places, before, budget }) => {
   const gl = document.getElementById("picture").getContext("webgl2"), pixel = new Uint8Array(4);
@@ -156,7 +157,9 @@ def read(path: Path | str) -> list[dict]:
 
 def write_plot(path: Path | str, rows: list[dict]) -> None:
     """Milliseconds of a frame's parts over Gaussians in view: a panel a renderer, a line a scene; rows have text."""
-    figure = figures.blank(10.0, 3.8)
+    from matplotlib.ticker import LogLocator  # here, not above: see `figures.blank`
+
+    figure = figures.blank(10.0, 4.4)
     panels = figure.subplots(1, 2)
     for axes, renderer in zip(panels, (LIBRARY, PAGE), strict=True):
         mine = [row for row in rows if row["renderer"] == renderer]
@@ -170,11 +173,16 @@ def write_plot(path: Path | str, rows: list[dict]) -> None:
                 )
         axes.set_xscale("log")
         axes.set_yscale("log")
+        axes.set_ylim(bottom=LEAST)
+        axes.xaxis.set_major_formatter(lambda value, _: f"{value / 1000:g} k")
+        axes.xaxis.set_minor_formatter("")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         axes.set_title(_titled(renderer, mine), fontsize=9, loc="left")
         axes.set_xlabel("Gaussians in view")
         axes.grid(alpha=0.3)
     panels[0].set_ylabel("milliseconds a frame (mean, sd)")
-    panels[1].legend(frameon=False, fontsize=8)
+    named = next((axes for axes in panels if axes.get_legend_handles_labels()[0]), panels[0])
+    figure.legend(*named.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=8)
     figures.save(figure, path)
 
 
