@@ -124,11 +124,13 @@ use rule gather_lod as gather_presort with:
 
 
 rule plot_presort:
-    """The same as a figure."""
+    """The same as a figure; both are kept in docs, too."""
     input:
         table=rules.gather_presort.output.table,
     output:
         plot="results/figures/presort.png",
+        kept="docs/figures/presort.png",
+        data="docs/data/presort.csv",
     log:
         "<logs>/figures/plot_presort.log",
     benchmark:
