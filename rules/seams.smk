@@ -36,7 +36,7 @@ rule measure_seams:
         "<logs>/<seams>/measure_seams.log",
     benchmark:
         "<benchmarks>/<seams>/measure_seams.tsv"
-    threads: 1 # crops are small: two cells beside each other take half the time
+    threads: 1  # crops are small: two cells beside each other take half the time
     resources:
         mem_mb=growing(4000),
         runtime=growing("20m"),
@@ -91,7 +91,7 @@ rule draw_grid:
         "<logs>/<seams>/draw_grid.log",
     benchmark:
         "<benchmarks>/<seams>/draw_grid.tsv"
-    threads: 1 # most of it places Gaussians, one cell after another
+    threads: 1  # most of it places Gaussians, one cell after another
     resources:
         mem_mb=growing(6000),
         runtime=growing("20m"),

@@ -67,20 +67,35 @@ def test_of_each_seed_only_what_is_asked_is_measured(planned, tmp_path):
 
 
 @pytest.mark.parametrize("size", ["config.yaml", "paper.yaml"])
-def test_the_study_plans(snakemake, planned, shared, root, tmp_path, size):
+def test_the_page_of_results_plans(planned, shared, root, tmp_path, size):
     """At `draft` and at the paper's size: every table and figure, each photo set and coarse field once."""
-    folder = tmp_path / "run"
-    folder.mkdir()
-    (tmp_path / "shared").symlink_to(shared)
     config = f"config/{size}"
-    plan = planned(folder, "study", "--scheduler", "greedy", configs=(USUAL, config))
+    plan = plan_of(planned, shared, tmp_path, "docs/results.md", config)
     asked = yaml.safe_load((root / config).read_text())
     scenes, seeds = len(asked["sweeps"]["k"]["scenes"]), len(asked["sweeps"]["k"]["measure"]["views"])
     assert plan["fit_coarse"] == scenes * seeds and plan["render_photos"] + plan["register_photos"] == scenes
-    assert plan["gather_sweep"] == plan["plot_sweep"] == 9
+    assert plan["gather_sweep"] == 7  # those that its tables are made from
     assert all(plan[f"tabulate_{table}"] == 1 for table in ("timing", "sensitivity", "ablation"))
     assert plan["plot_sphere"] == plan["plot_evolution"] == plan["plot_estimators"] == plan["show_cuts"] == 2
-    assert plan["write_results"] == plan["gather_lod"] == plan["study"] == 1
+    assert plan["write_results"] == plan["gather_lod"] == 1
+
+
+def test_the_study_makes_every_page_and_each_photo_set_once(planned, shared, root, tmp_path):
+    plan = plan_of(planned, shared, tmp_path, "study", "config/config.yaml")
+    pages = ("write_results", "show_stability", "write_tradeoff", "gather_auto")
+    assert all(plan[page] == 1 for page in (*pages, "study"))
+    assert plan["gather_sweep"] == plan["plot_sweep"] == 9
+    asked = yaml.safe_load((root / "config/config.yaml").read_text())
+    scenes = {*asked["sweeps"]["k"]["scenes"], asked["tradeoff"]["scene"], *asked["auto"]["scenes"]}
+    assert plan["render_photos"] + plan["register_photos"] == len(scenes)
+
+
+def plan_of(planned, shared, tmp_path, target, config):
+    """How often each rule runs for a target, from nothing."""
+    folder = tmp_path / "run"
+    folder.mkdir()
+    (tmp_path / "shared").symlink_to(shared)
+    return planned(folder, target, "--scheduler", "greedy", configs=(USUAL, config))
 
 
 def test_a_finished_run_is_swept_without_making_anything_twice(snakemake, tiny, tmp_path):
