@@ -50,7 +50,7 @@ def measured(playwright, path: str, address: str, script: str = "() => 0") -> di
     tab = browser.new_page(viewport={"width": 480, "height": 270})
     tab.goto(address)
     tab.evaluate(script)
-    time.sleep(3)
+    time.sleep(3)  # what was needed to read only is given back meanwhile
     found = dict.fromkeys(KINDS, 0.0)
     for process in psutil.Process().children(recursive=True):
         kind = next((kind for kind in KINDS if f"--type={kind}" in process.cmdline()), None)

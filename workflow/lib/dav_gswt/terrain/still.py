@@ -9,7 +9,7 @@ from numpy import ndarray as Array
 from dav_gswt import cameras
 from dav_gswt.cameras import Camera
 from dav_gswt.terrain import splats
-from dav_gswt.terrain.assemble import MOST, Terrain, coarsened, laid, visible, within_budget
+from dav_gswt.terrain.assemble import MOST, Terrain, coarsened, laid, sizes, visible, within_budget
 from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.meter import Meter
 
@@ -76,8 +76,10 @@ def draw(
     meter = meter or Meter()
     eye, here = camera.centre, replace(camera, translation=np.zeros(3))
     with meter.of("update"):
-        terrain = coarsened(terrain, camera, MOST)  # coarser rather than cut off; what even that has too many of goes
-        cells = within_budget(terrain, visible(terrain, camera))
+        cells = visible(terrain, camera)
+        if sizes(terrain, cells).sum() > MOST:  # coarser rather than cut off; what even that has too many of goes
+            terrain = coarsened(terrain, camera, MOST)
+            cells = within_budget(terrain, cells)
     behind = Backdrop.of(terrain, eye, sky, ground_colour)
     far, close = [splats.NONE], [splats.NONE]
     for k in range(len(cells)):

@@ -106,7 +106,8 @@ def _strips(sketch: Sketch, corner: Array, upright: bool, used: list, rng) -> li
     y, x = np.mgrid[: size[1], : size[0]]
     along = y if upright else x
     depth = np.minimum(along, n - 1 - along)
-    free = cuts.Zone(depth < b, depth >= a, depth >= (a + b) // 2)
+    ends_at = (a + b) // 2  # where a cut without looking lies, and the others about there
+    free = cuts.Zone(depth < b, depth >= a, depth >= ends_at)
     ends = np.where(along < n // 2, 1, 2)
     shift = layout.strip_shifts(plan, np.zeros(2, int), corner, upright)
     shown = tuple(np.clip(v, 0, plan.exemplar - 1) for v in layout.sources(ends, shift))
@@ -119,8 +120,7 @@ def _strips(sketch: Sketch, corner: Array, upright: bool, used: list, rng) -> li
     if len(fits) < FEW * sketch.tries:  # the best of both is all there is to choose from
         fits = np.argsort(cost, kind="stable")[: FEW * sketch.tries]
     places, cost = places[fits], cost[fits]
-    left = (a + b) // 2  # of the ends: about where the cut runs
-    seen = repeats.nothing(sketch.guide.features[..., :3], n, size, (0, left) if upright else (left, 0))
+    seen = repeats.nothing(sketch.guide.features[..., :3], n, size, (0, ends_at) if upright else (ends_at, 0))
     found = []
     for _ in range(2):
         taken = np.array([strip.place for strip in found], int).reshape(-1, 2)
@@ -138,11 +138,12 @@ def _tiles(sketch: Sketch, places: Places, masks: list, rng) -> list[Tile]:
     n, b = plan.side, plan.strip
     y, x = np.mgrid[:n, :n]
     depth = np.minimum(np.minimum(x, n - 1 - x), np.minimum(y, n - 1 - y))
-    free = cuts.Zone(depth < plan.block, depth >= b, depth >= (plan.block + b) // 2)
+    frame = (plan.block + b) // 2  # how wide it is where a cut does not look
+    free = cuts.Zone(depth < plan.block, depth >= b, depth >= frame)
     zone = _ring_lines(plan)
     size = (n, n)
     choice = patches.sure(sketch.guide, patches.candidates(plan, size, sketch.candidates, rng), size)
-    seen = repeats.nothing(sketch.guide.features[..., :3], n, size, ((plan.block + b) // 2,) * 2)
+    seen = repeats.nothing(sketch.guide.features[..., :3], n, size, (frame, frame))
     found = []
     for tile in progress(range(len(places.centres)), "cut tiles"):
         west, north, east, south = layout.colours(tile)
