@@ -186,10 +186,9 @@ def sweep_cell(values, measured):
 
 def tradeoff_cells():
     """A cell for every setting of every knob, each knob's most accurate first."""
-    asked = config["tradeoff"]
-    size = config["qualities"][asked["base"]["quality"]]["size"]
+    asked, size = config["tradeoff"], settings.tested_size(config)
     return [
-        {"knob": s.knob, "setting": s.shown, "most": s.most, "measure": s.measure}
+        {"knob": s.knob, "setting": s.shown, "most": s.most, "base": s.base, "measure": s.measure}
         | tradeoff_cell(asked["scene"], asked["seed"], s.chosen, size, s.measure)
         for s in settings.settings(config)
     ]

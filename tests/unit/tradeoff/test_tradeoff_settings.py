@@ -38,16 +38,22 @@ def test_a_setting_has_one_name(value, spelled):
 def test_every_setting_is_an_entry_that_differs_in_one_key(config):
     made = settings.entries(config)
     new = set(made["qualities"]) - set(config["qualities"])
-    assert {"reference-size-192", "reference-spacing-1_25", "reference-cap-auto"} < new
+    assert {"draft-size-192", "draft-spacing-1_75", "draft-cap-auto"} < new
     for entry in new:
         differing = {
             key
             for key in made["qualities"][entry]
-            if made["qualities"][entry][key] != made["qualities"]["reference"].get(key)
+            if made["qualities"][entry][key] != made["qualities"]["draft"].get(key)
         }
         assert len(differing) == 1 and f"-{differing.pop()}-" in entry
-    assert made["priors"]["reference-steps-8"]["steps"] == 8
-    assert made["seams"]["reference-variants-2"]["candidates"] == config["seams"]["reference"]["candidates"]
+    assert made["priors"]["terrain-steps-16"]["steps"] == 16
+    assert made["seams"]["semantic-variants-1"]["candidates"] == config["seams"]["semantic"]["candidates"]
+    for table, own in (
+        ("qualities", "draft-size-384"),
+        ("priors", "terrain-steps-8"),
+        ("seams", "semantic-variants-2"),
+    ):
+        assert own not in made[table]  # the base's own values
 
 
 def test_the_entries_are_valid_and_making_them_again_changes_nothing(config):
@@ -62,22 +68,37 @@ def test_a_config_without_a_trade_off_stays_as_it_is(config):
     assert settings.entries(config) == config and settings.settings(config) == []
 
 
-def test_each_knob_starts_with_its_base_and_no_setting_comes_twice(config):
-    config["tradeoff"]["knobs"]["steps"]["values"] = [250, 1000]  # the second is the base's own
+def test_each_knob_has_a_most_accurate_and_a_base_and_no_setting_comes_twice(config):
     found = settings.settings(config)
     knobs = [settings.PRESET, *config["tradeoff"]["knobs"]]
     assert list(dict.fromkeys(s.knob for s in found)) == knobs
     for knob in knobs:
         mine = [s for s in found if s.knob == knob]
         assert [s.most for s in mine] == [True] + [False] * (len(mine) - 1)
+        assert sum(s.base for s in mine) == 1
         assert len({s.shown for s in mine}) == len(mine)
-    assert [(s.shown, s.chosen["quality"]) for s in found if s.knob == "steps"] == [
-        ("1000", "reference"),
-        ("250", "reference-steps-250"),
+    assert [(s.shown, s.chosen["quality"], s.base) for s in found if s.knob == "steps"] == [
+        ("1000", "draft-steps-1000", False),
+        ("400", "draft", True),
+        ("200", "draft-steps-200", False),
+        ("auto", "draft-steps-auto", False),
     ]
     assert [s.shown for s in found if s.knob == "levels"][0] == "auto"
     assert {s.chosen["policy"] for s in found if s.knob == "denoising"} == {"w2-lpips-diverse"}
-    assert {s.chosen["tau"] for s in found if s.knob == "tau"} == {0, 0.6, 1}
+    assert [s.chosen["tau"] for s in found if s.knob == "tau"] == [0, 0.6, 1]
+
+
+def test_the_base_of_a_knob_that_does_not_name_it_is_its_last(config):
+    config["tradeoff"]["knobs"]["steps"]["values"] = [1000, 200]
+    found = [(s.shown, s.most, s.base) for s in settings.settings(config) if s.knob == "steps"]
+    assert found == [("1000", True, False), ("200", False, False), ("400", False, True)]
+
+
+def test_all_are_tested_on_photos_of_the_largest_size(config):
+    assert settings.tested_size(settings.entries(config)) == config["qualities"]["reference"]["size"]
+    config["tradeoff"]["presets"] = ["draft"]
+    config["tradeoff"]["knobs"]["size"]["values"] = [500, 100]
+    assert settings.tested_size(settings.entries(config)) == 500
 
 
 def test_only_the_knobs_that_are_asked_for_are_turned(config):
@@ -107,12 +128,12 @@ def changed(config, path, value):
         pytest.param("tradeoff.presets", ["best"], "tradeoff.presets: there is no quality 'best'", id="no such preset"),
         pytest.param("tradeoff.only", ["caps"], "tradeoff.only: there is no knob 'caps'", id="no such knob"),
         pytest.param("auto.auto.quality", "best", "auto.auto: there is no quality 'best'", id="no such auto"),
-        pytest.param("tradeoff.knobs.cap.values", [5], "reference-cap-5.*: 5 is less", id="out of range"),
-        pytest.param("tradeoff.knobs.degree.values", [9], "reference-degree-9", id="a degree too many"),
+        pytest.param("tradeoff.knobs.cap.values", [5], "draft-cap-5.*: 5 is less", id="out of range"),
+        pytest.param("tradeoff.knobs.degree.values", [9], "draft-degree-9", id="a degree too many"),
         pytest.param("tradeoff.knobs.cap.key", "cup", "there is no key 'cup'", id="a key that entries have not"),
         pytest.param("tradeoff.knobs.tau.values", [1.5], "1.5 is greater", id="tau above 1"),
         pytest.param("tradeoff.knobs.samples.base", {}, "samples: makes no difference to the policy", id="no prior"),
-        pytest.param("qualities.reference-cap-70000", {}, "qualities.reference-cap-70000", id="an empty entry"),
+        pytest.param("qualities.draft-cap-70000", {}, "qualities.draft-cap-70000", id="an empty entry"),
     ],
 )
 def test_what_makes_no_sense_is_named(config, path, value, said):
@@ -122,6 +143,6 @@ def test_what_makes_no_sense_is_named(config, path, value, said):
 
 
 def test_an_entry_of_ones_own_must_not_have_the_name_of_a_setting(config):
-    mine = config["qualities"]["draft"]
-    with pytest.raises(InputError, match="qualities.reference-cap-70000: `tradeoff` makes an entry of this name"):
-        check(changed(config, "qualities.reference-cap-70000", mine), SCHEMA)
+    mine = config["qualities"]["standard"]
+    with pytest.raises(InputError, match="qualities.draft-cap-70000: `tradeoff` makes an entry of this name"):
+        check(changed(config, "qualities.draft-cap-70000", mine), SCHEMA)

@@ -24,20 +24,20 @@ def write(path: Path | str, text: str) -> None:
 
 
 def text(rows: list[dict], pareto: list[dict]) -> str:
-    """rows, pareto: as `tables.read` gives them; a base for every knob."""
+    """rows, pareto: as `tables.read` gives them; the base and a most accurate setting for every knob."""
     base, first = next(row for row in rows if row["base"]), rows[0]
     parts = [
         "# Speed against accuracy",
         "Made by `snakemake tradeoff` from `docs/data/tradeoff.csv`; do not edit. "
         f"Scene `{first['scene']}`, seed {first['seed']:.0f}, on {first['cores']:.0f} cores of {first['processor']}. "
-        f"Each knob is turned by itself; the base, from which losses are counted, has the quality `{base['quality']}`, "
-        f"the seam `{base['seam']}` and tau {base['tau']:g}. Seconds are those of whole jobs from the start views to "
-        "the bundle, without the taking of photos; what settings share counts for each. One scene and one seed: "
+        f"Each knob is turned by itself from the base, which has the quality `{base['quality']}`, the seam "
+        f"`{base['seam']}` and tau {base['tau']:g}; its own settings are bold. Losses are counted from each knob's "
+        "first setting, taken for the most accurate. Seconds are those of whole jobs from the start views to the "
+        "bundle, without the taking of photos; what settings share counts for each. One scene and one seed: "
         "differences of a few hundredths of a decibel are within what another seed changes.",
         "## Presets",
         table(*_presets(pareto)),
         "\n".join(f"- {preset(row)}" for row in pareto if row["knob"] == PRESET),
-        _best(pareto),
         "![PSNR over seconds](figures/tradeoff_pareto.png)",
         "## Knobs",
         *(part for knob in dict.fromkeys(row["knob"] for row in rows) if knob != PRESET for part in _knob(knob, rows)),
@@ -58,27 +58,27 @@ def preset(row: dict) -> str:
     return f"`{row['setting']}` lies behind the front: another setting is as good and faster."
 
 
-def advice(row: dict, base: dict) -> str:
-    """What turning a knob from the base to a setting brings and costs, as a sentence."""
-    unit, own, other = UNITS[row["measure"]], row["own_seconds"], base["own_seconds"]
-    said = f"`{row['knob']}` {row['setting']} instead of {base['setting']}: "
+def advice(row: dict, best: dict) -> str:
+    """What turning a knob from its most accurate setting to another brings and costs, as a sentence."""
+    unit, own, other = UNITS[row["measure"]], row["own_seconds"], best["own_seconds"]
+    said = f"`{row['knob']}` {row['setting']} instead of {best['setting']}: "
     if None in (own, other, row["loss"]):
         return f"{said}not measured."
     lost = row["loss"] if abs(row["loss"]) >= TOLD[unit] else 0.0
     amount = f"{abs(lost):.{DIGITS[unit]}f} {unit}"
     value = {1: f"costs {amount}", 0: "costs nothing", -1: f"is better by {amount}"}[(lost > 0) - (lost < 0)]
     joined = "but" if (own > other) == (lost < 0) and lost else "and"
-    return f"{said}{_pace(own / other)} {joined} {value}{_bytes(row, base)}."
+    return f"{said}{_pace(own / other)} {joined} {value}{_bytes(row, best)}."
 
 
-def _bytes(row: dict, base: dict) -> str:
-    if None in (row["bundle_mb"], base["bundle_mb"]) or abs(row["bundle_mb"] / base["bundle_mb"] - 1) <= SAME:
+def _bytes(row: dict, best: dict) -> str:
+    if None in (row["bundle_mb"], best["bundle_mb"]) or abs(row["bundle_mb"] / best["bundle_mb"] - 1) <= SAME:
         return ""
-    return f"; the bundle is {row['bundle_mb'] / base['bundle_mb']:.2f} times as large"
+    return f"; the bundle is {row['bundle_mb'] / best['bundle_mb']:.2f} times as large"
 
 
 def _pace(share: float) -> str:
-    """share: of the base's time."""
+    """share: of the most accurate setting's time."""
     if abs(share - 1) <= SAME:
         return "is as fast"
     return f"is {1 / share:.2f} times as fast" if share < 1 else f"takes {share:.2f} times as long"
@@ -99,28 +99,19 @@ def _presets(pareto: list[dict]) -> tuple[list[str], list[list[str]]]:
     return head, found
 
 
-def _best(pareto: list[dict]) -> str:
-    """Where a setting beats the base, it is said: the base is the most accurate by intention only."""
-    if not pareto:
-        return ""
-    best, base = max(pareto, key=lambda row: row["psnr"]), next(row for row in pareto if row["base"])
-    if best["psnr"] <= base["psnr"]:
-        return ""
-    return (
-        f"The base is not the most accurate: {best['knob']} {best['setting']} shows test views better by "
-        f"{best['psnr'] - base['psnr']:.2f} dB."
-    )
-
-
 def _knob(knob: str, rows: list[dict]) -> list[str]:
     mine = [row for row in rows if row["knob"] == knob]
-    base, unit = next(row for row in mine if row["base"]), UNITS[mine[0]["measure"]]
+    best, unit = next(row for row in mine if row["most"]), UNITS[mine[0]["measure"]]
     head = ["setting", "seconds", "PSNR (dB)", "LPIPS", f"loss ({unit})", "memory (MB)", "bundle (MB)"]
     form = {"own_seconds": 1, "psnr": 2, "lpips": 3, "loss": DIGITS[unit], "peak_mb": 0, "bundle_mb": 1}
-    shown = [[row["setting"], *(number(row[key], digits) for key, digits in form.items())] for row in mine]
+    bold = {0: "{}", 1: "**{}**"}
+    shown = [
+        [bold[row["base"]].format(row["setting"]), *(number(row[key], digits) for key, digits in form.items())]
+        for row in mine
+    ]
     return [
         f"### {knob}",
-        f"Loss: {WHAT[base['measure']]}; policy `{base['policy']}`.",
+        f"Loss: {WHAT[best['measure']]}; policy `{best['policy']}`.",
         table(head, shown),
-        "\n".join(f"- {advice(row, base)}" for row in mine if not row["base"]),
+        "\n".join(f"- {advice(row, best)}" for row in mine if not row["most"]),
     ]

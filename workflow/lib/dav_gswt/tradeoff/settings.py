@@ -1,7 +1,7 @@
 """Which settings the config's `tradeoff` compares, and the named entries that it makes of them.
 
 A knob turns one key of an entry of `qualities`, `seams` or `priors`; the workflow knows entries by their names only, so
-each setting becomes an entry of its own: the cap 70000 of the quality reference is reference-cap-70000.
+each setting becomes an entry of its own: the cap 70000 of the quality draft is draft-cap-70000.
 Read by the workflow before the first job, so it loads no numerics.
 """
 
@@ -22,7 +22,7 @@ class Setting:
     """A setting of a knob.
 
     shown: its value. chosen: what a cell is made with, keys as in `sweeps.fixed`. measure: what tells its accuracy,
-    views, stills or seams. most: it is the base, taken for the most accurate.
+    views, stills or seams. most: taken for the knob's most accurate. base: the base's own.
     """
 
     knob: str
@@ -30,6 +30,7 @@ class Setting:
     chosen: dict
     measure: str
     most: bool
+    base: bool
 
 
 def name(base: str, key: str, value: int | float | str) -> str:
@@ -38,9 +39,17 @@ def name(base: str, key: str, value: int | float | str) -> str:
 
 
 def settings(config: dict) -> list[Setting]:
-    """Every setting of `tradeoff`, by knob, each knob's base first; no value comes twice."""
+    """Every setting of `tradeoff`, by knob, in the config's order, each knob's most accurate first.
+
+    The base's own value, where a knob does not name it, is its last; no value comes twice.
+    """
     asked = config.get("tradeoff")
     return [setting for each in _knobs(asked) for setting in _of_knob(config, *each)] if asked else []
+
+
+def tested_size(config: dict) -> int:
+    """The size of the photos that all settings are tested on: the largest that one is fitted to. config: `entries`'."""
+    return max(config["qualities"][setting.chosen["quality"]]["size"] for setting in settings(config))
 
 
 def entries(config: dict) -> dict:
@@ -99,27 +108,37 @@ def _knobs(asked: dict) -> Iterator[tuple[str, dict]]:
 
 
 def _of_knob(config: dict, knob: str, turned: dict) -> list[Setting]:
-    base, key = config["tradeoff"]["base"] | turned.get("base", {}), turned.get("key", knob)
-    if table := turned.get("of"):
-        called = CALLED[table]
-        first = config[table][base[called]].get(key, LEFT_OUT.get(key, ""))
-    else:
-        called, first = key, base[key]
-    found = {_spelled(first): Setting(knob, _spelled(first), base, turned["measure"], True)}
-    for value in turned["values"]:
-        chosen = base | {called: name(base[called], key, value) if table else value}
-        found.setdefault(_spelled(value), Setting(knob, _spelled(value), chosen, turned["measure"], False))
+    base, called, key = _turned(config, knob, turned)
+    usual, found = _usual(config, knob, turned), {}
+    for value in [*turned["values"], usual]:
+        chosen = base | {called: name(base[called], key, value) if "of" in turned else value}
+        own = _spelled(value) == _spelled(usual)
+        made = Setting(knob, _spelled(value), base if own else chosen, turned["measure"], not found, own)
+        found.setdefault(made.shown, made)
     return list(found.values())
+
+
+def _turned(config: dict, knob: str, turned: dict) -> tuple[dict, str, str]:
+    """What a knob is turned from, how this calls what the knob changes, and the key of the entry, if it is one."""
+    key = turned.get("key", knob)
+    called = CALLED[turned["of"]] if "of" in turned else key
+    return config["tradeoff"]["base"] | turned.get("base", {}), called, key
+
+
+def _usual(config: dict, knob: str, turned: dict) -> int | float | str:
+    """The base's own value of a knob."""
+    base, called, key = _turned(config, knob, turned)
+    return config[turned["of"]][base[called]].get(key, LEFT_OUT.get(key, "")) if "of" in turned else base[called]
 
 
 def _made(config: dict) -> Iterator[tuple[str, str, str, str, int | float | str]]:
     """Table, name, the entry below, key and value of every entry that is made."""
-    asked = config.get("tradeoff", {"knobs": {}})
-    for knob, turned in asked["knobs"].items():
+    for knob, turned in config.get("tradeoff", {"knobs": {}})["knobs"].items():
         if table := turned.get("of"):
-            below, key = (asked["base"] | turned.get("base", {}))[CALLED[table]], turned.get("key", knob)
-            for value in turned["values"]:
-                yield table, name(below, key, value), below, key, value
+            base, called, key = _turned(config, knob, turned)
+            usual = _spelled(_usual(config, knob, turned))
+            for value in (value for value in turned["values"] if _spelled(value) != usual):
+                yield table, name(base[called], key, value), base[called], key, value
 
 
 def _spelled(value: int | float | str) -> str:

@@ -1,4 +1,4 @@
-"""The table of the trade-off: a row a setting, with what it cost, what it is worth, and what it lost to the base."""
+"""The table of the trade-off: a row a setting, what it cost, is worth, and lost to the most accurate of its knob."""
 
 import csv
 from pathlib import Path
@@ -24,16 +24,18 @@ def rows(cells: list[dict]) -> list[dict]:
     seconds: of all jobs from the start views to the bundle, but the taking of photos; what cells share counts for each.
     own_seconds: of those that the knob can change: all of them where views tell its accuracy, else the jobs on tiles.
     loss: of PSNR in dB (views), of Seam-LPIPS over its floor (seams), or the root mean square difference of the stills
-    in grey levels (stills); 0 for the base, below 0 where a setting is better than it. stills_psnr: empty where equal.
-    cells: what `sweeps.tables.row` reads, with `knob`, `setting`, `most`, `measure` and the paths of `stills`.
+    in grey levels (stills); 0 for what is taken for the most accurate, below 0 where a setting is better than it.
+    stills_psnr: empty where equal. cells: what `sweeps.tables.row` reads, with `knob`, `setting`, `most`, `base`,
+    `measure` and the paths of `stills`.
     """
-    found, base = [], {}
+    found, best = [], {}
     for cell in cells:
         told = measured(cell)
         if cell["most"]:
-            base[cell["knob"]] = cell | told
-        about = {key: cell[key] for key in ("knob", "setting", "measure")} | {"base": int(cell["most"])}
-        found.append(about | told | _lost(cell | told, base[cell["knob"]]) | provenance.machine())
+            best[cell["knob"]] = cell | told
+        about = {key: cell[key] for key in ("knob", "setting", "measure")}
+        about |= {key: int(cell[key]) for key in ("most", "base")}
+        found.append(about | told | _lost(cell | told, best[cell["knob"]]) | provenance.machine())
     return found
 
 
@@ -51,15 +53,15 @@ def total(values) -> float | None:
     return None if None in values else float(sum(values))
 
 
-def _lost(mine: dict, base: dict) -> dict:
-    found = {"loss_lpips": _difference(mine["lpips"], base["lpips"]), "stills_psnr": None}
+def _lost(mine: dict, best: dict) -> dict:
+    found = {"loss_lpips": _difference(mine["lpips"], best["lpips"]), "stills_psnr": None}
     if mine["measure"] == "stills":
-        error = mean_square(mine["stills"], base["stills"])
+        error = mean_square(mine["stills"], best["stills"])
         found["stills_psnr"] = None if error == 0 else float(-10 * np.log10(error))
         return found | {"loss": LEVELS_OF_GREY * float(np.sqrt(error))}
     if mine["measure"] == "seams":
-        return found | {"loss": _difference(mine["seam_lpips"], base["seam_lpips"])}
-    return found | {"loss": _difference(base["psnr"], mine["psnr"])}
+        return found | {"loss": _difference(mine["seam_lpips"], best["seam_lpips"])}
+    return found | {"loss": _difference(best["psnr"], mine["psnr"])}
 
 
 def _difference(a: float | None, b: float | None) -> float | None:
@@ -77,7 +79,7 @@ def pareto(table: list[dict]) -> list[dict]:
     else by how many dB (`behind`) the best that is as fast (`rival_knob`, `rival_setting`) is better."""
     cells = {}
     for row in table:
-        cells.setdefault(tuple(row[key] for key in CELL), row)  # knobs share a base: it is one point
+        cells.setdefault(tuple(row[key] for key in CELL), row)  # knobs share the base: it is one point
     views = [row for row in cells.values() if row["measure"] == "views"]
     known = [row for row in views if None not in (row["seconds"], row["psnr"])]
     if not known:
