@@ -36,6 +36,7 @@ rule measure_seams:
         "<logs>/<seams>/measure_seams.log",
     benchmark:
         "<benchmarks>/<seams>/measure_seams.tsv"
+    priority: -1  # after all jobs of two threads: between them one core would stand idle
     threads: 1  # crops are small: two cells beside each other take half the time
     resources:
         mem_mb=growing(4000),
@@ -91,6 +92,7 @@ rule draw_grid:
         "<logs>/<seams>/draw_grid.log",
     benchmark:
         "<benchmarks>/<seams>/draw_grid.tsv"
+    priority: -1
     threads: 1  # most of it places Gaussians, one cell after another
     resources:
         mem_mb=growing(6000),

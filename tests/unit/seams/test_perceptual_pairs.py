@@ -82,7 +82,7 @@ def test_the_model_observer_judges_what_has_a_seam(sets, monkeypatch):
 def test_more_than_the_exemplar_holds_cannot_be_shown(sets, monkeypatch):
     monkeypatch.setattr(pairs, "TRIED", 20)
     with pytest.raises(InputError, match="only 0 of 1 crops of colour and floor .* smaller `size`"):
-        pairs.drawn(sets, ASKED | {"pairs": [["colour", "floor"]], "crops": 1, "size": 300}, None)
+        pairs.drawn(sets, ASKED | {"pairs": [["colour", "floor"]], "crops": 1, "size": 1200}, None)
 
 
 def test_what_is_written_is_read_again(items, tmp_path):

@@ -18,12 +18,13 @@ SIDE = 48  # pixels of a crop
 MOST = 3  # patches of a crop that are told apart
 FLATTEST = 0.6  # of the sine of the angle at which level ground is seen: what is flatter is not judged
 SEEN = 0.25  # share of a pixel that a patch must have for the pixel to be its
+FEWEST = 128  # cells: of tiles with fewer, a crop shows no larger a share than of one with so many
 
 
 @dataclass(frozen=True)
 class View:
     """How crops are looked at: `down` degrees below the horizon, towards `yaw` degrees from east, a finest cell
-    `pixels` wide; from `floors` eye floors above the ground.
+    `pixels` wide (more where tiles have fewer cells than FEWEST); from `floors` eye floors above the ground.
     """
 
     name: str
@@ -103,7 +104,7 @@ def crop(laid: Laid, terrain: Terrain, view: View, at: tuple[int, int], side: in
     ahead = np.array([np.cos(down) * np.cos(yaw), np.cos(down) * np.sin(yaw), -np.sin(down)])
     far = view.floors * laid.eye_floor / np.sin(down)
     camera = cameras.pinhole(middle - far * ahead, middle, side, side, 60.0)
-    focal = view.pixels * far / laid.spacing
+    focal = view.pixels * max(1.0, FEWEST / laid.plan.side) * far / laid.spacing
     camera = replace(camera, fx=focal, fy=focal)
     normal = np.array([-slope[0], -slope[1], 1.0]) / np.hypot(1.0, np.linalg.norm(slope))
     origin, ray = camera.rays()
