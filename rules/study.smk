@@ -2,8 +2,8 @@
 
 In: what the config's `study` names. Out: results/tables/{timing,lod,sensitivity,ablation}.csv, results/sweeps/*.png,
 results/figures/, figures beside what they show; docs/results.md with docs/figures/study_*.png; the pages of
-`stability` and `tradeoff`. Not part of `all`: `snakemake study` makes it, `snakemake study --report page.html` a page
-of it.
+`stability` and `tradeoff`. Not part of `all`: `snakemake study` makes it, fastest with `--max-threads 1`, a core to each cell;
+`snakemake study --report page.html` a page of it.
 """
 
 

@@ -1,5 +1,6 @@
 """The Slurm profile on a real Slurm of one node: the bytes of the local run, and what happens to cells that fail."""
 
+import csv
 import re
 import shutil
 import subprocess
@@ -14,6 +15,10 @@ from one_node import NotStarted, slurm
 from dav_gswt.files import digest, read_json, write_json
 
 COARSE = "results/desert/seed{}/draft/coarse"
+FEW = (
+    "sweeps: {few: {scenes: [desert], vary: {k: [1, 2]}, fixed: {policy: farthest, rounds: 1}, measure: {views: [0]}}}"
+)
+TABLE = "results/sweeps/few.csv"
 # Beside the profile what this Slurm lacks (accounts, a database), and less time between two looks at the queue.
 SLURM = ["--profile", "workflow/profiles/slurm", "--slurm-status-command", "squeue", "--slurm-no-account"]
 SLURM += ["--slurm-init-seconds-before-status-checks", "4"]
@@ -99,3 +104,26 @@ def test_a_cell_that_fails_is_tried_again_and_stops_no_other(sweep):
     assert not (sweep.folder / COARSE.format(1)).exists()
     assert (sweep.folder / COARSE.format(0) / "metrics.json").is_file()
     assert "lost.png" in (sweep.folder / "results/logs/desert/seed1/draft/coarse/fit_coarse.log").read_text()
+
+
+def test_a_sweep_has_the_numbers_of_the_local_run(submitted, snakemake, tiny, checkout, tmp_path):
+    (few := tmp_path / "few.yaml").write_text(FEW)
+    here = shutil.copytree(tiny.folder, tmp_path / "here", symlinks=True)
+    snakemake(here, "--cores", "2", TABLE, configs=(USUAL, TINY, few))
+    there = checkout(tmp_path / "there")
+    for known in (tiny.photos, tiny.start / "views.json", tiny.coarse):
+        copy = shutil.copytree if known.is_dir() else shutil.copy2
+        (place := there / known.relative_to(tiny.folder)).parent.mkdir(parents=True, exist_ok=True)
+        copy(known, place)
+    done = submitted(there, few, "--", TABLE)
+    assert done.returncode == 0, done.stdout
+    assert "rule update_field" in done.stdout and "rule fit_coarse" not in done.stdout
+    rows = [_numbers(folder / TABLE) for folder in (here, there)]
+    assert rows[0] == rows[1] and [row["k"] for row in rows[1]] == ["1", "2"]
+
+
+def _numbers(path: Path) -> list[dict]:
+    """A sweep's rows but for what jobs cost."""
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    return [{key: row[key] for key in row if not key.endswith("_s") and key != "peak_mb"} for row in rows]
