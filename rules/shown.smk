@@ -61,6 +61,11 @@ def study_figures():
     return found | {"budget": "results/sweeps/budget.png"}
 
 
+def kept_as(name):
+    """The ending of a figure of the study in docs/figures: those of photos are a fifth as large as JPEGs."""
+    return ".jpg" if name.startswith(("evolution", "estimators", "cuts")) else ".png"
+
+
 def captions():
     """What the figures of the study show, in their order."""
     about = {

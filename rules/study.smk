@@ -1,8 +1,8 @@
 """The study: all tables and figures of the paper from our own runs, and docs/results.md, which shows them.
 
 In: what the config's `study` names. Out: results/tables/{timing,lod,sensitivity,ablation}.csv, results/sweeps/*.png,
-results/figures/, figures beside what they show; docs/results.md with docs/figures/study_*.png; the pages of
-`stability` and `tradeoff`. Not part of `all`: `snakemake study` makes it, fastest with `--max-threads 1`, a core to each cell;
+results/figures/, figures beside what they show; docs/results.md with docs/figures/study_*; the pages of `stability`
+and `tradeoff`. Not part of `all`: `snakemake study` makes it, with `--max-threads 1` a core to each cell;
 `snakemake study --report page.html` a page of it.
 """
 
@@ -15,7 +15,7 @@ rule write_results:
     output:
         page="docs/results.md",
         lod="docs/data/lod.csv",
-        figures=[f"docs/figures/study_{name}.png" for name in study_figures()],
+        figures=[f"docs/figures/study_{name}{kept_as(name)}" for name in study_figures()],
     log:
         "<logs>/study/write_results.log",
     benchmark:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from dav_gswt import figures
 from dav_gswt.files import copied
 from dav_gswt.logs import logging_to
 from dav_gswt.tables import results
@@ -9,7 +10,7 @@ from dav_gswt.tables import results
 with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
     for source, target in zip(given.figures, out.figures, strict=True):
-        copied(source, target)
+        figures.kept(source, target)
     copied(given.lod, out.lod)
     shown = {about: f"figures/{Path(path).name}" for about, path in zip(params.shown, out.figures, strict=True)}
     names = ("timing", "lod", "sensitivity", "ablation")

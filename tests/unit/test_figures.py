@@ -1,3 +1,6 @@
+import numpy as np
+import pytest
+
 from dav_gswt import figures, images
 
 
@@ -13,3 +16,12 @@ def test_a_plot_is_a_picture_and_the_same_each_time(tmp_path):
         figures.fit_time({"dunes": rows}, tmp_path / name)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert images.read(tmp_path / "a.png").std() > 0.05
+
+
+@pytest.mark.parametrize("ending", [".png", ".jpg"])
+def test_a_picture_is_kept_as_its_ending_says(tmp_path, ending):
+    picture = np.tile(np.linspace(0, 1, 64, dtype=np.float32)[:, None, None], (1, 48, 3))
+    images.write(tmp_path / "a.png", picture)
+    figures.kept(tmp_path / "a.png", tmp_path / f"b{ending}")
+    assert (tmp_path / f"b{ending}").read_bytes()[:3] == {".png": b"\x89PN", ".jpg": b"\xff\xd8\xff"}[ending]
+    np.testing.assert_allclose(images.read(tmp_path / f"b{ending}"), picture, atol=0.02)

@@ -3,7 +3,10 @@
 import csv
 from pathlib import Path
 
-from dav_gswt.files import whole
+from dav_gswt import images
+from dav_gswt.files import copied, whole
+
+QUALITY = 88  # of JPEGs
 
 
 def write_rows(path: Path | str, rows: list[dict]) -> None:
@@ -36,9 +39,22 @@ def save(figure, path: Path | str) -> None:
     as_photo = Path(path).suffix == ".jpg"
     with whole(path) as part:
         if as_photo:
-            figure.savefig(part, format="jpg", pil_kwargs={"quality": 88})
+            figure.savefig(part, format="jpg", pil_kwargs={"quality": QUALITY})
         else:
             figure.savefig(part, format="png", metadata={"Software": None})
+
+
+def kept(source: Path | str, target: Path | str) -> None:
+    """A picture for docs/: the same file, or as a JPEG, a fifth of the bytes where it shows photos, by the target's
+    ending.
+    """
+    if Path(target).suffix != ".jpg":
+        copied(source, target)
+    else:
+        from matplotlib.image import imsave
+
+        with whole(target) as part:
+            imsave(part, images.read(source), format="jpg", pil_kwargs={"quality": QUALITY})
 
 
 def fit_time(curves: dict[str, list[dict[str, float]]], path: Path | str) -> None:

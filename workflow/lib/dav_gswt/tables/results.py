@@ -34,6 +34,7 @@ ABLATION = {
     "photos": ("photos", 0, None),
     "PSNR (dB)": ("psnr", 2, "psnr"),
     "Seam-LPIPS over its floor": ("seam_lpips", 4, "seam_lpips"),
+    "seam density": ("seam_density", 3, None),
     "scoring (s)": ("score_s", 1, "score_s"),
     "memory (MB)": ("peak_mb", 0, None),
 }
@@ -63,8 +64,8 @@ def text(tables: dict[str, list[dict]], figures: dict[str, str]) -> str:
         "## Timing",
         table(["scene", *_heads(TIMING)], [[row["scene"], *_cells(row, TIMING)] for row in tables["timing"]]),
         "Reconstruction is scoring, choosing and fitting, without the taking of photos; render, sort and update are "
-        "the viewer's, empty where it was not measured. The paper's percentages are left out: it does not say of what "
-        "they are.",
+        "the page's in a headless browser (`docs/data/frames.csv`), which without a graphics card draws in software. "
+        "The paper's percentages are left out: it does not say of what they are.",
         "## Levels of detail",
         table(*_levels(tables["lod"])),
         "## Sensitivity",
@@ -78,6 +79,7 @@ def text(tables: dict[str, list[dict]], figures: dict[str, str]) -> str:
             ["sweep", "variant", *_heads(ABLATION)],
             [[row["sweep"], f"`{row['variant']}`", *_cells(row, ABLATION)] for row in tables["ablation"]],
         ),
+        "Seam density is the share of cuts that run through the strongest quarter of the ground's gradients.",
         "Differences from the baseline, paired by scene and seed: mean, 95 % bootstrap interval, t (degrees of "
         "freedom), p, and p raised for how many variants were compared (Holm).",
         table(*_tested(tables["ablation"])),
