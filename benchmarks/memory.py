@@ -7,6 +7,7 @@ the tab's process and the one that draws, of pages that no other process shares.
 import json
 import sys
 import time
+from collections.abc import Iterator
 
 import made_up
 import psutil
@@ -50,8 +51,7 @@ def measured(playwright, path: str, address: str, script: str) -> dict[str, floa
     """Megabytes that only these processes of a new browser hold, a while after a script of the page came to be true."""
     browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
     tab = Tab(browser, address)
-    while not tab.run(script):
-        time.sleep(OFTEN)
+    next(True for _ in looks() if tab.run(script))
     time.sleep(3)  # what was needed to read only is given back meanwhile
     found = dict.fromkeys(KINDS, 0.0)
     for process in psutil.Process().children(recursive=True):
@@ -60,6 +60,15 @@ def measured(playwright, path: str, address: str, script: str) -> dict[str, floa
             found[kind] += process.memory_full_info().uss / 1e6
     browser.close()
     return found
+
+
+def looks() -> Iterator[None]:
+    """A turn every now and then. Raises: TimeoutError: there were enough."""
+    end = time.monotonic() + LONGEST
+    while time.monotonic() < end:
+        yield
+        time.sleep(OFTEN)
+    raise TimeoutError(f"the page did not answer within {LONGEST} s")
 
 
 class Tab:
@@ -80,12 +89,10 @@ class Tab:
         told = {"expression": script, "awaitPromise": True, "returnByValue": True}
         message = json.dumps({"id": self.asked, "method": "Runtime.evaluate", "params": told})
         self.session.send("Target.sendMessageToTarget", {"sessionId": self.id, "message": message})
-        end = time.monotonic() + LONGEST
-        while self.asked not in self.replies:
-            if time.monotonic() > end:
-                raise TimeoutError(f"the page did not answer within {LONGEST} s")
+        for _ in looks():
             self.session.send("Target.getTargets")  # any question: replies are taken while one waits
-            time.sleep(OFTEN)
+            if self.asked in self.replies:
+                break
         reply = self.replies.pop(self.asked).get("result", {})
         if "exceptionDetails" in reply:
             raise RuntimeError(reply["exceptionDetails"]["exception"].get("description", "the page failed"))
