@@ -197,16 +197,17 @@ def tradeoff_cells():
 def auto_cells():
     """Of each scene of `auto`: the base, then with each of what is chosen by itself alone, then with all of them."""
     asked = config["auto"]
-    chosen, size = asked["auto"], config["qualities"][asked["base"]["quality"]]["size"]
+    chosen, base = asked["auto"], asked["base"]["quality"]
+    size = config["qualities"][settings.sized(config, base)]["size"]
     parts = {
-        "base": {},
-        "fit": {"quality": chosen["quality"]},
+        "base": {"quality": settings.sized(config, base)},
+        "fit": {"quality": settings.sized(config, chosen["quality"])},
         "rounds": {"stop": {"worth": chosen["worth"]}},
         "orders": {"tau": chosen["tau"]},
     }
     parts["all"] = {key: value for part in parts.values() for key, value in part.items()}
     return [
-        {"part": part} | tradeoff_cell(scene, asked["seed"], asked["base"] | own, size, "stills")
+        {"part": part} | tradeoff_cell(scene, asked["seed"], asked["base"] | parts["base"] | own, size, "stills")
         for scene in asked["scenes"]
         for part, own in parts.items()
     ]

@@ -11,7 +11,7 @@ import pytest
 from dav_gswt import field as fields
 from dav_gswt.coarse import bounded, build, ground
 from dav_gswt.field import sh_of
-from dav_gswt.fitting.plan import AUTO, MOST_STEPS_PER_PHOTO, Report
+from dav_gswt.fitting.plan import AUTO, STEPS_PER_NEW_PHOTO, Report
 from dav_gswt.fitting.trainer import Fitted
 
 QUALITY = build.Quality(size=48, spacing=1.0, cap=2000, steps=40, steps_per_photo=12, level_steps=5)
@@ -126,15 +126,13 @@ def test_a_fit_goes_on_for_as_many_steps_twice_at_most(reached, fits, taken, cap
 
     def fit(start, plan):
         asked.append((start, plan.steps))
-        look = {"step": 5, "psnr": 20.0, "gaussians": 1}
-        return Fitted(spoilt(reached[len(asked) - 1]), Report(7, 1, 0, [{"what": len(asked)}], [look]))
+        return Fitted(spoilt(reached[len(asked) - 1]), Report(7, 1, 0, [{"what": len(asked)}]))
 
-    plan = build._plan(replace(QUALITY, steps_per_photo=AUTO), 1)
+    plan = build._plan(QUALITY, 1, 0)
     with caplog.at_level(logging.INFO):
         found = bounded.update(made.field(), spoilt(0.01), photos[:2], photos[2:], plan, fit)
-    assert [steps for _, steps in asked] == [AUTO, 7, 7][:fits] and found.taken == taken
+    assert [steps for _, steps in asked] == [plan.steps, 7, 7][:fits] and found.taken == taken
     assert found.report["steps"] == 7 * fits and [c["what"] for c in found.report["choices"]] == [1, 2, 3][:fits]
-    assert [look["step"] for look in found.report["held_out"]] == [5, 12, 19][:fits]
     assert caplog.text.count("fitting on") == fits - 1
     assert found.report["new_views"]["psnr_before"] == pytest.approx(np.mean(bounded.shown(made.field(), photos[2:])))
     same(found.field, spoilt(reached[fits - 1]) if taken else made.field())
@@ -168,7 +166,12 @@ def test_where_no_earlier_photo_counts_there_is_nothing_to_lose():
     photos = grained(3)
     blind = [replace(v, weight=np.zeros_like(v.weight)) for v in photos[:2]]
     found = bounded.update(
-        made.field(), made.field(), blind, photos[2:], build._plan(QUALITY, 1), lambda *_: Fitted(spoilt(0.3), Report())
+        made.field(),
+        made.field(),
+        blind,
+        photos[2:],
+        build._plan(QUALITY, 1, 0),
+        lambda *_: Fitted(spoilt(0.3), Report()),
     )
     assert found.taken and found.report["earlier_views"]["psnr_before"] is None
 
@@ -178,7 +181,8 @@ def test_what_may_be_lost_grows_with_every_doubling_of_the_photos():
     assert more == [0, bounded.DOUBLED, 2 * bounded.DOUBLED, 0]
 
 
-def test_steps_are_bounded_for_each_new_photo():
-    assert build._plan(QUALITY, 3).steps == 36
-    found = build._plan(replace(QUALITY, steps_per_photo=AUTO), 3)
-    assert found.steps == AUTO and found.most_steps == 3 * MOST_STEPS_PER_PHOTO
+def test_an_update_takes_so_many_steps_for_each_new_photo_and_keeps_the_degree_that_was_found():
+    assert build._plan(QUALITY, 3, 0).steps == 36
+    found = build._plan(replace(QUALITY, steps_per_photo=AUTO, degree=AUTO), 3, 1)
+    assert found.steps == 3 * STEPS_PER_NEW_PHOTO and found.degree == 1
+    assert build._plan(QUALITY, 3, 1).degree == QUALITY.degree

@@ -9,7 +9,7 @@ from dav_gswt.coarse import maps
 from dav_gswt.coarse.rules import OnGround
 from dav_gswt.coarse.things import blobs
 from dav_gswt.field import joined, sh_of
-from dav_gswt.fitting import held_out, snapshot, trainer
+from dav_gswt.fitting import snapshot, trainer
 from dav_gswt.fitting.plan import Plan
 
 
@@ -88,12 +88,8 @@ class Killed(Exception):
     pass
 
 
-@pytest.mark.parametrize("plan", [Plan(30, 1400, degree=1), Plan("auto", "auto", "auto")], ids=["numbers", "auto"])
+@pytest.mark.parametrize("plan", [Plan(30, 1400, degree=1), Plan(30, "auto", "auto")], ids=["numbers", "auto"])
 def test_a_killed_fit_goes_on_from_its_snapshot_and_ends_with_the_same_field(plan, tmp_path, monkeypatch):
-    monkeypatch.setattr(held_out, "GAIN", 10.0)  # nothing pays: the search is short
-    monkeypatch.setattr("dav_gswt.fitting.search.GAIN", 10.0)
-    monkeypatch.setattr("dav_gswt.fitting.search.WINDOW", 9)
-    monkeypatch.setattr("dav_gswt.fitting.search.LEAST_SETTLING", 6)
     whole = fitted(plan=plan)
     monkeypatch.setattr(snapshot, "EVERY", 0.0)  # after every step
     advance, count = trainer._advance, [0]
@@ -122,21 +118,40 @@ def test_a_snapshot_that_is_none_costs_nothing(tmp_path, monkeypatch, caplog):
     assert "begins anew" in caplog.text
 
 
-def test_what_is_chosen_is_told_with_its_reason(monkeypatch):
-    monkeypatch.setattr("dav_gswt.fitting.search.WINDOW", 60)
-    monkeypatch.setattr("dav_gswt.fitting.search.GAIN", 0.5)  # such short windows are noisy
-    found = fitted(plan=Plan("auto", "auto", "auto", most_steps=600))
+def test_what_is_chosen_is_told_with_its_reason():
+    found = fitted(plan=Plan(60, "auto", "auto"))
     report = found.report
-    assert {choice["what"] for choice in report.choices} >= {"steps", "cap", "degree"}
-    assert all("dB" in choice["why"] or "most" in choice["why"] for choice in report.choices)
-    assert report.steps == [c["value"] for c in report.choices if c["what"] == "steps"][0]
-    assert report.degree == [c["value"] for c in report.choices if c["what"] == "degree"][0]
+    assert {choice["what"]: choice["value"] for choice in report.choices} == {
+        "cap": len(found.field),
+        "degree": report.degree,
+    }
     assert found.field.sh.shape[1] == (report.degree + 1) ** 2
+    assert [row["degree"] for row in report.held_out] == [0, 1]
+
+
+def test_without_a_number_a_field_grows_where_errors_are_visible_and_not_where_none_are():
+    photos = made.photos()
+    rng = np.random.default_rng(5)
+    rough = [replace(p, image=p.image + rng.normal(0, 0.3, p.image.shape).astype(np.float32)) for p in photos]
+    grown, same_size = (
+        len(fitted(blotched(made.field()), Plan(60, "auto"), photos=p).field) for p in (rough, made.photos())
+    )
+    assert grown > same_size
+
+
+def test_what_hardly_shows_in_any_photo_goes_before_the_end():
+    points = np.array([[1.6, 1.6, 0.1], [1.4, 1.4, 0.1]])
+    field = joined([made.field(), blobs(points, np.full((2, 3), 0.5), np.full(2, 0.05), logit=0.0)])
+    field.opacity_logits[-1] = -3.7  # an opacity of .024, above that with which a Gaussian stays
+    found = fitted(field, Plan(10, 1)).field
+    assert len(found) == len(field) - 1 and np.abs(found.means[-1, :2] - 1.6).max() < 0.1
 
 
 def test_a_plan_refuses_what_makes_no_sense():
     with pytest.raises(ValueError, match="degree is 4"):
         Plan(10, 10, 4)
+    with pytest.raises(ValueError, match="steps is -1"):
+        Plan(-1, 10)
     with pytest.raises(ValueError, match="half_share"):
         Plan(10, 10, half_share=1.0)
     with pytest.raises(ValueError, match="at least one view"):

@@ -38,13 +38,10 @@ def test_a_setting_has_one_name(value, spelled):
 def test_every_setting_is_an_entry_that_differs_in_one_key(config):
     made = settings.entries(config)
     new = set(made["qualities"]) - set(config["qualities"])
-    assert {"draft-size-192", "draft-spacing-1_75", "draft-cap-auto"} < new
+    assert {"draft-size-192", "draft-spacing-1_75", "draft-cap-auto", "reference-size-384", "auto-size-384"} < new
     for entry in new:
-        differing = {
-            key
-            for key in made["qualities"][entry]
-            if made["qualities"][entry][key] != made["qualities"]["draft"].get(key)
-        }
+        below = made["qualities"][entry.split("-")[0]]
+        differing = {key for key, value in made["qualities"][entry].items() if value != below.get(key)}
         assert len(differing) == 1 and f"-{differing.pop()}-" in entry
     assert made["priors"]["terrain-steps-16"]["steps"] == 16
     assert made["seams"]["semantic-variants-1"]["candidates"] == config["seams"]["semantic"]["candidates"]
@@ -63,9 +60,17 @@ def test_the_entries_are_valid_and_making_them_again_changes_nothing(config):
     assert all(len(made[table]) > len(config[table]) for table in settings.CALLED)
 
 
-def test_a_config_without_a_trade_off_stays_as_it_is(config):
-    del config["tradeoff"]
+def test_a_config_that_compares_nothing_stays_as_it_is(config):
+    del config["tradeoff"], config["auto"]
     assert settings.entries(config) == config and settings.settings(config) == []
+
+
+def test_what_auto_compares_is_fitted_to_photos_of_one_size(config):
+    assert settings.sized(config, "reference") == "reference-size-384"
+    assert settings.sized(config, "draft") == "draft"  # its own size
+    del config["auto"]["size"]
+    assert settings.sized(config, "reference") == "reference"
+    assert "reference-size-384" not in settings.entries(config)["qualities"]
 
 
 def test_each_knob_has_a_most_accurate_and_a_base_and_no_setting_comes_twice(config):
@@ -144,5 +149,5 @@ def test_what_makes_no_sense_is_named(config, path, value, said):
 
 def test_an_entry_of_ones_own_must_not_have_the_name_of_a_setting(config):
     mine = config["qualities"]["standard"]
-    with pytest.raises(InputError, match="qualities.draft-cap-70000: `tradeoff` makes an entry of this name"):
+    with pytest.raises(InputError, match="qualities.draft-cap-70000: `tradeoff` or `auto` makes an entry of this name"):
         check(changed(config, "qualities.draft-cap-70000", mine), SCHEMA)

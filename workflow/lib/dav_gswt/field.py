@@ -46,6 +46,11 @@ class Field:
         return Field(*(getattr(self, f.name)[index] for f in fields(self)))
 
     @property
+    def degree(self) -> int:
+        """Degree of the spherical harmonics."""
+        return int(np.sqrt(self.sh.shape[1])) - 1
+
+    @property
     def base_colours(self) -> Float32[Array, "n 3"]:
         """Colour without its view-dependent part."""
         return 0.5 + np.float32(SH0) * self.sh[:, 0]

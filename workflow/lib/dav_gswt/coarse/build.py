@@ -19,7 +19,7 @@ from dav_gswt.coarse.rules import OnGround
 from dav_gswt.coarse.sweep import Relief, sweep
 from dav_gswt.field import Field
 from dav_gswt.fitting import exposure, trainer
-from dav_gswt.fitting.plan import AUTO, MOST_GAUSSIANS, MOST_STEPS_PER_PHOTO, Count, Plan
+from dav_gswt.fitting.plan import AUTO, MOST_GAUSSIANS, STEPS_PER_NEW_PHOTO, STEPS_PER_PHOTO, Count, Plan
 from dav_gswt.fitting.rules import Anywhere, Rules
 from dav_gswt.fitting.sampling import median_colours
 from dav_gswt.fitting.state import State
@@ -96,7 +96,7 @@ def fit(
     )
     _log.info("things: %d Gaussians over %.1f %% of the ground", len(stand), 100 * scene.relief.stands.mean())
     rules = _rules(grid, scene.relief, stand, frame)
-    plan = Plan(quality.steps, quality.cap, quality.degree, pose_rate=quality.pose_rate)
+    plan = Plan(_steps(quality, views), quality.cap, quality.degree, pose_rate=quality.pose_rate)
     masked = sky.behind(scene.views, modelled(scene.views, grid))
     fitted = trainer.fit(start, masked, plan, rules, rng, "fit coarse field", keep, watch)
     return _made(fitted, grid, masked)
@@ -126,7 +126,9 @@ def refine(
         return trainer.fit(start, begun.views, plan, begun.rules, rng, f"fit {len(new)} new photos", keep)
 
     n = len(before)
-    found = bounded.update(field, begun.field, begun.views[:n], begun.views[n:], _plan(quality, len(new)), on)
+    found = bounded.update(
+        field, begun.field, begun.views[:n], begun.views[n:], _plan(quality, len(new), field.degree), on
+    )
     if not found.taken:
         return Made(field, grid, found.report)
     return replace(_finished(found.field, begun.grid, begun.views), report=found.report)
@@ -164,11 +166,17 @@ def _begun(
     return _Begun(replace(field, sh=sh), grid, masked, _rules(grid, scene.relief, there, frame))
 
 
-def _plan(quality: Quality, new: int) -> Plan:
-    """What an update may spend: so many steps for each new photo."""
-    given, most = quality.steps_per_photo, MOST_STEPS_PER_PHOTO * new
-    steps = AUTO if given == AUTO else given * new
-    return Plan(steps, quality.cap, quality.degree, pose_rate=quality.pose_rate, most_steps=most)
+def _steps(quality: Quality, views: list[View]) -> int:
+    """How many a first fit takes."""
+    return STEPS_PER_PHOTO * len(views) if quality.steps == AUTO else quality.steps
+
+
+def _plan(quality: Quality, new: int, degree: int) -> Plan:
+    """What an update may spend: so many steps for each new photo. degree: of the field, which "auto" keeps."""
+    each = STEPS_PER_NEW_PHOTO if quality.steps_per_photo == AUTO else quality.steps_per_photo
+    return Plan(
+        each * new, quality.cap, degree if quality.degree == AUTO else quality.degree, pose_rate=quality.pose_rate
+    )
 
 
 @dataclass(frozen=True)
@@ -209,7 +217,7 @@ def _without_ground(grid, views, points, colours, quality, rng, keep, watch) -> 
     start = things.blobs(points, colours, np.clip(0.5 * apart, 1e-6, None), logit=0.0)
     if quality.cap != AUTO:
         start = start[: quality.cap]
-    plan = Plan(quality.steps, quality.cap, quality.degree, HALF_SHARE, quality.pose_rate)
+    plan = Plan(_steps(quality, views), quality.cap, quality.degree, HALF_SHARE, quality.pose_rate)
     rules = Anywhere(float(np.median(apart)), _extent(points))
     return _made(trainer.fit(start, views, plan, rules, rng, "fit free field", keep, watch), grid, views)
 

@@ -8,7 +8,7 @@ error that the photos carry back onto them, not by opacity: more detail where it
 from math import comb
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Float32, Int
 from numpy import ndarray as Array
 
 from dav_gswt.fitting.state import NAMES, State
@@ -17,6 +17,7 @@ DEAD = 0.005  # opacity below which a Gaussian shows nothing
 MOST_COPIES = 8  # of one source at a time
 CHILD = np.log(0.5)  # a detail on the ground starts at half its disc's size
 SHAKE = 0.3  # standard deviations that a transparent Gaussian is shaken a step, at the start
+LOOSE = DEAD + np.log(99) / 100  # opacity from which none is shaken: its share of the strength would be under .01
 
 
 def opacities(logits: Float[Array, "n"]) -> Float[Array, "n"]:
@@ -52,20 +53,22 @@ def grow(
 def shake(state: State, fixed: int, strength: float, rng: np.random.Generator) -> None:
     """Move nearly transparent free Gaussians at random within themselves; opaque ones stay."""
     values = state.values
-    loose = 1 / (1 + np.exp(100 * (opacities(values["opacity_logits"][fixed:]) - DEAD)))
-    rows = np.flatnonzero(loose > 0.01)
+    rows = fixed + np.flatnonzero(values["opacity_logits"][fixed:] < np.log(LOOSE / (1 - LOOSE)))
     if not len(rows):
         return
-    noise = rng.normal(size=(len(rows), 3)) * (strength * loose[rows, None])
-    values["means"][fixed + rows] += along(values, fixed + rows, noise)
+    loose = 1 / (1 + np.exp(100 * (opacities(values["opacity_logits"][rows]) - DEAD)))
+    noise = rng.standard_normal((len(rows), 3), np.float32) * (strength * loose[:, None]).astype(np.float32)
+    values["means"][rows] += along(values, rows, noise)
 
 
-def along(values: dict[str, Array], rows: Int[Array, "m"], steps: Float[Array, "m 3"]) -> Float[Array, "m 3"]:
+def along(values: dict[str, Array], rows: Int[Array, "m"], steps: Float[Array, "m 3"]) -> Float32[Array, "m 3"]:
     """Steps given in standard deviations along a Gaussian's own axes, in the world."""
-    w, x, y, z = (values["quats"][rows] / np.linalg.norm(values["quats"][rows], axis=1, keepdims=True)).T
-    s = steps * np.exp(values["log_scales"][rows])
-    u = np.stack([x, y, z], 1)
-    return (s + 2 * np.cross(u, np.cross(u, s) + w[:, None] * s)).astype(np.float32)
+    quats = values["quats"][rows]
+    w, x, y, z = (quats / np.sqrt(np.einsum("mi,mi->m", quats, quats))[:, None]).T
+    a, b, c = (steps * np.exp(values["log_scales"][rows])).T
+    p, q, r = y * c - z * b + w * a, z * a - x * c + w * b, x * b - y * a + w * c  # u x s + w s; then s + 2 u x that
+    moved = [a + 2 * (y * r - z * q), b + 2 * (z * p - x * r), c + 2 * (x * q - y * p)]
+    return np.stack(moved, 1).astype(np.float32)
 
 
 def split(opacity: Float[Array, "n"], parts: Int[Array, "n"]) -> tuple[Float[Array, "n"], Float[Array, "n"]]:

@@ -52,8 +52,14 @@ def tested_size(config: dict) -> int:
     return max(config["qualities"][setting.chosen["quality"]]["size"] for setting in settings(config))
 
 
+def sized(config: dict, quality: str) -> str:
+    """The entry that is this quality at the size of the config's `auto`."""
+    size = config["auto"].get("size", config["qualities"][quality]["size"])
+    return quality if config["qualities"][quality]["size"] == size else name(quality, "size", size)
+
+
 def entries(config: dict) -> dict:
-    """The config with the entries that its `tradeoff` names; what it holds already stays as it is.
+    """The config with the entries that its `tradeoff` and `auto` name; what it holds already stays as it is.
 
     Raises: InputError: the config has another entry of such a name.
     """
@@ -61,7 +67,9 @@ def entries(config: dict) -> dict:
     for table, entry, below, key, value in _made(config):
         found = config[table][below] | {key: value}
         if made[table].setdefault(entry, found) != found:
-            raise InputError(f"config: {table}.{entry}: `tradeoff` makes an entry of this name; give yours another")
+            raise InputError(
+                f"config: {table}.{entry}: `tradeoff` or `auto` makes an entry of this name; give yours another"
+            )
     return config | made
 
 
@@ -139,6 +147,16 @@ def _made(config: dict) -> Iterator[tuple[str, str, str, str, int | float | str]
             usual = _spelled(_usual(config, knob, turned))
             for value in (value for value in turned["values"] if _spelled(value) != usual):
                 yield table, name(base[called], key, value), base[called], key, value
+    for quality in _of_auto(config):
+        if (made := sized(config, quality)) != quality:
+            yield "qualities", made, quality, "size", config["auto"]["size"]
+
+
+def _of_auto(config: dict) -> list[str]:
+    """The qualities that `auto` compares; one that does not exist is `check`'s to tell."""
+    asked = config.get("auto")
+    named = [asked[part]["quality"] for part in ("base", "auto")] if asked else []
+    return [quality for quality in named if quality in config["qualities"]]
 
 
 def _spelled(value: int | float | str) -> str:

@@ -1,0 +1,50 @@
+"""When rates fall, when Gaussians grow and how many they may be."""
+
+from dataclasses import dataclass
+
+from dav_gswt.fitting.plan import AUTO, MOST_GAUSSIANS, Plan
+
+SETTLED = 0.1  # of the rates at the start are left at the end
+EVENTS = 10  # growth events of a fit
+GROWN = 0.7  # of the steps: growth ends there
+PRUNED = 0.8  # of the steps: then goes what shows nothing, and what stays makes up for it in those left
+GROWTH = 0.25  # of the Gaussians there are, at most, at an event of a growth without a number
+VISIBLE = 0.011  # error of one pixel that is worth a Gaussian where their number is to be found, of colours 0 to 1
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Of a fit; known before its first step. start: Gaussians it begins with: as many as the cap, and none moves or
+    is added."""
+
+    plan: Plan
+    start: int
+
+    def rate(self, step: int) -> float:
+        """Factor of all rates: 1, falling to SETTLED."""
+        return SETTLED ** (step / max(1, self.plan.steps))
+
+    def to_growth(self, step: int) -> int | None:
+        """Steps from this one to the next growth, 0: it is due now; None: none comes any more."""
+        due = max(1, -(-step // self._every)) * self._every
+        grows = self.plan.cap == AUTO or self.plan.cap > self.start
+        return due - step if grows and due <= GROWN * self.plan.steps else None
+
+    def prunes(self, step: int) -> bool:
+        """What shows nothing goes at this step."""
+        return step == int(PRUNED * self.plan.steps)
+
+    def cap(self, step: int, now: int, error: float) -> int:
+        """How many Gaussians there may be after growing at this step.
+
+        error: squared error that a photo shows, summed over the Gaussians: where no number is given one Gaussian is
+        worth VISIBLE**2 of it.
+        """
+        if self.plan.cap == AUTO:
+            return max(now, min(MOST_GAUSSIANS, int(now * (1 + GROWTH)), int(error / VISIBLE**2)))
+        left = max(1, int(self.plan.steps * GROWN) // self._every - step // self._every + 1)
+        return now + max(0, int(self.plan.cap) - now) // left
+
+    @property
+    def _every(self) -> int:
+        return max(1, int(self.plan.steps * GROWN) // EVENTS)
