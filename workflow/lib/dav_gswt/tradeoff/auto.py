@@ -55,6 +55,7 @@ def _row(mine: dict, base: dict) -> dict:
         "loss_lpips": _less(mine["lpips"], base["lpips"]),
     }
     found = {key: mine[key] for key in ("scene", "seed", "part")} | {"chosen": chosen(mine)}
+    found |= {"quality": mine["quality"], "fixed_quality": base["quality"]}
     saved = None if None in (seconds, fixed) else 1 - seconds / fixed
     found |= {"seconds": seconds, "fixed_seconds": fixed, "saved": saved}
     found |= lost | {"difference": 255 * mean_square(mine["stills"], base["stills"]) ** 0.5}
@@ -81,7 +82,8 @@ def text(rows: list[dict]) -> str:
     parts = [
         "# Only what the scene requires",
         "Made by `snakemake docs/auto.md` from `docs/data/auto.csv`; do not edit. What `auto` chose instead of fixed "
-        f"settings, seed {first['seed']:.0f}, on {first['cores']:.0f} cores of {first['processor']}: seconds of whole "
+        f"settings (quality `{first['fixed_quality']}`, all rounds, all pre-sorted orders; see config/README.md), "
+        f"seed {first['seed']:.0f}, on {first['cores']:.0f} cores of {first['processor']}: seconds of whole "
         "jobs from the start views to the bundle, without the taking of photos. Wanted is at least a third less time "
         f"for at most {MOST_DB:g} dB and {MOST_LPIPS:g} LPIPS. How many candidates are scored is not chosen by itself.",
         _reached(rows),

@@ -15,7 +15,7 @@ TILE_JOBS = ("levels_s", "cut_s", "bundle_s")
 LEVELS_OF_GREY = 255
 UNITS = {"views": "dB", "stills": "grey levels", "seams": "LPIPS"}  # of a loss
 TEXTS = ("scene", "knob", "setting", "measure", "quality", "policy", "prior", "seam", "psnr_is", "version", "renderer")
-TEXTS += ("field", "tiles", "processor", "part", "chosen", "rival_knob", "rival_setting")
+TEXTS += ("fixed_quality", "field", "tiles", "processor", "part", "chosen", "rival_knob", "rival_setting")
 
 
 def rows(cells: list[dict]) -> list[dict]:
