@@ -8,8 +8,9 @@
 import { inSight } from "./sight.js";
 import { REACH } from "./terrain.js";
 
-// Exponent: the reach shrinks by the factor's fifth root. On one scene, 20k to 100k Gaussians, against 1/2: a walker's
-// picture gains 0.2 to 0.7 dB, one from a hill loses up to 0.25 dB.
+// Exponent: the reach shrinks by the factor's fifth root. Desert, for development, 20k and 50k Gaussians: against 1/2 a
+// walker's picture loses 0.46 and 0.44 dB and one from six times as high gains 0.64 and 0.45; against 0, with the far
+// ground always there, the walker's gains 0.03 and 0.65 and the other loses 0 and 0.07.
 const NEARER = 1 / 5;
 const HALVINGS = 12; // steps of the search for the factor
 const NEVER = -1; // distance to which a level is drawn that is not drawn
