@@ -47,6 +47,7 @@ def test_what_is_left_to_the_next_growth_counts_down_to_it(steps, step):
 
 def test_a_field_that_is_as_large_as_it_may_be_stays_as_it_is():
     assert grown(Plan(100, 50), 50) == ([], 50)
+    assert not any(Schedule(Plan(100, 50), 50).prunes(step) for step in range(101))
 
 
 def test_rates_fall_to_what_is_left_of_them():

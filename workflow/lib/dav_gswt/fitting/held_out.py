@@ -5,8 +5,9 @@ from jaxtyping import Bool, Float32
 from numpy import ndarray as Array
 
 SHARE = 0.04  # of the pixels
-BLOCK = 32  # pixels a side of what is held out at once: within fewer the photo itself tells what is there, which no new
-# view can (desert and meadow, for development: with 8 more steps never seemed to pay where new views got better)
+# Pixels a side of what is held out at once: within fewer the photo itself tells what is there, which no new view can.
+# Desert, for development, 300 to 450 steps with twice the Gaussians: new views gain .10 dB; 32: +.14, 8: -.07.
+BLOCK = 32
 GAIN = 0.05  # dB that a degree of the spherical harmonics must bring
 
 

@@ -6,8 +6,8 @@ from typing import Literal
 AUTO = "auto"
 Count = int | Literal["auto"]  # a number, or: as many as the photos ask for
 
-# Of a first fit whose steps are "auto". Of 8 photos, for development, LPIPS of desert and meadow: 50 .096, .358; 75
-# .087, .308; 125 .099 on desert, with 1.5 dB less: more steps fit the photos' noise.
+# Of a first fit whose steps are "auto": 8 photos, cap 500k, LPIPS of desert and meadow, for development: 56 .088, .335;
+# 75 .086, .308. 150 were worse than 75 on desert, by .004 and .3 dB (before haze was pruned): they fit noise.
 STEPS_PER_PHOTO = 75
 STEPS_PER_NEW_PHOTO = 40  # of an update, for each new photo; the paper takes 5000
 MOST_GAUSSIANS = 2_000_000  # of a fit that finds its own cap

@@ -1,4 +1,4 @@
-"""When rates fall, when Gaussians grow and how many they may be."""
+"""When rates fall, when Gaussians grow and how many they may be, when those that show nothing go."""
 
 from dataclasses import dataclass
 
@@ -14,8 +14,10 @@ VISIBLE = 0.011  # error of one pixel that is worth a Gaussian where their numbe
 
 @dataclass(frozen=True)
 class Schedule:
-    """Of a fit; known before its first step. start: Gaussians it begins with: as many as the cap, and none moves or
-    is added."""
+    """Of a fit; known before its first step.
+
+    start: Gaussians it begins with: with as many as the cap none jumps, is added or goes, as in the fit of a level.
+    """
 
     plan: Plan
     start: int
@@ -27,12 +29,11 @@ class Schedule:
     def to_growth(self, step: int) -> int | None:
         """Steps from this one to the next growth, 0: it is due now; None: none comes any more."""
         due = max(1, -(-step // self._every)) * self._every
-        grows = self.plan.cap == AUTO or self.plan.cap > self.start
-        return due - step if grows and due <= GROWN * self.plan.steps else None
+        return due - step if self._grows and due <= GROWN * self.plan.steps else None
 
     def prunes(self, step: int) -> bool:
         """What shows nothing goes at this step."""
-        return step == int(PRUNED * self.plan.steps)
+        return self._grows and step == int(PRUNED * self.plan.steps)
 
     def cap(self, step: int, now: int, error: float) -> int:
         """How many Gaussians there may be after growing at this step.
@@ -44,6 +45,10 @@ class Schedule:
             return max(now, min(MOST_GAUSSIANS, int(now * (1 + GROWTH)), int(error / VISIBLE**2)))
         left = max(1, int(self.plan.steps * GROWN) // self._every - step // self._every + 1)
         return now + max(0, int(self.plan.cap) - now) // left
+
+    @property
+    def _grows(self) -> bool:
+        return self.plan.cap == AUTO or self.plan.cap > self.start
 
     @property
     def _every(self) -> int:

@@ -170,8 +170,8 @@ def _descend(run: Run, task: Task, index: int) -> None:
     seen = task.raster.forward(**run.state.values, camera=camera)
     behind = _behind(view, run.rng.uniform(0, 1, 3).astype(np.float32))
     shown, gain = _exposed(run, index, seen, behind, view)
-    ahead = task.schedule.to_growth(run.step)
-    if ahead is not None and ahead <= min(LOOKS, len(task.views)):
+    ahead = task.schedule.to_growth(run.step + 1)  # steps after this one
+    if ahead is not None and ahead < min(LOOKS, len(task.views)):
         run.residual.note(task.raster, shown - view.image, weight)
     _, gradient = raster.loss(shown, view.image, weight, STRUCTURE)
     gradient = np.ascontiguousarray(gradient * gain)

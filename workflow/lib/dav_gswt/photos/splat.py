@@ -43,7 +43,7 @@ def enter(field: Field, rng: np.random.Generator, up: Sequence = UP) -> tuple[Fi
     direction = np.asarray(up, float)
     if direction.shape != (3,) or not np.linalg.norm(direction) > 0 or not np.isfinite(direction).all():
         raise InputError(f"up: {list(up)} is no direction; give three numbers that are not all 0")
-    before, degree = len(field), int(field.sh.shape[1] ** 0.5) - 1
+    before, degree = len(field), field.degree
     if degree > 0:
         _log.warning("view-dependent colour (degree %d) is dropped: the colour from all sides is kept", degree)
         field = replace(field, sh=np.ascontiguousarray(field.sh[:, :1]))
