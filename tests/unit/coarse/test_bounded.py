@@ -62,7 +62,8 @@ def test_ordinary_photos_are_taken_and_both_sides_are_told(frame):
 
 @pytest.mark.parametrize("wrong", [upside_down, another_place])
 @pytest.mark.parametrize("frame", [made.FRAME, SYNTHETIC], ids=["photos", "synthetic"])
-def test_photos_that_contradict_the_others_change_nothing(wrong, frame, caplog):
+def test_photos_that_contradict_the_others_change_nothing(wrong, frame, caplog, monkeypatch):
+    monkeypatch.setattr(bounded, "CLEAR", 50.0)  # the made-up ground is shown at 42 dB
     photos = grained(4)
     found = refined(photos[:1], [wrong(view) for view in photos[1:]], frame=frame)
     earlier, new = found.report["earlier_views"], found.report["new_views"]
@@ -160,6 +161,21 @@ def test_the_sky_behind_the_field_is_part_of_its_picture():
     behind = np.random.default_rng(0).random(view.image.shape).astype(np.float32)
     shown = bounded.shown(empty, [replace(view, image=behind, behind=behind)])
     assert shown == [bounded.SAME] and bounded.shown(empty, [replace(view, image=behind)])[0] < 20
+
+
+@pytest.mark.parametrize(
+    "before, after, lost",
+    [
+        pytest.param([30.0, 32.0], [29.0, 28.0], 2.5, id="the mean"),
+        pytest.param([46.0, 44.0], [40.5, 41.0], 0.0, id="noise that was fitted is given up"),
+        pytest.param([44.0, 30.0], [38.0, 30.0], 1.0, id="each photo by itself, what is below CLEAR"),
+        pytest.param([None, 30.0], [None, 28.0], 2.0, id="one that does not count"),
+        pytest.param([None], [None], 0.0, id="none that counts"),
+        pytest.param([30.0], [33.0], -3.0, id="a gain"),
+    ],
+)
+def test_losses_count_where_they_can_be_seen(before, after, lost):
+    assert bounded.lost(before, after) == lost
 
 
 def test_where_no_earlier_photo_counts_there_is_nothing_to_lose():
