@@ -59,6 +59,42 @@ def test_what_stands_is_found_where_it_stands_and_as_high_as_it_is(found):
     assert np.median(np.abs(found.above[top] - TALL)) < found.step
 
 
+def flicker(eye, seed):
+    """Nearly plain sand, and in the middle what looks otherwise in every photo, as thin leaves do."""
+    view = photo(eye)
+    origin, step = view.camera.rays()
+    t = -origin[..., 2] / step[..., 2]
+    x, y = origin[..., 0] + t * step[..., 0], origin[..., 1] + t * step[..., 1]
+    leaves = (np.hypot(x - 1.6, y - 1.6) < 0.25)[..., None]
+    look = np.random.default_rng(seed).uniform(0, 1, (*x.shape, 3))
+    return replace(view, image=np.where(leaves, look, 0.5 + 0.04 * (texture(x, y, 2) - 0.5)).astype(np.float32))
+
+
+def test_sand_that_looks_like_sand_is_no_tower_over_what_no_two_photos_show_alike():
+    eyes = [(0, 0), (0.9, 0), (-0.9, 0), (0, 0.9), (0, -0.9), (0.6, 0.6), (-0.6, 0.6)]
+    views = [flicker([1.6 + x, 1.6 + y, 4.0], i) for i, (x, y) in enumerate(eyes)]
+    found = sweep.sweep(made.grid(0.05), views, flying_height=4.0, pixel=0.04)
+    assert found.above.max() < 0.25  # of 1.2 that are tried
+
+
+def test_nothing_is_a_column():
+    above = np.zeros((20, 20))
+    above[2:10, 2:10] = 0.2  # a bush, 8 cells of .1 wide, ...
+    above[5, 5] = above[5, 6] = 1.5  # ... and over it what is not even .2 wide
+    above[12:18, 12:18] = 1.5  # a tree
+    found = sweep.stout(above > 0, above, 0.1)
+    assert found[12:18, 12:18].all() and found[2:10, 2:10].sum() == 62 and found.sum() == 98
+    assert not sweep.stout(np.zeros((4, 4), bool), np.zeros((4, 4)), 0.1).any()
+
+
+def test_a_wider_grid_goes_on_as_high_as_its_border():
+    grid = replace(made.grid(0.1), heights=np.random.default_rng(0).random(made.grid(0.1).shape))
+    wide = sweep.padded(grid, 3)
+    assert wide.shape == tuple(n + 6 for n in grid.shape) and not wide.seen[:3].any()
+    at = np.array([[0.7, 1.3], [2.05, 0.4], [-0.2, 1.0]])
+    np.testing.assert_allclose(wide.height_at(at), grid.height_at(at), atol=1e-12)
+
+
 def test_the_ground_around_stays_ground(found):
     around = inner(found.grid, 0.4, 2.8) & ~inner(found.grid, BOX[0] - 0.25, BOX[1] + 0.25)
     assert found.stands[around].mean() < 0.01

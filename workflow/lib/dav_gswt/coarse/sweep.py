@@ -2,8 +2,10 @@
 
 For every cell and every height above the surface the photos that see the place are compared: where it is truly there
 they agree. This finds trees, shrubs and stones from photos taken straight from above, and the finer relief that the
-sparse points of structure from motion miss. Costs are summed along rows and columns as semi-global matching does
-(Hirschmueller 2008), so that sand without texture takes the height of its neighbours.
+sparse points of structure from motion miss. Sand is like sand, so photos also agree where nothing is; but what stood
+there would hide ground that they agree on as well, which tells it apart (`sight`). Costs are summed along rows and
+columns as semi-global matching does (Hirschmueller 2008), so that sand without texture takes the height of its
+neighbours.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -14,6 +16,7 @@ from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 from scipy.ndimage import gaussian_filter, label, map_coordinates
 
+from dav_gswt.coarse import sight
 from dav_gswt.coarse.ground import Ground
 from dav_gswt.views import View
 
@@ -26,6 +29,7 @@ BETTER = 0.8  # of the surface's cost: what stands must agree at least so much b
 UNKNOWN = 0.3  # cost where fewer than two photos look
 SUPPORT = 0.7  # of the photos that see the surface must see a height above it
 WITNESSES = 3  # photos without which nothing stands: two agree anywhere along a stripe
+SLANT = 2.0  # of a look, its run over its fall: so far beyond the grid the ground is compared, for what is before it
 SLENDER = 4.0  # a thing is at most so much higher than wide: more is a mistaken match
 THREADS = 4  # at most; changes no result
 STANDS = 2.0  # steps above the surface from which a height is that of a thing
@@ -60,24 +64,30 @@ def sweep(grid: Ground, views: list[View], flying_height: float, pixel: float) -
     costs, photos = disagreement(coarse, views, heights)
     known = photos >= 2
     surface = int(np.abs(heights).argmin())
+    see_through(costs, coarse, views, heights, costs[surface].copy(), STANDS * step)
     in_air = (np.abs(heights) > STANDS * step)[:, None, None] * np.float32(AIR)
     summed = aggregated(costs + in_air, ONE_STEP, MORE_STEPS)
     best = summed.argmin(0)
     cost = np.take_along_axis(costs, best[None], 0)[0]
     sure = (photos >= WITNESSES) & (cost <= BETTER * costs[surface])
     above = np.where(known, _between(summed, best, heights), 0)
-    stands = _stout(sure & (above > STANDS * step), above, coarse.spacing)
+    stands = stout(sure & (above > STANDS * step), above, coarse.spacing)
     near = np.abs(above) <= STANDS * step
     return Relief(coarse, np.where(stands | near, above, 0), stands, known, step)
 
 
-def _stout(
+def stout(
     stands: Bool[Array, "rows columns"], above: Float[Array, "rows columns"], cell: float
 ) -> Bool[Array, "rows columns"]:
-    """Those of the cells that are not a column in the air: no higher than SLENDER times their patch is wide."""
-    patch, count = label(stands, np.ones((3, 3)))
-    wide = cell * np.sqrt(np.bincount(patch.ravel(), minlength=count + 1))
-    return stands & (above <= SLENDER * wide[patch])
+    """Those of the cells that are not a column in the air: no higher than SLENDER times the patch is wide that stands
+    at least half as high (within a factor of two)."""
+    found, low = stands.copy(), above[stands].min(initial=np.inf)
+    while (band := stands & (above >= low)).any():
+        patch, count = label(band, np.ones((3, 3)))
+        wide = cell * np.sqrt(np.bincount(patch.ravel(), minlength=count + 1))
+        found &= ~(band & (above < 2 * low) & (above > SLENDER * wide[patch]))
+        low *= 2
+    return found
 
 
 def thinned(grid: Ground, stride: int) -> Ground:
@@ -86,6 +96,13 @@ def thinned(grid: Ground, stride: int) -> Ground:
     part = grid.heights[: rows * stride, : columns * stride]
     heights = part.reshape(rows, stride, columns, stride).mean((1, 3))
     return replace(grid, spacing=stride * grid.spacing, heights=heights, seen=np.zeros(heights.shape, bool))
+
+
+def padded(grid: Ground, cells: int) -> Ground:
+    """The grid with so many more cells on every side, as high as its border."""
+    off, seen = cells * grid.spacing, np.pad(grid.seen, cells)
+    heights = np.pad(grid.heights, cells, mode="edge")
+    return replace(grid, west=grid.west - off, south=grid.south - off, heights=heights, seen=seen)
 
 
 def disagreement(
@@ -116,6 +133,32 @@ def disagreement(
     return np.stack(costs).astype(np.float32, copy=False), number.reshape(grid.shape)
 
 
+def see_through(
+    costs: Float32[Array, "h rows columns"],
+    grid: Ground,
+    views: list[View],
+    heights: Float[Array, "h"],
+    surface: Float32[Array, "rows columns"],
+    lowest: float,
+) -> None:
+    """UNKNOWN becomes the cost of heights over `lowest` where a thing would hide ground that the photos agree on nearly
+    as well as on the thing: most that see the place see through it. So it does where too few see ground behind to tell.
+    surface: cost of the ground."""
+    around = padded(grid, int(np.ceil(SLANT * heights.max() / grid.spacing)))
+    (ground,), photos = disagreement(around, views, np.zeros(1))
+    ground = np.where(photos >= 2, ground, np.float32(np.nan))
+    places = grid.centres.astype(np.float32)
+
+    def at(height: float, cost: Float32[Array, "rows columns"]) -> None:
+        rows = np.flatnonzero(cost <= BETTER * surface)  # elsewhere nothing would stand anyway
+        behind = sight.behind(around, ground, places[rows] + np.float32([0, 0, height]), views, WITNESSES)
+        cost.ravel()[rows[~(cost.ravel()[rows] <= BETTER * behind)]] = UNKNOWN
+
+    over = np.flatnonzero(heights > lowest)
+    with ThreadPoolExecutor(THREADS) as pool:
+        list(pool.map(at, heights[over].tolist(), costs[over[0] :] if len(over) else []))
+
+
 def _spread(
     views: list[View], starts: list[Array], height: np.float32
 ) -> tuple[Float32[Array, "n"], Float32[Array, "n"]]:
@@ -134,23 +177,13 @@ def _spread(
 def _bilinear(view: View, q: Float32[Array, "n 3"]) -> tuple[Array, Float32[Array, "m 3"]]:
     """Rows of the points (in the camera's frame) that the photo sees, and its colours there."""
     camera = view.camera
-    per_z = 1 / np.where(q[:, 2] > 1e-6, q[:, 2], np.inf)
-    x, y = (np.float32(f) * q[:, k] * per_z + np.float32(c - 0.5) for k, f, c in _lens(camera))
-    inside = (q[:, 2] > 1e-6) & (x >= 0) & (y >= 0) & (x < camera.width - 1) & (y < camera.height - 1)
-    rows = np.flatnonzero(inside)
-    x, y = x[rows], y[rows]
+    rows, x, y = sight.seen(view, q)
     column, row = x.astype(np.int32), y.astype(np.int32)
-    counts = view.weight[row, column] > 0
-    rows, x, y, column, row = rows[counts], x[counts], y[counts], column[counts], row[counts]
     right, down = ((at - cell).astype(np.float32)[:, None] for at, cell in ((x, column), (y, row)))
     flat, at = view.image.reshape(-1, 3), row * camera.width + column
     top = flat[at] * (1 - right) + flat[at + 1] * right
     bottom = flat[at + camera.width] * (1 - right) + flat[at + camera.width + 1] * right
     return rows, top * (1 - down) + bottom * down
-
-
-def _lens(camera):
-    return (0, camera.fx, camera.cx), (1, camera.fy, camera.cy)
 
 
 def aggregated(costs: Float32[Array, "h rows columns"], one: float, more: float) -> Float32[Array, "h rows columns"]:
