@@ -80,16 +80,20 @@ def seam_values(scene, variant=None):
 
 
 def seam_cells():
-    """What tells each cell from the others, and its files; a scene's own seam is always among its variants."""
+    """What tells each cell from the others, and its files; a scene's own seam is always among its variants, and drawn
+    as often as is asked for."""
     asked, cells = config["seam_study"], []
     for scene in asked["scenes"]:
-        variants = dict.fromkeys([*asked["seams"], config["scenes"][scene]["seam"]])
-        for variant, seed in product(variants, config["seeds"]):
-            values = seam_values(scene, variant) | {"seed": seed}
+        own = config["scenes"][scene]["seam"]
+        variants = [(name, name, 0) for name in dict.fromkeys([*asked["seams"], own])]
+        variants += [(own, name, draw) for draw, name in enumerate(draws.names(own, asked)) if draw]
+        for (variant, entry, draw), seed in product(variants, config["seeds"]):
+            values = seam_values(scene, entry) | {"seed": seed}
             files = {"table": rules.measure_seams.output.crops, "facts": rules.measure_seams.output.facts}
-            files |= {"repeats": rules.measure_repetition.output.table}
+            files |= {} if draw else {"repeats": rules.measure_repetition.output.table}
             (cell,) = [{name: expand(path, **values)[0] for name, path in files.items()}]
-            cells.append({key: values[key] for key in ("scene", "seed", "quality")} | {"variant": variant} | cell)
+            about = {key: values[key] for key in ("scene", "seed", "quality")}
+            cells.append(about | {"variant": variant, "draw": draw} | cell)
     return cells
 
 

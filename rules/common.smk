@@ -8,6 +8,7 @@ import dav_gswt
 from dav_gswt.active.names import AT_ZERO, GEOMETRIC, IMAGINING, ORACLES
 from dav_gswt.config import FLOOR, REFINED, check
 from dav_gswt.errors import InputError
+from dav_gswt.seams import draws
 from dav_gswt.spelling import read_stop, spell, spell_completed, spell_stop
 from dav_gswt.tradeoff import settings
 
@@ -17,7 +18,7 @@ VIEWER = sorted(str(p) for p in Path(workflow.basedir, "workflow/viewer").iterdi
 
 try:
     check(config, Path(workflow.basedir) / "workflow/schemas/config.schema.yaml")
-    config.update(settings.entries(config))
+    config.update(draws.entries(settings.entries(config)))
 except InputError as error:
     raise WorkflowError(str(error)) from None
 

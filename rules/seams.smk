@@ -107,7 +107,9 @@ rule draw_grid:
 rule gather_seams:
     """Every crop of every cell in one table; what follows from them, added to what earlier runs found."""
     input:
-        measured=lambda wildcards: [cell[name] for cell in seam_cells() for name in ("table", "facts", "repeats")],
+        measured=lambda wildcards: [
+            cell[name] for cell in seam_cells() for name in ("table", "facts", "repeats") if name in cell
+        ],
     output:
         crops="results/tables/seams.csv",
         summary="results/tables/seam_summary.csv",

@@ -21,7 +21,7 @@ with logging_to(snakemake.log[0]):
     alexnet = weights.read(given.lpips) if given.get("lpips") else None
     options = build.Options.of(seam, semantics.Source(alexnet, seam.get("sam2")), made.wanted)
     exemplar = Exemplar(west, south, grid.spacing, grid.cells)
-    rng = np.random.default_rng(snakemake.params.seed)
+    rng = np.random.default_rng(build.seeds(snakemake.params.seed, seam))
     tiles = build.cut_tiles(fields, exemplar, above.known_colour(), above.uncertainty, options, rng)
     inputs = {f"level{number}": Path(given.levels, f"level{number}.ply") for number in range(len(fields))}
     inputs |= {name: given[name] for name in ("lpips", "sam2") if given.get(name)}

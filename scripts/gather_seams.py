@@ -8,11 +8,11 @@ with logging_to(snakemake.log[0]):
     out, cells, study = snakemake.output, snakemake.params.cells, snakemake.params.study
     rows = [row for cell in cells for row in tables.rows(cell)]
     figures.write_rows(out.crops, rows)
-    compared = [row for row in rows if row["variant"] in study["seams"]]
+    compared = [row for row in rows if row["variant"] in study["seams"] and not row["draw"]]
     found = {
         out.summary: summary.summary(rows),
         out.ablation: summary.ablation(compared, study["baseline"]),
-        out.repetition: [row for cell in cells for row in tables.repeats(cell)],
+        out.repetition: [row for cell in cells if "repeats" in cell for row in tables.repeats(cell)],
     }
     for (path, new), kept, key in zip(found.items(), out.kept, tables.KEYS, strict=True):
         tables.write(path, new)

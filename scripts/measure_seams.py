@@ -11,14 +11,15 @@ from dav_gswt.logs import logging_to
 from dav_gswt.perceptual import weights
 from dav_gswt.seams import density, exemplar, measure
 from dav_gswt.seams import ground as terrain
-from dav_gswt.tiles import semantics, store
+from dav_gswt.tiles import build, semantics, store
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     known = exemplar.Known.of(levels.read(given.levels))
     alexnet = weights.read(given.lpips) if given.get("lpips") else None
     tiles = store.read(given.tiles, given.seams)
-    rng, source = np.random.default_rng(params.seed), semantics.Source(alexnet, given.get("sam2"))
+    rng = np.random.default_rng(build.seeds(params.seed, params.seam))
+    source = semantics.Source(alexnet, given.get("sam2"))
     both = tiles, known.cut_straight(params.seam, source, rng)
     patches = known.flattened(tiles, params.seam)
     laid = [terrain.laid(each, patches, params.seed, params.tau) for each in both]

@@ -21,8 +21,8 @@ hills, from near, as a walker sees them and from above. Seam-LPIPS is a crop's d
 most like it. Its **floor** is that of the patches that meet there, each laid whole: what the same ground has without a
 seam; the **ceiling** is that of the same patches cut straight without looking. A **jump** is the colour difference of
 neighbouring pixels across a seam over that beside it; 1 is none. Brackets hold the 95 % interval, over places of strips
-and tiles, since every place is laid many times. Way: how far from floor to ceiling cuts are, where the ceiling surely
-lies above the floor.
+and tiles, since every place is laid many times. Sets: how many tile sets were cut, each from places drawn anew. Way:
+how far from floor to ceiling cuts are, where the ceiling surely lies above the floor.
 """
 
 
@@ -59,6 +59,7 @@ def _scenes(summary: list[dict], own: dict[str, str]) -> str:
     head = [
         "scene",
         "seam",
+        "sets",
         "borders over floor",
         "cuts over floor",
         "ceiling over floor",
@@ -73,7 +74,7 @@ def _scenes(summary: list[dict], own: dict[str, str]) -> str:
             places = [between(row, place, 4) for place in ("border", "cut", "ceiling")]
             way = f"{float(row['share']):.0%}" if row["share"] else ""
             jumps = [f"{float(row[f'{place}_jump']):.2f}" for place in ("border", "cut", "floor")]
-            lines.append([row["scene"], f"`{row['variant']}`", *places, way, *jumps])
+            lines.append([row["scene"], f"`{row['variant']}`", row.get("sets") or "1", *places, way, *jumps])
     return table(head, lines)
 
 

@@ -55,14 +55,16 @@ def interval(values: Float[Array, "draws"]) -> tuple[float, float, float]:
 def summary(rows: list[dict]) -> list[dict]:
     """A row for each cell, view and ground, and one over all of both.
 
-    border, cut, ceiling: Seam-LPIPS of these less their floors. share: of the way from floor to ceiling that cuts go,
-    cut / ceiling; empty where the interval of `ceiling` reaches 0, as then nothing can be told.
+    sets: tile sets that were drawn. border, cut, ceiling: Seam-LPIPS of these less their floors. share: of the way from
+    floor to ceiling that cuts go, cut / ceiling; empty where the interval of `ceiling` reaches 0, as then nothing can
+    be told.
     """
     found = []
     for cell, mine in _grouped(rows, CELL).items():
         views = _grouped(mine, ("view", "ground")) | {(EVERY, EVERY): mine}
         for (view, ground), some in sorted(views.items()):
-            about = {key: mine[0][key] for key in ("version", "weights", "tiles")}
+            about = {"sets": len({row.get("draw", 0) for row in mine})}
+            about |= {key: mine[0][key] for key in ("version", "weights", "tiles")}
             found.append(dict(zip(CELL, cell, strict=True)) | {"view": view, "ground": ground} | _told(some) | about)
     return found
 

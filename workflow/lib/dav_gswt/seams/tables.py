@@ -16,14 +16,21 @@ NUMBERS = ("seam_lpips", "psnr", "jump")
 
 
 def rows(cell: dict) -> list[dict]:
-    """The crops of a cell. cell: what CELL names, and its files `table` and `facts`."""
+    """The crops of a cell. cell: what CELL names, the draw, and its files `table` and `facts`.
+
+    Places and crops of another draw of the tiles are other ones: its number is part of their names.
+    """
     about = read_json(cell["facts"])["provenance"]
     origin = {
         "version": about["version"],
         "weights": about["inputs"].get("lpips", "")[:12],
         "tiles": about["inputs"]["seams"][:12],
     }
-    return [{key: cell[key] for key in CELL} | row | origin for row in read(cell["table"])]
+    about, draw = {key: cell[key] for key in (*CELL, "draw")}, cell["draw"]
+    return [
+        about | row | {key: f"{draw}:{row[key]}" if draw else row[key] for key in ("crop", "cluster")} | origin
+        for row in read(cell["table"])
+    ]
 
 
 def read(path: Path | str) -> list[dict]:

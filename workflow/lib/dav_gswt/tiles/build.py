@@ -48,6 +48,11 @@ class Options:
         return cls(**given, source=source, levels=levels)
 
 
+def seeds(seed: int, seam: dict) -> list[int]:
+    """What the generator of a tile set starts from: the workflow's seed and, if not 0, the `draw` of the entry."""
+    return [seed, seam["draw"]] if seam.get("draw") else [seed]
+
+
 @dataclass(frozen=True)
 class TileSet:
     """16 C tiles at every level, in world units from each tile's south-western corner.
