@@ -3,10 +3,14 @@
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from dav_gswt.terrain.browser import FLAGS, chromium_path
 
 ROOT = Path(__file__).parents[1]
+
+settings.register_profile("untimed", deadline=None)  # no test asserts times: machines are shared
+settings.load_profile("untimed")
 
 
 @pytest.fixture(scope="session")

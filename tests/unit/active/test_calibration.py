@@ -31,7 +31,7 @@ def test_ause_by_hand():
 
 
 @given(st.lists(st.tuples(st.integers(0, 5), st.floats(0, 1e6)), min_size=1, max_size=30), st.randoms())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_ause_is_0_for_the_oracle_never_less_and_blind_to_order_and_units(samples, random):
     u, error = (np.array(x, float) for x in zip(*samples, strict=True))
     value = un.ause(u, error)

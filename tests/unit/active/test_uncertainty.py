@@ -79,7 +79,7 @@ def test_w2_is_exactly_0_where_all_samples_agree_and_only_there(m, scale):
 
 
 @given(seed=st.integers(0, 10_000), shift=st.integers(-1000, 1000), power=st.integers(-30, 20), m=st.integers(2, 10))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_w2_ignores_a_shift_and_grows_with_the_square_of_a_factor(seed, shift, power, m):
     latents = whole(seed, 2, m, 3, 2, 2)
     scores, maps = un.w2_sq(latents)
@@ -90,7 +90,7 @@ def test_w2_ignores_a_shift_and_grows_with_the_square_of_a_factor(seed, shift, p
 
 
 @given(seed=st.integers(0, 10_000), m=st.integers(2, 6))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_w2_does_not_depend_on_the_order_of_samples_nor_a_pose_on_its_batch(seed, m):
     latents = normal(5, m, 2, 3, 3, seed=seed)
     scores, maps = un.w2_sq(latents)
@@ -239,7 +239,7 @@ def test_lam_0_ranks_by_w2_and_a_large_one_by_lpips():
 
 
 @given(seed=st.integers(0, 1000), power=st.integers(-40, 40), lam=st.floats(0, 100))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_a_latent_space_in_other_units_ranks_alike(seed, power, lam):
     latents, lpips = normal(12, 3, 2, 4, 4, seed=seed), np.random.default_rng(seed).uniform(0, 1, 12)
     ranks = []
@@ -336,7 +336,7 @@ def test_quantiles_are_those_of_the_candidates():
 
 
 @given(st.floats(0, 1, width=32), st.floats(0, 50, width=32))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_gamma_is_a_half_in_the_middle_and_symmetric_about_it(u, slope):
     for kind, tolerance in ((np.float32, 2e-6), (np.float64, 1e-12)):
         a = np.array([u, 0.5], kind)

@@ -52,7 +52,6 @@ def test_a_splat_is_stored_as_its_16_bytes():
     )
 
 
-@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_the_smallest_turn_is_the_same_ellipsoid_within_an_eighth_of_a_turn(seed):
     rng = np.random.default_rng(seed)
@@ -71,7 +70,7 @@ def test_no_turn_has_no_axes():
         smallest_turns(np.array([[1.0, 0, 0, 0], [0, 0, 0, 0]]))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.integers(0, 2**32 - 1),
     st.integers(1, 40),

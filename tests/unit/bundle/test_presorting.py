@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from dav_gswt.bundle import ladder, orders, sights
@@ -61,7 +61,6 @@ def test_order_runs_from_back_to_front_and_is_stable():
     assert [orders.back_to_front(means, a).tolist() for a in along] == [[1, 3, 2, 0], [0, 2, 3, 1]]
 
 
-@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 300), st.sampled_from([0.0, 1e-30, 1.0, 1e30]))
 def test_orders_are_permutations_by_depth_to_a_65535th(seed, count, size):
     rng = np.random.default_rng(seed)
@@ -84,7 +83,6 @@ def test_so_many_splats_as_two_bytes_count_need_four():
     assert found.dtype == np.uint32 and found[0, 0] == 65535 and (np.sort(found[0]) == np.arange(65536)).all()
 
 
-@settings(deadline=None)
 @given(st.floats(-np.pi, np.pi), st.floats(0, 90), st.sampled_from([(20.0,), (20.0, 45.0)]))
 def test_with_more_directions_the_nearest_is_never_farther(azimuth, down, elevations):
     to = orders.towards(np.array([azimuth]), np.radians(down))[0]

@@ -60,7 +60,8 @@ def test_rates_fall_to_what_is_left_of_them():
 def test_without_a_number_visible_errors_say_how_many_and_growth_is_bounded():
     schedule, asked = Schedule(Plan(100, "auto"), 1000), 5000 * 1.01 * VISIBLE**2
     assert schedule.cap(7, 4900, asked) == 5050
-    assert schedule.cap(7, 1000, asked) == 1000 * (1 + GROWTH)
+    assert schedule.cap(7, 1000, asked) == 1000 * (1 + GROWTH)  # the first of ten
+    assert schedule.cap(70, 1000, asked) == 1000 * (1 + GROWTH / EVENTS)  # the last
     assert schedule.cap(7, 6000, asked) == 6000  # none is taken away
     assert schedule.cap(7, 1000, 0.0) == 1000
     assert schedule.cap(7, MOST_GAUSSIANS - 10, 1e9) == MOST_GAUSSIANS

@@ -92,7 +92,7 @@ def test_a_truncated_pickle_is_refused(random_weights):
 
 
 @given(st.binary(max_size=200))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_bytes_that_are_no_pickle_of_weights_are_an_input_error(content):
     for start in (b"", b"\x80\x03"):
         with pytest.raises(InputError):

@@ -170,7 +170,7 @@ def brute_force(mask):
     return 0
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     arrays(bool, array_shapes(min_dims=2, max_dims=2, max_side=9), elements=st.sampled_from([True, True, True, False]))
 )

@@ -254,7 +254,7 @@ def test_damaged_binary_models_are_refused_by_file(photos, tmp_path, binary, fil
         imported.read(folder, photos, made.OPTIONS)
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     file=st.sampled_from(["cameras", "images", "points3D"]),
     at=st.floats(0, 1, exclude_max=True),
@@ -273,7 +273,7 @@ def test_whatever_bytes_change_there_is_a_model_or_one_message(photos, tmp_path,
         assert np.isfinite(found.points).all() and np.isfinite(found.pixels).all()
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(at=st.floats(0, 1, exclude_max=True), new=st.text(max_size=6), opensfm=st.booleans())
 def test_whatever_text_changes_there_is_a_model_or_one_message(photos, tmp_path, at, new, opensfm):
     text = json.dumps(made.reconstruction() if opensfm else made.transforms())

@@ -14,7 +14,7 @@ from dav_gswt.raster import cpu
 MODES = st.booleans()
 VIEWS = st.sampled_from(sorted(CAMERAS))
 SEEDS = st.integers(0, 1 << 16)
-quick = settings(max_examples=40, deadline=None, derandomize=True)
+quick = settings(max_examples=40, derandomize=True)
 
 
 def drawn(arrays, camera, antialiased: bool, **options) -> cpu.Rendering:

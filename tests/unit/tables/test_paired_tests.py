@@ -11,7 +11,7 @@ from dav_gswt.tables.paired import paired
 VALUES = some.lists(some.floats(-5, 5), min_size=3, max_size=6).filter(lambda v: np.std(v) > 1e-3)
 
 
-@settings(deadline=None, max_examples=15)  # each draws a bootstrap
+@settings(max_examples=15)  # each draws a bootstrap
 @given(values=VALUES)
 def test_one_scene_is_the_usual_paired_test(values):
     found, usual = paired({"a": np.array(values)}), stats.ttest_1samp(values, 0.0)

@@ -32,7 +32,7 @@ def laid(seed, count, shape):
 
 
 @given(seed=st.integers(0, 2**32 - 2), count=st.integers(2, 5))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_the_energy_never_rises_and_is_that_of_the_labels(seed, count):
     terms, patches = exemplar(seed), laid(seed, count, (6, 7))
     start = np.random.default_rng(seed).integers(0, count, (6, 7)).astype(np.uint8)

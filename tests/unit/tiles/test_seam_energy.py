@@ -73,7 +73,7 @@ def test_equal_patches_cost_nothing_and_no_scale_is_zero():
 
 
 @given(seed=st.integers(0, 2**32 - 1), share=SHARES, place=st.tuples(*[st.integers(0, 8)] * 4))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_weights_are_symmetric_finite_not_negative_and_0_for_the_same_patch(seed, share, place):
     terms, (x, y, u, v) = made_up(seed).terms(share), place
     there, back = (energy.weights(terms, *p) for p in ((where(x, y), where(u, v)), (where(u, v), where(x, y))))

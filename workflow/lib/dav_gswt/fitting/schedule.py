@@ -8,7 +8,10 @@ SETTLED = 0.1  # of the rates at the start are left at the end
 EVENTS = 10  # growth events of a fit
 GROWN = 0.7  # of the steps: growth ends there
 PRUNED = 0.8  # of the steps: then goes what shows nothing, and what stays makes up for it in those left
-GROWTH = 0.25  # of the Gaussians there are, at most, at an event of a growth without a number
+# Of the Gaussians there are, so many at most come at the first event of a growth without a number, a tenth of it at the
+# last: what comes late is fitted little. Meadow (development, 8 photos, 600 steps): 22.28 dB, LPIPS .316 with 492k
+# Gaussians of a quarter at every event, 22.46 and .297 with 419k so.
+GROWTH = 0.4
 VISIBLE = 0.011  # error of one pixel that is worth a Gaussian where their number is to be found, of colours 0 to 1
 
 
@@ -41,9 +44,11 @@ class Schedule:
         error: squared error that a photo shows, summed over the Gaussians: where no number is given one Gaussian is
         worth VISIBLE**2 of it.
         """
+        events = int(self.plan.steps * GROWN) // self._every
+        left = max(1, events - step // self._every + 1)
         if self.plan.cap == AUTO:
-            return max(now, min(MOST_GAUSSIANS, int(now * (1 + GROWTH)), int(error / VISIBLE**2)))
-        left = max(1, int(self.plan.steps * GROWN) // self._every - step // self._every + 1)
+            most = int(now * (1 + GROWTH * left / max(1, events)))
+            return max(now, min(MOST_GAUSSIANS, most, int(error / VISIBLE**2)))
         return now + max(0, int(self.plan.cap) - now) // left
 
     @property
