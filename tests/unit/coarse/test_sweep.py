@@ -91,6 +91,7 @@ def test_a_wider_grid_goes_on_as_high_as_its_border():
     grid = replace(made.grid(0.1), heights=np.random.default_rng(0).random(made.grid(0.1).shape))
     wide = sweep.padded(grid, 3)
     assert wide.shape == tuple(n + 6 for n in grid.shape) and not wide.seen[:3].any()
+    np.testing.assert_allclose(wide.exemplar, grid.exemplar, atol=1e-12)
     at = np.array([[0.7, 1.3], [2.05, 0.4], [-0.2, 1.0]])
     np.testing.assert_allclose(wide.height_at(at), grid.height_at(at), atol=1e-12)
 

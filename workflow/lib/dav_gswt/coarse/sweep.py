@@ -29,7 +29,7 @@ BETTER = 0.8  # of the surface's cost: what stands must agree at least so much b
 UNKNOWN = 0.3  # cost where fewer than two photos look
 SUPPORT = 0.7  # of the photos that see the surface must see a height above it
 WITNESSES = 3  # photos without which nothing stands: two agree anywhere along a stripe
-SLANT = 2.0  # of a look, its run over its fall: so far beyond the grid the ground is compared, for what is before it
+SLANT = 2.0  # of a look, its run over its fall: so far beyond the grid (half of it at most) the ground is compared too
 SLENDER = 4.0  # a thing is at most so much higher than wide: more is a mistaken match
 THREADS = 4  # at most; changes no result
 STANDS = 2.0  # steps above the surface from which a height is that of a thing
@@ -80,7 +80,7 @@ def stout(
     stands: Bool[Array, "rows columns"], above: Float[Array, "rows columns"], cell: float
 ) -> Bool[Array, "rows columns"]:
     """Those of the cells that are not a column in the air: no higher than SLENDER times the patch is wide that stands
-    at least half as high (within a factor of two)."""
+    at least half as high (within a factor of two). above: positive where something stands."""
     found, low = stands.copy(), above[stands].min(initial=np.inf)
     while (band := stands & (above >= low)).any():
         patch, count = label(band, np.ones((3, 3)))
@@ -102,7 +102,16 @@ def padded(grid: Ground, cells: int) -> Ground:
     """The grid with so many more cells on every side, as high as its border."""
     off, seen = cells * grid.spacing, np.pad(grid.seen, cells)
     heights = np.pad(grid.heights, cells, mode="edge")
-    return replace(grid, west=grid.west - off, south=grid.south - off, heights=heights, seen=seen)
+    row, column = grid.first_row + cells, grid.first_column + cells
+    return replace(
+        grid,
+        west=grid.west - off,
+        south=grid.south - off,
+        first_row=row,
+        first_column=column,
+        heights=heights,
+        seen=seen,
+    )
 
 
 def disagreement(
@@ -144,7 +153,7 @@ def see_through(
     """UNKNOWN becomes the cost of heights over `lowest` where a thing would hide ground that the photos agree on nearly
     as well as on the thing: most that see the place see through it. So it does where too few see ground behind to tell.
     surface: cost of the ground."""
-    around = padded(grid, int(np.ceil(SLANT * heights.max() / grid.spacing)))
+    around = padded(grid, min(int(np.ceil(SLANT * heights.max() / grid.spacing)), min(grid.shape) // 2))
     (ground,), photos = disagreement(around, views, np.zeros(1))
     ground = np.where(photos >= 2, ground, np.float32(np.nan))
     places = grid.centres.astype(np.float32)
