@@ -129,7 +129,7 @@ def test_a_fit_goes_on_for_as_many_steps_twice_at_most(reached, fits, taken, cap
         asked.append((start, plan.steps))
         return Fitted(spoilt(reached[len(asked) - 1]), Report(7, 1, 0, [{"what": len(asked)}]))
 
-    plan = build._plan(QUALITY, 1, 0)
+    plan = build._plan(QUALITY, made.field(), 2, 1)
     with caplog.at_level(logging.INFO):
         found = bounded.update(made.field(), spoilt(0.01), photos[:2], photos[2:], plan, fit)
     assert [steps for _, steps in asked] == [plan.steps, 7, 7][:fits] and found.taken == taken
@@ -186,7 +186,7 @@ def test_where_no_earlier_photo_counts_there_is_nothing_to_lose():
         made.field(),
         blind,
         photos[2:],
-        build._plan(QUALITY, 1, 0),
+        build._plan(QUALITY, made.field(), 2, 1),
         lambda *_: Fitted(spoilt(0.3), Report()),
     )
     assert found.taken and found.report["earlier_views"]["psnr_before"] is None
@@ -198,7 +198,14 @@ def test_what_may_be_lost_grows_with_every_doubling_of_the_photos():
 
 
 def test_an_update_takes_so_many_steps_for_each_new_photo_and_keeps_the_degree_that_was_found():
-    assert build._plan(QUALITY, 3, 0).steps == 36
-    found = build._plan(replace(QUALITY, steps_per_photo=AUTO, degree=AUTO), 3, 1)
+    flat, rich = made.field(), replace(made.field(), sh=np.repeat(made.field().sh, 4, 1))
+    assert build._plan(QUALITY, flat, 2, 3).steps == 36
+    found = build._plan(replace(QUALITY, steps_per_photo=AUTO, degree=AUTO), rich, 2, 3)
     assert found.steps == 3 * STEPS_PER_NEW_PHOTO and found.degree == 1
-    assert build._plan(QUALITY, 3, 1).degree == QUALITY.degree
+    assert build._plan(QUALITY, rich, 2, 3).degree == QUALITY.degree
+
+
+def test_an_update_without_a_number_has_as_many_gaussians_a_photo_as_the_field_before():
+    plan = build._plan(replace(QUALITY, cap=AUTO), made.field(), 8, 4)
+    assert (plan.cap, plan.most) == (AUTO, int(1.5 * len(made.field())))
+    assert build._plan(replace(QUALITY, cap=AUTO), made.field(), 0, 2).most == 2 * len(made.field())

@@ -65,3 +65,4 @@ def test_without_a_number_visible_errors_say_how_many_and_growth_is_bounded():
     assert schedule.cap(7, 6000, asked) == 6000  # none is taken away
     assert schedule.cap(7, 1000, 0.0) == 1000
     assert schedule.cap(7, MOST_GAUSSIANS - 10, 1e9) == MOST_GAUSSIANS
+    assert Schedule(Plan(100, "auto", most=1200), 1000).cap(7, 1000, asked) == 1200

@@ -126,9 +126,7 @@ def refine(
         return trainer.fit(start, begun.views, plan, begun.rules, rng, f"fit {len(new)} new photos", keep)
 
     n = len(before)
-    found = bounded.update(
-        field, begun.field, begun.views[:n], begun.views[n:], _plan(quality, len(new), field.degree), on
-    )
+    found = bounded.update(field, begun.field, begun.views[:n], begun.views[n:], _plan(quality, field, n, len(new)), on)
     if not found.taken:
         return Made(field, grid, found.report)
     return replace(_finished(found.field, begun.grid, begun.views), report=found.report)
@@ -171,12 +169,13 @@ def _steps(quality: Quality, views: list[View]) -> int:
     return STEPS_PER_PHOTO * len(views) if quality.steps == AUTO else quality.steps
 
 
-def _plan(quality: Quality, new: int, degree: int) -> Plan:
-    """What an update may spend: so many steps for each new photo. degree: of the field, which "auto" keeps."""
+def _plan(quality: Quality, field: Field, before: int, new: int) -> Plan:
+    """What an update may spend: so many steps for each new photo; where "auto", as many Gaussians a photo as the field
+    has that was fitted to those before, and the degree of it."""
     each = STEPS_PER_NEW_PHOTO if quality.steps_per_photo == AUTO else quality.steps_per_photo
-    return Plan(
-        each * new, quality.cap, degree if quality.degree == AUTO else quality.degree, pose_rate=quality.pose_rate
-    )
+    most = min(MOST_GAUSSIANS, len(field) * (before + new) // max(1, before))
+    degree = field.degree if quality.degree == AUTO else quality.degree
+    return Plan(each * new, quality.cap, degree, pose_rate=quality.pose_rate, most=most)
 
 
 @dataclass(frozen=True)

@@ -22,10 +22,10 @@ class Plan:
     """What a fit may spend.
 
     steps: of the optimiser, one photo each. cap: most Gaussians; it grows towards it where the residual asks for more,
-    with "auto" as long as errors are visible (`schedule.Schedule.cap`). degree: of the spherical harmonics; reached one
-    degree after the other, with "auto" kept if held-out pixels are better with it. half_share: share of the steps taken
-    at half the resolution. pose_rate: radians (and distances over the mean depth) that a camera may turn a step, at the
-    start; 0: none moves.
+    with "auto" as long as errors are visible (`schedule.Schedule.cap`), to `most`. degree: of the spherical harmonics;
+    reached one degree after the other, with "auto" kept if held-out pixels are better with it. half_share: share of the
+    steps taken at half the resolution. pose_rate: radians (and distances over the mean depth) that a camera may turn a
+    step, at the start; 0: none moves.
     """
 
     steps: int
@@ -33,6 +33,7 @@ class Plan:
     degree: Count = 0
     half_share: float = 0.0
     pose_rate: float = 0.0
+    most: int = MOST_GAUSSIANS
 
     def __post_init__(self):
         if self.steps < 0:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from dav_gswt.fitting.plan import AUTO, MOST_GAUSSIANS, Plan
+from dav_gswt.fitting.plan import AUTO, Plan
 
 SETTLED = 0.1  # of the rates at the start are left at the end
 EVENTS = 10  # growth events of a fit
@@ -47,8 +47,8 @@ class Schedule:
         events = int(self.plan.steps * GROWN) // self._every
         left = max(1, events - step // self._every + 1)
         if self.plan.cap == AUTO:
-            most = int(now * (1 + GROWTH * left / max(1, events)))
-            return max(now, min(MOST_GAUSSIANS, most, int(error / VISIBLE**2)))
+            soon = int(now * (1 + GROWTH * left / max(1, events)))
+            return max(now, min(self.plan.most, soon, int(error / VISIBLE**2)))
         return now + max(0, int(self.plan.cap) - now) // left
 
     @property
