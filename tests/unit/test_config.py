@@ -101,6 +101,7 @@ def test_a_comparison_that_cannot_be_made_is_refused(change, said):
         pytest.param({"seams": ["glue", "colour"]}, "seam_study.seams: there is no 'glue'", id="no such seam"),
         pytest.param({"baseline": "none", "seams": ["colour"]}, "none is not among", id="a baseline that is not cut"),
         pytest.param({"seams": []}, "seam_study.seams", id="nothing to compare"),
+        pytest.param({"draws": 0}, "seam_study.draws", id="no tiles"),
         pytest.param({"scenes": "desert"}, "seam_study.scenes", id="a name where a list belongs"),
     ],
 )
