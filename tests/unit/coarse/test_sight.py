@@ -67,7 +67,10 @@ def test_most_photos_decide_and_few_have_no_say():
     values[eastings(grid) < -0.5] = np.nan
     west, middle, east = photo((-2, 0.01, 3)), photo((0, 0.01, 3)), photo((2, 0.01, 3))  # they see 1, .2 and nothing
     place = [[0.0, 0.0, 1.5]]
-    tell = lambda *photos, least=1: float(one(place, *photos, values=values, least=least)[0])  # noqa: E731
+
+    def tell(*photos, least=1):
+        return float(one(place, *photos, values=values, least=least)[0])
+
     assert tell(west) == 1 and tell(middle) == pytest.approx(0.2) and np.isnan(tell(east))
     assert tell(west, middle) == pytest.approx(0.6) and tell(west, middle, middle, east) == pytest.approx(0.2)
     assert tell(west, middle, east, least=2) == pytest.approx(0.6) and np.isnan(tell(west, middle, east, least=3))

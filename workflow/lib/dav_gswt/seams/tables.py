@@ -20,11 +20,11 @@ def rows(cell: dict) -> list[dict]:
 
     Places and crops of another draw of the tiles are other ones: its number is part of their names.
     """
-    about = read_json(cell["facts"])["provenance"]
+    made = read_json(cell["facts"])["provenance"]
     origin = {
-        "version": about["version"],
-        "weights": about["inputs"].get("lpips", "")[:12],
-        "tiles": about["inputs"]["seams"][:12],
+        "version": made["version"],
+        "weights": made["inputs"].get("lpips", "")[:12],
+        "tiles": made["inputs"]["seams"][:12],
     }
     about, draw = {key: cell[key] for key in (*CELL, "draw")}, cell["draw"]
     return [
