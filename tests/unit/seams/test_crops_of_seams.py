@@ -90,6 +90,50 @@ def test_a_border_broken_on_purpose_is_found(laid, change, rng):
     raise AssertionError("no border could be looked at")
 
 
+def raised(laid, height):
+    """The same with all ground and what stands on it higher."""
+    out = {}
+    for key, field in laid.terrain.tiles.items():
+        out[key] = Shelf.of(replace(field, means=field.means + np.float32([0, 0, height])))
+    ground = laid.source.ground + [0, 0, 0, height]
+    return replace(laid, tiles=out, source=replace(laid.source, ground=ground))
+
+
+@pytest.mark.parametrize("view", crops.VIEWS, ids=lambda view: view.name)
+def test_a_crop_shows_what_it_is_of_however_high_the_ground_lies(laid, view, rng):
+    """Aimed at a plane below, a walker's crop would show ground that lies 2.7 times as far before it."""
+    place = next(
+        p for p in places.borders(laid, rng) if crops.meeting(laid, crops.crop(laid, laid.terrain, view, p.at))
+    )
+    tiles = []
+    for each in (laid, raised(laid, 12 * laid.spacing)):
+        crop = crops.crop(each, each.terrain, view, place.at)
+        tiles.append(crops.shown(each, each.terrain, crop, crops.meeting(each, crop), border=True).tile)
+    assert len(np.unique(tiles[0])) > 1
+    assert (tiles[0] == tiles[1]).mean() > 0.95
+
+
+def test_the_ground_s_height_is_that_of_the_tile_s_own_cells(laid):
+    assert raised(laid, 2.0).risen((3, 5)) == pytest.approx(2.0 + laid.risen((3, 5)))
+    n, height = laid.plan.side, laid.source.ground[..., 3]
+    x, y = 3 - laid.first, 5 - laid.first
+    column, row = [3, 5] - laid.origins[laid.patch[y, x]]
+    expected = height[row, column] + laid.correction[laid.tile[y, x], y % n, x % n, 3]
+    assert laid.relief[y, x] == pytest.approx(expected, nan_ok=True)
+    bare = replace(laid, source=replace(laid.source, ground=np.full_like(laid.source.ground, np.nan)))
+    assert bare.risen((3, 5)) == 0
+
+
+def test_borders_are_shown_without_cuts_where_that_is_possible(laid, rng):
+    places_looked_at = places.borders(laid, np.random.default_rng(2))[: measure.LOOKED]
+    view = crops.VIEWS[2]
+    met = [crops.meeting(laid, crops.crop(laid, laid.terrain, view, place.at)) for place in places_looked_at]
+    alone = sum(bool(each) and len(each) == 1 for each in met)
+    taken = measure._borders(laid, laid.terrain, view, np.random.default_rng(2))
+    shown = [len(each.shown.patches) for each in taken]
+    assert 0 < shown.count(1) == min(alone, measure.BORDERS) and shown == sorted(shown, key=lambda n: n > 1)
+
+
 def test_a_jump_is_1_without_a_seam_and_as_high_as_the_step_makes_it():
     """Texture noise of deviation s in 3 channels: neighbours differ by RMS sqrt(6) s; a step d adds 3 d^2 across."""
     known = np.ones((48, 48), bool)

@@ -99,7 +99,7 @@ def crop(laid: Laid, terrain: Terrain, view: View, at: tuple[int, int], side: in
     """
     spot = np.array(at, float) * laid.spacing
     (height,), (slope,) = terrain.heights.at(spot[:1], spot[1:])
-    middle = np.array([*spot, height])
+    middle = np.array([*spot, height + laid.risen(at)])
     down, yaw = np.radians(view.down), np.radians(view.yaw)
     ahead = np.array([np.cos(down) * np.cos(yaw), np.cos(down) * np.sin(yaw), -np.sin(down)])
     far = view.floors * laid.eye_floor / np.sin(down)

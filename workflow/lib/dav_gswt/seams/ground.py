@@ -23,6 +23,7 @@ from dav_gswt.tiles.layout import Exemplar, Layout
 
 WINDOW = 8  # tiles a side of the terrain that crops are taken from, around its origin
 REACH = 16  # tile sides that are laid
+AROUND = 4  # cells on each side that say how high the ground lies at a point
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,21 @@ class Laid:
     @property
     def spacing(self) -> float:
         return self.source.exemplar.spacing
+
+    @cached_property
+    def relief(self) -> Float[Array, "w w"]:
+        """How high the tiles' own ground lies in every cell of the window; NaN where nothing is known."""
+        y, x = np.mgrid[self.first : self.first + len(self.patch), self.first : self.first + len(self.patch)]
+        column, row = np.moveaxis(np.stack([x, y], -1) - self.origins[self.patch], -1, 0)
+        n = self.plan.side
+        return self.source.ground[row, column, 3] + self.correction[self.tile, y % n, x % n, 3]
+
+    def risen(self, at: tuple[int, int]) -> float:
+        """How high the tiles' own ground lies around a corner of finest cells; 0 where nothing is known."""
+        x, y = (slice(max(v - self.first - AROUND, 0), v - self.first + AROUND) for v in at)
+        near = self.relief[y, x]
+        known = near[np.isfinite(near)]
+        return float(known.mean()) if len(known) else 0.0
 
     @cached_property
     def corners(self) -> Int[Array, "n 3"]:

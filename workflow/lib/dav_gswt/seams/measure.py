@@ -28,6 +28,7 @@ from dav_gswt.terrain.assemble import Terrain
 _log = logging.getLogger(__name__)
 
 BORDERS, CUTS = 64, 64  # crops of each, view and ground
+LOOKED = 12 * BORDERS  # places of borders that are looked at for such crops as show no cut
 BANK = 160  # crops of the exemplar in a view
 COLUMNS = ("place", "view", "ground", "crop", "cluster", "seam_lpips", "psnr", "jump")
 BEST = 80.0  # dB, of pictures that are as good as equal
@@ -77,12 +78,16 @@ def measured(laid: Laid, straight: Laid, weights: Weights | None, seed: int) -> 
 
 
 def _borders(laid: Laid, terrain: Terrain, view: View, rng) -> list[Taken]:
-    found = []
-    for place in places.borders(laid, rng):
+    """First those that show a border alone, and then, if these are too few, some with a cut as well."""
+    alone, others = [], []
+    for place in places.borders(laid, rng)[:LOOKED]:
         if (crop := crops.crop(laid, terrain, view, place.at)) and (met := crops.meeting(laid, crop)):
-            shown = crops.shown(laid, terrain, crop, met, border=True)
-            if shown.any:
-                found.append(Taken("border", len(found), place.cluster, shown))
+            (others if len(met) > 1 else alone).append((place, crop, met))
+    found = []
+    for place, crop, met in alone + others:
+        shown = crops.shown(laid, terrain, crop, met, border=True)
+        if shown.any:
+            found.append(Taken("border", len(found), place.cluster, shown))
         if len(found) == BORDERS:
             return found
     return _enough(found, BORDERS, "borders")

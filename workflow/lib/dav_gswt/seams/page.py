@@ -16,13 +16,14 @@ SHOTS = {  # as rule draw_grid calls them
 DIGITS = {"seam_lpips": 4, "psnr": 2, "jump": 2}
 NAMES = {"seam_lpips": "Seam-LPIPS over the floor", "psnr": "PSNR (dB)", "jump": "jump"}
 MEANT = """
-Crops of 48 pixels are taken on the **borders** between tiles and on the **cuts** inside them: on level ground and on
-hills, from near, as a walker sees them and from above. Seam-LPIPS is a crop's distance from the crops of the exemplar
-most like it. Its **floor** is that of the patches that meet there, each laid whole: what the same ground has without a
-seam; the **ceiling** is that of the same patches cut straight without looking. A **jump** is the colour difference of
-neighbouring pixels across a seam over that beside it; 1 is none. Brackets hold the 95 % interval, over places of strips
-and tiles, since every place is laid many times. Sets: how many tile sets were cut, each from places drawn anew. Way:
-how far from floor to ceiling cuts are, where the ceiling surely lies above the floor.
+Crops of 48 pixels are taken on the **borders** between tiles, where there are such places without a cut beside them,
+and on the **cuts** inside tiles: on level ground and on hills, from near, as a walker sees them and from above.
+Seam-LPIPS is a crop's distance from the crops of the exemplar most like it. Its **floor** is that of the patches that
+meet there, each laid whole: what the same ground has without a seam; the **ceiling** is that of the same patches cut
+straight without looking. A **jump** is the colour difference of neighbouring pixels across a seam over that beside it;
+1 is none. Brackets hold the 95 % interval, over places of strips and tiles, since every place is laid many times. Sets:
+how many tile sets were cut, each from places drawn anew. Way: how far from floor to ceiling cuts are, where the ceiling
+surely lies above the floor.
 """
 
 

@@ -4,14 +4,12 @@ from dataclasses import dataclass
 from zlib import crc32
 
 import numpy as np
-from scipy.ndimage import maximum_filter, minimum_filter
 
 from dav_gswt.seams.ground import Laid
 from dav_gswt.tiles import layout
 from dav_gswt.tiles.layout import CENTRE, LABELS
 
 BIN = 12  # cells along a seam that count as one place of it
-AWAY = 8  # cells between a border's point and the next cut, where there are such points
 
 
 @dataclass(frozen=True)
@@ -23,7 +21,7 @@ class Place:
 
 
 def borders(laid: Laid, rng: np.random.Generator) -> list[Place]:
-    """Points on borders, away from the corners' patches, in an order drawn at random; first those far from any cut."""
+    """Points on borders, away from the corners' patches, in an order drawn at random."""
     n, a, size = laid.plan.side, laid.plan.corner, len(laid.patch)
     found = []
     for upright in (True, False):
@@ -34,9 +32,7 @@ def borders(laid: Laid, rng: np.random.Generator) -> list[Place]:
                     west, _, _, south = layout.colours(int(laid.tile[y, x]) % layout.EDGES)
                     name = f"v{west}" if upright else f"h{south}"
                     found.append(Place((x + laid.first, y + laid.first), f"{name}:{along % n // BIN}"))
-    pure = maximum_filter(laid.patch, 2 * AWAY) == minimum_filter(laid.patch, 2 * AWAY)
-    drawn = _shuffled(found, rng)
-    return sorted(drawn, key=lambda place: not pure[place.at[1] - laid.first, place.at[0] - laid.first])
+    return _shuffled(found, rng)
 
 
 def cuts(laid: Laid, rng: np.random.Generator) -> list[Place]:
