@@ -67,6 +67,7 @@ def way(policy):
 
 CHOOSING = "|".join(way(policy) for policy in (*GEOMETRIC, *IMAGINING))  # of poses, by their scores
 POLICY = f"{CHOOSING}|given(?=_none_pdrop0_lam0_k0/)"
+COMPARING = {"study", "tradeoff", "seams", "stability", "view_benchmark"}  # targets that are of no use without LPIPS
 SNAPSHOTS = "results/snapshots"  # of fits that run: outside the outputs, so that a killed fit can go on
 
 
@@ -260,9 +261,11 @@ def refining(wildcards):
 
 
 def lpips_if_fetched(wildcards):
-    """LPIPS's weights for what measures with them where they are, and says where they are not."""
+    """LPIPS's weights for what measures with them where they are, and says where they are not; they are fetched first
+    for the targets that are made to compare.
+    """
     path = Path(rules.fetch_lpips.output.weights)
-    return {"lpips": str(path)} if path.is_file() else {}
+    return {"lpips": str(path)} if path.is_file() or COMPARING & set(workflow.dag_settings.targets) else {}
 
 
 def describing(wildcards):

@@ -115,6 +115,15 @@ def test_the_oracle_needs_a_scene_whose_truth_is_known(snakemake, shared, tmp_pa
         assert known or "policy oracle: what copr_dunes truly shows is not known" in done.stdout
 
 
+def test_what_compares_fetches_lpips_first_and_a_terrain_does_without(snakemake, tmp_path):
+    (tmp_path / "few.yaml").write_text("seam_study: {scenes: [desert], seams: [semantic], baseline: semantic, draws: 1}")
+    for target, fetched in (("seams", True), ("all", False)):
+        said = snakemake(tmp_path, target, "--dry-run", configs=(USUAL, TINY, tmp_path / "few.yaml")).stdout
+        jobs = [job for job in said.split("\n\n") if "rule cut_tiles:" in job]
+        assert jobs and all(("lpips_alexnet.safetensors" in job) == fetched for job in jobs)
+        assert ("rule fetch_lpips:" in said) == fetched
+
+
 def test_tiles_go_by_the_doubt_of_the_prior_that_was_asked(planned, tmp_path):
     plan = planned(tmp_path, "--config", "policy=w2-lpips", configs=(USUAL, TINY))
     assert plan["score_coarse"] == plan["score_round"] == plan["make_levels"] == 1 and not plan["fetch_lpips"]
