@@ -116,7 +116,8 @@ def test_the_oracle_needs_a_scene_whose_truth_is_known(snakemake, shared, tmp_pa
 
 
 def test_what_compares_fetches_lpips_first_and_a_terrain_does_without(snakemake, tmp_path):
-    (tmp_path / "few.yaml").write_text("seam_study: {scenes: [desert], seams: [semantic], baseline: semantic, draws: 1}")
+    study = "seam_study: {scenes: [desert], seams: [semantic], baseline: semantic, draws: 1}"
+    (tmp_path / "few.yaml").write_text(study)
     for target, fetched in (("seams", True), ("all", False)):
         said = snakemake(tmp_path, target, "--dry-run", configs=(USUAL, TINY, tmp_path / "few.yaml")).stdout
         jobs = [job for job in said.split("\n\n") if "rule cut_tiles:" in job]
