@@ -15,6 +15,7 @@ from dav_gswt.views import View
 
 GAIN = 1.6  # a photo brighter or darker than the set by more than this is left at the bound
 STEP_GAIN = 1.25  # the same for what is left to correct during the fit
+LEARNT = np.float32(0.25)  # share of what a turn says of a photo's level
 PRIOR = 1e-3  # variance of made-up pixels with gain 1: a picture without contrast says nothing of its gain
 TRIM = 3.0  # pixels further off than this many medians of the difference say nothing of the exposure
 ROUNDS = 3
@@ -67,28 +68,28 @@ def matched(view: View, points: Float[Array, "n 3"], colours: Float[Array, "n 3"
 
 
 class Levels:
-    """Gain and offset of each photo against the picture that the field gave at its last turn.
+    """Gain and offset of each photo against the pictures that the field gave at its turns.
 
-    What is used of them is anchored: the median over the photos seen so far is taken out, so that the field shows what
-    the typical photo shows. Without this a picture that is not yet sharp, whose gain least squares finds below 1, would
-    make the field's contrast and brightness grow at every step.
+    What is used of them is anchored: the median over the photos is taken out, so that the field shows what the typical
+    photo shows. Without this a picture that is not yet sharp, whose gain least squares finds below 1, would make the
+    field's contrast and brightness grow at every step. A turn changes a photo's level by a share (LEARNT) only: the
+    median is as old as the other photos' last turns, and would it follow the field at once, the two would chase each
+    other, the wider the more photos there are.
     """
 
     def __init__(self, views: int):
         self.gains, self.offsets = np.ones((views, 3), np.float32), np.zeros((views, 3), np.float32)
-        self.known = np.zeros(views, bool)
 
     def look(self, index: int, picture: Float32[Array, "h w 3"], view: View) -> None:
-        """Learn a photo's level from the picture of its place."""
-        self.gains[index], self.offsets[index] = towards(picture, view, (self.gains[index], self.offsets[index]))
-        self.known[index] = True
+        """Learn of a photo's level from the picture of its place."""
+        a, b = towards(picture, view, (self.gains[index], self.offsets[index]))
+        self.gains[index] += LEARNT * (a - self.gains[index])
+        self.offsets[index] += LEARNT * (b - self.offsets[index])
 
     def of(self, index: int) -> tuple[Float32[Array, "3"], Float32[Array, "3"]]:
-        """Gain a and offset b that bring the picture x to the photo: a x + b; 1 and 0 of a photo not looked at."""
-        if not self.known[index]:
-            return np.ones(3, np.float32), np.zeros(3, np.float32)
-        a = self.gains[index] / np.median(self.gains[self.known], 0)
-        return a, self.offsets[index] - a * np.median(self.offsets[self.known], 0)
+        """Gain a and offset b that bring the picture x to the photo: a x + b; 1 and 0 where nothing is learnt yet."""
+        a = self.gains[index] / np.median(self.gains, 0)
+        return a, self.offsets[index] - a * np.median(self.offsets, 0)
 
 
 def towards(
