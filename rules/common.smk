@@ -67,7 +67,7 @@ def way(policy):
 
 CHOOSING = "|".join(way(policy) for policy in (*GEOMETRIC, *IMAGINING))  # of poses, by their scores
 POLICY = f"{CHOOSING}|given(?=_none_pdrop0_lam0_k0/)"
-COMPARING = {"study", "tradeoff", "seams", "stability", "view_benchmark"}  # targets that are of no use without LPIPS
+COMPARING = {"study", "tradeoff", "seams", "stability", "view_benchmark"}  # targets that compare by LPIPS
 SNAPSHOTS = "results/snapshots"  # of fits that run: outside the outputs, so that a killed fit can go on
 
 

@@ -89,7 +89,7 @@ def test_colours_do_not_swing_however_many_photos_there_are(count):
     """A field that is brightened or darkened by .004 a step, as its photos ask for; they differ by 2 %.
 
     A median that follows the field as fast as the field follows it is late by half a turn of all photos: of 200 the
-    brightness then swings by .7.
+    brightness then swings by .5.
     """
     rng = np.random.default_rng(3)
     texture = rng.uniform(0.2, 0.8, (40, 40, 3)).astype(np.float32)

@@ -101,7 +101,7 @@ def raised(laid, height):
 
 @pytest.mark.parametrize("view", crops.VIEWS, ids=lambda view: view.name)
 def test_a_crop_shows_what_it_is_of_however_high_the_ground_lies(laid, view, rng):
-    """Aimed at a plane below, a walker's crop would show ground that lies 2.7 times as far before it."""
+    """Aimed at a plane below it, a walker's crop would show ground 2.7 times that height before the place."""
     place = next(
         p for p in places.borders(laid, rng) if crops.meeting(laid, crops.crop(laid, laid.terrain, view, p.at))
     )
