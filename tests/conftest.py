@@ -13,6 +13,14 @@ settings.register_profile("untimed", deadline=None)  # no test asserts times: ma
 settings.load_profile("untimed")
 
 
+def pytest_collection_modifyitems(items):
+    """With several workers (pytest -n), one takes a whole folder: what its tests share is then made once. Whole runs
+    come first, as they take longest."""
+    items.sort(key=lambda item: "workflow" not in item.path.parts)  # stable: else the order stays
+    for item in items:
+        item.add_marker(pytest.mark.xdist_group(str(item.path.parent)))
+
+
 @pytest.fixture(scope="session")
 def root():
     return ROOT

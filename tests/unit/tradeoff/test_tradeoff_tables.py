@@ -98,6 +98,15 @@ def test_the_front_says_who_is_better_and_by_how_much(table):
     assert found["cap", "70000"]["behind"] == 0 and found["cap", "70000"]["rival_knob"] == ""
 
 
+def test_a_setting_behind_in_psnr_can_be_the_sharpest(table):
+    draft = next(row for row in table if row["setting"] == "draft")
+    draft["lpips"] = 0.6  # the others: from .70 on
+    found = {row["setting"]: (row["front"], row["sharp"]) for row in tables.pareto(table)}
+    assert found == {"reference": (1, 0), "draft": (0, 1), "70000": (1, 0), "100": (0, 0)}
+    draft["lpips"] = None
+    assert {row["sharp"] for row in tables.pareto(table)} == {None}
+
+
 def test_the_page_says_what_the_table_says(table, tmp_path):
     figures.write_rows(tmp_path / "t.csv", table)
     figures.write_rows(tmp_path / "p.csv", tables.pareto(table))
@@ -107,7 +116,8 @@ def test_the_page_says_what_the_table_says(table, tmp_path):
     assert "`cap` 100 instead of 1000000: takes 2.00 times as long and costs 1.00 dB." in text
     assert "costs 25.00 grey levels; the bundle is 0.50 times as large." in text
     assert "`draft` lies 1.80 dB behind the front: cap 70000 is as fast and better by that." in text
-    assert "`reference` lies on the front" in text and "| `draft` | 35 | 28.00 |" in text
+    assert "`reference` lies on the front" in text
+    assert "| `draft` | 35 | 28.00 | 0.500 | 0.720 | 800 | 0.2 | no | no |" in text
     assert "| **1000000** | 70.0 |" in text and "| 70000 | 35.0 |" in text
     assert "None" not in text and "nan" not in text
 
@@ -140,6 +150,8 @@ def test_figures_are_drawn_of_what_is_known(table, tmp_path):
     figures.save(plots.knobs(table), tmp_path / "knobs.png")
     figures.save(plots.fronts(tables.pareto(table)), tmp_path / "pareto.png")
     assert images.size(tmp_path / "knobs.png")[0] > 600 and images.size(tmp_path / "pareto.png")[0] > 600
+    figures.save(plots.fronts([row | {"sharp": None} for row in tables.pareto(table)]), tmp_path / "one.png")
+    assert images.size(tmp_path / "one.png")[0] < images.size(tmp_path / "pareto.png")[0]  # a panel less
 
 
 @pytest.mark.parametrize(

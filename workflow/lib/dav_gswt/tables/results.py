@@ -64,7 +64,8 @@ def text(tables: dict[str, list[dict]], figures: dict[str, str]) -> str:
         "## Timing",
         table(["scene", *_heads(TIMING)], [[row["scene"], *_cells(row, TIMING)] for row in tables["timing"]]),
         "Reconstruction is scoring, choosing and fitting, without the taking of photos; render, sort and update are "
-        "the page's in a headless browser (`docs/data/frames.csv`), which without a graphics card draws in software. "
+        "the page's in a headless browser, which without a graphics card draws in software (`docs/data/frames.csv`; "
+        "empty where `snakemake frame_times` was not run). "
         "The paper's percentages are left out: it does not say of what they are.",
         "## Levels of detail",
         table(*_levels(tables["lod"])),
@@ -73,7 +74,8 @@ def text(tables: dict[str, list[dict]], figures: dict[str, str]) -> str:
             ["setting", "value", "paper's value", *_heads(SENSITIVITY)],
             [[r["setting"], _bold(r), r["paper_value"], *_cells(r, SENSITIVITY)] for r in tables["sensitivity"]],
         ),
-        "In bold the value that is not varied elsewhere.",
+        "In bold the value that is not varied elsewhere. Seam-LPIPS is of one tile set a scene, and differs by some "
+        "thousandths from one set to the next: `docs/seams.md` has more sets and intervals.",
         "## Ablation",
         table(
             ["sweep", "variant", *_heads(ABLATION)],

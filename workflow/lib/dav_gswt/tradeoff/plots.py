@@ -15,26 +15,41 @@ COLUMNS, WIDE, TALL = 4, 2.9, 2.3  # inches a panel
 
 
 def fronts(pareto: list[dict]):
-    """PSNR over seconds of all settings that test views tell apart, their front as a line; presets have their names."""
-    figure = figures.blank(7.5, 4.6)
-    axes = figure.add_subplot()
-    on = sorted((row["seconds"], row["psnr"]) for row in pareto if row["front"])
-    axes.plot(*zip(*on, strict=True), drawstyle="steps-post", color="0.6", linewidth=1, zorder=1) if on else None
+    """PSNR and, where it was measured, LPIPS over seconds of all settings that test views tell apart, the front of each
+    as a line; presets have their names."""
+    shown = [("psnr", "front", AXES["views"][1])]
+    if any(row["sharp"] is not None for row in pareto):
+        shown.append(("lpips", "sharp", "LPIPS of test views (less is better)"))
+    figure = figures.blank(1.5 + 4.5 * len(shown), 4.6)
+    panels = figure.subplots(1, len(shown), squeeze=False)[0]
+    for axes, (key, on, up) in zip(panels, shown, strict=True):
+        _front(axes, pareto, key, on)
+        axes.set_xlabel("seconds from the start views to the bundle")
+        axes.set_ylabel(up)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=8)
+    return figure
+
+
+def _front(axes, pareto: list[dict], key: str, on: str) -> None:
+    best = sorted((row["seconds"], row[key]) for row in pareto if row[on])
+    axes.plot(*zip(*best, strict=True), drawstyle="steps-post", color="0.6", linewidth=1, zorder=1) if best else None
     for n, knob in enumerate(dict.fromkeys(row["knob"] for row in pareto)):
         mine = [row for row in pareto if row["knob"] == knob]
         colour = "black" if knob == PRESET else COLOURS[n % len(COLOURS)]
-        x, y = ([row[key] for row in mine] for key in ("seconds", "psnr"))
+        x, y = ([row[name] for row in mine] for name in ("seconds", key))
         axes.plot(x, y, MARKS[n % len(MARKS)], color=colour, markersize=6, label=knob, alpha=0.8, zorder=2)
-        for row in mine if knob == PRESET else []:
-            at = {"xytext": (6, 4), "textcoords": "offset points"}
-            axes.annotate(row["setting"], (row["seconds"], row["psnr"]), fontsize=9, **at)
-    axes.set_xlabel("seconds from the start views to the bundle")
-    axes.set_ylabel(AXES["views"][1])
+        if knob == PRESET:
+            _named(axes, [(row["seconds"], row[key], row["setting"]) for row in mine], 9)
     axes.margins(0.08)
     axes.set_xlim(left=0)
     axes.grid(alpha=0.3)
-    figure.legend(loc="outside right upper", frameon=False, fontsize=8)
-    return figure
+
+
+def _named(axes, points: list[tuple[float, float, str]], size: int) -> None:
+    """Names beside points, by turns above and below from left to right: those of close neighbours stay apart."""
+    for i, (x, y, name) in enumerate(sorted(points)):
+        at = {"xytext": (5, (4, -4)[i % 2]), "va": ("bottom", "top")[i % 2], "textcoords": "offset points"}
+        axes.annotate(name, (x, y), fontsize=size, **at)
 
 
 def knobs(rows: list[dict]):
@@ -52,12 +67,11 @@ def knobs(rows: list[dict]):
 
 def _panel(panel, knob: str, rows: list[dict]) -> None:
     key, (across, up) = SHOWN[rows[0]["measure"]], AXES[rows[0]["measure"]]
-    for row in rows:
-        if None in (row["own_seconds"], row[key]):
-            continue
-        point = (row["own_seconds"], row[key])
-        panel.plot(*point, "o", color=COLOURS[0], fillstyle="full" if row["base"] else "none", markersize=6)
-        panel.annotate(row["setting"], point, xytext=(4, 4), textcoords="offset points", fontsize=7)
+    known = [row for row in rows if None not in (row["own_seconds"], row[key])]
+    for row in known:
+        filled = "full" if row["base"] else "none"
+        panel.plot(row["own_seconds"], row[key], "o", color=COLOURS[0], fillstyle=filled, markersize=6)
+    _named(panel, [(row["own_seconds"], row[key], row["setting"]) for row in known], 7)
     panel.set_title(knob, fontsize=9, loc="left")
     panel.set_xlabel(across, fontsize=8)
     panel.set_ylabel(up, fontsize=8)

@@ -76,7 +76,8 @@ def mean_square(mine: list[str], others: list[str]) -> float:
 
 def pareto(table: list[dict]) -> list[dict]:
     """The rows that test views tell apart: `front`, 1 where nothing is as fast and better (or as good and faster);
-    else by how many dB (`behind`) the best that is as fast (`rival_knob`, `rival_setting`) is better."""
+    else by how many dB (`behind`) the best that is as fast (`rival_knob`, `rival_setting`) is better. `sharp`: 1 where
+    nothing is as fast with a lower LPIPS; empty where LPIPS was not measured of all."""
     cells = {}
     for row in table:
         cells.setdefault(tuple(row[key] for key in CELL), row)  # knobs share the base: it is one point
@@ -85,10 +86,12 @@ def pareto(table: list[dict]) -> list[dict]:
     if not known:
         return []
     cost, worth = (np.array([row[key] for row in known], float) for key in ("seconds", "psnr"))
+    blurred = [row["lpips"] for row in known]
+    sharp = [None] * len(known) if None in blurred else front(cost, -np.array(blurred, float)).astype(int).tolist()
     shown = ("scene", "seed", "knob", "setting", "base", "seconds", "psnr", "ssim", "lpips", "peak_mb", "bundle_mb")
     return [
         {key: row[key] for key in shown}
-        | {"front": int(on), "behind": float(worth[rival] - worth[i])}
+        | {"front": int(on), "behind": float(worth[rival] - worth[i]), "sharp": sharp[i]}
         | {f"rival_{key}": known[rival][key] if rival != i else "" for key in ("knob", "setting")}
         for i, (row, on, rival) in enumerate(zip(known, front(cost, worth), rivals(cost, worth), strict=True))
     ]
