@@ -46,10 +46,14 @@ def _front(axes, pareto: list[dict], key: str, on: str) -> None:
 
 
 def _named(axes, points: list[tuple[float, float, str]], size: int) -> None:
-    """Names beside points, by turns above and below from left to right: those of close neighbours stay apart."""
-    for i, (x, y, name) in enumerate(sorted(points)):
-        at = {"xytext": (5, (4, -4)[i % 2]), "va": ("bottom", "top")[i % 2], "textcoords": "offset points"}
-        axes.annotate(name, (x, y), fontsize=size, **at)
+    """Names beside points, inwards from the right end: above a point that is higher than its nearest in x, else below;
+    so two that nearly meet keep their names apart."""
+    xs = [x for x, _, _ in points]
+    for i, (x, y, name) in enumerate(points):
+        others = [(abs(x - px), py, k) for k, (px, py, _) in enumerate(points) if k != i]
+        above, end = not others or (y, i) > min(others)[1:], x > min(xs) + 0.8 * (max(xs) - min(xs))
+        at = {"xytext": (-5 if end else 5, 4 if above else -4), "textcoords": "offset points"}
+        axes.annotate(name, (x, y), fontsize=size, va="bottom" if above else "top", ha="right" if end else "left", **at)
 
 
 def knobs(rows: list[dict]):
