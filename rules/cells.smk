@@ -80,13 +80,16 @@ def seam_values(scene, variant=None):
 
 
 def seam_cells():
-    """What tells each cell from the others, and its files; a scene's own seam is always among its variants, and drawn
+    """What tells each cell from the others, and its files; a scene's own seam is always among its variants, each drawn
     as often as is asked for."""
     asked, cells = config["seam_study"], []
     for scene in asked["scenes"]:
         own = config["scenes"][scene]["seam"]
-        variants = [(name, name, 0) for name in dict.fromkeys([*asked["seams"], own])]
-        variants += [(own, name, draw) for draw, name in enumerate(draws.names(own, asked)) if draw]
+        variants = [
+            (variant, name, draw)
+            for variant in dict.fromkeys([*asked["seams"], own])
+            for draw, name in enumerate(draws.asked(variant, own, asked))
+        ]
         for (variant, entry, draw), seed in product(variants, config["seeds"]):
             values = seam_values(scene, entry) | {"seed": seed}
             files = {"table": rules.measure_seams.output.crops, "facts": rules.measure_seams.output.facts}

@@ -143,9 +143,9 @@ def values_of(scene, policy=None, over=None):
 
 
 def terrain_of(scene):
-    """A scene's terrain: page, stills and, where the config asks for one, a flight."""
-    flight = [rules.render_flight.output.frames] if config["flight"] else []
-    return expand([rules.make_page.output.page, *rules.render_terrain.output.stills, *flight], **values_of(scene))
+    """A scene's terrain: page, stills, these small and, where the config asks for one, a flight."""
+    made = [rules.make_page.output.page, *rules.render_terrain.output.stills, rules.show_stills.output.sheet]
+    return expand(made + [rules.render_flight.output.frames] * bool(config["flight"]), **values_of(scene))
 
 
 def study_of(scene):

@@ -61,6 +61,16 @@ def study_figures():
     return found | {"budget": "results/sweeps/budget.png"}
 
 
+def shown_terrains():
+    """The stills of the terrain of each scene that the study's figures show."""
+    asked = config["study"]["figures"]
+    return [
+        path
+        for scene in asked["scenes"]
+        for path in expand(rules.show_stills.output.sheet, **shown_estimator(scene, asked["policy"]))
+    ]
+
+
 def kept_as(name):
     """The ending of a figure of the study in docs/figures: those of photos are a fifth as large as JPEGs."""
     return ".jpg" if name.startswith(("evolution", "estimators", "cuts")) else ".png"

@@ -31,7 +31,7 @@ rule write_results:
 STUDY = [
     lambda wildcards: [f"results/tables/{name}.csv" for name in TABLES],
     lambda wildcards: [f"results/sweeps/{name}.png" for name in sweeps_of(config["study"])],
-    lambda wildcards: list(study_figures().values()),
+    lambda wildcards: list(study_figures().values()) + shown_terrains(),
     lambda wildcards: [rules.write_results.output.page],
     lambda wildcards: [rules.show_stability.output.page],
     lambda wildcards: [rules.write_tradeoff.output.page, rules.gather_auto.output.page],

@@ -1,7 +1,8 @@
 """Terrain: the tiles laid without end, as a page to walk in, as stills and, where the config asks, as a flight.
 
-In: the bundle. Out: page/ (open it with `make view`), walker.png, oblique.png, above.png, flight/; beside the bundle, where asked
-for, presort.csv: what the page's shortcuts do to a picture. `snakemake presort_table` gathers those of the config's `lod`.
+In: the bundle. Out: page/ (open it with `make view`), walker.png, oblique.png, above.png, these three small in stills.jpg,
+flight/; beside the bundle, where asked for, presort.csv: what the page's shortcuts do to a picture. `snakemake
+presort_table` gathers those of the config's `lod`.
 """
 
 
@@ -36,12 +37,7 @@ rule render_terrain:
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
     output:
-        stills=report(
-            expand("<results>/<terrain>/{shot}.png", shot=["walker", "oblique", "above"], allow_missing=True),
-            caption="../workflow/report/stills.rst",
-            category="Terrain",
-            labels={"scene": "{scene}", "quality": "{quality}"},
-        ),
+        stills=expand("<results>/<terrain>/{shot}.png", shot=["walker", "oblique", "above"], allow_missing=True),
     log:
         "<logs>/<terrain>/render_terrain.log",
     benchmark:
@@ -57,6 +53,27 @@ rule render_terrain:
         source=source_of("terrain", "bundle", "raster"),
     script:
         "../scripts/render_terrain.py"
+
+
+rule show_stills:
+    """The stills beside each other, small enough for a report of many scenes."""
+    input:
+        stills=rules.render_terrain.output.stills,
+    output:
+        sheet=report(
+            "<results>/<terrain>/stills.jpg",
+            caption="../workflow/report/stills.rst",
+            category="Terrain",
+            labels={"scene": "{scene}", "quality": "{quality}"},
+        ),
+    log:
+        "<logs>/<terrain>/show_stills.log",
+    benchmark:
+        "<benchmarks>/<terrain>/show_stills.tsv"
+    params:
+        source=source_of("figures"),
+    script:
+        "../scripts/show_stills.py"
 
 
 rule render_flight:

@@ -8,7 +8,8 @@ with logging_to(snakemake.log[0]):
     out, cells, study = snakemake.output, snakemake.params.cells, snakemake.params.study
     rows = [row for cell in cells for row in tables.rows(cell)]
     figures.write_rows(out.crops, rows)
-    compared = [row for row in rows if row["variant"] in study["seams"] and not row["draw"]]
+    often = study.get("compared_draws", 1)
+    compared = [row for row in rows if row["variant"] in study["seams"] and row["draw"] < often]
     found = {
         out.summary: summary.summary(rows),
         out.ablation: summary.ablation(compared, study["baseline"]),

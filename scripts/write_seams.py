@@ -2,12 +2,13 @@
 
 from pathlib import Path
 
+from dav_gswt import figures
 from dav_gswt.logs import logging_to
-from dav_gswt.seams import page, plots, tables
+from dav_gswt.seams import page, tables
 
 with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
-    plots.write_sheet(out.sheet, params.pictures, list(page.SHOTS.values()))
+    figures.save(figures.sheet(params.pictures, list(page.SHOTS.values())), out.sheet)
     pictures = {
         f"figures/{Path(given.ablation).name}": "Every way to cut less the baseline, in three measures",
         f"figures/{Path(out.sheet).name}": "Twenty by twenty tiles from above, and what a walker sees of them",

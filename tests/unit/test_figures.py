@@ -25,3 +25,17 @@ def test_a_picture_is_kept_as_its_ending_says(tmp_path, ending):
     figures.kept(tmp_path / "a.png", tmp_path / f"b{ending}")
     assert (tmp_path / f"b{ending}").read_bytes()[:3] == {".png": b"\x89PN", ".jpg": b"\xff\xd8\xff"}[ending]
     np.testing.assert_allclose(images.read(tmp_path / f"b{ending}"), picture, atol=0.02)
+
+
+def test_a_sheet_shows_every_picture_in_its_row(tmp_path):
+    """Two rows of two: each quarter has the colour of its own picture."""
+    colours = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0]], np.float32)
+    for number, colour in enumerate(colours):
+        images.write(tmp_path / f"{number}.png", np.broadcast_to(colour, (40, 80, 3)))
+    rows = {name: [tmp_path / f"{k + n}.png" for n in (0, 1)] for k, name in ((0, "upper"), (2, "lower"))}
+    figures.save(figures.sheet(rows, ["left", "right"], tall=1.0), tmp_path / "sheet.png")
+    shown = images.read(tmp_path / "sheet.png")
+    high, wide = (n // 4 for n in shown.shape[:2])
+    found = [shown[y * high, x * wide] for y in (1, 3) for x in (1, 3)]
+    np.testing.assert_allclose(found, colours, atol=0.02)
+    assert shown.shape[1] > 1.8 * shown.shape[0]

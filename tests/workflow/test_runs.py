@@ -26,9 +26,9 @@ RULES = {
     "active": ["select_poses", "capture_views", "update_field", "score_round", "evaluate_round"],
     "levels": ["make_levels"],
     "tiles": ["cut_tiles", "bundle_tiles"],
-    "terrain": ["make_page", "render_terrain"],
+    "terrain": ["make_page", "render_terrain", "show_stills"],
 }
-AFTER_TAU = {"bundle_tiles", "make_page", "render_terrain", "all"}
+AFTER_TAU = {"bundle_tiles", "make_page", "render_terrain", "show_stills", "all"}
 BEFORE_K = {*RULES["photos"], *RULES["coarse"]}
 
 
@@ -234,9 +234,11 @@ def test_another_round_goes_on_from_the_last_one(tiny, planned):
 @pytest.mark.parametrize(
     "change, made",
     [
-        pytest.param("stills: {width: 320, height: 180}", {"render_terrain"}, id="another size"),
+        pytest.param("stills: {width: 320, height: 180}", {"render_terrain", "show_stills"}, id="another size"),
         pytest.param(
-            "heights: {kind: hills, height: 2, wavelength: 20}", {"render_terrain", "make_page"}, id="another surface"
+            "heights: {kind: hills, height: 2, wavelength: 20}",
+            {"render_terrain", "show_stills", "make_page"},
+            id="another surface",
         ),
     ],
 )

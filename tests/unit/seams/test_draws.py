@@ -14,7 +14,7 @@ SCENES = {"desert": {"seam": "semantic-refined"}, "beach": {"seam": "small"}, "m
 
 
 def config(**study):
-    return {"scenes": SCENES, "seams": dict(SEAMS), "seam_study": {"scenes": ["desert", "beach"]} | study}
+    return {"scenes": SCENES, "seams": dict(SEAMS), "seam_study": {"scenes": ["desert", "beach"], "seams": []} | study}
 
 
 def test_every_scenes_own_seam_has_an_entry_for_each_draw():
@@ -25,8 +25,20 @@ def test_every_scenes_own_seam_has_an_entry_for_each_draw():
 
 
 def test_a_refined_seam_is_refined_in_every_draw():
-    assert draws.names("semantic-refined", {"draws": 2}) == ["semantic-refined", "semantic-draw-1-refined"]
-    assert draws.names("small", {}) == ["small"]
+    found = draws.asked("semantic-refined", "semantic-refined", {"seams": [], "draws": 2})
+    assert found == ["semantic-refined", "semantic-draw-1-refined"]
+    assert draws.asked("small", "small", {"seams": []}) == ["small"]
+
+
+@pytest.mark.parametrize(
+    "own, times", [({"draws": 1}, (2, 2)), ({"draws": 3}, (3, 2))], ids=["more are compared", "own drawn more often"]
+)
+def test_seams_that_are_compared_are_drawn_as_often_as_is_asked(own, times):
+    study = {"seams": ["semantic", "small"], "compared_draws": 2} | own
+    assert tuple(len(draws.asked(seam, "semantic", study)) for seam in ("semantic", "small")) == times
+    assert draws.asked("other", "semantic", study) == []
+    made = draws.entries(config(seams=["small"], compared_draws=2))["seams"]
+    assert list(made) == [*SEAMS, "small-draw-1"] and made["small-draw-1"] == SEAMS["small"] | {"draw": 1}
 
 
 def test_an_entry_of_such_a_name_is_told():

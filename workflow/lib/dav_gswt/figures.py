@@ -57,6 +57,23 @@ def kept(source: Path | str, target: Path | str) -> None:
             imsave(part, images.read(source), format="jpg", pil_kwargs={"quality": QUALITY})
 
 
+def sheet(pictures: dict[str, list[Path | str]], heads: list[str], tall: float = 2.05):
+    """Pictures of files beside each other, small: a row, so many inches tall, a name; each row's pictures under heads.
+
+    As wide as the first row's pictures are for their height.
+    """
+    shown = {name: [images.read(file) for file in files] for name, files in pictures.items()}
+    wide = [float(picture.shape[1] / picture.shape[0]) for picture in next(iter(shown.values()))]
+    figure = blank(tall * sum(wide), tall * len(shown))
+    grid = figure.subplots(len(shown), len(heads), squeeze=False, width_ratios=wide)
+    for (name, row), line in zip(shown.items(), grid, strict=True):
+        for axes, picture, head in zip(line, row, heads, strict=True):
+            axes.imshow(picture, interpolation="antialiased")
+            axes.set_title(f"{name}: {head}" if axes is line[0] else head, fontsize=7, loc="left", pad=2)
+            axes.axis("off")
+    return figure
+
+
 def fit_time(curves: dict[str, list[dict[str, float]]], path: Path | str) -> None:
     """PSNR of test photos (colour-corrected) against seconds of fitting, a line a scene."""
     figure = blank(6.4, 4.0)

@@ -4,6 +4,8 @@ Each is an entry of `seams` of its own: the first draw of `semantic` is `semanti
 Read by the workflow before the first job, so it loads no numerics.
 """
 
+from itertools import product
+
 from dav_gswt.config import REFINED
 from dav_gswt.errors import InputError
 
@@ -14,20 +16,23 @@ def name(seam: str, draw: int) -> str:
     return f"{own}-draw-{draw}{seam[len(own) :]}" if draw else seam
 
 
-def names(seam: str, study: dict) -> list[str]:
-    """All draws of an entry that the config's `seam_study` asks for."""
-    return [name(seam, draw) for draw in range(study.get("draws", 1))]
+def asked(seam: str, own: str, study: dict) -> list[str]:
+    """All draws of an entry that the config's `seam_study` asks for of a scene whose own entry is `own`."""
+    times = [study.get("draws", 1)] * (seam == own) + [study.get("compared_draws", 1)] * (seam in study["seams"])
+    return [name(seam, draw) for draw in range(max(times, default=0))]
 
 
 def entries(config: dict) -> dict:
-    """The config with the entries of `seams` that its `seam_study` draws of every scene's own.
+    """The config with the entries of `seams` that its `seam_study` draws: every scene's own, and those it compares.
 
     Raises: InputError: the config has another entry of such a name.
     """
-    study, made = config.get("seam_study", {"scenes": []}), dict(config["seams"])
-    for seam in dict.fromkeys(config["scenes"][scene]["seam"].removesuffix(REFINED) for scene in study["scenes"]):
-        for draw, entry in enumerate(names(seam, study)):
-            found = config["seams"][seam] | ({"draw": draw} if draw else {})
+    study, made = config.get("seam_study", {"scenes": [], "seams": []}), dict(config["seams"])
+    owned = dict.fromkeys(config["scenes"][scene]["seam"] for scene in study["scenes"])
+    for own, seam in product(owned, [*owned, *study["seams"]]):
+        for draw, entry in enumerate(asked(seam, own, study)):
+            plain, entry = seam.removesuffix(REFINED), entry.removesuffix(REFINED)
+            found = config["seams"][plain] | ({"draw": draw} if draw else {})
             if made.setdefault(entry, found) != found:
                 raise InputError(f"config: seams.{entry}: `seam_study` makes an entry of this name; give yours another")
     return config | {"seams": made}

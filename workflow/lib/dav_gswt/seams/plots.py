@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt import cameras, figures, images
+from dav_gswt import cameras, figures
 from dav_gswt.raster import render
 from dav_gswt.seams.repetition import Repeats
 from dav_gswt.seams.summary import EVERY, MEASURES
@@ -35,20 +35,6 @@ def write_ablation(path: Path | str, rows: list[dict], baseline: str) -> None:
         axes.set_xlabel(f"{NAMES[measure]}, less that of {baseline}", fontsize=8)
         axes.tick_params(axis="x", labelsize=7)
         axes.grid(axis="x", alpha=0.3)
-    figures.save(figure, path)
-
-
-def write_sheet(path: Path | str, pictures: dict[str, list[Path]], heads: list[str]) -> None:
-    """Pictures that rules have drawn, small: a row a scene."""
-    shown = {scene: [images.read(file) for file in files] for scene, files in pictures.items()}
-    wide = [float(picture.shape[1] / picture.shape[0]) for picture in next(iter(shown.values()))]
-    figure = figures.blank(2.0 * sum(wide), 2.05 * len(shown))
-    grid = figure.subplots(len(shown), len(heads), squeeze=False, width_ratios=wide)
-    for (scene, row), line in zip(shown.items(), grid, strict=True):
-        for axes, picture, head in zip(line, row, heads, strict=True):
-            axes.imshow(picture, interpolation="antialiased")
-            axes.set_title(f"{scene}: {head}" if axes is line[0] else head, fontsize=7, loc="left", pad=2)
-            axes.axis("off")
     figures.save(figure, path)
 
 
