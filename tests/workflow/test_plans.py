@@ -316,7 +316,9 @@ def test_the_code_is_formatted(root, tool):
 def test_seams_are_measured_by_cells_that_share_the_levels(planned, tmp_path):
     """Two ways to cut besides the scene's own, which is one of them or not, and is drawn once or thrice; they too."""
     for own, draws, twice, cells in (("colour", 1, 1, 2), ("small", 1, 1, 3), ("small", 3, 1, 5), ("small", 3, 2, 7)):
-        study = f"scenes: [desert], seams: [colour, semantic], baseline: colour, draws: {draws}, compared_draws: {twice}"
+        study = (
+            f"scenes: [desert], seams: [colour, semantic], baseline: colour, draws: {draws}, compared_draws: {twice}"
+        )
         (tmp_path / "few.yaml").write_text(f"seam_study: {{{study}}}\nscenes: {{desert: {{seam: {own}}}}}")
         plan = planned(tmp_path, "seams", configs=(USUAL, TINY, tmp_path / "few.yaml"))
         assert plan["measure_seams"] == plan["cut_tiles"] == cells
