@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dav_gswt.tiles import patches, repeats
+from dav_gswt.tiles import layout, patches, repeats
 
 
 @pytest.fixture
@@ -27,14 +27,19 @@ def power(picture):
     return squares[0] + repeats.LINES * (squares[1] + squares[2])
 
 
-def test_charges_sum_to_the_power_of_what_comes_back():
+def own(picture):
+    """A patch's own square, which is not charged."""
+    return (picture**2).sum(-1).mean()
+
+
+def test_charges_sum_to_the_power_of_what_comes_back_but_for_the_patches_own():
     shown = repeats.nothing(exemplar(), 16, (16, 16))
     places, total = np.array([[0, 0], [8, 4], [20, 24]]), 0.0
     for place in places:
         total += shown.charge(place[None])[0]
         shown = shown.plus(place)
     tiles = [shown.ground[y : y + 16, x : x + 16] for x, y in places]
-    assert total == pytest.approx(power(np.sum(tiles, 0)))
+    assert total == pytest.approx(power(np.sum(tiles, 0)) - sum(own(tile) for tile in tiles))
 
 
 def test_a_patch_taken_away_again_leaves_nothing():
@@ -48,7 +53,7 @@ def test_only_what_shows_counts():
     x, y = place = np.array([8, 4])
     tile = np.zeros((16, 16, 3))  # what does not show adds nothing to a row's mean
     tile[:6, :8] = shown.ground[y + 3 : y + 9, x + 4 : x + 12]
-    assert shown.charge(place[None])[0] == pytest.approx(power(tile) * 16 * 16 / (6 * 8))
+    assert shown.charge(place[None])[0] == pytest.approx((power(tile) - own(tile)) * 16 * 16 / (6 * 8))
 
 
 @pytest.mark.parametrize("upright", [True, False])
@@ -89,3 +94,18 @@ def test_two_strips_of_a_direction_never_show_nearly_the_same():
     assert patches.elsewhere(places, size, taken).tolist() == [[3, 0], [8, 1], [9, 40]]
     assert patches.elsewhere(places[:1], size, taken).tolist() == [[0, 0]]  # rather than none
     assert patches.elsewhere(places, size, np.zeros((0, 2), int)).tolist() == places.tolist()
+
+
+def test_a_strip_is_no_better_for_being_barer_than_the_ground(rng):
+    colour = np.full((60, 60, 3), 0.5)
+    colour[20:] -= 0.2 * (rng.random((40, 60, 1)) < 0.1)  # flowers on two thirds of it
+    colour[40:44, 4:8] = 0
+    plan = layout.Layout(60, 1, 20, 2, 3)
+    guide = patches.guide(colour, np.zeros((60, 60)), np.zeros((60, 60)), plan)
+    places = np.array([(x, y) for x in range(8, 56, 4) for y in range(0, 41, 5)] + [(4, 36)])
+    odd = patches.conspicuous(guide, places, (4, 20))
+    plain = patches.means(patches.oddness(guide), places, (4, 20))
+    bare = places[:, 1] == 0
+    assert plain[bare].max() < np.median(plain)
+    assert set(odd[bare]) == {odd.min()} == {np.median(plain)}
+    assert odd[-1] > 2 * odd.min()  # a landmark is dear

@@ -46,15 +46,16 @@ class Shown:
     def charge(self, places: Int[Array, "n 2"]) -> Float[Array, "n"]:
         """How much more there would be of what comes back, per sample, with a patch at each place.
 
-        sum |total + B|^2 - |total|^2 = sum (2 total + B) B: of a patch alone its own variance, 1 on average. The same
-        of the means over a tile's rows and columns, LINES times.
+        sum |total + B|^2 - |total|^2 - |B|^2 = 2 sum total B: a patch's own square is left out. Whatever it shows, that
+        comes back as often as there are tiles like it; charged for, tiles would be blander than the ground. The squares
+        of the means over a tile's rows and columns, LINES times, are charged in full: a line goes on by itself.
         """
         across, along = self._lines(self.total)
 
         def more(b: Float[Array, "h w c"]) -> float:
             rows, columns = self._lines(b)
             lines = ((2 * across + rows) * rows).sum() + ((2 * along + columns) * columns).sum()
-            return float((((2 * self.total + b) * b).sum() + LINES * self.side * lines) / (b.size / b.shape[-1]))
+            return float(((2 * self.total * b).sum() + LINES * self.side * lines) / (b.size / b.shape[-1]))
 
         return np.array([more(self.crop(place)) for place in places])
 

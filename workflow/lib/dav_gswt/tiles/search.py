@@ -114,7 +114,7 @@ def _strips(sketch: Sketch, corner: Array, upright: bool, used: list, rng) -> li
     zone = _end_lines(plan, upright)
     places = patches.sure(sketch.guide, patches.candidates(plan, size, sketch.candidates, rng), size)
     cost = patches.mismatch(sketch.guide, zone, tuple(v[zone] for v in shown), places)
-    odd = patches.means(patches.oddness(sketch.guide), places, size)
+    odd = patches.conspicuous(sketch.guide, places, size)
     fits = np.intersect1d(patches.fitting(cost), patches.fitting(odd))
     cost = patches.relative(cost) + patches.relative(odd)
     if len(fits) < FEW * sketch.tries:  # the best of both is all there is to choose from
