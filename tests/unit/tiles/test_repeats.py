@@ -87,13 +87,51 @@ def test_large_tiles_are_sampled_more_coarsely():
     assert shown.sample == 3 and shown.crop(np.array([100, 100])).shape == (66, 66, 3)
 
 
+def test_pairs_are_charged_what_both_bring_back_but_for_their_own():
+    empty = repeats.nothing(exemplar(), 16, (16, 16))
+    places = np.array([[0, 0], [8, 4], [20, 24]])
+    charges = empty.pairs(places)
+    for i, j in np.ndindex(charges.shape):
+        tiles = [empty.crop(places[k]) for k in (i, j)]
+        assert charges[i, j] == pytest.approx(power(sum(tiles)) - sum(own(tile) for tile in tiles))
+
+
+def test_what_lies_over_a_patch_shows_in_its_place():
+    over = np.zeros((16, 8), bool)
+    over[:3] = over[-2:] = True
+    rows, columns = (v + k for v, k in zip(np.mgrid[:16, :8], (20, 30), strict=True))
+    shown = repeats.nothing(exemplar(), 16, (8, 16), fast=(over, (rows, columns)))
+    crop = shown.crop(np.array([4, 6]))
+    np.testing.assert_array_equal(crop[over], shown.ground[20:36, 30:38][over])
+    np.testing.assert_array_equal(crop[~over], shown.ground[6:22, 4:12][~over])
+
+
+def test_of_two_strips_one_makes_good_what_the_other_lacks():
+    """Light ground, dark ground, and light once more."""
+    colour = np.full((60, 60, 3), 0.5)
+    colour[:, :20], colour[:, 20:40] = 0.7, 0.3
+    shown = repeats.nothing(colour, 20, (8, 20))
+    light, dark, other = np.array([[4, 0], [28, 0], [10, 0]])
+    charges = shown.pairs(np.stack([light, dark, other]))
+    assert charges[0, 1] < 0 < charges[0, 2]
+    pairs = patches.paired(np.stack([light, dark, other]), np.zeros(3), charges, (8, 20), [])
+    assert pairs[0].tolist() == [light.tolist(), dark.tolist()]
+
+
 def test_two_strips_of_a_direction_never_show_nearly_the_same():
-    places = np.array([[0, 0], [3, 0], [8, 1], [9, 40]])
-    size, taken = (12, 80), np.array([[0, 0]])
-    # nearer than a quarter of the shorter side is the same
-    assert patches.elsewhere(places, size, taken).tolist() == [[3, 0], [8, 1], [9, 40]]
-    assert patches.elsewhere(places[:1], size, taken).tolist() == [[0, 0]]  # rather than none
-    assert patches.elsewhere(places, size, np.zeros((0, 2), int)).tolist() == places.tolist()
+    places = np.array([[0, 0], [2, 0], [8, 1], [9, 40]])
+    size = (12, 80)
+    pairs = patches.paired(places, np.array([0.0, 0, 1, 5]), np.zeros((4, 4)), size, [])
+    # nearer than a quarter of the shorter side is the same, however cheap; then costs decide, then ground shown twice
+    assert [pair.tolist() for pair in pairs[[0, 1, -1]]] == [places[k].tolist() for k in ([0, 2], [1, 2], [0, 1])]
+    alone = patches.paired(places[:1], np.zeros(1), np.zeros((1, 1)), size, [])
+    assert alone.tolist() == [[[0, 0], [0, 0]]]  # rather than none
+
+
+def test_ground_seen_beside_a_strip_is_dearer():
+    places = np.array([[0, 0], [20, 0], [40, 0]])
+    pairs = patches.paired(places, np.zeros(3), np.zeros((3, 3)), (10, 30), [(places[0], (10, 10))])
+    assert pairs[0].tolist() == [[20, 0], [40, 0]]
 
 
 def test_a_strip_is_no_better_for_being_barer_than_the_ground(rng):

@@ -172,8 +172,23 @@ def ranked(
     return places[np.argsort(score, kind="stable")]
 
 
-def elsewhere(places: Int[Array, "n 2"], size: tuple[int, int], taken: Int[Array, "k 2"]) -> Int[Array, "m 2"]:
-    """The places that are not nearly one of those taken, in their order; all of them if none is left."""
-    away = np.abs(places[:, None] - taken[None]).max(2)
-    far = (away >= NEAR * min(size)).all(1)
-    return places[far] if far.any() else places
+def paired(
+    places: Int[Array, "n 2"],
+    cost: Float[Array, "n"],
+    together: Float[Array, "n n"],
+    size: tuple[int, int],
+    used: list[tuple[Array, tuple[int, int]]],
+) -> Int[Array, "p 2 2"]:
+    """Pairs of different candidate places from best to worst; a place twice where there is but one.
+
+    cost: relative, of each. together: what two cost beside that, symmetric. used: as in `ranked`. Two that show nearly
+    the same come last.
+    """
+    for place, other in used:
+        cost = cost + REPEAT * overlap(places, size, place, other)
+    first, second = np.triu_indices(len(places), len(places) > 1)
+    apart = np.abs(places[first] - places[second])
+    common = np.maximum(np.subtract(size, apart), 0).prod(1) / np.prod(size)
+    score = cost[first] + cost[second] + together[first, second] + REPEAT * common
+    order = np.lexsort((score, apart.max(1) < NEAR * min(size)))
+    return np.stack([places[first[order]], places[second[order]]], 1)

@@ -10,7 +10,7 @@ as a bare strip: it goes on for ever, so the eye finds it where it is much weake
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
 from scipy.ndimage import gaussian_filter
 
@@ -27,7 +27,8 @@ LINES = 4.0
 class Shown:
     """Pictures laid over one another. ground: the exemplar's, blurred to a sample's width, of mean 0 and variance 1
     over all its cells; sample: cells between two samples; side: samples along a tile. margin: cells (x, y) of a patch
-    that are left out at each side. total: sum of the patches so far.
+    that are left out at each side. total: sum of the patches so far. fast: what lies over any patch of these, NaN
+    where the patch shows; left out: nothing does.
     """
 
     ground: Float[Array, "m m c"]
@@ -35,13 +36,15 @@ class Shown:
     side: int
     margin: tuple[int, int]
     total: Float[Array, "h w c"]
+    fast: Float[Array, "h w c"] | None = None
 
     def crop(self, place: Int[Array, "2"]) -> Float[Array, "h w c"]:
         """What a patch at a place (x, y) shows."""
         x, y = np.add(place, self.margin)
         h, w = self.total.shape[:2]
         s = self.sample
-        return self.ground[y : y + h * s : s, x : x + w * s : s]
+        patch = self.ground[y : y + h * s : s, x : x + w * s : s]
+        return patch if self.fast is None else np.where(np.isnan(self.fast), patch, self.fast)
 
     def charge(self, places: Int[Array, "n 2"]) -> Float[Array, "n"]:
         """How much more there would be of what comes back, per sample, with a patch at each place.
@@ -59,6 +62,20 @@ class Shown:
 
         return np.array([more(self.crop(place)) for place in places])
 
+    def pairs(self, places: Int[Array, "n 2"]) -> Float[Array, "n n"]:
+        """The charge for patches at each two places together, where no other comes back: 2 sum B B' and the lines of
+        B + B'.
+
+        So one makes good what the other lacks, where the first chosen for itself would leave the second what is left.
+        (desert, flowers of seeds for development, against that: what comes back falls from .033, .064 of the colour's
+        variance to .030, .058, the strongest column of the mean tile from .19, .16 of its deviation to .16, .12)
+        """
+        crops = np.stack([self.crop(place) for place in places])
+        along, across = (crops.sum(axis) / self.side for axis in (1, 2))
+        lines = _of_sums(along) + _of_sums(across)
+        flat = crops.reshape(len(places), -1)
+        return (2 * flat @ flat.T + LINES * self.side * lines) / (flat.shape[1] / crops.shape[-1])
+
     def _lines(self, picture: Float[Array, "h w c"]) -> tuple[Float[Array, "h c"], Float[Array, "w c"]]:
         """Its part of the mean over each row and each column of a tile."""
         return picture.sum(1) / self.side, picture.sum(0) / self.side
@@ -68,15 +85,34 @@ class Shown:
         return replace(self, total=self.total + sign * self.crop(place))
 
 
-def nothing(colour: Float[Array, "m m c"], side: int, size: tuple[int, int], margin: tuple[int, int] = (0, 0)) -> Shown:
+def _of_sums(pictures: Float[Array, "n k c"]) -> Float[Array, "n n"]:
+    """Squares of the sums of each two pictures."""
+    flat = pictures.reshape(len(pictures), -1)
+    products = flat @ flat.T
+    own = np.diag(products)
+    return own[:, None] + own[None] + 2 * products
+
+
+def nothing(
+    colour: Float[Array, "m m c"],
+    side: int,
+    size: tuple[int, int],
+    margin: tuple[int, int] = (0, 0),
+    fast: tuple[Bool[Array, "h w"], tuple[Array, Array]] | None = None,
+) -> Shown:
     """No patch yet, of those of a size (width, height) of which a margin at each side does not show.
 
-    side: the tile's, in cells.
+    side: the tile's, in cells. fast: where something lies over the patches, and the exemplar's cells (rows, columns)
+    that show there; of patches without a margin.
     """
     sample = max(1, side // FINE)
     soft = np.stack([gaussian_filter(colour[..., c], sample, mode="nearest") for c in range(colour.shape[-1])], -1)
     soft -= soft.mean((0, 1))
     spread = float(np.sqrt((soft**2).sum(-1).mean()))
     w, h = (max(1, (whole - 2 * left) // sample) for whole, left in zip(size, margin, strict=True))
-    total = np.zeros((h, w, colour.shape[-1]))
-    return Shown(soft / scale(spread), sample, max(1, side // sample), margin, total)
+    ground, total = soft / scale(spread), np.zeros((h, w, colour.shape[-1]))
+    lies = None
+    if fast:
+        over, rows, columns = (v[::sample, ::sample][:h, :w] for v in (fast[0], *fast[1]))
+        lies = np.where(over[..., None], ground[rows, columns], np.nan)
+    return Shown(ground, sample, max(1, side // sample), margin, total, lies)

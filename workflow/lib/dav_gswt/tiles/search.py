@@ -12,6 +12,7 @@ from dav_gswt.tiles.energy import Energy, weights
 from dav_gswt.tiles.layout import CENTRE, EDGES, LABELS, Layout, Places
 
 FEW = 4  # times as many places as are tried: among fewer there is no choice
+PAIRED = 200  # strips, at most, of which every two are looked at together
 PERIODIC = 2.0  # charge for what comes back with every tile, where a median seam costs 1
 
 
@@ -119,15 +120,12 @@ def _strips(sketch: Sketch, corner: Array, upright: bool, used: list, rng) -> li
     cost = patches.relative(cost) + patches.relative(odd)
     if len(fits) < FEW * sketch.tries:  # the best of both is all there is to choose from
         fits = np.argsort(cost, kind="stable")[: FEW * sketch.tries]
+    fits = fits[np.argsort(cost[fits], kind="stable")[:PAIRED]]
     places, cost = places[fits], cost[fits]
-    seen = repeats.nothing(sketch.guide.features[..., :3], n, size, (0, ends_at) if upright else (ends_at, 0))
-    found = []
-    for _ in range(2):
-        taken = np.array([strip.place for strip in found], int).reshape(-1, 2)
-        order = patches.ranked(places, cost + PERIODIC * seen.charge(places), size, used, taken)
-        order = patches.elsewhere(order, size, taken)  # two colours that show the same are one
-        found.append(_best(sketch, shown, order, size, free))
-        seen = seen.plus(found[-1].place)
+    seen = repeats.nothing(sketch.guide.features[..., :3], n, size, fast=(depth < ends_at, shown))
+    pairs = patches.paired(places, cost, PERIODIC * seen.pairs(places), size, used)[: sketch.tries]
+    laid = [[_laid(sketch, shown, place, size, free) for place in pair] for pair in pairs]
+    found = min(laid, key=lambda strips: sum(strip.seam.energy for strip in strips))
     used += [(strip.place, size) for strip in found]
     return found
 
@@ -204,9 +202,12 @@ def _ring_lines(plan: Layout) -> tuple[Array, Array]:
 
 def _best(sketch: Sketch, shown: tuple, order: Int[Array, "n 2"], size: tuple[int, int], zone: cuts.Zone) -> Laid:
     """Of the first `tries` places the one whose seam is cheapest."""
-    y, x = np.mgrid[: size[1], : size[0]]
-    found = []
-    for place in order[: sketch.tries]:
-        gamma = sketch.gamma(place, size)
-        found.append(Laid(place, sketch.cut(shown, (y + place[1], x + place[0]), gamma, zone), gamma))
+    found = (_laid(sketch, shown, place, size, zone) for place in order[: sketch.tries])
     return min(found, key=lambda laid: laid.seam.energy)
+
+
+def _laid(sketch: Sketch, shown: tuple, place: Int[Array, "2"], size: tuple[int, int], zone: cuts.Zone) -> Laid:
+    """A patch in its place, cut against what is shown."""
+    y, x = np.mgrid[: size[1], : size[0]]
+    gamma = sketch.gamma(place, size)
+    return Laid(place, sketch.cut(shown, (y + place[1], x + place[0]), gamma, zone), gamma)
