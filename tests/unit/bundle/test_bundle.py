@@ -186,6 +186,23 @@ def test_a_damaged_archive_is_refused_by_name(copy_of):
         gswt.read(path, SIDE)
 
 
+@pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+@pytest.mark.parametrize("place", ["the data", "the name"])
+def test_what_each_method_says_of_damage_is_one_message(tmp_path, method, place):
+    path, name = tmp_path / "gswt.zip", "lod0_tile_00é.ply"
+    with zipfile.ZipFile(path, "w", method) as archive:
+        archive.writestr(name, bytes(range(256)) * 20)
+    whole, name = path.read_bytes(), name.encode()
+    start = whole.index(name) + len(name) + 12 if place == "the data" else whole.rindex(name) + len(name) - 5
+    path.write_bytes(
+        whole[:start] + b"\xff" * 8 + whole[start + 8 :]
+        if place == "the data"
+        else whole[:start] + b"\xff" + whole[start + 1 :]
+    )
+    with pytest.raises(InputError, match=r"gswt\.zip: not readable"):
+        gswt.read(path, SIDE)
+
+
 def test_entries_with_other_names_are_skipped(copy_of):
     rezipped(copy_of / "gswt.zip", lambda entries: entries.append(("notes.txt", b"x")))
     assert len(gswt.read(copy_of / "gswt.zip", SIDE)) == 2

@@ -42,12 +42,6 @@ def test_charges_sum_to_the_power_of_what_comes_back_but_for_the_patches_own():
     assert total == pytest.approx(power(np.sum(tiles, 0)) - sum(own(tile) for tile in tiles))
 
 
-def test_a_patch_taken_away_again_leaves_nothing():
-    empty = repeats.nothing(exemplar(), 16, (16, 16))
-    place = np.array([3, 5])
-    np.testing.assert_allclose(empty.plus(place).plus(place, -1).total, 0, atol=1e-12)
-
-
 def test_only_what_shows_counts():
     shown = repeats.nothing(exemplar(), 16, (16, 12), (4, 3))
     x, y = place = np.array([8, 4])

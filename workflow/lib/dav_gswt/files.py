@@ -2,12 +2,30 @@
 
 import hashlib
 import json
+import lzma
 import os
 import shutil
+import tokenize
+import zipfile
+import zlib
 from contextlib import contextmanager
 from pathlib import Path
 
 from dav_gswt.errors import InputError
+
+UNREADABLE = (  # what reading a damaged archive, or arrays in one, may end in
+    OSError,
+    ValueError,
+    TypeError,
+    EOFError,
+    LookupError,
+    RuntimeError,
+    SyntaxError,
+    tokenize.TokenError,
+    lzma.LZMAError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 @contextmanager

@@ -1,6 +1,5 @@
 """Maps of candidate poses: kept for all of them in one file, shown for some as parts of an EXR."""
 
-import zipfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from numpy import ndarray as Array
 from dav_gswt.active.scores import Scores
 from dav_gswt.errors import InputError
 from dav_gswt.field import Field
-from dav_gswt.files import whole
+from dav_gswt.files import UNREADABLE, whole
 from dav_gswt.images import enlarged
 
 Part = tuple[dict[str, Array], dict[str, str]]  # of an EXR: channels, and what the header says
@@ -77,5 +76,5 @@ def read(path: Path | str) -> tuple[PoseMaps, Float32[Array, "g"]]:
             w2_sq = stored.get("w2_sq")
             names = [str(name) for name in stored["names"]]
             return PoseMaps(names, stored["opacity"].astype(np.float32), w2_sq), stored["gaussians"]
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+    except UNREADABLE as error:
         raise InputError(f"{path}: not readable as maps of poses ({error}); make it again") from error

@@ -5,7 +5,6 @@ Its loader never reads property names and crashes on one header line too many, s
 
 import re
 import zipfile
-import zlib
 from itertools import product
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import Field
+from dav_gswt.files import UNREADABLE
 from dav_gswt.logs import progress
 
 WIDTH = 4.0
@@ -90,7 +90,7 @@ def read(path: Path | str, side: float) -> list[list[Field]]:
                     if key in found:
                         raise InputError(f"{path}: {entry.filename} is there twice")
                     found[key] = _field(archive, entry, side, MOST - sum(map(len, found.values())))
-    except (OSError, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
+    except UNREADABLE as error:
         raise InputError(f"{path}: not readable ({error}); make the bundle again") from error
     levels, tiles = ({key[axis] for key in found} for axis in (0, 1))
     if not found or len(tiles) % 16 or set(found) != set(product(range(len(levels)), range(len(tiles)))):

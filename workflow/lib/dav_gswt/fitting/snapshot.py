@@ -8,14 +8,13 @@ import hashlib
 import json
 import logging
 import time
-import zipfile
 from pathlib import Path
 
 import numpy as np
 from numpy import ndarray as Array
 
 import dav_gswt.fitting
-from dav_gswt.files import whole
+from dav_gswt.files import UNREADABLE, whole
 
 _log = logging.getLogger(__name__)
 
@@ -64,7 +63,7 @@ class Keeper:
             with np.load(self.path, allow_pickle=False) as file:
                 arrays = {name: file[name] for name in file.files}
             return arrays, json.loads(arrays.pop("rest").tobytes())
-        except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        except UNREADABLE as error:
             _log.warning("%s is not a snapshot (%s): the fit begins anew", self.path, error)
             return None
 

@@ -1,8 +1,6 @@
 """Examples that the prior learns from: what a field fitted from few photos shows of a world, beside the truth."""
 
-import tokenize
 import zipfile
-import zlib
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -18,7 +16,7 @@ from dav_gswt.coarse import build
 from dav_gswt.coarse.doubt import arrays
 from dav_gswt.errors import InputError
 from dav_gswt.field import Field
-from dav_gswt.files import whole
+from dav_gswt.files import UNREADABLE, whole
 from dav_gswt.fitting.sampling import sampled
 from dav_gswt.photos import rigs
 from dav_gswt.prior.conditions import Shown, nearest, relative, shown
@@ -47,18 +45,6 @@ SHAPES = {  # of the stored arrays, behind the number of examples
     "rgba": (SIZE, SIZE, 4),
     "true_inverse_depth": (SIZE, SIZE),
 }
-UNREADABLE = (  # what reading a damaged file may end in
-    OSError,
-    ValueError,
-    TypeError,
-    EOFError,
-    LookupError,
-    RuntimeError,
-    SyntaxError,
-    tokenize.TokenError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
 MOST_EXAMPLES = 10_000  # in a file
 BYTES = "colour", "alpha", "photo", "rgba"  # all others are of half precision
 

@@ -80,9 +80,9 @@ class Shown:
         """Its part of the mean over each row and each column of a tile."""
         return picture.sum(1) / self.side, picture.sum(0) / self.side
 
-    def plus(self, place: Int[Array, "2"], sign: int = 1) -> "Shown":
-        """With a patch at that place; without it where the sign is -1."""
-        return replace(self, total=self.total + sign * self.crop(place))
+    def plus(self, place: Int[Array, "2"]) -> "Shown":
+        """With a patch at that place."""
+        return replace(self, total=self.total + self.crop(place))
 
 
 def _of_sums(pictures: Float[Array, "n k c"]) -> Float[Array, "n n"]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from dav_gswt import field
 from dav_gswt.errors import InputError
-from dav_gswt.files import read_json, whole_folder, write_json
+from dav_gswt.files import UNREADABLE, read_json, whole_folder, write_json
 from dav_gswt.logs import progress
 from dav_gswt.tiles.build import TileSet
 
@@ -56,7 +56,7 @@ def read(folder: Path | str, seams: Path | str) -> TileSet:
     try:
         with np.load(folder / "labels.npz", allow_pickle=False) as arrays:
             labels, shifts = arrays["labels"], arrays["shifts"]
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+    except UNREADABLE as error:
         raise InputError(f"{folder / 'labels.npz'}: not readable ({error}); cut the tiles again") from error
     return TileSet(side, spacing, fields, labels, shifts, uncertainty, chosen)
 
