@@ -22,7 +22,7 @@ def test_scenes_share_their_levels_and_a_seam_that_is_in_two_pairs_is_cut_once(p
 
 
 def test_tiles_of_other_sizes_cannot_be_compared(snakemake, tmp_path):
-    (tmp_path / "few.yaml").write_text("perceptual_study: {pairs: [[semantic, varied]]}")
+    (tmp_path / "few.yaml").write_text("perceptual_study: {pairs: [[semantic, small]]}")
     done = snakemake(tmp_path, "perceptual_kit", "--dry-run", configs=(USUAL, tmp_path / "few.yaml"), check=False)
     assert done.returncode and "perceptual_study.pairs: seams of other `tile`" in done.stdout
 

@@ -2,7 +2,7 @@
 
 from dav_gswt.seams import page, summary
 
-OWN = {"desert": "semantic", "copr_dunes": "varied"}
+OWN = {"desert": "semantic", "copr_dunes": "auto"}
 NAMES = ("border", "cut", "ceiling")
 
 

@@ -11,8 +11,20 @@ from scipy.ndimage import distance_transform_edt
 from dav_gswt.errors import InputError
 from dav_gswt.field import SH0, Field
 from dav_gswt.logs import progress
-from dav_gswt.tiles import coarse, compose, energy, layout, membrane, patches, search, semantics, standing, trends
-from dav_gswt.tiles.layout import EDGES, Exemplar, Layout
+from dav_gswt.tiles import (
+    coarse,
+    compose,
+    energy,
+    layout,
+    membrane,
+    patches,
+    search,
+    semantics,
+    standing,
+    texture,
+    trends,
+)
+from dav_gswt.tiles.layout import AUTO, EDGES, Exemplar, Layout
 
 _log = logging.getLogger(__name__)
 
@@ -21,15 +33,15 @@ DOUBTFUL = 0.5  # mean uncertainty of a tile that is said
 
 @dataclass(frozen=True)
 class Options:
-    """share: tile side over the exemplar's. strip: half-width of the strips over the tile's side, below 1/5.
-    variants: centres per edge colouring. trend: width of the low-pass in tile sides. candidates: places that a search
-    compares; tries: of them, how many are cut before the best is taken. kind: one of energy.KINDS; slope: of gamma;
-    source: what the semantics are made of. levels: of the tiles, a number or layout.AUTO; None: as many as are given.
-    corrected: steps across seams are spread out (`membrane`).
+    """share: tile side over the exemplar's. strip: half-width of the strips over the tile's side, below 1/5. Either may
+    be layout.AUTO: by the scale of the exemplar's texture. variants: centres per edge colouring. trend: width of the
+    low-pass in tile sides. candidates: places that a search compares; tries: of them, how many are cut before the best
+    is taken. kind: one of energy.KINDS; slope: of gamma; source: what the semantics are made of. levels: of the tiles,
+    a number or layout.AUTO; None: as many as are given. corrected: steps across seams are spread out (`membrane`).
     """
 
-    share: float = 0.5
-    strip: float = 0.125
+    share: float | str = 0.5
+    strip: float | str = 0.125
     variants: int = 1
     trend: float = 0.2
     candidates: int = 192
@@ -97,8 +109,9 @@ def cut_tiles(
     shape = (exemplar.cells, exemplar.cells)
     if colour.shape[:2] != shape or uncertainty.shape != shape:
         raise ValueError(f"maps of {colour.shape[:2]} and {uncertainty.shape} cells for an exemplar of {shape}")
-    plan = layout.plan(exemplar.cells, options.levels or len(levels), options.share, options.strip, len(levels))
     known, doubt = _without_holes(colour, uncertainty)
+    scale = texture.scale(known)
+    plan = layout.plan(exemplar.cells, options.levels or len(levels), *_sizes(options, scale, exemplar), len(levels))
     _, height = ground_maps(levels[0], exemplar)
     trend = trends.trend_of(colour, height, exemplar, options.trend * plan.side)
     binned = [
@@ -128,6 +141,7 @@ def cut_tiles(
         "layout": {
             k: int(getattr(plan, k)) for k in ("exemplar", "levels", "laid", "side", "strip", "corner", "block")
         },
+        "texture": scale * exemplar.spacing,
         "raised": raised.tolist(),
         "energy": priced.record(),
         "trend": {"colour": float(np.ptp(trend.colour)), "height": float(np.ptp(trend.height))},
@@ -143,6 +157,16 @@ def cut_tiles(
         )
     fields = [list(level) for level in zip(*tiles, strict=True)]
     return TileSet(side, exemplar.spacing, fields, labels, shifts, np.array(shown), seams)
+
+
+def _sizes(options: Options, scale: float, exemplar: Exemplar) -> tuple[float, float]:
+    """What the options ask for as `share` and `strip`, by the texture's scale in cells where that is left to it."""
+    by_texture = texture.sizes(scale / exemplar.cells)
+    asked = options.share, options.strip
+    share, strip = (own if given == AUTO else given for given, own in zip(asked, by_texture, strict=True))
+    if AUTO in asked:
+        _log.info("texture of scale %.3g: tiles of %.2f of the exemplar", scale * exemplar.spacing, share)
+    return share, strip
 
 
 def _without_holes(colour: Array, uncertainty: Array) -> tuple[Float[Array, "m m 3"], Float[Array, "m m"]]:

@@ -1,0 +1,55 @@
+"""How large the things are that ground is made of, and the size of tiles that this asks for.
+
+Ground full of small things looks alike everywhere, and the larger a tile, the less of it lies along seams. Larger
+things are fewer: tiles of half the exemplar then all show the same ones, in rows when seen from above. Smaller tiles
+have more places to choose from.
+"""
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray as Array
+from scipy.ndimage import gaussian_filter
+
+TREND = 0.1  # of the exemplar's side: what is wider is no texture
+FARTHEST = 1 / 3  # of the exemplar's side that is looked at: beyond, too few cells are compared
+RELATED = 0.1  # correlation below which cells have nothing to do with one another
+# Scales, as shares of the exemplar's side, between which tiles get smaller and their strips wider. (seeds for
+# development: flowers .013, grass .015, meadow .017, where half the exemplar looks best from above; planet .027 and
+# desert .034, where .38 does)
+SCALES = 0.017, 0.027
+TILES = 0.5, 0.38
+STRIPS = 0.06, 0.125
+
+
+def scale(colour: Float[Array, "m m c"]) -> float:
+    """Radius in cells of a disc as large as the area over which colours go together; 0 where all are the same.
+
+    That area is 2 pi sum_d r(d) d with the autocorrelation r at a distance of d cells, in the mean over all directions,
+    up to where it first falls below RELATED. (Noise blurred by s cells: r = exp(-d^2 / 4 s^2), a scale of 1.9 s.)
+    """
+    m = len(colour)
+    rest = np.stack([v - gaussian_filter(v, TREND * m, mode="nearest") for v in np.moveaxis(colour, -1, 0)], -1)
+    rest -= rest.mean((0, 1))
+    together = _products(rest) / np.maximum(_products(np.ones((m, m, 1))), 1)
+    x = np.minimum(np.arange(2 * m), 2 * m - np.arange(2 * m))
+    distance = np.rint(np.hypot(x[:, None], x)).astype(int).ravel()
+    count = int(m * FARTHEST) + 1
+    r = (np.bincount(distance, together.ravel()) / np.bincount(distance))[:count]
+    if r[0] <= np.finfo(np.float32).eps ** 2:  # of colours from 0 to 1: rounding
+        return 0.0
+    r /= r[0]
+    end = np.argmax(r < RELATED) if (r < RELATED).any() else count
+    return float(np.sqrt(2 * (r * np.arange(count))[:end].sum()))
+
+
+def sizes(scale: float) -> tuple[float, float]:
+    """A tile's side over the exemplar's, and the half-width of its strips over the tile's, for a texture's scale over
+    the exemplar's side."""
+    return float(np.interp(scale, SCALES, TILES)), float(np.interp(scale, SCALES, STRIPS))
+
+
+def _products(values: Float[Array, "m m c"]) -> Float[Array, "k k"]:
+    """Sums of products of all cells that are so far apart (rows, columns; from 0, cyclic in twice the side)."""
+    shape = (2 * values.shape[0], 2 * values.shape[1])
+    spectrum = np.fft.rfft2(values, s=shape, axes=(0, 1))
+    return np.fft.irfft2((np.abs(spectrum) ** 2).sum(-1), s=shape)
