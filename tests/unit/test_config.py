@@ -47,6 +47,7 @@ def test_the_configs_that_come_with_the_project_are_valid(config):
         pytest.param(["flight"], {"frames": 1, "length": 1, "height": 1}, "flight.frames", id="a flight of one frame"),
         pytest.param(["flight"], {"frames": 8, "length": 1}, "'height'", id="a flight at no height"),
         pytest.param(["seams", "semantic", "tile"], 1.2, "tile", id="a tile larger than its exemplar"),
+        pytest.param(["seams", "semantic", "strip"], "texture", "strip", id="no size of a strip"),
         pytest.param(["seams", "semantic", "energy"], "semantics", "energy", id="a way to cut that is not there"),
         pytest.param(["seams", "semantic", "slope"], 0, "slope", id="a gamma that never falls"),
         pytest.param(["seams", "semantic", "sam"], "folder", "is .sam2. meant", id="a typo in a seam"),
