@@ -43,8 +43,8 @@ def test_a_stripe_as_wide_as_the_ground_is_finite():
 
 def test_tiles_get_smaller_and_strips_wider_with_the_scale():
     assert texture.sizes(0.0) == texture.sizes(texture.SCALES[0]) == (0.5, 0.06)
-    assert texture.sizes(0.022) == pytest.approx((0.44, 0.0925))
-    assert texture.sizes(texture.SCALES[1]) == texture.sizes(0.3) == (0.38, 0.125)
+    assert texture.sizes(0.022) == pytest.approx((0.44, 1.6 * 0.022 / 0.44))
+    assert texture.sizes(texture.SCALES[1])[0] == 0.38 and texture.sizes(0.3) == (0.38, 0.125)
 
 
 def test_tiles_by_their_texture_are_those_of_its_sizes(made_up):

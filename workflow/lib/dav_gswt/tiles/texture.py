@@ -13,12 +13,12 @@ from scipy.ndimage import gaussian_filter
 TREND = 0.1  # of the exemplar's side: what is wider is no texture
 FARTHEST = 1 / 3  # of the exemplar's side that is looked at: beyond, too few cells are compared
 RELATED = 0.1  # correlation below which cells have nothing to do with one another
-# Scales, as shares of the exemplar's side, between which tiles get smaller and their strips wider. (seeds for
-# development: flowers .013, grass .015, meadow .017, where half the exemplar looks best from above; planet .027 and
-# desert .034, where .38 does)
+# Scales, as shares of the exemplar's side, between which tiles get smaller. (seeds for development: flowers .013, grass
+# .015, meadow .017, where half the exemplar looks best from above; planet .027 and desert .034, where .38 does)
 SCALES = 0.017, 0.027
 TILES = 0.5, 0.38
-STRIPS = 0.06, 0.125
+AROUND = 1.6  # half-width of a strip over the scale: a cut can go around what lies in it
+STRIPS = 0.06, 0.125  # of a tile's side: narrower ones hardly hold a cut, wider ones are the same in too many tiles
 
 
 def scale(colour: Float[Array, "m m c"]) -> float:
@@ -45,7 +45,8 @@ def scale(colour: Float[Array, "m m c"]) -> float:
 def sizes(scale: float) -> tuple[float, float]:
     """A tile's side over the exemplar's, and the half-width of its strips over the tile's, for a texture's scale over
     the exemplar's side."""
-    return float(np.interp(scale, SCALES, TILES)), float(np.interp(scale, SCALES, STRIPS))
+    tile = float(np.interp(scale, SCALES, TILES))
+    return tile, float(np.clip(AROUND * scale / tile, *STRIPS))
 
 
 def _products(values: Float[Array, "m m c"]) -> Float[Array, "k k"]:
