@@ -9,10 +9,10 @@ BIN := .venv/bin
 .DELETE_ON_ERROR:
 
 run: .venv/installed
-	@$(BIN)/python -m dav_gswt.run --cores $(CORES) $(if $(SCENE),--scene $(SCENE))
+	@$(BIN)/python -m dav_gswt.cli.run --cores $(CORES) $(if $(SCENE),--scene $(SCENE))
 
 view: .venv/installed
-	@$(BIN)/python -m dav_gswt.run --view --port $(PORT) $(if $(SCENE),--scene $(SCENE))
+	@$(BIN)/python -m dav_gswt.cli.run --view --port $(PORT) $(if $(SCENE),--scene $(SCENE))
 
 test: .venv/installed-test
 	@$(BIN)/python -m pytest $(TESTS)

@@ -12,10 +12,10 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
-from made_up_splats import rough_ground
+from fixtures.splats import rough_ground
 from record import tell
 
-from dav_gswt.bundle import build, ladder, orders, sights, store
+from dav_gswt.bundle import build, direction_search, order_directions, orders, store
 from dav_gswt.terrain import assemble, still
 from dav_gswt.tiles.build import TileSet
 
@@ -34,7 +34,7 @@ def tile_set(cells: int, levels: int) -> TileSet:
 def presorting(tiles: TileSet, threads: int) -> tuple[float, float, int]:
     """Seconds of the search for directions and of sorting, and how many directions there are."""
     start = time.perf_counter()
-    rings = ladder.climbed(tiles.fields[0], tiles.side, build.Options.decibels).rings
+    rings = direction_search.climbed(tiles.fields[0], tiles.side, build.Options.decibels).rings
     searched = time.perf_counter() - start
     along = rings.directions()
     kept = [along[rings.kept(doubt, 0.5)] for doubt in tiles.uncertainty]
@@ -54,7 +54,7 @@ def walker(tiles: TileSet) -> float | None:
     value = bundle.manifest
     camera = still.camera_of(still.SHOTS[0], terrain, value["eye_floor"], 960, 540)
     pictures = [still.draw(terrain, camera, value["sky"], value["ground_colour"], exact) for exact in (False, True)]
-    return sights.decibels([tuple(pictures)])
+    return order_directions.decibels([tuple(pictures)])
 
 
 def main() -> int:

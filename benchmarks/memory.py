@@ -11,14 +11,14 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 
-import made_up
 import psutil
+from fixtures import bundles
 from pages import page_of
 from record import tell
 
-from dav_gswt.terrain.browser import FLAGS, chromium_path
+from dav_gswt.study.terrain.browser import FLAGS, chromium_path
 
-GROUND = made_up.Ground(discs=264, levels=6, speckle=20)
+GROUND = bundles.Ground(discs=264, levels=6, speckle=20)
 TARGETS = {"page_memory_mb": 300.0}
 KINDS = {"renderer": "the tab", "gpu-process": "what draws"}
 LONGEST, OFTEN = 120, 0.05  # seconds to wait for the page, between looks

@@ -8,13 +8,13 @@ Recorded is the median of update and sort together over hills: other work of the
 import statistics
 import sys
 
-import made_up
+from fixtures import bundles
 from pages import page_of
 from record import tell
 
-from dav_gswt.terrain.browser import FLAGS, chromium_path
+from dav_gswt.study.terrain.browser import FLAGS, chromium_path
 
-GROUND = made_up.Ground(discs=100, levels=3, speckle=20)  # 16 tiles x (100^2 + 50^2 + 25^2) = 210,000
+GROUND = bundles.Ground(discs=100, levels=3, speckle=20)  # 16 tiles x (100^2 + 50^2 + 25^2) = 210,000
 VISITS = 5
 TARGETS = {"terrain_update_ms": 4.0}
 LOAD = """async () => {

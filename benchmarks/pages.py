@@ -6,19 +6,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import made_up
-from visiting import VIEWER
+from fixtures import bundles
+from fixtures.page_visit import VIEWER
 
-from dav_gswt.terrain.browser import served
+from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain.page import write_page
 
 
 @contextmanager
-def page_of(ground: made_up.Ground) -> Iterator[str]:
+def page_of(ground: bundles.Ground) -> Iterator[str]:
     """Its address; prints how large it is."""
     with tempfile.TemporaryDirectory() as folder:
         bundle, page = Path(folder) / "bundle", Path(folder) / "page"
-        manifest = made_up.write_bundle(bundle, ground)
+        manifest = bundles.write_bundle(bundle, ground)
         start = time.perf_counter()
         write_page(bundle, VIEWER, page)
         written = time.perf_counter() - start

@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 from record import tell
 
-from dav_gswt.photos import rigs, sfm, synthetic
+from dav_gswt.photos.sfm import registration
+from dav_gswt.photos.synthetic import camera_layouts
+from dav_gswt.photos.synthetic import scene as synthetic
 
 COPR = Path("../shared/data/copr_dunes/images")
 SIDE = 256  # pixels
@@ -22,7 +24,7 @@ def copr() -> dict[str, float]:
         print("sfm_copr: skipped, the photos of copr_dunes are not there")
         return {}
     start = time.perf_counter()
-    found = sfm.register(COPR, sfm.Options(threads=2))
+    found = registration.register(COPR, registration.Options(threads=2))
     seconds = time.perf_counter() - start
     print(f"copr_dunes: {len(found.model.names)} of 41 photos placed, focal length {found.focal_ratio:.3f} of EXIF's")
     return {"sfm_copr_seconds": seconds}
@@ -33,8 +35,8 @@ def views() -> dict[str, float]:
     out = {}
     for family in synthetic.FAMILIES:
         scene = synthetic.make(family, 0)
-        places = rigs.ring(VIEWS + 1, 45.0, synthetic.RADIUS)
-        cameras = [rigs.orbit(*p, (0.0, 0.0, 0.0), SIDE, SIDE, synthetic.FIELD_OF_VIEW) for p in places]
+        places = camera_layouts.ring(VIEWS + 1, 45.0, synthetic.RADIUS)
+        cameras = [camera_layouts.orbit(*p, (0.0, 0.0, 0.0), SIDE, SIDE, synthetic.FIELD_OF_VIEW) for p in places]
         synthetic.render(scene, cameras[0])  # builds the scene
         times = []
         for camera in cameras[1:]:

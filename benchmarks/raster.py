@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from record import record
 
-from dav_gswt.cameras import Camera
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import _core, cpu
 
 REPEATS = 15

@@ -9,13 +9,15 @@ import time
 import numpy as np
 from record import tell
 
-from dav_gswt.active import imagining, poses, uncertainty
-from dav_gswt.active.imagining import Asking
-from dav_gswt.active.uncertainty.staging import TOP
-from dav_gswt.perceptual import lpips, weights
-from dav_gswt.photos import rigs
-from dav_gswt.prior import conditions, examples
-from dav_gswt.prior.worlds import FLYING_HEIGHT, world
+from dav_gswt.geometry import poses
+from dav_gswt.images import lpips, lpips_weights
+from dav_gswt.photos.synthetic import camera_layouts
+from dav_gswt.prior import conditions
+from dav_gswt.prior.training import examples
+from dav_gswt.prior.training.worlds import FLYING_HEIGHT, world
+from dav_gswt.views import prior_sampling, uncertainty
+from dav_gswt.views.prior_sampling import Asking
+from dav_gswt.views.uncertainty.staging import TOP
 
 REPEATS = 7
 LATENTS = 1000, 5, 4, 64, 64  # poses, samples, channels, rows, columns
@@ -51,10 +53,10 @@ def w2() -> dict[str, float]:
 
 def perceptual() -> dict[str, float]:
     """Seconds a pair of pictures, and a pose of five samples (ten pairs) at the smaller size."""
-    if not (path := weights.found()):
-        print(f"lpips: skipped, its weights are not there (snakemake {weights.PATH} fetches them)")
+    if not (path := lpips_weights.found()):
+        print(f"lpips: skipped, its weights are not there (snakemake {lpips_weights.PATH} fetches them)")
         return {}
-    given, rng, out = weights.read(path), np.random.default_rng(0), {}
+    given, rng, out = lpips_weights.read(path), np.random.default_rng(0), {}
     for side, pairs in PAIRS.items():
         a, b = rng.uniform(-1, 1, (2, pairs, side, side, 3)).astype(np.float32)
         out[f"lpips_pair_{side}_seconds"] = seconds(lambda a=a, b=b: lpips.distance(a, b, given)) / len(a)
@@ -67,20 +69,22 @@ def pools() -> dict[str, float]:
     made, rng = world(WORLD), np.random.default_rng(0)
     photos = examples.taken(made, rng)
     field = examples.fitted(made, photos, rng)
-    path = weights.found()
-    given = weights.read(path) if path else None
-    model = imagining.opened({"model": "terrain"})
+    path = lpips_weights.found()
+    given = lpips_weights.read(path) if path else None
+    model = prior_sampling.opened({"model": "terrain"})
     known = conditions.taken(photos, made.frame, model.size)
 
     def scored(count: int, staged: bool):
-        places = rigs.hemisphere(count, 30.0, FLYING_HEIGHT)
-        cameras = [rigs.orbit(*place, poses.middle(made.frame), 96, 96, examples.FIELD_OF_VIEW) for place in places]
+        places = camera_layouts.hemisphere(count, 30.0, FLYING_HEIGHT)
+        cameras = [
+            camera_layouts.orbit(*place, poses.middle(made.frame), 96, 96, examples.FIELD_OF_VIEW) for place in places
+        ]
         pool = [(poses.of_camera(f"pose_{i:04d}", c, made.frame), c) for i, c in enumerate(cameras)]
         start = time.perf_counter()
         told = conditions.condition(field, pool, known, FLYING_HEIGHT, model.size)
         ask = Asking(model, 5, 8, 0.15, weights=given, staged=staged)
         everywhere = np.ones((count, model.size, model.size), np.float32)
-        terms, _ = imagining.terms(ask, told, [pose.name for pose, _ in pool], everywhere)
+        terms, _ = prior_sampling.terms(ask, told, [pose.name for pose, _ in pool], everywhere)
         return time.perf_counter() - start, uncertainty.combined(
             terms.w2_sq, terms.lpips, 0.1, uncertainty.Scales.frozen(terms.named())
         )

@@ -14,15 +14,15 @@ import numpy as np
 from record import tell
 from scipy.ndimage import gaussian_filter
 
-from dav_gswt.active import imagining
-from dav_gswt.coarse import discs, maps, underlay
-from dav_gswt.coarse.ground import Ground
 from dav_gswt.field import Field, joined, sh_of
-from dav_gswt.levels import build as levels
-from dav_gswt.refine import build as refine
-from dav_gswt.refine import repair
+from dav_gswt.lod import build as levels
+from dav_gswt.reconstruction import discs, top_view, underlay
+from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.study.refine import build as refine
+from dav_gswt.study.refine import repair
 from dav_gswt.tiles import build as tiles
 from dav_gswt.tiles.layout import Exemplar
+from dav_gswt.views import prior_sampling
 
 CELLS, SPACING, ALL = 384, 0.05, 200_000
 STEPS = 60  # of each level's fit: quality `draft`
@@ -60,7 +60,7 @@ def measured() -> dict[str, float]:
     start = time.perf_counter()
     made = levels.fitted(field, grid, LEVELS, STEPS, 0)
     fitted = time.perf_counter()
-    above = maps.over_exemplar(made.fields[0], grid)
+    above = top_view.over_exemplar(made.fields[0], grid)
     west, south, _ = grid.exemplar
     exemplar = Exemplar(west, south, grid.spacing, grid.cells)
     options, rng = tiles.Options(levels=made.wanted), np.random.default_rng(0)
@@ -68,7 +68,7 @@ def measured() -> dict[str, float]:
     cut = time.perf_counter()
     assert [len(found.fields), len(found.labels)] == [LEVELS, 16]
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
-    model = imagining.opened({"model": "terrain", "samples": 1, "steps": 20, "lpips": False})
+    model = prior_sampling.opened({"model": "terrain", "samples": 1, "steps": 20, "lpips": False})
     by = repair.ByPrior.of(model, {"strength": STRENGTH}, 0)
     refine.refined(found, refine.Uncut(made.fields[0], exemplar), refine.Options(), by, model.size)
     return {

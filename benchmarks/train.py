@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from record import tell
 
-from dav_gswt.coarse import trial
-from dav_gswt.coarse.build import Quality
+from dav_gswt.reconstruction.build import Quality
+from dav_gswt.study import fit_profile
 
 COPR = Quality(size=256, spacing=1.5, cap=350_000, steps=1000, steps_per_photo=40, level_steps=80)
 HIGH = Quality(size=384, spacing=1.25, cap=150_000, steps=400, steps_per_photo=30, level_steps=60)
@@ -42,18 +42,18 @@ def copr() -> dict[str, float | None]:
     if not Path("../shared/data/copr_dunes").is_dir():
         print("train_copr: skipped, the photos of copr_dunes are not there")
         return {}
-    given = trial.opened(photos("copr_dunes"), COPR.size)
-    found = trial.run(given, COPR)
+    given = fit_profile.opened(photos("copr_dunes"), COPR.size)
+    found = fit_profile.run(given, COPR)
     last = found.curve[-1]
     shape = f"{len(given.train)} photos, {last['gaussians']} Gaussians, {last['step']} steps"
     print(f"copr_dunes: {shape}, {last['seconds']:.1f} s")
     return {
-        "train_copr_seconds_to_33": trial.seconds_to(found.curve, 33.0),
-        "train_copr_seconds_to_34": trial.seconds_to(found.curve, 34.0),
+        "train_copr_seconds_to_33": fit_profile.seconds_to(found.curve, 33.0),
+        "train_copr_seconds_to_34": fit_profile.seconds_to(found.curve, 34.0),
         "train_copr_final_ccpsnr": last["psnr_colour_corrected"],
         "train_copr_final_psnr": last["psnr"],
         "train_copr_seconds": last["seconds"],
-        "train_copr_free_space_opacity": trial.free_space_opacity(found.made.field, found.made.grid, given),
+        "train_copr_free_space_opacity": fit_profile.free_space_opacity(found.made.field, found.made.grid, given),
     }
 
 
@@ -61,8 +61,8 @@ def offpath() -> dict[str, float]:
     """Fitted from above 60 degrees of elevation: PSNR of high test views less that of test views at 45 degrees."""
     out, losses = {}, []
     for scene in SCENES:
-        given = trial.opened(photos(scene), HIGH.size, 0.15)
-        seen = trial.away(given, trial.run(given, HIGH, every=10**6).made)
+        given = fit_profile.opened(photos(scene), HIGH.size, 0.15)
+        seen = fit_profile.away(given, fit_profile.run(given, HIGH, every=10**6).made)
         losses.append(seen["high"] - seen["oblique"])
         out |= {f"offpath_{scene}_{group}_psnr": value for group, value in seen.items()}
         out[f"offpath_{scene}_loss_db"] = losses[-1]

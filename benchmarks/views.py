@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 from record import tell
 
-from dav_gswt.active.names import ORACLES
-from dav_gswt.active.policies import POLICIES, Wanted
-from dav_gswt.active.poses import Pose, place
-from dav_gswt.active.scores import TERMS, Scores
-from dav_gswt.active.uncertainty.weighing import Scales
-from dav_gswt.perceptual import weights
-from dav_gswt.photos import rigs
+from dav_gswt.geometry.poses import Pose, place
+from dav_gswt.images import lpips_weights
+from dav_gswt.photos.synthetic import camera_layouts
+from dav_gswt.views.policies import POLICIES, Wanted
+from dav_gswt.views.policy_names import ORACLES
+from dav_gswt.views.scores import TERMS, Scores
+from dav_gswt.views.uncertainty.weighting import Scales
 
 ROOT = Path(__file__).resolve().parents[1]
 CANDIDATES, PHOTOS, CHOSEN = 1000, 28, 20
@@ -34,7 +34,7 @@ TARGETS = {"select_1000_seconds": 0.2, "round_draft_seconds": 45}
 
 def selection() -> dict[str, float]:
     """The slowest policy that goes by scores alone, choosing as many as a round of the paper."""
-    places = rigs.hemisphere(CANDIDATES, 30.0, 7.0)
+    places = camera_layouts.hemisphere(CANDIDATES, 30.0, 7.0)
     found = [Pose(f"pose_{i:04d}", *p) for i, p in enumerate(places)]
     rng = np.random.default_rng(0)
     terms = {name: rng.uniform(0, 1, CANDIDATES) for name in TERMS}
@@ -57,12 +57,12 @@ def selection() -> dict[str, float]:
 
 def rounds() -> dict[str, float]:
     """Wall-clock seconds of round 1, from the coarse field to the updated one."""
-    if not (lpips := weights.found()):
-        print(f"round: skipped, LPIPS's weights are not there (snakemake {weights.PATH} fetches them)")
+    if not (lpips := lpips_weights.found()):
+        print(f"round: skipped, LPIPS's weights are not there (snakemake {lpips_weights.PATH} fetches them)")
         return {}
     out = {}
     with tempfile.TemporaryDirectory(prefix="round-") as folder:
-        there = Path(folder) / weights.PATH
+        there = Path(folder) / lpips_weights.PATH
         there.parent.mkdir(parents=True)
         there.write_bytes(Path(lpips).read_bytes())
         fit = "results/desert/seed0/draft"

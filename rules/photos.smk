@@ -4,8 +4,6 @@ In: a folder of photos, a synthetic family, or a finished field. Out: images/, s
 and per seed views.json: which photos start, which may be asked for, which only test.
 """
 
-REGISTERING = "build exif features focal folder gps ground imported lenses masks model pairs sfm".split()
-
 
 rule register_photos:
     """Structure from motion over a folder of photos; undistorted images and the ground frame."""
@@ -29,7 +27,7 @@ rule register_photos:
         runtime=growing("60m"),
     params:
         scene=entry("scenes", "scene"),
-        source=source_of(*(f"photos/{name}" for name in REGISTERING)),
+        source=code_of("register_photos"),
     script:
         "../scripts/register_photos.py"
 
@@ -53,7 +51,7 @@ rule render_photos:
         runtime=growing("60m"),
     params:
         scene=entry("scenes", "scene"),
-        source=source_of("photos"),
+        source=code_of("render_photos"),
     script:
         "../scripts/render_photos.py"
 
@@ -73,7 +71,7 @@ rule import_field:
         scene=scenes_of("field"),
     params:
         scene=entry("scenes", "scene"),
-        source=source_of("photos/build", "photos/ground", "photos/splat", "field"),
+        source=code_of("import_field"),
     script:
         "../scripts/import_field.py"
 
@@ -92,16 +90,13 @@ rule split_views:
     params:
         scene=entry("scenes", "scene"),
         seed=integer("seed"),
-        source=source_of("photos/views", "photos/model"),
+        source=code_of("split_views"),
     script:
         "../scripts/split_views.py"
 
 
 localrules:
     split_views,  # done sooner than a cluster would begin it
-
-
-REPORTING = "focal ground model report report_facts report_figures views".split()
 
 
 rule report_photos:
@@ -123,6 +118,6 @@ rule report_photos:
         mem_mb=growing(2000),
         runtime=growing("10m"),
     params:
-        source=source_of(*(f"photos/{name}" for name in REPORTING)),
+        source=code_of("report_photos"),
     script:
         "../scripts/report_photos.py"

@@ -21,7 +21,7 @@ rule make_page:
         "<benchmarks>/<terrain>/make_page.tsv"
     params:
         heights=lookup(dpath="heights", within=config),
-        source=source_of("terrain/page", "terrain/heights", "terrain/choice", "bundle/manifest"),
+        source=code_of("make_page"),
     script:
         "../scripts/make_page.py"
 
@@ -50,12 +50,12 @@ rule render_terrain:
         size=lookup(dpath="stills", within=config),
         heights=lookup(dpath="heights", within=config),
         schema=BUNDLE_SCHEMA,
-        source=source_of("terrain", "bundle", "raster"),
+        source=code_of("render_terrain"),
     script:
         "../scripts/render_terrain.py"
 
 
-rule show_stills:
+rule make_contact_sheet:
     """The stills beside each other, small enough for a report of many scenes."""
     input:
         stills=rules.render_terrain.output.stills,
@@ -64,16 +64,16 @@ rule show_stills:
             "<results>/<terrain>/stills.jpg",
             caption="../workflow/report/stills.rst",
             category="Terrain",
-            labels={"scene": "{scene}", "quality": "{quality}"},
+            labels={"scene": "{scene}", "preset": "{preset}"},
         ),
     log:
-        "<logs>/<terrain>/show_stills.log",
+        "<logs>/<terrain>/make_contact_sheet.log",
     benchmark:
-        "<benchmarks>/<terrain>/show_stills.tsv"
+        "<benchmarks>/<terrain>/make_contact_sheet.tsv"
     params:
-        source=source_of("figures"),
+        source=code_of("make_contact_sheet"),
     script:
-        "../scripts/show_stills.py"
+        "../scripts/make_contact_sheet.py"
 
 
 rule render_flight:
@@ -97,73 +97,6 @@ rule render_flight:
         heights=lookup(dpath="heights", within=config),
         flight=lookup(dpath="flight", within=config),
         schema=BUNDLE_SCHEMA,
-        source=source_of("terrain", "bundle", "raster"),
+        source=code_of("render_flight"),
     script:
         "../scripts/render_flight.py"
-
-
-rule measure_shortcuts:
-    """What pre-sorted orders, levels and rounding do to a picture, against all Gaussians sorted exactly."""
-    input:
-        manifest="<results>/<bundle>/davgswt.json",
-        chunks="<results>/<bundle>/chunks",
-        seams="<results>/<tiles>/seams.json",
-        tiles="<results>/<tiles>/tiles",
-    output:
-        table="<results>/<bundle>/presort.csv",
-    log:
-        "<logs>/<bundle>/measure_shortcuts.log",
-    benchmark:
-        "<benchmarks>/<bundle>/measure_shortcuts.tsv"
-    threads: 2
-    resources:
-        mem_mb=growing(4000),
-        runtime=growing("20m"),
-    params:
-        schema=BUNDLE_SCHEMA,
-        source=source_of("terrain", "bundle", "raster"),
-    script:
-        "../scripts/measure_shortcuts.py"
-
-
-use rule gather_lod as gather_presort with:
-    input:
-        tables=lambda wildcards: list(measured_of_tiles(rules.measure_shortcuts)),
-    output:
-        table="results/tables/presort.csv",
-    log:
-        "<logs>/tables/gather_presort.log",
-    benchmark:
-        "<benchmarks>/tables/gather_presort.tsv"
-    params:
-        cells=lambda wildcards: list(measured_of_tiles(rules.measure_shortcuts).values()),
-        source=source_of("figures"),
-
-
-rule plot_presort:
-    """The same as a figure; both are kept in docs, too."""
-    input:
-        table=rules.gather_presort.output.table,
-    output:
-        plot="results/figures/presort.png",
-        kept="docs/figures/presort.png",
-        data="docs/data/presort.csv",
-    log:
-        "<logs>/figures/plot_presort.log",
-    benchmark:
-        "<benchmarks>/figures/plot_presort.tsv"
-    params:
-        source=source_of("terrain/shortcuts", "figures"),
-    script:
-        "../scripts/plot_presort.py"
-
-
-rule presort_table:
-    """What the page's shortcuts cost: table and figure."""
-    input:
-        rules.gather_presort.output.table,
-        rules.plot_presort.output.plot,
-
-
-localrules:
-    presort_table,

@@ -1,74 +1,102 @@
-"""What active views are worth: figures of the rounds of a cell, that is of a scene, seed, quality and policy.
+"""Active views: score the candidate poses, choose k, capture them, refit, and again.
 
-In: what the rounds 1 to t left. Out: sphere_{t}.png, the candidates of each round by what the scores said of them, and
-those it chose (the paper's uncertainty sphere); evolution_{t}.png, two test views after rounds 0, 1 and t, and where
-their renders are wrong. Not part of `all`: a figure is asked for by its path.
+In: the coarse field. Out, per round t: poses.json and poses.exr, capture/, field.ply, ground.exr, and of that new field
+scores.csv and scores.json, maps.npz, uncertainty.exr and metrics.json. Round t starts from round t - 1, so T rounds are
+a prefix of T + 1, and T is only which round is asked for. A round after the stop asks for no pose and hands the field on
+as it is. Scoring keeps its terms apart: the policy, lam and k enter when poses are chosen.
 """
 
 
-rule plot_sphere:
-    """Show what each of the rounds 1 to t chose from, and what it chose."""
+rule score_coarse:
+    """Score every candidate pose by what the coarse field does not know there, and freeze the scales of the terms."""
     input:
-        scores=scores_that_chose,
-        poses=poses_until,
-        captures=captures_before,
-        views="<results>/<start>/views.json",
-        model="<results>/<photos>/sparse",
-        frame="<results>/<photos>/ground.json",
-    output:
-        plot=report(
-            "<results>/<active>/sphere_{t}.png",
-            caption="../workflow/report/sphere.rst",
-            category="View selection",
-            labels={"scene": "{scene}", "policy": "{policy}", "k": "{k}", "rounds": "{t}"},
-        ),
-    log:
-        "<logs>/<active>/plot_sphere_{t}.log",
-    benchmark:
-        "<benchmarks>/<active>/plot_sphere_{t}.tsv"
-    wildcard_constraints:
-        policy=CHOOSING,
-        t=POSITIVE,
-    params:
-        lam=real("lam"),
-        source=source_of(
-            *(f"active/{name}" for name in ("sphere", "candidates", "poses", "scores", "policies", "uncertainty")),
-            "figures",
-        ),
-    script:
-        "../scripts/plot_sphere.py"
-
-
-rule plot_evolution:
-    """Show two test views after the rounds 0, 1 and t, and where their renders are wrong."""
-    input:
-        fields=lambda wildcards: left_by("field.ply", wildcards),
-        grounds=lambda wildcards: left_by("ground.exr", wildcards),
-        metrics=lambda wildcards: left_by("metrics.json", wildcards),
+        unpack(prior_of),
+        field="<results>/<coarse>/field.ply",
+        ground="<results>/<coarse>/ground.exr",
         views="<results>/<start>/views.json",
         images="<results>/<photos>/images",
         model="<results>/<photos>/sparse",
         frame="<results>/<photos>/ground.json",
     output:
-        plot=report(
-            "<results>/<active>/evolution_{t}.png",
-            caption="../workflow/report/evolution.rst",
-            category="View selection",
-            labels={"scene": "{scene}", "policy": "{policy}", "k": "{k}", "rounds": "{t}"},
-        ),
+        scores="<results>/<scored>/scores.csv",
+        facts="<results>/<scored>/scores.json",
+        maps="<results>/<scored>/maps.npz",
+        shown="<results>/<scored>/uncertainty.exr",
     log:
-        "<logs>/<active>/plot_evolution_{t}.log",
+        "<logs>/<scored>/score_coarse.log",
     benchmark:
-        "<benchmarks>/<active>/plot_evolution_{t}.tsv"
-    wildcard_constraints:
-        policy=CHOOSING,
-        t=POSITIVE,
+        "<benchmarks>/<scored>/score_coarse.tsv"
+    threads: 2
     resources:
-        mem_mb=growing(1500),
-        runtime=growing("10m"),
+        mem_mb=lambda wildcards, attempt: (1000 if wildcards.prior == "none" else 3000) * attempt,
+        runtime=growing("60m"),
     params:
-        size=lambda wildcards: config["qualities"][wildcards.quality]["size"],
-        rounds=shown_rounds,
-        source=source_of("active/evolution", "metrics", "coarse/build", "raster", "figures"),
+        scene=entry("scenes", "scene"),
+        prior=lambda wildcards: config["priors"].get(wildcards.prior),
+        p_drop=real("p_drop"),
+        seed=integer("seed"),
+        source=code_of("score_poses"),
     script:
-        "../scripts/plot_evolution.py"
+        "../scripts/score_poses.py"
+
+
+use rule score_coarse as score_round with:
+    input:
+        unpack(prior_of),
+        field="<results>/<round>/field.ply",
+        ground="<results>/<round>/ground.exr",
+        frozen="<results>/<scored>/scores.json",
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+        captures=captures_until,
+    output:
+        scores="<results>/<round>/scores.csv",
+        facts="<results>/<round>/scores.json",
+        maps="<results>/<round>/maps.npz",
+        shown="<results>/<round>/uncertainty.exr",
+    log:
+        "<logs>/<round>/score_round.log",
+    benchmark:
+        "<benchmarks>/<round>/score_round.tsv"
+    wildcard_constraints:
+        t=POSITIVE,
+
+
+rule select_poses:
+    """Choose the k poses that the policy expects most of, or none after a stop, and show what is not known there."""
+    input:
+        unpack(before_round),
+        unpack(decided_before),
+        unpack(truth_for_oracle),
+        captures=captures_before,
+        views="<results>/<start>/views.json",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+    output:
+        poses=report(
+            "<results>/<round>/poses.json",
+            caption="../workflow/report/poses.rst",
+            category="View selection",
+            labels={"scene": "{scene}", "policy": "{policy}", "k": "{k}", "round": "{t}"},
+        ),
+        shown="<results>/<round>/poses.exr",
+    log:
+        "<logs>/<round>/select_poses.log",
+    benchmark:
+        "<benchmarks>/<round>/select_poses.tsv"
+    wildcard_constraints:
+        t=POSITIVE,
+    params:
+        scene=entry("scenes", "scene"),
+        size=lambda wildcards: config["presets"][wildcards.preset]["size"],
+        policy=lambda wildcards: wildcards.policy,
+        lam=real("lam"),
+        k=integer("k"),
+        stop=lambda wildcards: read_stop(wildcards.stop),
+        seed=integer("seed"),
+        t=integer("t"),
+        source=code_of("select_poses"),
+    script:
+        "../scripts/select_poses.py"

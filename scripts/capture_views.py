@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from dav_gswt.active import agents
-from dav_gswt.active.agents.site import Site
-from dav_gswt.active.agents.store import Store
+from dav_gswt import capture
+from dav_gswt.capture.site import Site
+from dav_gswt.capture.store import Store
 from dav_gswt.files import read_json
 from dav_gswt.logs import logging_to
 
@@ -15,4 +15,4 @@ with logging_to(snakemake.log[0]):
     site = Site(name, snakemake.params.scene, read_json(given.frame), photos, store, given.get("field"))
     before = list(given.captures)
     chosen = read_json(given.poses)["poses"]
-    agents.capture(site, read_json(given.views), before, chosen, Path(snakemake.output.capture))
+    capture.capture(site, read_json(given.views), before, chosen, Path(snakemake.output.capture))

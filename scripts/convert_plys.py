@@ -1,7 +1,7 @@
 """Rule convert_plys: patches of terrain in other programs' formats."""
 
-from dav_gswt.bundle import exports
+from dav_gswt.export import splats
 from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):
-    exports.convert(snakemake.input.plys, snakemake.wildcards.kind, snakemake.output.splats)
+    splats.convert(snakemake.input.plys, snakemake.wildcards.kind, snakemake.output.splats)

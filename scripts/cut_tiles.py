@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 
 from dav_gswt import provenance
-from dav_gswt.coarse import maps
-from dav_gswt.levels import store as levels
+from dav_gswt.images import lpips_weights
+from dav_gswt.lod import store as levels
 from dav_gswt.logs import logging_to
-from dav_gswt.perceptual import weights
+from dav_gswt.reconstruction import top_view
 from dav_gswt.tiles import build, semantics, store
 from dav_gswt.tiles.layout import Exemplar
 
@@ -16,9 +16,9 @@ with logging_to(snakemake.log[0]):
     given, seam = snakemake.input, snakemake.params.seam
     made = levels.read(given.levels)
     fields, grid = made.fields, made.grids[0]
-    above = maps.over_exemplar(fields[0], grid)
+    above = top_view.over_exemplar(fields[0], grid)
     west, south, _ = grid.exemplar
-    alexnet = weights.read(given.lpips) if given.get("lpips") else None
+    alexnet = lpips_weights.read(given.lpips) if given.get("lpips") else None
     options = build.Options.of(seam, semantics.Source(alexnet, seam.get("sam2")), made.wanted)
     exemplar = Exemplar(west, south, grid.spacing, grid.cells)
     rng = np.random.default_rng(build.seeds(snakemake.params.seed, seam))

@@ -1,19 +1,20 @@
 """Rules evaluate_coarse and evaluate_round: what the test photos say about a field."""
 
-from dav_gswt import field, provenance, views
-from dav_gswt.active import evaluation, stopping
-from dav_gswt.coarse import build, ground
+from dav_gswt import field, provenance
 from dav_gswt.files import read_json, write_json
+from dav_gswt.images import lpips_weights
 from dav_gswt.logs import logging_to
-from dav_gswt.perceptual import weights
+from dav_gswt.photos import training_views
+from dav_gswt.reconstruction import build, evaluation, ground
+from dav_gswt.views import stopping
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     split, captures = read_json(given.views), list(given.get("captures", []))
-    tests = views.taken(given.images, given.model, split["test"], [], params.quality["size"])
+    tests = training_views.taken(given.images, given.model, split["test"], [], params.quality["size"])
     shots = sum(len(read_json(f"{folder}/capture.json")["shots"]) for folder in captures)
     fitted, grid = field.read(given.field), ground.read(given.ground)
-    perceptual = weights.read(given.lpips) if given.get("lpips") else None
+    perceptual = lpips_weights.read(given.lpips) if given.get("lpips") else None
     groups = read_json(given.frame).get("test_groups")
     result = evaluation.evaluate(fitted, build.modelled(tests, grid), groups, perceptual)
     result |= {"round": params.t, "photos": len(split["start"]) + shots, "gaussians": len(fitted)}

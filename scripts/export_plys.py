@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
-from dav_gswt.bundle import exports, manifest
+from dav_gswt.bundle import manifest
+from dav_gswt.export import splats
 from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):
     told = manifest.read(Path(snakemake.input.manifest).parent, snakemake.params.schema)
-    exports.write_plys(snakemake.input.archive, told["tile_side"], snakemake.output.plys)
+    splats.write_plys(snakemake.input.archive, told["tile_side"], snakemake.output.plys)

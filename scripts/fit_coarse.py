@@ -2,17 +2,17 @@
 
 import numpy as np
 
-from dav_gswt import field, views
-from dav_gswt.coarse import build, ground
+from dav_gswt import field
 from dav_gswt.files import read_json, write_json
 from dav_gswt.logs import logging_to
-from dav_gswt.photos import model
+from dav_gswt.photos import model, training_views
+from dav_gswt.reconstruction import build, ground
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     quality, margin = build.Quality(**params.quality), ground.WHOLE if params.whole else ground.MARGIN
     names = read_json(given.views)["start"]
-    photos = views.taken(given.images, given.model, names, [], quality.size)
+    photos = training_views.taken(given.images, given.model, names, [], quality.size)
     points, colours = model.points_seen_by(model.read(given.model), names, given.images)
     rng = np.random.default_rng(params.seed)
     made = build.fit(read_json(given.frame), photos, points, colours, quality, rng, params.keep, margin)

@@ -1,10 +1,10 @@
 """Rule import_field: a finished 3DGS field in the ground frame."""
 
 from dav_gswt.logs import logging_to
-from dav_gswt.photos import build
+from dav_gswt.photos import photo_set
 
 with logging_to(snakemake.log[0]):
-    build.from_field(
+    photo_set.from_field(
         snakemake.input[0],
         snakemake.output.field,
         snakemake.output.frame,

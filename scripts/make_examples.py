@@ -4,7 +4,7 @@ import logging
 import os
 
 from dav_gswt.logs import logging_to, progress
-from dav_gswt.prior import examples
+from dav_gswt.prior.training import examples
 
 os.environ.setdefault("DAV_GSWT_THREADS", str(snakemake.threads))  # parts are made beside each other
 

@@ -1,16 +1,16 @@
 """Rule make_levels: ever coarser levels of the field."""
 
 from dav_gswt import field, provenance
-from dav_gswt.active import maps
-from dav_gswt.coarse import ground
-from dav_gswt.levels import build, merge, store
+from dav_gswt.lod import build, merge, store
 from dav_gswt.logs import logging_to
+from dav_gswt.reconstruction import ground
+from dav_gswt.views import pose_maps
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     finest, grid = field.read(given.field), ground.read(given.ground)
     if given.get("maps"):  # a prior was asked: what it doubts is what the tiles go by
-        finest = maps.doubted(finest, maps.read(given.maps)[1])
+        finest = pose_maps.doubted(finest, pose_maps.read(given.maps)[1])
     steps = params.quality["level_steps"]
     levels = build.fitted(*merge.cropped(finest, grid, 1), params.levels, steps, params.seed, params.keep)
     inputs = {"field": given.field, "ground": given.ground}

@@ -3,10 +3,11 @@
 from pathlib import Path
 
 from dav_gswt.logs import logging_to
-from dav_gswt.photos import build, sfm
+from dav_gswt.photos import photo_set
+from dav_gswt.photos.sfm import registration
 
 with logging_to(snakemake.log[0]):
     scene = snakemake.params.scene
-    options = sfm.options_of(scene, snakemake.threads)
+    options = registration.options_of(scene, snakemake.threads)
     out = Path(snakemake.output.frame).parent
-    build.from_photos(scene["folder"], out, options, scene.get("model"), scene.get("masks"))
+    photo_set.from_photos(scene["folder"], out, options, scene.get("model"), scene.get("masks"))

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from dav_gswt import images
 from dav_gswt.bundle import store
 from dav_gswt.files import whole_folder
+from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to, progress
 from dav_gswt.terrain import assemble, still
 
@@ -14,4 +14,4 @@ with logging_to(snakemake.log[0]):
     terrain = assemble.of_bundle(bundle, params.heights)
     with whole_folder(snakemake.output.frames) as folder:
         for shot in progress(still.flight(**params.flight), "render flight"):
-            images.write(folder / f"{shot.name}.png", still.taken(terrain, shot, bundle.manifest, **params.size))
+            image_files.write(folder / f"{shot.name}.png", still.taken(terrain, shot, bundle.manifest, **params.size))

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from dav_gswt.logs import logging_to
-from dav_gswt.photos import rendered
+from dav_gswt.photos.synthetic import photo_set
 
 with logging_to(snakemake.log[0]):
-    rendered.render_set(snakemake.params.scene, Path(snakemake.output.frame).parent)
+    photo_set.render_set(snakemake.params.scene, Path(snakemake.output.frame).parent)

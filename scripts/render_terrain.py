@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from dav_gswt import images
 from dav_gswt.bundle import store
+from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to, progress
 from dav_gswt.terrain import assemble, still
 
@@ -13,4 +13,4 @@ with logging_to(snakemake.log[0]):
     terrain = assemble.of_bundle(bundle, params.heights)
     targets = {Path(path).stem: path for path in snakemake.output.stills}
     for shot in progress(still.SHOTS, "render stills"):
-        images.write(targets[shot.name], still.taken(terrain, shot, bundle.manifest, **params.size))
+        image_files.write(targets[shot.name], still.taken(terrain, shot, bundle.manifest, **params.size))

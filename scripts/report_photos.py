@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from dav_gswt.logs import logging_to
-from dav_gswt.photos import report
+from dav_gswt.photos.report import page
 
 with logging_to(snakemake.log[0]):
     given = snakemake.input
-    report.write(Path(given.frame).parent, given.template, snakemake.wildcards.scene, snakemake.output.page)
+    page.write(Path(given.frame).parent, given.template, snakemake.wildcards.scene, snakemake.output.page)

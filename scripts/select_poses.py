@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from dav_gswt import images
-from dav_gswt.active import candidates, maps, needs, poses, scores, selection, stopping
-from dav_gswt.active.policies import Wanted
 from dav_gswt.files import read_json, write_json
+from dav_gswt.geometry import poses
+from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to
+from dav_gswt.views import candidates, policy_inputs, pose_maps, scores, selection, stopping
+from dav_gswt.views.policies import Wanted
 
 with logging_to(snakemake.log[0]):
     given, params, policy = snakemake.input, snakemake.params, snakemake.params.policy
@@ -18,9 +19,9 @@ with logging_to(snakemake.log[0]):
     if not decided.stopped:
         pool = candidates.left(params.scene, frame, given.model, split, given.captures)
         places, rng = candidates.places(taken, frame), np.random.default_rng([params.seed, params.t])
-        information = needs.information(policy, scored, pool, taken, given.field)
-        errors = needs.errors(policy, scored, pool, given, params.scene, params.size)
+        information = policy_inputs.information(policy, scored, pool, taken, given.field)
+        errors = policy_inputs.errors(policy, scored, pool, given, params.scene, params.size)
         chosen = selection.select(policy, scored, Wanted(places, decided.poses, rng, params.lam, information, errors))
     write_json(snakemake.output.poses, poses.to_json(chosen, policy, params.k) | decided.to_json())
-    shown = maps.read(given.maps)[0].parts(scored, [pose.name for pose in chosen])
-    images.write_exr_parts(snakemake.output.shown, shown or maps.NOTHING)
+    shown = pose_maps.read(given.maps)[0].parts(scored, [pose.name for pose in chosen])
+    image_files.write_exr_parts(snakemake.output.shown, shown or pose_maps.NOTHING)

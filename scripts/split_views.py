@@ -4,11 +4,11 @@ import numpy as np
 
 from dav_gswt.files import read_json, write_json
 from dav_gswt.logs import logging_to
-from dav_gswt.photos import model, views
+from dav_gswt.photos import model, split
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     start, whole = params.scene.get("start") or params.scene["photos"], params.scene.get("whole", False)
     rng = np.random.default_rng(params.seed)
-    found = views.split(model.read(given.model), read_json(given.frame), start, rng, whole)
+    found = split.split(model.read(given.model), read_json(given.frame), start, rng, whole)
     write_json(snakemake.output.views, found)

@@ -2,17 +2,18 @@
 
 import numpy as np
 
-from dav_gswt import field, views
-from dav_gswt.coarse import bounded, build, ground
+from dav_gswt import field
 from dav_gswt.files import read_json, write_json
 from dav_gswt.logs import logging_to
+from dav_gswt.photos import training_views
+from dav_gswt.reconstruction import build, ground, regression_guard
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     quality, captures = build.Quality(**params.quality), list(given.captures)
-    names, aside = read_json(given.views)["start"], bounded.set_aside(map(read_json, given.fits))
-    before = views.taken(given.images, given.model, names, captures[:-1], quality.size)
-    new = views.captured(captures[-1], quality.size)
+    names, aside = read_json(given.views)["start"], regression_guard.set_aside(map(read_json, given.fits))
+    before = training_views.taken(given.images, given.model, names, captures[:-1], quality.size)
+    new = training_views.captured(captures[-1], quality.size)
     rng = np.random.default_rng([params.seed, params.t])
     last = field.read(given.field), ground.read(given.ground), read_json(given.frame)
     made = build.refine(*last, [v for v in before if v.name not in aside], new, quality, rng, params.keep)

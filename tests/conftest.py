@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from dav_gswt.terrain.browser import FLAGS, chromium_path
+from dav_gswt.study.terrain.browser import FLAGS, chromium_path
 
 ROOT = Path(__file__).parents[1]
 

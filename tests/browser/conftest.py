@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-import made_up
 import pytest
-from visiting import VIEWER, Visit
+from fixtures import bundles
+from fixtures.page_visit import VIEWER, Visit
 
-from dav_gswt.terrain.browser import served
+from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain.page import write_page
 
 
@@ -14,9 +14,9 @@ from dav_gswt.terrain.page import write_page
 def page_of(tmp_path_factory):
     """Make the page folder of a made-up ground."""
 
-    def make(ground: made_up.Ground, rows_of=None, surface=None) -> Path:
+    def make(ground: bundles.Ground, rows_of=None, surface=None) -> Path:
         folder = tmp_path_factory.mktemp("page")
-        made_up.write_bundle(folder / "bundle", ground, rows_of)
+        bundles.write_bundle(folder / "bundle", ground, rows_of)
         write_page(folder / "bundle", VIEWER, folder / "page", surface)
         return folder / "page"
 
@@ -26,7 +26,7 @@ def page_of(tmp_path_factory):
 @pytest.fixture(scope="session")
 def plain(page_of):
     """The address of a page with 5120 Gaussians, one plain colour a tile."""
-    with served(page_of(made_up.Ground())) as address:
+    with served(page_of(bundles.Ground())) as address:
         yield address
 
 

@@ -9,13 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_up import SKY, Ground
+from fixtures.bundles import SKY, Ground
 
-from dav_gswt import cameras
 from dav_gswt.bundle.store import Bundle
+from dav_gswt.geometry import cameras
+from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain import assemble, still
 from dav_gswt.terrain.assemble import Terrain
-from dav_gswt.terrain.browser import served
 from dav_gswt.terrain.heights import Flat, Hills, Relief
 
 GROUND = Ground(levels=3, speckle=40, things=4)

@@ -6,16 +6,16 @@ import json
 import struct
 import zipfile
 
-import made_up
 import numpy as np
 import pytest
-from made_up import Ground
+from fixtures import bundles
+from fixtures.bundles import Ground
 
 from dav_gswt.bundle import gswt
 from dav_gswt.bundle.encoding import Encoding
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.field import Field, sh_of
-from dav_gswt.terrain.browser import served
+from dav_gswt.study.terrain.browser import served
 
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
 OTHER = Ground(discs=8, salt=99, speckle=20)
@@ -34,7 +34,7 @@ def drop(seen, name: str, data: bytes) -> None:
 def other(tmp_path_factory):
     """The folder of another bundle."""
     folder = tmp_path_factory.mktemp("other") / "bundle"
-    made_up.write_bundle(folder, OTHER)
+    bundles.write_bundle(folder, OTHER)
     return folder
 
 
@@ -71,7 +71,7 @@ def test_a_gswt_zip_of_the_public_renderer_is_shown(visit, plain, other, tmp_pat
     seen.until("davgswt.state.opened === 2")
     picture = seen.at(x=2.0, y=2.0, eye=1.5, yaw=90, pitch=-90)
     # the set's own eye floor keeps the eye so high that hundreds of tiles are in the picture: it has their mean colour
-    assert np.abs(picture.mean((0, 1)) - np.mean([made_up.colour_of(t) for t in range(16)], 0)).max() < 4
+    assert np.abs(picture.mean((0, 1)) - np.mean([bundles.colour_of(t) for t in range(16)], 0)).max() < 4
     assert picture.std() > 5
 
 

@@ -4,9 +4,9 @@ import json
 import re
 
 import pytest
-from made_up import Ground
+from fixtures.bundles import Ground
 
-from dav_gswt.terrain.browser import served
+from dav_gswt.study.terrain.browser import served
 
 
 def test_progress_is_said_in_bytes_and_coarse_levels_come_first(visit, plain):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from dav_gswt import cameras
 from dav_gswt.field import Field, sh_of
+from dav_gswt.geometry import cameras
 from dav_gswt.terrain import splats
 from dav_gswt.terrain.drape import lifted
 from dav_gswt.terrain.heights import of_config

@@ -2,12 +2,12 @@
 
 import json
 
-import made_up
 import numpy as np
 import pytest
-from made_up import Ground, colour_of
+from fixtures import bundles
+from fixtures.bundles import Ground, colour_of
 
-from dav_gswt.terrain.browser import served
+from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain.choice import tile_at
 
 SIDE, SALT = Ground().side, Ground().salt
@@ -55,7 +55,7 @@ def test_east_is_right_and_north_is_up_when_one_faces_north(visit, plain):
 def test_sky_is_above_the_horizon_and_ground_below_it(visit, plain):
     picture = visit().open(f"{plain}?still").at(x=2.0, y=2.0, eye=1.0, yaw=60, pitch=0) / 255
     middle = len(picture) // 2
-    horizon, zenith = np.array(made_up.SKY["horizon"]), np.array(made_up.SKY["zenith"])
+    horizon, zenith = np.array(bundles.SKY["horizon"]), np.array(bundles.SKY["zenith"])
     focal = 160 / np.tan(np.radians(30))
     rise = (middle - 0.5 - np.arange(middle - 2)) / focal
     expected = horizon + (zenith - horizon) * np.sqrt(rise / np.hypot(rise, 1))[:, None]
@@ -155,7 +155,7 @@ def test_each_tile_keeps_the_order_of_its_own_direction(visit, plain):
     orders = {(cell["i"], cell["j"]): cell["order"] for cell in seen.state["drawn"]}
     assert orders[5, 0] == 0, "eastwards along +x"
     assert orders[0, 0] == orders[1, 1] == 255, "the 3 x 3 about the eye are sorted exactly"
-    slanted = made_up.directions()[6]  # (-1, 1, -sqrt 2)
+    slanted = bundles.directions()[6]  # (-1, 1, -sqrt 2)
     seen.at(x=2.0 + 4 * SIDE, y=2.0 - 4 * SIDE, eye=4 * SIDE * np.sqrt(2), yaw=135, pitch=-45)
     assert np.allclose(slanted * 2, [-1, 1, -np.sqrt(2)])
     assert {(c["i"], c["j"]): c["order"] for c in seen.state["drawn"]}[0, 0] == 6
@@ -168,5 +168,5 @@ def test_discs_underfoot_do_not_haze_the_sky(visit, page_of):
     # 60 degrees are 320 pixels wide: the horizon is 277 tan 5 degrees = 24 rows above the middle, far tiles are thinner
     sky = picture[:70]
     assert (sky[..., 2] > sky[..., 0]).all()
-    least = np.minimum(*(np.array(made_up.SKY[key]) for key in ("horizon", "zenith")))
+    least = np.minimum(*(np.array(bundles.SKY[key]) for key in ("horizon", "zenith")))
     assert (sky >= least - 1.6 / 255).all()

@@ -2,15 +2,15 @@
 
 import json
 
-import made_up
 import numpy as np
 import pytest
+from fixtures import bundles
 from scipy.spatial.transform import Rotation
 
-from dav_gswt import cameras
 from dav_gswt.bundle import store
 from dav_gswt.field import Field
-from dav_gswt.terrain.browser import served
+from dav_gswt.geometry import cameras
+from dav_gswt.study.terrain.browser import served
 
 AT, DEVIATION, PAINT = np.array([3.0, 1.0, 0.1]), np.array([0.3, 0.05, 0.02]), np.array([230, 40, 90, 200])
 TURN = np.array([0.96, 0.05, -0.09, 0.26])  # any quaternion
@@ -18,7 +18,7 @@ BACK = np.array([0.5, 0.75, 0.25])
 
 
 def one(ground, tile, level):
-    row = np.zeros(1, made_up.LOOK)
+    row = np.zeros(1, bundles.LOOK)
     row["position"], row["deviation"], row["paint"], row["turn"] = AT, DEVIATION, PAINT, TURN
     return row
 
@@ -32,7 +32,7 @@ def seen_as(lonely_folder):
 @pytest.fixture(scope="module")
 def lonely_folder(page_of):
     """A page with one turned, drawn-out Gaussian a tile of 40 units before one plain colour."""
-    folder = page_of(made_up.Ground(side=40.0, levels=1, eye_floor=0.5), one)
+    folder = page_of(bundles.Ground(side=40.0, levels=1, eye_floor=0.5), one)
     manifest = json.loads((folder / "davgswt.json").read_text())
     plain = {"ground_colour": BACK.tolist(), "sky": {"zenith": BACK.tolist(), "horizon": BACK.tolist()}}
     (folder / "davgswt.json").write_text(json.dumps(manifest | plain))

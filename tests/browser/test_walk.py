@@ -1,9 +1,9 @@
 """Walking: keys, mouse, touch, the eye's floor, the link, and what survives a resize or a lost context."""
 
 import pytest
-from made_up import Ground
+from fixtures.bundles import Ground
 
-from dav_gswt.terrain.browser import served
+from dav_gswt.study.terrain.browser import served
 
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
 

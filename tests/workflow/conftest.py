@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from made_runs import TINY, USUAL, Made
+from fixtures.runs import TINY, USUAL, Made
 
 COPIED = ["Snakefile", "rules", "scripts", "config", "profiles"]  # the last is a link
 COPIED += [f"workflow/{name}" for name in ("profiles", "report", "schemas", "viewer", "forced_choice")]
@@ -92,7 +92,7 @@ qualities:
 
 @pytest.fixture(scope="session")
 def checkout(root) -> Callable[[Path], Path]:
-    """Copy what of the repository a run needs into a folder, so that `dav_gswt.run` works there as in a clone."""
+    """Copy what of the repository a run needs into a folder, so that `dav_gswt.cli.run` works there as in a clone."""
 
     def copy(folder: Path) -> Path:
         for name in COPIED:
@@ -111,7 +111,7 @@ def run():
     """Call what `make run` calls in a copy of the repository; returns the finished process, its output in stdout."""
 
     def call(folder, *arguments, env=None):
-        command = [sys.executable, "-m", "dav_gswt.run", *arguments]
+        command = [sys.executable, "-m", "dav_gswt.cli.run", *arguments]
         return subprocess.run(
             command,
             cwd=folder,

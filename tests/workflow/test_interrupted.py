@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from made_runs import TINY
+from fixtures.runs import TINY
 
 from dav_gswt.files import digest
 
@@ -52,7 +52,7 @@ def ended(tmp_path_factory) -> Callable[..., Ended]:
     """Begin a run, send a signal to it and to its jobs, as a terminal does, soon after a rule begins."""
 
     def call(folder: Path, rule: str, number: int) -> Ended:
-        command = [sys.executable, "-m", "dav_gswt.run", *ARGUMENTS]
+        command = [sys.executable, "-m", "dav_gswt.cli.run", *ARGUMENTS]
         out = tmp_path_factory.mktemp("out") / "out"
         with out.open("w") as file:
             job = subprocess.Popen(
@@ -175,7 +175,7 @@ def test_a_full_disk_is_named_and_the_next_run_goes_on(cramp, tiny, checkout, sn
             shutil.copytree(stage, place) if stage.is_dir() else shutil.copy2(stage, place)
         if cramp is small_disk:
             (folder / "filler").write_bytes(bytes(shutil.disk_usage(folder).free - 300_000))
-        command = [sys.executable, "-m", "dav_gswt.run", *ARGUMENTS]
+        command = [sys.executable, "-m", "dav_gswt.cli.run", *ARGUMENTS]
         done = subprocess.run(
             command,
             cwd=folder,

@@ -1,9 +1,9 @@
 """The page that a run makes, opened in a browser as a visitor opens it."""
 
 import pytest
-from visiting import Visit
+from fixtures.page_visit import Visit
 
-from dav_gswt.terrain.browser import served
+from dav_gswt.study.terrain.browser import served
 
 
 @pytest.mark.parametrize("made", ["tiny", "finished", "beach"])

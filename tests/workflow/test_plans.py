@@ -5,9 +5,9 @@ import sys
 from collections import Counter
 
 import pytest
-from made_runs import TINY, USUAL
+from fixtures.runs import TINY, USUAL
 
-from dav_gswt.active.names import AT_ZERO, IMAGINING, ORACLES, POLICIES
+from dav_gswt.views.policy_names import AT_ZERO, IMAGINING, ORACLES, POLICIES
 
 ROUND = "results/desert/seed0/draft/active_{policy}_none_pdrop0_lam0_k{k}/iter{t}"
 BUNDLE = ROUND + "/tiles_semantic/bundle_tau{tau}/davgswt.json"

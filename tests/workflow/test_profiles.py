@@ -6,9 +6,9 @@ import sys
 
 import pytest
 import yaml
-from made_runs import TINY, USUAL
+from fixtures.runs import TINY, USUAL
 
-from dav_gswt import run as make_run
+from dav_gswt.cli import run as make_run
 
 PROFILES = "workflow/profiles"
 ROUND = "results/desert/seed0/draft/active_farthest_none_pdrop0_lam0_k2{stop}/iter{t}"

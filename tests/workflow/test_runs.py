@@ -8,16 +8,17 @@ import sys
 import numpy as np
 import pytest
 import yaml
+from fixtures.runs import TINY, USUAL
 from jsonschema import Draft202012Validator
-from made_runs import TINY, USUAL
 
-from dav_gswt import field, images
-from dav_gswt.active import maps, scores
-from dav_gswt.coarse import ground
+from dav_gswt import field
 from dav_gswt.files import digest, read_json
+from dav_gswt.images import image_files
 from dav_gswt.photos import model
-from dav_gswt.tables import spread
+from dav_gswt.reconstruction import ground
+from dav_gswt.study.tables import spread
 from dav_gswt.terrain.still import SHOTS
+from dav_gswt.views import pose_maps, scores
 
 CONFIGS = (USUAL, TINY)
 RULES = {
@@ -43,7 +44,7 @@ def test_photos_and_their_cameras_are_there(tiny, tiny_config):
     assert {p.name for p in (tiny.photos / "images").glob("[!.]*")} == set(known.names)
     assert len(known.names) == scene["photos"] + scene["test"] and len(frame["test"]) == scene["test"]
     for name in known.names:
-        assert images.size(tiny.photos / "images" / name) == (scene["size"], scene["size"])
+        assert image_files.size(tiny.photos / "images" / name) == (scene["size"], scene["size"])
 
 
 def test_no_photo_both_tests_and_is_fitted(tiny):
@@ -82,7 +83,7 @@ def test_metrics_are_those_of_a_picture_of_the_place(tiny):
 
 def test_doubt_is_a_share(tiny):
     for stage in (tiny.coarse / "scores_none_pdrop0", tiny.round):
-        for channels, _ in images.read_exr_parts(stage / "uncertainty.exr").values():
+        for channels, _ in image_files.read_exr_parts(stage / "uncertainty.exr").values():
             for values in channels.values():
                 seen = values[np.isfinite(values)]
                 assert len(seen) and seen.min() >= 0 and seen.max() <= 1
@@ -100,11 +101,11 @@ def test_a_round_may_go_by_what_the_prior_doubts(snakemake, tiny, tmp_path):
     chosen = [pose["name"] for pose in read_json(way / "poses.json")["poses"]]
     best = np.argsort(-first.term("w2_sq"), kind="stable")[:2]
     assert chosen == [first.names[i] for i in best]
-    shown = images.read_exr_parts(way / "poses.exr")
+    shown = image_files.read_exr_parts(way / "poses.exr")
     assert set(shown) == set(chosen) and all(set(channels) == {"opacity", "w2_sq"} for channels, _ in shown.values())
     later = scores.read(way / "scores.csv")
     assert later.scales == first.scales and not set(later.names) & set(chosen)
-    doubt, level = maps.read(way / "maps.npz")[1], field.read(way / "levels/level0.ply")
+    doubt, level = pose_maps.read(way / "maps.npz")[1], field.read(way / "levels/level0.ply")
     assert len(doubt) == len(field.read(way / "field.ply"))
     top = level.ground & (level.uncertainty > 0)  # the underlay of a level has none
     assert top.any() and np.isin(level.uncertainty[top], doubt).all()
@@ -169,7 +170,7 @@ def test_stills_show_ground_without_holes(made, tiny_config, request):
     """Not black, not flat, no haze of one colour; and nothing darker than shade in a place that is lit."""
     terrain, size = request.getfixturevalue(made).terrain, tiny_config["stills"]
     for shot in SHOTS:
-        still = images.read(terrain / f"{shot.name}.png")
+        still = image_files.read(terrain / f"{shot.name}.png")
         assert still.shape == (size["height"], size["width"], 3)
         below = still[size["height"] // 2 :]
         assert 0.15 < below.mean() < 0.9 and below.std() > 0.01, shot.name

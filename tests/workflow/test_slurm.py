@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from made_runs import TINY, USUAL
-from one_node import NotStarted, slurm
+from fixtures.runs import TINY, USUAL
+from fixtures.slurm_node import NotStarted, slurm
 
 from dav_gswt.files import digest, read_json, write_json
 

@@ -2,7 +2,7 @@
 
 import json
 
-from dav_gswt.stability.extremes import EXTREMES
+from dav_gswt.study.stability.extremes import EXTREMES
 
 
 def test_every_extreme_is_a_job_of_its_own(planned, tmp_path):

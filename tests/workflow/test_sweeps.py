@@ -5,9 +5,9 @@ import shutil
 
 import pytest
 import yaml
-from made_runs import TINY, USUAL
+from fixtures.runs import TINY, USUAL
 
-from dav_gswt import images
+from dav_gswt.images import image_files
 
 FEW = """
 sweeps:
@@ -123,4 +123,4 @@ def test_a_finished_run_is_swept_without_making_anything_twice(snakemake, tiny, 
             ("0.6", "29.41±0.08"),
         ]
     for path in ("results/sweeps/few.png", doubt):
-        assert images.size(folder / path)[0] > 600
+        assert image_files.size(folder / path)[0] > 600

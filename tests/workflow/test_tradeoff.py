@@ -3,9 +3,9 @@
 import csv
 import shutil
 
-from made_runs import TINY, USUAL
+from fixtures.runs import TINY, USUAL
 
-from dav_gswt import images
+from dav_gswt.images import image_files
 
 SMALL = """
 tradeoff:
@@ -74,4 +74,4 @@ def test_a_finished_run_is_measured_drawn_and_told(snakemake, tiny, tmp_path):
     assert "`draft` lies on the front" in (folder / "docs/tradeoff.md").read_text()
     assert (folder / "docs/data/tradeoff.csv").read_text().count("\n") == len(rows) + 1
     for path in ("results/tradeoff/pareto.png", "results/tradeoff/knobs.png", "docs/figures/tradeoff_knobs.png"):
-        assert images.size(folder / path)[0] > 300
+        assert image_files.size(folder / path)[0] > 300

@@ -4,9 +4,9 @@ import re
 import shutil
 
 import pytest
-from made_runs import TINY, USUAL
+from fixtures.runs import TINY, USUAL
 
-from dav_gswt import images
+from dav_gswt.images import image_files
 
 CELL = "results/desert/seed0/draft/active_farthest_none_pdrop0_lam0_k{k}"
 SCORED = "results/desert/seed0/draft/coarse/scores_none_pdrop0/scores.csv"
@@ -59,4 +59,4 @@ def test_a_finished_run_has_both_figures(snakemake, tiny, tmp_path):
     done = snakemake(folder, "--cores", "2", *made, configs=(USUAL, TINY))
     assert "2 of 2 steps (100%) done" in done.stdout  # all they need is there
     for path in made:
-        assert images.size(folder / path)[0] >= 1000 and images.read(folder / path).std() > 0.05
+        assert image_files.size(folder / path)[0] >= 1000 and image_files.read(folder / path).std() > 0.05

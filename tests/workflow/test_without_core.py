@@ -3,7 +3,7 @@
 import shutil
 
 import pytest
-from made_runs import TINY, USUAL
+from fixtures.runs import TINY, USUAL
 
 from dav_gswt.files import read_json
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dav_gswt.bundle import fidelity
-from dav_gswt.coarse import discs
-from dav_gswt.coarse.ground import Ground
+from dav_gswt.reconstruction import discs
+from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.tiles.build import TileSet
 
 CELLS, SPACING = 16, 0.25

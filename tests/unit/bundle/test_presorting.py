@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dav_gswt.bundle import ladder, orders, sights
+from dav_gswt.bundle import direction_search, order_directions, orders
 from dav_gswt.bundle.orders import Rings
 from dav_gswt.field import Field, sh_of
 
@@ -93,33 +93,35 @@ def test_with_more_directions_the_nearest_is_never_farther(azimuth, down, elevat
 
 def test_with_more_directions_a_picture_is_never_worse():
     fields = [ground(seed) for seed in range(4)]
-    views = [(down, 7 + 360 * k / 23) for down in sights.ELEVATIONS.values() for k in range(23)]
-    sample = [sights.Sight(k % 4, azimuth, down) for k, (down, azimuth) in enumerate(views)]
+    views = [(down, 7 + 360 * k / 23) for down in order_directions.ELEVATIONS.values() for k in range(23)]
+    sample = [order_directions.Sight(k % 4, azimuth, down) for k, (down, azimuth) in enumerate(views)]
     told = []
     for azimuths in (4, 8, 16, 64):
-        along = Rings(tuple(sights.ELEVATIONS.values()), azimuths).directions()
-        told.append(sights.decibels([ladder.in_two_orders(fields[s.tile], SIDE, s, along) for s in sample]))
+        along = Rings(tuple(order_directions.ELEVATIONS.values()), azimuths).directions()
+        told.append(
+            order_directions.decibels([direction_search.in_two_orders(fields[s.tile], SIDE, s, along) for s in sample])
+        )
     assert told == sorted(told) and told[-1] > told[0] + 3
 
 
 def test_a_picture_in_its_own_order_is_the_rasterizer_s():
-    field, sight = ground(1), sights.Sight(0, 37.0, 45.0)
-    exact, same = (sights.drawn(field, SIDE, sight.direction, 0.01, o) for o in (None, sight.direction))
+    field, sight = ground(1), order_directions.Sight(0, 37.0, 45.0)
+    exact, same = (order_directions.drawn(field, SIDE, sight.direction, 0.01, o) for o in (None, sight.direction))
     assert (exact == same).all() and exact.max() > 0.5
-    backwards = sights.drawn(field, SIDE, sight.direction, 0.01, -sight.direction)
+    backwards = order_directions.drawn(field, SIDE, sight.direction, 0.01, -sight.direction)
     assert np.abs(backwards - exact).max() > 0.1
 
 
 def test_one_colour_needs_the_fewest_directions():
-    found = ladder.climbed([ground(0, colours=0.0)], SIDE, 40.0)
-    assert found.rings == Rings((20.0,), 2 * ladder.FEWEST) and set(found.decibels) == {"walker", "oblique"}
+    found = direction_search.climbed([ground(0, colours=0.0)], SIDE, 40.0)
+    assert found.rings == Rings((20.0,), 2 * direction_search.FEWEST) and set(found.decibels) == {"walker", "oblique"}
 
 
 def test_directions_are_added_until_the_error_is_small_or_the_room_is_full():
     fields = [ground(seed) for seed in range(2)]
     wanted = [15.0, 25.0, 60.0]
-    found = [ladder.climbed(fields, SIDE, w) for w in wanted]
+    found = [direction_search.climbed(fields, SIDE, w) for w in wanted]
     counts = [len(f.rings.kept(0.0, 1.0)) for f in found]
-    assert counts == sorted(counts) and counts[0] < counts[-1] <= ladder.MOST
+    assert counts == sorted(counts) and counts[0] < counts[-1] <= direction_search.MOST
     assert min(found[0].decibels.values()) >= 15.0
     assert min(found[-1].decibels.values()) < 60.0, "no room for what this asks for"

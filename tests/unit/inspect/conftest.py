@@ -1,7 +1,7 @@
 """A made-up scene, and whether this machine draws off screen."""
 
-import made_up_tree
 import pytest
+from fixtures import result_tree
 
 from dav_gswt.errors import InputError
 from dav_gswt.inspect import saving
@@ -19,6 +19,6 @@ def drawable():
 
 
 @pytest.fixture(scope="session")
-def tree(tmp_path_factory) -> made_up_tree.Tree:
+def tree(tmp_path_factory) -> result_tree.Tree:
     """Tests leave it as it is."""
-    return made_up_tree.write(tmp_path_factory.mktemp("inspect") / "results" / "made_up")
+    return result_tree.write(tmp_path_factory.mktemp("inspect") / "results" / "made_up")

@@ -5,11 +5,11 @@ import importlib.util
 import numpy as np
 import pytest
 
-from dav_gswt import images
-from dav_gswt.command import main
+from dav_gswt.cli.main import main
 from dav_gswt.errors import InputError
+from dav_gswt.images import image_files
 from dav_gswt.inspect import command, kinds, saving
-from dav_gswt.inspect.asked import Asked
+from dav_gswt.inspect.options import Asked
 
 
 @pytest.fixture(autouse=True)
@@ -91,10 +91,10 @@ def test_where_nothing_draws_the_packages_are_named(drawable, tree, tmp_path, mo
 
 def test_a_picture_shows_colours_where_they_belong(drawable, tmp_path):
     values = np.repeat(np.repeat(np.array([[0.0, 1.0], [1.0, 1.0]]), 8, 0), 8, 1)
-    images.write_exr(tmp_path / "uncertainty.exr", {"uncertainty": values})
+    image_files.write_exr(tmp_path / "uncertainty.exr", {"uncertainty": values})
     out = tmp_path / "a.png"
     assert main(["inspect", str(tmp_path / "uncertainty.exr"), "--save", str(out), "--size", "400x300"]) == 0
-    picture = images.read(out)
+    picture = image_files.read(out)
     assert picture.shape == (300, 400, 3)
     warm = (picture[..., 0] > 0.6) & (picture[..., 2] < 0.3)
     cool = (picture[..., 2] > 0.6) & (picture[..., 0] < 0.3)
@@ -120,7 +120,7 @@ def test_a_page_is_the_same_each_time_and_asks_for_nothing(drawable, tree, tmp_p
     warm = cool = 0
     for _ in range(100):  # until candidates of both kinds are drawn
         page.screenshot(path=str(tmp_path / "seen.png"))
-        picture = images.read(tmp_path / "seen.png")[200:]
+        picture = image_files.read(tmp_path / "seen.png")[200:]
         warm = (picture[..., 0] - picture[..., 2] > 0.4).sum()
         cool = (picture[..., 2] - picture[..., 0] > 0.4).sum()
         if min(warm, cool) > 50:

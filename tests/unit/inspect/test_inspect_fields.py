@@ -1,8 +1,8 @@
 """Gaussians as solids: their place, size, direction and colour."""
 
-import made_up_tiles
 import numpy as np
 import pytest
+from fixtures import tiles
 from scipy.spatial.transform import Rotation
 
 from dav_gswt import field as fields
@@ -10,7 +10,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import Field, sh_of
 from dav_gswt.inspect import fields as seen
 from dav_gswt.inspect import scene
-from dav_gswt.inspect.asked import Asked
+from dav_gswt.inspect.options import Asked
 
 
 def one(sigma, ground=False, turn=None, opacity=4.0, uncertainty=0.0):
@@ -85,7 +85,7 @@ def test_levels_stand_side_by_side_and_one_can_be_picked(tree):
     assert list(both.legend[0].named) == ["level 0", "level 1"]
     finest, coarse = both.layers[0], both.layers[2]
     assert finest.points[:, 0].max() < coarse.points[:, 0].min()
-    assert len(coarse.cells) == (made_up_tiles.CELLS // 2) ** 2
+    assert len(coarse.cells) == (tiles.CELLS // 2) ** 2
     single = seen.show_levels(tree.round / "levels", Asked(level=1))
     assert sum(len(layer.cells) for layer in single.layers) < sum(len(layer.cells) for layer in both.layers)
     with pytest.raises(InputError, match="levels 0 to 1"):

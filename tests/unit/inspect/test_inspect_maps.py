@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from dav_gswt import images
-from dav_gswt.coarse.ground import Ground
 from dav_gswt.errors import InputError
+from dav_gswt.images import image_files
 from dav_gswt.inspect import maps as seen
-from dav_gswt.inspect.asked import Asked
+from dav_gswt.inspect.options import Asked
 from dav_gswt.inspect.scene import Bar
+from dav_gswt.reconstruction.ground import Ground
 
 
 def test_a_ground_is_a_surface_through_its_cells_with_a_colour_each():
@@ -62,24 +62,24 @@ def test_a_part_or_channel_that_is_not_there_is_answered_with_those_that_are(tre
 
 
 def test_maps_of_another_ground_and_headers_that_lie_are_refused(tree, tmp_path):
-    images.write_exr(tmp_path / "ground.exr", {"Z": np.zeros((4, 4))}, {"ground_west": "far"})
+    image_files.write_exr(tmp_path / "ground.exr", {"Z": np.zeros((4, 4))}, {"ground_west": "far"})
     with pytest.raises(InputError, match="ground.exr: not the grid of a ground"):
         seen.show(tmp_path / "ground.exr", Asked())
     above, other = ({"uncertainty": np.zeros((4, 4))}, {}), ({"a": np.zeros((2, 2))}, {})
-    images.write_exr_parts(tmp_path / "uncertainty.exr", {"above": above, "b": other})
+    image_files.write_exr_parts(tmp_path / "uncertainty.exr", {"above": above, "b": other})
     with pytest.raises(InputError, match="ground.exr"):
         seen.show(tmp_path / "uncertainty.exr", Asked(part="above"))
 
 
 def test_skies_are_grey(tmp_path):
-    images.write_exr(tmp_path / "deep.exr", {"Z": np.array([[np.inf, 1.0], [2.0, 3.0]])})
+    image_files.write_exr(tmp_path / "deep.exr", {"Z": np.array([[np.inf, 1.0], [2.0, 3.0]])})
     shown = seen.show(tmp_path / "deep.exr", Asked())
     np.testing.assert_array_equal(shown.layers[0].picture[0, 0], [150, 150, 150])
     assert "grey" in shown.notes[0]
 
 
 def test_a_header_that_promises_too_much_is_refused_before_anything_is_made_room_for(tmp_path):
-    images.write_exr(tmp_path / "a.exr", {"Z": np.zeros((3, 5))})
+    image_files.write_exr(tmp_path / "a.exr", {"Z": np.zeros((3, 5))})
     data = (tmp_path / "a.exr").read_bytes()
     at = data.index(b"dataWindow\0box2i\0") + len(b"dataWindow\0box2i\0") + 4
     huge = np.array([0, 0, 99_999, 99_999], "<i4").tobytes()

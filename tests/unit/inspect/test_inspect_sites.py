@@ -1,17 +1,17 @@
 """Cameras over the ground: what they look at, what they are for."""
 
-import made_up_tree
 import numpy as np
 import pytest
+from fixtures import result_tree
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import write_json
 from dav_gswt.inspect import beside, sites
-from dav_gswt.inspect.asked import Asked
+from dav_gswt.inspect.options import Asked
 
 
 def test_a_camera_is_a_pyramid_whose_base_fills_its_picture():
-    camera = made_up_tree.camera(made_up_tree.poses()[3])
+    camera = result_tree.camera(result_tree.poses()[3])
     (layer,) = sites.looking(camera, 0.5, (1, 2, 3), None)
     np.testing.assert_allclose(layer.points[0], camera.centre, atol=1e-5)
     pixels, depth = camera.project(layer.points[1:].astype(float))
@@ -40,9 +40,9 @@ def test_names_that_lead_out_of_the_folder_are_refused(tree, tmp_path):
     write_json(tmp_path / "capture.json", {"shots": [shot]})
     with pytest.raises(InputError, match="not as the workflow writes it"):
         beside.shots_of(tmp_path / "capture.json")
-    from dav_gswt import cameras
+    from dav_gswt.geometry import cameras
 
-    shot["got"] = cameras.to_json(made_up_tree.camera(made_up_tree.poses()[0]))
+    shot["got"] = cameras.to_json(result_tree.camera(result_tree.poses()[0]))
     write_json(tree.start / "capture.json", {"shots": [shot]})
     try:
         with pytest.raises(InputError, match="is no file's name"):
@@ -52,7 +52,7 @@ def test_names_that_lead_out_of_the_folder_are_refused(tree, tmp_path):
 
 
 def test_a_frame_without_a_square_is_refused(tmp_path):
-    for frame in ({}, {"exemplar": 3}, made_up_tree.FRAME | {"exemplar": {"west": 0, "south": 0, "side": -1}}):
+    for frame in ({}, {"exemplar": 3}, result_tree.FRAME | {"exemplar": {"west": 0, "south": 0, "side": -1}}):
         write_json(tmp_path / "ground.json", frame)
         with pytest.raises(InputError, match="ground.json: not as the workflow writes it"):
             beside.frame_of(tmp_path / "ground.json")

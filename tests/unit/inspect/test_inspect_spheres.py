@@ -2,18 +2,18 @@
 
 import shutil
 
-import made_up_tree
 import numpy as np
 import pytest
+from fixtures import result_tree
 
-from dav_gswt.active.poses import place
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json, write_json
+from dav_gswt.geometry.poses import place
 from dav_gswt.inspect import scene, spheres
-from dav_gswt.inspect.asked import Asked
+from dav_gswt.inspect.options import Asked
 from dav_gswt.inspect.scene import Bar
 
-POSES = made_up_tree.poses()
+POSES = result_tree.poses()
 
 
 def centres(layer):
@@ -23,7 +23,7 @@ def centres(layer):
 
 
 def at(numbers):
-    return np.array([made_up_tree.MIDDLE + place(POSES[i]) for i in numbers])
+    return np.array([result_tree.MIDDLE + place(POSES[i]) for i in numbers])
 
 
 def test_scores_and_poses_find_each_other_and_show_the_same(tree):
@@ -36,12 +36,12 @@ def test_scores_and_poses_find_each_other_and_show_the_same(tree):
 
 def test_candidates_stand_where_they_are_and_the_chosen_are_marked_in_order(tree):
     shown = spheres.show_chosen(tree.round / "poses.json", Asked())
-    rest = [i for i in range(made_up_tree.CANDIDATES) if i not in made_up_tree.CHOSEN]
+    rest = [i for i in range(result_tree.CANDIDATES) if i not in result_tree.CHOSEN]
     np.testing.assert_allclose(centres(shown.layers[0]), at(rest), atol=1e-4)
     stems = next(layer for layer in shown.layers if layer.kind == "lines" and len(layer.cells) == 2)
-    np.testing.assert_allclose(stems.points[0], made_up_tree.MIDDLE, atol=1e-6)
-    np.testing.assert_allclose(stems.points[1:], at(made_up_tree.CHOSEN), atol=1e-5)
-    for word, above in zip(shown.words, at(made_up_tree.CHOSEN), strict=True):
+    np.testing.assert_allclose(stems.points[0], result_tree.MIDDLE, atol=1e-6)
+    np.testing.assert_allclose(stems.points[1:], at(result_tree.CHOSEN), atol=1e-5)
+    for word, above in zip(shown.words, at(result_tree.CHOSEN), strict=True):
         np.testing.assert_allclose(word.place[:2], above[:2], atol=1e-9)
 
 
@@ -59,8 +59,8 @@ def test_colours_are_the_doubt_by_which_was_chosen_or_any_column(tree):
 def test_where_several_branches_chose_none_is_marked_until_one_is_named(tree, tmp_path):
     shutil.copytree(tree.photos.parent, tmp_path / "scene")
     draft = tmp_path / "scene/seed0/draft"
-    twin = draft / made_up_tree.BRANCH.replace("k2", "k3")
-    shutil.copytree(draft / made_up_tree.BRANCH, twin)
+    twin = draft / result_tree.BRANCH.replace("k2", "k3")
+    shutil.copytree(draft / result_tree.BRANCH, twin)
     scores = draft / "coarse/scores_terrain_pdrop0.15/scores.csv"
     shown = spheres.show(scores, Asked())
     assert not shown.words and "2 branches" in shown.notes[0]

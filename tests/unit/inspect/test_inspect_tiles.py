@@ -6,7 +6,7 @@ import pytest
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json, write_json
 from dav_gswt.inspect import tiles as seen
-from dav_gswt.inspect.asked import Asked
+from dav_gswt.inspect.options import Asked
 from dav_gswt.tiles import store
 from dav_gswt.tiles.layout import colours
 

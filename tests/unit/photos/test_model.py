@@ -2,12 +2,12 @@
 
 from dataclasses import replace
 
-import made_up_photos as made_up
 import numpy as np
 import pytest
+from fixtures import photos as made_up
 
-from dav_gswt import images
 from dav_gswt.errors import InputError
+from dav_gswt.images import image_files
 from dav_gswt.photos import model as models
 
 
@@ -97,7 +97,7 @@ def test_an_image_that_is_not_in_the_model_is_named(flown):
 
 def test_colours_come_from_the_named_images_alone(flown, tmp_path):
     for i, name in enumerate(flown.names):
-        images.write(tmp_path / name, np.full((made_up.HEIGHT, made_up.WIDTH, 3), 0.2 if i < 3 else 1.0))
+        image_files.write(tmp_path / name, np.full((made_up.HEIGHT, made_up.WIDTH, 3), 0.2 if i < 3 else 1.0))
     _, colours = models.points_seen_by(flown, flown.names[:3], tmp_path)
     assert colours == pytest.approx(np.full(colours.shape, 0.2), abs=1e-6)
 

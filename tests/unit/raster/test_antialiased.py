@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from raster_scenes import CAMERAS, gaussians, image_gradients, map_camera, one, oracle_answers, relative
+from fixtures.raster_scenes import CAMERAS, gaussians, image_gradients, map_camera, one, oracle_answers, relative
 
 from dav_gswt.raster import cpu
 

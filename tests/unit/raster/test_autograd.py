@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 import torch
-from backend_scenes import SCENES
-from raster_scenes import NAMES, relative
+from fixtures.backend_scenes import SCENES
+from fixtures.raster_scenes import NAMES, relative
 
 from dav_gswt.raster import backends, oracle
 from dav_gswt.raster.autograd import rasterize

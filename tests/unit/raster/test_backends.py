@@ -7,13 +7,13 @@ everywhere through a gsplat that is made up (`fake_gsplat`).
 import importlib
 import sys
 
-import fake_gsplat
 import numpy as np
 import pytest
-from backend_scenes import SCENES, answers, blend_weights
-from raster_scenes import CAMERAS, gaussians, relative, taken
+from fixtures import fake_gsplat
+from fixtures.backend_scenes import SCENES, answers, blend_weights
+from fixtures.raster_scenes import CAMERAS, gaussians, relative, taken
 
-from dav_gswt.cameras import Camera
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import backends
 
 FAKED = "cuda through a made-up gsplat"

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from backend_scenes import SCENES
-from raster_scenes import relative
+from fixtures.backend_scenes import SCENES
+from fixtures.raster_scenes import relative
 from scipy.spatial.transform import Rotation
 
-from dav_gswt.cameras import Camera
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import cpu, oracle
 
 STEP = 2e-9  # so small that hardly a pixel crosses a splat's rim, where alpha jumps by 1/255; float64 has digits left

@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from raster_scenes import CAMERAS, gaussians, relative
+from fixtures.raster_scenes import CAMERAS, gaussians, relative
 
 from dav_gswt import provenance, raster
 from dav_gswt.errors import InputError

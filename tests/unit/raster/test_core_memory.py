@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from raster_scenes import CAMERAS, gaussians, image_gradients, taken
+from fixtures.raster_scenes import CAMERAS, gaussians, image_gradients, taken
 
 from dav_gswt.raster import cpu
 

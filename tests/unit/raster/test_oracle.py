@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from backend_scenes import SCENES, answers, blend_weights
-from raster_scenes import CAMERAS, NAMES, gaussians, image_gradients, oracle_answers, relative
+from fixtures.backend_scenes import SCENES, answers, blend_weights
+from fixtures.raster_scenes import CAMERAS, NAMES, gaussians, image_gradients, oracle_answers, relative
 
 from dav_gswt.raster import cpu, harmonics
 

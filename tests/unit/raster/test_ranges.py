@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures.raster_scenes import CAMERAS, gaussians, image_gradients, oracle_answers, taken
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from raster_scenes import CAMERAS, gaussians, image_gradients, oracle_answers, taken
 from scipy.spatial.transform import Rotation
 
 from dav_gswt.raster import cpu

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from raster_scenes import CAMERAS, NAMES, gaussians, image_gradients, map_camera, one, taken, together
+from fixtures.raster_scenes import CAMERAS, NAMES, gaussians, image_gradients, map_camera, one, taken, together
 
-from dav_gswt import cameras
+from dav_gswt.geometry import cameras
 from dav_gswt.raster import cpu, interface
 
 

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from raster_scenes import CAMERAS, gaussians
+from fixtures.raster_scenes import CAMERAS, gaussians
 
-from dav_gswt import cameras
 from dav_gswt.field import Field, sh_of
+from dav_gswt.geometry import cameras
 from dav_gswt.raster import backends, harmonics, render
 
 

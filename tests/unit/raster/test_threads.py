@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from raster_scenes import gaussians, image_gradients
+from fixtures.raster_scenes import gaussians, image_gradients
 
-from dav_gswt import cameras
+from dav_gswt.geometry import cameras
 from dav_gswt.raster import cpu
 
 CAMERA = cameras.pinhole((0.3, -4, 1.5), (0, 0, 0), 150, 130, 60.0)

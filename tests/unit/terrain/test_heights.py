@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dav_gswt import images
 from dav_gswt.errors import InputError
+from dav_gswt.images import image_files
 from dav_gswt.terrain import heights
 from dav_gswt.terrain.choice import hashed
 from dav_gswt.terrain.heights import STEEPEST, Flat, Heights, Hills, Relief
@@ -173,11 +173,11 @@ def test_an_image_file_becomes_a_surface(tmp_path, suffix):
     values = np.array([[0.0, 1.0, 2.5], [-3.0, 0.25, 7.0]], np.float32)
     path = tmp_path / f"map.{suffix}"
     if suffix == "exr":
-        images.write_exr(path, {"Y": values})
+        image_files.write_exr(path, {"Y": values})
         expected = values
     else:
         values = np.array([[0.0, 1.0, 0.4], [0.2, 0.6, 0.8]], np.float32)
-        images.write(path, values[..., None])
+        image_files.write(path, values[..., None])
         expected = values
     entry = {"kind": "image", "file": str(path), "width": 6.0, "height": 10.0}
     surface = heights.of_config(entry, 2.8)
@@ -201,9 +201,9 @@ def test_hills_are_measured_in_tile_sides():
 
 
 def test_an_image_too_large_is_refused_before_it_is_read(tmp_path, monkeypatch):
-    images.write(tmp_path / "map.png", np.zeros((4, 5, 1)))
+    image_files.write(tmp_path / "map.png", np.zeros((4, 5, 1)))
     monkeypatch.setattr(heights, "MOST_CELLS", 19)
-    monkeypatch.setattr(images, "read_channel", None)
+    monkeypatch.setattr(image_files, "read_channel", None)
     with pytest.raises(InputError, match=r"map\.png: 5 x 4 heights; at most 19"):
         heights.read_map(tmp_path / "map.png")
 
@@ -211,7 +211,7 @@ def test_an_image_too_large_is_refused_before_it_is_read(tmp_path, monkeypatch):
 def test_a_height_that_is_not_finite_is_named(tmp_path):
     values = np.zeros((3, 4), np.float32)
     values[1, 2] = np.nan
-    images.write_exr(tmp_path / "map.exr", {"Y": values})
+    image_files.write_exr(tmp_path / "map.exr", {"Y": values})
     with pytest.raises(InputError, match=r"map\.exr: the height in row 1, column 2 is not finite"):
         heights.read_map(tmp_path / "map.exr")
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dav_gswt import cameras
 from dav_gswt.field import Field, sh_of
+from dav_gswt.geometry import cameras
 from dav_gswt.raster import render
 from dav_gswt.terrain import splats
 from dav_gswt.terrain.drape import axes

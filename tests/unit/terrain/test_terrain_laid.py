@@ -7,10 +7,10 @@ import pytest
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt import cameras
 from dav_gswt.bundle import orders
-from dav_gswt.coarse import discs, ground
 from dav_gswt.field import joined
+from dav_gswt.geometry import cameras
+from dav_gswt.reconstruction import discs, ground
 from dav_gswt.terrain import assemble, order, still
 from dav_gswt.terrain.choice import tile_at
 from dav_gswt.terrain.heights import Hills

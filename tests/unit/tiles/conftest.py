@@ -1,14 +1,14 @@
 """A made-up exemplar and its tiles, made once."""
 
-import made_up_tiles
 import pytest
+from fixtures import tiles
 
 
 @pytest.fixture(scope="session")
 def made_up():
-    return made_up_tiles.exemplar()
+    return tiles.exemplar()
 
 
 @pytest.fixture(scope="session")
 def tiles(made_up):
-    return made_up_tiles.tiles_of(made_up)
+    return tiles.tiles_of(made_up)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_up_seams import cheapest
+from fixtures.seams import cheapest
 
 from dav_gswt.tiles import cuts
 

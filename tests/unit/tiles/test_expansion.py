@@ -4,9 +4,9 @@ from itertools import product
 
 import numpy as np
 import pytest
+from fixtures.seams import cost
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_up_seams import cost
 
 from dav_gswt.tiles import energy, expansion, semantics
 from dav_gswt.tiles.expansion import Patches

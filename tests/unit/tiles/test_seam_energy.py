@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from fixtures.seams import cheapest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_up_seams import cheapest
 
 from dav_gswt.tiles import cuts, energy, semantics
 from dav_gswt.tiles.energy import Colours, Scales

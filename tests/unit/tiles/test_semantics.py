@@ -2,10 +2,10 @@
 
 import logging
 
-import made_up_weights
 import numpy as np
 import pytest
 import torch
+from fixtures import weights
 
 from dav_gswt.tiles import energy, semantics
 from dav_gswt.tiles.semantics import Source, covered, of_segments, superpixels
@@ -13,7 +13,7 @@ from dav_gswt.tiles.semantics import Source, covered, of_segments, superpixels
 
 @pytest.fixture(scope="module")
 def weights():
-    return made_up_weights.random()
+    return weights.random()
 
 
 @pytest.fixture(scope="module")

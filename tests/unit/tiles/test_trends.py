@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dav_gswt.levels.merge import covariances
+from dav_gswt.lod.merge import covariances
 from dav_gswt.tiles import membrane, trends
 from dav_gswt.tiles.layout import Exemplar, Layout
 

@@ -8,9 +8,9 @@ from jsonschema import Draft202012Validator
 from jsonschema.exceptions import ValidationError, best_match
 
 from dav_gswt.errors import InputError
-from dav_gswt.sweeps import grid
-from dav_gswt.tables import asked as tables
-from dav_gswt.tradeoff import settings
+from dav_gswt.study.sweeps import grid
+from dav_gswt.study.tables import checks as tables
+from dav_gswt.study.tradeoff import settings
 
 FLOOR = "floor"  # in a pair of the perceptual study: the same place without a seam
 REFINED = "-refined"  # after a seam's name: its tiles, refined as its `refine` says

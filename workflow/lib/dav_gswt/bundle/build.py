@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt.bundle import chunks, gswt, ladder, lod, manifest, orders, sights
+from dav_gswt.bundle import chunks, direction_search, gswt, lod, manifest, order_directions, orders
+from dav_gswt.bundle.direction_search import Measured
 from dav_gswt.bundle.encoding import Encoding, Errors
-from dav_gswt.bundle.ladder import Measured
 from dav_gswt.errors import InputError
 from dav_gswt.field import Field, mean_scale
 from dav_gswt.files import write_json
@@ -51,7 +51,7 @@ def write_bundle(tiles: TileSet, out_dir: Path | str, options: Options, schema: 
     (part / "chunks").mkdir(parents=True)
     try:
         gswt.write(tiles.fields, tiles.side, part / "gswt.zip")
-        climbed = ladder.climbed(tiles.fields[0], tiles.side, options.decibels)
+        climbed = direction_search.climbed(tiles.fields[0], tiles.side, options.decibels)
         value = laying(tiles, options, climbed.rings)
         pixel = tiles.spacing / options.floor_pixels
         encoding = Encoding.of([f for level in tiles.fields for f in level], tiles.side, pixel)
@@ -119,13 +119,13 @@ def _write_chunks(tiles: TileSet, encoding: Encoding, value: dict, options: Opti
 def _picture(tiles: TileSet, encoding: Encoding, pixel: float) -> dict[str, float | None]:
     """By elevation, the PSNR of rounded tiles against tiles, both as near as the lowest eye sees them."""
     found = {}
-    for view, down in sights.ELEVATIONS.items():
+    for view, down in order_directions.ELEVATIONS.items():
         pairs = []
-        for sight in sights.spread(len(tiles.labels), down):
+        for sight in order_directions.spread(len(tiles.labels), down):
             source = tiles.fields[0][sight.tile]
             pair = (encoding.decoded(encoding.encoded(source)), source)
-            pairs.append(tuple(sights.drawn(f, tiles.side, sight.direction, pixel) for f in pair))
-        found[view] = sights.decibels(pairs)
+            pairs.append(tuple(order_directions.drawn(f, tiles.side, sight.direction, pixel) for f in pair))
+        found[view] = order_directions.decibels(pairs)
     return found
 
 

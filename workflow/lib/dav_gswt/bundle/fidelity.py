@@ -13,13 +13,14 @@ from jaxtyping import Float32, Int, UInt8
 from numpy import ndarray as Array
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from dav_gswt import cameras, images
 from dav_gswt.bundle import lod
-from dav_gswt.cameras import Camera
-from dav_gswt.coarse.doubt import arrays
 from dav_gswt.field import Field, joined, mean_scale
+from dav_gswt.geometry import cameras
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.images import image_files
 from dav_gswt.logs import progress
 from dav_gswt.raster import Rasterizer
+from dav_gswt.reconstruction.uncertainty import arrays
 from dav_gswt.tiles.build import TileSet
 from dav_gswt.tiles.layout import EDGES
 
@@ -91,7 +92,7 @@ def averaged(field: Field, camera: Camera, factor: int) -> Float32[Array, "h w 3
     large = camera.resized(factor * camera.width, factor * camera.height)
     seen = Rasterizer(near=1e-6, antialiased=True).forward(**arrays(field), camera=large)
     colour = np.clip(seen.colour / np.maximum(seen.alpha, 0.5)[..., None], 0, 1).astype(np.float32)
-    return images.resized(colour, camera.width, camera.height)
+    return image_files.resized(colour, camera.width, camera.height)
 
 
 def _camera(side: float, distance: float, elevation: float, height: float) -> Camera:

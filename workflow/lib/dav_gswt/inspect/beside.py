@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt import cameras
-from dav_gswt.cameras import Camera
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
+from dav_gswt.geometry import cameras
+from dav_gswt.geometry.cameras import Camera
 
 ROUND = re.compile(r"iter(0|[1-9]\d{0,5})")
 ACTIVE = re.compile(r"active_[a-z0-9-]+_([a-z0-9_-]+)_pdrop([0-9.]+)_lam([0-9.]+)_k\d.*")

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from dav_gswt.errors import InputError
-from dav_gswt.inspect.asked import MOST, Asked
+from dav_gswt.inspect.options import MOST, Asked
 
 NEEDED = ("pyvista", "trame_vtk")
 FORMATS = (".png", ".html")

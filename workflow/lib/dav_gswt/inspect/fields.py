@@ -11,12 +11,12 @@ from scipy.spatial.transform import Rotation
 from scipy.special import expit
 
 from dav_gswt import field as fields
-from dav_gswt.active import maps
 from dav_gswt.errors import InputError
 from dav_gswt.field import Field
-from dav_gswt.inspect.asked import Asked
+from dav_gswt.inspect.options import Asked
 from dav_gswt.inspect.scene import DOUBT, Bar, Keys, Layer, Scene, bytes_of, coloured, copies, moved
-from dav_gswt.levels import store
+from dav_gswt.lod import store
+from dav_gswt.views import pose_maps
 
 FAINT = 0.1  # peak opacity below which a Gaussian is left out: it hides what it would hardly tint
 FLAT = 0.35  # of a Gaussian's middle axis, below which its least one is not shown
@@ -45,11 +45,11 @@ def show_doubted(path: Path, asked: Asked) -> Scene:
     beside = next((f for f in (path.parent / "field.ply", path.parent.parent / "field.ply") if f.is_file()), None)
     if beside is None:
         raise InputError(f"{path}: there is no field.ply beside it; it tells of the Gaussians of one")
-    found, doubt = fields.read(beside), maps.read(path)[1]
+    found, doubt = fields.read(beside), pose_maps.read(path)[1]
     if doubt.ndim != 1 or len(doubt) > len(found) or not np.isfinite(doubt).all():
         raise InputError(f"{path}: tells of other Gaussians than those of {beside}; score the poses again")
     asked = replace(asked, colour=asked.colour or "uncertainty")
-    return of_fields(str(path), [maps.doubted(found, doubt.astype(np.float32))], [0], asked)
+    return of_fields(str(path), [pose_maps.doubted(found, doubt.astype(np.float32))], [0], asked)
 
 
 def show_levels(path: Path, asked: Asked) -> Scene:

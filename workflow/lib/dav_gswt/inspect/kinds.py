@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dav_gswt.errors import InputError
 from dav_gswt.inspect import fields, maps, sites, spheres, tiles
-from dav_gswt.inspect.asked import Asked
+from dav_gswt.inspect.options import Asked
 from dav_gswt.inspect.scene import Scene
 
 

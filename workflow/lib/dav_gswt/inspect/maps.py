@@ -7,16 +7,16 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt import images
-from dav_gswt.active import maps as posed
-from dav_gswt.active.maps import Part
-from dav_gswt.active.sphere import HIGHEST
-from dav_gswt.coarse import ground
-from dav_gswt.coarse.ground import Ground
 from dav_gswt.errors import InputError
+from dav_gswt.images import image_files
 from dav_gswt.inspect import beside, fields
-from dav_gswt.inspect.asked import Asked
+from dav_gswt.inspect.options import Asked
 from dav_gswt.inspect.scene import DOUBT, Bar, Layer, Scene, Word, bar_over, coloured, hung
+from dav_gswt.reconstruction import ground
+from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.study.views.sphere import HIGHEST
+from dav_gswt.views import pose_maps as posed
+from dav_gswt.views.pose_maps import Part
 
 WIDE = 1.6  # of all pictures side by side, over their height
 MOST_PICTURES = 60
@@ -29,7 +29,7 @@ ABOVE = "above"  # the part of uncertainty.exr that lies over the ground
 
 def show(path: Path, asked: Asked) -> Scene:
     """An EXR file: a ground's as its surface, and so the part `above` where it is asked for; all else as pictures."""
-    parts = images.read_exr_parts(path)
+    parts = image_files.read_exr_parts(path)
     if len(parts) == 1 and "ground_west" in (only := next(iter(parts.values())))[1]:
         return _of_grid(path, ground.read(path), only[0], asked)
     if asked.part == ABOVE and ABOVE in parts:

@@ -6,12 +6,12 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt import images
-from dav_gswt.cameras import Camera
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.images import image_files
 from dav_gswt.inspect import beside
-from dav_gswt.inspect.asked import Asked
+from dav_gswt.inspect.options import Asked
 from dav_gswt.inspect.scene import Keys, Layer, Scene, bytes_of, hung, outline
 
 EDGE = 0.12  # flying heights from a camera to its picture
@@ -112,8 +112,8 @@ def looking(camera: Camera, reach: float, colour: tuple[int, int, int], photo: P
     edges = np.array([[0, 1], [0, 2], [0, 3], [0, 4], [1, 2], [2, 3], [3, 4], [4, 1]])
     found = [Layer("lines", points, edges, colour)]
     if photo is not None and photo.is_file():
-        picture = images.read(photo)
+        picture = image_files.read(photo)
         share = min(1.0, PICTURE / max(picture.shape[:2]))
-        small = images.resized(picture, *(max(1, round(n * share)) for n in picture.shape[1::-1]))
+        small = image_files.resized(picture, *(max(1, round(n * share)) for n in picture.shape[1::-1]))
         found.append(hung(bytes_of(small), corners[0], corners[1] - corners[0], corners[3] - corners[0]))
     return found

@@ -7,17 +7,17 @@ from jaxtyping import Float64
 from numpy import ndarray as Array
 
 from dav_gswt import field as fields
-from dav_gswt.active import poses as places
-from dav_gswt.active import scores as tables
-from dav_gswt.active.scores import Scores
-from dav_gswt.active.sphere import HIGHEST, shade
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
+from dav_gswt.geometry import poses as places
 from dav_gswt.inspect import beside
-from dav_gswt.inspect.asked import Asked
 from dav_gswt.inspect.fields import colours, solid, thinned
+from dav_gswt.inspect.options import Asked
 from dav_gswt.inspect.scene import INK, Keys, Layer, Scene, Word, balls, bar_over, coloured
 from dav_gswt.inspect.sites import bounds, ground, looking
+from dav_gswt.study.views.sphere import HIGHEST, shade
+from dav_gswt.views import scores as tables
+from dav_gswt.views.scores import Scores
 
 BALL, CHOSEN, LETTER = 0.018, 0.03, 0.07  # radii and height, in radii of the hemisphere
 TAKEN = (0, 0, 0)
@@ -118,7 +118,7 @@ def _field(path: Path, asked: Asked) -> list[Layer]:
 
 def _taken(path: Path, photos: Path) -> list:
     """Cameras of the photos that the scored field was made of, as far as they are there."""
-    from dav_gswt.active import candidates  # here, not above: it loads pycolmap and the synthetic scenes
+    from dav_gswt.views import candidates  # here, not above: it loads pycolmap and the synthetic scenes
 
     path = path.resolve()
     up = next((p for p in path.parents if (p / "views.json").is_file()), None)

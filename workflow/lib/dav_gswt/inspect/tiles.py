@@ -7,13 +7,13 @@ from jaxtyping import Float, Integer
 from numpy import ndarray as Array
 
 from dav_gswt.bundle import store as bundles
-from dav_gswt.bundle.exports import ROW
 from dav_gswt.bundle.fidelity import laid
 from dav_gswt.errors import InputError
+from dav_gswt.export.splats import ROW
 from dav_gswt.field import Field
 from dav_gswt.inspect import beside
-from dav_gswt.inspect.asked import Asked
 from dav_gswt.inspect.fields import LEVELS, NAMES, colours, level_colour, shaded, solid, thinned
+from dav_gswt.inspect.options import Asked
 from dav_gswt.inspect.scene import Bar, Keys, Layer, Scene, Word, moved
 from dav_gswt.tiles import store
 from dav_gswt.tiles.build import TileSet

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import OpenImageIO as oiio
 
-from dav_gswt import images
+from dav_gswt.images import image_files
 
 FILM_DIAGONAL = 43.2666  # of a 36 x 24 mm frame, which "35 mm equivalent" compares diagonals with
 WIDEST = 1.55  # photos wider than a 3:2 sensor are cut from a 4:3 one, whose diagonal the equivalent refers to
@@ -22,7 +22,7 @@ def focal_length(path: Path | str) -> float | None:
     diagonal: f / 43.27 mm * sqrt(w^2 + h^2), with the height of the 4:3 sensor where the picture is wider than 3:2.
     Where the tagged width differs from the real one, the pitch is scaled with it: the photo was resized, the tag not.
     """
-    width, height = sorted(images.size(path), reverse=True)
+    width, height = sorted(image_files.size(path), reverse=True)
     tags = _jpeg_tags(Path(path))
     spec = oiio.ImageInput.open(str(path)).spec()
     focal = tags.get(_FOCAL) or _number(spec.getattribute("Exif:FocalLength"))

@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt import images
 from dav_gswt.files import whole_folder, write_json
+from dav_gswt.images import image_files
 from dav_gswt.photos import lenses
 from dav_gswt.photos import model as models
 from dav_gswt.photos.lenses import Lens
@@ -33,7 +33,7 @@ def write(
         (part / "images").mkdir()
         for name, image in pictures:
             cover = covers.get(name)
-            images.write(part / "images" / name, image if cover is None else np.dstack([image, cover]))
+            image_files.write(part / "images" / name, image if cover is None else np.dstack([image, cover]))
         (part / "sparse").mkdir()
         models.write(model, part / "sparse")
         if kinds:

@@ -13,10 +13,10 @@ from jaxtyping import Float32
 from numpy import ndarray as Array
 from scipy.ndimage import map_coordinates
 
-from dav_gswt import images
-from dav_gswt.cameras import Camera
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json, write_json
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.images import image_files
 
 SAME = 1e-6  # pixels: two pinholes are one
 ASPECT = 0.01  # a photo whose sides differ more from its lens's, as a share, is of another camera
@@ -81,7 +81,7 @@ def developed(photo: Float32[Array, "h w 3"], folder: Path | str, camera: Camera
             f"a photo of {photo.shape[1]} x {photo.shape[0]} pixels is not of the scene's camera "
             f"({width} x {height}); take photos with the same camera, uncropped and not turned"
         )
-    photo = images.resized(photo, width, height)
+    photo = image_files.resized(photo, width, height)
     return undistorted(photo, own.camera, camera) if own else photo
 
 

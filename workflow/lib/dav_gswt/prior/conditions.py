@@ -9,15 +9,15 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
-from dav_gswt import images
-from dav_gswt.active import poses
-from dav_gswt.active.poses import Pose
-from dav_gswt.cameras import Camera
-from dav_gswt.coarse.doubt import arrays
 from dav_gswt.field import Field
+from dav_gswt.geometry import poses
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.poses import Pose
+from dav_gswt.images import image_files
+from dav_gswt.photos.training_views import View
 from dav_gswt.prior.interface import Condition
 from dav_gswt.raster import Rasterizer
-from dav_gswt.views import View
+from dav_gswt.reconstruction.uncertainty import arrays
 
 FINE = 2  # pictures are drawn so many times as large and averaged: edges are soft, as in a photo made smaller
 CLEAR = 0.05  # opacity below which a pixel has no depth
@@ -48,8 +48,8 @@ def taken(views: list[View], frame: dict, size: int) -> Taken:
 
 def _sized(square: Float32[Array, "s s 3"], size: int) -> Float32[Array, "{size} {size} 3"]:
     if len(square) >= size:
-        return images.resized(square, size, size)
-    return np.stack([images.enlarged(square[..., c], size, size) for c in range(3)], -1)
+        return image_files.resized(square, size, size)
+    return np.stack([image_files.enlarged(square[..., c], size, size) for c in range(3)], -1)
 
 
 def condition(

@@ -23,7 +23,7 @@ from numpy import ndarray as Array
 from torch import Tensor
 from torch.nn import functional
 
-from dav_gswt import images
+from dav_gswt.images import image_files
 from dav_gswt.prior import sampler, zero123_folder
 from dav_gswt.prior.interface import Condition, Imagined
 from dav_gswt.prior.zero123_folder import CODE, Parts
@@ -130,7 +130,7 @@ def sized(photo: Float32[Array, "b s s 3"]) -> Float[Tensor, "b 3 size size"]:
     """Photos of any size as the coder takes them: means over areas of larger ones, smaller ones bicubic."""
     side = photo.shape[1]
     if side > SIZE:
-        photo = np.stack([images.resized(one, SIZE, SIZE) for one in photo])
+        photo = np.stack([image_files.resized(one, SIZE, SIZE) for one in photo])
     planes = torch.from_numpy(np.ascontiguousarray(photo.transpose(0, 3, 1, 2)))
     if side < SIZE:
         planes = functional.interpolate(planes, (SIZE, SIZE), mode="bicubic", align_corners=False)

@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.cameras import Camera
 from dav_gswt.field import Field
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import backends
 from dav_gswt.raster.interface import Contributions, Gradients, Rasterizer, Rendering
 

@@ -6,7 +6,7 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from dav_gswt.cameras import Camera
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import backends
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.cameras import Camera
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import _core, interface
 from dav_gswt.raster.interface import Contributions, Gradients, Rendering
 

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.cameras import Camera
+from dav_gswt.geometry.cameras import Camera
 
 
 def directions(means: Float[Array, "n 3"], camera: Camera) -> Float[Array, "n 3"]:

@@ -11,7 +11,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from dav_gswt.cameras import Camera
+from dav_gswt.geometry.cameras import Camera
 
 ALPHA_MIN, ALPHA_MAX, CLEAR_MIN = 1 / 255, 0.99, 1e-4
 MARGIN = 0.15  # of the picture's side: further out the camera is linearised at this rim

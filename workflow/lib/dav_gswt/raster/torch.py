@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Float32, Int
 from numpy import ndarray as Array
 from torch import Tensor
 
-from dav_gswt.cameras import Camera
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import interface, oracle
 from dav_gswt.raster.interface import Contributions, Gradients, Rendering
 from dav_gswt.raster.oracle import ALPHA_MAX, ALPHA_MIN, CLEAR_MIN, Splats

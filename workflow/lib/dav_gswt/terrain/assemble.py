@@ -8,8 +8,8 @@ from numpy import ndarray as Array
 
 from dav_gswt.bundle.orders import back_to_front
 from dav_gswt.bundle.store import Bundle
-from dav_gswt.cameras import Camera
 from dav_gswt.field import Field, joined
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster.interface import RIM
 from dav_gswt.terrain import order, weights
 from dav_gswt.terrain.choice import tiles_at

@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt import images
 from dav_gswt.errors import InputError
+from dav_gswt.images import image_files
 from dav_gswt.terrain.choice import hashed
 
 HILLS = 3  # what a hash is for, after west, south and centre: the gradient of octave 0, 1, ...
@@ -160,10 +160,10 @@ def read_map(path: Path | str) -> Float32[Array, "rows columns"]:
 
     Raises: InputError: not readable, larger than MOST_CELLS (nothing is allocated then), or a pixel is not finite.
     """
-    width, height = images.size(path)
+    width, height = image_files.size(path)
     if width * height > MOST_CELLS:
         raise InputError(f"{path}: {width} x {height} heights; at most {MOST_CELLS} are read: shrink the image")
-    pixels = images.read_channel(path)
+    pixels = image_files.read_channel(path)
     if len(bad := np.argwhere(~np.isfinite(pixels))):
         row, column = bad[0]
         raise InputError(f"{path}: the height in row {row}, column {column} is not finite ({len(bad)} such); fill it")

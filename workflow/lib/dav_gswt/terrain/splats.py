@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 from numpy import ndarray as Array
 
-from dav_gswt.cameras import Camera
 from dav_gswt.field import Field
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import Rasterizer, Rendering, harmonics
 from dav_gswt.terrain.drape import axes
 

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
-from dav_gswt import cameras
-from dav_gswt.cameras import Camera
+from dav_gswt.geometry import cameras
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.terrain import splats
 from dav_gswt.terrain.assemble import MOST, Terrain, coarsened, laid, sizes, visible, within_budget
 from dav_gswt.terrain.backdrop import Backdrop

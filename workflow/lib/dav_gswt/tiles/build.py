@@ -12,15 +12,15 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import SH0, Field
 from dav_gswt.logs import progress
 from dav_gswt.tiles import (
-    coarse,
+    coarse_levels,
     compose,
     energy,
     layout,
     membrane,
+    occluders,
     patches,
     search,
     semantics,
-    standing,
     texture,
     trends,
 )
@@ -118,7 +118,7 @@ def cut_tiles(
         _checked(compose.binned(trends.detrended(field, trend), exemplar, 2**number), number)
         for number, field in enumerate(levels[: plan.laid])
     ]
-    stands = energy.standing(standing.cover(levels[0], exemplar, height))
+    stands = energy.standing(occluders.cover(levels[0], exemplar, height))
     colour = np.clip(known - trend.colour, 0, 1).astype(float)
     height = np.nan_to_num(height - trend.height, nan=float(np.nanmean(height)))
     meant = None if options.kind == "colour" else semantics.semantics(colour, options.source)
@@ -218,7 +218,7 @@ def _merged(tile: list[Field], plan: Layout, spacing: float) -> list[Field]:
     """A tile's levels with those that are coarser than a block."""
     for number in range(len(tile), plan.levels):
         cell = 2 ** (number - 1)
-        tile = [*tile, coarse.coarser(tile[-1], plan.side // cell, cell * spacing)]
+        tile = [*tile, coarse_levels.coarser(tile[-1], plan.side // cell, cell * spacing)]
     return tile
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray as Array
 
-from dav_gswt.active.uncertainty import gamma
+from dav_gswt.views.uncertainty import gamma
 
 KINDS = ("none", "colour", "semantic", "semantic-nogamma", "expansion")
 STAND = 2.0  # D of a thing that hides the ground, beside bare ground; in units of two random colours

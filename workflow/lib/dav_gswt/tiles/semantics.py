@@ -15,7 +15,7 @@ from numpy import ndarray as Array
 from scipy.sparse import csr_array
 from scipy.spatial.distance import pdist, squareform
 
-from dav_gswt.perceptual import weights
+from dav_gswt.images import lpips_weights
 from dav_gswt.threads import one_thread
 from dav_gswt.tiles.energy import Cells, Scales, frozen, scale
 
@@ -33,7 +33,7 @@ MARGIN = 32  # pixels of mirrored picture around, for AlexNet takes what is beyo
 class Source:
     """What describes an exemplar beside its colours: AlexNet (LPIPS's weights), the folder of a segmenter; or None."""
 
-    alexnet: weights.Weights | None = None
+    alexnet: lpips_weights.Weights | None = None
     sam2: Path | str | None = None
 
 
@@ -88,7 +88,7 @@ def covered(segments: Integer[Array, "m m"], masks: list[Array]) -> Int[Array, "
 
 
 def of_segments(
-    segments: Integer[Array, "m m"], colour: Float[Array, "m m 3"], alexnet: weights.Weights | None, said: dict
+    segments: Integer[Array, "m m"], colour: Float[Array, "m m 3"], alexnet: lpips_weights.Weights | None, said: dict
 ) -> Semantics:
     """Describe an exemplar that has been segmented; the segments may have any numbers.
 
@@ -139,9 +139,9 @@ def _slope(index: Int[Array, "n m"], distance: Float32[Array, "s s"]) -> Float[A
     return distance[after, before] / steps[:, None]
 
 
-def _seen(mean: csr_array, colour: Float[Array, "m m 3"], alexnet: weights.Weights) -> Float[Array, "s k"]:
+def _seen(mean: csr_array, colour: Float[Array, "m m 3"], alexnet: lpips_weights.Weights) -> Float[Array, "s k"]:
     """Mean over each segment of AlexNet's features, of unit length and weighed by channel as LPIPS does."""
-    from dav_gswt.perceptual import lpips  # here, not above: PyTorch takes seconds to load
+    from dav_gswt.images import lpips  # here, not above: PyTorch takes seconds to load
 
     m = len(colour)
     with one_thread():

@@ -1,0 +1,54 @@
+"""TODO."""
+
+
+rule capture_views:
+    """Have the scene's agent take the photos: at once, where the scene can be rendered or replayed."""
+    input:
+        poses="<results>/<round>/poses.json",
+        views="<results>/<start>/views.json",
+        captures=captures_before,
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+    output:
+        capture=directory("<results>/<round>/capture"),
+    log:
+        "<logs>/<round>/capture_views.log",
+    benchmark:
+        "<benchmarks>/<round>/capture_views.tsv"
+    wildcard_constraints:
+        scene=scenes_by("render", "replay"),
+        t=POSITIVE,
+    threads: 2
+    resources:
+        mem_mb=growing(2500),
+        runtime=growing("30m"),
+    params:
+        scene=entry("scenes", "scene"),
+        source=code_of("capture_views"),
+    script:
+        "../scripts/capture_views.py"
+
+
+use rule capture_views as request_views with:
+    input:
+        field=lambda wildcards: before_round(wildcards)["field"],
+        poses="<results>/<round>/poses.json",
+        views="<results>/<start>/views.json",
+        captures=captures_before,
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        lenses="<results>/<photos>/lenses.json",
+        frame="<results>/<photos>/ground.json",
+    log:
+        "<logs>/<round>/request_views.log",
+    benchmark:
+        "<benchmarks>/<round>/request_views.tsv"
+    wildcard_constraints:
+        scene=scenes_by("serial", "plan", "handheld"),
+        t=POSITIVE,
+    retries: 0  # whatever a profile says: nothing is taken twice
+
+
+localrules:
+    request_views,  # the device, or the folder that people drop photos into, is here

@@ -1,0 +1,41 @@
+"""TODO."""
+
+
+rule export_plys:
+    """A patch of terrain at each level as a PLY that any viewer of splats opens."""
+    input:
+        manifest="<results>/<bundle>/davgswt.json",
+        archive="<results>/<bundle>/gswt.zip",
+    output:
+        plys=directory("<results>/<bundle>/exports/ply"),
+    log:
+        "<logs>/<bundle>/export_plys.log",
+    benchmark:
+        "<benchmarks>/<bundle>/export_plys.tsv"
+    resources:
+        mem_mb=growing(2500),
+        runtime=growing("10m"),
+    params:
+        schema=BUNDLE_SCHEMA,
+        source=code_of("export_plys"),
+    script:
+        "../scripts/export_plys.py"
+
+
+rule convert_plys:
+    """The same patches as SPZ, or as SOG whose levels are streamed, by splat-transform: needs Node.js and the network."""
+    input:
+        plys="<results>/<bundle>/exports/ply",
+    output:
+        splats=directory("<results>/<bundle>/exports/{kind}"),
+    log:
+        "<logs>/<bundle>/convert_plys_{kind}.log",
+    benchmark:
+        "<benchmarks>/<bundle>/convert_plys_{kind}.tsv"
+    resources:
+        mem_mb=growing(2500),
+        runtime=growing("20m"),
+    params:
+        source=code_of("convert_plys"),
+    script:
+        "../scripts/convert_plys.py"

@@ -1,0 +1,68 @@
+"""Completion: what no photo saw is painted by a prior, where the config asks for it (`complete`).
+
+In: the last round's field and ground, and its photos. Out: field.ply, in which what is imagined is marked and all else
+has its bytes; ground.exr, unchanged, since nothing imagined was seen; completion.json, how much it was; metrics.json,
+what the test photos say of the field before and after, which nothing else sees.
+"""
+
+
+rule inpaint_field:
+    """Paint the ground that no photo saw; a field without such ground goes on as it is."""
+    input:
+        unpack(inpainter_of),
+        field="<results>/<round>/field.ply",
+        ground="<results>/<round>/ground.exr",
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+        captures=captures_until,
+    output:
+        field="<results>/<round>/inpainted_{inpainter}/field.ply",
+        ground="<results>/<round>/inpainted_{inpainter}/ground.exr",
+        facts="<results>/<round>/inpainted_{inpainter}/completion.json",
+    log:
+        "<logs>/<round>/inpainted_{inpainter}/inpaint_field.log",
+    benchmark:
+        "<benchmarks>/<round>/inpainted_{inpainter}/inpaint_field.tsv"
+    wildcard_constraints:
+        policy=CHOOSING,
+    threads: 2
+    resources:
+        mem_mb=growing(3000),
+        runtime=growing("30m"),
+    params:
+        prior=entry("priors", "inpainter"),
+        seed=integer("seed"),
+        source=code_of("inpaint_field"),
+    script:
+        "../scripts/inpaint_field.py"
+
+
+rule evaluate_inpainted:
+    """Compare the field before and after with the test photos, everywhere and where it is imagined."""
+    input:
+        unpack(lpips_if_fetched),
+        before="<results>/<round>/field.ply",
+        after="<results>/<round>/inpainted_{inpainter}/field.ply",
+        ground="<results>/<round>/ground.exr",
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+    output:
+        metrics="<results>/<round>/inpainted_{inpainter}/metrics.json",
+    log:
+        "<logs>/<round>/inpainted_{inpainter}/evaluate_inpainted.log",
+    benchmark:
+        "<benchmarks>/<round>/inpainted_{inpainter}/evaluate_inpainted.tsv"
+    wildcard_constraints:
+        policy=CHOOSING,
+    threads: 2
+    resources:
+        mem_mb=growing(1500),
+        runtime=growing("10m"),
+    params:
+        quality=entry("presets", "preset"),
+        source=code_of("evaluate_inpainted"),
+    script:
+        "../scripts/evaluate_inpainted.py"

@@ -1,0 +1,31 @@
+"""Levels of detail: ever coarser fields of the exemplar, each fitted to what its finer neighbour shows.
+
+In: the last round's field and ground, completed or not. Out: levels/, a folder with level{l}.ply and its grid level{l}.exr,
+from fine to coarse, and levels.json, which tells of them and why there are no more.
+"""
+
+
+rule make_levels:
+    """As many levels as the config wants and the exemplar has room for; tiles add coarser ones of their own."""
+    input:
+        unpack(maps_of_round),
+        field="<results>/<round>{inpainted}/field.ply",
+        ground="<results>/<round>{inpainted}/ground.exr",
+    output:
+        levels=directory("<results>/<levels>"),
+    log:
+        "<logs>/<levels>/make_levels.log",
+    benchmark:
+        "<benchmarks>/<levels>/make_levels.tsv"
+    threads: 2
+    resources:
+        mem_mb=growing(2000),
+        runtime=growing("30m"),
+    params:
+        levels=lambda wildcards: config["presets"][wildcards.preset].get("levels", config["levels"]),
+        quality=entry("presets", "preset"),
+        seed=integer("seed"),
+        keep=SNAPSHOTS,
+        source=code_of("make_levels"),
+    script:
+        "../scripts/make_levels.py"

@@ -1,0 +1,168 @@
+"""Coarse field: a ground layer through the start views' points and the things on it, fitted to the start views.
+
+In: photos, their model, views.json. Out: field.ply (standard 3DGS), ground.exr (height, seen or not), fit.json
+(what the fit chose and why), metrics.json.
+"""
+
+
+rule fit_coarse:
+    """Fit the coarse field to the start views."""
+    input:
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+    output:
+        field="<results>/<coarse>/field.ply",
+        ground="<results>/<coarse>/ground.exr",
+        fit="<results>/<coarse>/fit.json",
+    log:
+        "<logs>/<coarse>/fit_coarse.log",
+    benchmark:
+        "<benchmarks>/<coarse>/fit_coarse.tsv"
+    threads: 2
+    resources:
+        mem_mb=growing(2000),
+        runtime=growing("60m"),
+    params:
+        quality=entry("presets", "preset"),
+        seed=integer("seed"),
+        whole=lambda wildcards: config["scenes"][wildcards.scene].get("whole", False),
+        keep=SNAPSHOTS,
+        source=code_of("fit_coarse"),
+    script:
+        "../scripts/fit_coarse.py"
+
+
+rule evaluate_coarse:
+    """Compare the coarse field with the test photos, which nothing else sees."""
+    input:
+        unpack(lpips_if_fetched),
+        field="<results>/<coarse>/field.ply",
+        ground="<results>/<coarse>/ground.exr",
+        fit="<results>/<coarse>/fit.json",
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+    output:
+        metrics="<results>/<coarse>/metrics.json",
+    log:
+        "<logs>/<coarse>/evaluate_coarse.log",
+    benchmark:
+        "<benchmarks>/<coarse>/evaluate_coarse.tsv"
+    threads: 2
+    resources:
+        mem_mb=growing(1500),
+        runtime=growing("10m"),
+    params:
+        quality=entry("presets", "preset"),
+        t=0,
+        source=code_of("evaluate_field"),
+    script:
+        "../scripts/evaluate_field.py"
+
+
+rule update_field:
+    """Refit the field with the photos of this round; without any it goes on as it is."""
+    input:
+        unpack(before_round),
+        unpack(fits_before),
+        captures=captures_until,
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+    output:
+        field="<results>/<round>/field.ply",
+        ground="<results>/<round>/ground.exr",
+        fit="<results>/<round>/fit.json",
+    log:
+        "<logs>/<round>/update_field.log",
+    benchmark:
+        "<benchmarks>/<round>/update_field.tsv"
+    wildcard_constraints:
+        policy=CHOOSING,
+        t=POSITIVE,
+    threads: 2
+    resources:
+        mem_mb=growing(2000),
+        runtime=growing("60m"),
+    params:
+        quality=entry("presets", "preset"),
+        seed=integer("seed"),
+        t=integer("t"),
+        keep=SNAPSHOTS,
+        source=code_of("update_field"),
+    script:
+        "../scripts/update_field.py"
+
+
+use rule evaluate_coarse as evaluate_round with:
+    input:
+        unpack(lpips_if_fetched),
+        field="<results>/<round>/field.ply",
+        ground="<results>/<round>/ground.exr",
+        fit="<results>/<round>/fit.json",
+        poses="<results>/<round>/poses.json",
+        captures=captures_until,
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+    output:
+        metrics="<results>/<round>/metrics.json",
+    log:
+        "<logs>/<round>/evaluate_round.log",
+    benchmark:
+        "<benchmarks>/<round>/evaluate_round.tsv"
+    wildcard_constraints:
+        t=POSITIVE,
+    params:
+        quality=entry("presets", "preset"),
+        t=integer("t"),
+        source=code_of("evaluate_field"),
+
+
+rule copy_coarse_field:
+    """Round 0: no photo was asked for, the coarse field goes on as it is."""
+    input:
+        field="<results>/<coarse>/field.ply",
+        ground="<results>/<coarse>/ground.exr",
+        metrics="<results>/<coarse>/metrics.json",
+    output:
+        field="<results>/<active>/iter0/field.ply",
+        ground="<results>/<active>/iter0/ground.exr",
+        metrics="<results>/<active>/iter0/metrics.json",
+    log:
+        "<logs>/<active>/iter0/copy_coarse_field.log",
+    benchmark:
+        "<benchmarks>/<active>/iter0/copy_coarse_field.tsv"
+    wildcard_constraints:
+        policy=CHOOSING,
+    script:
+        "../scripts/copy_coarse_field.py"
+
+
+localrules:
+    copy_coarse_field,  # copies three files
+
+
+rule prepare_external_field:
+    """A finished field enters here: its exemplar's surface is found, no photo is needed."""
+    input:
+        field="<results>/<photos>/field.ply",
+        frame="<results>/<photos>/ground.json",
+    output:
+        field="<results>/<fit>/active_given_none_pdrop0_lam0_k0/iter0/field.ply",
+        ground="<results>/<fit>/active_given_none_pdrop0_lam0_k0/iter0/ground.exr",
+    log:
+        "<logs>/<fit>/active_given_none_pdrop0_lam0_k0/iter0/prepare_external_field.log",
+    benchmark:
+        "<benchmarks>/<fit>/active_given_none_pdrop0_lam0_k0/iter0/prepare_external_field.tsv"
+    threads: 2
+    params:
+        quality=entry("presets", "preset"),
+        source=code_of("prepare_external_field"),
+    script:
+        "../scripts/prepare_external_field.py"

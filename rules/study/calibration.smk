@@ -1,0 +1,113 @@
+"""Figures of docs/: how soon a fit shows photos it has not seen, what its field looks like from elsewhere, and whether
+scores of poses say where a field is wrong.
+
+In: the photos of a scene; calibration.json of scenes and rounds. Out: tables in docs/data with their provenance, plots.
+Not part of `all`: `snakemake docs/figures/fit_time.png docs/figures/calibration.png` makes them. Seconds differ from
+machine to machine.
+"""
+
+
+rule render_candidates:
+    """Draw what some candidates truly show, as small as they are scored: for those who judge scores, never for scores."""
+    input:
+        frame="<results>/<photos>/ground.json",
+    output:
+        truth=directory("<results>/<photos>/candidates"),
+    log:
+        "<logs>/<photos>/render_candidates.log",
+    benchmark:
+        "<benchmarks>/<photos>/render_candidates.tsv"
+    wildcard_constraints:
+        scene=scenes_by("render"),
+    threads: 2
+    resources:
+        mem_mb=growing(2500),
+        runtime=growing("60m"),
+    params:
+        scene=entry("scenes", "scene"),
+        poses=lookup(dpath="calibration/poses", within=config),
+        source=code_of("study/render_candidates"),
+    script:
+        "../../scripts/study/render_candidates.py"
+
+
+rule calibrate_coarse:
+    """Compare the scores of some candidates with the true error of the field there."""
+    input:
+        unpack(prior_of),
+        unpack(regressors_of),
+        unpack(truth_of),
+        field="<results>/<coarse>/field.ply",
+        ground="<results>/<coarse>/ground.exr",
+        scores="<results>/<scored>/scores.csv",
+        maps="<results>/<scored>/maps.npz",
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+    output:
+        found="<results>/<scored>/calibration.json",
+        poses="<results>/<scored>/calibration.csv",
+    log:
+        "<logs>/<scored>/calibrate_coarse.log",
+    benchmark:
+        "<benchmarks>/<scored>/calibrate_coarse.tsv"
+    threads: 2
+    resources:
+        mem_mb=growing(3000),
+        runtime=growing("60m"),
+    params:
+        scene=entry("scenes", "scene"),
+        size=lambda wildcards: config["presets"][wildcards.preset]["size"],
+        prior=lambda wildcards: config["priors"].get(wildcards.prior),
+        p_drop=real("p_drop"),
+        lam=lookup(dpath="lam", within=config),
+        seed=integer("seed"),
+        poses=lookup(dpath="calibration/poses", within=config),
+        source=code_of("study/calibrate_scores"),
+    script:
+        "../../scripts/study/calibrate_scores.py"
+
+
+use rule calibrate_coarse as calibrate_round with:
+    input:
+        unpack(prior_of),
+        unpack(regressors_of),
+        unpack(truth_of),
+        field="<results>/<round>/field.ply",
+        ground="<results>/<round>/ground.exr",
+        scores="<results>/<round>/scores.csv",
+        maps="<results>/<round>/maps.npz",
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+        captures=captures_until,
+    output:
+        found="<results>/<round>/calibration.json",
+        poses="<results>/<round>/calibration.csv",
+    log:
+        "<logs>/<round>/calibrate_round.log",
+    benchmark:
+        "<benchmarks>/<round>/calibrate_round.tsv"
+    wildcard_constraints:
+        t=POSITIVE,
+
+
+rule plot_calibration:
+    """Do scores say where a field is wrong? All scenes and rounds in one table and one figure."""
+    input:
+        cells=lambda wildcards: list(calibrations()),
+    output:
+        table="docs/data/calibration.csv",
+        facts="docs/data/calibration.json",
+        plot="docs/figures/calibration.png",
+    log:
+        "<logs>/figures/plot_calibration.log",
+    benchmark:
+        "<benchmarks>/figures/plot_calibration.tsv"
+    params:
+        cells=lambda wildcards: list(calibrations().values()),
+        source=code_of("study/plot_calibration"),
+    script:
+        "../../scripts/study/plot_calibration.py"

@@ -1,0 +1,134 @@
+"""Frames: how long one takes on a walk at a fixed height over hills, for several budgets of Gaussians in view.
+
+In: the bundles that the config's `frames` names, viewer. Out, beside each bundle: frames/library.csv (drawn by the library
+on the processor), frames/page.csv (by the page in a headless Chromium), frames/steadiness.csv (what changes from a frame to
+the next of a slow walk, in pre-sorted orders and sorted exactly); of all together results/tables/frames.csv, also in
+docs/data, results/figures/frames.png, and results/tables/viewer.csv, which the study's tables show. Not part of `all`:
+`snakemake frame_times`; needs Chromium and requirements-test.lock. Milliseconds hold for the machine and its load, which
+every row names.
+"""
+
+
+rule time_library:
+    """Frames as the library draws them."""
+    input:
+        manifest="<results>/<bundle>/davgswt.json",
+        chunks="<results>/<bundle>/chunks",
+    output:
+        table="<results>/<bundle>/frames/library.csv",
+    log:
+        "<logs>/<bundle>/time_library.log",
+    benchmark:
+        "<benchmarks>/<bundle>/time_library.tsv"
+    threads: 2
+    resources:
+        mem_mb=growing(4000),
+        runtime=growing("1h"),
+    params:
+        asked=walked_over,
+        schema=BUNDLE_SCHEMA,
+        source=code_of("study/time_library"),
+    script:
+        "../../scripts/study/time_library.py"
+
+
+rule time_page:
+    """Frames as the page draws them, with software rendering."""
+    input:
+        manifest="<results>/<bundle>/davgswt.json",
+        chunks="<results>/<bundle>/chunks",
+        viewer=VIEWER,
+    output:
+        table="<results>/<bundle>/frames/page.csv",
+    log:
+        "<logs>/<bundle>/time_page.log",
+    benchmark:
+        "<benchmarks>/<bundle>/time_page.tsv"
+    threads: 2
+    resources:
+        mem_mb=growing(3000),
+        runtime=growing("2h"),
+    params:
+        asked=walked_over,
+        source=code_of("study/time_page"),
+    script:
+        "../../scripts/study/time_page.py"
+
+
+rule measure_flicker:
+    """Whether anything jumps from a frame to the next."""
+    input:
+        manifest="<results>/<bundle>/davgswt.json",
+        chunks="<results>/<bundle>/chunks",
+    output:
+        table="<results>/<bundle>/frames/steadiness.csv",
+    log:
+        "<logs>/<bundle>/measure_flicker.log",
+    benchmark:
+        "<benchmarks>/<bundle>/measure_flicker.tsv"
+    threads: 2
+    resources:
+        mem_mb=growing(4000),
+        runtime=growing("1h"),
+    params:
+        heights=lambda wildcards: config["frames"]["heights"],
+        walk=lambda wildcards: {
+            "count": config["frames"]["pairs"],
+            "length": config["frames"]["flight"]["length"],
+            "width": config["frames"]["width"],
+            "height": config["frames"]["height"],
+            "budget": max(config["frames"]["budgets"]),
+        },
+        schema=BUNDLE_SCHEMA,
+        source=code_of("study/measure_flicker"),
+    script:
+        "../../scripts/study/measure_flicker.py"
+
+
+rule gather_frames:
+    """All scenes in one table; of the page at the first budget what the study's tables show."""
+    input:
+        library=lambda wildcards: list(measured_of_tiles(rules.time_library, "frames")),
+        page=lambda wildcards: list(measured_of_tiles(rules.time_page, "frames")),
+    output:
+        table="results/tables/frames.csv",
+        viewer=FRAMES,
+        kept="docs/data/frames.csv",
+    log:
+        "<logs>/tables/gather_frames.log",
+    benchmark:
+        "<benchmarks>/tables/gather_frames.tsv"
+    params:
+        cells=lambda wildcards: list(measured_of_tiles(rules.time_page, "frames").values()),
+        source=code_of("study/gather_frames"),
+    script:
+        "../../scripts/study/gather_frames.py"
+
+
+rule plot_frames:
+    """Milliseconds over Gaussians in view."""
+    input:
+        table=rules.gather_frames.output.table,
+    output:
+        plot="results/figures/frames.png",
+        kept="docs/figures/frames.png",
+    log:
+        "<logs>/figures/plot_frames.log",
+    benchmark:
+        "<benchmarks>/figures/plot_frames.tsv"
+    params:
+        source=code_of("study/plot_frames"),
+    script:
+        "../../scripts/study/plot_frames.py"
+
+
+rule frame_times:
+    """How long a frame takes: tables and figure."""
+    input:
+        lambda wildcards: list(measured_of_tiles(rules.measure_flicker, "frames")),
+        rules.gather_frames.output.viewer,
+        rules.plot_frames.output.plot,
+
+
+localrules:
+    frame_times,

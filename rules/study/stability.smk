@@ -1,0 +1,100 @@
+"""Numerical stability at the extremes: every formula in float32 against float64, and the workflow at the ends of its range.
+
+In: the library; the config of the tests, with each extreme laid over it. Out: results/tables/stability.csv, a row a
+formula; results/stability/{extreme}/, what came of a run, each restarted by itself; results/tables/stability_runs.csv,
+a row a run; both tables also in docs/data with stability.json, which says what they were made with;
+docs/figures/stability.png and the page docs/stability.md.
+Not part of `all`: `snakemake stability` makes them. LPIPS takes part in the runs where its weights were fetched.
+"""
+
+
+rule measure_formulas:
+    """Compare every formula with its float64 reference over its whole range."""
+    output:
+        table="results/tables/stability.csv",
+        kept="docs/data/stability.csv",
+        facts="docs/data/stability.json",
+    log:
+        "<logs>/stability/measure_formulas.log",
+    benchmark:
+        "<benchmarks>/stability/measure_formulas.tsv"
+    resources:
+        mem_mb=growing(2000),
+        runtime=growing("10m"),
+    params:
+        source=code_of("study/measure_formulas"),
+    script:
+        "../../scripts/study/measure_formulas.py"
+
+
+rule run_extreme:
+    """Run the whole workflow at one extreme, in a folder of its own; that it fails is an outcome like any other."""
+    input:
+        unpack(lpips_if_fetched),
+        configs=[str(Path(workflow.basedir, name)) for name in ("config/config.yaml", "config/test/config.yaml")],
+    output:
+        folder=directory("results/stability/{extreme}"),
+    log:
+        "<logs>/stability/run_{extreme}.log",
+    benchmark:
+        "<benchmarks>/stability/run_{extreme}.tsv"
+    wildcard_constraints:
+        extreme="|".join(map(re.escape, EXTREMES)),
+    threads: 2
+    resources:
+        mem_mb=growing(8000),
+        runtime=growing("60m"),
+    params:
+        root=lambda wildcards: workflow.basedir,
+        source=code_of("study/run_extreme"),
+    script:
+        "../../scripts/study/run_extreme.py"
+
+
+rule gather_extremes:
+    """What came of every run, in one table."""
+    input:
+        runs=expand(rules.run_extreme.output.folder, extreme=list(EXTREMES)),
+    output:
+        table="results/tables/stability_runs.csv",
+        kept="docs/data/stability_runs.csv",
+    log:
+        "<logs>/stability/gather_extremes.log",
+    benchmark:
+        "<benchmarks>/stability/gather_extremes.tsv"
+    params:
+        source=code_of("study/gather_extremes"),
+    script:
+        "../../scripts/study/gather_extremes.py"
+
+
+rule write_stability:
+    """The page about it, and its figure."""
+    input:
+        formulas=rules.measure_formulas.output.kept,
+        facts=rules.measure_formulas.output.facts,
+        runs=rules.gather_extremes.output.kept,
+        template=str(Path(workflow.basedir, "workflow/report/stability.md")),
+    output:
+        page="docs/stability.md",
+        plot="docs/figures/stability.png",
+    log:
+        "<logs>/stability/write_stability.log",
+    benchmark:
+        "<benchmarks>/stability/write_stability.tsv"
+    params:
+        source=code_of("study/write_stability"),
+    script:
+        "../../scripts/study/write_stability.py"
+
+
+rule stability:
+    """How numbers behave at the extremes: a page, a figure, two tables."""
+    input:
+        rules.write_stability.output,
+        rules.measure_formulas.output,
+        rules.gather_extremes.output,
+
+
+localrules:
+    stability,

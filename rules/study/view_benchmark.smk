@@ -1,0 +1,61 @@
+"""What policies are worth: the same scenes, photos to start from and pools for each, compared photo by photo.
+
+In: what the cells of the config's `benchmark` left, each a scene, a seed, a policy and k; a cell is restarted by itself.
+Out: docs/data/{table}_curves.csv, where runs add up, a row a round of a cell; {table}_benchmark.csv, a row a cell, also
+under results/tables; {table}_comparison.csv and .md, every policy less the baseline; {table}_worth.csv, what rounds
+gained against what was expected of them; docs/figures/{table}_budget.png, PSNR against photos.
+Not part of `all`: `snakemake view_benchmark` makes them.
+"""
+
+
+rule gather_curves:
+    """Collect what every round of every cell measured, and what it cost, beside what earlier runs found."""
+    input:
+        measured=lambda wildcards: [path for cell in compared_cells() for path in (*cell["metrics"], *cell["facts"])],
+    output:
+        curves=update("docs/data/{table}_curves.csv"),
+    log:
+        "<logs>/benchmark/gather_{table}.log",
+    benchmark:
+        "<benchmarks>/benchmark/gather_{table}.tsv"
+    wildcard_constraints:
+        table="view|development",
+    params:
+        cells=lambda wildcards: compared_cells(),
+        source=code_of("study/gather_curves"),
+    script:
+        "../../scripts/study/gather_curves.py"
+
+
+rule compare_policies:
+    """Area under each curve, and every policy less the baseline with its interval."""
+    input:
+        curves="docs/data/{table}_curves.csv",
+    output:
+        results="results/tables/{table}_benchmark.csv",
+        kept="docs/data/{table}_benchmark.csv",
+        compared="docs/data/{table}_comparison.csv",
+        text="docs/data/{table}_comparison.md",
+        worth="docs/data/{table}_worth.csv",
+        plot="docs/figures/{table}_budget.png",
+    log:
+        "<logs>/benchmark/compare_{table}.log",
+    benchmark:
+        "<benchmarks>/benchmark/compare_{table}.tsv"
+    wildcard_constraints:
+        table="view|development",
+    params:
+        baseline=lambda wildcards: config["benchmark"]["baseline"],
+        source=code_of("study/compare_policies"),
+    script:
+        "../../scripts/study/compare_policies.py"
+
+
+rule view_benchmark:
+    """Compare the policies of the config's `benchmark`."""
+    input:
+        lambda wildcards: expand(list(rules.compare_policies.output), table=config["benchmark"]["table"]),
+
+
+localrules:
+    view_benchmark,

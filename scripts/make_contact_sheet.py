@@ -1,0 +1,11 @@
+"""Rule show_stills: the terrain's stills beside each other."""
+
+from pathlib import Path
+
+from dav_gswt.logs import logging_to
+from dav_gswt.study import figures
+
+with logging_to(snakemake.log[0]):
+    stills = snakemake.input.stills
+    names = [Path(path).stem for path in stills]
+    figures.save(figures.sheet({snakemake.wildcards.scene: stills}, names, 3.2), snakemake.output.sheet)

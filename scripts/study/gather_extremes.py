@@ -1,0 +1,12 @@
+"""Rule gather_extremes: what came of every run, in one table."""
+
+from pathlib import Path
+
+from dav_gswt.logs import logging_to
+from dav_gswt.study import figures
+from dav_gswt.study.stability import tables
+
+with logging_to(snakemake.log[0]):
+    rows = tables.runs(Path(snakemake.input.runs[0]).parent)
+    for path in snakemake.output:
+        figures.write_rows(path, rows)

@@ -1,0 +1,13 @@
+"""Rule measure_formulas: how far is every formula from float64?"""
+
+from dav_gswt import provenance
+from dav_gswt.files import write_json
+from dav_gswt.logs import logging_to
+from dav_gswt.study import figures
+from dav_gswt.study.stability import tables
+
+with logging_to(snakemake.log[0]):
+    rows = tables.formulas()
+    for path in (snakemake.output.table, snakemake.output.kept):
+        figures.write_rows(path, rows)
+    write_json(snakemake.output.facts, provenance.of({}, {}) | {"source": snakemake.params.source})

@@ -1,0 +1,14 @@
+"""Rule measure_shortcuts: what pre-sorting, levels and rounding do to the terrain's picture."""
+
+from pathlib import Path
+
+from dav_gswt.bundle import store as bundles
+from dav_gswt.logs import logging_to
+from dav_gswt.study import figures
+from dav_gswt.study.terrain import shortcuts
+from dav_gswt.tiles import store
+
+with logging_to(snakemake.log[0]):
+    given = snakemake.input
+    bundle = bundles.read(Path(given.manifest).parent, snakemake.params.schema)
+    figures.write_rows(snakemake.output.table, shortcuts.rows(store.read(given.tiles, given.seams), bundle))

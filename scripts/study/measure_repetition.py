@@ -1,0 +1,17 @@
+"""Rule measure_repetition: does a large top view repeat at the tiles' period?"""
+
+from dav_gswt.lod import store as levels
+from dav_gswt.logs import logging_to
+from dav_gswt.study import figures
+from dav_gswt.study.seams import exemplar, plots, repetition
+from dav_gswt.tiles import store
+
+with logging_to(snakemake.log[0]):
+    given, out, params = snakemake.input, snakemake.output, snakemake.params
+    known = exemplar.Known.of(levels.read(given.levels))
+    tiles = store.read(given.tiles, given.seams)
+    source = known.flattened(tiles, params.seam)
+    fields = [shelf.field for shelf in source.levels]
+    found = repetition.repeats(tiles, fields, source.exemplar.cells * tiles.spacing, params.seed)
+    figures.write_rows(out.table, repetition.rows(found))
+    plots.write_repeats(out.plot, found)

@@ -1,0 +1,32 @@
+"""Rule measure_seams: crops on borders and cuts, their floors and ceilings."""
+
+from pathlib import Path
+
+import numpy as np
+
+from dav_gswt import provenance
+from dav_gswt.files import write_json
+from dav_gswt.images import lpips_weights
+from dav_gswt.lod import store as levels
+from dav_gswt.logs import logging_to
+from dav_gswt.study import figures
+from dav_gswt.study.seams import density, exemplar, measure
+from dav_gswt.study.seams import ground as terrain
+from dav_gswt.tiles import build, semantics, store
+
+with logging_to(snakemake.log[0]):
+    given, params = snakemake.input, snakemake.params
+    known = exemplar.Known.of(levels.read(given.levels))
+    alexnet = lpips_weights.read(given.lpips) if given.get("lpips") else None
+    tiles = store.read(given.tiles, given.seams)
+    rng = np.random.default_rng(build.seeds(params.seed, params.seam))
+    source = semantics.Source(alexnet, given.get("sam2"))
+    both = tiles, known.cut_straight(params.seam, source, rng)
+    patches = known.flattened(tiles, params.seam)
+    laid = [terrain.laid(each, patches, params.seed, params.tau) for each in both]
+    figures.write_rows(snakemake.output.crops, measure.measured(*laid, alexnet, params.seed))
+    inputs = {"seams": given.seams, "level0": Path(given.levels, "level0.ply")} | (
+        {"lpips": given.lpips} if alexnet else {}
+    )
+    found = {"dense": density.of_tiles(tiles, patches), "provenance": provenance.of(inputs, dict(params.seam))}
+    write_json(snakemake.output.facts, found)

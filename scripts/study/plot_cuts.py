@@ -1,0 +1,10 @@
+"""Rule show_cuts: where the seams of the same tiles run, by colour alone and by what the ground is."""
+
+from dav_gswt.logs import logging_to
+from dav_gswt.study.seams import plots
+from dav_gswt.tiles import store
+
+with logging_to(snakemake.log[0]):
+    given = snakemake.input
+    pair = [store.read(*files) for files in zip(given.tiles, given.seams, strict=True)]
+    plots.write_cuts(snakemake.output.plot, dict(zip(("colour", "semantic"), pair, strict=True)))

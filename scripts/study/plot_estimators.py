@@ -1,0 +1,20 @@
+"""Rule plot_estimators: the same test views after as many photos, chosen in different ways."""
+
+from dav_gswt import field
+from dav_gswt.files import read_json
+from dav_gswt.logs import logging_to
+from dav_gswt.photos import training_views
+from dav_gswt.reconstruction import ground
+from dav_gswt.study.tables import estimators
+from dav_gswt.study.views import evolution
+
+with logging_to(snakemake.log[0]):
+    given, params = snakemake.input, snakemake.params
+    key, found = evolution.measure(read_json(given.frame)), []
+    for name, *paths in zip(params.named, given.fields, given.grounds, given.metrics, given.crops, strict=True):
+        fitted, surface, measured, crops = paths
+        read = field.read(fitted), ground.read(surface), read_json(measured)
+        found.append(evolution.Round(params.rounds, *read, title=name, note=estimators.note(crops)))
+    names = list(evolution.shown(found[0].metrics, key))
+    tests = training_views.taken(given.images, given.model, names, [], params.size)
+    evolution.write_figure(snakemake.output.plot, evolution.strips(found, tests, key), found, key)

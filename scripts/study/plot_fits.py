@@ -1,0 +1,10 @@
+"""Rule plot_fits: how soon fits show photos they have not seen."""
+
+from pathlib import Path
+
+from dav_gswt.logs import logging_to
+from dav_gswt.study import figures
+
+with logging_to(snakemake.log[0]):
+    curves = {Path(path).stem.removeprefix("fit_"): figures.read_rows(path) for path in snakemake.input.curves}
+    figures.fit_time(curves, snakemake.output.plot)

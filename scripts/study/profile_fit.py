@@ -1,0 +1,22 @@
+"""Rule watch_fit: a fit, watched second by second, and stills of its field that nobody photographed."""
+
+from pathlib import Path
+
+from dav_gswt import provenance
+from dav_gswt.files import write_json
+from dav_gswt.images import image_files
+from dav_gswt.logs import logging_to
+from dav_gswt.reconstruction import build
+from dav_gswt.study import figures, fit_profile
+
+with logging_to(snakemake.log[0]):
+    out, settings = snakemake.output, dict(snakemake.params.trial)
+    margin = settings.pop("margin")
+    quality = build.Quality(**settings)
+    photos = fit_profile.opened(Path(snakemake.input.frame).parent, quality.size, margin)
+    found = fit_profile.run(photos, quality)
+    figures.write_rows(out.curve, found.curve)
+    for name, picture in fit_profile.stills(found.made, photos.frame).items():
+        image_files.write(out[name], picture)
+    inputs = {"frame": snakemake.input.frame}
+    write_json(out.facts, fit_profile.facts(found, photos) | {"provenance": provenance.of(inputs, settings)})

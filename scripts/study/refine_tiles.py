@@ -1,0 +1,24 @@
+"""Rule refine_tiles: what lies beside the cuts, repaired by a prior."""
+
+from pathlib import Path
+
+from dav_gswt import provenance
+from dav_gswt.lod import store as levels
+from dav_gswt.logs import logging_to
+from dav_gswt.study.refine import build, repair
+from dav_gswt.tiles import store
+from dav_gswt.tiles.layout import Exemplar
+from dav_gswt.views import prior_sampling
+
+with logging_to(snakemake.log[0]):
+    given, out, params = snakemake.input, snakemake.output, snakemake.params
+    tiles, made = store.read(given.tiles, given.seams), levels.read(given.levels)
+    grid = made.grids[0]
+    west, south, _ = grid.exemplar
+    uncut = build.Uncut(made.fields[0], Exemplar(west, south, grid.spacing, grid.cells))
+    model = prior_sampling.opened(params.prior)
+    by = repair.ByPrior.of(model, params.refine, params.seed)
+    mended = build.refined(tiles, uncut, build.Options.of(params.refine), by, model.size)
+    inputs = {name: given[name] for name in ("seams", "weights")} | {"level0": Path(given.levels, "level0.ply")}
+    about = {"refine": dict(params.refine), "prior": dict(params.prior), "seed": params.seed}
+    store.write(mended, out.tiles, out.seams, provenance.of(inputs, about))

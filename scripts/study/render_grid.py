@@ -1,0 +1,16 @@
+"""Rule draw_grid: twenty by twenty tiles, to be looked at."""
+
+from pathlib import Path
+
+from dav_gswt.files import read_json
+from dav_gswt.images import image_files
+from dav_gswt.logs import logging_to, progress
+from dav_gswt.study.seams import pictures
+from dav_gswt.tiles import store
+
+with logging_to(snakemake.log[0]):
+    given, bundle = snakemake.input, read_json(snakemake.input.manifest)
+    tiles = store.read(given.tiles, given.seams)
+    for path in progress(snakemake.output.pictures, "draw grids"):
+        shot, surface = Path(path).stem.split("_")
+        image_files.write(path, pictures.drawn(tiles, bundle, shot, surface, snakemake.params.size))

@@ -1,0 +1,11 @@
+"""Rule show_stability: the page about numbers at the extremes, and its figure."""
+
+from dav_gswt.files import read_json
+from dav_gswt.logs import logging_to
+from dav_gswt.study.stability import page, plots, tables
+
+with logging_to(snakemake.log[0]):
+    given = snakemake.input
+    formulas, runs = tables.read(given.formulas), tables.read(given.runs)
+    plots.write(snakemake.output.plot, formulas)
+    page.write(snakemake.output.page, given.template, formulas, runs, read_json(given.facts))

@@ -1,0 +1,182 @@
+import json
+
+import numpy as np
+import pytest
+
+from dav_gswt.capture import drone, drop_folder, qgc_plan
+from dav_gswt.capture.site import Site
+from dav_gswt.capture.store import Store
+from dav_gswt.errors import InputError
+from dav_gswt.geometry import cameras
+from dav_gswt.geometry.geodesy import Georeference
+from dav_gswt.geometry.poses import of_camera
+from dav_gswt.photos.synthetic import camera_layouts
+
+PLACE = Georeference(47.1, 8.2, 430.0, 30.0, 20.0)  # a world unit is 20 m
+FRAME = {
+    "unit": "flying height",
+    "flying_height": 1.0,
+    "exemplar": {"west": -0.5, "south": -0.5, "side": 1.0},
+    "georeference": {"latitude": 47.1, "longitude": 8.2, "altitude": 430.0, "north": 30.0, "metres_per_unit": 20.0},
+}
+ORBITS = [(90, 0, 1.0), (60, 10, 1.0), (45, 200, 1.2), (30, 100, 0.8), (10, 45, 1.0), (9, 46, 1.0)]
+
+
+@pytest.fixture
+def asked():
+    found = [camera_layouts.orbit(*orbit, [0, 0, 0], 64, 48, 60) for orbit in ORBITS]
+    return [(of_camera(f"pose_{i}", camera, FRAME), camera) for i, camera in enumerate(found)]
+
+
+@pytest.fixture
+def site(tmp_path, monkeypatch):
+    monkeypatch.setattr(drop_folder, "collect", lambda site, asked, agent: asked)
+    return Site("moor", {"agent": "plan", "burst": 2}, FRAME, tmp_path, Store(tmp_path / "captures" / "moor"))
+
+
+@pytest.fixture
+def items(site, asked):
+    with pytest.raises(InputError):
+        drone.take(site, asked)
+    return json.loads((site.store.folder / "mission.plan").read_text())["mission"]["items"]
+
+
+def places(items):
+    """World positions of everything with a place, the vehicle's home in front, and their items."""
+    found = [item for item in items if item["frame"] == 3]
+    earth = [[*item["params"][4:6], item["params"][6] + 430.0] for item in found]
+    home = [*items[0]["params"][4:6], 430.0]
+    return PLACE.to_world(np.array([home, *earth])), found
+
+
+def test_the_file_has_what_qgroundcontrol_reads(site, asked):
+    with pytest.raises(InputError):
+        drone.take(site, asked)
+    content = json.loads((site.store.folder / "mission.plan").read_text())
+    flown = content["mission"]
+    items = flown.pop("items")
+    assert content.pop("mission") is flown
+    assert content == {
+        "fileType": "Plan",
+        "geoFence": {"circles": [], "polygons": [], "version": 2},
+        "groundStation": "QGroundControl",
+        "rallyPoints": {"points": [], "version": 2},
+        "version": 1,
+    }
+    assert flown.pop("plannedHomePosition") == [*items[0]["params"][4:6], 430.0]
+    assert flown == {
+        "cruiseSpeed": 3,
+        "firmwareType": 12,
+        "globalPlanAltitudeMode": 1,
+        "hoverSpeed": 3,
+        "vehicleType": 2,
+        "version": 2,
+    }
+    assert [item["doJumpId"] for item in items] == list(range(1, len(items) + 1))
+    assert all(len(item["params"]) == 7 and item["type"] == "SimpleItem" and item["autoContinue"] for item in items)
+    for item in items:
+        if item["frame"] == 3:
+            assert (item["Altitude"], item["AltitudeMode"]) == (item["params"][6], 1)
+            assert item["AMSLAltAboveTerrain"] is None
+    assert [items[0]["command"], items[1]["command"], items[-1]["command"]] == [22, 178, 20]
+
+
+def test_photos_are_taken_from_the_poses_with_their_views(items, asked):
+    stops = [i for i, item in enumerate(items) if item["command"] == 16 and items[i + 1]["command"] == 205]
+    assert len(stops) == len(asked)
+    left = {pose.name: camera for pose, camera in asked}
+    for i in stops:
+        assert [item["command"] for item in items[i + 1 : i + 7]] == [205, 93, 2000, 93, 2000, 93]
+        hold, _, _, yaw, latitude, longitude, up = items[i]["params"]
+        at = PLACE.to_world(np.array([[latitude, longitude, 430.0 + up]]))[0]
+        name = min(left, key=lambda n: np.linalg.norm(left[n].centre - at))
+        camera = left.pop(name)
+        # places are written to 0.1 mm and 1 mm; altitudes above the ellipsoid differ from the plane's by 0.1 mm here
+        np.testing.assert_allclose(at, camera.centre, atol=0.002 / 20)
+        pitch, roll, turned = items[i + 1]["params"][:3]
+        assert (hold > 0, roll, turned, items[i + 1]["params"][6]) == (True, 0, 0, 2)
+        # the world's +y is 30 degrees east of north: east and north of the view, by hand
+        a, e = np.radians(yaw - 30), np.radians(pitch)
+        ahead = [np.sin(a) * np.cos(e), np.cos(a) * np.cos(e), np.sin(e)]
+        np.testing.assert_allclose(ahead, camera.forward, atol=2e-5)  # angles are written to a thousandth of a degree
+        assert items[i + 3]["params"][:3] == [0, 0, 1]
+    assert not left
+
+
+def test_looking_straight_down_the_nose_points_to_the_top_of_the_picture():
+    rotation, translation = cameras.look_at([0, 0, 5.0], [0, 0, 0.0])  # the picture's top is the world's +y
+    camera = cameras.Camera(rotation, translation, 50.0, 50.0, 32.0, 24.0, 64, 48)
+    assert qgc_plan.nose_and_tilt(camera, PLACE) == pytest.approx((30.0, -90.0))
+
+
+def test_sideways_ways_stay_above_the_clearance(items):
+    at, _ = places(items)
+    at = at * 20
+    assert at[:, 2].min() < 5  # two poses and the start lie below it
+    for a, b in zip(at[:-1], at[1:], strict=True):
+        if np.linalg.norm(a[:2] - b[:2]) > 0.01:
+            assert min(a[2], b[2]) >= 5 - 0.002
+
+
+def test_detours_are_only_made_where_they_are_needed():
+    a, low, high = np.array([0, 0, 9.0]), np.array([4, 0, 2.0]), np.array([4, 0, 12.0])
+    assert qgc_plan.detour(a, high, 5.0) == []
+    assert qgc_plan.detour(low, high, 5.0) == []  # straight up
+    np.testing.assert_array_equal(qgc_plan.detour(a, low, 5.0), [[4, 0, 5]])
+    np.testing.assert_array_equal(qgc_plan.detour(low, low + [1, 0, 0], 5.0), [[4, 0, 5], [5, 0, 5]])
+
+
+def test_the_message_says_what_to_fly_what_is_missing_and_where_to_put_it(site, asked):
+    with pytest.raises(InputError) as said:
+        drone.take(site, asked[:2])
+    for part in ("mission.plan", "4 photos are missing, of 2 poses (pose_0, pose_1)", "drop", "same command again"):
+        assert part in str(said.value)
+
+
+def test_nothing_is_written_when_nothing_is_missing(site, asked, monkeypatch):
+    monkeypatch.setattr(drop_folder, "collect", lambda site, asked, agent: [])
+    assert drone.take(site, asked) is None
+    assert not (site.store.folder / "mission.plan").exists()
+
+
+def test_a_scene_without_gps_is_refused(site, asked):
+    bare = Site("moor", site.scene, {k: v for k, v in FRAME.items() if k != "georeference"}, site.photos, site.store)
+    with pytest.raises(InputError, match="GPS positions in their EXIF"):
+        drone.take(bare, asked)
+
+
+def test_poses_that_are_too_low_are_refused_by_name(site, asked):
+    low = Site("moor", {"flight": {"least_altitude": 3.6}}, FRAME, site.photos, site.store)
+    with pytest.raises(InputError, match=r"pose_4, pose_5: lower than 3.6 m"):
+        drone.take(low, asked)
+
+
+def test_ground_too_steep_for_altitudes_above_a_plane_is_refused(site, asked):
+    def on(slope, **flight):
+        frame = FRAME | {"georeference": FRAME["georeference"] | {"slope": slope}}
+        return Site("moor", {"flight": flight}, frame, site.photos, site.store)
+
+    # the farthest pose is 1.3 x 20 m from where the drone takes off: 10 degrees are 4.7 m, 2 degrees 0.9 m
+    with pytest.raises(InputError, match=r"slopes by 10.0 degrees, .* up to 4\.\d m"):
+        drone.take(on(10.0), asked)
+    with pytest.raises(InputError, match="fly this mission"):
+        drone.take(on(10.0, clearance=12), asked)
+    with pytest.raises(InputError, match="fly this mission"):
+        drone.take(on(2.0), asked)
+
+
+def test_the_same_poses_give_the_same_file(site, asked):
+    written = []
+    for _ in range(2):
+        with pytest.raises(InputError):
+            drone.take(site, asked)
+        written.append((site.store.folder / "mission.plan").read_bytes())
+    assert written[0] == written[1]
+
+
+def test_a_pose_is_flown_whatever_its_place_in_the_list(asked):
+    views = [(pose.name, camera) for pose, camera in asked]
+    flown = qgc_plan.flight(views, PLACE, np.array([0.0, -0.5]), qgc_plan.Rules())
+    assert sorted(flown.names) == sorted(pose.name for pose, _ in asked)
+    assert flown.highest == pytest.approx(20.0)
+    assert flown.duration > flown.length / 3

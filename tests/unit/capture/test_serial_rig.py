@@ -1,0 +1,400 @@
+"""The agent of camera rigs, against a simulated one: whatever goes wrong, it stands still and no photo is lost."""
+
+import re
+import signal
+import sys
+
+import numpy as np
+import pytest
+from fixtures.simulated_rig import Faults, SimulatedRig
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dav_gswt import config
+from dav_gswt.capture import inbox, rig_limits, serial_protocol, serial_rig
+from dav_gswt.capture.rig_geometry import Mount
+from dav_gswt.capture.site import Site
+from dav_gswt.capture.store import Store
+from dav_gswt.errors import InputError
+from dav_gswt.geometry.cameras import look_at
+from dav_gswt.geometry.poses import Pose
+from dav_gswt.images import image_files
+from dav_gswt.photos.synthetic import camera_layouts
+
+FRAME = {"exemplar": {"west": 1.0, "south": -3.0, "side": 4.0}, "flying_height": 4.0}
+CENTRE = (3.0, -1.0, 0.0)
+PLACES = ((60.0, 10.0, 4.0), (45.0, 120.0, 4.0), (90.0, 30.0, 4.0), (50.0, 350.0, 3.0))
+RIG = {
+    "millimetres": 1000.0,
+    "limits": {"pan": [-180, 180], "tilt": [10, 90], "radius": [1000, 8000]},
+    "settle": 0,
+    "timeout": 0.05,  # a machine that stalls for longer only asks again
+    "retries": 60,
+    "move_timeout": 20,
+    "photo_timeout": 10,
+    "dry_run": False,
+}
+
+
+@pytest.fixture(autouse=True)
+def no_long_waits(monkeypatch):
+    monkeypatch.setattr(inbox, "POLL", 0.01)
+    monkeypatch.setattr(serial_rig, "POLL", 0.005)
+    monkeypatch.setattr(serial_protocol, "SLICE", 0.01)
+
+
+@pytest.fixture
+def shoot(tmp_path):
+    """Have places photographed by a rig with faults; returns the rig, what it ended with, and the store."""
+    (tmp_path / "inbox").mkdir()
+    store = Store(tmp_path / "captures")
+
+    def shot(faults=None, places=PLACES, burst=1, seed=0, **changed):
+        scene = {"agent": "serial", "burst": burst}
+        with SimulatedRig(tmp_path / "inbox", faults, seed) as device:
+            shot.device = device
+            scene["rig"] = RIG | {"port": device.port, "inbox": str(tmp_path / "inbox")} | changed
+            site = Site("meadow", scene, FRAME, tmp_path / "photos", store)
+            asked = [posed(i, place) for i, place in enumerate(places)]
+            missing = [(pose, camera) for pose, camera in asked if len(store.of(camera)) < burst]
+            try:
+                serial_rig.take(site, missing)
+                ended = ""
+            except InputError as error:
+                ended = str(error)
+        return device, ended, store
+
+    return shot
+
+
+def posed(i, place):
+    return Pose(f"pose_{i:04d}", *place), camera_layouts.orbit(*place, CENTRE, 64, 48, 60.0)
+
+
+def held(store, places=PLACES):
+    """How many photos of each place the store holds."""
+    return [len(store.of(posed(0, place)[1])) for place in places]
+
+
+def test_each_pose_is_photographed_once_from_where_it_was_asked_for(shoot):
+    device, ended, store = shoot()
+    assert (ended, held(store), device.photos) == ("", [1, 1, 1, 1], 4)
+    assert [record["pose"]["name"] for record in store.records()].count("pose_0000") == 1
+    for i, place in enumerate(PLACES):
+        camera = posed(i, place)[1]
+        [stored] = store.of(camera)
+        assert image_files.read(stored.photo).shape == (48, 64, 3)
+        np.testing.assert_allclose(stored.got.rotation, camera.rotation, atol=2e-5)  # the line's thousandth of a degree
+        np.testing.assert_allclose(stored.got.centre, camera.centre, atol=1e-4)
+        assert stored.got.fx == camera.fx
+
+
+@pytest.mark.parametrize(
+    "faults",
+    [
+        pytest.param(Faults(lost_in=0.004), id="bytes to it are lost"),
+        pytest.param(Faults(lost_out=0.004), id="bytes from it are lost"),
+        pytest.param(Faults(late=0.08), id="answers are late"),
+        pytest.param(Faults(twice=True), id="answers come twice"),
+        pytest.param(Faults(garbage=b"\xff\x00*\xc3#\n! BOOT*0000\n" + 300 * b"x" + b"\n\n"), id="garbage"),
+        pytest.param(Faults(boot_during_move=(2,)), id="it restarts in the middle of a move"),
+        pytest.param(Faults(boot_during_move=(2,), boots_in_silence=True), id="it restarts without a word"),
+        pytest.param(Faults(boot_before_shot=(2,)), id="it restarts instead of releasing the camera"),
+        pytest.param(Faults(boot_after_shot=(1, 3)), id="it restarts between the photo and the answer"),
+        pytest.param(Faults(boot_after_shot=(4,), boots_in_silence=True), id="it does so without a word"),
+        pytest.param(Faults(boot_after_shot=(2,), camera="late"), id="the photo only comes when it is homed again"),
+        pytest.param(Faults(camera="slow"), id="photos are written slowly"),
+        pytest.param(Faults(twice=True, late=0.08, lost_in=0.002, lost_out=0.002, boot_after_shot=(2,)), id="all"),
+    ],
+)
+def test_what_passes_costs_no_photo_and_takes_none_twice(shoot, faults):
+    waits = faults.boot_before_shot or faults.camera == "late"  # in vain, for a photo
+    patience = 1.0 if waits else RIG["photo_timeout"]
+    device, ended, store = shoot(faults, seed=3, photo_timeout=patience)
+    assert (ended, held(store), device.photos) == ("", [1, 1, 1, 1], 4)
+
+
+@pytest.mark.parametrize(
+    "faults, changed, said",
+    [
+        pytest.param(Faults(silent=("SHOOT",)), {"retries": 2}, "did not answer SHOOT, asked 3 times", id="silent"),
+        pytest.param(Faults(refused={"MOVE": "FAULT motor 2"}), {}, "refused MOVE: FAULT motor 2", id="refuses a move"),
+        pytest.param(Faults(refused={"SHOOT": "CAMERA is off"}), {}, "refused SHOOT: CAMERA is off", id="no camera"),
+        pytest.param(Faults(unasked_during_move={1: "LIMIT tilt"}), {}, "limit switch (tilt)", id="limit switch"),
+        pytest.param(Faults(unasked_during_move={1: "STOP"}), {}, "stop button", id="stop button"),
+        pytest.param(Faults(answers={"WHERE": "OK stopped 0 0 0"}), {}, "stop button", id="stopped before"),
+        pytest.param(Faults(answers={"WHERE": "OK still nan 1e9 0"}), {}, "is none of docs", id="no numbers"),
+        pytest.param(Faults(answers={"WHERE": "OK moving 0 60 5000"}), {"move_timeout": 0.2}, "still moves", id="slow"),
+        pytest.param(Faults(stuck=(1,)), {}, "does something bar it", id="stuck half-way"),
+        pytest.param(Faults(boot_during_move=(1, 2, 3, 4)), {}, "restarted 4 times", id="restarts again and again"),
+        pytest.param(Faults(camera="none"), {"photo_timeout": 0.2}, "no photo came into", id="no photo"),
+        pytest.param(Faults(camera="cut"), {"photo_timeout": 0.6}, "cut short", id="half a photo"),
+        pytest.param(Faults(camera="two"), {}, "2 photos came for one exposure", id="two photos"),
+        pytest.param(Faults(camera="small"), {}, "does not shrink", id="a photo of another camera"),
+    ],
+)
+def test_what_does_not_pass_is_said_and_ends_with_stop(shoot, faults, changed, said):
+    device, ended, store = shoot(faults, **changed)
+    assert said in ended
+    assert device.last == "STOP"
+    assert held(store) == [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    "answers, said",
+    [
+        pytest.param({"HELLO": "OK 2"}, "speaks version 2, not 1", id="another version"),
+        pytest.param({"HELLO": "OK 1 0 1"}, "is none of docs/rig-protocol.md", id="numbers are missing"),
+        pytest.param({"HELLO": "OK"}, "speaks version , not 1", id="nothing"),
+    ],
+)
+def test_a_rig_that_speaks_otherwise_is_left_alone(shoot, answers, said):
+    device, ended, _ = shoot(Faults(answers=answers))
+    assert said in ended
+    assert {verb for _, verb in device.seen} == {"HELLO", "STOP"}
+
+
+def test_photos_before_a_fault_are_kept_and_not_taken_again(shoot):
+    first, ended, store = shoot(Faults(unasked_during_move={3: "LIMIT pan"}))
+    assert ("limit switch" in ended, first.last, held(store)) == (True, "STOP", [1, 1, 0, 0])
+    second, ended, store = shoot()
+    assert (ended, second.photos, held(store)) == ("", 2, [1, 1, 1, 1])
+
+
+def test_a_burst_goes_on_where_it_was_left(shoot):
+    places = PLACES[:1]
+    shoot(places=places)
+    device, ended, store = shoot(places=places, burst=3)
+    assert (ended, device.photos, held(store, places)) == ("", 2, [3])
+    assert len(device.verbs("MOVE")) == 1  # the rig stays where it is
+    assert len({stored.photo.read_bytes() for stored in store.of(posed(0, places[0])[1])}) == 3
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_run_that_is_ended_stops_the_rig_and_keeps_the_photos(shoot, monkeypatch, tmp_path, number):
+    where = serial_protocol.Line.where
+
+    def interrupted(self):
+        if shoot.device.photos == 2 and shoot.device.verbs("MOVE")[2:]:
+            signal.raise_signal(number)
+        return where(self)
+
+    monkeypatch.setattr(serial_protocol.Line, "where", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        shoot()
+    assert (shoot.device.last, held(Store(tmp_path / "captures"))) == ("STOP", [1, 1, 0, 0])
+
+
+def test_a_repeated_release_takes_one_photo(shoot):
+    device, ended, store = shoot(Faults(asked_twice=("SHOOT",)))
+    numbers = [seq for seq, verb in device.seen if verb == "SHOOT"]
+    assert (ended, device.photos, held(store)) == ("", 4, [1, 1, 1, 1])
+    assert len(set(numbers)) == 4 and all(numbers.count(seq) >= 2 for seq in numbers)
+
+
+def test_one_pose_out_of_reach_keeps_the_rig_where_it_is_and_all_are_named(shoot):
+    places = [PLACES[0], (5.0, 0.0, 4.0), (60.0, 0.0, 9.0), PLACES[1]]
+    device, ended, store = shoot(places=places)
+    assert device.verbs("HOME", "MOVE", "SHOOT") == []
+    assert "cannot reach 2 of 4 poses" in ended
+    assert "pose_0001" in ended and "tilt 5 is outside 10 to 90" in ended
+    assert "pose_0002" in ended and "radius 9000 is outside 1000 to 8000" in ended
+    assert "pose_0000" not in ended and "pose_0003" not in ended
+
+
+def test_the_rigs_own_limits_hold_too(shoot):
+    wide = {"pan": [-500, 500], "tilt": [0, 100], "radius": [1, 99999]}
+    device, ended, _ = shoot(places=[(60.0, 0.0, 9.5)], limits=wide)
+    assert "radius 9500 is outside 500 to 9000" in ended
+    assert device.verbs("HOME", "MOVE", "SHOOT") == []
+
+
+def test_a_pose_that_looks_elsewhere_is_refused(shoot, tmp_path):
+    pose, camera = posed(0, PLACES[0])
+    rotation, translation = look_at(camera.centre, [3.0, 0.5, 0.0])
+    mount = Mount(np.array(CENTRE), 1000.0, 0.0, 0.0)
+    assert mount.trouble(camera) is None
+    turned = type(camera)(rotation, translation, 1.0, 1.0, 1.0, 1.0, 2, 2)
+    assert "degrees away from how the rig looks" in mount.trouble(turned)
+
+
+NO_GO = {
+    "a pose in a zone": ([{"pan": [100, 140], "tilt": [0, 50]}], "it lies in no_go 1"),
+    "a zone a turn on": ([{"pan": [460, 500], "tilt": [0, 50]}], "it lies in no_go 1"),
+    "a wall between": ([{"pan": [60, 70]}], "crosses a no_go"),
+    "home in a zone": ([{"pan": [-5, 5], "radius": [4000, 6000]}], "home"),
+}
+
+
+@pytest.mark.parametrize("name", NO_GO)
+def test_nothing_moves_where_a_zone_bars_a_pose_or_the_way(shoot, name):
+    no_go, said = NO_GO[name]
+    device, ended, _ = shoot(places=PLACES[:2], no_go=no_go)
+    assert said in ended
+    assert device.verbs("HOME", "MOVE", "SHOOT") == []
+
+
+@pytest.mark.parametrize("faults", [Faults(), Faults(boot_during_move=(3,)), Faults(boot_after_shot=(2,))])
+def test_no_move_touches_a_zone_also_after_a_restart(shoot, faults):
+    no_go = [{"pan": [50, 80], "tilt": [0, 70]}, {"pan": [-60, -40], "radius": [0, 4500]}]
+    device, ended, store = shoot(faults, no_go=no_go)
+    assert (ended, held(store)) == ("", [1, 1, 1, 1])
+    assert len(device.ways) > 4  # some went round
+    for a, b in device.ways:
+        for place in a + np.linspace(0, 1, 500)[:, None] * (b - a):
+            at = dict(zip(rig_limits.AXES, place, strict=True))
+            assert not any(all(low <= at[n] <= high for n, (low, high) in zone.items()) for zone in no_go)
+
+
+def test_a_dry_run_moves_nothing_and_says_every_move(shoot, caplog):
+    caplog.set_level("INFO")
+    device, ended, store = shoot(dry_run=True)
+    assert "dry run" in ended and "scenes.meadow.rig.dry_run: false" in ended
+    assert {verb for _, verb in device.seen} == {"HELLO"}
+    assert [r.getMessage().split(":")[0] for r in caplog.records] == [f"pose_{i:04d}" for i in range(4)]
+    assert "pan 120.0, tilt 45.0 degrees, radius 4000 mm" in caplog.text
+    assert held(store) == [0, 0, 0, 0]
+
+
+def test_a_config_without_dry_run_is_one(shoot):
+    device, ended, _ = shoot(dry_run=serial_rig.DEFAULTS["dry_run"])
+    assert "dry run" in ended and device.photos == 0
+
+
+def test_what_was_in_the_inbox_before_is_not_taken_for_a_photo(shoot, tmp_path):
+    old = tmp_path / "inbox" / "old.png"
+    image_files.write(old, np.zeros((48, 64, 3)))
+    (tmp_path / "inbox" / "shot.part").write_bytes(b"unfinished")
+    _, ended, store = shoot()
+    assert (ended, held(store)) == ("", [1, 1, 1, 1])
+    assert "old.png" not in {record["source"] for record in store.records()}
+
+
+def test_a_photo_written_over_another_is_new(tmp_path):
+    image_files.write(tmp_path / "capt.png", np.zeros((48, 64, 3)))
+    before = inbox.listing(tmp_path)
+    assert inbox.arrived(tmp_path, before, 0.0) is None
+    image_files.write(tmp_path / "capt.png", np.random.default_rng(0).random((48, 64, 3)))
+    assert inbox.arrived(tmp_path, before, 5.0) == tmp_path / "capt.png"
+
+
+def test_a_missing_inbox_port_or_table_is_said(shoot, tmp_path):
+    assert "rig.inbox" in shoot(inbox=str(tmp_path / "none"))[1]
+    assert "does not open" in shoot(port=str(tmp_path / "none"))[1]
+    assert "did not answer HELLO" in shoot(port="loop://", retries=1)[1]  # an echo is no answer
+    site = Site("meadow", {"agent": "serial"}, FRAME, tmp_path, Store(tmp_path))
+    with pytest.raises(InputError, match="scenes.meadow.rig"):
+        serial_rig.take(site, [])
+
+
+def test_without_pyserial_the_message_says_how_to_get_it(shoot, monkeypatch):
+    monkeypatch.setitem(sys.modules, "serial", None)
+    assert "pip install pyserial" in shoot()[1]
+
+
+def test_a_port_that_is_in_use_is_refused(tmp_path):
+    with (
+        SimulatedRig(tmp_path) as device,
+        serial_protocol.opened(device.port, 115200, 1.0, 1),
+        pytest.raises(InputError, match="does not open"),
+        serial_protocol.opened(device.port, 115200, 1.0, 1),
+    ):
+        pass
+
+
+def test_the_checksum_is_that_of_the_standard():
+    assert serial_protocol.framed("123456789") == b"123456789*29B1\n"
+
+
+@given(st.text(st.characters(min_codepoint=32, max_codepoint=126), min_size=1, max_size=100), st.data())
+def test_a_line_survives_and_a_damaged_one_does_not(text, data):
+    sent = serial_protocol.framed(text)
+    assert serial_protocol.unframed(sent) == text
+    at = data.draw(st.integers(0, len(sent) - 1))
+    assert serial_protocol.unframed(sent[:at] + sent[at + 1 :]) in (None, text)
+    byte = data.draw(st.integers(0, 255).filter(lambda b: b != sent[at]))
+    assert serial_protocol.unframed(sent[:at] + bytes([byte]) + sent[at + 1 :]) in (
+        None,
+        text,
+    )  # text: a digit in lower case
+
+
+@given(st.binary(max_size=200))
+def test_noise_is_no_line(noise):
+    assert (
+        serial_protocol.unframed(noise) is None
+        or serial_protocol.framed(serial_protocol.unframed(noise))[:-1].lower() in noise.lower()
+    )
+
+
+@given(*[st.tuples(*[st.floats(-10, 10, width=32) for _ in range(3)]) for _ in range(2)])
+def test_the_exact_test_of_a_move_agrees_with_many_points_on_it(a, b):
+    limits = {axis: [-20, 20] for axis in rig_limits.AXES}
+    there = rig_limits.reach(limits, [{"pan": [-3, 1], "tilt": [0, 2], "radius": [-1, 4]}], np.array([[-20.0, 20]] * 3))
+    a, b = np.array(a), np.array(b)
+    points = a + np.linspace(0, 1, 2001)[:, None] * (b - a)
+    box = there.zones[0]
+    depth = np.minimum(points - box[:, 0], box[:, 1] - points).min(1).max()  # how deep the deepest point is inside
+    met = rig_limits._met(there, a, b)[0]
+    apart = 0.5 * np.abs(b - a).max() / 2000
+    assert met if depth >= 0 else True
+    assert not met or depth >= -apart - 1e-9
+
+
+@pytest.mark.parametrize(
+    "changed, said",
+    [
+        pytest.param({}, "", id="whole"),
+        pytest.param({"dry_runs": True}, "is 'dry_run' meant?", id="misspelt"),
+        pytest.param({"limits": {"pan": [0, 1], "tilt": [0, 1]}}, "radius", id="an axis without limits"),
+        pytest.param({"no_go": [{}]}, "no_go", id="a zone of everything"),
+        pytest.param({"millimetres": 0}, "millimetres", id="no scale"),
+    ],
+)
+def test_the_configs_schema_knows_a_rig(root, changed, said):
+    experiment = config.read([root / "config/config.yaml"])
+    optional = {k: v for k, v in serial_rig.DEFAULTS.items() if k != "no_go"} | {"no_go": [{"pan": [-10, 10]}]}
+    table = optional | {"port": "/dev/ttyUSB0", "inbox": "in", "millimetres": 250, "limits": RIG["limits"]} | changed
+    scene = {"kind": "photos", "folder": "x", "size": 512, "start": 8, "agent": "serial", "rig": table}
+    experiment["scenes"]["meadow"] = scene | {"quality": "draft", "seam": "semantic"}
+    if not said:
+        return config.check(experiment, root / "workflow/schemas/config.schema.yaml")
+    with pytest.raises(InputError, match=re.escape(said)):
+        config.check(experiment, root / "workflow/schemas/config.schema.yaml")
+    return None
+
+
+@pytest.mark.parametrize("wrong, said", [({"pan": [1, 0]}, "from high to low"), ({"pan": [300, 400]}, "nothing of it")])
+def test_limits_that_leave_nothing_are_named(shoot, wrong, said):
+    assert said in shoot(limits=RIG["limits"] | wrong)[1]
+
+
+@pytest.mark.parametrize("place", [*PLACES, (90.0, 200.0, 2.0), (12.0, 359.9999, 1.0)])
+def test_axes_and_cameras_are_each_others_inverse(place):
+    camera = posed(0, place)[1]
+    mount = Mount(np.array(CENTRE), 250.0, 33.0, -5.0)
+    axes = mount.axes(camera)
+    np.testing.assert_allclose(axes, [(place[1] + 33.0) % 360, place[0] - 5.0, 250.0 * place[2]], atol=1e-3)
+    back = mount.camera(axes, camera)
+    np.testing.assert_allclose(back.rotation, camera.rotation, atol=2e-5)
+    np.testing.assert_allclose(back.translation, camera.translation, atol=1e-4)
+    assert mount.trouble(camera) is None
+
+
+def test_a_pan_goes_the_short_way_round_where_the_limits_let_it():
+    there = rig_limits.reach({"pan": [-270, 270], "tilt": [0, 90], "radius": [1, 9]}, [], np.array([[-1e6, 1e6]] * 3))
+    [stop] = rig_limits.route(there, np.array([-170.0, 45.0, 5.0]), np.array([170.0, 45.0, 5.0]))
+    assert stop[0] == -190.0
+
+
+def test_only_poses_where_the_rig_may_stand_are_candidates():
+    pool = [posed(i, place) for i, place in enumerate([(60.0, 0.0, 5.0), (60.0, 90.0, 5.0), (5.0, 0.0, 5.0)])]
+    radius = 5.0 * RIG["millimetres"]
+    limits = RIG["limits"] | {"radius": [0.9 * radius, 1.1 * radius]}
+    zone = {"pan": [80, 100]}
+    scene = {"rig": RIG | {"limits": limits, "no_go": [zone]}}
+    assert [pose.name for pose, _ in serial_rig.within(scene, FRAME, pool)] == ["pose_0000"]
+    scene["rig"]["limits"] = limits | {"radius": [1, 2]}
+    with pytest.raises(InputError, match="none of the candidate poses"):
+        serial_rig.within(scene, FRAME, pool)
+    assert serial_rig.within({}, FRAME, pool) == pool  # `take` says what is missing

@@ -1,0 +1,134 @@
+import json
+
+import numpy as np
+import pytest
+
+from dav_gswt.capture import survey
+from dav_gswt.capture.survey import Lens
+from dav_gswt.errors import InputError
+from dav_gswt.geometry.geodesy import Georeference
+
+LENS = Lens()
+WHERE = ["--latitude", "47.1", "--longitude", "8.2", "--altitude", "430", "--side", "20"]
+
+
+def circles(views):
+    """Cameras by height and how far the point they look at is from the middle."""
+    found = {}
+    for _, camera in views:
+        at = camera.centre - camera.centre[2] / camera.forward[2] * camera.forward
+        key = (round(camera.centre[2], 3), round(-camera.forward[2], 4), round(float(np.hypot(*at[:2])), 3))
+        found.setdefault(key, []).append(camera)
+    return found
+
+
+def overlap(a, b):
+    """The share of a's footprint on the ground that b sees, by many rays; both look straight down."""
+    half = a.centre[2] * np.array([a.width, a.height]) / (2 * a.fx)
+    gap = np.abs((a.centre - b.centre)[:2])
+    return float(np.prod(np.clip(1 - gap / (2 * half), 0, 1)))
+
+
+def test_overlap_of_photos_straight_down_is_that_of_their_rectangles():
+    lens = Lens(fov=60.0, aspect=4 / 3)
+    a = lens.camera(90.0, 0.0, 10.0, 0.0)
+    for away in (0.5, 2.0, 6.0):
+        b = lens.camera(90.0, 0.0, 10.0, away)
+        # azimuth 0: the picture's top is west, its shorter side runs east; rays sample it in 24 rows
+        shorter = 2 * 10 * lens.shorter
+        assert survey.shared(a, b) == pytest.approx(1 - away / shorter, abs=1 / 24)
+
+
+def test_neighbours_on_every_circle_overlap_enough():
+    views = survey.exhaustive(20.0, [12.0, 6.0], LENS)
+    rings = circles(views)
+    assert {key[0] for key in rings} == {12.0, 6.0}
+    assert len({key[1] for key in rings}) == 3
+    for ring in rings.values():
+        for a, b in zip(ring, ring[1:] + ring[:1], strict=True):
+            if len(ring) > 1:
+                assert min(survey.shared(a, b), survey.shared(b, a)) >= 0.7
+                assert a.forward @ b.forward >= np.cos(np.radians(30.001))
+
+
+def test_circles_of_one_height_overlap_with_the_next():
+    rings = [
+        ring[0] for (_, down, _), ring in sorted(circles(survey.exhaustive(20.0, [8.0], LENS)).items()) if down == 1
+    ]
+    assert len(rings) >= 3
+    for a, b in zip(rings[:-1], rings[1:], strict=True):
+        assert survey.shared(a, b) >= 0.7
+
+
+def test_an_exhaustive_flight_shows_every_place_often_and_a_start_flight_all_of_it():
+    assert survey.seen(survey.exhaustive(20.0, [8.0], LENS), 20.0) >= 8
+    height = survey.height_for(20.0, LENS)
+    assert survey.seen(survey.start(8, [height], LENS), 20.0) >= 3
+    above = survey.start(8, [height], LENS)[0][1]
+    assert height * (above.height / 2 / above.fy) >= 10.0  # half a side, on the ground
+
+
+def test_a_start_flight_has_a_photo_from_straight_above_and_a_circle_at_each_height():
+    views = survey.start(12, [20.0, 12.0], LENS)
+    assert len(views) == 12
+    np.testing.assert_allclose(views[0][1].centre, [0, 0, 20], atol=1e-9)
+    heights = [round(camera.centre[2], 6) for _, camera in views[1:]]
+    assert (heights.count(20.0), heights.count(12.0)) == (5, 6)
+    elevations = [np.degrees(np.arcsin(-camera.forward[2])) for _, camera in views[1:]]
+    np.testing.assert_allclose(elevations, 65.0)
+
+
+def test_too_few_photos_are_refused_with_the_number_that_is_enough():
+    with pytest.raises(InputError, match=r"take at least (\d+)") as said:
+        survey.start(4, [20.0], LENS)
+    enough = int(str(said.value).split()[-1])
+    assert len(survey.start(enough, [20.0], LENS)) == enough
+    with pytest.raises(InputError):
+        survey.start(enough - 1, [20.0], LENS)
+
+
+@pytest.mark.parametrize("kind, count", [("start", 8), ("exhaustive", None)])
+def test_the_plan_that_is_written_has_the_cameras_that_were_meant(tmp_path, kind, count):
+    out = tmp_path / "flight.plan"
+    more = ["--heights", "20", "--north", "25", "--minutes", "60"]
+    assert survey.main([kind, str(out), *WHERE, *more]) == 0
+    views = survey.start(8, [20.0], LENS) if kind == "start" else survey.exhaustive(20.0, [20.0], LENS)
+    assert count in (None, len(views))
+    mission = json.loads(out.read_text())["mission"]
+    items = mission["items"]
+    stops = [i for i, item in enumerate(items) if item["command"] == 205]
+    assert len(stops) == len(views)
+    place = Georeference(47.1, 8.2, 430.0, 25.0, 1.0)
+    at = [[*items[i - 1]["params"][4:6], items[i - 1]["params"][6] + mission["plannedHomePosition"][2]] for i in stops]
+    found = place.to_world(np.array(at))
+    meant = np.array([camera.centre for _, camera in views])
+    gaps = np.linalg.norm(found[:, None] - meant[None], axis=-1).min(1)
+    assert gaps.max() < 0.002  # metres: places are written to 0.1 mm, altitudes to 1 mm
+    tilts = sorted({round(items[i]["params"][0]) for i in stops})
+    assert tilts == ([-90, -65] if kind == "start" else [-90, -65, -45])
+
+
+def test_a_flight_longer_than_a_battery_becomes_several_files(tmp_path):
+    views = survey.exhaustive(20.0, [20.0], LENS)
+    assert survey.main(["exhaustive", str(tmp_path / "all.plan"), *WHERE, "--heights", "20", "--minutes", "4"]) == 0
+    written = sorted(tmp_path.iterdir())
+    assert [path.name for path in written] == [f"all_{i + 1}.plan" for i in range(len(written))]
+    assert len(written) > 1
+    items = [json.loads(path.read_text())["mission"]["items"] for path in written]
+    assert sum(item["command"] == 2000 for one in items for item in one) == len(views)
+    assert all(one[0]["command"] == 22 and one[-1]["command"] == 20 for one in items)
+
+
+def test_more_photos_than_anyone_flies_are_refused():
+    with pytest.raises(InputError, match="more than 2000 photos"):
+        survey.exhaustive(500.0, [5.0], LENS)
+
+
+def test_what_cannot_be_flown_is_said(tmp_path, capsys):
+    assert survey.main(["start", str(tmp_path / "a.plan"), *WHERE, "--heights", "5"]) == 1
+    assert "fly at" in capsys.readouterr().err
+    assert survey.main(["start", str(tmp_path / "a.plan"), *WHERE, "--least-altitude", "30"]) == 1
+    assert "lower than 30 m" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        survey.main(["start", str(tmp_path / "a.plan"), *WHERE, "--latitude", "147"])
+    assert not (tmp_path / "a.plan").exists()

@@ -1,0 +1,42 @@
+"""What `make run` lays over the config where PyTorch has to draw."""
+
+import pytest
+
+from dav_gswt import config
+from dav_gswt.cli import run
+from dav_gswt.raster import backends
+
+
+@pytest.fixture
+def without_core(monkeypatch):
+    real = backends.lacking
+    monkeypatch.delenv(backends.VARIABLE, raising=False)
+    monkeypatch.setattr(backends, "lacking", lambda name: real(name) if name == "torch" else "it was not built")
+
+
+def test_where_the_core_is_missing_a_smaller_size_is_said_and_laid_over(without_core, capsys):
+    assert run.smaller(quietly=False) == [run.SMALLER]
+    assert "slower" in (said := capsys.readouterr().out) and "it was not built" in said
+    assert run.smaller(quietly=True) == [run.SMALLER] and not capsys.readouterr().out
+
+
+def test_where_torch_is_asked_for_that_is_the_reason(monkeypatch, capsys):
+    if backends.lacking("cpu"):
+        pytest.skip(f"cpu: {backends.lacking('cpu')}")
+    monkeypatch.setenv(backends.VARIABLE, "torch")
+    assert run.smaller(quietly=False) == [run.SMALLER]
+    assert "DAV_GSWT_BACKEND asks for it" in capsys.readouterr().out
+    monkeypatch.setenv(backends.VARIABLE, "cpu")
+    assert run.smaller(quietly=False) == []
+
+
+def test_the_smaller_config_is_valid_and_smaller_for_every_quality(root):
+    usual = config.read([root / run.CONFIG])
+    small = config.read([root / run.CONFIG, root / run.SMALLER])
+    config.check(small, root / run.SCHEMA)
+    for name, quality in usual["qualities"].items():
+        for key in ("size", "cap", "steps", "steps_per_photo", "level_steps"):
+            if quality[key] != "auto":
+                assert small["qualities"][name][key] < quality[key], (name, key)
+            assert isinstance(small["qualities"][name][key], int)
+    assert small["scenes"] == usual["scenes"] and small["scene"] == usual["scene"]

@@ -1,0 +1,57 @@
+import numpy as np
+import pytest
+
+from dav_gswt.geometry import cameras
+
+
+def test_a_pinhole_sees_its_target_in_the_middle_and_up_is_up():
+    camera = cameras.pinhole([3.0, 0, 4], [0, 0, 0], 100, 80, 60.0)
+    pixels, depth = camera.project(np.array([[0.0, 0, 0], [0, 0, 0.5]]))
+    np.testing.assert_allclose(pixels[0], [50, 40], atol=1e-9)
+    assert depth[0] == pytest.approx(5)
+    assert pixels[1, 1] < 40  # higher in the world is higher in the picture: rows grow downwards
+
+
+def test_a_map_camera_puts_north_up_and_one_cell_on_one_pixel():
+    camera = cameras.top_down(west=10.0, south=20.0, width=4, height=3, cell=0.5, top=7.0)
+    south_west, north_east = np.array([[10.25, 20.25, 0], [11.75, 21.25, 5]])
+    pixels, depth = camera.project(np.stack([south_west, north_east]))
+    np.testing.assert_allclose(pixels, [[0.5, 2.5], [3.5, 0.5]])
+    np.testing.assert_allclose(depth, [7, 2])
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+def test_a_point_on_a_pixels_ray_projects_to_that_pixel(orthographic):
+    made = cameras.pinhole([1.0, -2, 3], [0.3, 0.1, 0], 7, 5, 50.0)
+    camera = cameras.Camera(**(vars(made) | {"orthographic": orthographic}))
+    origin, step = camera.rays()
+    pixels, depth = camera.project((origin + 2.5 * step).reshape(-1, 3))
+    x, y = np.meshgrid(np.arange(7) + 0.5, np.arange(5) + 0.5)
+    np.testing.assert_allclose(pixels, np.stack([x.ravel(), y.ravel()], 1), atol=1e-9)
+    np.testing.assert_allclose(depth, 2.5)
+
+
+def test_a_resized_camera_sees_the_same_directions():
+    camera = cameras.pinhole([1.0, -2, 3], [0, 0, 0], 64, 48, 50.0)
+    half = camera.resized(32, 24)
+    point = np.array([[0.2, 0.3, 0.1]])
+    np.testing.assert_allclose(half.project(point)[0] * 2, camera.project(point)[0])
+
+
+def test_looking_straight_down_has_north_on_top():
+    camera = cameras.pinhole([0, 0, 5.0], [0, 0, 0], 10, 10, 90.0)
+    pixels, _ = camera.project(np.array([[0.0, 1, 0], [1, 0, 0]]))
+    assert pixels[0, 1] < 5 < pixels[1, 0]
+
+
+def test_an_eye_at_its_target_is_refused():
+    with pytest.raises(ValueError, match="coincide"):
+        cameras.look_at([1, 2, 3], [1, 2, 3])
+
+
+def test_a_camera_comes_back_from_json_as_it_was():
+    camera = cameras.pinhole([1.0, -2, 3], [0, 0, 0], 64, 48, 50.0)
+    back = cameras.from_json(cameras.to_json(camera))
+    np.testing.assert_array_equal(back.rotation, camera.rotation)
+    np.testing.assert_array_equal(back.translation, camera.translation)
+    assert (back.fx, back.width, back.orthographic) == (camera.fx, 64, False)

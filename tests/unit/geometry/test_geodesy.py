@@ -1,0 +1,68 @@
+import numpy as np
+import pytest
+
+from dav_gswt.errors import InputError
+from dav_gswt.geometry import geodesy
+from dav_gswt.geometry.geodesy import Georeference
+
+A, F = 6378137.0, 1 / 298.257223563
+E2 = F * (2 - F)
+
+
+def radii(latitude):
+    """Of curvature: in the meridian, in the prime vertical."""
+    w = np.sqrt(1 - E2 * np.sin(np.radians(latitude)) ** 2)
+    return A * (1 - E2) / w**3, A / w
+
+
+@pytest.mark.parametrize("latitude", [-63.0, 0.0, 47.1, 80.0])
+def test_a_kilometre_north_is_a_kilometre_along_the_meridian(latitude):
+    place = Georeference(latitude, 8.0, 0.0, 0.0, 1.0)
+    found = place.to_earth(np.array([[0.0, 1000.0, 0.0]]))[0]
+    steps = np.linspace(latitude, found[0], 1001)
+    arc = np.trapezoid(radii(steps)[0], np.radians(steps))
+    assert arc == pytest.approx(1000, abs=1e-3)  # a tangent of 1 km is 8 micrometres longer than its arc
+    assert found[1] == pytest.approx(8.0, abs=1e-12)
+
+
+def test_a_kilometre_east_on_the_equator():
+    found = Georeference(0.0, 20.0, 0.0, 0.0, 1.0).to_earth(np.array([[1000.0, 0.0, 0.0]]))[0]
+    assert found[:2] == pytest.approx([0, 20 + np.degrees(np.arctan(1000 / A))], abs=1e-11)
+    assert found[2] == pytest.approx(np.hypot(A, 1000) - A, abs=1e-6)  # the plane leaves the ground: 78 mm
+
+
+def test_near_the_origin_the_radii_of_curvature_say_where():
+    place = Georeference(47.1, 8.2, 430.0, 0.0, 2.0)
+    east, north, up = 2 * np.array([3.0, -4.0, 1.5])
+    m, n = radii(47.1)
+    found = place.to_earth(np.array([[3.0, -4.0, 1.5]]))[0]
+    expected = [47.1 + np.degrees(north / (m + 430)), 8.2 + np.degrees(east / (n + 430) / np.cos(np.radians(47.1)))]
+    assert found[:2] == pytest.approx(expected, abs=3e-10)  # the next order is 6 m x 8 m / 6400 km: 8 micrometres
+    assert found[2] == pytest.approx(430 + up, abs=1e-5)
+
+
+def test_the_world_turns_with_its_north():
+    turned = Georeference(47.1, 8.2, 430.0, 90.0, 1.0)  # +y looks east, so +x looks south
+    straight = Georeference(47.1, 8.2, 430.0, 0.0, 1.0)
+    places = turned.to_earth(np.array([[0.0, 5.0, 1.0], [2.0, 0.0, 0.0]]))
+    np.testing.assert_allclose(straight.to_world(places), [[5.0, 0.0, 1.0], [0.0, -2.0, 0.0]], atol=1e-6)
+    assert turned.azimuth(np.array([0.0, 1.0, 0.3])) == pytest.approx(90)
+    assert turned.azimuth(np.array([1.0, 0.0])) == pytest.approx(180)
+
+
+def test_what_goes_to_the_earth_comes_back():
+    points = np.random.default_rng(0).uniform(-1500, 1500, (50, 3))
+    for latitude in (-89.0, -30.0, 0.0, 60.0):
+        place = Georeference(latitude, -179.9999, 300.0, 211.0, 1.7)
+        np.testing.assert_allclose(place.to_world(place.to_earth(points)), points, atol=1e-6)
+
+
+def test_a_scene_has_a_georeference_or_none():
+    whole = {"latitude": 47.1, "longitude": 8, "altitude": 430, "north": 12, "metres_per_unit": 2.5}
+    assert geodesy.of_frame({}) is None
+    assert geodesy.of_frame({"georeference": None}) is None
+    assert geodesy.of_frame({"georeference": whole}) == Georeference(47.1, 8.0, 430.0, 12.0, 2.5)
+    with pytest.raises(InputError, match="north"):
+        geodesy.of_frame({"georeference": {k: v for k, v in whole.items() if k != "north"}})
+    with pytest.raises(InputError, match="no place on earth"):
+        geodesy.of_frame({"georeference": whole | {"metres_per_unit": 0}})

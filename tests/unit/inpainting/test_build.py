@@ -1,0 +1,314 @@
+"""What no photo saw, painted by a prior whose painting is known: what changes, what must not, and what is marked."""
+
+from dataclasses import fields as members
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from fixtures import ground as patch
+
+from dav_gswt import field as fields
+from dav_gswt.field import Field, sh_of
+from dav_gswt.geometry import cameras, poses
+from dav_gswt.inpainting import build, evaluation, occluders, paint, unseen, viewpoints
+from dav_gswt.prior import conditions
+from dav_gswt.prior.interface import Imagined
+from dav_gswt.prior.networks import Network
+from dav_gswt.prior.terrain import Terrain
+from dav_gswt.reconstruction import underlay
+from dav_gswt.views import pose_maps
+from dav_gswt.views.prior_sampling import Asking
+
+MIDDLE = [1.6, 1.6, 0.0]
+FIRST = 20  # column of the first unseen cell
+SEEN = patch.look(*np.meshgrid(0.05 + 0.1 * np.arange(FIRST), 0.05 + 0.1 * np.arange(32))).mean((0, 1))
+PAINTS = SEEN + np.float32([[0.2, -0.2, 0.1], [-0.2, 0.2, -0.1]])  # of which the mean is the colour of known ground
+BAND = 8  # pixels of a picture that have one of them
+
+
+class Painting:
+    """Paints bands of two colours where it is told not to believe the render, and elsewhere the render itself."""
+
+    name, size = "painting", 32
+
+    def __init__(self, spoil=None, depth=True):
+        self.spoil, self.depth = spoil, depth
+
+    def samples(self, condition, m, p_drop, steps, seed, known=None, common=True):
+        assert p_drop == 0 and not common
+        hidden = np.kron(~known, np.ones((1, paint.CELL, paint.CELL), bool))[..., None]
+        bands = PAINTS[np.arange(self.size) // BAND % 2][None, :, None]
+        colour = np.where(hidden, bands, condition.colour)
+        planes = [colour, condition.alpha[..., None], condition.inverse_depth[..., None]]
+        return np.repeat(np.concatenate(planes, -1).transpose(0, 3, 1, 2)[:, None], m, 1).astype(np.float32)
+
+    def shown(self, condition):
+        return np.concatenate([condition.colour, condition.alpha[..., None]], -1).transpose(0, 3, 1, 2)
+
+    def variances(self, latents):
+        return np.zeros_like(latents)
+
+    def decoded(self, latents):
+        planes = np.ascontiguousarray(latents.transpose(0, 1, 3, 4, 2))
+        if self.spoil is not None:
+            planes[0, 0, 3, 4, self.spoil] = np.nan
+        return Imagined(planes[..., :4], planes[..., 4] if self.depth else None)
+
+
+def asked(prior=None, samples=2):
+    return Asking(prior or Painting(), samples, 2, 0.0)
+
+
+def half_seen():
+    """A ground whose east no photo saw: grey, as if filled, and in doubt."""
+    grid = patch.grid()
+    seen = grid.seen.copy()
+    seen[:, FIRST:] = False
+    field = patch.field(grid)
+    east = unseen.gaussians(field, grid, ~seen)
+    sh = field.sh.copy()
+    sh[east] = 0
+    doubt = np.where(east, np.float32(1), np.float32(0.1))
+    return replace(field, sh=sh, uncertainty=doubt), replace(grid, seen=seen)
+
+
+def completed(field, grid, prior=None):
+    return build.complete(field, grid, patch.FRAME, patch.photos(), asked(prior))
+
+
+def off_paint(colours):
+    """How far colours are from the nearer of the two."""
+    return np.abs(colours[..., None, :] - PAINTS).max(-1).min(-1)
+
+
+def same(one: Field, two: Field) -> bool:
+    return all(np.array_equal(getattr(one, f.name), getattr(two, f.name)) for f in members(Field))
+
+
+def test_unseen_ground_takes_the_priors_colour_and_all_else_keeps_its_bytes():
+    field, grid = half_seen()
+    before = field[:], grid.seen.copy()
+    made = completed(field, grid)
+    n = grid.heights.size
+    marked = made.field.imagined
+    assert np.array_equal(marked[:n].reshape(grid.shape), ~grid.seen) and np.array_equal(made.painted, ~grid.seen)
+    assert same(made.field[~marked], field[~marked])
+    inner = np.zeros(grid.shape, bool)
+    inner[4:-4, FIRST + 4 : -4] = True
+    off = off_paint(made.field.base_colours[:n][inner.ravel()])
+    assert np.median(off) < 0.08  # between two bands colours mix, and far in they keep to the mean
+    assert off_paint(field.base_colours[:n][inner.ravel()]).min() > 0.1
+    assert (made.field.uncertainty[marked] == 1).all() and made.things == 0
+    assert np.array_equal(made.field.means, field.means)  # no height is moved
+    assert same(field, before[0]) and np.array_equal(grid.seen, before[1])  # nothing is changed in place
+    assert made.facts(grid) == {
+        "cells": n,
+        "unseen": 32 * 12,
+        "painted": 32 * 12,
+        "things": 0,
+        "exemplar": {"unseen": 32 * 12, "painted": 32 * 12},
+        "changed": True,
+    }
+
+
+def test_the_underlay_shows_what_was_painted_above_it():
+    field, grid = half_seen()
+    made = completed(field, grid).field
+    rows = underlay.rows(made, grid)
+    under = made[rows].base_colours.reshape(16, 16, 3)
+    assert np.median(off_paint(under[3:-3, 13:-2])) < 0.1
+    assert np.array_equal(made.imagined[rows].reshape(16, 16), np.tile(np.arange(16) >= FIRST // 2, (16, 1)))
+
+
+def test_colours_join_their_surroundings():
+    """A prior that paints all a third too dark, what is known included, leaves no step at the border."""
+
+    class Dark(Painting):
+        def samples(self, condition, m, p_drop, steps, seed, known=None, common=True):
+            dark = replace(condition, colour=np.float32(0.66) * true.colour)
+            return super().samples(dark, m, p_drop, steps, seed, np.ones_like(known), common)
+
+    field, grid = half_seen()
+    pool = seen_by([1.6, 1.6, 4.0])
+    true, condition = told(patch.field(), pool)[0], told(field, pool)[0]
+    hidden = unseen.share(field, unseen.gaussians(field, grid, ~grid.seen), pool[0][1])[None] > unseen.TOUCHES
+    made = paint.painted(asked(Dark()), condition, hidden, SEEN.astype(float))
+    sure = ~hidden[0] & (condition.alpha[0] > 0.9)
+    near = hidden[0] & (true.alpha[0] > 0.9) & (np.roll(sure, 2, 1) | np.roll(sure, -2, 1))
+    off, raw = (np.abs(picture - true.colour[0])[near].mean() for picture in (made.colour[0], 0.66 * true.colour[0]))
+    assert near.sum() > 10 and off < 0.25 * raw
+
+
+def test_far_from_all_that_is_known_a_picture_keeps_to_the_grounds_mean_colour():
+    rng = np.random.default_rng(0)
+    picture, ground = rng.uniform(0.4, 0.6, (64, 64, 3)).astype(np.float32), np.array([0.3, 0.5, 0.4])
+    known = np.zeros((64, 64), bool)
+    known[:, :8] = True
+    found = paint.levelled(picture, picture + np.float32(0.2), known, ~known, ground)
+    np.testing.assert_allclose(found[:, 48:].mean((0, 1)), ground, atol=0.01)
+    np.testing.assert_allclose(found[:, :4], picture[:, :4] + 0.2, atol=0.03)
+    everywhere = paint.levelled(picture, picture + np.float32(0.2), known | True, known & False, ground)
+    np.testing.assert_allclose(everywhere, picture + 0.2, atol=1e-6)
+
+
+def test_where_photos_missed_nothing_the_field_is_handed_on():
+    made = completed(patch.field(), patch.grid())
+    assert not made.facts(patch.grid())["changed"] and made.painted.sum() == made.unseen.sum() == 0
+    field = patch.field()
+    assert completed(field, patch.grid()).field is field
+
+
+def test_a_cell_is_unseen_where_neither_the_grid_nor_the_fit_knows_it():
+    field, grid = half_seen()
+    doubt = field.uncertainty.copy()
+    doubt[: grid.heights.size].reshape(grid.shape)[:10] = 0.2  # fitted since, although something once stood before it
+    found = unseen.cells(replace(field, uncertainty=doubt), grid)
+    assert not found[:10].any() and found[10:, FIRST:].all() and not found[:, :FIRST].any()
+    free = replace(field, ground=np.zeros(len(field), bool))
+    assert not unseen.cells(free, grid).any() and completed(free, grid).field is free
+
+
+def test_what_a_known_thing_covers_is_not_painted():
+    field, grid = half_seen()
+    lid = blob([2.7, 0.6, 0.3], [0.35, 0.35, 0.02], [0.1, 0.9, 0.1])
+    made = completed(fields.joined([field, lid]), grid)
+    covered = np.hypot(grid.centres[:, 0] - 2.7, grid.centres[:, 1] - 0.6) < 0.2
+    assert covered.any() and not made.field.imagined[: grid.heights.size][covered].any()
+    assert not made.painted.ravel()[covered].any() and made.unseen.ravel()[covered].all()
+    assert same(made.field[len(field) : len(field) + 1], lid)
+    roof = fields.joined([field, blob([2.6, 1.6, 0.3], [2.0, 3.0, 0.02], [0.1, 0.9, 0.1])])
+    hidden = completed(roof, grid)
+    assert hidden.field is roof and hidden.unseen.any() and not hidden.facts(grid)["changed"]
+
+
+@pytest.mark.parametrize("plane", [0, 3, 4], ids=["colour", "opacity", "depth"])
+def test_a_prior_that_paints_what_is_no_number_is_refused(plane):
+    with pytest.raises(ValueError, match="view 0 is not finite"):
+        completed(*half_seen(), Painting(spoil=plane))
+
+
+def test_a_prior_without_depth_is_refused():
+    with pytest.raises(ValueError, match="painting has no depth"):
+        completed(*half_seen(), Painting(depth=False))
+
+
+@pytest.fixture(scope="module")
+def terrain():
+    torch.manual_seed(5)
+    return Terrain(Network())
+
+
+def test_the_projects_own_prior_paints_the_same_bytes_on_any_number_of_threads(terrain):
+    assert isinstance(terrain, paint.Painter)
+    found, before = [], torch.get_num_threads()
+    for threads in (1, 2, 2):
+        torch.set_num_threads(threads)
+        found.append(completed(*half_seen(), terrain).field)
+    torch.set_num_threads(before)
+    assert found[0].imagined.any() and same(found[0], found[1]) and same(found[1], found[2])
+
+
+def blob(place, sizes, colour):
+    return Field(
+        np.float32([place]),
+        np.log(np.float32([sizes])),
+        np.float32([[1, 0, 0, 0]]),
+        np.full(1, 6.0, np.float32),
+        sh_of(np.array([colour], float)),
+        np.zeros(1, np.float32),
+        np.zeros(1, bool),
+    )
+
+
+def seen_by(*eyes):
+    found = [cameras.pinhole(eye, MIDDLE, 32, 32, 55.0) for eye in eyes]
+    return [(poses.of_camera(f"p{i}", c, patch.FRAME), c) for i, c in enumerate(found)]
+
+
+def told(field, pool):
+    """What is known of views, and a painting that shows the field itself."""
+    photos = conditions.taken(patch.photos(), patch.FRAME, 32)
+    c = conditions.condition(field, pool, photos, patch.FRAME["flying_height"], 32)
+    return c, paint.Painted(c.colour, c.alpha, c.inverse_depth)
+
+
+EYES = [1.6, 1.0, 4.2], [3.6, 1.6, 3.7], [1.6, 4.0, 3.5]
+
+
+@pytest.mark.parametrize("count, stands", [(1, False), (2, True), (3, True)])
+def test_a_thing_stands_where_two_views_agree_that_it_does(count, stands):
+    bare = patch.field()
+    bare = replace(bare, imagined=bare.ground.copy())
+    there = fields.joined([bare, blob([1.7, 1.5, 0.5], [0.2, 0.2, 0.2], [0.1, 0.9, 0.1])])
+    pool = seen_by(*EYES[:count])
+    (condition, _), (_, made) = told(bare, pool), told(there, pool)
+    new = occluders.things(bare, patch.grid(), pool, condition, made, patch.FRAME["flying_height"])
+    assert bool(len(new)) == stands
+    if stands:
+        assert np.hypot(new.means[:, 0] - 1.7, new.means[:, 1] - 1.5).max() < 0.7
+        assert new.means[:, 2].min() > occluders.RISES * patch.FRAME["flying_height"] and new.means[:, 2].max() < 1.1
+        assert new.base_colours.mean(0)[1] > 0.6 and new.imagined.all() and (new.uncertainty == 1).all()
+
+
+def test_no_thing_stands_where_views_contradict_each_other_or_the_ground_is_known():
+    bare = patch.field()
+    marked = replace(bare, imagined=bare.ground.copy())
+    pool = seen_by(*EYES[:2])
+    condition, flat = told(marked, pool)
+    thing = blob([1.7, 1.5, 0.5], [0.2, 0.2, 0.2], [0.1, 0.9, 0.1])
+    _, made = told(fields.joined([marked, thing]), pool)
+    half = made.inverse_depth.copy()
+    half[1] = flat.inverse_depth[1]
+    alone = replace(made, inverse_depth=half)
+    height = patch.FRAME["flying_height"]
+    assert len(occluders.things(marked, patch.grid(), pool, condition, alone, height)) == 0
+    assert len(occluders.things(bare, patch.grid(), pool, condition, made, height)) == 0
+
+
+def test_every_unseen_cell_is_well_inside_the_picture_of_its_block():
+    rng = np.random.default_rng(0)
+    grid = patch.grid(0.05)
+    there = rng.random(grid.shape) < 0.02
+    fresh = there.copy()
+    for target in viewpoints.blocks(grid, there, patch.FRAME["flying_height"]):
+        ((_, camera),) = viewpoints.cameras(viewpoints.ABOVE, target, patch.field(), grid, patch.FRAME, 64)
+        assert camera.forward[2] < -np.sin(np.radians(75))
+        at, depth = camera.project(grid.centres)
+        fresh &= ~((depth > 0) & (at > 2).all(1) & (at < 62).all(1)).reshape(grid.shape)
+    assert there.any() and not fresh.any()
+    assert viewpoints.blocks(grid, np.zeros(grid.shape, bool), 6.0) == []
+
+
+def test_no_camera_stands_inside_of_something_or_under_the_ground():
+    target = np.array(MIDDLE)
+    free = viewpoints.cameras(viewpoints.ASIDE, target, patch.field(), patch.grid(), patch.FRAME, 32)
+    tower = blob(list(free[2][1].centre), [0.4, 0.4, 0.4], [0.5, 0.5, 0.5])
+    left = viewpoints.cameras(
+        viewpoints.ASIDE, target, fields.joined([patch.field(), tower]), patch.grid(), patch.FRAME, 32
+    )
+    assert len(free) == 4 and [pose for pose, _ in left] == [pose for i, (pose, _) in enumerate(free) if i != 2]
+
+
+def test_it_is_measured_before_and_after_everywhere_and_where_it_was_painted():
+    field, grid = half_seen()
+    east = unseen.gaussians(field, grid, ~grid.seen)
+    tests = patch.photos(2)  # of the ground as it is
+    after = replace(patch.field(), imagined=east)
+    after.sh[east] += 0.05
+    found = evaluation.judged(field, after, tests)
+    for part in ("all", "imagined"):
+        assert found[part]["after"]["psnr"] > found[part]["before"]["psnr"] + 3
+    assert 0 < found["imagined"]["pixels"] < found["all"]["pixels"]
+    assert found["gaussians"] == {"before": len(field), "after": len(after), "imagined": int(after.imagined.sum())}
+    same_again = evaluation.judged(field, field, tests)
+    assert same_again["imagined"]["pixels"] == 0 and same_again["imagined"]["before"]["psnr"] is None
+    assert same_again["all"]["before"] == same_again["all"]["after"]
+
+
+def test_the_maps_of_a_prior_leave_what_was_imagined_in_full_doubt():
+    field = fields.joined([patch.field()[:4], blob(MIDDLE, [0.1] * 3, [0.5] * 3)])
+    marked = np.array([False, True, False, False, True])
+    field = replace(field, imagined=marked, uncertainty=np.float32([0.1, 1, 0.1, 0.1, 1]))
+    told = pose_maps.doubted(field, np.float32([0.3, 0.3, 0.4, 0.5]))
+    assert told.uncertainty.tolist() == np.float32([0.3, 1, 0.4, 0.5, 1]).tolist()

@@ -1,0 +1,89 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dav_gswt.field import Field, joined, sh_of
+from dav_gswt.lod import merge
+from dav_gswt.reconstruction import discs, ground
+
+FRAME = {
+    "exemplar": {"west": 0.0, "south": 0.0, "side": 3.2},
+    "extent": {"west": -1.0, "south": -1.0, "east": 4.2, "north": 4.2},
+}
+
+
+@pytest.fixture
+def scene():
+    grid = ground.lay(FRAME, np.zeros((0, 3)), spacing=0.1, cap=10**6, block=8, margin=0.2)
+    x, y, _ = grid.centres.T
+    grid = replace(grid, heights=(0.1 * x).reshape(grid.shape), seen=np.ones(grid.shape, bool))
+    colours = np.stack([x / 10, y / 10, 0 * x + 0.5], 1)
+    return joined([discs.ground_discs(grid, colours), things(3)]), grid
+
+
+def things(n, seed=0):
+    rng = np.random.default_rng(seed)
+    return Field(
+        rng.uniform(0.5, 2.5, (n, 3)).astype(np.float32),
+        np.log(rng.uniform(0.02, 0.06, (n, 3))).astype(np.float32),
+        rng.normal(size=(n, 4)).astype(np.float32),
+        rng.normal(size=n).astype(np.float32),
+        sh_of(rng.uniform(0, 1, (n, 3))),
+        rng.uniform(0, 1, n).astype(np.float32),
+        np.zeros(n, bool),
+    )
+
+
+def test_a_crop_keeps_discs_and_grid_in_step_and_the_exemplar_in_place(scene):
+    field, grid = scene
+    small, cut = merge.cropped(field, grid, 8)
+    assert cut.first_row % 8 == cut.first_column % 8 == 0
+    assert cut.exemplar == pytest.approx(grid.exemplar)
+    np.testing.assert_allclose(small.means[: cut.heights.size, :2], cut.centres[:, :2], atol=1e-5)
+
+
+def test_four_discs_become_one_of_their_mean(scene):
+    field, grid = merge.cropped(*scene, 8)
+    half, coarse = merge.halved(field, grid)
+    n = coarse.heights.size
+    assert 4 * n == grid.heights.size
+    assert coarse.spacing == pytest.approx(2 * grid.spacing)
+    assert coarse.exemplar == pytest.approx(grid.exemplar)
+    # both colour and height are linear in place, so the mean of four is the value in their middle
+    np.testing.assert_allclose(half.base_colours[:n, 0], half.means[:n, 0] / 10, atol=1e-5)
+    np.testing.assert_allclose(half.means[:n, 2], 0.1 * half.means[:n, 0], atol=1e-5)
+    assert np.exp(half.log_scales).mean() > np.exp(field.log_scales).mean()
+
+
+def test_merging_one_gaussian_gives_it_back():
+    one = things(1)
+    back = merge.merged(one, voxel=0.5)
+    np.testing.assert_allclose(back.means, one.means, atol=1e-6)
+    np.testing.assert_allclose(merge.covariances(back), merge.covariances(one), rtol=1e-4, atol=1e-7)
+    np.testing.assert_allclose(back.opacity_logits, one.opacity_logits, atol=1e-4)
+    np.testing.assert_allclose(back.sh, one.sh, atol=1e-5)
+
+
+def test_merged_moments_are_those_of_the_mixture():
+    a = things(2)
+    upright = np.tile(np.array([1, 0, 0, 0], np.float32), (2, 1))
+    a = replace(a, means=np.array([[0.1, 0, 0], [0.3, 0, 0]], np.float32), quats=upright)
+    a = replace(a, log_scales=np.full((2, 3), np.log(0.05), np.float32), opacity_logits=np.zeros(2, np.float32))
+    back = merge.merged(a, voxel=1.0)
+    np.testing.assert_allclose(back.means, [[0.2, 0, 0]], atol=1e-6)
+    # variance along x: 0.05^2 + 0.1^2, across: 0.05^2
+    np.testing.assert_allclose(np.diag(merge.covariances(back)[0]), [0.0125, 0.0025, 0.0025], rtol=1e-4)
+
+
+def test_merging_does_not_depend_on_the_order(scene):
+    many = things(50, seed=3)
+    turned = many[np.random.default_rng(0).permutation(50)]
+    a, b = merge.merged(many, 0.5), merge.merged(turned, 0.5)
+    np.testing.assert_allclose(a.means, b.means, atol=1e-6)
+    np.testing.assert_allclose(a.opacity_logits, b.opacity_logits, atol=1e-5)
+    assert len(a) < 50
+
+
+def test_nothing_merges_to_nothing():
+    assert len(merge.merged(things(1)[:0], 0.5)) == 0

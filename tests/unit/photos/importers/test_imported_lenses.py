@@ -1,0 +1,177 @@
+"""Lenses of other programs: their own formulas against the cameras that stand for them, and what no lens can be."""
+
+import numpy as np
+import pycolmap
+import pytest
+
+from dav_gswt.errors import InputError
+from dav_gswt.photos.importers import lens_models, nerfstudio, opensfm
+
+W, H = 400, 300
+RNG = np.random.default_rng(11)
+RAYS = np.c_[RNG.uniform(-0.6, 0.6, (200, 2)), np.ones(200)] * RNG.uniform(0.5, 3, (200, 1))
+
+
+def brown(rays, fx, fy, cx, cy, k, p):
+    """OpenCV's definition (calib3d, "Detailed Description"); OpenSfM's and nerfstudio's are the same one."""
+    x, y = (rays[:, :2] / rays[:, 2:]).T
+    r2 = x * x + y * y
+    radial = 1 + sum(c * r2 ** (i + 1) for i, c in enumerate(k))
+    u = x * radial + 2 * p[0] * x * y + p[1] * (r2 + 2 * x * x)
+    v = y * radial + p[0] * (r2 + 2 * y * y) + 2 * p[1] * x * y
+    return np.c_[fx * u + cx, fy * v + cy]
+
+
+def bent(rays, fx, fy, cx, cy, k):
+    """A fisheye after OpenCV (calib3d, fisheye) and OpenSfM (FisheyeProjection): by the angle off the axis."""
+    r = np.hypot(rays[:, 0], rays[:, 1])
+    angle = np.arctan2(r, rays[:, 2])
+    out = angle * (1 + sum(c * angle ** (2 * i + 2) for i, c in enumerate(k)))
+    return np.c_[fx * out * rays[:, 0] / r + cx, fy * out * rays[:, 1] / r + cy]
+
+
+K, P = (-0.11, 0.03, 0.004, -0.002), (0.0013, -0.0008)
+ONE, TWO = {"focal": 0.8}, {"focal_x": 0.8, "focal_y": 0.81, "c_x": 0.011, "c_y": -0.007}
+NAMED = {f"k{i + 1}": v for i, v in enumerate(K)} | {"p1": P[0], "p2": P[1]}
+
+
+@pytest.mark.parametrize(
+    "kind, focal, terms, formula",
+    [
+        ("perspective", ONE, 2, lambda *a: brown(*a, K[:2], (0, 0))),
+        ("brown", TWO, 3, lambda *a: brown(*a, K[:3], P)),
+        ("radial", TWO, 2, lambda *a: brown(*a, K[:2], (0, 0))),
+        ("simple_radial", TWO, 1, lambda *a: brown(*a, K[:1], (0, 0))),
+        ("fisheye", ONE, 2, lambda *a: bent(*a, K[:2])),
+        ("fisheye_opencv", TWO, 4, lambda *a: bent(*a, K)),
+    ],
+)
+def test_opensfm_cameras_project_as_its_own_formula_says(kind, focal, terms, formula):
+    used = {
+        k: v for k, v in NAMED.items() if k in [f"k{i + 1}" for i in range(terms)] or kind == "brown" and k[0] == "p"
+    }
+    found = opensfm._lens({"projection_type": kind, "width": W, "height": H} | focal | used, "there")
+    fx = focal.get("focal_x", 0.8) * W
+    fy = focal.get("focal_y", 0.8) * W
+    cx, cy = W / 2 + W * focal.get("c_x", 0), H / 2 + W * focal.get("c_y", 0)  # lengths in longer sides, both
+    assert found.img_from_cam(RAYS) == pytest.approx(formula(RAYS, fx, fy, cx, cy), abs=1e-9)
+
+
+def test_a_portrait_picture_of_opensfm_is_measured_by_its_height():
+    found = opensfm._lens({"projection_type": "perspective", "width": H, "height": W, "focal": 0.8}, "there")
+    assert found.params == pytest.approx(np.array([0.8 * W, 0.8 * W, H / 2, W / 2]))
+
+
+@pytest.mark.parametrize(
+    "said, formula",
+    [
+        ({"camera_model": "OPENCV"}, lambda *a: brown(*a, K[:3], P)),
+        ({"camera_model": "OPENCV_FISHEYE", "p1": 0, "p2": 0, "k4": K[3]}, lambda *a: bent(*a, K)),
+        ({"is_fisheye": True, "p1": 0, "p2": 0, "k4": K[3]}, lambda *a: bent(*a, K)),
+        ({"k1": 0, "k2": 0, "k3": 0, "p1": 0, "p2": 0}, lambda *a: brown(*a, (), (0, 0))),
+    ],
+)
+def test_nerfstudio_cameras_project_as_its_own_formula_says(said, formula):
+    base = {"w": W, "h": H, "fl_x": 320.0, "fl_y": 322.0, "cx": 203.0, "cy": 148.0}
+    base |= {"k1": K[0], "k2": K[1], "k3": K[2], "p1": P[0], "p2": P[1]}
+    wanted = nerfstudio._intrinsics(base | said, {}, "x", lambda name: None, "there")
+    found = nerfstudio._lens(dict(wanted), "there")
+    assert found.img_from_cam(RAYS) == pytest.approx(formula(RAYS, 320.0, 322.0, 203.0, 148.0), abs=1e-9)
+
+
+MODELS = [n for n in pycolmap.CameraModelId.__members__ if n not in ("INVALID", "EQUIRECTANGULAR")]
+
+
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("turns, orientation", [(1, 6), (2, 3), (3, 8)])
+def test_a_turned_lens_sees_turned_rays_at_turned_places(name, turns, orientation):
+    """Every model of COLMAP's: clockwise once, (x, y) is at (height - y, x)."""
+    plain = pycolmap.Camera.create_from_model_name(1, name, 320.0, W, H)
+    params = plain.params.copy()
+    small = RNG.uniform(-0.03, 0.03, len(params))
+    for i in plain.extra_params_idxs():
+        params[i] += small[i] if name not in ("FOV", "EUCM") else abs(small[i])
+    for i in plain.principal_point_idxs():
+        params[i] += 100 * small[i]
+    if len(plain.focal_length_idxs()) == 2:
+        params[plain.focal_length_idxs()[1]] += 4
+    plain.params = params
+    turned, count = lens_models.fitted(plain, (W, H), orientation, "there")
+    at = np.asarray(plain.img_from_cam(RAYS))
+    size = np.array([W, H])
+    for _ in range(turns):
+        at, size = np.c_[size[1] - at[:, 1], at[:, 0]], size[::-1]
+    rays = RAYS @ np.linalg.matrix_power(lens_models.QUARTER, turns).T
+    assert count == turns and (turned.width, turned.height) == tuple(size)
+    assert turned.img_from_cam(np.ascontiguousarray(rays)) == pytest.approx(at, abs=1e-9)
+
+
+def test_a_lens_that_fits_the_upright_photo_alone_is_not_turned():
+    camera = lens_models.perspective(H, W, (320.0, 320.0, H / 2, W / 2))
+    same, turns = lens_models.fitted(camera, (W, H), 6, "there")
+    assert turns == 0 and (same.width, same.height) == (H, W)
+
+
+def test_mirrored_photos_are_refused():
+    with pytest.raises(InputError, match="there: its EXIF orientation mirrors"):
+        lens_models.fitted(lens_models.perspective(W, H, (320.0, 320.0, 200.0, 150.0)), (W, H), 2, "there")
+
+
+@pytest.mark.parametrize(
+    "size, fits",
+    [((400, 300), True), ((200, 150), True), ((133, 100), True), ((4000, 3000), True), ((400, 296), False),
+     ((300, 400), False), ((401, 300), True), ((4000, 2980), False)],
+)  # fmt: skip
+def test_a_scaled_copy_fits_and_another_shape_does_not(size, fits):
+    camera = lens_models.perspective(W, H, (320.0, 320.0, 200.0, 150.0))
+    if fits:
+        found, _ = lens_models.fitted(camera, size, 1, "there")
+        assert found.focal_length_x == pytest.approx(320 * size[0] / W)
+    else:
+        with pytest.raises(InputError, match="there: the photo has"):
+            lens_models.fitted(camera, size, 1, "there")
+
+
+def test_a_wide_fisheye_becomes_a_pinhole_that_sees_nothing_but_the_photo():
+    wide = lens_models.fisheye(W, H, (150.0, 150.0, 200.0, 150.0), (0.01, 0.002))  # 190 degrees across the diagonal
+    small, pinhole = lens_models.pinhole(wide, 200, "there")
+    assert max(pinhole.width, pinhole.height) <= 200 and max(small.width, small.height) == 200
+    corners = np.array([[0, 0], [pinhole.width, 0], [0, pinhole.height], [pinhole.width, pinhole.height]], float)
+    seen = small.img_from_cam(np.c_[pinhole.cam_from_img(corners), np.ones(4)])
+    assert (seen > -1).all() and (seen < np.array([small.width, small.height]) + 1).all()
+
+
+def test_pixels_without_a_ray_have_none():
+    wide = lens_models.fisheye(W, H, (100.0, 100.0, 200.0, 150.0))
+    found = lens_models.rays(wide, np.array([[200.0, 250.0], [0.0, 0.0]]))  # 57 and 143 degrees off the axis
+    assert found[0] == pytest.approx([0.0, np.tan(1.0)]) and np.isnan(found[1]).all()
+
+
+@pytest.mark.parametrize(
+    "k, p",
+    [((-3.0, 5.0), (1.0, 1.0)), ((-1.2,), ()), ((1e30,), ()), ((0.0, -40.0), ())],
+    ids=["wild", "k1", "huge", "k2"],
+)
+def test_a_distortion_that_folds_over_is_refused(k, p):
+    camera = lens_models.perspective(W, H, (200.0, 200.0, 200.0, 150.0), k, p)
+    with pytest.raises(InputError, match="there: the distortion of its camera cannot be undone"):
+        lens_models.pinhole(camera, W, "there")
+
+
+@pytest.mark.parametrize(
+    "model, width, height, params",
+    [
+        ("PINHOLE", W, H, (0.0, 320.0, 200.0, 150.0)),
+        ("PINHOLE", W, H, (-320.0, 320.0, 200.0, 150.0)),
+        ("PINHOLE", W, H, (320.0, 320.0, np.nan, 150.0)),
+        ("PINHOLE", W, H, (1e300, 320.0, 200.0, 150.0)),
+        ("PINHOLE", W, H, (320.0, 200.0, 150.0)),
+        ("PINHOLE", 0, H, (320.0, 320.0, 200.0, 150.0)),
+        ("PINHOLE", 10**18, 10**18, (320.0, 320.0, 200.0, 150.0)),
+        ("EQUIRECTANGULAR", W, H, (400.0, 300.0)),
+        ("BANANA", W, H, (320.0, 320.0, 200.0, 150.0)),
+    ],
+)
+def test_numbers_that_no_lens_has_are_refused(model, width, height, params):
+    with pytest.raises(InputError, match="^there: "):
+        lens_models.lens(model, width, height, params, "there")

@@ -1,0 +1,381 @@
+"""Camera models of other programs: one made-up scene in three formats, the same cameras, pictures and points."""
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+import pycolmap
+import pytest
+from fixtures import photos as made_up
+from scipy.ndimage import map_coordinates
+from scipy.spatial.transform import Rotation
+
+from dav_gswt.errors import InputError
+from dav_gswt.images import image_files
+from dav_gswt.photos import importers, model, photo_set
+from dav_gswt.photos.importers import points, undistortion
+from dav_gswt.photos.importers.undistortion import Placed
+from dav_gswt.photos.sfm import registration
+
+HALF = 1.0  # of the made-up ground
+WIDTH, HEIGHT = 320, 240
+# fx, fy, cx, cy, k1, k2, p1, p2
+NUMBERS = (300.0, 302.0, 163.2, 117.4, -0.08, 0.02, 0.001, -0.0007)
+OPTIONS = registration.Options(size=320, features=1024, side=320)
+MOVE = np.array([[1.0, 0, 0, 0.3], [0, 0, 1, -0.2], [0, -1, 0, 0.5]])  # what nerfstudio does to a world, and a shift
+WORLD = Rotation.from_rotvec([0.3, -0.2, 0.4]).as_matrix()  # so that no axis of the scene is an axis of the file
+
+
+@dataclass(frozen=True)
+class Scene:
+    names: tuple[str, ...]
+    rotations: np.ndarray
+    translations: np.ndarray
+    points: np.ndarray
+
+
+def made_scene() -> Scene:
+    """Eight cameras in two lines at two heights, and points of the ground."""
+    flown = made_up.flight(2, 4, step=0.2, tilt=0.2)
+    cameras = [
+        made_up.camera(c.centre * [1, 1, 1 + 0.2 * (i % 2)], [0.6 * c.centre[0], 0.6 * c.centre[1] + 1e-3, 0])
+        for i, c in enumerate(flown)
+    ]
+    rotations = np.array([c.rotation @ WORLD.T for c in cameras])
+    ground = made_up.plain(60, 0.4, np.random.default_rng(7))
+    return Scene(
+        tuple(f"{i:03d}.png" for i in range(8)),
+        rotations,
+        np.array([c.translation for c in cameras]),
+        ground @ WORLD.T,
+    )
+
+
+SCENE = made_scene()
+
+
+def lens(scale: float = 1.0) -> pycolmap.Camera:
+    camera = pycolmap.Camera(model="OPENCV", width=WIDTH, height=HEIGHT, params=NUMBERS)
+    if scale != 1:
+        camera.rescale(scale)
+    return camera
+
+
+def photograph(camera: pycolmap.Camera, rotation, translation, ground: np.ndarray) -> np.ndarray:
+    """What a distorted camera sees of a picture laid on the plane z = 0 before the world was turned."""
+    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
+    rays = np.c_[camera.cam_from_img(np.stack([x, y], -1).reshape(-1, 2)), np.ones(x.size)]
+    turn = rotation @ WORLD
+    origin, step = -turn.T @ translation, rays @ turn
+    at = (origin - origin[2] / step[:, 2:] * step)[:, :2]
+    size = len(ground)
+    where = np.array([(HALF - at[:, 1]), (at[:, 0] + HALF)]) / (2 * HALF) * size - 0.5
+    planes = [map_coordinates(ground[..., c], where, order=1, mode="nearest") for c in range(3)]
+    return np.stack(planes, -1).reshape(camera.height, camera.width, 3).astype(np.float32)
+
+
+def shoot(folder, scale: float = 1.0, names=SCENE.names) -> None:
+    """Photos of the scene."""
+    ground, camera = made_up.texture(np.random.default_rng(4)), lens(scale)
+    folder.mkdir(parents=True, exist_ok=True)
+    for i, name in enumerate(names):
+        (folder / name).parent.mkdir(exist_ok=True, parents=True)
+        image_files.write(folder / name, photograph(camera, SCENE.rotations[i], SCENE.translations[i], ground))
+
+
+def alike(picture: np.ndarray, wanted: np.ndarray) -> bool:
+    """Whether two pictures differ much less than one does from itself a pixel aside (one was sampled twice)."""
+    shifts = [np.abs(np.roll(wanted, 1, axis) - wanted)[4:-4, 4:-4].mean() for axis in (0, 1)]
+    return np.abs(picture - wanted)[4:-4, 4:-4].mean() < 0.35 * min(shifts)
+
+
+def quaternion(rotation) -> np.ndarray:
+    return np.roll(Rotation.from_matrix(rotation).as_quat(), 1)
+
+
+def observations(camera: pycolmap.Camera) -> list[np.ndarray]:
+    """Of every image the pixels at which it sees the scene's points."""
+    return [
+        np.asarray(camera.img_from_cam(SCENE.points @ r.T + t))
+        for r, t in zip(SCENE.rotations, SCENE.translations, strict=True)
+    ]
+
+
+def write_colmap(folder, names=SCENE.names, sees: bool = False) -> None:
+    """A text model; sees: with points and observations, else without points."""
+    folder.mkdir(parents=True)
+    camera = lens()
+    (folder / "cameras.txt").write_text(
+        f"# Camera list\n3 OPENCV {WIDTH} {HEIGHT} {' '.join(map(repr, NUMBERS))}\n", encoding="utf-8"
+    )
+    lines = ["# Image list"]
+    for i, (name, at) in enumerate(zip(names, observations(camera), strict=True)):
+        pose = [*quaternion(SCENE.rotations[i]), *SCENE.translations[i]]
+        lines.append(f"{10 * i + 5} {' '.join(repr(float(v)) for v in pose)} 3 {name}")
+        seen = [f"{x!r} {y!r} {100 + 3 * k}" for k, (x, y) in enumerate(at.tolist())]
+        lines.append(" ".join(["1.5 2.5 -1", *seen]) if sees else "")
+    (folder / "images.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    if sees:
+        rows = [f"{100 + 3 * k} {x!r} {y!r} {z!r} 51 102 204 0.1" for k, (x, y, z) in enumerate(SCENE.points.tolist())]
+        (folder / "points3D.txt").write_text("\n".join(reversed(rows)) + "\n", encoding="utf-8")
+
+
+def transforms(names=SCENE.names, move=MOVE) -> dict:
+    """What nerfstudio would write."""
+    fx, fy, cx, cy, k1, k2, p1, p2 = NUMBERS
+    frames = []
+    for i, name in enumerate(names):
+        pose = np.eye(4)
+        pose[:3, :3] = SCENE.rotations[i].T * [1, -1, -1]
+        pose[:3, 3] = -SCENE.rotations[i].T @ SCENE.translations[i]
+        frames.append({"file_path": f"./{name}", "transform_matrix": (np.r_[move, [[0, 0, 0, 1]]] @ pose).tolist()})
+    out = {"camera_model": "OPENCV", "fl_x": fx, "fl_y": fy, "cx": cx, "cy": cy, "w": WIDTH, "h": HEIGHT}
+    return out | {"k1": k1, "k2": k2, "p1": p1, "p2": p2, "applied_transform": move.tolist(), "frames": frames}
+
+
+def reconstruction(names=SCENE.names) -> list:
+    """What OpenSfM would write."""
+    fx, fy, cx, cy, k1, k2, p1, p2 = NUMBERS
+    side = max(WIDTH, HEIGHT)
+    camera = {"projection_type": "brown", "width": WIDTH, "height": HEIGHT, "focal_x": fx / side, "focal_y": fy / side}
+    camera |= {"c_x": (cx - WIDTH / 2) / side, "c_y": (cy - HEIGHT / 2) / side}
+    camera |= {"k1": k1, "k2": k2, "k3": 0.0, "p1": p1, "p2": p2}
+    shots = {
+        name: {
+            "rotation": Rotation.from_matrix(SCENE.rotations[i]).as_rotvec().tolist(),
+            "translation": SCENE.translations[i].tolist(),
+            "camera": "v2 brown",
+        }
+        for i, name in enumerate(names)
+    }
+    places = {str(k): {"coordinates": p, "color": [51, 102, 204]} for k, p in enumerate(SCENE.points.tolist())}
+    return [{"cameras": {"v2 brown": camera}, "shots": shots, "points": places}]
+
+
+def write_json(path, values):
+    path.write_text(json.dumps(values), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def photos(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("photos")
+    shoot(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def three(photos, tmp_path_factory):
+    """The scene read from each of the three formats."""
+    folder = tmp_path_factory.mktemp("models")
+    write_colmap(folder / "colmap")
+    sources = {
+        "colmap": folder / "colmap",
+        "nerfstudio": write_json(folder / "transforms.json", transforms()),
+        "opensfm": write_json(folder / "reconstruction.json", reconstruction()),
+    }
+    return {kind: importers.read(path, photos, OPTIONS) for kind, path in sources.items()}
+
+
+@pytest.mark.parametrize("kind", ["colmap", "nerfstudio", "opensfm"])
+def test_the_cameras_are_those_of_the_scene(three, kind):
+    found = three[kind]
+    assert found.model.names == SCENE.names and not found.left_out
+    for i, camera in enumerate(found.model.cameras):
+        assert camera.rotation == pytest.approx(SCENE.rotations[i], abs=1e-9)
+        assert camera.translation == pytest.approx(SCENE.translations[i], abs=1e-9)
+    assert found.lenses[0].params == pytest.approx(np.array(NUMBERS), abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["nerfstudio", "opensfm"])
+def test_all_formats_give_the_same_pictures_and_points(three, kind):
+    one, two = three["colmap"], three[kind]
+    for i in (0, 5):
+        a, b = one.model.cameras[i], two.model.cameras[i]
+        assert [a.fx, a.fy, a.cx, a.cy, a.width, a.height] == pytest.approx([b.fx, b.fy, b.cx, b.cy, b.width, b.height])
+        assert registration.undistorted(one, i) == pytest.approx(registration.undistorted(two, i), abs=1e-5)
+    n = len(one.model.points)
+    assert two.model.points[:n] == pytest.approx(one.model.points, abs=1e-5)
+
+
+def test_points_found_under_the_given_cameras_lie_on_the_ground(three):
+    found = three["nerfstudio"]
+    assert len(found.model.points) > 200
+    # Features lie a fifth of a pixel of 1/300 off; over base lines of a fifth of the height that is five times as much.
+    assert np.median(np.abs(found.model.points @ WORLD[:, 2])) < 0.003
+    assert found.error < 0.7 and np.median(model.errors(found.model)) < 0.7
+
+
+def test_an_undistorted_picture_is_that_of_its_pinhole_camera(three):
+    found, ground = three["opensfm"], made_up.texture(np.random.default_rng(4))
+    c = found.model.cameras[2]
+    exact = pycolmap.Camera(model="PINHOLE", width=c.width, height=c.height, params=[c.fx, c.fy, c.cx, c.cy])
+    assert alike(registration.undistorted(found, 2), photograph(exact, c.rotation, c.translation, ground))
+
+
+def test_points_that_nobody_is_known_to_see_follow_the_others(three):
+    n = len(three["colmap"].model.points)
+    assert len(three["opensfm"].model.points) == n + len(SCENE.points)
+    assert three["opensfm"].model.points[n:] == pytest.approx(SCENE.points, abs=1e-12)
+    assert three["opensfm"].model.point_of.max() < n
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_run_repeats_to_the_bit(three, photos, tmp_path, threads):
+    path = write_json(tmp_path / "t.json", transforms())
+    again = importers.read(path, photos, replace(OPTIONS, threads=threads))
+    for name in ("points", "colours", "point_of", "image_of", "pixels"):
+        assert np.array_equal(getattr(again.model, name), getattr(three["nerfstudio"].model, name)), name
+
+
+@pytest.mark.parametrize("binary", [False, True], ids=["text", "binary"])
+def test_observations_of_a_colmap_model_are_its_own(photos, tmp_path, binary):
+    write_colmap(tmp_path / "sparse" / "0", sees=True)
+    if binary:
+        stored = pycolmap.Reconstruction(str(tmp_path / "sparse" / "0"))
+        (tmp_path / "b").mkdir()
+        stored.write_binary(str(tmp_path / "b"))
+    found = importers.read(tmp_path / "b" if binary else tmp_path, photos, OPTIONS)
+    assert found.model.points == pytest.approx(SCENE.points, abs=1e-12)
+    assert found.model.colours == pytest.approx(np.tile([0.2, 0.4, 0.8], (60, 1)), abs=1e-6)
+    assert found.error < 1e-6 and model.errors(found.model).max() < 1e-4
+    assert len(found.model.pixels) > 0.7 * 60 * 8
+
+
+def test_photos_may_be_smaller_than_the_models_and_pictures_smaller_still(tmp_path):
+    shoot(tmp_path / "half", 0.5)
+    write_colmap(tmp_path / "m", sees=True)
+    found = importers.read(tmp_path / "m", tmp_path / "half", replace(OPTIONS, side=100))
+    assert max(found.lenses[0].width, found.lenses[0].height) == 100
+    assert max(found.model.cameras[0].width, found.model.cameras[0].height) <= 100
+    assert model.errors(found.model).max() < 1e-4
+    assert registration.undistorted(found, 0).shape == (found.model.cameras[0].height, found.model.cameras[0].width, 3)
+
+
+def test_photos_of_another_shape_are_refused_by_name(tmp_path, photos):
+    for path in photos.iterdir():
+        image_files.write(tmp_path / "cut" / path.name, image_files.read(path)[:200])
+    write_colmap(tmp_path / "m", sees=True)
+    with pytest.raises(InputError, match=r"000.png: the photo has 320 x 200 pixels, .* 320 x 240"):
+        importers.read(tmp_path / "m", tmp_path / "cut", OPTIONS)
+
+
+def test_photos_and_images_without_each_other_are_left_out_with_the_reason(tmp_path):
+    shoot(tmp_path / "photos")
+    (tmp_path / "photos" / "001.png").unlink()
+    (tmp_path / "photos" / "007.png").rename(tmp_path / "photos" / "other.png")
+    (tmp_path / "photos" / "thumbs").mkdir()  # has nothing of the model: not worth telling
+    image_files.write(tmp_path / "photos" / "thumbs" / "x.png", np.zeros((4, 4, 3)))
+    write_colmap(tmp_path / "m", sees=True)
+    found = importers.read(tmp_path / "m", tmp_path / "photos", OPTIONS)
+    assert found.model.names == tuple(n for n in SCENE.names if n not in ("001.png", "007.png"))
+    reasons = dict(found.left_out)
+    assert set(reasons) == {"001.png", "007.png", "other.png"}
+    assert "no photo" in reasons["001.png"] and "no camera" in reasons["other.png"]
+    for i, camera in enumerate(found.model.cameras):
+        at = SCENE.names.index(found.model.names[i])
+        assert camera.translation == pytest.approx(SCENE.translations[at], abs=1e-9)
+
+
+def test_names_are_found_by_path_then_file_name_then_stem(tmp_path):
+    files = ["a/1.jpg", "b/1.jpg", "b/2.png", "c/3.v2.jpg"]
+    for name in files:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        image_files.write(tmp_path / name, np.zeros((4, 4, 3)))
+    found = undistortion.Folder(tmp_path)
+    assert [found.find(n) for n in ("a/1.jpg", "b/1", "x/2.png", "2.JPG", "3.v2")] == [
+        *("a/1.jpg", "b/1.jpg", "b/2.png", "b/2.png", "c/3.v2.jpg")
+    ]
+    assert found.find("1.jpg") is None and found.find("3") is None  # of two photos, of none
+
+
+def test_photos_of_equal_names_in_two_folders_become_pictures_of_two_names(tmp_path):
+    names = [f"{'ab'[i % 2]}/{i // 2}.png" for i in range(8)]
+    shoot(tmp_path / "photos", names=names)
+    write_colmap(tmp_path / "m", names, sees=True)
+    found = importers.read(tmp_path / "m", tmp_path / "photos", OPTIONS)
+    assert sorted(found.model.names) == sorted(f"{n.replace('/', '_').replace('.', '_')}.png" for n in names)
+    assert [s.relative_to(tmp_path / "photos").as_posix() for s in found.sources] == sorted(names)
+
+
+def test_one_photo_of_two_images_is_refused(tmp_path, photos):
+    values = transforms()
+    values["frames"][1]["file_path"] = "elsewhere/000.jpg"
+    with pytest.raises(InputError, match=r"are one photo: 000.png"):
+        importers.read(write_json(tmp_path / "t.json", values), photos, OPTIONS)
+
+
+def test_fewer_than_three_photos_are_too_few(tmp_path):
+    shoot(tmp_path / "photos", names=SCENE.names[:2])
+    write_colmap(tmp_path / "m")
+    with pytest.raises(InputError, match="2 of its 8 images have a photo"):
+        importers.read(tmp_path / "m", tmp_path / "photos", OPTIONS)
+
+
+@pytest.mark.parametrize("orientation", [3, 6, 8])
+def test_a_turned_photo_is_turned_back_with_its_camera(tmp_path, orientation):
+    """Programs that make models read the stored picture; we read the upright one. What is seen where stays."""
+    shoot(tmp_path / "plain")
+    for path in sorted((tmp_path / "plain").iterdir()):
+        spec = oiio.ImageSpec(WIDTH, HEIGHT, 3, oiio.UINT8)
+        spec["Orientation"] = orientation
+        (tmp_path / "tagged").mkdir(exist_ok=True)
+        file = oiio.ImageOutput.create("x.tif")
+        assert file.open(str(tmp_path / "tagged" / f"{path.stem}.tif"), spec)
+        file.write_image(np.rint(image_files.read(path) * 255).astype(np.uint8))
+        file.close()
+    write_colmap(tmp_path / "m", [f"{n[:3]}.tif" for n in SCENE.names], sees=True)
+    found = importers.read(tmp_path / "m", tmp_path / "tagged", OPTIONS)
+    upright = image_files.size(tmp_path / "tagged" / "000.tif")
+    assert (found.lenses[0].width, found.lenses[0].height) == upright
+    assert model.errors(found.model).max() < 1e-4
+    ground, c = made_up.texture(np.random.default_rng(4)), found.model.cameras[0]
+    exact = pycolmap.Camera(model="PINHOLE", width=c.width, height=c.height, params=[c.fx, c.fy, c.cx, c.cy])
+    assert alike(registration.undistorted(found, 0), photograph(exact, c.rotation, c.translation, ground))
+
+
+def test_a_world_of_large_coordinates_keeps_its_points_sharp(three, photos, tmp_path):
+    far = np.array([5.1e6, 4.2e5, 300.0])
+    values = reconstruction()
+    for i, shot in enumerate(values[0]["shots"].values()):
+        shot["translation"] = (SCENE.translations[i] - SCENE.rotations[i] @ far).tolist()
+    del values[0]["points"]
+    found = importers.read(write_json(tmp_path / "r.json", values), photos, OPTIONS)
+    near = three["colmap"].model
+    assert abs(len(found.model.points) - len(near.points)) <= 0.01 * len(near.points)
+    assert np.median(np.abs((found.model.points - far) @ WORLD[:, 2])) < 0.003
+
+
+def test_many_photos_are_matched_with_those_near_them_only():
+    def place(x, turned):
+        turn = np.diag([1.0, -1, -1]) if turned else np.eye(3)
+        return Placed(Path(), "", 0, lens(), 0, turn, -turn @ [x, 0.0, 0.0])
+
+    line = [place(float(i), False) for i in range(61)]
+    pairs = points.near_pairs(line)
+    assert all(i < j for i, j in pairs) and len(set(pairs)) == len(pairs)
+    assert {j for i, j in pairs if i == 30} | {i for i, j in pairs if j == 30} >= set(range(20, 41)) - {30}
+    assert max(j - i for i, j in pairs) <= points.NEAREST
+    assert len(points.near_pairs(line[:60])) == 60 * 59 // 2
+    opposed = [place(float(i), i % 2 == 1) for i in range(61)]
+    assert all((j - i) % 2 == 0 for i, j in points.near_pairs(opposed))
+
+
+def test_the_stage_goes_on_from_a_given_model(photos, tmp_path):
+    write_colmap(tmp_path / "m", sees=False)
+    facts = photo_set.from_photos(photos, tmp_path / "out", OPTIONS, tmp_path / "m")
+    assert facts["registered"] == 8 and facts["relief"] < 0.02
+    stored = model.read(tmp_path / "out" / "sparse")
+    assert len(stored.points) == facts["points"]
+    assert np.median([c.centre[2] for c in stored.cameras]) == pytest.approx(1, abs=1e-9)
+
+
+def test_loose_points_are_stored_with_the_others(photos, tmp_path):
+    path = write_json(tmp_path / "r.json", reconstruction())
+    facts = photo_set.from_photos(photos, tmp_path / "out", OPTIONS, path)
+    stored = model.read(tmp_path / "out" / "sparse")
+    assert len(stored.points) == facts["points"] and np.isfinite(stored.points).all()
+    places, colours = model.points_seen_by(stored, stored.names)
+    assert 100 < len(places) < len(stored.points)

@@ -1,0 +1,167 @@
+"""What pictures of synthetic scenes show: depth and labels, against positions that are known and the pictures."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from dav_gswt.errors import InputError
+from dav_gswt.geometry.cameras import pinhole
+from dav_gswt.images import image_files
+from dav_gswt.photos.synthetic import camera_layouts, desert, renderer, truth
+from dav_gswt.photos.synthetic import scene as synthetic
+from dav_gswt.photos.synthetic.land import Land, Light
+from dav_gswt.photos.synthetic.meshes import Mesh
+
+pytest.importorskip("mitsuba")
+RED, GREEN, BLUE, GREY = np.eye(3).tolist() + [[0.5, 0.5, 0.5]]
+BESIDE = pinhole((0.0, -6.0, 3.0), (0.0, 0.0, 0.4), 90, 60, 60.0)
+
+
+def box(size, colour, at=(0.0, 0.0, 0.0)):
+    """A cube on the ground, a face's corners its own."""
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
+    faces, corners = [], []
+    for axis in range(3):
+        for side in (0.0, 1.0):
+            quad = np.insert(square, axis, side, axis=1)
+            faces += [np.array([0, 1, 2]) + 4 * len(corners), np.array([0, 2, 3]) + 4 * len(corners)]
+            corners.append(quad)
+    vertices = (np.concatenate(corners) - [0.5, 0.5, 0.0]) * size + at
+    colours = np.tile(np.array(colour, np.float32), (len(vertices), 1))
+    return Mesh(vertices.astype(np.float32), np.array(faces), colours, False)
+
+
+@pytest.fixture
+def simple(monkeypatch):
+    """Flat ground at z = 0; a stone, a cube of 1 at x = -1; a plant, a cube of 0.8 at x = 1. All in plain colours."""
+
+    def grow(options, seed, exemplar):
+        edge = 40.0
+        corners = np.array([[-edge, -edge, 0], [edge, -edge, 0], [edge, edge, 0], [-edge, edge, 0]], np.float32)
+        ground = Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]]), np.tile(np.float32(RED), (4, 1)), False)
+        albedo = np.tile(np.float32(RED), (2, 2, 1))
+        light = Light(60.0, 30.0, np.ones(3), np.ones(3), np.ones(3), np.ones(3))
+        places = np.array([[0, 1.0, 0.0, 0.0, 0.8, 0.0, 0.0, 0.0]])
+        return Land(ground, albedo, 4.0, box(1.0, GREEN, (-1.0, 0.0, 0.0)), [box(1.0, BLUE)], places, light)
+
+    family = SimpleNamespace(grow=grow, options=desert.options)
+    monkeypatch.setitem(synthetic.FAMILIES, "simple", family)
+    synthetic._world.cache_clear(), synthetic._alone.cache_clear()
+    yield synthetic.make("simple", 0)
+    synthetic._world.cache_clear(), synthetic._alone.cache_clear()
+
+
+@pytest.fixture
+def sand(monkeypatch):
+    monkeypatch.setattr(desert, "TEXELS", 256)
+    yield synthetic.make("desert", 0, tufts=60, stones=40)
+    synthetic._world.cache_clear(), synthetic._alone.cache_clear()
+
+
+def expected(camera):
+    """Depth and label by hand: the nearest of the plane z = 0 and the two boxes along every pixel's ray."""
+    origin, step = camera.rays()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = -origin[..., 2] / step[..., 2]
+        depth = np.where((t > 0) & (np.abs(origin + t[..., None] * step)[..., :2].max(-1) < 40), t, np.inf)
+        label = np.where(np.isfinite(depth), truth.GROUND, truth.SKY)
+        for middle, side, kind in ((-1.0, 1.0, truth.STONE), (1.0, 0.8, truth.PLANT)):
+            low = np.array([middle - side / 2, -side / 2, 0.0])
+            enter, leave = (low - origin) / step, (low + side - origin) / step
+            near, far = np.minimum(enter, leave).max(-1), np.maximum(enter, leave).min(-1)
+            hit = (near < far) & (near > 0) & (near < depth)
+            depth, label = np.where(hit, near, depth), np.where(hit, kind, label)
+    return depth, label
+
+
+def test_depth_and_label_are_what_a_ray_through_the_pixel_s_centre_meets(simple):
+    for camera in (BESIDE, replace(BESIDE, cx=30.0, cy=41.0)):
+        depth, label = truth.seen(simple, camera)
+        by_hand, kinds = expected(camera)
+        assert set(np.unique(kinds)) == {0, 1, 2, 3}
+        assert (label == kinds).mean() > 0.999  # a ray along an edge may meet either side of it
+        same = label == kinds
+        assert (np.isinf(depth) == (label == truth.SKY)).all()
+        seen = same & np.isfinite(by_hand)
+        assert depth[seen] == pytest.approx(by_hand[seen], rel=1e-5)  # float32
+
+
+def test_labels_are_where_the_picture_has_the_things_colours(simple):
+    _, label = truth.seen(simple, BESIDE)
+    picture = synthetic.render(simple, BESIDE, 16)
+    inner = np.ones(label.shape, bool)  # away from edges, where a pixel has several colours
+    for axis in (0, 1):
+        for way in (-1, 1):
+            inner &= np.roll(label, way, axis) == label
+    inner[[0, -1]] = inner[:, [0, -1]] = False
+    for kind, channel in ((truth.GROUND, 0), (truth.STONE, 1), (truth.PLANT, 2)):
+        own = inner & (label == kind)
+        # in shade, lit by what stands around alone, a pixel is dark, but still of its own colour
+        assert own.sum() > 20 and (picture[own].argmax(-1) == channel).mean() > 0.99
+
+
+def test_depth_is_that_of_the_picture_s_own_pass(sand):
+    camera = camera_layouts.orbit(70, 0, 7.0, (0, 0, 0), 64, 64, 55.0)
+    depth, label = truth.seen(sand, camera)
+    assert (depth == synthetic.render_depth(sand, camera)).mean() > 0.999  # but where a ray slipped through
+    assert {truth.GROUND, truth.STONE, truth.PLANT} <= set(np.unique(label))
+
+
+def test_no_ray_slips_through_the_ground(sand):
+    cameras = [camera_layouts.orbit(65, azimuth, 7.0, (0, 0, 0), 128, 128, 45.0) for azimuth in range(0, 360, 30)]
+    slipped = sum(np.isinf(synthetic.render_depth(sand, camera)).sum() for camera in cameras)
+    assert slipped < 20  # of 200000
+    assert not any(np.isinf(truth.seen(sand, camera)[0]).any() for camera in cameras)
+
+
+def test_strewn_rocks_are_stones_where_the_family_has_no_plants(simple, monkeypatch):
+    monkeypatch.setattr(truth, "ROCKY", ("simple",))
+    _, label = truth.seen(simple, BESIDE)
+    assert set(np.unique(label)) == {truth.SKY, truth.GROUND, truth.STONE}
+
+
+def test_a_scene_of_bare_ground_is_ground_and_sky(monkeypatch):
+    monkeypatch.setattr(desert, "TEXELS", 256)
+    scene = synthetic.make("desert", 0, stones=0, pebbles=0, shrubs=0, tufts=0)
+    walker = camera_layouts.walker(1.6, 0.0, 4.6, (0, 0, 0), 40, 30, 60.0)
+    depth, label = truth.seen(scene, walker)
+    assert set(np.unique(label)) == {truth.SKY, truth.GROUND}
+    assert (label[:5] == truth.SKY).all() and (label[-5:] == truth.GROUND).all()
+
+
+def test_a_file_keeps_depth_label_camera_and_what_labels_mean(simple, tmp_path):
+    truth.write(tmp_path / "view_00.exr", simple, BESIDE)
+    depth, label, camera = truth.read(tmp_path / "view_00.exr")
+    want = truth.seen(simple, BESIDE)
+    assert (depth == want[0]).all() and (label == want[1]).all()
+    assert (camera.rotation == BESIDE.rotation).all() and camera.fx == BESIDE.fx and camera.width == 90
+    channels, header = image_files.read_exr(tmp_path / "view_00.exr")
+    assert set(channels) == {"Z", "label"}
+    assert header["labels"] == '{"sky": 0, "ground": 1, "stone": 2, "plant": 3}'
+
+
+def test_a_file_of_another_kind_is_refused(tmp_path):
+    image_files.write_exr(tmp_path / "other.exr", {"Z": np.zeros((2, 2))})
+    with pytest.raises(InputError, match="no depth, labels and camera"):
+        truth.read(tmp_path / "other.exr")
+
+
+@pytest.mark.parametrize("kind", ["standing", "turned", "leaning"])
+def test_merged_plants_stand_where_instances_do(kind):
+    """The two ways to place a plant, for the variants that need one mesh of all."""
+    renderer.use()
+    from dav_gswt.photos.synthetic import world
+
+    stand = {
+        "standing": [1.0, 2.0, 0.5, 0.7, 0.0, 0.0, 0.0],
+        "turned": [1.0, 2.0, 0.5, 0.7, 1.1, 0.0, 0.0],
+        "leaning": [1.0, 2.0, 0.5, 0.7, 1.1, 0.2, -0.3],
+    }[kind]
+    plant = box(1.0, BLUE, (0.3, 0.1, 0.0))
+    matrix = np.array(world._standing(*stand).matrix)
+    by_matrix = plant.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    both = world.placed(plant, np.array([stand, stand]))
+    assert both[: len(by_matrix)] == pytest.approx(by_matrix, abs=1e-6)
+    assert (both[len(by_matrix) :] == both[: len(by_matrix)]).all()

@@ -1,0 +1,108 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dav_gswt.geometry import cameras
+from dav_gswt.photos import training_views
+from dav_gswt.reconstruction import ground
+from dav_gswt.reconstruction.fitting import exposure
+from dav_gswt.reconstruction.fitting.photo_colours import median_colours
+
+FRAME = {
+    "exemplar": {"west": 0.0, "south": 0.0, "side": 4.0},
+    "extent": {"west": 0.0, "south": 0.0, "east": 4.0, "north": 4.0},
+}
+
+
+@pytest.fixture
+def grid():
+    return ground.lay(FRAME, np.zeros((0, 3)), spacing=0.1, cap=10**6, block=8, margin=0.0)
+
+
+def photo(colour, name="photo", eye=(2.0, 2, 6)):
+    camera = cameras.pinhole(eye, [eye[0], eye[1], 0], 40, 40, 60.0)
+    image = np.broadcast_to(np.asarray(colour, np.float32), (40, 40, 3)).copy()
+    return training_views.View(name, camera, image, np.ones((40, 40), np.float32))
+
+
+def test_the_median_ignores_one_photo_that_differs(grid):
+    three = [photo([0.2, 0.3, 0.4]), photo([0.2, 0.3, 0.4]), photo([0.9, 0.9, 0.9])]
+    colours, known = median_colours(grid.centres, three)
+    assert known.any()
+    np.testing.assert_allclose(colours[known], np.tile([0.2, 0.3, 0.4], (known.sum(), 1)), atol=1e-6)
+    assert np.isnan(colours[~known]).all()
+
+
+def test_the_median_of_two_photos_is_their_mean(grid):
+    colours, known = median_colours(grid.centres, [photo([0.2, 0.2, 0.2]), photo([0.4, 0.4, 0.4])])
+    np.testing.assert_allclose(colours[known], 0.3, atol=1e-6)
+
+
+def test_exposures_are_levelled_without_drift(grid):
+    rng = np.random.default_rng(0)
+    texture = rng.uniform(0.2, 0.7, (40, 40, 3)).astype(np.float32)
+    gains = [0.8, 1.0, 1.0, 1.25]
+    photos = [replace(photo([0, 0, 0], str(g)), image=(texture * g).astype(np.float32)) for g in gains]
+    levelled = exposure.levelled(photos, grid.centres)
+    for view in levelled:
+        np.testing.assert_allclose(view.image.mean((0, 1)), texture.mean((0, 1)), rtol=0.02)
+
+
+def test_a_pictures_exposure_is_found_beside_what_moves():
+    rng = np.random.default_rng(1)
+    picture = rng.uniform(0.2, 0.8, (40, 40, 3)).astype(np.float32)
+    image = (1.1 * picture - 0.03).astype(np.float32)
+    image[:6] = 1.0  # something else
+    none = np.ones(3, np.float32), np.zeros(3, np.float32)
+    a, b = exposure.towards(picture, replace(photo([0, 0, 0]), image=image), none)
+    # the prior's share: 1e-3 against the variance of the picture, 0.03
+    np.testing.assert_allclose(a, 1.1, atol=0.01)
+    np.testing.assert_allclose(b, -0.03, atol=0.01)
+
+
+def test_pixels_without_weight_and_flat_pictures_give_no_gain():
+    none = np.ones(3, np.float32), np.zeros(3, np.float32)
+    picture = np.full((40, 40, 3), 0.4, np.float32)
+    a, b = exposure.towards(picture, photo([0.5, 0.5, 0.5]), none)
+    np.testing.assert_allclose(a, 1, atol=1e-6)
+    np.testing.assert_allclose(b, 0.1, atol=1e-6)
+    blind = replace(photo([0.5, 0.5, 0.5]), weight=np.zeros((40, 40), np.float32))
+    assert exposure.towards(picture, blind, none) is none
+
+
+def test_the_level_of_the_typical_photo_is_taken_out():
+    rng = np.random.default_rng(2)
+    picture = rng.uniform(0.2, 0.8, (40, 40, 3)).astype(np.float32)
+    levels = exposure.Levels(3)
+    np.testing.assert_array_equal(levels.of(2), (np.ones(3), np.zeros(3)))
+    for _ in range(20):
+        for index, gain in enumerate([0.9, 1.0, 1.1]):  # of a field that is too dark
+            image = (gain * (picture / 0.95 + 0.02)).astype(np.float32)
+            levels.look(index, picture, replace(photo([0, 0, 0]), image=image))
+    used = np.array([levels.of(i) for i in range(3)])
+    np.testing.assert_allclose(used[1], np.repeat([[1.0], [0.0]], 3, 1), atol=0.01)
+    np.testing.assert_allclose(used[:, 0], np.repeat([[0.9], [1.0], [1.1]], 3, 1), atol=0.02)
+
+
+@pytest.mark.parametrize("count", [4, 48, 200])
+def test_colours_do_not_swing_however_many_photos_there_are(count):
+    """A field that is brightened or darkened by .004 a step, as its photos ask for; they differ by 2 %.
+
+    A median that follows the field as fast as the field follows it is late by half a turn of all photos: of 200 the
+    brightness then swings by .5.
+    """
+    rng = np.random.default_rng(3)
+    texture = rng.uniform(0.2, 0.8, (40, 40, 3)).astype(np.float32)
+    levels, bright, momentum, away = exposure.Levels(count), 0.0, 0.0, []
+    for step in range(1200):
+        if step % count == 0:
+            turn = rng.permutation(count)
+        picture, taken = texture + np.float32(bright), texture * np.float32(rng.normal(1, 0.02))
+        index = int(turn[step % count])
+        levels.look(index, picture, replace(photo([0, 0, 0]), image=taken))
+        a, b = levels.of(index)
+        momentum = 0.9 * momentum + 0.1 * float((picture * a + b - taken).mean())
+        bright -= 0.004 * np.clip(momentum / 1e-3, -1, 1)
+        away.append(abs(bright))
+    assert max(away) < 0.08 and np.mean(away[-200:]) < 0.03

@@ -1,0 +1,148 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fixtures import ground as made
+
+from dav_gswt.geometry import cameras
+from dav_gswt.photos import training_views as views
+from dav_gswt.reconstruction import objects, plane_sweep
+from dav_gswt.reconstruction.ground import Ground
+
+SIDE, TALL = 3.2, 0.5
+BOX = (1.2, 2.0)  # from, to, in x and y
+
+
+def texture(x, y, seed):
+    """A smooth random look of a plane."""
+    rng = np.random.default_rng(seed)
+    out = np.zeros((*np.shape(x), 3))
+    for _ in range(24):
+        k, phase, colour = rng.uniform(-14, 14, 2), rng.uniform(0, 7), rng.uniform(-0.12, 0.12, 3)
+        out += np.sin(k[0] * x + k[1] * y + phase)[..., None] * colour
+    return np.clip(0.5 + out, 0, 1)
+
+
+def photo(eye, size=96):
+    """A table of height TALL over textured ground, as rays see it from above."""
+    camera = cameras.pinhole(eye, [1.6, 1.6, 0.0], size, size, 50.0)
+    origin, step = camera.rays()
+
+    def at(z):
+        t = (z - origin[..., 2]) / step[..., 2]
+        return origin[..., 0] + t * step[..., 0], origin[..., 1] + t * step[..., 1]
+
+    x, y = at(TALL)
+    top = (x > BOX[0]) & (x < BOX[1]) & (y > BOX[0]) & (y < BOX[1])
+    image = np.where(top[..., None], texture(x, y, 1), texture(*at(0.0), 2)).astype(np.float32)
+    return views.View(str(eye), camera, image, np.ones((size, size), np.float32))
+
+
+@pytest.fixture(scope="module")
+def photos():
+    return [photo([1.6 + dx, 1.6 + dy, 4.0]) for dx, dy in [(0, 0), (0.9, 0), (-0.9, 0), (0, 0.9), (0, -0.9)]]
+
+
+@pytest.fixture(scope="module")
+def found(photos) -> plane_sweep.Relief:
+    return plane_sweep.sweep(made.grid(0.05), photos, flying_height=4.0, pixel=0.04)
+
+
+def inner(grid: Ground, low: float, high: float):
+    x, y = (grid.centres[:, k].reshape(grid.shape) for k in (0, 1))
+    return (x > low) & (x < high) & (y > low) & (y < high)
+
+
+def test_what_stands_is_found_where_it_stands_and_as_high_as_it_is(found):
+    top = inner(found.grid, BOX[0] + 0.1, BOX[1] - 0.1)
+    assert found.stands[top].mean() > 0.95
+    # a step of the sweep: half of it by the parabola, as much again by the window
+    assert np.median(np.abs(found.above[top] - TALL)) < found.step
+
+
+def flicker(eye, seed):
+    """Nearly plain sand, and in the middle what looks otherwise in every photo, as thin leaves do."""
+    view = photo(eye)
+    origin, step = view.camera.rays()
+    t = -origin[..., 2] / step[..., 2]
+    x, y = origin[..., 0] + t * step[..., 0], origin[..., 1] + t * step[..., 1]
+    leaves = (np.hypot(x - 1.6, y - 1.6) < 0.25)[..., None]
+    look = np.random.default_rng(seed).uniform(0, 1, (*x.shape, 3))
+    return replace(view, image=np.where(leaves, look, 0.5 + 0.04 * (texture(x, y, 2) - 0.5)).astype(np.float32))
+
+
+def test_sand_that_looks_like_sand_is_no_tower_over_what_no_two_photos_show_alike():
+    eyes = [(0, 0), (0.9, 0), (-0.9, 0), (0, 0.9), (0, -0.9), (0.6, 0.6), (-0.6, 0.6)]
+    views = [flicker([1.6 + x, 1.6 + y, 4.0], i) for i, (x, y) in enumerate(eyes)]
+    found = plane_sweep.sweep(made.grid(0.05), views, flying_height=4.0, pixel=0.04)
+    assert found.above.max() < 0.25  # of 1.2 that are tried
+
+
+def test_nothing_is_a_column():
+    above = np.zeros((20, 20))
+    above[2:10, 2:10] = 0.2  # a bush, 8 cells of .1 wide, ...
+    above[5, 5] = above[5, 6] = 1.5  # ... and over it what is not even .2 wide
+    above[12:18, 12:18] = 1.5  # a tree
+    found = plane_sweep.stout(above > 0, above, 0.1)
+    assert found[12:18, 12:18].all() and found[2:10, 2:10].sum() == 62 and found.sum() == 98
+    assert not plane_sweep.stout(np.zeros((4, 4), bool), np.zeros((4, 4)), 0.1).any()
+
+
+def test_a_wider_grid_goes_on_as_high_as_its_border():
+    grid = replace(made.grid(0.1), heights=np.random.default_rng(0).random(made.grid(0.1).shape))
+    wide = plane_sweep.padded(grid, 3)
+    assert wide.shape == tuple(n + 6 for n in grid.shape) and not wide.seen[:3].any()
+    np.testing.assert_allclose(wide.exemplar, grid.exemplar, atol=1e-12)
+    at = np.array([[0.7, 1.3], [2.05, 0.4], [-0.2, 1.0]])
+    np.testing.assert_allclose(wide.height_at(at), grid.height_at(at), atol=1e-12)
+
+
+def test_the_ground_around_stays_ground(found):
+    around = inner(found.grid, 0.4, 2.8) & ~inner(found.grid, BOX[0] - 0.25, BOX[1] + 0.25)
+    assert found.stands[around].mean() < 0.01
+    assert np.abs(found.above[around]).max() <= 2 * found.step
+
+
+def test_ground_that_fewer_than_two_photos_see_is_not_known(photos):
+    alone = plane_sweep.sweep(made.grid(0.1), photos[:1], flying_height=4.0, pixel=0.08)
+    assert not alone.known.any() and not alone.stands.any()
+    assert (alone.above == 0).all()
+
+
+def test_the_shell_closes_what_stands_down_to_the_ground(found, photos):
+    shell = objects.shell(found, photos)
+    heights = shell.means[:, 2]
+    assert not shell.ground.any()
+    assert heights.max() == pytest.approx(TALL, abs=2 * found.step)
+    assert heights.min() < 0.2 * TALL  # walls reach down
+    ceiling = objects.ceiling(made.grid(0.05), found, shell)
+    grid = made.grid(0.05)
+    assert ceiling[inner(grid, 0.3, 0.7)].max() < 0.3 * TALL  # free space over bare ground
+    assert ceiling[inner(grid, 1.4, 1.8)].min() > TALL
+
+
+def test_costs_without_steps_are_each_cells_own():
+    rng = np.random.default_rng(0)
+    costs = rng.uniform(0, 1, (5, 4, 6)).astype(np.float32)
+    free = plane_sweep.aggregated(costs, 0.0, 0.0)
+    np.testing.assert_array_equal(free.argmin(0), costs.argmin(0))  # changes cost nothing
+
+
+def test_a_cell_that_says_nothing_takes_the_height_of_its_neighbours():
+    costs = np.full((5, 7, 7), 0.5, np.float32)
+    costs[3] = 0.1
+    costs[:, 3, 3] = 0.3
+    costs[1, 3, 3] = 0.29  # a little better elsewhere
+    assert costs.argmin(0)[3, 3] == 1
+    assert (plane_sweep.aggregated(costs, 0.01, 0.06).argmin(0) == 3).all()
+
+
+def test_points_in_the_air_become_things_only_together_and_where_the_sweep_saw_nothing():
+    grid = made.grid()
+    flat = plane_sweep.Relief(grid, np.zeros(grid.shape), np.zeros(grid.shape, bool), np.ones(grid.shape, bool), 0.1)
+    crowd = np.array([[1.0, 1.0, 0.5], [1.1, 1.0, 0.5], [1.0, 1.1, 0.5], [1.1, 1.1, 0.55]])
+    points = np.concatenate([crowd, [[2.5, 2.5, 0.5], [1.0, 1.05, 3.0], [1.0, 1.0, 0.05]]])
+    field = objects.lone_points(grid, flat, points, np.full((7, 3), 0.5), band=1.0)
+    np.testing.assert_allclose(field.means, crowd, atol=1e-6)
+    taken = replace(flat, stands=inner(grid, 0.8, 1.3))
+    assert not len(objects.lone_points(grid, taken, points, np.full((7, 3), 0.5), band=1.0))

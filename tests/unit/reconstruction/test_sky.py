@@ -1,0 +1,92 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fixtures import ground as made
+
+from dav_gswt.field import joined
+from dav_gswt.geometry import cameras
+from dav_gswt.photos import training_views
+from dav_gswt.raster import render
+from dav_gswt.reconstruction import build, sky
+from dav_gswt.reconstruction.fitting import trainer
+from dav_gswt.reconstruction.fitting.plan import Plan
+from dav_gswt.reconstruction.ground_constraints import OnGround
+from dav_gswt.reconstruction.objects import blobs
+
+THING = np.array([[1.6, 1.6, 0.35]])
+
+
+def heavens(directions):
+    """Bright at the horizon and towards the east."""
+    up, east = directions[..., 2], directions[..., 0]
+    return np.stack([0.55 + 0.1 * east - 0.2 * up, 0.65 - 0.1 * up, 0.9 + 0 * up], -1).astype(np.float32)
+
+
+def low(count=4, size=64, thing=True):
+    """Photos of the made-up ground from low down, under the made-up sky, with a dark thing that stands against it."""
+    field = made.field()
+    if thing:
+        field = joined([field, blobs(THING, np.full((1, 3), 0.05), np.full(1, 0.08), logit=5.0)])
+    found = []
+    for i in range(count):
+        angle = 2 * np.pi * i / count + 0.3
+        eye = [1.6 + 1.3 * np.cos(angle), 1.6 + 1.3 * np.sin(angle), 0.3]
+        camera = cameras.pinhole(eye, [1.6, 1.6, 0.4], size, size, 60.0)
+        _, step = camera.rays()
+        directions = step / np.linalg.norm(step, axis=-1, keepdims=True)
+        seen = render(field, camera)
+        image = np.clip(seen.colour + (1 - seen.alpha)[..., None] * heavens(directions), 0, 1).astype(np.float32)
+        found.append(training_views.View(f"low_{i}", camera, image, np.ones((size, size), np.float32)))
+    return found
+
+
+def over(photos):
+    return build.modelled(photos, made.grid())
+
+
+def test_the_sky_is_found_whatever_stands_before_it():
+    rng = np.random.default_rng(0)
+    directions = rng.normal(size=(4000, 3))
+    directions[:, 2] = np.abs(directions[:, 2])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    colours = heavens(directions)
+    colours[::4] = 0.1  # a quarter is something else
+    coefficients, deviation = sky.fitted(directions, colours)
+    basis = sky.harmonics.basis(directions, sky.DEGREE)
+    np.testing.assert_allclose(basis @ coefficients, heavens(directions), atol=0.03)
+    assert deviation < 0.01
+
+
+def test_sky_counts_and_what_stands_against_it_says_nothing():
+    photos = low()
+    found = sky.behind(photos, over(photos))
+    for view, photo, ground in zip(found, photos, over(photos), strict=True):
+        _, step = photo.camera.rays()
+        rising = step[..., 2] > 0
+        known = ~np.isnan(view.behind[..., 0])
+        assert known[rising].mean() > 0.8 and not known[~rising].any()
+        dark = rising & (photo.image.max(-1) < 0.3)
+        assert dark.any() and not known[dark].any() and not view.weight[dark].any()
+        np.testing.assert_array_equal(view.weight[~rising], ground.weight[~rising])
+        np.testing.assert_allclose(view.behind[known], photo.image[known], atol=0.06)
+
+
+def test_photos_from_above_and_broken_skies_have_none():
+    above = over(made.photos())
+    assert all(v.behind is None for v in sky.behind(made.photos(), above))
+    rng = np.random.default_rng(1)
+    broken = [replace(v, image=rng.uniform(0, 1, v.image.shape).astype(np.float32)) for v in low()]
+    assert all(v.behind is None for v in sky.behind(broken, over(broken)))
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_what_the_photos_show_to_be_sky_is_not_modelled(known):
+    photos = low(thing=False)
+    masked = sky.behind(photos, over(photos)) if known else over(photos)
+    start = joined([made.field(), blobs(THING, np.full((1, 3), 0.05), np.full(1, 0.08), logit=1.0)])
+    grid = made.grid()
+    rules = OnGround(grid, np.full(grid.shape, 0.8))
+    fitted = trainer.fit(start, masked, Plan(100, 1), rules, np.random.default_rng(0)).field
+    gone = len(fitted) < len(start) or fitted.opacity_logits[-1] < -1
+    assert gone == known

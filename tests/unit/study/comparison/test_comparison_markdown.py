@@ -1,0 +1,33 @@
+"""The comparison as a table to read, and the README's copy of it."""
+
+from pathlib import Path
+
+from dav_gswt.study.comparison import markdown
+
+ROOT = Path(__file__).parents[4]
+
+
+def row(policy, scene, k, mean, low=None, high=None, counts=(1, 0, 2)):
+    return {"policy": policy, "scene": scene, "k": k, "mean": mean, "low": low, "high": high} | dict(
+        zip(("wins", "ties", "losses"), counts, strict=True)
+    )
+
+
+def test_best_first_with_intervals_where_there_are_some():
+    compared = [
+        row("random", "every", "", -0.123, -0.2, 0.01),
+        row("random", "sand_pool", 4, -0.123, -0.2, 0.01),
+        row("diverse", "every", "", 0.051, -0.0, 0.1, (2, 1, 0)),
+        row("diverse", "grass_pool", 2, 0.049),
+    ]
+    assert markdown.text(compared, "farthest").splitlines() == [
+        "| less `farthest`, dB | all | grass, 2 a round | sand, 4 a round | wins, ties, losses |",
+        "| --- | --- | --- | --- | --- |",
+        "| `diverse` | +0.05 (-0.00, +0.10) | +0.05 |  | 2, 1, 0 |",
+        "| `random` | -0.12 (-0.20, +0.01) |  | -0.12 (-0.20, +0.01) | 1, 0, 2 |",
+    ]
+
+
+def test_the_readme_shows_the_table_that_the_rule_made():
+    made = (ROOT / "docs/data/view_comparison.md").read_text(encoding="utf-8")
+    assert made in (ROOT / "README.md").read_text(encoding="utf-8")

@@ -1,0 +1,35 @@
+"""The paper's values as they are printed, and what its own numbers say."""
+
+import re
+
+import pytest
+
+from dav_gswt.study.tables import paper
+from dav_gswt.study.tables.paired import two_sided
+
+
+def test_every_value_is_printed_in_the_paper(root):
+    text = root.parent / "shared/paper/dav-gswt.tex"
+    if not text.is_file():
+        pytest.skip("needs the paper's source beside the repository")
+    printed = set(re.findall(r"\d+(?:\.\d+)?", text.read_text()))
+    for where, value in paper.read().items():
+        assert set(re.findall(r"\d+(?:\.\d+)?", value)) <= printed, where
+
+
+def test_rows_stand_beside_ours_and_are_empty_where_the_paper_has_none():
+    assert paper.beside("ablation", "w2", ("psnr", "p")) == {"paper_psnr": "29.12±0.09", "paper_p": "0.006"}
+    assert paper.beside("timing", "copr_dunes", ("cut_s",)) == {"paper_cut_s": None}
+    levels = paper.beside("lod", "desert", ("scale5", "count0"))
+    assert levels == {"paper_scale5": "0.2023", "paper_count0": "64.2K"}
+
+
+@pytest.mark.parametrize("printed, value", [("29.41±0.08", 29.41), ("64.2K", 64200), ("<0.001", 0.001), ("60.6", 60.6)])
+def test_numbers_are_read_as_printed(printed, value):
+    assert paper.number(printed) == pytest.approx(value)
+
+
+def test_the_papers_t_value_is_not_below_one_per_cent():
+    assert two_sided(4.28, 4) == pytest.approx(0.0129, abs=1e-4)
+    with pytest.raises(ValueError, match="no number"):
+        paper.number("—")

@@ -1,0 +1,48 @@
+"""How long frames take: columns, means, and what the study's tables join. No time is asserted but that there is one."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dav_gswt.study import figures
+from dav_gswt.study.tables import spread
+from dav_gswt.study.terrain import frames
+
+ASKED = frames.Asked(
+    {"kind": "hills", "height": 1, "wavelength": 10}, {"frames": 3, "length": 1, "height": 1}, 48, 32, [900, 300]
+)
+CELL = {"scene": "desert", "seed": 0, "quality": "draft", "seam": "semantic", "tau": "0.6"}
+
+
+def row_of(renderer: str, budget: int, **times) -> dict:
+    parts = {"render": [3.0, 5.0, 4.0], "sort": [1.0, 2.0], "update": [2.0, 2.0]} | times
+    made = frames._row(ASKED, budget, parts, [budget - 1, budget, budget + 1], ran=2)
+    return made | frames._about(renderer, "SwiftShader" if renderer == frames.PAGE else "")
+
+
+def test_a_row_holds_means_deviations_and_shares_worked_by_hand():
+    row = row_of(frames.PAGE, 900)
+    assert (row["splats"], row["render_ms"], row["sort_ms"], row["update_ms"]) == (900, 4, 1.5, 2)
+    np.testing.assert_allclose([row["render_ms_sd"], row["sort_ms_sd"], row["update_ms_sd"]], [1, 0.5**0.5, 0])
+    assert row["sort_share"] == row["update_share"] == pytest.approx(2 / 3)
+    never = row_of(frames.PAGE, 900, sort=[])
+    assert never["sort_ms"] is never["sort_ms_sd"] is None
+
+
+def test_the_pages_first_budget_is_what_the_studys_tables_join(tmp_path: Path):
+    for renderer in (frames.LIBRARY, frames.PAGE):
+        figures.write_rows(tmp_path / f"{renderer}.csv", [row_of(renderer, budget) for budget in ASKED.budgets])
+    paths = [[str(tmp_path / f"{renderer}.csv")] for renderer in (frames.LIBRARY, frames.PAGE)]
+    rows = frames.gathered([CELL], *paths)
+    assert [(row["renderer"], row["budget"]) for row in rows] == [
+        (name, str(budget)) for name in (frames.LIBRARY, frames.PAGE) for budget in ASKED.budgets
+    ]
+    figures.write_rows(tmp_path / "viewer.csv", frames.of_viewer(rows))
+    (joined,) = spread.with_viewer([CELL], spread.read_viewer(tmp_path / "viewer.csv"))
+    assert (joined["render_ms"], joined["sort_ms"]) == (4, 1.5) and joined["update_share"] == 0.66667  # five digits
+    with (tmp_path / "viewer.csv").open(newline="") as file:
+        assert next(csv.reader(file)) == [*spread.CELL, *spread.VIEWER]
+    frames.write_plot(tmp_path / "plot.png", rows)
+    assert (tmp_path / "plot.png").stat().st_size > 5000

@@ -1,0 +1,42 @@
+"""Nothing jumps while one walks: changes from frame to frame, beside those of the exactly sorted walk."""
+
+import numpy as np
+import pytest
+from test_terrain_laid import PINK, SIDE, SKY, terrain_of, tile_of
+
+from dav_gswt.study.terrain import steadiness
+from dav_gswt.terrain import order
+
+BUDGET = 10**6
+TOLD = {"eye_floor": 1.0, "sky": SKY, "ground_colour": PINK}
+
+
+@pytest.fixture(scope="module")
+def stony():
+    """Discs and stones at one level: where orders change, something is in front of something else."""
+    return terrain_of({(0, t): tile_of(t, 0.25, 40) for t in range(16)}, [np.inf], [0.0])
+
+
+def test_every_second_pair_of_frames_lies_across_a_border():
+    found = steadiness.pairs(8, 3.0, 0.01)
+    for k, (before, after) in enumerate(found):
+        np.testing.assert_allclose(np.hypot(*np.subtract(after.at, before.at)), 0.01)
+        assert (np.floor(before.at) != np.floor(after.at)).any() == bool(k % 2)
+
+
+def test_a_slow_walk_in_pre_sorted_orders_jumps_no_more_than_twice_as_far(stony):
+    found = steadiness.rows(stony, TOLD, 6, 2.0, 96, 54, BUDGET)
+    assert all(row["exact_largest"] > 0 for row in found)
+    assert steadiness.worst(found) < steadiness.MOST
+
+
+def test_a_jump_is_found(stony, monkeypatch):
+    """Orders that turn about from one frame to the next."""
+    turns = iter(range(10**6))
+    monkeypatch.setattr(order, "nearest", lambda directions, kept, *_: next(turns) * 5 % len(kept))
+    assert steadiness.worst(steadiness.rows(stony, TOLD, 2, 1.0, 96, 54, BUDGET)) > steadiness.MOST
+
+
+def test_the_way_is_counted_in_tiles(stony):
+    (first, *_) = steadiness.rows(stony, TOLD, 2, 1.0, 16, 9, BUDGET)
+    assert (first["east"], first["north"]) == (0.5, 0.5) and stony.side == SIDE

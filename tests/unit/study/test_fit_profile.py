@@ -1,0 +1,74 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fixtures import ground as made
+
+from dav_gswt.field import joined
+from dav_gswt.files import write_json
+from dav_gswt.images import image_files
+from dav_gswt.photos import model as models
+from dav_gswt.reconstruction import build
+from dav_gswt.reconstruction.objects import blobs
+from dav_gswt.study import fit_profile
+
+QUALITY = build.Quality(size=48, spacing=1.0, cap=5000, steps=12, steps_per_photo=10, level_steps=5)
+
+
+def photo_set(tests):
+    none = np.zeros(0, int)
+    empty = models.Model((), (), np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2)))
+    frame = made.FRAME | {"kind": "synthetic"}
+    return fit_profile.PhotoSet(frame, empty, made.photos(4), {"test": tests})
+
+
+def test_the_sixth_photo_and_every_tenth_after_it_are_for_testing(tmp_path):
+    photos = made.photos(17)
+    (tmp_path / "images").mkdir()
+    names = tuple(f"{chr(97 + i)}.png" for i in range(17))
+    for name, photo in zip(names, photos, strict=True):
+        image_files.write(tmp_path / "images" / name, photo.image)
+    none = np.zeros(0, int)
+    cameras = tuple(photo.camera for photo in photos)
+    (tmp_path / "sparse").mkdir()
+    models.write(
+        models.Model(names, cameras, np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2))),
+        tmp_path / "sparse",
+    )
+    write_json(tmp_path / "ground.json", made.FRAME | {"test": None})
+    given = fit_profile.opened(tmp_path, 48)
+    assert [v.name for v in given.tests["test"]] == ["f.png", "p.png"]
+    assert len(given.train) == 15
+
+
+def test_a_trial_tells_seconds_steps_and_quality_and_gives_the_field_that_a_fit_gives():
+    photos = photo_set(made.photos(5)[4:])
+    found = fit_profile.run(replace(photos, margin=0.15), QUALITY, every=5)
+    assert [row["step"] for row in found.curve] == [5, 10, 12]
+    assert all(row["seconds"] > 0 and row["psnr"] > 10 for row in found.curve)
+    none = np.zeros((0, 3)), np.zeros((0, 3), np.float32)
+    alone = build.fit(photos.frame, photos.train, *none, QUALITY, np.random.default_rng(0))
+    np.testing.assert_array_equal(found.made.field.means, alone.field.means)
+    assert set(fit_profile.away(photos, found.made)) == {"test"}
+
+
+def test_when_a_quality_was_first_reached():
+    curve = [{"seconds": float(s), "psnr_colour_corrected": p} for s, p in [(1, 30.0), (2, 33.5), (3, 32.9)]]
+    assert fit_profile.seconds_to(curve, 33.0) == 2.0
+    assert fit_profile.seconds_to(curve, 34.0) is None
+
+
+def test_haze_is_counted_and_what_stands_low_is_not():
+    photos = photo_set(made.photos(1))
+    low = blobs(np.array([[1.6, 1.6, 0.3]]), np.full((1, 3), 0.5), np.full(1, 0.3))
+    high = blobs(np.array([[1.6, 1.6, 2.0]]), np.full((1, 3), 0.5), np.full(1, 0.3))
+    assert fit_profile.free_space_opacity(joined([made.field(), low]), made.grid(), photos) == 0
+    assert fit_profile.free_space_opacity(joined([made.field(), high]), made.grid(), photos) > 0.01
+
+
+def test_stills_are_pictures_of_the_exemplar():
+    grid = made.grid()
+    seen = fit_profile.stills(build.Made(made.field(), grid, {}), made.FRAME, 96, 64)
+    assert seen["oblique"].shape == (64, 96, 3)
+    true = made.look(np.array([1.6]), np.array([1.6]))[0]
+    assert seen["oblique"][32, 48] == pytest.approx(true, abs=0.15)  # a pixel is 0.13 of the stripes' slope

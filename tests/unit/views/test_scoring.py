@@ -1,0 +1,222 @@
+"""Scores of poses over a made-up ground, with a prior whose doubt is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fixtures import ground as patch
+
+from dav_gswt.errors import InputError
+from dav_gswt.geometry import cameras, poses
+from dav_gswt.images import image_files
+from dav_gswt.prior import conditions
+from dav_gswt.prior.interface import Imagined
+from dav_gswt.raster import Rasterizer
+from dav_gswt.views import collision, fisher, frozen_scales, pose_maps, scores, scoring
+from dav_gswt.views.frozen_scales import Frozen
+from dav_gswt.views.prior_sampling import Asking
+from dav_gswt.views.uncertainty import Quantiles, Scales
+from dav_gswt.views.uncertainty.backprojection import carried
+
+MIDDLE = [1.6, 1.6, 0.0]
+
+
+class Doubting:
+    """Samples that disagree where the render is blue, and by how much; pictures are the latents themselves."""
+
+    name, size = "doubting", 32
+
+    def samples(self, condition, m, p_drop, steps, seed, common=True):
+        blue = condition.colour[..., 2]
+        signs = np.where(np.arange(m) % 2, -1.0, 1.0)[None, :, None, None, None]
+        return (p_drop * signs * blue[:, None, None]).repeat(4, 2).astype(np.float32)
+
+    def shown(self, condition):
+        return 0.5 * condition.colour[..., 2:].repeat(4, -1).transpose(0, 3, 1, 2)
+
+    def variances(self, latents):
+        return np.zeros_like(latents)
+
+    def decoded(self, latents):
+        pictures = np.clip(0.5 + latents, 0, 1).transpose(0, 1, 3, 4, 2)
+        return Imagined(np.ascontiguousarray(pictures), None)
+
+
+def pool(*eyes, width=40, height=40):
+    found = []
+    for i, eye in enumerate(eyes or ([1.6, 1.6, 5.0], [4.0, 1.6, 4.0], [1.6, 4.5, 4.0])):
+        camera = cameras.pinhole(eye, MIDDLE, width, height, 40.0)
+        found.append((poses.of_camera(f"p{i}", camera, patch.FRAME), camera))
+    return found
+
+
+def scored(prior=None, **more):
+    return scoring.score(patch.field(), patch.grid(), pool(), patch.photos(), patch.FRAME, prior, **more)
+
+
+def test_without_a_prior_there_are_geometric_terms_alone():
+    found = scored()
+    assert set(found.scores.terms) == {"opacity", "fisher"} and found.maps.w2_sq is None
+    assert np.array_equal(found.gaussians, patch.field().uncertainty) and not found.scores.steps.any()
+    assert (found.scores.terms["fisher"] > 0).all() and found.frozen.pixels is None
+
+
+def test_a_prior_adds_what_its_samples_disagree_about():
+    still, doubting = (scored(Asking(Doubting(), 2, 4, p)) for p in (0.0, 0.2))
+    assert not still.scores.terms["w2_sq"].any() and still.scores.scales.of["w2_sq"] == 0
+    # two samples at +-d in four channels: 2 var(ddof=1) summed is 4 (2 d)^2, and d is .2 of a blue of about .4
+    np.testing.assert_allclose(doubting.scores.terms["w2_sq"][0], 4 * (2 * 0.2 * 0.4) ** 2, rtol=0.2)
+    assert doubting.maps.w2_sq.shape == (3, 32, 32) and (doubting.scores.steps == 4).all()
+    assert "lpips" not in doubting.scores.terms
+
+
+def test_a_latents_own_width_counts_where_it_is_asked_for():
+    """Here all are equally wide (0), so it changes nothing; a prior whose samples differ in width disagrees more."""
+
+    class Uneven(Doubting):
+        def variances(self, latents):
+            return np.arange(latents.shape[1], dtype=np.float32)[None, :, None, None, None] + np.zeros_like(latents)
+
+    point, posterior = (scored(Asking(Doubting(), 2, 4, 0.2, posterior=p)).scores.terms["w2_sq"] for p in (False, True))
+    assert np.array_equal(point, posterior)
+    wider = scored(Asking(Uneven(), 2, 4, 0.2, posterior=True)).scores.terms["w2_sq"]
+    np.testing.assert_allclose(wider - point, 4.0, rtol=1e-5)  # deviations 0 and 1, in four channels
+
+
+def test_the_residual_is_how_far_the_mean_of_the_samples_lies_from_the_render():
+    """Samples to either side of nothing: their mean stays, whatever they differ by."""
+    little, much = (scored(Asking(Doubting(), 2, 4, p)).scores.terms["residual"] for p in (0.1, 0.4))
+    np.testing.assert_allclose(little, much, rtol=1e-6)
+    np.testing.assert_allclose(little[0], 4 * (0.5 * 0.4) ** 2, rtol=0.2)
+
+
+def test_samples_may_start_from_noises_of_their_own():
+    class Noisy(Doubting):
+        def samples(self, condition, m, p_drop, steps, seed, common=True):
+            return super().samples(condition, m, 0.0 if common else 0.3, steps, seed)
+
+    common, own = (scored(Asking(Noisy(), 2, 4, 0.0, noises=n)).scores.terms["w2_sq"] for n in (False, True))
+    assert not common.any() and (own > 0).all()
+
+
+def test_later_rounds_keep_the_scales_of_the_first():
+    first = Frozen(Scales(dict.fromkeys(scores.TERMS, 7.0)), Quantiles(0.0, 1.0))
+    assert scored(Asking(Doubting(), 2, 4, 0.2), frozen=first).scores.scales == first.scales
+
+
+def test_a_gaussian_gets_the_doubt_of_the_pixels_it_is_in():
+    """A map that is 1 in the picture's left half alone: what lies there is in doubt, what lies right is not."""
+    field, (_, camera) = patch.field(), pool()[0]
+    half = np.zeros((16, 16), np.float32)
+    half[:, :8] = 1
+    found = carried(field, [camera], half[None])
+    column = camera.project(field.means.astype(float))[0][:, 0]
+    drawn = np.isfinite(found)
+    assert found[drawn & (column < 0.4 * 40)].min() > 0.95 and found[drawn & (column > 0.6 * 40)].max() < 0.05
+    one = carried(field, [camera], np.full((1, 16, 16), 0.25, np.float32))
+    np.testing.assert_allclose(one[drawn], 0.25, rtol=1e-5)
+
+
+def test_what_no_camera_sees_keeps_its_geometric_doubt():
+    field = replace(patch.field(), uncertainty=np.full(len(patch.field()), 0.3, np.float32))
+    tele = cameras.pinhole([0.3, 0.3, 5.0], [0.3, 0.3, 0.0], 40, 40, 4.0)
+    one = [(poses.of_camera("p0", tele, patch.FRAME), tele)]
+    found = scoring.score(field, patch.grid(), one, patch.photos(), patch.FRAME, Asking(Doubting(), 2, 4, 0.2))
+    far = np.linalg.norm(field.means[:, :2] - 0.3, axis=1) > 1
+    assert (found.gaussians[far] == np.float32(0.3)).all() and (found.gaussians[~far] != np.float32(0.3)).any()
+
+
+def test_fisher_gain_is_the_squared_blend_weights_over_what_is_known():
+    field, raster, camera = patch.field(), Rasterizer(), pool()[0][1]
+    raster.forward(field.means, field.log_scales, field.quats, field.opacity_logits, field.sh, camera)
+    seen = raster.contributions()
+    none, once = fisher.known(field, [], raster), fisher.known(field, [camera], raster)
+    assert fisher.gain(seen, none) == pytest.approx(float(seen.squared.sum()) / fisher.PRIOR)
+    np.testing.assert_allclose(once - fisher.PRIOR, seen.squared, rtol=1e-6)
+    assert fisher.gain(seen, once) < fisher.gain(seen, none)
+
+
+def test_gathered_information_lowers_the_gain_of_what_overlaps_it():
+    field, cameras_ = patch.field(), [scoring.small(camera) for _, camera in pool()]
+    gathered = fisher.Gathered(field, [], cameras_)
+    before = [gathered.gain(i) for i in range(3)]
+    gathered.take(0)
+    after = [gathered.gain(i) for i in range(3)]
+    assert all(a < b for a, b in zip(after, before, strict=True)) and after[0] / before[0] < after[2] / before[2]
+    raster = Rasterizer()
+    np.testing.assert_allclose(gathered.known, fisher.known(field, cameras_[:1], raster))
+
+
+def test_a_prior_sees_the_middle_square_and_the_nearest_photo():
+    wide, square = pool([1.6, 1.6, 5.0], width=60)[0][1], pool([1.6, 1.6, 5.0])[0][1]
+    cut = conditions.squared(wide)
+    assert (cut.width, cut.height) == (40, 40) and cut.cx == wide.cx - 10
+    np.testing.assert_allclose(cut.rays()[1], wide.rays()[1][:, 10:50])
+    picture = np.random.default_rng(0).random((40, 60, 3), np.float32)
+    assert np.array_equal(conditions.middle_square(picture), picture[:, 10:50])
+    photos = patch.photos()
+    assert conditions.taken(photos, patch.FRAME, 64).photos.shape == (3, 64, 64, 3)  # smaller photos are enlarged
+    known = conditions.taken(photos, patch.FRAME, 24)
+    near = photos[1].camera.centre + [0, 0, 0.1]
+    told = conditions.condition(patch.field(), pool(near), known, 6.0, 24)
+    assert np.array_equal(told.photo[0], known.photos[1])
+    assert told.relative[0] == pytest.approx([0, 0, 1, 0], abs=0.05) and told.colour.shape == (1, 24, 24, 3)
+    assert square.width == 40
+
+
+@pytest.mark.parametrize(
+    ("eye", "said"),
+    [([1.6, 1.6, -0.5], "p0: under the ground"), ([1.6, 1.6, 2.0], "p0: inside of what stands there")],
+    ids=["under", "inside"],
+)
+def test_a_pose_that_no_photo_comes_from_is_named(eye, said):
+    block = replace(
+        patch.field()[:1],
+        means=np.float32([[1.6, 1.6, 2.0]]),
+        log_scales=np.log(np.float32([[0.3, 0.3, 0.3]])),
+        opacity_logits=np.float32([4.0]),
+    )
+    camera = cameras.pinhole(eye, [1.6, 1.7, 5.0], 40, 40, 40.0)
+    with pytest.raises(InputError, match=said):
+        collision.require([(poses.of_camera("p0", camera, patch.FRAME), camera)], block, patch.grid())
+    collision.require(pool(), block, patch.grid())
+
+
+def test_maps_come_back_and_are_shown_with_their_pose(tmp_path):
+    found = scored(Asking(Doubting(), 2, 4, 0.2))
+    pose_maps.write(tmp_path / "maps.npz", found.maps, found.gaussians)
+    back, gaussians = pose_maps.read(tmp_path / "maps.npz")
+    assert back.names == ["p0", "p1", "p2"] and np.array_equal(gaussians, found.gaussians)
+    assert np.array_equal(back.w2_sq, found.maps.w2_sq)
+    np.testing.assert_allclose(back.opacity, found.maps.opacity, atol=1e-3)
+    image_files.write_exr_parts(tmp_path / "u.exr", scoring.parts(found, patch.field(), patch.grid()))
+    read = image_files.read_exr_parts(tmp_path / "u.exr")
+    assert set(read) == {"above", "p0", "p1", "p2"}
+    channels, header = read["p1"]
+    assert channels["opacity"].shape == channels["w2_sq"].shape == (96, 96)
+    assert float(header["w2_sq"]) == found.scores.terms["w2_sq"][1] and float(header["radius"]) == pool()[1][0].radius
+
+
+def test_a_wide_pictures_map_knows_its_middle_square_alone():
+    found = pose_maps.PoseMaps(["p0"], np.zeros((1, 64, 96), np.float32), np.ones((1, 16, 16), np.float32))
+    table = scores.Scores([pool()[0][0]], {"w2_sq": np.ones(1)}, Scales({"w2_sq": 1.0}), np.ones(1, int))
+    shown = found.part(table, "p0")[0]["w2_sq"]
+    assert (shown[:, 16:80] == 1).all() and np.isnan(shown[:, :16]).all() and np.isnan(shown[:, 80:]).all()
+
+
+def test_maps_of_something_else_are_refused(tmp_path):
+    (tmp_path / "maps.npz").write_bytes(b"PK nothing of the kind")
+    with pytest.raises(InputError, match="maps.npz: not readable as maps"):
+        pose_maps.read(tmp_path / "maps.npz")
+
+
+def test_what_is_frozen_comes_back_to_the_bit(tmp_path):
+    first = Frozen(Scales({"w2_sq": 1 / 3, "fisher": 0.0}), Quantiles(0.1, 2 / 3))
+    frozen_scales.write(tmp_path / "scores.json", first, {"candidates": 3}, {}, {})
+    assert frozen_scales.read(tmp_path / "scores.json") == first
+    frozen_scales.write(tmp_path / "scores.json", replace(first, pixels=None), {}, {}, {})
+    assert frozen_scales.read(tmp_path / "scores.json").pixels is None
+    for bad in ("{}", '{"scales": [], "pixels": null}', '{"scales": {"w2_sq": -1}, "pixels": null}'):
+        (tmp_path / "scores.json").write_text(bad)
+        with pytest.raises(InputError, match="scores.json: does not hold the scales"):
+            frozen_scales.read(tmp_path / "scores.json")

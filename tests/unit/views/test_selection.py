@@ -1,0 +1,203 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dav_gswt.errors import InputError
+from dav_gswt.geometry import poses
+from dav_gswt.geometry.poses import Pose
+from dav_gswt.views import scores, selection
+from dav_gswt.views.policies import POLICIES, Wanted
+from dav_gswt.views.scores import Scores
+from dav_gswt.views.uncertainty import Scales
+
+
+def scored(*places, **terms):
+    """Candidates at azimuths (degrees) on the horizon of a unit circle."""
+    given = {"opacity": [0.0] * len(places)} | terms
+    columns = {name: np.array(values, float) for name, values in given.items()}
+    found = [Pose(f"p{i}", 0.0, float(a), 1.0) for i, a in enumerate(places)]
+    return Scores(found, columns, Scales(dict.fromkeys(columns, 2.0)), np.zeros(len(places), int))
+
+
+class Sharing:
+    """Information that fades for the neighbours of what was taken, as that of overlapping photos does."""
+
+    def __init__(self, gains):
+        self.gains, self.looks = list(gains), 0
+
+    def gain(self, i):
+        self.looks += 1
+        return self.gains[i]
+
+    def take(self, i):
+        for j in (i - 1, i, i + 1):
+            if 0 <= j < len(self.gains):
+                self.gains[j] /= 10
+
+
+def chosen(policy, pool, k, captured=((1.0, 0, 0),), seed=0, lam=0.0, information=None, errors=None):
+    wanted = Wanted(np.array(captured).reshape(-1, 3), k, np.random.default_rng(seed), lam, information, errors)
+    return [pose.name for pose in selection.select(policy, pool, wanted)]
+
+
+def test_farthest_takes_the_opposite_side_then_the_gaps():
+    names = chosen("farthest", scored(0, 90, 180, 270, 10), 3)
+    assert names[0] == "p2"  # 180 is farthest from 0; then come 90 and 270, equal but for rounding
+    assert set(names[1:]) == {"p1", "p3"}
+
+
+def test_equal_distances_go_by_index():
+    assert chosen("farthest", scored(90, 90), 1) == ["p0"]
+
+
+def test_farthest_does_not_take_a_pose_twice_when_all_coincide():
+    assert sorted(chosen("farthest", scored(0, 0, 0), 3, captured=())) == ["p0", "p1", "p2"]
+
+
+def test_opacity_takes_the_most_unknown_and_ties_by_index():
+    assert chosen("opacity", scored(0, 1, 2, 3, opacity=[0.1, 0.5, 0.5, 0.2]), 3) == ["p1", "p2", "p3"]
+
+
+def test_w2_lpips_weighs_lpips_by_lam_and_ties_go_by_index():
+    pool = scored(0, 1, 2, 3, w2_sq=[1.0, 3, 2, 3], lpips=[9.0, 0, 4, 0])
+    assert chosen("w2-lpips", pool, 2) == ["p1", "p3"]
+    assert chosen("w2-lpips", pool, 2, lam=1e6) == ["p0", "p2"]
+
+
+def test_w2_lpips_says_that_lpips_is_absent_and_needs_a_prior(caplog):
+    assert chosen("w2-lpips", scored(0, 1, w2_sq=[1.0, 2]), 1, lam=1.0) == ["p1"]
+    assert "its term is left out" in caplog.text
+    with pytest.raises(InputError, match="w2_sq: the poses were scored without it"):
+        chosen("w2-lpips", scored(0, 1), 1)
+
+
+def test_w2_does_without_lpips_and_gradients_stand_in_for_it():
+    pool = scored(0, 1, 2, w2_sq=[1.0, 3, 2], lpips=[9.0, 0, 0], gradient=[1.0, 0, 3])
+    assert chosen("w2", pool, 2, lam=1e6) == ["p1", "p2"]
+    assert chosen("grad-lpips", pool, 1) == ["p2"] and chosen("grad-lpips", pool, 1, lam=1e6) == ["p0"]
+
+
+def test_the_expected_error_ranks_alone_or_weighs_what_is_to_have_a_photo_near():
+    pool = scored(0, 3, 6, 120, 240, residual=[1.0, 1.1, 1.0, 0.5, 0.1])
+    assert chosen("residual", pool, 3, captured=()) == ["p1", "p0", "p2"]
+    assert chosen("residual-diverse", pool, 2, captured=()) == ["p1", "p3"]
+
+
+def test_doubt_and_diversity_share_the_choice():
+    """The most doubtful are neighbours: one photo tells about all of them."""
+    pool = scored(0, 3, 6, 120, 240, w2_sq=[1.0, 1.1, 1.0, 0.5, 0.4], lpips=[0.0] * 5)
+    assert chosen("w2-lpips", pool, 3, captured=()) == ["p1", "p0", "p2"]
+    assert chosen("w2-lpips-diverse", pool, 3, captured=()) == ["p1", "p3", "p4"]
+    assert set(chosen("diverse", pool, 3, captured=())) == set(chosen("w2-lpips-diverse", pool, 3, captured=()))
+
+
+def test_a_photo_taken_where_the_doubt_is_sends_the_next_elsewhere():
+    pool = scored(0, 3, 6, 120, 240, w2_sq=[1.0, 1.1, 1.0, 0.5, 0.4], lpips=[0.0] * 5)
+    assert chosen("w2-lpips-diverse", pool, 1, captured=((1.0, 0.05, 0),)) == ["p3"]
+
+
+def test_shuffled_doubt_is_dealt_by_the_generator():
+    pool = scored(*range(0, 360, 12), w2_sq=np.linspace(0, 1, 30) ** 4)
+    draws = [chosen("shuffled", pool, 3, captured=(), seed=s) for s in (1, 1, 2)]
+    assert draws[0] == draws[1] != draws[2] and draws[0] != chosen("w2-lpips-diverse", pool, 3, captured=())
+
+
+def test_a_ring_is_even_and_the_next_one_turned():
+    found = [
+        Pose(f"p{i}", e, float(a), 1.0)
+        for i, (e, a) in enumerate((e, a) for e in (45.0, 80.0) for a in range(0, 360, 5))
+    ]
+    pool = Scores(found, {"opacity": np.zeros(144)}, Scales({"opacity": 0.0}), np.zeros(144, int))
+    at = {pose.name: pose for pose in found}
+    first, second = (sorted(at[n].azimuth for n in chosen("ring", pool, 4, captured=c)) for c in ((), ((1.0, 0, 0),)))
+    assert first == [0, 90, 180, 270] and all(at[n].elevation == 45 for n in chosen("ring", pool, 4))
+    assert np.ptp(np.diff(second)) <= 5 and not set(first) & set(second)
+
+
+def test_fisher_is_greedy_with_update_and_looks_no_more_often_than_it_must():
+    gains = [5.0, 4.9, 4.8, 1.0, 3.0, *([0.5] * 40)]
+    sharing = Sharing(gains)
+    assert chosen("fisher", scored(*range(45), fisher=gains), 3, information=sharing) == ["p0", "p2", "p4"]
+    assert sharing.looks <= 5  # p0, p1 (fell), p2, p4, not all 45 each time
+
+
+def test_the_oracle_takes_the_worst_of_what_it_knows():
+    errors = np.array([0.1, np.nan, 0.5, 0.3])
+    assert chosen("oracle", scored(0, 1, 2, 3), 2, errors=errors) == ["p2", "p3"]
+
+
+def test_the_diverse_oracle_takes_one_of_two_neighbours_that_are_both_wrong():
+    errors = np.array([0.5, 0.5, 0.0, 0.3, np.nan])
+    near, far, away = Pose("p0", 45.0, 0.0, 1.0), Pose("p3", 45.0, 180.0, 1.0), Pose("p4", 45.0, 90.0, 1.0)
+    pool = [near, replace(near, name="p1", azimuth=1.0), replace(near, name="p2", azimuth=90.0), far, away]
+    told = Scores(pool, {"opacity": np.zeros(5)}, Scales({"opacity": 0.0}), np.zeros(5, int))
+    assert chosen("oracle", told, 2, errors=errors) == ["p0", "p1"]
+    assert sorted(chosen("oracle-diverse", told, 2, errors=errors, captured=())) in (["p0", "p3"], ["p1", "p3"])
+
+
+def test_all_asks_for_all_whatever_k_is_and_takes_what_a_budget_leaves():
+    assert selection.asked("all", 1, 3) == 3 and selection.asked("farthest", 1, 3) == 1
+    assert chosen("all", scored(0, 1, 2), 3) == ["p0", "p1", "p2"]
+    assert chosen("all", scored(0, 1, 2), 2) == ["p0", "p1"]
+
+
+def test_random_depends_on_its_generator_alone():
+    pool = scored(*range(20))
+    draw = [chosen("random", pool, 5, seed=s) for s in (1, 1, 2)]
+    assert draw[0] == draw[1] != draw[2]
+    assert len(set(draw[0])) == 5
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+def test_a_pool_that_is_too_small_is_taken_whole_and_said_so(policy, caplog):
+    terms = dict(w2_sq=[0.0, 1], gradient=[1.0, 2], fisher=[1.0, 2], lpips=[1.0, 1], single=[0.1, 0], residual=[0.1, 0])
+    more = dict(information=Sharing([1.0, 2]), errors=np.array([0.5, np.nan]))
+    assert sorted(chosen(policy, scored(0, 90, **terms), 5, **more)) == ["p0", "p1"]
+    assert "only 2 candidates" in caplog.text
+    assert chosen(policy, scored(), 5) == []
+    assert "no candidate pose is left" in caplog.text
+
+
+def test_spread_poses_are_far_apart_and_the_first_comes_first():
+    assert poses.spread(scored(0, 5, 180, 90).poses, 3) == [0, 2, 3]
+    assert poses.spread(scored(0, 0).poses, 5) == [0, 1]
+
+
+def test_scores_come_back_to_the_bit(tmp_path):
+    pool = scored(0.1, 33.3333333333, opacity=[1 / 3, 0.25], w2_sq=[1e-30, 7e20])
+    scores.write(tmp_path / "s.csv", pool)
+    back = scores.read(tmp_path / "s.csv")
+    assert (back.poses, back.scales, list(back.terms)) == (pool.poses, pool.scales, ["opacity", "w2_sq"])
+    assert all(np.array_equal(back.terms[name], values) for name, values in pool.terms.items())
+    assert np.array_equal(back.steps, pool.steps)
+
+
+def test_no_candidate_left_is_a_table_without_rows(tmp_path):
+    scores.write(tmp_path / "s.csv", scored())
+    assert len(scores.read(tmp_path / "s.csv")) == 0
+
+
+def test_scores_that_are_not_finite_name_their_poses(tmp_path):
+    scores.write(tmp_path / "s.csv", scored(0, 1, opacity=[float("nan"), 0]))
+    with pytest.raises(InputError, match="p0"):
+        scores.read(tmp_path / "s.csv")
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"), [("p0,1,2", "not a table"), ("p0,1,2,x" + "," * 11, "could not convert")], ids=["short", "word"]
+)
+def test_a_table_of_something_else_is_refused(tmp_path, line, reason):
+    (tmp_path / "s.csv").write_text(",".join(scores.FIELDS) + "\n" + line + "\n")
+    with pytest.raises(InputError, match=reason):
+        scores.read(tmp_path / "s.csv")
+
+
+def test_a_pose_is_where_its_camera_is():
+    from dav_gswt.geometry import cameras
+
+    frame = {"exemplar": {"west": 1.0, "south": 2.0, "side": 2.0}}
+    camera = cameras.pinhole([2.0, 3 + 3.0, 4.0], [2, 3, 0], 10, 10, 40.0)
+    pose = poses.of_camera("x", camera, frame)
+    assert (pose.azimuth, pose.radius) == (pytest.approx(90), pytest.approx(5))
+    np.testing.assert_allclose(poses.place(pose), [0, 3, 4], atol=1e-12)

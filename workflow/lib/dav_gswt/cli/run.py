@@ -1,0 +1,180 @@
+"""What `make run` and `make view` do: run the workflow, say what was made and where, serve the page."""
+
+import argparse
+import signal
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import psutil
+
+from dav_gswt import config
+from dav_gswt.cli.log_filter import Narrator
+from dav_gswt.errors import InputError
+from dav_gswt.paths import spell, spell_completed, spell_stop
+from dav_gswt.raster import backends
+
+CONFIG = Path("config/config.yaml")
+SMALLER = Path("config/without_compiler.yaml")
+SCHEMA = Path("workflow/schemas/config.schema.yaml")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="python -m dav_gswt.cli.run", description=__doc__)
+    parser.add_argument("--scene", help="an entry of scenes in config/config.yaml (default: its scene)")
+    parser.add_argument("--cores", type=int, default=2)
+    parser.add_argument("--configfile", nargs="+", type=Path, default=[], help="laid over config/config.yaml in turn")
+    parser.add_argument("--view", action="store_true", help="serve the scene's page on this machine")
+    parser.add_argument("--port", type=int, default=8000)
+    options = parser.parse_args(arguments)
+    try:
+        overlays = smaller(options.view) + options.configfile
+        given = config.read([CONFIG, *overlays], {"scene": options.scene} if options.scene else {})
+        config.check(given, SCHEMA)
+        if options.view:
+            return view(given, options.port)
+        return run(given, options.cores, overlays)
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+
+
+def smaller(quietly: bool) -> list[Path]:
+    """What is laid over the config where PyTorch draws, below the user's own; said unless quietly."""
+    if backends.in_use() != "torch":
+        return []
+    if not quietly:
+        why = backends.lacking("cpu") or f"{backends.VARIABLE} asks for it"
+        print(f"PyTorch draws, many times slower, so at a smaller size ({SMALLER}): {why}", flush=True)
+    return [SMALLER]
+
+
+def run(given: dict, cores: int, overlays: list[Path]) -> int:
+    """Run the workflow for the config's scene; a lock that a killed run left behind is taken away first.
+
+    Snakemake finds profiles/default beside the Snakefile: by it, what a killed run left half made is made again.
+    """
+    snakemake = [sys.executable, "-m", "snakemake", "--config", f"scene={given['scene']}"]
+    if overlays:
+        snakemake += ["--configfile", *map(str, [CONFIG, *overlays])]
+    locks = Path(".snakemake/locks")
+    if locks.is_dir() and any(locks.iterdir()):
+        if others := running():
+            raise InputError(f"another run works in this folder (process {others[0]}): wait for it or stop it")
+        print("The last run was cut short; going on where it stopped.")
+        subprocess.run([*snakemake, "--unlock"], check=False, capture_output=True)
+    start = time.monotonic()
+    code, jobs = follow([*snakemake, "--cores", str(cores), "--quiet", "host", "reason"])
+    if code < 0 or code == 130:
+        print("\nStopped. The same command goes on where this ended.", file=sys.stderr)
+        return 130
+    if code:
+        print("\nNot finished. What stands above says why; the same command goes on from here.", file=sys.stderr)
+        return code
+    seconds = time.monotonic() - start
+    tell(given, f"{jobs} jobs done in {seconds:.0f} s" if jobs else "Up to date, nothing to do", overlays)
+    return 0
+
+
+def follow(command: list[str]) -> tuple[int, int]:
+    """Run Snakemake and retell its lines. Returns its exit status (130 after Ctrl-C), and the jobs it began."""
+    narrator = Narrator()
+    with (
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace") as job,
+        ending(job) as asked,
+    ):
+        for line in job.stdout:
+            text = narrator.short(line)
+            if text is not None and not asked:  # what jobs cry on their way out helps nobody
+                print(text, flush=True)
+        code = job.wait()
+    return (130 if asked and code else code), narrator.begun
+
+
+@contextmanager
+def ending(job: subprocess.Popen):
+    """On Ctrl-C or a request to end, let Snakemake tidy up and end first. Yields the list of signals that came.
+
+    A terminal sends Ctrl-C to Snakemake and its jobs as well; SIGTERM comes to this process alone and is passed on.
+    """
+    asked = []
+
+    def note(number, _):
+        asked.append(number)
+        if number == signal.SIGTERM:
+            job.terminate()
+
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def running() -> list[int]:
+    """Processes that work in this folder: Snakemake, or a job that outlived it."""
+    here, found = Path.cwd(), []
+    for process in psutil.process_iter():
+        try:
+            words = process.cmdline()[:4]
+            works = any(word.endswith("snakemake") or ".snakemake/scripts/" in word for word in words)
+            if works and Path(process.cwd()) == here:
+                found.append(process.pid)
+        except (psutil.Error, OSError):
+            continue
+    return found
+
+
+def pages(given: dict) -> list[Path]:
+    """The pages of the config's scene, newest first; those made at its parameters, if there are any."""
+    scene = given["scenes"][given["scene"]]
+    stop = spell_stop(given["stop"])
+    views = ("given", "0", 0) if scene["kind"] == "field" else (given["policy"], f"{given['k']}{stop}", given["rounds"])
+    completed = "" if scene["kind"] == "field" else spell_completed(given["complete"], given["prior"])
+    branch = "seed{}/{}/active_{}_*_k{}/iter{}{}/tiles_{}/bundle_tau{}".format(
+        given["seeds"][0], scene["quality"], *views, completed, scene["seam"], spell(given["tau"])
+    )
+    folder = Path("results", given["scene"])
+    found = list(folder.glob(f"{branch}/terrain/page/index.html")) or folder.rglob("terrain/page/index.html")
+    return sorted((p.parent for p in found), key=lambda p: p.stat().st_mtime, reverse=True)
+
+
+def tell(given: dict, done: str, overlays: list[Path]) -> None:
+    """What was made, where it is, and what to type next."""
+    page = pages(given)[0]
+    terrain, bundle, tiles = page.parent, page.parents[1], page.parents[2]
+    usual = given["scene"] == config.read([CONFIG])["scene"] and not set(overlays) - {SMALLER}
+    print(
+        f"""
+{done}.
+  stills   {terrain}/*.png
+  page     {page}
+  tiles    {tiles}/tiles/*.ply (for any splat viewer)
+           {bundle}/gswt.zip (for the public GSWT renderer)
+  field    {tiles.parent}/field.ply
+Next:
+  make view{"" if usual else f" SCENE={given['scene']}"}
+           walk over the terrain in a browser
+  make run SCENE=name
+           another scene of config/config.yaml; config/README.md says how to add your own photos""",
+        flush=True,
+    )
+
+
+def view(given: dict, port: int) -> int:
+    """Serve the page of a scene, on this machine only."""
+    from dav_gswt.terrain import serve
+
+    if not (found := pages(given)):
+        scene = given["scene"]
+        raise InputError(f"there is no page of {scene!r} yet: type `make run SCENE={scene}` first")
+    return serve.main([str(found[0]), "--port", str(port)])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,57 @@
+"""A digest of the library code that a script runs: Snakemake follows a rule's script, but not what the script imports."""
+
+import re
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+
+LIBRARY = Path(__file__).parent
+_IMPORT = re.compile(r"^[ \t]*(?:from (dav_gswt[\w.]*) import (\([^)]*\)|[^\n]*)|import (dav_gswt[\w.]*))", re.M)
+
+
+def digest_code(script: Path) -> str:
+    """Digest of every library file that a script imports, directly or through other library files.
+
+    Imports inside functions count. The C++ sources count where the rasterizer is imported.
+    """
+    modules: set[str] = set()
+    found = list(_imported_modules(script))
+    while found:
+        module = found.pop()
+        if module not in modules:
+            modules.add(module)
+            found += _imported_modules(_file_of(module))  # only modules with a file are ever found
+    digest = sha256(b"".join(_file_of(module).read_bytes() for module in sorted(modules)))
+    if "dav_gswt.raster" in modules:
+        digest.update(_core_sources())
+    return digest.hexdigest()[:12]
+
+
+@cache
+def _imported_modules(file: Path) -> tuple[str, ...]:
+    """The library modules that a file imports, and the packages that they lie in."""
+    found: set[str] = set()
+    for origin, names, plain in _IMPORT.findall(file.read_text(encoding="utf-8")):
+        found.update(_parents_of(plain or origin))
+        named = re.findall(r"\w+", re.sub(r" as \w+|#.*", "", names))
+        found.update(f"{origin}.{name}" for name in named if _file_of(f"{origin}.{name}"))
+    return tuple(sorted(found))
+
+
+def _parents_of(module: str) -> list[str]:
+    parts = module.split(".")
+    return [".".join(parts[: n + 1]) for n in range(len(parts))]
+
+
+@cache
+def _file_of(module: str) -> Path | None:
+    """The file of a library module or package; None where the name is none (a function, a compiled module)."""
+    place = LIBRARY.joinpath(*module.split(".")[1:])
+    files = (place / "__init__.py", place.with_suffix(".py"))
+    return next((file for file in files if file.is_file()), None)
+
+
+@cache
+def _core_sources() -> bytes:
+    files = sorted(f for f in (LIBRARY / "raster/core").iterdir() if f.suffix in (".cpp", ".h", ".txt"))
+    return b"".join(file.read_bytes() for file in files)

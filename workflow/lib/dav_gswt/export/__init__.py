@@ -1,0 +1,1 @@
+"""Exports: the terrain in the formats of other programs."""

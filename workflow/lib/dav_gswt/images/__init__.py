@@ -1,0 +1,1 @@
+"""Images: reading and writing files, and metrics between two images (PSNR, SSIM, LPIPS)."""

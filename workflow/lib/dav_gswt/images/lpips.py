@@ -1,0 +1,135 @@
+"""LPIPS v0.1 on AlexNet: features after each ReLU, unit length per pixel, weighted squared difference, spatial mean.
+
+Pictures are channels-last float32 in [-1, 1], of at least 31 pixels a side: less leaves AlexNet's third layer empty.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+import torch
+from jaxtyping import Float, Float32, Float64
+from numpy import ndarray as Array
+from torch import Tensor
+from torch.nn import functional
+
+from dav_gswt.images.lpips_weights import Weights
+
+LEAST = 31  # pixels a side
+CHUNK = 1 << 19  # pixels whose features are held at a time, of each of two pictures
+SHIFT, SCALE = (-0.030, -0.088, -0.188), (0.458, 0.448, 0.450)  # the mean and deviation of photos, for [-1, 1]
+STEPS = (4, 2), (1, 2), (1, 1), (1, 1), (1, 1)  # stride and padding of each convolution
+POOLED = 1, 2  # convolutions that a 3 x 3 maximum at every second pixel goes before
+
+
+def distance(a: Float32[Array, "n h w 3"], b: Float32[Array, "n h w 3"], weights: Weights) -> Float64[Array, "n"]:
+    """LPIPS of each pair of pictures. 0 for equal ones, the same either way round.
+
+    Raises: ValueError: sides under 31 pixels, values outside [-1, 1] or not finite, with the picture's index.
+    """
+    _require_pictures(a)
+    _require_pictures(b)
+    heads = _tensors(weights.heads)
+    out = np.zeros(len(a))
+    with torch.inference_mode():
+        for rows in _chunks(len(a), a.shape[1] * a.shape[2]):
+            both = zip(_unit(_features(a[rows], weights)), _unit(_features(b[rows], weights)), heads, strict=True)
+            out[rows] = sum(_weighted(first - second, head) for first, second, head in both).numpy()
+    return out
+
+
+def pairwise_mean(pictures: Float32[Array, "n m h w 3"], weights: Weights) -> Float64[Array, "n"]:
+    """Mean LPIPS over all pairs of the m pictures of each of n sets; each picture's features are computed once.
+
+    As LPIPS is a weighted squared distance of unit features, its mean over pairs is twice their unbiased variance:
+    O(m), not O(m^2). Exactly 0 where all m are equal. Raises: ValueError: m < 2; as `distance`.
+    """
+    n, m, h, w, _ = pictures.shape
+    if m < 2:
+        raise ValueError(f"LPIPS between samples needs at least 2 of a pose, not {m}: one has no pair")
+    _require_pictures(pictures.reshape(n * m, h, w, 3), m)
+    out = np.zeros(n)
+    with torch.inference_mode():
+        for rows in _chunks(n, h * w):
+            out[rows] = _spread(pictures[rows], weights)
+    return out
+
+
+def layers(pictures: Float32[Array, "n h w 3"], weights: Weights) -> list[Float32[Array, "n _ _ _"]]:
+    """AlexNet's features after each of its five ReLUs, finest first, channels first, not normalised.
+
+    Their strides are 4, 8, 16, 16 and 16 pixels. Raises: as `distance`.
+    """
+    _require_pictures(pictures)
+    parts = []
+    with torch.inference_mode():
+        for rows in _chunks(len(pictures), pictures.shape[1] * pictures.shape[2]) or [slice(0, 0)]:
+            parts.append([f.numpy() for f in _features(pictures[rows], weights)])
+    return [np.concatenate(layer) for layer in zip(*parts, strict=True)]
+
+
+def resized(pictures: Float32[Array, "n h w 3"], side: int) -> Float32[Array, "n _ _ 3"]:
+    """The pictures at side x side pixels, bilinear: 512 is the paper's, at which enlarged pictures look more alike."""
+    small = functional.interpolate(
+        torch.from_numpy(np.ascontiguousarray(pictures)).movedim(-1, 1), (side, side), mode="bilinear", antialias=True
+    )
+    return np.ascontiguousarray(small.movedim(1, -1).numpy().clip(-1, 1))
+
+
+def _spread(sets: Float32[Array, "b m h w 3"], weights: Weights) -> Float64[Array, "b"]:
+    """Twice the weighted unbiased variance of the unit features, taken relative to each set's first picture.
+
+    Sum of |d|^2 less |sum of d|^2 / m cancels by no more than the factor m + 1, since d holds the first one's own 0.
+    """
+    m, heads = sets.shape[1], _tensors(weights.heads)
+    first = list(_unit(_features(sets[:, 0], weights)))
+    total = [torch.zeros_like(f) for f in first]
+    squares = torch.zeros(len(sets), dtype=torch.float64)
+    for i in range(1, m):
+        for k, feature in enumerate(_unit(_features(sets[:, i], weights))):
+            apart = feature.sub_(first[k])
+            squares += _weighted(apart, heads[k])
+            total[k] += apart
+    for summed, head in zip(total, heads, strict=True):
+        squares -= _weighted(summed, head) / m
+    return (2 / (m - 1) * squares).numpy()
+
+
+def _features(pictures: Float32[Array, "b h w 3"], weights: Weights) -> Iterator[Float[Tensor, "b _ _ _"]]:
+    x = torch.from_numpy(np.ascontiguousarray(pictures)).movedim(-1, 1)
+    x = (x - torch.tensor(SHIFT)[:, None, None]) / torch.tensor(SCALE)[:, None, None]
+    convolutions = zip(_tensors(weights.kernels), _tensors(weights.biases), STEPS, strict=True)
+    for i, (kernel, bias, (stride, padding)) in enumerate(convolutions):
+        if i in POOLED:
+            x = functional.max_pool2d(x, 3, 2)
+        x = functional.relu(functional.conv2d(x, kernel, bias, stride, padding))
+        yield x
+
+
+def _unit(features: Iterator[Tensor]) -> Iterator[Tensor]:
+    """Each pixel's features over their length; 0 where all are 0."""
+    for x in features:
+        yield x / (torch.linalg.vector_norm(x, dim=1, keepdim=True) + 1e-10)
+
+
+def _weighted(apart: Float[Tensor, "b c _ _"], head: Float[Tensor, "c"]) -> Float[Tensor, "b"]:
+    """Mean over pixels of the squares, weighted by channel."""
+    return torch.einsum("bchw,bchw,c->b", apart, apart, head).double() / (apart.shape[2] * apart.shape[3])
+
+
+def _tensors(arrays: tuple[Array, ...]) -> list[Tensor]:
+    return [torch.from_numpy(a) for a in arrays]
+
+
+def _chunks(n: int, pixels: int) -> list[slice]:
+    step = max(1, CHUNK // pixels)
+    return [slice(start, start + step) for start in range(0, n, step)]
+
+
+def _require_pictures(pictures: Float32[Array, "n h w 3"], of: int = 1) -> None:
+    """of: how many make up one, for its index in errors."""
+    _, h, w, _ = pictures.shape
+    if min(h, w) < LEAST:
+        raise ValueError(f"LPIPS needs pictures of at least {LEAST} pixels a side, not {w} x {h}")
+    for start, rows in enumerate(pictures):
+        if not (rows.min() >= -1 and rows.max() <= 1):  # NaN is neither
+            raise ValueError(f"picture {start // of} has values outside [-1, 1], or some that are not finite")

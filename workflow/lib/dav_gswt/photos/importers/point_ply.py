@@ -1,0 +1,36 @@
+"""Clouds of points from a .ply file."""
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Float32
+from numpy import ndarray as Array
+from plyfile import PlyData, PlyParseError
+
+from dav_gswt.errors import InputError
+from dav_gswt.photos.importers import checks
+
+
+def read(path: Path) -> tuple[Float[Array, "n 3"], Float32[Array, "n 3"]]:
+    """Positions, and colours as sRGB in [0, 1]: mid-grey where the file has none.
+
+    Raises: InputError: not a PLY of points, promises more than it holds, or a number is not finite.
+    """
+    size = checks.sized(path, checks.LARGEST)
+    try:
+        with path.open("rb") as file:
+            header = PlyData._parse_header(file)
+            room = size - file.tell()
+        promised = sum(e.count * max(1, len(e.properties)) for e in header.elements)
+        if promised > room or max((e.count for e in header.elements), default=0) > checks.MOST_POINTS:
+            raise InputError(f"{path}: promises more points than it holds, or than are read; is it cut short?")
+        rows = PlyData.read(str(path))["vertex"].data
+        places = np.stack([np.asarray(rows[axis], float) for axis in "xyz"], -1)
+        colours = np.full(places.shape, 0.5, np.float32)
+        if {"red", "green", "blue"} <= set(rows.dtype.names):
+            whole = rows.dtype["red"].kind in "ui"
+            stack = np.stack([np.asarray(rows[c], np.float32) for c in ("red", "green", "blue")], -1)
+            colours = np.clip(stack / (np.iinfo(rows.dtype["red"]).max if whole else 1), 0, 1)
+    except (PlyParseError, ValueError, KeyError, TypeError, UnicodeDecodeError, OSError) as error:
+        raise InputError(f"{path}: not readable as a PLY of points ({error}); export or copy it again") from error
+    return checks.finite(places, str(path)), checks.finite(colours.astype(np.float32), str(path))

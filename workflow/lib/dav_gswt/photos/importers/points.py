@@ -1,0 +1,197 @@
+"""Points under cameras that are known: observed in the model, or found from features of the photos.
+
+Features and matches may use several threads, as in structure from motion, points use one: a run repeats to the bit.
+"""
+
+import tempfile
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+from jaxtyping import Bool, Float, Float32, Int
+from numpy import ndarray as Array
+from scipy.spatial import cKDTree
+
+from dav_gswt.images import image_files
+from dav_gswt.logs import progress
+from dav_gswt.photos.importers import lens_models
+from dav_gswt.photos.importers.imported_model import Given, Shot
+from dav_gswt.photos.importers.undistortion import Placed
+from dav_gswt.photos.sfm import features
+from dav_gswt.photos.sfm.registration import Options
+
+ALL_PAIRS = 60  # photos up to which each is matched with every other
+NEAREST = 20  # photos with which each is matched otherwise
+WIDEST = 90.0  # degrees between two viewing directions, beyond which features do not match
+SAMPLE = 2000  # points, and a tenth as many shots, from which it is told how much is seen
+
+
+@dataclass(frozen=True)
+class Seen:
+    """n points and m observations of them: rays[k] is where photo image_of[k] sees point point_of[k] at depth 1.
+
+    error: mean distance in pixels of the observations from the points' projections.
+    """
+
+    points: Float[Array, "n 3"]
+    colours: Float32[Array, "n 3"]
+    point_of: Int[Array, "m"]
+    image_of: Int[Array, "m"]
+    rays: Float[Array, "m 2"]
+    error: float
+
+
+def observed(given: Given, placed: Sequence[Placed]) -> Seen:
+    """The model's own observations, of those of its images that have a photo."""
+    seen, error, out = [], [], []
+    for i, place in enumerate(placed):
+        shot = given.shots[place.index]
+        own = np.flatnonzero(given.image_of == place.index)
+        rays, pixels = lens_models.rays(shot.lens, given.pixels[own]), given.pixels[own]
+        known = np.isfinite(rays).all(1)
+        own, rays = own[known], rays[known]
+        at = given.points[given.point_of[own]] @ shot.rotation.T + shot.translation
+        error.append(_errors(shot.lens, at, pixels[known]))
+        turned = np.linalg.matrix_power(lens_models.QUARTER, place.turns)[:2, :2]
+        out.append(rays @ turned.T)
+        seen.append(np.stack([given.point_of[own], np.full(len(own), i)], -1))
+    pairs = np.concatenate(seen)
+    return Seen(given.points, given.colours, pairs[:, 0], pairs[:, 1], np.concatenate(out), _mean(error))
+
+
+def triangulated(placed: Sequence[Placed], options: Options) -> Seen:
+    """Points where rays through matched SIFT features cross; cameras stay as they are.
+
+    The world is moved to the cameras' mean meanwhile: coordinates of a map projection run to millions.
+    """
+    middle = np.mean([-p.rotation.T @ p.translation for p in placed], axis=0)
+    with tempfile.TemporaryDirectory(prefix="points-") as scratch:
+        folder, database = Path(scratch), Path(scratch) / "database.db"
+        known = _entered(placed, middle, database, options.size)
+        names = [known.images[i + 1].name for i in range(len(placed))]
+        _shrink(placed, known, folder)
+        features.find(len(names), folder, database, options.size, options.features, options.threads)
+        pairs = [(names[i], names[j]) for i, j in near_pairs(placed)]
+        features.match_pairs(pairs, database, options.threads, options.seed)
+        choice = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=options.seed)
+        choice.triangulation.random_seed = choice.mapper.random_seed = options.seed
+        choice.mapper.num_threads = 1
+        found = pycolmap.triangulate_points(known, database, folder, folder, options=choice)
+        return _seen(found, len(placed), middle)
+
+
+def near_pairs(placed: Sequence[Placed]) -> list[tuple[int, int]]:
+    """Pairs of photos to match, the lower number first: all, or those near each other that look the same way.
+
+    Beyond ALL_PAIRS photos each is paired with the NEAREST ones whose viewing direction differs by less than WIDEST.
+    """
+    n = len(placed)
+    if n <= ALL_PAIRS:
+        return [(i, j) for i in range(n) for j in range(i + 1, n)]
+    centres = np.array([-p.rotation.T @ p.translation for p in placed])
+    forward = np.array([p.rotation[2] for p in placed])
+    _, order = cKDTree(centres).query(centres, min(n, 8 * NEAREST + 1))
+    pairs = set()
+    for i in range(n):
+        alike = [int(j) for j in order[i] if j != i and forward[i] @ forward[j] > np.cos(np.radians(WIDEST))]
+        pairs |= {(min(i, j), max(i, j)) for j in alike[:NEAREST]}
+    return sorted(pairs)
+
+
+def share_seen(points: Float[Array, "n 3"], shots: Sequence[Shot]) -> float:
+    """Which share of points lies in the pictures of some shot; from a sample spread evenly over both."""
+    few = points[:: max(1, len(points) // SAMPLE)]
+    known = [s for s in shots if s.lens is not None]
+    inside = np.zeros(len(few), bool)
+    for shot in known[:: max(1, len(known) * 10 // SAMPLE)]:
+        inside |= sees(shot.lens, shot.rotation, shot.translation, few)
+    return float(inside.mean()) if len(inside) else 0.0
+
+
+def sees(
+    lens: pycolmap.Camera, rotation: Float[Array, "3 3"], translation: Float[Array, "3"], points: Float[Array, "n 3"]
+) -> Bool[Array, "n"]:
+    """Which points lie before a camera and within its picture."""
+    at = points @ rotation.T + translation
+    # A polynomial far outside the picture may lead back into it; a ray 80 degrees off the axis is none of a pinhole's.
+    before = at[:, 2] > np.linalg.norm(at, axis=1) * np.cos(np.radians(80))
+    pixels = np.full((len(points), 2), -1.0)
+    pixels[before] = lens.img_from_cam(at[before])
+    return (pixels > 0).all(1) & (pixels < [lens.width, lens.height]).all(1)
+
+
+def _entered(placed: Sequence[Placed], middle: Array, database: Path, size: int) -> pycolmap.Reconstruction:
+    """Cameras and images by numbers from 1 on, the same in a new database and in a reconstruction without points."""
+    known, numbers = pycolmap.Reconstruction(), {}
+    with closing(pycolmap.Database.open(database)) as store:
+        for i, place in enumerate(placed, 1):
+            lens = lens_models.shrunk(place.lens, size)
+            if (key := lens_models.key(lens)) not in numbers:
+                numbers[key] = lens.camera_id = len(numbers) + 1
+                rig = pycolmap.Rig(rig_id=lens.camera_id)
+                rig.add_ref_sensor(lens.sensor_id)
+                store.write_camera(lens, use_camera_id=True)
+                store.write_rig(rig, use_rig_id=True)
+                known.add_camera_with_trivial_rig(lens)
+            image = pycolmap.Image(name=f"{i:06d}.png", camera_id=numbers[key], image_id=i)
+            store.write_image(image, use_image_id=True)
+            frame = pycolmap.Frame(frame_id=i, rig_id=numbers[key])
+            frame.add_data_id(image.data_id)
+            store.write_frame(frame, use_frame_id=True)
+            pose = np.c_[place.rotation, place.translation + place.rotation @ middle]
+            known.add_image_with_trivial_frame(image, pycolmap.Rigid3d(pose))
+    return known
+
+
+def _shrink(placed: Sequence[Placed], known: pycolmap.Reconstruction, folder: Path) -> None:
+    """Write what features are looked for in: the photos upright, shrunk by area means."""
+    for i in progress(range(len(placed)), "read photos"):
+        image = known.images[i + 1]
+        photo = image_files.read(placed[i].path)
+        image_files.write(folder / image.name, image_files.resized(photo, image.camera.width, image.camera.height))
+
+
+def _seen(found: pycolmap.Reconstruction, photos: int, middle: Array) -> Seen:
+    """Arrays of a reconstruction whose images are numbered from 1 on."""
+    ids = np.array(sorted(found.points3D), np.int64)
+    points = np.array([found.points3D[i].xyz for i in ids]).reshape(-1, 3)
+    colours = (np.array([found.points3D[i].color for i in ids]).reshape(-1, 3) / 255).astype(np.float32)
+    seen, out, error = [], [], []
+    for i in range(photos):
+        image = found.images[i + 1]
+        own = np.array([(p.point3D_id, *p.xy) for p in image.get_observation_points2D()], float).reshape(-1, 3)
+        place = np.searchsorted(ids, own[:, 0].astype(np.int64))
+        pose = image.cam_from_world().matrix()
+        error.append(_errors(image.camera, points[place] @ pose[:, :3].T + pose[:, 3], own[:, 1:]))
+        out.append(lens_models.rays(image.camera, own[:, 1:]))
+        seen.append(np.stack([place, np.full(len(own), i)], -1))
+    pairs = np.concatenate(seen)
+    return Seen(points + middle, colours, pairs[:, 0], pairs[:, 1], np.concatenate(out), _mean(error))
+
+
+def _errors(lens: pycolmap.Camera, at: Float[Array, "k 3"], pixels: Float[Array, "k 2"]) -> Array:
+    """Distances of projections from pixels; NaN behind the camera."""
+    seen = np.asarray(lens.img_from_cam(np.ascontiguousarray(at))).reshape(-1, 2)
+    return np.linalg.norm(seen - pixels, axis=1)
+
+
+def _mean(errors: list[Array]) -> float:
+    every = np.concatenate(errors)
+    every = every[np.isfinite(every)]
+    return float(every.mean()) if len(every) else 0.0
+
+
+def only(seen: Seen, kept: Bool[Array, "m"]) -> Seen:
+    """Some of the observations, and the points that they are of."""
+    own = np.unique(seen.point_of[kept])
+    return replace(
+        seen,
+        points=seen.points[own],
+        colours=seen.colours[own],
+        point_of=np.searchsorted(own, seen.point_of[kept]),
+        image_of=seen.image_of[kept],
+        rays=seen.rays[kept],
+    )

@@ -1,0 +1,154 @@
+"""The photos of a folder, and which of them belongs to which image of a model."""
+
+import logging
+import os
+from collections import Counter, defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+import OpenImageIO as oiio
+import pycolmap
+from jaxtyping import Float
+from numpy import ndarray as Array
+
+from dav_gswt.errors import InputError
+from dav_gswt.images import image_files
+from dav_gswt.photos.importers import lens_models
+from dav_gswt.photos.importers.imported_model import Given, Shot
+
+_log = logging.getLogger(__name__)
+
+MOST_FILES = 200_000  # looked through for photos
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A photo and its place. lens: upright, at the photo's size. index: of the shot in the model.
+
+    turns: quarter turns clockwise from the picture that the model speaks of to the upright one; rotation and
+    translation are the upright camera's.
+    """
+
+    path: Path
+    key: str
+    index: int
+    lens: pycolmap.Camera
+    turns: int
+    rotation: Float[Array, "3 3"]
+    translation: Float[Array, "3"]
+
+
+class Folder:
+    """The photos below a folder, by their path relative to it, by file name and by stem."""
+
+    def __init__(self, folder: Path):
+        if not folder.is_dir():
+            raise InputError(f"{folder}: there is no such folder of photos")
+        self.folder = folder
+        self.photos: dict[str, Path] = {}
+        looked = 0
+        for root, folders, files in os.walk(folder):
+            folders[:] = sorted(f for f in folders if not f.startswith("."))
+            looked += len(files)
+            if looked > MOST_FILES:
+                raise InputError(f"{folder}: more than {MOST_FILES} files; give the folder of the photos alone")
+            for file in sorted(files):
+                if not file.startswith(".") and Path(file).suffix.lower() in image_files.SUFFIXES:
+                    self.photos[(Path(root) / file).relative_to(folder).as_posix()] = Path(root) / file
+        if not self.photos:
+            raise InputError(f"{folder}: no photos in this folder; put .jpg, .png or .tif files into it")
+        self._tables: list[Mapping[str, list[str]]] = [defaultdict(list) for _ in range(3)]
+        for name in self.photos:
+            for table, label in zip(self._tables, _labels(name), strict=True):
+                table[label].append(name)
+
+    def find(self, name: str) -> str | None:
+        """The photo of that name: the same path, else without suffix, else the one of this file name, or stem."""
+        if name in self.photos:
+            return name
+        for table, label in zip(self._tables, _labels(name), strict=True):
+            if len(found := table.get(label, [])) == 1:
+                return found[0]
+        return None
+
+    def stored_size(self, name: str) -> tuple[int, int] | None:
+        """Width and height of a photo as stored, without EXIF's orientation; None where there is no such photo."""
+        found = self.find(name)
+        return None if found is None else _stored(self.photos[found])[:2]
+
+
+def placed(given: Given, folder: Folder, source: Path) -> tuple[list[Placed], tuple[tuple[str, str], ...]]:
+    """The photos that have a camera, by their pictures' names; and the others, and images without photo, with reasons.
+
+    Photos without a camera are told where another photo of the same folder has one.
+    Raises: InputError: a photo that does not fit its camera, or is that of two images.
+    """
+    owners: dict[str, int] = {}
+    left_out = []
+    for i, shot in enumerate(given.shots):
+        found = folder.find(shot.name)
+        if found is None:
+            left_out.append((shot.name, f"{folder.folder} has no photo of this name (or several of this file name)"))
+        elif found in owners:
+            raise InputError(f"{source}: {given.shots[owners[found]].name} and {shot.name} are one photo: {found}")
+        else:
+            owners[found] = i
+    homes = {PurePosixPath(name).parent for name in owners}
+    reasons = {found: reason for name, reason in given.reasons.items() if (found := folder.find(name))}
+    for name in folder.photos:
+        if name not in owners and PurePosixPath(name).parent in homes:
+            left_out.append((name, reasons.get(name, "the model has no camera for it")))
+    out = [
+        _place(given.shots[owners[name]], owners[name], folder.photos[name], key, source)
+        for name, key in _keys(sorted(owners)).items()
+    ]
+    if scaled := [p for p in out if _scaled_pinhole(given.shots[p.index].lens, p.lens)]:
+        _log.warning(
+            "%s: its size is not that of its pinhole camera; if the model is of undistorted pictures, use these",
+            scaled[0].path.name,
+        )
+    return sorted(out, key=lambda p: p.key), tuple(left_out)
+
+
+def _labels(name: str) -> tuple[str, str, str]:
+    """Path without suffix, file name, stem. A suffix is that of a picture: a name may have other points in it."""
+    path = PurePosixPath(name)
+    bare = path.with_suffix("") if path.suffix.lower() in image_files.SUFFIXES and path.stem else path
+    return str(bare), path.name, bare.name
+
+
+def _keys(names: list[str]) -> dict[str, str]:
+    """Names of the pictures made of photos: the stem; where two are equal the whole path, and a number if need be."""
+    stems = Counter(_labels(n)[2] for n in names)
+    keys, used = {}, set()
+    for name in names:
+        stem = _labels(name)[2]
+        plain = stem if stems[stem] == 1 else name.replace("/", "_").replace(".", "_")
+        number, free = 1, plain
+        while free in used:
+            number, free = number + 1, f"{plain}_{number + 1}"
+        used.add(free)
+        keys[name] = f"{free}.png"
+    return keys
+
+
+def _place(shot: Shot, index: int, path: Path, key: str, source: Path) -> Placed:
+    width, height, orientation = _stored(path)
+    lens, turns = lens_models.fitted(shot.lens, (width, height), orientation, f"{source}: {shot.name}")
+    turn = np.linalg.matrix_power(lens_models.QUARTER, turns)
+    return Placed(path, key, index, lens, turns, turn @ shot.rotation, turn @ shot.translation)
+
+
+def _stored(path: Path) -> tuple[int, int, int]:
+    """Width, height as stored, and EXIF's orientation."""
+    width, height = image_files.size(path)
+    value = oiio.ImageInput.open(str(path)).spec().getattribute("Orientation")
+    orientation = value if isinstance(value, int) and 1 <= value <= 8 else 1
+    return (height, width, orientation) if orientation >= 5 else (width, height, orientation)
+
+
+def _scaled_pinhole(model: pycolmap.Camera, photo: pycolmap.Camera) -> bool:
+    same = {model.width, model.height} == {photo.width, photo.height}
+    return model.model_name in ("PINHOLE", "SIMPLE_PINHOLE") and not same

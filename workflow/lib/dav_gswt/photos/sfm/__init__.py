@@ -1,0 +1,1 @@
+"""Structure from motion with pycolmap: features, pairs, mapping, focal guard, GPS."""

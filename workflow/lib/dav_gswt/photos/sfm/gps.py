@@ -1,0 +1,104 @@
+"""Where photos were taken, by their own GPS: metres and north for a set that is placed only relative to itself.
+
+Receivers in cameras lag and drift, so positions are judged by the photos before they count: a robust similarity brings
+the cameras to them, and where they still differ by more than receivers do, they are not used. Where they agree they
+enter the last adjustment as priors.
+"""
+
+import logging
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+from jaxtyping import Float
+from numpy import ndarray as Array
+
+from dav_gswt.geometry.geodesy import Georeference
+from dav_gswt.photos import exif, model
+
+_log = logging.getLogger(__name__)
+
+ACROSS, UP = 3.0, 6.0  # metres: standard deviation of a receiver's position, along the ground and in height
+LEAST_SHARE = 0.8  # of the photos that must have a position, or none counts
+LEAST_SPREAD = 4.0  # positions must spread this many ACROSS, or they say neither scale nor north
+WORST = 2.0  # ACROSS: median distance from the cameras at which the positions contradict the photos
+ROUNDS = 50  # of reweighting
+
+
+@dataclass(frozen=True)
+class Positions:
+    """Where photos were taken. about: the place of a frame of metres east, north and up; its own north is 0.
+
+    at: in that frame, by photo; NaN where a photo does not say.
+    """
+
+    about: Georeference
+    at: Float[Array, "n 3"]
+
+
+def of_photos(paths: list[Path]) -> Positions | None:
+    """The positions of a set's photos; None, with the reason in the log, where they cannot place it."""
+    found = np.array([exif.position(path) or (np.nan,) * 3 for path in paths], float)
+    known = np.isfinite(found).all(1)
+    if not known.any():
+        return None
+    if known.mean() < LEAST_SHARE:
+        _log.warning("only %d of %d photos have a GPS position: none is used", known.sum(), len(paths))
+        return None
+    about = Georeference(*map(float, np.median(found[known], axis=0)), north=0.0, metres_per_unit=1.0)
+    at = np.full(found.shape, np.nan)
+    at[known] = about.to_world(found[known])
+    spread = float(np.sqrt(np.nanvar(at[:, :2], axis=0).sum()))
+    if spread < LEAST_SPREAD * ACROSS:
+        _log.warning("the photos' GPS positions lie within %.0f m, which is within their error: none is used", spread)
+        return None
+    return Positions(about, at)
+
+
+def enter(best: pycolmap.Reconstruction, at: dict[str, Float[Array, "3"]]) -> bool:
+    """Bring a reconstruction into the frame of the positions, in place, and adjust it with them as priors.
+
+    at: the positions by the images' names. Returns whether they agree with the photos; if not, nothing is changed.
+    """
+    numbers = [i for i in best.reg_image_ids() if np.isfinite(at[best.images[i].name]).all()]
+    if len(numbers) < 3:
+        return False
+    centres = np.stack([best.images[i].projection_center() for i in numbers])
+    wanted = np.stack([at[best.images[i].name] for i in numbers])
+    scale, turn, shift, off = similarity(centres, wanted)
+    if off > WORST * ACROSS:
+        _log.warning("the photos' GPS positions are %.0f m off where the photos themselves place them: unused", off)
+        return False
+    best.transform(pycolmap.Sim3d(scale, pycolmap.Rotation3d(turn), shift))
+    model.adjust_with_priors(best, [_prior(best.images[i], at[best.images[i].name]) for i in numbers])
+    _log.info("GPS: the photos lie in metres, %.1f m from their positions (median)", off)
+    return True
+
+
+def similarity(
+    a: Float[Array, "n 3"], b: Float[Array, "n 3"]
+) -> tuple[float, Float[Array, "3 3"], Float[Array, "3"], float]:
+    """Scale s, rotation R and shift t of b = s R a + t, and the median distance that is left.
+
+    Umeyama's closed form under Geman-McClure weights at the scale of a receiver's error: lone outliers have no say.
+    """
+    weight = np.ones(len(a))
+    for _ in range(ROUNDS):
+        w = weight / weight.sum()
+        ma, mb = w @ a, w @ b
+        u, s, vt = np.linalg.svd(((b - mb) * w[:, None]).T @ (a - ma))
+        sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
+        turn = u * sign @ vt
+        scale = float((s * sign).sum() / max(w @ ((a - ma) ** 2).sum(1), 1e-300))
+        shift = mb - scale * turn @ ma
+        off = np.linalg.norm(scale * a @ turn.T + shift - b, axis=1)
+        weight = (1 + (off / ACROSS) ** 2) ** -2
+    return scale, turn, shift, float(np.median(off))
+
+
+def _prior(image: pycolmap.Image, at: Float[Array, "3"]) -> pycolmap.PosePrior:
+    prior = pycolmap.PosePrior(corr_data_id=image.data_id, position=at)
+    prior.position_covariance = np.diag([ACROSS**2, ACROSS**2, UP**2])
+    prior.coordinate_system = pycolmap.PosePriorCoordinateSystem.CARTESIAN
+    return prior

@@ -1,0 +1,148 @@
+"""Where were further photos taken? Each finds its place against the pictures and points that a scene already has."""
+
+import logging
+import tempfile
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+from jaxtyping import Float
+from numpy import ndarray as Array
+from scipy.spatial import cKDTree
+
+from dav_gswt.errors import InputError
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.images import image_files
+from dav_gswt.logs import progress
+from dav_gswt.photos import lenses
+from dav_gswt.photos import model as models
+from dav_gswt.photos.model import Model
+from dav_gswt.photos.sfm import features, pairs
+
+_log = logging.getLogger(__name__)
+
+FEATURES = 4096
+NEIGHBOURS = 8  # pictures of the scene that a new photo is matched with
+SAME = 2.0  # pixels between a feature of a picture and the point seen there, within which they are one
+LEAST = 20  # points that fix a photo's place
+LEAST_SHARE = 0.25  # of its matched points that must agree on it
+WORST = 6.0  # pixels, of a point that agrees
+
+
+def located(photos: Path, paths: list[Path], seed: int = 0) -> list[Camera | None]:
+    """The cameras of photos in the world of a photos/ folder; None for one that finds no place.
+
+    The photos must be taken with the scene's own camera: each is undistorted as its pictures were.
+    """
+    if not paths:
+        return []
+    known = models.read(photos / "sparse")
+    with tempfile.TemporaryDirectory(prefix="locate-") as scratch:
+        return _located(known, photos, paths, Path(scratch), seed)
+
+
+def _located(known: Model, photos: Path, paths: list[Path], scratch: Path, seed: int) -> list[Camera | None]:
+    pinhole = _main(known, photos)
+    new = [_developed(path, photos, pinhole, scratch / f"new_{i:04d}.png") for i, path in enumerate(paths)]
+    for name in progress(known.names, "read pictures"):
+        image_files.write(scratch / f"old_{name}", image_files.read(photos / "images" / name))
+    database = scratch / "database.db"
+    names = [f"old_{name}" for name in known.names] + [name for name in new if name]
+    size = max(pinhole.width, pinhole.height)
+    with closing(pycolmap.Database.open(database)) as store:
+        _enter(names, [*known.cameras, *[pinhole] * (len(names) - len(known.names))], store)
+    features.find(len(names), scratch, database, size, FEATURES, 1)
+    _match(names, len(known.names), database, seed)
+    with closing(pycolmap.Database.open(database)) as store:
+        seen = _seen(known, store)
+        return [_placed(names.index(name), seen, known, pinhole, store, seed) if name else None for name in new]
+
+
+def _main(known: Model, photos: Path) -> Camera:
+    """A camera with the lens of most pictures."""
+    kinds = lenses.read(photos)
+    if not kinds:
+        return known.cameras[0]
+    return next(c for c in known.cameras if np.allclose(lenses.pinhole(c), kinds[0].pinhole, atol=lenses.SAME))
+
+
+def _developed(path: Path, photos: Path, pinhole: Camera, out: Path) -> str | None:
+    """Write the photo as a picture of the scene's; None, with the reason in the log, where it is not of its camera."""
+    try:
+        image_files.write(out, lenses.developed(image_files.read(path), photos, pinhole))
+    except (InputError, ValueError) as error:
+        _log.warning("%s: %s", path.name, error)
+        return None
+    return out.name
+
+
+def _enter(names: list[str], cameras: list[Camera], store: pycolmap.Database) -> None:
+    """Images numbered from 1 in the order of their names' list, each with a pinhole of its own."""
+    for name, camera in zip(names, cameras, strict=True):
+        params = [camera.fx, camera.fy, camera.cx, camera.cy]
+        lens = pycolmap.Camera(model="PINHOLE", width=camera.width, height=camera.height, params=params)
+        lens.camera_id = store.write_camera(lens)
+        rig = pycolmap.Rig()
+        rig.add_ref_sensor(lens.sensor_id)
+        number = store.write_rig(rig)
+        image = pycolmap.Image(name=name, camera_id=lens.camera_id)
+        image.image_id = store.write_image(image)
+        frame = pycolmap.Frame(rig_id=number)
+        frame.add_data_id(image.data_id)
+        store.write_frame(frame)
+
+
+def _match(names: list[str], old: int, database: Path, seed: int) -> None:
+    """Match every new photo with the pictures that it looks like most."""
+    with closing(pycolmap.Database.open(database)) as store:
+        found = [store.read_descriptors(i + 1).data for i in range(len(names))]
+    alike = pairs.similarity(pairs.described(found, seed))
+    some = [
+        (j, int(i)) for j in range(old, len(names)) for i in np.argsort(-alike[j, :old], kind="stable")[:NEIGHBOURS]
+    ]
+    features.match_pairs([(names[i], names[j]) for j, i in some], database, 1, seed)
+
+
+def _seen(known: Model, store: pycolmap.Database) -> list[dict[int, int]]:
+    """Per picture of the scene: which of its features shows which point."""
+    out = []
+    for i in range(len(known.names)):
+        own = np.flatnonzero(known.image_of == i)
+        places = _keypoints(store, i)
+        if not len(own) or not len(places):
+            out.append({})
+            continue
+        far, which = cKDTree(known.pixels[own]).query(places)
+        out.append({int(k): int(known.point_of[own[which[k]]]) for k in np.flatnonzero(far <= SAME)})
+    return out
+
+
+def _keypoints(store: pycolmap.Database, index: int) -> Float[Array, "n 2"]:
+    return store.read_keypoints(index + 1)[:, :2].astype(float)
+
+
+def _placed(
+    index: int, seen: list[dict[int, int]], known: Model, pinhole: Camera, store: pycolmap.Database, seed: int
+) -> Camera | None:
+    """The camera whose view of the matched points fits best, if enough of them agree."""
+    own, at = _keypoints(store, index), {}
+    for i, points in enumerate(seen):
+        if not store.exists_two_view_geometry(i + 1, index + 1):
+            continue
+        for a, b in store.read_two_view_geometry(i + 1, index + 1).inlier_matches:
+            if int(a) in points:
+                at[int(b), points[int(a)]] = None
+    if len(at) < LEAST:
+        return None
+    rows, columns = (np.array(v) for v in zip(*at, strict=True))
+    params = [pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy]
+    lens = pycolmap.Camera(model="PINHOLE", width=pinhole.width, height=pinhole.height, params=params)
+    options = pycolmap.AbsolutePoseEstimationOptions()
+    options.ransac.max_error, options.ransac.random_seed = WORST, seed
+    found = pycolmap.estimate_and_refine_absolute_pose(own[rows], known.points[columns], lens, options)
+    if not found or found["num_inliers"] < max(LEAST, LEAST_SHARE * len(rows)):
+        return None
+    pose = found["cam_from_world"].matrix()
+    return replace(pinhole, rotation=pose[:, :3].copy(), translation=pose[:, 3].copy())

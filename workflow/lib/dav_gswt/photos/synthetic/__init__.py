@@ -1,0 +1,1 @@
+"""Synthetic photo sets: five families of ground, rendered with exact poses."""

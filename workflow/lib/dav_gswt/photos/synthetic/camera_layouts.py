@@ -1,0 +1,90 @@
+"""Where a synthetic scene is photographed from: poses (elevation, azimuth, radius) about a target, and sets of them.
+
+Elevation is measured from the ground up (90: straight above), azimuth from +x towards +y; both in degrees.
+"""
+
+import numpy as np
+
+from dav_gswt.geometry.cameras import Camera, look_at, pinhole
+
+Place = tuple[float, float, float]  # elevation, azimuth, radius
+NEARER = 0.9  # radius of a test view, as a share of the others'
+GOLDEN = np.pi * (3.0 - 5.0**0.5)  # radians: the turn between neighbours of a Fibonacci lattice
+CIRCLE = 36  # views of the rig `paper` that stand on a circle: of 100, and of any number from twice as many on
+STRIDE = 12.0  # degrees below the horizon that a walker looks
+
+
+def orbit(elevation, azimuth, radius, target, width: int, height: int, fov) -> Camera:
+    """The camera at a place, looking at `target`. fov: of the picture's width, degrees.
+
+    The picture's top is up; from straight above it is the side away from the camera's azimuth, which is what the top
+    tends to as the elevation tends to 90.
+    Raises: ValueError: a radius that is not positive, an elevation outside -90 to 90, or a number that is not finite.
+    """
+    if not (np.isfinite([elevation, azimuth, radius]).all() and radius > 0 and -90 <= elevation <= 90):
+        raise ValueError(f"no camera stands at elevation {elevation}, azimuth {azimuth}, radius {radius}")
+    e, a = np.radians(elevation), np.radians(azimuth % 360.0)
+    target = np.asarray(target, float)
+    outward = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    upward = np.array([-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)])  # of length 1 at every elevation
+    rotation, translation = look_at(target + radius * outward, target, upward)
+    focal = 0.5 * width / np.tan(0.5 * np.radians(fov))
+    return Camera(rotation, translation, focal, focal, width / 2, height / 2, width, height)
+
+
+def start_ring(n: int, elevation: float, radius: float) -> list[Place]:
+    """n places: one straight above, the others evenly around at `elevation`. One alone is the one above."""
+    if n < 1:
+        raise ValueError(f"a ring has at least 1 place, not {n}")
+    return [(90.0, 0.0, radius)] + ring(n - 1, elevation, radius)
+
+
+def ring(n: int, elevation: float, radius: float, turn: float = 0.0) -> list[Place]:
+    """n places evenly around at `elevation`, the first at azimuth `turn`."""
+    return [(elevation, turn + 360.0 * i / n, radius) for i in range(n)]
+
+
+def hemisphere(n: int, lowest_elevation: float, radius: float, turn: float = 0.0) -> list[Place]:
+    """n places, uniform by area between `lowest_elevation` and 90, on a Fibonacci lattice.
+
+    Place i lies at sin(elevation) = 1 - (i + 1/2)/n (1 - sin(lowest)): equal steps of height are equal areas of a
+    sphere. turn: turns the whole lattice, degrees.
+    """
+    low = np.sin(np.radians(lowest_elevation))
+    height = 1.0 - (np.arange(n) + 0.5) / max(n, 1) * (1.0 - low)
+    azimuth = (np.degrees(np.arange(n) * GOLDEN) + turn) % 360.0
+    return [(float(np.degrees(np.arcsin(h))), float(a), radius) for h, a in zip(height, azimuth, strict=True)]
+
+
+def paper(n: int, elevation: float, lowest_elevation: float, radius: float) -> list[Place]:
+    """n places as in the paper: a circle at `elevation`, the others uniform by area above `lowest_elevation`.
+
+    On the circle are 36, or 36 in 100 where n is below 72.
+    """
+    circle = CIRCLE if n >= 2 * CIRCLE else round(n * CIRCLE / 100)
+    return ring(circle, elevation, radius) + hemisphere(n - circle, lowest_elevation, radius, turn=35.0)
+
+
+def test_views(n: int, lowest_elevation: float, radius: float) -> list[Place]:
+    """n places that only test: uniform by area like `hemisphere`, turned away from its lattice and nearer by a tenth.
+
+    The other radius keeps them distinct from every start view and candidate, whatever their number.
+    """
+    return hemisphere(n, lowest_elevation, NEARER * radius, turn=70.0)
+
+
+test_views.__test__ = False  # not a test, whatever its name makes pytest think
+
+
+def walker(height: float, azimuth: float, away: float, target, width: int, rows: int, fov: float) -> Camera:
+    """The camera at a walker's eye: `height` above the target, `away` from it, looking past it to the horizon.
+
+    azimuth: where the walker stands, from the target. fov: of the picture's width, degrees.
+    Raises: ValueError: a height that is not positive.
+    """
+    if not height > 0:
+        raise ValueError(f"a walker's eye is above the ground, not at {height}")
+    a, down = np.radians(azimuth), np.radians(STRIDE)
+    out = np.array([np.cos(a), np.sin(a), 0.0])
+    eye = np.asarray(target, float) + away * out + [0.0, 0.0, height]
+    return pinhole(eye, eye - np.cos(down) * out - [0.0, 0.0, np.sin(down)], width, rows, fov)

@@ -1,0 +1,139 @@
+"""A synthetic scene as photos: start and test views rendered, and points triangulated from their exact poses."""
+
+import logging
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+
+from dav_gswt.files import write_json
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.images import image_files
+from dav_gswt.logs import progress
+from dav_gswt.photos import model
+from dav_gswt.photos.model import Model
+from dav_gswt.photos.synthetic import renderer, truth
+from dav_gswt.photos.synthetic import scene as synthetic
+
+_log = logging.getLogger(__name__)
+
+FEATURES = 4096
+ALL = 40  # views up to which every pair is matched
+NEIGHBOURS = 20  # of each view among more
+WIDEST = 60.0  # degrees between two views of the same ground, beyond which features no longer look alike
+LEAST_SHARED = 0.1  # of the exemplar that both views of a pair must see
+
+
+def render_set(entry: dict, folder: Path) -> None:
+    """Fill a photos/ folder: images/, truth/ (see `truth`), sparse/ (exact cameras, triangulated points), ground.json.
+
+    entry: a synthetic scene of the config. Points come from the start views alone; test views are in the model, but
+    observe nothing. ground.json names them by group, and says what rendered.
+    """
+    scene = synthetic.of_config(entry)
+    start, test = synthetic.start_views(entry), synthetic.test_views(entry)
+    shots, tests = _named("view", start), _named("test", test)
+    for part in ("images", "truth", "sparse"):
+        (folder / part).mkdir(parents=True, exist_ok=True)
+    for name, camera in progress(shots + tests, "render photos"):
+        image_files.write(folder / "images" / name, synthetic.render(scene, camera))
+        truth.write(folder / "truth" / Path(name).with_suffix(".exr"), scene, camera)
+    found = triangulated(folder / "images", shots, entry["seed"])
+    model.write(with_cameras(found, tests), folder / "sparse")
+    named = [name for name, _ in tests]
+    groups = {group: [named[i] for i in part] for group, part in synthetic.test_groups(entry).items()}
+    frame = scene.frame | {"test": named, "test_groups": groups, "images": len(shots), "registered": len(shots)}
+    write_json(folder / "ground.json", frame | {"left_out": [], "focal_ratio": None, "renderer": renderer.described()})
+
+
+def _named(kind: str, views: list[Camera]) -> list[tuple[str, Camera]]:
+    """The views with names that sort by number."""
+    digits = max(2, len(str(len(views) - 1)))
+    return [(f"{kind}_{i:0{digits}d}.png", camera) for i, camera in enumerate(views)]
+
+
+def triangulated(folder: Path, shots: list[tuple[str, Camera]], seed: int) -> Model:
+    """Points where matched SIFT features of pictures with known cameras cross; cameras stay as they are.
+
+    Up to ALL pictures every pair is matched, else those of `overlapping`.
+    """
+    names, cameras = (list(column) for column in zip(*shots, strict=True))
+    none = np.zeros(0, int)
+    known = Model(
+        tuple(names), tuple(cameras), np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2))
+    )
+    extraction = pycolmap.FeatureExtractionOptions(num_threads=1, use_gpu=False)
+    extraction.sift.max_num_features = FEATURES
+    matching = pycolmap.FeatureMatchingOptions(num_threads=1, use_gpu=False)
+    verification = pycolmap.TwoViewGeometryOptions()
+    verification.ransac.random_seed = seed
+    reader = pycolmap.ImageReaderOptions(camera_model="PINHOLE")
+    reader.camera_params = ",".join(str(v) for v in (cameras[0].fx, cameras[0].fy, cameras[0].cx, cameras[0].cy))
+    with tempfile.TemporaryDirectory(prefix="points-") as scratch:
+        database, sparse = Path(scratch) / "database.db", Path(scratch) / "sparse"
+        sparse.mkdir()
+        pycolmap.extract_features(
+            database,
+            folder,
+            image_names=names,
+            camera_mode=pycolmap.CameraMode.SINGLE,
+            reader_options=reader,
+            extraction_options=extraction,
+            device=pycolmap.Device.cpu,
+        )
+        if len(names) <= ALL:
+            pycolmap.match_exhaustive(database, matching, verification_options=verification, device=pycolmap.Device.cpu)
+        else:
+            some, every = overlapping(cameras), len(names) * (len(names) - 1) // 2
+            _log.info("match %d of %d pairs of views: those that see the same ground alike", len(some), every)
+            listed = Path(scratch) / "pairs.txt"
+            listed.write_text("".join(f"{names[i]} {names[j]}\n" for i, j in some), encoding="utf-8")
+            choice = pycolmap.ImportedPairingOptions(match_list_path=listed)
+            pycolmap.match_image_pairs(database, matching, choice, verification, pycolmap.Device.cpu)
+        model.write(known, sparse)
+        options = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=seed)
+        stored = pycolmap.triangulate_points(
+            pycolmap.Reconstruction(str(sparse)), database, folder, sparse, options=options
+        )
+        return model.of(stored)
+
+
+def overlapping(cameras: list[Camera], side: float = synthetic.EXEMPLAR) -> list[tuple[int, int]]:
+    """Pairs i < j of views to match: each with the NEIGHBOURS that see most of the same ground under like angles.
+
+    Neighbours share LEAST_SHARED of the exemplar, a square of a side about the origin, and look at it under angles that
+    differ by at most WIDEST, taken from its middle. They are ranked by the share times the angle's cosine.
+    """
+    at = (np.arange(16) + 0.5) / 16 * side - side / 2
+    x, y = np.meshgrid(at, at)
+    ground = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], 1)
+    sees = np.zeros((len(cameras), len(ground)))
+    for i, camera in enumerate(cameras):
+        pixels, depth = camera.project(ground)
+        sees[i] = (depth > 0) & (pixels > 0).all(1) & (pixels < [camera.width, camera.height]).all(1)
+    towards = np.stack([camera.centre / np.linalg.norm(camera.centre) for camera in cameras])
+    shared, cosine = sees @ sees.T / len(ground), towards @ towards.T
+    worth = np.where((shared >= LEAST_SHARED) & (cosine >= np.cos(np.radians(WIDEST))), shared * cosine, 0.0)
+    np.fill_diagonal(worth, 0.0)
+    best = np.argsort(-worth, axis=1, kind="stable")[:, :NEIGHBOURS]
+    pairs = {(min(i, int(j)), max(i, int(j))) for i, row in enumerate(best) for j in row if worth[i, j] > 0}
+    return sorted(pairs)
+
+
+def with_cameras(found: Model, more: list[tuple[str, Camera]]) -> Model:
+    """The model with further images that observe nothing, ordered by name as a model's images are."""
+    named = sorted([*zip(found.names, found.cameras, strict=True), *more], key=lambda pair: pair[0])
+    names = tuple(name for name, _ in named)
+    moved = np.array([names.index(name) for name in found.names])
+    image_of = moved[found.image_of]
+    order = np.lexsort((image_of, found.point_of))
+    return replace(
+        found,
+        names=names,
+        cameras=tuple(camera for _, camera in named),
+        point_of=found.point_of[order],
+        image_of=image_of[order],
+        pixels=found.pixels[order],
+    )

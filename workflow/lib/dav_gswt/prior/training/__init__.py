@@ -1,0 +1,1 @@
+"""Training of the project's own prior: synthetic worlds, examples made of them, optimization."""

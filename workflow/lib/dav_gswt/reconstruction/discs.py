@@ -1,0 +1,54 @@
+"""Discs of the ground layer as Gaussians."""
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32
+from numpy import ndarray as Array
+from scipy.ndimage import distance_transform_edt, gaussian_filter
+
+from dav_gswt.field import Field, sh_of
+from dav_gswt.reconstruction.ground import Ground
+
+WIDTH = 0.72  # standard deviation of a disc in spacings: neighbours overlap, the ground is opaque (docs/deviations.md)
+THICKNESS = 0.1  # of a disc, in spacings
+OPAQUE = 4.0  # opacity logit of a disc before the first step
+STANDS = 1.5  # what is this many spacings above the surface is a thing, not a disc
+
+
+def quaternions(east: Float[Array, "n"], north: Float[Array, "n"]) -> Float32[Array, "n 4"]:
+    """The shortest rotation (w x y z) that takes +z to the normal of a surface with these slopes."""
+    normal = np.stack([-east, -north, np.ones_like(east)], 1)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    # half-way quaternion: (1 + z.n, z x n)
+    q = np.stack([1 + normal[:, 2], -normal[:, 1], normal[:, 0], np.zeros(len(normal))], 1)
+    return (q / np.linalg.norm(q, axis=1, keepdims=True)).astype(np.float32)
+
+
+def ground_discs(grid: Ground, colours: Float[Array, "n 3"]) -> Field:
+    """One disc a cell, tangent to the surface and stretched by its slope, so that none opens a hole downhill."""
+    n = grid.heights.size
+    east, north = (s.ravel() for s in grid.slopes())
+    stretch = np.sqrt(1 + east**2 + north**2)
+    scales = np.full((n, 3), WIDTH * grid.spacing) * np.stack([stretch, stretch, np.ones(n)], 1)
+    scales[:, 2] = THICKNESS * grid.spacing
+    return Field(
+        grid.centres.astype(np.float32),
+        np.log(scales).astype(np.float32),
+        quaternions(east, north),
+        np.full(n, OPAQUE, np.float32),
+        sh_of(colours),
+        np.where(grid.seen.ravel(), 0, 1).astype(np.float32),
+        np.ones(n, bool),
+    )
+
+
+def filled(colours: Float[Array, "n 3"], known: Bool[Array, "rows columns"]) -> Float32[Array, "n 3"]:
+    """Colours of unknown cells from the nearest known ones, blurred so that no streak shows; grey if none is known."""
+    image = np.where(known[..., None], colours.reshape(*known.shape, 3), 0)
+    if not known.any():
+        return np.full((known.size, 3), 0.5, np.float32)
+    if known.all():
+        return image.reshape(-1, 3).astype(np.float32)
+    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    spread = image[tuple(nearest)]
+    soft = np.stack([gaussian_filter(spread[..., c], 3.0, mode="nearest") for c in range(3)], -1)
+    return np.where(known[..., None], image, soft).reshape(-1, 3).astype(np.float32)

@@ -1,0 +1,76 @@
+"""How well a field shows what the test photos show. Test photos are seen by nothing but this."""
+
+import logging
+from math import ceil
+
+import numpy as np
+from jaxtyping import Float32
+from numpy import ndarray as Array
+
+from dav_gswt.field import Field
+from dav_gswt.images import metrics
+from dav_gswt.images.lpips_weights import Weights
+from dav_gswt.photos.training_views import View
+from dav_gswt.raster import render
+
+_log = logging.getLogger(__name__)
+
+MEASURES = ("psnr", "psnr_colour_corrected", "ssim", "lpips")
+WORST = 0.1  # of the views, at least one: how bad it is where it is bad
+
+
+def evaluate(
+    field: Field, tests: list[View], groups: dict[str, list[str]] | None = None, weights: Weights | None = None
+) -> dict:
+    """Mean PSNR (raw, colour-corrected), SSIM and LPIPS over the test views, over the pixels that look at the ground.
+
+    groups: names of views that are looked at by themselves, too (from low, from aside). weights: of LPIPS; without them
+    it is null, and said. `worst_decile`: the mean of the worst tenth.
+    Returns: null where there is no test view, or where pictures are equal and PSNR has no value.
+    """
+    if weights is None:
+        _log.info("LPIPS has no weights here: it is left out of the metrics (docs/prior.md)")
+    rows = [_row(field, view, weights) for view in tests if view.weight.any()]
+    named = {row["view"]: row for row in rows}
+    parts = {group: [named[name] for name in names if name in named] for group, names in (groups or {}).items()}
+    return _summed(rows) | {"groups": {group: _summed(part) for group, part in parts.items()}, "test_views": rows}
+
+
+def _summed(rows: list[dict]) -> dict:
+    return _means(rows) | {"worst_decile": _worst(rows)}
+
+
+def _row(field: Field, view: View, weights: Weights | None) -> dict:
+    seen = np.clip(render(field, view.camera).colour, 0, 1)
+    level = np.clip(metrics.colour_corrected(seen, view.image, view.weight), 0, 1).astype(np.float32)
+    return {
+        "view": view.name,
+        "psnr": metrics.psnr(seen, view.image, view.weight),
+        "psnr_colour_corrected": metrics.psnr(level, view.image, view.weight),
+        "ssim": metrics.ssim(seen, view.image, view.weight),
+        "lpips": None if weights is None else _lpips(seen, view, weights),
+    }
+
+
+def _lpips(seen: Float32[Array, "h w 3"], view: View, weights: Weights) -> float:
+    """LPIPS of the picture, the photo's own pixels standing where none counts; over the area that does."""
+    from dav_gswt.images import lpips  # here, not above: torch takes seconds to load
+
+    counts = (view.weight > 0)[..., None]
+    pair = (2 * np.where(counts, seen, view.image) - 1)[None], (2 * view.image - 1)[None]
+    return float(lpips.distance(*(p.astype(np.float32) for p in pair), weights)[0] / counts.mean())
+
+
+def _means(rows: list[dict]) -> dict[str, float | None]:
+    columns = {key: [row[key] for row in rows] for key in MEASURES}
+    return {key: None if not c or None in c else float(np.mean(c)) for key, c in columns.items()}
+
+
+def _worst(rows: list[dict]) -> dict[str, float | None]:
+    """Means over the worst tenth by each measure."""
+    out = {}
+    for key in MEASURES:
+        values = sorted((row[key] for row in rows if row[key] is not None), reverse=key == "lpips")
+        known = values and len(values) == len(rows)
+        out[key] = float(np.mean(values[: ceil(WORST * len(values))])) if known else None
+    return out

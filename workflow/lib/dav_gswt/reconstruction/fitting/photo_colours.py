@@ -1,0 +1,43 @@
+"""Colours that photos give to points of the world."""
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32
+from numpy import ndarray as Array
+
+from dav_gswt.photos.training_views import View
+
+CHUNK = 50_000  # points at a time: what stays in the cache of a small machine
+
+
+def sampled(points: Float[Array, "n 3"], view: View) -> tuple[Float32[Array, "n 3"], Bool[Array, "n"]]:
+    """The photo's colour at each point's pixel, and which points are inside the picture and count there."""
+    pixel, depth = view.camera.project(points)
+    x, y = pixel[:, 0], pixel[:, 1]
+    inside = (depth > 0) & (x >= 0.5) & (y >= 0.5) & (x < view.camera.width - 0.5) & (y < view.camera.height - 0.5)
+    row, column = y[inside].astype(int), x[inside].astype(int)
+    inside[inside] = view.weight[row, column] > 0
+    colours = np.full((len(points), 3), np.nan, np.float32)
+    colours[inside] = view.image[y[inside].astype(int), x[inside].astype(int)]
+    return colours, inside
+
+
+def samples(points: Float[Array, "n 3"], views: list[View]) -> Float32[Array, "v n 3"]:
+    """Every photo's colours of the points; NaN where it does not see them."""
+    return np.stack([sampled(points, view)[0] for view in views])
+
+
+def median_colours(points: Float[Array, "n 3"], views: list[View]) -> tuple[Float32[Array, "n 3"], Bool[Array, "n"]]:
+    """Median over the photos that see each point, and which points any photo sees (the others are NaN)."""
+    colours = np.full((len(points), 3), np.nan, np.float32)
+    for start in range(0, len(points), CHUNK):
+        part = np.s_[start : start + CHUNK]
+        colours[part] = middle(samples(points[part], views))
+    return colours, np.isfinite(colours[:, 0])
+
+
+def middle(values: Float32[Array, "v n c"]) -> Float32[Array, "n c"]:
+    """Median over the first axis of what is not NaN; NaN where all is."""
+    ordered = np.sort(values, axis=0)  # NaN goes last: the median is at half of the number that are not
+    count = np.isfinite(ordered[..., 0]).sum(0)
+    pick, last = np.arange(values.shape[1]), np.maximum(count - 1, 0)
+    return 0.5 * (ordered[last // 2, pick] + ordered[np.minimum(count // 2, last), pick])

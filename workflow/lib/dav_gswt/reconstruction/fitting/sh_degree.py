@@ -1,0 +1,39 @@
+"""Do colours have to change with direction? The least degree of spherical harmonics that held-out pixels ask for."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.raster import harmonics
+from dav_gswt.reconstruction.fitting.held_out import GAIN
+from dav_gswt.reconstruction.fitting.plan import Report
+from dav_gswt.reconstruction.fitting.state import State
+
+
+def least(now: State, cameras: list[Camera], score: Callable[[State], float], report: Report) -> State:
+    """The state with the least degree that loses less than GAIN.
+
+    cameras: of the photos. score: PSNR of held-out pixels, dB.
+    """
+    tried = {degree: reduced(now, degree, cameras) for degree in range(now.degree)} | {now.degree: now}
+    scores = {degree: score(state) for degree, state in tried.items()}
+    report.held_out += [{"degree": degree, "psnr": round(value, 3)} for degree, value in scores.items()]
+    chosen = min(degree for degree, value in scores.items() if value > max(scores.values()) - GAIN)
+    worth = scores[now.degree] - scores[0]
+    report.chose("degree", chosen, f"degree {now.degree} is worth {worth:+.3f} dB on held-out pixels")
+    return tried[chosen]
+
+
+def reduced(full: State, degree: int, cameras: list[Camera]) -> State:
+    """A state of a lower degree. What is left out goes into the constant: its mean over the photos' directions."""
+    k = (degree + 1) ** 2
+    colours, mean = full.values["colours"], 0.0
+    for camera in cameras:
+        seen = harmonics.directions(full.values["means"].astype(float), camera)
+        mean = mean + harmonics.basis(seen, full.degree) / len(cameras)
+    out = full.copy()
+    out.bend_to(degree)
+    gone = np.einsum("nk,nkc->nc", mean[:, k:], colours[:, k:])
+    out.values["colours"][:, 0] += (gone / mean[:, :1]).astype(np.float32)
+    return out

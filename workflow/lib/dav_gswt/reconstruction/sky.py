@@ -1,0 +1,84 @@
+"""The sky: what lies behind where rays miss the ground, so that low photos carve things out against it.
+
+Colours by direction as spherical harmonics of degree 3, one sky for all photos, fitted so that what stands before it
+has no say (least absolute deviations). A pixel above the horizon that has the sky's colour sees through everything: it
+counts, with the sky behind the field. One that has not may show a thing or a far hill that is not modelled: it says
+nothing.
+"""
+
+import logging
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32
+from numpy import ndarray as Array
+from scipy.ndimage import binary_dilation
+
+from dav_gswt.photos.training_views import View
+from dav_gswt.raster import harmonics
+
+_log = logging.getLogger(__name__)
+
+DEGREE = 3
+LEAST = 2000  # pixels above the horizon, of all photos, to know a sky by
+ENOUGH = 50_000  # of them, evenly over the photos, are looked at
+ROUNDS = 12  # of reweighting
+RIDGE = 1e-3  # keeps directions that no photo shows near the others' colours
+TRIM, SLACK = 3.0, 0.02  # a pixel is sky within so many median deviations and so much more
+SPLIT = 0.08  # median deviation from which there is no one sky: broken clouds, trees all around
+EDGE = 2  # pixels around what stands against the sky that are neither
+
+
+def behind(views: list[View], modelled: list[View]) -> list[View]:
+    """The modelled views with the sky behind them, where they see it.
+
+    views: the photos, counting wherever a photo may be trusted. modelled: the same, counting only over the ground.
+    Without enough sky, or with one that no smooth function shows, they come back as they are.
+    """
+    rising = [_rising(view) for view in views]
+    total = sum(int(mask.sum()) for _, mask in rising)
+    if total < LEAST:
+        return modelled
+    stride = max(1, total // ENOUGH)
+    directions = np.concatenate([d[mask] for d, mask in rising])[::stride]
+    colours = np.concatenate([view.image[mask] for view, (_, mask) in zip(views, rising, strict=True)])[::stride]
+    coefficients, deviation = fitted(directions, colours)
+    if deviation > SPLIT:
+        _log.info("sky: none that is smooth (its pixels differ by %.2f), it counts for nothing", deviation)
+        return modelled
+    bound = TRIM * 1.4826 * deviation + SLACK
+    found = [_with(m, v, *r, coefficients, bound) for m, v, r in zip(modelled, views, rising, strict=True)]
+    seen = sum(int((~np.isnan(v.behind[..., 0])).sum()) for v in found)
+    _log.info("sky: %.0f %% of what lies above the horizon", 100 * seen / total)
+    return found
+
+
+def fitted(directions: Float[Array, "n 3"], colours: Float32[Array, "n 3"]) -> tuple[Float[Array, "16 3"], float]:
+    """Coefficients of the sky that leaves the least absolute deviation, and the median deviation that it leaves."""
+    basis = harmonics.basis(directions, DEGREE)
+    weight = np.ones(len(basis))
+    ridge = RIDGE * len(basis) * np.diag([0.0] + [1.0] * (basis.shape[1] - 1))
+    for _ in range(ROUNDS):
+        weighted = basis * weight[:, None]
+        coefficients = np.linalg.solve(basis.T @ weighted + ridge * weight.mean(), weighted.T @ colours)
+        residual = np.abs(basis @ coefficients - colours).max(1)
+        weight = 1 / np.maximum(residual, 0.01)
+    return coefficients, float(np.median(residual))
+
+
+def _rising(view: View) -> tuple[Float[Array, "h w 3"], Bool[Array, "h w"]]:
+    """Unit directions of a view's rays, and which of them rise above the horizon and count."""
+    _, step = view.camera.rays()
+    direction = step / np.linalg.norm(step, axis=-1, keepdims=True)
+    return direction, (direction[..., 2] > 0) & (view.weight > 0)
+
+
+def _with(modelled: View, view: View, directions, rising, coefficients, bound: float) -> View:
+    sky = np.full(view.image.shape, np.nan, np.float32)
+    sky[rising] = np.clip(harmonics.basis(directions[rising], DEGREE) @ coefficients, 0, 1)
+    with np.errstate(invalid="ignore"):
+        agrees = rising & (np.abs(sky - view.image).max(-1) <= bound)
+    other = rising & ~agrees
+    sees = agrees & ~binary_dilation(other, iterations=EDGE) if other.any() else agrees
+    sky[~sees] = np.nan
+    return replace(modelled, behind=sky, weight=np.where(sees, view.weight, modelled.weight))

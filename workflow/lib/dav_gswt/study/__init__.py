@@ -1,0 +1,1 @@
+"""The study: what rules/study measures and draws. Nothing outside this package imports it."""

@@ -1,0 +1,101 @@
+"""Curves of the policies that were compared: a row for each round of each cell, kept from run to run.
+
+A cell is a scene, a seed (which photos start), a policy with its parameters, and k. Rows of several runs add up: a
+round that was measured again replaces what it was.
+"""
+
+import csv
+from pathlib import Path
+
+from dav_gswt.files import read_json
+from dav_gswt.views import marginal_gain
+
+CELL = ("scene", "seed", "quality", "policy", "prior", "p_drop", "lam", "k")
+MEASURES = ("psnr", "ssim", "lpips", "worst_psnr", "walker_psnr")
+ASIDE = ("oblique", "walker")  # groups of test views away from where photos may be taken
+EXPECTED = ("closes", "expected", "expected_low", "expected_high")  # of a round, before it: see `worth`
+WORK = ("score", "select", "capture", "update")  # a round's jobs whose time counts; measuring does not
+
+
+def rows(cell: dict) -> list[dict]:
+    """The rows of a cell, the start first.
+
+    cell: what CELL names; `corrected`: PSNR after the photos' exposure is fitted; files: `metrics` of each round, the
+    start's first; `facts`, scores.json of what rounds 1 to T chose by; `times`, for each of these rounds its jobs'
+    benchmarks; `samples` that the prior draws of a pose.
+    """
+    found, fits = [], []
+    for t, path in enumerate(cell["metrics"]):
+        told = read_json(path)
+        row = {key: cell[key] for key in CELL} | {"round": t, "photos": told["photos"]}
+        row |= measured(told, "psnr_colour_corrected" if cell["corrected"] else "psnr")
+        row |= _expected(found, fits, told["photos"])
+        if t:
+            fits.append(told["fit"])
+        row |= {"seconds": _seconds(cell["times"][t - 1]) if t else 0.0}
+        row |= {"evaluations": _evaluations(cell["facts"][t - 1], cell["samples"]) if t else 0}
+        about = told["provenance"]
+        renderer = " ".join(str(value) for value in about["renderer"].values())
+        found.append(row | {"version": about["version"], "renderer": renderer, "field": about["inputs"]["field"][:12]})
+    return found
+
+
+def merged(before: list[dict], new: list[dict]) -> list[dict]:
+    """Rows of both, sorted; of a round that both hold the new one. Rounds beyond those of a new cell stay."""
+    at = {_key(row): row for row in before} | {_key(row): row for row in new}
+    return [at[key] for key in sorted(at)]
+
+
+def read(path: Path | str) -> list[dict]:
+    """What `figures.write_rows` wrote of them; no rows where there is no file yet."""
+    if not Path(path).is_file():
+        return []
+    with Path(path).open(newline="", encoding="utf-8") as file:
+        return [_typed(row) for row in csv.DictReader(file)]
+
+
+def _typed(row: dict[str, str]) -> dict:
+    whole_numbers = ("seed", "k", "round", "photos", "evaluations")
+    numbers = (*MEASURES, *EXPECTED, "seconds")
+    out = row | {key: int(row[key]) for key in whole_numbers}
+    return out | {key: float(row[key]) if row[key] else None for key in numbers}
+
+
+def _key(row: dict) -> tuple:
+    return tuple(row[key] for key in CELL) + (row["round"],)
+
+
+def measured(told: dict, psnr: str) -> dict:
+    """MEASURES of a metrics.json, PSNR by its key: over the test views from where photos may be taken, if they are a
+    group of their own, else over all."""
+    groups = told["groups"]
+    mine = next((groups[name] for name in groups if name not in ASIDE), told)
+    found = {"psnr": mine[psnr], "ssim": mine["ssim"], "lpips": mine["lpips"]}
+    found |= {"worst_psnr": mine["worst_decile"][psnr]}
+    return found | {"walker_psnr": groups["walker"][psnr] if "walker" in groups else None}
+
+
+def _expected(before: list[dict], fits: list[dict], photos: int) -> dict:
+    """What could be said of a round's gain beforehand. before: rows of the rounds before it; fits: their reports."""
+    if not before:
+        return dict.fromkeys(EXPECTED)
+    found = marginal_gain.expected(marginal_gain.history(fits, before[0]["photos"], photos - before[-1]["photos"]))
+    values = (found.closes, found.gain, found.low, found.high) if found else (None,) * len(EXPECTED)
+    return dict(zip(EXPECTED, values, strict=True))
+
+
+def _seconds(files: list[str]) -> float | None:
+    """Of a round's jobs together; None where one left no benchmark."""
+    if not all(Path(file).is_file() for file in files):
+        return None
+    total = 0.0
+    for file in files:
+        with Path(file).open(newline="", encoding="utf-8") as text:
+            total += float(next(csv.DictReader(text, delimiter="\t"))["s"])
+    return total
+
+
+def _evaluations(facts: str, samples: int) -> int:
+    """Forward passes of the prior's network, for one pose each."""
+    by_steps = read_json(facts)["poses_by_steps"]
+    return samples * sum(int(steps) * poses for steps, poses in by_steps.items())

@@ -1,0 +1,36 @@
+"""A comparison as a table to read, for the README."""
+
+from pathlib import Path
+
+from dav_gswt.files import whole
+from dav_gswt.study.comparison.tables import EVERY
+from dav_gswt.study.markdown import table
+
+
+def write(path: Path | str, compared: list[dict], baseline: str) -> None:
+    """The table of `text`, as a file."""
+    with whole(path) as part:
+        part.write_text(text(compared, baseline), encoding="utf-8")
+
+
+def text(compared: list[dict], baseline: str) -> str:
+    """Rows of nAUC less the baseline's in dB: a row a policy, best first, with a column for all scenes and one a scene
+    and k; in brackets the 95 % interval, where there is more than one start.
+    """
+    columns = [(EVERY, ""), *sorted({(row["scene"], row["k"]) for row in compared} - {(EVERY, "")})]
+    named = ["all" if scene == EVERY else f"{scene.removesuffix('_pool')}, {k} a round" for scene, k in columns]
+    found = {(row["policy"], row["scene"], row["k"]): row for row in compared}
+    best = sorted((row for row in compared if row["scene"] == EVERY), key=lambda row: -row["mean"])
+    lines = []
+    for row in best:
+        cells = [_cell(found.get((row["policy"], *column))) for column in columns]
+        lines.append([f"`{row['policy']}`", *cells, f"{row['wins']}, {row['ties']}, {row['losses']}"])
+    return table(["less `" + baseline + "`, dB", *named, "wins, ties, losses"], lines)
+
+
+def _cell(row: dict | None) -> str:
+    if row is None:
+        return ""
+    if row["low"] is None:
+        return f"{row['mean']:+.2f}"
+    return f"{row['mean']:+.2f} ({row['low']:+.2f}, {row['high']:+.2f})"

@@ -1,0 +1,94 @@
+"""The figure of a comparison: PSNR against photos, scene by scene, and how far each policy is from the baseline."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from dav_gswt.study import figures
+from dav_gswt.study.comparison.tables import EVERY, EVERYTHING
+from dav_gswt.views.policy_names import ORACLES
+
+PANEL = 3.3, 3.4  # inches
+FOREST = 0.34  # inches a policy
+SHOWN = 6  # curves that a panel holds legibly: the baseline, an oracle and the best
+BASE, TRUTH = {"color": "black", "linewidth": 2.4}, {"color": "0.55", "linestyle": "--"}
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito: told apart by everybody
+
+
+def write(path: Path | str, curves: list[dict], compared: list[dict], baseline: str) -> None:
+    """Above a panel a scene (and k): PSNR against photos, means over seeds; below every policy less the baseline."""
+    panels = sorted({(row["scene"], row["k"]) for row in curves if row["policy"] == baseline})
+    policies = [row["policy"] for row in _ranked(compared)]
+    best = [p for p in policies if p not in ORACLES][: SHOWN - 2]
+    looks = (
+        {baseline: BASE}
+        | {p: TRUTH for p in [p for p in policies if p in ORACLES][:1]}
+        | {policy: {"color": colour, "linewidth": 1.6} for policy, colour in zip(best, COLOURS, strict=False)}
+    )
+    columns = min(3, len(panels))
+    above = -(-len(panels) // columns)
+    figure = figures.blank(PANEL[0] * 3, PANEL[1] * above + FOREST * len(policies) + 1.3)
+    top, bottom = figure.subfigures(2, 1, height_ratios=[PANEL[1] * above, FOREST * len(policies) + 1.3])
+    grid = top.subplots(above, columns, squeeze=False).ravel()
+    for axes, (scene, k) in zip(grid, panels, strict=False):
+        _curves(axes, [row for row in curves if row["scene"] == scene], k, looks)
+        axes.set_title(f"{scene}, {k} a round", fontsize=10, loc="left")
+    for empty in grid[len(panels) :]:
+        empty.axis("off")
+    handles, labels = grid[0].get_legend_handles_labels()
+    top.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
+    _forest(bottom.subplots(), compared, baseline)
+    figures.save(figure, path)
+
+
+def _curves(axes, rows: list[dict], k: int, looks: dict[str, dict]) -> None:
+    for policy, look in looks.items():
+        mine = [row for row in rows if row["policy"] == policy and row["k"] == k]
+        photos = sorted({row["photos"] for row in mine})
+        means = [_mean(mine, lambda row, n=n: row["photos"] == n) for n in photos]
+        axes.plot(photos, means, label=policy, marker="o", markersize=3.5, **look)
+    everything = [row for row in rows if row["policy"] == EVERYTHING and row["round"] == 1]
+    if everything:
+        axes.axhline(_mean(everything, lambda row: True), color="0.7", linewidth=1.2, linestyle=":")
+        photos = everything[0]["photos"]
+        axes.annotate(
+            f"all {photos} photos",
+            (0.03, _mean(everything, lambda row: True)),
+            xycoords=("axes fraction", "data"),
+            xytext=(0, -10),  # under the line: above it is the frame
+            textcoords="offset points",
+            fontsize=8,
+        )
+    axes.set_xlabel("photos", fontsize=9)
+    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.set_ylabel("PSNR of test views (dB)", fontsize=9)
+    axes.tick_params(labelsize=8)
+    axes.grid(alpha=0.3)
+
+
+def _mean(rows: list[dict], which: Callable[[dict], bool]) -> float:
+    return float(np.mean([row["psnr"] for row in rows if which(row)]))
+
+
+def _ranked(compared: list[dict]) -> list[dict]:
+    return sorted((row for row in compared if row["scene"] == EVERY), key=lambda row: -row["mean"])
+
+
+def _forest(axes, compared: list[dict], baseline: str) -> None:
+    """A bar a policy, its 95 % interval over all scenes, and a dot a scene."""
+    ranked = _ranked(compared)
+    for place, row in enumerate(ranked):
+        if row["low"] is not None:
+            axes.plot([row["low"], row["high"]], [place, place], color="0.25", linewidth=2)
+        axes.plot(row["mean"], place, "s", color="0.25", markersize=6)
+        alone = [r["mean"] for r in compared if r["policy"] == row["policy"] and r["scene"] != EVERY]
+        axes.plot(alone, [place] * len(alone), "o", color=COLOURS[0], markersize=4, alpha=0.7)
+    axes.axvline(0, color="black", linewidth=1, linestyle=":")
+    axes.set_yticks(range(len(ranked)), [row["policy"] for row in ranked], fontsize=9)
+    axes.set_ylim(len(ranked) - 0.5, -0.5)
+    axes.set_xlabel(
+        f"nAUC less that of {baseline} (dB): mean and 95 % interval over scenes, dots are scenes", fontsize=9
+    )
+    axes.tick_params(axis="x", labelsize=8)
+    axes.grid(axis="x", alpha=0.3)

@@ -1,0 +1,110 @@
+"""From curves to results: a row a cell, and every policy less the baseline, paired, with intervals."""
+
+from dataclasses import asdict
+from itertools import pairwise
+
+import numpy as np
+
+from dav_gswt.study.comparison.curves import CELL
+from dav_gswt.study.comparison.stats import compared, holm, nauc, to_reach
+
+EVERYTHING = "all"  # the policy that takes the whole pool: what there is to reach, and no curve
+EVERY = "every"  # scene, in the rows over all of them
+UNIT = ("scene", "quality", "seed", "k")
+BOOTSTRAP = 0  # its seed
+
+
+def results(curves: list[dict]) -> list[dict]:
+    """A row a cell: nAUC, PSNR and the other measures of its last round, photos to reach WAY of all, cost.
+
+    gap: dB under all photos; empty, as `to_reach`, where all were not tried or were not reached.
+    """
+    best = {unit[:3]: rounds[-1]["psnr"] for unit, policy, rounds in _cells(curves) if policy[0] == EVERYTHING}
+    table = []
+    for unit, policy, rounds in _cells(curves):
+        if policy[0] == EVERYTHING:
+            continue
+        photos, psnr = (np.array([row[key] for row in rounds], float) for key in ("photos", "psnr"))
+        goal, last = best.get(unit[:3]), rounds[-1]
+        row = {key: last[key] for key in CELL} | {"photos": last["photos"], "nauc": nauc(photos, psnr)}
+        row |= {key: last[key] for key in ("psnr", "ssim", "lpips", "worst_psnr", "walker_psnr")}
+        row |= {"gap": None if goal is None else goal - last["psnr"]}
+        row |= {"to_reach": None if goal is None else to_reach(photos, psnr, goal)}
+        seconds = [r["seconds"] for r in rounds[1:]]
+        row |= {"seconds": None if None in seconds else sum(seconds)}
+        table.append(row | {"evaluations": sum(r["evaluations"] for r in rounds)})
+    return table
+
+
+def comparisons(table: list[dict], baseline: str) -> list[dict]:
+    """Every policy less the baseline, in dB of nAUC: over all scenes, and of each scene and k alone.
+
+    Cells are paired by scene, quality, seed, k and the photos that they end with. holm: p values over all scenes,
+    raised by how many policies were compared. One cell alone has neither interval nor p.
+    """
+    units = [(*(row[key] for key in UNIT), row["photos"]) for row in table]
+    cells = {(unit, _policy(row)): row["nauc"] for unit, row in zip(units, table, strict=True)}
+    base = {unit: value for (unit, policy), value in cells.items() if policy[0] == baseline}
+    rows = []
+    for policy in sorted({policy for _, policy in cells if policy[0] != baseline}):
+        pairs = {unit: cells[unit, policy] - base[unit] for unit in sorted(base) if (unit, policy) in cells}
+        if not pairs:
+            continue
+        rows.append(_compared(policy, EVERY, "", pairs))
+        for scene, k in sorted({(unit[0], unit[3]) for unit in pairs}):
+            rows.append(_compared(policy, scene, k, {u: v for u, v in pairs.items() if (u[0], u[3]) == (scene, k)}))
+    raised = holm({" ".join(_policy(row)): row["p"] for row in rows if row["scene"] == EVERY and row["p"] is not None})
+    return [row | {"holm": raised.get(" ".join(_policy(row))) if row["scene"] == EVERY else None} for row in rows]
+
+
+def worth(curves: list[dict]) -> list[dict]:
+    """What rounds gained against what was expected of them, over all scenes and of each: see `active.worth`.
+
+    share: of the gap that closes, what test views gained (geometric mean), off: standard deviation of its logarithm,
+    both over rounds that gained something; covered: share of all rounds whose gain lies in the interval.
+    """
+    checked: dict[str, list[tuple[dict, float]]] = {}
+    for _, policy, rounds in _cells(curves):
+        for before, row in pairwise(rounds):
+            if row["expected"] is not None and policy[0] != EVERYTHING:
+                gained = row["psnr"] - before["psnr"]
+                for name in (EVERY, row["scene"]):
+                    checked.setdefault(name, []).append((row, gained))
+    return [{"scene": name} | _checked(found) for name, found in sorted(checked.items(), key=lambda i: i[0] != EVERY)]
+
+
+def _checked(found: list[tuple[dict, float]]) -> dict:
+    logs = np.array([np.log(gain / row["closes"]) for row, gain in found if gain > 0 and row["closes"] > 0])
+    inside = [row["expected_low"] <= gain <= row["expected_high"] for row, gain in found]
+    return {
+        "rounds": len(found),
+        "gained": float(np.mean([gain for _, gain in found])),
+        "expected": float(np.mean([row["expected"] for row, _ in found])),
+        "apart": float(np.mean([abs(gain - row["expected"]) for row, gain in found])),
+        "covered": float(np.mean(inside)),
+        "share": float(np.exp(logs.mean())) if len(logs) else None,
+        "off": float(logs.std(ddof=1)) if len(logs) > 1 else None,
+    }
+
+
+def _compared(policy: tuple[str, ...], scene: str, k: int | str, pairs: dict[tuple, float]) -> dict:
+    by_scene: dict[str, list[float]] = {}
+    for unit, value in pairs.items():
+        by_scene.setdefault(unit[0], []).append(value)
+    found = asdict(compared({name: np.array(values) for name, values in by_scene.items()}, BOOTSTRAP))
+    if len(pairs) < 2:  # nothing tells how far another cell would be from this one
+        found |= dict.fromkeys(("low", "high", "p"))
+    named = dict(zip(("policy", "prior", "p_drop", "lam"), policy, strict=True))
+    return named | {"scene": scene, "k": k, "units": len(pairs)} | found
+
+
+def _policy(row: dict) -> tuple[str, ...]:
+    return tuple(str(row[key]) for key in ("policy", "prior", "p_drop", "lam"))
+
+
+def _cells(curves: list[dict]):
+    """Unit, policy and rounds of every cell that has at least two rounds."""
+    cells: dict[tuple, list[dict]] = {}
+    for row in sorted(curves, key=lambda row: row["round"]):
+        cells.setdefault((tuple(row[key] for key in UNIT), _policy(row)), []).append(row)
+    return [(unit, policy, rounds) for (unit, policy), rounds in sorted(cells.items()) if len(rounds) > 1]

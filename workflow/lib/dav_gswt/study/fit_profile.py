@@ -1,0 +1,167 @@
+"""A fit that is watched: how well it shows photos it has not seen, second by second, and what it looks like elsewhere.
+
+Of photos every tenth by name, from the sixth, is for testing; of synthetic scenes those that ground.json names, by
+group. Time spent on measuring is not counted.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float32
+from numpy import ndarray as Array
+from scipy.spatial import cKDTree
+
+from dav_gswt import raster
+from dav_gswt.field import Field
+from dav_gswt.files import read_json
+from dav_gswt.geometry import cameras
+from dav_gswt.images import metrics
+from dav_gswt.photos import model as models
+from dav_gswt.photos.training_views import View, over_ground, read
+from dav_gswt.reconstruction import build
+from dav_gswt.reconstruction.build import Made, Quality
+from dav_gswt.reconstruction.ground import WHOLE, Ground
+
+FIRST_TEST, EACH = 5, 10
+FREE = 0.1  # flying heights above the ground from which space is free
+NEAR = 3.0  # spacings to a matched point within which a Gaussian may stand in it
+LOW = 0.06  # discs that the low eye stands above the ground, over the picture's width
+SKY = np.array([0.62, 0.75, 0.95], np.float32)
+
+
+@dataclass(frozen=True)
+class PhotoSet:
+    """A photos/ folder, split for a trial. tests: groups of test views by name."""
+
+    frame: dict
+    model: models.Model
+    train: list[View]
+    tests: dict[str, list[View]]
+    margin: float = WHOLE
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What came out. curve: rows of seconds, step, psnr, psnr_colour_corrected and Gaussians."""
+
+    made: Made
+    curve: list[dict]
+
+
+def opened(folder: Path | str, size: int, margin: float = WHOLE) -> PhotoSet:
+    """Read a photos/ folder at a size, its test views apart.
+
+    margin: see `build.fit`. Of the test views all pixels count where all ground that photos see is modelled (WHOLE);
+    else those that look at the exemplar: at the border of what is modelled relief hides and shows what is not.
+    """
+    folder = Path(folder)
+    frame, model = read_json(folder / "ground.json"), models.read(folder / "sparse")
+    known = {n: read(n, c, folder / "images" / n, size) for n, c in zip(model.names, model.cameras, strict=True)}
+    names = sorted(known)
+    groups = frame.get("test_groups") or {"test": frame["test"] or names[FIRST_TEST::EACH]}
+    out = {name for group in groups.values() for name in group}
+    tests = {group: [known[n] for n in members] for group, members in groups.items()}
+    if margin < WHOLE:
+        tests = {group: _over_exemplar(views, frame["exemplar"]) for group, views in tests.items()}
+    return PhotoSet(frame, model, [known[n] for n in names if n not in out], tests, margin)
+
+
+def _over_exemplar(views: list[View], square: dict) -> list[View]:
+    west, south, side = square["west"], square["south"], square["side"]
+    seen = [over_ground(v, west, south, west + side, south + side) for v in views]
+    return [v for v in seen if v.weight.any()]
+
+
+def run(photos: PhotoSet, quality: Quality, seed: int = 0, every: int = 25) -> Trial:
+    """Fit the training photos, looking at the first group of test views every so many steps."""
+    watched, measuring = next(iter(photos.tests.values())), 0.0
+    start = time.perf_counter()
+    curve: list[dict] = []
+    drawn = raster.Rasterizer()
+
+    def watch(step: int, state) -> None:
+        nonlocal measuring
+        if step % every:
+            return
+        begun = time.perf_counter()
+        row = {"seconds": begun - start - measuring, "step": step, "gaussians": len(state)}
+        curve.append(row | quality_of(lambda v: drawn.forward(**state.values, camera=v.camera).colour, watched))
+        measuring += time.perf_counter() - begun
+
+    rng = np.random.default_rng(seed)
+    points, colours = photos.model.points, photos.model.colours
+    made = build.fit(photos.frame, photos.train, points, colours, quality, rng, margin=photos.margin, watch=watch)
+    seconds = time.perf_counter() - start - measuring
+    last = quality_of(lambda v: raster.render(made.field, v.camera).colour, watched)
+    curve.append({"seconds": seconds, "step": made.report["steps"], "gaussians": len(made.field)} | last)
+    return Trial(made, curve)
+
+
+def quality_of(draw: Callable[[View], Float32[Array, "h w 3"]], tests: list[View]) -> dict[str, float]:
+    """Mean PSNR of what is drawn, raw and colour-corrected, over the pixels of weight > 0."""
+    raw, level = [], []
+    for view in tests:
+        seen = np.clip(draw(view), 0, 1)
+        corrected = np.clip(metrics.colour_corrected(seen, view.image, view.weight), 0, 1).astype(np.float32)
+        raw.append(metrics.psnr(seen, view.image, view.weight))
+        level.append(metrics.psnr(corrected, view.image, view.weight))
+    return {"psnr": float(np.mean(raw)), "psnr_colour_corrected": float(np.mean(level))}
+
+
+def seconds_to(curve: list[dict], decibel: float) -> float | None:
+    """When the colour-corrected PSNR first reached so much; None: never."""
+    reached = [row["seconds"] for row in curve if row["psnr_colour_corrected"] >= decibel]
+    return reached[0] if reached else None
+
+
+def free_space_opacity(field: Field, grid: Ground, photos: PhotoSet) -> float:
+    """Mean accumulated alpha, over the test views, of what stands higher than FREE flying heights above the ground and
+    not at a matched point: the haze that photos from their own places reward."""
+    above = field.means[:, 2] - grid.height_at(field.means)
+    high = field[above > FREE * photos.frame["flying_height"]]
+    if len(high):
+        high = high[cKDTree(photos.model.points).query(high.means)[0] > NEAR * grid.spacing]
+    views = [view for group in photos.tests.values() for view in group]
+    return float(np.mean([raster.render(high, v.camera).alpha.mean() if len(high) else 0.0 for v in views]))
+
+
+def away(photos: PhotoSet, made: Made) -> dict[str, float]:
+    """Mean PSNR of each group of test views, raw."""
+    seen = {g: quality_of(lambda v: raster.render(made.field, v.camera).colour, v) for g, v in photos.tests.items()}
+    return {group: quality["psnr"] for group, quality in seen.items()}
+
+
+def stills(made: Made, frame: dict, width: int = 768, height: int = 512) -> dict[str, Float32[Array, "h w 3"]]:
+    """What nobody photographed: from 45 degrees at the flying height, and from as low as the photos' detail allows.
+
+    Low: a disc in the middle of the picture is some eight pixels wide, so all detail that there is shows, and no more.
+    """
+    square, up = frame["exemplar"], frame["flying_height"]
+    middle = np.array([square["west"], square["south"], 0.0]) + 0.5 * square["side"] * np.array([1, 1, 0.0])
+    middle[2] = float(made.grid.height_at(middle[None])[0])
+    low = LOW * width * made.grid.spacing
+    places = {
+        "oblique": (middle + up * np.array([0.0, -0.7, 0.7]), middle, 50.0),
+        "low": (middle + [0.0, -2 * low, low], middle + [0.0, 2 * low, 0.5 * low], 60.0),
+    }
+    out = {}
+    for name, (eye, at, angle) in places.items():
+        seen = raster.render(made.field, cameras.pinhole(eye, at, width, height, angle), antialiased=True)
+        out[name] = np.clip(seen.colour + (1 - seen.alpha)[..., None] * SKY, 0, 1)
+    return out
+
+
+def facts(found: Trial, photos: PhotoSet) -> dict:
+    """What a trial measured, in numbers."""
+    made, last = found.made, found.curve[-1]
+    return {
+        "photos": len(photos.train),
+        "last": last,
+        "seconds_to": {str(d): seconds_to(found.curve, d) for d in (30.0, 33.0, 34.0)},
+        "free_space_opacity": free_space_opacity(made.field, made.grid, photos),
+        "away_psnr": away(photos, made),
+        "choices": made.report["choices"],
+    }

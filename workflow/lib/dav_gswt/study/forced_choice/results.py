@@ -1,0 +1,67 @@
+"""What follows from answers: a row a comparison, over all scenes and of each, of people and of the model observer.
+
+The model observer is no person and stands in rows of its own: of two crops it chooses the one whose middle has the
+lower Seam-LPIPS over its floor (`seams.measure`: how much farther it is from the exemplar than its patches, laid
+whole). A place that is laid whole has no seam, and 0 there. Ties count as half.
+"""
+
+import numpy as np
+
+from dav_gswt.errors import InputError
+from dav_gswt.study.forced_choice import shares
+from dav_gswt.study.forced_choice.answers import Participant
+from dav_gswt.study.seams.summary import EVERY
+from dav_gswt.study.tables import paper
+
+PEOPLE, MODEL = "participants", "model observer (LPIPS)"
+MEASURES = ("low", "high", "p", "df", "worth", "binomial_low", "binomial_high", "binomial_p", "median_ms")
+
+
+def table(key: dict, participants: list[Participant]) -> list[dict]:
+    """Rows: first, second, scene, observer, participants, answers, share (of answers that chose the first), and of
+    people MEASURES; `paper_preference`, in percent, where the paper has the comparison. Empty where nothing is known.
+
+    Raises: InputError: neither an answer nor LPIPS of any pair.
+    """
+    rows, pairs = [], {name: item for name, item in key["items"].items() if not item["check"]}
+    for first, second in sorted({(item["a"], item["b"]) for item in pairs.values()}):
+        mine = {name: item for name, item in pairs.items() if (item["a"], item["b"]) == (first, second)}
+        for scene in (EVERY, *sorted({item["scene"] for item in mine.values()})):
+            some = {name: item for name, item in mine.items() if scene in (EVERY, item["scene"])}
+            about = {"first": first, "second": second, "scene": scene}
+            printed = paper.beside("perceptual", f"{first} {second}" if scene == EVERY else "", ("preference",))
+            rows += [about | row | printed for row in (_people(some, participants), _model(some)) if row]
+    if not rows:
+        raise InputError(
+            "perceptual_study: there are neither answers (`answers` names their folder) nor LPIPS for the model "
+            "observer (`snakemake results/weights/lpips_alexnet.safetensors` fetches it; then make the kit again)"
+        )
+    return rows
+
+
+def _people(items: dict[str, dict], participants: list[Participant]) -> dict | None:
+    if not participants:
+        return None
+    chosen = np.array([sum(each.chosen[name] for name in items) for each in participants], float)
+    asked = np.full(len(participants), float(len(items)))
+    found = shares.clustered(chosen, asked)
+    plain = shares.binomial(int(chosen.sum()), found.answers)
+    own = (found.low, found.high, found.p, found.df, found.worth)
+    times = float(np.median([each.ms[name] for each in participants for name in items]))
+    return _row(PEOPLE, found.participants, found.answers, found.share) | dict(
+        zip(MEASURES, (*own, *plain, times), strict=True)
+    )
+
+
+def _model(items: dict[str, dict]) -> dict | None:
+    """None where LPIPS was not measured."""
+    known = [item["over"] for item in items.values() if None not in item["over"]]
+    if not known:
+        return None
+    share = float(np.mean([0.5 if a == b else float(a < b) for a, b in known]))
+    return _row(MODEL, 0, len(known), share)
+
+
+def _row(observer: str, participants: int, answers: int, share: float) -> dict:
+    told = {"observer": observer, "participants": participants, "answers": answers, "share": share}
+    return told | dict.fromkeys(MEASURES)

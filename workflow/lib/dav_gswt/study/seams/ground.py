@@ -1,0 +1,149 @@
+"""A tile set laid as terrain, beside the exemplar that it was cut from: which patch lies in every ground cell.
+
+A patch that lies in the terrain is the whole exemplar, moved so that the cell (x, y) of the exemplar comes to the
+terrain's cell origin + (x, y): both halves of a strip have the same origin, so across a border nothing changes.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray as Array
+
+from dav_gswt.bundle import direction_search
+from dav_gswt.bundle.build import Options as Bundled
+from dav_gswt.bundle.build import laying
+from dav_gswt.field import Field
+from dav_gswt.study.seams.spatial_index import Shelf
+from dav_gswt.terrain import assemble
+from dav_gswt.terrain.choice import tiles_in
+from dav_gswt.tiles import build, layout, trends
+from dav_gswt.tiles.layout import Exemplar, Layout
+
+WINDOW = 8  # tiles a side of the terrain that crops are taken from, around its origin
+REACH = 16  # tile sides that are laid
+AROUND = 4  # cells on each side that say how high the ground lies at a point
+
+
+@dataclass(frozen=True)
+class Source:
+    """The exemplar that tiles were cut from, at every level, its trend taken out, and the mean colour and height of
+    its cells' ground.
+    """
+
+    exemplar: Exemplar
+    levels: list[Shelf]
+    ground: Float[Array, "m m 4"]
+
+
+@dataclass(frozen=True)
+class Laid:
+    """terrain: the tiles, laid. tiles: by (level, number), as they lie there, on shelves. eye_floor: lowest eye height.
+    colour: of the far ground.
+
+    Maps of the window's cells, row 0 in the south; cell (0, 0) of the terrain is at [-first, -first]. patch: a number
+    for each patch and place, an index into `origins`. tile: number of the tile. label: of the cell in it.
+    correction: of a tile's cells, what they are changed by against the exemplar (colour, height); NaN if unknown.
+    """
+
+    source: Source
+    plan: Layout
+    terrain: assemble.Terrain
+    tiles: dict[tuple[int, int], Shelf]
+    eye_floor: float
+    colour: list[float]
+    first: int
+    patch: Int[Array, "w w"]
+    tile: Int[Array, "w w"]
+    label: Int[Array, "w w"]
+    origins: Int[Array, "patches 2"]
+    correction: Float[Array, "tiles n n 4"]
+
+    @property
+    def spacing(self) -> float:
+        return self.source.exemplar.spacing
+
+    @cached_property
+    def relief(self) -> Float[Array, "w w"]:
+        """How high the tiles' own ground lies in every cell of the window; NaN where nothing is known."""
+        y, x = np.mgrid[self.first : self.first + len(self.patch), self.first : self.first + len(self.patch)]
+        column, row = np.moveaxis(np.stack([x, y], -1) - self.origins[self.patch], -1, 0)
+        n = self.plan.side
+        return self.source.ground[row, column, 3] + self.correction[self.tile, y % n, x % n, 3]
+
+    def risen(self, at: tuple[int, int]) -> float:
+        """How high the tiles' own ground lies around a corner of finest cells; 0 where nothing is known."""
+        x, y = (slice(max(v - self.first - AROUND, 0), v - self.first + AROUND) for v in at)
+        near = self.relief[y, x]
+        known = near[np.isfinite(near)]
+        return float(known.mean()) if len(known) else 0.0
+
+    @cached_property
+    def corners(self) -> Int[Array, "n 3"]:
+        """Corners (x, y) of cells where patches meet in one tile, and whether a centre is one of them."""
+        n, patches = self.plan.side, _around(self.patch)
+        y, x = np.nonzero((patches != patches[0]).any(0))
+        keep = ((x + 1) % n != 0) & ((y + 1) % n != 0)
+        x, y = x[keep], y[keep]
+        return np.stack([x + 1, y + 1, (_around(self.label)[:, y, x] == layout.CENTRE).any(0)], 1)
+
+
+def source_of(levels: list[Field], exemplar: Exemplar, colour: Float[Array, "m m 3"], width: float) -> Source:
+    """The exemplar as `build.cut_tiles` sees it. colour: NaN for holes. width: of the low-pass, in cells."""
+    _, height = build.ground_maps(levels[0], exemplar)
+    trend = trends.trend_of(colour, height, exemplar, width)
+    flat = [trends.detrended(field, trend) for field in levels]
+    corner = np.float32([exemplar.west, exemplar.south, 0])
+    home = replace(exemplar, west=0.0, south=0.0)
+    flat = [replace(field, means=field.means - corner) for field in flat]
+    return Source(home, [Shelf.of(field) for field in flat], _cell_means(flat[0], home))
+
+
+def laid(tiles: build.TileSet, source: Source, salt: int, tau: float) -> Laid:
+    """The tile set as its bundle of this tau lays it, on level ground. Gaussians are not rounded: patches of the
+    exemplar, which lie beside them, are not either.
+    """
+    options = Bundled(tau=tau, salt=salt)
+    rings = direction_search.climbed(tiles.fields[0], tiles.side, options.decibels).rings
+    described = laying(tiles, options, rings)
+    terrain = replace(assemble.of_fields(tiles.fields, described, {"kind": "flat"}), reach=REACH)
+    plan = Layout.of(tiles.seams["layout"])
+    first = -(WINDOW // 2)
+    numbers = tiles_in(first, first, (WINDOW, WINDOW), salt, tiles.variants)
+    n = plan.side
+    label = np.block([[tiles.labels[t] for t in row] for row in numbers]).astype(int)
+    tile = np.kron(numbers, np.ones((n, n), int))
+    cell = n * (np.arange(WINDOW) + first).repeat(n)  # of the tiles' south-western corners
+    origin = np.stack(np.meshgrid(cell, cell), -1) - tiles.shifts[tile, label]
+    origins, patch = np.unique(origin.reshape(-1, 2), axis=0, return_inverse=True)
+    return Laid(
+        source,
+        plan,
+        terrain,
+        {which: Shelf.of(field) for which, field in terrain.tiles.items()},
+        described["eye_floor"],
+        described["ground_colour"],
+        first * n,
+        patch.reshape(label.shape),
+        tile,
+        label,
+        origins,
+        np.stack([_correction(tiles, source, number) for number in range(len(tiles.labels))]),
+    )
+
+
+def _around(cells: Int[Array, "w w"]) -> Int[Array, "4 v v"]:
+    """The four cells that meet at each corner within."""
+    return np.stack([cells[:-1, :-1], cells[:-1, 1:], cells[1:, :-1], cells[1:, 1:]])
+
+
+def _correction(tiles: build.TileSet, source: Source, number: int) -> Float[Array, "n n 4"]:
+    labels, shift = tiles.labels[number], tiles.shifts[number]
+    own = _cell_means(tiles.fields[0][number], Exemplar(0.0, 0.0, tiles.spacing, len(labels)))
+    return own - source.ground[layout.sources(labels, shift)]
+
+
+def _cell_means(field: Field, cells: Exemplar) -> Float[Array, "m m 4"]:
+    colour, height = build.ground_maps(field, cells)
+    return np.concatenate([colour, height[..., None]], -1)

@@ -1,0 +1,28 @@
+"""Large pictures to be looked at: does a grid show, a repeat, a border?"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float32
+from numpy import ndarray as Array
+
+from dav_gswt.study.seams.measure import GROUNDS
+from dav_gswt.terrain import assemble, still
+from dav_gswt.tiles.build import TileSet
+
+TILES = 20  # a side of the picture from above
+SQUARE = 1600  # pixels of its side
+
+
+def drawn(tiles: TileSet, manifest: dict, shot: str, surface: str, size: dict) -> Float32[Array, "h w 3"]:
+    """A `grid` of TILES x TILES from above, or what a `walker` sees, on `flat` or `hilly` ground.
+
+    size: of the walker's picture. From above the eye is so high that a picture 60 degrees wide shows that many tiles.
+    """
+    terrain = assemble.of_fields(tiles.fields, manifest, GROUNDS[surface])
+    if shot == "walker":
+        return still.taken(terrain, still.SHOTS[0], manifest, **size)
+    high = 0.5 * TILES * tiles.side / np.tan(np.radians(30.0)) / manifest["eye_floor"]
+    above = still.Shot("grid", (0.5, 0.5), float(high), 90.0, 90.0)
+    far = replace(terrain, reach=2 * TILES + 8)  # all of it is nearer than what goes over into the far ground
+    return still.taken(far, above, manifest, SQUARE, SQUARE)

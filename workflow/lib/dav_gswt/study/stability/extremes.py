@@ -1,0 +1,115 @@
+"""The workflow at its extremes: what is laid over the smallest experiment, and what is expected to come of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from dav_gswt.field import Field, sh_of
+from dav_gswt.field import write as write_field
+from dav_gswt.images import image_files
+
+COUNT = 160  # Gaussians along a side of a world that is given as a field
+SIDE = 10.0  # of that world, in its unit
+
+Prepare = Callable[[Path], None]
+
+
+@dataclass(frozen=True)
+class Extreme:
+    """One run. about: what is extreme. over: laid over config/test/config.yaml. prepare: makes files in its folder.
+
+    says: a regular expression that the message must match; None: the run must end, with all its numbers finite.
+    like: another run whose stills these must resemble.
+    """
+
+    name: str
+    about: str
+    over: dict = field(default_factory=dict)
+    prepare: Prepare | None = None
+    says: str | None = None
+    like: str | None = None
+
+
+def ground(count: int, side: float) -> Field:
+    """A finished field: count x count opaque flat discs on a gentle relief, in blotches of two colours."""
+    rng = np.random.default_rng(0)
+    step = side / count
+    x, y = np.meshgrid((np.arange(count) + 0.5) * step, (np.arange(count) + 0.5) * step)
+    waves = rng.uniform(0, 2 * np.pi, (6, 2)), rng.uniform(2, 9, (6, 2)) * 2 * np.pi / side
+    blotch = sum(np.sin(k[0] * x + p[0]) * np.sin(k[1] * y + p[1]) for p, k in zip(*waves, strict=True)).ravel()
+    grain = 0.04 * rng.standard_normal((count**2, 1))
+    colour = np.array([0.55, 0.45, 0.32]) + 0.07 * blotch[:, None] * np.array([1.0, 0.4, -0.6]) + grain
+    n = count**2
+    means = np.stack([x.ravel(), y.ravel(), 0.01 * side * blotch / 6], 1)
+    return Field(
+        means.astype(np.float32),
+        np.tile(np.log([0.7 * step, 0.7 * step, 0.05 * step]).astype(np.float32), (n, 1)),
+        np.tile(np.array([1, 0, 0, 0], np.float32), (n, 1)),
+        np.full(n, 4.0, np.float32),
+        sh_of(np.clip(colour, 0, 1)),
+        np.zeros(n, np.float32),
+        np.zeros(n, bool),
+    )
+
+
+def world(count: int, side: float) -> Prepare:
+    """Such a field as the file of the scene `finished`."""
+    return lambda folder: write_field(ground(count, side), folder / "finished.ply")
+
+
+def single(folder: Path) -> None:
+    write_field(ground(1, SIDE), folder / "finished.ply")
+
+
+def two_photos(folder: Path) -> None:
+    rng = np.random.default_rng(0)
+    (folder / "photos").mkdir()
+    for number in range(2):
+        image_files.write(folder / f"photos/{number}.png", rng.uniform(0, 1, (96, 128, 3)).astype(np.float32))
+
+
+def desert(**keys) -> dict:
+    """Keys of the scene `desert`."""
+    return {"scenes": {"desert": keys}}
+
+
+def views(**keys) -> dict:
+    """The paper's own choice of views, which reads the prior."""
+    return {"policy": "w2-lpips", **keys}
+
+
+FINISHED = {"scene": "finished"}
+FOLDER = {"kind": "photos", "folder": "photos", "size": 128, "start": 3, "agent": "replay"}
+FOLDER |= {"quality": "draft", "seam": "semantic"}
+MILLION = {"size": 128, "spacing": 1.5, "cap": 2_000_000, "steps": 60, "steps_per_photo": 10, "level_steps": 4}
+MILLION_FINISHED = {"scenes": {"finished": {"quality": "million"}}, "qualities": {"million": MILLION}}
+
+ALL = (
+    Extreme(
+        "two-photos", "one synthetic photo too few", desert(photos=2), says=r"scenes\.desert\.photos: 2 is less than"
+    ),
+    Extreme(
+        "two-in-folder",
+        "one photo too few in a folder",
+        {"scene": "folder", "scenes": {"folder": FOLDER}},
+        two_photos,
+        says="at least 3 overlapping photos are needed",
+    ),
+    Extreme("all-start", "start views ask for all photos: no pool", desert(agent="replay", photos=5, start=6)),
+    Extreme("k-pool", "k = pool", {"k": 6} | desert(candidates=6)),
+    Extreme("k-over-pool", "k far above the pool", {"k": 1000} | desert(candidates=6)),
+    Extreme("lam-0", "lambda 0", views(lam=0)),
+    Extreme("lam-1e6", "lambda 1e6", views(lam=1_000_000)),
+    Extreme("tau-0", "tau 0: every tile keeps all orders", {"tau": 0}),
+    Extreme("tau-1", "tau 1: none does", {"tau": 1}),
+    Extreme("pdrop-0", "no dropout: all samples are equal", views(p_drop=0)),
+    Extreme("pdrop-0.95", "19 of 20 of the attention dropped", views(p_drop=0.95)),
+    Extreme("one-gaussian", "a field of one Gaussian", FINISHED, single, says="1 opaque Gaussians"),
+    Extreme("world-1", "a world of usual size, to compare with", FINISHED, world(COUNT, SIDE)),
+    Extreme("world-1e-3", "the same, a thousandth as large", FINISHED, world(COUNT, 1e-3 * SIDE), like="world-1"),
+    Extreme("world-1e6", "the same, a million times as large", FINISHED, world(COUNT, 1e6 * SIDE), like="world-1"),
+    Extreme("million", "a million Gaussians", FINISHED | MILLION_FINISHED, world(1000, SIDE)),
+)
+EXTREMES = {extreme.name: extreme for extreme in ALL}

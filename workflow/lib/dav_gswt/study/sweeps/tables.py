@@ -1,0 +1,115 @@
+"""One table of a sweep: a row a cell, its wildcards, what it measured, what it cost, and where it comes from."""
+
+import csv
+from pathlib import Path
+
+from dav_gswt.files import read_json
+from dav_gswt.study.comparison import curves
+from dav_gswt.study.seams import summary
+from dav_gswt.study.seams import tables as crops
+from dav_gswt.study.sweeps.grid import CELL
+
+KEY = ("sweep", *CELL)  # what tells rows apart
+ABOUT = ("samples", "steps")  # of the prior, which its name hides
+VIEWS = ("photos", "gaussians", *curves.MEASURES)  # of the test views
+TILES = ("uncertainty", "deep", "levels", "splats", "orders", "bundle_mb")
+SEAMS = ("seam_lpips", "seam_lpips_low", "seam_lpips_high", "seam_psnr", "seam_jump", "seam_density")
+ROUNDS = ("score", "select", "update")  # jobs that every round has: seconds a round
+ONCE = ("coarse", "levels", "cut", "bundle", "stills")
+TIMES = ("coarse_s", *(f"{job}_s" for job in ROUNDS), "recon_s", *(f"{job}_s" for job in ONCE[1:]), "peak_mb")
+NUMBERS = (*ABOUT, *VIEWS, *TILES, *SEAMS, *TIMES)
+SOURCES = ("psnr_is", "version", "renderer", "field", "tiles")
+MEGA = 1e6
+
+
+def row(cell: dict) -> dict:
+    """The row of a cell; what was not measured is None.
+
+    psnr_is: `colour-corrected` of photos, whose exposure changes, else `raw`. uncertainty: mean over the tiles; deep:
+    share of them that keep all orders; orders: kept of all tiles and levels; bundle_mb: of the chunks a page loads.
+    seam_lpips: Seam-LPIPS of cuts less their floor over all views, with its 95 % interval over places; seam_psnr and
+    seam_jump of these cuts; seam_density: share of their length through strong gradients. Seconds are those of whole
+    jobs, score_s, select_s and update_s the mean over the rounds; recon_s: all that leads to the field but taking the
+    photos. peak_mb: the largest memory of any of these jobs.
+    cell: what KEY and ABOUT name, `varied`, `corrected`, `files` of what was measured, `times`: benchmarks by job.
+    """
+    files, found = cell["files"], {key: cell[key] for key in (*KEY, *ABOUT)}
+    found |= {f"varied_{k}": value for k, value in enumerate(cell["varied"].values())}
+    found |= {"psnr_is": "colour-corrected" if cell["corrected"] else "raw"}
+    found |= _views(files["metrics"], cell["corrected"]) if "metrics" in files else {}
+    found |= _tiles(files["manifest"]) if "manifest" in files else {}
+    found |= _seams(cell | files) if "crops" in files else {}
+    return dict.fromkeys(columns(len(cell["varied"]))) | found | times(cell["times"])
+
+
+def columns(axes: int) -> tuple[str, ...]:
+    """The table's columns, in order. axes: how many settings are varied together."""
+    return (*KEY, *(f"varied_{k}" for k in range(axes)), *ABOUT, *VIEWS, *TILES, *SEAMS, *TIMES, *SOURCES)
+
+
+def read(path: Path | str) -> list[dict]:
+    """A table as it was written, NUMBERS as floats, None where one is empty; no rows where there is no file yet."""
+    if not Path(path).is_file():
+        return []
+    with Path(path).open(newline="", encoding="utf-8") as file:
+        return [r | {k: float(r[k]) if r[k] else None for k in NUMBERS if k in r} for r in csv.DictReader(file)]
+
+
+def times(jobs: dict[str, list[str]]) -> dict:
+    """Seconds by job and the largest memory, of benchmarks; None where one of them is not there."""
+    told = {job: [_benchmark(path) for path in paths] for job, paths in jobs.items()}
+    seconds = {job: None if None in found or not found else sum(s for s, _ in found) for job, found in told.items()}
+    out = dict.fromkeys(TIMES) | {f"{job}_s": seconds.get(job) for job in ONCE}
+    for job in ROUNDS:
+        out[f"{job}_s"] = None if seconds.get(job) is None else seconds[job] / len(told[job])
+    parts = [seconds[job] for job in ("coarse", *ROUNDS) if told.get(job)]
+    out["recon_s"] = None if None in parts or not parts else sum(parts)
+    memory = [one[1] for found in told.values() for one in found if one and one[1] is not None]
+    return out | {"peak_mb": max(memory, default=None)}
+
+
+def _benchmark(path: str) -> tuple[float, float | None] | None:
+    """Seconds and megabytes of a job; a job that was over at once has no memory told."""
+    if not Path(path).is_file():
+        return None
+    with Path(path).open(newline="", encoding="utf-8") as text:
+        told = next(csv.DictReader(text, delimiter="\t"))
+    memory = told.get("max_rss", "")
+    return float(told["s"]), float(memory) if memory.replace(".", "", 1).isdigit() else None
+
+
+def _views(path: str, corrected: bool) -> dict:
+    told = read_json(path)
+    about = told["provenance"]
+    found = {key: told[key] for key in ("photos", "gaussians")}
+    found |= curves.measured(told, "psnr_colour_corrected" if corrected else "psnr")
+    return found | _origin(about) | {"field": about["inputs"]["field"][:12]}
+
+
+def _tiles(path: str) -> dict:
+    manifest = read_json(path)
+    tiles = manifest["tiles"]
+    chunks = [chunk for tile in tiles for chunk in tile["chunks"]]
+    deep = [len(tile["chunks"][0]["orders"]) == len(manifest["directions"]) for tile in tiles]
+    return {
+        "uncertainty": sum(tile["uncertainty"] for tile in tiles) / len(tiles),
+        "deep": sum(deep) / len(deep),
+        "levels": len(manifest["levels"]),
+        "splats": sum(chunk["count"] for chunk in chunks),
+        "orders": sum(len(chunk["orders"]) for chunk in chunks),
+        "bundle_mb": sum(chunk["bytes"] for chunk in chunks) / MEGA,
+    } | _origin(manifest["provenance"])
+
+
+def _seams(cell: dict) -> dict:
+    rows = crops.rows(cell | {"table": cell["crops"], "variant": cell["seam"], "draw": 0})
+    told = next(r for r in summary.summary(rows) if r["view"] == r["ground"] == summary.EVERY)
+    named = {"seam_lpips": "cut", "seam_lpips_low": "cut_low", "seam_lpips_high": "cut_high"}
+    found = {key: told[name] for key, name in (named | {"seam_psnr": "cut_psnr", "seam_jump": "cut_jump"}).items()}
+    facts = read_json(cell["facts"])
+    return found | {"seam_density": facts["dense"], "tiles": told["tiles"]} | _origin(facts["provenance"])
+
+
+def _origin(provenance: dict) -> dict:
+    renderer = " ".join(str(value) for value in provenance["renderer"].values())
+    return {"version": provenance["version"], "renderer": renderer}

@@ -1,0 +1,1 @@
+"""Measurements of bundle and terrain: levels, pre-sorted orders, frame times, tile uncertainty."""

@@ -1,0 +1,196 @@
+"""How long a frame takes on a walk at a fixed height over hills: drawn by the library, and by the page in a browser.
+
+Both go the same way, frame by frame, at several budgets of Gaussians, and fill the same columns; milliseconds hold for
+the machine that the row names, and for what else it did meanwhile (`load`).
+"""
+
+import csv
+import os
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dav_gswt import provenance
+from dav_gswt.bundle.store import Bundle
+from dav_gswt.logs import progress
+from dav_gswt.study import figures
+from dav_gswt.study.tables import spread
+from dav_gswt.study.terrain import browser
+from dav_gswt.terrain import assemble, heights, still
+from dav_gswt.terrain.meter import Meter
+from dav_gswt.terrain.page import write_page
+from dav_gswt.terrain.still import Shot
+
+PARTS = ("render", "sort", "update")
+LIBRARY, PAGE = "library", "page"
+LEAST = 0.1  # milliseconds: what is less is not drawn
+BEFORE = 4  # frames at the walk's start that are not counted: orders are made, shaders compiled
+VISIT = """async ({ places, before, budget }) => {
+  const gl = document.getElementById("picture").getContext("webgl2"), pixel = new Uint8Array(4);
+  const render = [], counts = [], times = { update: [], sort: [] };
+  let last = null, ran = 0;
+  for (let k = -before; k < places.length; k++) {
+    davgswt.set(places[Math.max(k, 0)]);
+    davgswt.ask(budget);
+    await new Promise((done) => requestAnimationFrame(done));
+    const start = performance.now();
+    davgswt.frame();
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+    const answer = davgswt.answer;
+    if (k >= 0) {
+      render.push(performance.now() - start);
+      counts.push(answer.count);
+      if (answer !== last) for (const part in times) times[part].push(answer.milliseconds[part]);
+      ran += answer !== last;
+    }
+    last = answer;
+  }
+  const info = gl.getExtension("WEBGL_debug_renderer_info");
+  return { render, ...times, counts, ran, gl: gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER) };
+}"""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is measured: config's `frames`."""
+
+    heights: dict
+    flight: dict
+    width: int
+    height: int
+    budgets: list[int]
+
+    def shots(self) -> list[Shot]:
+        return still.flight(**self.flight)
+
+
+def of_library(bundle: Bundle, asked: Asked) -> list[dict]:
+    """A row a budget, of the library's own pictures: every frame is updated, sorted and rendered.
+
+    update holds the orders, too, which the library makes again for every frame; the page reads them from the bundle.
+    """
+    terrain, told, rows = assemble.of_bundle(bundle, asked.heights), bundle.manifest, []
+    for budget in progress(asked.budgets, "measure frames of the library"):
+        meters = []
+        for shot in asked.shots():
+            meters.append(Meter())
+            camera = still.camera_of(shot, terrain, told["eye_floor"], asked.width, asked.height)
+            with meters[-1].of("update"):
+                coarser = assemble.coarsened(terrain, camera, budget)
+            still.draw(coarser, camera, told["sky"], told["ground_colour"], meter=meters[-1])
+        times = {part: [meter.milliseconds[part] for meter in meters] for part in PARTS}
+        rows.append(
+            _row(asked, budget, times, [meter.gaussians for meter in meters], len(meters)) | _about(LIBRARY, "")
+        )
+    return rows
+
+
+def of_page(bundle_dir: Path | str, viewer_dir: Path | str, manifest: dict, asked: Asked) -> list[dict]:
+    """A row a budget, of the page in a headless Chromium with software rendering.
+
+    render: until the first pixel can be read; sort and update: in the worker, meanwhile. Their shares are of frames
+    that something new had come for from the worker.
+    Raises: InputError: see `browser.chromium`, `page.write_page`.
+    """
+    surface, rows = heights.of_config(asked.heights, manifest["tile_side"]), []
+    places = [_place(shot, manifest) for shot in asked.shots()]
+    first = ",".join(f"{places[0][key]:.6g}" for key in ("x", "y", "eye", "yaw", "pitch"))
+    with tempfile.TemporaryDirectory() as folder, browser.chromium() as chromium:
+        write_page(bundle_dir, viewer_dir, Path(folder) / "page", surface)
+        with browser.served(Path(folder) / "page") as address:
+            tab = chromium.new_page(viewport={"width": asked.width, "height": asked.height})
+            tab.goto(f"{address}?still={min(asked.budgets)}#{first}")
+            tab.evaluate("davgswt.ready.then(() => 0)")
+            for budget in progress(asked.budgets, "measure frames of the page"):
+                found = tab.evaluate(VISIT, {"places": places, "before": BEFORE, "budget": budget})
+                times = {part: found[part] for part in PARTS}
+                rows.append(_row(asked, budget, times, found["counts"], found["ran"]) | _about(PAGE, found["gl"]))
+    return rows
+
+
+def _place(shot: Shot, manifest: dict) -> dict:
+    """A shot as the page's places are."""
+    x, y = (v * manifest["tile_side"] for v in shot.at)
+    return {"x": x, "y": y, "eye": shot.height * manifest["eye_floor"], "yaw": shot.yaw, "pitch": -shot.pitch}
+
+
+def _row(asked: Asked, budget: int, times: dict[str, list[float]], counts: list[int], ran: int) -> dict:
+    """Means and standard deviations (ddof 1); of what the worker never did None."""
+    frames = len(counts)
+    row = {"width": asked.width, "height": asked.height, "frames": frames, "budget": budget}
+    row |= {"splats": float(np.mean(counts))}
+    for part in PARTS:
+        values = times[part]
+        row[f"{part}_ms"] = float(np.mean(values)) if values else None
+        row[f"{part}_ms_sd"] = float(np.std(values, ddof=1)) if len(values) > 1 else None
+        if part != "render":
+            row[f"{part}_share"] = ran / frames
+    return row
+
+
+def _about(renderer: str, gl: str) -> dict:
+    return {"renderer": renderer, "gl": gl} | provenance.machine() | {"load": os.getloadavg()[0]}
+
+
+def gathered(cells: list[dict], library: list[str], page: list[str]) -> list[dict]:
+    """All rows with what tells each bundle from the others in front; paths of tables, one a cell."""
+    found = []
+    for cell, *paths in zip(cells, library, page, strict=True):
+        found += [cell | row for path in paths for row in read(path)]
+    return found
+
+
+def of_viewer(rows: list[dict]) -> list[dict]:
+    """The page's row of each bundle at the first budget, in the columns that the study's tables join."""
+    first: dict[tuple, dict] = {}
+    for row in rows:
+        if row["renderer"] == PAGE:
+            first.setdefault(tuple(row[key] for key in spread.CELL), row)
+    return [{key: row[key] for key in (*spread.CELL, *spread.VIEWER)} for row in first.values()]
+
+
+def read(path: Path | str) -> list[dict]:
+    """Rows as text."""
+    with Path(path).open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def write_plot(path: Path | str, rows: list[dict]) -> None:
+    """Milliseconds of a frame's parts over Gaussians in view: a panel a renderer, a line a scene; rows have text."""
+    from matplotlib.ticker import LogLocator  # here, not above: see `figures.blank`
+
+    figure = figures.blank(10.0, 4.4)
+    panels = figure.subplots(1, 2)
+    for axes, renderer in zip(panels, (LIBRARY, PAGE), strict=True):
+        mine = [row for row in rows if row["renderer"] == renderer]
+        for k, scene in enumerate(dict.fromkeys(row["scene"] for row in mine)):
+            of_scene = sorted((r for r in mine if r["scene"] == scene), key=lambda row: float(row["splats"]))
+            for part, style in zip(PARTS, ("-o", "--s", ":^"), strict=True):
+                known = [row for row in of_scene if row[f"{part}_ms"]]
+                x, y, sd = ([float(r[key] or 0) for r in known] for key in ("splats", f"{part}_ms", f"{part}_ms_sd"))
+                axes.errorbar(
+                    x, y, yerr=sd, fmt=style, color=f"C{k}", markersize=4, capsize=2, label=f"{scene}: {part}"
+                )
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_ylim(bottom=LEAST)
+        axes.xaxis.set_major_formatter(lambda value, _: f"{value / 1000:g} k")
+        axes.xaxis.set_minor_formatter("")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axes.set_title(_titled(renderer, mine), fontsize=9, loc="left")
+        axes.set_xlabel("Gaussians in view")
+        axes.grid(alpha=0.3)
+    panels[0].set_ylabel("milliseconds a frame (mean, sd)")
+    named = next((axes for axes in panels if axes.get_legend_handles_labels()[0]), panels[0])
+    figure.legend(*named.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=8)
+    figures.save(figure, path)
+
+
+def _titled(renderer: str, rows: list[dict]) -> str:
+    if not rows:
+        return f"{renderer}: not measured"
+    row = rows[0]
+    software = " in Chromium, software rendering" if "SwiftShader" in row["gl"] else ""
+    return f"{renderer}{software}, {row['width']} x {row['height']}\n{row['processor']}, {row['cores']} cores"

@@ -1,0 +1,163 @@
+"""Which settings the config's `tradeoff` compares, and the named entries that it makes of them.
+
+A knob turns one key of an entry of `qualities`, `seams` or `priors`; the workflow knows entries by their names only, so
+each setting becomes an entry of its own: the cap 70000 of the quality draft is draft-cap-70000.
+Read by the workflow before the first job, so it loads no numerics.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from dav_gswt.errors import InputError
+from dav_gswt.paths import spell
+from dav_gswt.views.policy_names import IMAGINING
+
+CALLED = {"qualities": "quality", "seams": "seam", "priors": "prior"}  # how what is chosen calls an entry of a table
+LEFT_OUT = {"degree": 0, "levels": "auto"}  # what a key means where an entry has none
+PRESET = "preset"  # the knob of the named qualities
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A setting of a knob.
+
+    shown: its value. chosen: what a cell is made with, keys as in `sweeps.fixed`. measure: what tells its accuracy,
+    views, stills or seams. most: taken for the knob's most accurate. base: the base's own.
+    """
+
+    knob: str
+    shown: str
+    chosen: dict
+    measure: str
+    most: bool
+    base: bool
+
+
+def name(base: str, key: str, value: int | float | str) -> str:
+    """The name of the entry that is `base` but for one value: reference-spacing-1_25. One spelling a number."""
+    return f"{base}-{key}-{_spelled(value).replace('.', '_')}"
+
+
+def settings(config: dict) -> list[Setting]:
+    """Every setting of `tradeoff`, by knob, in the config's order, each knob's most accurate first.
+
+    The base's own value, where a knob does not name it, is its last; no value comes twice.
+    """
+    asked = config.get("tradeoff")
+    return [setting for each in _knobs(asked) for setting in _of_knob(config, *each)] if asked else []
+
+
+def tested_size(config: dict) -> int:
+    """The size of the photos that all settings are tested on: the largest that one is fitted to. config: `entries`'."""
+    return max(config["qualities"][setting.chosen["quality"]]["size"] for setting in settings(config))
+
+
+def sized(config: dict, quality: str) -> str:
+    """The entry that is this quality at the size of the config's `auto`."""
+    size = config["auto"].get("size", config["qualities"][quality]["size"])
+    return quality if config["qualities"][quality]["size"] == size else name(quality, "size", size)
+
+
+def entries(config: dict) -> dict:
+    """The config with the entries that its `tradeoff` and `auto` name; what it holds already stays as it is.
+
+    Raises: InputError: the config has another entry of such a name.
+    """
+    made = {table: dict(config[table]) for table in CALLED}
+    for table, entry, below, key, value in _made(config):
+        found = config[table][below] | {key: value}
+        if made[table].setdefault(entry, found) != found:
+            raise InputError(
+                f"config: {table}.{entry}: `tradeoff` or `auto` makes an entry of this name; give yours another"
+            )
+    return config | made
+
+
+def check(config: dict) -> None:
+    """Check `tradeoff` and `auto` against the rest of the config.
+
+    Raises: InputError: the key, what is wrong with it, and what it may be.
+    """
+    for section in ("tradeoff", "auto"):
+        asked = config.get(section, {})
+        for scene in [asked["scene"]] if "scene" in asked else asked.get("scenes", []):
+            if config["scenes"].get(scene, {"kind": "field"})["kind"] == "field":
+                able = ", ".join(n for n, s in config["scenes"].items() if s["kind"] != "field")
+                raise InputError(f"config: {section}: {scene} is no scene with photos; they are {able}")
+        for part in ("base", "auto"):
+            _check_names(f"{section}.{part}", asked.get(part, {}), config)
+    asked = config.get("tradeoff", {"knobs": {}, "presets": []})
+    for quality in asked["presets"]:
+        _check_names("tradeoff.presets", {"quality": quality}, config)
+    for knob in asked.get("only", []):
+        if knob not in asked["knobs"]:
+            raise InputError(f"config: tradeoff.only: there is no knob {knob!r}; knobs has {', '.join(asked['knobs'])}")
+    for knob, turned in asked["knobs"].items():
+        where, base = f"tradeoff.knobs.{knob}", asked["base"] | turned.get("base", {})
+        _check_names(f"{where}.base", turned.get("base", {}), config)
+        if turned.get("of") == "priors" and base["policy"] not in IMAGINING:
+            raise InputError(
+                f"config: {where}: makes no difference to the policy {base['policy']}, which asks no prior; "
+                "give it one that does, as base: {policy: w2-lpips}"
+            )
+
+
+def _check_names(where: str, chosen: dict, config: dict) -> None:
+    for table, called in CALLED.items():
+        if called in chosen and chosen[called] not in config[table]:
+            known = ", ".join(config[table]) or "nothing"
+            raise InputError(f"config: {where}: there is no {called} {chosen[called]!r}; {table} has {known}")
+
+
+def _knobs(asked: dict) -> Iterator[tuple[str, dict]]:
+    yield PRESET, {"key": "quality", "values": asked["presets"], "measure": "views"}
+    for knob in asked.get("only", asked["knobs"]):
+        yield knob, asked["knobs"][knob]
+
+
+def _of_knob(config: dict, knob: str, turned: dict) -> list[Setting]:
+    base, called, key = _turned(config, knob, turned)
+    usual, found = _usual(config, knob, turned), {}
+    for value in [*turned["values"], usual]:
+        chosen = base | {called: name(base[called], key, value) if "of" in turned else value}
+        own = _spelled(value) == _spelled(usual)
+        made = Setting(knob, _spelled(value), base if own else chosen, turned["measure"], not found, own)
+        found.setdefault(made.shown, made)
+    return list(found.values())
+
+
+def _turned(config: dict, knob: str, turned: dict) -> tuple[dict, str, str]:
+    """What a knob is turned from, how this calls what the knob changes, and the key of the entry, if it is one."""
+    key = turned.get("key", knob)
+    called = CALLED[turned["of"]] if "of" in turned else key
+    return config["tradeoff"]["base"] | turned.get("base", {}), called, key
+
+
+def _usual(config: dict, knob: str, turned: dict) -> int | float | str:
+    """The base's own value of a knob."""
+    base, called, key = _turned(config, knob, turned)
+    return config[turned["of"]][base[called]].get(key, LEFT_OUT.get(key, "")) if "of" in turned else base[called]
+
+
+def _made(config: dict) -> Iterator[tuple[str, str, str, str, int | float | str]]:
+    """Table, name, the entry below, key and value of every entry that is made."""
+    for knob, turned in config.get("tradeoff", {"knobs": {}})["knobs"].items():
+        if table := turned.get("of"):
+            base, called, key = _turned(config, knob, turned)
+            usual = _spelled(_usual(config, knob, turned))
+            for value in (value for value in turned["values"] if _spelled(value) != usual):
+                yield table, name(base[called], key, value), base[called], key, value
+    for quality in _of_auto(config):
+        if (made := sized(config, quality)) != quality:
+            yield "qualities", made, quality, "size", config["auto"]["size"]
+
+
+def _of_auto(config: dict) -> list[str]:
+    """The qualities that `auto` compares; one that does not exist is `check`'s to tell."""
+    asked = config.get("auto")
+    named = [asked[part]["quality"] for part in ("base", "auto")] if asked else []
+    return [quality for quality in named if quality in config["qualities"]]
+
+
+def _spelled(value: int | float | str) -> str:
+    return value if isinstance(value, str) else spell(value)

@@ -1,0 +1,104 @@
+"""The table of the trade-off: a row a setting, what it cost, is worth, and lost to the most accurate of its knob."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from dav_gswt import provenance
+from dav_gswt.images import image_files
+from dav_gswt.study.sweeps import tables as sweeps
+from dav_gswt.study.sweeps.grid import CELL
+from dav_gswt.study.tradeoff.front import front, rivals
+
+KEY = ("scene", "seed", "knob", "setting", "quality", "seam", "prior", "tau", "processor", "cores")  # tells rows apart
+TILE_JOBS = ("levels_s", "cut_s", "bundle_s")
+LEVELS_OF_GREY = 255
+UNITS = {"views": "dB", "stills": "grey levels", "seams": "LPIPS"}  # of a loss
+TEXTS = ("scene", "knob", "setting", "measure", "quality", "policy", "prior", "seam", "psnr_is", "version", "renderer")
+TEXTS += ("fixed_quality", "field", "tiles", "processor", "part", "chosen", "rival_knob", "rival_setting")
+
+
+def rows(cells: list[dict]) -> list[dict]:
+    """A row a cell; a knob's most accurate setting comes before the others, which are compared with it.
+
+    seconds: of all jobs from the start views to the bundle, but the taking of photos; what cells share counts for each.
+    own_seconds: of those that the knob can change: all of them where views tell its accuracy, else the jobs on tiles.
+    loss: of PSNR in dB (views), of Seam-LPIPS over its floor (seams), or the root mean square difference of the stills
+    in grey levels (stills); 0 for what is taken for the most accurate, below 0 where a setting is better than it.
+    stills_psnr: empty where equal. cells: what `sweeps.tables.row` reads, with `knob`, `setting`, `most`, `base`,
+    `measure` and the paths of `stills`.
+    """
+    found, best = [], {}
+    for cell in cells:
+        told = measured(cell)
+        if cell["most"]:
+            best[cell["knob"]] = cell | told
+        about = {key: cell[key] for key in ("knob", "setting", "measure")}
+        about |= {key: int(cell[key]) for key in ("most", "base")}
+        found.append(about | told | _lost(cell | told, best[cell["knob"]]) | provenance.machine())
+    return found
+
+
+def measured(cell: dict) -> dict:
+    """What a cell left and cost: the columns of a sweep's row, seconds and own_seconds."""
+    told = {key: value for key, value in sweeps.row(cell).items() if key not in ("sweep", "samples", "steps")}
+    tiles = total(told[key] for key in TILE_JOBS)
+    seconds = total([told["recon_s"], tiles])
+    return told | {"seconds": seconds, "own_seconds": seconds if cell.get("measure") == "views" else tiles}
+
+
+def total(values) -> float | None:
+    """The sum, None where one of them is not known."""
+    values = list(values)
+    return None if None in values else float(sum(values))
+
+
+def _lost(mine: dict, best: dict) -> dict:
+    found = {"loss_lpips": _difference(mine["lpips"], best["lpips"]), "stills_psnr": None}
+    if mine["measure"] == "stills":
+        error = mean_square(mine["stills"], best["stills"])
+        found["stills_psnr"] = None if error == 0 else float(-10 * np.log10(error))
+        return found | {"loss": LEVELS_OF_GREY * float(np.sqrt(error))}
+    if mine["measure"] == "seams":
+        return found | {"loss": _difference(mine["seam_lpips"], best["seam_lpips"])}
+    return found | {"loss": _difference(best["psnr"], mine["psnr"])}
+
+
+def _difference(a: float | None, b: float | None) -> float | None:
+    return None if None in (a, b) else float(a - b)
+
+
+def mean_square(mine: list[str], others: list[str]) -> float:
+    """Mean squared difference of pictures, pair by pair, over all their pixels; 0 where they are equal."""
+    found = [(image_files.read(a).astype(float) - image_files.read(b)) ** 2 for a, b in zip(mine, others, strict=True)]
+    return float(np.mean([difference.mean() for difference in found]))
+
+
+def pareto(table: list[dict]) -> list[dict]:
+    """The rows that test views tell apart: `front`, 1 where nothing is as fast and better (or as good and faster);
+    else by how many dB (`behind`) the best that is as fast (`rival_knob`, `rival_setting`) is better. `sharp`: 1 where
+    nothing is as fast with a lower LPIPS; empty where LPIPS was not measured of all."""
+    cells = {}
+    for row in table:
+        cells.setdefault(tuple(row[key] for key in CELL), row)  # knobs share the base: it is one point
+    views = [row for row in cells.values() if row["measure"] == "views"]
+    known = [row for row in views if None not in (row["seconds"], row["psnr"])]
+    if not known:
+        return []
+    cost, worth = (np.array([row[key] for row in known], float) for key in ("seconds", "psnr"))
+    blurred = [row["lpips"] for row in known]
+    sharp = [None] * len(known) if None in blurred else front(cost, -np.array(blurred, float)).astype(int).tolist()
+    shown = ("scene", "seed", "knob", "setting", "base", "seconds", "psnr", "ssim", "lpips", "peak_mb", "bundle_mb")
+    return [
+        {key: row[key] for key in shown}
+        | {"front": int(on), "behind": float(worth[rival] - worth[i]), "sharp": sharp[i]}
+        | {f"rival_{key}": known[rival][key] if rival != i else "" for key in ("knob", "setting")}
+        for i, (row, on, rival) in enumerate(zip(known, front(cost, worth), rivals(cost, worth), strict=True))
+    ]
+
+
+def read(path: Path | str) -> list[dict]:
+    """A table of the trade-off as it was written: numbers as floats, None where one is empty, texts as they are."""
+    with Path(path).open(newline="", encoding="utf-8") as file:
+        return [{k: v if k in TEXTS else float(v) if v else None for k, v in r.items()} for r in csv.DictReader(file)]

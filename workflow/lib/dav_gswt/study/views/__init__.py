@@ -1,0 +1,1 @@
+"""Figures of view selection: the uncertainty sphere, and test views over the rounds."""

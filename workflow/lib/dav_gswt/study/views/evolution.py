@@ -1,0 +1,187 @@
+"""The paper's evolution figure: two test views after some rounds, and where each render differs from the photo.
+
+Errors are taken from the photo, not from the last field as in the paper: what the last field gets wrong shows as well.
+Source: DAV-GSWT, figure on iterative reconstruction evolution.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float32
+from numpy import ndarray as Array
+
+from dav_gswt.errors import InputError
+from dav_gswt.field import Field
+from dav_gswt.images import metrics
+from dav_gswt.photos.training_views import View
+from dav_gswt.raster import render
+from dav_gswt.reconstruction.build import modelled
+from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.study import figures
+
+WIDE = 9.0  # inches of the figure
+HEAD, LABEL, FOOT, KEY = 0.25, 0.25, 0.5, 0.85  # inches: titles, a line under maps, two under all, the colours' scale
+NOTE = 0.2  # inches: a line more under all
+GREY = 0.75  # of what does not count
+FADED = 0.8  # how grey a picture becomes where it does not count
+HIGHEST = 0.99  # quantile of all errors at which their colours end
+MAP = "magma"
+
+
+@dataclass(frozen=True)
+class Round:
+    """What a round ended with. metrics: its metrics.json. title: what stands over it; note: and under its measures."""
+
+    number: int
+    field: Field
+    grid: Ground
+    metrics: dict
+    title: str = ""
+    note: str = ""
+
+    @property
+    def named(self) -> str:
+        return self.title or f"round {self.number}"
+
+
+@dataclass(frozen=True)
+class Look:
+    """A test view after a round. error: mean of |picture - photo| over the channels, NaN where the pixel does not
+    count. row: the view's measures, of metrics.json."""
+
+    picture: Float32[Array, "h w 3"]
+    error: Float32[Array, "h w"]
+    row: dict
+
+
+@dataclass(frozen=True)
+class Strip:
+    """A test view and how it looks after each round. why: it is shown."""
+
+    name: str
+    why: str
+    photo: Float32[Array, "h w 3"]
+    looks: list[Look]
+
+
+def measure(frame: dict) -> str:
+    """The key of PSNR in metrics.json: colour-corrected for photos, which change their exposure."""
+    return "psnr_colour_corrected" if frame["kind"] == "photos" else "psnr"
+
+
+def shown(first: dict, key: str, named: str = "round 0") -> dict[str, str]:
+    """The test views to show, by name, and why: the worst and the median one by PSNR. first: metrics.json of `named`.
+
+    Of an even number the better one of the middle two; one test view is shown alone.
+    Raises: InputError: there is no test view.
+    """
+    rows = sorted(first["test_views"], key=lambda row: np.inf if row[key] is None else row[key])
+    if not rows:
+        raise InputError("metrics.json of round 0: has no test view, so there is none to show; give the scene some")
+    if len(rows) == 1:
+        return {rows[0]["view"]: "the only test view"}
+    whys = {0: f"the worst of {len(rows)}\ntest views at {named}", len(rows) // 2: f"the median one\nat {named}"}
+    return {rows[i]["view"]: why for i, why in whys.items()}
+
+
+def strips(rounds: list[Round], tests: list[View], key: str) -> list[Strip]:
+    """The test views that `shown` chooses, after each round, the first of which is round 0. key: see `measure`.
+
+    Raises: InputError: a round's metrics lack the view.
+    """
+    views = {view.name: view for view in tests}
+    found = []
+    for name, why in shown(rounds[0].metrics, key, rounds[0].named).items():
+        looks = [look(one, views[name], key) for one in rounds]
+        counts = np.isfinite(looks[0].error)
+        found.append(Strip(name, why, faded(views[name].image, counts), looks))
+    return found
+
+
+def look(one: Round, view: View, key: str) -> Look:
+    """The view after a round, its colours corrected where its PSNR is that of corrected ones."""
+    row = next((row for row in one.metrics["test_views"] if row["view"] == view.name), None)
+    if row is None:
+        raise InputError(f"metrics.json of round {one.number}: lacks the test view {view.name}; make it again")
+    (view,) = modelled([view], one.grid)
+    picture = np.clip(render(one.field, view.camera).colour, 0, 1)
+    if key == "psnr_colour_corrected":
+        picture = np.clip(metrics.colour_corrected(picture, view.image, view.weight), 0, 1).astype(np.float32)
+    counts = view.weight > 0
+    error = np.where(counts, np.abs(picture - view.image).mean(-1), np.float32(np.nan))
+    return Look(faded(picture, counts), error, row)
+
+
+def faded(picture: Float32[Array, "h w 3"], counts: Array) -> Float32[Array, "h w 3"]:
+    """The picture, nearly GREY where a pixel does not count."""
+    grey = picture + np.float32(FADED) * (np.float32(GREY) - picture)
+    return np.where(counts[..., None], picture, grey)
+
+
+def highest(found: list[Strip]) -> float:
+    """The error at which colours end, of all maps."""
+    errors = np.concatenate([one.error[np.isfinite(one.error)] for strip in found for one in strip.looks])
+    return float(np.quantile(errors, HIGHEST)) or 1.0
+
+
+def write_figure(path: Path | str, found: list[Strip], rounds: list[Round], key: str) -> None:
+    """The figure of strips, as a PNG."""
+    figures.save(drawn(found, rounds, key), path)
+
+
+def drawn(found: list[Strip], rounds: list[Round], key: str):
+    """Of each view the photo and a render a round, under these maps of the error on one scale, under these the view's
+    measures; under each column the photos that the round had and its measures over all test views."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    columns = 1 + len(rounds)
+    side = WIDE / columns
+    tall = [side * strip.photo.shape[0] / strip.photo.shape[1] for strip in found for _ in range(2)]
+    foot = FOOT + NOTE * any(one.note for one in rounds)
+    figure = figures.blank(WIDE, sum(tall) + HEAD + LABEL * len(found) + foot + KEY)
+    figure.get_layout_engine().set(w_pad=0.02, h_pad=0.02, hspace=0.0, wspace=0.0)
+    grid = figure.subplots(len(tall) + 2, columns, squeeze=False, height_ratios=[HEAD, *tall, foot])
+    colours = {"norm": Normalize(0, highest(found)), "cmap": colormaps[MAP].with_extremes(bad=str(GREY))}
+    for axes in grid.flat:
+        axes.set(xticks=[], yticks=[])
+        axes.spines[:].set_visible(False)
+    for axes, title in zip(grid[0], ["photo", *(one.named for one in rounds)], strict=True):
+        _say(axes, title, size=12)
+    for strip, pictures, maps in zip(found, grid[1:-1:2], grid[2:-1:2], strict=True):
+        _strip(strip, pictures, maps, colours, key)
+    _foot(grid[-1], rounds, key)
+    bar = figure.colorbar(
+        ScalarMappable(**colours), ax=grid, location="bottom", extend="max", shrink=0.7, aspect=45, pad=0.01
+    )
+    bar.set_label("absolute error of colours in [0, 1]; grey: does not count", fontsize=11)
+    bar.ax.tick_params(labelsize=11)
+    return figure
+
+
+def _strip(strip: Strip, pictures, maps, colours: dict, key: str) -> None:
+    pictures[0].imshow(strip.photo)
+    _say(maps[0], f"{strip.name}:\n{strip.why}")
+    for one, above, below in zip(strip.looks, pictures[1:], maps[1:], strict=True):
+        above.imshow(one.picture)
+        below.imshow(one.error, **colours)
+        below.set_xlabel(_measured(one.row, key), fontsize=11)
+
+
+def _foot(row, rounds: list[Round], key: str) -> None:
+    count = len(rounds[0].metrics["test_views"])
+    corrected = ",\nPSNR colour-corrected" if key == "psnr_colour_corrected" else ""
+    _say(row[0], (f"mean of {count} test views" if count > 1 else "the one test view") + corrected)
+    for axes, one in zip(row[1:], rounds, strict=True):
+        _say(axes, f"{one.metrics['photos']} photos\n{_measured(one.metrics, key)}{one.note}", weight="bold")
+
+
+def _say(axes, text: str, **how) -> None:
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", **({"size": 11} | how))
+
+
+def _measured(row: dict, key: str) -> str:
+    psnr = "equal" if row[key] is None else f"{row[key]:.1f} dB"
+    return f"{psnr}, SSIM {row['ssim']:.3f}"

@@ -1,0 +1,186 @@
+"""The paper's uncertainty sphere: what the scores said of each candidate when a round chose, and what it chose.
+
+The hemisphere is seen from above, by Lambert's projection: equal areas of it are equal areas of the figure, so that
+candidates spread evenly over it lie evenly in the figure. Source: DAV-GSWT, figure on active-view uncertainty.
+"""
+
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float64
+from numpy import ndarray as Array
+
+from dav_gswt.errors import InputError
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.poses import Pose, of_camera
+from dav_gswt.study import figures
+from dav_gswt.views.policies import doubt
+from dav_gswt.views.scores import Scores
+
+WIDE, TALL = 9.0, 4.5  # inches: the figure, a row of its panels
+BESIDE = 2  # panels of a row: with more, stars hide their neighbours
+KEY = 1.4  # inches: what is under the panels
+RING = 15  # degrees of elevation between rings
+NUMBERED = 24  # poses of a round, above which stars have no numbers
+CROWDED = 4000.0  # square points that all dots cover together, where they are many
+LARGEST = 42.0  # square points: a dot, where they are few
+APART = 0.075  # from a star to its number, in radii of the disc
+HIGHEST = 0.98  # quantile of all values at which colours end
+PHOTO = {"marker": "s", "facecolors": "none", "edgecolors": "black", "linewidths": 1.6}
+STAR = {"marker": "*", "edgecolors": "black", "linewidths": 1.2}
+
+
+@dataclass(frozen=True)
+class Round:
+    """What a round chose from. values: of the candidates, by which they are coloured. candidates, taken: angle and
+    radius in the figure (`on_disc`), taken being the photos before the round. chosen: candidates, in order of choice.
+    lowest: elevation in degrees, of all that is shown."""
+
+    number: int
+    values: Float64[Array, "n"]
+    candidates: Float64[Array, "n 2"]
+    taken: Float64[Array, "m 2"]
+    chosen: list[int]
+    lowest: float
+
+
+def on_disc(poses: list[Pose]) -> Float64[Array, "n 2"]:
+    """Where poses lie in the figure: azimuth (radians, from east to north) and r = sqrt(1 - sin(elevation)).
+
+    r is 0 straight above and 1 at the horizon, and r^2, as the area of a cap, grows by equal steps of height.
+    """
+    elevation, azimuth = (np.radians([getattr(p, name) for p in poses]) for name in ("elevation", "azimuth"))
+    return np.stack([azimuth, np.sqrt(1 - np.sin(elevation))], -1)
+
+
+def shade(scores: Scores, lam: float) -> tuple[str, Float64[Array, "n"]]:
+    """What candidates are coloured by, in words and in numbers: the doubt u, or opacity if no prior was asked (or one
+    without dropout, whose samples all agree)."""
+    if scores.scales.of.get("w2_sq", 0.0) > 0:
+        lpips = f" + {lam:g} LPIPS" if lam and "lpips" in scores.terms else ""
+        return f"doubt u = W2{lpips}, in units of the scale frozen at round 1", doubt(scores, lam)
+    scale, values = scores.scales.of["opacity"], scores.term("opacity")
+    values = values / scale if scale > 0 else np.zeros(len(scores))
+    return "not known to be opaque, in units of the scale frozen at round 1", values
+
+
+def of_round(number: int, scores: Scores, asked: dict, taken: list[Camera], frame: dict, lam: float) -> Round:
+    """scores: of the candidates before the round. asked: the round's poses.json. taken: cameras of all photos before.
+
+    Raises: InputError: a pose was chosen that is not among the candidates.
+    """
+    photos = [of_camera("", camera, frame) for camera in taken]
+    index = {name: i for i, name in enumerate(scores.names)}
+    names = [pose["name"] for pose in asked["poses"]]
+    if strange := [name for name in names if name not in index]:
+        raise InputError(f"poses.json of round {number}: {strange[0]} is not among the scored poses; make it again")
+    lowest = min((pose.elevation for pose in scores.poses + photos), default=0.0)
+    chosen = [index[name] for name in names]
+    return Round(number, shade(scores, lam)[1], on_disc(scores.poses), on_disc(photos), chosen, lowest)
+
+
+def write_figure(path: Path | str, rounds: list[Round], label: str) -> None:
+    """The figure of rounds, as a PNG. label: what the colours are."""
+    figures.save(drawn(rounds, label), path)
+
+
+def drawn(rounds: list[Round], label: str):
+    """A panel a round: each candidate a dot, its colour on one scale for all rounds; photos taken before the round are
+    hollow squares, the poses it chose are stars, numbered as they were chosen."""
+    from matplotlib.cm import ScalarMappable
+
+    rows, columns = ceil(len(rounds) / BESIDE), min(BESIDE, len(rounds))
+    figure = figures.blank(WIDE, rows * TALL + KEY)
+    figure.get_layout_engine().set(w_pad=0.06, h_pad=0.06)
+    panels = figure.subplots(rows, columns, squeeze=False, subplot_kw={"projection": "polar"})
+    rim = RING * int(min(one.lowest for one in rounds) // RING)
+    colours = {"norm": _scale(rounds), "cmap": "viridis"}
+    for axes, one in zip(panels.flat, rounds, strict=False):
+        _draw(axes, one, rim, colours)
+    for empty in panels.flat[len(rounds) :]:
+        empty.set_axis_off()
+    bar = figure.colorbar(
+        ScalarMappable(**colours), ax=panels, location="bottom", extend="max", shrink=0.6, aspect=40, pad=0.02
+    )
+    bar.set_label(label, fontsize=11)
+    bar.ax.tick_params(labelsize=11)
+    about = (
+        f"from above: azimuth around; elevation 90° in the middle, {RING}° less at each ring, {rim}° at the outermost"
+    )
+    key = {"frameon": False, "fontsize": 11, "title_fontsize": 11}
+    figure.legend(handles=_key(), loc="outside lower center", ncols=3, title=about, **key)
+    return figure
+
+
+def _scale(rounds: list[Round]):
+    """Colours from the least value of all rounds to nearly the greatest."""
+    from matplotlib.colors import Normalize
+
+    values = np.concatenate([one.values for one in rounds])
+    low, high = (values.min(), np.quantile(values, HIGHEST)) if len(values) else (0.0, 1.0)
+    return Normalize(float(low), float(high) if high > low else float(low) + 1.0)
+
+
+def _draw(axes, one: Round, rim: int, colours: dict) -> None:
+    edge = float(np.sqrt(1 - np.sin(np.radians(rim))))
+    axes.set_ylim(0, 1.04 * edge)
+    axes.set_yticks(np.sqrt(1 - np.sin(np.radians(np.arange(rim, 90, RING)))), [])
+    axes.set_xticks(np.radians([0, 90, 180, 270]), ["0°", "90°", "180°", "270°"], fontsize=11)
+    axes.tick_params(pad=3)
+    axes.grid(color="0.8", linewidth=0.8)
+    axes.set_axisbelow(True)
+    dot = min(LARGEST, CROWDED * BESIDE / max(1, len(one.values)))
+    axes.scatter(*one.candidates.T, c=one.values, s=dot, linewidths=0, **colours)
+    axes.scatter(*one.taken.T, s=min(60, max(30, 2 * dot)), **PHOTO)
+    numbered = len(one.chosen) <= NUMBERED
+    stars, star = one.candidates[one.chosen], min(260, max(120, 8 * dot)) if numbered else 70
+    axes.scatter(*stars.T, c=one.values[one.chosen], s=star, zorder=3, **STAR, **colours)
+    if numbered and one.chosen:
+        _number(axes, stars, one.taken, edge)
+    chosen = f"{len(one.chosen)} of {len(one.values)} poses" if one.chosen else "no pose"
+    photos = "1 photo" if len(one.taken) == 1 else f"{len(one.taken)} photos"
+    axes.set_title(f"round {one.number}: {chosen}, after {photos}", fontsize=12)
+
+
+def _number(axes, stars: Float64[Array, "k 2"], taken: Float64[Array, "m 2"], edge: float) -> None:
+    from matplotlib.patheffects import withStroke
+
+    halo = [withStroke(linewidth=2.5, foreground="white")]
+    for order, (x, y) in enumerate(beside(_flat(stars), _flat(taken), edge), 1):
+        at = np.arctan2(y, x), np.hypot(x, y)
+        how = {"ha": "center", "va": "center_baseline", "fontsize": 11, "weight": "bold"}
+        axes.text(*at, f"{order}", zorder=4, path_effects=halo, **how)
+
+
+def beside(stars: Float64[Array, "k 2"], taken: Float64[Array, "m 2"], edge: float) -> Float64[Array, "k 2"]:
+    """Where numbers go, x and y: APART from their star, on that of eight sides where most is free of stars, photos
+    and the numbers before; the first of equal ones, from the right and counter-clockwise. edge: radius of the disc,
+    outside of which none stands."""
+    turns = np.radians(np.arange(0, 360, 45))
+    sides = APART * edge * np.stack([np.cos(turns), np.sin(turns)], -1)
+    used, found = np.concatenate([stars, taken]), []
+    for star in stars:
+        free = np.linalg.norm((star + sides)[:, None] - used, axis=-1).min(1)
+        free[np.linalg.norm(star + sides, axis=1) > edge] = -1
+        found.append(star + sides[np.argmax(np.round(free, 9))])
+        used = np.concatenate([used, found[-1:]])
+    return np.array(found)
+
+
+def _flat(polar: Float64[Array, "n 2"]) -> Float64[Array, "n 2"]:
+    """Angle and radius as x and y."""
+    angle, radius = polar.T
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], -1)
+
+
+def _key() -> list:
+    from matplotlib.lines import Line2D
+
+    edge = {"linestyle": "", "markeredgecolor": "black", "markerfacecolor": "none"}
+    return [
+        Line2D([], [], marker="o", markersize=7, color="0.5", linestyle="", label="candidate"),
+        Line2D([], [], marker="s", markersize=8, markeredgewidth=1.6, label="photo taken", **edge),
+        Line2D([], [], marker="*", markersize=15, markeredgewidth=1.2, label="chosen, numbered in order", **edge),
+    ]

@@ -1,0 +1,50 @@
+"""A camera stands in the open: under the ground, or inside of what stands on it, no photo is taken and none scored."""
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray as Array
+from scipy.spatial.transform import Rotation
+from scipy.special import expit
+
+from dav_gswt.errors import InputError
+from dav_gswt.field import Field
+from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.views.candidates import Candidates
+from dav_gswt.views.uncertainty.finite import named
+
+SOLID = 0.5  # opacity from which a Gaussian is something that one can be inside of
+
+
+def require(pool: Candidates, field: Field, grid: Ground) -> None:
+    """Raises: InputError: candidates under the ground, or within one deviation of a solid Gaussian, by their names."""
+    if not pool:
+        return
+    centres = np.stack([camera.centre for _, camera in pool])
+    checks = {"under the ground": under(centres, grid), "inside of what stands there": inside(centres, field)}
+    for what, bad in checks.items():
+        if bad.any():
+            names = named(bad, [pose.name for pose, _ in pool])
+            raise InputError(
+                f"pose {names}: {what}; no photo comes from there. Set `reach` or `lowest` of the scene, or look "
+                f"whether its ground is right"
+            )
+
+
+def under(centres: Float[Array, "n 3"], grid: Ground) -> Bool[Array, "n"]:
+    """Which places are at or below the surface; none beyond the grid, where there is no surface."""
+    return grid.contains(centres) & (centres[:, 2] <= grid.height_at(centres))
+
+
+def inside(centres: Float[Array, "n 3"], field: Field) -> Bool[Array, "n"]:
+    """Which places are within one standard deviation of a solid Gaussian's centre."""
+    solid = expit(field.opacity_logits) >= SOLID
+    means, scales = field.means[solid].astype(float), np.exp(field.log_scales[solid].astype(float))
+    found = np.zeros(len(centres), bool)
+    for i, centre in enumerate(centres):
+        apart = means - centre
+        near = np.flatnonzero((apart**2).sum(1) <= scales.max(1) ** 2)
+        if len(near):
+            w, x, y, z = field.quats[solid][near].T
+            own = Rotation.from_quat(np.stack([x, y, z, w], 1)).inv().apply(apart[near])
+            found[i] = (((own / scales[near]) ** 2).sum(1) <= 1).any()
+    return found

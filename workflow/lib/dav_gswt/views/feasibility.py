@@ -1,0 +1,230 @@
+"""Poses that no photo can come from: inside the ground or too near to it, hidden behind it, out of the scene's limits.
+
+The ground is the height field as a mesh, the part beyond the exemplar included; rays decide what is hidden. embree
+traces them in single precision, so everything is brought to the exemplar first: its middle becomes the origin and its
+side the unit, and the answers do not depend on where the world's origin lies or on its unit.
+"""
+
+import logging
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray as Array
+from scipy.ndimage import map_coordinates
+from scipy.spatial import cKDTree
+
+from dav_gswt.errors import InputError
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.views.candidates import Candidates
+
+_log = logging.getLogger(__name__)
+
+MOST = 512  # vertices of the mesh along the grid's longer side: five for each knot of the surface
+LATTICE = 9  # points on the exemplar that are looked at, along its side
+SHARE = 0.5  # of those in the picture that must be in sight: else the photo shows more of what hides the ground
+CLEARANCE = 0.05  # flying heights: what stands on the ground may reach as high
+OFF = 1e-4  # sides of the exemplar that a ray starts above the surface: beyond single precision, below any bump
+
+
+@dataclass(frozen=True)
+class _Site:
+    """The ground about the exemplar's middle, its side being 1. Vertices run row by row, from the south.
+
+    points, normals: the lattice on the exemplar; each of its points is a vertex, so none lies under a triangle.
+    """
+
+    grid: Ground
+    middle: Float[Array, "3"]
+    side: float
+    x: Float[Array, "columns"]
+    y: Float[Array, "rows"]
+    mesh: trimesh.Trimesh
+    points: Float[Array, "m 3"]
+    normals: Float[Array, "m 3"]
+
+    def local(self, places: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
+        return (places - self.middle) / self.side
+
+
+def kept(
+    candidates: Candidates, grid: Ground, limits: dict | None = None, clearance: float | None = None
+) -> Candidates:
+    """The candidates that are not `rejected`; how many are, and why, is logged.
+
+    Raises: InputError: all are.
+    """
+    reasons = rejected(candidates, grid, limits, clearance)
+    if not reasons:
+        return candidates
+    kinds = Counter(reason.split(":")[0] for reason in reasons.values())
+    told = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
+    if len(reasons) == len(candidates):
+        raise InputError(f"no photo can be taken from any of the {len(candidates)} candidate poses: {told}")
+    _log.info("%d of %d candidate poses are left out: %s", len(reasons), len(candidates), told)
+    return [(pose, camera) for pose, camera in candidates if pose.name not in reasons]
+
+
+def rejected(
+    candidates: Candidates, grid: Ground, limits: dict | None = None, clearance: float | None = None
+) -> dict[str, str]:
+    """Why a pose is none, in words, by its name: what stands before the colon is the kind of reason.
+
+    limits: lowest_height and highest_height above the ground, farthest from the exemplar's middle, in world units; each
+    may be missing. clearance: least distance from the ground, in world units; if None, CLEARANCE times the median
+    distance of the candidates from the middle, which is the flying height where they lie on its hemisphere.
+    A pose is hidden where fewer than SHARE of the lattice's points in its picture are in sight, and where it has none.
+    """
+    if not candidates:
+        return {}
+    site = _site(grid)
+    cameras = [camera for _, camera in candidates]
+    centres = np.stack([camera.centre for camera in cameras])
+    if clearance is None:
+        clearance = CLEARANCE * float(np.median(np.linalg.norm(centres - site.middle, axis=1)))
+    if not trimesh.ray.has_embree:
+        _log.warning("embreex is not installed: rays go over the ground step by step, more slowly")
+    why = _hidden(site, cameras, centres) | _limited(site, centres, limits or {}) | _near(site, centres, clearance)
+    return {candidates[i][0].name: why[i] for i in sorted(why)}
+
+
+def _site(grid: Ground) -> _Site:
+    west, south, side = grid.exemplar
+    n, m, cells = grid.first_row, grid.first_column, grid.cells
+    middle = np.array([west + side / 2, south + side / 2, np.median(grid.heights[n : n + cells, m : m + cells])])
+    rows, columns = (np.unique(np.linspace(0, k - 1, min(k, MOST)).round().astype(int)) for k in grid.shape)
+    x = (columns + 0.5 - m - cells / 2) / cells
+    y = (rows + 0.5 - n - cells / 2) / cells
+    z = (grid.heights[np.ix_(rows, columns)] - middle[2]) / side
+    vertices = np.stack([*np.meshgrid(x, y), z], -1).reshape(-1, 3)
+    mesh = trimesh.Trimesh(vertices, _faces(len(rows), len(columns)), process=False)
+    at = (np.arange(LATTICE) + 0.5) / LATTICE - 0.5
+    i, j = (np.abs(axis[:, None] - at).argmin(0) for axis in (y, x))
+    places = (i[:, None] * len(x) + j).ravel()
+    east, north = (slope[np.ix_(rows[i], columns[j])].ravel() for slope in grid.slopes())
+    normals = np.stack([-east, -north, np.ones(len(east))], 1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return _Site(grid, middle, side, x, y, mesh, vertices[places], normals)
+
+
+def _faces(rows: int, columns: int) -> Int[Array, "n 3"]:
+    """Two triangles a cell, upwards; the cells row by row."""
+    a = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    b, c, d = a + 1, a + columns, a + columns + 1
+    return np.stack([a, b, d, a, d, c], 1).reshape(-1, 3)
+
+
+def _near(site: _Site, centres: Float[Array, "n 3"], clearance: float) -> dict[int, str]:
+    """Cameras below the surface or nearer to it than the clearance."""
+    above = centres[:, 2] - site.grid.height_at(centres)
+    away = np.minimum(np.abs(above), site.side * _distance(site, site.local(centres)))
+    reasons = {
+        i: f"too near the ground: {away[i]:.3g} from it, {clearance:.3g} is the least" for i in _where(away < clearance)
+    }
+    return reasons | {i: f"buried: {-above[i]:.3g} below the ground" for i in _where(above <= 0)}
+
+
+def _distance(site: _Site, places: Float[Array, "n 3"]) -> Float[Array, "n"]:
+    """Distance to the mesh: to the triangles of the four cells around the nearest vertex."""
+    rows, columns = len(site.y), len(site.x)
+    nearest = cKDTree(site.mesh.vertices).query(places)[1]
+    row, column = np.divmod(nearest, columns)
+    i = np.clip(row[:, None] + [-1, -1, 0, 0], 0, rows - 2)
+    j = np.clip(column[:, None] + [-1, 0, -1, 0], 0, columns - 2)
+    cells = i * (columns - 1) + j
+    faces = np.stack([2 * cells, 2 * cells + 1], -1).reshape(len(places), -1)
+    corners = site.mesh.vertices[site.mesh.faces[faces.ravel()]]
+    all_places = np.repeat(places, faces.shape[1], axis=0)
+    found = trimesh.triangles.closest_point(corners, all_places)
+    return np.linalg.norm(found - all_places, axis=1).reshape(faces.shape).min(1)
+
+
+def _limited(site: _Site, centres: Float[Array, "n 3"], limits: dict) -> dict[int, str]:
+    """Cameras lower, higher or farther than the limits."""
+    above = centres[:, 2] - site.grid.height_at(centres)
+    away = np.linalg.norm(centres - site.middle, axis=1)
+    low, high, far = (
+        limits.get(name, default)
+        for name, default in (("lowest_height", -np.inf), ("highest_height", np.inf), ("farthest", np.inf))
+    )
+    reasons = {int(i): f"too low: {above[i]:.3g} above the ground, {low:g} is the least" for i in _where(above < low)}
+    reasons |= {i: f"too high: {above[i]:.3g} above the ground, {high:g} is the most" for i in _where(above > high)}
+    return {i: f"too far: {away[i]:.3g} from the middle, {far:g} is the most" for i in _where(away > far)} | reasons
+
+
+def _where(mask: Bool[Array, "n"]) -> list[int]:
+    return np.flatnonzero(mask).tolist()
+
+
+def _hidden(site: _Site, cameras: list[Camera], centres: Float[Array, "n 3"]) -> dict[int, str]:
+    """Cameras that show too little of the exemplar, or no ground in the middle of the picture."""
+    shown, seen = _sight(site, cameras, centres)
+    ground = np.isfinite(_hits(site, site.local(centres), np.stack([camera.forward for camera in cameras])))
+    reasons = {i: "past the ground: the middle of the picture shows none" for i in _where(~ground)}
+    reasons |= {
+        i: f"hidden: {seen[i]} of {shown[i]} points of the exemplar are in sight" for i in _where(seen < SHARE * shown)
+    }
+    return reasons | {i: "off the exemplar: none of it is in the picture" for i in _where(shown == 0)}
+
+
+def _sight(site: _Site, cameras: list[Camera], centres: Float[Array, "n 3"]) -> tuple[Int[Array, "n"], Int[Array, "n"]]:
+    """Of the lattice's points, how many lie in each camera's picture, and how many of these are in its sight."""
+    world = site.middle + site.side * site.points
+    shown = np.stack([_in_picture(camera, world) for camera in cameras])
+    which, point = np.nonzero(shown)
+    start = site.points[point] + OFF * site.normals[point]
+    way = site.local(centres)[which] - start
+    length = np.linalg.norm(way, axis=1)
+    free = _hits(site, start, way / length[:, None]) >= length
+    return shown.sum(1), np.bincount(which, weights=free, minlength=len(cameras)).round().astype(int)
+
+
+def _in_picture(camera: Camera, points: Float[Array, "m 3"]) -> Bool[Array, "m"]:
+    at, depth = camera.project(points)
+    return (depth > 0) & (at > 0).all(1) & (at[:, 0] < camera.width) & (at[:, 1] < camera.height)
+
+
+def _hits(site: _Site, origins: Float[Array, "n 3"], ways: Float[Array, "n 3"]) -> Float[Array, "n"]:
+    """Distance to the ground along rays of unit direction, infinite where they miss it."""
+    if not trimesh.ray.has_embree:
+        return _stepped(site, origins, ways)
+    found = np.full(len(origins), np.inf)
+    face = site.mesh.ray.intersects_first(origins, ways)
+    hit = np.flatnonzero(face >= 0)
+    a, b, c = np.moveaxis(site.mesh.vertices[site.mesh.faces[face[hit]]], 1, 0)
+    normal = np.cross(b - a, c - a)
+    along = np.einsum("ni,ni->n", normal, ways[hit])
+    rise = np.einsum("ni,ni->n", normal, a - origins[hit])
+    found[hit] = rise / np.where(along == 0, np.nan, along)  # a ray within its triangle's plane
+    return np.nan_to_num(found, nan=0.0, posinf=np.inf)
+
+
+def _stepped(site: _Site, origins: Float[Array, "n 3"], ways: Float[Array, "n 3"]) -> Float[Array, "n"]:
+    """As `_hits`, without embree: where a ray is first below the surface, tried in steps over the grid's box.
+
+    It takes as many steps as the longer side has vertices, so a ray below a crest by a cell's width is stopped.
+    """
+    steps = max(len(site.x), len(site.y))
+    heights = site.mesh.vertices[:, 2].reshape(len(site.y), len(site.x))
+    margin = OFF + 2 / steps * np.ptp(heights)  # so that the last step of a ray downwards ends below the surface
+    low = np.array([site.x[0], site.y[0], heights.min() - margin])
+    high = np.array([site.x[-1], site.y[-1], heights.max() + OFF])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slabs = np.stack([(low - origins) / ways, (high - origins) / ways])
+    first = np.maximum(np.nan_to_num(slabs.min(0), nan=-np.inf).max(1), 0)
+    last = np.nan_to_num(slabs.max(0), nan=np.inf).min(1)
+    found, open_ = np.full(len(origins), np.inf), np.flatnonzero(first < last)
+    for k in range(steps):
+        t = first[open_] + (k + 1) / steps * (last - first)[open_]
+        at = origins[open_] + t[:, None] * ways[open_]
+        row, column = (
+            np.interp(at[:, 1], site.y, np.arange(len(site.y))),
+            np.interp(at[:, 0], site.x, np.arange(len(site.x))),
+        )
+        below = at[:, 2] < map_coordinates(heights, [row, column], order=1, mode="nearest")
+        found[open_[below]] = t[below]
+        open_ = open_[~below]
+    return found

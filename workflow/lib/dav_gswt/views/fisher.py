@@ -1,0 +1,56 @@
+"""Fisher information that a photo would give about a field: how much better its Gaussians' colours would be known.
+
+A pixel's colour is the sum of w_i c_i, so its derivative by the colour c_i is the blend weight w_i, and the diagonal of
+the information of a whole picture is H_i = sum over pixels of w_i^2, alike in each channel: exact, and squared before
+it is summed (the square of a sum would let pixels cancel).
+"""
+
+import numpy as np
+from jaxtyping import Float64
+from numpy import ndarray as Array
+
+from dav_gswt.field import Field
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.raster import Rasterizer
+from dav_gswt.raster.interface import Contributions
+from dav_gswt.reconstruction.uncertainty import arrays
+
+PRIOR = 1.0  # information on each Gaussian before any photo: one pixel that it fills
+
+
+def known(field: Field, cameras: list[Camera], raster: Rasterizer) -> Float64[Array, "n"]:
+    """Information on each Gaussian in photos that were taken, and a little before them."""
+    total = np.full(len(field), PRIOR)
+    for camera in cameras:
+        raster.forward(**arrays(field), camera=camera)
+        total += raster.contributions().squared
+    return total
+
+
+def gain(seen: Contributions, already: Float64[Array, "n"]) -> float:
+    """Sum over Gaussians of a photo's information over what there is: the trace of H (H_known)^-1, both diagonal.
+
+    Source: Jiang et al., FisherRF, ECCV 2024, of colours alone.
+    """
+    return float((seen.squared / already).sum())
+
+
+class Gathered:
+    """The information on a field that photos give, growing as candidates are chosen (`policies.Information`)."""
+
+    def __init__(self, field: Field, taken: list[Camera], candidates: list[Camera]):
+        """taken, candidates: cameras at the size at which poses are scored."""
+        self.field, self.candidates, self.raster = field, candidates, Rasterizer()
+        self.known = known(field, taken, self.raster)
+
+    def gain(self, i: int) -> float:
+        """Of a photo from candidate i, given all that was taken."""
+        return gain(self._seen(i), self.known)
+
+    def take(self, i: int) -> None:
+        """Candidate i is chosen."""
+        self.known = self.known + self._seen(i).squared
+
+    def _seen(self, i: int) -> Contributions:
+        self.raster.forward(**arrays(self.field), camera=self.candidates[i])
+        return self.raster.contributions()

@@ -1,0 +1,79 @@
+"""Scores of candidate poses, term by term: raw, in columns of scores.csv; they are weighed when poses are chosen.
+
+A term that could not be had (no prior, no LPIPS weights) is absent, and its column is empty.
+"""
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float64, Int
+from numpy import ndarray as Array
+
+from dav_gswt.errors import InputError
+from dav_gswt.files import whole
+from dav_gswt.geometry.poses import Pose
+from dav_gswt.views.uncertainty.weighting import Scales
+
+TERMS = ("opacity", "fisher", "w2_sq", "lpips", "gradient", "single", "residual")
+FIELDS = ("pose", "elevation", "azimuth", "radius", *TERMS, "steps", *(f"{term}_scale" for term in TERMS))
+
+
+@dataclass(frozen=True)
+class Scores:
+    """One row a candidate. terms: those of TERMS that are known. scales: what each is to be divided by, frozen at the
+    first round. steps: of denoising that a row's prior terms rest on; 0 without a prior."""
+
+    poses: list[Pose]
+    terms: dict[str, Float64[Array, "n"]]
+    scales: Scales
+    steps: Int[Array, "n"]
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    @property
+    def names(self) -> list[str]:
+        return [pose.name for pose in self.poses]
+
+    def term(self, name: str) -> Float64[Array, "n"]:
+        """Raises: InputError: the term is absent."""
+        if name not in self.terms:
+            raise InputError(f"{name}: the poses were scored without it; it needs {_needed(name)} (docs/prior.md)")
+        return self.terms[name]
+
+
+def _needed(name: str) -> str:
+    return "a prior asked without dropout (p_drop 0), and LPIPS" if name == "single" else "a prior"
+
+
+def write(path: Path | str, scores: Scores) -> None:
+    """One row a candidate; numbers as they are, so that reading gives the same bits."""
+    with whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+        table = csv.DictWriter(file, FIELDS)
+        table.writeheader()
+        for i, pose in enumerate(scores.poses):
+            row = {"pose": pose.name, "steps": int(scores.steps[i])}
+            row |= {k: repr(getattr(pose, k)) for k in ("elevation", "azimuth", "radius")}
+            row |= {name: repr(float(values[i])) for name, values in scores.terms.items()}
+            row |= {f"{name}_scale": repr(scores.scales.of[name]) for name in scores.terms}
+            table.writerow(row)
+
+
+def read(path: Path | str) -> Scores:
+    """What `write` wrote. Raises: InputError: not such a table, or scores that are not finite, naming the poses."""
+    with Path(path).open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    try:
+        poses = [Pose(r["pose"], *(float(r[k]) for k in ("elevation", "azimuth", "radius"))) for r in rows]
+        known = [name for name in TERMS if rows and rows[0][name]]
+        terms = {name: np.array([float(r[name]) for r in rows]) for name in known}
+        scales = Scales({name: float(rows[0][f"{name}_scale"]) for name in known})
+        steps = np.array([int(r["steps"]) for r in rows], int)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{path}: not a table of scores ({error}); make it again") from error
+    bad = sorted({i for values in terms.values() for i in np.flatnonzero(~np.isfinite(values))})
+    if bad:
+        raise InputError(f"{path}: the scores of {', '.join(poses[i].name for i in bad[:5])} are not finite")
+    return Scores(poses, terms, scales, steps)

@@ -1,0 +1,140 @@
+"""Scores of candidate poses: how much of what a camera would see there is not known yet."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float32, Float64
+from numpy import ndarray as Array
+
+from dav_gswt.field import Field
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.poses import spread
+from dav_gswt.logs import progress
+from dav_gswt.photos.training_views import View, over_ground
+from dav_gswt.prior import conditions
+from dav_gswt.prior.interface import Condition
+from dav_gswt.raster import Rasterizer
+from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.reconstruction.top_view import from_above
+from dav_gswt.reconstruction.uncertainty import uncertainty_map
+from dav_gswt.views import collision, fisher, prior_sampling
+from dav_gswt.views.candidates import Candidates
+from dav_gswt.views.frozen_scales import Frozen
+from dav_gswt.views.pose_maps import Part, PoseMaps
+from dav_gswt.views.prior_sampling import Asking
+from dav_gswt.views.scores import Scores
+from dav_gswt.views.uncertainty.backprojection import carried
+from dav_gswt.views.uncertainty.weighting import Quantiles, Scales, normalised
+
+WIDTH = 96  # pixels of a picture that is only scored
+PHOTO = 384  # pixels across of a photo that priors are shown, before it is cut to its middle square and made smaller
+OTHERS = 16  # candidates whose maps are shown
+
+
+@dataclass(frozen=True)
+class Scored:
+    """All that scoring finds. gaussians: uncertainty of each of the field's Gaussians, in [0, 1]."""
+
+    scores: Scores
+    maps: PoseMaps
+    frozen: Frozen
+    gaussians: Float32[Array, "gaussians"]
+
+    def facts(self) -> dict:
+        """What scores.json says beside the scales: how many poses rest on how many steps, and which terms there are."""
+        steps, count = np.unique(self.scores.steps, return_counts=True)
+        told = {str(s): int(n) for s, n in zip(steps, count, strict=True)}
+        return {"candidates": len(self.scores), "terms": list(self.scores.terms), "poses_by_steps": told}
+
+
+def parts(found: Scored, field: Field, grid: Ground) -> dict[str, Part]:
+    """The maps to show, as parts of an EXR: the ground from above, and candidates spread over the hemisphere."""
+    above = from_above(replace(field, uncertainty=found.gaussians), grid).uncertainty[::-1]
+    some = [found.scores.names[i] for i in spread(found.scores.poses, OTHERS)]
+    shown = found.maps.parts(found.scores, some)
+    return {"above": ({"uncertainty": above}, {"camera": "straight above"})} | shown
+
+
+def small(camera: Camera) -> Camera:
+    """A candidate's camera at the size at which poses are scored."""
+    return camera.resized(WIDTH, max(1, round(WIDTH * camera.height / camera.width)))
+
+
+def score(
+    field: Field,
+    grid: Ground,
+    pool: Candidates,
+    taken: list[View],
+    frame: dict,
+    prior: Asking | None = None,
+    frozen: Frozen | None = None,
+) -> Scored:
+    """Every candidate's terms (opacity and Fisher gain; with a prior also how much its samples disagree) and its maps.
+
+    taken: the photos so far. prior: None: geometry alone. frozen: of the first round; None: this is the first.
+    Raises: InputError: a candidate under the ground or inside of what stands on it, by name.
+    """
+    collision.require(pool, field, grid)
+    terms, opacity = _geometric(field, grid, pool, [small(view.camera) for view in taken])
+    steps, w2_sq = np.zeros(len(pool), int), None
+    if prior is not None and pool:
+        condition, counts = told(field, grid, pool, taken, frame, prior.model.size)
+        found, steps = prior_sampling.terms(prior, condition, [pose.name for pose, _ in pool], counts)
+        terms |= {name: values.astype(np.float64) for name, values in found.named().items()}
+        w2_sq = found.maps
+    poses, names = [pose for pose, _ in pool], [pose.name for pose, _ in pool]
+    frozen = frozen or _frozen(terms, w2_sq, names)
+    scores, maps = Scores(poses, terms, frozen.scales, steps), PoseMaps(names, opacity, w2_sq)
+    return Scored(scores, maps, frozen, _gaussians(field, pool, w2_sq, frozen))
+
+
+def told(
+    field: Field, grid: Ground, pool: Candidates, taken: list[View], frame: dict, size: int
+) -> tuple[Condition, Float32[Array, "n s s"]]:
+    """What a prior is told of candidates, and which of its pixels look at the modelled ground (1)."""
+    known = conditions.taken(taken, frame, size)
+    squares = [conditions.squared(camera).resized(size, size) for _, camera in pool]
+    counts = np.stack([on_ground(grid, camera) for camera in squares])
+    return conditions.condition(field, pool, known, frame["flying_height"], size), counts
+
+
+def _geometric(
+    field: Field, grid: Ground, pool: Candidates, taken: list[Camera]
+) -> tuple[dict[str, Float64[Array, "n"]], Float32[Array, "n h w"]]:
+    """opacity: mean of the opacity map over the pixels that look at the modelled ground; 0 where none does."""
+    raster = Rasterizer()
+    already = fisher.known(field, taken, raster)
+    terms, maps = {"opacity": np.zeros(len(pool)), "fisher": np.zeros(len(pool))}, []
+    for i, (_, camera) in enumerate(progress(pool, "score poses")):
+        maps.append(uncertainty_map(field, small(camera), raster))
+        terms["fisher"][i] = fisher.gain(raster.contributions(), already)
+        weight = on_ground(grid, small(camera))
+        terms["opacity"][i] = float((maps[-1] * weight).sum() / max(1.0, weight.sum()))
+    shape = (0, 1, 1) if not maps else (len(maps), *np.max([m.shape for m in maps], axis=0))
+    out = np.full(shape, np.nan, np.float32)  # cameras of one pool may differ in their height
+    for row, m in zip(out, maps, strict=True):
+        row[: m.shape[0], : m.shape[1]] = m
+    return terms, out
+
+
+def on_ground(grid: Ground, camera: Camera) -> Float32[Array, "h w"]:
+    """1 for the pixels of a camera that look at the modelled ground."""
+    shape = camera.height, camera.width
+    blank = View("", camera, np.zeros((*shape, 3), np.float32), np.ones(shape, np.float32))
+    return over_ground(blank, *grid.judged).weight
+
+
+def _frozen(terms: dict[str, Float64[Array, "n"]], w2_sq: Float32[Array, "n h w"] | None, names: list[str]) -> Frozen:
+    pixels = None if w2_sq is None or not w2_sq.size else Quantiles.frozen(w2_sq.ravel())
+    return Frozen(Scales.frozen(terms, names), pixels)
+
+
+def _gaussians(
+    field: Field, pool: Candidates, w2_sq: Float32[Array, "n h w"] | None, frozen: Frozen
+) -> Float32[Array, "gaussians"]:
+    """What the prior's maps say of each Gaussian; of those that no candidate sees, and without a prior, geometry."""
+    if w2_sq is None or frozen.pixels is None:
+        return field.uncertainty
+    cameras = [conditions.squared(camera) for _, camera in pool]
+    found = carried(field, cameras, normalised(w2_sq, frozen.pixels))
+    return np.where(np.isnan(found), field.uncertainty, found).astype(np.float32)

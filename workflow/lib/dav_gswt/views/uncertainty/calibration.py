@@ -1,0 +1,124 @@
+"""Does the score know where the errors are? Rank correlation, sparsification, and intervals that hold what they say.
+
+Nothing here assumes that uncertainty grows with error: that is what is measured.
+"""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ceil
+
+import numpy as np
+from jaxtyping import Float, Float64
+from numpy import ndarray as Array
+
+from dav_gswt.views.uncertainty.finite import require_finite
+
+LEAST = 0.1  # of the mean expected error: what an interval's unit of width is at least
+
+
+def spearman(u: Float[Array, "n"], error: Float[Array, "n"]) -> float | None:
+    """Rank correlation of a score with the true error, ties by their mean rank; None where one of them is constant.
+
+    Raises: ValueError: a value that is not finite.
+    """
+    from scipy.stats import spearmanr  # here, not above: slow to load, and scores do without
+
+    u, error = _checked(u, error)
+    if len(u) < 2 or np.ptp(u) == 0 or np.ptp(error) == 0:
+        return None
+    return float(spearmanr(u, error).statistic)
+
+
+def ause(u: Float[Array, "n"], error: Float[Array, "n"]) -> float:
+    """Area under the sparsification error: 0 for a score that orders as the true error does; smaller is better.
+
+    Leave out the most uncertain share f of the samples: the mean error of the rest, over that of all, is the curve
+    s(f). Leave out by true error instead: the oracle's curve. AUSE is the integral over f from 0 to (n - 1) / n of
+    their difference, by the trapezoidal rule. Samples of equal score are left out in no particular order: each counts
+    with the mean error of its equals. Errors that are all 0: 0.
+    Raises: ValueError: no sample, a value that is not finite, an error below 0.
+    Source: Ilg et al., Uncertainty estimates and multi-hypotheses networks for optical flow, ECCV 2018.
+    """
+    u, error = _checked(u, error)
+    if not len(u) or error.min() < 0:
+        raise ValueError("sparsification needs samples, with errors of at least 0")
+    if error.max() == 0 or len(u) == 1:
+        return 0.0
+    scaled = error / error.max()  # so that no sum leaves the range
+    return float(np.trapezoid(_curve(u, scaled) - _curve(scaled, scaled), dx=1 / len(u)))
+
+
+def _curve(by: Float64[Array, "n"], error: Float64[Array, "n"]) -> Float64[Array, "n"]:
+    """Mean error of what is left, over that of all, when 0, 1, ... n - 1 samples of the largest `by` are left out."""
+    _, group = np.unique(by, return_inverse=True)
+    alike = np.bincount(group, error) / np.bincount(group)
+    rising = alike[np.sort(group)]
+    left = np.cumsum(rising)[::-1] / np.arange(len(by), 0, -1)
+    return left / left[0]
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """Split-conformal intervals of |error| against u. expected: |error| at the knots u, rising, linear between them.
+
+    reach: half the interval's width over `unit`; infinite where there were too few samples for the level.
+    """
+
+    u: Float64[Array, "k"]
+    expected: Float64[Array, "k"]
+    reach: float
+    level: float
+
+    def at(self, u: Float[Array, "n"]) -> tuple[Float64[Array, "n"], Float64[Array, "n"]]:
+        """The ends, not below 0, between which |error| is with probability of at least the level.
+
+        On average over samples that are exchangeable with those of the calibration, whatever the quality of u.
+        """
+        middle = np.interp(u, self.u, self.expected)
+        wide = self.reach * self.unit(middle)
+        return np.maximum(middle - wide, 0), middle + wide
+
+    def unit(self, middle: Float64[Array, "n"]) -> Float64[Array, "n"]:
+        """What a deviation is measured in: the expected error, but never as little as none; 1 if none is expected."""
+        return np.maximum(middle, LEAST * float(self.expected.mean()) or 1.0)
+
+
+def calibrated(
+    u: Float[Array, "n"], error: Float[Array, "n"], rng: np.random.Generator, level: float = 0.9
+) -> Intervals:
+    """Intervals from held-out samples: one random half says what |error| is expected at u, the other how far it strays.
+
+    Raises: ValueError: fewer than 2 samples, a level outside (0, 1), a value that is not finite.
+    """
+    from scipy.optimize import isotonic_regression
+
+    u, error = _checked(u, np.abs(error))
+    if len(u) < 2:
+        raise ValueError(f"calibration needs at least 2 samples, not {len(u)}")
+    order = rng.permutation(len(u))
+    fit, rest = order[: len(u) // 2], order[len(u) // 2 :]
+    knots, group = np.unique(u[fit], return_inverse=True)
+    count = np.bincount(group)
+    expected = isotonic_regression(np.bincount(group, error[fit]) / count, weights=count).x
+    rough = Intervals(knots, expected, 0.0, level)
+    middle = np.interp(u[rest], knots, expected)
+    strays = np.abs(error[rest] - middle) / rough.unit(middle)
+    return Intervals(knots, expected, conformal_quantile(strays, level), level)
+
+
+def conformal_quantile(strays: Float[Array, "n"], level: float) -> float:
+    """The ceil((n + 1) level)-th smallest of n: one more, exchangeable with them, is at most that with probability of
+    at least `level` (exactly that rank over n + 1 without ties). Infinite where the rank exceeds n.
+
+    Raises: ValueError: a level outside (0, 1).
+    """
+    if not 0 < level < 1:
+        raise ValueError(f"the level of an interval lies between 0 and 1, not at {level}")
+    rank = ceil((len(strays) + 1) * Fraction(repr(float(level))))  # as written: 0.9 is nine tenths
+    return float(np.sort(strays)[rank - 1]) if rank <= len(strays) else np.inf
+
+
+def _checked(u: Float[Array, "n"], error: Float[Array, "n"]) -> tuple[Float64[Array, "n"], Float64[Array, "n"]]:
+    require_finite(u, "the score")
+    require_finite(error, "the error")
+    return u.astype(np.float64), error.astype(np.float64)
