@@ -4,7 +4,7 @@ import json
 from contextlib import contextmanager
 
 import pytest
-from fixtures import answers
+from fixtures import answer_files
 from fixtures.page_visit import Visit
 
 from dav_gswt.files import read_json
@@ -18,14 +18,14 @@ STORED = "davgswt-2afc-"
 @pytest.fixture(scope="module")
 def kit(tmp_path_factory):
     """A kit of ten pairs: page and key."""
-    return answers.written(tmp_path_factory.mktemp("kit"), answers.drawn(crops=2))
+    return answer_files.written(tmp_path_factory.mktemp("kit"), answer_files.drawn(crops=2))
 
 
 @pytest.fixture(scope="module")
 def brief(tmp_path_factory):
     """The same, with pictures that soon go."""
     folder = tmp_path_factory.mktemp("brief")
-    return answers.written(folder, answers.drawn(crops=2), seconds=BRIEF)
+    return answer_files.written(folder, answer_files.drawn(crops=2), seconds=BRIEF)
 
 
 @pytest.fixture
@@ -115,7 +115,7 @@ def test_all_trials_answered_are_saved_and_analysed(person, kit, tmp_path, as_fi
     assert path.name == f"2afc_{told['participant']}.json" and told["list"] == 5
     assert told["screen"]["width"] == 1280 and told["screen"]["picture"] == 512
     assert all(one["seen"] == 1 and 0 < one["ms"] < 60000 for one in told["answers"])
-    people = answers.gathered([str(path)], key, answers.SCHEMA)
+    people = answers.gathered([str(path)], key, answer_files.SCHEMA)
     assert people.facts == {"files": 1, "copies": 0, "incomplete": 0, "attention": 0, "participants": 1}
     rows = results.table(key, people.participants)
     shares = {

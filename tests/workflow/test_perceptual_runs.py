@@ -4,7 +4,7 @@ import csv
 import json
 import shutil
 
-from fixtures import answers
+from fixtures import answer_files
 from fixtures.runs import TINY, USUAL
 
 from dav_gswt.files import read_json
@@ -37,7 +37,7 @@ def test_a_kit_is_made_answered_and_analysed(snakemake, tiny, tmp_path):
 
     (folder / "answers").mkdir()
     for number in range(4):
-        told = answers.answers(key, number, lambda item, number=number: item["check"] or number == 0)
+        told = answer_files.answers(key, number, lambda item, number=number: item["check"] or number == 0)
         (folder / f"answers/2afc_{told['participant']}.json").write_text(json.dumps(told))
     snakemake(folder, "--cores", "1", "perceptual_results", configs=(USUAL, TINY))
     with (folder / "results/tables/perceptual.csv").open(newline="") as file:

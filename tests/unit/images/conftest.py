@@ -1,7 +1,7 @@
 """Weights of LPIPS: the published ones where they are at hand or can be fetched, and random ones of the same shapes."""
 
 import pytest
-from fixtures import weights
+from fixtures import lpips_arrays
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import lpips_weights
@@ -26,4 +26,4 @@ def real_weights(root, request, tmp_path_factory):
 @pytest.fixture(scope="session")
 def random_weights():
     """Values of about the size that keeps features of unit size; heads not below 0, as LPIPS's are."""
-    return weights.random()
+    return lpips_arrays.random()

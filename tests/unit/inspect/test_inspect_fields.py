@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from fixtures import tiles
+from fixtures import tile_sets
 from scipy.spatial.transform import Rotation
 
 from dav_gswt import field as fields
@@ -85,7 +85,7 @@ def test_levels_stand_side_by_side_and_one_can_be_picked(tree):
     assert list(both.legend[0].named) == ["level 0", "level 1"]
     finest, coarse = both.layers[0], both.layers[2]
     assert finest.points[:, 0].max() < coarse.points[:, 0].min()
-    assert len(coarse.cells) == (tiles.CELLS // 2) ** 2
+    assert len(coarse.cells) == (tile_sets.CELLS // 2) ** 2
     single = seen.show_levels(tree.round / "levels", Asked(level=1))
     assert sum(len(layer.cells) for layer in single.layers) < sum(len(layer.cells) for layer in both.layers)
     with pytest.raises(InputError, match="levels 0 to 1"):

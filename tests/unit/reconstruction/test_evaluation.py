@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fixtures import ground as patch
-from fixtures import weights
+from fixtures import lpips_arrays
 
 from dav_gswt.reconstruction import evaluation
 
 
 def test_a_field_that_is_right_has_no_psnr_and_full_marks():
-    found = evaluation.evaluate(patch.field(), patch.photos(), weights=weights.random())
+    found = evaluation.evaluate(patch.field(), patch.photos(), weights=lpips_arrays.random())
     assert found["psnr"] is None  # equal pictures
     assert found["ssim"] == pytest.approx(1) and found["lpips"] == 0
     assert [row["view"] for row in found["test_views"]] == ["photo_0", "photo_1", "photo_2"]
@@ -29,7 +29,7 @@ def off(amount, views=None):
 def test_means_groups_and_the_worst_tenth():
     tests = off([0.02, 0.02, 0.1])
     groups = {"high": ["photo_0", "photo_1"], "low": ["photo_2"], "none": ["elsewhere"]}
-    found = evaluation.evaluate(patch.field(), tests, groups, weights.random())
+    found = evaluation.evaluate(patch.field(), tests, groups, lpips_arrays.random())
     rows = found["test_views"]
     for key in evaluation.MEASURES:
         values = [row[key] for row in rows]
@@ -67,7 +67,7 @@ def test_lpips_counts_by_the_area_that_counts():
     wrong[:, :48] = 1 - wrong[:, :48]
     half = np.zeros_like(view.weight)
     half[:, :48] = 1
-    weights = weights.random()
+    weights = lpips_arrays.random()
     alone, beside = (
         evaluation.evaluate(patch.field(), [replace(view, image=wrong, weight=w)], weights=weights)["lpips"]
         for w in (half, view.weight)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fixtures.tiles import splats
+from fixtures.tile_sets import splats
 
 from dav_gswt.field import joined
 from dav_gswt.geometry import cameras

@@ -5,7 +5,7 @@ import logging
 import numpy as np
 import pytest
 import torch
-from fixtures import weights
+from fixtures import lpips_arrays
 
 from dav_gswt.tiles import energy, semantics
 from dav_gswt.tiles.semantics import Source, covered, of_segments, superpixels
@@ -13,7 +13,7 @@ from dav_gswt.tiles.semantics import Source, covered, of_segments, superpixels
 
 @pytest.fixture(scope="module")
 def weights():
-    return weights.random()
+    return lpips_arrays.random()
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""A digest of the library code that a script runs: Snakemake follows a rule's script, but not what the script imports."""
+"""A digest of the library code that a script runs: Snakemake follows a rule's script, but not what it imports."""
 
 import re
 from functools import cache

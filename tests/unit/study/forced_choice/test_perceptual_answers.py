@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from fixtures import answers
+from fixtures import answer_files
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
@@ -13,7 +13,7 @@ from dav_gswt.study.forced_choice import answers, plots, results, trials
 
 @pytest.fixture(scope="module")
 def key():
-    return trials.key_of(answers.drawn(), seed=0)
+    return trials.key_of(answer_files.drawn(), seed=0)
 
 
 def attentive(item):
@@ -30,48 +30,48 @@ def gather(tmp_path, key):
         for number, one in enumerate(given):
             files.append(tmp_path / f"{number}.json")
             files[-1].write_text(one if isinstance(one, str) else json.dumps(one))
-        return answers.gathered([str(file) for file in files], key, answers.SCHEMA)
+        return answers.gathered([str(file) for file in files], key, answer_files.SCHEMA)
 
     return call
 
 
 def test_who_stopped_early_or_failed_the_checks_is_left_out_and_counted(gather, key):
     found = gather(
-        answers.answers(key, 0, attentive),
-        answers.answers(key, 1, attentive, upto=5),
-        answers.answers(key, 2, lambda item: not item["check"]),
-        answers.answers(key, 3, attentive),
+        answer_files.answers(key, 0, attentive),
+        answer_files.answers(key, 1, attentive, upto=5),
+        answer_files.answers(key, 2, lambda item: not item["check"]),
+        answer_files.answers(key, 3, attentive),
     )
     assert found.facts == {"files": 4, "copies": 0, "incomplete": 1, "attention": 1, "participants": 2}
     assert [each.name[-1] for each in found.participants] == ["0", "3"]
 
 
 def test_a_fifth_of_the_checks_may_be_wrong():
-    key = trials.key_of(answers.drawn(crops=1, checks=5, scenes=("desert",)), seed=0)
+    key = trials.key_of(answer_files.drawn(crops=1, checks=5, scenes=("desert",)), seed=0)
     checks = [name for name, item in key["items"].items() if item["check"]]
     for wrong, kept in ((1, True), (2, False)):
         missed = [key["items"][name]["pictures"] for name in checks[:wrong]]
-        given = answers.answers(key, 0, lambda item, missed=missed: item["pictures"] not in missed)
+        given = answer_files.answers(key, 0, lambda item, missed=missed: item["pictures"] not in missed)
         assert (answers._left_out(given, key) is None) is kept
 
 
 def test_two_files_of_one_participant_count_once_and_the_longer_counts(gather, key):
-    short, long = (answers.answers(key, 4, attentive, upto) for upto in (5, None))
+    short, long = (answer_files.answers(key, 4, attentive, upto) for upto in (5, None))
     found = gather(long, short, long)
     assert found.facts["copies"] == 2 and found.facts["participants"] == 1 and found.facts["incomplete"] == 0
 
 
 def test_two_files_of_one_participant_that_contradict_each_other_are_named(gather, key):
     with pytest.raises(InputError, match=r"1\.json: contradicts .*0\.json"):
-        gather(answers.answers(key, 4, attentive), answers.answers(key, 4, lambda item: True))
+        gather(answer_files.answers(key, 4, attentive), answer_files.answers(key, 4, lambda item: True))
 
 
 def changed(key, **change):
-    return answers.answers(key, 0, attentive) | change
+    return answer_files.answers(key, 0, attentive) | change
 
 
 def first_answer(key, **change):
-    given = answers.answers(key, 0, attentive)
+    given = answer_files.answers(key, 0, attentive)
     given["answers"][0] |= change
     return given
 
@@ -99,7 +99,7 @@ def first_answer(key, **change):
 )
 def test_a_file_that_is_not_what_the_page_saves_is_named_in_one_message(gather, key, broken, said):
     with pytest.raises(InputError, match=said) as refused:
-        gather(answers.answers(key, 1, attentive), broken(key))
+        gather(answer_files.answers(key, 1, attentive), broken(key))
     assert "1.json" in str(refused.value) and len(str(refused.value)) < 500 and "\n" not in str(refused.value)
 
 
@@ -117,7 +117,7 @@ def test_scripted_answers_give_the_shares_that_they_were_scripted_with(gather, k
     """Two of four people prefer semantic to colour throughout, one the other, one on desert alone."""
     rules = [lambda item: True, lambda item: True, lambda item: item["check"]]
     rules += [lambda item: item["check"] or item["scene"] == "desert"]
-    people = gather(*(answers.answers(key, n, rule) for n, rule in enumerate(rules)))
+    people = gather(*(answer_files.answers(key, n, rule) for n, rule in enumerate(rules)))
     table = results.table(key, people.participants)
     (every,) = rows_of(table, first="semantic", second="colour", scene="every", observer=results.PEOPLE)
     assert (every["participants"], every["answers"]) == (4, 32)
@@ -140,7 +140,7 @@ def test_without_answers_there_is_the_model_observer_alone_and_it_is_no_particip
 
 
 def test_people_and_model_are_never_in_one_row(gather, key):
-    table = results.table(key, gather(*(answers.answers(key, n, attentive) for n in (0, 1))).participants)
+    table = results.table(key, gather(*(answer_files.answers(key, n, attentive) for n in (0, 1))).participants)
     for row in table:
         assert row["participants"] == (2 if row["observer"] == results.PEOPLE else 0)
     assert len(table) == 2 * 2 * 3  # observers, comparisons, every scene and each
@@ -165,11 +165,11 @@ def test_with_neither_answers_nor_lpips_the_message_says_what_to_do(key):
 
 def test_the_figure_is_drawn_with_and_without_people(gather, key, tmp_path):
     for number, count in enumerate((0, 1, 3)):
-        people = gather(*(answers.answers(key, n, attentive) for n in range(count)))
+        people = gather(*(answer_files.answers(key, n, attentive) for n in range(count)))
         plots.write(path := tmp_path / f"{number}.png", results.table(key, people.participants))
         assert image_files.size(path)[0] > 500
 
 
 def test_a_written_key_is_read_as_it_was(tmp_path):
-    _, path = answers.written(tmp_path)
+    _, path = answer_files.written(tmp_path)
     assert answers.read_key(path) == read_json(path)

@@ -5,7 +5,7 @@ import re
 from collections import Counter
 
 import pytest
-from fixtures import answers
+from fixtures import answer_files
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
@@ -14,7 +14,7 @@ from dav_gswt.study.forced_choice import kit, trials
 
 @pytest.fixture(scope="module")
 def drawn():
-    return answers.drawn(crops=4, checks=2)
+    return answer_files.drawn(crops=4, checks=2)
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def test_every_list_has_every_pair_once_and_half_of_each_comparison_either_way_r
 
 
 def test_of_an_odd_number_one_side_has_one_more_and_not_always_the_same(drawn):
-    odd = trials.key_of(answers.drawn(crops=3, checks=0, scenes=("desert",)), seed=0)
+    odd = trials.key_of(answer_files.drawn(crops=3, checks=0, scenes=("desert",)), seed=0)
     lefts = {on_the_left(odd, number)["semantic", "colour"] for number in range(trials.LISTS)}
     assert lefts == {1, 2}
 
@@ -70,7 +70,7 @@ def test_the_same_seed_makes_the_same_kit_and_another_another(drawn, key):
 
 
 def test_the_page_tells_nothing_of_what_is_shown(tmp_path, drawn):
-    page, path = answers.written(tmp_path, drawn)
+    page, path = answer_files.written(tmp_path, drawn)
     key = read_json(path)
     script = (page / kit.TRIALS).read_text()
     study = json.loads(re.fullmatch(r'"use strict";\nconst STUDY = (.+);\n', script)[1])
@@ -96,13 +96,13 @@ def test_the_name_of_a_picture_says_nothing_of_which_of_the_two_it_is(key):
 
 
 def test_the_same_picture_in_two_pairs_has_two_names():
-    pair = answers.drawn(crops=1, checks=0, scenes=("desert",))[0]
+    pair = answer_files.drawn(crops=1, checks=0, scenes=("desert",))[0]
     key = trials.key_of([pair, pair], seed=0)
     assert len({name for item in key["items"].values() for name in item["pictures"]}) == 4
 
 
 def test_a_kit_without_pairs_is_refused_and_leaves_nothing(tmp_path):
-    checks = [pair for pair in answers.drawn(crops=1) if pair.check]
+    checks = [pair for pair in answer_files.drawn(crops=1) if pair.check]
     with pytest.raises(InputError, match="no pair to show"):
-        answers.written(tmp_path, checks)
+        answer_files.written(tmp_path, checks)
     assert not list(tmp_path.iterdir())

@@ -2,19 +2,19 @@
 
 import numpy as np
 import pytest
-from fixtures import tiles
+from fixtures import tile_sets
 
 from dav_gswt.study.seams import ground
 
 
 @pytest.fixture(scope="session")
 def made_up():
-    return tiles.exemplar()
+    return tile_sets.exemplar()
 
 
 @pytest.fixture(scope="session")
 def tiles(made_up):
-    return tiles.tiles_of(made_up, "colour")
+    return tile_sets.tiles_of(made_up, "colour")
 
 
 @pytest.fixture(scope="session")
@@ -30,7 +30,7 @@ def laid(tiles, source):
 
 @pytest.fixture(scope="session")
 def straight(made_up, source):
-    return ground.laid(tiles.tiles_of(made_up, "none", corrected=False), source, 3, 0.6)
+    return ground.laid(tile_sets.tiles_of(made_up, "none", corrected=False), source, 3, 0.6)
 
 
 @pytest.fixture()

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from fixtures import weights
+from fixtures import lpips_arrays
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import metrics
@@ -74,7 +74,7 @@ def test_the_same_seed_draws_the_same_pairs(sets, items):
 
 def test_the_model_observer_judges_what_has_a_seam(sets, monkeypatch):
     monkeypatch.setattr(measure, "BANK", 40)
-    found = pairs.drawn(sets, ASKED | {"crops": 1, "checks": 1}, weights.random())
+    found = pairs.drawn(sets, ASKED | {"crops": 1, "checks": 1}, lpips_arrays.random())
     over = {item.halves[1].name: item.over for item in found}
     assert over["check"] == (None, None) and over["floor"][1] == 0.0
     assert all(np.isfinite(value) and value != 0 for value in (*over["none"], over["floor"][0]))

@@ -4,7 +4,7 @@ import logging
 
 import numpy as np
 import pytest
-from fixtures import weights
+from fixtures import lpips_arrays
 
 from dav_gswt.prior.interface import Condition, Imagined
 from dav_gswt.views import prior_sampling
@@ -139,9 +139,13 @@ def test_few_poses_are_scored_in_full_at_once():
 
 def test_without_dropout_the_one_sample_is_compared_with_the_render():
     prior, told = Counting(), condition(3)
-    some = prior_sampling.terms(Asking(prior, 2, 2, 0.0, weights=weights.random()), told, ["a", "b", "c"], ALL[:3])[0]
+    some = prior_sampling.terms(
+        Asking(prior, 2, 2, 0.0, weights=lpips_arrays.random()), told, ["a", "b", "c"], ALL[:3]
+    )[0]
     assert (some.single > 0).all()  # grey is not the black that the render shows
-    hidden = prior_sampling.terms(Asking(prior, 2, 2, 0.0, weights=weights.random()), told, ["a"] * 3, 0 * ALL[:3])[0]
+    hidden = prior_sampling.terms(
+        Asking(prior, 2, 2, 0.0, weights=lpips_arrays.random()), told, ["a"] * 3, 0 * ALL[:3]
+    )[0]
     assert not hidden.single.any()
     assert prior_sampling.terms(Asking(prior, 2, 2, 0.1), told, ["a", "b", "c"], ALL[:3])[0].single is None
 
