@@ -1,0 +1,5 @@
+"""What Snakemake injects into scripts."""
+
+from typing import Any
+
+snakemake: Any
