@@ -13,16 +13,13 @@ from dav_gswt.photos.sfm import registration
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.photos.synthetic import scene as synthetic
 
-COPR = Path("../shared/data/copr_dunes/images")
+COPR = Path("resources/photos/copr_dunes/images")
 SIDE = 256  # pixels
 VIEWS = 3  # of each family, from the side, where most is seen
 
 
 def copr() -> dict[str, float]:
     """Quick structure from motion, from photos on disk to the undistorted model."""
-    if not COPR.is_dir():
-        print("sfm_copr: skipped, the photos of copr_dunes are not there")
-        return {}
     start = time.perf_counter()
     found = registration.register(COPR, registration.Options(threads=2))
     seconds = time.perf_counter() - start

@@ -39,9 +39,6 @@ def photos(scene: str) -> Path:
 
 def copr() -> dict[str, float | None]:
     """Of the 38 photos that register every tenth is for testing; all ground that any photo sees is modelled."""
-    if not Path("../shared/data/copr_dunes").is_dir():
-        print("train_copr: skipped, the photos of copr_dunes are not there")
-        return {}
     given = fit_profile.opened(photos("copr_dunes"), COPR.size)
     found = fit_profile.run(given, COPR)
     last = found.curve[-1]

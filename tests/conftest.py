@@ -1,4 +1,4 @@
-"""What all tests share: where the repository is, the real photos where they are at hand, one headless Chromium."""
+"""What all tests share: where the repository is, its real photos, one headless Chromium."""
 
 from pathlib import Path
 
@@ -27,12 +27,18 @@ def root():
 
 
 @pytest.fixture(scope="session")
-def shared():
-    """The folder of photos and tools beside the repository; tests that need it are skipped where it is not."""
-    folder = ROOT.parent / "shared"
-    if not (folder / "data").is_dir():
-        pytest.skip(f"needs the real photos in {folder.name}/data beside the repository")
-    return folder
+def photo_sets():
+    """The folder of the real photo sets: `photo_sets / "brighton_beach/images"`."""
+    return ROOT / "resources/photos"
+
+
+@pytest.fixture(scope="session")
+def gswt_checker():
+    """The public renderer's checker of gswt.zip, where it is at hand."""
+    script = ROOT.parent / "shared/tools/check_gswt_zip.py"
+    if not script.is_file():
+        pytest.skip("the public renderer's checker is not at hand")
+    return script
 
 
 @pytest.fixture(scope="session")

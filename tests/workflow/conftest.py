@@ -69,7 +69,7 @@ def finished(snakemake, tiny, tmp_path_factory) -> Made:
 
 
 @pytest.fixture(scope="session")
-def beach(snakemake, shared, tmp_path_factory) -> Made:
+def beach(snakemake, photo_sets, tmp_path_factory) -> Made:
     """Real photos of a beach, reduced: all stages, with little work in each."""
     folder = tmp_path_factory.mktemp("beach")
     (folder / "beach.yaml").write_text(f"""
@@ -77,7 +77,7 @@ scene: beach
 scenes:
   beach:
     kind: photos
-    folder: {shared}/data/brighton_beach/images
+    folder: {photo_sets}/brighton_beach/images
     size: 512
     start: 8
     agent: replay

@@ -125,10 +125,10 @@ def test_a_field_on_its_side_says_what_to_give(refused, tiny, tmp_path):
 
 
 @pytest.fixture
-def some_of_the_beach(shared, tmp_path):
+def some_of_the_beach(photo_sets, tmp_path):
     """Ten photos of the beach, small, every other one of them smaller still."""
     (tmp_path / "photos").mkdir()
-    for number, path in enumerate(image_files.listed(shared / "data/brighton_beach/images")[:10]):
+    for number, path in enumerate(image_files.listed(photo_sets / "brighton_beach/images")[:10]):
         photo = image_files.read(path)
         share = (640 if number % 2 else 512) / max(photo.shape[:2])
         small = image_files.resized(photo, round(photo.shape[1] * share), round(photo.shape[0] * share))
@@ -146,9 +146,9 @@ def test_photos_of_mixed_sizes_find_their_places(snakemake, some_of_the_beach):
     assert all(left["reason"] for left in frame["left_out"])
 
 
-def test_a_photo_cut_short_stops_before_any_is_used(refused, shared, tmp_path):
+def test_a_photo_cut_short_stops_before_any_is_used(refused, photo_sets, tmp_path):
     (tmp_path / "photos").mkdir()
-    for path in image_files.listed(shared / "data/brighton_beach/images")[:4]:
+    for path in image_files.listed(photo_sets / "brighton_beach/images")[:4]:
         shutil.copy(path, tmp_path / "photos")
     whole = path.read_bytes()
     (tmp_path / "photos" / path.name).write_bytes(whole[: len(whole) // 3])

@@ -105,11 +105,11 @@ def test_every_stop_has_a_branch_of_its_own_and_all_share_the_coarse_field(plann
     assert default["select_poses"] == default["make_page"] == 1
 
 
-def test_the_oracle_needs_a_scene_whose_truth_is_known(snakemake, shared, tmp_path):
+def test_the_oracle_needs_a_scene_whose_truth_is_known(snakemake, photo_sets, tmp_path):
     path = "results/copr_dunes/seed0/standard/active_oracle_none_pdrop0_lam0_k4/iter1/poses.json"
     config = tmp_path / "there.yaml"
     for agent, known in (("replay", True), ("plan", False)):
-        config.write_text(f"scenes: {{copr_dunes: {{folder: {shared}/data/copr_dunes/images, agent: {agent}}}}}")
+        config.write_text(f"scenes: {{copr_dunes: {{folder: {photo_sets}/copr_dunes/images, agent: {agent}}}}}")
         done = snakemake(tmp_path, path, "--dry-run", configs=(USUAL, config), check=False)
         assert (done.returncode == 0) == known
         assert known or "policy oracle: what copr_dunes truly shows is not known" in done.stdout
@@ -272,11 +272,13 @@ def test_a_config_that_is_not_yaml_is_named_with_its_line(run, checkout, tmp_pat
 
 
 def test_a_missing_folder_of_photos_is_named(snakemake, run, checkout, tmp_path):
-    said = "config: scenes.copr_dunes.folder: there is no folder ../shared/data/copr_dunes/images"
-    folder = checkout(tmp_path / "no" / "photos")
-    done = snakemake(folder, "--dry-run", "--config", "scene=copr_dunes", check=False)
+    said = "config: scenes.copr_dunes.folder: there is no folder photos/of_nothing"
+    (tmp_path / "missing.yaml").write_text("scenes: {copr_dunes: {folder: photos/of_nothing}}\n")
+    folder = checkout(tmp_path / "clone")
+    configs = (USUAL, tmp_path / "missing.yaml")
+    done = snakemake(folder, "--dry-run", "--config", "scene=copr_dunes", configs=configs, check=False)
     assert done.returncode != 0 and said in done.stdout
-    done = run(folder, "--scene", "copr_dunes")
+    done = run(folder, "--scene", "copr_dunes", "--configfile", tmp_path / "missing.yaml")
     assert done.returncode == 1 and said in done.stdout and len(done.stdout.splitlines()) <= 4, done.stdout
 
 

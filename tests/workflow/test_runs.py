@@ -158,10 +158,10 @@ def test_levels_leave_as_patches_for_other_viewers(tiny, snakemake, tmp_path):
 
 
 @pytest.mark.parametrize("made", ["tiny", "finished", "beach"])
-def test_the_public_renderers_checker_finds_no_fault(made, shared, request):
+def test_the_public_renderers_checker_finds_no_fault(made, gswt_checker, request):
     archive = request.getfixturevalue(made).bundle / "gswt.zip"
-    checker = [sys.executable, shared / "tools/check_gswt_zip.py", archive]
-    done = subprocess.run(checker, capture_output=True, text=True, check=False)
+    command = [sys.executable, gswt_checker, archive]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0 and " 0 faults" in done.stdout, done.stdout + done.stderr
 
 
@@ -186,9 +186,9 @@ def test_a_page_holds_all_that_it_needs(made, request):
     assert {"index.html", "main.js", "davgswt.json"} <= {p.name for p in page.iterdir()}
 
 
-def test_real_photos_find_their_places(beach, shared):
+def test_real_photos_find_their_places(beach, photo_sets):
     frame = read_json(beach.photos / "ground.json")
-    given = len(list((shared / "data/brighton_beach/images").glob("*.[jJ]*")))
+    given = len(list((photo_sets / "brighton_beach/images").glob("*.[jJ]*")))
     assert frame["kind"] == "photos" and frame["images"] == given
     assert frame["registered"] >= 0.9 * given and not [x for x in frame["left_out"] if not x["reason"]]
 

@@ -67,10 +67,10 @@ def test_of_each_seed_only_what_is_asked_is_measured(planned, tmp_path):
 
 
 @pytest.mark.parametrize("size", ["config.yaml", "paper.yaml"])
-def test_the_page_of_results_plans(planned, shared, root, tmp_path, size):
+def test_the_page_of_results_plans(planned, root, tmp_path, size):
     """At `draft` and at the paper's size: every table and figure, each photo set and coarse field once."""
     config = f"config/{size}"
-    plan = plan_of(planned, shared, tmp_path, "docs/results.md", config)
+    plan = plan_of(planned, root, tmp_path, "docs/results.md", config)
     asked = yaml.safe_load((root / config).read_text())
     scenes, seeds = len(asked["sweeps"]["k"]["scenes"]), len(asked["sweeps"]["k"]["measure"]["views"])
     assert plan["fit_coarse"] == scenes * seeds and plan["render_photos"] + plan["register_photos"] == scenes
@@ -80,8 +80,8 @@ def test_the_page_of_results_plans(planned, shared, root, tmp_path, size):
     assert plan["write_results"] == plan["gather_lod"] == 1
 
 
-def test_the_study_makes_every_page_and_each_photo_set_once(planned, shared, root, tmp_path):
-    plan = plan_of(planned, shared, tmp_path, "study", "config/config.yaml")
+def test_the_study_makes_every_page_and_each_photo_set_once(planned, root, tmp_path):
+    plan = plan_of(planned, root, tmp_path, "study", "config/config.yaml")
     pages = ("write_results", "show_stability", "write_tradeoff", "gather_auto")
     assert all(plan[page] == 1 for page in (*pages, "study"))
     assert plan["gather_sweep"] == plan["plot_sweep"] == 9
@@ -90,11 +90,11 @@ def test_the_study_makes_every_page_and_each_photo_set_once(planned, shared, roo
     assert plan["render_photos"] + plan["register_photos"] == len(scenes)
 
 
-def plan_of(planned, shared, tmp_path, target, config):
+def plan_of(planned, root, tmp_path, target, config):
     """How often each rule runs for a target, from nothing."""
     folder = tmp_path / "run"
     folder.mkdir()
-    (tmp_path / "shared").symlink_to(shared)
+    (folder / "resources").symlink_to(root / "resources")
     return planned(folder, target, "--scheduler", "greedy", configs=(USUAL, config))
 
 

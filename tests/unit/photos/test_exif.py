@@ -80,6 +80,6 @@ def test_a_damaged_block_is_passed_over(tmp_path, cut):
 
 
 @pytest.mark.parametrize("name, pixels", [("brighton_beach", 592), ("copr_dunes", 1377), ("caliterra_earthworks", 743)])
-def test_the_real_sets_have_the_focal_lengths_that_their_notes_give(shared, name, pixels):
-    first = min((shared / "data" / name / "images").iterdir())
+def test_the_real_sets_have_the_focal_lengths_that_their_notes_give(photo_sets, name, pixels):
+    first = min((photo_sets / name / "images").iterdir())
     assert exif.focal_length(first) == pytest.approx(pixels, abs=1)

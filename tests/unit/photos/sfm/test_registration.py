@@ -292,9 +292,7 @@ def test_the_photos_folder_is_whole(photos, tmp_path):
     assert np.median([c.centre[2] for c in stored.cameras]) == pytest.approx(1, abs=1e-9)
 
 
-def test_brighton_beach_registers_at_half_size(shared):
-    found = registration.register(
-        shared / "data" / "brighton_beach" / "images", registration.Options(512, 2048, side=512)
-    )
+def test_brighton_beach_registers_at_half_size(photo_sets):
+    found = registration.register(photo_sets / "brighton_beach/images", registration.Options(512, 2048, side=512))
     assert len(found.model.names) == 18 and not found.left_out
     assert found.focal_ratio == pytest.approx(1, abs=1e-12) and found.error < 0.5
