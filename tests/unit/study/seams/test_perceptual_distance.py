@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from fixtures import seams, weights
+from fixtures import lpips_arrays, seams
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import lpips
 from dav_gswt.study.seams import perceptual_distance
 
-WEIGHTS = weights.random()
+WEIGHTS = lpips_arrays.random()
 
 
 @pytest.fixture(scope="module")
