@@ -16,14 +16,14 @@ from record import tell
 from dav_gswt.geometry.poses import Pose, place
 from dav_gswt.images import lpips_weights
 from dav_gswt.photos.synthetic import camera_layouts
-from dav_gswt.views.policies import POLICIES, Wanted
-from dav_gswt.views.policy_names import ORACLES
+from dav_gswt.views.policies import POLICIES, SelectionInput
+from dav_gswt.views.policy_names import NEEDS_FIELD, ORACLES
 from dav_gswt.views.scores import TERMS, Scores
 from dav_gswt.views.uncertainty.weighting import Scales
 
 ROOT = Path(__file__).resolve().parents[1]
 CANDIDATES, PHOTOS, CHOSEN = 1000, 28, 20
-NEEDY = {"fisher", *ORACLES}  # policies that look at more than scores
+MORE_THAN_SCORES = {*NEEDS_FIELD, *ORACLES}
 REPEATS = 5
 CELLS = {  # the default policy first
     "round_draft_seconds": ("scores_none_pdrop0", "active_farthest_none_pdrop0_lam0_k4"),
@@ -42,12 +42,12 @@ def selection() -> dict[str, float]:
     captured = np.array([place(pose) for pose in found[:PHOTOS]])
     out = {}
     for name, policy in POLICIES.items():
-        if name in NEEDY:
+        if name in MORE_THAN_SCORES:
             continue
         times = []
         for _ in range(REPEATS):
             start = time.perf_counter()
-            policy(scores, Wanted(captured, CHOSEN, np.random.default_rng(0), 0.1))
+            policy(scores, SelectionInput(captured, CHOSEN, np.random.default_rng(0), 0.1))
             times.append(time.perf_counter() - start)
         out[name] = min(times)
     slowest = max(out, key=out.get)

@@ -7,7 +7,7 @@ from collections import Counter
 import pytest
 from fixtures.runs import TINY, USUAL
 
-from dav_gswt.views.policy_names import AT_ZERO, IMAGINING, ORACLES, POLICIES
+from dav_gswt.views.policy_names import ORACLES, POLICY_NAMES, PRIOR_POLICIES, ZERO_SETTINGS
 
 ROUND = "results/desert/seed0/draft/active_{policy}_none_pdrop0_lam0_k{k}/iter{t}"
 BUNDLE = ROUND + "/tiles_semantic/bundle_tau{tau}/davgswt.json"
@@ -80,14 +80,16 @@ def test_policies_share_what_they_start_from(planned, tmp_path):
 
 
 def test_every_policy_has_a_path(planned, tmp_path):
-    for policy in POLICIES[:-1]:
+    for policy in POLICY_NAMES:
         spelled = {"prior": "none", "p_drop": "0", "lam": "0"}
-        if policy in IMAGINING:
-            spelled = {"prior": "terrain", "p_drop": "0.15", "lam": "0.1"} | dict.fromkeys(AT_ZERO.get(policy, ()), "0")
+        if policy in PRIOR_POLICIES:
+            spelled = {"prior": "terrain", "p_drop": "0.15", "lam": "0.1"} | dict.fromkeys(
+                ZERO_SETTINGS.get(policy, ()), "0"
+            )
         way = "{}_{prior}_pdrop{p_drop}_lam{lam}".format(policy, **spelled)
         plan = planned(tmp_path, f"results/desert/seed0/draft/active_{way}_k4/iter1/field.ply")
         assert plan["update_field"] == plan["select_poses"] == 1, policy
-        assert plan["show_candidates"] == (policy in ORACLES) and plan["fetch_lpips"] == (policy in IMAGINING)
+        assert plan["show_candidates"] == (policy in ORACLES) and plan["fetch_lpips"] == (policy in PRIOR_POLICIES)
         default = planned(tmp_path, "--config", f"policy={policy}", configs=(USUAL, TINY))
         assert default["make_page"] == 1 and default["select_poses"] == 1, policy
 

@@ -6,8 +6,9 @@ import pytest
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import poses
 from dav_gswt.geometry.poses import Pose
-from dav_gswt.views import scores, selection
-from dav_gswt.views.policies import POLICIES, Wanted
+from dav_gswt.views import policies, scores, selection
+from dav_gswt.views.policies import POLICIES, SelectionInput
+from dav_gswt.views.policy_names import POLICY_NAMES
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.uncertainty import Scales
 
@@ -37,8 +38,8 @@ class Sharing:
 
 
 def chosen(policy, pool, k, captured=((1.0, 0, 0),), seed=0, lam=0.0, information=None, errors=None):
-    wanted = Wanted(np.array(captured).reshape(-1, 3), k, np.random.default_rng(seed), lam, information, errors)
-    return [pose.name for pose in selection.select(policy, pool, wanted)]
+    inputs = SelectionInput(np.array(captured).reshape(-1, 3), k, np.random.default_rng(seed), lam, information, errors)
+    return [pose.name for pose in selection.select(policy, pool, inputs)]
 
 
 def test_farthest_takes_the_opposite_side_then_the_gaps():
@@ -137,9 +138,18 @@ def test_the_diverse_oracle_takes_one_of_two_neighbours_that_are_both_wrong():
 
 
 def test_all_asks_for_all_whatever_k_is_and_takes_what_a_budget_leaves():
-    assert selection.asked("all", 1, 3) == 3 and selection.asked("farthest", 1, 3) == 1
+    assert selection.poses_per_round("all", 1, 3) == 3 and selection.poses_per_round("farthest", 1, 3) == 1
     assert chosen("all", scored(0, 1, 2), 3) == ["p0", "p1", "p2"]
     assert chosen("all", scored(0, 1, 2), 2) == ["p0", "p1"]
+
+
+def test_every_described_policy_has_a_function():
+    assert set(POLICIES) == set(POLICY_NAMES)
+
+
+def test_a_policy_that_is_not_described_cannot_be_registered():
+    with pytest.raises(ValueError, match="describe the policy"):
+        policies.policy("unknown")
 
 
 def test_random_depends_on_its_generator_alone():

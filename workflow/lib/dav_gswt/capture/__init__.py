@@ -14,7 +14,8 @@ from dav_gswt.images import image_files
 from dav_gswt.photos import lenses
 from dav_gswt.photos.synthetic import scene
 from dav_gswt.views import candidates
-from dav_gswt.views.policy_names import DEVICES
+
+DEVICES = {"serial": "rig", "plan": "mission", "handheld": "walk"}  # the module of each agent that is no picture source
 
 
 def capture(site: Site, split: dict, before: list, chosen: list[dict], folder: Path) -> None:

@@ -36,7 +36,7 @@ def gain(seen: Contributions, already: Float64[Array, "n"]) -> float:
 
 
 class Gathered:
-    """The information on a field that photos give, growing as candidates are chosen (`policies.Information`)."""
+    """The information on a field that photos give, growing as candidates are chosen (`policies.InformationGain`)."""
 
     def __init__(self, field: Field, taken: list[Camera], candidates: list[Camera]):
         """taken, candidates: cameras at the size at which poses are scored."""

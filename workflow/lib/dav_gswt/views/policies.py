@@ -1,4 +1,7 @@
-"""Policies: which k of the scored candidates to capture next. Each is a function of the scores and what is wanted."""
+"""Policies: functions that choose which k of the scored candidates to capture next.
+
+To add one: describe it in `policy_names.POLICY_SPECS`, write its function here, and decorate that with `@policy(name)`.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,6 +14,7 @@ from numpy import ndarray as Array
 from dav_gswt.geometry.poses import Pose, place, spread
 from dav_gswt.views import facility_location
 from dav_gswt.views.greedy import lazily
+from dav_gswt.views.policy_names import POLICY_NAMES
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.uncertainty.weighting import combined, combined_image
 
@@ -19,127 +23,169 @@ TURN = 180 * (3 - 5**0.5)  # degrees between the starts of rings: the golden ang
 
 
 @runtime_checkable
-class Information(Protocol):
-    """What photos tell about a field, as it grows with every choice."""
+class InformationGain(Protocol):
+    """Information that photos give about a field; it grows with every choice."""
 
     def gain(self, i: int) -> float:
-        """Of a photo from candidate i, given all that was taken."""
+        """Return what a photo from candidate i adds to the photos taken or chosen so far."""
+        ...
 
     def take(self, i: int) -> None:
-        """Candidate i is chosen."""
+        """Add the photo from candidate i."""
+        ...
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """What a policy goes by beside the scores. captured: where photos were taken, relative to the exemplar's middle.
-    k: poses to choose, at most as many as there are. lam: weight of LPIPS. information: for `fisher`. errors: true ones
-    of the candidates, NaN where not known, for oracles."""
+class SelectionInput:
+    """What a policy reads beside the scores.
+
+    captured: camera centres of the photos so far, relative to the exemplar's middle. k: number of poses to choose, at
+    most the number of candidates. lam: weight of LPIPS. information: for policies with `needs_field`. errors: true
+    error of each candidate, NaN where unknown, for policies with `needs_truth`.
+    """
 
     captured: Float[Array, "m 3"]
     k: int
     rng: np.random.Generator
     lam: float = 0.0
-    information: Information | None = None
+    information: InformationGain | None = None
     errors: Float64[Array, "n"] | None = None
 
 
-def random(scores: Scores, wanted: Wanted) -> list[int]:
+Policy = Callable[[Scores, SelectionInput], list[int]]
+POLICIES: dict[str, Policy] = {}
+
+
+def policy(name: str) -> Callable[[Policy], Policy]:
+    """Register a function as the policy `name`. It returns indices of candidates, best first."""
+    if name not in POLICY_NAMES:
+        raise ValueError(f"{name}: describe the policy in policy_names.POLICY_SPECS first")
+
+    def register(function: Policy) -> Policy:
+        POLICIES[name] = function
+        return function
+
+    return register
+
+
+@policy("random")
+def random(scores: Scores, inputs: SelectionInput) -> list[int]:
     """k candidates drawn without replacement."""
-    return [int(i) for i in wanted.rng.permutation(len(scores))[: wanted.k]]
+    return [int(i) for i in inputs.rng.permutation(len(scores))[: inputs.k]]
 
 
-def ring(scores: Scores, wanted: Wanted) -> list[int]:
-    """The candidates nearest to k places evenly on a ring, each taken once; every round's ring is turned."""
+@policy("ring")
+def ring(scores: Scores, inputs: SelectionInput) -> list[int]:
+    """The candidates nearest to k evenly spaced points on a ring; the ring turns from round to round."""
     places, chosen = _places(scores.poses), []
     radius = float(np.median(np.linalg.norm(places, axis=1)))
-    for i in range(wanted.k):
-        at = place(Pose("", RING, (len(wanted.captured) * TURN + 360 * i / wanted.k) % 360, radius))
+    for i in range(inputs.k):
+        at = place(Pose("", RING, (len(inputs.captured) * TURN + 360 * i / inputs.k) % 360, radius))
         apart = np.linalg.norm(places - at, axis=1)
         apart[chosen] = np.inf
         chosen.append(int(np.argmin(apart)))
     return chosen
 
 
-def farthest(scores: Scores, wanted: Wanted) -> list[int]:
-    """Greedily the candidate farthest from all views taken or chosen so far (farthest points); ties by index."""
-    return spread(scores.poses, wanted.k, wanted.captured)
+@policy("farthest")
+def farthest(scores: Scores, inputs: SelectionInput) -> list[int]:
+    """Farthest point sampling: the candidate farthest from all views so far; ties by index."""
+    return spread(scores.poses, inputs.k, inputs.captured)
 
 
-def diverse(scores: Scores, wanted: Wanted) -> list[int]:
-    """Facility location with all candidates alike: coverage alone."""
-    return facility_location.located(_places(scores.poses), wanted.captured, np.ones(len(scores)), wanted.k)
+@policy("diverse")
+def diverse(scores: Scores, inputs: SelectionInput) -> list[int]:
+    """Facility location with equal weights: coverage alone."""
+    return facility_location.located(_places(scores.poses), inputs.captured, np.ones(len(scores)), inputs.k)
 
 
-def opacity(scores: Scores, wanted: Wanted) -> list[int]:
-    """The k candidates whose pictures hold most that is not known to be opaque."""
-    return top(scores.term("opacity"), wanted.k)
+@policy("opacity")
+def opacity(scores: Scores, inputs: SelectionInput) -> list[int]:
+    """The k candidates whose pictures are least opaque."""
+    return top(scores.term("opacity"), inputs.k)
 
 
-def fisher(scores: Scores, wanted: Wanted) -> list[int]:
-    """Greedily the candidate of the largest gain of information, which every choice lowers for the others."""
-    at = wanted.information
-    return lazily(scores.term("fisher"), at.gain, at.take, wanted.k)
+@policy("fisher")
+def fisher(scores: Scores, inputs: SelectionInput) -> list[int]:
+    """Greedy choice of the largest information gain; every choice lowers the gain of the others."""
+    if inputs.information is None:
+        raise ValueError("fisher: needs the information that photos give about the field")
+    return lazily(scores.term("fisher"), inputs.information.gain, inputs.information.take, inputs.k)
 
 
-def grad_lpips(scores: Scores, wanted: Wanted) -> list[int]:
-    """The k candidates of greatest u_img, an ablation: texture of what the prior expects, and lam LPIPS."""
+@policy("grad-lpips")
+def grad_lpips(scores: Scores, inputs: SelectionInput) -> list[int]:
+    """The k candidates of greatest u_img, an ablation: texture of the expected picture, and lam LPIPS."""
     gradient, lpips = scores.term("gradient"), scores.terms.get("lpips")
-    return top(combined_image(gradient, lpips, wanted.lam, scores.scales, scores.names), wanted.k)
+    return top(combined_image(gradient, lpips, inputs.lam, scores.scales, scores.names), inputs.k)
 
 
-def w2(scores: Scores, wanted: Wanted) -> list[int]:
-    """The k candidates whose samples lie farthest apart in latents."""
-    return top(scores.term("w2_sq"), wanted.k)
+@policy("w2")
+def w2(scores: Scores, inputs: SelectionInput) -> list[int]:
+    """The k candidates whose samples disagree most in latents."""
+    return top(scores.term("w2_sq"), inputs.k)
 
 
-def single(scores: Scores, wanted: Wanted) -> list[int]:
-    """The k candidates whose one sample looks least like the render: a single forward pass, without dropout."""
-    return top(scores.term("single"), wanted.k)
+@policy("single")
+def single(scores: Scores, inputs: SelectionInput) -> list[int]:
+    """The k candidates whose single sample, without dropout, differs most from the render."""
+    return top(scores.term("single"), inputs.k)
 
 
-def residual(scores: Scores, wanted: Wanted) -> list[int]:
-    """The k candidates whose picture the prior expects to differ most from the render."""
-    return top(scores.term("residual"), wanted.k)
+@policy("residual")
+def residual(scores: Scores, inputs: SelectionInput) -> list[int]:
+    """The k candidates whose expected picture differs most from the render, in latents."""
+    return top(scores.term("residual"), inputs.k)
 
 
-def residual_diverse(scores: Scores, wanted: Wanted) -> list[int]:
-    """Facility location weighed by the same: where the render looks wrong a photo is to be near."""
-    return facility_location.located(_places(scores.poses), wanted.captured, scores.term("residual"), wanted.k)
+@policy("residual-diverse")
+def residual_diverse(scores: Scores, inputs: SelectionInput) -> list[int]:
+    """Facility location weighted by `residual`."""
+    return facility_location.located(_places(scores.poses), inputs.captured, scores.term("residual"), inputs.k)
 
 
-def w2_lpips(scores: Scores, wanted: Wanted) -> list[int]:
+@policy("w2-lpips")
+def w2_lpips(scores: Scores, inputs: SelectionInput) -> list[int]:
     """The k candidates of greatest u = W2 + lam LPIPS, each over its frozen scale: the paper's Algorithm 1."""
-    return top(doubt(scores, wanted.lam), wanted.k)
+    return top(uncertainty(scores, inputs.lam), inputs.k)
 
 
-def w2_lpips_diverse(scores: Scores, wanted: Wanted) -> list[int]:
-    """Facility location weighed by u: doubtful candidates are to have a photo near."""
-    return facility_location.located(_places(scores.poses), wanted.captured, doubt(scores, wanted.lam), wanted.k)
+@policy("w2-lpips-diverse")
+def w2_lpips_diverse(scores: Scores, inputs: SelectionInput) -> list[int]:
+    """Facility location weighted by u: uncertain candidates get a photo nearby."""
+    return facility_location.located(_places(scores.poses), inputs.captured, uncertainty(scores, inputs.lam), inputs.k)
 
 
-def shuffled(scores: Scores, wanted: Wanted) -> list[int]:
-    """As `w2_lpips_diverse`, with u dealt out anew among the candidates: is it the doubt, or the diversity?"""
-    dealt = wanted.rng.permutation(doubt(scores, wanted.lam))
-    return facility_location.located(_places(scores.poses), wanted.captured, dealt, wanted.k)
+@policy("shuffled")
+def shuffled(scores: Scores, inputs: SelectionInput) -> list[int]:
+    """As `w2_lpips_diverse`, with u permuted among the candidates: a control of u against diversity."""
+    permuted = inputs.rng.permutation(uncertainty(scores, inputs.lam))
+    return facility_location.located(_places(scores.poses), inputs.captured, permuted, inputs.k)
 
 
-def oracle(scores: Scores, wanted: Wanted) -> list[int]:
-    """The k candidates of greatest true error, of those whose truth is known: what a perfect score would choose."""
-    return top(np.where(np.isnan(wanted.errors), -np.inf, wanted.errors), wanted.k)
+@policy("oracle")
+def oracle(scores: Scores, inputs: SelectionInput) -> list[int]:
+    """The k candidates of greatest true error, among those whose truth is known: the choice of a perfect score."""
+    errors = _true_errors(inputs)
+    return top(np.where(np.isnan(errors), -np.inf, errors), inputs.k)
 
 
-def oracle_diverse(scores: Scores, wanted: Wanted) -> list[int]:
-    """Facility location weighed by the true error, 0 where it is not known: a perfect score and diversity."""
-    return facility_location.located(_places(scores.poses), wanted.captured, np.nan_to_num(wanted.errors), wanted.k)
+@policy("oracle-diverse")
+def oracle_diverse(scores: Scores, inputs: SelectionInput) -> list[int]:
+    """Facility location weighted by the true error, 0 where it is unknown."""
+    return facility_location.located(
+        _places(scores.poses), inputs.captured, np.nan_to_num(_true_errors(inputs)), inputs.k
+    )
 
 
-def everything(scores: Scores, wanted: Wanted) -> list[int]:
+@policy("all")
+def everything(scores: Scores, inputs: SelectionInput) -> list[int]:
     """The whole pool, whatever k is."""
     return list(range(len(scores)))
 
 
-def doubt(scores: Scores, lam: float) -> Float64[Array, "n"]:
-    """u = W2 + lam LPIPS of every candidate."""
+def uncertainty(scores: Scores, lam: float) -> Float64[Array, "n"]:
+    """Return u = W2 + lam LPIPS of every candidate."""
     return combined(scores.term("w2_sq"), scores.terms.get("lpips"), lam, scores.scales, scores.names)
 
 
@@ -148,26 +194,11 @@ def top(values: Float[Array, "n"], k: int) -> list[int]:
     return [int(i) for i in np.argsort(-values, kind="stable")[:k]]
 
 
-def _places(found: list[Pose]) -> Float64[Array, "n 3"]:
-    return np.array([place(pose) for pose in found], float).reshape(-1, 3)
+def _true_errors(inputs: SelectionInput) -> Float64[Array, "n"]:
+    if inputs.errors is None:
+        raise ValueError("an oracle needs the true errors of the candidates")
+    return inputs.errors
 
 
-POLICIES: dict[str, Callable[[Scores, Wanted], list[int]]] = {
-    "random": random,
-    "ring": ring,
-    "farthest": farthest,
-    "diverse": diverse,
-    "opacity": opacity,
-    "fisher": fisher,
-    "grad-lpips": grad_lpips,
-    "w2": w2,
-    "single": single,
-    "residual": residual,
-    "residual-diverse": residual_diverse,
-    "w2-lpips": w2_lpips,
-    "w2-lpips-diverse": w2_lpips_diverse,
-    "shuffled": shuffled,
-    "oracle": oracle,
-    "oracle-diverse": oracle_diverse,
-    "all": everything,
-}
+def _places(poses: list[Pose]) -> Float64[Array, "n 3"]:
+    return np.array([place(pose) for pose in poses], float).reshape(-1, 3)

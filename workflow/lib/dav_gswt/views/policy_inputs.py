@@ -13,17 +13,17 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.reconstruction import ground
 from dav_gswt.views import fisher
 from dav_gswt.views.candidates import Candidates
-from dav_gswt.views.policies import Information
-from dav_gswt.views.policy_names import ORACLES
+from dav_gswt.views.policies import InformationGain
+from dav_gswt.views.policy_names import NEEDS_FIELD, ORACLES
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.scoring import small
 
 
 def information(
     policy: str, scores: Scores, pool: Candidates, taken: list[Camera], file: Path | str
-) -> Information | None:
+) -> InformationGain | None:
     """For `fisher`: the information that photos give about a field's file, candidates in the order of the scores."""
-    if policy != "fisher":
+    if policy not in NEEDS_FIELD:
         return None
     at = {pose.name: camera for pose, camera in pool}
     return fisher.Gathered(field.read(file), [small(c) for c in taken], [small(at[name]) for name in scores.names])

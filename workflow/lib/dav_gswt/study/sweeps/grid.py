@@ -6,7 +6,7 @@ Read by the workflow before the first job, so it loads no numerics.
 from itertools import product
 
 from dav_gswt.errors import InputError
-from dav_gswt.views.policy_names import AT_ZERO, GEOMETRIC
+from dav_gswt.views.policy_names import GEOMETRIC, ZERO_SETTINGS
 
 CELL = ("scene", "seed", "quality", "policy", "prior", "p_drop", "lam", "k", "rounds", "seam", "tau")  # its wildcards
 ASKING = ("prior", "p_drop", "lam")  # what only a prior that is asked depends on
@@ -89,7 +89,7 @@ def _check_names(where: str, asked: dict, config: dict) -> None:
 def _check_asking(where: str, vary: dict, policy: str) -> None:
     """What is varied must matter: two cells of one path would be one."""
     for key in ASKING:
-        if key in vary and len(vary) == 1 and (policy in GEOMETRIC or key in AT_ZERO.get(policy, ())):
+        if key in vary and len(vary) == 1 and (policy in GEOMETRIC or key in ZERO_SETTINGS.get(policy, ())):
             raise InputError(
                 f"{where}.vary.{key}: makes no difference to the policy {policy}; fix a policy that reads it, as "
                 "fixed: {policy: w2-lpips}"

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from dav_gswt.errors import InputError
 from dav_gswt.paths import spell
-from dav_gswt.views.policy_names import IMAGINING
+from dav_gswt.views.policy_names import PRIOR_POLICIES
 
 CALLED = {"qualities": "quality", "seams": "seam", "priors": "prior"}  # how what is chosen calls an entry of a table
 LEFT_OUT = {"degree": 0, "levels": "auto"}  # what a key means where an entry has none
@@ -95,7 +95,7 @@ def check(config: dict) -> None:
     for knob, turned in asked["knobs"].items():
         where, base = f"tradeoff.knobs.{knob}", asked["base"] | turned.get("base", {})
         _check_names(f"{where}.base", turned.get("base", {}), config)
-        if turned.get("of") == "priors" and base["policy"] not in IMAGINING:
+        if turned.get("of") == "priors" and base["policy"] not in PRIOR_POLICIES:
             raise InputError(
                 f"config: {where}: makes no difference to the policy {base['policy']}, which asks no prior; "
                 "give it one that does, as base: {policy: w2-lpips}"
