@@ -21,9 +21,8 @@ with logging_to(snakemake.log[0]):
         places, rng = candidates.places(taken, frame), np.random.default_rng([params.seed, params.t])
         information = policy_inputs.information(policy, scored, pool, taken, given.field)
         errors = policy_inputs.errors(policy, scored, pool, given, params.scene, params.size)
-        chosen = selection.select(
-            policy, scored, SelectionInput(places, decided.poses, rng, params.lam, information, errors)
-        )
+        inputs = SelectionInput(places, decided.poses, rng, params.lam, information, errors)
+        chosen = selection.select(policy, scored, inputs)
     write_json(snakemake.output.poses, poses.to_json(chosen, policy, params.k) | decided.to_json())
     shown = pose_maps.read(given.maps)[0].parts(scored, [pose.name for pose in chosen])
     image_files.write_exr_parts(snakemake.output.shown, shown or pose_maps.NOTHING)

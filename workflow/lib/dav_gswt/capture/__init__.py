@@ -15,7 +15,7 @@ from dav_gswt.photos import lenses
 from dav_gswt.photos.synthetic import scene
 from dav_gswt.views import candidates
 
-DEVICES = {"serial": "rig", "plan": "mission", "handheld": "walk"}  # the module of each agent that is no picture source
+DEVICES = {"serial": "serial_rig", "plan": "drone", "handheld": "handheld"}  # the module of each agent
 
 
 def capture(site: Site, split: dict, before: list, chosen: list[dict], folder: Path) -> None:

@@ -16,7 +16,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import Pose, of_camera
 from dav_gswt.study import figures
-from dav_gswt.views.policies import doubt
+from dav_gswt.views.policies import uncertainty
 from dav_gswt.views.scores import Scores
 
 WIDE, TALL = 9.0, 4.5  # inches: the figure, a row of its panels
@@ -60,7 +60,7 @@ def shade(scores: Scores, lam: float) -> tuple[str, Float64[Array, "n"]]:
     without dropout, whose samples all agree)."""
     if scores.scales.of.get("w2_sq", 0.0) > 0:
         lpips = f" + {lam:g} LPIPS" if lam and "lpips" in scores.terms else ""
-        return f"doubt u = W2{lpips}, in units of the scale frozen at round 1", doubt(scores, lam)
+        return f"uncertainty u = W2{lpips}, in units of the scale frozen at round 1", uncertainty(scores, lam)
     scale, values = scores.scales.of["opacity"], scores.term("opacity")
     values = values / scale if scale > 0 else np.zeros(len(scores))
     return "not known to be opaque, in units of the scale frozen at round 1", values
