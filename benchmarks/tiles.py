@@ -14,7 +14,7 @@ import numpy as np
 from record import tell
 from scipy.ndimage import gaussian_filter
 
-from dav_gswt.field import Field, joined, sh_of
+from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.lod import build as levels
 from dav_gswt.reconstruction import discs, top_view, underlay
 from dav_gswt.reconstruction.ground import Ground
@@ -31,7 +31,7 @@ STRENGTH = 0.2
 TARGETS = {"tiles_200k_seconds": 10, "tiles_200k_memory_mb": 2000}
 
 
-def made_up() -> tuple[Field, Ground]:
+def made_up() -> tuple[GaussianField, Ground]:
     """A field of ALL Gaussians: a disc a cell, an underlay, and blades of grass for the rest."""
     rng = np.random.default_rng(0)
     soft = sum(s * gaussian_filter(rng.normal(size=(CELLS, CELLS)), s, mode="wrap") for s in (1, 3, 9))
@@ -39,20 +39,20 @@ def made_up() -> tuple[Field, Ground]:
     heights = 0.4 * gaussian_filter(rng.normal(size=(CELLS, CELLS)), 12, mode="wrap")
     grid = Ground(0.0, 0.0, SPACING, 0, 0, CELLS, heights, np.ones((CELLS, CELLS), bool))
     layer = discs.ground_discs(grid, colour.reshape(-1, 3))
-    layer = joined([layer, underlay.beneath(grid, layer)])
+    layer = concatenate_fields([layer, underlay.beneath(grid, layer)])
     n = ALL - len(layer)
     place = np.concatenate([rng.uniform(0, CELLS * SPACING, (n, 2)), np.zeros((n, 1))], 1)
     place[:, 2] = grid.height_at(place) + SPACING * rng.uniform(1, 6, n)
-    blades = Field(
+    blades = GaussianField(
         place.astype(np.float32),
         np.log(SPACING * np.tile([0.3, 0.3, 1.2], (n, 1))).astype(np.float32),
         np.tile(np.float32([1, 0, 0, 0]), (n, 1)),
         np.full(n, 2, np.float32),
-        sh_of(np.clip(rng.normal([0.25, 0.4, 0.15], 0.05, (n, 3)), 0, 1)),
+        rgb_to_sh(np.clip(rng.normal([0.25, 0.4, 0.15], 0.05, (n, 3)), 0, 1)),
         np.zeros(n, np.float32),
         np.zeros(n, bool),
     )
-    return joined([layer, blades]), grid
+    return concatenate_fields([layer, blades]), grid
 
 
 def measured() -> dict[str, float]:

@@ -1,6 +1,7 @@
 """Rules evaluate_coarse and evaluate_round: what the test photos say about a field."""
 
-from dav_gswt import field, provenance
+from dav_gswt import provenance
+from dav_gswt.field import read_field
 from dav_gswt.files import read_json, write_json
 from dav_gswt.images import lpips_weights
 from dav_gswt.logs import logging_to
@@ -13,7 +14,7 @@ with logging_to(snakemake.log[0]):
     split, captures = read_json(given.views), list(given.get("captures", []))
     tests = training_views.taken(given.images, given.model, split["test"], [], params.quality["size"])
     shots = sum(len(read_json(f"{folder}/capture.json")["shots"]) for folder in captures)
-    fitted, grid = field.read(given.field), ground.read(given.ground)
+    fitted, grid = read_field(given.field), ground.read(given.ground)
     perceptual = lpips_weights.read(given.lpips) if given.get("lpips") else None
     groups = read_json(given.frame).get("test_groups")
     result = evaluation.evaluate(fitted, build.modelled(tests, grid), groups, perceptual)

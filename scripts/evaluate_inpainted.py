@@ -1,6 +1,7 @@
 """Rule evaluate_completed: what the test photos say about a field before and after it was completed."""
 
-from dav_gswt import field, provenance
+from dav_gswt import provenance
+from dav_gswt.field import read_field
 from dav_gswt.files import read_json, write_json
 from dav_gswt.images import lpips_weights
 from dav_gswt.inpainting import evaluation
@@ -13,6 +14,6 @@ with logging_to(snakemake.log[0]):
     names, grid = read_json(given.views)["test"], ground.read(given.ground)
     tests = build.modelled(training_views.taken(given.images, given.model, names, [], quality["size"]), grid)
     perceptual = lpips_weights.read(given.lpips) if given.get("lpips") else None
-    result = evaluation.judged(field.read(given.before), field.read(given.after), tests, perceptual)
+    result = evaluation.judged(read_field(given.before), read_field(given.after), tests, perceptual)
     inputs = {name: given[name] for name in ("before", "after", "ground", "views")}
     write_json(snakemake.output.metrics, result | {"provenance": provenance.of(inputs, dict(quality))})

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dav_gswt import field
+from dav_gswt.field import write_field
 from dav_gswt.files import read_json, write_json
 from dav_gswt.logs import logging_to
 from dav_gswt.photos import model, training_views
@@ -16,6 +16,6 @@ with logging_to(snakemake.log[0]):
     points, colours = model.points_seen_by(model.read(given.model), names, given.images)
     rng = np.random.default_rng(params.seed)
     made = build.fit(read_json(given.frame), photos, points, colours, quality, rng, params.keep, margin)
-    field.write(made.field, snakemake.output.field)
+    write_field(made.field, snakemake.output.field)
     ground.write(made.grid, snakemake.output.ground)
     write_json(snakemake.output.fit, made.report)

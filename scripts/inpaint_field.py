@@ -1,6 +1,7 @@
 """Rule complete_field: what no photo saw, painted by a prior."""
 
-from dav_gswt import field, provenance
+from dav_gswt import provenance
+from dav_gswt.field import read_field, write_field
 from dav_gswt.files import copied, read_json, write_json
 from dav_gswt.inpainting import build
 from dav_gswt.logs import logging_to
@@ -10,14 +11,14 @@ from dav_gswt.views import prior_sampling, scoring
 
 with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
-    fitted, grid, names = field.read(given.field), ground.read(given.ground), read_json(given.views)["start"]
+    fitted, grid, names = read_field(given.field), ground.read(given.ground), read_json(given.views)["start"]
     taken = training_views.taken(given.images, given.model, names, list(given.captures), scoring.PHOTO)
     asked = prior_sampling.painter(params.prior, params.seed)
     made = build.complete(fitted, grid, read_json(given.frame), taken, asked)
     if made.field is fitted:
         copied(given.field, out.field)
     else:
-        field.write(made.field, out.field)
+        write_field(made.field, out.field)
     copied(given.ground, out.ground)
     inputs = {name: given[name] for name in ("field", "ground", "views", "weights")}
     about = {"prior": params.prior, "seed": params.seed}

@@ -1,6 +1,7 @@
 """Rule make_levels: ever coarser levels of the field."""
 
-from dav_gswt import field, provenance
+from dav_gswt import provenance
+from dav_gswt.field import read_field
 from dav_gswt.lod import build, merge, store
 from dav_gswt.logs import logging_to
 from dav_gswt.reconstruction import ground
@@ -8,7 +9,7 @@ from dav_gswt.views import pose_maps
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    finest, grid = field.read(given.field), ground.read(given.ground)
+    finest, grid = read_field(given.field), ground.read(given.ground)
     if given.get("maps"):  # a prior was asked: what it doubts is what the tiles go by
         finest = pose_maps.doubted(finest, pose_maps.read(given.maps)[1])
     steps = params.quality["level_steps"]

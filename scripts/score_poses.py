@@ -1,7 +1,7 @@
 """Rules score_coarse and score_round: how much is not known yet at each candidate pose?"""
 
-from dav_gswt import field
 from dav_gswt.capture import serial_rig
+from dav_gswt.field import read_field
 from dav_gswt.files import read_json
 from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to
@@ -13,7 +13,7 @@ with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
     captures = list(given.get("captures", []))
     scene, frame, split = params.scene, read_json(given.frame), read_json(given.views)
-    fitted, grid = field.read(given.field), ground.read(given.ground)
+    fitted, grid = read_field(given.field), ground.read(given.ground)
     pool = candidates.left(scene, frame, given.model, split, captures)
     if scene["agent"] != "replay":  # whose frames were all taken, wherever they stand
         pool = serial_rig.within(scene, frame, pool) if scene["agent"] == "serial" else pool

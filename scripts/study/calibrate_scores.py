@@ -1,6 +1,7 @@
 """Rules calibrate_coarse and calibrate_round: do scores say where the field is wrong?"""
 
-from dav_gswt import field, provenance
+from dav_gswt import provenance
+from dav_gswt.field import read_field
 from dav_gswt.files import read_json, write_json
 from dav_gswt.logs import logging_to
 from dav_gswt.photos import training_views
@@ -14,7 +15,7 @@ with logging_to(snakemake.log[0]):
     captures = list(given.get("captures", []))
     frame, split = read_json(given.frame), read_json(given.views)
     taken = training_views.taken(given.images, given.model, split["start"], captures, scoring.PHOTO)
-    fitted = field.read(given.field), ground.read(given.ground)
+    fitted = read_field(given.field), ground.read(given.ground)
     judged = judging.Judged(params.scene, *fitted, frame, taken, params.size)
     pool = candidates.left(params.scene, frame, given.model, split, captures)
     prior = prior_sampling.asked(params.prior, params.p_drop, params.seed, given.get("lpips"))

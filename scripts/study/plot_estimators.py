@@ -1,6 +1,6 @@
 """Rule plot_estimators: the same test views after as many photos, chosen in different ways."""
 
-from dav_gswt import field
+from dav_gswt.field import read_field
 from dav_gswt.files import read_json
 from dav_gswt.logs import logging_to
 from dav_gswt.photos import training_views
@@ -13,7 +13,7 @@ with logging_to(snakemake.log[0]):
     key, found = evolution.measure(read_json(given.frame)), []
     for name, *paths in zip(params.named, given.fields, given.grounds, given.metrics, given.crops, strict=True):
         fitted, surface, measured, crops = paths
-        read = field.read(fitted), ground.read(surface), read_json(measured)
+        read = read_field(fitted), ground.read(surface), read_json(measured)
         found.append(evolution.Round(params.rounds, *read, title=name, note=estimators.note(crops)))
     names = list(evolution.shown(found[0].metrics, key))
     tests = training_views.taken(given.images, given.model, names, [], params.size)

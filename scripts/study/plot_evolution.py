@@ -1,6 +1,6 @@
 """Rule plot_evolution: how do two test views change from round to round?"""
 
-from dav_gswt import field
+from dav_gswt.field import read_field
 from dav_gswt.files import read_json
 from dav_gswt.logs import logging_to
 from dav_gswt.photos import training_views
@@ -12,7 +12,7 @@ with logging_to(snakemake.log[0]):
     key, rounds = evolution.measure(read_json(given.frame)), []
     for t, *paths in zip(params.rounds, given.fields, given.grounds, given.metrics, strict=True):
         fitted, surface, measured = paths
-        rounds.append(evolution.Round(t, field.read(fitted), ground.read(surface), read_json(measured)))
+        rounds.append(evolution.Round(t, read_field(fitted), ground.read(surface), read_json(measured)))
     names = list(evolution.shown(rounds[0].metrics, key))
     tests = training_views.taken(given.images, given.model, names, [], params.size)
     evolution.write_figure(snakemake.output.plot, evolution.strips(rounds, tests, key), rounds, key)

@@ -14,7 +14,7 @@ from fixtures.bundles import Ground
 from dav_gswt.bundle import gswt
 from dav_gswt.bundle.encoding import Encoding
 from dav_gswt.bundle.store import Bundle
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.study.terrain.browser import served
 
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
@@ -103,21 +103,21 @@ def test_the_page_rounds_a_set_as_the_library_does(visit, plain):
         assert bytes(own) == encoding.encoded(field).tobytes()
 
 
-def rounded_before(rng, n: int) -> Field:
+def rounded_before(rng, n: int) -> GaussianField:
     """Gaussians whose colours and opacities are bytes already."""
     opacity = np.clip(rng.integers(1, 255, n) / 255, 1e-6, 1)
-    return Field(
+    return GaussianField(
         rng.uniform(-0.2, 4.3, (n, 3)).astype(np.float32),
         rng.uniform(-12, 3, (n, 3)).astype(np.float32),  # some are cut, below and above
         rng.normal(size=(n, 4)).astype(np.float32),
         np.log(opacity / (1 - opacity)).astype(np.float32),
-        sh_of((rng.integers(0, 256, (n, 3)) / 255).astype(np.float32)),
+        rgb_to_sh((rng.integers(0, 256, (n, 3)) / 255).astype(np.float32)),
         np.zeros(n, np.float32),
         np.zeros(n, bool),
     )
 
 
-def bytes_of(field: Field) -> list[int]:
+def bytes_of(field: GaussianField) -> list[int]:
     opacity = 1 / (1 + np.exp(-field.opacity_logits.astype(float)))
     return np.rint(255 * np.concatenate([field.base_colours, opacity[:, None]], 1)).astype(int).ravel().tolist()
 

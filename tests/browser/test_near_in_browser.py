@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.geometry import cameras
 from dav_gswt.terrain import splats
 from dav_gswt.terrain.drape import lifted
@@ -30,16 +30,16 @@ def rng():
 
 
 @pytest.fixture
-def field(rng) -> Field:
+def field(rng) -> GaussianField:
     """Gaussians of any size and turn, strewn over a tile."""
     which = rng.integers(0, len(DEVIATIONS), (COUNT, 3))
     means = rng.uniform([0, 0, -0.1], [SIDE, SIDE, 0.8], (COUNT, 3)).astype(np.float32)
-    return Field(
+    return GaussianField(
         means,
         np.log(DEVIATIONS[which]).astype(np.float32),
         rng.normal(size=(COUNT, 4)).astype(np.float32),
         np.full(COUNT, 6.0, np.float32),
-        sh_of(rng.uniform(size=(COUNT, 3))),
+        rgb_to_sh(rng.uniform(size=(COUNT, 3))),
         np.zeros(COUNT, np.float32),
         np.zeros(COUNT, bool),
     )

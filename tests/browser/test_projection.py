@@ -8,7 +8,7 @@ from fixtures import bundles
 from scipy.spatial.transform import Rotation
 
 from dav_gswt.bundle import store
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry import cameras
 from dav_gswt.study.terrain.browser import served
 
@@ -45,7 +45,7 @@ def lonely(lonely_folder):
         yield address
 
 
-def expected(camera: cameras.Camera, field: Field) -> np.ndarray:
+def expected(camera: cameras.Camera, field: GaussianField) -> np.ndarray:
     """The picture of the one Gaussian: J W S W^T J^T + 0.3 px^2, cut below 1/255."""
     at = field.means[0].astype(float)
     axes = Rotation.from_quat(field.quats[0].astype(float), scalar_first=True).as_matrix()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from fixtures.runs import TINY, USUAL
 
-from dav_gswt import field
+from dav_gswt.field import read_field, write_field
 from dav_gswt.files import read_json
 from dav_gswt.images import image_files
 
@@ -94,9 +94,9 @@ def without_opacity(folder, good) -> None:
 
 
 def with_nan(folder, good) -> None:
-    whole = field.read(good)
+    whole = read_field(good)
     whole.means[7, 2] = np.nan
-    field.write(whole, folder / "given.ply")
+    write_field(whole, folder / "given.ply")
 
 
 def text(folder, good) -> None:

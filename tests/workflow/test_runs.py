@@ -11,7 +11,7 @@ import yaml
 from fixtures.runs import TINY, USUAL
 from jsonschema import Draft202012Validator
 
-from dav_gswt import field
+from dav_gswt.field import read_field
 from dav_gswt.files import digest, read_json
 from dav_gswt.images import image_files
 from dav_gswt.photos import model
@@ -57,7 +57,7 @@ def test_fields_lie_on_their_grids(tiny):
     levels = [(tiny.round / f"levels/level{level}.ply", tiny.round / f"levels/level{level}.exr") for level in (0, 1)]
     pairs = [(stage / "field.ply", stage / "ground.exr") for stage in (tiny.coarse, tiny.round)]
     for path, grid_path in pairs + levels:
-        fitted, grid = field.read(path), ground.read(grid_path)
+        fitted, grid = read_field(path), ground.read(grid_path)
         cells = grid.shape[0] * grid.shape[1]
         assert fitted.ground[:cells].all() and not fitted.ground[cells:].any()
         assert (
@@ -87,7 +87,7 @@ def test_doubt_is_a_share(tiny):
             for values in channels.values():
                 seen = values[np.isfinite(values)]
                 assert len(seen) and seen.min() >= 0 and seen.max() <= 1
-    assert 0 <= field.read(tiny.round / "field.ply").uncertainty.min() <= 1
+    assert 0 <= read_field(tiny.round / "field.ply").uncertainty.min() <= 1
 
 
 def test_a_round_may_go_by_what_the_prior_doubts(snakemake, tiny, tmp_path):
@@ -105,11 +105,11 @@ def test_a_round_may_go_by_what_the_prior_doubts(snakemake, tiny, tmp_path):
     assert set(shown) == set(chosen) and all(set(channels) == {"opacity", "w2_sq"} for channels, _ in shown.values())
     later = scores.read(way / "scores.csv")
     assert later.scales == first.scales and not set(later.names) & set(chosen)
-    doubt, level = pose_maps.read(way / "maps.npz")[1], field.read(way / "levels/level0.ply")
-    assert len(doubt) == len(field.read(way / "field.ply"))
+    doubt, level = pose_maps.read(way / "maps.npz")[1], read_field(way / "levels/level0.ply")
+    assert len(doubt) == len(read_field(way / "field.ply"))
     top = level.ground & (level.uncertainty > 0)  # the underlay of a level has none
     assert top.any() and np.isin(level.uncertainty[top], doubt).all()
-    assert not np.array_equal(level.uncertainty, field.read(tiny.round / "levels/level0.ply").uncertainty)
+    assert not np.array_equal(level.uncertainty, read_field(tiny.round / "levels/level0.ply").uncertainty)
 
 
 def test_a_budget_ends_inside_a_round_and_later_rounds_hand_the_field_on(snakemake, tiny, tmp_path):
@@ -152,7 +152,7 @@ def test_levels_leave_as_patches_for_other_viewers(tiny, snakemake, tmp_path):
     snakemake(folder, "--cores", "2", str(plys), configs=CONFIGS)
     bundle = read_json(tiny.bundle / "davgswt.json")
     for level in range(len(bundle["levels"])):
-        patch = field.read(folder / plys / f"level{level}.ply")
+        patch = read_field(folder / plys / f"level{level}.ply")
         assert len(patch) == sum(tile["chunks"][level]["count"] for tile in bundle["tiles"])
         assert np.ptp(patch.means[:, 0]) == pytest.approx(4 * bundle["tile_side"], rel=0.2)
 
@@ -255,7 +255,7 @@ def test_a_field_is_completed_beside_its_round_and_levels_go_on_from_it(tiny, sn
     made = tiny.round.relative_to(tiny.folder) / "completed_terrain"
     snakemake(folder, "--cores", "2", made / "metrics.json", made / "levels", configs=CONFIGS)
     facts, found = read_json(folder / made / "completion.json"), read_json(folder / made / "metrics.json")
-    before, after = (field.read(path / "field.ply") for path in (tiny.round, folder / made))
+    before, after = (read_field(path / "field.ply") for path in (tiny.round, folder / made))
     assert facts["painted"] <= facts["unseen"] < facts["cells"] and facts["changed"] == bool(after.imagined.any())
     assert facts["changed"] or digest(tiny.round / "field.ply") == digest(folder / made / "field.ply")
     assert digest(tiny.round / "ground.exr") == digest(folder / made / "ground.exr")
@@ -265,7 +265,7 @@ def test_a_field_is_completed_beside_its_round_and_levels_go_on_from_it(tiny, sn
         and (after.uncertainty[after.imagined] == 1).all()
     )
     assert found["gaussians"]["imagined"] == after.imagined.sum() and found["all"]["before"]["psnr"] > 10
-    level = field.read(folder / made / "levels/level0.ply")
+    level = read_field(folder / made / "levels/level0.ply")
     assert len(level) and level.imagined.any() <= after.imagined.any()
 
 

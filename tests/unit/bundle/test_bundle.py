@@ -12,7 +12,7 @@ import pytest
 
 from dav_gswt.bundle import build, gswt, lod, manifest, store
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.terrain import assemble, still
 from dav_gswt.tiles.build import TileSet
 
@@ -22,12 +22,12 @@ SIDE = 2.0
 
 def made_up(n, sigma, seed):
     rng = np.random.default_rng(seed)
-    return Field(
+    return GaussianField(
         (rng.random((n, 3)) * [SIDE, SIDE, 0.2]).astype(np.float32),
         np.log(sigma * rng.uniform(0.5, 1.5, (n, 3))).astype(np.float32),
         rng.normal(size=(n, 4)).astype(np.float32),
         rng.normal(size=n).astype(np.float32),
-        sh_of(rng.random((n, 3)).astype(np.float32)),
+        rgb_to_sh(rng.random((n, 3)).astype(np.float32)),
         np.zeros(n, np.float32),
         np.ones(n, bool),
     )

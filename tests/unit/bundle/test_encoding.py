@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from dav_gswt.bundle.encoding import SIZES, STEEPEST, Encoding, Errors, smallest_turns
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, rgb_to_sh
 
 SIDE, PIXEL = 2.0, 1e-3
 
@@ -18,12 +18,12 @@ def field_of(means, deviations, quats=None, opacities=0.5, colours=0.5):
     opacities = np.broadcast_to(np.asarray(opacities, float), n)
     with np.errstate(divide="ignore"):
         logits = np.clip(np.log(opacities) - np.log1p(-opacities), -1e3, 1e3)
-    return Field(
+    return GaussianField(
         np.float32(means),
         np.log(np.float32(deviations)),
         np.float32(np.tile([1, 0, 0, 0], (n, 1)) if quats is None else quats),
         logits.astype(np.float32),
-        sh_of(np.broadcast_to(np.float32(colours), (n, 3))),
+        rgb_to_sh(np.broadcast_to(np.float32(colours), (n, 3))),
         np.zeros(n, np.float32),
         np.zeros(n, bool),
     )

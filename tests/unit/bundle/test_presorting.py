@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from dav_gswt.bundle import direction_search, order_directions, orders
 from dav_gswt.bundle.orders import Rings
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, rgb_to_sh
 
 SIDE = 2.0
 
@@ -20,12 +20,12 @@ def ground(seed, stones=300, colours=1.0):
     n = len(means)
     sizes = np.full((n, 3), 0.08)
     sizes[: len(flat), 2] = 0.002
-    return Field(
+    return GaussianField(
         means.astype(np.float32),
         np.log(sizes).astype(np.float32),
         np.tile(np.float32([1, 0, 0, 0]), (n, 1)),
         np.full(n, 2.0, np.float32),
-        sh_of((0.5 + colours * (rng.random((n, 3)) - 0.5)).astype(np.float32)),
+        rgb_to_sh((0.5 + colours * (rng.random((n, 3)) - 0.5)).astype(np.float32)),
         np.zeros(n, np.float32),
         np.zeros(n, bool),
     )

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from fixtures import ground as made
 
-from dav_gswt import field as fields
 from dav_gswt.capture import directions, drop_folder, handheld, shot_list_map, shot_list_page
 from dav_gswt.capture.site import Site
 from dav_gswt.capture.store import Store
 from dav_gswt.errors import InputError
+from dav_gswt.field import write_field
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.poses import of_camera
 from dav_gswt.images import image_files
@@ -37,7 +37,7 @@ def asked():
 @pytest.fixture
 def listed(site, asked, tmp_path):
     """The page's folder and its text."""
-    fields.write(made.field(), tmp_path / "field.ply")
+    write_field(made.field(), tmp_path / "field.ply")
     with pytest.raises(InputError):
         handheld.take(site, asked, tmp_path / "field.ply")
     folder = site.store.folder / "shot-list"

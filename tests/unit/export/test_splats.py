@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from fixtures.splats import rough_ground
 
-from dav_gswt import field
 from dav_gswt.bundle import gswt
 from dav_gswt.errors import InputError
 from dav_gswt.export import splats
+from dav_gswt.field import read_field
 
 SIDE = 2.0
 
@@ -45,7 +45,7 @@ def test_patches_are_plys_of_every_level_in_the_bundle_s_unit(fields, tmp_path):
     gswt.write(fields, SIDE, tmp_path / "gswt.zip")
     splats.write_plys(tmp_path / "gswt.zip", SIDE, tmp_path / "ply")
     assert sorted(p.name for p in (tmp_path / "ply").iterdir()) == ["level0.ply", "level1.ply"]
-    read, patch = field.read(tmp_path / "ply/level1.ply"), splats.patch(fields[1], SIDE)
+    read, patch = read_field(tmp_path / "ply/level1.ply"), splats.patch(fields[1], SIDE)
     np.testing.assert_allclose(read.means, patch.means, atol=1e-5)
     np.testing.assert_allclose(read.log_scales, patch.log_scales, atol=1e-5)
 

@@ -8,8 +8,7 @@ import pytest
 import torch
 from fixtures import ground as patch
 
-from dav_gswt import field as fields
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.geometry import cameras, poses
 from dav_gswt.inpainting import build, evaluation, occluders, paint, unseen, viewpoints
 from dav_gswt.prior import conditions
@@ -82,8 +81,8 @@ def off_paint(colours):
     return np.abs(colours[..., None, :] - PAINTS).max(-1).min(-1)
 
 
-def same(one: Field, two: Field) -> bool:
-    return all(np.array_equal(getattr(one, f.name), getattr(two, f.name)) for f in members(Field))
+def same(one: GaussianField, two: GaussianField) -> bool:
+    return all(np.array_equal(getattr(one, f.name), getattr(two, f.name)) for f in members(GaussianField))
 
 
 def test_unseen_ground_takes_the_priors_colour_and_all_else_keeps_its_bytes():
@@ -172,12 +171,12 @@ def test_a_cell_is_unseen_where_neither_the_grid_nor_the_fit_knows_it():
 def test_what_a_known_thing_covers_is_not_painted():
     field, grid = half_seen()
     lid = blob([2.7, 0.6, 0.3], [0.35, 0.35, 0.02], [0.1, 0.9, 0.1])
-    made = completed(fields.joined([field, lid]), grid)
+    made = completed(concatenate_fields([field, lid]), grid)
     covered = np.hypot(grid.centres[:, 0] - 2.7, grid.centres[:, 1] - 0.6) < 0.2
     assert covered.any() and not made.field.imagined[: grid.heights.size][covered].any()
     assert not made.painted.ravel()[covered].any() and made.unseen.ravel()[covered].all()
     assert same(made.field[len(field) : len(field) + 1], lid)
-    roof = fields.joined([field, blob([2.6, 1.6, 0.3], [2.0, 3.0, 0.02], [0.1, 0.9, 0.1])])
+    roof = concatenate_fields([field, blob([2.6, 1.6, 0.3], [2.0, 3.0, 0.02], [0.1, 0.9, 0.1])])
     hidden = completed(roof, grid)
     assert hidden.field is roof and hidden.unseen.any() and not hidden.facts(grid)["changed"]
 
@@ -210,12 +209,12 @@ def test_the_projects_own_prior_paints_the_same_bytes_on_any_number_of_threads(t
 
 
 def blob(place, sizes, colour):
-    return Field(
+    return GaussianField(
         np.float32([place]),
         np.log(np.float32([sizes])),
         np.float32([[1, 0, 0, 0]]),
         np.full(1, 6.0, np.float32),
-        sh_of(np.array([colour], float)),
+        rgb_to_sh(np.array([colour], float)),
         np.zeros(1, np.float32),
         np.zeros(1, bool),
     )
@@ -240,7 +239,7 @@ EYES = [1.6, 1.0, 4.2], [3.6, 1.6, 3.7], [1.6, 4.0, 3.5]
 def test_a_thing_stands_where_two_views_agree_that_it_does(count, stands):
     bare = patch.field()
     bare = replace(bare, imagined=bare.ground.copy())
-    there = fields.joined([bare, blob([1.7, 1.5, 0.5], [0.2, 0.2, 0.2], [0.1, 0.9, 0.1])])
+    there = concatenate_fields([bare, blob([1.7, 1.5, 0.5], [0.2, 0.2, 0.2], [0.1, 0.9, 0.1])])
     pool = seen_by(*EYES[:count])
     (condition, _), (_, made) = told(bare, pool), told(there, pool)
     new = occluders.things(bare, patch.grid(), pool, condition, made, patch.FRAME["flying_height"])
@@ -257,7 +256,7 @@ def test_no_thing_stands_where_views_contradict_each_other_or_the_ground_is_know
     pool = seen_by(*EYES[:2])
     condition, flat = told(marked, pool)
     thing = blob([1.7, 1.5, 0.5], [0.2, 0.2, 0.2], [0.1, 0.9, 0.1])
-    _, made = told(fields.joined([marked, thing]), pool)
+    _, made = told(concatenate_fields([marked, thing]), pool)
     half = made.inverse_depth.copy()
     half[1] = flat.inverse_depth[1]
     alone = replace(made, inverse_depth=half)
@@ -285,7 +284,7 @@ def test_no_camera_stands_inside_of_something_or_under_the_ground():
     free = viewpoints.cameras(viewpoints.ASIDE, target, patch.field(), patch.grid(), patch.FRAME, 32)
     tower = blob(list(free[2][1].centre), [0.4, 0.4, 0.4], [0.5, 0.5, 0.5])
     left = viewpoints.cameras(
-        viewpoints.ASIDE, target, fields.joined([patch.field(), tower]), patch.grid(), patch.FRAME, 32
+        viewpoints.ASIDE, target, concatenate_fields([patch.field(), tower]), patch.grid(), patch.FRAME, 32
     )
     assert len(free) == 4 and [pose for pose, _ in left] == [pose for i, (pose, _) in enumerate(free) if i != 2]
 
@@ -307,7 +306,7 @@ def test_it_is_measured_before_and_after_everywhere_and_where_it_was_painted():
 
 
 def test_the_maps_of_a_prior_leave_what_was_imagined_in_full_doubt():
-    field = fields.joined([patch.field()[:4], blob(MIDDLE, [0.1] * 3, [0.5] * 3)])
+    field = concatenate_fields([patch.field()[:4], blob(MIDDLE, [0.1] * 3, [0.5] * 3)])
     marked = np.array([False, True, False, False, True])
     field = replace(field, imagined=marked, uncertainty=np.float32([0.1, 1, 0.1, 0.1, 1]))
     told = pose_maps.doubted(field, np.float32([0.3, 0.3, 0.4, 0.5]))

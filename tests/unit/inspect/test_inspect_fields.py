@@ -5,9 +5,8 @@ import pytest
 from fixtures import tile_sets
 from scipy.spatial.transform import Rotation
 
-from dav_gswt import field as fields
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh, write_field
 from dav_gswt.inspect import fields as seen
 from dav_gswt.inspect import scene
 from dav_gswt.inspect.options import Asked
@@ -15,12 +14,12 @@ from dav_gswt.inspect.options import Asked
 
 def one(sigma, ground=False, turn=None, opacity=4.0, uncertainty=0.0):
     turn = Rotation.identity() if turn is None else turn
-    return Field(
+    return GaussianField(
         np.float32([[1.0, 2.0, 3.0]]),
         np.log(np.float32([sigma])),
         np.roll(turn.as_quat(), 1)[None].astype(np.float32),
         np.float32([opacity]),
-        sh_of(np.array([[0.2, 0.4, 0.6]])),
+        rgb_to_sh(np.array([[0.2, 0.4, 0.6]])),
         np.float32([uncertainty]),
         np.array([ground]),
     )
@@ -52,14 +51,16 @@ def test_a_disc_is_a_hexagon_of_its_ellipses_area_across_its_least_axis():
 
 
 def test_faint_gaussians_are_left_out_and_large_fields_are_thinned_evenly():
-    many = fields.joined([one([0.1] * 3, opacity=-9.0)] + [one([0.1] * 3, uncertainty=i / 100) for i in range(100)])
+    many = concatenate_fields(
+        [one([0.1] * 3, opacity=-9.0)] + [one([0.1] * 3, uncertainty=i / 100) for i in range(100)]
+    )
     assert len(seen.thinned(many, 1000)) == 100
     np.testing.assert_allclose(seen.thinned(many, 4).uncertainty, [0, 0.33, 0.66, 0.99], atol=1e-6)
 
 
 def test_a_field_is_coloured_by_what_is_asked(tmp_path):
     path = tmp_path / "level2_of.ply"
-    fields.write(one([0.1] * 3, uncertainty=1.0), path)
+    write_field(one([0.1] * 3, uncertainty=1.0), path)
     shown = {by: seen.show(path, Asked(colour=by)).layers[0].colours[0] for by in seen.NAMES}
     np.testing.assert_array_equal(shown["colour"], [51, 102, 153])
     np.testing.assert_array_equal(shown["uncertainty"], scene.coloured(np.ones(1), scene.Bar("", 0.0, 1.0))[0])
@@ -69,13 +70,13 @@ def test_a_field_is_coloured_by_what_is_asked(tmp_path):
 
 
 def test_a_field_whose_name_tells_no_level_has_none(tmp_path):
-    fields.write(one([0.1] * 3), tmp_path / "field.ply")
+    write_field(one([0.1] * 3), tmp_path / "field.ply")
     with pytest.raises(InputError, match="no level by its name"):
         seen.show(tmp_path / "field.ply", Asked(colour="level"))
 
 
 def test_a_field_of_nothing_opaque_is_said(tmp_path):
-    fields.write(one([0.1] * 3, opacity=-9.0), tmp_path / "field.ply")
+    write_field(one([0.1] * 3, opacity=-9.0), tmp_path / "field.ply")
     with pytest.raises(InputError, match="nothing is to be seen"):
         seen.show(tmp_path / "field.ply", Asked())
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from fixtures import ground as made
 
-from dav_gswt import field as field_module
 from dav_gswt.errors import InputError
+from dav_gswt.field import mean_scale, write_field
 from dav_gswt.geometry import cameras
 from dav_gswt.lod import build, merge, store
 from dav_gswt.raster import render
@@ -44,7 +44,7 @@ def test_levels_are_fitted_while_the_exemplar_has_room():
     widths = [g.cells for g in made_levels.grids]
     assert widths == [grid.cells >> number for number in range(len(widths))] and len(widths) > 1
     assert widths[-1] < 2 * build.ROOM and made_levels.wanted == build.AUTO
-    scales = [field_module.mean_scale([f]) for f in made_levels.fields]
+    scales = [mean_scale([f]) for f in made_levels.fields]
     assert scales == sorted(scales) and "tiles make it" in made_levels.stopped
     two = build.fitted(field, grid, 2, 3, seed=0)
     assert len(two.fields) == 2 and two.wanted == 2
@@ -65,7 +65,7 @@ def test_levels_that_were_written_read_back(levels, tmp_path):
     assert back.wanted == build.AUTO and back.stopped == "why" and len(back.fields) == 2
     np.testing.assert_array_equal(back.fields[1].means, fields[1].means)
     assert back.grids[1].spacing == grids[1].spacing
-    field_module.write(fields[0], tmp_path / "levels/level1.ply")
+    write_field(fields[0], tmp_path / "levels/level1.ply")
     with pytest.raises(InputError, match="levels.json tells of"):
         store.read(tmp_path / "levels")
 

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dav_gswt.field import Field, joined, sh_of
+from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.lod import merge
 from dav_gswt.reconstruction import discs, ground
 
@@ -19,17 +19,17 @@ def scene():
     x, y, _ = grid.centres.T
     grid = replace(grid, heights=(0.1 * x).reshape(grid.shape), seen=np.ones(grid.shape, bool))
     colours = np.stack([x / 10, y / 10, 0 * x + 0.5], 1)
-    return joined([discs.ground_discs(grid, colours), things(3)]), grid
+    return concatenate_fields([discs.ground_discs(grid, colours), things(3)]), grid
 
 
 def things(n, seed=0):
     rng = np.random.default_rng(seed)
-    return Field(
+    return GaussianField(
         rng.uniform(0.5, 2.5, (n, 3)).astype(np.float32),
         np.log(rng.uniform(0.02, 0.06, (n, 3))).astype(np.float32),
         rng.normal(size=(n, 4)).astype(np.float32),
         rng.normal(size=n).astype(np.float32),
-        sh_of(rng.uniform(0, 1, (n, 3))),
+        rgb_to_sh(rng.uniform(0, 1, (n, 3))),
         rng.uniform(0, 1, n).astype(np.float32),
         np.zeros(n, bool),
     )

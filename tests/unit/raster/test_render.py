@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 from fixtures.raster_scenes import CAMERAS, gaussians
 
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.geometry import cameras
 from dav_gswt.raster import backends, harmonics, render
 
 
-def field(n: int = 100, degree: int = 0) -> Field:
+def field(n: int = 100, degree: int = 0) -> GaussianField:
     arrays = gaussians(n)
     sh = np.concatenate(
         [
-            sh_of(arrays["colours"]),
+            rgb_to_sh(arrays["colours"]),
             0.2 * gaussians(n, channels=3 * ((degree + 1) ** 2 - 1))["colours"].reshape(n, -1, 3),
         ],
         axis=1,
     )
     names = ("means", "log_scales", "quats", "opacity_logits")
-    return Field(*(arrays[k] for k in names), sh.astype(np.float32), np.zeros(n, np.float32), np.zeros(n, bool))
+    return GaussianField(*(arrays[k] for k in names), sh.astype(np.float32), np.zeros(n, np.float32), np.zeros(n, bool))
 
 
 @pytest.mark.parametrize("view", CAMERAS)

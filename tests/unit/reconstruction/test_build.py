@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from fixtures import ground as made
 
-from dav_gswt.field import sh_of
+from dav_gswt.field import rgb_to_sh
 from dav_gswt.geometry import cameras
 from dav_gswt.photos import training_views
 from dav_gswt.raster import render
@@ -118,5 +118,5 @@ def test_a_scene_without_a_ground_is_fitted_as_free_gaussians():
     quality = replace(QUALITY, cap=2000, steps=150)
     found = build.fit(frame, photos, points, np.full((400, 3), 0.5, np.float32), quality, np.random.default_rng(0))
     assert not found.field.ground.any()
-    grey = replace(truth, sh=sh_of(np.full((400, 3), 0.5)))
+    grey = replace(truth, sh=rgb_to_sh(np.full((400, 3), 0.5)))
     assert evaluate(found.field, photos)["psnr"] > evaluate(grey, photos)["psnr"] + 1

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.reconstruction import external_field
 from dav_gswt.reconstruction.build import Quality
 
@@ -19,12 +19,12 @@ def test_the_surface_under_a_finished_field_is_found_and_what_lies_beyond_is_cut
     rng = np.random.default_rng(0)
     xy = rng.uniform(-1, 5, (30_000, 2))
     n = len(xy)
-    field = Field(
+    field = GaussianField(
         np.column_stack([xy, 0.3 + 0.1 * xy[:, 0]]).astype(np.float32),
         np.full((n, 3), np.log(0.05), np.float32),
         np.tile(np.array([1, 0, 0, 0], np.float32), (n, 1)),
         np.full(n, 3.0, np.float32),
-        sh_of(np.full((n, 3), 0.5)),
+        rgb_to_sh(np.full((n, 3), 0.5)),
         np.zeros(n, np.float32),
         np.ones(n, bool),  # as if it came from a ground layer of ours
     )

@@ -1,7 +1,7 @@
 import numpy as np
 from fixtures import ground as made
 
-from dav_gswt.field import joined
+from dav_gswt.field import concatenate_fields
 from dav_gswt.reconstruction.discs import quaternions
 from dav_gswt.reconstruction.fitting import state
 from dav_gswt.reconstruction.ground_constraints import OnGround
@@ -11,7 +11,7 @@ from dav_gswt.reconstruction.objects import blobs
 def start(points):
     grid = made.grid()
     things = blobs(np.asarray(points, float).reshape(-1, 3), np.full((len(points), 3), 0.5), np.full(len(points), 0.1))
-    return grid, OnGround(grid, np.full(grid.shape, 0.5)), state.of(joined([made.field(), things]))
+    return grid, OnGround(grid, np.full(grid.shape, 0.5)), state.of(concatenate_fields([made.field(), things]))
 
 
 def test_discs_keep_to_their_cells_and_turn_with_the_surface():

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from fixtures import ground as made
 
-from dav_gswt import field as fields
-from dav_gswt.field import sh_of
+from dav_gswt.field import read_field, rgb_to_sh, write_field
 from dav_gswt.reconstruction import build, ground, regression_guard
 from dav_gswt.reconstruction.fitting.plan import AUTO, STEPS_PER_NEW_PHOTO, Report
 from dav_gswt.reconstruction.fitting.trainer import Fitted
@@ -98,11 +97,11 @@ def test_the_same_seed_gives_the_same_field_and_report(monkeypatch):
 
 
 def test_without_new_photos_field_and_ground_go_on_to_the_byte(tmp_path):
-    fields.write(refined(grained(3)[:2], grained(3)[2:]).field, tmp_path / "a.ply")
+    write_field(refined(grained(3)[:2], grained(3)[2:]).field, tmp_path / "a.ply")
     ground.write(made.grid(), tmp_path / "a.exr")
-    last = fields.read(tmp_path / "a.ply"), ground.read(tmp_path / "a.exr")
+    last = read_field(tmp_path / "a.ply"), ground.read(tmp_path / "a.exr")
     found = build.refine(*last, SYNTHETIC, grained(2), [], QUALITY, np.random.default_rng(0))
-    fields.write(found.field, tmp_path / "b.ply")
+    write_field(found.field, tmp_path / "b.ply")
     ground.write(found.grid, tmp_path / "b.exr")
     for kind in ("ply", "exr"):
         assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
@@ -114,7 +113,7 @@ def spoilt(amount):
     """The made-up field with a noise in its colours."""
     field = made.field()
     noise = np.random.default_rng(1).normal(0, amount, (len(field), 3))
-    return replace(field, sh=sh_of(field.base_colours + noise))
+    return replace(field, sh=rgb_to_sh(field.base_colours + noise))
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from fixtures import ground as made
 
-from dav_gswt.field import joined
+from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry import cameras
 from dav_gswt.photos import training_views
 from dav_gswt.raster import render
@@ -27,7 +27,7 @@ def low(count=4, size=64, thing=True):
     """Photos of the made-up ground from low down, under the made-up sky, with a dark thing that stands against it."""
     field = made.field()
     if thing:
-        field = joined([field, blobs(THING, np.full((1, 3), 0.05), np.full(1, 0.08), logit=5.0)])
+        field = concatenate_fields([field, blobs(THING, np.full((1, 3), 0.05), np.full(1, 0.08), logit=5.0)])
     found = []
     for i in range(count):
         angle = 2 * np.pi * i / count + 0.3
@@ -84,7 +84,7 @@ def test_photos_from_above_and_broken_skies_have_none():
 def test_what_the_photos_show_to_be_sky_is_not_modelled(known):
     photos = low(thing=False)
     masked = sky.behind(photos, over(photos)) if known else over(photos)
-    start = joined([made.field(), blobs(THING, np.full((1, 3), 0.05), np.full(1, 0.08), logit=1.0)])
+    start = concatenate_fields([made.field(), blobs(THING, np.full((1, 3), 0.05), np.full(1, 0.08), logit=1.0)])
     grid = made.grid()
     rules = OnGround(grid, np.full(grid.shape, 0.8))
     fitted = trainer.fit(start, masked, Plan(100, 1), rules, np.random.default_rng(0)).field

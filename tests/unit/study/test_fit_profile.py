@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from fixtures import ground as made
 
-from dav_gswt.field import joined
+from dav_gswt.field import concatenate_fields
 from dav_gswt.files import write_json
 from dav_gswt.images import image_files
 from dav_gswt.photos import model as models
@@ -62,8 +62,8 @@ def test_haze_is_counted_and_what_stands_low_is_not():
     photos = photo_set(made.photos(1))
     low = blobs(np.array([[1.6, 1.6, 0.3]]), np.full((1, 3), 0.5), np.full(1, 0.3))
     high = blobs(np.array([[1.6, 1.6, 2.0]]), np.full((1, 3), 0.5), np.full(1, 0.3))
-    assert fit_profile.free_space_opacity(joined([made.field(), low]), made.grid(), photos) == 0
-    assert fit_profile.free_space_opacity(joined([made.field(), high]), made.grid(), photos) > 0.01
+    assert fit_profile.free_space_opacity(concatenate_fields([made.field(), low]), made.grid(), photos) == 0
+    assert fit_profile.free_space_opacity(concatenate_fields([made.field(), high]), made.grid(), photos) > 0.01
 
 
 def test_stills_are_pictures_of_the_exemplar():

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.terrain.drape import axes, draped, lifted
 from dav_gswt.terrain.heights import Flat, Hills
 
@@ -33,12 +33,12 @@ class Slope:
 
 def made(n, seed=0, spread=5.0, scales=(0.02, 0.4)):
     rng = np.random.default_rng(seed)
-    return Field(
+    return GaussianField(
         rng.uniform(-spread, spread, (n, 3)).astype(np.float32),
         np.log(rng.uniform(*scales, (n, 3))).astype(np.float32),
         rng.normal(size=(n, 4)).astype(np.float32),
         rng.normal(size=n).astype(np.float32),
-        sh_of(rng.uniform(size=(n, 3))),
+        rgb_to_sh(rng.uniform(size=(n, 3))),
         np.zeros(n, np.float32),
         np.zeros(n, bool),
     )

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.geometry import cameras
 from dav_gswt.raster import render
 from dav_gswt.terrain import splats
@@ -18,8 +18,8 @@ def made(n, seed=0, coefficients=1):
     """Gaussians 4 to 9 units away in all of the picture and beyond its rim."""
     rng = np.random.default_rng(seed)
     means = np.stack([rng.uniform(4, 9, n), rng.uniform(-4, 5, n), rng.uniform(-5, 3, n)], 1)
-    sh = np.concatenate([sh_of(rng.uniform(size=(n, 3))), rng.normal(0, 0.2, (n, coefficients - 1, 3))], 1)
-    return Field(
+    sh = np.concatenate([rgb_to_sh(rng.uniform(size=(n, 3))), rng.normal(0, 0.2, (n, coefficients - 1, 3))], 1)
+    return GaussianField(
         means.astype(np.float32),
         np.log(rng.uniform(0.01, 0.4, (n, 3))).astype(np.float32),
         rng.normal(size=(n, 4)).astype(np.float32),
@@ -78,7 +78,7 @@ def test_the_last_of_two_covers_the_first():
     one = made(2)
     ends = np.array([[5, 1, -1.5], [7, 1.4, -2.1]], np.float32)  # on one ray, the nearer first
     pair = replace(one, means=ends, log_scales=np.full((2, 3), -0.5, np.float32))
-    pair = replace(pair, opacity_logits=np.full(2, 9, np.float32), sh=sh_of(np.array([[1.0, 0, 0], [0, 1.0, 0]])))
+    pair = replace(pair, opacity_logits=np.full(2, 9, np.float32), sh=rgb_to_sh(np.array([[1.0, 0, 0], [0, 1.0, 0]])))
     pixel = CAMERA.project(ends[:1].astype(float))[0][0].astype(int)
     red, green = (
         splats.blended(splats.projected(part, level(part), CAMERA, 0.01), CAMERA).colour[pixel[1], pixel[0]]

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.bundle import orders
-from dav_gswt.field import joined
+from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry import cameras
 from dav_gswt.reconstruction import discs, ground
 from dav_gswt.terrain import assemble, order, still
@@ -37,7 +37,7 @@ def tile_of(number, spacing, stones=0):
     means = some.means + [0, 0, 0.25] * rng.uniform(0.2, 1, (stones, 1))
     colours = rng.normal(0, 0.8, some.sh.shape).astype(np.float32)
     scales = np.full((stones, 3), np.log(0.12), np.float32)
-    return joined([flat, replace(some, means=means.astype(np.float32), sh=colours, log_scales=scales)])
+    return concatenate_fields([flat, replace(some, means=means.astype(np.float32), sh=colours, log_scales=scales)])
 
 
 def terrain_of(tiles, switches=(20.0, np.inf), bands=(2.0, 0.0), **more):

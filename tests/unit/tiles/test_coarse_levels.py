@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fixtures.tile_sets import splats
 
-from dav_gswt.field import joined
+from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry import cameras
 from dav_gswt.raster import Rasterizer
 from dav_gswt.reconstruction import discs, underlay
@@ -26,7 +26,7 @@ def tile():
     layer = discs.ground_discs(grid, rng.uniform(0.2, 0.8, (CELLS**2, 3)))
     layer = replace(layer, uncertainty=rng.random(CELLS**2).astype(np.float32))
     things = splats(rng.random((200, 3)) * CELLS * SPACING, rng.random((200, 3)), [0.02, 0.02, 0.05], False)
-    whole = joined([layer, underlay.beneath(grid, layer), things])
+    whole = concatenate_fields([layer, underlay.beneath(grid, layer), things])
     return whole[rng.permutation(len(whole))]
 
 

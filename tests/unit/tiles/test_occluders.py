@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.tiles import cuts, energy, occluders
 from dav_gswt.tiles.layout import Exemplar
 
@@ -19,12 +19,12 @@ def a_field(*rows):
     """Gaussians of (x, y, z, standard deviation, opacity), round; the first one is ground."""
     x, y, z, size, opacity = np.array([GROUND, *rows], float).T
     n = len(x)
-    return Field(
+    return GaussianField(
         np.stack([x, y, z], 1).astype(np.float32),
         np.repeat(np.log(size)[:, None], 3, 1).astype(np.float32),
         np.tile(np.array([1, 0, 0, 0], np.float32), (n, 1)),
         np.log(opacity / (1 - opacity)).astype(np.float32),
-        sh_of(np.full((n, 3), 0.5)),
+        rgb_to_sh(np.full((n, 3), 0.5)),
         np.zeros(n, np.float32),
         np.arange(n) == 0,
     )

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from fixtures import ground as patch
 
-from dav_gswt import field
 from dav_gswt.errors import InputError
+from dav_gswt.field import write_field
 from dav_gswt.files import write_json
 from dav_gswt.images import image_files
 from dav_gswt.photos.training_views import View
@@ -27,7 +27,7 @@ def pool():
 def files(tmp_path):
     """A field that is darker than its photos, and more so in the last of them."""
     true = patch.field()
-    field.write(replace(true, sh=true.sh - np.float32(0.1)), tmp_path / "field.ply")
+    write_field(replace(true, sh=true.sh - np.float32(0.1)), tmp_path / "field.ply")
     ground.write(patch.grid(), tmp_path / "ground.exr")
     write_json(tmp_path / "ground.json", patch.FRAME | {"kind": "synthetic"})
     views = []

@@ -1,5 +1,6 @@
-"""A 3D Gaussian field: arrays in the form that training optimises and the 3DGS PLY stores."""
+"""`GaussianField`, the arrays of a 3D Gaussian splat, and the standard 3DGS PLY that stores them."""
 
+import re
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -12,17 +13,20 @@ from dav_gswt.errors import InputError
 from dav_gswt.files import whole
 
 SH0 = 0.28209479177387814  # the constant real spherical harmonic, 1 / (2 sqrt(pi))
+HEADER_BYTES = 1 << 16  # a header is no longer than this
 
 
 @dataclass(frozen=True)
-class Field:
-    """n Gaussians in the world frame: z up, the unit of length is the scene's.
+class GaussianField:
+    """n Gaussians in the world frame: z up, in the scene's unit of length.
 
-    log_scales: natural logarithm of the standard deviations along the axes of `quats` (w x y z, any length but 0).
-    opacity_logits: peak opacity is expit of it. sh: colour coefficients, degree 0 first:
-    colour = 0.5 + SH0 sh[:, 0] + ...
-    uncertainty: 0 (sure) to 1 (nothing is known). ground: the Gaussian is a disc of the ground layer. imagined: a prior
-    painted it, no photo saw it; left out: none.
+    log_scales: natural logarithms of the standard deviations along the axes of `quats`.
+    quats: rotations as quaternions w x y z, of any length but 0.
+    opacity_logits: peak opacity = expit(logit).
+    sh: colour coefficients, degree 0 first: colour = 0.5 + SH0 sh[:, 0] + ...
+    uncertainty: from 0 (certain) to 1 (unobserved).
+    ground: whether the Gaussian is a disc of the ground layer.
+    imagined: whether a prior made the Gaussian, where no photo sees it; by default none.
     """
 
     means: Float32[Array, "n 3"]
@@ -32,7 +36,7 @@ class Field:
     sh: Float32[Array, "n k 3"]
     uncertainty: Float32[Array, "n"]
     ground: Bool[Array, "n"]
-    imagined: Bool[Array, "n"] = None
+    imagined: Bool[Array, "n"] = None  # pyright: ignore[reportAssignmentType]  # __post_init__ fills it in
 
     def __post_init__(self):
         if self.imagined is None:
@@ -41,12 +45,12 @@ class Field:
     def __len__(self) -> int:
         return len(self.means)
 
-    def __getitem__(self, index) -> "Field":
-        """The Gaussians that a mask, slice or index array names."""
-        return Field(*(getattr(self, f.name)[index] for f in fields(self)))
+    def __getitem__(self, index: slice | Array) -> "GaussianField":
+        """The Gaussians that a mask, a slice or an index array selects."""
+        return GaussianField(*(getattr(self, f.name)[index] for f in fields(self)))
 
     @property
-    def degree(self) -> int:
+    def sh_degree(self) -> int:
         """Degree of the spherical harmonics."""
         return int(np.sqrt(self.sh.shape[1])) - 1
 
@@ -56,18 +60,18 @@ class Field:
         return 0.5 + np.float32(SH0) * self.sh[:, 0]
 
 
-def joined(parts: list[Field]) -> Field:
+def concatenate_fields(parts: list[GaussianField]) -> GaussianField:
     """One field of all parts, in their order."""
-    return Field(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Field)))
+    return GaussianField(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(GaussianField)))
 
 
-def mean_scale(fields: list[Field]) -> float:
-    """Mean standard deviation over all axes of all splats: how the GSWT renderer measures a level."""
-    return float(np.mean(np.concatenate([np.exp(f.log_scales.astype(float)).mean(1) for f in fields])))
+def mean_scale(parts: list[GaussianField]) -> float:
+    """Mean standard deviation over all axes of all Gaussians: how the GSWT renderer measures a level."""
+    return float(np.mean(np.concatenate([np.exp(p.log_scales.astype(float)).mean(1) for p in parts])))
 
 
-def sh_of(colours: Float[Array, "n 3"]) -> Float32[Array, "n 1 3"]:
-    """Degree-0 coefficients of a colour that is the same from all sides."""
+def rgb_to_sh(colours: Float[Array, "n 3"]) -> Float32[Array, "n 1 3"]:
+    """Degree-0 coefficients of colours that do not depend on the view."""
     return ((colours - 0.5) / SH0).astype(np.float32)[:, None]
 
 
@@ -83,9 +87,11 @@ def _columns(k: int) -> dict[str, list[str]]:
     }
 
 
-def write(field: Field, path: Path | str) -> None:
-    """Write a standard 3DGS PLY; `uncertainty` and `ground` follow as two more properties, which viewers ignore, and
-    `imagined` as a third where there is such a Gaussian."""
+def write_field(field: GaussianField, path: Path | str) -> None:
+    """Write a standard 3DGS PLY, with `uncertainty` and `ground` as two more properties, which viewers ignore.
+
+    `imagined` is a third one, written only if it is set anywhere.
+    """
     n, k = field.sh.shape[:2]
     names = _columns(k)
     order = ["means", "normals", "dc", "rest", "opacity_logits", "log_scales", "quats"]
@@ -112,11 +118,11 @@ def write(field: Field, path: Path | str) -> None:
         PlyData([PlyElement.describe(rows, "vertex")], byte_order="<").write(str(part))
 
 
-def read(path: Path | str) -> Field:
-    """Read a 3DGS PLY: ours, or anybody's (then nothing is uncertain, imagined, or known to be ground).
+def read_field(path: Path | str) -> GaussianField:
+    """Read a 3DGS PLY. In files of other programs `uncertainty`, `ground` and `imagined` are 0.
 
-    Raises: InputError: not a PLY, a property is missing, a value is not finite, or `imagined` is neither 0 nor 1 (with
-    its index).
+    Raises: InputError: the file is not a PLY, a property is missing, a value is not finite, or `imagined` is neither
+    0 nor 1; with the index of the first such Gaussian.
     """
     path = Path(path)
     rows = _vertices(path)
@@ -130,11 +136,11 @@ def read(path: Path | str) -> Field:
         raise InputError(f"{path}: Gaussian {zero[0]} has a zero quaternion; remove it and try again")
     n = len(rows)
     shs = np.concatenate([columns["dc"][:, None], columns["rest"].reshape(n, 3, k - 1).transpose(0, 2, 1)], 1)
-    own = ("uncertainty", "ground", "imagined")
-    extra = {name: rows[name] if name in rows.dtype.names else np.zeros(n) for name in own}
+    ours = ("uncertainty", "ground", "imagined")
+    extra = {name: rows[name] if name in rows.dtype.names else np.zeros(n) for name in ours}
     if len(bad := np.flatnonzero((extra["imagined"] != 0) & (extra["imagined"] != 1))):
         raise InputError(f"{path}: imagined of Gaussian {bad[0]} is neither 0 nor 1; write the field again")
-    return Field(
+    return GaussianField(
         columns["means"],
         columns["log_scales"],
         quats,
@@ -147,23 +153,29 @@ def read(path: Path | str) -> Field:
 
 
 def _vertices(path: Path) -> Array:
-    """The vertex table, memory-mapped where it is binary: a header's false count is found before any allocation."""
+    """The vertex table. plyfile allocates what the header says, so its counts are checked against the file first."""
     try:
-        with path.open("rb") as file:
-            header = PlyData._parse_header(file)
-            room = path.stat().st_size - file.tell()
-        if "vertex" not in header or not len(header["vertex"].properties):
+        _check_counts(path)
+        vertices = PlyData.read(str(path))
+        if "vertex" not in vertices or not vertices["vertex"].properties:
             raise InputError(f"{path}: no vertices; a 3DGS .ply has an element 'vertex'")
-        least = sum(e.count * max(1, len(e.properties)) for e in header.elements)
-        if least > room:
-            raise InputError(f"{path}: the header promises more than the file holds ({room} bytes); is it cut short?")
-        return PlyData.read(str(path))["vertex"].data
-    except InputError:
-        raise
+        return vertices["vertex"].data
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file") from None
     except (PlyParseError, ValueError, KeyError, UnicodeDecodeError, OSError) as error:
         raise InputError(f"{path}: not a readable PLY ({error}); export or copy it again") from error
+
+
+def _check_counts(path: Path) -> None:
+    """Raises: InputError: the header announces more values than the file has bytes."""
+    with path.open("rb") as file:
+        header, end, _ = file.read(HEADER_BYTES).partition(b"end_header")
+    room = path.stat().st_size - len(header) - len(end)
+    announced = 0
+    for count, properties in re.findall(rb"element\s+\S+\s+(\d+)((?:(?!element\s)[\s\S])*)", header):
+        announced += int(count) * max(1, properties.count(b"property"))
+    if announced > room:
+        raise InputError(f"{path}: the header announces more than the file holds ({room} bytes); is it cut short?")
 
 
 def _stack(rows: Array, names: list[str], path: Path) -> Float32[Array, "n m"]:

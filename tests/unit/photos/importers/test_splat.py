@@ -5,9 +5,8 @@ import pytest
 from fixtures import photos as made_up
 from scipy.spatial.transform import Rotation
 
-from dav_gswt import field as fields
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField, write_field
 from dav_gswt.photos import photo_set
 from dav_gswt.photos.importers import splat
 
@@ -18,7 +17,7 @@ def ground_field(rng, n=6000, degree=0):
     means[: n // 10, 2] += rng.uniform(0, 0.2, n // 10)
     means[-20:] = rng.normal(0, 40, (20, 3))
     scales = np.tile(np.log([0.02, 0.02, 0.002]), (n, 1))
-    return Field(
+    return GaussianField(
         means.astype(np.float32),
         scales.astype(np.float32),
         np.tile(np.float32([1, 0, 0, 0]), (n, 1)),
@@ -94,7 +93,9 @@ def test_covariances_turn_and_grow_with_the_field(rng):
 
 def test_quaternions_of_any_length_mean_the_same(rng):
     field = ground_field(rng, n=400)
-    long = Field(field.means, field.log_scales, field.quats * np.float32(1e30), *(field[:].__dict__[k] for k in REST))
+    long = GaussianField(
+        field.means, field.log_scales, field.quats * np.float32(1e30), *(field[:].__dict__[k] for k in REST)
+    )
     one, two = (splat.enter(f, np.random.default_rng(0), (0, 0, 1))[0] for f in (field, long))
     assert np.array_equal(one.quats, two.quats)
 
@@ -122,19 +123,19 @@ def test_up_that_is_no_direction_is_refused(rng, up):
 
 def test_a_field_without_a_surface_is_refused_by_file_name(rng, tmp_path):
     haze = ground_field(rng, n=200)
-    haze = Field(
+    haze = GaussianField(
         *(getattr(haze, k) for k in ("means", "log_scales", "quats")),
         haze.opacity_logits - 8,
         *(getattr(haze, k) for k in ("sh", "uncertainty", "ground")),
     )
-    fields.write(haze, tmp_path / "haze.ply")
+    write_field(haze, tmp_path / "haze.ply")
     with pytest.raises(InputError, match="haze.ply.*opaque"):
         photo_set.from_field(tmp_path / "haze.ply", tmp_path / "out.ply", tmp_path / "ground.json")
     assert not (tmp_path / "out.ply").exists() and not (tmp_path / "ground.json").exists()
 
 
 def test_the_same_file_gives_the_same_bytes(rng, tmp_path):
-    fields.write(ground_field(rng), tmp_path / "in.ply")
+    write_field(ground_field(rng), tmp_path / "in.ply")
     for name in ("a", "b"):
         photo_set.from_field(tmp_path / "in.ply", tmp_path / f"{name}.ply", tmp_path / f"{name}.json", (0, 0, 1))
     assert (tmp_path / "a.ply").read_bytes() == (tmp_path / "b.ply").read_bytes()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.prior import conditions
@@ -60,12 +60,12 @@ def test_truth_shows_ground_and_the_fit_resembles_it(made):
 
 def test_depth_and_colour_of_a_disc_straight_below():
     """A wide opaque disc of one colour 3.5 below the camera, flying height 7: inverse depth 2."""
-    disc = Field(
+    disc = GaussianField(
         np.zeros((1, 3), np.float32),
         np.log([[50, 50, 0.01]]).astype(np.float32),
         np.float32([[1, 0, 0, 0]]),
         np.float32([8.0]),
-        sh_of(np.array([[0.2, 0.4, 0.6]])),
+        rgb_to_sh(np.array([[0.2, 0.4, 0.6]])),
         np.zeros(1, np.float32),
         np.ones(1, bool),
     )

@@ -5,7 +5,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.prior.training import worlds, worlds_ground, worlds_light, worlds_objects
 from dav_gswt.raster import render
@@ -13,8 +13,8 @@ from dav_gswt.raster import render
 FAMILIES = ("desert", "flowers", "grass", "planet", "meadow")
 
 
-def same(a: Field, b: Field) -> bool:
-    return all(getattr(a, f.name).tobytes() == getattr(b, f.name).tobytes() for f in fields(Field))
+def same(a: GaussianField, b: GaussianField) -> bool:
+    return all(getattr(a, f.name).tobytes() == getattr(b, f.name).tobytes() for f in fields(GaussianField))
 
 
 def test_a_seed_makes_one_world_and_another_seed_another():
@@ -27,7 +27,7 @@ def test_a_seed_makes_one_world_and_another_seed_another():
 def test_a_world_can_be_drawn_and_fills_a_photo_from_above(seed):
     made = worlds.world(seed)
     assert 40_000 < len(made.field) < 250_000
-    assert all(np.isfinite(getattr(made.field, f.name)).all() for f in fields(Field))
+    assert all(np.isfinite(getattr(made.field, f.name)).all() for f in fields(GaussianField))
     assert made.field.base_colours.min() >= -1e-6 and made.field.base_colours.max() <= 1 + 1e-6
     seen = render(made.field, camera_layouts.orbit(90, 0, worlds.FLYING_HEIGHT, (0, 0, 0), 64, 64, 55))
     assert seen.alpha.min() > 0.95

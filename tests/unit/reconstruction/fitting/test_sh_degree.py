@@ -24,7 +24,7 @@ def test_a_lower_degree_shows_what_the_photos_see_on_average():
     plain = full.copy()
     plain.bend_to(0)
     folded = sh_degree.reduced(full, 0, cameras)
-    assert folded.degree == 0 and full.degree == 1
+    assert folded.sh_degree == 0 and full.sh_degree == 1
 
     def apart(now):
         pictures = [[render(state.field_of(s, 0), c).colour for s in (now, full)] for c in cameras]
@@ -43,8 +43,8 @@ def test_one_camera_sees_no_difference_at_all():
 @pytest.mark.parametrize("gain, degree", [(0.01, 0), (1.0, 1)])
 def test_the_least_degree_that_loses_little_is_chosen_and_told(gain, degree):
     full, report = directed(0.2), Report()
-    found = sh_degree.least(full, [made.photos(1)[0].camera], lambda now: 30 + gain * now.degree, report)
-    assert found.degree == degree
+    found = sh_degree.least(full, [made.photos(1)[0].camera], lambda now: 30 + gain * now.sh_degree, report)
+    assert found.sh_degree == degree
     assert report.choices == [
         {"what": "degree", "value": degree, "why": f"degree 1 is worth {gain:+.3f} dB on held-out pixels"}
     ]

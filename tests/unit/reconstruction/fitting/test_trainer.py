@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from fixtures import ground as made
 
-from dav_gswt.field import joined, sh_of
+from dav_gswt.field import concatenate_fields, rgb_to_sh
 from dav_gswt.reconstruction import top_view
 from dav_gswt.reconstruction.evaluation import evaluate
 from dav_gswt.reconstruction.fitting import snapshot, trainer
@@ -14,12 +14,12 @@ from dav_gswt.reconstruction.objects import blobs
 
 
 def grey(field):
-    return replace(field, sh=sh_of(np.full((len(field), 3), 0.5)))
+    return replace(field, sh=rgb_to_sh(np.full((len(field), 3), 0.5)))
 
 
 def blotched(field):
     noise = np.random.default_rng(3).normal(0, 0.15, (len(field), 3))
-    return replace(field, sh=sh_of(field.base_colours + noise))
+    return replace(field, sh=rgb_to_sh(field.base_colours + noise))
 
 
 def fitted(field=None, plan=None, seed=0, photos=None, keep=None):
@@ -63,7 +63,7 @@ def test_the_same_seed_gives_the_same_bits_whatever_the_threads(monkeypatch):
 
 def test_things_above_the_ceiling_go_and_the_rest_stays():
     points = np.array([[1.6, 1.6, 3.0], [1.6, 1.6, 0.2]])
-    field = joined([made.field(), blobs(points, np.full((2, 3), 0.5), np.full(2, 0.05))])
+    field = concatenate_fields([made.field(), blobs(points, np.full((2, 3), 0.5), np.full(2, 0.05))])
     found = fitted(field, Plan(12, 1)).field
     assert len(found) == len(field) - 1
     assert found.means[-1, 2] == pytest.approx(0.2, abs=0.1)
@@ -141,7 +141,7 @@ def test_without_a_number_a_field_grows_where_errors_are_visible_and_not_where_n
 
 def test_what_hardly_shows_in_any_photo_goes_before_the_end():
     points = np.array([[1.6, 1.6, 0.1], [1.4, 1.4, 0.1]])
-    field = joined([made.field(), blobs(points, np.full((2, 3), 0.5), np.full(2, 0.05), logit=0.0)])
+    field = concatenate_fields([made.field(), blobs(points, np.full((2, 3), 0.5), np.full(2, 0.05), logit=0.0)])
     field.opacity_logits[-1] = -3.7  # an opacity of .024, above that with which a Gaussian stays
     found = fitted(field, Plan(10, len(field) + 1)).field.means[len(made.field()) :]
     firm, faint = (np.linalg.norm(found - point, axis=1).min(initial=9.0) for point in points)

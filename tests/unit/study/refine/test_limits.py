@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.study.refine import limits
 from dav_gswt.tiles.layout import CENTRE, W
 
@@ -20,12 +20,12 @@ def labels(margin=6):
 
 def discs(places, sigma):
     n = len(places)
-    return Field(
+    return GaussianField(
         np.column_stack([places, np.zeros(n)]).astype(np.float32),
         np.log(np.float32(sigma)) * np.ones((n, 3), np.float32),
         np.tile(np.float32([1, 0, 0, 0]), (n, 1)),
         np.zeros(n, np.float32),
-        sh_of(np.full((n, 3), 0.5)),
+        rgb_to_sh(np.full((n, 3), 0.5)),
         np.zeros(n, np.float32),
         np.ones(n, bool),
     )

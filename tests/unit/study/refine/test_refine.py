@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from dav_gswt.field import SH0, Field, joined
+from dav_gswt.field import SH0, GaussianField, concatenate_fields
 from dav_gswt.prior.interface import Condition, Imagined
 from dav_gswt.prior.networks import Network
 from dav_gswt.prior.terrain import Terrain
@@ -30,7 +30,7 @@ def ground(n, spacing, colour, west=0.0, south=0.0):
     quats = np.tile(np.float32([1, 0, 0, 0]), (k, 1))
     sh = ((colour.reshape(-1, 1, 3) - 0.5) / SH0).astype(np.float32)
     unsure, is_ground = np.zeros(k, np.float32), np.ones(k, bool)
-    return Field(means.astype(np.float32), scales, quats, np.full(k, 4, np.float32), sh, unsure, is_ground)
+    return GaussianField(means.astype(np.float32), scales, quats, np.full(k, 4, np.float32), sh, unsure, is_ground)
 
 
 def labels():
@@ -74,8 +74,8 @@ def mended():
     return refined(truth)
 
 
-def same(one: Field, two: Field) -> bool:
-    return all(getattr(one, f.name).tobytes() == getattr(two, f.name).tobytes() for f in members(Field))
+def same(one: GaussianField, two: GaussianField) -> bool:
+    return all(getattr(one, f.name).tobytes() == getattr(two, f.name).tobytes() for f in members(GaussianField))
 
 
 def test_where_nothing_is_repaired_every_level_keeps_its_bytes():
@@ -237,6 +237,6 @@ def test_neighbours_are_what_a_tile_is_seen_among(monkeypatch):
     tiles = tile_set()
     build._tile(tiles, 0, UNCUT, FEW, look, 32)
     bright = replace(tiles.fields[0][0], sh=tiles.fields[0][0].sh + 1)
-    monkeypatch.setattr(build.looking, "assembly", lambda *_: joined([bright]))
+    monkeypatch.setattr(build.looking, "assembly", lambda *_: concatenate_fields([bright]))
     build._tile(tiles, 0, UNCUT, FEW, look, 32)
     assert np.abs(seen[0] - seen[1]).max() > 0.05

@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dav_gswt import config, field
+from dav_gswt import config
 from dav_gswt.bundle import chunks
 from dav_gswt.bundle.encoding import Encoding
 from dav_gswt.errors import InputError
+from dav_gswt.field import write_field
 from dav_gswt.files import write_json
 from dav_gswt.images import image_files
 from dav_gswt.study.stability import extremes, running, tables
@@ -81,10 +82,10 @@ def test_a_number_that_is_not_finite_is_found_in_a_table(tmp_path, bad):
 
 def test_a_number_that_is_not_finite_is_found_in_a_field(tmp_path):
     given, path = ground(3, 1.0), tmp_path / "a.ply"
-    field.write(given, path)
+    write_field(given, path)
     assert running.finite(path)
     given.means[4, 1] = np.nan
-    field.write(given, path)
+    write_field(given, path)
     assert not running.finite(path)
 
 

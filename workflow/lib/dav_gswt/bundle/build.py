@@ -11,7 +11,7 @@ from dav_gswt.bundle import chunks, direction_search, gswt, lod, manifest, order
 from dav_gswt.bundle.direction_search import Measured
 from dav_gswt.bundle.encoding import Encoding, Errors
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field, mean_scale
+from dav_gswt.field import GaussianField, mean_scale
 from dav_gswt.files import write_json
 from dav_gswt.logs import progress
 from dav_gswt.tiles.build import TileSet
@@ -134,7 +134,7 @@ def _told(climbed: Measured, options: Options) -> dict:
     return rings | {"wanted_db": options.decibels} | {f"{view}_db": v for view, v in climbed.decibels.items()}
 
 
-def heights_of(field: Field) -> tuple[float, float]:
+def heights_of(field: GaussianField) -> tuple[float, float]:
     """Lowest and highest z of the splats, three of their largest standard deviations around the centres included."""
     if not len(field):
         raise InputError("a tile has no splat; the field has a hole as wide as a tile")
@@ -142,7 +142,7 @@ def heights_of(field: Field) -> tuple[float, float]:
     return float((z - reach).min()), float((z + reach).max())
 
 
-def _mean_colour(fields: list[Field]) -> list[float]:
+def _mean_colour(fields: list[GaussianField]) -> list[float]:
     """What the terrain looks like from very far: the mean ground colour (of all splats where none is
     ground).
     """

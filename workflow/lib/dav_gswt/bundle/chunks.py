@@ -10,7 +10,7 @@ from numpy import ndarray as Array
 from dav_gswt.bundle.encoding import RECORD, Encoding
 from dav_gswt.bundle.orders import index_type
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 
 
 def size_of(count: int, orders: int) -> int:
@@ -25,7 +25,7 @@ def write(rows: Array, order: Integer[Array, "d n"], path: Path) -> dict:
     return {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest(), "count": len(rows)}
 
 
-def read(folder: Path | str, entry: dict, encoding: Encoding) -> tuple[Field, Integer[Array, "d n"]]:
+def read(folder: Path | str, entry: dict, encoding: Encoding) -> tuple[GaussianField, Integer[Array, "d n"]]:
     """Splats (as they were rounded, nothing known of ground or doubt) and orders of one manifest entry.
 
     Raises: InputError: the file lies outside of the folder, is missing, has another size (looked at before anything

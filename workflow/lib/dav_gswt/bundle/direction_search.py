@@ -9,7 +9,7 @@ from dav_gswt.bundle import order_directions
 from dav_gswt.bundle.chunks import size_of
 from dav_gswt.bundle.order_directions import Sight
 from dav_gswt.bundle.orders import Rings
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.logs import progress
 from dav_gswt.tiles.build import TileSet
 
@@ -30,7 +30,7 @@ class Measured:
     decibels: dict[str, float | None]
 
 
-def climbed(fields: list[Field], side: float, wanted: float, most: int = MOST) -> Measured:
+def climbed(fields: list[GaussianField], side: float, wanted: float, most: int = MOST) -> Measured:
     """The fewest directions with which no sight is below `wanted` decibels, or as many as `most` allow.
 
     Begins with a ring of FEWEST azimuths 20 degrees down, as walkers look at the ground around. Where the worst sight
@@ -55,7 +55,9 @@ def climbed(fields: list[Field], side: float, wanted: float, most: int = MOST) -
         elevations, kept = more
 
 
-def by_elevation(fields: list[Field], side: float, elevations: tuple[float, ...], kept: int) -> dict[str, float | None]:
+def by_elevation(
+    fields: list[GaussianField], side: float, elevations: tuple[float, ...], kept: int
+) -> dict[str, float | None]:
     """The PSNR half-way between azimuths, at the elevations looked at."""
     return {
         view: in_between(fields, side, elevations, kept, down) for view, down in order_directions.ELEVATIONS.items()
@@ -87,7 +89,12 @@ def rows(tiles: TileSet, wanted: float) -> list[dict]:
 
 
 def in_between(
-    fields: list[Field], side: float, elevations: tuple[float, ...], kept: int, down: float, halfway: bool = True
+    fields: list[GaussianField],
+    side: float,
+    elevations: tuple[float, ...],
+    kept: int,
+    down: float,
+    halfway: bool = True,
 ) -> float | None:
     """PSNR over sights at one elevation, drawn in the order of the nearest direction against their own.
 
@@ -101,7 +108,7 @@ def in_between(
     return order_directions.decibels(pairs)
 
 
-def in_two_orders(field: Field, side: float, sight: Sight, along) -> tuple:
+def in_two_orders(field: GaussianField, side: float, sight: Sight, along) -> tuple:
     """A sight in the order of the nearest of some directions, and in its own."""
     direction, pixel = sight.direction, order_directions.nearest_pixel(side)
     best = along[int(np.argmax(along @ direction))]

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import expit
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, rgb_to_sh
 
 RECORD = np.dtype([("position", "<u2", 3), ("scale", "u1", 3), ("turn", "u1", 3), ("rgba", "u1", 4)])
 assert RECORD.itemsize == 16
@@ -40,7 +40,7 @@ class Encoding:
     log_scale: list[float]
 
     @classmethod
-    def of(cls, parts: list[Field], side: float, pixel: float) -> "Encoding":
+    def of(cls, parts: list[GaussianField], side: float, pixel: float) -> "Encoding":
         """The finest grid that holds all these Gaussians; pixel: the width of one on the nearest ground in sight.
 
         Raises: InputError: they spread over so many tile sides that a side has less than LEAST steps.
@@ -60,7 +60,7 @@ class Encoding:
         ladder = [least, float(sizes.max() - least) / SIZES]
         return cls([west, west, float(low[2])], [step, step, rise], ladder)
 
-    def encoded(self, field: Field) -> Array:
+    def encoded(self, field: GaussianField) -> Array:
         """The records of a field; what lies outside of the grid goes to its rim."""
         rows = np.empty(len(field), RECORD)
         step = np.array(self.step)
@@ -75,17 +75,17 @@ class Encoding:
         rows["rgba"] = np.rint(255 * np.clip(rgba, 0, 1))
         return rows
 
-    def decoded(self, rows: Array) -> Field:
+    def decoded(self, rows: Array) -> GaussianField:
         """The Gaussians of records, as the page sees them; nothing is known of ground or doubt."""
         turn = (rows["turn"].astype(float) - TURNS) * (STEEPEST / TURNS)
         whole = np.sqrt(np.maximum(1 - (turn**2).sum(1, keepdims=True), 0))
         opacity = np.clip(rows["rgba"][:, 3] / 255, MIDDLE, 1 - MIDDLE)
-        return Field(
+        return GaussianField(
             (np.array(self.origin) + rows["position"] * np.array(self.step)).astype(np.float32),
             (self.log_scale[0] + self.log_scale[1] * rows["scale"]).astype(np.float32),
             np.concatenate([whole, turn], 1).astype(np.float32),
             (np.log(opacity) - np.log1p(-opacity)).astype(np.float32),
-            sh_of((rows["rgba"][:, :3] / 255).astype(np.float32)),
+            rgb_to_sh((rows["rgba"][:, :3] / 255).astype(np.float32)),
             np.zeros(len(rows), np.float32),
             np.zeros(len(rows), bool),
         )
@@ -143,7 +143,7 @@ class Errors:
     clipped: int = 0
 
     @classmethod
-    def of(cls, encoding: Encoding, field: Field, rows: Array, pixel: float) -> "Errors":
+    def of(cls, encoding: Encoding, field: GaussianField, rows: Array, pixel: float) -> "Errors":
         """Those of a field's records."""
         back, (turn, axes) = encoding.decoded(rows), smallest_turns(field.quats)
         away = float(np.linalg.norm(back.means.astype(float) - field.means, axis=1).max(initial=0.0))

@@ -14,7 +14,7 @@ from numpy import ndarray as Array
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from dav_gswt.bundle import lod
-from dav_gswt.field import Field, joined, mean_scale
+from dav_gswt.field import GaussianField, concatenate_fields, mean_scale
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
@@ -78,16 +78,16 @@ def laid(variant: int) -> Int[Array, "6 6"]:
     return EDGES * variant + 8 * west + 4 * north + 2 * east + south
 
 
-def assembled(fields: list[Field], torus: Int[Array, "6 6"], side: float) -> Field:
+def assembled(fields: list[GaussianField], torus: Int[Array, "6 6"], side: float) -> GaussianField:
     """Tiles side by side; the south-western corner of the sixteen is the origin."""
     parts = []
     for (row, column), tile in np.ndenumerate(torus):
         corner = np.array([(column - 1) * side, (row - 1) * side, 0.0], np.float32)
         parts.append(replace(fields[tile], means=fields[tile].means + corner))
-    return joined(parts)
+    return concatenate_fields(parts)
 
 
-def averaged(field: Field, camera: Camera, factor: int) -> Float32[Array, "h w 3"]:
+def averaged(field: GaussianField, camera: Camera, factor: int) -> Float32[Array, "h w 3"]:
     """A picture drawn `factor` times as large and averaged. What shines through is not the field's: divided out."""
     large = camera.resized(factor * camera.width, factor * camera.height)
     seen = Rasterizer(near=1e-6, antialiased=True).forward(**arrays(field), camera=large)

@@ -13,7 +13,7 @@ from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.files import UNREADABLE
 from dav_gswt.logs import progress
 
@@ -31,7 +31,7 @@ PROPERTIES = [
 ]
 
 
-def rows(field: Field, side: float) -> Float32[Array, "n 62"]:
+def rows(field: GaussianField, side: float) -> Float32[Array, "n 62"]:
     """Splats of a tile `side` wide, scaled to WIDTH; view-dependent colour is left out, quaternions have length 1."""
     scale = WIDTH / side
     out = np.zeros((len(field), len(PROPERTIES)), np.float32)
@@ -52,7 +52,7 @@ def ply(values: Float32[Array, "n 62"]) -> bytes:
     return "\n".join([*lines, "end_header\n"]).encode("ascii") + values.astype("<f4").tobytes()
 
 
-def write(fields: list[list[Field]], side: float, path: Path) -> None:
+def write(fields: list[list[GaussianField]], side: float, path: Path) -> None:
     """Write fields[level][tile] as lod{L}_tile_{T}.ply entries, in a fixed order with a fixed time.
 
     Raises: InputError: a tile has no splat, there are more than the renderer takes, or a value is not finite.
@@ -73,7 +73,7 @@ def write(fields: list[list[Field]], side: float, path: Path) -> None:
             archive.writestr(entry, ply(values), compresslevel=1)
 
 
-def read(path: Path | str, side: float) -> list[list[Field]]:
+def read(path: Path | str, side: float) -> list[list[GaussianField]]:
     """fields[level][tile] of an archive that `write` made, or anybody else, for tiles `side` wide.
 
     What an entry says of its size is compared with its header before it is unpacked, and all of it with the most that
@@ -98,7 +98,7 @@ def read(path: Path | str, side: float) -> list[list[Field]]:
     return [[found[level, tile] for tile in range(len(tiles))] for level in range(len(levels))]
 
 
-def _field(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, side: float, room: int) -> Field:
+def _field(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, side: float, room: int) -> GaussianField:
     """An entry's Gaussians; room: how many are left of MOST."""
     name = f"{archive.filename}: {entry.filename}"
     none = ply(np.zeros((0, len(PROPERTIES)), np.float32))
@@ -118,7 +118,7 @@ def _field(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, side: float, room: 
     if not np.isfinite(values).all():
         raise InputError(f"{name}: a value is not finite; make the bundle again")
     scale = WIDTH / side
-    return Field(
+    return GaussianField(
         (values[:, :3] / scale).astype(np.float32),
         (values[:, 55:58] - np.log(scale)).astype(np.float32),
         values[:, 58:],

@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.bundle import lod, orders
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import Rasterizer
 from dav_gswt.reconstruction.uncertainty import arrays
@@ -46,7 +46,7 @@ def nearest_pixel(side: float) -> float:
 
 
 def drawn(
-    field: Field, side: float, along: Float[Array, "3"], pixel: float, order: Float[Array, "3"] | None = None
+    field: GaussianField, side: float, along: Float[Array, "3"], pixel: float, order: Float[Array, "3"] | None = None
 ) -> Float32[Array, "h w 3"]:
     """The middle of a tile seen along a direction, in the order of another one, pixels `pixel` wide; black behind."""
     middle = np.array([side / 2, side / 2, np.median(field.means[:, 2])])
@@ -61,7 +61,7 @@ def drawn(
     return Rasterizer(near=1e-6).forward(**arrays(moved), camera=camera).colour
 
 
-def _shown(field: Field, middle: Float[Array, "3"], camera: Camera) -> Bool[Array, "n"]:
+def _shown(field: GaussianField, middle: Float[Array, "3"], camera: Camera) -> Bool[Array, "n"]:
     """Which Gaussians reach into the picture, four deviations about their centres."""
     x, y, z = (field.means - middle.astype(np.float32)).T
     a, b, c = field.log_scales.T

@@ -8,7 +8,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.bundle import chunks, manifest
 from dav_gswt.bundle.encoding import Encoding
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.logs import progress
 
 
@@ -23,11 +23,11 @@ class Bundle:
     def encoding(self) -> Encoding:
         return Encoding.of_json(self.manifest["encoding"])
 
-    def chunk(self, tile: int, level: int) -> tuple[Field, Integer[Array, "d n"]]:
+    def chunk(self, tile: int, level: int) -> tuple[GaussianField, Integer[Array, "d n"]]:
         """A tile's Gaussians at a level, and their orders. Raises: InputError: see `chunks.read`."""
         return chunks.read(self.folder, self.manifest["tiles"][tile]["chunks"][level], self.encoding)
 
-    def fields(self) -> list[list[Field]]:
+    def fields(self) -> list[list[GaussianField]]:
         """fields[level][tile] of the whole set."""
         levels, tiles = range(len(self.manifest["levels"])), range(len(self.manifest["tiles"]))
         return [[self.chunk(t, level)[0] for t in tiles] for level in progress(levels, "read levels")]

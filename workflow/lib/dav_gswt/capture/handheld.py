@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt import field as fields
 from dav_gswt.capture import directions, drop_folder, requests, route, shot_list_page
 from dav_gswt.capture.shots import Asked
 from dav_gswt.capture.site import Site
 from dav_gswt.errors import InputError
+from dav_gswt.field import read_field
 from dav_gswt.files import whole_folder
 
 
@@ -42,5 +42,5 @@ def shot_list(site: Site, missing: list[Asked], field: Path | str | None) -> Pat
     )
     folder = site.store.folder / "shot-list"
     with whole_folder(folder) as part:
-        shot_list_page.write(part, errand, stations, fields.read(field) if field else None)
+        shot_list_page.write(part, errand, stations, read_field(field) if field else None)
     return folder / "index.html"

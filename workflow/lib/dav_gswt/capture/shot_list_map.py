@@ -9,7 +9,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.capture import directions
 from dav_gswt.capture.directions import Ruler
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import render
@@ -32,7 +32,7 @@ class Map:
     drawing: str
 
 
-def draw(stations: list[Camera], frame: dict, by: Ruler, field: Field | None) -> Map:
+def draw(stations: list[Camera], frame: dict, by: Ruler, field: GaussianField | None) -> Map:
     """The map of poses in walking order, with the exemplar, a scale, and north where it is known."""
     camera = _over(stations, frame, by)
     blank = np.full((camera.height, camera.width, 3), BLANK, np.float32)

@@ -11,7 +11,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.capture import directions, shot_list_map
 from dav_gswt.capture.directions import Ruler
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import middle
 from dav_gswt.images import image_files
@@ -43,7 +43,7 @@ class Errand:
     length: float
 
 
-def write(folder: Path, errand: Errand, stations: list[Station], field: Field | None) -> None:
+def write(folder: Path, errand: Errand, stations: list[Station], field: GaussianField | None) -> None:
     """index.html, map.png and, where there is a field, the picture expected of every station, into `folder`."""
     by = errand.ruler
     drawn = shot_list_map.draw([station.camera for station in stations], errand.frame, by, field)
@@ -70,7 +70,7 @@ def write(folder: Path, errand: Errand, stations: list[Station], field: Field | 
     (folder / "index.html").write_text(text, encoding="utf-8")
 
 
-def expected(field: Field, camera: Camera) -> Float32[Array, "h w 3"]:
+def expected(field: GaussianField, camera: Camera) -> Float32[Array, "h w 3"]:
     """What the field shows from a camera, over a sky and a ground of its mean colour."""
     scale = LONGER / max(camera.width, camera.height)
     view = camera.resized(max(round(camera.width * scale), 16), max(round(camera.height * scale), 16))
@@ -78,7 +78,7 @@ def expected(field: Field, camera: Camera) -> Float32[Array, "h w 3"]:
     return np.clip(seen.colour + (1 - seen.alpha)[..., None] * _behind(view, field), 0, 1)
 
 
-def _behind(camera: Camera, field: Field) -> Float32[Array, "h w 3"]:
+def _behind(camera: Camera, field: GaussianField) -> Float32[Array, "h w 3"]:
     step = camera.rays()[1]
     rise = (step[..., 2] / np.linalg.norm(step, axis=-1))[..., None]
     sky = HORIZON + (ZENITH - HORIZON) * np.clip(rise, 0, 1) ** 0.5

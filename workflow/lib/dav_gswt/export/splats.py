@@ -12,11 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt import field
 from dav_gswt.bundle import gswt
 from dav_gswt.bundle.fidelity import laid
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field, joined
+from dav_gswt.field import GaussianField, concatenate_fields, write_field
 from dav_gswt.files import whole_folder
 from dav_gswt.logs import progress
 from dav_gswt.tiles.layout import EDGES
@@ -25,14 +24,14 @@ PACKAGE = "@playcanvas/splat-transform@2.7.1"
 ROW = 4  # tiles
 
 
-def patch(fields: list[Field], side: float) -> Field:
+def patch(fields: list[GaussianField], side: float) -> GaussianField:
     """One level's tiles, side by side; the south-western corner is the origin."""
     parts = []
     for variant in range(len(fields) // EDGES):
         for (row, column), tile in np.ndenumerate(laid(variant)[1:-1, 1:-1]):
             corner = np.array([(ROW * variant + column) * side, row * side, 0.0], np.float32)
             parts.append(replace(fields[tile], means=fields[tile].means + corner))
-    return joined(parts)
+    return concatenate_fields(parts)
 
 
 def write_plys(archive: Path | str, side: float, out: Path | str) -> None:
@@ -40,7 +39,7 @@ def write_plys(archive: Path | str, side: float, out: Path | str) -> None:
     fields = gswt.read(archive, side)
     with whole_folder(out) as folder:
         for level, tiles in enumerate(progress(fields, "write patches")):
-            field.write(patch(tiles, side), folder / f"level{level}.ply")
+            write_field(patch(tiles, side), folder / f"level{level}.ply")
 
 
 def convert(plys: Path | str, kind: str, out: Path | str) -> None:

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Float32, Int
 from numpy import ndarray as Array
 from scipy.ndimage import map_coordinates
 
-from dav_gswt.field import Field, joined, sh_of
+from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.inpainting import occluders, unseen, viewpoints
 from dav_gswt.inpainting.paint import LEAST_ALPHA, painted
@@ -29,7 +29,7 @@ INSET = 2.0  # pixels along a picture's border that are not used: the prior know
 class Completed:
     """A field, the cells that no photo saw, and those of them that were painted. things: Gaussians that are new."""
 
-    field: Field
+    field: GaussianField
     unseen: Bool[Array, "rows columns"]
     painted: Bool[Array, "rows columns"]
     things: int
@@ -42,7 +42,7 @@ class Completed:
         return counts | {"things": self.things, "exemplar": inside, "changed": bool(self.field.imagined.any())}
 
 
-def complete(field: Field, grid: Ground, frame: dict, taken: list[View], asked: Asking) -> Completed:
+def complete(field: GaussianField, grid: Ground, frame: dict, taken: list[View], asked: Asking) -> Completed:
     """Paint the ground that no photo saw, one picture from above after the other, each told of those before.
 
     Discs of such ground, and the underlay under them alone, take the painted colours and keep their places: a prior's
@@ -74,35 +74,35 @@ def complete(field: Field, grid: Ground, frame: dict, taken: list[View], asked: 
         return Completed(field, there, done, 0)
     marked = unseen.gaussians(field, grid, done)
     out = _marked(_above_underlay(told, grid, marked), marked)
-    made = joined([out, *_standing(out, grid, frame, known, targets, asked)])
+    made = concatenate_fields([out, *_standing(out, grid, frame, known, targets, asked)])
     _log.info("%d cells painted, %d Gaussians stand on them", done.sum(), len(made) - len(field))
     return Completed(made, there, done, len(made) - len(field))
 
 
-def _ground_colour(field: Field, grid: Ground) -> Float[Array, "3"]:
+def _ground_colour(field: GaussianField, grid: Ground) -> Float[Array, "3"]:
     """Mean colour of the discs that a photo saw, or of all if none did."""
     seen = grid.seen.ravel() if grid.seen.any() else np.ones(grid.heights.size, bool)
     return np.clip(field.base_colours[: seen.size][seen], 0, 1).mean(0, dtype=float)
 
 
 def _coloured(
-    field: Field,
+    field: GaussianField,
     todo: Bool[Array, "rows columns"],
     camera: Camera,
     picture: Float32[Array, "s s 3"],
     good: Bool[Array, "s s"],
-) -> tuple[Field, Bool[Array, "rows columns"]]:
+) -> tuple[GaussianField, Bool[Array, "rows columns"]]:
     """The field with the colours that a picture's good pixels give the discs to do, and the cells that still are."""
     rows, pixels = _in_picture(field, todo, camera, good)
     sh = field.sh.copy()
-    sh[rows], sh[rows, :1] = 0, sh_of(_read_off(picture, pixels))
+    sh[rows], sh[rows, :1] = 0, rgb_to_sh(_read_off(picture, pixels))
     left = todo.ravel().copy()
     left[rows] = False
     return replace(field, sh=sh), left.reshape(todo.shape)
 
 
 def _in_picture(
-    field: Field, todo: Bool[Array, "rows columns"], camera: Camera, good: Bool[Array, "s s"]
+    field: GaussianField, todo: Bool[Array, "rows columns"], camera: Camera, good: Bool[Array, "s s"]
 ) -> tuple[Int[Array, "n"], Float[Array, "n 2"]]:
     """The discs of cells that a good pixel shows, and where in the picture they are."""
     rows = np.flatnonzero(todo)
@@ -119,18 +119,18 @@ def _read_off(picture: Float32[Array, "s s 3"], pixels: Float[Array, "n 2"]) -> 
     return np.stack([map_coordinates(picture[..., c], at, order=1, mode="nearest") for c in range(3)], 1).astype(float)
 
 
-def _above_underlay(field: Field, grid: Ground, marked: Bool[Array, "n"]) -> Field:
+def _above_underlay(field: GaussianField, grid: Ground, marked: Bool[Array, "n"]) -> GaussianField:
     """The field with the colours of the marked discs on what of its underlay is marked."""
     rows, n = underlay.rows(field, grid), grid.heights.size
     if rows.stop == rows.start:
         return field
     colours = underlay.places(grid, field.means[:n, 2], field.base_colours[:n])[2]
     under, sh = np.flatnonzero(marked[rows]), field.sh.copy()
-    sh[rows.start + under, :1] = sh_of(colours[under])
+    sh[rows.start + under, :1] = rgb_to_sh(colours[under])
     return replace(field, sh=sh)
 
 
-def _marked(field: Field, marked: Bool[Array, "n"]) -> Field:
+def _marked(field: GaussianField, marked: Bool[Array, "n"]) -> GaussianField:
     return replace(
         field,
         uncertainty=np.where(marked, np.float32(1), field.uncertainty),
@@ -139,8 +139,8 @@ def _marked(field: Field, marked: Bool[Array, "n"]) -> Field:
 
 
 def _standing(
-    field: Field, grid: Ground, frame: dict, known: Taken, targets: list[Float[Array, "3"]], asked: Asking
-) -> list[Field]:
+    field: GaussianField, grid: Ground, frame: dict, known: Taken, targets: list[Float[Array, "3"]], asked: Asking
+) -> list[GaussianField]:
     """What stands on the painted ground about each target."""
     found, size = [], asked.model.size
     for target in progress(targets, "look at it from aside"):

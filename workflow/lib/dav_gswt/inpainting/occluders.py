@@ -6,7 +6,7 @@ from numpy import ndarray as Array
 from scipy.ndimage import median_filter
 from scipy.spatial import cKDTree
 
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.inpainting import unseen
 from dav_gswt.inpainting.paint import Painted
@@ -23,8 +23,8 @@ APART = 1.5  # their distance, in deviations of one
 
 
 def things(
-    field: Field, grid: Ground, pool: Candidates, condition: Condition, made: Painted, flying_height: float
-) -> Field:
+    field: GaussianField, grid: Ground, pool: Candidates, condition: Condition, made: Painted, flying_height: float
+) -> GaussianField:
     """Gaussians, one a pixel, of what at least two views agree to stand over imagined ground; often none.
 
     A prior's depth bends over a whole picture, so only what rises above its surroundings counts: the difference from
@@ -66,7 +66,9 @@ def _agreed(points: Float[Array, "n 3"], views: Array, near: float) -> Bool[Arra
     return found
 
 
-def _gaussians(points: Float[Array, "n 3"], colours: Float[Array, "n 3"], sizes: Float[Array, "n"], k: int) -> Field:
+def _gaussians(
+    points: Float[Array, "n 3"], colours: Float[Array, "n 3"], sizes: Float[Array, "n"], k: int
+) -> GaussianField:
     """Round Gaussians, of those nearer than APART one."""
     if len(points):
         cell = np.floor(points / (APART * sizes.mean())).astype(int)
@@ -74,8 +76,8 @@ def _gaussians(points: Float[Array, "n 3"], colours: Float[Array, "n 3"], sizes:
         points, colours, sizes = points[first], colours[first], sizes[first]
     n = len(points)
     sh = np.zeros((n, k, 3), np.float32)
-    sh[:, :1] = sh_of(colours)
-    return Field(
+    sh[:, :1] = rgb_to_sh(colours)
+    return GaussianField(
         points.astype(np.float32),
         np.log(np.repeat(sizes[:, None], 3, 1)).astype(np.float32),
         np.tile(np.float32([1, 0, 0, 0]), (n, 1)),

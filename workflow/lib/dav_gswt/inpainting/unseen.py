@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import Rasterizer
 from dav_gswt.reconstruction import underlay
@@ -16,7 +16,7 @@ TOUCHES = 0.1  # of a pixel's blend weight that, if it is of certain Gaussians, 
 LOOKS = 0.5  # of a pixel's blend weight that must be of certain Gaussians for the pixel to look at them
 
 
-def cells(field: Field, grid: Ground) -> Bool[Array, "rows columns"]:
+def cells(field: GaussianField, grid: Ground) -> Bool[Array, "rows columns"]:
     """The cells that no photo saw: not `seen` when the ground was coloured, and in doubt since.
 
     The grid alone would say too much: it calls a cell unseen where something stood in front before the fit, and the
@@ -28,7 +28,7 @@ def cells(field: Field, grid: Ground) -> Bool[Array, "rows columns"]:
     return ~grid.seen & (field.uncertainty[:n] > UNKNOWN).reshape(grid.shape)
 
 
-def gaussians(field: Field, grid: Ground, there: Bool[Array, "rows columns"]) -> Bool[Array, "n"]:
+def gaussians(field: GaussianField, grid: Ground, there: Bool[Array, "rows columns"]) -> Bool[Array, "n"]:
     """The discs of some cells, and of the underlay what lies under such cells alone."""
     marked = np.zeros(len(field), bool)
     marked[: there.size] = there.ravel()
@@ -40,12 +40,12 @@ def gaussians(field: Field, grid: Ground, there: Bool[Array, "rows columns"]) ->
     return marked
 
 
-def share(field: Field, marked: Bool[Array, "n"], camera: Camera) -> Float32[Array, "h w"]:
+def share(field: GaussianField, marked: Bool[Array, "n"], camera: Camera) -> Float32[Array, "h w"]:
     """Of every pixel's blend weight, what marked Gaussians have of it; 0 where nothing is."""
     seen = Rasterizer().forward(**arrays(field, marked.astype(np.float32)[:, None]), camera=camera)
     return np.clip(seen.colour[..., 0], 0, 1)
 
 
-def looking(field: Field, marked: Bool[Array, "n"], camera: Camera) -> Bool[Array, "h w"]:
+def looking(field: GaussianField, marked: Bool[Array, "n"], camera: Camera) -> Bool[Array, "h w"]:
     """The pixels that look at marked Gaussians."""
     return share(field, marked, camera) > LOOKS

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry.poses import of_camera
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.photos.synthetic.camera_layouts import Place
@@ -31,7 +31,7 @@ def blocks(grid: Ground, there: Bool[Array, "rows columns"], flying_height: floa
 
 
 def cameras(
-    places: list[Place], target: Float[Array, "3"], field: Field, grid: Ground, frame: dict, size: int
+    places: list[Place], target: Float[Array, "3"], field: GaussianField, grid: Ground, frame: dict, size: int
 ) -> Candidates:
     """The cameras at places (radius in flying heights) about a target; those that would stand inside of something, or
     under the ground, are left out."""

@@ -10,9 +10,8 @@ from numpy import ndarray as Array
 from scipy.spatial.transform import Rotation
 from scipy.special import expit
 
-from dav_gswt import field as fields
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField, read_field
 from dav_gswt.inspect.options import Asked
 from dav_gswt.inspect.scene import DOUBT, Bar, Keys, Layer, Scene, bytes_of, coloured, copies, moved
 from dav_gswt.lod import store
@@ -33,7 +32,7 @@ NAMES = ("colour", "uncertainty", "level")
 
 def show(path: Path, asked: Asked) -> Scene:
     """A field of a .ply file."""
-    found = fields.read(path)
+    found = read_field(path)
     number = re.match(r"(?:level|lod)(\d+)", path.stem)
     if asked.colour == "level" and number is None:
         raise InputError(f"{path}: no level by its name; give levels/ or a folder of tiles to see levels")
@@ -45,7 +44,7 @@ def show_doubted(path: Path, asked: Asked) -> Scene:
     beside = next((f for f in (path.parent / "field.ply", path.parent.parent / "field.ply") if f.is_file()), None)
     if beside is None:
         raise InputError(f"{path}: there is no field.ply beside it; it tells of the Gaussians of one")
-    found, doubt = fields.read(beside), pose_maps.read(path)[1]
+    found, doubt = read_field(beside), pose_maps.read(path)[1]
     if doubt.ndim != 1 or len(doubt) > len(found) or not np.isfinite(doubt).all():
         raise InputError(f"{path}: tells of other Gaussians than those of {beside}; score the poses again")
     asked = replace(asked, colour=asked.colour or "uncertainty")
@@ -59,7 +58,7 @@ def show_levels(path: Path, asked: Asked) -> Scene:
     return of_fields(str(path), [found[i] for i in numbers], numbers, asked)
 
 
-def of_fields(title: str, found: list[Field], numbers: list[int], asked: Asked) -> Scene:
+def of_fields(title: str, found: list[GaussianField], numbers: list[int], asked: Asked) -> Scene:
     """Fields side by side, in their order. numbers: their levels."""
     colour = asked.one_of(NAMES, title)
     layers, lows, highs, counts, east = [], [], [], [], 0.0
@@ -81,7 +80,7 @@ def of_fields(title: str, found: list[Field], numbers: list[int], asked: Asked) 
     return Scene(title, layers, np.min(lows, 0), np.max(highs, 0), about, legend=legend)
 
 
-def thinned(whole: Field, most: int) -> Field:
+def thinned(whole: GaussianField, most: int) -> GaussianField:
     """What is opaque enough to be seen, and of that at most so many, evenly by their order in the file; these are then
     so much larger that they cover as much."""
     seen = whole[expit(whole.opacity_logits) >= FAINT]
@@ -95,7 +94,7 @@ def level_colour(number: int) -> tuple[int, int, int]:
     return LEVELS[number % len(LEVELS)]
 
 
-def colours(some: Field, by: str, level: int = 0) -> UInt8[Array, "n 3"]:
+def colours(some: GaussianField, by: str, level: int = 0) -> UInt8[Array, "n 3"]:
     """A colour a Gaussian. by: one of NAMES."""
     if by == "uncertainty":
         return coloured(some.uncertainty, Bar("", 0.0, 1.0, DOUBT))
@@ -104,14 +103,14 @@ def colours(some: Field, by: str, level: int = 0) -> UInt8[Array, "n 3"]:
     return bytes_of(some.base_colours)
 
 
-def shaded(named: Int[Array, "#n 3"], some: Field) -> UInt8[Array, "n 3"]:
+def shaded(named: Int[Array, "#n 3"], some: GaussianField) -> UInt8[Array, "n 3"]:
     """Colours of names, as bytes, brighter and darker by each Gaussian's own, so that shapes can be seen."""
     grey = np.clip(some.base_colours, 0, 1).mean(1)
     light = 1 + SHADE * (grey - np.median(grey))
     return bytes_of(named / 255 * light[:, None])
 
 
-def solid(some: Field, tint: UInt8[Array, "n 3"]) -> list[Layer]:
+def solid(some: GaussianField, tint: UInt8[Array, "n 3"]) -> list[Layer]:
     """Gaussians at one standard deviation: a hexagon of the ellipse's area for a flat one, else an octahedron of the
     ellipsoid's volume."""
     scales = np.exp(some.log_scales.astype(float))

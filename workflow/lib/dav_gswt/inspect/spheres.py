@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray as Array
 
-from dav_gswt import field as fields
 from dav_gswt.errors import InputError
+from dav_gswt.field import read_field
 from dav_gswt.files import read_json
 from dav_gswt.geometry import poses as places
 from dav_gswt.inspect import beside
@@ -112,7 +112,7 @@ def _field(path: Path, asked: Asked) -> list[Layer]:
     found = path.parent / "field.ply" if beside.round_of(path) is not None else path.parent.parent / "field.ply"
     if not found.is_file():
         return []
-    some = thinned(fields.read(found), asked.most)
+    some = thinned(read_field(found), asked.most)
     return solid(some, colours(some, "colour")) if len(some) else []
 
 

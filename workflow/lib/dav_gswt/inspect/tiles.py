@@ -10,7 +10,7 @@ from dav_gswt.bundle import store as bundles
 from dav_gswt.bundle.fidelity import laid
 from dav_gswt.errors import InputError
 from dav_gswt.export.splats import ROW
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.inspect import beside
 from dav_gswt.inspect.fields import LEVELS, NAMES, colours, level_colour, shaded, solid, thinned
 from dav_gswt.inspect.options import Asked
@@ -54,7 +54,7 @@ def _check(found: TileSet, seams: Path) -> None:
         raise InputError(f"{seams}: its tiles are {found.side} wide and their maps are not; cut them again")
 
 
-def of_tiles(title: str, found: list[list[Field]], side: float, cut: TileSet | None, asked: Asked) -> Scene:
+def of_tiles(title: str, found: list[list[GaussianField]], side: float, cut: TileSet | None, asked: Asked) -> Scene:
     """All tiles of a level, or at `level` all levels in a row, the finest in the west. cut: where seams run."""
     by = asked.one_of((*NAMES, "patch") if cut else NAMES, title)
     numbers = asked.levels_of(len(found), Path(title))
@@ -90,7 +90,7 @@ def placed(count: int, step: float) -> list[tuple[int, Float[Array, "3"]]]:
     ]
 
 
-def _drawn(some: Field, by: str, level: int, tile: int, cut: TileSet | None) -> list[Layer]:
+def _drawn(some: GaussianField, by: str, level: int, tile: int, cut: TileSet | None) -> list[Layer]:
     if not len(some):
         return []
     if by != "patch":
@@ -98,7 +98,7 @@ def _drawn(some: Field, by: str, level: int, tile: int, cut: TileSet | None) -> 
     return solid(some, shaded(np.array(PATCHES)[patch_of(some, cut, tile)], some))
 
 
-def patch_of(some: Field, cut: TileSet, tile: int) -> Integer[Array, "n"]:
+def patch_of(some: GaussianField, cut: TileSet, tile: int) -> Integer[Array, "n"]:
     """The label of the cell that each Gaussian lies over; of the nearest one, beyond the tile."""
     last = cut.labels.shape[1] - 1
     column, row = np.clip(some.means[:, :2] / cut.spacing, 0, last).astype(int).T
@@ -130,7 +130,7 @@ def _ribbons(starts: Float[Array, "n 3"], shape: Float[Array, "4 2"], spacing: f
     return points
 
 
-def heights(some: Field, cells: int, spacing: float) -> Float[Array, "cells cells"]:
+def heights(some: GaussianField, cells: int, spacing: float) -> Float[Array, "cells cells"]:
     """The ground's height over a tile's finest cells: the highest disc's, of the nearest cell where there is none."""
     from scipy.ndimage import distance_transform_edt
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from dav_gswt import raster
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field, mean_scale
+from dav_gswt.field import GaussianField, mean_scale
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
@@ -43,7 +43,7 @@ class Levels:
     """A field's levels with their grids, finest first. wanted: how many its tiles are to have, a number or AUTO.
     stopped: why none coarser than these was fitted."""
 
-    fields: list[Field]
+    fields: list[GaussianField]
     grids: list[Ground]
     wanted: int | str
     stopped: str
@@ -58,7 +58,7 @@ class Still(OnGround):
 
 
 def fitted(
-    field: Field, grid: Ground, asked: int | str, steps: int, seed: int, keep: Path | str | None = None
+    field: GaussianField, grid: Ground, asked: int | str, steps: int, seed: int, keep: Path | str | None = None
 ) -> Levels:
     """The field and as many coarser levels as are asked for and as its exemplar has room for.
 
@@ -87,7 +87,7 @@ def fitted(
     return Levels(fields, grids, asked, stopped)
 
 
-def _useless(finer: Field, level: Field) -> str | None:
+def _useless(finer: GaussianField, level: GaussianField) -> str | None:
     """Why a level is not worth having, if it is not."""
     if not mean_scale([level]) > mean_scale([finer]):
         return "its mean scale does not rise"
@@ -97,8 +97,8 @@ def _useless(finer: Field, level: Field) -> str | None:
 
 
 def coarser(
-    field: Field, grid: Ground, steps: int, rng: np.random.Generator, keep: Path | str | None = None
-) -> tuple[Field, Ground]:
+    field: GaussianField, grid: Ground, steps: int, rng: np.random.Generator, keep: Path | str | None = None
+) -> tuple[GaussianField, Ground]:
     """The next level: half the resolution, about a quarter of the Gaussians, fitted for `steps` steps."""
     start, coarse = halved(*cropped(field, grid, 2))
     views = modelled(neighbour_views(field, coarse), coarse)
@@ -113,7 +113,7 @@ def coarser(
     return level, coarse
 
 
-def neighbour_views(field: Field, coarse: Ground) -> list[View]:
+def neighbour_views(field: GaussianField, coarse: Ground) -> list[View]:
     """Pictures of a field, PIXELS pixels a coarse disc, drawn at twice that and averaged so that they do not alias.
 
     Drawn once, splats finer than a pixel are wider than they are: level 1 of flowers of a seed for development is then

@@ -7,13 +7,13 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 from scipy.spatial.transform import Rotation
 
-from dav_gswt.field import Field, joined, sh_of
+from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.reconstruction import discs, underlay
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.top_view import from_above
 
 
-def cropped(field: Field, grid: Ground, block: int) -> tuple[Field, Ground]:
+def cropped(field: GaussianField, grid: Ground, block: int) -> tuple[GaussianField, Ground]:
     """Field and grid cut down to whole blocks of cells that start at the exemplar's corner."""
     under = underlay.rows(field, grid)
     had = under.stop > under.start
@@ -35,12 +35,12 @@ def cropped(field: Field, grid: Ground, block: int) -> tuple[Field, Ground]:
     stand = np.flatnonzero(~field.ground)
     stand = stand[small.contains(field.means[stand])]
     discs_alone, standing = field[np.asarray(keep, int)], field[stand]
-    return joined(
+    return concatenate_fields(
         [discs_alone, underlay.beneath(small, discs_alone), standing] if had else [discs_alone, standing]
     ), small
 
 
-def halved(field: Field, grid: Ground) -> tuple[Field, Ground]:
+def halved(field: GaussianField, grid: Ground) -> tuple[GaussianField, Ground]:
     """Twice the spacing: four discs become one with their mean colour, height and uncertainty; things merge likewise.
 
     The grid's shape, first_row, first_column and cells must be even (see cropped).
@@ -65,10 +65,10 @@ def halved(field: Field, grid: Ground) -> tuple[Field, Ground]:
         things = field[above > discs.STANDS * coarse.spacing]
     base = discs.ground_discs(coarse, _mean4(colours.astype(float)).reshape(-1, 3))
     base = replace(base, uncertainty=_mean4(doubt.astype(float)).ravel().astype(np.float32))
-    return joined([base, underlay.beneath(coarse, base), merged(things, coarse.spacing)]), coarse
+    return concatenate_fields([base, underlay.beneath(coarse, base), merged(things, coarse.spacing)]), coarse
 
 
-def merged(field: Field, voxel: float) -> Field:
+def merged(field: GaussianField, voxel: float) -> GaussianField:
     """Gaussians of one voxel as one Gaussian with their common mean, covariance, colour and opaque area.
 
     Weights are opacity times the area of the two larger axes: what a picture of them shows. The merged opacity keeps
@@ -93,18 +93,18 @@ def merged(field: Field, voxel: float) -> Field:
     axes[np.linalg.det(axes) < 0, :, 0] *= -1
     size = np.sqrt(np.maximum(variance, 1e-20))
     opacity = np.clip(total / (size[:, 1] * size[:, 2]), 0.01, 0.99)
-    return Field(
+    return GaussianField(
         centre.astype(np.float32),
         np.log(size).astype(np.float32),
         Rotation.from_matrix(axes).as_quat(scalar_first=True).astype(np.float32),
         np.log(opacity / (1 - opacity)).astype(np.float32),
-        sh_of(mean(field.base_colours.astype(float))),
+        rgb_to_sh(mean(field.base_colours.astype(float))),
         mean(field.uncertainty[:, None].astype(float))[:, 0].astype(np.float32),
         np.zeros(len(centre), bool),
     )
 
 
-def covariances(field: Field) -> Float[Array, "n 3 3"]:
+def covariances(field: GaussianField) -> Float[Array, "n 3 3"]:
     """World covariances R diag(sigma^2) R^T."""
     axes = Rotation.from_quat(field.quats.astype(float), scalar_first=True).as_matrix()
     half = axes * np.exp(field.log_scales.astype(float))[:, None, :]

@@ -2,9 +2,8 @@
 
 from pathlib import Path
 
-from dav_gswt import field
 from dav_gswt.errors import InputError
-from dav_gswt.field import mean_scale
+from dav_gswt.field import mean_scale, read_field, write_field
 from dav_gswt.files import read_json, whole_folder, write_json
 from dav_gswt.lod.build import Levels
 from dav_gswt.reconstruction import ground
@@ -14,7 +13,7 @@ def write(levels: Levels, folder: Path | str, provenance: dict) -> None:
     """Write the levels; the folder appears whole or not at all."""
     with whole_folder(folder) as part:
         for number, (fitted, grid) in enumerate(zip(levels.fields, levels.grids, strict=True)):
-            field.write(fitted, part / f"level{number}.ply")
+            write_field(fitted, part / f"level{number}.ply")
             ground.write(grid, part / f"level{number}.exr")
         table = [
             {"level": number, "spacing": grid.spacing, "gaussians": len(f), "mean_scale": mean_scale([f])}
@@ -33,7 +32,7 @@ def read(folder: Path | str) -> Levels:
         wanted, stopped = told["wanted"], told["stopped"]
     except (KeyError, TypeError) as error:
         raise InputError(f"{folder / 'levels.json'}: {error} is missing; make the levels again") from None
-    fields = [field.read(folder / f"level{number}.ply") for number in range(len(counts))]
+    fields = [read_field(folder / f"level{number}.ply") for number in range(len(counts))]
     if [len(f) for f in fields] != counts:
         raise InputError(f"{folder}: the levels are not those that levels.json tells of; make them again")
     return Levels(

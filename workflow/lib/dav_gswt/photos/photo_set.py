@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt import field
 from dav_gswt.errors import InputError
+from dav_gswt.field import read_field, write_field
 from dav_gswt.files import write_json
 from dav_gswt.logs import progress
 from dav_gswt.photos import folder, ground_frame, importers, lenses
@@ -73,14 +73,14 @@ def from_field(
 ) -> dict:
     """Bring a finished 3DGS .ply into its ground frame: the field to `out`, ground.json to `frame`.
 
-    up: a direction that points roughly upwards in the file. Raises: InputError: see field.read and splat.enter.
+    up: a direction that points roughly upwards in the file. Raises: InputError: see read_field and splat.enter.
     """
-    given = field.read(source)
+    given = read_field(source)
     try:
         entered, facts = splat.enter(given, np.random.default_rng(seed), up)
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     facts |= {"images": 0, "registered": 0, "left_out": [], "focal_ratio": None} | (extra or {})
-    field.write(entered, out)
+    write_field(entered, out)
     write_json(frame, facts)
     return facts

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry import poses
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import Pose
@@ -53,7 +53,7 @@ def _sized(square: Float32[Array, "s s 3"], size: int) -> Float32[Array, "{size}
 
 
 def condition(
-    field: Field, pool: list[tuple[Pose, Camera]], known: Taken, flying_height: float, size: int
+    field: GaussianField, pool: list[tuple[Pose, Camera]], known: Taken, flying_height: float, size: int
 ) -> Condition:
     """The condition of every candidate, at size x size pixels of the middle square of its picture."""
     seen = [shown(field, squared(camera).resized(size, size), flying_height) for _, camera in pool]
@@ -63,7 +63,7 @@ def condition(
     return Condition(*(np.stack(p) for p in parts), known.photos[at], np.stack(apart))
 
 
-def shown(field: Field, camera: Camera, flying_height: float) -> Shown:
+def shown(field: GaussianField, camera: Camera, flying_height: float) -> Shown:
     """What a field shows to a camera: the field's part of a Condition. All that asks a prior draws fields with this."""
     large = camera.resized(FINE * camera.width, FINE * camera.height)
     seen = Rasterizer().forward(**arrays(field), camera=large)

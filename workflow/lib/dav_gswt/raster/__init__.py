@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import backends
 from dav_gswt.raster.interface import Contributions, Gradients, Rasterizer, Rendering
@@ -16,7 +16,7 @@ __all__ = ["Contributions", "Gradients", "Rasterizer", "Rendering", "adam", "los
 
 
 def render(
-    field: Field,
+    field: GaussianField,
     camera: Camera,
     background: float | tuple[float | int, ...] | Float[Array, "c"] = 0.0,
     colours: Float[Array, "n c"] | None = None,

@@ -10,9 +10,8 @@ from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 from scipy.spatial import cKDTree
 
-from dav_gswt import field as fields
 from dav_gswt import raster
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.photos.training_views import View, over_ground
 from dav_gswt.reconstruction import discs, distractors, ground, objects, regression_guard, sky, underlay
 from dav_gswt.reconstruction.fitting import exposure, trainer
@@ -55,7 +54,7 @@ class Quality:
 class Made:
     """A field over its ground, and how it came to be."""
 
-    field: Field
+    field: GaussianField
     grid: Ground
     report: dict
 
@@ -86,11 +85,11 @@ def fit(
     scene = _look(frame, grid, views, pixel)
     stand = objects.shell(scene.relief, scene.views)
     lone = objects.lone_points(grid, scene.relief, points, colours, BAND * frame["flying_height"])
-    stand = _some(fields.joined([lone, stand]), _most(quality) - grid.heights.size - underlay.count(grid), rng)
+    stand = _some(concatenate_fields([lone, stand]), _most(quality) - grid.heights.size - underlay.count(grid), rng)
     colour, known = _ground_colours(grid, scene.views, stand)
     grid = replace(grid, seen=known)
     layer = discs.ground_discs(grid, discs.filled(colour, known))
-    start = fields.joined([layer, underlay.beneath(grid, layer), stand])
+    start = concatenate_fields([layer, underlay.beneath(grid, layer), stand])
     _log.info(
         "ground: %d x %d discs of %.4g %s, %.0f %% seen", *grid.shape, grid.spacing, frame["unit"], 100 * known.mean()
     )
@@ -103,7 +102,7 @@ def fit(
 
 
 def refine(
-    field: Field,
+    field: GaussianField,
     grid: Ground,
     frame: dict,
     before: list[View],
@@ -122,7 +121,7 @@ def refine(
         return Made(field, grid, regression_guard.unchanged(field))
     begun = _begun(field, grid, frame, before + new, quality, rng)
 
-    def on(start: Field, plan: Plan) -> trainer.Fitted:
+    def on(start: GaussianField, plan: Plan) -> trainer.Fitted:
         return trainer.fit(start, begun.views, plan, begun.rules, rng, f"fit {len(new)} new photos", keep)
 
     n = len(before)
@@ -138,14 +137,14 @@ def refine(
 class _Begun:
     """What a refinement starts from. views: all photos, counting where they are fitted."""
 
-    field: Field
+    field: GaussianField
     grid: Ground
     views: list[View]
     rules: Rules
 
 
 def _begun(
-    field: Field, grid: Ground, frame: dict, views: list[View], quality: Quality, rng: np.random.Generator
+    field: GaussianField, grid: Ground, frame: dict, views: list[View], quality: Quality, rng: np.random.Generator
 ) -> _Begun:
     """The field with what photos show and it lacks; its first Gaussians are the grid's, as before."""
     if not field.ground.any():
@@ -156,11 +155,11 @@ def _begun(
     stand = _unknown(objects.shell(scene.relief, scene.views), there, scene.relief.grid.spacing)
     stand = _like(_some(stand, _most(quality) - len(field), rng), field)
     _log.info("things: %d Gaussians where nothing stood", len(stand))
-    field, there = fields.joined([field, stand]), fields.joined([there, stand])
+    field, there = concatenate_fields([field, stand]), concatenate_fields([there, stand])
     colour, known = _ground_colours(grid, scene.views, there)
     fresh = known & ~grid.seen
     sh = field.sh.copy()
-    sh[: known.size, :1][fresh.ravel()] = fields.sh_of(colour[fresh.ravel()])
+    sh[: known.size, :1][fresh.ravel()] = rgb_to_sh(colour[fresh.ravel()])
     grid = replace(grid, seen=known)
     masked = sky.behind(scene.views, modelled(scene.views, grid))
     return _Begun(replace(field, sh=sh), grid, masked, _rules(grid, scene.relief, there, frame))
@@ -171,7 +170,7 @@ def _steps(quality: Quality, views: list[View]) -> int:
     return STEPS_PER_PHOTO * len(views) if quality.steps == AUTO else quality.steps
 
 
-def _plan(quality: Quality, field: Field, before: int, new: int) -> Plan:
+def _plan(quality: Quality, field: GaussianField, before: int, new: int) -> Plan:
     """What an update may spend: so many steps for each new photo; where "auto", as many Gaussians a photo as the field
     has that was fitted to those before, and the degree of it."""
     each = STEPS_PER_NEW_PHOTO if quality.steps_per_photo == AUTO else quality.steps_per_photo
@@ -198,7 +197,9 @@ def _look(frame: dict, grid: Ground, views: list[View], pixel: float) -> _Scene:
     return _Scene(views, relief)
 
 
-def _ground_colours(grid: Ground, views: list[View], stand: Field) -> tuple[Float[Array, "n 3"], Bool[Array, "r c"]]:
+def _ground_colours(
+    grid: Ground, views: list[View], stand: GaussianField
+) -> tuple[Float[Array, "n 3"], Bool[Array, "r c"]]:
     """The ground's median colours, and which cells a photo sees with nothing standing in between."""
     if len(stand):
         drawn = raster.Rasterizer()
@@ -208,7 +209,7 @@ def _ground_colours(grid: Ground, views: list[View], stand: Field) -> tuple[Floa
     return colour, known.reshape(grid.shape)
 
 
-def _rules(grid: Ground, relief: Relief, stand: Field, frame: dict) -> OnGround:
+def _rules(grid: Ground, relief: Relief, stand: GaussianField, frame: dict) -> OnGround:
     ceiling = np.maximum(objects.ceiling(grid, relief, stand), LEAST_CEILING * frame["flying_height"])
     return OnGround(grid, ceiling)
 
@@ -227,7 +228,7 @@ def _made(fitted: trainer.Fitted, grid: Ground, views: list[View]) -> Made:
     return replace(_finished(fitted.field, grid, views), report=vars(fitted.report))
 
 
-def _finished(fitted: Field, grid: Ground, views: list[View]) -> Made:
+def _finished(fitted: GaussianField, grid: Ground, views: list[View]) -> Made:
     """A field with its uncertainty, over the surface that its discs have."""
     field = underlay.as_sure(with_uncertainty(fitted, views), grid)
     return Made(field, surface_of(field, grid) if field.ground.any() else grid, {})
@@ -246,7 +247,7 @@ def _explained(grid: Ground, points: Float[Array, "n 3"], frame: dict) -> float:
     return float((apart < BAND * frame["flying_height"]).mean())
 
 
-def _unknown(stand: Field, there: Field, near: float) -> Field:
+def _unknown(stand: GaussianField, there: GaussianField, near: float) -> GaussianField:
     """Those Gaussians of a shell that stand where there is no thing yet."""
     if not len(there) or not len(stand):
         return stand
@@ -262,14 +263,14 @@ def _most(quality: Quality) -> int:
     return MOST_GAUSSIANS if quality.cap == AUTO else quality.cap
 
 
-def _some(part: Field, room: int, rng: np.random.Generator) -> Field:
+def _some(part: GaussianField, room: int, rng: np.random.Generator) -> GaussianField:
     """As many as there is room for, drawn at random: what stands gets thinner everywhere, not lost at one end."""
     if len(part) <= room:
         return part
     return part[np.sort(rng.choice(len(part), max(0, room), replace=False))]
 
 
-def _like(part: Field, field: Field) -> Field:
+def _like(part: GaussianField, field: GaussianField) -> GaussianField:
     """A part with as many colour coefficients as the field has."""
     sh = np.zeros((len(part), *field.sh.shape[1:]), np.float32)
     sh[:, :1] = part.sh[:, :1]
@@ -284,7 +285,7 @@ def modelled(views: list[View], grid: Ground) -> list[View]:
     return [over_ground(v, grid.west + inset, grid.south + inset, east - inset, north - inset) for v in views]
 
 
-def surface_of(field: Field, grid: Ground) -> Ground:
+def surface_of(field: GaussianField, grid: Ground) -> Ground:
     """The grid with the heights that the fit gave its discs."""
     return replace(grid, heights=field.means[: grid.heights.size, 2].reshape(grid.shape).astype(float))
 

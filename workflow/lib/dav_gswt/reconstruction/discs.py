@@ -5,7 +5,7 @@ from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.reconstruction.ground import Ground
 
 WIDTH = 0.72  # standard deviation of a disc in spacings: neighbours overlap, the ground is opaque (docs/deviations.md)
@@ -23,19 +23,19 @@ def quaternions(east: Float[Array, "n"], north: Float[Array, "n"]) -> Float32[Ar
     return (q / np.linalg.norm(q, axis=1, keepdims=True)).astype(np.float32)
 
 
-def ground_discs(grid: Ground, colours: Float[Array, "n 3"]) -> Field:
+def ground_discs(grid: Ground, colours: Float[Array, "n 3"]) -> GaussianField:
     """One disc a cell, tangent to the surface and stretched by its slope, so that none opens a hole downhill."""
     n = grid.heights.size
     east, north = (s.ravel() for s in grid.slopes())
     stretch = np.sqrt(1 + east**2 + north**2)
     scales = np.full((n, 3), WIDTH * grid.spacing) * np.stack([stretch, stretch, np.ones(n)], 1)
     scales[:, 2] = THICKNESS * grid.spacing
-    return Field(
+    return GaussianField(
         grid.centres.astype(np.float32),
         np.log(scales).astype(np.float32),
         quaternions(east, north),
         np.full(n, OPAQUE, np.float32),
-        sh_of(colours),
+        rgb_to_sh(colours),
         np.where(grid.seen.ravel(), 0, 1).astype(np.float32),
         np.ones(n, bool),
     )

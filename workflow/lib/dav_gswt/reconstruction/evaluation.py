@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.images import metrics
 from dav_gswt.images.lpips_weights import Weights
 from dav_gswt.photos.training_views import View
@@ -20,7 +20,7 @@ WORST = 0.1  # of the views, at least one: how bad it is where it is bad
 
 
 def evaluate(
-    field: Field, tests: list[View], groups: dict[str, list[str]] | None = None, weights: Weights | None = None
+    field: GaussianField, tests: list[View], groups: dict[str, list[str]] | None = None, weights: Weights | None = None
 ) -> dict:
     """Mean PSNR (raw, colour-corrected), SSIM and LPIPS over the test views, over the pixels that look at the ground.
 
@@ -40,7 +40,7 @@ def _summed(rows: list[dict]) -> dict:
     return _means(rows) | {"worst_decile": _worst(rows)}
 
 
-def _row(field: Field, view: View, weights: Weights | None) -> dict:
+def _row(field: GaussianField, view: View, weights: Weights | None) -> dict:
     seen = np.clip(render(field, view.camera).colour, 0, 1)
     level = np.clip(metrics.colour_corrected(seen, view.image, view.weight), 0, 1).astype(np.float32)
     return {

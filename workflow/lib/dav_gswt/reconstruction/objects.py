@@ -6,7 +6,7 @@ from numpy import ndarray as Array
 from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial import cKDTree
 
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.photos.training_views import View
 from dav_gswt.reconstruction.fitting.photo_colours import median_colours
 from dav_gswt.reconstruction.ground import Ground
@@ -20,7 +20,7 @@ ALONE = 4.0  # spacings to its neighbours from which a point in the air is taken
 LONE = 1.5  # spacings above the surface from which a point is that of a thing
 
 
-def shell(relief: Relief, views: list[View]) -> Field:
+def shell(relief: Relief, views: list[View]) -> GaussianField:
     """Round Gaussians over the cells where something stands, and below each down to its lowest neighbour."""
     grid, cell = relief.grid, relief.grid.spacing
     tops = np.where(relief.stands, relief.above, 0)
@@ -39,7 +39,7 @@ def shell(relief: Relief, views: list[View]) -> Field:
 
 def lone_points(
     grid: Ground, relief: Relief, points: Float[Array, "n 3"], colours: Float[Array, "n 3"], band: float
-) -> Field:
+) -> GaussianField:
     """Gaussians at matched points that stand together above the surface, up to `band`, where the sweep saw nothing."""
     inside = grid.contains(points)
     points, colours = points[inside], colours[inside]
@@ -55,7 +55,7 @@ def lone_points(
     return blobs(points[together], colours[together], size, logit=0.0)
 
 
-def ceiling(grid: Ground, relief: Relief, things: Field) -> Float[Array, "rows columns"]:
+def ceiling(grid: Ground, relief: Relief, things: GaussianField) -> Float[Array, "rows columns"]:
     """How high above the surface anything may be, by cell of the ground: all above it the photos see through.
 
     The highest that the sweep or a matched point stands within CLEARANCE cells, and CLEARANCE cells more.
@@ -74,12 +74,12 @@ def blobs(points: Float[Array, "n 3"], colours: Float[Array, "n 3"], sizes: Floa
     n = len(points)
     quats = np.zeros((n, 4), np.float32)
     quats[:, 0] = 1
-    return Field(
+    return GaussianField(
         points.astype(np.float32),
         np.repeat(np.log(np.maximum(sizes, 1e-12))[:, None], 3, 1).astype(np.float32),
         quats,
         np.full(n, logit, np.float32),
-        sh_of(colours),
+        rgb_to_sh(colours),
         np.zeros(n, np.float32),
         np.zeros(n, bool),
     )

@@ -13,7 +13,7 @@ from math import log2
 import numpy as np
 
 from dav_gswt import raster
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.images import metrics
 from dav_gswt.photos.training_views import View
 from dav_gswt.reconstruction.fitting.plan import Plan
@@ -37,18 +37,18 @@ SAME = 100.0  # dB that stand for equal pictures
 class Update:
     """field: what the fit made, or the one from before where that is handed on. taken: the fit's."""
 
-    field: Field
+    field: GaussianField
     taken: bool
     report: dict
 
 
 def update(
-    field: Field,
-    start: Field,
+    field: GaussianField,
+    start: GaussianField,
     earlier: list[View],
     new: list[View],
     plan: Plan,
-    fit: Callable[[Field, Plan], Fitted],
+    fit: Callable[[GaussianField, Plan], Fitted],
 ) -> Update:
     """Fit; while the earlier photos have lost more than `bound` fit on, AGAIN times at most; then the field before.
 
@@ -99,7 +99,7 @@ def lost(before: list[float | None], after: list[float | None]) -> float:
     return float(np.mean([min(b, CLEAR) - min(a, CLEAR) for b, a in known])) if known else 0.0
 
 
-def unchanged(field: Field) -> dict:
+def unchanged(field: GaussianField) -> dict:
     """The report of a round without new photos."""
     none = {"steps": 0, "gaussians": len(field), "choices": [], "held_out": [], "earlier_views": None}
     return none | {"new_views": {"photos": 0, "taken": True, "psnr_before": None, "psnr_after": None, "views": []}}
@@ -111,14 +111,14 @@ def set_aside(reports: Iterable[dict]) -> set[str]:
     return {row["view"] for rows in refused for row in rows}
 
 
-def shown(field: Field, views: list[View]) -> list[float | None]:
+def shown(field: GaussianField, views: list[View]) -> list[float | None]:
     """How well a field shows each photo: PSNR in dB, the picture's gain and offset per channel fitted to the photo,
     over the pixels that count; None where none does."""
     drawn = raster.Rasterizer()
     return [_psnr(drawn, field, view) if view.weight.any() else None for view in views]
 
 
-def _psnr(drawn: raster.Rasterizer, field: Field, view: View) -> float:
+def _psnr(drawn: raster.Rasterizer, field: GaussianField, view: View) -> float:
     seen = drawn.forward(**arrays(field), camera=view.camera)
     picture = seen.colour
     if view.behind is not None:
@@ -128,7 +128,7 @@ def _psnr(drawn: raster.Rasterizer, field: Field, view: View) -> float:
     return SAME if found is None else min(SAME, float(found))
 
 
-def _of_new(new: list[View], field: Field, kept: Field, taken: bool) -> dict:
+def _of_new(new: list[View], field: GaussianField, kept: GaussianField, taken: bool) -> dict:
     """A new photo is an honest test of the field from before it: nothing was fitted to it yet."""
     before = shown(field, new)
     after = shown(kept, new) if taken else before

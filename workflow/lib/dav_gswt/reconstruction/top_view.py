@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry import cameras
 from dav_gswt.raster import Rasterizer
 from dav_gswt.reconstruction.ground import Ground
@@ -29,13 +29,13 @@ class Maps:
         return np.where(self.alpha[..., None] > LEAST, self.colour, np.float32(np.nan))
 
 
-def over_exemplar(field: Field, grid: Ground) -> Maps:
+def over_exemplar(field: GaussianField, grid: Ground) -> Maps:
     """The maps of the exemplar's cells alone."""
     block = np.s_[grid.first_row : grid.first_row + grid.cells, grid.first_column : grid.first_column + grid.cells]
     return Maps(*(m[block] for m in vars(from_above(field, grid)).values()))
 
 
-def from_above(field: Field, grid: Ground) -> Maps:
+def from_above(field: GaussianField, grid: Ground) -> Maps:
     """Draw the field by an orthographic camera over the grid, from above its highest Gaussian."""
     rows, columns = grid.shape
     top = float(field.means[:, 2].max()) + 10 * grid.spacing

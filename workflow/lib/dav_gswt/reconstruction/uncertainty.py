@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.photos.training_views import View
 from dav_gswt.raster import Rasterizer
@@ -18,7 +18,7 @@ from dav_gswt.raster import Rasterizer
 SEEN = 0.05  # pixels of blend weight from which a photo counts as seeing a Gaussian
 
 
-def with_uncertainty(field: Field, views: list[View]) -> Field:
+def with_uncertainty(field: GaussianField, views: list[View]) -> GaussianField:
     """The field with uncertainty u_i = 1 - max over views of (sum of w_i alpha / sum of w_i), 1 where none sees it."""
     known = np.zeros(len(field), np.float32)
     raster = Rasterizer()
@@ -31,13 +31,13 @@ def with_uncertainty(field: Field, views: list[View]) -> Field:
     return replace(field, uncertainty=np.clip(1 - known, 0, 1).astype(np.float32))
 
 
-def uncertainty_map(field: Field, camera: Camera, raster: Rasterizer) -> Float32[Array, "h w"]:
+def uncertainty_map(field: GaussianField, camera: Camera, raster: Rasterizer) -> Float32[Array, "h w"]:
     """Per pixel: blend-weighted uncertainty of what is seen, plus the transmittance (nothing at all is known there)."""
     seen = raster.forward(**arrays(field, field.uncertainty[:, None]), camera=camera)
     return np.clip(seen.colour[..., 0] + 1 - seen.alpha, 0, 1)
 
 
-def arrays(field: Field, colours: Float32[Array, "n c"] | None = None) -> dict[str, Float[Array, "..."]]:
+def arrays(field: GaussianField, colours: Float32[Array, "n c"] | None = None) -> dict[str, Float[Array, "..."]]:
     """A field's arrays as the rasterizer takes them; colours: something else to draw than its spherical harmonics."""
     return {
         "means": field.means,

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 from scipy.ndimage import minimum_filter, uniform_filter
 
-from dav_gswt.field import SH0, Field, sh_of
+from dav_gswt.field import SH0, GaussianField, rgb_to_sh
 from dav_gswt.reconstruction.discs import THICKNESS, quaternions
 from dav_gswt.reconstruction.ground import Ground
 
@@ -28,7 +28,7 @@ def count(grid: Ground) -> int:
     return -(-rows // STRIDE) * -(-columns // STRIDE)
 
 
-def rows(field: Field, grid: Ground) -> slice:
+def rows(field: GaussianField, grid: Ground) -> slice:
     """Where a field over this grid has its underlay: right after the discs; empty if it has none."""
     first, last = grid.heights.size, grid.heights.size + count(grid)
     part = field.opacity_logits[first:last]
@@ -36,7 +36,7 @@ def rows(field: Field, grid: Ground) -> slice:
     return slice(first, last if there and field.ground.any() else first)
 
 
-def without(field: Field, grid: Ground) -> Field:
+def without(field: GaussianField, grid: Ground) -> GaussianField:
     """The field without its underlay: the discs, then what stands on them. All of one that has none."""
     under = rows(field, grid)
     if under.start == under.stop:  # perhaps beyond the end: a finished field may have fewer Gaussians than cells
@@ -44,7 +44,7 @@ def without(field: Field, grid: Ground) -> Field:
     return field[np.r_[0 : under.start, under.stop : len(field)]]
 
 
-def as_sure(field: Field, grid: Ground) -> Field:
+def as_sure(field: GaussianField, grid: Ground) -> GaussianField:
     """The field with its underlay as uncertain as the discs above it: no photo is to see it."""
     part = rows(field, grid)
     doubt = field.uncertainty.copy()
@@ -54,15 +54,17 @@ def as_sure(field: Field, grid: Ground) -> Field:
     return replace(field, uncertainty=doubt)
 
 
-def beneath(grid: Ground, layer: Field) -> Field:
+def beneath(grid: Ground, layer: GaussianField) -> GaussianField:
     """The underlay of a field whose first Gaussians are the grid's discs."""
     n, s = count(grid), grid.spacing
     scales = np.full((n, 3), np.log(WIDTH * STRIDE * s), np.float32)
     scales[:, 2] = np.log(THICKNESS * s)
     means, quats, colours = places(grid, layer.means[: grid.heights.size, 2], layer.base_colours[: grid.heights.size])
     sh = np.zeros((n, *layer.sh.shape[1:]), np.float32)
-    sh[:, :1] = sh_of(colours)
-    return Field(means, scales, quats, np.full(n, SOLID, np.float32), sh, np.zeros(n, np.float32), np.zeros(n, bool))
+    sh[:, :1] = rgb_to_sh(colours)
+    return GaussianField(
+        means, scales, quats, np.full(n, SOLID, np.float32), sh, np.zeros(n, np.float32), np.zeros(n, bool)
+    )
 
 
 def follow(grid: Ground, values: dict[str, Array]) -> None:
@@ -70,7 +72,7 @@ def follow(grid: Ground, values: dict[str, Array]) -> None:
     first, last = grid.heights.size, grid.heights.size + count(grid)
     base = 0.5 + np.float32(SH0) * values["colours"][:first, 0]
     values["means"][first:last], values["quats"][first:last], colours = places(grid, values["means"][:first, 2], base)
-    values["colours"][first:last, :1] = sh_of(colours)
+    values["colours"][first:last, :1] = rgb_to_sh(colours)
 
 
 def places(grid: Ground, heights: Float[Array, "n"], colours: Float[Array, "n 3"]):

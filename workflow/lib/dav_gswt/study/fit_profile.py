@@ -15,7 +15,7 @@ from numpy import ndarray as Array
 from scipy.spatial import cKDTree
 
 from dav_gswt import raster
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.files import read_json
 from dav_gswt.geometry import cameras
 from dav_gswt.images import metrics
@@ -117,7 +117,7 @@ def seconds_to(curve: list[dict], decibel: float) -> float | None:
     return reached[0] if reached else None
 
 
-def free_space_opacity(field: Field, grid: Ground, photos: PhotoSet) -> float:
+def free_space_opacity(field: GaussianField, grid: Ground, photos: PhotoSet) -> float:
     """Mean accumulated alpha, over the test views, of what stands higher than FREE flying heights above the ground and
     not at a matched point: the haze that photos from their own places reward."""
     above = field.means[:, 2] - grid.height_at(field.means)

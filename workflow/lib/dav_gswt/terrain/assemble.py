@@ -8,7 +8,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.bundle.orders import back_to_front
 from dav_gswt.bundle.store import Bundle
-from dav_gswt.field import Field, joined
+from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster.interface import RIM
 from dav_gswt.terrain import order, weights
@@ -33,7 +33,7 @@ class Terrain:
     tile sides to the end of what is laid; beyond it the far ground has the terrain's mean colour.
     """
 
-    tiles: dict[tuple[int, int], Field]
+    tiles: dict[tuple[int, int], GaussianField]
     side: float
     switches: list[float]
     bands: list[float]
@@ -85,7 +85,7 @@ def of_bundle(bundle: Bundle, surface: dict) -> Terrain:
     return of_fields(bundle.fields(), bundle.manifest, surface)
 
 
-def of_fields(tiles: list[list[Field]], manifest: dict, surface: dict) -> Terrain:
+def of_fields(tiles: list[list[GaussianField]], manifest: dict, surface: dict) -> Terrain:
     """tiles[level][tile] laid as a bundle's manifest says, over the surface that the config's `heights` asks for.
 
     Raises: InputError: as `heights.of_config`.
@@ -189,7 +189,7 @@ def coarsened(terrain: Terrain, camera: Camera, budget: int) -> Terrain:
     return shrunk(low)
 
 
-def laid(terrain: Terrain, cell: Cells, eye: Float[Array, "3"]) -> tuple[Field, Float[Array, "n 2"]]:
+def laid(terrain: Terrain, cell: Cells, eye: Float[Array, "3"]) -> tuple[GaussianField, Float[Array, "n 2"]]:
     """The Gaussians of one cell, placed relative to the eye, and the surface's slope at each (`drape.axes`).
 
     So float32 still resolves a disc kilometres out. They are cross-faded between levels by their own distances, and
@@ -204,13 +204,16 @@ def laid(terrain: Terrain, cell: Cells, eye: Float[Array, "3"]) -> tuple[Field, 
 
 def placed(
     terrain: Terrain,
-    parts: dict[int, Field],
+    parts: dict[int, GaussianField],
     corner: Float[Array, "3"],
     direction: Float[Array, "3"],
     eye: Float[Array, "3"],
-) -> tuple[Field, Float[Array, "n 2"]]:
+) -> tuple[GaussianField, Float[Array, "n 2"]]:
     """`laid` of any Gaussians: those of each level, counted from a corner in the world, in the order of a direction."""
-    level, flat = np.repeat(list(parts), [len(part) for part in parts.values()]), joined(list(parts.values()))
+    level, flat = (
+        np.repeat(list(parts), [len(part) for part in parts.values()]),
+        concatenate_fields(list(parts.values())),
+    )
     sequence = back_to_front(flat.means, direction)
     field, slope = lifted(flat[sequence], terrain.heights, corner, eye)
     level, distance = level[sequence], np.linalg.norm(field.means.astype(float), axis=1)
@@ -229,7 +232,7 @@ def along(terrain: Terrain, i: int, j: int, tile: int, eye: Float[Array, "3"]) -
     return terrain.directions[kept[order.nearest(terrain.directions, kept, to, slope[0])]]
 
 
-def _faded(field: Field, weight: Float[Array, "n"]) -> Field:
+def _faded(field: GaussianField, weight: Float[Array, "n"]) -> GaussianField:
     """Opacities of Gaussians that are drawn with a weight; a whole one keeps its bits."""
     partly = weight < 1
     if not partly.any():

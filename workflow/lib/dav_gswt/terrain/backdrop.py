@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.terrain.assemble import Terrain
 from dav_gswt.terrain.weights import finer
 
@@ -39,7 +39,7 @@ class Backdrop:
         below = self.ground + (self.horizon - self.ground) * np.exp(np.clip(rise, -1, 0) / (0.3 * self.low))
         return np.where(rise > 0, above, below).astype(np.float32)
 
-    def over(self, field: Field) -> Field:
+    def over(self, field: GaussianField) -> GaussianField:
         """A field around the eye, its far end gone over into what is behind it: no edge shows where tiles end.
 
         Colours do, not opacities: a stack of fading ones would stay opaque until the very end.
@@ -49,5 +49,5 @@ class Backdrop:
         if not share.any():
             return field
         sh = field.sh.copy()
-        sh[:, 0] += share[:, None].astype(np.float32) * (sh_of(self.seen_along(to))[:, 0] - sh[:, 0])
+        sh[:, 0] += share[:, None].astype(np.float32) * (rgb_to_sh(self.seen_along(to))[:, 0] - sh[:, 0])
         return replace(field, sh=sh)

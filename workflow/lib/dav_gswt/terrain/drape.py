@@ -7,15 +7,15 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 from scipy.spatial.transform import Rotation
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.terrain.heights import Heights
 
 THINNEST = 1e-30  # of an axis that the map has flattened to nothing
 
 
 def lifted(
-    field: Field, heights: Heights, corner: Float[Array, "3"], about: Float[Array, "3"]
-) -> tuple[Field, Float[Array, "n 2"]]:
+    field: GaussianField, heights: Heights, corner: Float[Array, "3"], about: Float[Array, "3"]
+) -> tuple[GaussianField, Float[Array, "n 2"]]:
     """Centres over the surface: (x, y, z) goes to (x, y, z + h(x, y)); with the surface's slope at each.
 
     What stands, stands upright: heights above the surface are kept along z. So nothing leaves its tile's column,
@@ -30,7 +30,7 @@ def lifted(
     return replace(field, means=means.astype(np.float32)), slope
 
 
-def axes(field: Field, slope: Float[Array, "n 2"]) -> Float[Array, "n 3 3"]:
+def axes(field: GaussianField, slope: Float[Array, "n 2"]) -> Float[Array, "n 3 3"]:
     """A = J R S of every Gaussian on a surface with these slopes: its covariance is A A^T = J Sigma J^T.
 
     J = [[1, 0, 0], [0, 1, 0], [h_x, h_y, 1]] is the derivative of `lifted`; its determinant is 1. Discs on a slope are
@@ -43,7 +43,9 @@ def axes(field: Field, slope: Float[Array, "n 2"]) -> Float[Array, "n 3 3"]:
     return own
 
 
-def draped(field: Field, heights: Heights, corner: Float[Array, "3"], about: Float[Array, "3"]) -> Field:
+def draped(
+    field: GaussianField, heights: Heights, corner: Float[Array, "3"], about: Float[Array, "3"]
+) -> GaussianField:
     """The field over the surface, as a field that any rasterizer draws: `lifted`, and shapes by `axes`.
 
     A is factored as R' S' V^T: its singular values are the new scales, and needles keep their digits. Where the

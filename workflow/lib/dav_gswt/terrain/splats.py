@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import Rasterizer, Rendering, harmonics
 from dav_gswt.terrain.drape import axes
@@ -59,12 +59,14 @@ def by_depth(splats: Splats) -> Int[Array, "n"]:
     return np.argsort(splats.depths, kind="stable")[::-1]
 
 
-def projected(field: Field, slope: Float[Array, "n 2"], camera: Camera, near: float) -> Splats:
+def projected(field: GaussianField, slope: Float[Array, "n 2"], camera: Camera, near: float) -> Splats:
     """The Gaussians, on a surface of these slopes, that may show in a pinhole camera's picture; in their order."""
     return indexed(field, slope, camera, near)[0]
 
 
-def indexed(field: Field, slope: Float[Array, "n 2"], camera: Camera, near: float) -> tuple[Splats, Int[Array, "k"]]:
+def indexed(
+    field: GaussianField, slope: Float[Array, "n 2"], camera: Camera, near: float
+) -> tuple[Splats, Int[Array, "k"]]:
     """The Gaussians that may show, and which they are.
 
     S = (J W A)(J W A)^T with A of `drape.axes` (EWA), its determinant by Lagrange's identity |p x q|^2. A Gaussian

@@ -9,7 +9,7 @@ from numpy import ndarray as Array
 from scipy.ndimage import distance_transform_edt
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import SH0, Field
+from dav_gswt.field import SH0, GaussianField
 from dav_gswt.logs import progress
 from dav_gswt.tiles import (
     coarse_levels,
@@ -76,7 +76,7 @@ class TileSet:
 
     side: float
     spacing: float
-    fields: list[list[Field]]
+    fields: list[list[GaussianField]]
     labels: UInt8[Array, "tiles n n"]
     shifts: Int[Array, "tiles 9 2"]
     uncertainty: Float[Array, "tiles"]
@@ -88,7 +88,7 @@ class TileSet:
 
 
 def cut_tiles(
-    levels: list[Field],
+    levels: list[GaussianField],
     exemplar: Exemplar,
     colour: Float[Array, "m m 3"],
     uncertainty: Float[Array, "m m"],
@@ -206,7 +206,7 @@ def _corrections(plan: Layout, found: search.Found, shifts: Array, ground: membr
     return np.stack(out)
 
 
-def _tile(level: compose.Binned, labels: Array, shift: Array, correction: Array) -> Field:
+def _tile(level: compose.Binned, labels: Array, shift: Array, correction: Array) -> GaussianField:
     """One tile at one level, corrected; a coarser level follows the finest one's labels by majority."""
     majority = compose.coarser(labels, level.cell)
     splats = compose.composed(level, majority, shift)
@@ -214,7 +214,7 @@ def _tile(level: compose.Binned, labels: Array, shift: Array, correction: Array)
     return membrane.applied(splats, change, level.cell * level.exemplar.spacing)
 
 
-def _merged(tile: list[Field], plan: Layout, spacing: float) -> list[Field]:
+def _merged(tile: list[GaussianField], plan: Layout, spacing: float) -> list[GaussianField]:
     """A tile's levels with those that are coarser than a block."""
     for number in range(len(tile), plan.levels):
         cell = 2 ** (number - 1)
@@ -222,7 +222,7 @@ def _merged(tile: list[Field], plan: Layout, spacing: float) -> list[Field]:
     return tile
 
 
-def ground_maps(field: Field, exemplar: Exemplar) -> tuple[Float[Array, "m m 3"], Float[Array, "m m"]]:
+def ground_maps(field: GaussianField, exemplar: Exemplar) -> tuple[Float[Array, "m m 3"], Float[Array, "m m"]]:
     """Mean colour and height of each finest cell's ground discs (all Gaussians', if none is ground); NaN for none."""
     ground = field[field.ground] if field.ground.any() else field
     level = compose.binned(ground, exemplar, 1)

@@ -11,14 +11,14 @@ from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 from scipy.ndimage import distance_transform_edt
 
-from dav_gswt.field import Field, joined
+from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.lod.merge import merged
 from dav_gswt.reconstruction import discs, underlay
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.ground_constraints import DISC_SIZES
 
 
-def coarser(tile: Field, cells: int, spacing: float) -> Field:
+def coarser(tile: GaussianField, cells: int, spacing: float) -> GaussianField:
     """The next level of a tile of `cells` x `cells` cells, an even number, each `spacing` wide.
 
     The discs of four cells become one with their mean colour, height, opacity and uncertainty, twice as wide and
@@ -42,16 +42,16 @@ def coarser(tile: Field, cells: int, spacing: float) -> Field:
         uncertainty=doubt.ravel().astype(np.float32),
     )
     parts = [layer[known.ravel()], merged(tile[~tile.ground & ~under], 2 * spacing)]
-    return joined([parts[0], underlay.beneath(grid, layer), parts[1]] if under.any() else parts)
+    return concatenate_fields([parts[0], underlay.beneath(grid, layer), parts[1]] if under.any() else parts)
 
 
-def underneath(tile: Field, spacing: float) -> Bool[Array, "n"]:
+def underneath(tile: GaussianField, spacing: float) -> Bool[Array, "n"]:
     """Which Gaussians of a tile are underlay, in any order: opaque as nothing else is that is so large."""
     large = tile.log_scales.max(1) > np.log(0.9 * underlay.WIDTH * underlay.STRIDE * spacing)
     return ~tile.ground & (tile.opacity_logits == underlay.SOLID) & large
 
 
-def _means(layer: Field, cells: int, spacing: float) -> tuple[Bool[Array, "k k"], list[Float[Array, "k k"]]]:
+def _means(layer: GaussianField, cells: int, spacing: float) -> tuple[Bool[Array, "k k"], list[Float[Array, "k k"]]]:
     """Which cells hold discs, and the means of these: red, green, blue, height, uncertainty, opacity's logit, logarithm
     of the width; the nearest cell's where there are none."""
     column, row = (np.clip((layer.means[:, i] / spacing).astype(int), 0, cells - 1) for i in (0, 1))

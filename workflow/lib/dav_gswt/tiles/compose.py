@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.tiles.layout import LABELS, Exemplar, sources
 
 
@@ -16,7 +16,7 @@ class Binned:
     start[k]:start[k+1].
     """
 
-    field: Field
+    field: GaussianField
     exemplar: Exemplar
     cell: int  # finest cells along one cell of this level
     start: Int[Array, "k"]
@@ -26,7 +26,7 @@ class Binned:
         return self.exemplar.cells // self.cell
 
 
-def binned(field: Field, exemplar: Exemplar, cell: int) -> Binned:
+def binned(field: GaussianField, exemplar: Exemplar, cell: int) -> Binned:
     """Sort a level's Gaussians by cell; those outside the exemplar are left out."""
     count = exemplar.cells // cell
     size = exemplar.spacing * cell
@@ -53,7 +53,7 @@ def coarser(labels: UInt8[Array, "n n"], factor: int) -> UInt8[Array, "k k"]:
     return counts.argmax(0).astype(np.uint8)
 
 
-def composed(level: Binned, labels: UInt8[Array, "n n"], shift: Int[Array, "9 2"]) -> Field:
+def composed(level: Binned, labels: UInt8[Array, "n n"], shift: Int[Array, "9 2"]) -> GaussianField:
     """A tile's Gaussians at one level, cell by cell from the south-west; x and y from its south-western corner, z kept.
 
     labels: of this level's cells (see coarser); shift in finest cells.
@@ -79,7 +79,7 @@ def bump(points: Float[Array, "n d"], side: float) -> Float[Array, "n"]:
     return s[:, 0] * s[:, 1]
 
 
-def levelled(tiles: list[list[Field]], side: float) -> tuple[list[list[Field]], Float[Array, "tiles"]]:
+def levelled(tiles: list[list[GaussianField]], side: float) -> tuple[list[list[GaussianField]], Float[Array, "tiles"]]:
     """Give all tiles the same mean height at the finest level; tiles[t][l] is level l of tile t.
 
     A rigid shift would tear borders apart, so a tile is raised by A_t bump(x, y) in all its levels alike; A_t makes
@@ -96,7 +96,7 @@ def levelled(tiles: list[list[Field]], side: float) -> tuple[list[list[Field]], 
     return raised, np.array(amounts)
 
 
-def _raised(field: Field, amount: float, side: float) -> Field:
+def _raised(field: GaussianField, amount: float, side: float) -> GaussianField:
     means = field.means.copy()
     means[:, 2] += (amount * bump(field.means, side)).astype(np.float32)
     return replace(field, means=means)

@@ -16,7 +16,7 @@ from numpy import ndarray as Array
 from scipy.fft import dct, dst, idct, idst
 from scipy.ndimage import gaussian_filter
 
-from dav_gswt.field import SH0, Field
+from dav_gswt.field import SH0, GaussianField
 from dav_gswt.tiles.layout import Layout, colours
 
 SOFT = (2.0, 2.0, 2.0, 0.5)  # cells: grain is not a step; a surface is smooth already
@@ -107,7 +107,7 @@ def ring(
     return out
 
 
-def applied(field: Field, correction: Float[Array, "n n 4"], cell: float) -> Field:
+def applied(field: GaussianField, correction: Float[Array, "n n 4"], cell: float) -> GaussianField:
     """A tile's Gaussians with the correction of the cell they are in, `cell` world units wide."""
     column, row = (np.minimum((field.means[:, i] / cell).astype(int), len(correction) - 1) for i in (0, 1))
     change = correction[row, column]

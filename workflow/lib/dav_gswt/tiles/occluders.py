@@ -8,14 +8,14 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.tiles import compose
 from dav_gswt.tiles.layout import Exemplar
 
 ABOVE = 0.5  # cells over the ground discs' mean height: a rough ground's discs do not stand
 
 
-def cover(field: Field, exemplar: Exemplar, height: Float[Array, "m m"]) -> Float[Array, "m m"]:
+def cover(field: GaussianField, exemplar: Exemplar, height: Float[Array, "m m"]) -> Float[Array, "m m"]:
     """Share of each cell that is hidden by what stands over it, at whatever height, in [0, 1].
 
     sum of opacity x 2 pi sigma_1 sigma_2 over the Gaussians whose centre is over the cell, sigma_1 and sigma_2 their

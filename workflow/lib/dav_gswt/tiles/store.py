@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt import field
 from dav_gswt.errors import InputError
+from dav_gswt.field import read_field, write_field
 from dav_gswt.files import UNREADABLE, read_json, whole_folder, write_json
 from dav_gswt.logs import progress
 from dav_gswt.tiles.build import TileSet
@@ -28,7 +28,7 @@ def write(tiles: TileSet, folder: Path | str, seams: Path | str, provenance: dic
     with whole_folder(folder) as part:
         for level, fields in enumerate(tiles.fields):
             for tile, splats in enumerate(progress(fields, f"write tiles of level {level}")):
-                field.write(splats, part / name(level, tile))
+                write_field(splats, part / name(level, tile))
         _write_npz(part / "labels.npz", labels=tiles.labels, shifts=tiles.shifts)
     table = {
         "side": tiles.side,
@@ -50,7 +50,7 @@ def read(folder: Path | str, seams: Path | str) -> TileSet:
     except (KeyError, TypeError) as error:
         raise InputError(f"{seams}: {error} is missing; cut the tiles again") from None
     side, spacing, uncertainty, chosen, counts = values
-    fields = [[field.read(folder / name(level, tile)) for tile in range(count)] for level in range(levels)]
+    fields = [[read_field(folder / name(level, tile)) for tile in range(count)] for level in range(levels)]
     if [[len(f) for f in level] for level in fields] != counts:
         raise InputError(f"{folder}: the tiles are not those that {seams} tells of; cut them again")
     try:

@@ -13,7 +13,7 @@ from numpy import ndarray as Array
 from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.spatial.transform import Rotation
 
-from dav_gswt.field import SH0, Field
+from dav_gswt.field import SH0, GaussianField
 from dav_gswt.tiles.layout import Exemplar
 
 ROUNDS = 3  # of reweighting
@@ -80,7 +80,7 @@ def trend_of(colour: Float[Array, "m m 3"], height: Float[Array, "m m"], exempla
     return Trend(exemplar, np.stack(parts[:3], -1), parts[3])
 
 
-def detrended(field: Field, trend: Trend) -> Field:
+def detrended(field: GaussianField, trend: Trend) -> GaussianField:
     """The field without the trend: ground and what stands on it move and change colour alike; local relief stays.
 
     Gaussians follow the slope that is taken out (z' = z - h(x, y) shears their covariance), so that discs stay closed.
@@ -93,7 +93,7 @@ def detrended(field: Field, trend: Trend) -> Field:
     return sheared(replace(field, means=means, sh=sh), -slope)
 
 
-def sheared(field: Field, slope: Float[Array, "n 2"]) -> Field:
+def sheared(field: GaussianField, slope: Float[Array, "n 2"]) -> GaussianField:
     """Covariances under z' = z + slope . (x, y), for the Gaussians whose slope matters (STEEP)."""
     steep = np.flatnonzero(np.linalg.norm(slope, axis=1) > STEEP)
     if not len(steep):

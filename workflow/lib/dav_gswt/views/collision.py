@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import expit
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.uncertainty.finite import named
@@ -15,7 +15,7 @@ from dav_gswt.views.uncertainty.finite import named
 SOLID = 0.5  # opacity from which a Gaussian is something that one can be inside of
 
 
-def require(pool: Candidates, field: Field, grid: Ground) -> None:
+def require(pool: Candidates, field: GaussianField, grid: Ground) -> None:
     """Raises: InputError: candidates under the ground, or within one deviation of a solid Gaussian, by their names."""
     if not pool:
         return
@@ -35,7 +35,7 @@ def under(centres: Float[Array, "n 3"], grid: Ground) -> Bool[Array, "n"]:
     return grid.contains(centres) & (centres[:, 2] <= grid.height_at(centres))
 
 
-def inside(centres: Float[Array, "n 3"], field: Field) -> Bool[Array, "n"]:
+def inside(centres: Float[Array, "n 3"], field: GaussianField) -> Bool[Array, "n"]:
     """Which places are within one standard deviation of a solid Gaussian's centre."""
     solid = expit(field.opacity_logits) >= SOLID
     means, scales = field.means[solid].astype(float), np.exp(field.log_scales[solid].astype(float))

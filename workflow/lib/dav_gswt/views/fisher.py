@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import Rasterizer
 from dav_gswt.raster.interface import Contributions
@@ -18,7 +18,7 @@ from dav_gswt.reconstruction.uncertainty import arrays
 PRIOR = 1.0  # information on each Gaussian before any photo: one pixel that it fills
 
 
-def known(field: Field, cameras: list[Camera], raster: Rasterizer) -> Float64[Array, "n"]:
+def known(field: GaussianField, cameras: list[Camera], raster: Rasterizer) -> Float64[Array, "n"]:
     """Information on each Gaussian in photos that were taken, and a little before them."""
     total = np.full(len(field), PRIOR)
     for camera in cameras:
@@ -38,7 +38,7 @@ def gain(seen: Contributions, already: Float64[Array, "n"]) -> float:
 class Gathered:
     """The information on a field that photos give, growing as candidates are chosen (`policies.InformationGain`)."""
 
-    def __init__(self, field: Field, taken: list[Camera], candidates: list[Camera]):
+    def __init__(self, field: GaussianField, taken: list[Camera], candidates: list[Camera]):
         """taken, candidates: cameras at the size at which poses are scored."""
         self.field, self.candidates, self.raster = field, candidates, Rasterizer()
         self.known = known(field, taken, self.raster)

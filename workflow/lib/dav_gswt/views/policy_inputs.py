@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray as Array
 
-from dav_gswt import field
 from dav_gswt.errors import InputError
+from dav_gswt.field import read_field
 from dav_gswt.files import read_json
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.reconstruction import ground
@@ -26,7 +26,7 @@ def information(
     if policy not in NEEDS_FIELD:
         return None
     at = {pose.name: camera for pose, camera in pool}
-    return fisher.Gathered(field.read(file), [small(c) for c in taken], [small(at[name]) for name in scores.names])
+    return fisher.Gathered(read_field(file), [small(c) for c in taken], [small(at[name]) for name in scores.names])
 
 
 def errors(
@@ -47,7 +47,7 @@ def errors(
     else:
         some, views = truth.kept(pool, files["truth"])
     corrected = read_json(files["frame"])["kind"] == "photos"  # which change their exposure
-    found, _ = measures.errors(field.read(files["field"]), ground.read(files["ground"]), views, size, corrected)
+    found, _ = measures.errors(read_field(files["field"]), ground.read(files["ground"]), views, size, corrected)
     known = {pose.name: error for (pose, _), error in zip(some, found, strict=True)}
     if not known:
         raise InputError(f"{files['truth']}: shows no candidate that is left; make it again with more of them")

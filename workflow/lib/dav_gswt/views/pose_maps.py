@@ -8,7 +8,7 @@ from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.files import UNREADABLE, whole
 from dav_gswt.images.image_files import enlarged
 from dav_gswt.views.scores import Scores
@@ -52,7 +52,7 @@ def _over(square: Float32[Array, "s s"], shape: tuple[int, int]) -> Float32[Arra
     return out
 
 
-def doubted(field: Field, gaussians: Float32[Array, "g"]) -> Field:
+def doubted(field: GaussianField, gaussians: Float32[Array, "g"]) -> GaussianField:
     """The field with the uncertainty that maps gave its first Gaussians. What was imagined since stays as it is, in
     full doubt: the maps are of the field before."""
     doubt = field.uncertainty.copy()

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float32, Float64
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import spread
 from dav_gswt.logs import progress
@@ -47,7 +47,7 @@ class Scored:
         return {"candidates": len(self.scores), "terms": list(self.scores.terms), "poses_by_steps": told}
 
 
-def parts(found: Scored, field: Field, grid: Ground) -> dict[str, Part]:
+def parts(found: Scored, field: GaussianField, grid: Ground) -> dict[str, Part]:
     """The maps to show, as parts of an EXR: the ground from above, and candidates spread over the hemisphere."""
     above = from_above(replace(field, uncertainty=found.gaussians), grid).uncertainty[::-1]
     some = [found.scores.names[i] for i in spread(found.scores.poses, OTHERS)]
@@ -61,7 +61,7 @@ def small(camera: Camera) -> Camera:
 
 
 def score(
-    field: Field,
+    field: GaussianField,
     grid: Ground,
     pool: Candidates,
     taken: list[View],
@@ -89,7 +89,7 @@ def score(
 
 
 def told(
-    field: Field, grid: Ground, pool: Candidates, taken: list[View], frame: dict, size: int
+    field: GaussianField, grid: Ground, pool: Candidates, taken: list[View], frame: dict, size: int
 ) -> tuple[Condition, Float32[Array, "n s s"]]:
     """What a prior is told of candidates, and which of its pixels look at the modelled ground (1)."""
     known = conditions.taken(taken, frame, size)
@@ -99,7 +99,7 @@ def told(
 
 
 def _geometric(
-    field: Field, grid: Ground, pool: Candidates, taken: list[Camera]
+    field: GaussianField, grid: Ground, pool: Candidates, taken: list[Camera]
 ) -> tuple[dict[str, Float64[Array, "n"]], Float32[Array, "n h w"]]:
     """opacity: mean of the opacity map over the pixels that look at the modelled ground; 0 where none does."""
     raster = Rasterizer()
@@ -130,7 +130,7 @@ def _frozen(terms: dict[str, Float64[Array, "n"]], w2_sq: Float32[Array, "n h w"
 
 
 def _gaussians(
-    field: Field, pool: Candidates, w2_sq: Float32[Array, "n h w"] | None, frozen: Frozen
+    field: GaussianField, pool: Candidates, w2_sq: Float32[Array, "n h w"] | None, frozen: Frozen
 ) -> Float32[Array, "gaussians"]:
     """What the prior's maps say of each Gaussian; of those that no candidate sees, and without a prior, geometry."""
     if w2_sq is None or frozen.pixels is None:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import expit
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.photos import ground_frame
 
 _log = logging.getLogger(__name__)
@@ -30,7 +30,7 @@ DISC = 2.0  # standard deviations of a disc that count as covered ground
 WIDEST_DISC = 6  # cells, the most that a single Gaussian covers
 
 
-def enter(field: Field, rng: np.random.Generator, up: Sequence = UP) -> tuple[Field, dict]:
+def enter(field: GaussianField, rng: np.random.Generator, up: Sequence = UP) -> tuple[GaussianField, dict]:
     """The field in its ground frame, and what ground.json says about the ground.
 
     z points from the robust plane through the opaque Gaussians to the side of `up`, three numbers of any length; x and
@@ -43,7 +43,7 @@ def enter(field: Field, rng: np.random.Generator, up: Sequence = UP) -> tuple[Fi
     direction = np.asarray(up, float)
     if direction.shape != (3,) or not np.linalg.norm(direction) > 0 or not np.isfinite(direction).all():
         raise InputError(f"up: {list(up)} is no direction; give three numbers that are not all 0")
-    before, degree = len(field), field.degree
+    before, degree = len(field), field.sh_degree
     if degree > 0:
         _log.warning("view-dependent colour (degree %d) is dropped: the colour from all sides is kept", degree)
         field = replace(field, sh=np.ascontiguousarray(field.sh[:, :1]))
@@ -80,7 +80,7 @@ def enter(field: Field, rng: np.random.Generator, up: Sequence = UP) -> tuple[Fi
     return field, facts
 
 
-def _near(field: Field) -> Bool[Array, "n"]:
+def _near(field: GaussianField) -> Bool[Array, "n"]:
     """Gaussians within the scene: not far outside the box that holds nearly all opaque ones, and not as large as it."""
     opaque = expit(field.opacity_logits) >= OPAQUE
     if opaque.sum() < LEAST:
@@ -91,7 +91,7 @@ def _near(field: Field) -> Bool[Array, "n"]:
     return inside.all(1) & (field.log_scales.max(1) <= np.log(LARGEST * size))
 
 
-def _levelled(field: Field, up: Float[Array, "3"], rng: np.random.Generator) -> tuple[Field, float]:
+def _levelled(field: GaussianField, up: Float[Array, "3"], rng: np.random.Generator) -> tuple[GaussianField, float]:
     """The field with z up and its plane at 0; and its surface's spread about the plane."""
     surface = field.means[expit(field.opacity_logits) >= OPAQUE].astype(float)
     size = float(np.ptp(np.percentile(surface, ROBUST, axis=0), axis=0).max())
@@ -107,8 +107,8 @@ def _levelled(field: Field, up: Float[Array, "3"], rng: np.random.Generator) -> 
 
 
 def _moved(
-    field: Field, rotation: Float[Array, "3 3"], scale: float = 1.0, shift: Float[Array, "3"] | None = None
-) -> Field:
+    field: GaussianField, rotation: Float[Array, "3 3"], scale: float = 1.0, shift: Float[Array, "3"] | None = None
+) -> GaussianField:
     """The field in another world frame: p becomes scale * rotation @ p + shift. Colours of degree 0 do not turn."""
     means = scale * field.means.astype(float) @ rotation.T + (0.0 if shift is None else shift)
     # Rotation composes in x y z w and normalises; a length that float32 cannot square must not overflow on the way.
@@ -127,7 +127,7 @@ def _turn(degrees: float) -> Float[Array, "3 3"]:
     return np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
 
 
-def _discs(field: Field) -> tuple[Float[Array, "m 2"], Float[Array, "m"]]:
+def _discs(field: GaussianField) -> tuple[Float[Array, "m 2"], Float[Array, "m"]]:
     """Where the opaque Gaussians are over the ground, and the geometric means of their two larger deviations."""
     opaque = expit(field.opacity_logits) >= OPAQUE
     larger = np.sort(field.log_scales[opaque].astype(float), axis=1)[:, 1:]

@@ -9,7 +9,7 @@ from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.files import UNREADABLE, whole
 from dav_gswt.geometry import poses
 from dav_gswt.geometry.cameras import Camera, look_at
@@ -85,7 +85,7 @@ def examples(seed: int, count: int) -> Examples:
     return joined([none(), *found])
 
 
-def stands_free(field: Field, camera: Camera) -> bool:
+def stands_free(field: GaussianField, camera: Camera) -> bool:
     """Whether nothing of a field is so near to the camera that it would fill the picture."""
     return bool(((field.means - camera.centre) ** 2).sum(1).min() > NEAREST**2)
 
@@ -143,7 +143,7 @@ def matched(made: World, photos: list[View], rng: np.random.Generator) -> tuple[
     return points[often], colours[often]
 
 
-def fitted(made: World, photos: list[View], rng: np.random.Generator) -> Field:
+def fitted(made: World, photos: list[View], rng: np.random.Generator) -> GaussianField:
     """The program's own coarse fit of the photos, small and short; some of more or less ground than usual."""
     steps = int(rng.integers(*STEPS, endpoint=True))
     quality = build.Quality(photos[0].camera.width, 1.25, MOST_GAUSSIANS, steps, 0, 0)

@@ -10,8 +10,7 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt import field as fields
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.prior.training import worlds_ground as ground
 from dav_gswt.prior.training import worlds_light as light
@@ -44,7 +43,7 @@ class Sky:
 class World:
     """A world with its light in its colours. frame: as ground.json has it."""
 
-    field: Field
+    field: GaussianField
     frame: dict
     sky: Sky
 
@@ -62,7 +61,7 @@ def world(seed: int) -> World:
     near = np.abs(flat.means[:, :2]).max(1) < ground.EXEMPLAR / 2
     mean = np.exp(rng.uniform(*np.log(GREY))) / below[near].mean()
     exposure = min(mean, WHITE / np.quantile(below[near], 0.95))
-    field = fields.joined([_ground(flat, ground.encoded(exposure * below)), _things(cloud, exposure * above)])
+    field = concatenate_fields([_ground(flat, ground.encoded(exposure * below)), _things(cloud, exposure * above)])
     return World(field, _frame(), _sky(rng, sun))
 
 
@@ -80,25 +79,25 @@ def _lit_things(sun: light.Light, shaded: light.Shade, cloud: Cloud, around: Flo
     return light.lit(sun, shaded, cloud.means, normals, cloud.albedo, cloud.firm, around)
 
 
-def _ground(flat: ground.Discs, colours: Float[Array, "n 3"]) -> Field:
+def _ground(flat: ground.Discs, colours: Float[Array, "n 3"]) -> GaussianField:
     n = len(colours)
     stretch = np.stack([np.sqrt(1 + flat.east**2), np.sqrt(1 + flat.north**2)], 1)
     scales = np.column_stack([ground.WIDTH * flat.sizes * stretch, THICK * flat.sizes.min(1)])
     return _field(flat.means, scales, quaternions(flat.east, flat.north), np.full(n, OPACITY), colours, True)
 
 
-def _things(cloud: Cloud, shine: Float[Array, "n 3"]) -> Field:
+def _things(cloud: Cloud, shine: Float[Array, "n 3"]) -> GaussianField:
     return _field(cloud.means, cloud.scales, cloud.quats[:, [3, 0, 1, 2]], cloud.opacity, ground.encoded(shine), False)
 
 
-def _field(means, scales, quats, opacity, colours, is_ground: bool) -> Field:
+def _field(means, scales, quats, opacity, colours, is_ground: bool) -> GaussianField:
     n = len(means)
-    return Field(
+    return GaussianField(
         means.astype(np.float32),
         np.log(scales).astype(np.float32),
         quats.astype(np.float32),
         np.log(opacity / (1 - opacity)).astype(np.float32),
-        sh_of(colours),
+        rgb_to_sh(colours),
         np.zeros(n, np.float32),
         np.full(n, is_ground),
     )

@@ -16,12 +16,12 @@ def least(now: State, cameras: list[Camera], score: Callable[[State], float], re
 
     cameras: of the photos. score: PSNR of held-out pixels, dB.
     """
-    tried = {degree: reduced(now, degree, cameras) for degree in range(now.degree)} | {now.degree: now}
+    tried = {degree: reduced(now, degree, cameras) for degree in range(now.sh_degree)} | {now.sh_degree: now}
     scores = {degree: score(state) for degree, state in tried.items()}
     report.held_out += [{"degree": degree, "psnr": round(value, 3)} for degree, value in scores.items()]
     chosen = min(degree for degree, value in scores.items() if value > max(scores.values()) - GAIN)
-    worth = scores[now.degree] - scores[0]
-    report.chose("degree", chosen, f"degree {now.degree} is worth {worth:+.3f} dB on held-out pixels")
+    worth = scores[now.sh_degree] - scores[0]
+    report.chose("degree", chosen, f"degree {now.sh_degree} is worth {worth:+.3f} dB on held-out pixels")
     return tried[chosen]
 
 
@@ -31,7 +31,7 @@ def reduced(full: State, degree: int, cameras: list[Camera]) -> State:
     colours, mean = full.values["colours"], 0.0
     for camera in cameras:
         seen = harmonics.directions(full.values["means"].astype(float), camera)
-        mean = mean + harmonics.basis(seen, full.degree) / len(cameras)
+        mean = mean + harmonics.basis(seen, full.sh_degree) / len(cameras)
     out = full.copy()
     out.bend_to(degree)
     gone = np.einsum("nk,nkc->nc", mean[:, k:], colours[:, k:])

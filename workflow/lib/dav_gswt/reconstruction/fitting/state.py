@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 
 NAMES = ("means", "log_scales", "quats", "opacity_logits", "colours")  # colours: spherical harmonics, n k 3
 
@@ -23,7 +23,7 @@ class State:
         return len(self.values["means"])
 
     @property
-    def degree(self) -> int:
+    def sh_degree(self) -> int:
         """Degree of the spherical harmonics."""
         return int(np.sqrt(self.values["colours"].shape[1])) - 1
 
@@ -60,18 +60,18 @@ class State:
             part["colours"][:, :kept] = old[:, :kept]
 
 
-def of(field: Field) -> State:
+def of(field: GaussianField) -> State:
     """A field at the start of its training."""
     arrays = (field.means, field.log_scales, field.quats, field.opacity_logits, field.sh)
     values = {name: np.array(a, np.float32, order="C") for name, a in zip(NAMES, arrays, strict=True)}
     return State(values, *({k: np.zeros_like(v) for k, v in values.items()} for _ in range(2)))
 
 
-def field_of(state: State, ground: int, keep: Bool[Array, "n"] | None = None) -> Field:
+def field_of(state: State, ground: int, keep: Bool[Array, "n"] | None = None) -> GaussianField:
     """The field in training, its first `ground` Gaussians marked as discs of the ground; nothing in it is uncertain."""
     n = len(state)
     values = state.values
-    field = Field(
+    field = GaussianField(
         values["means"],
         values["log_scales"],
         values["quats"],

@@ -15,7 +15,7 @@ from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt import raster
-from dav_gswt.field import SH0, Field
+from dav_gswt.field import SH0, GaussianField
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos import training_views as photos
@@ -47,7 +47,7 @@ LEAST_PEAK = 0.03  # its largest blend weight in any photo, not to be pruned
 class Fitted:
     """A field and how it came to be."""
 
-    field: Field
+    field: GaussianField
     report: Report
 
 
@@ -79,7 +79,7 @@ class Task:
 
 
 def fit(
-    field: Field,
+    field: GaussianField,
     views: list[View],
     plan: Plan,
     rules: Rules,
@@ -113,9 +113,9 @@ def fit(
     return _ended(run, task, what)
 
 
-def _begun(field: Field, views: list[View], plan: Plan, rng: np.random.Generator) -> Run:
+def _begun(field: GaussianField, views: list[View], plan: Plan, rng: np.random.Generator) -> Run:
     begun = state.of(field)
-    if begun.degree > plan.most_degree:
+    if begun.sh_degree > plan.most_degree:
         begun.bend_to(plan.most_degree)
     n = len(views)
     return Run(begun, Report(), rng, exposure.Levels(n), poses.Poses(n), Residual(), [])
@@ -156,7 +156,7 @@ def _advance(run: Run, task: Task) -> None:
 def _warm_up(run: Run, task: Task) -> None:
     """The spherical harmonics come one degree after the other, in the first half."""
     due = int(task.plan.most_degree * min(1.0, 2 * run.step / max(1, task.plan.steps)))
-    if due > run.state.degree:
+    if due > run.state.sh_degree:
         run.state.bend_to(due)
 
 
@@ -263,13 +263,13 @@ def _ended(run: Run, task: Task, what: str) -> Fitted:
     field = state.field_of(run.state, task.rules.discs, alive)
     if task.plan.cap == AUTO:
         run.report.chose("cap", len(field), f"as many as {VISIBLE:g} of error in a pixel ask for")
-    run.report.steps, run.report.gaussians, run.report.degree = run.step, len(field), run.state.degree
+    run.report.steps, run.report.gaussians, run.report.degree = run.step, len(field), run.state.sh_degree
     for choice in run.report.choices:
         _log.info("%s: %s is %s: %s", what, choice["what"], choice["value"], choice["why"])
     return Fitted(field, run.report)
 
 
-def _key(field: Field, views: list[View], plan: Plan, rng: np.random.Generator) -> str:
+def _key(field: GaussianField, views: list[View], plan: Plan, rng: np.random.Generator) -> str:
     arrays = [a for v in views for a in (v.image, v.weight, v.behind, v.camera.rotation, v.camera.translation)]
     numbers = [(v.camera.fx, v.camera.fy, v.camera.cx, v.camera.cy) for v in views]
     return snapshot.key(*vars(field).values(), *arrays, numbers, plan, rng.bit_generator.state)

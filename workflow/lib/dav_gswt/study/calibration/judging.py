@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float32, Float64
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry.poses import Pose, of_camera, place
 from dav_gswt.photos.training_views import View
 from dav_gswt.reconstruction.ground import Ground
@@ -26,7 +26,7 @@ class Judged:
     """The field whose scores are judged. taken: the photos so far. size: longer side of those that it was fitted to."""
 
     scene: dict
-    field: Field
+    field: GaussianField
     grid: Ground
     frame: dict
     taken: list[View]

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files, metrics
 from dav_gswt.photos.training_views import View
@@ -27,7 +27,7 @@ Judgement = dict[str, float | None]
 
 
 def errors(
-    field: Field, grid: Ground, views: list[View], size: int, corrected: bool = False
+    field: GaussianField, grid: Ground, views: list[View], size: int, corrected: bool = False
 ) -> tuple[Float64[Array, "n"], list[Float32[Array, "_ _"]]]:
     """RMSE between what the field shows and the true views, over the pixels that look at the modelled exemplar.
 
@@ -53,7 +53,7 @@ def errors(
     return error, maps
 
 
-def _picture(field: Field, camera: Camera, size: int) -> Float32[Array, "h w 3"]:
+def _picture(field: GaussianField, camera: Camera, size: int) -> Float32[Array, "h w 3"]:
     """What the field shows, drawn `size` pixels long, then shrunk to the camera's own."""
     width, height = camera.width, camera.height
     share = max(1.0, size / max(width, height))

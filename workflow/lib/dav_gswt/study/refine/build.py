@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field, joined
+from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.logs import progress
 from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import Condition
@@ -53,7 +53,7 @@ class Options:
 class Uncut:
     """The exemplar's finest level: what ground looks like where nothing was cut."""
 
-    field: Field
+    field: GaussianField
     exemplar: Exemplar
 
 
@@ -76,7 +76,9 @@ def refined(tiles: TileSet, uncut: Uncut, options: Options, repair: Repair, size
     return replace(tiles, fields=levels, seams=tiles.seams | {"refined": {"options": vars(options), "tiles": told}})
 
 
-def _tile(tiles: TileSet, number: int, uncut: Uncut, options: Options, repair: Repair, size: int) -> tuple[Field, dict]:
+def _tile(
+    tiles: TileSet, number: int, uncut: Uncut, options: Options, repair: Repair, size: int
+) -> tuple[GaussianField, dict]:
     """One tile's finest level, and what was done to it."""
     cell, labels, field = tiles.spacing, tiles.labels[number], tiles.fields[0][number]
     share = limits.shares(labels, options.reach, float(tiles.seams["layout"]["strip"]))
@@ -119,7 +121,7 @@ def _photos(
 
 
 def _wanted(
-    field: Field,
+    field: GaussianField,
     bounds: limits.Bounds,
     places: list[Place],
     photos: Float32[Array, "b s s 3"],
@@ -130,7 +132,7 @@ def _wanted(
     drawn, shown, near, now = Rasterizer(), [], [], []
     looks = [(place, camera) for place in places for camera in place.cameras]
     for place, camera in looks:
-        both = joined([field[place.own], place.around])
+        both = concatenate_fields([field[place.own], place.around])
         share = np.zeros((len(both), 1), np.float32)
         share[: len(place.own), 0] = bounds.share[place.own]
         shown.append(conditions.shown(both, camera, flying_height))
@@ -145,7 +147,7 @@ def _wanted(
     ]
 
 
-def _follows(tiles: TileSet, level: int, number: int, finest: Field) -> Field:
+def _follows(tiles: TileSet, level: int, number: int, finest: GaussianField) -> GaussianField:
     """A coarser level of a tile, with the mean change of colour of what it stands for."""
     before, field, labels = tiles.fields[0][number], tiles.fields[level][number], tiles.labels[number]
     change, count = np.zeros((*labels.shape, 4)), np.zeros((*labels.shape, 1))

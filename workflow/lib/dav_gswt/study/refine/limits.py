@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Float32, UInt8
 from numpy import ndarray as Array
 from scipy.ndimage import distance_transform_edt
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.lod.merge import covariances
 from dav_gswt.raster.interface import RIM
 from dav_gswt.tiles.layout import CENTRE
@@ -69,21 +69,21 @@ def shares(labels: UInt8[Array, "n n"], reach: float, margin: float) -> Float[Ar
     return np.cos(0.5 * np.pi * away) ** 2 * np.minimum(rise[:, None], rise)
 
 
-def clearance(field: Field, side: float) -> Float[Array, "n"]:
+def clearance(field: GaussianField, side: float) -> Float[Array, "n"]:
     """From where each Gaussian ends to its tile's nearest border, in world units; negative where it reaches over it."""
     ends = RIM * np.sqrt(np.diagonal(covariances(field), axis1=1, axis2=2)[:, :2])
     place = field.means[:, :2].astype(float)
     return (np.minimum(place, side - place) - ends).min(1)
 
 
-def in_cells(field: Field, values: Float[Array, "n n *c"], side: float) -> Float[Array, "k *c"]:
+def in_cells(field: GaussianField, values: Float[Array, "n n *c"], side: float) -> Float[Array, "k *c"]:
     """Of each Gaussian, the value of the cell that its centre is in."""
     column, row = (np.clip((field.means[:, i] * len(values) / side).astype(int), 0, len(values) - 1) for i in (0, 1))
     return values[row, column]
 
 
 def bounds(
-    field: Field, share: Float[Array, "n n"], side: float, colour: float, opacity: float, position: float
+    field: GaussianField, share: Float[Array, "n n"], side: float, colour: float, opacity: float, position: float
 ) -> Bounds:
     """Of a tile's Gaussians. position: in world units; none comes to reach a border that it did not."""
     room = clearance(field, side)

@@ -7,7 +7,7 @@ from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt import raster
-from dav_gswt.field import SH0, Field, joined
+from dav_gswt.field import SH0, GaussianField, concatenate_fields
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import Rasterizer
 from dav_gswt.reconstruction.uncertainty import arrays
@@ -31,7 +31,7 @@ class Wanted:
 
 
 def refitted(
-    field: Field, wanted: list[Wanted], bounds: Bounds, moves: Float32[Array, "n 7"], steps: int
+    field: GaussianField, wanted: list[Wanted], bounds: Bounds, moves: Float32[Array, "n 7"], steps: int
 ) -> tuple[Float32[Array, "n 7"], float, float]:
     """Fit colours, opacities and positions of the free Gaussians to all pictures at once, by `steps` steps of Adam.
 
@@ -56,7 +56,7 @@ def refitted(
     return moves, before, after
 
 
-def changed(field: Field, moves: Float32[Array, "n 7"], scale: Float32[Array, "n 7"]) -> Field:
+def changed(field: GaussianField, moves: Float32[Array, "n 7"], scale: Float32[Array, "n 7"]) -> GaussianField:
     """The field moved by shares of the bounds; what is not moved keeps its bits."""
     by = moves * scale
     rows = np.flatnonzero(by.any(1))
@@ -67,13 +67,15 @@ def changed(field: Field, moves: Float32[Array, "n 7"], scale: Float32[Array, "n
     return replace(field, sh=sh, opacity_logits=logits, means=means)
 
 
-def _gradient(field: Field, wanted: list[Wanted], scale: Float32[Array, "n 7"]) -> tuple[float, Float32[Array, "n 7"]]:
+def _gradient(
+    field: GaussianField, wanted: list[Wanted], scale: Float32[Array, "n 7"]
+) -> tuple[float, Float32[Array, "n 7"]]:
     """Root of the loss, and the loss by the shares that everything is moved by."""
     total, gradient = 0.0, np.zeros((len(field), 7), float)
     drawn = Rasterizer()
     for one in wanted:
         own, k = one.place.own, len(one.place.own)
-        seen = drawn.forward(**arrays(joined([field[own], one.place.around])), camera=one.camera)
+        seen = drawn.forward(**arrays(concatenate_fields([field[own], one.place.around])), camera=one.camera)
         apart = one.weight[..., None] * (seen.colour - one.picture)
         total += float((apart.astype(float) ** 2).mean())
         found = drawn.backward(np.ascontiguousarray(2 * one.weight[..., None] * apart / apart.size, np.float32))

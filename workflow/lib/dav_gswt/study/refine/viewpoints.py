@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field, joined
+from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.study.refine.limits import seam
@@ -26,7 +26,7 @@ class Place:
 
     middle: Float[Array, "3"]
     own: Int[Array, "n"]
-    around: Field
+    around: GaussianField
     cameras: list[Camera]
 
 
@@ -56,20 +56,22 @@ def neighbours(tile: int) -> Int[Array, "3 3"]:
     return out
 
 
-def assembly(tiles: list[Field], tile: int, side: float) -> Field:
+def assembly(tiles: list[GaussianField], tile: int, side: float) -> GaussianField:
     """The neighbours of a tile, laid around it."""
     numbers = neighbours(tile)
-    return joined([moved(tiles[numbers[j, i]], [(i - 1) * side, (j - 1) * side, 0.0]) for j, i in _AROUND])
+    return concatenate_fields([moved(tiles[numbers[j, i]], [(i - 1) * side, (j - 1) * side, 0.0]) for j, i in _AROUND])
 
 
 _AROUND = [(j, i) for j in range(3) for i in range(3) if (j, i) != (1, 1)]
 
 
-def moved(field: Field, by) -> Field:
+def moved(field: GaussianField, by) -> GaussianField:
     return replace(field, means=(field.means + np.asarray(by, float)).astype(np.float32))
 
 
-def place(field: Field, around: Field, at: Float[Array, "2"], width: float, views: int, size: int) -> Place:
+def place(
+    field: GaussianField, around: GaussianField, at: Float[Array, "2"], width: float, views: int, size: int
+) -> Place:
     """A point of a tile's cut, and what is seen of it; width: of the ground in a picture. views: evenly around it."""
     own = np.flatnonzero(near(field, at, SPREAD * width))
     height = ground_height(field[own], at, 0.1 * width)
@@ -78,11 +80,11 @@ def place(field: Field, around: Field, at: Float[Array, "2"], width: float, view
     return Place(middle, own, around[near(around, at, SPREAD * width)], looks)
 
 
-def near(field: Field, at: Float[Array, "2"], half: float) -> Bool[Array, "n"]:
+def near(field: GaussianField, at: Float[Array, "2"], half: float) -> Bool[Array, "n"]:
     return (np.abs(field.means[:, :2] - at) < half).all(1)
 
 
-def ground_height(field: Field, at: Float[Array, "2"], half: float) -> float:
+def ground_height(field: GaussianField, at: Float[Array, "2"], half: float) -> float:
     """Mean height of the ground's discs around a point; of all Gaussians where none is ground; 0 of none."""
     there = field[near(field, at, half)]
     there = there[there.ground] if there.ground.any() else there

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.study.seams import rendering
@@ -194,12 +194,12 @@ def change(laid: Laid, crop: Crop, patch: int) -> Float[Array, "4"]:
     return known.mean(0) if len(known) else np.zeros(4)
 
 
-def _cells_of(field: Field, eye: Float[Array, "3"], size: float) -> Int[Array, "n 2"]:
+def _cells_of(field: GaussianField, eye: Float[Array, "3"], size: float) -> Int[Array, "n 2"]:
     """Cells of a size that Gaussians, counted from the eye, lie in."""
     return np.floor((field.means[:, :2] + eye[:2]) / size).astype(int)
 
 
-def _patch_at(laid: Laid, field: Field, eye: Float[Array, "3"]) -> Int[Array, "n"]:
+def _patch_at(laid: Laid, field: GaussianField, eye: Float[Array, "3"]) -> Int[Array, "n"]:
     column, row = (_cells_of(field, eye, laid.spacing) - laid.first).T
     inside = (column >= 0) & (row >= 0) & (column < len(laid.patch)) & (row < len(laid.patch))
     return np.where(inside, laid.patch[row * inside, column * inside], -1)

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.lod.build import Levels
 from dav_gswt.reconstruction import top_view
 from dav_gswt.study.seams.ground import Source, source_of
@@ -22,7 +22,7 @@ class Known:
     NaN for holes.
     """
 
-    levels: list[Field]
+    levels: list[GaussianField]
     wanted: int | str
     exemplar: Exemplar
     colour: Float[Array, "m m 3"]

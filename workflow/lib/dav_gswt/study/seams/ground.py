@@ -14,7 +14,7 @@ from numpy import ndarray as Array
 from dav_gswt.bundle import direction_search
 from dav_gswt.bundle.build import Options as Bundled
 from dav_gswt.bundle.build import laying
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.study.seams.spatial_index import Shelf
 from dav_gswt.terrain import assemble
 from dav_gswt.terrain.choice import tiles_in
@@ -89,7 +89,7 @@ class Laid:
         return np.stack([x + 1, y + 1, (_around(self.label)[:, y, x] == layout.CENTRE).any(0)], 1)
 
 
-def source_of(levels: list[Field], exemplar: Exemplar, colour: Float[Array, "m m 3"], width: float) -> Source:
+def source_of(levels: list[GaussianField], exemplar: Exemplar, colour: Float[Array, "m m 3"], width: float) -> Source:
     """The exemplar as `build.cut_tiles` sees it. colour: NaN for holes. width: of the low-pass, in cells."""
     _, height = build.ground_maps(levels[0], exemplar)
     trend = trends.trend_of(colour, height, exemplar, width)
@@ -144,6 +144,6 @@ def _correction(tiles: build.TileSet, source: Source, number: int) -> Float[Arra
     return own - source.ground[layout.sources(labels, shift)]
 
 
-def _cell_means(field: Field, cells: Exemplar) -> Float[Array, "m m 4"]:
+def _cell_means(field: GaussianField, cells: Exemplar) -> Float[Array, "m m 4"]:
     colour, height = build.ground_maps(field, cells)
     return np.concatenate([colour, height[..., None]], -1)

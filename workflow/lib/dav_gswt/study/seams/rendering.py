@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.field import SH0, Field
+from dav_gswt.field import SH0, GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.study.seams.spatial_index import Seen, Shelf
 from dav_gswt.terrain import assemble, splats
@@ -20,7 +20,7 @@ from dav_gswt.terrain.backdrop import Backdrop
 
 SKY = {"zenith": [0.0, 0.0, 0.0], "horizon": [0.0, 0.0, 0.0]}  # crops see none
 
-Look = Callable[[Field, Float[Array, "3"]], Float32[Array, "n 3"]]  # colours of Gaussians counted from the eye
+Look = Callable[[GaussianField, Float[Array, "3"]], Float32[Array, "n 3"]]  # colours of Gaussians counted from the eye
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Piece:
     whether about the eye.
     """
 
-    parts: dict[int, Field]
+    parts: dict[int, GaussianField]
     corner: Float[Array, "3"]
     direction: Float[Array, "3"]
     close: bool

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field, joined
+from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.geometry import cameras
 from dav_gswt.raster import render
 from dav_gswt.terrain.choice import tiles_in
@@ -32,7 +32,7 @@ class Repeats:
     pixels: int
 
 
-def repeats(tiles: TileSet, exemplar: list[Field], side: float, salt: int) -> Repeats:
+def repeats(tiles: TileSet, exemplar: list[GaussianField], side: float, salt: int) -> Repeats:
     """exemplar: its levels, trend out, from (0, 0), `side` wide. From above, a pixel a cell of the second level.
 
     The terrain is seen in WINDOWS places: in one of them equal tiles lie two apart half as often again, or
@@ -45,18 +45,20 @@ def repeats(tiles: TileSet, exemplar: list[Field], side: float, salt: int) -> Re
     return Repeats(terrain, autocorrelation(_above(exemplar[level], side, pixel)), round(tiles.side / pixel))
 
 
-def _laid(tiles: TileSet, level: int, first: int, salt: int) -> Field:
+def _laid(tiles: TileSet, level: int, first: int, salt: int) -> GaussianField:
     """The terrain's tiles from (first, 0) on, from the origin on."""
     numbers = tiles_in(first, 0, (TILES, TILES), salt, tiles.variants)
     at = [(number, i, j) for j, row in enumerate(numbers.tolist()) for i, number in enumerate(row)]
-    return joined([_moved(tiles.fields[level][number], i * tiles.side, j * tiles.side) for number, i, j in at])
+    return concatenate_fields(
+        [_moved(tiles.fields[level][number], i * tiles.side, j * tiles.side) for number, i, j in at]
+    )
 
 
-def _moved(field: Field, east: float, north: float) -> Field:
+def _moved(field: GaussianField, east: float, north: float) -> GaussianField:
     return replace(field, means=field.means + np.float32([east, north, 0]))
 
 
-def _above(field: Field, side: float, pixel: float) -> Float[Array, "h w 3"]:
+def _above(field: GaussianField, side: float, pixel: float) -> Float[Array, "h w 3"]:
     count = round(side / pixel)
     top = float(field.means[:, 2].max()) + 10 * pixel
     return render(field, cameras.top_down(0.0, 0.0, count, count, pixel, top)).colour

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster.interface import RIM
 
@@ -44,7 +44,7 @@ class Shelf:
     there at most, its lowest and highest point. most: the farthest reach, the lowest and the highest point of all.
     """
 
-    field: Field
+    field: GaussianField
     order: Int[Array, "n"]
     places: Float[Array, "2 n"]
     reach: Float[Array, "n"]
@@ -53,7 +53,7 @@ class Shelf:
     most: tuple[float, float, float]
 
     @classmethod
-    def of(cls, field: Field) -> "Shelf":
+    def of(cls, field: GaussianField) -> "Shelf":
         order = np.argsort(field.means[:, 0], kind="stable")
         means = field.means[order].astype(float)
         reach = RIM * np.exp(field.log_scales.max(1, initial=-np.inf)[order].astype(float))
@@ -61,7 +61,7 @@ class Shelf:
         most = reach.max(initial=0), low.min(initial=np.inf), high.max(initial=-np.inf)
         return cls(field, order, np.ascontiguousarray(means[:, :2].T), reach, low, high, tuple(float(v) for v in most))
 
-    def near(self, seen: Seen, corner: Float[Array, "3"]) -> Field:
+    def near(self, seen: Seen, corner: Float[Array, "3"]) -> GaussianField:
         """Those that may show over the ground that is seen, counted from a corner; in the field's own order."""
         box = seen.box - corner[:2]
         some, shown = self._between(seen, *box[:, 0]), True

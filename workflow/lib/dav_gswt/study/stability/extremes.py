@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt.field import Field, sh_of
-from dav_gswt.field import write as write_field
+from dav_gswt.field import GaussianField, rgb_to_sh, write_field
 from dav_gswt.images import image_files
 
 COUNT = 160  # Gaussians along a side of a world that is given as a field
@@ -32,7 +31,7 @@ class Extreme:
     like: str | None = None
 
 
-def ground(count: int, side: float) -> Field:
+def ground(count: int, side: float) -> GaussianField:
     """A finished field: count x count opaque flat discs on a gentle relief, in blotches of two colours."""
     rng = np.random.default_rng(0)
     step = side / count
@@ -43,12 +42,12 @@ def ground(count: int, side: float) -> Field:
     colour = np.array([0.55, 0.45, 0.32]) + 0.07 * blotch[:, None] * np.array([1.0, 0.4, -0.6]) + grain
     n = count**2
     means = np.stack([x.ravel(), y.ravel(), 0.01 * side * blotch / 6], 1)
-    return Field(
+    return GaussianField(
         means.astype(np.float32),
         np.tile(np.log([0.7 * step, 0.7 * step, 0.05 * step]).astype(np.float32), (n, 1)),
         np.tile(np.array([1, 0, 0, 0], np.float32), (n, 1)),
         np.full(n, 4.0, np.float32),
-        sh_of(np.clip(colour, 0, 1)),
+        rgb_to_sh(np.clip(colour, 0, 1)),
         np.zeros(n, np.float32),
         np.zeros(n, bool),
     )

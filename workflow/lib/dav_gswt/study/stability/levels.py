@@ -7,7 +7,7 @@ import numpy as np
 from numpy import ndarray as Array
 
 from dav_gswt.bundle import lod
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.study.stability.formula import LAW, SINGLE, Formula, Point, Tolerance
 from dav_gswt.study.stability.scoring import EXACT
 from dav_gswt.terrain import drape, weights
@@ -99,7 +99,9 @@ def _draped(quats: Array, scales: tuple, slope: Array) -> Array:
     n = len(quats)
     logs = np.tile(np.log(np.array(scales)).astype(np.float32), (n, 1))
     zero = np.zeros(n, np.float32)
-    field = Field(np.zeros((n, 3), np.float32), logs, quats, zero, np.zeros((n, 1, 3), np.float32), zero, zero > 0)
+    field = GaussianField(
+        np.zeros((n, 3), np.float32), logs, quats, zero, np.zeros((n, 1, 3), np.float32), zero, zero > 0
+    )
     return drape.axes(field, slope) / np.exp(logs.astype(np.float64))[:, None]
 
 

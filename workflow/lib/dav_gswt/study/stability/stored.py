@@ -9,7 +9,7 @@ from numpy import ndarray as Array
 from scipy.special import expit
 
 from dav_gswt.bundle import chunks, encoding, gswt, orders
-from dav_gswt.field import Field, sh_of
+from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.study.stability.formula import LAW, SINGLE, Formula, Point, Tolerance
 from dav_gswt.study.stability.scoring import EXACT
 from dav_gswt.views import pose_maps
@@ -23,26 +23,26 @@ SIDES = (1e-12, 1e-3, 1.0, 1e6)
 
 
 @cache
-def splats(side: float = 1.0) -> Field:
+def splats(side: float = 1.0) -> GaussianField:
     """Over a tile of that side and half of its neighbours: opacities 0 to 1, colours beyond both ends, quaternions of
     any length, deviations of all that a record tells apart.
     """
     rng = np.random.default_rng(0)
     thinnest, widest = np.log(encoding.SLIGHTEST * side / PIXELS), np.log(encoding.WIDEST * side)
     sizes = np.linspace(thinnest, widest, COUNT)
-    return Field(
+    return GaussianField(
         (rng.uniform(-0.5, 1.5, (COUNT, 3)) * side).astype(np.float32),
         np.column_stack([sizes, sizes[::-1], rng.permutation(sizes)]).astype(np.float32),
         (rng.standard_normal((COUNT, 4)) * 10 ** rng.uniform(-25, 25, (COUNT, 1))).astype(np.float32),
         np.concatenate([[-1e4, 1e4], np.linspace(-20, 20, COUNT - 2)]).astype(np.float32),
-        sh_of(rng.uniform(-0.2, 1.2, (COUNT, 3))),
+        rgb_to_sh(rng.uniform(-0.2, 1.2, (COUNT, 3))),
         np.zeros(COUNT, np.float32),
         np.zeros(COUNT, bool),
     )
 
 
 @cache
-def read_back(side: float = 1.0) -> Field:
+def read_back(side: float = 1.0) -> GaussianField:
     """The same from a bundle's chunk."""
     field = splats(side)
     code = encoding.Encoding.of([field], side, side / PIXELS)
@@ -59,7 +59,7 @@ def _sides() -> list[Point]:
     return [Point(f"tiles {side:g} wide", (side,)) for side in SIDES]
 
 
-def _deviations(field: Field) -> Array:
+def _deviations(field: GaussianField) -> Array:
     """Of each splat from its longest axis to its shortest: a record may name the axes anew."""
     return -np.sort(-np.exp(field.log_scales.astype(np.float64)), 1)
 

@@ -12,7 +12,7 @@ from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.images import metrics
 from dav_gswt.photos.training_views import View
 from dav_gswt.raster import render
@@ -34,7 +34,7 @@ class Round:
     """What a round ended with. metrics: its metrics.json. title: what stands over it; note: and under its measures."""
 
     number: int
-    field: Field
+    field: GaussianField
     grid: Ground
     metrics: dict
     title: str = ""

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
-from dav_gswt.field import Field
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images.image_files import enlarged
 from dav_gswt.raster import Rasterizer
@@ -14,7 +14,7 @@ SIDE = 64  # pixels of the pictures whose blend weights are taken
 SEEN = 0.05  # pixels of blend weight, over all pictures, from which a Gaussian counts as seen
 
 
-def carried(field: Field, cameras: list[Camera], maps: Float32[Array, "n h w"]) -> Float32[Array, "gaussians"]:
+def carried(field: GaussianField, cameras: list[Camera], maps: Float32[Array, "n h w"]) -> Float32[Array, "gaussians"]:
     """Mean over cameras and pixels of u, weighted by blend weight: sum of w_i(p) u(p) / sum of w_i(p); NaN where a
     Gaussian is not seen.
 
