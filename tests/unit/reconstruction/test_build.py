@@ -8,8 +8,9 @@ from dav_gswt.field import rgb_to_sh
 from dav_gswt.geometry import cameras
 from dav_gswt.photos import training_views
 from dav_gswt.raster import render
-from dav_gswt.reconstruction import build, top_view, uncertainty, underlay
+from dav_gswt.reconstruction import build, top_view, underlay
 from dav_gswt.reconstruction.evaluation import evaluate
+from dav_gswt.reconstruction.opacity_uncertainty import estimate_uncertainty
 
 QUALITY = build.Quality(size=48, spacing=1.0, cap=5000, steps=40, steps_per_photo=10, level_steps=5)
 
@@ -17,7 +18,7 @@ QUALITY = build.Quality(size=48, spacing=1.0, cap=5000, steps=40, steps_per_phot
 def test_ground_that_no_photo_sees_is_uncertain_and_the_rest_is_not():
     photos = [replace(photo, weight=photo.weight.copy()) for photo in made.photos(1)]
     photos[0].weight[:, :24] = 0
-    field = uncertainty.with_uncertainty(made.field(), photos)
+    field = estimate_uncertainty(made.field(), photos)
     field = field[field.ground]
     pixels, _ = photos[0].camera.project(field.means.astype(float))
     inside = (pixels > 2).all(1) & (pixels < 46).all(1)

@@ -8,10 +8,9 @@ from fixtures.tile_sets import splats
 
 from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry import cameras
-from dav_gswt.raster import Rasterizer
+from dav_gswt.raster import Rasterizer, to_raster_arrays
 from dav_gswt.reconstruction import discs, underlay
 from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.reconstruction.uncertainty import arrays
 from dav_gswt.tiles import build, coarse_levels
 
 CELLS, SPACING = 16, 0.25
@@ -59,7 +58,7 @@ def test_each_level_is_a_coarser_and_smaller_one_as_bright_as_the_one_before(til
     # things hide ground by chance: brightness is compared without them
     level = tile[tile.ground | coarse_levels.underneath(tile, SPACING)]
     for number in range(3):
-        seen = Rasterizer().forward(**arrays(level), camera=camera)
+        seen = Rasterizer().forward(**to_raster_arrays(level), camera=camera)
         means.append((seen.colour / seen.alpha[..., None]).mean((0, 1)))
         counts.append(len(level))
         scales.append(np.exp(level.log_scales.astype(float)).mean())

@@ -2,16 +2,15 @@ import numpy as np
 import pytest
 from fixtures import ground as made
 
-from dav_gswt.raster import Rasterizer
+from dav_gswt.raster import Rasterizer, to_raster_arrays
 from dav_gswt.reconstruction.fitting.residual import Residual
-from dav_gswt.reconstruction.uncertainty import arrays
 
 
 def noted(shares):
     """What a residual says after pictures that are wrong by .1 in this share of their columns."""
     residual, drawn = Residual(), Rasterizer()
     for view, share in zip(made.photos(len(shares)), shares, strict=True):
-        drawn.forward(**arrays(made.field()), camera=view.camera)
+        drawn.forward(**to_raster_arrays(made.field()), camera=view.camera)
         weight = np.zeros_like(view.weight)
         weight[:, : round(share * weight.shape[1])] = 1
         residual.note(drawn, np.full_like(view.image, 0.1), weight)

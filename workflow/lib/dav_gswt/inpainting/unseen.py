@@ -6,10 +6,9 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.raster import Rasterizer
+from dav_gswt.raster import Rasterizer, to_raster_arrays
 from dav_gswt.reconstruction import underlay
 from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.reconstruction.uncertainty import arrays
 
 UNKNOWN = 0.5  # uncertainty of a disc above which no photo fitted it, either
 TOUCHES = 0.1  # of a pixel's blend weight that, if it is of certain Gaussians, the pixel shows something of them
@@ -42,7 +41,7 @@ def gaussians(field: GaussianField, grid: Ground, there: Bool[Array, "rows colum
 
 def share(field: GaussianField, marked: Bool[Array, "n"], camera: Camera) -> Float32[Array, "h w"]:
     """Of every pixel's blend weight, what marked Gaussians have of it; 0 where nothing is."""
-    seen = Rasterizer().forward(**arrays(field, marked.astype(np.float32)[:, None]), camera=camera)
+    seen = Rasterizer().forward(**to_raster_arrays(field, marked.astype(np.float32)[:, None]), camera=camera)
     return np.clip(seen.colour[..., 0], 0, 1)
 
 

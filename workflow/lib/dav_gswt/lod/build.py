@@ -19,13 +19,12 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
 from dav_gswt.lod.merge import cropped, halved
 from dav_gswt.photos.training_views import View
-from dav_gswt.raster import Gradients
+from dav_gswt.raster import Gradients, to_raster_arrays
 from dav_gswt.reconstruction.build import modelled
 from dav_gswt.reconstruction.fitting import trainer
 from dav_gswt.reconstruction.fitting.plan import Plan
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.ground_constraints import OnGround
-from dav_gswt.reconstruction.uncertainty import arrays
 from dav_gswt.tiles.layout import AUTO, MOST
 
 _log = logging.getLogger(__name__)
@@ -122,7 +121,7 @@ def neighbour_views(field: GaussianField, coarse: Ground) -> list[View]:
     drawn, views = raster.Rasterizer(), []
     for number, camera in enumerate(_cameras(coarse)):
         fine = camera.resized(2 * camera.width, 2 * camera.height)
-        seen = drawn.forward(**arrays(field), camera=fine)
+        seen = drawn.forward(**to_raster_arrays(field), camera=fine)
         # what shines through is not the field's colour: divide it out
         colour = seen.colour / np.maximum(seen.alpha, 0.5)[..., None]
         image = image_files.resized(np.clip(colour, 0, 1).astype(np.float32), camera.width, camera.height)

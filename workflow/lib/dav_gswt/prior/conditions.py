@@ -16,8 +16,7 @@ from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
 from dav_gswt.photos.training_views import View
 from dav_gswt.prior.interface import Condition
-from dav_gswt.raster import Rasterizer
-from dav_gswt.reconstruction.uncertainty import arrays
+from dav_gswt.raster import Rasterizer, to_raster_arrays
 
 FINE = 2  # pictures are drawn so many times as large and averaged: edges are soft, as in a photo made smaller
 CLEAR = 0.05  # opacity below which a pixel has no depth
@@ -66,7 +65,7 @@ def condition(
 def shown(field: GaussianField, camera: Camera, flying_height: float) -> Shown:
     """What a field shows to a camera: the field's part of a Condition. All that asks a prior draws fields with this."""
     large = camera.resized(FINE * camera.width, FINE * camera.height)
-    seen = Rasterizer().forward(**arrays(field), camera=large)
+    seen = Rasterizer().forward(**to_raster_arrays(field), camera=large)
     colour, alpha, depth = (pooled(a) for a in (seen.colour, seen.alpha, seen.depth))
     there = alpha > CLEAR
     inverse = np.where(there, flying_height * alpha / np.where(there, depth, 1), 0)

@@ -10,9 +10,10 @@ from numpy import ndarray as Array
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import backends
+from dav_gswt.raster.adapter import to_raster_arrays
 from dav_gswt.raster.interface import Contributions, Gradients, Rasterizer, Rendering
 
-__all__ = ["Contributions", "Gradients", "Rasterizer", "Rendering", "adam", "loss", "render"]
+__all__ = ["Contributions", "Gradients", "Rasterizer", "Rendering", "adam", "loss", "render", "to_raster_arrays"]
 
 
 def render(

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from dav_gswt import raster
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.photos.training_views import View, over_ground
+from dav_gswt.raster import to_raster_arrays
 from dav_gswt.reconstruction import discs, distractors, ground, objects, regression_guard, sky, underlay
 from dav_gswt.reconstruction.fitting import exposure, trainer
 from dav_gswt.reconstruction.fitting.constraints import Anywhere, Rules
@@ -21,8 +22,8 @@ from dav_gswt.reconstruction.fitting.plan import AUTO, MOST_GAUSSIANS, STEPS_PER
 from dav_gswt.reconstruction.fitting.state import State
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.ground_constraints import OnGround
+from dav_gswt.reconstruction.opacity_uncertainty import estimate_uncertainty
 from dav_gswt.reconstruction.plane_sweep import Relief, sweep
-from dav_gswt.reconstruction.uncertainty import arrays, with_uncertainty
 
 _log = logging.getLogger(__name__)
 
@@ -203,7 +204,7 @@ def _ground_colours(
     """The ground's median colours, and which cells a photo sees with nothing standing in between."""
     if len(stand):
         drawn = raster.Rasterizer()
-        clear = [drawn.forward(**arrays(stand), camera=v.camera).alpha < 0.5 for v in views]
+        clear = [drawn.forward(**to_raster_arrays(stand), camera=v.camera).alpha < 0.5 for v in views]
         views = [replace(v, weight=v.weight * c) for v, c in zip(views, clear, strict=True)]
     colour, known = median_colours(grid.centres, views)
     return colour, known.reshape(grid.shape)
@@ -230,7 +231,7 @@ def _made(fitted: trainer.Fitted, grid: Ground, views: list[View]) -> Made:
 
 def _finished(fitted: GaussianField, grid: Ground, views: list[View]) -> Made:
     """A field with its uncertainty, over the surface that its discs have."""
-    field = underlay.as_sure(with_uncertainty(fitted, views), grid)
+    field = underlay.as_sure(estimate_uncertainty(fitted, views), grid)
     return Made(field, surface_of(field, grid) if field.ground.any() else grid, {})
 
 

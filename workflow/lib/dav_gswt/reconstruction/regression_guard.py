@@ -16,9 +16,9 @@ from dav_gswt import raster
 from dav_gswt.field import GaussianField
 from dav_gswt.images import metrics
 from dav_gswt.photos.training_views import View
+from dav_gswt.raster import to_raster_arrays
 from dav_gswt.reconstruction.fitting.plan import Plan
 from dav_gswt.reconstruction.fitting.trainer import Fitted
-from dav_gswt.reconstruction.uncertainty import arrays
 
 _log = logging.getLogger(__name__)
 
@@ -119,7 +119,7 @@ def shown(field: GaussianField, views: list[View]) -> list[float | None]:
 
 
 def _psnr(drawn: raster.Rasterizer, field: GaussianField, view: View) -> float:
-    seen = drawn.forward(**arrays(field), camera=view.camera)
+    seen = drawn.forward(**to_raster_arrays(field), camera=view.camera)
     picture = seen.colour
     if view.behind is not None:
         picture = picture + (1 - seen.alpha)[..., None] * np.nan_to_num(view.behind)

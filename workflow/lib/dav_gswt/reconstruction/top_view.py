@@ -8,9 +8,8 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry import cameras
-from dav_gswt.raster import Rasterizer
+from dav_gswt.raster import Rasterizer, to_raster_arrays
 from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.reconstruction.uncertainty import arrays
 
 LEAST = 1e-6  # alpha of what is there
 
@@ -41,8 +40,8 @@ def from_above(field: GaussianField, grid: Ground) -> Maps:
     top = float(field.means[:, 2].max()) + 10 * grid.spacing
     camera = cameras.top_down(grid.west, grid.south, columns, rows, grid.spacing, top)
     raster = Rasterizer()
-    seen = raster.forward(**arrays(field), camera=camera)
-    doubt = raster.forward(**arrays(field, field.uncertainty[:, None]), camera=camera)
+    seen = raster.forward(**to_raster_arrays(field), camera=camera)
+    doubt = raster.forward(**to_raster_arrays(field, field.uncertainty[:, None]), camera=camera)
     solid = np.maximum(seen.alpha, LEAST)
     maps = Maps(
         seen.colour / solid[..., None],

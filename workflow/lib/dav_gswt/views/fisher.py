@@ -11,9 +11,8 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.raster import Rasterizer
+from dav_gswt.raster import Rasterizer, to_raster_arrays
 from dav_gswt.raster.interface import Contributions
-from dav_gswt.reconstruction.uncertainty import arrays
 
 PRIOR = 1.0  # information on each Gaussian before any photo: one pixel that it fills
 
@@ -22,7 +21,7 @@ def known(field: GaussianField, cameras: list[Camera], raster: Rasterizer) -> Fl
     """Information on each Gaussian in photos that were taken, and a little before them."""
     total = np.full(len(field), PRIOR)
     for camera in cameras:
-        raster.forward(**arrays(field), camera=camera)
+        raster.forward(**to_raster_arrays(field), camera=camera)
         total += raster.contributions().squared
     return total
 
@@ -52,5 +51,5 @@ class Gathered:
         self.known = self.known + self._seen(i).squared
 
     def _seen(self, i: int) -> Contributions:
-        self.raster.forward(**arrays(self.field), camera=self.candidates[i])
+        self.raster.forward(**to_raster_arrays(self.field), camera=self.candidates[i])
         return self.raster.contributions()

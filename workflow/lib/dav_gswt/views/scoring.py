@@ -15,8 +15,8 @@ from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import Condition
 from dav_gswt.raster import Rasterizer
 from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.reconstruction.opacity_uncertainty import render_uncertainty
 from dav_gswt.reconstruction.top_view import from_above
-from dav_gswt.reconstruction.uncertainty import uncertainty_map
 from dav_gswt.views import collision, fisher, prior_sampling
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.frozen_scales import Frozen
@@ -106,7 +106,7 @@ def _geometric(
     already = fisher.known(field, taken, raster)
     terms, maps = {"opacity": np.zeros(len(pool)), "fisher": np.zeros(len(pool))}, []
     for i, (_, camera) in enumerate(progress(pool, "score poses")):
-        maps.append(uncertainty_map(field, small(camera), raster))
+        maps.append(render_uncertainty(field, small(camera), raster))
         terms["fisher"][i] = fisher.gain(raster.contributions(), already)
         weight = on_ground(grid, small(camera))
         terms["opacity"][i] = float((maps[-1] * weight).sum() / max(1.0, weight.sum()))

@@ -20,10 +20,9 @@ from dav_gswt.photos.training_views import View
 from dav_gswt.prior.conditions import Shown, nearest, relative, shown
 from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.training.worlds import FLYING_HEIGHT, World, world
-from dav_gswt.raster import Rasterizer
+from dav_gswt.raster import Rasterizer, to_raster_arrays
 from dav_gswt.reconstruction import build
 from dav_gswt.reconstruction.fitting.photo_colours import sampled
-from dav_gswt.reconstruction.uncertainty import arrays
 
 SIZE = 64  # pixels a side of an example
 FIELD_OF_VIEW = 55.0  # degrees, as synthetic scenes have it
@@ -129,7 +128,7 @@ def matched(made: World, photos: list[View], rng: np.random.Generator) -> tuple[
     each = int(np.exp(rng.uniform(least, most))) // len(photos) + 1
     points, colours = [], []
     for view in photos:
-        seen = Rasterizer().forward(**arrays(made.field), camera=view.camera)
+        seen = Rasterizer().forward(**to_raster_arrays(made.field), camera=view.camera)
         rows, columns = rng.integers(0, seen.alpha.shape, (each, 2)).T
         solid = seen.alpha[rows, columns] > 0.9
         rows, columns = rows[solid], columns[solid]

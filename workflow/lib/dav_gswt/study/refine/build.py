@@ -11,8 +11,7 @@ from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.logs import progress
 from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import Condition
-from dav_gswt.raster import Rasterizer
-from dav_gswt.reconstruction.uncertainty import arrays
+from dav_gswt.raster import Rasterizer, to_raster_arrays
 from dav_gswt.study.refine import limits, refit, viewpoints
 from dav_gswt.study.refine.refit import Wanted
 from dav_gswt.study.refine.repair import Repair
@@ -136,8 +135,8 @@ def _wanted(
         share = np.zeros((len(both), 1), np.float32)
         share[: len(place.own), 0] = bounds.share[place.own]
         shown.append(conditions.shown(both, camera, flying_height))
-        now.append(drawn.forward(**arrays(both), camera=camera).colour)
-        near.append(np.clip(drawn.forward(**arrays(both, share), camera=camera).colour[..., 0], 0, 1))
+        now.append(drawn.forward(**to_raster_arrays(both), camera=camera).colour)
+        near.append(np.clip(drawn.forward(**to_raster_arrays(both, share), camera=camera).colour[..., 0], 0, 1))
     parts = (np.stack([getattr(s, name) for s in shown]) for name in ("colour", "alpha", "inverse_depth"))
     same = np.tile(np.float32([0, 0, 1, 0]), (len(looks), 1))
     added = repair(Condition(*parts, photos, same), np.stack(near))

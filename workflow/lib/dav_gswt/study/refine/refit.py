@@ -9,8 +9,7 @@ from numpy import ndarray as Array
 from dav_gswt import raster
 from dav_gswt.field import SH0, GaussianField, concatenate_fields
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.raster import Rasterizer
-from dav_gswt.reconstruction.uncertainty import arrays
+from dav_gswt.raster import Rasterizer, to_raster_arrays
 from dav_gswt.study.refine.limits import Bounds
 from dav_gswt.study.refine.viewpoints import Place
 
@@ -75,7 +74,7 @@ def _gradient(
     drawn = Rasterizer()
     for one in wanted:
         own, k = one.place.own, len(one.place.own)
-        seen = drawn.forward(**arrays(concatenate_fields([field[own], one.place.around])), camera=one.camera)
+        seen = drawn.forward(**to_raster_arrays(concatenate_fields([field[own], one.place.around])), camera=one.camera)
         apart = one.weight[..., None] * (seen.colour - one.picture)
         total += float((apart.astype(float) ** 2).mean())
         found = drawn.backward(np.ascontiguousarray(2 * one.weight[..., None] * apart / apart.size, np.float32))

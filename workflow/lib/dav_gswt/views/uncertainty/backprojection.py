@@ -7,8 +7,7 @@ from numpy import ndarray as Array
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images.image_files import enlarged
-from dav_gswt.raster import Rasterizer
-from dav_gswt.reconstruction.uncertainty import arrays
+from dav_gswt.raster import Rasterizer, to_raster_arrays
 
 SIDE = 64  # pixels of the pictures whose blend weights are taken
 SEEN = 0.05  # pixels of blend weight, over all pictures, from which a Gaussian counts as seen
@@ -24,7 +23,7 @@ def carried(field: GaussianField, cameras: list[Camera], maps: Float32[Array, "n
     raster = Rasterizer()
     total = np.zeros((2, len(field)))
     for camera, u in zip(cameras, maps, strict=True):
-        raster.forward(**arrays(field), camera=camera.resized(SIDE, SIDE))
+        raster.forward(**to_raster_arrays(field), camera=camera.resized(SIDE, SIDE))
         found = raster.contributions(enlarged(u, SIDE, SIDE)[..., None])
         total += found.mapped[:, 0], found.total
     weighted, weight = total
