@@ -3,7 +3,7 @@
 In: nothing of a scene. Out: weights/lpips_alexnet.safetensors, LPIPS's published weights, out of a package's source archive;
 prior/examples/part{part}.npz, what the project's own prior learns from: part p is of the made-up worlds 20 p to 20 p + 19;
 prior/terrain.safetensors, its weights; prior/regressor{member}.safetensors, a deterministic network of the same shape, as a control;
-docs/data/prior_trial.csv and docs/figures/prior_*.png, how good they are on worlds that they were not trained on.
+docs/research/data/prior_trial.csv and docs/research/figures/prior_*.png, how good they are on worlds that they were not trained on.
 Not part of `all`: `snakemake results/weights/lpips_alexnet.safetensors` fetches them. Without them scores lack LPIPS, and say so.
 """
 

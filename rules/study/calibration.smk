@@ -1,8 +1,8 @@
 """Figures of docs/: how soon a fit shows photos it has not seen, what its field looks like from elsewhere, and whether
 scores of poses say where a field is wrong.
 
-In: the photos of a scene; calibration.json of scenes and rounds. Out: tables in docs/data with their provenance, plots.
-Not part of `all`: `snakemake docs/figures/fit_time.png docs/figures/calibration.png` makes them. Seconds differ from
+In: the photos of a scene; calibration.json of scenes and rounds. Out: tables in docs/research/data with their provenance, plots.
+Not part of `all`: `snakemake docs/research/figures/fit_time.png docs/research/figures/calibration.png` makes them. Seconds differ from
 machine to machine.
 """
 
@@ -99,9 +99,9 @@ rule plot_calibration:
     input:
         cells=lambda wildcards: list(calibrations()),
     output:
-        table="docs/data/calibration.csv",
-        facts="docs/data/calibration.json",
-        plot="docs/figures/calibration.png",
+        table="docs/research/data/calibration.csv",
+        facts="docs/research/data/calibration.json",
+        plot="docs/research/figures/calibration.png",
     log:
         "<logs>/figures/plot_calibration.log",
     benchmark:

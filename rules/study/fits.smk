@@ -1,8 +1,8 @@
 """Figures of docs/: how soon a fit shows photos it has not seen, what its field looks like from elsewhere, and whether
 scores of poses say where a field is wrong.
 
-In: the photos of a scene; calibration.json of scenes and rounds. Out: tables in docs/data with their provenance, plots.
-Not part of `all`: `snakemake docs/figures/fit_time.png docs/figures/calibration.png` makes them. Seconds differ from
+In: the photos of a scene; calibration.json of scenes and rounds. Out: tables in docs/research/data with their provenance, plots.
+Not part of `all`: `snakemake docs/research/figures/fit_time.png docs/research/figures/calibration.png` makes them. Seconds differ from
 machine to machine.
 """
 
@@ -14,10 +14,10 @@ rule profile_fit:
         images="<results>/<photos>/images",
         model="<results>/<photos>/sparse",
     output:
-        curve="docs/data/fit_{scene}.csv",
-        facts="docs/data/fit_{scene}.json",
-        oblique="docs/figures/{scene}_oblique.png",
-        low="docs/figures/{scene}_low.png",
+        curve="docs/research/data/fit_{scene}.csv",
+        facts="docs/research/data/fit_{scene}.json",
+        oblique="docs/research/figures/{scene}_oblique.png",
+        low="docs/research/figures/{scene}_low.png",
     log:
         "<logs>/figures/profile_fit_{scene}.log",
     benchmark:
@@ -36,9 +36,9 @@ rule profile_fit:
 rule plot_fits:
     """PSNR of test photos against seconds."""
     input:
-        curves=expand("docs/data/fit_{scene}.csv", scene=CURVES),
+        curves=expand("docs/research/data/fit_{scene}.csv", scene=CURVES),
     output:
-        plot="docs/figures/fit_time.png",
+        plot="docs/research/figures/fit_time.png",
     log:
         "<logs>/figures/plot_fits.log",
     benchmark:

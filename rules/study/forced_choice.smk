@@ -4,7 +4,7 @@ In: the levels and, of each seam that is compared, the tiles; the files that peo
 config's `perceptual_study`. Out, per scene: perceptual/{scene}/pairs, the crops; for all: perceptual/kit/page, a page that works
 offline and does not say which crop is which, perceptual/kit/key.json, which does; results/tables/perceptual.csv,
 results/figures/perceptual.png and perceptual/participants.json, who was counted.
-Not part of `all`: `snakemake perceptual_kit` and `snakemake perceptual_results`; docs/perceptual.md says how to run it.
+Not part of `all`: `snakemake perceptual_kit` and `snakemake perceptual_results`; docs/research/results/forced-choice.md says how to run it.
 """
 
 

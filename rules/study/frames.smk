@@ -3,7 +3,7 @@
 In: the bundles that the config's `frames` names, viewer. Out, beside each bundle: frames/library.csv (drawn by the library
 on the processor), frames/page.csv (by the page in a headless Chromium), frames/steadiness.csv (what changes from a frame to
 the next of a slow walk, in pre-sorted orders and sorted exactly); of all together results/tables/frames.csv, also in
-docs/data, results/figures/frames.png, and results/tables/viewer.csv, which the study's tables show. Not part of `all`:
+docs/research/data, results/figures/frames.png, and results/tables/viewer.csv, which the study's tables show. Not part of `all`:
 `snakemake frame_times`; needs Chromium and requirements-test.lock. Milliseconds hold for the machine and its load, which
 every row names.
 """
@@ -93,7 +93,7 @@ rule gather_frames:
     output:
         table="results/tables/frames.csv",
         viewer=FRAMES,
-        kept="docs/data/frames.csv",
+        kept="docs/research/data/frames.csv",
     log:
         "<logs>/tables/gather_frames.log",
     benchmark:
@@ -111,7 +111,7 @@ rule plot_frames:
         table=rules.gather_frames.output.table,
     output:
         plot="results/figures/frames.png",
-        kept="docs/figures/frames.png",
+        kept="docs/research/figures/frames.png",
     log:
         "<logs>/figures/plot_frames.log",
     benchmark:

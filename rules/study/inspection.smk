@@ -1,6 +1,6 @@
 """Pictures of docs/inspect.md: what `dav-gswt inspect` shows of a round of the config's scene.
 
-In: photos, scores, poses, field, levels, tiles and maps of the scene's last round. Out: docs/figures/inspect_{shown}.png.
+In: photos, scores, poses, field, levels, tiles and maps of the scene's last round. Out: docs/research/figures/inspect_{shown}.png.
 Not part of `all`: `snakemake --cores 2 --config policy=w2-lpips-diverse rounds=1 -- inspection` makes them. Needs the extra
 `inspect`.
 """
@@ -13,7 +13,7 @@ rule inspect_artifact:
             INSPECTED[wildcards.shown][0], **(values_of(config["scene"]) | {"seed": config["seeds"][0]})
         ),
     output:
-        picture="docs/figures/inspect_{shown}.png",
+        picture="docs/research/figures/inspect_{shown}.png",
     log:
         "<logs>/figures/inspect_{shown}.log",
     benchmark:
@@ -33,4 +33,4 @@ rule inspect_artifact:
 rule inspection:
     """All pictures of docs/inspect.md."""
     input:
-        expand("docs/figures/inspect_{shown}.png", shown=INSPECTED),
+        expand("docs/research/figures/inspect_{shown}.png", shown=INSPECTED),

@@ -45,8 +45,8 @@ rule plot_presort:
         table=rules.gather_presort.output.table,
     output:
         plot="results/figures/presort.png",
-        kept="docs/figures/presort.png",
-        data="docs/data/presort.csv",
+        kept="docs/research/figures/presort.png",
+        data="docs/research/data/presort.csv",
     log:
         "<logs>/figures/plot_presort.log",
     benchmark:

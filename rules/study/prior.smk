@@ -34,9 +34,9 @@ rule evaluate_prior:
         examples=expand("<results>/prior/examples/part{part}.npz", part=HELD_OUT),
         lpips=lambda wildcards: [f for f in rules.fetch_lpips.output if Path(f).exists()],
     output:
-        table="docs/data/prior_trial.csv",
-        losses="docs/figures/prior_losses.png",
-        samples="docs/figures/prior_samples.png",
+        table="docs/research/data/prior_trial.csv",
+        losses="docs/research/figures/prior_losses.png",
+        samples="docs/research/figures/prior_samples.png",
     log:
         "<logs>/prior/evaluate_prior.log",
     benchmark:

@@ -4,7 +4,7 @@ In: the levels and the tiles. Out, per cell (a scene, a seed, a variant of `seam
 facts.json (with the share of cuts through strong gradients), repetition.csv, repetition.png; of each scene's own seam
 20 x 20 tiles from above and walking, flat and hilly; seam_cuts.png, where colour and semantics cut. Gathered:
 results/tables/seams.csv (every crop), seam_summary.csv, seam_ablation.csv and repetition.csv; the last three also in
-docs/data, where runs add up; docs/figures/seam_ablation.png, seam_sheet.jpg and the page docs/seams.md.
+docs/research/data, where runs add up; docs/research/figures/seam_ablation.png, seam_sheet.jpg and the page docs/research/results/seams.md.
 Not part of `all`: `snakemake seams` makes them, for the scenes of the config's `seam_study`.
 """
 
@@ -102,8 +102,8 @@ rule gather_seams:
         summary="results/tables/seam_summary.csv",
         ablation="results/tables/seam_ablation.csv",
         repetition="results/tables/repetition.csv",
-        kept=update(expand("docs/data/{table}.csv", table=["seam_summary", "seam_ablation", "repetition"])),
-        plot="docs/figures/seam_ablation.png",
+        kept=update(expand("docs/research/data/{table}.csv", table=["seam_summary", "seam_ablation", "repetition"])),
+        plot="docs/research/figures/seam_ablation.png",
     log:
         "<logs>/seams/gather_seams.log",
     benchmark:
@@ -123,8 +123,8 @@ rule write_seams:
         ablation=rules.gather_seams.output.plot,
         drawn=lambda wildcards: [path for paths in seam_pictures().values() for path in paths],
     output:
-        page="docs/seams.md",
-        sheet="docs/figures/seam_sheet.jpg",
+        page="docs/research/results/seams.md",
+        sheet="docs/research/figures/seam_sheet.jpg",
     log:
         "<logs>/seams/write_seams.log",
     benchmark:

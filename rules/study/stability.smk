@@ -2,8 +2,8 @@
 
 In: the library; the config of the tests, with each extreme laid over it. Out: results/tables/stability.csv, a row a
 formula; results/stability/{extreme}/, what came of a run, each restarted by itself; results/tables/stability_runs.csv,
-a row a run; both tables also in docs/data with stability.json, which says what they were made with;
-docs/figures/stability.png and the page docs/stability.md.
+a row a run; both tables also in docs/research/data with stability.json, which says what they were made with;
+docs/research/figures/stability.png and the page docs/research/results/stability.md.
 Not part of `all`: `snakemake stability` makes them. LPIPS takes part in the runs where its weights were fetched.
 """
 
@@ -12,8 +12,8 @@ rule measure_formulas:
     """Compare every formula with its float64 reference over its whole range."""
     output:
         table="results/tables/stability.csv",
-        kept="docs/data/stability.csv",
-        facts="docs/data/stability.json",
+        kept="docs/research/data/stability.csv",
+        facts="docs/research/data/stability.json",
     log:
         "<logs>/stability/measure_formulas.log",
     benchmark:
@@ -57,7 +57,7 @@ rule gather_extremes:
         runs=expand(rules.run_extreme.output.folder, extreme=list(EXTREMES)),
     output:
         table="results/tables/stability_runs.csv",
-        kept="docs/data/stability_runs.csv",
+        kept="docs/research/data/stability_runs.csv",
     log:
         "<logs>/stability/gather_extremes.log",
     benchmark:
@@ -76,8 +76,8 @@ rule write_stability:
         runs=rules.gather_extremes.output.kept,
         template=str(Path(workflow.basedir, "workflow/report/stability.md")),
     output:
-        page="docs/stability.md",
-        plot="docs/figures/stability.png",
+        page="docs/research/results/stability.md",
+        plot="docs/research/figures/stability.png",
     log:
         "<logs>/stability/write_stability.log",
     benchmark:

@@ -1,7 +1,7 @@
 """Sweeps: the rows of the config's `sweeps`, each one table (a row a cell) and its figure.
 
 In: what its cells left, each a scene, a seed and a combination of settings; a cell is restarted by itself, and what cells
-have in common is made once. Out: results/sweeps/{sweep}.csv and {sweep}.png; docs/data/sweep_{sweep}.csv, where runs add up.
+have in common is made once. Out: results/sweeps/{sweep}.csv and {sweep}.png; docs/research/data/sweep_{sweep}.csv, where runs add up.
 Not part of `all`: a sweep is asked for by its path, several by `snakemake study`.
 """
 
@@ -17,7 +17,7 @@ rule gather_sweep:
             category="Sweeps",
             labels={"sweep": "{sweep}", "shown": "table"},
         ),
-        kept=update("docs/data/sweep_{sweep}.csv"),
+        kept=update("docs/research/data/sweep_{sweep}.csv"),
     log:
         "<logs>/sweeps/gather_{sweep}.log",
     benchmark:

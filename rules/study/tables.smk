@@ -2,7 +2,7 @@
 
 In: sweeps that the config's `study` names; where a browser measured it, results/tables/viewer.csv: a row a bundle (scene,
 seed, quality, seam, tau) with milliseconds a frame. Out: results/tables/timing.csv, sensitivity.csv, ablation.csv, also in
-docs/data; results/figures/estimators_{scene}.png; doubt.png beside a bundle.
+docs/research/data; results/figures/estimators_{scene}.png; doubt.png beside a bundle.
 """
 
 
@@ -18,7 +18,7 @@ rule tabulate_timing:
             category="Tables",
             labels={"table": "timing"},
         ),
-        kept="docs/data/timing.csv",
+        kept="docs/research/data/timing.csv",
     log:
         "<logs>/tables/timing.log",
     benchmark:
@@ -43,7 +43,7 @@ rule tabulate_sensitivity:
             category="Tables",
             labels={"table": "sensitivity"},
         ),
-        kept="docs/data/sensitivity.csv",
+        kept="docs/research/data/sensitivity.csv",
     log:
         "<logs>/tables/sensitivity.log",
     benchmark:
@@ -68,7 +68,7 @@ rule tabulate_ablation:
             category="Tables",
             labels={"table": "ablation"},
         ),
-        kept="docs/data/ablation.csv",
+        kept="docs/research/data/ablation.csv",
     log:
         "<logs>/tables/ablation.log",
     benchmark:

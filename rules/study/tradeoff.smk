@@ -1,8 +1,8 @@
 """Speed against accuracy: every setting of the config's `tradeoff` as a cell, and what `auto` chose.
 
 In: what each cell left, and its jobs' benchmarks; a cell is restarted by itself, and what cells have in common is made
-once. Out: results/tradeoff/{tradeoff,pareto,auto}.csv, {pareto,knobs}.png; docs/data/tradeoff.csv and auto.csv, where runs
-add up; docs/tradeoff.md and docs/auto.md. Not part of `all`: `snakemake tradeoff` makes it, or `study`. Seconds differ from machine
+once. Out: results/tradeoff/{tradeoff,pareto,auto}.csv, {pareto,knobs}.png; docs/research/data/tradeoff.csv and auto.csv, where runs
+add up; docs/research/results/tradeoff.md and docs/research/results/auto.md. Not part of `all`: `snakemake tradeoff` makes it, or `study`. Seconds differ from machine
 to machine: one that is otherwise idle is to run all of it.
 """
 
@@ -27,7 +27,7 @@ rule gather_tradeoff:
     output:
         table="results/tradeoff/tradeoff.csv",
         pareto="results/tradeoff/pareto.csv",
-        kept=update("docs/data/tradeoff.csv"),
+        kept=update("docs/research/data/tradeoff.csv"),
     log:
         "<logs>/tradeoff/gather_tradeoff.log",
     benchmark:
@@ -64,8 +64,8 @@ rule write_tradeoff:
         pareto=rules.gather_tradeoff.output.pareto,
         figures=rules.plot_tradeoff.output,
     output:
-        page="docs/tradeoff.md",
-        figures=expand("docs/figures/tradeoff_{shown}.png", shown=["pareto", "knobs"]),
+        page="docs/research/results/tradeoff.md",
+        figures=expand("docs/research/figures/tradeoff_{shown}.png", shown=["pareto", "knobs"]),
     log:
         "<logs>/tradeoff/write_tradeoff.log",
     benchmark:
@@ -82,8 +82,8 @@ rule gather_auto:
         measured=lambda wildcards: files_of(auto_cells()),
     output:
         table="results/tradeoff/auto.csv",
-        kept=update("docs/data/auto.csv"),
-        page="docs/auto.md",
+        kept=update("docs/research/data/auto.csv"),
+        page="docs/research/results/auto.md",
     log:
         "<logs>/tradeoff/gather_auto.log",
     benchmark:

@@ -1,9 +1,9 @@
 """What policies are worth: the same scenes, photos to start from and pools for each, compared photo by photo.
 
 In: what the cells of the config's `benchmark` left, each a scene, a seed, a policy and k; a cell is restarted by itself.
-Out: docs/data/{table}_curves.csv, where runs add up, a row a round of a cell; {table}_benchmark.csv, a row a cell, also
+Out: docs/research/data/{table}_curves.csv, where runs add up, a row a round of a cell; {table}_benchmark.csv, a row a cell, also
 under results/tables; {table}_comparison.csv and .md, every policy less the baseline; {table}_worth.csv, what rounds
-gained against what was expected of them; docs/figures/{table}_budget.png, PSNR against photos.
+gained against what was expected of them; docs/research/figures/{table}_budget.png, PSNR against photos.
 Not part of `all`: `snakemake view_benchmark` makes them.
 """
 
@@ -13,7 +13,7 @@ rule gather_curves:
     input:
         measured=lambda wildcards: [path for cell in compared_cells() for path in (*cell["metrics"], *cell["facts"])],
     output:
-        curves=update("docs/data/{table}_curves.csv"),
+        curves=update("docs/research/data/{table}_curves.csv"),
     log:
         "<logs>/benchmark/gather_{table}.log",
     benchmark:
@@ -30,14 +30,14 @@ rule gather_curves:
 rule compare_policies:
     """Area under each curve, and every policy less the baseline with its interval."""
     input:
-        curves="docs/data/{table}_curves.csv",
+        curves="docs/research/data/{table}_curves.csv",
     output:
         results="results/tables/{table}_benchmark.csv",
-        kept="docs/data/{table}_benchmark.csv",
-        compared="docs/data/{table}_comparison.csv",
-        text="docs/data/{table}_comparison.md",
-        worth="docs/data/{table}_worth.csv",
-        plot="docs/figures/{table}_budget.png",
+        kept="docs/research/data/{table}_benchmark.csv",
+        compared="docs/research/data/{table}_comparison.csv",
+        text="docs/research/data/{table}_comparison.md",
+        worth="docs/research/data/{table}_worth.csv",
+        plot="docs/research/figures/{table}_budget.png",
     log:
         "<logs>/benchmark/compare_{table}.log",
     benchmark:

@@ -12,6 +12,6 @@ with logging_to(snakemake.log[0]):
     for source, target in zip(given.figures, out.figures, strict=True):
         figures.kept(source, target)
     copied(given.lod, out.lod)
-    shown = {about: f"figures/{Path(path).name}" for about, path in zip(params.shown, out.figures, strict=True)}
+    shown = {about: f"../figures/{Path(path).name}" for about, path in zip(params.shown, out.figures, strict=True)}
     names = ("timing", "lod", "sensitivity", "ablation")
     results.write(out.page, {name: results.read(given[name]) for name in names}, shown)

@@ -293,7 +293,7 @@ def test_frames_of_the_library_and_of_the_page_are_timed(tiny, chromium, snakema
     assert all(float(r["splats"]) <= float(r["budget"]) for r in rows if r["renderer"] == "page")
     (joined,) = spread.read_viewer(folder / "results/tables/viewer.csv")
     assert (joined["scene"], joined["tau"]) == ("desert", "0.6") and 0 < joined["update_share"] <= 1
-    assert (folder / "docs/figures/frames.png").stat().st_size > 5000
+    assert (folder / "docs/research/figures/frames.png").stat().st_size > 5000
 
 
 def test_every_level_of_every_tile_is_measured(tiny, snakemake, tmp_path):

@@ -70,7 +70,7 @@ def test_of_each_seed_only_what_is_asked_is_measured(planned, tmp_path):
 def test_the_page_of_results_plans(planned, root, tmp_path, size):
     """At `draft` and at the paper's size: every table and figure, each photo set and coarse field once."""
     config = f"config/{size}"
-    plan = plan_of(planned, root, tmp_path, "docs/results.md", config)
+    plan = plan_of(planned, root, tmp_path, "docs/research/results/results.md", config)
     asked = yaml.safe_load((root / config).read_text())
     scenes, seeds = len(asked["sweeps"]["k"]["scenes"]), len(asked["sweeps"]["k"]["measure"]["views"])
     assert plan["fit_coarse"] == scenes * seeds and plan["render_photos"] + plan["register_photos"] == scenes
@@ -115,7 +115,7 @@ def test_a_finished_run_is_swept_without_making_anything_twice(snakemake, tiny, 
     assert [(row["tau"], row["scene"], row["photos"]) for row in rows] == [(t, "desert", "7") for t in ("0.3", "0.6")]
     assert all(float(row[key]) > 0 for row in rows for key in ("psnr", "bundle_mb", "orders", "recon_s", "stills_s"))
     assert rows[0]["psnr"] == rows[1]["psnr"] and rows[0]["seam_lpips"] == ""
-    kept = (folder / "docs/data/sweep_few.csv").read_text()
+    kept = (folder / "docs/research/data/sweep_few.csv").read_text()
     assert kept.count("\n") == 3 and rows[0]["field"] in kept
     with (folder / "results/tables/sensitivity.csv").open(newline="") as file:
         assert [(row["value"], row["paper_psnr"]) for row in csv.DictReader(file)] == [

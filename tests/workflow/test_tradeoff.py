@@ -50,7 +50,7 @@ def test_settings_share_what_they_have_in_common(planned, tmp_path):
 
 
 def test_what_auto_chose_needs_no_more_than_its_own_cells(planned, tmp_path):
-    plan = planned(tmp_path, "docs/auto.md", configs=small(tmp_path, "tau"))
+    plan = planned(tmp_path, "docs/research/results/auto.md", configs=small(tmp_path, "tau"))
     # fixed, stopping, with other orders; the coarse field of the fixed settings serves all three
     assert (plan["fit_coarse"], plan["update_field"], plan["bundle_tiles"], plan["gather_auto"]) == (2, 4, 5, 1)
 
@@ -59,7 +59,9 @@ def test_a_finished_run_is_measured_drawn_and_told(snakemake, tiny, tmp_path):
     """What the tiny run made is there already: the settings are tau 0, 0.6 (the base) and 1 of its tiles."""
     folder = shutil.copytree(tiny.folder, tmp_path / "run", symlinks=True)
     configs = small(tmp_path, "tau")
-    done = snakemake(folder, "--cores", "2", "--scheduler", "greedy", "docs/tradeoff.md", configs=configs)
+    done = snakemake(
+        folder, "--cores", "2", "--scheduler", "greedy", "docs/research/results/tradeoff.md", configs=configs
+    )
     assert "8 of 8 steps (100%) done" in done.stdout  # metrics, two bundles and their stills, table, plot, page
     with (folder / "results/tradeoff/tradeoff.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -71,7 +73,11 @@ def test_a_finished_run_is_measured_drawn_and_told(snakemake, tiny, tmp_path):
     ]
     assert all(float(row[key]) > 0 for row in rows for key in ("seconds", "own_seconds", "psnr", "bundle_mb"))
     assert all(float(row["loss"]) == 0 for row in rows if row["most"] == "1")
-    assert "`draft` lies on the front" in (folder / "docs/tradeoff.md").read_text()
-    assert (folder / "docs/data/tradeoff.csv").read_text().count("\n") == len(rows) + 1
-    for path in ("results/tradeoff/pareto.png", "results/tradeoff/knobs.png", "docs/figures/tradeoff_knobs.png"):
+    assert "`draft` lies on the front" in (folder / "docs/research/results/tradeoff.md").read_text()
+    assert (folder / "docs/research/data/tradeoff.csv").read_text().count("\n") == len(rows) + 1
+    for path in (
+        "results/tradeoff/pareto.png",
+        "results/tradeoff/knobs.png",
+        "docs/research/figures/tradeoff_knobs.png",
+    ):
         assert image_files.size(folder / path)[0] > 300

@@ -29,5 +29,5 @@ def test_best_first_with_intervals_where_there_are_some():
 
 
 def test_the_readme_shows_the_table_that_the_rule_made():
-    made = (ROOT / "docs/data/view_comparison.md").read_text(encoding="utf-8")
+    made = (ROOT / "docs/research/data/view_comparison.md").read_text(encoding="utf-8")
     assert made in (ROOT / "README.md").read_text(encoding="utf-8")

@@ -8,7 +8,7 @@ from scipy.ndimage import distance_transform_edt, gaussian_filter
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.reconstruction.ground import Ground
 
-WIDTH = 0.72  # standard deviation of a disc in spacings: neighbours overlap, the ground is opaque (docs/deviations.md)
+WIDTH = 0.72  # standard deviation of a disc in spacings: neighbours overlap, the ground is opaque
 THICKNESS = 0.1  # of a disc, in spacings
 OPAQUE = 4.0  # opacity logit of a disc before the first step
 STANDS = 1.5  # what is this many spacings above the surface is a thing, not a disc

@@ -15,7 +15,7 @@ def finer(distance: Float[Array, "n"], switch: float, band: float, smooth: bool 
 
     1 nearer than switch - band, 0 beyond switch + band; band = 0 is a step with 1/2 at the switch; an infinite switch
     is never reached. smooth: s^2 (3 - 2 s) of it, whose slope has no jump.
-    Source: DAV-GSWT, Eq. (lod_blend); see docs/deviations.md on its "0 otherwise".
+    Source: DAV-GSWT, Eq. (lod_blend); see docs/research/deviations.md on its "0 otherwise".
     """
     if switch == np.inf:
         return np.ones_like(distance)

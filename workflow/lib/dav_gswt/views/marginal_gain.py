@@ -14,7 +14,7 @@ LEVEL = 0.95  # of the interval
 LEAST = 3  # new photos, without which nothing can be said
 # Of the gap that closes, what test views gained, and the standard deviation of its logarithm from cell to cell: over 27
 # rounds on development scenes (desert, grass, flowers, caliterra_earthworks; draft, `farthest`, four photos a round).
-# How they do on others: docs/data/view_worth.csv.
+# How they do on others: docs/research/data/view_worth.csv.
 SHARE, OFF = 0.5, 0.4
 SCENES = 4  # that these two are from: few, so another scene may be farther off than a normal law says
 

@@ -1,4 +1,4 @@
-"""docs/seams.md: can anybody find the seams? Every number comes from the tables that add up in docs/data."""
+"""The page docs/research/results/seams.md. Every number comes from the tables that add up in docs/research/data."""
 
 from pathlib import Path
 
@@ -37,8 +37,8 @@ def text(summary: list[dict], ablation: list[dict], repetition: list[dict], own:
     """Rows of the tables as `tables.read` gives them. own: each scene's own seam. pictures: captions by path."""
     baseline = next((row["baseline"] for row in ablation), "")
     parts = [
-        "# Can anybody find the seams?\nThis page is made by `snakemake seams`, from `docs/data/seam_summary.csv`, "
-        "`seam_ablation.csv` and `repetition.csv`; do not edit it.",
+        "# Can anybody find the seams?\nThis page is made by `snakemake seams`, from "
+        "`docs/research/data/seam_summary.csv`, `seam_ablation.csv` and `repetition.csv`; do not edit it.",
         MEANT.strip(),
         "## Every scene as its own seam says",
         _scenes(summary, own),

@@ -1,4 +1,4 @@
-"""The page docs/stability.md: a template's text, with the tables."""
+"""The page docs/research/results/stability.md: a template's text, with the tables."""
 
 from pathlib import Path
 

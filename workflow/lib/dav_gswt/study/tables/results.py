@@ -1,4 +1,4 @@
-"""docs/results.md: the tables of a study and its figures to read; every number comes from a table or the paper."""
+"""The page docs/research/results/results.md: a study's tables and figures. Numbers come from tables or the paper."""
 
 import csv
 from pathlib import Path
@@ -57,14 +57,16 @@ def text(tables: dict[str, list[dict]], figures: dict[str, str]) -> str:
     """tables: rows of timing, lod, sensitivity and ablation. figures: paths from the page, by what they show."""
     parts = [
         "# Results",
-        "Made by `snakemake docs/results.md` from `docs/data/{timing,lod,sensitivity,ablation}.csv`; do not edit. "
+        "Made by `snakemake docs/research/results/results.md` from "
+        "`docs/research/data/{timing,lod,sensitivity,ablation}.csv`; do not edit. "
         "± is a standard deviation over seeds; PSNR of photos is colour-corrected, of synthetic scenes raw. Columns "
         "“paper” repeat what is printed there, of other scenes, photos and machines: they stand beside ours for "
         "orientation, not for comparison.",
         "## Timing",
         table(["scene", *_heads(TIMING)], [[row["scene"], *_cells(row, TIMING)] for row in tables["timing"]]),
         "Reconstruction is scoring, choosing and fitting, without the taking of photos; render, sort and update are "
-        "the page's in a headless browser, which without a graphics card draws in software (`docs/data/frames.csv`; "
+        "the page's in a headless browser, which without a graphics card draws in software "
+        "(`docs/research/data/frames.csv`; "
         "empty where `snakemake frame_times` was not run). "
         "The paper's percentages are left out: it does not say of what they are.",
         "## Levels of detail",
@@ -75,7 +77,7 @@ def text(tables: dict[str, list[dict]], figures: dict[str, str]) -> str:
             [[r["setting"], _bold(r), r["paper_value"], *_cells(r, SENSITIVITY)] for r in tables["sensitivity"]],
         ),
         "In bold the value that is not varied elsewhere. Seam-LPIPS is of one tile set a scene, and differs by some "
-        "thousandths from one set to the next: `docs/seams.md` has more sets and intervals.",
+        "thousandths from one set to the next: `docs/research/results/seams.md` has more sets and intervals.",
         "## Ablation",
         table(
             ["sweep", "variant", *_heads(ABLATION)],

@@ -1,4 +1,4 @@
-"""What `auto` chose for each scene, what fixed settings cost instead, and what was lost: docs/auto.md."""
+"""The page docs/research/results/auto.md: what `auto` chose, what fixed settings cost instead, and what was lost."""
 
 from dav_gswt import provenance
 from dav_gswt.files import read_json
@@ -81,7 +81,8 @@ def text(rows: list[dict]) -> str:
     first = rows[0]
     parts = [
         "# Only what the scene requires",
-        "Made by `snakemake docs/auto.md` from `docs/data/auto.csv`; do not edit. What `auto` chose instead of fixed "
+        "Made by `snakemake docs/research/results/auto.md` from `docs/research/data/auto.csv`; "
+        "do not edit. What `auto` chose instead of fixed "
         f"settings (quality `{first['fixed_quality']}`, all rounds, all pre-sorted orders; see config/README.md), "
         f"seed {first['seed']:.0f}, on {first['cores']:.0f} cores of {first['processor']}: seconds of whole "
         "jobs from the start views to the bundle, without the taking of photos. Wanted is at least a third less time "

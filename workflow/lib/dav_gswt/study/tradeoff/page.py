@@ -1,4 +1,4 @@
-"""docs/tradeoff.md: which settings are worth their time; every number comes from the table."""
+"""docs/research/results/tradeoff.md: which settings are worth their time; every number comes from the table."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ def text(rows: list[dict], pareto: list[dict]) -> str:
     base, first = next(row for row in rows if row["base"]), rows[0]
     parts = [
         "# Speed against accuracy",
-        "Made by `snakemake tradeoff` from `docs/data/tradeoff.csv`; do not edit. "
+        "Made by `snakemake tradeoff` from `docs/research/data/tradeoff.csv`; do not edit. "
         f"Scene `{first['scene']}`, seed {first['seed']:.0f}, on {first['cores']:.0f} cores of {first['processor']}. "
         f"Each knob is turned by itself from the base, which has the quality `{base['quality']}`, the seam "
         f"`{base['seam']}` and tau {base['tau']:g}; its own settings are bold. Losses are counted from each knob's "
@@ -40,10 +40,10 @@ def text(rows: list[dict], pareto: list[dict]) -> str:
         "On the front is what no other setting here is as fast as and better than: in PSNR, and beside it in LPIPS, as "
         "what is ahead in PSNR can be the less sharp picture.",
         "\n".join(f"- {preset(row)}" for row in pareto if row["knob"] == PRESET),
-        "![PSNR and LPIPS over seconds](figures/tradeoff_pareto.png)",
+        "![PSNR and LPIPS over seconds](../figures/tradeoff_pareto.png)",
         "## Knobs",
         *(part for knob in dict.fromkeys(row["knob"] for row in rows) if knob != PRESET for part in _knob(knob, rows)),
-        "![Every knob by itself](figures/tradeoff_knobs.png)",
+        "![Every knob by itself](../figures/tradeoff_knobs.png)",
     ]
     return "\n\n".join(part.rstrip("\n") for part in parts if part) + "\n"
 
