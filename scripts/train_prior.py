@@ -5,7 +5,7 @@ from pathlib import Path
 from dav_gswt.logs import logging_to
 from dav_gswt.prior.training import pipeline
 from dav_gswt.prior.training.optimization import Plan
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 
 with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
@@ -16,4 +16,4 @@ with logging_to(snakemake.log[0]):
     rows = [
         {"trained": what, "step": i + 1, "loss": value} for what, of in losses.items() for i, value in enumerate(of)
     ]
-    figures.write_rows(out.losses, rows)
+    csv_tables.write_table(out.losses, rows)

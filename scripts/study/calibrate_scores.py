@@ -6,7 +6,7 @@ from dav_gswt.files import read_json, write_json
 from dav_gswt.logs import logging_to
 from dav_gswt.photos import training_views
 from dav_gswt.reconstruction import ground
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.calibration import controls, judging
 from dav_gswt.views import candidates, pose_maps, prior_sampling, scores, scoring
 
@@ -23,7 +23,7 @@ with logging_to(snakemake.log[0]):
     scored = scores.read(given.scores), pose_maps.read(given.maps)[0]
     some = judging.compared(judged, pool, scored[0], given, params.poses)
     found, rows = judging.calibrated(judged, *some, scored, params.lam, params.seed, prior, others)
-    figures.write_rows(snakemake.output.poses, rows)
+    csv_tables.write_table(snakemake.output.poses, rows)
     inputs = {name: given[name] for name in ("field", "ground", "scores", "maps", "views")}
     about = {name: getattr(params, name) for name in ("prior", "p_drop", "lam", "seed", "poses")}
     write_json(snakemake.output.found, found | {"provenance": provenance.of(inputs, about)})

@@ -1,7 +1,7 @@
 """Rule compare_policies: from curves to tables and a figure."""
 
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.comparison import curves, markdown, plots, tables
 
 with logging_to(snakemake.log[0]):
@@ -10,8 +10,8 @@ with logging_to(snakemake.log[0]):
     results = tables.results(rounds)
     compared = tables.comparisons(results, baseline)
     for path in (out.results, out.kept):
-        figures.write_rows(path, results)
-    figures.write_rows(out.compared, compared)
+        csv_tables.write_table(path, results)
+    csv_tables.write_table(out.compared, compared)
     markdown.write(out.text, compared, baseline)
-    figures.write_rows(out.worth, tables.worth(rounds))
+    csv_tables.write_table(out.worth, tables.worth(rounds))
     plots.write(out.plot, rounds, compared, baseline)

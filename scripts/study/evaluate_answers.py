@@ -3,7 +3,7 @@
 from dav_gswt import provenance
 from dav_gswt.files import write_json
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.forced_choice import answers, plots, results
 
 with logging_to(snakemake.log[0]):
@@ -11,7 +11,7 @@ with logging_to(snakemake.log[0]):
     key, files = answers.read_key(given.key), list(given.get("answers", []))
     people = answers.gathered(files, key, given.schema)
     rows = results.table(key, people.participants)
-    figures.write_rows(out.table, rows)
+    csv_tables.write_table(out.table, rows)
     plots.write(out.plot, rows)
     origin = provenance.of({"key": given.key, "answers": files}, {"study": key["study"]})
     write_json(out.facts, people.facts | {"provenance": origin})

@@ -4,7 +4,7 @@ from dav_gswt.images import lpips_weights
 from dav_gswt.logs import logging_to
 from dav_gswt.prior.terrain import Terrain
 from dav_gswt.prior.training import examples
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.prior import plots, trial
 from dav_gswt.study.prior.regressor import Regressor
 
@@ -15,6 +15,6 @@ with logging_to(snakemake.log[0]):
     made = examples.joined([examples.read(part) for part in given.examples])
     perceptual = lpips_weights.read(*given.lpips) if given.lpips else None  # a list of none or one
     rows = trial.tried(trial.evenly(made, params.views), prior, regressors, setting, perceptual)
-    figures.write_rows(out.table, rows)
+    csv_tables.write_table(out.table, rows)
     plots.losses(plots.read_losses(given.losses), out.losses)
     plots.samples(plots.gallery(trial.evenly(made, params.shown), prior, regressors[0], setting), out.samples)

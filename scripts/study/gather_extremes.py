@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.stability import tables
 
 with logging_to(snakemake.log[0]):
     rows = tables.runs(Path(snakemake.input.runs[0]).parent)
     for path in snakemake.output:
-        figures.write_rows(path, rows)
+        csv_tables.write_table(path, rows)

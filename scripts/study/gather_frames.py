@@ -1,12 +1,12 @@
 """Rule gather_frames: how long frames take, of all scenes that were asked for."""
 
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.terrain import frames
 
 with logging_to(snakemake.log[0]):
     given, made = snakemake.input, snakemake.output
     rows = frames.gathered(snakemake.params.cells, given.library, given.page)
     for path in (made.table, made.kept):
-        figures.write_rows(path, rows)
-    figures.write_rows(made.viewer, frames.of_viewer(rows))
+        csv_tables.write_table(path, rows)
+    csv_tables.write_table(made.viewer, frames.of_viewer(rows))

@@ -1,13 +1,13 @@
 """Rule gather_seams: all cells in one table, what follows from it, and a figure."""
 
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.seams import plots, summary, tables
 
 with logging_to(snakemake.log[0]):
     out, cells, study = snakemake.output, snakemake.params.cells, snakemake.params.study
     rows = [row for cell in cells for row in tables.rows(cell)]
-    figures.write_rows(out.crops, rows)
+    csv_tables.write_table(out.crops, rows)
     often = study.get("compared_draws", 1)
     compared = [row for row in rows if row["variant"] in study["seams"] and row["draw"] < often]
     found = {
@@ -16,6 +16,6 @@ with logging_to(snakemake.log[0]):
         out.repetition: [row for cell in cells if "repeats" in cell for row in tables.repeats(cell)],
     }
     for (path, new), kept, key in zip(found.items(), out.kept, tables.KEYS, strict=True):
-        tables.write(path, new)
-        tables.write(kept, tables.merged(tables.read(kept), new, key))
+        csv_tables.write_table(path, new)
+        csv_tables.update_table(kept, new, key)
     plots.write_ablation(out.plot, found[out.ablation], study["baseline"])

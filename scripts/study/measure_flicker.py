@@ -4,7 +4,7 @@ from pathlib import Path
 
 from dav_gswt.bundle import store
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.terrain import steadiness
 from dav_gswt.terrain import assemble
 
@@ -12,4 +12,4 @@ with logging_to(snakemake.log[0]):
     params = snakemake.params
     bundle = store.read(Path(snakemake.input.manifest).parent, params.schema)
     terrain = assemble.of_bundle(bundle, params.heights)
-    figures.write_rows(snakemake.output.table, steadiness.rows(terrain, bundle.manifest, **params.walk))
+    csv_tables.write_table(snakemake.output.table, steadiness.rows(terrain, bundle.manifest, **params.walk))

@@ -3,11 +3,11 @@
 from dav_gswt import provenance
 from dav_gswt.files import write_json
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.stability import tables
 
 with logging_to(snakemake.log[0]):
     rows = tables.formulas()
     for path in (snakemake.output.table, snakemake.output.kept):
-        figures.write_rows(path, rows)
+        csv_tables.write_table(path, rows)
     write_json(snakemake.output.facts, provenance.of({}, {}) | {"source": snakemake.params.source})

@@ -2,9 +2,9 @@
 
 from dav_gswt.bundle import build, fidelity
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
     tiles, used = store.read(snakemake.input.tiles, snakemake.input.seams), build.Options
-    figures.write_rows(snakemake.output.table, fidelity.rows(tiles, used.level_pixels, used.band))
+    csv_tables.write_table(snakemake.output.table, fidelity.rows(tiles, used.level_pixels, used.band))

@@ -2,9 +2,9 @@
 
 from dav_gswt.bundle import build, direction_search
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
     tiles = store.read(snakemake.input.tiles, snakemake.input.seams)
-    figures.write_rows(snakemake.output.table, direction_search.rows(tiles, build.Options.decibels))
+    csv_tables.write_table(snakemake.output.table, direction_search.rows(tiles, build.Options.decibels))

@@ -2,7 +2,7 @@
 
 from dav_gswt.lod import store as levels
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.seams import exemplar, plots, repetition
 from dav_gswt.tiles import store
 
@@ -13,5 +13,5 @@ with logging_to(snakemake.log[0]):
     source = known.flattened(tiles, params.seam)
     fields = [shelf.field for shelf in source.levels]
     found = repetition.repeats(tiles, fields, source.exemplar.cells * tiles.spacing, params.seed)
-    figures.write_rows(out.table, repetition.rows(found))
+    csv_tables.write_table(out.table, repetition.rows(found))
     plots.write_repeats(out.plot, found)

@@ -9,7 +9,7 @@ from dav_gswt.files import write_json
 from dav_gswt.images import lpips_weights
 from dav_gswt.lod import store as levels
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.seams import density, exemplar, measure
 from dav_gswt.study.seams import ground as terrain
 from dav_gswt.tiles import build, semantics, store
@@ -24,7 +24,7 @@ with logging_to(snakemake.log[0]):
     both = tiles, known.cut_straight(params.seam, source, rng)
     patches = known.flattened(tiles, params.seam)
     laid = [terrain.laid(each, patches, params.seed, params.tau) for each in both]
-    figures.write_rows(snakemake.output.crops, measure.measured(*laid, alexnet, params.seed))
+    csv_tables.write_table(snakemake.output.crops, measure.measured(*laid, alexnet, params.seed))
     inputs = {"seams": given.seams, "level0": Path(given.levels, "level0.ply")} | (
         {"lpips": given.lpips} if alexnet else {}
     )

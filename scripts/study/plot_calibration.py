@@ -3,14 +3,14 @@
 from dav_gswt import provenance
 from dav_gswt.files import read_json, write_json
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.calibration import report
 
 with logging_to(snakemake.log[0]):
     out, paths = snakemake.output, snakemake.input.cells
     found = [read_json(path) for path in paths]
     table = report.rows(snakemake.params.cells, found)
-    figures.write_rows(out.table, table)
+    csv_tables.write_table(out.table, table)
     report.write_figure(out.plot, table, found[0]["level"])
     about = {path: f["provenance"]["parameters"] for path, f in zip(paths, found, strict=True)}
     write_json(out.facts, provenance.of(dict(zip(paths, paths, strict=True)), about))

@@ -7,7 +7,7 @@ from dav_gswt.files import write_json
 from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to
 from dav_gswt.reconstruction import build
-from dav_gswt.study import figures, fit_profile
+from dav_gswt.study import csv_tables, fit_profile
 
 with logging_to(snakemake.log[0]):
     out, settings = snakemake.output, dict(snakemake.params.trial)
@@ -15,7 +15,7 @@ with logging_to(snakemake.log[0]):
     quality = build.Quality(**settings)
     photos = fit_profile.opened(Path(snakemake.input.frame).parent, quality.size, margin)
     found = fit_profile.run(photos, quality)
-    figures.write_rows(out.curve, found.curve)
+    csv_tables.write_table(out.curve, found.curve)
     for name, picture in fit_profile.stills(found.made, photos.frame).items():
         image_files.write(out[name], picture)
     inputs = {"frame": snakemake.input.frame}

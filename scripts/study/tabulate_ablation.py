@@ -1,7 +1,7 @@
 """Rule tabulate_ablation: estimators, policies and ways to cut, each less the baseline of its sweep."""
 
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.tables import ablation, spread
 
 with logging_to(snakemake.log[0]):
@@ -9,4 +9,4 @@ with logging_to(snakemake.log[0]):
     sweeps = spread.read_sweeps(given.sweeps, given.get("viewer"))
     rows = ablation.rows(dict(zip(params.baselines, sweeps, strict=True)), params.baselines)
     for path in (snakemake.output.table, snakemake.output.kept):
-        figures.write_rows(path, rows)
+        csv_tables.write_table(path, rows)

@@ -1,7 +1,7 @@
 """Rule tabulate_sensitivity: what one setting changes, the others as they are."""
 
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.tables import sensitivity, spread
 
 with logging_to(snakemake.log[0]):
@@ -9,4 +9,4 @@ with logging_to(snakemake.log[0]):
     sweeps = spread.read_sweeps(given.sweeps, given.get("viewer"))
     rows = sensitivity.rows(dict(zip(params.settings, sweeps, strict=True)), params.defaults)
     for path in (snakemake.output.table, snakemake.output.kept):
-        figures.write_rows(path, rows)
+        csv_tables.write_table(path, rows)

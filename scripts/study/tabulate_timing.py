@@ -1,7 +1,7 @@
 """Rule tabulate_timing: what each stage took, and a frame of the viewer."""
 
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.tables import spread, timing
 
 with logging_to(snakemake.log[0]):
@@ -9,4 +9,4 @@ with logging_to(snakemake.log[0]):
     (cells,) = spread.read_sweeps([given.sweep], given.get("viewer"))
     rows = timing.rows(timing.at_setting(cells, params.value), params.families)
     for path in (snakemake.output.table, snakemake.output.kept):
-        figures.write_rows(path, rows)
+        csv_tables.write_table(path, rows)

@@ -4,9 +4,9 @@ from pathlib import Path
 
 from dav_gswt.bundle import store
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.terrain import frames
 
 with logging_to(snakemake.log[0]):
     bundle = store.read(Path(snakemake.input.manifest).parent, snakemake.params.schema)
-    figures.write_rows(snakemake.output.table, frames.of_library(bundle, frames.Asked(**snakemake.params.asked)))
+    csv_tables.write_table(snakemake.output.table, frames.of_library(bundle, frames.Asked(**snakemake.params.asked)))

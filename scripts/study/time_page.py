@@ -4,11 +4,11 @@ from pathlib import Path
 
 from dav_gswt.files import read_json
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.terrain import frames
 
 with logging_to(snakemake.log[0]):
     given = snakemake.input
     bundle, viewer = Path(given.manifest).parent, Path(given.viewer[0]).parent
     rows = frames.of_page(bundle, viewer, read_json(given.manifest), frames.Asked(**snakemake.params.asked))
-    figures.write_rows(snakemake.output.table, rows)
+    csv_tables.write_table(snakemake.output.table, rows)

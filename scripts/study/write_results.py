@@ -4,7 +4,7 @@ from pathlib import Path
 
 from dav_gswt.files import copied
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables, figures
 from dav_gswt.study.tables import results
 
 with logging_to(snakemake.log[0]):
@@ -14,4 +14,4 @@ with logging_to(snakemake.log[0]):
     copied(given.lod, out.lod)
     shown = {about: f"../figures/{Path(path).name}" for about, path in zip(params.shown, out.figures, strict=True)}
     names = ("timing", "lod", "sensitivity", "ablation")
-    results.write(out.page, {name: results.read(given[name]) for name in names}, shown)
+    results.write(out.page, {name: csv_tables.read_table(given[name]) for name in names}, shown)

@@ -2,10 +2,11 @@
 
 from dav_gswt.files import read_json
 from dav_gswt.logs import logging_to
-from dav_gswt.study.stability import page, plots, tables
+from dav_gswt.study import csv_tables
+from dav_gswt.study.stability import page, plots
 
 with logging_to(snakemake.log[0]):
     given = snakemake.input
-    formulas, runs = tables.read(given.formulas), tables.read(given.runs)
+    formulas, runs = csv_tables.read_table(given.formulas), csv_tables.read_table(given.runs)
     plots.write(snakemake.output.plot, formulas)
     page.write(snakemake.output.page, given.template, formulas, runs, read_json(given.facts))

@@ -5,12 +5,6 @@ from dav_gswt.images import image_files
 from dav_gswt.study import figures
 
 
-def test_rows_come_back_as_they_were_written(tmp_path):
-    rows = [{"seconds": 1.5, "step": 25, "psnr": 30.125}, {"seconds": 2.5, "step": 50, "psnr": 31.0}]
-    figures.write_rows(tmp_path / "a.csv", rows)
-    assert figures.read_rows(tmp_path / "a.csv") == rows
-
-
 def test_a_plot_is_a_picture_and_the_same_each_time(tmp_path):
     rows = [{"seconds": float(i), "psnr_colour_corrected": 30.0 + i} for i in range(5)]
     for name in ("a.png", "b.png"):

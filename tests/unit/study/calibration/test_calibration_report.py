@@ -5,7 +5,7 @@ import csv
 import pytest
 
 from dav_gswt.images import image_files
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.calibration import report
 
 NONE = dict.fromkeys(report.MEASURES)
@@ -46,7 +46,7 @@ def test_the_table_has_a_row_for_each_score_of_each_cell(tmp_path):
         ("dunes", 0, "poor"), ("dunes", 0, "best"), ("dunes", 1, "poor"), ("dunes", 1, "best"),
         ("beach", 0, "poor"), ("beach", 0, "dumb"),
     ]  # fmt: skip
-    figures.write_rows(tmp_path / "a.csv", made)
+    csv_tables.write_table(tmp_path / "a.csv", made)
     with (tmp_path / "a.csv").open(newline="") as file:
         back = list(csv.DictReader(file))
     wanted = "scene seed quality policy prior p_drop round score poses spearman ause coverage width pixel_spearman"

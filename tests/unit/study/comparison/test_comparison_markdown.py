@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from fixtures.markdown import collapse_spaces
+
 from dav_gswt.study.comparison import markdown
 
 ROOT = Path(__file__).parents[4]
@@ -20,11 +22,12 @@ def test_best_first_with_intervals_where_there_are_some():
         row("diverse", "every", "", 0.051, -0.0, 0.1, (2, 1, 0)),
         row("diverse", "grass_pool", 2, 0.049),
     ]
-    assert markdown.text(compared, "farthest").splitlines() == [
+    head, rule, *rows = collapse_spaces(markdown.text(compared, "farthest")).splitlines()
+    assert set(rule) == set("|-")
+    assert [head, *rows] == [
         "| less `farthest`, dB | all | grass, 2 a round | sand, 4 a round | wins, ties, losses |",
-        "| --- | --- | --- | --- | --- |",
-        "| `diverse` | +0.05 (-0.00, +0.10) | +0.05 |  | 2, 1, 0 |",
-        "| `random` | -0.12 (-0.20, +0.01) |  | -0.12 (-0.20, +0.01) | 1, 0, 2 |",
+        "| `diverse` | +0.05 (-0.00, +0.10) | +0.05 | | 2, 1, 0 |",
+        "| `random` | -0.12 (-0.20, +0.01) | | -0.12 (-0.20, +0.01) | 1, 0, 2 |",
     ]
 
 

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.comparison import curves, plots, tables
 from dav_gswt.views import marginal_gain
 
@@ -95,7 +95,7 @@ def test_rows_survive_the_file_and_runs_add_up(tmp_path):
     path = tmp_path / "curves.csv"
     assert curves.read(path) == []
     old, other = rounds([20, 21, 22]), rounds([19, 20, 21], seed=1)
-    figures.write_rows(path, curves.merged(old, other))
+    csv_tables.write_table(path, curves.merged(old, other))
     assert curves.read(path) == old + other
     again = curves.merged(curves.read(path), rounds([20, 23], (8, 12)))
     assert [row["psnr"] for row in again if row["seed"] == 0] == [20, 23, 22] and len(again) == 6

@@ -7,7 +7,7 @@ from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.networks import CODE, SIZE, Network
 from dav_gswt.prior.terrain import Terrain
 from dav_gswt.prior.training.examples import Examples
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.prior import plots
 from dav_gswt.study.prior.regressor import Regressor
 from dav_gswt.study.prior.trial import Setting
@@ -15,8 +15,8 @@ from dav_gswt.study.prior.trial import Setting
 
 def test_losses_come_back_by_file_and_what_was_trained(tmp_path):
     rows = [{"trained": what, "step": i + 1, "loss": i + 0.5} for what in ("coder", "denoiser") for i in range(3)]
-    figures.write_rows(tmp_path / "terrain_losses.csv", rows)
-    figures.write_rows(tmp_path / "regressor0_losses.csv", rows[3:])
+    csv_tables.write_table(tmp_path / "terrain_losses.csv", rows)
+    csv_tables.write_table(tmp_path / "regressor0_losses.csv", rows[3:])
     found = plots.read_losses([tmp_path / f"{name}_losses.csv" for name in ("terrain", "regressor0")])
     assert list(found) == ["terrain: coder", "terrain: denoiser", "regressor0: denoiser"]
     assert all(values.tolist() == [0.5, 1.5, 2.5] for values in found.values())

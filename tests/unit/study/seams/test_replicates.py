@@ -5,7 +5,7 @@ import pytest
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import write_json
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.seams import replicates, summary, tables
 from dav_gswt.tiles import build
 
@@ -65,7 +65,7 @@ def test_crops_of_another_draw_are_other_places_of_the_same_seam(tmp_path):
             for crop in range(3)
             for place, value in places.items()
         ]
-        figures.write_rows(tmp_path / f"{draw}.csv", crops)
+        csv_tables.write_table(tmp_path / f"{draw}.csv", crops)
         write_json(tmp_path / "facts.json", {"provenance": {"version": "1", "inputs": {"seams": "abc"}}})
         cell = {"scene": "desert", "seed": 0, "quality": "draft", "variant": "semantic", "draw": draw}
         rows += tables.rows(cell | {"table": tmp_path / f"{draw}.csv", "facts": tmp_path / "facts.json"})

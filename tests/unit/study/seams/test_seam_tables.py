@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from dav_gswt.study import figures
-from dav_gswt.study.seams import repetition, summary, tables
+from dav_gswt.study.seams import repetition, summary
 
 ABOUT = {
     "scene": "desert",
@@ -50,31 +49,12 @@ def test_without_lpips_there_is_none_in_the_summary():
     assert every["border"] is None and every["share"] is None and every["cut_psnr"] == pytest.approx(30)
 
 
-def test_crops_of_one_cluster_count_as_one():
-    """Twenty copies of each of four values: the interval is that of four, not of eighty."""
-    values = {f"{k}": float(k) for k in range(4)}
-    few = summary.summed((name, [v]) for name, v in values.items())
-    many = summary.summed((name, [v]) for name, v in values.items() for _ in range(20))
-    first, second = (summary.interval(summary.drawn(each)[0][:, 0]) for each in (few, many))
-    assert first == pytest.approx(second)
-
-
 def test_a_variant_is_compared_with_the_baseline_in_the_same_clusters():
     rows = table() + table(cut=0.03, variant="none")
     found = summary.ablation(rows, "colour")
     row = next(r for r in found if r["measure"] == "seam_lpips")
     assert row["variant"] == "none" and row["difference"] == pytest.approx(0.02, abs=1e-3)
     assert row["difference_low"] > 0.018
-
-
-def test_rows_add_up_and_new_ones_replace(tmp_path):
-    old = [{"scene": "a", "seed": 0, "value": 1.0}, {"scene": "b", "seed": 0, "value": 2.0}]
-    path = tmp_path / "kept.csv"
-    figures.write_rows(path, old)
-    new = [{"scene": "b", "seed": 0, "value": 3.0, "more": 1}]
-    found = tables.merged(tables.read(path), new, ("scene", "seed"))
-    assert [(row["scene"], float(row["value"]), row["more"]) for row in found] == [("a", 1.0, None), ("b", 3.0, 1)]
-    assert tables.read(tmp_path / "not_there.csv") == []
 
 
 def test_autocorrelation_is_that_of_the_slow_sum():

@@ -5,9 +5,8 @@ import json
 import pytest
 
 from dav_gswt.images import image_files
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.seams import measure
-from dav_gswt.study.seams import tables as kept
 from dav_gswt.study.sweeps import plots, tables
 
 CELL = dict(
@@ -42,7 +41,7 @@ def crops(folder):
         for n in range(4)
         for place, value in (("cut", 0.3), ("floor", 0.1))
     ]
-    figures.write_rows(folder / "crops.csv", [{key: row[key] for key in measure.COLUMNS} for row in rows])
+    csv_tables.write_table(folder / "crops.csv", [{key: row[key] for key in measure.COLUMNS} for row in rows])
     (folder / "facts.json").write_text(json.dumps({"dense": 0.4, "provenance": ORIGIN}))
     return {"crops": str(folder / "crops.csv"), "facts": str(folder / "facts.json")}
 
@@ -102,9 +101,9 @@ def rows(tmp_path, **more):
 
 def test_rows_of_several_runs_add_up(tmp_path):
     path = tmp_path / "kept.csv"
-    kept.write(path, [rows(tmp_path), rows(tmp_path, tau="0.3", psnr=10.0)])
+    csv_tables.write_table(path, [rows(tmp_path), rows(tmp_path, tau="0.3", psnr=10.0)])
     new = [rows(tmp_path, tau="0.3", psnr=30.0), rows(tmp_path, seed=1)]
-    kept.write(path, kept.merged(kept.read(path), new, tables.KEY))
+    csv_tables.update_table(path, new, tables.KEY)
     found = {(row["tau"], row["seed"]): row["psnr"] for row in tables.read(path)}
     assert found == {("0.3", "0"): 30, ("0.6", "0"): 20, ("0.6", "1"): 20}
 

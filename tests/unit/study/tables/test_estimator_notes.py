@@ -1,6 +1,6 @@
 """What stands under the figure of estimators."""
 
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.seams import measure
 from dav_gswt.study.tables import estimators
 
@@ -12,7 +12,7 @@ def crops(path, value, floor):
         for n in range(3)
         for place, lpips in (("cut", value), ("floor", floor))
     ]
-    figures.write_rows(path, [{key: row[key] for key in measure.COLUMNS} for row in rows])
+    csv_tables.write_table(path, [{key: row[key] for key in measure.COLUMNS} for row in rows])
     return path
 
 

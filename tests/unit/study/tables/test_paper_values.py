@@ -4,8 +4,8 @@ import re
 
 import pytest
 
+from dav_gswt.study.statistics import two_sided_p
 from dav_gswt.study.tables import paper
-from dav_gswt.study.tables.paired import two_sided
 
 
 def test_every_value_is_printed_in_the_paper(root):
@@ -30,6 +30,6 @@ def test_numbers_are_read_as_printed(printed, value):
 
 
 def test_the_papers_t_value_is_not_below_one_per_cent():
-    assert two_sided(4.28, 4) == pytest.approx(0.0129, abs=1e-4)
+    assert two_sided_p(4.28, 4) == pytest.approx(0.0129, abs=1e-4)
     with pytest.raises(ValueError, match="no number"):
         paper.number("—")

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from fixtures.markdown import collapse_spaces
 
 from dav_gswt.images import image_files
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.sweeps import tables as sweeps
 from dav_gswt.study.tables import ablation, results, sensitivity, spread, timing
 from dav_gswt.study.terrain import tile_uncertainty
@@ -31,7 +32,7 @@ def test_means_count_scenes_alike_and_deviations_are_over_seeds():
 
 def test_the_viewer_is_beside_the_bundle_that_it_measured(tmp_path):
     measured = {"scene": "desert", "seed": 0, "quality": "draft", "seam": "semantic", "tau": 0.6, "render_ms": 5.0}
-    figures.write_rows(tmp_path / "viewer.csv", [measured])
+    csv_tables.write_table(tmp_path / "viewer.csv", [measured])
     viewer = spread.read_viewer(tmp_path / "viewer.csv")
     mine, other = spread.with_viewer([cell("0.6"), cell("0.6") | {"tau": "0.3"}], viewer)
     assert (mine["render_ms"], mine["sort_ms"], other["render_ms"]) == (5, None, None)
@@ -98,14 +99,14 @@ def test_the_page_holds_the_tables_numbers_and_the_papers_slips(tmp_path):
         ],
     }
     for name, table in rows.items():
-        figures.write_rows(tmp_path / f"{name}.csv", table)
-    read = {name: results.read(tmp_path / f"{name}.csv") for name in rows}
+        csv_tables.write_table(tmp_path / f"{name}.csv", table)
+    read = {name: csv_tables.read_table(tmp_path / f"{name}.csv") for name in rows}
     results.write(tmp_path / "results.md", read, {"a sphere": "figures/sphere.png"})
-    text = (tmp_path / "results.md").read_text()
-    assert "| desert_pool |  | 5.5 | 2.00 | 68.5 | 5.0 | 76.6 |" in text
+    text = collapse_spaces((tmp_path / "results.md").read_text())
+    assert "| desert_pool | | 5.5 | 2.00 | 68.5 | 5.0 | 76.6 |" in text
     assert "| tau | **0.6** | 0.6 | 30.00 | 29.41±0.08 |" in text and "| tau | 0.3 |" in text
     assert "| `w2` less `w2-lpips` | PSNR (dB) | 4 | +0.30 | (+0." in text and "| 8.49 (2) |" in text
-    assert "| desert_pool | mean scale | 0.0100 | 0.0200 |" in text and "| paper, desert |  | 64.2K | 17.3K |" in text
+    assert "| desert_pool | mean scale | 0.0100 | 0.0200 |" in text and "| paper, desert | | 64.2K | 17.3K |" in text
     assert "p = 0.013, not p < 0.01; 68 of 200 views are 2.9 times fewer" in text
     assert "![a sphere](figures/sphere.png)" in text
 

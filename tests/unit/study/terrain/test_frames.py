@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.tables import spread
 from dav_gswt.study.terrain import frames
 
@@ -33,13 +33,13 @@ def test_a_row_holds_means_deviations_and_shares_worked_by_hand():
 
 def test_the_pages_first_budget_is_what_the_studys_tables_join(tmp_path: Path):
     for renderer in (frames.LIBRARY, frames.PAGE):
-        figures.write_rows(tmp_path / f"{renderer}.csv", [row_of(renderer, budget) for budget in ASKED.budgets])
+        csv_tables.write_table(tmp_path / f"{renderer}.csv", [row_of(renderer, budget) for budget in ASKED.budgets])
     paths = [[str(tmp_path / f"{renderer}.csv")] for renderer in (frames.LIBRARY, frames.PAGE)]
     rows = frames.gathered([CELL], *paths)
     assert [(row["renderer"], row["budget"]) for row in rows] == [
         (name, str(budget)) for name in (frames.LIBRARY, frames.PAGE) for budget in ASKED.budgets
     ]
-    figures.write_rows(tmp_path / "viewer.csv", frames.of_viewer(rows))
+    csv_tables.write_table(tmp_path / "viewer.csv", frames.of_viewer(rows))
     (joined,) = spread.with_viewer([CELL], spread.read_viewer(tmp_path / "viewer.csv"))
     assert (joined["render_ms"], joined["sort_ms"]) == (4, 1.5) and joined["update_share"] == 0.66667  # five digits
     with (tmp_path / "viewer.csv").open(newline="") as file:

@@ -4,9 +4,10 @@ import json
 
 import numpy as np
 import pytest
+from fixtures.markdown import collapse_spaces
 
 from dav_gswt.images import image_files
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables, figures
 from dav_gswt.study.tradeoff import auto, page, plots, tables
 
 SECONDS = dict(coarse=40.0, score=0.0, select=1.0, update=19.0, levels=5.0, cut=3.0, bundle=2.0)  # 70 in all
@@ -109,10 +110,10 @@ def test_a_setting_behind_in_psnr_can_be_the_sharpest(table):
 
 
 def test_the_page_says_what_the_table_says(table, tmp_path):
-    figures.write_rows(tmp_path / "t.csv", table)
-    figures.write_rows(tmp_path / "p.csv", tables.pareto(table))
+    csv_tables.write_table(tmp_path / "t.csv", table)
+    csv_tables.write_table(tmp_path / "p.csv", tables.pareto(table))
     rows, pareto = tables.read(tmp_path / "t.csv"), tables.read(tmp_path / "p.csv")
-    text = page.text(rows, pareto)
+    text = collapse_spaces(page.text(rows, pareto))
     assert "`cap` 70000 instead of 1000000: is 2.00 times as fast but costs 0.20 dB." in text
     assert "`cap` 100 instead of 1000000: takes 2.00 times as long and costs 1.00 dB." in text
     assert "costs 25.00 grey levels; the bundle is 0.50 times as large." in text
@@ -141,7 +142,7 @@ def test_advice_is_time_and_loss_in_words(own, loss, said):
 
 def test_where_a_setting_beats_the_most_accurate_it_is_said(tmp_path):
     cells = [cell(tmp_path, "2", 30.0, most=True), cell(tmp_path, "1", 30.5)]
-    figures.write_rows(tmp_path / "t.csv", tables.rows(cells))
+    csv_tables.write_table(tmp_path / "t.csv", tables.rows(cells))
     rows = tables.read(tmp_path / "t.csv")
     assert "`cap` 1 instead of 2: is as fast and is better by 0.50 dB." in page.text(rows, tables.pareto(rows))
 
@@ -179,7 +180,7 @@ def test_what_auto_chose_stands_beside_what_it_cost(tmp_path):
     assert [row["saved"] for row in rows] == pytest.approx([0.5, 0.2, 0.0, 0.75])
     assert [row["target"] for row in rows] == [1, 0, 0, 1] and rows[0]["loss_db"] == pytest.approx(0.05)
     assert rows[0]["chosen"] == "9 Gaussians, degree 1, 300 steps, then 300" and rows[1]["chosen"] == "12 photos"
-    figures.write_rows(tmp_path / "auto.csv", rows)
-    text = auto.text(tables.read(tmp_path / "auto.csv"))
+    csv_tables.write_table(tmp_path / "auto.csv", rows)
+    text = collapse_spaces(auto.text(tables.read(tmp_path / "auto.csv")))
     assert "1 of 1 scenes reach that with all three." in text
     assert "| cap, degree and steps | 9 Gaussians, degree 1, 300 steps, then 300 | 35 | 70 | 50% | 0.05 |" in text

@@ -1,27 +1,11 @@
-"""Plots for docs/, and the tables they are made of."""
+"""Matplotlib figures of the studies: create, save, arrange pictures."""
 
-import csv
 from pathlib import Path
 
 from dav_gswt.files import copied, whole
 from dav_gswt.images import image_files
 
 QUALITY = 88  # of JPEGs
-
-
-def write_rows(path: Path | str, rows: list[dict]) -> None:
-    """Write rows of numbers under the names of the first one's keys; floats to five digits."""
-    with whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        table.writeheader()
-        for row in rows:
-            table.writerow({k: f"{v:.5g}" if isinstance(v, float) else v for k, v in row.items()})
-
-
-def read_rows(path: Path | str) -> list[dict[str, float]]:
-    """Read what `write_rows` wrote."""
-    with Path(path).open(newline="", encoding="utf-8") as file:
-        return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
 
 
 def blank(width: float, height: float):

@@ -2,8 +2,11 @@
 
 from collections.abc import Iterable, Sequence
 
+import pandas as pd
 
-def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table; bars in its cells stay bars."""
-    lines = [header, ["---"] * len(header), *rows]
-    return "".join("| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |\n" for line in lines)
+
+def format_table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A Markdown table; bars inside cells are escaped."""
+    cells = [[str(cell).replace("|", "\\|") for cell in row] for row in rows]
+    frame = pd.DataFrame(cells, columns=list(header), dtype=str)
+    return frame.to_markdown(index=False, tablefmt="github", disable_numparse=True) + "\n"

@@ -8,6 +8,7 @@ import csv
 from pathlib import Path
 
 from dav_gswt.files import read_json
+from dav_gswt.study import csv_tables
 from dav_gswt.views import marginal_gain
 
 CELL = ("scene", "seed", "quality", "policy", "prior", "p_drop", "lam", "k")
@@ -47,18 +48,9 @@ def merged(before: list[dict], new: list[dict]) -> list[dict]:
 
 
 def read(path: Path | str) -> list[dict]:
-    """What `figures.write_rows` wrote of them; no rows where there is no file yet."""
-    if not Path(path).is_file():
-        return []
-    with Path(path).open(newline="", encoding="utf-8") as file:
-        return [_typed(row) for row in csv.DictReader(file)]
-
-
-def _typed(row: dict[str, str]) -> dict:
-    whole_numbers = ("seed", "k", "round", "photos", "evaluations")
-    numbers = (*MEASURES, *EXPECTED, "seconds")
-    out = row | {key: int(row[key]) for key in whole_numbers}
-    return out | {key: float(row[key]) if row[key] else None for key in numbers}
+    """Read the table of curves; no rows where there is no file yet."""
+    integers = ("seed", "k", "round", "photos", "evaluations")
+    return csv_tables.read_table(path, numbers=(*MEASURES, *EXPECTED, "seconds"), integers=integers, missing_ok=True)
 
 
 def _key(row: dict) -> tuple:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from dav_gswt.files import whole
 from dav_gswt.study.comparison.tables import EVERY
-from dav_gswt.study.markdown import table
+from dav_gswt.study.markdown import format_table
 
 
 def write(path: Path | str, compared: list[dict], baseline: str) -> None:
@@ -25,7 +25,7 @@ def text(compared: list[dict], baseline: str) -> str:
     for row in best:
         cells = [_cell(found.get((row["policy"], *column))) for column in columns]
         lines.append([f"`{row['policy']}`", *cells, f"{row['wins']}, {row['ties']}, {row['losses']}"])
-    return table(["less `" + baseline + "`, dB", *named, "wins, ties, losses"], lines)
+    return format_table(["less `" + baseline + "`, dB", *named, "wins, ties, losses"], lines)
 
 
 def _cell(row: dict | None) -> str:

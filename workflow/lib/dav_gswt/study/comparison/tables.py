@@ -6,12 +6,12 @@ from itertools import pairwise
 import numpy as np
 
 from dav_gswt.study.comparison.curves import CELL
-from dav_gswt.study.comparison.stats import compared, holm, nauc, to_reach
+from dav_gswt.study.comparison.stats import nauc, to_reach
+from dav_gswt.study.statistics import adjust_holm, bootstrap_paired
 
 EVERYTHING = "all"  # the policy that takes the whole pool: what there is to reach, and no curve
 EVERY = "every"  # scene, in the rows over all of them
 UNIT = ("scene", "quality", "seed", "k")
-BOOTSTRAP = 0  # its seed
 
 
 def results(curves: list[dict]) -> list[dict]:
@@ -53,7 +53,9 @@ def comparisons(table: list[dict], baseline: str) -> list[dict]:
         rows.append(_compared(policy, EVERY, "", pairs))
         for scene, k in sorted({(unit[0], unit[3]) for unit in pairs}):
             rows.append(_compared(policy, scene, k, {u: v for u, v in pairs.items() if (u[0], u[3]) == (scene, k)}))
-    raised = holm({" ".join(_policy(row)): row["p"] for row in rows if row["scene"] == EVERY and row["p"] is not None})
+    raised = adjust_holm(
+        {" ".join(_policy(row)): row["p"] for row in rows if row["scene"] == EVERY and row["p"] is not None}
+    )
     return [row | {"holm": raised.get(" ".join(_policy(row))) if row["scene"] == EVERY else None} for row in rows]
 
 
@@ -91,7 +93,7 @@ def _compared(policy: tuple[str, ...], scene: str, k: int | str, pairs: dict[tup
     by_scene: dict[str, list[float]] = {}
     for unit, value in pairs.items():
         by_scene.setdefault(unit[0], []).append(value)
-    found = asdict(compared({name: np.array(values) for name, values in by_scene.items()}, BOOTSTRAP))
+    found = asdict(bootstrap_paired({name: np.array(values) for name, values in by_scene.items()}))
     if len(pairs) < 2:  # nothing tells how far another cell would be from this one
         found |= dict.fromkeys(("low", "high", "p"))
     named = dict(zip(("policy", "prior", "p_drop", "lam"), policy, strict=True))

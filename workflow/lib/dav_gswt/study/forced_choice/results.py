@@ -8,7 +8,7 @@ whole). A place that is laid whole has no seam, and 0 there. Ties count as half.
 import numpy as np
 
 from dav_gswt.errors import InputError
-from dav_gswt.study.forced_choice import shares
+from dav_gswt.study import statistics
 from dav_gswt.study.forced_choice.answers import Participant
 from dav_gswt.study.seams.summary import EVERY
 from dav_gswt.study.tables import paper
@@ -44,9 +44,9 @@ def _people(items: dict[str, dict], participants: list[Participant]) -> dict | N
         return None
     chosen = np.array([sum(each.chosen[name] for name in items) for each in participants], float)
     asked = np.full(len(participants), float(len(items)))
-    found = shares.clustered(chosen, asked)
-    plain = shares.binomial(int(chosen.sum()), found.answers)
-    own = (found.low, found.high, found.p, found.df, found.worth)
+    found = statistics.compute_clustered_share(chosen, asked)
+    plain = statistics.compute_binomial_test(int(chosen.sum()), found.answers)
+    own = (found.low, found.high, found.p, found.df, found.effective_answers)
     times = float(np.median([each.ms[name] for each in participants for name in items]))
     return _row(PEOPLE, found.participants, found.answers, found.share) | dict(
         zip(MEASURES, (*own, *plain, times), strict=True)

@@ -1,6 +1,5 @@
 """Plots of the prior: how its training went, and what it makes of views that it has not seen."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.prior.terrain import Terrain
 from dav_gswt.prior.training.examples import Examples
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables, figures
 from dav_gswt.study.prior.regressor import Regressor
 from dav_gswt.study.prior.trial import Setting, opaque
 from dav_gswt.views.uncertainty import w2_sq
@@ -26,9 +25,8 @@ def read_losses(paths: list[Path | str]) -> dict[str, Float[Array, "_"]]:
     found: dict[str, list[float]] = {}
     for path in paths:
         name = Path(path).stem.removesuffix("_losses")
-        with Path(path).open(newline="", encoding="utf-8") as file:
-            for row in csv.DictReader(file):
-                found.setdefault(f"{name}: {row['trained']}", []).append(float(row["loss"]))
+        for row in csv_tables.read_table(path, numbers=["loss"]):
+            found.setdefault(f"{name}: {row['trained']}", []).append(row["loss"])
     return {name: np.array(values) for name, values in found.items()}
 
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from dav_gswt.files import whole
-from dav_gswt.study.markdown import table
+from dav_gswt.study.markdown import format_table
 from dav_gswt.study.seams.repetition import LAGS
 from dav_gswt.study.seams.summary import EVERY, MEASURES
 
@@ -76,7 +76,7 @@ def _scenes(summary: list[dict], own: dict[str, str]) -> str:
             way = f"{float(row['share']):.0%}" if row["share"] else ""
             jumps = [f"{float(row[f'{place}_jump']):.2f}" for place in ("border", "cut", "floor")]
             lines.append([row["scene"], f"`{row['variant']}`", row.get("sets") or "1", *places, way, *jumps])
-    return table(head, lines)
+    return format_table(head, lines)
 
 
 def _ways(ablation: list[dict]) -> str:
@@ -87,7 +87,7 @@ def _ways(ablation: list[dict]) -> str:
         rows = [(measure, found.get((variant, scene, measure))) for measure in MEASURES]
         values = [between(row, "difference", DIGITS[measure]) if row else "" for measure, row in rows]
         lines.append([f"`{variant}`", "all" if scene == EVERY else scene, *values])
-    return table(["cut", "scene", *(NAMES[measure] for measure in MEASURES)], lines)
+    return format_table(["cut", "scene", *(NAMES[measure] for measure in MEASURES)], lines)
 
 
 def _repeats(repetition: list[dict], own: dict[str, str]) -> str:
@@ -98,7 +98,7 @@ def _repeats(repetition: list[dict], own: dict[str, str]) -> str:
         rows = [at.get((scene, variant, *lag)) for lag in lags]
         if any(rows):
             lines.append([scene, *(_repeat(row) for row in rows)])
-    return table(["scene", *(f"{east}, {north}" for east, north in lags)], lines)
+    return format_table(["scene", *(f"{east}, {north}" for east, north in lags)], lines)
 
 
 def _repeat(row: dict | None) -> str:

@@ -4,52 +4,16 @@ Crops that show the same place of the same strip, or of the same tile, are one c
 often they are laid, and the bootstrap draws clusters, never crops. All views of a place belong to its cluster.
 """
 
-from collections.abc import Iterable
-
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-DRAWS = 4000
+from dav_gswt.study import statistics
+
 EVERY = "every"
 CELL = ("scene", "seed", "quality", "variant")
 PLACES = ("border", "cut", "ceiling")
 MEASURES = ("seam_lpips", "psnr", "jump")
-
-Sums = dict[str, Float[Array, "_"]]  # by cluster: sums of some values, and how many there are
-
-
-def summed(rows: Iterable[tuple[str, list[float | None]]]) -> Sums:
-    """Sums of values by cluster, and their count last; rows with a value that is not known are left out."""
-    out: Sums = {}
-    for cluster, values in rows:
-        if all(v is not None and np.isfinite(v) for v in values):
-            out[cluster] = out.get(cluster, np.zeros(len(values) + 1)) + [*values, 1.0]
-    return out
-
-
-def drawn(*groups: Sums, seed: int = 0) -> list[Float[Array, "draws _"]]:
-    """Means of the values: the first row as they are, then bootstrap draws; clusters of one name are drawn together.
-
-    A draw that leaves a group without any crop is NaN there.
-    """
-    names = sorted({name for group in groups for name in group}) or [""]
-    weights = np.random.default_rng(seed).multinomial(len(names), np.full(len(names), 1 / len(names)), DRAWS)
-    weights = np.concatenate([np.ones((1, len(names))), weights])
-    out = []
-    for group in groups:
-        width = len(next(iter(group.values()), np.zeros(2)))
-        table = np.array([group.get(name, np.zeros(width)) for name in names]).reshape(-1, width)
-        total = weights @ table
-        with np.errstate(invalid="ignore"):
-            out.append(total[:, :-1] / total[:, -1:])
-    return out
-
-
-def interval(values: Float[Array, "draws"]) -> tuple[float, float, float]:
-    """The value itself and the ends of its 95 % interval."""
-    low, high = np.nanquantile(values[1:], [0.025, 0.975])
-    return float(values[0]), float(low), float(high)
 
 
 def summary(rows: list[dict]) -> list[dict]:
@@ -75,7 +39,9 @@ def _told(rows: list[dict]) -> dict:
     out = {}
     for place in ("border", "cut"):
         out |= {f"{place}s": len([r for r in rows if r["place"] == place]), f"{place}_clusters": len(sums[place])}
-    draws = {place: values[:, 0] for place, values in zip(PLACES, drawn(*sums.values()), strict=True)}
+    draws = {
+        place: values[:, 0] for place, values in zip(PLACES, statistics.bootstrap_clusters(*sums.values()), strict=True)
+    }
     for place in PLACES:
         out |= _named(place, draws[place])
     sure = out["ceiling_low"] is not None and out["ceiling_low"] > 0
@@ -87,18 +53,18 @@ def _told(rows: list[dict]) -> dict:
     return out
 
 
-def of_crops(at: dict[tuple, dict], place: str) -> Sums:
+def of_crops(at: dict[tuple, dict], place: str) -> statistics.ClusterSums:
     """By cluster: Seam-LPIPS of crops less that of their floors."""
     pairs = []
     for (name, *where), row in at.items():
         if name == place:
             both = row["seam_lpips"], at["floor", *where]["seam_lpips"]
             pairs.append((row["cluster"], [None] if None in both else [both[0] - both[1]]))
-    return summed(pairs)
+    return statistics.sum_by_cluster(pairs)
 
 
 def _named(name: str, values: Float[Array, "draws"] | None) -> dict:
-    found = (None, None, None) if values is None or np.isnan(values[0]) else interval(values)
+    found = (None, None, None) if values is None or np.isnan(values[0]) else statistics.percentile_interval(values)
     return dict(zip((name, f"{name}_low", f"{name}_high"), found, strict=True))
 
 
@@ -117,7 +83,7 @@ def ablation(rows: list[dict], baseline: str) -> list[dict]:
                 pair = [cells.get((scene, seed, name)) for name in (variant, baseline)]
                 if not all(pair) or not all(sums := [_of_variant(some, measure) for some in pair]):
                     continue
-                first, second = drawn(*sums)
+                first, second = statistics.bootstrap_clusters(*sums)
                 all_draws.append(first[:, 0] - second[:, 0])
                 found.append(_less(variant, baseline, measure, scene, seed, all_draws[-1]))
             if len(all_draws) > 1:
@@ -125,11 +91,11 @@ def ablation(rows: list[dict], baseline: str) -> list[dict]:
     return found
 
 
-def _of_variant(rows: list[dict], measure: str) -> Sums:
+def _of_variant(rows: list[dict], measure: str) -> statistics.ClusterSums:
     if measure == "seam_lpips":
         at = {(row["place"], row["view"], row["ground"], row["crop"]): row for row in rows}
         return of_crops(at, "cut")
-    return summed((row["cluster"], [row[measure]]) for row in rows if row["place"] == "cut")
+    return statistics.sum_by_cluster((row["cluster"], [row[measure]]) for row in rows if row["place"] == "cut")
 
 
 def _less(variant: str, baseline: str, measure: str, scene, seed, draws: Float[Array, "draws"]) -> dict:

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from dav_gswt.files import whole
-from dav_gswt.study.markdown import table
+from dav_gswt.study.markdown import format_table
 
 
 def write(path: Path | str, template: Path | str, formulas: list[dict], runs: list[dict], facts: dict) -> None:
@@ -33,7 +33,7 @@ def formula_tables(rows: list[dict]) -> str:
     parts = []
     head = ("formula", "range", "kept or computed in", "worst error", "relative", "where", "of its tolerance")
     for group in dict.fromkeys(row["group"] for row in rows):
-        parts.append(f"### {group}\n\n{table(head, [_formula(row) for row in rows if row['group'] == group])}")
+        parts.append(f"### {group}\n\n{format_table(head, [_formula(row) for row in rows if row['group'] == group])}")
     return "\n".join(parts)
 
 
@@ -52,7 +52,7 @@ def printed_table(rows: list[dict]) -> str:
         if row["printed_share_of_tolerance"]:
             values = (number(row["printed_gives"]), number(row["printed_right"]), number(row["absolute_error"]))
             lines.append((row["formula"], row["printed_at"], *values))
-    return table(("formula", "at", "gives", "right is", "ours is off by, at worst"), lines)
+    return format_table(("formula", "at", "gives", "right is", "ours is off by, at worst"), lines)
 
 
 def run_table(rows: list[dict]) -> str:
@@ -63,7 +63,7 @@ def run_table(rows: list[dict]) -> str:
         lines.append(
             (row["about"], _outcome(row), good, row["gaussians"], f"{float(row['seconds']):.0f}", row["peak_mb"])
         )
-    return table(("run", "what came of it", "as expected", "Gaussians", "seconds", "MB"), lines)
+    return format_table(("run", "what came of it", "as expected", "Gaussians", "seconds", "MB"), lines)
 
 
 def _outcome(row: dict) -> str:

@@ -1,6 +1,5 @@
 """The two tables: a row a formula, a row a run; written, read back, and what a run's row says."""
 
-import csv
 import re
 from pathlib import Path
 
@@ -73,9 +72,3 @@ def likeness(folder: Path, other: Path) -> float | None:
     a, b = (np.concatenate([image_files.read(pair[i]) for pair in pairs]) for i in (0, 1))
     found = metrics.psnr(a, b, np.ones(a.shape[:2], np.float32))
     return 100.0 if found is None else min(100.0, float(found))
-
-
-def read(path: Path | str) -> list[dict[str, str]]:
-    """Rows that `figures.write_rows` wrote."""
-    with Path(path).open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))

@@ -4,6 +4,7 @@ import csv
 from pathlib import Path
 
 from dav_gswt.files import read_json
+from dav_gswt.study import csv_tables
 from dav_gswt.study.comparison import curves
 from dav_gswt.study.seams import summary
 from dav_gswt.study.seams import tables as crops
@@ -49,10 +50,7 @@ def columns(axes: int) -> tuple[str, ...]:
 
 def read(path: Path | str) -> list[dict]:
     """A table as it was written, NUMBERS as floats, None where one is empty; no rows where there is no file yet."""
-    if not Path(path).is_file():
-        return []
-    with Path(path).open(newline="", encoding="utf-8") as file:
-        return [r | {k: float(r[k]) if r[k] else None for k in NUMBERS if k in r} for r in csv.DictReader(file)]
+    return csv_tables.read_table(path, numbers=NUMBERS, missing_ok=True)
 
 
 def times(jobs: dict[str, list[str]]) -> dict:

@@ -4,9 +4,8 @@ from dataclasses import asdict
 
 import numpy as np
 
-from dav_gswt.study.comparison.stats import holm
+from dav_gswt.study import statistics
 from dav_gswt.study.tables import paper, spread
-from dav_gswt.study.tables.paired import paired
 
 QUALITY = ("psnr", "lpips", "seam_lpips", "seam_psnr", "seam_density")
 MEANS = (*QUALITY, "peak_mb", "render_ms", "score_s", "recon_s", "photos")
@@ -15,9 +14,11 @@ PRINTED = ("psnr", "seam_lpips", "memory_gb", "render_ms", "score_s", "p")
 
 
 def rows(sweeps: dict[str, list[dict]], baselines: dict[str, str]) -> list[dict]:
-    """A row a variant of each sweep: means and deviations over seeds as in `sensitivity`, and for each of COMPARED its
-    difference from the sweep's baseline, paired by scene and seed, as `paired` tells it; `_holm`: p values of a sweep
-    and measure, raised for how many they are. Of a sweep over two settings the last value of the second counts.
+    """A row for each variant of each sweep: means and deviations over seeds as in `sensitivity`, and for each measure
+    of COMPARED its difference from the sweep's baseline, paired by scene and seed (`statistics.PairedTest`).
+
+    `_holm`: p adjusted for the number of variants of the sweep. Of a sweep over two settings the last value of the
+    second one counts.
     """
     found = []
     for name, cells in sweeps.items():
@@ -25,8 +26,10 @@ def rows(sweeps: dict[str, list[dict]], baselines: dict[str, str]) -> list[dict]
         variants = list(dict.fromkeys(row["varied_0"] for row in last))
         block = [_variant(name, variant, last, baselines[name]) for variant in variants]
         for key in COMPARED:
-            raised = holm({row["variant"]: row[f"{key}_p"] for row in block if row[f"{key}_p"] is not None})
-            block = [row | {f"{key}_holm": raised.get(row["variant"])} for row in block]
+            adjusted = statistics.adjust_holm(
+                {row["variant"]: row[f"{key}_p"] for row in block if row[f"{key}_p"] is not None}
+            )
+            block = [row | {f"{key}_holm": adjusted.get(row["variant"])} for row in block]
         found += [row | paper.beside("ablation", row["variant"], PRINTED) for row in block]
     return found
 
@@ -56,5 +59,5 @@ def _compared(key: str, mine: list[dict], base: list[dict], same: bool) -> dict:
             pairs.setdefault(row["scene"], []).append(row[key] - at[unit])
     if same or not pairs:
         return dict.fromkeys(("units", "difference", "low", "high", "t", "df", "p", "d"))
-    told = asdict(paired({scene: np.array(values) for scene, values in pairs.items()}))
+    told = asdict(statistics.compute_paired_test({scene: np.array(values) for scene, values in pairs.items()}))
     return {"units": told["units"], "difference": told.pop("mean")} | told

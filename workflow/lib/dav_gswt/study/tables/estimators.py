@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from dav_gswt.study import statistics
 from dav_gswt.study.seams import summary, tables
 
 
@@ -12,5 +13,5 @@ def note(crops: Path | str) -> str:
     sums = summary.of_crops(at, "cut")
     if not sums:
         return ""
-    value, _, _ = summary.interval(summary.drawn(sums)[0][:, 0])
+    value, _, _ = statistics.percentile_interval(statistics.bootstrap_clusters(sums)[0][:, 0])
     return f"\nSeam-LPIPS {value:+.3f}"

@@ -4,9 +4,10 @@ Source: DAV-GSWT, the tables of timing, levels, sensitivity, ablation and prefer
 says which.
 """
 
-import csv
 import re
 from pathlib import Path
+
+from dav_gswt.study import csv_tables
 
 PRINTED = Path(__file__).with_name("paper.csv")
 THOUSAND = 1e3
@@ -14,8 +15,8 @@ THOUSAND = 1e3
 
 def read() -> dict[tuple[str, str, str], str]:
     """All values, by table, row and column."""
-    with PRINTED.open(newline="", encoding="utf-8") as file:
-        return {(row["table"], row["row"], row["column"]): row["printed"] for row in csv.DictReader(file)}
+    rows = csv_tables.read_table(PRINTED)
+    return {(row["table"], row["row"], row["column"]): row["printed"] for row in rows}
 
 
 def beside(table: str, row: str, columns: tuple[str, ...]) -> dict[str, str | None]:

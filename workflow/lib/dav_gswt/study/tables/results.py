@@ -1,14 +1,13 @@
 """The page docs/research/results/results.md: a study's tables and figures. Numbers come from tables or the paper."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
 
 from dav_gswt.files import whole
-from dav_gswt.study.markdown import table
+from dav_gswt.study.markdown import format_table
+from dav_gswt.study.statistics import two_sided_p
 from dav_gswt.study.tables import paper
-from dav_gswt.study.tables.paired import two_sided
 
 UNKNOWN = ""
 TIMING = {
@@ -41,12 +40,6 @@ ABLATION = {
 TESTED = {"PSNR (dB)": ("psnr", 2), "Seam-LPIPS": ("seam_lpips", 4)}
 
 
-def read(path: Path | str) -> list[dict[str, str]]:
-    """The rows of a table, as they are written."""
-    with Path(path).open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
-
-
 def write(path: Path | str, tables: dict[str, list[dict]], figures: dict[str, str]) -> None:
     """The page of `text`, as a file."""
     with whole(path) as part:
@@ -63,30 +56,30 @@ def text(tables: dict[str, list[dict]], figures: dict[str, str]) -> str:
         "“paper” repeat what is printed there, of other scenes, photos and machines: they stand beside ours for "
         "orientation, not for comparison.",
         "## Timing",
-        table(["scene", *_heads(TIMING)], [[row["scene"], *_cells(row, TIMING)] for row in tables["timing"]]),
+        format_table(["scene", *_heads(TIMING)], [[row["scene"], *_cells(row, TIMING)] for row in tables["timing"]]),
         "Reconstruction is scoring, choosing and fitting, without the taking of photos; render, sort and update are "
         "the page's in a headless browser, which without a graphics card draws in software "
         "(`docs/research/data/frames.csv`; "
         "empty where `snakemake frame_times` was not run). "
         "The paper's percentages are left out: it does not say of what they are.",
         "## Levels of detail",
-        table(*_levels(tables["lod"])),
+        format_table(*_levels(tables["lod"])),
         "## Sensitivity",
-        table(
+        format_table(
             ["setting", "value", "paper's value", *_heads(SENSITIVITY)],
             [[r["setting"], _bold(r), r["paper_value"], *_cells(r, SENSITIVITY)] for r in tables["sensitivity"]],
         ),
         "In bold the value that is not varied elsewhere. Seam-LPIPS is of one tile set a scene, and differs by some "
         "thousandths from one set to the next: `docs/research/results/seams.md` has more sets and intervals.",
         "## Ablation",
-        table(
+        format_table(
             ["sweep", "variant", *_heads(ABLATION)],
             [[row["sweep"], f"`{row['variant']}`", *_cells(row, ABLATION)] for row in tables["ablation"]],
         ),
         "Seam density is the share of cuts that run through the strongest quarter of the ground's gradients.",
         "Differences from the baseline, paired by scene and seed: mean, 95 % bootstrap interval, t (degrees of "
         "freedom), p, and p raised for how many variants were compared (Holm).",
-        table(*_tested(tables["ablation"])),
+        format_table(*_tested(tables["ablation"])),
         _slips(),
         "## Figures",
         *(f"![{shown}]({path})\n\n{shown}" for shown, path in figures.items()),
@@ -163,6 +156,6 @@ def _slips() -> str:
     taken = start + k * rounds
     return (
         f"Not copied from the paper: its t = {t:g} with {df:.0f} degrees of freedom is p = "
-        f"{two_sided(t, int(df)):.3f}, not p < 0.01; {taken:.0f} of {views:.0f} views are "
+        f"{two_sided_p(t, int(df)):.3f}, not p < 0.01; {taken:.0f} of {views:.0f} views are "
         f"{views / taken:.1f} times fewer, not ten."
     )

@@ -1,10 +1,10 @@
 """Means of a sweep's rows, over scenes and seeds, and the viewer's measurements of the same cells."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
 
+from dav_gswt.study import csv_tables
 from dav_gswt.study.sweeps import tables as sweep
 
 VIEWER = (
@@ -56,7 +56,5 @@ def read_sweeps(paths: list[Path | str], viewer: Path | str | None) -> list[list
 def read_viewer(path: Path | str | None) -> list[dict]:
     """A table with the columns CELL and some of VIEWER (milliseconds a frame; shares of frames, 0 to 1, in which the
     worker ran); no rows where there is no such file."""
-    if not path or not Path(path).is_file():
-        return []
-    with Path(path).open(newline="", encoding="utf-8") as file:
-        return [row | {k: float(row[k]) if row.get(k) else None for k in VIEWER} for row in csv.DictReader(file)]
+    rows = csv_tables.read_table(path, numbers=VIEWER, missing_ok=True) if path else []
+    return [dict.fromkeys(VIEWER) | row for row in rows]

@@ -4,7 +4,6 @@ Both go the same way, frame by frame, at several budgets of Gaussians, and fill 
 the machine that the row names, and for what else it did meanwhile (`load`).
 """
 
-import csv
 import os
 import tempfile
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ import numpy as np
 from dav_gswt import provenance
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.logs import progress
-from dav_gswt.study import figures
+from dav_gswt.study import csv_tables, figures
 from dav_gswt.study.tables import spread
 from dav_gswt.study.terrain import browser
 from dav_gswt.terrain import assemble, heights, still
@@ -138,7 +137,7 @@ def gathered(cells: list[dict], library: list[str], page: list[str]) -> list[dic
     """All rows with what tells each bundle from the others in front; paths of tables, one a cell."""
     found = []
     for cell, *paths in zip(cells, library, page, strict=True):
-        found += [cell | row for path in paths for row in read(path)]
+        found += [cell | row for path in paths for row in csv_tables.read_table(path)]
     return found
 
 
@@ -149,12 +148,6 @@ def of_viewer(rows: list[dict]) -> list[dict]:
         if row["renderer"] == PAGE:
             first.setdefault(tuple(row[key] for key in spread.CELL), row)
     return [{key: row[key] for key in (*spread.CELL, *spread.VIEWER)} for row in first.values()]
-
-
-def read(path: Path | str) -> list[dict]:
-    """Rows as text."""
-    with Path(path).open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
 
 
 def write_plot(path: Path | str, rows: list[dict]) -> None:

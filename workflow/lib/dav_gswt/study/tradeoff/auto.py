@@ -2,7 +2,7 @@
 
 from dav_gswt import provenance
 from dav_gswt.files import read_json
-from dav_gswt.study.markdown import table
+from dav_gswt.study.markdown import format_table
 from dav_gswt.study.tradeoff.page import number
 from dav_gswt.study.tradeoff.tables import mean_square, measured, total
 
@@ -108,4 +108,4 @@ def _scene(scene: str, rows: list[dict]) -> list[str]:
         cells += [number(row["loss_lpips"], 4), number(row["difference"], 2)]
         cells += [number(row["bundle_mb"], 1), number(row["fixed_bundle_mb"], 1)]
         shown.append([*cells, {None: "", 0: "no", 1: "yes"}[row["target"]]])
-    return [f"## {scene}", table(head, shown)]
+    return [f"## {scene}", format_table(head, shown)]

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from dav_gswt.files import whole
-from dav_gswt.study.markdown import table
+from dav_gswt.study.markdown import format_table
 from dav_gswt.study.tradeoff.settings import PRESET
 from dav_gswt.study.tradeoff.tables import UNITS
 
@@ -36,7 +36,7 @@ def text(rows: list[dict], pareto: list[dict]) -> str:
         "bundle, without the taking of photos; what settings share counts for each. One scene and one seed: "
         "differences of a few hundredths of a decibel are within what another seed changes.",
         "## Presets",
-        table(*_presets(pareto)),
+        format_table(*_presets(pareto)),
         "On the front is what no other setting here is as fast as and better than: in PSNR, and beside it in LPIPS, as "
         "what is ahead in PSNR can be the less sharp picture.",
         "\n".join(f"- {preset(row)}" for row in pareto if row["knob"] == PRESET),
@@ -116,6 +116,6 @@ def _knob(knob: str, rows: list[dict]) -> list[str]:
     return [
         f"### {knob}",
         f"Loss: {WHAT[best['measure']]}; policy `{best['policy']}`.",
-        table(head, shown),
+        format_table(head, shown),
         "\n".join(f"- {advice(row, best)}" for row in mine if not row["most"]),
     ]

@@ -1,12 +1,12 @@
 """The table of the trade-off: a row a setting, what it cost, is worth, and lost to the most accurate of its knob."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
 
 from dav_gswt import provenance
 from dav_gswt.images import image_files
+from dav_gswt.study import csv_tables
 from dav_gswt.study.sweeps import tables as sweeps
 from dav_gswt.study.sweeps.grid import CELL
 from dav_gswt.study.tradeoff.front import front, rivals
@@ -100,5 +100,4 @@ def pareto(table: list[dict]) -> list[dict]:
 
 def read(path: Path | str) -> list[dict]:
     """A table of the trade-off as it was written: numbers as floats, None where one is empty, texts as they are."""
-    with Path(path).open(newline="", encoding="utf-8") as file:
-        return [{k: v if k in TEXTS else float(v) if v else None for k, v in r.items()} for r in csv.DictReader(file)]
+    return csv_tables.read_table(path, texts=TEXTS)

@@ -1,0 +1,80 @@
+"""Read, write and merge the CSV tables of studies.
+
+A table is a list of rows, a row a dict from column to value. Files keep one format: floats with five significant
+digits, an empty field for a value that is not known, lines that end in a newline.
+"""
+
+from collections.abc import Collection, Iterable
+from pathlib import Path
+
+import pandas as pd
+
+from dav_gswt.files import whole
+
+
+def write_table(path: Path | str, rows: Iterable[dict]) -> None:
+    """Write rows under the columns of the first one; no rows give an empty file.
+
+    Raises: ValueError: a row has a column that the first one lacks.
+    """
+    rows = list(rows)
+    with whole(path) as part:
+        if not rows:
+            part.touch()
+            return
+        columns = list(rows[0])
+        if extra := {name for row in rows for name in row} - set(columns):
+            raise ValueError(f"{path}: the first row has no column {', '.join(sorted(extra))}")
+        frame = pd.DataFrame([[_format(row.get(name)) for name in columns] for row in rows], columns=columns, dtype=str)
+        frame.to_csv(part, index=False, lineterminator="\n")
+
+
+def read_table(
+    path: Path | str,
+    *,
+    numbers: Collection[str] = (),
+    integers: Collection[str] = (),
+    texts: Collection[str] | None = None,
+    missing_ok: bool = False,
+) -> list[dict]:
+    """Read a table: `numbers` as float, `integers` as int, both None where a field is empty, other columns as text.
+
+    texts: if given, all columns but these are numbers. missing_ok: a file that does not exist has no rows.
+    """
+    path = Path(path)
+    if missing_ok and not path.is_file():
+        return []
+    if path.stat().st_size == 0:
+        return []
+    frame = pd.read_csv(path, dtype=str, keep_default_na=False, na_filter=False, encoding="utf-8")
+    if texts is not None:
+        numbers = [*numbers, *frame.columns.difference([*texts, *integers])]
+    kinds = dict.fromkeys(numbers, float) | dict.fromkeys(integers, int)
+    return [{name: _parse(value, kinds.get(name)) for name, value in row.items()} for row in frame.to_dict("records")]
+
+
+def merge_rows(before: list[dict], new: list[dict], key: Collection[str]) -> list[dict]:
+    """Rows of both, sorted by key; of two rows with the same key the new one stays.
+
+    Columns are those of the new rows, then what only old rows have; a value that a row lacks is None.
+    """
+    columns = list(dict.fromkeys(name for row in [*new, *before] for name in row))
+    at = {tuple(str(row[name]) for name in key): row for row in [*before, *new]}
+    return [{name: at[k].get(name) for name in columns} for k in sorted(at)]
+
+
+def update_table(path: Path | str, rows: list[dict], key: Collection[str]) -> None:
+    """Add rows to a table that grows from run to run; rows with the same key are replaced."""
+    write_table(path, merge_rows(read_table(path, missing_ok=True), rows, key))
+
+
+def _format(value: object) -> str:
+    if value is None:
+        return ""
+    return f"{value:.5g}" if isinstance(value, float) else str(value)
+
+
+def _parse(text: str, kind: type | None) -> str | float | int | None:
+    if kind is None:
+        return text
+    return kind(text) if text else None
