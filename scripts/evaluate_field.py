@@ -3,6 +3,7 @@
 from dav_gswt import provenance
 from dav_gswt.field import read_field
 from dav_gswt.files import read_json, write_json
+from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import lpips_weights
 from dav_gswt.logs import logging_to
 from dav_gswt.photos import training_views
@@ -16,7 +17,7 @@ with logging_to(snakemake.log[0]):
     shots = sum(len(read_json(f"{folder}/capture.json")["shots"]) for folder in captures)
     fitted, grid = read_field(given.field), ground.read(given.ground)
     perceptual = lpips_weights.read(given.lpips) if given.get("lpips") else None
-    groups = read_json(given.frame).get("test_groups")
+    groups = read_scene_frame(given.frame).test_groups
     result = evaluation.evaluate(fitted, build.modelled(tests, grid), groups, perceptual)
     result |= {"round": params.t, "photos": len(split["start"]) + shots, "gaussians": len(fitted)}
     result |= {"fit": read_json(given.fit)}

@@ -4,6 +4,7 @@ import numpy as np
 
 from dav_gswt.field import write_field
 from dav_gswt.files import read_json, write_json
+from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.photos import model, training_views
 from dav_gswt.reconstruction import build, ground
@@ -15,7 +16,7 @@ with logging_to(snakemake.log[0]):
     photos = training_views.taken(given.images, given.model, names, [], quality.size)
     points, colours = model.points_seen_by(model.read(given.model), names, given.images)
     rng = np.random.default_rng(params.seed)
-    made = build.fit(read_json(given.frame), photos, points, colours, quality, rng, params.keep, margin)
+    made = build.fit(read_scene_frame(given.frame), photos, points, colours, quality, rng, params.keep, margin)
     write_field(made.field, snakemake.output.field)
     ground.write(made.grid, snakemake.output.ground)
     write_json(snakemake.output.fit, made.report)

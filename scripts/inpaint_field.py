@@ -3,6 +3,7 @@
 from dav_gswt import provenance
 from dav_gswt.field import read_field, write_field
 from dav_gswt.files import copied, read_json, write_json
+from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.inpainting import build
 from dav_gswt.logs import logging_to
 from dav_gswt.photos import training_views
@@ -14,7 +15,7 @@ with logging_to(snakemake.log[0]):
     fitted, grid, names = read_field(given.field), ground.read(given.ground), read_json(given.views)["start"]
     taken = training_views.taken(given.images, given.model, names, list(given.captures), scoring.PHOTO)
     asked = prior_sampling.painter(params.prior, params.seed)
-    made = build.complete(fitted, grid, read_json(given.frame), taken, asked)
+    made = build.complete(fitted, grid, read_scene_frame(given.frame), taken, asked)
     if made.field is fitted:
         copied(given.field, out.field)
     else:

@@ -1,12 +1,14 @@
 """Rule enter_field: a finished field and the surface under it."""
 
 from dav_gswt.field import read_field, write_field
-from dav_gswt.files import read_json
+from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.reconstruction import build, external_field, ground
 
 with logging_to(snakemake.log[0]):
     quality = build.Quality(**snakemake.params.quality)
-    entered, grid = external_field.enter(read_field(snakemake.input.field), read_json(snakemake.input.frame), quality)
+    entered, grid = external_field.enter(
+        read_field(snakemake.input.field), read_scene_frame(snakemake.input.frame), quality
+    )
     write_field(entered, snakemake.output.field)
     ground.write(grid, snakemake.output.ground)

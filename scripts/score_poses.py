@@ -3,6 +3,7 @@
 from dav_gswt.capture import serial_rig
 from dav_gswt.field import read_field
 from dav_gswt.files import read_json
+from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to
 from dav_gswt.photos import training_views
@@ -12,12 +13,12 @@ from dav_gswt.views import candidates, feasibility, frozen_scales, pose_maps, pr
 with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
     captures = list(given.get("captures", []))
-    scene, frame, split = params.scene, read_json(given.frame), read_json(given.views)
+    scene, frame, split = params.scene, read_scene_frame(given.frame), read_json(given.views)
     fitted, grid = read_field(given.field), ground.read(given.ground)
     pool = candidates.left(scene, frame, given.model, split, captures)
     if scene["agent"] != "replay":  # whose frames were all taken, wherever they stand
         pool = serial_rig.within(scene, frame, pool) if scene["agent"] == "serial" else pool
-        pool = feasibility.kept(pool, grid, scene.get("reach"), feasibility.CLEARANCE * frame["flying_height"])
+        pool = feasibility.kept(pool, grid, scene.get("reach"), feasibility.CLEARANCE * frame.flying_height)
     taken = training_views.taken(given.images, given.model, split["start"], captures, scoring.PHOTO)
     prior = prior_sampling.asked(params.prior, params.p_drop, params.seed, given.get("lpips"))
     first = frozen_scales.read(given.frozen) if given.get("frozen") else None

@@ -4,6 +4,7 @@ import numpy as np
 
 from dav_gswt.files import read_json, write_json
 from dav_gswt.geometry import poses
+from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to
 from dav_gswt.views import candidates, policy_inputs, pose_maps, scores, selection, stopping
@@ -11,7 +12,7 @@ from dav_gswt.views.policies import SelectionInput
 
 with logging_to(snakemake.log[0]):
     given, params, policy = snakemake.input, snakemake.params, snakemake.params.policy
-    frame, split, scored = read_json(given.frame), read_json(given.views), scores.read(given.scores)
+    frame, split, scored = read_scene_frame(given.frame), read_json(given.views), scores.read(given.scores)
     taken = candidates.taken(given.model, split, given.captures)
     known = stopping.known(given, len(split["start"]), len(taken), len(scored))
     k, chosen = selection.poses_per_round(policy, params.k, len(scored)), []

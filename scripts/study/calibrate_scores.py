@@ -3,6 +3,7 @@
 from dav_gswt import provenance
 from dav_gswt.field import read_field
 from dav_gswt.files import read_json, write_json
+from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.photos import training_views
 from dav_gswt.reconstruction import ground
@@ -13,7 +14,7 @@ from dav_gswt.views import candidates, pose_maps, prior_sampling, scores, scorin
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     captures = list(given.get("captures", []))
-    frame, split = read_json(given.frame), read_json(given.views)
+    frame, split = read_scene_frame(given.frame), read_json(given.views)
     taken = training_views.taken(given.images, given.model, split["start"], captures, scoring.PHOTO)
     fitted = read_field(given.field), ground.read(given.ground)
     judged = judging.Judged(params.scene, *fitted, frame, taken, params.size)

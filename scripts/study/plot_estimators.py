@@ -2,6 +2,7 @@
 
 from dav_gswt.field import read_field
 from dav_gswt.files import read_json
+from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.photos import training_views
 from dav_gswt.reconstruction import ground
@@ -10,7 +11,7 @@ from dav_gswt.study.views import evolution
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    key, found = evolution.measure(read_json(given.frame)), []
+    key, found = evolution.measure(read_scene_frame(given.frame)), []
     for name, *paths in zip(params.named, given.fields, given.grounds, given.metrics, given.crops, strict=True):
         fitted, surface, measured, crops = paths
         read = read_field(fitted), ground.read(surface), read_json(measured)

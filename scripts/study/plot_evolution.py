@@ -2,6 +2,7 @@
 
 from dav_gswt.field import read_field
 from dav_gswt.files import read_json
+from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.photos import training_views
 from dav_gswt.reconstruction import ground
@@ -9,7 +10,7 @@ from dav_gswt.study.views import evolution
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    key, rounds = evolution.measure(read_json(given.frame)), []
+    key, rounds = evolution.measure(read_scene_frame(given.frame)), []
     for t, *paths in zip(params.rounds, given.fields, given.grounds, given.metrics, strict=True):
         fitted, surface, measured = paths
         rounds.append(evolution.Round(t, read_field(fitted), ground.read(surface), read_json(measured)))

@@ -1,13 +1,14 @@
 """Rule plot_sphere: what was each candidate worth to each round, and which did it choose?"""
 
 from dav_gswt.files import read_json
+from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.study.views import sphere
 from dav_gswt.views import candidates, scores
 
 with logging_to(snakemake.log[0]):
     given, lam = snakemake.input, snakemake.params.lam
-    frame, split = read_json(given.frame), read_json(given.views)
+    frame, split = read_scene_frame(given.frame), read_json(given.views)
     captures, rounds = list(given.captures), []
     for t, (scored, asked) in enumerate(zip(given.scores, given.poses, strict=True), 1):
         taken = candidates.taken(given.model, split, captures[: t - 1])

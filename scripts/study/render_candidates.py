@@ -1,12 +1,13 @@
 """Rule show_candidates: what do some candidates truly show?"""
 
-from dav_gswt.files import read_json, whole_folder
+from dav_gswt.files import whole_folder
+from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.study.calibration import truth
 from dav_gswt.views import candidates
 
 with logging_to(snakemake.log[0]):
     scene = snakemake.params.scene
-    pool = candidates.hemisphere(scene, read_json(snakemake.input.frame))
+    pool = candidates.hemisphere(scene, read_scene_frame(snakemake.input.frame))
     with whole_folder(snakemake.output.truth) as folder:
         truth.write(folder, truth.shown(scene, truth.spread(pool, snakemake.params.poses), ""))

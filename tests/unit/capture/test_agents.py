@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from fixtures.frames import scene_frame
 
 from dav_gswt import capture
 from dav_gswt.capture import drop_folder, render, replay, shots
@@ -37,7 +38,7 @@ def picture(path, value=0.5):
 @pytest.fixture
 def site(tmp_path):
     (tmp_path / "photos").mkdir()
-    frame = {"flying_height": 5.0}
+    frame = scene_frame(flying_height=5.0)
     return Site("dune", {"agent": "handheld"}, frame, tmp_path / "photos", Store(tmp_path / "captures"))
 
 
@@ -138,7 +139,7 @@ def test_where_no_pose_was_chosen_nobody_is_asked_for_anything(agent, tmp_path, 
     monkeypatch.setattr(replay, "take", no_one)
     monkeypatch.setattr(capture.candidates, "left", lambda *_: asked(0.0))
     scene = {"agent": agent, "kind": "photos"}
-    site = Site("dune", scene, {"flying_height": 5.0}, tmp_path / "photos", Store(tmp_path / "captures"))
+    site = Site("dune", scene, scene_frame(flying_height=5.0), tmp_path / "photos", Store(tmp_path / "captures"))
     capture.capture(site, {}, [], [], tmp_path / "capture")
     assert [path.name for path in (tmp_path / "capture").iterdir()] == ["capture.json"]
     assert json.loads((tmp_path / "capture/capture.json").read_text()) == {"agent": agent, "shots": []}

@@ -1,24 +1,26 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures.frames import scene_frame
 
 from dav_gswt.capture import drone, drop_folder, qgc_plan
 from dav_gswt.capture.site import Site
 from dav_gswt.capture.store import Store
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
-from dav_gswt.geometry.geodesy import Georeference
+from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.poses import of_camera
 from dav_gswt.photos.synthetic import camera_layouts
 
 PLACE = Georeference(47.1, 8.2, 430.0, 30.0, 20.0)  # a world unit is 20 m
-FRAME = {
-    "unit": "flying height",
-    "flying_height": 1.0,
-    "exemplar": {"west": -0.5, "south": -0.5, "side": 1.0},
-    "georeference": {"latitude": 47.1, "longitude": 8.2, "altitude": 430.0, "north": 30.0, "metres_per_unit": 20.0},
-}
+FRAME = scene_frame(
+    unit="flying height",
+    flying_height=1.0,
+    exemplar=(-0.5, -0.5, 1.0),
+    georeference=Georeference(latitude=47.1, longitude=8.2, altitude=430.0, north=30.0, metres_per_unit=20.0),
+)
 ORBITS = [(90, 0, 1.0), (60, 10, 1.0), (45, 200, 1.2), (30, 100, 0.8), (10, 45, 1.0), (9, 46, 1.0)]
 
 
@@ -140,7 +142,7 @@ def test_nothing_is_written_when_nothing_is_missing(site, asked, monkeypatch):
 
 
 def test_a_scene_without_gps_is_refused(site, asked):
-    bare = Site("moor", site.scene, {k: v for k, v in FRAME.items() if k != "georeference"}, site.photos, site.store)
+    bare = Site("moor", site.scene, replace(FRAME, georeference=None), site.photos, site.store)
     with pytest.raises(InputError, match="GPS positions in their EXIF"):
         drone.take(bare, asked)
 
@@ -153,7 +155,7 @@ def test_poses_that_are_too_low_are_refused_by_name(site, asked):
 
 def test_ground_too_steep_for_altitudes_above_a_plane_is_refused(site, asked):
     def on(slope, **flight):
-        frame = FRAME | {"georeference": FRAME["georeference"] | {"slope": slope}}
+        frame = replace(FRAME, georeference=replace(FRAME.georeference, slope=slope))
         return Site("moor", {"flight": flight}, frame, site.photos, site.store)
 
     # the farthest pose is 1.3 x 20 m from where the drone takes off: 10 degrees are 4.7 m, 2 degrees 0.9 m

@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from fixtures.frames import scene_frame
 from fixtures.simulated_rig import Faults, SimulatedRig
 from hypothesis import given
 from hypothesis import strategies as st
@@ -21,7 +22,7 @@ from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
 from dav_gswt.photos.synthetic import camera_layouts
 
-FRAME = {"exemplar": {"west": 1.0, "south": -3.0, "side": 4.0}, "flying_height": 4.0}
+FRAME = scene_frame(exemplar=(1.0, -3.0, 4.0), flying_height=4.0)
 CENTRE = (3.0, -1.0, 0.0)
 PLACES = ((60.0, 10.0, 4.0), (45.0, 120.0, 4.0), (90.0, 30.0, 4.0), (50.0, 350.0, 3.0))
 RIG = {

@@ -1,4 +1,5 @@
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -11,14 +12,15 @@ from dav_gswt.capture.store import Store
 from dav_gswt.errors import InputError
 from dav_gswt.field import write_field
 from dav_gswt.geometry import cameras
+from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.poses import of_camera
 from dav_gswt.images import image_files
 from dav_gswt.photos.synthetic import camera_layouts
 
 MIDDLE = [1.6, 1.6, 0.0]
-FRAME = made.FRAME | {"flying_height": 1.6}
-NORTH = {"latitude": 47.1, "longitude": 8.2, "altitude": 430.0, "north": 90.0, "metres_per_unit": 2.0}
-UNKNOWN = FRAME | {"unit": "flying height"}
+FRAME = replace(made.FRAME, flying_height=1.6)
+NORTH = Georeference(47.1, 8.2, 430.0, north=90.0, metres_per_unit=2.0)
+UNKNOWN = replace(FRAME, unit="flying height")
 ORBITS = [(40, 0, 2.0), (35, 180, 2.4), (90, 0, 1.8), (30, 90, 2.5)]
 
 
@@ -163,7 +165,7 @@ def test_words_say_where_to_stand_and_where_to_look():
     assert directions.told(camera, FRAME, directions.ruler(FRAME)).startswith(
         "Stand 1.5 m from the middle, towards the right of the map, camera 1.3 m above the ground"
     )
-    known = FRAME | {"georeference": NORTH}  # +y is east: the right of the map is south
+    known = replace(FRAME, georeference=NORTH)  # +y is east: the right of the map is south
     assert directions.told(camera, known, directions.ruler(known)) == (
         "Stand 3.1 m south of the middle, camera 2.6 m above the ground; face the middle, which is to the north; "
         "look down 40 degrees."
@@ -199,5 +201,5 @@ def test_the_map_shows_the_exemplar_and_every_pose(asked):
     assert drawn.picture.shape == (drawn.camera.height, drawn.camera.width, 3)
     assert drawn.drawing.count('class="arrow"') == 3  # the fourth looks straight down
     assert "N</text>" not in drawn.drawing
-    known = FRAME | {"georeference": NORTH}
+    known = replace(FRAME, georeference=NORTH)
     assert "N</text>" in shot_list_map.draw([asked[0][1]], known, directions.ruler(known), None).drawing

@@ -6,7 +6,7 @@ import pytest
 from dav_gswt.capture import survey
 from dav_gswt.capture.survey import Lens
 from dav_gswt.errors import InputError
-from dav_gswt.geometry.geodesy import Georeference
+from dav_gswt.geometry.georeference import Georeference
 
 LENS = Lens()
 WHERE = ["--latitude", "47.1", "--longitude", "8.2", "--altitude", "430", "--side", "20"]

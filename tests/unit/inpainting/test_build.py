@@ -228,7 +228,7 @@ def seen_by(*eyes):
 def told(field, pool):
     """What is known of views, and a painting that shows the field itself."""
     photos = conditions.taken(patch.photos(), patch.FRAME, 32)
-    c = conditions.condition(field, pool, photos, patch.FRAME["flying_height"], 32)
+    c = conditions.condition(field, pool, photos, patch.FRAME.flying_height, 32)
     return c, paint.Painted(c.colour, c.alpha, c.inverse_depth)
 
 
@@ -242,11 +242,11 @@ def test_a_thing_stands_where_two_views_agree_that_it_does(count, stands):
     there = concatenate_fields([bare, blob([1.7, 1.5, 0.5], [0.2, 0.2, 0.2], [0.1, 0.9, 0.1])])
     pool = seen_by(*EYES[:count])
     (condition, _), (_, made) = told(bare, pool), told(there, pool)
-    new = occluders.things(bare, patch.grid(), pool, condition, made, patch.FRAME["flying_height"])
+    new = occluders.things(bare, patch.grid(), pool, condition, made, patch.FRAME.flying_height)
     assert bool(len(new)) == stands
     if stands:
         assert np.hypot(new.means[:, 0] - 1.7, new.means[:, 1] - 1.5).max() < 0.7
-        assert new.means[:, 2].min() > occluders.RISES * patch.FRAME["flying_height"] and new.means[:, 2].max() < 1.1
+        assert new.means[:, 2].min() > occluders.RISES * patch.FRAME.flying_height and new.means[:, 2].max() < 1.1
         assert new.base_colours.mean(0)[1] > 0.6 and new.imagined.all() and (new.uncertainty == 1).all()
 
 
@@ -260,7 +260,7 @@ def test_no_thing_stands_where_views_contradict_each_other_or_the_ground_is_know
     half = made.inverse_depth.copy()
     half[1] = flat.inverse_depth[1]
     alone = replace(made, inverse_depth=half)
-    height = patch.FRAME["flying_height"]
+    height = patch.FRAME.flying_height
     assert len(occluders.things(marked, patch.grid(), pool, condition, alone, height)) == 0
     assert len(occluders.things(bare, patch.grid(), pool, condition, made, height)) == 0
 
@@ -270,7 +270,7 @@ def test_every_unseen_cell_is_well_inside_the_picture_of_its_block():
     grid = patch.grid(0.05)
     there = rng.random(grid.shape) < 0.02
     fresh = there.copy()
-    for target in viewpoints.blocks(grid, there, patch.FRAME["flying_height"]):
+    for target in viewpoints.blocks(grid, there, patch.FRAME.flying_height):
         ((_, camera),) = viewpoints.cameras(viewpoints.ABOVE, target, patch.field(), grid, patch.FRAME, 64)
         assert camera.forward[2] < -np.sin(np.radians(75))
         at, depth = camera.project(grid.centres)

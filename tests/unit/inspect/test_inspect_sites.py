@@ -49,10 +49,3 @@ def test_names_that_lead_out_of_the_folder_are_refused(tree, tmp_path):
             sites.show_captured(tree.start / "capture.json", Asked())
     finally:
         (tree.start / "capture.json").unlink()
-
-
-def test_a_frame_without_a_square_is_refused(tmp_path):
-    for frame in ({}, {"exemplar": 3}, result_tree.FRAME | {"exemplar": {"west": 0, "south": 0, "side": -1}}):
-        write_json(tmp_path / "ground.json", frame)
-        with pytest.raises(InputError, match="ground.json: not as the workflow writes it"):
-            beside.frame_of(tmp_path / "ground.json")

@@ -2,15 +2,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures.frames import scene_frame
 
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.lod import merge
 from dav_gswt.reconstruction import discs, ground
 
-FRAME = {
-    "exemplar": {"west": 0.0, "south": 0.0, "side": 3.2},
-    "extent": {"west": -1.0, "south": -1.0, "east": 4.2, "north": 4.2},
-}
+FRAME = scene_frame(exemplar=(0.0, 0.0, 3.2), extent=(-1.0, -1.0, 4.2, 4.2))
 
 
 @pytest.fixture

@@ -71,7 +71,7 @@ def test_the_frame_has_z_up_the_ground_at_0_and_the_flying_height_as_unit(flown,
     assert all(c.forward[2] < -0.9 for c in framed.cameras)
     # 3000 heights of 0.01: their robust mean is within 0.001.
     assert np.median(framed.points[:, 2]) == pytest.approx(0, abs=1e-3)
-    assert facts["relief"] == pytest.approx(0.01, rel=0.2)
+    assert facts.relief == pytest.approx(0.01, rel=0.2)
     assert model.errors(framed).max() < 1e-9  # pixels: a similarity changes no picture
 
 
@@ -81,18 +81,18 @@ def test_the_frame_does_not_depend_on_the_frame_before(flown, rng):
     one, a = ground_frame.frame(flown, np.random.default_rng(0))
     two, b = ground_frame.frame(model.similar(flown, 3.0, turn, np.ones(3)), np.random.default_rng(0))
     assert two.points == pytest.approx(one.points, abs=1e-6)
-    assert b["exemplar"]["side"] == pytest.approx(a["exemplar"]["side"], abs=1e-6)
+    assert b.exemplar.side == pytest.approx(a.exemplar.side, abs=1e-6)
 
 
 def test_every_point_of_the_exemplar_is_seen_often_enough(flown, rng):
     framed, facts = ground_frame.frame(tossed(flown, rng), rng)
-    square = facts["exemplar"]
-    corner = np.array([square["west"], square["south"], 0])
-    probes = corner + np.c_[rng.random((2000, 2)), np.zeros(2000)] * square["side"]
+    square = facts.exemplar
+    corner = np.array([square.west, square.south, 0])
+    probes = corner + np.c_[rng.random((2000, 2)), np.zeros(2000)] * square.side
     assert sum(ground_frame.seen(c, probes).astype(int) for c in framed.cameras).min() >= 3
-    extent = facts["extent"]
-    assert extent["west"] <= square["west"] and extent["south"] <= square["south"]
-    assert extent["east"] >= square["west"] + square["side"] and extent["north"] >= square["south"] + square["side"]
+    extent = facts.extent
+    assert extent.west <= square.west and extent.south <= square.south
+    assert extent.east >= square.west + square.side and extent.north >= square.south + square.side
 
 
 def test_the_x_axis_turns_so_that_the_square_is_large(rng):
@@ -101,7 +101,7 @@ def test_the_x_axis_turns_so_that_the_square_is_large(rng):
     straight = made_up.model(cameras, made_up.plain(4000, 1.2, rng))
     c = np.sqrt(0.5)
     diagonal = model.similar(straight, 1.0, np.array([[c, -c, 0], [c, c, 0], [0, 0, 1]]), np.zeros(3))
-    sides = [ground_frame.frame(m, np.random.default_rng(0))[1]["exemplar"]["side"] for m in (straight, diagonal)]
+    sides = [ground_frame.frame(m, np.random.default_rng(0))[1].exemplar.side for m in (straight, diagonal)]
     assert sides[1] == pytest.approx(sides[0], rel=0.03)  # two cells of about 70
 
 
@@ -109,9 +109,9 @@ def test_ground_without_points_is_not_well_seen(rng):
     """The northern half is water: photos see it, but nothing in it holds still."""
     points = made_up.plain(4000, 1.0, rng)
     cameras = made_up.flight(4, 5, tilt=0)
-    all_over = ground_frame.frame(made_up.model(cameras, points), rng)[1]["exemplar"]
-    half = ground_frame.frame(made_up.model(cameras, points[points[:, 1] < 0]), rng)[1]["exemplar"]
-    assert half["side"] < 0.8 * all_over["side"]
+    all_over = ground_frame.frame(made_up.model(cameras, points), rng)[1].exemplar
+    half = ground_frame.frame(made_up.model(cameras, points[points[:, 1] < 0]), rng)[1].exemplar
+    assert half.side < 0.8 * all_over.side
 
 
 def test_photos_that_look_along_a_wall_are_refused(rng):
@@ -184,5 +184,5 @@ def test_few_photos_need_two_looks_and_many_need_three(flown, rng):
     few = replace(flown, names=flown.names[:8], cameras=flown.cameras[:8])
     keep = few_obs = flown.image_of < 8
     few = replace(few, point_of=flown.point_of[keep], image_of=flown.image_of[few_obs], pixels=flown.pixels[keep])
-    assert ground_frame.frame(few, rng)[1]["photos_per_cell"] == 2
-    assert ground_frame.frame(flown, rng)[1]["photos_per_cell"] == 3
+    assert ground_frame.frame(few, rng)[1].photos_per_cell == 2
+    assert ground_frame.frame(flown, rng)[1].photos_per_cell == 3

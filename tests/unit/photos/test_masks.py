@@ -4,6 +4,7 @@ import numpy as np
 import pycolmap
 import pytest
 from fixtures import photos as made_up
+from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
@@ -40,7 +41,7 @@ def test_black_does_not_count_nor_does_its_edge(found, tmp_path, name):
 def test_masks_go_with_the_pictures_as_their_alpha_and_views_do_not_count_them(found, tmp_path):
     covers = masks.undistorted(found, masked(tmp_path))
     picture = np.random.default_rng(0).uniform(0, 1, (240, 320, 3)).astype(np.float32)
-    folder.write(tmp_path / "photos", found.model, [("000.png", picture)], {}, None, covers)
+    folder.write(tmp_path / "photos", found.model, [("000.png", picture)], scene_frame(), None, covers)
     path = tmp_path / "photos" / "images" / "000.png"
     np.testing.assert_allclose(image_files.read(path), picture, atol=0.5 / 255 + 1e-6)  # also under the mask
     for size in (320, 160):

@@ -1,13 +1,16 @@
 """Start views, pool and test views."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from fixtures import photos as made_up
+from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
 from dav_gswt.photos import split as views
 
-FRAME = {"exemplar": {"west": -0.6, "south": -0.6, "side": 1.2}, "test": None}
+FRAME = scene_frame(exemplar=(-0.6, -0.6, 1.2))
 
 
 @pytest.fixture
@@ -87,7 +90,7 @@ def test_photos_that_share_no_points_still_all_start():
 
 def test_photos_of_other_ground_take_no_part(flown):
     """An exemplar in one corner: photos of the opposite corner do not see it."""
-    frame = {"exemplar": {"west": -0.9, "south": -0.9, "side": 0.6}, "test": None}
+    frame = scene_frame(exemplar=(-0.9, -0.9, 0.6))
     parts = split(flown, start=4, frame=frame)
     named = [name for part in parts.values() for name in part]
     assert 6 <= len(named) < 30
@@ -103,22 +106,21 @@ def test_sight_is_the_share_of_the_square_by_hand():
 
 
 def test_the_test_views_that_ground_json_names_are_taken(flown):
-    parts = split(flown, frame=FRAME | {"test": ["003.png", "017.png"]})
+    parts = split(flown, frame=replace(FRAME, test=("003.png", "017.png")))
     assert parts["test"] == ["003.png", "017.png"]
     assert not set(parts["test"]) & set(parts["start"] + parts["pool"])
 
 
 def test_a_named_test_view_that_is_no_image_is_refused(flown):
     with pytest.raises(InputError, match="nowhere.png"):
-        split(flown, frame=FRAME | {"test": ["nowhere.png"]})
+        split(flown, frame=replace(FRAME, test=("nowhere.png",)))
     with pytest.raises(InputError, match="every image is a test view"):
-        split(flown, frame=FRAME | {"test": list(flown.names)})
+        split(flown, frame=replace(FRAME, test=flown.names))
 
 
 def test_photos_of_all_ground_take_part_where_all_of_it_is_in_question(flown):
     """The same corner, but every photo sees some of the whole; tests are spread over the whole, too."""
-    corner = {"exemplar": {"west": -0.9, "south": -0.9, "side": 0.6}, "test": None}
-    frame = corner | {"extent": {"west": -1.2, "south": -1.2, "east": 1.2, "north": 1.2}}
+    frame = scene_frame(exemplar=(-0.9, -0.9, 0.6), extent=(-1.2, -1.2, 1.2, 1.2))
     parts = views.split(flown, frame, 4, np.random.default_rng(0), whole=True)
     assert sum(len(part) for part in parts.values()) == 30
     aims = np.array([views.aim(flown.camera(name)) for name in parts["test"]])

@@ -50,7 +50,7 @@ def test_a_refinement_colours_ground_that_only_the_new_photo_sees():
     field = made.field()
     sh = field.sh.copy()
     sh[: seen.size][~seen.ravel()] = 0  # mid-grey, as if filled
-    frame = made.FRAME | {"kind": "synthetic"}
+    frame = replace(made.FRAME, kind="synthetic")
     photos = made.photos(2)
     after = build.refine(replace(field, sh=sh), grid, frame, photos[:1], photos[1:], QUALITY, np.random.default_rng(0))
     assert after.grid.seen.sum() > seen.sum()
@@ -115,7 +115,7 @@ def test_a_scene_without_a_ground_is_fitted_as_free_gaussians():
         seen = render(truth, camera)
         image = np.clip(seen.colour / np.maximum(seen.alpha, 0.5)[..., None], 0, 1).astype(np.float32)
         photos.append(training_views.View(f"photo_{i}", camera, image, (seen.alpha > 0.5).astype(np.float32)))
-    frame = made.FRAME | {"kind": "synthetic", "flying_height": 3.0}
+    frame = replace(made.FRAME, kind="synthetic", flying_height=3.0)
     quality = replace(QUALITY, cap=2000, steps=150)
     found = build.fit(frame, photos, points, np.full((400, 3), 0.5, np.float32), quality, np.random.default_rng(0))
     assert not found.field.ground.any()

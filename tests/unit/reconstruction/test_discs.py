@@ -2,14 +2,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures.frames import scene_frame
 from scipy.spatial.transform import Rotation
 
 from dav_gswt.reconstruction import discs, ground
 
-FRAME = {
-    "exemplar": {"west": 0.0, "south": 0.0, "side": 4.0},
-    "extent": {"west": 0.0, "south": 0.0, "east": 4.0, "north": 4.0},
-}
+FRAME = scene_frame(exemplar=(0.0, 0.0, 4.0), extent=(0.0, 0.0, 4.0, 4.0))
 
 
 @pytest.fixture

@@ -1,18 +1,15 @@
 import numpy as np
 import pytest
+from fixtures.frames import scene_frame
 
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.reconstruction import external_field
 from dav_gswt.reconstruction.build import Quality
 
 QUALITY = Quality(size=64, spacing=1.0, cap=20_000, steps=1, steps_per_photo=1, level_steps=1)
-FRAME = {
-    "kind": "field",
-    "unit": "metre",
-    "flying_height": 5.0,
-    "exemplar": {"west": 0.0, "south": 0.0, "side": 4.0},
-    "extent": {"west": 0.0, "south": 0.0, "east": 4.0, "north": 4.0},
-}
+FRAME = scene_frame(
+    kind="field", unit="metre", flying_height=5.0, exemplar=(0.0, 0.0, 4.0), extent=(0.0, 0.0, 4.0, 4.0)
+)
 
 
 def test_the_surface_under_a_finished_field_is_found_and_what_lies_beyond_is_cut_off():

@@ -1,13 +1,14 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
+from dav_gswt.geometry.scene_frame import Extent
 from dav_gswt.reconstruction import ground
 
-FRAME = {
-    "exemplar": {"west": 0.0, "south": 0.0, "side": 8.0},
-    "extent": {"west": -2.0, "south": -1.0, "east": 10.0, "north": 9.0},
-}
+FRAME = scene_frame(exemplar=(0.0, 0.0, 8.0), extent=(-2.0, -1.0, 10.0, 9.0))
 
 
 def test_the_exemplar_is_a_block_of_whole_cells_inside_the_well_seen_square():
@@ -29,7 +30,7 @@ def test_judged_is_the_exemplar_unless_far_more_is_modelled():
     usual = ground.lay(FRAME, np.zeros((0, 3)), spacing=0.1, cap=10**6, block=32, margin=ground.MARGIN)
     west, south, side = usual.exemplar
     assert usual.judged == pytest.approx((west, south, west + side, south + side))
-    wide = FRAME | {"extent": {"west": -20.0, "south": 0.0, "east": 10.0, "north": 9.0}}
+    wide = replace(FRAME, extent=Extent(-20.0, 0.0, 10.0, 9.0))
     whole = ground.lay(wide, np.zeros((0, 3)), spacing=0.1, cap=10**6, block=32, margin=ground.WHOLE)
     west, south, side = whole.exemplar
     rows, columns = whole.shape

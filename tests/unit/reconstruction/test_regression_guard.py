@@ -15,7 +15,7 @@ from dav_gswt.reconstruction.fitting.trainer import Fitted
 
 QUALITY = build.Quality(size=48, spacing=1.0, cap=2000, steps=40, steps_per_photo=12, level_steps=5)
 GRAIN = 0.03  # as coarse as what a real field does not know of its photos
-SYNTHETIC = made.FRAME | {"kind": "synthetic"}
+SYNTHETIC = replace(made.FRAME, kind="synthetic")
 
 
 def grained(count):

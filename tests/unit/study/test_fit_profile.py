@@ -5,7 +5,7 @@ import pytest
 from fixtures import ground as made
 
 from dav_gswt.field import concatenate_fields
-from dav_gswt.files import write_json
+from dav_gswt.geometry.scene_frame import write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.photos import model as models
 from dav_gswt.reconstruction import build
@@ -18,7 +18,7 @@ QUALITY = build.Quality(size=48, spacing=1.0, cap=5000, steps=12, steps_per_phot
 def photo_set(tests):
     none = np.zeros(0, int)
     empty = models.Model((), (), np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2)))
-    frame = made.FRAME | {"kind": "synthetic"}
+    frame = replace(made.FRAME, kind="synthetic")
     return fit_profile.PhotoSet(frame, empty, made.photos(4), {"test": tests})
 
 
@@ -35,7 +35,7 @@ def test_the_sixth_photo_and_every_tenth_after_it_are_for_testing(tmp_path):
         models.Model(names, cameras, np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2))),
         tmp_path / "sparse",
     )
-    write_json(tmp_path / "ground.json", made.FRAME | {"test": None})
+    write_scene_frame(tmp_path / "ground.json", made.FRAME)
     given = fit_profile.opened(tmp_path, 48)
     assert [v.name for v in given.tests["test"]] == ["f.png", "p.png"]
     assert len(given.train) == 15

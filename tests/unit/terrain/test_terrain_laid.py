@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from fixtures.frames import scene_frame
 from jaxtyping import Float
 from numpy import ndarray as Array
 
@@ -24,10 +25,7 @@ SIDE = 4.0
 
 def tile_of(number, spacing, stones=0):
     """A tile of discs of one colour and, if asked for, opaque stones that stand on it."""
-    frame = {
-        "exemplar": {"west": 0.0, "south": 0.0, "side": SIDE},
-        "extent": {"west": 0.0, "south": 0.0, "east": SIDE, "north": SIDE},
-    }
+    frame = scene_frame(exemplar=(0.0, 0.0, SIDE), extent=(0.0, 0.0, SIDE, SIDE))
     grid = ground.lay(frame, np.zeros((0, 3)), spacing, 10**6, block=16, margin=0.0)
     flat = discs.ground_discs(grid, np.tile([0.2 + number / 32, 0.5, 0.3], (grid.heights.size, 1)))
     if not stones:

@@ -8,7 +8,7 @@ from fixtures import ground as patch
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import write_field
-from dav_gswt.files import write_json
+from dav_gswt.geometry.scene_frame import write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.photos.training_views import View
 from dav_gswt.raster import render
@@ -29,7 +29,7 @@ def files(tmp_path):
     true = patch.field()
     write_field(replace(true, sh=true.sh - np.float32(0.1)), tmp_path / "field.ply")
     ground.write(patch.grid(), tmp_path / "ground.exr")
-    write_json(tmp_path / "ground.json", patch.FRAME | {"kind": "synthetic"})
+    write_scene_frame(tmp_path / "ground.json", replace(patch.FRAME, kind="synthetic"))
     views = []
     for i, (pose, camera) in enumerate(pool()):
         picture = np.clip(render(true, camera).colour + np.float32(0.2 * (i == 2)), 0, 1)

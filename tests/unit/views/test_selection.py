@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import poses
@@ -206,7 +207,7 @@ def test_a_table_of_something_else_is_refused(tmp_path, line, reason):
 def test_a_pose_is_where_its_camera_is():
     from dav_gswt.geometry import cameras
 
-    frame = {"exemplar": {"west": 1.0, "south": 2.0, "side": 2.0}}
+    frame = scene_frame(exemplar=(1.0, 2.0, 2.0))
     camera = cameras.pinhole([2.0, 3 + 3.0, 4.0], [2, 3, 0], 10, 10, 40.0)
     pose = poses.of_camera("x", camera, frame)
     assert (pose.azimuth, pose.radius) == (pytest.approx(90), pytest.approx(5))

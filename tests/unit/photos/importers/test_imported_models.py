@@ -366,9 +366,9 @@ def test_many_photos_are_matched_with_those_near_them_only():
 def test_the_stage_goes_on_from_a_given_model(photos, tmp_path):
     write_colmap(tmp_path / "m", sees=False)
     facts = photo_set.from_photos(photos, tmp_path / "out", OPTIONS, tmp_path / "m")
-    assert facts["registered"] == 8 and facts["relief"] < 0.02
+    assert facts.registered == 8 and facts.relief < 0.02
     stored = model.read(tmp_path / "out" / "sparse")
-    assert len(stored.points) == facts["points"]
+    assert len(stored.points) == facts.points
     assert np.median([c.centre[2] for c in stored.cameras]) == pytest.approx(1, abs=1e-9)
 
 
@@ -376,6 +376,6 @@ def test_loose_points_are_stored_with_the_others(photos, tmp_path):
     path = write_json(tmp_path / "r.json", reconstruction())
     facts = photo_set.from_photos(photos, tmp_path / "out", OPTIONS, path)
     stored = model.read(tmp_path / "out" / "sparse")
-    assert len(stored.points) == facts["points"] and np.isfinite(stored.points).all()
+    assert len(stored.points) == facts.points and np.isfinite(stored.points).all()
     places, colours = model.points_seen_by(stored, stored.names)
     assert 100 < len(places) < len(stored.points)

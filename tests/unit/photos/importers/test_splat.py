@@ -49,30 +49,30 @@ def entered(rng):
 def test_the_ground_lies_at_0_and_bushes_stand_up(entered):
     _, field, facts = entered
     z = field.means[:, 2] * 1.0
-    side = facts["exemplar"]["side"]
+    side = facts.exemplar.side
     assert np.median(z) == pytest.approx(0, abs=0.002)  # 6000 heights of 0.004 / side
     assert z.max() > 0.05 * side and z.min() > -0.02 * side
-    assert facts["relief"] < 0.01
+    assert facts.relief < 0.01
 
 
 def test_the_exemplar_is_nearly_the_whole_ground(entered):
     _, field, facts = entered
     # The square is 2 wide; percentiles and the inset take 2 % each on both sides.
     scale = 2 / np.ptp(np.percentile(field.means[:, 0], [0.5, 99.5]))
-    assert facts["exemplar"]["side"] * scale == pytest.approx(2 * 0.94, rel=0.03)
-    extent, square = facts["extent"], facts["exemplar"]
-    assert extent["west"] <= square["west"] and extent["north"] >= square["south"] + square["side"]
+    assert facts.exemplar.side * scale == pytest.approx(2 * 0.94, rel=0.03)
+    extent, square = facts.extent, facts.exemplar
+    assert extent.west <= square.west and extent.north >= square.south + square.side
 
 
 def test_from_the_flying_height_a_picture_shows_just_the_exemplar(entered):
-    side = entered[2]["exemplar"]["side"]
-    assert 2 * np.tan(np.radians(splat.VIEW / 2)) * entered[2]["flying_height"] == pytest.approx(side)
+    side = entered[2].exemplar.side
+    assert 2 * np.tan(np.radians(splat.VIEW / 2)) * entered[2].flying_height == pytest.approx(side)
 
 
 def test_far_floaters_are_removed_and_counted(entered):
     lying, field, facts = entered
-    assert len(lying) - len(field) == facts["removed"]
-    assert 15 <= facts["removed"] <= 20  # a floater may lie within the scene by chance
+    assert len(lying) - len(field) == facts.removed
+    assert 15 <= facts.removed <= 20  # a floater may lie within the scene by chance
     assert np.abs(field.means).max() < 2
 
 

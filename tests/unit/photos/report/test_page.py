@@ -1,40 +1,41 @@
 """The report on a scene's photos: what it says, what it warns of, and that it needs nothing but itself."""
 
 import re
-from dataclasses import asdict, replace
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 from fixtures import photos as made_up
+from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
+from dav_gswt.geometry.georeference import Georeference
+from dav_gswt.geometry.scene_frame import FocalLength, LeftOutPhoto, Square
 from dav_gswt.photos import folder, model
 from dav_gswt.photos.report import facts, figures
 from dav_gswt.photos.report import page as report
-from dav_gswt.photos.sfm.focal import Focal
 
-FRAME = {
-    "kind": "photos",
-    "unit": "flying height",
-    "flying_height": 1.0,
-    "exemplar": {"west": -0.5, "south": -0.5, "side": 1.0},
-    "extent": {"west": -1.0, "south": -1.0, "east": 1.0, "north": 1.0},
-    "photos_per_cell": 3,
-    "relief": 0.01,
-    "test": None,
-    "images": 14,
-    "registered": 12,
-    "left_out": [
-        {"name": "<b>bold</b>.jpg", "reason": "it matches <i>no</i> photo & nothing else"},
-        {"name": "blurred.jpg", "reason": "it shares 9 points with a placed photo, but its position stays unsure"},
-    ],
-    "focal_ratio": 1.0,
-    "focal": asdict(Focal(300.0, 300.0, 303.0, 30.0, "EXIF's, which the photos confirm")),
-    "reprojection_error": 0.4,
-    "points": 3000,
-}
-PLACE = {"latitude": -33.5, "longitude": 151.25, "altitude": 10.0, "metres_per_unit": 1.0}
+FRAME = scene_frame(
+    kind="photos",
+    unit="flying height",
+    flying_height=1.0,
+    exemplar=(-0.5, -0.5, 1.0),
+    extent=(-1.0, -1.0, 1.0, 1.0),
+    photos_per_cell=3,
+    relief=0.01,
+    images=14,
+    registered=12,
+    left_out=(
+        LeftOutPhoto("<b>bold</b>.jpg", "it matches <i>no</i> photo & nothing else"),
+        LeftOutPhoto("blurred.jpg", "it shares 9 points with a placed photo, but its position stays unsure"),
+    ),
+    focal_ratio=1.0,
+    focal=FocalLength(300.0, 300.0, 303.0, 30.0, "EXIF's, which the photos confirm"),
+    reprojection_error=0.4,
+    points=3000,
+)
+PLACE = Georeference(-33.5, 151.25, 10.0, north=30.0, metres_per_unit=1.0)
 SCENE = 'dunes "<&>"'
 
 
@@ -144,7 +145,7 @@ def test_weak_spots_stand_at_the_top_in_words(page, made):
 
 def test_a_set_without_weak_spots_says_so(page, made):
     sparse = made_up.model(made_up.flight(5, 5, 0.2), made_up.plain(5000, 0.9, np.random.default_rng(1)))
-    frame = FRAME | {"left_out": [], "images": 25, "registered": 25}
+    frame = replace(FRAME, left_out=(), images=25, registered=25)
     text = page(made(sparse=sparse, frame=frame))
     assert "Nothing is weak" in text and "⚠" not in text and 'id="left-out"' not in text
 
@@ -171,7 +172,7 @@ def test_what_makes_a_photo_weak(points, error, shared, said):
 )
 def test_a_corner_that_few_photos_see_is_named_by_the_compass_or_the_map(made, flown, north, part):
     """Of twelve photos only three see the corner in the north-west of the sheet."""
-    frame = FRAME | ({} if north is None else {"georeference": PLACE | {"north": north}})
+    frame = FRAME if north is None else replace(FRAME, georeference=replace(PLACE, north=north))
     found = facts.read(made(frame=frame), SCENE)
     counts = np.full(found.cover.counts.shape, 8)
     y = found.cover.south + (np.arange(counts.shape[0]) + 0.5) * found.cover.cell
@@ -186,17 +187,17 @@ def test_a_corner_that_few_photos_see_is_named_by_the_compass_or_the_map(made, f
 
 def test_a_doubtful_focal_length_is_a_weak_spot(made):
     """EXIF's is held, but the photos alone would say 1.1 times that; or no EXIF, and all look straight down."""
-    held, none = Focal(300.0, 300.0, 330.0, 3.0, "EXIF's"), Focal(None, 300.0, None, 3.0, "found by the photos alone")
+    held = FocalLength(300.0, 300.0, 330.0, 3.0, "EXIF's")
+    none = FocalLength(None, 300.0, None, 3.0, "found by the photos alone")
     for lens, said in ((held, "1.10 times that of EXIF"), (none, "focal length is unsure")):
-        found = facts.read(made(frame=FRAME | {"focal": asdict(lens)}), SCENE)
+        found = facts.read(made(frame=replace(FRAME, focal=lens)), SCENE)
         assert any(said in spot for spot in facts.weak_spots(found))
 
 
 def test_coverage_does_not_depend_on_the_unit(made, flown):
     """A world in metres, 40 of them a flying height: the same photos see the same places."""
     metres = model.similar(flown, 40.0, np.eye(3), np.zeros(3))
-    square = {"west": -20.0, "south": -20.0, "side": 40.0}
-    frame = FRAME | {"unit": "metre", "flying_height": 40.0, "exemplar": square}
+    frame = replace(FRAME, unit="metre", flying_height=40.0, exemplar=Square(-20.0, -20.0, 40.0))
     one, two = facts.read(made(), SCENE), facts.read(made("metres", frame, metres), SCENE)
     assert np.array_equal(one.cover.counts, two.cover.counts)
     assert two.cover.cell == pytest.approx(40 * one.cover.cell)
@@ -227,7 +228,7 @@ def test_every_number_of_photos_has_one_colour(made, most, need):
 def test_masks_and_the_place_on_earth_are_told(page, made, flown):
     cover = np.ones((made_up.HEIGHT, made_up.WIDTH), np.float32)
     cover[:60] = 0
-    frame = FRAME | {"georeference": PLACE | {"north": 30.0}}
+    frame = replace(FRAME, georeference=PLACE)
     words = " ".join(Seen(page(made(frame=frame, covers={"003.png": cover}))).words)
     assert "25 % masked" in words and "-33.500000, 151.250000" in words and "30 degrees from north" in words
 
@@ -235,8 +236,7 @@ def test_masks_and_the_place_on_earth_are_told(page, made, flown):
 def test_photos_that_only_test_are_marked_and_do_not_count(page, made, flown):
     own = flown.image_of < 8
     sparse = replace(flown, **{k: getattr(flown, k)[own] for k in ("point_of", "image_of", "pixels")})
-    frame = {k: v for k, v in FRAME.items() if k not in ("photos_per_cell", "relief", "focal", "reprojection_error")}
-    frame |= {"kind": "synthetic", "test": list(flown.names[8:]), "left_out": [], "focal_ratio": None}
+    frame = replace(FRAME, kind="synthetic", test=flown.names[8:], left_out=(), focal_ratio=None)
     photos = made(sparse=sparse, frame=frame)
     found = facts.read(photos, SCENE)
     assert found.cover.counts.max() <= 8 and len(found.placed) == 8
@@ -247,9 +247,9 @@ def test_photos_that_only_test_are_marked_and_do_not_count(page, made, flown):
 
 def test_a_model_of_another_program_and_old_frames_are_read(page, made):
     """Neither says how the focal length was settled; an older ground.json has no word of it at all."""
-    given = FRAME | {"focal": None, "focal_ratio": None}
+    given = replace(FRAME, focal=None, focal_ratio=None)
     assert "from the model of another program" in page(made(frame=given))
-    assert "1.000 times" in page(made(frame={k: v for k, v in FRAME.items() if k != "focal"}))
+    assert "1.000 times" in page(made(frame=replace(FRAME, focal=None)))
 
 
 def test_a_template_that_asks_for_what_is_not_there_is_refused(made, template, tmp_path):

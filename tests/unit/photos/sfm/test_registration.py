@@ -9,8 +9,8 @@ import pytest
 from fixtures import photos as made_up
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import read_json
-from dav_gswt.geometry import geodesy
+from dav_gswt.geometry.georeference import Georeference
+from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.photos import model, photo_set
 from dav_gswt.photos.sfm import registration
@@ -133,12 +133,12 @@ def test_positions_by_gps_give_metres_and_north(tmp_path, ground):
         np.sin(turn) * true[:, 0] + np.cos(turn) * true[:, 1],
     )
     at = np.stack([east, north, true[:, 2]], 1) + rng.normal(0, 0.1, true.shape)
-    world = geodesy.Georeference(46.8, -92.0, 180.0, 0.0, 1.0)
+    world = Georeference(46.8, -92.0, 180.0, 0.0, 1.0)
     for i, (camera, place) in enumerate(zip(flight(), world.to_earth(at), strict=True)):
         as_jpeg(tmp_path / f"{i:03d}.jpg", made_up.photograph(camera, ground, HALF), **gps_tags(place))
     made = photo_set.from_photos(tmp_path, tmp_path / "out", OPTIONS)
-    assert made["unit"] == "metre" and made["flying_height"] == pytest.approx(np.median(true[:, 2]), rel=0.02)
-    reference = geodesy.of_frame(made)
+    assert made.unit == "metre" and made.flying_height == pytest.approx(np.median(true[:, 2]), rel=0.02)
+    reference = made.georeference
     stored = model.read(tmp_path / "out" / "sparse")
     back = world.to_world(reference.to_earth(np.array([c.centre for c in stored.cameras])))
     assert np.abs(back - at).max() < 1.0  # of flights of 100 metres: features are read to half a pixel, 0.2 m here
@@ -146,7 +146,7 @@ def test_positions_by_gps_give_metres_and_north(tmp_path, ground):
 
 
 def test_positions_that_contradict_the_photos_are_not_used(tmp_path, ground, caplog):
-    world = geodesy.Georeference(46.8, -92.0, 180.0, 0.0, 1.0)
+    world = Georeference(46.8, -92.0, 180.0, 0.0, 1.0)
     at = np.random.default_rng(5).normal(0, 60, (8, 3))
     for i, (camera, place) in enumerate(zip(flight(), world.to_earth(at), strict=True)):
         as_jpeg(tmp_path / f"{i:03d}.jpg", made_up.photograph(camera, ground, HALF), **gps_tags(place))
@@ -281,12 +281,12 @@ def test_a_half_written_photo_is_refused_by_name_and_nothing_is_left(photos, tmp
 def test_the_photos_folder_is_whole(photos, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "old").touch()
-    facts = photo_set.from_photos(photos, tmp_path / "out", OPTIONS, extra={"more": 1})
+    facts = photo_set.from_photos(photos, tmp_path / "out", OPTIONS)
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["ground.json", "images", "lenses.json", "sparse"]
-    assert read_json(tmp_path / "out" / "ground.json") == facts and facts["more"] == 1
+    assert read_scene_frame(tmp_path / "out" / "ground.json") == facts
     stored = model.read(tmp_path / "out" / "sparse")
-    assert (facts["images"], facts["registered"], facts["points"]) == (8, 8, len(stored.points))
+    assert (facts.images, facts.registered, facts.points) == (8, 8, len(stored.points))
     for name, camera in zip(stored.names, stored.cameras, strict=True):
         assert image_files.size(tmp_path / "out" / "images" / name) == (camera.width, camera.height)
     assert np.median([c.centre[2] for c in stored.cameras]) == pytest.approx(1, abs=1e-9)

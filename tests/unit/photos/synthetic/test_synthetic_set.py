@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dav_gswt.files import read_json
+from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.photos import model
 from dav_gswt.photos.model import Model
 from dav_gswt.photos.synthetic import photo_set, truth
@@ -44,11 +44,11 @@ def dark(monkeypatch):
 )
 def test_test_views_are_written_by_group(tmp_path, given, groups):
     photo_set.render_set(ENTRY | given, tmp_path)
-    frame = read_json(tmp_path / "ground.json")
-    assert frame["test_groups"] == groups
-    assert frame["test"] == [name for group in groups.values() for name in group]
+    frame = read_scene_frame(tmp_path / "ground.json")
+    assert frame.test_groups == {group: tuple(names) for group, names in groups.items()}
+    assert frame.test == tuple(name for group in groups.values() for name in group)
     stored = model.read(tmp_path / "sparse")
-    for name, camera in zip(frame["test"], synthetic.test_views(ENTRY | given), strict=True):
+    for name, camera in zip(frame.test, synthetic.test_views(ENTRY | given), strict=True):
         assert stored.cameras[stored.names.index(name)].centre == pytest.approx(camera.centre)
 
 
@@ -57,7 +57,7 @@ def test_every_picture_has_its_truth_and_the_record_says_what_rendered(tmp_path)
     pictures = sorted(p.stem for p in (tmp_path / "images").iterdir())
     assert pictures == ["test_00", "test_01", "view_00", "view_01", "view_02"]
     assert sorted(p.name for p in (tmp_path / "truth").iterdir()) == [f"{name}.exr" for name in pictures]
-    assert set(read_json(tmp_path / "ground.json")["renderer"]) == {"mitsuba", "variant", "llvm"}
+    assert set(read_scene_frame(tmp_path / "ground.json").renderer) == {"mitsuba", "variant", "llvm"}
     written = (tmp_path / "truth" / "test_01.exr").read_text()
     assert written == str(synthetic.test_views(ENTRY)[1].centre.tolist())
 

@@ -199,7 +199,7 @@ def test_a_fit_stays_under_its_cap(monkeypatch):
     seen = []
 
     def fit(frame, photos, points, colours, quality: Quality, rng, margin):
-        seen.append((quality, len(points), len(photos), frame["extent"]["east"]))
+        seen.append((quality, len(points), len(photos), frame.extent.east))
         raise InterruptedError
 
     monkeypatch.setattr(examples.build, "fit", fit)

@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures.frames import scene_frame
 
 from dav_gswt.geometry import cameras
 from dav_gswt.photos import training_views
@@ -9,10 +10,7 @@ from dav_gswt.reconstruction import ground
 from dav_gswt.reconstruction.fitting import exposure
 from dav_gswt.reconstruction.fitting.photo_colours import median_colours
 
-FRAME = {
-    "exemplar": {"west": 0.0, "south": 0.0, "side": 4.0},
-    "extent": {"west": 0.0, "south": 0.0, "east": 4.0, "north": 4.0},
-}
+FRAME = scene_frame(exemplar=(0.0, 0.0, 4.0), extent=(0.0, 0.0, 4.0, 4.0))
 
 
 @pytest.fixture

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fixtures import ground as patch
+from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files, metrics
@@ -67,7 +68,8 @@ def test_the_choice_goes_by_the_measure_and_equal_pictures_are_the_best():
     assert list(evolution.shown(found, "psnr_colour_corrected")) == ["a", "c"]
     found["test_views"][1]["psnr"] = None
     assert list(evolution.shown(found, "psnr")) == ["c", "a"]
-    assert evolution.measure({"kind": "photos"}) == KEYS[1] and evolution.measure({"kind": "synthetic"}) == KEYS[0]
+    assert evolution.measure(scene_frame(kind="photos")) == KEYS[1]
+    assert evolution.measure(scene_frame(kind="synthetic")) == KEYS[0]
 
 
 def test_without_a_test_view_there_is_nothing_to_show():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
@@ -12,7 +13,7 @@ from dav_gswt.study.views import sphere
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.uncertainty import Scales
 
-FRAME = {"exemplar": {"west": 1.0, "south": 2.0, "side": 2.0}}
+FRAME = scene_frame(exemplar=(1.0, 2.0, 2.0))
 MIDDLE = np.array([2.0, 3.0, 0.0])
 
 

@@ -6,10 +6,10 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.geometry import geodesy
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.geometry.geodesy import Georeference
+from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.poses import middle
+from dav_gswt.geometry.scene_frame import SceneFrame
 
 COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 ON_MAP = ("top", "upper right", "right", "lower right", "bottom", "lower left", "left", "upper left")
@@ -45,11 +45,11 @@ class Ruler:
         return f"the {ON_MAP[round(np.degrees(np.arctan2(direction[0], direction[1])) / 45) % 8]} of the map"
 
 
-def ruler(frame: dict) -> Ruler:
+def ruler(frame: SceneFrame) -> Ruler:
     """The ruler of a scene, from its ground.json."""
-    place = geodesy.of_frame(frame)
-    metres = place.metres_per_unit if place else 1.0 if frame["unit"] in ("metre", "metres", "m") else None
-    return Ruler(frame["flying_height"], metres, place)
+    place = frame.georeference
+    metres = place.metres_per_unit if place else 1.0 if frame.unit == "metre" else None
+    return Ruler(frame.flying_height, metres, place)
 
 
 def tilt(camera: Camera) -> float:
@@ -70,7 +70,7 @@ def heading(camera: Camera) -> Float[Array, "3"]:
     return -camera.rotation[1] if abs(tilt(camera)) >= STEEP else camera.forward
 
 
-def facing(camera: Camera, frame: dict, by: Ruler) -> str:
+def facing(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
     """Where to turn to."""
     ahead, inwards = heading(camera)[:2], (middle(frame) - camera.centre)[:2]
     towards = by.towards(ahead)
@@ -83,7 +83,7 @@ def facing(camera: Camera, frame: dict, by: Ruler) -> str:
     return f"face the middle, which is to {'the ' if by.place else ''}{towards}"
 
 
-def standing(camera: Camera, frame: dict, by: Ruler) -> str:
+def standing(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
     """Where to stand."""
     out = (camera.centre - middle(frame))[:2]
     away = float(np.linalg.norm(out))
@@ -94,7 +94,7 @@ def standing(camera: Camera, frame: dict, by: Ruler) -> str:
     return f"Stand {by.length(away)} from the middle, towards {by.towards(out)}"
 
 
-def told(camera: Camera, frame: dict, by: Ruler) -> str:
+def told(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
     """The whole of it: where to stand, how high the camera is, where it looks."""
     up = f"camera {by.length(float(camera.centre[2]))} above the ground"
     return f"{standing(camera, frame, by)}, {up}; {facing(camera, frame, by)}; look {looking(camera)}."

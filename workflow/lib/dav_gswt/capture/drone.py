@@ -9,8 +9,7 @@ from dav_gswt.capture.shots import Asked
 from dav_gswt.capture.site import Site
 from dav_gswt.errors import InputError
 from dav_gswt.files import write_json
-from dav_gswt.geometry import geodesy
-from dav_gswt.geometry.geodesy import Georeference
+from dav_gswt.geometry.georeference import Georeference
 
 
 def take(site: Site, asked: list[Asked]) -> None:
@@ -22,14 +21,14 @@ def take(site: Site, asked: list[Asked]) -> None:
     missing = drop_folder.collect(site, asked, "plan")
     if not missing:
         return
-    place = geodesy.of_frame(site.frame)
+    place = site.frame.georeference
     if place is None:
         raise InputError(
             f"scenes.{site.name}: a mission needs to know where on earth the scene lies (georeference in ground.json), "
             "which is known where the photos carry GPS positions in their EXIF; use photos that do, or agent: handheld"
         )
-    exemplar = site.frame["exemplar"]
-    home = np.array([exemplar["west"] + exemplar["side"] / 2, exemplar["south"]])
+    exemplar = site.frame.exemplar
+    home = np.array([exemplar.west + exemplar.side / 2, exemplar.south])
     rules = qgc_plan.Rules(**{key: float(value) for key, value in site.scene.get("flight", {}).items()})
     _check_level(site, place, missing, home, rules)
     flown = qgc_plan.flight([(pose.name, camera) for pose, camera in missing], place, home, rules, site.burst)
@@ -45,12 +44,11 @@ def _check_level(
     site: Site, place: Georeference, missing: list[Asked], home: Float[Array, "2"], rules: qgc_plan.Rules
 ) -> None:
     """A mission takes the plane of the ground for level. Raises: InputError: that is wrong by half the clearance."""
-    slope = float(site.frame["georeference"].get("slope", 0.0))  # degrees; in which direction is not known
     reach = max(float(np.linalg.norm(camera.centre[:2] - home)) for _, camera in missing) * place.metres_per_unit
-    off = reach * np.tan(np.radians(slope))
+    off = reach * np.tan(np.radians(place.slope))
     if off > rules.clearance / 2:
         raise InputError(
-            f"scenes.{site.name}: the ground slopes by {slope:.1f} degrees, so that altitudes of a mission over level "
-            f"ground would be wrong by up to {off:.1f} m; set flight.clearance above {2 * off:.0f} if there is room to "
-            "spare everywhere, or take agent: handheld"
+            f"scenes.{site.name}: the ground slopes by {place.slope:.1f} degrees, so that altitudes of a mission over "
+            f"level ground would be wrong by up to {off:.1f} m; set flight.clearance above {2 * off:.0f} if there is "
+            "room to spare everywhere, or take agent: handheld"
         )

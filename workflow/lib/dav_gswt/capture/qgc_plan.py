@@ -14,7 +14,7 @@ from numpy import ndarray as Array
 from dav_gswt.capture import route
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.geometry.geodesy import Georeference
+from dav_gswt.geometry.georeference import Georeference
 
 View = tuple[str, Camera]
 

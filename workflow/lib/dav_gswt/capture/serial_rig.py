@@ -19,6 +19,7 @@ from dav_gswt.capture.shots import Asked
 from dav_gswt.capture.site import Site
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.poses import middle
+from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos import lenses
@@ -62,7 +63,7 @@ def take(site: Site, asked: list[Asked]) -> None:
         raise InputError(_rehearsed(site, stops))
 
 
-def within(scene: dict, frame: dict, pool: list[Asked]) -> list[Asked]:
+def within(scene: dict, frame: SceneFrame, pool: list[Asked]) -> list[Asked]:
     """The poses where the rig may stand by the config's limits: it is asked for no others. Its own come with `take`.
 
     Raises: InputError: there is none.
@@ -82,7 +83,7 @@ def within(scene: dict, frame: dict, pool: list[Asked]) -> list[Asked]:
     if pool and not found:
         raise InputError(
             "the rig can stand at none of the candidate poses: their radius is the flying height, "
-            f"{frame['flying_height'] * rig['millimetres']:.0f} mm; check rig.limits and rig.millimetres"
+            f"{frame.flying_height * rig['millimetres']:.0f} mm; check rig.limits and rig.millimetres"
         )
     return found
 

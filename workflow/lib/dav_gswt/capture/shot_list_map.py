@@ -12,6 +12,7 @@ from dav_gswt.capture.directions import Ruler
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.raster import render
 
 WIDE = 800  # pixels of the longer side; what is drawn over it stays readable at half the size
@@ -32,7 +33,7 @@ class Map:
     drawing: str
 
 
-def draw(stations: list[Camera], frame: dict, by: Ruler, field: GaussianField | None) -> Map:
+def draw(stations: list[Camera], frame: SceneFrame, by: Ruler, field: GaussianField | None) -> Map:
     """The map of poses in walking order, with the exemplar, a scale, and north where it is known."""
     camera = _over(stations, frame, by)
     blank = np.full((camera.height, camera.width, 3), BLANK, np.float32)
@@ -48,9 +49,9 @@ def draw(stations: list[Camera], frame: dict, by: Ruler, field: GaussianField | 
     return Map(camera, picture, "\n".join(parts))
 
 
-def _over(stations: list[Camera], frame: dict, by: Ruler) -> Camera:
-    square = frame["exemplar"]
-    corners = [[square["west"], square["south"]], [square["west"] + square["side"], square["south"] + square["side"]]]
+def _over(stations: list[Camera], frame: SceneFrame, by: Ruler) -> Camera:
+    square = frame.exemplar
+    corners = [[square.west, square.south], [square.east, square.north]]
     points = np.array([*corners, *(station.centre[:2] for station in stations)])
     low, high = points.min(0), points.max(0)
     margin = MARGIN * (high - low).max()
@@ -72,12 +73,12 @@ def apart(at: Float[Array, "n 2"], least: float) -> Float[Array, "n 2"]:
     return moved
 
 
-def _exemplar(camera: Camera, frame: dict) -> str:
-    square = frame["exemplar"]
-    west, north = square["west"], square["south"] + square["side"]
-    middle = [west + square["side"] / 2, north - square["side"] / 2, 0.0]
+def _exemplar(camera: Camera, frame: SceneFrame) -> str:
+    square = frame.exemplar
+    west, north = square.west, square.north
+    middle = [west + square.side / 2, north - square.side / 2, 0.0]
     (x, y), (u, v) = camera.project(np.array([[west, north, 0.0], middle]))[0]
-    side = square["side"] * camera.fx
+    side = square.side * camera.fx
     return (
         f'<rect class="wanted" x="{x:.1f}" y="{y:.1f}" width="{side:.1f}" height="{side:.1f}"/>'
         f'<path class="cross" d="M{u - 12:.1f} {v:.1f}h24M{u:.1f} {v - 12:.1f}v24"/>'

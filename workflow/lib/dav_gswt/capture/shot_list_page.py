@@ -14,6 +14,7 @@ from dav_gswt.capture.directions import Ruler
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import middle
+from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import image_files
 from dav_gswt.raster import render
 
@@ -37,7 +38,7 @@ class Errand:
     """What a shot list is about. drop: where photos are put. length: of the walk, in world units."""
 
     scene: str
-    frame: dict
+    frame: SceneFrame
     ruler: Ruler
     drop: Path
     length: float

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dav_gswt.capture.store import Store
+from dav_gswt.geometry.scene_frame import SceneFrame
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,7 @@ class Site:
 
     name: str
     scene: dict
-    frame: dict
+    frame: SceneFrame
     photos: Path
     store: Store
     field: Path | str | None = None
@@ -30,4 +31,4 @@ class Site:
     @property
     def unit(self) -> float:
         """The flying height, in units of the world."""
-        return self.frame["flying_height"]
+        return self.frame.flying_height

@@ -18,7 +18,7 @@ from dav_gswt.capture import qgc_plan
 from dav_gswt.errors import InputError
 from dav_gswt.files import write_json
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.geometry.geodesy import Georeference
+from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.photos.synthetic import camera_layouts
 
 ELEVATION = 65.0  # degrees: of the circles that a start flight flies around the photo from straight above

@@ -7,6 +7,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.scene_frame import SceneFrame
 
 
 @dataclass(frozen=True)
@@ -19,13 +20,12 @@ class Pose:
     radius: float
 
 
-def middle(frame: dict) -> Float[Array, "3"]:
+def middle(frame: SceneFrame) -> Float[Array, "3"]:
     """The exemplar's centre on the plane z = 0."""
-    exemplar = frame["exemplar"]
-    return np.array([exemplar["west"] + exemplar["side"] / 2, exemplar["south"] + exemplar["side"] / 2, 0.0])
+    return frame.exemplar.centre
 
 
-def of_camera(name: str, camera: Camera, frame: dict) -> Pose:
+def of_camera(name: str, camera: Camera, frame: SceneFrame) -> Pose:
     """Where a camera stands, as a pose about the exemplar's centre."""
     x, y, z = camera.centre - middle(frame)
     radius = float(np.sqrt(x * x + y * y + z * z))

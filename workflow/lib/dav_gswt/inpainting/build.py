@@ -10,6 +10,7 @@ from scipy.ndimage import map_coordinates
 
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.inpainting import occluders, unseen, viewpoints
 from dav_gswt.inpainting.paint import LEAST_ALPHA, painted
 from dav_gswt.logs import progress
@@ -42,7 +43,7 @@ class Completed:
         return counts | {"things": self.things, "exemplar": inside, "changed": bool(self.field.imagined.any())}
 
 
-def complete(field: GaussianField, grid: Ground, frame: dict, taken: list[View], asked: Asking) -> Completed:
+def complete(field: GaussianField, grid: Ground, frame: SceneFrame, taken: list[View], asked: Asking) -> Completed:
     """Paint the ground that no photo saw, one picture from above after the other, each told of those before.
 
     Discs of such ground, and the underlay under them alone, take the painted colours and keep their places: a prior's
@@ -58,12 +59,12 @@ def complete(field: GaussianField, grid: Ground, frame: dict, taken: list[View],
     _log.info("%d of %d cells of the ground were seen by no photo", there.sum(), there.size)
     if not there.any():
         return Completed(field, there, there, 0)
-    targets = viewpoints.blocks(grid, there, frame["flying_height"])
+    targets = viewpoints.blocks(grid, there, frame.flying_height)
     known = conditions.taken(taken, frame, asked.model.size)
     told, todo, ground = field, there, _ground_colour(field, grid)
     for target in progress(targets, "paint unseen ground"):
         for pose, camera in viewpoints.cameras(viewpoints.ABOVE, target, told, grid, frame, asked.model.size):
-            condition = conditions.condition(told, [(pose, camera)], known, frame["flying_height"], asked.model.size)
+            condition = conditions.condition(told, [(pose, camera)], known, frame.flying_height, asked.model.size)
             sees, seeks = (unseen.share(told, unseen.gaussians(field, grid, cells), camera) for cells in (there, todo))
             made = painted(asked, condition, seeks[None] > unseen.TOUCHES, ground)
             good = (sees > unseen.LOOKS) & (made.alpha[0] > LEAST_ALPHA)
@@ -139,15 +140,15 @@ def _marked(field: GaussianField, marked: Bool[Array, "n"]) -> GaussianField:
 
 
 def _standing(
-    field: GaussianField, grid: Ground, frame: dict, known: Taken, targets: list[Float[Array, "3"]], asked: Asking
+    field: GaussianField, grid: Ground, frame: SceneFrame, known: Taken, targets: list[Float[Array, "3"]], asked: Asking
 ) -> list[GaussianField]:
     """What stands on the painted ground about each target."""
     found, size = [], asked.model.size
     for target in progress(targets, "look at it from aside"):
         pool = viewpoints.cameras(viewpoints.ABOVE + viewpoints.ASIDE, target, field, grid, frame, size)
         if len(pool) > 1:
-            condition = conditions.condition(field, pool, known, frame["flying_height"], size)
+            condition = conditions.condition(field, pool, known, frame.flying_height, size)
             nothing = np.zeros((len(pool), size, size), bool)
             made = painted(asked, condition, nothing, _ground_colour(field, grid))
-            found.append(occluders.things(field, grid, pool, condition, made, frame["flying_height"]))
+            found.append(occluders.things(field, grid, pool, condition, made, frame.flying_height))
     return found

@@ -6,6 +6,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.poses import of_camera
+from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.photos.synthetic.camera_layouts import Place
 from dav_gswt.reconstruction.ground import Ground
@@ -31,14 +32,14 @@ def blocks(grid: Ground, there: Bool[Array, "rows columns"], flying_height: floa
 
 
 def cameras(
-    places: list[Place], target: Float[Array, "3"], field: GaussianField, grid: Ground, frame: dict, size: int
+    places: list[Place], target: Float[Array, "3"], field: GaussianField, grid: Ground, frame: SceneFrame, size: int
 ) -> Candidates:
     """The cameras at places (radius in flying heights) about a target; those that would stand inside of something, or
     under the ground, are left out."""
     found = []
     for elevation, azimuth, radius in places:
         camera = camera_layouts.orbit(
-            elevation, azimuth, radius * frame["flying_height"], target, size, size, FIELD_OF_VIEW
+            elevation, azimuth, radius * frame.flying_height, target, size, size, FIELD_OF_VIEW
         )
         centre = camera.centre[None]
         if not (collision.under(centre, grid) | collision.inside(centre, field)).any():

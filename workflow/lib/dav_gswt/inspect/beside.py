@@ -4,8 +4,6 @@ import re
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
-
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
 from dav_gswt.geometry import cameras
@@ -31,17 +29,6 @@ def photos_of(path: Path) -> Path | None:
     """The folder photos/ of the scene that a file belongs to."""
     found = (folder / "photos" for folder in path.resolve().parents)
     return next((folder for folder in found if (folder / "ground.json").is_file()), None)
-
-
-def frame_of(path: Path) -> dict:
-    """ground.json. Raises: InputError: no exemplar in it, or one that is no square of ground."""
-    frame = read_json(path)
-    with told_by(path):
-        values = [float(frame["exemplar"][k]) for k in ("west", "south", "side")]
-        values += [float(frame["extent"][k]) for k in ("west", "south", "east", "north")]
-        if not np.isfinite([*values, float(frame["flying_height"])]).all() or not values[2] > 0:
-            raise ValueError("the exemplar is no square")
-    return frame
 
 
 def shots_of(path: Path) -> list[tuple[str, Camera]]:

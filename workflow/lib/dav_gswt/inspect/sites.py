@@ -9,6 +9,7 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
 from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.inspect import beside
 from dav_gswt.inspect.options import Asked
@@ -57,10 +58,10 @@ def of_photos(folder: Path, split: Path | None, title: str, captured: list[tuple
     """A photos/ folder. split: views.json. captured: further cameras, and their photos."""
     from dav_gswt.photos import model  # here, not above: it loads pycolmap
 
-    frame = beside.frame_of(folder / "ground.json")
+    frame = read_scene_frame(folder / "ground.json")
     found = model.read(folder / "sparse")
     roles = _roles(split)
-    reach = EDGE * float(frame["flying_height"])
+    reach = EDGE * frame.flying_height
     layers, used = ground(frame), {}
     for name, camera in zip(found.names, found.cameras, strict=True):
         role = roles.get(name, "photo")
@@ -74,7 +75,7 @@ def of_photos(folder: Path, split: Path | None, title: str, captured: list[tuple
     eyes = np.array([c.centre for c in [*found.cameras, *(camera for camera, _ in captured)]]).reshape(-1, 3)
     low, high = bounds(frame, eyes)
     keys = Keys(used | {"exemplar": EXEMPLAR, "seen by a photo": EXTENT})
-    about = f"{len(eyes)} cameras, {len(found.points)} points; unit: {str(frame.get('unit', 'unknown'))[:40]}"
+    about = f"{len(eyes)} cameras, {len(found.points)} points; unit: {frame.unit[:40]}"
     return Scene(title, layers, low, high, [about], legend=[keys])
 
 
@@ -86,19 +87,19 @@ def _roles(split: Path | None) -> dict[str, str]:
         return {str(name): role for role in ("start", "pool", "test") for name in told[role]}
 
 
-def ground(frame: dict) -> list[Layer]:
+def ground(frame: SceneFrame) -> list[Layer]:
     """The exemplar's border and that of all ground that is seen, at height 0."""
-    square, extent = frame["exemplar"], frame["extent"]
-    west, south, side = (float(square[k]) for k in ("west", "south", "side"))
-    seen = [float(extent[k]) for k in ("west", "south", "east", "north")]
-    return [outline(west, south, west + side, south + side, 0.0, EXEMPLAR), outline(*seen, 0.0, EXTENT)]
+    square, extent = frame.exemplar, frame.extent
+    return [
+        outline(square.west, square.south, square.east, square.north, 0.0, EXEMPLAR),
+        outline(extent.west, extent.south, extent.east, extent.north, 0.0, EXTENT),
+    ]
 
 
-def bounds(frame: dict, eyes: Float[Array, "n 3"]) -> tuple[Float[Array, "3"], Float[Array, "3"]]:
+def bounds(frame: SceneFrame, eyes: Float[Array, "n 3"]) -> tuple[Float[Array, "3"], Float[Array, "3"]]:
     """The box of the exemplar and of places."""
-    square = frame["exemplar"]
-    west, south, side = (float(square[k]) for k in ("west", "south", "side"))
-    points = np.concatenate([eyes, [[west, south, 0.0], [west + side, south + side, 0.0]]])
+    square = frame.exemplar
+    points = np.concatenate([eyes, [[square.west, square.south, 0.0], [square.east, square.north, 0.0]]])
     return points.min(0), points.max(0)
 
 

@@ -10,6 +10,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import read_field
 from dav_gswt.files import read_json
 from dav_gswt.geometry import poses as places
+from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.inspect import beside
 from dav_gswt.inspect.fields import colours, solid, thinned
 from dav_gswt.inspect.options import Asked
@@ -42,7 +43,7 @@ def of_scores(path: Path, poses: Path | None, asked: Asked, rounds: int) -> Scen
         raise InputError(
             f"{path}: its scene's photos/ground.json is in no folder above it; leave it in its result tree"
         )
-    frame, table = beside.frame_of(photos / "ground.json"), tables.read(path)
+    frame, table = read_scene_frame(photos / "ground.json"), tables.read(path)
     if not len(table):
         raise InputError(f"{path}: no candidate is in it: none was left to choose from")
     label, values = shaded(table, asked.colour, beside.lam_of(poses or path))
@@ -64,7 +65,7 @@ def of_scores(path: Path, poses: Path | None, asked: Asked, rounds: int) -> Scen
         words = [Word(f"{i}", tuple(at[k] + up), LETTER * radius) for i, k in enumerate(chosen, 1)]
     taken, known = _taken(path, photos), "taken before" if round_before(path) else "taken at the start"
     for camera in taken:
-        layers += looking(camera, REACH * float(frame["flying_height"]), TAKEN, None)
+        layers += looking(camera, REACH * frame.flying_height, TAKEN, None)
     low, high = bounds(frame, at)
     keys = [Keys({f"{len(taken)} photos {known}": TAKEN})] * bool(taken)
     about = [_about(table, chosen, poses, rounds), *([f"{label}: {unit}"] * bool(unit))]

@@ -7,7 +7,8 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.files import whole_folder, write_json
+from dav_gswt.files import whole_folder
+from dav_gswt.geometry.scene_frame import SceneFrame, write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.photos import lenses
 from dav_gswt.photos import model as models
@@ -19,7 +20,7 @@ def write(
     path: Path | str,
     model: Model,
     pictures: Iterable[tuple[str, Float[Array, "h w 3"]]],
-    facts: dict,
+    frame: SceneFrame,
     kinds: list[Lens] | None = None,
     covers: Mapping[str, Float32[Array, "h w"]] | None = None,
 ) -> None:
@@ -38,4 +39,4 @@ def write(
         models.write(model, part / "sparse")
         if kinds:
             lenses.write(part, kinds)
-        write_json(part / "ground.json", facts)
+        write_scene_frame(part / "ground.json", frame)

@@ -10,6 +10,8 @@ from scipy.spatial import cKDTree
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.georeference import Georeference
+from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square
 from dav_gswt.photos import model as models
 from dav_gswt.photos.model import Model
 from dav_gswt.photos.sfm.gps import Positions
@@ -35,8 +37,8 @@ class Coverage:
     counts: Int[Array, "rows columns"]
 
 
-def frame(model: Model, rng: np.random.Generator, positions: Positions | None = None) -> tuple[Model, dict]:
-    """The model in its ground frame, and what ground.json says about the ground.
+def frame(model: Model, rng: np.random.Generator, positions: Positions | None = None) -> tuple[Model, SceneFrame]:
+    """The model in its ground frame, and this frame.
 
     z points from the robust plane through all points to the cameras' side; the unit of length is the flying height, the
     median height of the cameras, or the metre where the model is in metres about GPS `positions`. x and y run so that
@@ -59,34 +61,33 @@ def frame(model: Model, rng: np.random.Generator, positions: Positions | None = 
     flat = models.similar(flat, 1.0, np.eye(3), np.array([-middle[0], -middle[1], 0.0]))
     west, south, side = _square(flat, need)
     unit = height if positions else 1.0  # of the world, in flying heights; below, lengths are brought to it
-    extent = _extent(coverage(flat.cameras, flat.points))
+    extent = _extent(coverage(flat.cameras, flat.points), unit)
     flat = models.similar(flat, unit, np.eye(3), np.zeros(3))
-    facts = {
-        "unit": "metre" if positions else "flying height",
-        "flying_height": unit,
-        "exemplar": {"west": unit * west, "south": unit * south, "side": unit * side},
-        "extent": {name: unit * value for name, value in extent.items()},
-        "photos_per_cell": need,
-        "relief": relief,
-    }
     _log.info("well-seen square of ground: %.2f flying heights wide; relief %.3f", side, relief)
-    return flat, facts | ({"georeference": _georeference(model, flat, positions)} if positions else {})
+    return flat, SceneFrame(
+        kind="photos",
+        unit="metre" if positions else "flying height",
+        flying_height=unit,
+        exemplar=Square(unit * west, unit * south, unit * side),
+        extent=extent,
+        photos_per_cell=need,
+        relief=relief,
+        georeference=_georeference(model, flat, positions) if positions else None,
+    )
 
 
-def _georeference(east_north_up: Model, flat: Model, positions: Positions) -> dict[str, float]:
+def _georeference(east_north_up: Model, flat: Model, positions: Positions) -> Georeference:
     """Where the world's origin lies and how its +y is turned: from the move of one model to the other."""
     old, new = east_north_up.cameras[0], flat.cameras[0]
     turn = new.rotation.T @ old.rotation  # from east, north, up to the world; both in metres
     place = positions.about.to_earth((old.centre - turn.T @ new.centre)[None])[0]
     north = turn.T @ [0.0, 1.0, 0.0]
-    return {
-        "latitude": float(place[0]),
-        "longitude": float(place[1]),
-        "altitude": float(place[2]),
-        "north": float(np.degrees(np.arctan2(north[0], north[1])) % 360),  # of +y, clockwise from true north
-        "slope": float(np.degrees(np.arccos(np.clip(turn[2, 2], -1, 1)))),  # of the plane z = 0
-        "metres_per_unit": 1.0,
-    }
+    return Georeference(
+        *map(float, place),
+        north=float(np.degrees(np.arctan2(north[0], north[1])) % 360),
+        slope=float(np.degrees(np.arccos(np.clip(turn[2, 2], -1, 1)))),
+        metres_per_unit=1.0,
+    )
 
 
 def plane(
@@ -233,12 +234,12 @@ def _square(model: Model, need: int, cells: int = CELLS) -> tuple[float, float, 
     return float(west), float(south), float(side * grid.cell - 2 * inset)
 
 
-def _extent(grid: Coverage) -> dict[str, float]:
-    """The bounding rectangle of the cells that at least one photo sees."""
+def _extent(grid: Coverage, unit: float) -> Extent:
+    """The bounding rectangle of the cells that at least one photo sees. unit: the grid's, in world units."""
     rows, columns = np.nonzero(grid.counts)
-    return {
-        "west": grid.west + float(columns.min()) * grid.cell,
-        "south": grid.south + float(rows.min()) * grid.cell,
-        "east": grid.west + float(columns.max() + 1) * grid.cell,
-        "north": grid.south + float(rows.max() + 1) * grid.cell,
-    }
+    return Extent(
+        west=unit * (grid.west + float(columns.min()) * grid.cell),
+        south=unit * (grid.south + float(rows.min()) * grid.cell),
+        east=unit * (grid.west + float(columns.max() + 1) * grid.cell),
+        north=unit * (grid.south + float(rows.max() + 1) * grid.cell),
+    )

@@ -2,14 +2,14 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import read_field, write_field
-from dav_gswt.files import write_json
+from dav_gswt.geometry.scene_frame import LeftOutPhoto, SceneFrame, write_scene_frame
 from dav_gswt.logs import progress
 from dav_gswt.photos import folder, ground_frame, importers, lenses
 from dav_gswt.photos import masks as masking
@@ -25,35 +25,29 @@ def from_photos(
     options: Options,
     given: Path | str | None = None,
     masks: Path | str | None = None,
-    extra: dict | None = None,
-) -> dict:
+) -> SceneFrame:
     """Register the photos in `source`, and write undistorted pictures, model and ground.json into the folder `out`.
 
-    given: a model of another program, taken as it is. masks: a folder, see `masks`. extra: more for ground.json (where
-    it comes from). Returns what ground.json holds.
+    given: a model of another program, taken as it is. masks: a folder, see `masks`. Returns what ground.json holds.
     Raises: InputError: see sfm.register, imported.read, masks.read and ground.frame.
     """
     found = importers.read(given, source, options) if given else registration.register(source, options)
-    model, facts = ground_frame.frame(found.model, np.random.default_rng(options.seed), found.positions)
-    left_out = [{"name": name, "reason": reason} for name, reason in found.left_out]
-    facts = {
-        "kind": "photos",
-        **facts,
-        "test": None,
-        "images": len(model.names) + len(left_out),
-        "registered": len(model.names),
-        "left_out": left_out,
-        "focal_ratio": found.focal_ratio,
-        "focal": asdict(found.focal) if found.focal else None,
-        "reprojection_error": found.error,
-        "points": len(model.points),
-        **(extra or {}),
-    }
+    model, frame = ground_frame.frame(found.model, np.random.default_rng(options.seed), found.positions)
+    frame = replace(
+        frame,
+        images=len(model.names) + len(found.left_out),
+        registered=len(model.names),
+        left_out=tuple(LeftOutPhoto(name, reason) for name, reason in found.left_out),
+        focal_ratio=found.focal_ratio,
+        focal=found.focal,
+        reprojection_error=found.error,
+        points=len(model.points),
+    )
     numbers = progress(range(len(model.names)), "undistort photos")
     pictures = ((model.names[i], registration.undistorted(found, i)) for i in numbers)
     covers = masking.undistorted(found, masks) if masks else {}
-    folder.write(out, model, pictures, facts, lenses_of(found), covers)
-    return facts
+    folder.write(out, model, pictures, frame, lenses_of(found), covers)
+    return frame
 
 
 def lenses_of(found: registration.Registered) -> list[Lens]:
@@ -66,21 +60,19 @@ def lenses_of(found: registration.Registered) -> list[Lens]:
 def from_field(
     source: Path | str,
     out: Path | str,
-    frame: Path | str,
+    ground: Path | str,
     up: Sequence = splat.UP,
     seed: int = 0,
-    extra: dict | None = None,
-) -> dict:
-    """Bring a finished 3DGS .ply into its ground frame: the field to `out`, ground.json to `frame`.
+) -> SceneFrame:
+    """Bring a finished 3DGS .ply into its ground frame: the field to `out`, ground.json to `ground`.
 
     up: a direction that points roughly upwards in the file. Raises: InputError: see read_field and splat.enter.
     """
     given = read_field(source)
     try:
-        entered, facts = splat.enter(given, np.random.default_rng(seed), up)
+        entered, frame = splat.enter(given, np.random.default_rng(seed), up)
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
-    facts |= {"images": 0, "registered": 0, "left_out": [], "focal_ratio": None} | (extra or {})
     write_field(entered, out)
-    write_json(frame, facts)
-    return facts
+    write_scene_frame(ground, frame)
+    return frame

@@ -8,6 +8,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.model import Model, shared_points
 
 _log = logging.getLogger(__name__)
@@ -22,7 +23,9 @@ LINK = 30  # points that a start view shares with one chosen before: enough to f
 Bounds = tuple[float, float, float, float]  # west, south, east, north
 
 
-def split(model: Model, frame: dict, start: int, rng: np.random.Generator, whole: bool = False) -> dict[str, list[str]]:
+def split(
+    model: Model, frame: SceneFrame, start: int, rng: np.random.Generator, whole: bool = False
+) -> dict[str, list[str]]:
     """Names of the start views, the pool and the test views.
 
     whole: all ground that the photos see is in question, not the exemplar alone.
@@ -90,12 +93,13 @@ def start_views(model: Model, among: list[int], count: int, rng: np.random.Gener
     return chosen
 
 
-def bounds(frame: dict, whole: bool) -> Bounds:
+def bounds(frame: SceneFrame, whole: bool) -> Bounds:
     """The exemplar, or all ground that the photos see."""
     if whole:
-        return tuple(float(frame["extent"][side]) for side in ("west", "south", "east", "north"))
-    west, south, side = (float(frame["exemplar"][key]) for key in ("west", "south", "side"))
-    return west, south, west + side, south + side
+        extent = frame.extent
+        return extent.west, extent.south, extent.east, extent.north
+    square = frame.exemplar
+    return square.west, square.south, square.east, square.north
 
 
 def sight(camera: Camera, ground: Bounds, grid: int = 16) -> float:
@@ -120,9 +124,9 @@ def _farthest(places: Float[Array, "n d"], among: list[int], chosen: list[int]) 
     return int(among[int(apart.argmax())])
 
 
-def _given_test(model: Model, frame: dict) -> list[int] | None:
-    if frame.get("test") is None:
+def _given_test(model: Model, frame: SceneFrame) -> list[int] | None:
+    if frame.test is None:
         return None
-    if unknown := [name for name in frame["test"] if name not in model.names]:
+    if unknown := [name for name in frame.test if name not in model.names]:
         raise InputError(f"ground.json: test view {unknown[0]} is not among the images")
-    return [model.names.index(name) for name in frame["test"]]
+    return [model.names.index(name) for name in frame.test]

@@ -13,6 +13,7 @@ from dav_gswt.field import GaussianField
 from dav_gswt.geometry import poses
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import Pose
+from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import image_files
 from dav_gswt.photos.training_views import View
 from dav_gswt.prior.interface import Condition
@@ -39,7 +40,7 @@ class Taken:
     photos: Float32[Array, "n s s 3"]
 
 
-def taken(views: list[View], frame: dict, size: int) -> Taken:
+def taken(views: list[View], frame: SceneFrame, size: int) -> Taken:
     """Of photos at any size."""
     small = [_sized(middle_square(view.image), size) for view in views]
     return Taken([poses.of_camera(view.name, view.camera, frame) for view in views], np.stack(small))

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from dav_gswt import raster
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
+from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.training_views import View, over_ground
 from dav_gswt.raster import to_raster_arrays
 from dav_gswt.reconstruction import discs, distractors, ground, objects, regression_guard, sky, underlay
@@ -61,7 +62,7 @@ class Made:
 
 
 def fit(
-    frame: dict,
+    frame: SceneFrame,
     views: list[View],
     points: Float[Array, "n 3"],
     colours: Float[Array, "n 3"],
@@ -77,7 +78,7 @@ def fit(
     a share of its side. keep, watch: see `trainer.fit`. A scene that no height field explains is fitted as free
     Gaussians.
     """
-    pixel = min(frame["flying_height"] / view.camera.fx for view in views)
+    pixel = min(frame.flying_height / view.camera.fx for view in views)
     grid = ground.lay(frame, points, quality.spacing * pixel, most_discs(quality), BLOCK, margin)
     explained = _explained(grid, points, frame)
     if explained < EXPLAINED:
@@ -85,14 +86,14 @@ def fit(
         return _without_ground(grid, views, points, colours, quality, rng, keep, watch)
     scene = _look(frame, grid, views, pixel)
     stand = objects.shell(scene.relief, scene.views)
-    lone = objects.lone_points(grid, scene.relief, points, colours, BAND * frame["flying_height"])
+    lone = objects.lone_points(grid, scene.relief, points, colours, BAND * frame.flying_height)
     stand = _some(concatenate_fields([lone, stand]), _most(quality) - grid.heights.size - underlay.count(grid), rng)
     colour, known = _ground_colours(grid, scene.views, stand)
     grid = replace(grid, seen=known)
     layer = discs.ground_discs(grid, discs.filled(colour, known))
     start = concatenate_fields([layer, underlay.beneath(grid, layer), stand])
     _log.info(
-        "ground: %d x %d discs of %.4g %s, %.0f %% seen", *grid.shape, grid.spacing, frame["unit"], 100 * known.mean()
+        "ground: %d x %d discs of %.4g %s, %.0f %% seen", *grid.shape, grid.spacing, frame.unit, 100 * known.mean()
     )
     _log.info("things: %d Gaussians over %.1f %% of the ground", len(stand), 100 * scene.relief.stands.mean())
     rules = _rules(grid, scene.relief, stand, frame)
@@ -105,7 +106,7 @@ def fit(
 def refine(
     field: GaussianField,
     grid: Ground,
-    frame: dict,
+    frame: SceneFrame,
     before: list[View],
     new: list[View],
     quality: Quality,
@@ -145,13 +146,13 @@ class _Begun:
 
 
 def _begun(
-    field: GaussianField, grid: Ground, frame: dict, views: list[View], quality: Quality, rng: np.random.Generator
+    field: GaussianField, grid: Ground, frame: SceneFrame, views: list[View], quality: Quality, rng: np.random.Generator
 ) -> _Begun:
     """The field with what photos show and it lacks; its first Gaussians are the grid's, as before."""
     if not field.ground.any():
         rules = Anywhere(float(np.exp(np.median(field.log_scales))), _extent(field.means))
         return _Begun(field, grid, views, rules)
-    scene = _look(frame, grid, views, min(frame["flying_height"] / view.camera.fx for view in views))
+    scene = _look(frame, grid, views, min(frame.flying_height / view.camera.fx for view in views))
     there = field[grid.heights.size + underlay.count(grid) :]
     stand = _unknown(objects.shell(scene.relief, scene.views), there, scene.relief.grid.spacing)
     stand = _like(_some(stand, _most(quality) - len(field), rng), field)
@@ -188,11 +189,11 @@ class _Scene:
     relief: Relief
 
 
-def _look(frame: dict, grid: Ground, views: list[View], pixel: float) -> _Scene:
-    if frame["kind"] == "photos":
+def _look(frame: SceneFrame, grid: Ground, views: list[View], pixel: float) -> _Scene:
+    if frame.kind == "photos":
         views = exposure.levelled(views, _spread(grid))
-    relief = sweep(grid, views, frame["flying_height"], pixel)
-    if frame["kind"] == "photos":
+    relief = sweep(grid, views, frame.flying_height, pixel)
+    if frame.kind == "photos":
         open_ground = ~(relief.onto(grid, relief.stands.astype(float)) > 0.1)
         views = distractors.without(views, grid.centres[open_ground.ravel()])
     return _Scene(views, relief)
@@ -210,8 +211,8 @@ def _ground_colours(
     return colour, known.reshape(grid.shape)
 
 
-def _rules(grid: Ground, relief: Relief, stand: GaussianField, frame: dict) -> OnGround:
-    ceiling = np.maximum(objects.ceiling(grid, relief, stand), LEAST_CEILING * frame["flying_height"])
+def _rules(grid: Ground, relief: Relief, stand: GaussianField, frame: SceneFrame) -> OnGround:
+    ceiling = np.maximum(objects.ceiling(grid, relief, stand), LEAST_CEILING * frame.flying_height)
     return OnGround(grid, ceiling)
 
 
@@ -235,7 +236,7 @@ def _finished(fitted: GaussianField, grid: Ground, views: list[View]) -> Made:
     return Made(field, surface_of(field, grid) if field.ground.any() else grid, {})
 
 
-def _explained(grid: Ground, points: Float[Array, "n 3"], frame: dict) -> float:
+def _explained(grid: Ground, points: Float[Array, "n 3"], frame: SceneFrame) -> float:
     """Share of the points over the grid that lie near the median height of their neighbours; 1 of too few to tell.
 
     The surface itself is no judge: between few points it bends to all of them.
@@ -245,7 +246,7 @@ def _explained(grid: Ground, points: Float[Array, "n 3"], frame: dict) -> float:
         return 1.0
     near = cKDTree(inside[:, :2]).query(inside[:, :2], k=AROUND + 1)[1][:, 1:]
     apart = np.abs(inside[:, 2] - np.median(inside[near, 2], axis=1))
-    return float((apart < BAND * frame["flying_height"]).mean())
+    return float((apart < BAND * frame.flying_height).mean())
 
 
 def _unknown(stand: GaussianField, there: GaussianField, near: float) -> GaussianField:

@@ -1,6 +1,7 @@
 """How well a field shows what the test photos show. Test photos are seen by nothing but this."""
 
 import logging
+from collections.abc import Mapping, Sequence
 from math import ceil
 
 import numpy as np
@@ -20,7 +21,10 @@ WORST = 0.1  # of the views, at least one: how bad it is where it is bad
 
 
 def evaluate(
-    field: GaussianField, tests: list[View], groups: dict[str, list[str]] | None = None, weights: Weights | None = None
+    field: GaussianField,
+    tests: list[View],
+    groups: Mapping[str, Sequence[str]] | None = None,
+    weights: Weights | None = None,
 ) -> dict:
     """Mean PSNR (raw, colour-corrected), SSIM and LPIPS over the test views, over the pixels that look at the ground.
 

@@ -15,6 +15,7 @@ from scipy.sparse import coo_matrix, diags, identity, kron
 from scipy.sparse.linalg import spsolve
 
 from dav_gswt.errors import InputError
+from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import image_files
 
 NODES = 96  # knots of the height surface along the longer side: what sparse points can carry
@@ -92,22 +93,22 @@ class Ground:
         return (x >= inset) & (y >= inset) & (x <= columns * self.spacing - inset) & (y <= rows * self.spacing - inset)
 
 
-def lay(frame: dict, points: Float[Array, "n 3"], spacing: float, cap: int, block: int, margin: float) -> Ground:
+def lay(frame: SceneFrame, points: Float[Array, "n 3"], spacing: float, cap: int, block: int, margin: float) -> Ground:
     """Lay the grid over the exemplar and a margin around it, and draw the surface through the points.
 
-    frame: ground.json. spacing: of the discs, in world units; widened where more than `cap` cells would be needed.
+    spacing: of the discs, in world units; widened where more than `cap` cells would be needed.
     block: the exemplar's side becomes a multiple of it, in cells. margin: ground kept around the exemplar, as a share
     of its side, as far as a photo sees any.
     Raises: InputError: the exemplar is too small for one block.
     """
-    west, south, side = (float(frame["exemplar"][k]) for k in ("west", "south", "side"))
-    extent = frame["extent"]
+    west, south, side = frame.exemplar.west, frame.exemplar.south, frame.exemplar.side
+    extent = frame.extent
     reach = margin * side
     around = (
-        max(extent["west"], west - reach),
-        max(extent["south"], south - reach),
-        min(extent["east"], west + side + reach),
-        min(extent["north"], south + side + reach),
+        max(extent.west, west - reach),
+        max(extent.south, south - reach),
+        min(extent.east, west + side + reach),
+        min(extent.north, south + side + reach),
     )
     area = (around[2] - around[0]) * (around[3] - around[1])
     spacing = max(spacing, float(np.sqrt(area / cap)))

@@ -16,8 +16,8 @@ from scipy.spatial import cKDTree
 
 from dav_gswt import raster
 from dav_gswt.field import GaussianField
-from dav_gswt.files import read_json
 from dav_gswt.geometry import cameras
+from dav_gswt.geometry.scene_frame import SceneFrame, Square, read_scene_frame
 from dav_gswt.images import metrics
 from dav_gswt.photos import model as models
 from dav_gswt.photos.training_views import View, over_ground, read
@@ -36,7 +36,7 @@ SKY = np.array([0.62, 0.75, 0.95], np.float32)
 class PhotoSet:
     """A photos/ folder, split for a trial. tests: groups of test views by name."""
 
-    frame: dict
+    frame: SceneFrame
     model: models.Model
     train: list[View]
     tests: dict[str, list[View]]
@@ -58,20 +58,19 @@ def opened(folder: Path | str, size: int, margin: float = WHOLE) -> PhotoSet:
     else those that look at the exemplar: at the border of what is modelled relief hides and shows what is not.
     """
     folder = Path(folder)
-    frame, model = read_json(folder / "ground.json"), models.read(folder / "sparse")
+    frame, model = read_scene_frame(folder / "ground.json"), models.read(folder / "sparse")
     known = {n: read(n, c, folder / "images" / n, size) for n, c in zip(model.names, model.cameras, strict=True)}
     names = sorted(known)
-    groups = frame.get("test_groups") or {"test": frame["test"] or names[FIRST_TEST::EACH]}
+    groups = frame.test_groups or {"test": frame.test or names[FIRST_TEST::EACH]}
     out = {name for group in groups.values() for name in group}
     tests = {group: [known[n] for n in members] for group, members in groups.items()}
     if margin < WHOLE:
-        tests = {group: _over_exemplar(views, frame["exemplar"]) for group, views in tests.items()}
+        tests = {group: _over_exemplar(views, frame.exemplar) for group, views in tests.items()}
     return PhotoSet(frame, model, [known[n] for n in names if n not in out], tests, margin)
 
 
-def _over_exemplar(views: list[View], square: dict) -> list[View]:
-    west, south, side = square["west"], square["south"], square["side"]
-    seen = [over_ground(v, west, south, west + side, south + side) for v in views]
+def _over_exemplar(views: list[View], square: Square) -> list[View]:
+    seen = [over_ground(v, square.west, square.south, square.east, square.north) for v in views]
     return [v for v in seen if v.weight.any()]
 
 
@@ -121,7 +120,7 @@ def free_space_opacity(field: GaussianField, grid: Ground, photos: PhotoSet) -> 
     """Mean accumulated alpha, over the test views, of what stands higher than FREE flying heights above the ground and
     not at a matched point: the haze that photos from their own places reward."""
     above = field.means[:, 2] - grid.height_at(field.means)
-    high = field[above > FREE * photos.frame["flying_height"]]
+    high = field[above > FREE * photos.frame.flying_height]
     if len(high):
         high = high[cKDTree(photos.model.points).query(high.means)[0] > NEAR * grid.spacing]
     views = [view for group in photos.tests.values() for view in group]
@@ -134,13 +133,13 @@ def away(photos: PhotoSet, made: Made) -> dict[str, float]:
     return {group: quality["psnr"] for group, quality in seen.items()}
 
 
-def stills(made: Made, frame: dict, width: int = 768, height: int = 512) -> dict[str, Float32[Array, "h w 3"]]:
+def stills(made: Made, frame: SceneFrame, width: int = 768, height: int = 512) -> dict[str, Float32[Array, "h w 3"]]:
     """What nobody photographed: from 45 degrees at the flying height, and from as low as the photos' detail allows.
 
     Low: a disc in the middle of the picture is some eight pixels wide, so all detail that there is shows, and no more.
     """
-    square, up = frame["exemplar"], frame["flying_height"]
-    middle = np.array([square["west"], square["south"], 0.0]) + 0.5 * square["side"] * np.array([1, 1, 0.0])
+    square, up = frame.exemplar, frame.flying_height
+    middle = np.array([square.west, square.south, 0.0]) + 0.5 * square.side * np.array([1, 1, 0.0])
     middle[2] = float(made.grid.height_at(middle[None])[0])
     low = LOW * width * made.grid.spacing
     places = {

@@ -11,6 +11,7 @@ from dav_gswt.files import read_json
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import Pose, middle, of_camera
+from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos import model
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.photos.synthetic import scene as synthetic
@@ -20,7 +21,7 @@ Candidates = list[tuple[Pose, Camera]]
 AROUND, LOWEST = 250, 30.0  # poses that devices and people may be asked for, and their least elevation in degrees
 
 
-def left(scene: dict, frame: dict, model_folder: Path | str, split: dict, captures: list) -> Candidates:
+def left(scene: dict, frame: SceneFrame, model_folder: Path | str, split: dict, captures: list) -> Candidates:
     """Every pose that can still be captured: the scene's candidates less those that captures have used."""
     if scene["agent"] == "render":
         pool = hemisphere(scene, frame)
@@ -35,17 +36,17 @@ def left(scene: dict, frame: dict, model_folder: Path | str, split: dict, captur
     return [(pose, camera) for pose, camera in pool if pose.name not in used]
 
 
-def hemisphere(scene: dict, frame: dict) -> Candidates:
+def hemisphere(scene: dict, frame: SceneFrame) -> Candidates:
     """Poses spread evenly over the hemisphere from which a synthetic scene can be photographed."""
     found = synthetic.candidates(scene, middle(frame))
     return [(of_camera(f"pose_{i:04d}", camera, frame), camera) for i, camera in enumerate(found)]
 
 
-def around(scene: dict, frame: dict, like: Camera) -> Candidates:
+def around(scene: dict, frame: SceneFrame, like: Camera) -> Candidates:
     """Poses spread evenly over the hemisphere at the flying height, for devices and people. like: a camera whose lens
     they have. `lowest`: the least elevation, degrees."""
     places = camera_layouts.hemisphere(
-        scene.get("candidates", AROUND), scene.get("lowest", LOWEST), frame["flying_height"]
+        scene.get("candidates", AROUND), scene.get("lowest", LOWEST), frame.flying_height
     )
     found = [camera_layouts.orbit(*place, middle(frame), like.width, like.height, 60.0) for place in places]
     lens = {name: getattr(like, name) for name in ("fx", "fy", "cx", "cy")}
@@ -60,7 +61,7 @@ def taken(model_folder: Path | str, split: dict, captures: list) -> list[Camera]
     return start + [cameras.from_json(shot["got"]) for folder in captures for shot in _shots(folder)]
 
 
-def places(taken: list[Camera], frame: dict) -> Float[Array, "m 3"]:
+def places(taken: list[Camera], frame: SceneFrame) -> Float[Array, "m 3"]:
     """Where cameras stand, relative to the exemplar's centre."""
     return np.array([camera.centre - middle(frame) for camera in taken]).reshape(-1, 3)
 

@@ -8,8 +8,8 @@ from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import read_field
-from dav_gswt.files import read_json
 from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.reconstruction import ground
 from dav_gswt.views import fisher
 from dav_gswt.views.candidates import Candidates
@@ -46,7 +46,7 @@ def errors(
         some, views = pool, list(truth.shown(scene, pool, files["images"]))
     else:
         some, views = truth.kept(pool, files["truth"])
-    corrected = read_json(files["frame"])["kind"] == "photos"  # which change their exposure
+    corrected = read_scene_frame(files["frame"]).kind == "photos"  # which change their exposure
     found, _ = measures.errors(read_field(files["field"]), ground.read(files["ground"]), views, size, corrected)
     known = {pose.name: error for (pose, _), error in zip(some, found, strict=True)}
     if not known:

@@ -9,6 +9,7 @@ from numpy import ndarray as Array
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import spread
+from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.logs import progress
 from dav_gswt.photos.training_views import View, over_ground
 from dav_gswt.prior import conditions
@@ -65,7 +66,7 @@ def score(
     grid: Ground,
     pool: Candidates,
     taken: list[View],
-    frame: dict,
+    frame: SceneFrame,
     prior: Asking | None = None,
     frozen: Frozen | None = None,
 ) -> Scored:
@@ -89,13 +90,13 @@ def score(
 
 
 def told(
-    field: GaussianField, grid: Ground, pool: Candidates, taken: list[View], frame: dict, size: int
+    field: GaussianField, grid: Ground, pool: Candidates, taken: list[View], frame: SceneFrame, size: int
 ) -> tuple[Condition, Float32[Array, "n s s"]]:
     """What a prior is told of candidates, and which of its pixels look at the modelled ground (1)."""
     known = conditions.taken(taken, frame, size)
     squares = [conditions.squared(camera).resized(size, size) for _, camera in pool]
     counts = np.stack([on_ground(grid, camera) for camera in squares])
-    return conditions.condition(field, pool, known, frame["flying_height"], size), counts
+    return conditions.condition(field, pool, known, frame.flying_height, size), counts
 
 
 def _geometric(

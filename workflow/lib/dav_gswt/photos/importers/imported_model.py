@@ -8,7 +8,7 @@ import pycolmap
 from jaxtyping import Float, Float32, Int
 from numpy import ndarray as Array
 
-from dav_gswt.geometry.geodesy import Georeference
+from dav_gswt.geometry.georeference import Georeference
 
 
 @dataclass(frozen=True)

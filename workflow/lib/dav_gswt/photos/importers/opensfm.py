@@ -12,7 +12,7 @@ from numpy import ndarray as Array
 from scipy.spatial.transform import Rotation
 
 from dav_gswt.errors import InputError
-from dav_gswt.geometry.geodesy import Georeference
+from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.photos.importers import checks, lens_models
 from dav_gswt.photos.importers.imported_model import Given, Shot
 

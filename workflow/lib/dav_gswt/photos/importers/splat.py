@@ -13,6 +13,7 @@ from scipy.special import expit
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
+from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square
 from dav_gswt.photos import ground_frame
 
 _log = logging.getLogger(__name__)
@@ -30,8 +31,8 @@ DISC = 2.0  # standard deviations of a disc that count as covered ground
 WIDEST_DISC = 6  # cells, the most that a single Gaussian covers
 
 
-def enter(field: GaussianField, rng: np.random.Generator, up: Sequence = UP) -> tuple[GaussianField, dict]:
-    """The field in its ground frame, and what ground.json says about the ground.
+def enter(field: GaussianField, rng: np.random.Generator, up: Sequence = UP) -> tuple[GaussianField, SceneFrame]:
+    """The field in its ground frame, and this frame.
 
     z points from the robust plane through the opaque Gaussians to the side of `up`, three numbers of any length; x and
     y run so that the exemplar, the largest square of opaque ground, is as large as can be; the origin is its middle. No
@@ -60,24 +61,23 @@ def enter(field: GaussianField, rng: np.random.Generator, up: Sequence = UP) -> 
     mask, west, south, cell = _opaque_ground(*_discs(field), CELLS)
     rows, columns = np.nonzero(mask)
     side, relief = float(side / height), float(relief / height)
-    facts = {
-        "kind": "field",
-        "unit": "flying height",
-        "flying_height": 1.0,
-        "exemplar": {"west": -side / 2, "south": -side / 2, "side": side},
-        "extent": {
-            "west": float(west + columns.min() * cell),
-            "south": float(south + rows.min() * cell),
-            "east": float(west + (columns.max() + 1) * cell),
-            "north": float(south + (rows.max() + 1) * cell),
-        },
-        "test": None,
-        "relief": relief,
-        "gaussians": len(field),
-        "removed": before - len(field),
-    }
+    frame = SceneFrame(
+        kind="field",
+        unit="flying height",
+        flying_height=1.0,
+        exemplar=Square(-side / 2, -side / 2, side),
+        extent=Extent(
+            west=float(west + columns.min() * cell),
+            south=float(south + rows.min() * cell),
+            east=float(west + (columns.max() + 1) * cell),
+            north=float(south + (rows.max() + 1) * cell),
+        ),
+        relief=relief,
+        gaussians=len(field),
+        removed=before - len(field),
+    )
     _log.info("%d of %d Gaussians are kept; relief %.3f flying heights", len(field), before, relief)
-    return field, facts
+    return field, frame
 
 
 def _near(field: GaussianField) -> Bool[Array, "n"]:

@@ -7,9 +7,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray as Array
 
-from dav_gswt.files import read_json
-from dav_gswt.geometry import geodesy
-from dav_gswt.geometry.geodesy import Georeference
+from dav_gswt.geometry.georeference import Georeference
+from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
 from dav_gswt.photos import ground_frame, split
 from dav_gswt.photos import model as models
 from dav_gswt.photos.ground_frame import Coverage
@@ -51,7 +50,7 @@ class Found:
     """A scene's photos. need: photos that must see a place. cover: in world units, without those that only test."""
 
     scene: str
-    frame: dict
+    frame: SceneFrame
     model: Model
     photos: tuple[Photo, ...]
     need: int
@@ -60,7 +59,8 @@ class Found:
 
     @property
     def exemplar(self) -> tuple[float, float, float]:
-        return tuple(float(self.frame["exemplar"][key]) for key in ("west", "south", "side"))
+        square = self.frame.exemplar
+        return square.west, square.south, square.side
 
     @property
     def placed(self) -> tuple[Photo, ...]:
@@ -69,7 +69,7 @@ class Found:
 
     def length(self, of: float) -> str:
         """A length of the world, with its unit."""
-        if self.frame["unit"] == "flying height":
+        if self.frame.unit == "flying height":
             return f"{of:.2f} flying heights"
         return f"{of:.0f} m" if abs(of) >= 20 else f"{of:.1f} m"
 
@@ -82,16 +82,16 @@ class Found:
 def read(folder: Path | str, scene: str) -> Found:
     """The facts of a photos/ folder. Raises: InputError: what it holds is not readable."""
     folder = Path(folder)
-    frame, model = read_json(folder / "ground.json"), models.read(folder / "sparse")
-    tests = set(frame.get("test") or ())
-    unit = float(frame["flying_height"])
+    frame, model = read_scene_frame(folder / "ground.json"), models.read(folder / "sparse")
+    tests = set(frame.test or ())
+    unit = frame.flying_height
     flat = models.similar(model, 1 / unit, np.eye(3), np.zeros(3))
     cameras = tuple(c for name, c in zip(model.names, flat.cameras, strict=True) if name not in tests)
     empty = Coverage(0.0, 0.0, 1.0, np.zeros((1, 1), int))
     grid = ground_frame.coverage(cameras, flat.points) if len(flat.points) else empty
     cover = replace(grid, west=unit * grid.west, south=unit * grid.south, cell=unit * grid.cell)
-    need = int(frame.get("photos_per_cell", 3 if len(cameras) >= 9 else 2))
-    return Found(scene, frame, model, photos(model, tests), need, cover, geodesy.of_frame(frame))
+    need = frame.photos_per_cell or (3 if len(cameras) >= 9 else 2)
+    return Found(scene, frame, model, photos(model, tests), need, cover, frame.georeference)
 
 
 def photos(model: Model, tests: set[str]) -> tuple[Photo, ...]:
@@ -156,7 +156,7 @@ def weak_spots(found: Found) -> list[str]:
 
 
 def _left_out(found: Found) -> list[str]:
-    out, total = len(found.frame["left_out"]), found.frame["images"]
+    out, total = len(found.frame.left_out), found.frame.images
     if not out:
         return []
     are = "photo was" if total == 1 else "photos were"
@@ -196,18 +196,18 @@ def _unsure_lens(found: Found) -> list[str]:
     error = mean_error(found)
     if error is not None and error > WORST_MEAN:
         said.append(f"Points are {error:.1f} px off on average: is every photo of one camera, unzoomed, and sharp?")
-    lens = frame.get("focal") or {}
-    if lens and lens["exif"] is None and lens["tilt"] < focal.OBLIQUE:
+    lens = frame.focal
+    if lens and lens.exif is None and lens.tilt < focal.OBLIQUE:
         said.append("The focal length is unsure, and heights with it: give the scene's `focal`, or add views aslant.")
-    elif lens.get("exif") and lens["free"]:
-        ratio = lens["free"] / lens["exif"]
+    elif lens and lens.exif and lens.free:
+        ratio = lens.free / lens.exif
         if abs(ratio - 1) > focal.HELD:
             said.append(f"The photos alone would say a focal length {ratio:.2f} times that of EXIF: are heights right?")
     return said
 
 
 def _small(found: Found) -> list[str]:
-    side = found.exemplar[2] / found.frame["flying_height"]
+    side = found.exemplar[2] / found.frame.flying_height
     if side >= LEAST_SIDE:
         return []
     return [f"The exemplar is only {side:.2f} flying heights wide: tiles will repeat soon. Photograph a larger place."]
@@ -215,8 +215,8 @@ def _small(found: Found) -> list[str]:
 
 def mean_error(found: Found) -> float | None:
     """Mean reprojection error in pixels: as registration says it, else over the model's observations."""
-    if found.frame.get("reprojection_error") is not None:
-        return float(found.frame["reprojection_error"])
+    if found.frame.reprojection_error is not None:
+        return found.frame.reprojection_error
     off = models.errors(found.model)
     return float(off.mean()) if len(off) else None
 

@@ -62,8 +62,8 @@ class Sheet:
 def sheet(found: Found) -> Sheet:
     """Room for the ground that photos see, the exemplar and all cameras."""
     west, south, side = found.exemplar
-    extent = found.frame["extent"]
-    corners = [[extent["west"], extent["south"]], [extent["east"], extent["north"]]]
+    extent = found.frame.extent
+    corners = [[extent.west, extent.south], [extent.east, extent.north]]
     corners += [[west, south], [west + side, south + side], *(c.centre[:2] for c in found.model.cameras)]
     low, high = np.min(corners, axis=0), np.max(corners, axis=0)
     margin = AROUND * float((high - low).max())
@@ -212,7 +212,7 @@ def _exemplar(found: Found, on: Sheet) -> str:
 
 def _shot(index: int, photo: Photo, camera: Camera, found: Found, on: Sheet) -> str:
     """A camera: its footprint, an arrow to where it looks, and a dot that leads to its row."""
-    unit = found.frame["flying_height"]
+    unit = found.frame.flying_height
     outline = " ".join(f"{x:.1f},{y:.1f}" for x, y in on.at(footprint(camera, ground_frame.REACH * unit)))
     ((x, y),) = on.at(camera.centre[None])
     kind = "shot weak" if photo.weak else "shot test" if photo.tests else "shot"
@@ -247,7 +247,7 @@ def _furniture(found: Found, on: Sheet) -> str:
     wanted = 0.2 * on.width / on.per_unit
     tens = 10 ** np.floor(np.log10(wanted))
     length = float(tens * STEPS[STEPS * tens <= wanted * 1.0001].max())
-    name = f"{length:g} flying height{'' if length == 1 else 's'}" if found.frame["unit"] == "flying height" else ""
+    name = f"{length:g} flying height{'' if length == 1 else 's'}" if found.frame.unit == "flying height" else ""
     x, y, end = 24.0, on.height - 24, 24 + length * on.per_unit
     bar = f'<path class="bar" d="M{x},{y - 10:.1f} V{y:.1f} H{end:.1f} V{y - 10:.1f}"/>'
     text = f'<text x="{x}" y="{y - 18:.1f}">{name or f"{length:g} m"}</text>'

@@ -54,7 +54,7 @@ def parts(found: Found, smalls: list[Small]) -> dict[str, str]:
         "left_out": left_out(found),
         "strip": "\n".join(_thumb(i, photo, small, found) for i, (photo, small) in photos),
         "rows": "\n".join(_row(i, photo, small.masked, found) for i, (photo, small) in photos),
-        "height_unit": "m" if found.frame["unit"] == "metre" else "flying heights",
+        "height_unit": "m" if found.frame.unit == "metre" else "flying heights",
         "link": str(split.LINK),
     }
 
@@ -62,11 +62,11 @@ def parts(found: Found, smalls: list[Small]) -> dict[str, str]:
 def summary(found: Found) -> str:
     """The page's first sentences."""
     frame, side = found.frame, found.length(found.exemplar[2])
-    if frame["kind"] == "synthetic":
+    if frame.kind == "synthetic":
         tests = len(found.photos) - len(found.placed)
         first = f"{len(found.placed)} photos were rendered, and {tests} that only test; their cameras are exact."
     else:
-        first = f"{frame['registered']} of {frame['images']} photos found their place over the ground."
+        first = f"{frame.registered} of {frame.images} photos found their place over the ground."
     return f"{first} Tiles are made of a square of ground {side} wide: the exemplar, framed on both maps."
 
 
@@ -114,10 +114,10 @@ def registration(found: Found) -> list[Fact]:
     sights = [split.sight(camera, split.bounds(frame, whole=False)) for photo, camera in pairs if not photo.tests]
     sees = sum(sight >= split.LEAST_SIGHT for sight in sights)
     rest = "all of them" if sees == len(sights) else "the others show too little of it to take part"
-    if frame["kind"] == "synthetic":
+    if frame.kind == "synthetic":
         first = ("Photos", f"{len(found.placed)} and {len(found.photos) - len(found.placed)} tests", "rendered")
     else:
-        first = ("Photos in the folder", f"{frame['images']}", f"{frame['registered']} of them found their place")
+        first = ("Photos in the folder", f"{frame.images}", f"{frame.registered} of them found their place")
     return [
         first,
         ("Photos of the exemplar", f"{sees}", rest),
@@ -134,15 +134,15 @@ def registration(found: Found) -> list[Fact]:
 
 def focal_length(found: Found) -> tuple[str, str]:
     """The focal length over EXIF's, and what was decided about it."""
-    frame, lens = found.frame, found.frame.get("focal")
-    if frame["kind"] == "synthetic":
+    frame, lens = found.frame, found.frame.focal
+    if frame.kind == "synthetic":
         return "exact", "as rendered"
-    ratio = frame.get("focal_ratio")
+    ratio = frame.focal_ratio
     value = "EXIF has none" if ratio is None else f"{ratio:.3f} times EXIF's"
     if not lens:
         return (value, "as it was solved with") if ratio else ("as given", "from the model of another program")
-    free = f"; the photos alone say {lens['free'] / lens['exif']:.3f} times EXIF's" if lens["free"] and ratio else ""
-    return value, f"{lens['decision']}{free if 'alone' not in lens['decision'] else ''}"
+    free = f"; the photos alone say {lens.free / lens.exif:.3f} times EXIF's" if lens.free and ratio else ""
+    return value, f"{lens.decision}{free if 'alone' not in lens.decision else ''}"
 
 
 def camera_facts(found: Found) -> list[Fact]:
@@ -150,8 +150,8 @@ def camera_facts(found: Found) -> list[Fact]:
     frame, cameras = found.frame, found.photos
     low, usual, high = report_facts.spread(np.array([c.height for c in cameras]))
     least, middle, most = report_facts.spread(np.array([c.tilt for c in cameras]))
-    metric = frame["unit"] == "metre"
-    flying = found.length(frame["flying_height"]) if metric else "the unit of length: metres are not known"
+    metric = frame.unit == "metre"
+    flying = found.length(frame.flying_height) if metric else "the unit of length: metres are not known"
     facts = [
         ("Exemplar", found.length(found.exemplar[2]), "side of the square of ground that tiles are made of"),
         ("Flying height", flying, "median height of the cameras above the ground"),
@@ -162,15 +162,13 @@ def camera_facts(found: Found) -> list[Fact]:
             f"median {middle:.0f}; 0 looks straight down, 90 to the horizon",
         ),
     ]
-    if frame.get("relief") is not None:
-        facts.append(
-            ("Relief", f"{frame['relief']:.3f} flying heights", "how far points lie off the plane of the ground")
-        )
+    if frame.relief is not None:
+        facts.append(("Relief", f"{frame.relief:.3f} flying heights", "how far points lie off the plane of the ground"))
     if found.place:
         where = f"{found.place.latitude:.6f}, {found.place.longitude:.6f}"
         turned = f"latitude and longitude of the origin; up on the maps is {found.place.north:.0f} degrees from north"
         return [*facts, ("Place", where, turned)]
-    if frame["kind"] == "photos":
+    if frame.kind == "photos":
         facts.append(("Place", "not known", "the photos have no GPS positions, or none that agree with them"))
     return facts
 
@@ -186,9 +184,9 @@ def masks(smalls: list[Small]) -> list[Fact]:
 
 def left_out(found: Found) -> str:
     """The photos that found no place, and why, as a section; nothing where all did."""
-    if not (rows := found.frame["left_out"]):
+    if not (rows := found.frame.left_out):
         return ""
-    body = "\n".join(f"<tr><th scope=row>{escape(r['name'])}</th><td>{escape(r['reason'])}</td></tr>" for r in rows)
+    body = "\n".join(f"<tr><th scope=row>{escape(r.name)}</th><td>{escape(r.reason)}</td></tr>" for r in rows)
     head = '<tr><th scope="col">Photo</th><th scope="col">Reason</th></tr>'
     return (
         f'<section id="left-out">\n<h2>Left out</h2>\n<div class="scroll"><table>\n<thead>{head}</thead>\n'
@@ -213,7 +211,7 @@ def _thumb(index: int, photo: Photo, small: Small, found: Found) -> str:
 
 
 def _row(index: int, photo: Photo, masked: float, found: Found) -> str:
-    unit = "" if found.frame["unit"] == "flying height" else " m"
+    unit = "" if found.frame.unit == "flying height" else " m"
     if photo.partner:
         share = 100 * photo.shared / max(photo.points, 1)
         overlap = f"{photo.shared:,} with {photo.partner} ({share:.0f} %), {photo.linked} linked"

@@ -5,14 +5,13 @@ registers whatever it is. So where EXIF has one it is held. Where photos look at
 fix it themselves, and the adjusted one is taken.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import pycolmap
 from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
+from dav_gswt.geometry.scene_frame import FocalLength
 from dav_gswt.photos import ground_frame, model
 
 OBLIQUE = 20.0  # degrees off the vertical from which a view helps to fix the focal length
@@ -23,24 +22,7 @@ LENSES = 0.35, 6.0  # focal length in longer sides of the picture: a fisheye's t
 LEAST_ANGLE = 2.0  # degrees, median over the points of the widest angle under which photos see them
 
 
-@dataclass(frozen=True)
-class Focal:
-    """exif, used: pixels, medians over the cameras (exif: None where no photo says). free: what adjustment alone gives.
-    tilt: degrees off the vertical, the 95th percentile. decision: in words."""
-
-    exif: float | None
-    used: float
-    free: float | None
-    tilt: float
-    decision: str
-
-    @property
-    def ratio(self) -> float | None:
-        """The used focal length over EXIF's."""
-        return self.used / self.exif if self.exif else None
-
-
-def decided(best: pycolmap.Reconstruction, held: dict[int, float], rng: np.random.Generator) -> Focal:
+def decided(best: pycolmap.Reconstruction, held: dict[int, float], rng: np.random.Generator) -> FocalLength:
     """Settle the focal length of a reconstruction, in place. held: EXIF's by camera, kept so far.
 
     Raises: InputError: a solution that no lens gives, or photos from one spot.
@@ -68,7 +50,7 @@ def decided(best: pycolmap.Reconstruction, held: dict[int, float], rng: np.rando
         if not fixes:
             decision += ", and they look too straight down to know it well: heights may be too great or too small"
     _refuse_absurd(best, used)
-    return Focal(
+    return FocalLength(
         float(np.median(exif)) if exif else None,
         float(np.median([best.cameras[c].focal_length for c in used])),
         float(np.median([free.cameras[c].focal_length for c in used])) if free else None,

@@ -14,7 +14,7 @@ import pycolmap
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.geometry.geodesy import Georeference
+from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.photos import exif, model
 
 _log = logging.getLogger(__name__)

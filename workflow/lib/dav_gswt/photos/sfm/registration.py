@@ -18,12 +18,12 @@ from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
+from dav_gswt.geometry.scene_frame import FocalLength
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos import exif, lenses, model
 from dav_gswt.photos.model import Model
 from dav_gswt.photos.sfm import features, focal, gps
-from dav_gswt.photos.sfm.focal import Focal
 from dav_gswt.photos.sfm.gps import Positions
 
 _log = logging.getLogger(__name__)
@@ -80,7 +80,7 @@ class Registered:
     sources: tuple[Path, ...]
     lenses: tuple[pycolmap.Camera, ...]
     left_out: tuple[tuple[str, str], ...]
-    focal: Focal | None
+    focal: FocalLength | None
     error: float
     positions: Positions | None = None
 
@@ -273,7 +273,7 @@ def _undistortable(
     photos: list[_Photo],
     best: pycolmap.Reconstruction,
     left_out: tuple,
-    settled: Focal,
+    settled: FocalLength,
     options: Options,
     positions: Positions | None,
 ) -> Registered:

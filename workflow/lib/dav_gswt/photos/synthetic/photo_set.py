@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pycolmap
 
-from dav_gswt.files import write_json
 from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.scene_frame import write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos import model
@@ -43,9 +43,16 @@ def render_set(entry: dict, folder: Path) -> None:
     found = triangulated(folder / "images", shots, entry["seed"])
     model.write(with_cameras(found, tests), folder / "sparse")
     named = [name for name, _ in tests]
-    groups = {group: [named[i] for i in part] for group, part in synthetic.test_groups(entry).items()}
-    frame = scene.frame | {"test": named, "test_groups": groups, "images": len(shots), "registered": len(shots)}
-    write_json(folder / "ground.json", frame | {"left_out": [], "focal_ratio": None, "renderer": renderer.described()})
+    groups = {group: tuple(named[i] for i in part) for group, part in synthetic.test_groups(entry).items()}
+    frame = replace(
+        scene.frame,
+        test=tuple(named),
+        test_groups=groups,
+        images=len(shots),
+        registered=len(shots),
+        renderer=renderer.described(),
+    )
+    write_scene_frame(folder / "ground.json", frame)
 
 
 def _named(kind: str, views: list[Camera]) -> list[tuple[str, Camera]]:

@@ -16,6 +16,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square
 from dav_gswt.photos.synthetic import camera_layouts, desert, flowers, grass, meadow, planet, renderer
 
 FAMILIES = {"desert": desert, "meadow": meadow, "flowers": flowers, "grass": grass, "planet": planet}
@@ -42,17 +43,12 @@ class Scene:
     exemplar: float = EXEMPLAR
 
     @property
-    def frame(self) -> dict:
-        """What ground.json says about where the scene is and from how far it is photographed."""
+    def frame(self) -> SceneFrame:
+        """Where the scene is, and from how far it is photographed."""
         half = self.exemplar / 2
-        seen = {"west": -half, "south": -half, "east": half, "north": half}
-        return {
-            "kind": "synthetic",
-            "unit": "metre",
-            "flying_height": RADIUS,
-            "exemplar": {"west": -half, "south": -half, "side": self.exemplar},
-            "extent": {side: 1.25 * at for side, at in seen.items()},
-        }
+        reach = 1.25 * half
+        exemplar, extent = Square(-half, -half, self.exemplar), Extent(-reach, -reach, reach, reach)
+        return SceneFrame("synthetic", "metre", RADIUS, exemplar, extent)
 
     @property
     def sky(self) -> dict:

@@ -1,7 +1,7 @@
 """Examples that the prior learns from: what a field fitted from few photos shows of a world, beside the truth."""
 
 import zipfile
-from dataclasses import dataclass, fields, replace
+from dataclasses import astuple, dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from dav_gswt.files import UNREADABLE, whole
 from dav_gswt.geometry import poses
 from dav_gswt.geometry.cameras import Camera, look_at
 from dav_gswt.geometry.poses import Pose
+from dav_gswt.geometry.scene_frame import Extent
 from dav_gswt.images import image_files
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.photos.training_views import View
@@ -149,7 +150,8 @@ def fitted(made: World, photos: list[View], rng: np.random.Generator) -> Gaussia
     frame = made.frame
     if rng.uniform() < OTHER_EXTENT:
         share = rng.uniform(*EXTENTS) / 1.25
-        frame = frame | {"extent": {side: share * at for side, at in frame["extent"].items()}}
+        extent = Extent(*(share * at for at in astuple(frame.extent)))
+        frame = replace(frame, extent=extent)
     return build.fit(frame, photos, *matched(made, photos, rng), quality, rng, margin=0.5 * (EXTENTS[1] - 1)).field
 
 

@@ -12,6 +12,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square
 from dav_gswt.prior.training import worlds_ground as ground
 from dav_gswt.prior.training import worlds_light as light
 from dav_gswt.prior.training import worlds_objects as things
@@ -41,10 +42,10 @@ class Sky:
 
 @dataclass(frozen=True)
 class World:
-    """A world with its light in its colours. frame: as ground.json has it."""
+    """A world with its light in its colours."""
 
     field: GaussianField
-    frame: dict
+    frame: SceneFrame
     sky: Sky
 
 
@@ -105,14 +106,9 @@ def _field(means, scales, quats, opacity, colours, is_ground: bool) -> GaussianF
 
 def _frame() -> dict:
     half = ground.EXEMPLAR / 2
-    sides = {"west": -half, "south": -half, "east": half, "north": half}
-    return {
-        "kind": "synthetic",
-        "unit": "metre",
-        "flying_height": FLYING_HEIGHT,
-        "exemplar": {"west": -half, "south": -half, "side": ground.EXEMPLAR},
-        "extent": {side: 1.25 * at for side, at in sides.items()},
-    }
+    reach = 1.25 * half
+    exemplar, extent = Square(-half, -half, ground.EXEMPLAR), Extent(-reach, -reach, reach, reach)
+    return SceneFrame("synthetic", "metre", FLYING_HEIGHT, exemplar, extent)
 
 
 def _sky(rng: np.random.Generator, sun: light.Light) -> Sky:

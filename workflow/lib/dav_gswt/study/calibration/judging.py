@@ -9,6 +9,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.poses import Pose, of_camera, place
+from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.training_views import View
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.study.calibration import controls, measures, truth
@@ -28,7 +29,7 @@ class Judged:
     scene: dict
     field: GaussianField
     grid: Ground
-    frame: dict
+    frame: SceneFrame
     taken: list[View]
     size: int
 
@@ -58,7 +59,7 @@ def calibrated(
         shown |= others
         # `residual` takes the place of the scores' term: that of samples from other noises, whatever was asked for them
         terms |= {name: prior_sampling.over(m, counts) for name, m in others.items()}
-    corrected = judged.frame["kind"] == "photos"  # which change their exposure
+    corrected = judged.frame.kind == "photos"  # which change their exposure
     error, error_maps = measures.errors(judged.field, judged.grid, views, judged.size, corrected)
     table = [
         {"pose": pose.name, "error": error[i]} | {name: values[i] for name, values in terms.items()}

@@ -13,6 +13,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
+from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import metrics
 from dav_gswt.photos.training_views import View
 from dav_gswt.raster import render
@@ -65,9 +66,9 @@ class Strip:
     looks: list[Look]
 
 
-def measure(frame: dict) -> str:
+def measure(frame: SceneFrame) -> str:
     """The key of PSNR in metrics.json: colour-corrected for photos, which change their exposure."""
-    return "psnr_colour_corrected" if frame["kind"] == "photos" else "psnr"
+    return "psnr_colour_corrected" if frame.kind == "photos" else "psnr"
 
 
 def shown(first: dict, key: str, named: str = "round 0") -> dict[str, str]:

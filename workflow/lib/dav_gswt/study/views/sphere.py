@@ -15,6 +15,7 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import Pose, of_camera
+from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.study import figures
 from dav_gswt.views.policies import uncertainty
 from dav_gswt.views.scores import Scores
@@ -66,7 +67,7 @@ def shade(scores: Scores, lam: float) -> tuple[str, Float64[Array, "n"]]:
     return "not known to be opaque, in units of the scale frozen at round 1", values
 
 
-def of_round(number: int, scores: Scores, asked: dict, taken: list[Camera], frame: dict, lam: float) -> Round:
+def of_round(number: int, scores: Scores, asked: dict, taken: list[Camera], frame: SceneFrame, lam: float) -> Round:
     """scores: of the candidates before the round. asked: the round's poses.json. taken: cameras of all photos before.
 
     Raises: InputError: a pose was chosen that is not among the candidates.

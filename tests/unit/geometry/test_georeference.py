@@ -1,9 +1,7 @@
 import numpy as np
 import pytest
 
-from dav_gswt.errors import InputError
-from dav_gswt.geometry import geodesy
-from dav_gswt.geometry.geodesy import Georeference
+from dav_gswt.geometry.georeference import Georeference
 
 A, F = 6378137.0, 1 / 298.257223563
 E2 = F * (2 - F)
@@ -55,14 +53,3 @@ def test_what_goes_to_the_earth_comes_back():
     for latitude in (-89.0, -30.0, 0.0, 60.0):
         place = Georeference(latitude, -179.9999, 300.0, 211.0, 1.7)
         np.testing.assert_allclose(place.to_world(place.to_earth(points)), points, atol=1e-6)
-
-
-def test_a_scene_has_a_georeference_or_none():
-    whole = {"latitude": 47.1, "longitude": 8, "altitude": 430, "north": 12, "metres_per_unit": 2.5}
-    assert geodesy.of_frame({}) is None
-    assert geodesy.of_frame({"georeference": None}) is None
-    assert geodesy.of_frame({"georeference": whole}) == Georeference(47.1, 8.0, 430.0, 12.0, 2.5)
-    with pytest.raises(InputError, match="north"):
-        geodesy.of_frame({"georeference": {k: v for k, v in whole.items() if k != "north"}})
-    with pytest.raises(InputError, match="no place on earth"):
-        geodesy.of_frame({"georeference": whole | {"metres_per_unit": 0}})

@@ -4,13 +4,11 @@ Exact at any distance: the world is a frame of east, north and up that touches t
 Altitudes above sea level are taken for heights above the ellipsoid: that moves places by at most 16 mm a kilometre.
 """
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, field
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
-
-from dav_gswt.errors import InputError
 
 EQUATOR = 6378137.0  # metres: WGS84's semi-major axis
 FLATTENING = 1 / 298.257223563
@@ -20,13 +18,23 @@ ROUNDS = 6  # of Bowring's iteration for the latitude; three leave less than a m
 
 @dataclass(frozen=True)
 class Georeference:
-    """Where the world's origin lies, in degrees and metres above sea level; north: the azimuth of the world's +y."""
+    """Where the world's origin lies, in degrees and metres above sea level.
+
+    north: azimuth of the world's +y, degrees clockwise from true north. slope: of the plane z = 0, degrees; in which
+    direction is not known.
+    """
 
     latitude: float
     longitude: float
     altitude: float
     north: float
+    slope: float = field(default=0.0, kw_only=True)
     metres_per_unit: float
+
+    @property
+    def is_on_earth(self) -> bool:
+        """Whether all values are finite, the place is no pole and the scale is positive."""
+        return bool(np.isfinite(astuple(self)).all() and abs(self.latitude) < 89.9 and self.metres_per_unit > 0)
 
     @property
     def turn(self) -> Float[Array, "2 2"]:
@@ -52,23 +60,6 @@ class Georeference:
         offset = _geocentric(np.asarray(places, float)) - _geocentric(at)
         local = offset @ _axes(self.latitude, self.longitude).T
         return np.concatenate([local[:, :2] @ self.turn, local[:, 2:]], axis=1) / self.metres_per_unit
-
-
-def of_frame(frame: dict) -> Georeference | None:
-    """The georeference of a scene's ground.json, if it has one. Raises: InputError: one that no place on earth has."""
-    found = frame.get("georeference")
-    if found is None:
-        return None
-    try:
-        place = Georeference(**{key: float(found[key]) for key in Georeference.__annotations__})
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(
-            f"ground.json: its georeference is incomplete ({error}); make the photos stage again"
-        ) from error
-    values = np.array([getattr(place, key) for key in Georeference.__annotations__])
-    if not (np.isfinite(values).all() and abs(place.latitude) < 89.9 and place.metres_per_unit > 0):
-        raise InputError("ground.json: its georeference is no place on earth; check the GPS positions of the photos")
-    return place
 
 
 def _axes(latitude: float, longitude: float) -> Float[Array, "3 3"]:

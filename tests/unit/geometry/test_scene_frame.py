@@ -1,0 +1,123 @@
+"""ground.json: what is written is read back, in a fixed order of keys, and what is wrong in it is named."""
+
+import json
+from dataclasses import replace
+
+import pytest
+from fixtures.frames import scene_frame
+
+from dav_gswt.errors import InputError
+from dav_gswt.geometry.georeference import Georeference
+from dav_gswt.geometry.scene_frame import (
+    FocalLength,
+    LeftOutPhoto,
+    Square,
+    read_scene_frame,
+    write_scene_frame,
+)
+
+PLACE = Georeference(47.1, 8.0, 430.0, 12.0, 2.5, slope=3.0)
+FRAME = scene_frame(
+    (1.0, -2.0, 4.0),
+    (-5.0, -6.0, 7.0, 8.0),
+    photos_per_cell=3,
+    relief=0.01,
+    georeference=PLACE,
+    images=3,
+    registered=2,
+    left_out=(LeftOutPhoto("a.jpg", "too dark"),),
+    focal_ratio=1.0,
+    focal=FocalLength(300.0, 300.0, None, 3.0, "EXIF's"),
+    reprojection_error=0.5,
+    points=100,
+)
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "ground.json"
+
+
+def test_a_square_by_hand():
+    square = Square(1.0, -2.0, 4.0)
+    assert (square.east, square.north) == (5.0, 2.0)
+    assert square.centre.tolist() == [3.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        FRAME,
+        replace(FRAME, georeference=None, focal=None, test=("b.png",)),
+        scene_frame(kind="synthetic", test=("t.png",), test_groups={"low": ("t.png",)}, renderer={"llvm": None}),
+        scene_frame(kind="field", relief=0.1, gaussians=9, removed=1),
+    ],
+    ids=["photos", "without GPS", "synthetic", "field"],
+)
+def test_what_is_written_is_read_back(path, frame):
+    write_scene_frame(path, frame)
+    assert read_scene_frame(path) == frame
+
+
+def test_keys_are_written_in_the_order_of_the_format(path):
+    write_scene_frame(path, FRAME)
+    values = json.loads(path.read_text())
+    assert list(values) == [
+        *("kind", "unit", "flying_height", "exemplar", "extent", "photos_per_cell", "relief", "georeference", "test"),
+        *("images", "registered", "left_out", "focal_ratio", "focal", "reprojection_error", "points"),
+    ]
+    assert list(values["georeference"]) == ["latitude", "longitude", "altitude", "north", "slope", "metres_per_unit"]
+    assert values["left_out"] == [{"name": "a.jpg", "reason": "too dark"}] and values["test"] is None
+
+
+def test_a_frame_without_a_place_on_earth_has_no_georeference(path):
+    write_scene_frame(path, replace(FRAME, georeference=None))
+    assert "georeference" not in json.loads(path.read_text())
+
+
+def written_with(path, **values):
+    """FRAME's ground.json with other values; None: without the key."""
+    write_scene_frame(path, FRAME)
+    changed = json.loads(path.read_text()) | values
+    path.write_text(json.dumps({key: value for key, value in changed.items() if value is not None}))
+    return path
+
+
+def test_whole_numbers_are_read_as_lengths(path):
+    assert read_scene_frame(written_with(path, flying_height=2)).flying_height == 2.0
+
+
+def test_a_slope_that_is_not_stored_is_0(path):
+    place = {"latitude": 47.1, "longitude": 8, "altitude": 430, "north": 12, "metres_per_unit": 2.5}
+    assert read_scene_frame(written_with(path, georeference=place)).georeference == replace(PLACE, slope=0.0)
+
+
+@pytest.mark.parametrize(
+    "values, said",
+    [
+        ({"exemplar": None}, "exemplar"),
+        ({"exemplar": 3}, "exemplar"),
+        ({"exemplar": {"west": 0, "south": 0}}, "exemplar.side"),
+        ({"exemplar": {"west": 0, "south": 0, "side": -1}}, "no square"),
+        ({"exemplar": {"west": float("nan"), "south": 0, "side": 1}}, "no square"),
+        ({"flying_height": "high"}, "flying_height"),
+        ({"kind": "film"}, "kind"),
+        ({"georeference": {"latitude": 47.1, "longitude": 8, "altitude": 430, "metres_per_unit": 2.5}}, "north"),
+    ],
+)
+def test_a_wrong_value_is_named(path, values, said):
+    with pytest.raises(InputError, match=f"ground.json: not as the workflow writes it.*{said}.*photos stage again"):
+        read_scene_frame(written_with(path, **values))
+
+
+@pytest.mark.parametrize("wrong", [{"metres_per_unit": 0}, {"latitude": 90}, {"altitude": float("inf")}])
+def test_no_place_on_earth_is_refused(path, wrong):
+    place = {"latitude": 47.1, "longitude": 8, "altitude": 430, "north": 12, "metres_per_unit": 2.5}
+    with pytest.raises(InputError, match="no place on earth"):
+        read_scene_frame(written_with(path, georeference=place | wrong))
+
+
+def test_what_is_no_object_is_refused(path):
+    path.write_text("[]")
+    with pytest.raises(InputError, match="not as the workflow writes it"):
+        read_scene_frame(path)

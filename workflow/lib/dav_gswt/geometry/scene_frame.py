@@ -1,0 +1,150 @@
+"""The scene frame: the world coordinates of a scene, its exemplar and its extent, as ground.json stores them."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray as Array
+from pydantic import TypeAdapter, ValidationError
+
+from dav_gswt.errors import InputError
+from dav_gswt.files import read_json, write_json
+from dav_gswt.geometry.georeference import Georeference
+
+_COMMON = ("kind", "unit", "flying_height", "exemplar", "extent")
+_KEYS = {  # of ground.json by kind of scene, in the order in which they are written
+    "photos": (
+        *_COMMON,
+        *("photos_per_cell", "relief", "georeference", "test", "images", "registered", "left_out"),
+        *("focal_ratio", "focal", "reprojection_error", "points"),
+    ),
+    "synthetic": (*_COMMON, "test", "test_groups", "images", "registered", "left_out", "focal_ratio", "renderer"),
+    "field": (
+        *_COMMON,
+        *("test", "relief", "gaussians", "removed", "images", "registered", "left_out", "focal_ratio"),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Square:
+    """A square of the plane z = 0, its sides along x and y."""
+
+    west: float
+    south: float
+    side: float
+
+    @property
+    def east(self) -> float:
+        return self.west + self.side
+
+    @property
+    def north(self) -> float:
+        return self.south + self.side
+
+    @property
+    def centre(self) -> Float[Array, "3"]:
+        return np.array([self.west + self.side / 2, self.south + self.side / 2, 0.0])
+
+
+@dataclass(frozen=True)
+class Extent:
+    """A rectangle of the plane z = 0."""
+
+    west: float
+    south: float
+    east: float
+    north: float
+
+
+@dataclass(frozen=True)
+class LeftOutPhoto:
+    """A photo that was not registered, and why."""
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class FocalLength:
+    """How the focal length of a photo set was settled; pixels, medians over its cameras.
+
+    exif: None where no photo says. free: what bundle adjustment alone gives. tilt: of the views off the vertical,
+    degrees, 95th percentile. decision: in words.
+    """
+
+    exif: float | None
+    used: float
+    free: float | None
+    tilt: float
+    decision: str
+
+    @property
+    def ratio(self) -> float | None:
+        """The used focal length over EXIF's."""
+        return self.used / self.exif if self.exif else None
+
+
+@dataclass(frozen=True)
+class SceneFrame:
+    """A z-up world frame with the ground near z = 0, and how it came about.
+
+    flying_height: median height of the cameras, in world units. exemplar: the square that tiles are made of. extent: of
+    all ground that photos see. test, test_groups: names of photos that only test; None where the scene names none.
+    photos_per_cell: photos that must see ground of the exemplar. relief: spread of the points about the plane, in
+    flying heights. focal_ratio: the used focal length over EXIF's. reprojection_error: mean, pixels. points: of the
+    sparse model. gaussians, removed: of an imported field. renderer: versions of a synthetic scene's renderer.
+    """
+
+    kind: Literal["photos", "synthetic", "field"]
+    unit: str
+    flying_height: float
+    exemplar: Square
+    extent: Extent
+    test: tuple[str, ...] | None = None
+    test_groups: dict[str, tuple[str, ...]] | None = None
+    georeference: Georeference | None = None
+    photos_per_cell: int | None = None
+    relief: float | None = None
+    images: int = 0
+    registered: int = 0
+    left_out: tuple[LeftOutPhoto, ...] = ()
+    focal_ratio: float | None = None
+    focal: FocalLength | None = None
+    reprojection_error: float | None = None
+    points: int | None = None
+    gaussians: int | None = None
+    removed: int | None = None
+    renderer: dict[str, str | None] | None = None
+
+
+def write_scene_frame(path: Path | str, frame: SceneFrame) -> None:
+    """Write ground.json."""
+    values = asdict(frame)
+    if frame.georeference is None:
+        del values["georeference"]
+    write_json(path, {key: values[key] for key in _KEYS[frame.kind] if key in values})
+
+
+def read_scene_frame(path: Path | str) -> SceneFrame:
+    """Read ground.json.
+
+    Raises: InputError: not readable, a value is missing or of another type, an exemplar without area, or a
+        georeference that no place on earth has.
+    """
+    try:
+        frame = TypeAdapter(SceneFrame).validate_python(read_json(path))
+    except ValidationError as error:
+        first = error.errors()[0]
+        problem = f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
+        raise InputError(f"{path}: not as the workflow writes it ({problem}); make the photos stage again") from error
+    values = [*asdict(frame.exemplar).values(), *asdict(frame.extent).values(), frame.flying_height]
+    if not np.isfinite(values).all() or not frame.exemplar.side > 0:
+        raise InputError(
+            f"{path}: not as the workflow writes it (the exemplar is no square); make the photos stage again"
+        )
+    if frame.georeference and not frame.georeference.is_on_earth:
+        raise InputError(f"{path}: its georeference is no place on earth; check the GPS positions of the photos")
+    return frame
