@@ -31,7 +31,7 @@ def test_colour_correction_undoes_a_change_of_exposure():
     rng = np.random.default_rng(0)
     picture = rng.uniform(0.2, 0.6, (16, 16, 3)).astype(np.float32)
     photo = picture * [1.2, 1.0, 0.8] + [0.05, 0, -0.02]
-    np.testing.assert_allclose(metrics.colour_corrected(picture, photo, ONE), photo, atol=1e-6)
+    np.testing.assert_allclose(metrics.correct_colours(picture, photo, ONE), photo, atol=1e-6)
 
 
 def test_ssim_is_1_for_equal_pictures_and_falls_with_noise():

@@ -18,6 +18,7 @@ from dav_gswt.field import GaussianField, concatenate_fields, mean_scale
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
+from dav_gswt.images.metrics import mse_to_psnr
 from dav_gswt.logs import progress
 from dav_gswt.raster import Rasterizer, to_raster_arrays
 from dav_gswt.tiles.build import TileSet
@@ -129,4 +130,4 @@ def _told(error: Float32[Array, "n 3"], cut: UInt8[Array, "n"]) -> dict:
 
 def _decibels(error: Float32[Array, "n 3"]) -> float | None:
     square = float((error.astype(float) ** 2).mean()) if len(error) else 0.0
-    return -10 * float(np.log10(square)) if square > 0 else None
+    return mse_to_psnr(square)

@@ -13,6 +13,7 @@ from numpy import ndarray as Array
 from dav_gswt.bundle import lod, orders
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
+from dav_gswt.images.metrics import mse_to_psnr
 from dav_gswt.raster import Rasterizer, to_raster_arrays
 
 ELEVATIONS = {"walker": float(np.degrees(np.arcsin(0.1))), "oblique": 45.0}  # a walker's eye: a tenth of the distance
@@ -73,7 +74,7 @@ def _shown(field: GaussianField, middle: Float[Array, "3"], camera: Camera) -> B
 def decibels(pairs: list[tuple[Float32[Array, "h w 3"], Float32[Array, "h w 3"]]]) -> float | None:
     """PSNR of pictures against others, over all pixels of all; None: they are equal."""
     square = float(np.mean([((a.astype(float) - b) ** 2).mean() for a, b in pairs]))
-    return -10 * float(np.log10(square)) if square > 0 else None
+    return mse_to_psnr(square)
 
 
 def _camera(along: Float[Array, "3"], pixel: float) -> Camera:

@@ -1,25 +1,30 @@
-"""How good a picture is: PSNR and SSIM, over the pixels that count, raw and with its exposure corrected."""
+"""Image quality against a reference: PSNR and SSIM over weighted pixels, raw or after a colour correction."""
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
 
-def psnr(a: Float[Array, "h w 3"], b: Float[Array, "h w 3"], weight: Float[Array, "h w"]) -> float | None:
-    """Peak signal-to-noise ratio in dB over pixels of weight > 0, for values in [0, 1]; None if they are equal.
+def mse_to_psnr(mse: float) -> float | None:
+    """Peak signal-to-noise ratio in dB of a mean squared error of values in [0, 1]; None where the error is 0."""
+    return None if mse == 0 else float(-10 * np.log10(mse))
 
-    Raises: ValueError: no pixel counts.
+
+def psnr(a: Float[Array, "h w 3"], b: Float[Array, "h w 3"], weight: Float[Array, "h w"]) -> float | None:
+    """PSNR in dB, the squared error averaged by weight, for values in [0, 1]; None if the pictures are equal.
+
+    Raises: ValueError: the weight is 0 everywhere.
     """
     if not (total := float(weight.sum())) > 0:
         raise ValueError("no pixel of the picture counts: its weight is 0 everywhere")
     error = float((((a - b).astype(float) ** 2).mean(-1) * weight).sum() / total)
-    return None if error == 0 else -10 * np.log10(error)
+    return mse_to_psnr(error)
 
 
-def colour_corrected(
+def correct_colours(
     picture: Float[Array, "h w 3"], photo: Float[Array, "h w 3"], weight: Float[Array, "h w"]
 ) -> Float[Array, "h w 3"]:
-    """The picture fitted to the photo by a least-squares gain and offset per channel: photos change exposure."""
+    """The picture after a least-squares gain and offset per channel that fit it to the photo's exposure."""
     keep = weight > 0
     out = np.empty_like(picture)
     for c in range(3):
@@ -30,8 +35,8 @@ def colour_corrected(
 
 
 def ssim(a: Float[Array, "h w 3"], b: Float[Array, "h w 3"], weight: Float[Array, "h w"]) -> float:
-    """Structural similarity (Wang et al. 2004; 11-tap Gaussian window), mean over pixels of weight > 0."""
-    import torch  # here, not above: most jobs need neither it nor kornia, and they take seconds to load
+    """Structural similarity (Wang et al. 2004; 11-tap Gaussian window), its map averaged by weight."""
+    import torch  # deferred: torch and kornia take seconds to load, and most jobs need neither
     from kornia.metrics import ssim as ssim_map
 
     first, second = (torch.from_numpy(np.ascontiguousarray(x, np.float32)).movedim(-1, 0)[None] for x in (a, b))

@@ -46,7 +46,7 @@ def _summed(rows: list[dict]) -> dict:
 
 def _row(field: GaussianField, view: View, weights: Weights | None) -> dict:
     seen = np.clip(render(field, view.camera).colour, 0, 1)
-    level = np.clip(metrics.colour_corrected(seen, view.image, view.weight), 0, 1).astype(np.float32)
+    level = np.clip(metrics.correct_colours(seen, view.image, view.weight), 0, 1).astype(np.float32)
     return {
         "view": view.name,
         "psnr": metrics.psnr(seen, view.image, view.weight),

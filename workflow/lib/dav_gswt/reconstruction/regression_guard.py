@@ -123,7 +123,7 @@ def _psnr(drawn: raster.Rasterizer, field: GaussianField, view: View) -> float:
     picture = seen.colour
     if view.behind is not None:
         picture = picture + (1 - seen.alpha)[..., None] * np.nan_to_num(view.behind)
-    level = np.clip(metrics.colour_corrected(np.clip(picture, 0, 1), view.image, view.weight), 0, 1)
+    level = np.clip(metrics.correct_colours(np.clip(picture, 0, 1), view.image, view.weight), 0, 1)
     found = metrics.psnr(level.astype(np.float32), view.image, view.weight)
     return SAME if found is None else min(SAME, float(found))
 

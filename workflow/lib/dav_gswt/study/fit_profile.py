@@ -104,7 +104,7 @@ def quality_of(draw: Callable[[View], Float32[Array, "h w 3"]], tests: list[View
     raw, level = [], []
     for view in tests:
         seen = np.clip(draw(view), 0, 1)
-        corrected = np.clip(metrics.colour_corrected(seen, view.image, view.weight), 0, 1).astype(np.float32)
+        corrected = np.clip(metrics.correct_colours(seen, view.image, view.weight), 0, 1).astype(np.float32)
         raw.append(metrics.psnr(seen, view.image, view.weight))
         level.append(metrics.psnr(corrected, view.image, view.weight))
     return {"psnr": float(np.mean(raw)), "psnr_colour_corrected": float(np.mean(level))}

@@ -4,6 +4,8 @@ import numpy as np
 from jaxtyping import Bool, Float32
 from numpy import ndarray as Array
 
+from dav_gswt.images.metrics import mse_to_psnr
+
 SHARE = 0.04  # of the pixels
 # Pixels a side of what is held out at once: within fewer the photo itself tells what is there, which no new view can.
 # Desert, for development, 300 to 450 steps with twice the Gaussians: new views gain .10 dB; 32: +.14, 8: -.07.
@@ -34,4 +36,6 @@ class Tally:
     @property
     def psnr(self) -> float:
         """100 where nothing is wrong, or nothing counts."""
-        return float(-10 * np.log10(max(self.error / max(self.count, 1e-9), 1e-10)))
+        found = mse_to_psnr(max(self.error / max(self.count, 1e-9), 1e-10))
+        assert found is not None  # the error is above 0
+        return found

@@ -45,7 +45,7 @@ def errors(
         if counts.any():
             picture = _picture(field, view.camera, size)
             if corrected:
-                picture = np.clip(metrics.colour_corrected(picture, view.image, weight), 0, 1)
+                picture = np.clip(metrics.correct_colours(picture, view.image, weight), 0, 1)
             apart = picture[counts].astype(np.float64) - view.image[counts]
             squares[counts] = (apart**2).mean(-1)
             error[i] = np.sqrt(squares[counts].mean())

@@ -104,7 +104,7 @@ def _equal() -> list[Point]:
 
 
 def _corrected(a: Array, b: Array, weight: Array) -> Array:
-    return metrics.colour_corrected(a, b, weight)
+    return metrics.correct_colours(a, b, weight)
 
 
 def _corrected_slowly(a: Array, b: Array, weight: Array) -> Array:

@@ -7,6 +7,7 @@ import numpy as np
 from dav_gswt import provenance
 from dav_gswt.images import image_files
 from dav_gswt.study import csv_tables
+from dav_gswt.images.metrics import mse_to_psnr
 from dav_gswt.study.sweeps import tables as sweeps
 from dav_gswt.study.sweeps.grid import CELL
 from dav_gswt.study.tradeoff.front import front, rivals
@@ -58,7 +59,7 @@ def _lost(mine: dict, best: dict) -> dict:
     found = {"loss_lpips": _difference(mine["lpips"], best["lpips"]), "stills_psnr": None}
     if mine["measure"] == "stills":
         error = mean_square(mine["stills"], best["stills"])
-        found["stills_psnr"] = None if error == 0 else float(-10 * np.log10(error))
+        found["stills_psnr"] = mse_to_psnr(error)
         return found | {"loss": LEVELS_OF_GREY * float(np.sqrt(error))}
     if mine["measure"] == "seams":
         return found | {"loss": _difference(mine["seam_lpips"], best["seam_lpips"])}

@@ -108,7 +108,7 @@ def look(one: Round, view: View, key: str) -> Look:
     (view,) = modelled([view], one.grid)
     picture = np.clip(render(one.field, view.camera).colour, 0, 1)
     if key == "psnr_colour_corrected":
-        picture = np.clip(metrics.colour_corrected(picture, view.image, view.weight), 0, 1).astype(np.float32)
+        picture = np.clip(metrics.correct_colours(picture, view.image, view.weight), 0, 1).astype(np.float32)
     counts = view.weight > 0
     error = np.where(counts, np.abs(picture - view.image).mean(-1), np.float32(np.nan))
     return Look(faded(picture, counts), error, row)
