@@ -14,4 +14,6 @@ with logging_to(snakemake.log[0]):
     terrain = assemble.of_bundle(bundle, params.heights)
     with whole_folder(snakemake.output.frames) as folder:
         for shot in progress(still.flight(**params.flight), "render flight"):
-            image_files.write(folder / f"{shot.name}.png", still.taken(terrain, shot, bundle.manifest, **params.size))
+            image_files.write_png(
+                folder / f"{shot.name}.png", still.taken(terrain, shot, bundle.manifest, **params.size)
+            )

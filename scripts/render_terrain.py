@@ -13,4 +13,4 @@ with logging_to(snakemake.log[0]):
     terrain = assemble.of_bundle(bundle, params.heights)
     targets = {Path(path).stem: path for path in snakemake.output.stills}
     for shot in progress(still.SHOTS, "render stills"):
-        image_files.write(targets[shot.name], still.taken(terrain, shot, bundle.manifest, **params.size))
+        image_files.write_png(targets[shot.name], still.taken(terrain, shot, bundle.manifest, **params.size))

@@ -17,6 +17,6 @@ with logging_to(snakemake.log[0]):
     found = fit_profile.run(photos, quality)
     csv_tables.write_table(out.curve, found.curve)
     for name, picture in fit_profile.stills(found.made, photos.frame).items():
-        image_files.write(out[name], picture)
+        image_files.write_png(out[name], picture)
     inputs = {"frame": snakemake.input.frame}
     write_json(out.facts, fit_profile.facts(found, photos) | {"provenance": provenance.of(inputs, settings)})

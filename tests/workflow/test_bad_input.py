@@ -23,7 +23,7 @@ def noise(seed: int, height: int = HEIGHT, width: int = WIDTH):
 
 def noisy_photos(folder, count: int) -> None:
     for number in range(count):
-        image_files.write(folder / f"{number}.png", noise(number))
+        image_files.write_png(folder / f"{number}.png", noise(number))
 
 
 def one_that_is_text(folder) -> None:
@@ -128,11 +128,11 @@ def test_a_field_on_its_side_says_what_to_give(refused, tiny, tmp_path):
 def some_of_the_beach(photo_sets, tmp_path):
     """Ten photos of the beach, small, every other one of them smaller still."""
     (tmp_path / "photos").mkdir()
-    for number, path in enumerate(image_files.listed(photo_sets / "brighton_beach/images")[:10]):
-        photo = image_files.read(path)
+    for number, path in enumerate(image_files.list_photos(photo_sets / "brighton_beach/images")[:10]):
+        photo = image_files.read_photo(path)
         share = (640 if number % 2 else 512) / max(photo.shape[:2])
-        small = image_files.resized(photo, round(photo.shape[1] * share), round(photo.shape[0] * share))
-        image_files.write(tmp_path / "photos" / f"{number}.png", small)
+        small = image_files.shrink_image(photo, round(photo.shape[1] * share), round(photo.shape[0] * share))
+        image_files.write_png(tmp_path / "photos" / f"{number}.png", small)
     return tmp_path
 
 
@@ -148,7 +148,7 @@ def test_photos_of_mixed_sizes_find_their_places(snakemake, some_of_the_beach):
 
 def test_a_photo_cut_short_stops_before_any_is_used(refused, photo_sets, tmp_path):
     (tmp_path / "photos").mkdir()
-    for path in image_files.listed(photo_sets / "brighton_beach/images")[:4]:
+    for path in image_files.list_photos(photo_sets / "brighton_beach/images")[:4]:
         shutil.copy(path, tmp_path / "photos")
     whole = path.read_bytes()
     (tmp_path / "photos" / path.name).write_bytes(whole[: len(whole) // 3])

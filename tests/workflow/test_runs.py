@@ -44,7 +44,7 @@ def test_photos_and_their_cameras_are_there(tiny, tiny_config):
     assert {p.name for p in (tiny.photos / "images").glob("[!.]*")} == set(known.names)
     assert len(known.names) == scene["photos"] + scene["test"] and len(frame["test"]) == scene["test"]
     for name in known.names:
-        assert image_files.size(tiny.photos / "images" / name) == (scene["size"], scene["size"])
+        assert image_files.read_size(tiny.photos / "images" / name) == (scene["size"], scene["size"])
 
 
 def test_no_photo_both_tests_and_is_fitted(tiny):
@@ -170,7 +170,7 @@ def test_stills_show_ground_without_holes(made, tiny_config, request):
     """Not black, not flat, no haze of one colour; and nothing darker than shade in a place that is lit."""
     terrain, size = request.getfixturevalue(made).terrain, tiny_config["stills"]
     for shot in SHOTS:
-        still = image_files.read(terrain / f"{shot.name}.png")
+        still = image_files.read_photo(terrain / f"{shot.name}.png")
         assert still.shape == (size["height"], size["width"], 3)
         below = still[size["height"] // 2 :]
         assert 0.15 < below.mean() < 0.9 and below.std() > 0.01, shot.name

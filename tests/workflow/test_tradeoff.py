@@ -80,4 +80,4 @@ def test_a_finished_run_is_measured_drawn_and_told(snakemake, tiny, tmp_path):
         "results/tradeoff/knobs.png",
         "docs/research/figures/tradeoff_knobs.png",
     ):
-        assert image_files.size(folder / path)[0] > 300
+        assert image_files.read_size(folder / path)[0] > 300

@@ -59,4 +59,4 @@ def test_a_finished_run_has_both_figures(snakemake, tiny, tmp_path):
     done = snakemake(folder, "--cores", "2", *made, configs=(USUAL, TINY))
     assert "2 of 2 steps (100%) done" in done.stdout  # all they need is there
     for path in made:
-        assert image_files.size(folder / path)[0] >= 1000 and image_files.read(folder / path).std() > 0.05
+        assert image_files.read_size(folder / path)[0] >= 1000 and image_files.read_photo(folder / path).std() > 0.05

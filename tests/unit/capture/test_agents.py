@@ -31,7 +31,7 @@ def asked(*places):
 
 
 def picture(path, value=0.5):
-    image_files.write(path, np.full((8, 8, 3), value, np.float32))
+    image_files.write_png(path, np.full((8, 8, 3), value, np.float32))
     return path
 
 
@@ -66,7 +66,7 @@ def test_a_burst_takes_several_photos_of_a_pose(tmp_path):
     assert [(shot.name, shot.pose.name) for shot in found] == [("1.png", "a0"), ("0.png", "a0"), ("2.png", "a1")]
     made = render.take(lambda _, i: np.full((8, 8, 3), i / 4, np.float32), asked(0.0), 3, tmp_path)
     assert [shot.name for shot in made] == ["a0_0.png", "a0_1.png", "a0_2.png"]
-    assert image_files.read(tmp_path / "a0_2.png")[0, 0, 0] == pytest.approx(0.5, abs=0.01)
+    assert image_files.read_photo(tmp_path / "a0_2.png")[0, 0, 0] == pytest.approx(0.5, abs=0.01)
 
 
 def test_the_store_gives_a_poses_photos_back_and_no_others(tmp_path):
@@ -75,7 +75,7 @@ def test_the_store_gives_a_poses_photos_back_and_no_others(tmp_path):
     for value in (0.2, 0.4):
         store.add(picture(tmp_path / "in.PNG", value), "serial", *one, at(0.1), WHEN)
     found = store.of(one[1])
-    assert [round(float(image_files.read(s.photo)[0, 0, 0]), 1) for s in found] == [0.2, 0.4]
+    assert [round(float(image_files.read_photo(s.photo)[0, 0, 0]), 1) for s in found] == [0.2, 0.4]
     assert found[0].got.centre[0] == pytest.approx(0.1) and found[0].taken == WHEN
     assert store.of(two[1]) == [] and len(store.records()) == 2
 
@@ -126,7 +126,7 @@ def test_what_the_store_holds_is_not_taken_again(site, tmp_path, monkeypatch):
     assert calls == [["a1"]]
     assert [shot.name for shot in found] == ["a0.png", "a1.png"]
     assert found[1].apart == pytest.approx(0.75 / 5) and found[1].taken == WHEN
-    assert image_files.size(tmp_path / "a1.png") == (8, 8)
+    assert image_files.read_size(tmp_path / "a1.png") == (8, 8)
 
 
 @pytest.mark.parametrize("agent", ["render", "replay", "serial", "plan", "handheld"])

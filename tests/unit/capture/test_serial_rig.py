@@ -84,7 +84,7 @@ def test_each_pose_is_photographed_once_from_where_it_was_asked_for(shoot):
     for i, place in enumerate(PLACES):
         camera = posed(i, place)[1]
         [stored] = store.of(camera)
-        assert image_files.read(stored.photo).shape == (48, 64, 3)
+        assert image_files.read_photo(stored.photo).shape == (48, 64, 3)
         np.testing.assert_allclose(stored.got.rotation, camera.rotation, atol=2e-5)  # the line's thousandth of a degree
         np.testing.assert_allclose(stored.got.centre, camera.centre, atol=1e-4)
         assert stored.got.fx == camera.fx
@@ -264,7 +264,7 @@ def test_a_config_without_dry_run_is_one(shoot):
 
 def test_what_was_in_the_inbox_before_is_not_taken_for_a_photo(shoot, tmp_path):
     old = tmp_path / "inbox" / "old.png"
-    image_files.write(old, np.zeros((48, 64, 3)))
+    image_files.write_png(old, np.zeros((48, 64, 3)))
     (tmp_path / "inbox" / "shot.part").write_bytes(b"unfinished")
     _, ended, store = shoot()
     assert (ended, held(store)) == ("", [1, 1, 1, 1])
@@ -272,10 +272,10 @@ def test_what_was_in_the_inbox_before_is_not_taken_for_a_photo(shoot, tmp_path):
 
 
 def test_a_photo_written_over_another_is_new(tmp_path):
-    image_files.write(tmp_path / "capt.png", np.zeros((48, 64, 3)))
+    image_files.write_png(tmp_path / "capt.png", np.zeros((48, 64, 3)))
     before = inbox.listing(tmp_path)
     assert inbox.arrived(tmp_path, before, 0.0) is None
-    image_files.write(tmp_path / "capt.png", np.random.default_rng(0).random((48, 64, 3)))
+    image_files.write_png(tmp_path / "capt.png", np.random.default_rng(0).random((48, 64, 3)))
     assert inbox.arrived(tmp_path, before, 5.0) == tmp_path / "capt.png"
 
 

@@ -107,7 +107,7 @@ def test_the_walk_is_told_in_metres_and_flying_heights(listed):
 
 
 def test_the_expected_picture_is_the_field_over_sky_and_ground(listed):
-    picture = image_files.read(listed[0] / "place_001.png")
+    picture = image_files.read_photo(listed[0] / "place_001.png")
     assert picture.shape == (540, 720, 3)
     low = cameras.pinhole([1.6, -3.0, 0.5], [1.6, 1.6, 0.9], 40, 30, 60.0)
     drawn = shot_list_page.expected(made.field(), low)

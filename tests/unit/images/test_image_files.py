@@ -29,31 +29,31 @@ def stored(path, pixels, **attributes):
 
 
 def test_a_png_comes_back_to_the_bit(tmp_path):
-    image_files.write(tmp_path / "a.png", PICTURE / 255)
-    assert np.array_equal(np.rint(image_files.read(tmp_path / "a.png") * 255).astype(np.uint8), PICTURE)
+    image_files.write_png(tmp_path / "a.png", PICTURE / 255)
+    assert np.array_equal(np.rint(image_files.read_photo(tmp_path / "a.png") * 255).astype(np.uint8), PICTURE)
 
 
 def test_writing_the_same_image_twice_gives_the_same_bytes(tmp_path):
     for name in ("a.png", "b.png"):
-        image_files.write(tmp_path / name, PICTURE / 255)
+        image_files.write_png(tmp_path / name, PICTURE / 255)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
 def test_a_write_that_fails_leaves_nothing_behind(tmp_path):
     (tmp_path / ".a.png.part.png").symlink_to("/dev/full")
     with pytest.raises(OSError):
-        image_files.write(tmp_path / "a.png", np.tile(PICTURE / 255, (99, 99, 1)))
+        image_files.write_png(tmp_path / "a.png", np.tile(PICTURE / 255, (99, 99, 1)))
     assert not list(tmp_path.iterdir())
 
 
 def test_sixteen_bits_are_read_to_their_full_depth(tmp_path):
     path = stored(tmp_path / "a.tif", np.full((4, 5, 3), 12345, np.uint16))
-    assert image_files.read(path) == pytest.approx(12345 / 65535, abs=1e-7)
+    assert image_files.read_photo(path) == pytest.approx(12345 / 65535, abs=1e-7)
 
 
 def test_grey_becomes_three_equal_channels(tmp_path):
     path = stored(tmp_path / "a.png", PICTURE[..., :1])
-    assert image_files.read(path) == pytest.approx(
+    assert image_files.read_photo(path) == pytest.approx(
         np.repeat(PICTURE[..., :1], 3, 2) / 255, abs=1e-7
     )  # float32's rounding
 
@@ -61,7 +61,7 @@ def test_grey_becomes_three_equal_channels(tmp_path):
 @pytest.mark.parametrize("channels", [2, 4])
 def test_alpha_is_left_out_and_colours_stay_as_stored(tmp_path, channels):
     with_alpha = np.concatenate([PICTURE[..., : channels - 1], np.full((6, 9, 1), 100, np.uint8)], 2)
-    seen = image_files.read(stored(tmp_path / "a.png", with_alpha))
+    seen = image_files.read_photo(stored(tmp_path / "a.png", with_alpha))
     assert np.rint(seen[..., 0] * 255).astype(int).tolist() == PICTURE[..., 0].tolist()
 
 
@@ -82,8 +82,8 @@ UPRIGHT = {
 def test_exif_orientation_is_applied(tmp_path, orientation):
     sensor = np.repeat(np.arange(6, dtype=np.uint8).reshape(2, 3, 1), 3, 2)
     path = stored(tmp_path / "a.tif", sensor, Orientation=orientation)
-    assert (image_files.read(path)[..., 0] * 255).round().tolist() == UPRIGHT[orientation]
-    width, height = image_files.size(path)
+    assert (image_files.read_photo(path)[..., 0] * 255).round().tolist() == UPRIGHT[orientation]
+    width, height = image_files.read_size(path)
     assert (height, width) == np.shape(UPRIGHT[orientation])
 
 
@@ -93,14 +93,14 @@ def test_a_half_written_image_is_refused_by_name(tmp_path, suffix, share):
     path = stored(tmp_path / f"half.{suffix}", GENERATOR.integers(0, 256, (90, 80, 3)).astype(np.uint8))
     path.write_bytes(path.read_bytes()[: int(path.stat().st_size * share)])
     with pytest.raises(InputError, match=f"half.{suffix}"):
-        image_files.read(path)
+        image_files.read_photo(path)
 
 
 def test_what_is_no_image_and_what_is_not_there_is_refused_by_name(tmp_path):
     (tmp_path / "text.jpg").write_text("no image at all")
     for name in ("text.jpg", "nothing.jpg"):
         with pytest.raises(InputError, match=name):
-            image_files.read(tmp_path / name)
+            image_files.read_photo(tmp_path / name)
 
 
 def test_a_header_that_promises_too_many_pixels_is_refused_before_they_are_allocated(tmp_path):
@@ -109,59 +109,59 @@ def test_a_header_that_promises_too_many_pixels_is_refused_before_they_are_alloc
     head = struct.pack(">I", 13) + chunk + struct.pack(">I", zlib.crc32(chunk))
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + head + struct.pack(">I", 9) + b"IDAT" + bytes(99))
     with pytest.raises(InputError, match="huge.png"):
-        image_files.read(path)
+        image_files.read_photo(path)
 
 
 def test_more_pixels_than_allowed_are_refused_with_their_number(tmp_path, monkeypatch):
-    image_files.write(tmp_path / "a.png", PICTURE / 255)
-    monkeypatch.setattr(image_files, "MOST_PIXELS", 6 * 9 - 1)
+    image_files.write_png(tmp_path / "a.png", PICTURE / 255)
+    monkeypatch.setattr(image_files, "MAX_PIXELS", 6 * 9 - 1)
     with pytest.raises(InputError, match="a.png: 9 x 6 pixels"):
-        image_files.read(tmp_path / "a.png")
+        image_files.read_photo(tmp_path / "a.png")
 
 
 def test_a_float_image_with_nan_is_refused(tmp_path):
     pixels = np.full((4, 4, 3), 0.5, np.float32)
     pixels[1, 2] = np.nan
     with pytest.raises(InputError, match="finite"):
-        image_files.read(stored(tmp_path / "a.tif", pixels))
+        image_files.read_photo(stored(tmp_path / "a.tif", pixels))
 
 
 def test_photos_are_listed_by_name_without_hidden_and_other_files(tmp_path):
     for name in ("b.JPG", "a.png", ".c.jpg", "notes.txt", "raw.dng"):
         (tmp_path / name).write_bytes(b"x")
-    assert [p.name for p in image_files.listed(tmp_path)] == ["a.png", "b.JPG"]
+    assert [p.name for p in image_files.list_photos(tmp_path)] == ["a.png", "b.JPG"]
 
 
 def test_a_folder_without_photos_is_refused_and_says_what_to_do(tmp_path):
     (tmp_path / "raw.heic").write_bytes(b"x")
     with pytest.raises(InputError, match="no photos.*raw.heic.*JPEG"):
-        image_files.listed(tmp_path)
+        image_files.list_photos(tmp_path)
     with pytest.raises(InputError, match="no such folder"):
-        image_files.listed(tmp_path / "nowhere")
+        image_files.list_photos(tmp_path / "nowhere")
 
 
 def test_shrinking_averages_areas_by_hand():
     row = np.array([[0.0, 3.0, 6.0]], np.float32)[..., None]
     # Two pixels of 1.5 old ones each: (0 + 3/2) / 1.5 = 1 and (3/2 + 6) / 1.5 = 5.
-    assert image_files.resized(row, 2, 1)[0, :, 0] == pytest.approx([1, 5])
+    assert image_files.shrink_image(row, 2, 1)[0, :, 0] == pytest.approx([1, 5])
 
 
 def test_shrinking_equals_blocks_of_the_finest_common_grid():
     image = GENERATOR.random((6, 10, 3)).astype(np.float32)
     fine = image.repeat(2, 0).repeat(4 // 2, 1)  # 12 x 20: multiples of 4 x 5
     slow = fine.reshape(4, 3, 5, 4, 3).mean((1, 3))
-    assert image_files.resized(image, 5, 4) == pytest.approx(slow, abs=1e-6)  # one rounding to float32
+    assert image_files.shrink_image(image, 5, 4) == pytest.approx(slow, abs=1e-6)  # one rounding to float32
 
 
 def test_shrinking_keeps_the_mean_and_a_constant():
     image = GENERATOR.random((31, 47, 3)).astype(np.float32)
-    assert image_files.resized(image, 13, 7).mean((0, 1)) == pytest.approx(image.mean((0, 1)), abs=1e-6)
-    assert np.array_equal(image_files.resized(image, 47, 31), image)
+    assert image_files.shrink_image(image, 13, 7).mean((0, 1)) == pytest.approx(image.mean((0, 1)), abs=1e-6)
+    assert np.array_equal(image_files.shrink_image(image, 47, 31), image)
 
 
 def test_photos_are_never_enlarged():
     with pytest.raises(ValueError, match="does not shrink"):
-        image_files.resized(np.zeros((4, 4, 3), np.float32), 5, 4)
+        image_files.shrink_image(np.zeros((4, 4, 3), np.float32), 5, 4)
 
 
 def test_exr_keeps_channels_by_name_and_texts_and_leaves_the_arguments_alone(tmp_path):

@@ -94,7 +94,7 @@ def test_a_picture_shows_colours_where_they_belong(drawable, tmp_path):
     image_files.write_exr(tmp_path / "uncertainty.exr", {"uncertainty": values})
     out = tmp_path / "a.png"
     assert main(["inspect", str(tmp_path / "uncertainty.exr"), "--save", str(out), "--size", "400x300"]) == 0
-    picture = image_files.read(out)
+    picture = image_files.read_photo(out)
     assert picture.shape == (300, 400, 3)
     warm = (picture[..., 0] > 0.6) & (picture[..., 2] < 0.3)
     cool = (picture[..., 2] > 0.6) & (picture[..., 0] < 0.3)
@@ -120,7 +120,7 @@ def test_a_page_is_the_same_each_time_and_asks_for_nothing(drawable, tree, tmp_p
     warm = cool = 0
     for _ in range(100):  # until candidates of both kinds are drawn
         page.screenshot(path=str(tmp_path / "seen.png"))
-        picture = image_files.read(tmp_path / "seen.png")[200:]
+        picture = image_files.read_photo(tmp_path / "seen.png")[200:]
         warm = (picture[..., 0] - picture[..., 2] > 0.4).sum()
         cool = (picture[..., 2] - picture[..., 0] > 0.4).sum()
         if min(warm, cool) > 50:

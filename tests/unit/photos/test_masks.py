@@ -15,7 +15,7 @@ from dav_gswt.photos import folder, masks, training_views
 def found(tmp_path):
     """One registered photo, photo.jpg, through a lens without distortion."""
     camera = made_up.camera((0, 0, 1))
-    image_files.write(tmp_path / "photo.png", np.full((camera.height, camera.width, 3), 0.5))
+    image_files.write_png(tmp_path / "photo.png", np.full((camera.height, camera.width, 3), 0.5))
     params = [camera.fx, camera.fy, camera.cx, camera.cy]
     lens = pycolmap.Camera(model="PINHOLE", width=camera.width, height=camera.height, params=params)
     one = made_up.model([camera], np.zeros((1, 3)))
@@ -27,7 +27,7 @@ def masked(tmp_path, name="photo.png", shape=(120, 160)):
     (tmp_path / "masks").mkdir()
     mask = np.ones((*shape, 3), np.float32)
     mask[:, : shape[1] // 2] = 0
-    image_files.write(tmp_path / "masks" / name, mask)
+    image_files.write_png(tmp_path / "masks" / name, mask)
     return tmp_path / "masks"
 
 
@@ -43,7 +43,7 @@ def test_masks_go_with_the_pictures_as_their_alpha_and_views_do_not_count_them(f
     picture = np.random.default_rng(0).uniform(0, 1, (240, 320, 3)).astype(np.float32)
     folder.write(tmp_path / "photos", found.model, [("000.png", picture)], scene_frame(), None, covers)
     path = tmp_path / "photos" / "images" / "000.png"
-    np.testing.assert_allclose(image_files.read(path), picture, atol=0.5 / 255 + 1e-6)  # also under the mask
+    np.testing.assert_allclose(image_files.read_photo(path), picture, atol=0.5 / 255 + 1e-6)  # also under the mask
     for size in (320, 160):
         view = training_views.read("000.png", found.model.cameras[0], path, size)
         assert not view.weight[:, : size // 2].any() and view.weight[:, size // 2 + 3 :].all()

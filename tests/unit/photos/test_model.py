@@ -97,7 +97,7 @@ def test_an_image_that_is_not_in_the_model_is_named(flown):
 
 def test_colours_come_from_the_named_images_alone(flown, tmp_path):
     for i, name in enumerate(flown.names):
-        image_files.write(tmp_path / name, np.full((made_up.HEIGHT, made_up.WIDTH, 3), 0.2 if i < 3 else 1.0))
+        image_files.write_png(tmp_path / name, np.full((made_up.HEIGHT, made_up.WIDTH, 3), 0.2 if i < 3 else 1.0))
     _, colours = models.points_seen_by(flown, flown.names[:3], tmp_path)
     assert colours == pytest.approx(np.full(colours.shape, 0.2), abs=1e-6)
 

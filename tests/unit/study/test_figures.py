@@ -10,26 +10,26 @@ def test_a_plot_is_a_picture_and_the_same_each_time(tmp_path):
     for name in ("a.png", "b.png"):
         figures.fit_time({"dunes": rows}, tmp_path / name)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-    assert image_files.read(tmp_path / "a.png").std() > 0.05
+    assert image_files.read_photo(tmp_path / "a.png").std() > 0.05
 
 
 @pytest.mark.parametrize("ending", [".png", ".jpg"])
 def test_a_picture_is_kept_as_its_ending_says(tmp_path, ending):
     picture = np.tile(np.linspace(0, 1, 64, dtype=np.float32)[:, None, None], (1, 48, 3))
-    image_files.write(tmp_path / "a.png", picture)
+    image_files.write_png(tmp_path / "a.png", picture)
     figures.kept(tmp_path / "a.png", tmp_path / f"b{ending}")
     assert (tmp_path / f"b{ending}").read_bytes()[:3] == {".png": b"\x89PN", ".jpg": b"\xff\xd8\xff"}[ending]
-    np.testing.assert_allclose(image_files.read(tmp_path / f"b{ending}"), picture, atol=0.02)
+    np.testing.assert_allclose(image_files.read_photo(tmp_path / f"b{ending}"), picture, atol=0.02)
 
 
 def test_a_sheet_shows_every_picture_in_its_row(tmp_path):
     """Two rows of two: each quarter has the colour of its own picture."""
     colours = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0]], np.float32)
     for number, colour in enumerate(colours):
-        image_files.write(tmp_path / f"{number}.png", np.broadcast_to(colour, (40, 80, 3)))
+        image_files.write_png(tmp_path / f"{number}.png", np.broadcast_to(colour, (40, 80, 3)))
     rows = {name: [tmp_path / f"{k + n}.png" for n in (0, 1)] for k, name in ((0, "upper"), (2, "lower"))}
     figures.save(figures.sheet(rows, ["left", "right"], tall=1.0), tmp_path / "sheet.png")
-    shown = image_files.read(tmp_path / "sheet.png")
+    shown = image_files.read_photo(tmp_path / "sheet.png")
     high, wide = (n // 4 for n in shown.shape[:2])
     found = [shown[y * high, x * wide] for y in (1, 3) for x in (1, 3)]
     np.testing.assert_allclose(found, colours, atol=0.02)

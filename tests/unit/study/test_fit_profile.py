@@ -27,7 +27,7 @@ def test_the_sixth_photo_and_every_tenth_after_it_are_for_testing(tmp_path):
     (tmp_path / "images").mkdir()
     names = tuple(f"{chr(97 + i)}.png" for i in range(17))
     for name, photo in zip(names, photos, strict=True):
-        image_files.write(tmp_path / "images" / name, photo.image)
+        image_files.write_png(tmp_path / "images" / name, photo.image)
     none = np.zeros(0, int)
     cameras = tuple(photo.camera for photo in photos)
     (tmp_path / "sparse").mkdir()

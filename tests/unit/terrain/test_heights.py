@@ -177,7 +177,7 @@ def test_an_image_file_becomes_a_surface(tmp_path, suffix):
         expected = values
     else:
         values = np.array([[0.0, 1.0, 0.4], [0.2, 0.6, 0.8]], np.float32)
-        image_files.write(path, values[..., None])
+        image_files.write_png(path, values[..., None])
         expected = values
     entry = {"kind": "image", "file": str(path), "width": 6.0, "height": 10.0}
     surface = heights.of_config(entry, 2.8)
@@ -201,7 +201,7 @@ def test_hills_are_measured_in_tile_sides():
 
 
 def test_an_image_too_large_is_refused_before_it_is_read(tmp_path, monkeypatch):
-    image_files.write(tmp_path / "map.png", np.zeros((4, 5, 1)))
+    image_files.write_png(tmp_path / "map.png", np.zeros((4, 5, 1)))
     monkeypatch.setattr(heights, "MOST_CELLS", 19)
     monkeypatch.setattr(image_files, "read_channel", None)
     with pytest.raises(InputError, match=r"map\.png: 5 x 4 heights; at most 19"):

@@ -33,7 +33,7 @@ def files(tmp_path):
     views = []
     for i, (pose, camera) in enumerate(pool()):
         picture = np.clip(render(true, camera).colour + np.float32(0.2 * (i == 2)), 0, 1)
-        image_files.write(tmp_path / pose.name, picture)
+        image_files.write_png(tmp_path / pose.name, picture)
         views.append(View(pose.name, camera, picture, np.ones((96, 96), np.float32)))
     truth.write(tmp_path / "truth", iter(views[1:]))
     given = {"field": tmp_path / "field.ply", "ground": tmp_path / "ground.exr", "frame": tmp_path / "ground.json"}

@@ -21,7 +21,7 @@ def photos(tmp_path_factory):
     """Photos without content: nothing here gets as far as to look at them."""
     folder = tmp_path_factory.mktemp("photos")
     for name in made.SCENE.names:
-        image_files.write(folder / name, np.zeros((made.HEIGHT, made.WIDTH, 3)))
+        image_files.write_png(folder / name, np.zeros((made.HEIGHT, made.WIDTH, 3)))
     return folder
 
 

@@ -82,7 +82,7 @@ def shoot(folder, scale: float = 1.0, names=SCENE.names) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for i, name in enumerate(names):
         (folder / name).parent.mkdir(exist_ok=True, parents=True)
-        image_files.write(folder / name, photograph(camera, SCENE.rotations[i], SCENE.translations[i], ground))
+        image_files.write_png(folder / name, photograph(camera, SCENE.rotations[i], SCENE.translations[i], ground))
 
 
 def alike(picture: np.ndarray, wanted: np.ndarray) -> bool:
@@ -256,7 +256,7 @@ def test_photos_may_be_smaller_than_the_models_and_pictures_smaller_still(tmp_pa
 
 def test_photos_of_another_shape_are_refused_by_name(tmp_path, photos):
     for path in photos.iterdir():
-        image_files.write(tmp_path / "cut" / path.name, image_files.read(path)[:200])
+        image_files.write_png(tmp_path / "cut" / path.name, image_files.read_photo(path)[:200])
     write_colmap(tmp_path / "m", sees=True)
     with pytest.raises(InputError, match=r"000.png: the photo has 320 x 200 pixels, .* 320 x 240"):
         importers.read(tmp_path / "m", tmp_path / "cut", OPTIONS)
@@ -267,7 +267,7 @@ def test_photos_and_images_without_each_other_are_left_out_with_the_reason(tmp_p
     (tmp_path / "photos" / "001.png").unlink()
     (tmp_path / "photos" / "007.png").rename(tmp_path / "photos" / "other.png")
     (tmp_path / "photos" / "thumbs").mkdir()  # has nothing of the model: not worth telling
-    image_files.write(tmp_path / "photos" / "thumbs" / "x.png", np.zeros((4, 4, 3)))
+    image_files.write_png(tmp_path / "photos" / "thumbs" / "x.png", np.zeros((4, 4, 3)))
     write_colmap(tmp_path / "m", sees=True)
     found = importers.read(tmp_path / "m", tmp_path / "photos", OPTIONS)
     assert found.model.names == tuple(n for n in SCENE.names if n not in ("001.png", "007.png"))
@@ -283,7 +283,7 @@ def test_names_are_found_by_path_then_file_name_then_stem(tmp_path):
     files = ["a/1.jpg", "b/1.jpg", "b/2.png", "c/3.v2.jpg"]
     for name in files:
         (tmp_path / name).parent.mkdir(exist_ok=True)
-        image_files.write(tmp_path / name, np.zeros((4, 4, 3)))
+        image_files.write_png(tmp_path / name, np.zeros((4, 4, 3)))
     found = undistortion.Folder(tmp_path)
     assert [found.find(n) for n in ("a/1.jpg", "b/1", "x/2.png", "2.JPG", "3.v2")] == [
         *("a/1.jpg", "b/1.jpg", "b/2.png", "b/2.png", "c/3.v2.jpg")
@@ -324,11 +324,11 @@ def test_a_turned_photo_is_turned_back_with_its_camera(tmp_path, orientation):
         (tmp_path / "tagged").mkdir(exist_ok=True)
         file = oiio.ImageOutput.create("x.tif")
         assert file.open(str(tmp_path / "tagged" / f"{path.stem}.tif"), spec)
-        file.write_image(np.rint(image_files.read(path) * 255).astype(np.uint8))
+        file.write_image(np.rint(image_files.read_photo(path) * 255).astype(np.uint8))
         file.close()
     write_colmap(tmp_path / "m", [f"{n[:3]}.tif" for n in SCENE.names], sees=True)
     found = importers.read(tmp_path / "m", tmp_path / "tagged", OPTIONS)
-    upright = image_files.size(tmp_path / "tagged" / "000.tif")
+    upright = image_files.read_size(tmp_path / "tagged" / "000.tif")
     assert (found.lenses[0].width, found.lenses[0].height) == upright
     assert model.errors(found.model).max() < 1e-4
     ground, c = made_up.texture(np.random.default_rng(4)), found.model.cameras[0]

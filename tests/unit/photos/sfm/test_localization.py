@@ -36,7 +36,7 @@ def test_further_photos_find_their_places_and_others_do_not(photos, ground, tmp_
     asked = [made_up.camera((0.1, 0.05, 0.9), (0.12, 0.1, 0)), made_up.camera((-0.15, 0.1, 1.1), (-0.1, 0, 0))]
     made_up.shoot(tmp_path, asked, ground, HALF)
     other = made_up.photograph(made_up.camera((0, 0, 1)), made_up.texture(np.random.default_rng(99)), HALF)
-    image_files.write(tmp_path / "other.png", other)
+    image_files.write_png(tmp_path / "other.png", other)
     found = localization.located(photos, sorted(tmp_path.iterdir()))
     assert found[2] is None
     for camera, true in zip(found[:2], asked, strict=True):
@@ -49,7 +49,7 @@ def test_no_photo_asks_for_nothing(photos):
 
 
 def test_a_photo_of_another_camera_is_named(photos, tmp_path, caplog):
-    image_files.write(tmp_path / "square.png", np.full((200, 200, 3), 0.5))
+    image_files.write_png(tmp_path / "square.png", np.full((200, 200, 3), 0.5))
     with caplog.at_level(logging.WARNING):
         assert localization.located(photos, [tmp_path / "square.png"]) == [None]
     assert "square.png" in caplog.text and "same camera" in caplog.text

@@ -219,7 +219,7 @@ def test_an_undistorted_picture_is_what_a_pinhole_camera_sees(tmp_path, k):
 
     x, y = np.meshgrid(np.arange(200) + 0.5, np.arange(150) + 0.5)
     rays = lens.cam_from_img(np.stack([x.ravel(), y.ravel()], 1)).reshape(150, 200, 2)
-    image_files.write(tmp_path / "a.png", scene(rays[..., 0], rays[..., 1]))
+    image_files.write_png(tmp_path / "a.png", scene(rays[..., 0], rays[..., 1]))
     flat = replace(
         made_up.camera((0, 0, 1)),
         fx=pinhole.focal_length_x, fy=pinhole.focal_length_y, cx=pinhole.principal_point_x,
@@ -257,14 +257,14 @@ def test_two_photos_are_refused_by_name(tmp_path, ground):
 def test_photos_that_do_not_overlap_are_refused_with_how_many_were_placed(tmp_path):
     for i in range(4):
         texture = made_up.texture(np.random.default_rng(100 + i))
-        image_files.write(tmp_path / f"{i}.png", made_up.photograph(made_up.camera((0, 0, 1)), texture, HALF))
+        image_files.write_png(tmp_path / f"{i}.png", made_up.photograph(made_up.camera((0, 0, 1)), texture, HALF))
     with pytest.raises(InputError, match="0 of 4 photos.*overlap"):
         registration.register(tmp_path, OPTIONS)
 
 
 def test_photos_without_texture_are_refused(tmp_path):
     for i in range(4):
-        image_files.write(tmp_path / f"{i}.png", np.full((60, 80, 3), 0.5))
+        image_files.write_png(tmp_path / f"{i}.png", np.full((60, 80, 3), 0.5))
     with pytest.raises(InputError, match="0 of 4 photos.*texture"):
         registration.register(tmp_path, OPTIONS)
 
@@ -288,7 +288,7 @@ def test_the_photos_folder_is_whole(photos, tmp_path):
     stored = model.read(tmp_path / "out" / "sparse")
     assert (facts.images, facts.registered, facts.points) == (8, 8, len(stored.points))
     for name, camera in zip(stored.names, stored.cameras, strict=True):
-        assert image_files.size(tmp_path / "out" / "images" / name) == (camera.width, camera.height)
+        assert image_files.read_size(tmp_path / "out" / "images" / name) == (camera.width, camera.height)
     assert np.median([c.centre[2] for c in stored.cameras]) == pytest.approx(1, abs=1e-9)
 
 

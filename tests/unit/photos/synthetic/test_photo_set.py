@@ -48,7 +48,7 @@ def test_few_and_many_views_yield_points_on_the_ground(tmp_path, monkeypatch):
     cameras = synthetic.start_views(ENTRY | {"photos": 7, "size": 256, "rig": "ring"})
     shots = [(f"view_{i:02d}.png", camera) for i, camera in enumerate(cameras)]
     for name, camera in shots:
-        image_files.write(tmp_path / name, synthetic.render(scene, camera, 9))
+        image_files.write_png(tmp_path / name, synthetic.render(scene, camera, 9))
     synthetic._world.cache_clear()
     every = photo_set.triangulated(tmp_path, shots, 0)
     monkeypatch.setattr(photo_set, "ALL", 4)

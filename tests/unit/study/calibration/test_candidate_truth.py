@@ -55,7 +55,7 @@ def test_a_synthetic_scene_truly_shows_its_photo(monkeypatch):
     (view,) = truth.shown(ENTRY, pool, "nowhere")
     photo = scene.render(scene.of_config(ENTRY), pool[0][1])
     scene._world.cache_clear()
-    np.testing.assert_array_equal(view.image, image_files.resized(photo, 96, 96))
+    np.testing.assert_array_equal(view.image, image_files.shrink_image(photo, 96, 96))
     assert view.image.std() > 0.02
 
 
@@ -64,11 +64,13 @@ def test_a_replayed_scene_truly_shows_its_frames_without_what_is_masked(tmp_path
     ((pose, camera),) = pool = candidates(*size)
     cover = np.ones((camera.height, camera.width), np.float32)
     cover[: camera.height // 2] = 0
-    image_files.write(tmp_path / pose.name, np.dstack([noise(camera), cover]))
+    image_files.write_png(tmp_path / pose.name, np.dstack([noise(camera), cover]))
     (view,) = truth.shown({"agent": "replay"}, pool, tmp_path)
     assert vars(view.camera).keys() == vars(small(camera)).keys() and view.camera.fx == small(camera).fx
     assert view.image.shape == (small(camera).height, 96, 3) == (*view.weight.shape, 3)
-    np.testing.assert_allclose(view.image, image_files.resized(noise(camera), 96, small(camera).height), atol=0.5 / 255)
+    np.testing.assert_allclose(
+        view.image, image_files.shrink_image(noise(camera), 96, small(camera).height), atol=0.5 / 255
+    )
     middle = small(camera).height // 2
     assert (view.weight[: middle - 1] == 0).all() and (view.weight[middle + 1 :] == 1).all()
 

@@ -46,7 +46,7 @@ def replayed(tmp_path):
     """A field that shows its south in false colours; photos of the truth."""
     truth = patch.field()
     for pose, camera in pool():
-        image_files.write(tmp_path / pose.name, np.clip(render(truth, camera).colour, 0, 1))
+        image_files.write_png(tmp_path / pose.name, np.clip(render(truth, camera).colour, 0, 1))
     south = truth.means[:, 1] < 0.6
     colour = np.where(south[:, None, None], truth.sh + np.float32(0.8), truth.sh)
     wrong = replace(truth, sh=colour, uncertainty=np.where(south, 1, 0).astype(np.float32))
@@ -98,7 +98,7 @@ def test_truth_that_was_drawn_once_is_what_is_compared(replayed, tmp_path):
     assert {pose.name for pose, _ in again[0]} == {pose.name for pose, _ in some} and len(some) == 5
     by_name = {view.name: view.image for view in views}
     assert all(np.abs(view.image - by_name[view.name]).max() < 0.003 for view in again[1])
-    image_files.write(tmp_path / "truth" / f"{some[0][0].name}.png", np.zeros((5, 5, 3), np.float32))
+    image_files.write_png(tmp_path / "truth" / f"{some[0][0].name}.png", np.zeros((5, 5, 3), np.float32))
     with pytest.raises(InputError, match="5 x 5 pixels, not those of its pose"):
         truth.kept(pool(), tmp_path / "truth")
 

@@ -71,7 +71,7 @@ def test_the_field_is_drawn_as_large_as_it_was_fitted(views):
     fine = ground.field(large)
     camera = views[0].camera
     photo = np.clip(render(fine, camera.resized(4 * SIDE, 4 * SIDE)).colour, 0, 1).astype(np.float32)
-    view = replace(views[0], image=image_files.resized(photo, SIDE, SIDE))
+    view = replace(views[0], image=image_files.shrink_image(photo, SIDE, SIDE))
     assert measures.errors(fine, large, [view], 4 * SIDE)[0][0] == pytest.approx(0, abs=1e-6)
     assert measures.errors(fine, large, [view], SIDE)[0][0] > 1e-3
 

@@ -167,7 +167,7 @@ def test_the_figure_is_drawn_with_and_without_people(gather, key, tmp_path):
     for number, count in enumerate((0, 1, 3)):
         people = gather(*(answer_files.answers(key, n, attentive) for n in range(count)))
         plots.write(path := tmp_path / f"{number}.png", results.table(key, people.participants))
-        assert image_files.size(path)[0] > 500
+        assert image_files.read_size(path)[0] > 500
 
 
 def test_a_written_key_is_read_as_it_was(tmp_path):

@@ -40,7 +40,7 @@ def test_the_plot_of_losses_is_a_picture_and_the_same_each_time(tmp_path):
     for name in ("a.png", "b.png"):
         plots.losses(curves, tmp_path / name)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-    assert image_files.read(tmp_path / "a.png").std() > 0.05
+    assert image_files.read_photo(tmp_path / "a.png").std() > 0.05
 
 
 def test_a_gallery_shows_what_was_given_what_is_true_and_what_was_guessed(tmp_path):
@@ -60,6 +60,6 @@ def test_a_gallery_shows_what_was_given_what_is_true_and_what_was_guessed(tmp_pa
     np.testing.assert_array_equal(np.isnan(error), drawn[5][..., 3] == 0)
     assert doubt.shape == (2, *CODE[1:]) and doubt.min() > 0
     plots.samples(columns, tmp_path / "a.png")
-    picture = image_files.read(tmp_path / "a.png")
+    picture = image_files.read_photo(tmp_path / "a.png")
     assert picture.shape[1] > 1.4 * SIZE * len(columns)  # no picture is shown smaller than it is
     assert picture.std() > 0.05

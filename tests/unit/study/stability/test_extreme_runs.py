@@ -104,7 +104,7 @@ def test_a_number_that_is_not_finite_is_found_in_a_chunk(tmp_path):
 
 def made(folder: Path, name: str, picture, **more) -> None:
     for still in tables.NEAR:
-        image_files.write(folder / name / f"{still}.png", picture)
+        image_files.write_png(folder / name / f"{still}.png", picture)
     found = {"name": name, "exit_code": 0, "message": None, "traceback": False, "warnings": [], "checked": 3}
     found |= {"not_finite": [], "gaussians": 9, "seconds": 1.0, "peak_mb": 2.0}
     write_json(folder / name / "outcome.json", found | more)

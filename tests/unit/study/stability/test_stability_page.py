@@ -64,4 +64,4 @@ def test_the_figure_is_a_picture_and_the_same_each_time(tmp_path, formulas):
     for name in ("a.png", "b.png"):
         plots.write(tmp_path / name, formulas)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-    assert image_files.read(tmp_path / "a.png").std() > 0.05
+    assert image_files.read_photo(tmp_path / "a.png").std() > 0.05

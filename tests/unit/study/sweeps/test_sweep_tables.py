@@ -123,4 +123,4 @@ def test_the_figure_shows_each_measure_and_curves_where_rounds_are_varied_too(tm
     assert [list(line.get_ydata()) for line in curves] == [[20, 21, 22]] * 2
     assert all(dot == 22 for line in figure.axes[1].get_lines() for dot in line.get_ydata())  # the last round's
     plots.write(tmp_path / "budget.png", "budget", ["policy", "rounds"], two)
-    assert image_files.size(tmp_path / "budget.png")[0] > 600
+    assert image_files.read_size(tmp_path / "budget.png")[0] > 600

@@ -118,4 +118,4 @@ def test_cells_of_the_terrain_are_as_uncertain_as_their_tiles(tmp_path):
     assert shown.shape == (5, 6) and (deep == (shown > 7 / 16)).all() and deep.any() and not deep.all()
     assert np.abs(tile_uncertainty.walk(50, 16.0)[[0, -1], 0] - [0.5, 16.5]).max() == 0
     tile_uncertainty.write_figure(tmp_path / "doubt.png", manifest, 0.5, 6.0)
-    assert image_files.size(tmp_path / "doubt.png")[0] > 900
+    assert image_files.read_size(tmp_path / "doubt.png")[0] > 900

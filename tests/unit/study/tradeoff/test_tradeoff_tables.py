@@ -24,7 +24,7 @@ def cell(folder, setting, psnr, faster=1.0, grey=0.5, measure="views", most=Fals
     told["fit.json"] = {"degree": 1, "steps": 300}
     for name, content in told.items():
         (place / name).write_text(json.dumps(content))
-    image_files.write(place / "still.png", np.full((4, 6, 3), grey, np.float32))
+    image_files.write_png(place / "still.png", np.full((4, 6, 3), grey, np.float32))
     times = {}
     for job, seconds in SECONDS.items():
         (place / f"{job}.tsv").write_text(f"s\tmax_rss\n{seconds / faster}\t800.0\n")
@@ -151,9 +151,14 @@ def test_figures_are_drawn_of_what_is_known(table, tmp_path):
     table[3]["own_seconds"] = None
     figures.save(plots.knobs(table), tmp_path / "knobs.png")
     figures.save(plots.fronts(tables.pareto(table)), tmp_path / "pareto.png")
-    assert image_files.size(tmp_path / "knobs.png")[0] > 600 and image_files.size(tmp_path / "pareto.png")[0] > 600
+    assert (
+        image_files.read_size(tmp_path / "knobs.png")[0] > 600
+        and image_files.read_size(tmp_path / "pareto.png")[0] > 600
+    )
     figures.save(plots.fronts([row | {"sharp": None} for row in tables.pareto(table)]), tmp_path / "one.png")
-    assert image_files.size(tmp_path / "one.png")[0] < image_files.size(tmp_path / "pareto.png")[0]  # a panel less
+    assert (
+        image_files.read_size(tmp_path / "one.png")[0] < image_files.read_size(tmp_path / "pareto.png")[0]
+    )  # a panel less
 
 
 @pytest.mark.parametrize(

@@ -145,5 +145,7 @@ def test_the_figure_is_wide_enough_to_read_and_the_same_each_time(tmp_path):
     for name in ("a.png", "b.png"):
         evolution.write_figure(tmp_path / name, found, rounds, "psnr")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-    assert image_files.size(tmp_path / "a.png")[0] >= 1000 and image_files.read(tmp_path / "a.png").std() > 0.05
+    assert (
+        image_files.read_size(tmp_path / "a.png")[0] >= 1000 and image_files.read_photo(tmp_path / "a.png").std() > 0.05
+    )
     assert [p.name for p in sorted(tmp_path.iterdir())] == ["a.png", "b.png"]

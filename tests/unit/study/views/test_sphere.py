@@ -118,7 +118,7 @@ def test_many_chosen_are_not_numbered_and_none_is_said():
 def test_candidates_all_alike_or_none_at_all_are_drawn(tmp_path):
     alike = [round_of(high=0.0), sphere.of_round(2, scored(0), asked(), [photo(0.0, 0.0, 5.0)], FRAME, 0.0)]
     sphere.write_figure(tmp_path / "a.png", alike, "doubt")
-    assert image_files.read(tmp_path / "a.png").std() > 0.05
+    assert image_files.read_photo(tmp_path / "a.png").std() > 0.05
 
 
 def test_the_figure_is_wide_enough_to_read_and_the_same_each_time(tmp_path):
@@ -126,6 +126,6 @@ def test_the_figure_is_wide_enough_to_read_and_the_same_each_time(tmp_path):
     for name in ("a.png", "b.png"):
         sphere.write_figure(tmp_path / name, rounds, "doubt")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-    width, height = image_files.size(tmp_path / "a.png")
+    width, height = image_files.read_size(tmp_path / "a.png")
     assert width >= 1000 and height > width  # two panels side by side, the third below
     assert [p.name for p in sorted(tmp_path.iterdir())] == ["a.png", "b.png"]

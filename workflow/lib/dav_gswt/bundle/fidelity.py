@@ -92,7 +92,7 @@ def averaged(field: GaussianField, camera: Camera, factor: int) -> Float32[Array
     large = camera.resized(factor * camera.width, factor * camera.height)
     seen = Rasterizer(near=1e-6, antialiased=True).forward(**to_raster_arrays(field), camera=large)
     colour = np.clip(seen.colour / np.maximum(seen.alpha, 0.5)[..., None], 0, 1).astype(np.float32)
-    return image_files.resized(colour, camera.width, camera.height)
+    return image_files.shrink_image(colour, camera.width, camera.height)
 
 
 def _camera(side: float, distance: float, elevation: float, height: float) -> Camera:

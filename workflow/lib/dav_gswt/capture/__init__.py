@@ -54,6 +54,8 @@ def _developed(site: Site, pose, camera, folder: Path) -> list[Shot]:
     found = []
     for i, stored in enumerate(site.store.of(camera)[: site.burst]):
         name = f"{pose.name}.png" if site.burst == 1 else f"{pose.name}_{i}.png"
-        image_files.write(folder / name, lenses.developed(image_files.read(stored.photo), site.photos, stored.got))
+        image_files.write_png(
+            folder / name, lenses.developed(image_files.read_photo(stored.photo), site.photos, stored.got)
+        )
         found.append(Shot(name, pose, camera, stored.got, shots.apart(camera, stored.got, site.unit), stored.taken))
     return found

@@ -31,7 +31,7 @@ def collect(site: Site, asked: list[Asked], agent: str) -> list[Asked]:
     """Take over what was dropped, nearest photos first; returns the poses that still lack photos."""
     known = {record["sha256"] for record in site.store.records()}
     folder = folder_of(site)
-    here = image_files.listed(folder) if any(not p.name.startswith(".") for p in folder.iterdir()) else []
+    here = image_files.list_photos(folder) if any(not p.name.startswith(".") for p in folder.iterdir()) else []
     paths = [p for p in here if digest(p) not in known]  # cameras use names again
     found = [(p, camera) for p, camera in zip(paths, localization.located(site.photos, paths), strict=True) if camera]
     for path in sorted(set(paths) - {p for p, _ in found}):

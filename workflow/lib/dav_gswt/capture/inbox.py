@@ -63,7 +63,7 @@ def arrived(folder: Path, before: Listing, patience: float) -> Path | None:
 
 def _trouble(path: Path) -> str:
     try:
-        image_files.read(path)
+        image_files.read_photo(path)
     except InputError as error:
         return str(error)
     return ""

@@ -20,6 +20,6 @@ def take(
     for pose, camera in progress(asked, "render photos"):
         for i in range(burst):
             name = f"{pose.name}.png" if burst == 1 else f"{pose.name}_{i}.png"
-            image_files.write(folder / name, picture(camera, i))
+            image_files.write_png(folder / name, picture(camera, i))
             shots.append(Shot(name, pose, camera, camera, 0.0))
     return shots

@@ -220,6 +220,6 @@ def _photo(driver: Driver, name: str, wanted: Axes) -> tuple[Path, Axes, str]:
 def _usable(photo: Path, site: Site, got) -> None:
     """A photo that the scene's lens did not take is better refused now than after all others."""
     try:
-        lenses.developed(image_files.read(photo), site.photos, got)
+        lenses.developed(image_files.read_photo(photo), site.photos, got)
     except (InputError, ValueError) as error:
         raise InputError(f"{photo}: {error}") from error

@@ -48,11 +48,11 @@ def write(folder: Path, errand: Errand, stations: list[Station], field: Gaussian
     """index.html, map.png and, where there is a field, the picture expected of every station, into `folder`."""
     by = errand.ruler
     drawn = shot_list_map.draw([station.camera for station in stations], errand.frame, by, field)
-    image_files.write(folder / "map.png", drawn.picture)
+    image_files.write_png(folder / "map.png", drawn.picture)
     cards = []
     for i, station in enumerate(stations):
         if field is not None:
-            image_files.write(folder / _file(i), expected(field, station.camera))
+            image_files.write_png(folder / _file(i), expected(field, station.camera))
         before = stations[i - 1].camera if i else None
         cards.append(_card(i, station, before, errand, field is not None))
     photos = sum(station.photos for station in stations)

@@ -1,4 +1,4 @@
-"""Images in and out: photos of any format by OpenImageIO, float maps with named channels as OpenEXR."""
+"""Image files: photos of any format by OpenImageIO, float maps with named channels as OpenEXR."""
 
 import logging
 from pathlib import Path
@@ -16,76 +16,77 @@ from dav_gswt.files import whole
 
 _log = logging.getLogger(__name__)
 
-MOST_PIXELS = 200_000_000  # of a photo: what claims more is a broken header, or nothing that two cores should work on
+MAX_PIXELS = 200_000_000  # of a photo: more is a broken header, or more than two cores should work on
 SUFFIXES = {".jpg", ".jpeg", ".jpe", ".jfif", ".png", ".tif", ".tiff", ".webp", ".jp2", ".jxl", ".bmp", ".ppm", ".tga"}
-FOREIGN = {".heic", ".heif", ".avif", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".rw2", ".raf", ".raw"}
-
-oiio.attribute("threads", 1)  # rules say how many threads a job has; decoding one photo needs no more
+UNSUPPORTED = {".heic", ".heif", ".avif", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".rw2", ".raf", ".raw"}
 
 
-def listed(folder: Path | str) -> list[Path]:
-    """The photos that lie directly in a folder, by name; hidden files and other kinds of files are passed over.
+def list_photos(folder: Path | str) -> list[Path]:
+    """Photos that lie directly in a folder, sorted by name; hidden and other files are skipped.
 
-    Raises: InputError: no folder, or no photo in it.
+    Raises: InputError: the folder is missing, or has no photo.
     """
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(f"{folder}: there is no such folder of photos")
     found = sorted(p for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
     photos = [p for p in found if p.suffix.lower() in SUFFIXES]
-    foreign = [p for p in found if p.suffix.lower() in FOREIGN]
+    unsupported = [p for p in found if p.suffix.lower() in UNSUPPORTED]
     if not photos:
-        hint = f" ({foreign[0].name} is of a kind that is not read: convert it to JPEG)" if foreign else ""
+        hint = f" ({unsupported[0].name} is of a kind that is not read: convert it to JPEG)" if unsupported else ""
         raise InputError(f"{folder}: no photos in this folder{hint}; put .jpg, .png or .tif files directly into it")
-    if foreign:
-        _log.warning("%s: %d files like %s are not read; convert them to JPEG", folder, len(foreign), foreign[0].name)
+    if unsupported:
+        _log.warning(
+            "%s: %d files like %s are not read; convert them to JPEG", folder, len(unsupported), unsupported[0].name
+        )
     return photos
 
 
-def size(path: Path | str) -> tuple[int, int]:
-    """Width and height as seen, that is with the EXIF orientation applied, from the header alone."""
-    file, spec = _opened(path)
+def read_size(path: Path | str) -> tuple[int, int]:
+    """Width and height with the EXIF orientation applied, from the header alone."""
+    file, spec = _open_image(path)
     file.close()
-    return (spec.height, spec.width) if _orientation(spec) >= 5 else (spec.width, spec.height)
+    return (spec.height, spec.width) if _read_orientation(spec) >= 5 else (spec.width, spec.height)
 
 
-def read(path: Path | str) -> Float32[Array, "h w 3"]:
+def read_photo(path: Path | str) -> Float32[Array, "h w 3"]:
     """A photo as sRGB-encoded colours in [0, 1], upright by its EXIF orientation.
 
-    Any bit depth; grey becomes three equal channels; alpha is left out and the colours stay as they are stored.
-    Raises: InputError: missing, not an image, cut short (a decoder's warning is enough), or too large.
+    Any bit depth. Grey becomes three equal channels; alpha is dropped, and the colours stay as they are stored.
+    Raises: InputError: missing, not an image, cut short (a decoder's warning counts), or too large.
     """
-    return read_covered(path)[0]
+    return read_photo_and_alpha(path)[0]
 
 
-def read_covered(path: Path | str) -> tuple[Float32[Array, "h w 3"], Float32[Array, "h w"]]:
-    """A photo as `read` gives it, and its alpha: 0 where it is masked. Without alpha all counts."""
-    file, spec = _opened(path)
-    # one channel too many is read where there is alpha: reading a part of the channels is slower in many formats
-    pixels = _pixels(file, path, min(spec.nchannels, 4))
+def read_photo_and_alpha(path: Path | str) -> tuple[Float32[Array, "h w 3"], Float32[Array, "h w"]]:
+    """A photo as `read_photo` returns it, and its alpha: 0 where it is masked; 1 where the file has none."""
+    file, spec = _open_image(path)
+    # alpha is read along: reading only some of the channels is slower in many formats
+    pixels = _read_pixels(file, path, min(spec.nchannels, 4))
     alpha = pixels[..., spec.alpha_channel] if 0 <= spec.alpha_channel < pixels.shape[2] else None
     pixels = pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
     alpha = np.ones(pixels.shape[:2], np.float32) if alpha is None else alpha
     if not np.isfinite(pixels).all():
         raise InputError(f"{path}: has pixels that are not finite; export it as 8 or 16 bit")
-    upright = (_upright(np.clip(part, 0, 1), _orientation(spec)) for part in (pixels, alpha))
+    upright = (_apply_orientation(np.clip(part, 0, 1), _read_orientation(spec)) for part in (pixels, alpha))
     return tuple(map(np.ascontiguousarray, upright))
 
 
 def read_channel(path: Path | str) -> Float32[Array, "h w"]:
-    """The first channel as it is stored, integers over their largest value; upright, and neither clipped nor checked.
+    """The first channel, upright, integers scaled to [0, 1]; neither clipped nor checked for finite values.
 
     Raises: InputError: missing, not an image, cut short, or too large.
     """
-    file, spec = _opened(path)
-    return np.ascontiguousarray(_upright(_pixels(file, path, 1)[..., 0], _orientation(spec)))
+    file, spec = _open_image(path)
+    return np.ascontiguousarray(_apply_orientation(_read_pixels(file, path, 1)[..., 0], _read_orientation(spec)))
 
 
-def write(path: Path | str, image: Float[Array, "h w c"]) -> None:
-    """Write a PNG of 8 bits a channel; values are clipped to [0, 1]. It appears whole or not at all.
+def write_png(path: Path | str, image: Float[Array, "h w c"]) -> None:
+    """Write a PNG of 8 bits a channel, atomically; values are clipped to [0, 1].
 
-    A fourth channel is alpha; the colours stay as they are under it.
+    A fourth channel is alpha, not premultiplied.
     """
+    oiio.attribute("threads", 1)
     pixels = np.ascontiguousarray(np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8))
     spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], oiio.UINT8)
     spec["oiio:UnassociatedAlpha"] = 1
@@ -101,32 +102,32 @@ def write(path: Path | str, image: Float[Array, "h w c"]) -> None:
             raise OSError(f"{path}: not written ({_first_line(trouble or file.geterror())}); is the disk full?")
 
 
-def resized(image: Float32[Array, "h w c"], width: int, height: int) -> Float32[Array, "height width c"]:
-    """The image on a coarser grid: every new pixel is the exact mean over its area, on the encoded values.
+def shrink_image(image: Float32[Array, "h w c"], width: int, height: int) -> Float32[Array, "height width c"]:
+    """The image on a coarser grid: each pixel is the exact mean over its area, of the encoded values.
 
     Exact for any ratio (a box filter sampled at pixel centres is up to 7 % off for ratios like 10 to 4).
     Raises: ValueError: the image would be enlarged, or have no pixels.
     """
     if not (1 <= width <= image.shape[1] and 1 <= height <= image.shape[0]):
         raise ValueError(f"an image of {image.shape[1]} x {image.shape[0]} does not shrink to {width} x {height}")
-    return np.ascontiguousarray(_mean_over(_mean_over(image, height, 0), width, 1), np.float32)
+    return np.ascontiguousarray(_average_axis(_average_axis(image, height, 0), width, 1), np.float32)
 
 
 def write_exr(path: Path | str, channels: dict[str, Array], header: dict[str, str] | None = None) -> None:
-    """Write named float maps of one size, with parameters in the header.
+    """Write named float maps of one size, with texts in the header.
 
-    Header values are text: EXR's own numbers are of single precision, so write numbers with repr().
+    Write numbers as text by repr(): EXR's own numbers have single precision.
     """
     write_exr_parts(path, {"": (channels, header or {})})
 
 
 def read_exr(path: Path | str) -> tuple[dict[str, Array], dict[str, str]]:
-    """Channels by name and the header's texts of a file with one part. Raises: InputError: not readable."""
+    """Channels by name and the header's texts, of a file with one part. Raises: InputError: not readable."""
     return next(iter(read_exr_parts(path).values()))
 
 
-def enlarged(values: Float32[Array, "h w"], width: int, height: int) -> Float32[Array, "h2 w2"]:
-    """A map on a finer grid over the same area: linear between the cells' centres, constant beyond the outermost."""
+def enlarge_map(values: Float32[Array, "h w"], width: int, height: int) -> Float32[Array, "h2 w2"]:
+    """A map on a finer grid over the same area: linear between cell centres, constant beyond the outermost."""
     rows, columns = ((np.arange(n) + 0.5) * old / n - 0.5 for n, old in zip((height, width), values.shape, strict=True))
     at = np.stack(np.meshgrid(rows, columns, indexing="ij"))
     return map_coordinates(values, at, order=1, mode="nearest")
@@ -158,13 +159,13 @@ def read_exr_parts(path: Path | str) -> dict[str, tuple[dict[str, Array], dict[s
         raise InputError(f"{path}: there is no such file")
     try:
         with OpenEXR.File(str(path), header_only=True) as file:
-            promised = len(file.parts)
+            announced = len(file.parts)
             for part in file.parts:
                 low, high = (np.asarray(corner, np.int64) for corner in part.header["dataWindow"])
-                if np.prod(high - low + 1) > MOST_PIXELS:
+                if np.prod(high - low + 1) > MAX_PIXELS:
                     raise ValueError(f"a part of {' x '.join(map(str, high - low + 1))} pixels is more than is read")
         with OpenEXR.File(str(path), separate_channels=True) as file:
-            if len(file.parts) < promised:  # the library drops damaged parts with a mere warning
+            if len(file.parts) < announced:  # the library drops damaged parts with a mere warning
                 raise ValueError("damaged or cut short")
             return {part.name(): (_channels(part), _texts(part)) for part in file.parts}
     except (RuntimeError, ValueError, TypeError, OSError) as error:
@@ -179,8 +180,9 @@ def _texts(part) -> dict[str, str]:
     return {k: v for k, v in part.header.items() if isinstance(v, str) and k != "name"}
 
 
-def _opened(path: Path | str):
-    """An open image and its header, refused where that promises more than can be."""
+def _open_image(path: Path | str):
+    """An open image and its header. Raises: InputError: missing, not an image, or too large."""
+    oiio.attribute("threads", 1)  # a job has as many threads as its rule says; decoding needs one
     config = oiio.ImageSpec()
     config["oiio:UnassociatedAlpha"] = 1
     if not Path(path).is_file():
@@ -191,14 +193,14 @@ def _opened(path: Path | str):
     spec = file.spec()
     if spec.width < 1 or spec.height < 1 or spec.nchannels < 1 or spec.depth > 1 or spec.deep:
         raise InputError(f"{path}: holds no flat picture; remove or replace it")
-    if spec.width * spec.height > MOST_PIXELS:
-        most = MOST_PIXELS // 10**6
+    if spec.width * spec.height > MAX_PIXELS:
+        most = MAX_PIXELS // 10**6
         raise InputError(f"{path}: {spec.width} x {spec.height} pixels; at most {most} megapixels are read: shrink it")
     return file, spec
 
 
-def _pixels(file, path: Path | str, channels: int) -> Float32[Array, "h w c"]:
-    """The first channels of an open image as they are stored; closes it."""
+def _read_pixels(file, path: Path | str, channels: int) -> Float32[Array, "h w c"]:
+    """The first channels of an open image as they are stored. Closes the image."""
     spec = file.spec()
     try:
         pixels = file.read_image(0, 0, 0, channels, oiio.FLOAT)
@@ -210,13 +212,13 @@ def _pixels(file, path: Path | str, channels: int) -> Float32[Array, "h w c"]:
     return np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
 
 
-def _orientation(spec) -> int:
+def _read_orientation(spec) -> int:
     value = spec.getattribute("Orientation")
     return value if isinstance(value, int) and 1 <= value <= 8 else 1
 
 
-def _upright(pixels: Array, orientation: int) -> Array:
-    """Undo EXIF orientation: 5 to 8 are transposed, then rows and columns are mirrored as the number says."""
+def _apply_orientation(pixels: Array, orientation: int) -> Array:
+    """Undo an EXIF orientation: 5 to 8 are transposed, then rows and columns are mirrored."""
     if orientation >= 5:
         pixels = pixels.swapaxes(0, 1)
     if orientation in (3, 4, 7, 8):
@@ -226,15 +228,15 @@ def _upright(pixels: Array, orientation: int) -> Array:
     return pixels
 
 
-def _mean_over(values: Array, n: int, axis: int) -> Array:
-    """Means over n equal stretches of an axis: a sparse matrix of how much of each pixel lies in each stretch."""
+def _average_axis(values: Array, n: int, axis: int) -> Array:
+    """Means over n equal intervals of an axis, by a sparse matrix of the overlap of pixels and intervals."""
     m = values.shape[axis]
     if m == n:
         return values
     edges = np.arange(n + 1) * (m / n)
     cuts = np.union1d(np.minimum(edges, m), np.arange(m + 1))
-    stretch = np.minimum(np.searchsorted(edges, cuts[:-1], side="right") - 1, n - 1)
-    shares = csr_array((np.diff(cuts) * (n / m), (stretch, cuts[:-1].astype(int))), shape=(n, m))
+    interval = np.minimum(np.searchsorted(edges, cuts[:-1], side="right") - 1, n - 1)
+    shares = csr_array((np.diff(cuts) * (n / m), (interval, cuts[:-1].astype(int))), shape=(n, m))
     lines = np.moveaxis(values, axis, 0)
     return np.moveaxis((shares @ lines.reshape(m, -1)).reshape(n, *lines.shape[1:]), 0, axis)
 

@@ -113,8 +113,8 @@ def looking(camera: Camera, reach: float, colour: tuple[int, int, int], photo: P
     edges = np.array([[0, 1], [0, 2], [0, 3], [0, 4], [1, 2], [2, 3], [3, 4], [4, 1]])
     found = [Layer("lines", points, edges, colour)]
     if photo is not None and photo.is_file():
-        picture = image_files.read(photo)
+        picture = image_files.read_photo(photo)
         share = min(1.0, PICTURE / max(picture.shape[:2]))
-        small = image_files.resized(picture, *(max(1, round(n * share)) for n in picture.shape[1::-1]))
+        small = image_files.shrink_image(picture, *(max(1, round(n * share)) for n in picture.shape[1::-1]))
         found.append(hung(bytes_of(small), corners[0], corners[1] - corners[0], corners[3] - corners[0]))
     return found

@@ -124,7 +124,7 @@ def neighbour_views(field: GaussianField, coarse: Ground) -> list[View]:
         seen = drawn.forward(**to_raster_arrays(field), camera=fine)
         # what shines through is not the field's colour: divide it out
         colour = seen.colour / np.maximum(seen.alpha, 0.5)[..., None]
-        image = image_files.resized(np.clip(colour, 0, 1).astype(np.float32), camera.width, camera.height)
+        image = image_files.shrink_image(np.clip(colour, 0, 1).astype(np.float32), camera.width, camera.height)
         views.append(View(f"neighbour_{number}", camera, image, np.ones(image.shape[:2], np.float32)))
     return views
 

@@ -22,7 +22,7 @@ def focal_length(path: Path | str) -> float | None:
     diagonal: f / 43.27 mm * sqrt(w^2 + h^2), with the height of the 4:3 sensor where the picture is wider than 3:2.
     Where the tagged width differs from the real one, the pitch is scaled with it: the photo was resized, the tag not.
     """
-    width, height = sorted(image_files.size(path), reverse=True)
+    width, height = sorted(image_files.read_size(path), reverse=True)
     tags = _jpeg_tags(Path(path))
     spec = oiio.ImageInput.open(str(path)).spec()
     focal = tags.get(_FOCAL) or _number(spec.getattribute("Exif:FocalLength"))

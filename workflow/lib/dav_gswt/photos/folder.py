@@ -34,7 +34,7 @@ def write(
         (part / "images").mkdir()
         for name, image in pictures:
             cover = covers.get(name)
-            image_files.write(part / "images" / name, image if cover is None else np.dstack([image, cover]))
+            image_files.write_png(part / "images" / name, image if cover is None else np.dstack([image, cover]))
         (part / "sparse").mkdir()
         models.write(model, part / "sparse")
         if kinds:

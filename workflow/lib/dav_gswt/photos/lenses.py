@@ -81,7 +81,7 @@ def developed(photo: Float32[Array, "h w 3"], folder: Path | str, camera: Camera
             f"a photo of {photo.shape[1]} x {photo.shape[0]} pixels is not of the scene's camera "
             f"({width} x {height}); take photos with the same camera, uncropped and not turned"
         )
-    photo = image_files.resized(photo, width, height)
+    photo = image_files.shrink_image(photo, width, height)
     return undistorted(photo, own.camera, camera) if own else photo
 
 

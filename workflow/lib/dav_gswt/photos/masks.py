@@ -30,13 +30,13 @@ def undistorted(found, folder: Path | str) -> dict[str, Float32[Array, "h w"]]:
     found: an `sfm.Registered`. Raises: InputError: no folder, a mask of another shape than its photo, or none that
     belongs to a photo.
     """
-    listed = {path.stem: path for path in image_files.listed(folder)}
+    listed = {path.stem: path for path in image_files.list_photos(folder)}
     covers = {}
     for i, (name, source) in enumerate(zip(found.model.names, found.sources, strict=True)):
         path = listed.get(source.stem) or listed.get(source.name)  # as COLMAP names them: photo.jpg.png
         if path is None:
             continue
-        mask, (width, height) = image_files.read(path), image_files.size(source)
+        mask, (width, height) = image_files.read_photo(path), image_files.read_size(source)
         if abs(mask.shape[1] * height / (mask.shape[0] * width) - 1) > ASPECT:
             raise InputError(f"{path}: is {mask.shape[1]} x {mask.shape[0]}, its photo {width} x {height}; same shape")
         covers[name] = _cover(mask, found.lenses[i], found.model.cameras[i])

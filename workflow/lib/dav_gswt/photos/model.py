@@ -201,7 +201,7 @@ def _colours(model: Model, photos: Path) -> Float32[Array, "n 3"]:
     total = np.zeros((len(model.points), 3))
     for i, name in enumerate(model.names):
         own = model.image_of == i
-        image = image_files.read(photos / name)
+        image = image_files.read_photo(photos / name)
         column, row = np.clip(model.pixels[own].astype(int), 0, [image.shape[1] - 1, image.shape[0] - 1]).T
         np.add.at(total, model.point_of[own], image[row, column])
     count = np.bincount(model.point_of, minlength=len(model.points))

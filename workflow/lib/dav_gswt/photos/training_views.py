@@ -41,15 +41,15 @@ def of(
     share = min(1.0, size / max(camera.width, camera.height))
     width, height = max(1, round(camera.width * share)), max(1, round(camera.height * share))
     if (width, height) != (camera.width, camera.height):
-        image, camera = image_files.resized(image, width, height), camera.resized(width, height)
-        cover = cover if cover is None else image_files.resized(cover[..., None], width, height)[..., 0]
+        image, camera = image_files.shrink_image(image, width, height), camera.resized(width, height)
+        cover = cover if cover is None else image_files.shrink_image(cover[..., None], width, height)[..., 0]
     weight = np.ones(image.shape[:2]) if cover is None else cover > WHOLE
     return View(name, camera, image, weight.astype(np.float32))
 
 
 def read(name: str, camera: Camera, path: Path | str, size: int) -> View:
     """The view of a picture file; what its alpha masks does not count."""
-    image, cover = image_files.read_covered(path)
+    image, cover = image_files.read_photo_and_alpha(path)
     return of(name, camera, image, size, cover)
 
 

@@ -48,8 +48,8 @@ def taken(views: list[View], frame: SceneFrame, size: int) -> Taken:
 
 def _sized(square: Float32[Array, "s s 3"], size: int) -> Float32[Array, "{size} {size} 3"]:
     if len(square) >= size:
-        return image_files.resized(square, size, size)
-    return np.stack([image_files.enlarged(square[..., c], size, size) for c in range(3)], -1)
+        return image_files.shrink_image(square, size, size)
+    return np.stack([image_files.enlarge_map(square[..., c], size, size) for c in range(3)], -1)
 
 
 def condition(

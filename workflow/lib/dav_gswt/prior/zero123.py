@@ -130,7 +130,7 @@ def sized(photo: Float32[Array, "b s s 3"]) -> Float[Tensor, "b 3 size size"]:
     """Photos of any size as the coder takes them: means over areas of larger ones, smaller ones bicubic."""
     side = photo.shape[1]
     if side > SIZE:
-        photo = np.stack([image_files.resized(one, SIZE, SIZE) for one in photo])
+        photo = np.stack([image_files.shrink_image(one, SIZE, SIZE) for one in photo])
     planes = torch.from_numpy(np.ascontiguousarray(photo.transpose(0, 3, 1, 2)))
     if side < SIZE:
         planes = functional.interpolate(planes, (SIZE, SIZE), mode="bicubic", align_corners=False)

@@ -38,7 +38,7 @@ def kept(source: Path | str, target: Path | str) -> None:
         from matplotlib.image import imsave
 
         with whole(target) as part:
-            imsave(part, image_files.read(source), format="jpg", pil_kwargs={"quality": QUALITY})
+            imsave(part, image_files.read_photo(source), format="jpg", pil_kwargs={"quality": QUALITY})
 
 
 def sheet(pictures: dict[str, list[Path | str]], heads: list[str], tall: float = 2.05):
@@ -46,7 +46,7 @@ def sheet(pictures: dict[str, list[Path | str]], heads: list[str], tall: float =
 
     As wide as the first row's pictures are for their height.
     """
-    shown = {name: [image_files.read(file) for file in files] for name, files in pictures.items()}
+    shown = {name: [image_files.read_photo(file) for file in files] for name, files in pictures.items()}
     wide = [float(picture.shape[1] / picture.shape[0]) for picture in next(iter(shown.values()))]
     figure = blank(tall * sum(wide), tall * len(shown))
     grid = figure.subplots(len(shown), len(heads), squeeze=False, width_ratios=wide)

@@ -160,7 +160,7 @@ def read_map(path: Path | str) -> Float32[Array, "rows columns"]:
 
     Raises: InputError: not readable, larger than MOST_CELLS (nothing is allocated then), or a pixel is not finite.
     """
-    width, height = image_files.size(path)
+    width, height = image_files.read_size(path)
     if width * height > MOST_CELLS:
         raise InputError(f"{path}: {width} x {height} heights; at most {MOST_CELLS} are read: shrink the image")
     pixels = image_files.read_channel(path)

@@ -10,7 +10,7 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 from dav_gswt.files import UNREADABLE, whole
-from dav_gswt.images.image_files import enlarged
+from dav_gswt.images.image_files import enlarge_map
 from dav_gswt.views.scores import Scores
 
 Part = tuple[dict[str, Array], dict[str, str]]  # of an EXR: channels, and what the header says
@@ -48,7 +48,7 @@ def _over(square: Float32[Array, "s s"], shape: tuple[int, int]) -> Float32[Arra
     side = min(h, w)
     top, left = (h - side) // 2, (w - side) // 2
     out = np.full(shape, np.nan, np.float32)
-    out[top : top + side, left : left + side] = enlarged(square, side, side)
+    out[top : top + side, left : left + side] = enlarge_map(square, side, side)
     return out
 
 

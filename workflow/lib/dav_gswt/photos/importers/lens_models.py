@@ -44,8 +44,8 @@ def lens(model: str, width: int, height: int, params: tuple, where: str) -> pyco
     """A camera of one of COLMAP's models. Raises: InputError: unknown, spherical, or numbers that no lens has."""
     if model not in _MODELS or model in ("INVALID", "EQUIRECTANGULAR"):
         raise InputError(f"{where}: pictures of a camera {model} are not read; export pictures of a perspective camera")
-    if not (min(width, height) >= 1 and width * height <= image_files.MOST_PIXELS):
-        most = image_files.MOST_PIXELS // 10**6
+    if not (min(width, height) >= 1 and width * height <= image_files.MAX_PIXELS):
+        most = image_files.MAX_PIXELS // 10**6
         raise InputError(f"{where}: pictures of {width} x {height} pixels; 1 pixel to {most} megapixels are read")
     camera = pycolmap.Camera(model=model, width=width, height=height, params=[float(v) for v in params])
     if not camera.verify_params() or not np.isfinite(camera.params).all():

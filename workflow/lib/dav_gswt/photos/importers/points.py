@@ -150,8 +150,10 @@ def _shrink(placed: Sequence[Placed], known: pycolmap.Reconstruction, folder: Pa
     """Write what features are looked for in: the photos upright, shrunk by area means."""
     for i in progress(range(len(placed)), "read photos"):
         image = known.images[i + 1]
-        photo = image_files.read(placed[i].path)
-        image_files.write(folder / image.name, image_files.resized(photo, image.camera.width, image.camera.height))
+        photo = image_files.read_photo(placed[i].path)
+        image_files.write_png(
+            folder / image.name, image_files.shrink_image(photo, image.camera.width, image.camera.height)
+        )
 
 
 def _seen(found: pycolmap.Reconstruction, photos: int, middle: Array) -> Seen:

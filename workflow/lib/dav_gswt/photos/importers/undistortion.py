@@ -143,7 +143,7 @@ def _place(shot: Shot, index: int, path: Path, key: str, source: Path) -> Placed
 
 def _stored(path: Path) -> tuple[int, int, int]:
     """Width, height as stored, and EXIF's orientation."""
-    width, height = image_files.size(path)
+    width, height = image_files.read_size(path)
     value = oiio.ImageInput.open(str(path)).spec().getattribute("Orientation")
     orientation = value if isinstance(value, int) and 1 <= value <= 8 else 1
     return (height, width, orientation) if orientation >= 5 else (width, height, orientation)

@@ -163,10 +163,13 @@ def dots(model: Model, colour: Float32[Array, "n 3"], on: Sheet) -> UInt8[Array,
 
 def shrunk(path: Path, longer: int) -> Small:
     """A picture at most `longer` pixels wide or high."""
-    image, cover = image_files.read_covered(path)
+    image, cover = image_files.read_photo_and_alpha(path)
     share = min(1.0, longer / max(image.shape[:2]))
     width, height = (max(1, round(share * side)) for side in (image.shape[1], image.shape[0]))
-    small, counts = image_files.resized(image, width, height), image_files.resized(cover[..., None], width, height)
+    small, counts = (
+        image_files.shrink_image(image, width, height),
+        image_files.shrink_image(cover[..., None], width, height),
+    )
     shown = counts * small + (1 - counts) * (0.5 * small + 0.5 * MASKED)
     return Small(small, _uri(shown, "jpeg"), float(1 - cover.mean()))
 

@@ -47,7 +47,7 @@ def _located(known: Model, photos: Path, paths: list[Path], scratch: Path, seed:
     pinhole = _main(known, photos)
     new = [_developed(path, photos, pinhole, scratch / f"new_{i:04d}.png") for i, path in enumerate(paths)]
     for name in progress(known.names, "read pictures"):
-        image_files.write(scratch / f"old_{name}", image_files.read(photos / "images" / name))
+        image_files.write_png(scratch / f"old_{name}", image_files.read_photo(photos / "images" / name))
     database = scratch / "database.db"
     names = [f"old_{name}" for name in known.names] + [name for name in new if name]
     size = max(pinhole.width, pinhole.height)
@@ -71,7 +71,7 @@ def _main(known: Model, photos: Path) -> Camera:
 def _developed(path: Path, photos: Path, pinhole: Camera, out: Path) -> str | None:
     """Write the photo as a picture of the scene's; None, with the reason in the log, where it is not of its camera."""
     try:
-        image_files.write(out, lenses.developed(image_files.read(path), photos, pinhole))
+        image_files.write_png(out, lenses.developed(image_files.read_photo(path), photos, pinhole))
     except (InputError, ValueError) as error:
         _log.warning("%s: %s", path.name, error)
         return None

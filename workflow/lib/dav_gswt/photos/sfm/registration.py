@@ -107,7 +107,7 @@ def register(folder: Path | str, options: Options) -> Registered:
     Raises: InputError: no folder or no photos, fewer than three, one that cannot be read, they do not overlap, or a
     solution that is degenerate, with the reason.
     """
-    paths = image_files.listed(folder)
+    paths = image_files.list_photos(folder)
     if len(paths) < LEAST_PHOTOS:
         names = " and ".join(p.name for p in paths)
         raise InputError(f"{folder}: only {names}; at least {LEAST_PHOTOS} overlapping photos are needed, better 20")
@@ -146,7 +146,7 @@ def undistorted(registered: Registered, index: int) -> Float32[Array, "h w 3"]:
     The photo is shrunk by area means to the picture's resolution, then sampled (`lenses.undistorted`).
     """
     lens, camera = registered.lenses[index], registered.model.cameras[index]
-    photo = image_files.resized(image_files.read(registered.sources[index]), lens.width, lens.height)
+    photo = image_files.shrink_image(image_files.read_photo(registered.sources[index]), lens.width, lens.height)
     return lenses.undistorted(photo, lens, camera)
 
 
@@ -162,7 +162,7 @@ def _fit(width: int, height: int, longest: int) -> tuple[int, int]:
 
 
 def _described(path: Path, key: str, options: Options) -> _Photo:
-    full = image_files.size(path)
+    full = image_files.read_size(path)
     width, height = _fit(*full, options.size)
     given = options.focal and options.focal / exif.FILM_DIAGONAL * float(np.hypot(*full))
     pixels = given or exif.focal_length(path)
@@ -196,9 +196,9 @@ def _enter(photos: list[_Photo], store: pycolmap.Database, options: Options) -> 
 def _shrink(photos: list[_Photo], folder: Path) -> None:
     """Write what features are looked for in: the photos shrunk by area means, grey by Rec. 601."""
     for photo in progress(photos, "read photos"):
-        image = image_files.resized(image_files.read(photo.path), photo.width, photo.height)
+        image = image_files.shrink_image(image_files.read_photo(photo.path), photo.width, photo.height)
         grey = image @ np.array([0.299, 0.587, 0.114], np.float32)
-        image_files.write(folder / photo.key, np.repeat(grey[..., None], 3, axis=2))
+        image_files.write_png(folder / photo.key, np.repeat(grey[..., None], 3, axis=2))
 
 
 def _map(
@@ -286,7 +286,7 @@ def _undistortable(
         number = image.camera_id
         if number not in found:
             lens = pycolmap.Camera(image.camera.todict())
-            lens.rescale(*_fit(*image_files.size(by_key[image.name].path), options.side))
+            lens.rescale(*_fit(*image_files.read_size(by_key[image.name].path), options.side))
             found[number], pinholes[number] = lens, pycolmap.undistort_camera(limits, lens)
     sparse = model.of(best, pinholes=pinholes)
     numbers = {best.images[i].name: best.images[i].camera_id for i in best.reg_image_ids()}

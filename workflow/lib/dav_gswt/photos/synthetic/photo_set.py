@@ -38,7 +38,7 @@ def render_set(entry: dict, folder: Path) -> None:
     for part in ("images", "truth", "sparse"):
         (folder / part).mkdir(parents=True, exist_ok=True)
     for name, camera in progress(shots + tests, "render photos"):
-        image_files.write(folder / "images" / name, synthetic.render(scene, camera))
+        image_files.write_png(folder / "images" / name, synthetic.render(scene, camera))
         truth.write(folder / "truth" / Path(name).with_suffix(".exr"), scene, camera)
     found = triangulated(folder / "images", shots, entry["seed"])
     model.write(with_cameras(found, tests), folder / "sparse")

@@ -67,7 +67,7 @@ def examples(seed: int, count: int) -> Examples:
     made, rng = world(seed), np.random.default_rng([seed, 30_000])
     photos = taken(made, rng)
     field = fitted(made, photos, rng)
-    small = [image_files.resized(v.image, SIZE, SIZE) for v in photos]
+    small = [image_files.shrink_image(v.image, SIZE, SIZE) for v in photos]
     places = [poses.of_camera(v.name, v.camera, made.frame) for v in photos]
     found = []
     for _ in range(TRIES * count):

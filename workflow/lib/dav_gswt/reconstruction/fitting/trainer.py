@@ -131,7 +131,7 @@ def _half(view: View) -> View:
     """A view at half its size."""
     half = photos.of(view.name, view.camera, view.image, max(view.camera.width, view.camera.height) // 2)
     width, height = half.camera.width, half.camera.height
-    weight = image_files.resized(view.weight[..., None], width, height)[..., 0]
+    weight = image_files.shrink_image(view.weight[..., None], width, height)[..., 0]
     rows, columns = ((np.arange(n) + 0.5) * of // n for n, of in zip((height, width), view.weight.shape, strict=True))
     behind = None if view.behind is None else view.behind[rows.astype(int)][:, columns.astype(int)]
     return replace(half, weight=np.ascontiguousarray(weight, np.float32), behind=behind)

@@ -59,7 +59,7 @@ def _picture(field: GaussianField, camera: Camera, size: int) -> Float32[Array, 
     share = max(1.0, size / max(width, height))
     large = camera.resized(round(width * share), round(height * share))
     seen = np.clip(render(field, large).colour, 0, 1).astype(np.float32)
-    return image_files.resized(seen, width, height)
+    return image_files.shrink_image(seen, width, height)
 
 
 def judged(
@@ -141,7 +141,7 @@ def in_cells(error_map: Float[Array, "h w"], rows: int, columns: int) -> Float32
     square = error_map[top : top + side, left : left + side]
     known = np.isfinite(square)
     parts = np.stack([np.where(known, square, 0), known], -1).astype(np.float32)
-    total, share = np.moveaxis(image_files.resized(parts, columns, rows), -1, 0)
+    total, share = np.moveaxis(image_files.shrink_image(parts, columns, rows), -1, 0)
     enough = share > KNOWN - 1e-6  # sums of parts of pixels round
     return np.where(enough, total / np.where(enough, share, 1), np.nan).astype(np.float32)
 

@@ -35,7 +35,7 @@ def shown(scene: dict, pool: Candidates, images_folder: Path | str) -> Iterator[
             yield _shrunk(pose.name, camera, synthetic.render(world, _drawn(camera)))
     elif scene["agent"] == "replay":
         for pose, camera in pool:
-            yield _shrunk(pose.name, camera, *image_files.read_covered(Path(images_folder) / pose.name))
+            yield _shrunk(pose.name, camera, *image_files.read_photo_and_alpha(Path(images_folder) / pose.name))
     else:
         raise InputError(f"agent {scene['agent']}: what candidates truly show is known of `render` and `replay` alone")
 
@@ -43,7 +43,7 @@ def shown(scene: dict, pool: Candidates, images_folder: Path | str) -> Iterator[
 def write(folder: Path | str, views: Iterator[View]) -> None:
     """Keep what candidates show, as PNGs named by their poses."""
     for view in views:
-        image_files.write(Path(folder) / f"{view.name}.png", view.image)
+        image_files.write_png(Path(folder) / f"{view.name}.png", view.image)
 
 
 def kept(pool: Candidates, folder: Path | str) -> tuple[Candidates, list[View]]:
@@ -51,7 +51,7 @@ def kept(pool: Candidates, folder: Path | str) -> tuple[Candidates, list[View]]:
     some = [(pose, camera) for pose, camera in pool if (Path(folder) / f"{pose.name}.png").is_file()]
     found = []
     for pose, camera in some:
-        image = image_files.read(path := Path(folder) / f"{pose.name}.png")
+        image = image_files.read_photo(path := Path(folder) / f"{pose.name}.png")
         camera = small(camera)
         if image.shape != (camera.height, camera.width, 3):
             raise InputError(
@@ -78,6 +78,8 @@ def _shrunk(
     camera = small(camera)
     size = camera.width, camera.height
     weight = (
-        np.ones(size[::-1], bool) if cover is None else image_files.resized(cover[..., None], *size)[..., 0] > WHOLE
+        np.ones(size[::-1], bool)
+        if cover is None
+        else image_files.shrink_image(cover[..., None], *size)[..., 0] > WHOLE
     )
-    return View(name, camera, image_files.resized(image, *size), weight.astype(np.float32))
+    return View(name, camera, image_files.shrink_image(image, *size), weight.astype(np.float32))

@@ -33,7 +33,7 @@ def write(folder: Path | str, items: list[Item], origin: dict) -> None:
         told = []
         for number, item in enumerate(items):
             for letter, half in zip("ab", item.halves, strict=True):
-                image_files.write(part / _name(number, letter), half.picture)
+                image_files.write_png(part / _name(number, letter), half.picture)
             names = dict(zip("ab", (half.name for half in item.halves), strict=True))
             seen = {"view": item.view, "ground": item.ground, "cluster": item.cluster}
             told.append(names | seen | {"over": list(item.over)})

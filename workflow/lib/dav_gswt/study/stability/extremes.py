@@ -66,7 +66,7 @@ def two_photos(folder: Path) -> None:
     rng = np.random.default_rng(0)
     (folder / "photos").mkdir()
     for number in range(2):
-        image_files.write(folder / f"photos/{number}.png", rng.uniform(0, 1, (96, 128, 3)).astype(np.float32))
+        image_files.write_png(folder / f"photos/{number}.png", rng.uniform(0, 1, (96, 128, 3)).astype(np.float32))
 
 
 def desert(**keys) -> dict:

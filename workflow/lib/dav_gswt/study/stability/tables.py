@@ -60,7 +60,7 @@ def known_warnings(found: list[str]) -> list[str]:
 
 def is_blank(path: Path) -> bool:
     """Whether a picture's lower half is of one colour."""
-    picture = image_files.read(path)
+    picture = image_files.read_photo(path)
     return float(picture[len(picture) // 2 :].std((0, 1)).max()) < 1 / 255
 
 
@@ -69,6 +69,6 @@ def likeness(folder: Path, other: Path) -> float | None:
     pairs = [(path, other / path.name) for path in sorted(folder.glob("*.png"))]
     if not pairs or not all(second.is_file() for _, second in pairs):
         return None
-    a, b = (np.concatenate([image_files.read(pair[i]) for pair in pairs]) for i in (0, 1))
+    a, b = (np.concatenate([image_files.read_photo(pair[i]) for pair in pairs]) for i in (0, 1))
     found = metrics.psnr(a, b, np.ones(a.shape[:2], np.float32))
     return 100.0 if found is None else min(100.0, float(found))

@@ -6,8 +6,8 @@ import numpy as np
 
 from dav_gswt import provenance
 from dav_gswt.images import image_files
-from dav_gswt.study import csv_tables
 from dav_gswt.images.metrics import mse_to_psnr
+from dav_gswt.study import csv_tables
 from dav_gswt.study.sweeps import tables as sweeps
 from dav_gswt.study.sweeps.grid import CELL
 from dav_gswt.study.tradeoff.front import front, rivals
@@ -72,7 +72,10 @@ def _difference(a: float | None, b: float | None) -> float | None:
 
 def mean_square(mine: list[str], others: list[str]) -> float:
     """Mean squared difference of pictures, pair by pair, over all their pixels; 0 where they are equal."""
-    found = [(image_files.read(a).astype(float) - image_files.read(b)) ** 2 for a, b in zip(mine, others, strict=True)]
+    found = [
+        (image_files.read_photo(a).astype(float) - image_files.read_photo(b)) ** 2
+        for a, b in zip(mine, others, strict=True)
+    ]
     return float(np.mean([difference.mean() for difference in found]))
 
 

@@ -6,7 +6,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.images.image_files import enlarged
+from dav_gswt.images.image_files import enlarge_map
 from dav_gswt.raster import Rasterizer, to_raster_arrays
 
 SIDE = 64  # pixels of the pictures whose blend weights are taken
@@ -24,7 +24,7 @@ def carried(field: GaussianField, cameras: list[Camera], maps: Float32[Array, "n
     total = np.zeros((2, len(field)))
     for camera, u in zip(cameras, maps, strict=True):
         raster.forward(**to_raster_arrays(field), camera=camera.resized(SIDE, SIDE))
-        found = raster.contributions(enlarged(u, SIDE, SIDE)[..., None])
+        found = raster.contributions(enlarge_map(u, SIDE, SIDE)[..., None])
         total += found.mapped[:, 0], found.total
     weighted, weight = total
     return np.where(weight > SEEN, weighted / np.maximum(weight, SEEN), np.nan).astype(np.float32)
