@@ -104,7 +104,7 @@ def _field(means, scales, quats, opacity, colours, is_ground: bool) -> GaussianF
     )
 
 
-def _frame() -> dict:
+def _frame() -> SceneFrame:
     half = ground.EXEMPLAR / 2
     reach = 1.25 * half
     exemplar, extent = Square(-half, -half, ground.EXEMPLAR), Extent(-reach, -reach, reach, reach)
