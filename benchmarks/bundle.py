@@ -16,7 +16,7 @@ from fixtures.splats import rough_ground
 from record import tell
 
 from dav_gswt.bundle import build, direction_search, order_directions, orders, store
-from dav_gswt.terrain import assemble, still
+from dav_gswt.terrain import endless, stills
 from dav_gswt.tiles.build import TileSet
 
 SCHEMA = Path(__file__).parents[1] / "workflow/schemas/davgswt.schema.json"
@@ -50,10 +50,12 @@ def walker(tiles: TileSet) -> float | None:
     with tempfile.TemporaryDirectory() as folder:
         build.write_bundle(tiles, Path(folder, "bundle"), build.Options(tau=0.5), SCHEMA, {})
         bundle = store.read(Path(folder, "bundle"), SCHEMA)
-        terrain = assemble.of_bundle(bundle, {"kind": "flat"})
+        terrain = endless.terrain_from_bundle(bundle, {"kind": "flat"})
     value = bundle.manifest
-    camera = still.camera_of(still.SHOTS[0], terrain, value["eye_floor"], 960, 540)
-    pictures = [still.draw(terrain, camera, value["sky"], value["ground_colour"], exact) for exact in (False, True)]
+    camera = stills.shot_camera(stills.SHOTS[0], terrain, value["eye_floor"], 960, 540)
+    pictures = [
+        stills.render_view(terrain, camera, value["sky"], value["ground_colour"], exact) for exact in (False, True)
+    ]
     return order_directions.decibels([tuple(pictures)])
 
 

@@ -5,12 +5,12 @@ from pathlib import Path
 from dav_gswt.bundle import store
 from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to, progress
-from dav_gswt.terrain import assemble, still
+from dav_gswt.terrain import endless, stills
 
 with logging_to(snakemake.log[0]):
     params = snakemake.params
     bundle = store.read(Path(snakemake.input.manifest).parent, params.schema)
-    terrain = assemble.of_bundle(bundle, params.heights)
+    terrain = endless.terrain_from_bundle(bundle, params.heights)
     targets = {Path(path).stem: path for path in snakemake.output.stills}
-    for shot in progress(still.SHOTS, "render stills"):
-        image_files.write_png(targets[shot.name], still.taken(terrain, shot, bundle.manifest, **params.size))
+    for shot in progress(stills.SHOTS, "render stills"):
+        image_files.write_png(targets[shot.name], stills.render_shot(terrain, shot, bundle.manifest, **params.size))

@@ -14,15 +14,15 @@ from fixtures.bundles import SKY, Ground
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.geometry import cameras
 from dav_gswt.study.terrain.browser import served
-from dav_gswt.terrain import assemble, still
-from dav_gswt.terrain.assemble import Terrain
-from dav_gswt.terrain.heights import Flat, Hills, Relief
+from dav_gswt.terrain import endless, stills
+from dav_gswt.terrain.endless import EndlessTerrain
+from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills
 
 GROUND = Ground(levels=3, speckle=40, things=4)
 SURFACES = {
-    "flat": Flat(),
+    "flat": FlatSurface(),
     "hills": Hills(2.0 * GROUND.side, 12.0 * GROUND.side, 3, 5),
-    "image": Relief(np.random.default_rng(1).uniform(0, 3, (9, 7)).astype(np.float32), 60.0),
+    "image": HeightMap(np.random.default_rng(1).uniform(0, 3, (9, 7)).astype(np.float32), 60.0),
 }
 PLACES = {
     "walker": dict(x=3.0, y=5.0, eye=0.8, yaw=60.0, pitch=-12.0),
@@ -41,9 +41,9 @@ def hilly(request, page_of):
         yield address, terrain_of(folder, surface)
 
 
-def terrain_of(folder, surface) -> tuple[Terrain, dict]:
+def terrain_of(folder, surface) -> tuple[EndlessTerrain, dict]:
     bundle = Bundle(folder, json.loads((folder / "davgswt.json").read_text()))
-    return replace(assemble.of_bundle(bundle, {"kind": "flat"}), heights=surface), bundle.manifest
+    return replace(endless.terrain_from_bundle(bundle, {"kind": "flat"}), heights=surface), bundle.manifest
 
 
 @pytest.mark.parametrize("place", [pytest.param(place, id=name) for name, place in PLACES.items()])
@@ -51,7 +51,7 @@ def test_the_page_draws_what_the_library_draws(visit, hilly, place):
     address, (terrain, manifest) = hilly
     seen = visit(160, 100).open(f"{address}?still")
     drawn = seen.at(**place)
-    expected = np.rint(255 * still.draw(terrain, camera_at(terrain, place), SKY, manifest["ground_colour"]))
+    expected = np.rint(255 * stills.render_view(terrain, camera_at(terrain, place), SKY, manifest["ground_colour"]))
     difference = np.abs(drawn - expected)
     assert difference.mean() < MEAN and difference.max() <= MOST
     assert expected.std() > 8, "there is something to see"

@@ -6,8 +6,8 @@ import pytest
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.geometry import cameras
 from dav_gswt.terrain import splats
-from dav_gswt.terrain.drape import lifted
-from dav_gswt.terrain.heights import of_config
+from dav_gswt.terrain.displacement import displace_means
+from dav_gswt.terrain.heights import surface_from_config
 
 SIDE, COUNT, NEAR = 4.0, 3000, 0.05
 DEVIATIONS = np.geomspace(0.005, 0.5, 16)
@@ -60,7 +60,7 @@ def looks(surface, rng) -> list[tuple[np.ndarray, cameras.Camera]]:
 
 @pytest.mark.parametrize("entry", SURFACES.values(), ids=SURFACES)
 def test_whatever_may_show_is_sorted(visit, plain, field, rng, entry):
-    surface = of_config(entry, SIDE)
+    surface = surface_from_config(entry, SIDE)
     views = looks(surface, rng)
     given = {
         "surface": {"octaves": 4, "salt": 0} | entry,
@@ -74,8 +74,8 @@ def test_whatever_may_show_is_sorted(visit, plain, field, rng, entry):
     sorted_ = visit(160, 100).open(f"{plain}?still").page.evaluate(LOOK, given)
     shown = kept = 0
     for (eye, camera), found in zip(views, sorted_, strict=True):
-        placed, slope = lifted(field, surface, np.zeros(3), eye)
-        _, which = splats.indexed(placed, slope, camera, NEAR)
+        placed, slope = displace_means(field, surface, np.zeros(3), eye)
+        _, which = splats.project_indexed(placed, slope, camera, NEAR)
         assert set(which.tolist()) <= set(found)
         depth = placed.means @ camera.rotation[2]
         assert (np.diff(depth[found]) <= 1e-4).all(), "back to front"

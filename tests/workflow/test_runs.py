@@ -17,7 +17,7 @@ from dav_gswt.images import image_files
 from dav_gswt.photos import model
 from dav_gswt.reconstruction import ground
 from dav_gswt.study.tables import spread
-from dav_gswt.terrain.still import SHOTS
+from dav_gswt.terrain.stills import SHOTS
 from dav_gswt.views import pose_maps, scores
 
 CONFIGS = (USUAL, TINY)

@@ -13,7 +13,7 @@ import pytest
 from dav_gswt.bundle import build, gswt, lod, manifest, store
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, rgb_to_sh
-from dav_gswt.terrain import assemble, still
+from dav_gswt.terrain import endless, stills
 from dav_gswt.tiles.build import TileSet
 
 SCHEMA = Path(__file__).parents[3] / "workflow/schemas/davgswt.schema.json"
@@ -91,10 +91,14 @@ def test_a_bundle_reads_back_as_the_tiles_it_was_made_of(bundle, tiles):
 
 def test_the_terrain_of_a_bundle_is_that_of_its_tiles_but_for_the_rounding(bundle, tiles):
     read = store.read(bundle[0], SCHEMA)
-    rounded = assemble.of_bundle(read, {"kind": "flat"})
-    exact = assemble.of_fields(tiles.fields, read.manifest, {"kind": "flat"})
-    assert (rounded.side, rounded.kept, rounded.z[0]) == (exact.side, exact.kept, pytest.approx(exact.z[0], abs=0.01))
-    pictures = [still.taken(terrain, still.SHOTS[1], read.manifest, 64, 36) for terrain in (rounded, exact)]
+    rounded = endless.terrain_from_bundle(read, {"kind": "flat"})
+    exact = endless.terrain_from_fields(tiles.fields, read.manifest, {"kind": "flat"})
+    assert (rounded.side, rounded.tile_orders, rounded.z[0]) == (
+        exact.side,
+        exact.tile_orders,
+        pytest.approx(exact.z[0], abs=0.01),
+    )
+    pictures = [stills.render_shot(terrain, stills.SHOTS[1], read.manifest, 64, 36) for terrain in (rounded, exact)]
     assert 0 < np.abs(pictures[0] - pictures[1]).max() < 0.05
 
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dav_gswt.terrain.choice import CENTRE, SOUTH, WEST, hashed, tile_at, tiles_in
+from dav_gswt.terrain.choice import CENTRE, SOUTH, WEST, hash_cell, tile_at, tiles_in
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "tile_choice.json").read_text())["cells"]
 EDGE = 2**31
@@ -29,32 +29,32 @@ def twin(i, j, axis, salt):
 
 
 def test_nothing_hashes_to_nothing():
-    assert hashed(0, 0, WEST, 0) == 0
+    assert hash_cell(0, 0, WEST, 0) == 0
 
 
 def test_the_hash_of_salt_one_is_the_value_worked_by_hand():
     # 1 ^ 1 >> 16 = 1; * 85ebca6b = 85ebca6b; ^ 00042f5e (>> 13) = 85efe535; * c2b2ae35 = 65dd47a4 514e79f9, of which
     # the low word stays; ^ 0000514e (>> 16) = 514e28b7
-    assert hashed(0, 0, WEST, 1) == 0x514E28B7
+    assert hash_cell(0, 0, WEST, 1) == 0x514E28B7
 
 
 def test_tile_number_is_read_off_the_edges_around_the_cell():
-    west, east = hashed(5, 3, WEST, 7) & 1, hashed(6, 3, WEST, 7) & 1
-    south, north = hashed(5, 3, SOUTH, 7) & 1, hashed(5, 4, SOUTH, 7) & 1
-    centre = (hashed(5, 3, CENTRE, 7) >> 1) % 3
+    west, east = hash_cell(5, 3, WEST, 7) & 1, hash_cell(6, 3, WEST, 7) & 1
+    south, north = hash_cell(5, 3, SOUTH, 7) & 1, hash_cell(5, 4, SOUTH, 7) & 1
+    centre = (hash_cell(5, 3, CENTRE, 7) >> 1) % 3
     assert tile_at(5, 3, 7, 3) == 16 * centre + 8 * west + 4 * north + 2 * east + south
 
 
 @pytest.mark.parametrize("cell", GOLDEN, ids=lambda c: f"{c['i']},{c['j']}")
 def test_integers_are_those_shared_with_the_page(cell):
     i, j, salt = cell["i"], cell["j"], cell["salt"]
-    assert [hashed(i, j, axis, salt) for axis in (WEST, SOUTH, CENTRE)] == cell["hashes"]
+    assert [hash_cell(i, j, axis, salt) for axis in (WEST, SOUTH, CENTRE)] == cell["hashes"]
     assert tile_at(i, j, salt, cell["variants"]) == cell["tile"]
 
 
 @given(coordinates, coordinates, st.integers(0, 2), salts)
 def test_hash_equals_its_twin_in_wrapping_arithmetic(i, j, axis, salt):
-    assert hashed(i, j, axis, salt) == twin(i, j, axis, salt)
+    assert hash_cell(i, j, axis, salt) == twin(i, j, axis, salt)
 
 
 @given(coordinates, coordinates, salts, st.integers(1, 9))
@@ -91,7 +91,7 @@ def test_even_cells_take_what_the_hash_says(variants):
     window = tiles_in(0, 0, (20, 20), 5, variants)
     for j, i in np.ndindex(20, 20):
         if (i + j) % 2 == 0 or variants == 1:
-            assert window[j, i] // 16 == (hashed(i, j, CENTRE, 5) >> 1) % variants
+            assert window[j, i] // 16 == (hash_cell(i, j, CENTRE, 5) >> 1) % variants
 
 
 def test_a_window_names_the_same_tiles_as_its_cells_and_uses_them_all():

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dav_gswt.bundle import orders
-from dav_gswt.terrain import order
+from dav_gswt.terrain import draw_order
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "draw_order.json").read_text())
 
@@ -22,9 +22,9 @@ def window(west, south, columns, rows):
 @pytest.mark.parametrize("entry", GOLDEN["cells"], ids=lambda e: str(e["eye"]))
 def test_cells_stand_in_the_order_shared_with_the_page(entry):
     i, j = window(*(entry[key] for key in ("west", "south", "columns", "rows")))
-    sequence, _ = order.back_to_front(i, j, tuple(entry["eye"]))
+    sequence, _ = draw_order.sort_cells(i, j, tuple(entry["eye"]))
     assert np.stack([i, j], 1)[sequence].tolist() == entry["order"]
-    assert order.around(i, j, tuple(entry["eye"]))[sequence].tolist() == entry["close"]
+    assert draw_order.in_near_block(i, j, tuple(entry["eye"]))[sequence].tolist() == entry["close"]
 
 
 def test_orders_are_those_shared_with_the_page():
@@ -32,12 +32,12 @@ def test_orders_are_those_shared_with_the_page():
     np.testing.assert_allclose(along, orders.Rings().directions(), atol=1e-15)
     for entry in GOLDEN["orders"]:
         to, slope = np.array(entry["to"], float), np.array(entry["slope"], float)
-        assert order.nearest(along, entry["kept"], to, slope) == entry["position"]
+        assert draw_order.nearest_order(along, entry["kept"], to, slope) == entry["position"]
 
 
 def test_three_by_three_cells_are_worked_by_hand():
     i, j = window(0, 0, 3, 3)
-    sequence, steps = order.back_to_front(i, j, (0, 1))
+    sequence, steps = draw_order.sort_cells(i, j, (0, 1))
     assert steps.tolist() == [1, 2, 3, 0, 1, 2, 1, 2, 3]
     expected = [(2, 0), (2, 2), (1, 0), (2, 1), (1, 2), (0, 0), (1, 1), (0, 2), (0, 1)]
     assert [(int(i[k]), int(j[k])) for k in sequence] == expected
@@ -47,7 +47,7 @@ def test_three_by_three_cells_are_worked_by_hand():
 def test_no_ray_meets_a_cell_before_one_that_is_drawn_after_it(x, y, angle):
     """The slow way: walk along a ray from the eye and note the cells in the order that it enters them."""
     i, j = window(-6, -6, 13, 13)
-    sequence, _ = order.back_to_front(i, j, (0, 0))
+    sequence, _ = draw_order.sort_cells(i, j, (0, 0))
     place = {(int(i[k]), int(j[k])): at for at, k in enumerate(sequence)}
     t = np.arange(0, 6, 1e-3)
     met = np.floor(np.stack([x + t * np.cos(angle), y + t * np.sin(angle)], 1)).astype(int)
@@ -60,23 +60,23 @@ def test_no_ray_meets_a_cell_before_one_that_is_drawn_after_it(x, y, angle):
 @given(st.integers(-50, 50), st.integers(-50, 50))
 def test_the_order_goes_with_the_eye(di, dj):
     i, j = window(-3, -3, 7, 7)
-    here, _ = order.back_to_front(i, j, (0, 0))
-    there, _ = order.back_to_front(i + di, j + dj, (di, dj))
+    here, _ = draw_order.sort_cells(i, j, (0, 0))
+    there, _ = draw_order.sort_cells(i + di, j + dj, (di, dj))
     assert here.tolist() == there.tolist()
 
 
 def test_the_cells_about_the_eye_are_nine():
     i, j = window(-4, -4, 9, 9)
-    close = order.around(i, j, (1, -2))
+    close = draw_order.in_near_block(i, j, (1, -2))
     assert close.sum() == 9 and set(i[close].tolist()) == {0, 1, 2} and set(j[close].tolist()) == {-3, -2, -1}
 
 
 def test_on_level_ground_the_nearest_direction_is_that_of_the_least_angle():
     along = orders.Rings().directions()
     east = np.array([1.0, 0.0, -np.tan(np.radians(20.0))])
-    assert order.nearest(along, list(range(17)), east, np.zeros(2)) == 0
-    assert order.nearest(along, [8, 16, 4, 0], east, np.zeros(2)) == 3, "a position in what is kept"
-    assert order.nearest(along, list(range(17)), np.array([0.1, 0.0, -1.0]), np.zeros(2)) == 16
+    assert draw_order.nearest_order(along, list(range(17)), east, np.zeros(2)) == 0
+    assert draw_order.nearest_order(along, [8, 16, 4, 0], east, np.zeros(2)) == 3, "a position in what is kept"
+    assert draw_order.nearest_order(along, list(range(17)), np.array([0.1, 0.0, -1.0]), np.zeros(2)) == 16
 
 
 @given(st.floats(-2, 2), st.floats(-2, 2), st.integers(0, 2**32 - 1))
@@ -89,4 +89,4 @@ def test_on_a_slope_the_order_is_that_of_the_slope(east, north, seed):
     draped = flat + (flat[:, :2] @ slope)[:, None] * [0, 0, 1]
     to = along[which] - np.array([east, north, 0]) * along[which, 2]
     np.testing.assert_allclose(draped @ to, flat @ along[which], atol=1e-12)
-    assert order.nearest(along, list(range(17)), to, slope) == which
+    assert draw_order.nearest_order(along, list(range(17)), to, slope) == which

@@ -12,24 +12,24 @@ from hypothesis import strategies as st
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.terrain import heights
-from dav_gswt.terrain.choice import hashed
-from dav_gswt.terrain.heights import STEEPEST, Flat, Heights, Hills, Relief
+from dav_gswt.terrain.choice import hash_cell
+from dav_gswt.terrain.heights import STEEPEST, FlatSurface, HeightField, HeightMap, Hills
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "heights.json").read_text())["surfaces"]
 RNG = np.random.default_rng(0)
-RUGGED = Relief(RNG.normal(size=(7, 9)).astype(np.float32), 13.0)
+RUGGED = HeightMap(RNG.normal(size=(7, 9)).astype(np.float32), 13.0)
 SURFACES = [
     pytest.param(Hills(2.0, 7.0, 5, 3), id="hills"),
     pytest.param(RUGGED, id="mirrored image"),
-    pytest.param(Relief(RUGGED.pixels, 13.0, "clamp"), id="clamped image"),
+    pytest.param(HeightMap(RUGGED.pixels, 13.0, "clamp"), id="clamped image"),
 ]
 salts = st.integers(0, 2**32 - 1)
 
 
-def surface_of(entry) -> Heights:
+def surface_of(entry) -> HeightField:
     if entry["kind"] == "hills":
         return Hills(*(entry[key] for key in ("height", "wavelength", "octaves", "salt")))
-    return Relief(np.array(entry["pixels"], np.float32), entry["width"], entry["beyond"])
+    return HeightMap(np.array(entry["pixels"], np.float32), entry["width"], entry["beyond"])
 
 
 def places(n, reach=60.0):
@@ -49,21 +49,21 @@ def test_numbers_are_those_shared_with_the_page(entry):
 
 
 def test_a_plain_is_level():
-    height, slope = Flat().at(*places(5))
+    height, slope = FlatSurface().at(*places(5))
     assert not height.any() and not slope.any()
-    assert (Flat.low, Flat.high, Flat.steepest) == (0, 0, 0)
+    assert (FlatSurface.low, FlatSurface.high, FlatSurface.steepest) == (0, 0, 0)
 
 
 def test_hills_half_way_along_an_edge_are_worked_by_hand():
     # on an edge of the lattice only its two corners count; half-way each has weight 1/2 and is half a cell away
-    west, east = (hashed(i, 0, heights.HILLS, 5) & 0xFFFF for i in (0, 1))
+    west, east = (hash_cell(i, 0, heights.HILLS, 5) & 0xFFFF for i in (0, 1))
     g0, g1 = west / 32767.5 - 1, east / 32767.5 - 1
     height, _ = Hills(3.0, 10.0, 1, 5).at(np.array([5.0]), np.array([0.0]))
     assert height[0] == pytest.approx(3 * (0.5 * g0 * 0.5 + 0.5 * g1 * -0.5), abs=1e-15)
 
 
 def test_at_the_lattice_one_octave_is_zero_and_as_steep_as_its_hash_says():
-    bits = hashed(-4, 9, heights.HILLS, 1)
+    bits = hash_cell(-4, 9, heights.HILLS, 1)
     height, slope = Hills(1.0, 2.0, 1, 1).at(np.array([-8.0]), np.array([18.0]))
     assert height[0] == 0
     expected = 0.5 * np.array([(bits & 0xFFFF) / 32767.5 - 1, (bits >> 16) / 32767.5 - 1])
@@ -96,7 +96,7 @@ def test_no_gradients_at_the_corners_make_the_noise_steeper_than_its_bound(monke
                 mine = (i == corner % 2) & (j == corner // 2)
                 return np.where(mine, bits, 0x7FFF7FFF)
 
-            monkeypatch.setattr(heights, "hashed", one)
+            monkeypatch.setattr(heights, "hash_cell", one)
             most += np.abs(turns @ heights._noise(u, v, 3, 0)[1].T)
     # 0x7fff is -1.5e-5 and not 0, in up to 8 terms
     assert most.max() < STEEPEST + 1e-3
@@ -125,28 +125,28 @@ def test_height_and_slope_have_no_jumps(surface):
 
 @pytest.mark.parametrize("surface", SURFACES)
 def test_bounds_hold(surface):
-    assert isinstance(surface, Heights)
+    assert isinstance(surface, HeightField)
     height, slope = surface.at(*places(5000))
     assert surface.low <= height.min() and height.max() <= surface.high
     assert np.hypot(*slope.T).max() <= surface.steepest
 
 
 def test_a_constant_image_is_a_plateau():
-    height, slope = Relief(np.full((3, 5), 1.25, np.float32), 10.0).at(*places(50))
+    height, slope = HeightMap(np.full((3, 5), 1.25, np.float32), 10.0).at(*places(50))
     np.testing.assert_allclose(height, 1.25, rtol=1e-15)
     np.testing.assert_allclose(slope, 0, atol=1e-15)
 
 
 def test_a_ramp_in_the_middle_of_an_image_has_its_slope():
     """10 pixels over 20 units, each 1 higher than its western neighbour: a B-spline of a line is that line."""
-    ramp = Relief(np.tile(np.arange(10, dtype=np.float32), (10, 1)), 20.0)
+    ramp = HeightMap(np.tile(np.arange(10, dtype=np.float32), (10, 1)), 20.0)
     height, slope = ramp.at(np.array([-3.0, 0.0, 4.4]), np.array([1.0, 0.0, -2.0]))
     np.testing.assert_allclose(height, [4.5 - 1.5, 4.5, 4.5 + 2.2], atol=1e-12)
     np.testing.assert_allclose(slope, [[0.5, 0]] * 3, atol=1e-12)
 
 
 def test_the_first_row_of_an_image_lies_in_the_north():
-    north = Relief(np.array([[1.0], [0.0]], np.float32), 1.0)
+    north = HeightMap(np.array([[1.0], [0.0]], np.float32), 1.0)
     assert north.at(np.array([0.0, 0.0]), np.array([0.5, -0.5]))[0].tolist() == [0.875, 0.125]
 
 
@@ -159,7 +159,7 @@ def test_a_mirrored_image_is_the_same_on_both_sides_of_its_edge():
 
 
 def test_a_clamped_image_goes_on_as_its_edge():
-    clamped = Relief(RUGGED.pixels, 13.0, "clamp")
+    clamped = HeightMap(RUGGED.pixels, 13.0, "clamp")
     far, _ = clamped.at(np.array([50.0, 1e6]), np.array([1.0, 1.0]))
     assert far[0] == pytest.approx(far[1], rel=1e-14)
     _, slope = clamped.at(np.array([50.0]), np.array([500.0]))
@@ -180,7 +180,7 @@ def test_an_image_file_becomes_a_surface(tmp_path, suffix):
         image_files.write_png(path, values[..., None])
         expected = values
     entry = {"kind": "image", "file": str(path), "width": 6.0, "height": 10.0}
-    surface = heights.of_config(entry, 2.8)
+    surface = heights.surface_from_config(entry, 2.8)
     np.testing.assert_allclose(surface.pixels, 10 * expected, rtol=1e-6)
     assert surface.width == 6.0 and surface.beyond == "mirror"
 
@@ -192,20 +192,20 @@ def test_sixteen_bits_are_read_as_such(tmp_path):
     file.open(str(tmp_path / "map.png"), oiio.ImageSpec(3, 2, 1, oiio.UINT16))
     file.write_image(values[..., None])
     file.close()
-    np.testing.assert_allclose(heights.read_map(tmp_path / "map.png") * 65535, values, atol=0.01)
+    np.testing.assert_allclose(heights.read_height_map(tmp_path / "map.png") * 65535, values, atol=0.01)
 
 
 def test_hills_are_measured_in_tile_sides():
-    assert heights.of_config({"kind": "hills", "height": 2, "wavelength": 10}, 0.3) == Hills(0.6, 3.0, 4, 0)
-    assert heights.of_config({"kind": "flat"}, 0.3) == Flat()
+    assert heights.surface_from_config({"kind": "hills", "height": 2, "wavelength": 10}, 0.3) == Hills(0.6, 3.0, 4, 0)
+    assert heights.surface_from_config({"kind": "flat"}, 0.3) == FlatSurface()
 
 
 def test_an_image_too_large_is_refused_before_it_is_read(tmp_path, monkeypatch):
     image_files.write_png(tmp_path / "map.png", np.zeros((4, 5, 1)))
-    monkeypatch.setattr(heights, "MOST_CELLS", 19)
+    monkeypatch.setattr(heights, "MAX_PIXELS", 19)
     monkeypatch.setattr(image_files, "read_channel", None)
     with pytest.raises(InputError, match=r"map\.png: 5 x 4 heights; at most 19"):
-        heights.read_map(tmp_path / "map.png")
+        heights.read_height_map(tmp_path / "map.png")
 
 
 def test_a_height_that_is_not_finite_is_named(tmp_path):
@@ -213,13 +213,13 @@ def test_a_height_that_is_not_finite_is_named(tmp_path):
     values[1, 2] = np.nan
     image_files.write_exr(tmp_path / "map.exr", {"Y": values})
     with pytest.raises(InputError, match=r"map\.exr: the height in row 1, column 2 is not finite"):
-        heights.read_map(tmp_path / "map.exr")
+        heights.read_height_map(tmp_path / "map.exr")
 
 
 def test_a_file_that_is_no_image_is_named(tmp_path):
     (tmp_path / "map.png").write_text("no image")
     with pytest.raises(InputError, match=r"map\.png: not readable"):
-        heights.read_map(tmp_path / "map.png")
+        heights.read_height_map(tmp_path / "map.png")
 
 
 def test_hills_kilometres_out_are_as_smooth_as_at_home():

@@ -23,7 +23,7 @@ def folder(tmp_path):
 @pytest.fixture
 def ask(folder):
     """Ask the server for a path as it stands; returns status, headers and body."""
-    with serve.server(folder, 0) as running:
+    with serve.create_server(folder, 0) as running:
         thread = threading.Thread(target=running.serve_forever, kwargs={"poll_interval": 0.02})
         thread.start()
 
@@ -72,12 +72,12 @@ def test_listings_missing_files_and_writes_are_refused(ask, path, method, status
 
 
 def test_it_listens_on_loopback_alone(folder):
-    with serve.server(folder, 0) as running:
+    with serve.create_server(folder, 0) as running:
         assert running.server_address[0] == "127.0.0.1"
 
 
 def test_a_taken_port_is_named(folder, capsys):
-    with serve.server(folder, 0) as running:
+    with serve.create_server(folder, 0) as running:
         port = running.server_address[1]
         assert serve.main([str(folder), "--port", str(port)]) == 1
     assert f"port {port} is taken" in capsys.readouterr().err
@@ -93,4 +93,4 @@ def test_a_folder_without_a_page_is_named(folder, name, capsys):
 
 def test_a_port_that_is_none_is_refused(folder):
     with pytest.raises(InputError, match="--port 70000"):
-        serve.server(folder, 70000)
+        serve.create_server(folder, 70000)

@@ -9,7 +9,7 @@ from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.geometry import cameras
 from dav_gswt.raster import render
 from dav_gswt.terrain import splats
-from dav_gswt.terrain.drape import axes
+from dav_gswt.terrain.displacement import displaced_axes
 
 CAMERA = cameras.pinhole([0.0, 0, 0], [1, 0.2, -0.3], 64, 40, 60.0)
 
@@ -44,7 +44,7 @@ def twin(field, camera) -> np.ndarray:
         rim = np.array([0.65 * camera.width / camera.fx, 0.65 * camera.height / camera.fy])
         bound = np.clip(slope, -rim, rim)
         jacobian = camera.fx / q[2] * np.array([[1, 0, -bound[0]], [0, 1, -bound[1]]])
-        spread = jacobian @ camera.rotation @ axes(field[k : k + 1], np.zeros((1, 2)))[0]
+        spread = jacobian @ camera.rotation @ displaced_axes(field[k : k + 1], np.zeros((1, 2)))[0]
         inverse = np.linalg.inv(spread @ spread.T + 0.3 * np.eye(2))
         d = np.stack([u, v], -1) - (camera.fx * slope + [camera.cx, camera.cy])
         alpha = np.exp(-0.5 * np.einsum("hwi,ij,hwj->hw", d, inverse, d)) / (1 + np.exp(-field.opacity_logits[k]))
@@ -56,7 +56,7 @@ def twin(field, camera) -> np.ndarray:
 @pytest.mark.parametrize("coefficients", [1, 4])
 def test_sorted_by_depth_it_is_the_rasterizer_s_picture(coefficients):
     field = made(300, coefficients=coefficients)
-    seen = splats.blended(splats.sorted_by_depth(splats.projected(field, level(field), CAMERA, 0.01)), CAMERA)
+    seen = splats.blend(splats.sort_by_depth(splats.project(field, level(field), CAMERA, 0.01)), CAMERA)
     expected = render(field, CAMERA)
     # both in float32; a pixel where an alpha is 1/255 to the last bits may take it in one of them: one or two do
     difference = np.abs(seen.colour - expected.colour)
@@ -68,7 +68,7 @@ def test_sorted_by_depth_it_is_the_rasterizer_s_picture(coefficients):
 def test_a_given_order_is_kept_however_wrong_it_is(seed):
     field = made(40, seed)
     expected = twin(field, CAMERA)
-    seen = splats.blended(splats.projected(field, level(field), CAMERA, 0.01), CAMERA).colour
+    seen = splats.blend(splats.project(field, level(field), CAMERA, 0.01), CAMERA).colour
     assert np.abs(seen - expected).max() < 2e-3  # a pixel takes no splat that leaves it less than 1e-4; 1/255's edge
     exact = render(field, CAMERA).colour
     assert np.abs(exact - expected).max() > 0.1, "the order matters"
@@ -81,7 +81,7 @@ def test_the_last_of_two_covers_the_first():
     pair = replace(pair, opacity_logits=np.full(2, 9, np.float32), sh=rgb_to_sh(np.array([[1.0, 0, 0], [0, 1.0, 0]])))
     pixel = CAMERA.project(ends[:1].astype(float))[0][0].astype(int)
     red, green = (
-        splats.blended(splats.projected(part, level(part), CAMERA, 0.01), CAMERA).colour[pixel[1], pixel[0]]
+        splats.blend(splats.project(part, level(part), CAMERA, 0.01), CAMERA).colour[pixel[1], pixel[0]]
         for part in (pair[::-1], pair)
     )
     # opacities are held below .99; a pixel's centre is up to half a pixel off
@@ -92,34 +92,36 @@ def test_the_last_of_two_covers_the_first():
 def test_what_is_behind_or_too_near_or_out_of_sight_is_left_out():
     field = made(4)
     means = np.array([[-5, 0, 0], [0.5, 0, 0], [6, 90, 0], [6, 1, -1]], np.float32)
-    seen = splats.projected(replace(field, means=means), level(field), CAMERA, 1.0)
+    seen = splats.project(replace(field, means=means), level(field), CAMERA, 1.0)
     assert seen.depths == pytest.approx([(CAMERA.rotation @ means[3])[2]])
 
 
 def test_what_reaches_into_the_picture_from_beside_it_is_kept():
     big = replace(made(1), means=np.array([[6, 5.5, 0]], np.float32), log_scales=np.zeros((1, 3), np.float32))
     big = replace(big, opacity_logits=np.full(1, 5, np.float32))
-    seen = splats.projected(big, level(big), CAMERA, 0.01)
-    assert seen.centres[0, 0] < 0 and splats.blended(seen, CAMERA).alpha.max() > 0.05
+    seen = splats.project(big, level(big), CAMERA, 0.01)
+    assert seen.centres[0, 0] < 0 and splats.blend(seen, CAMERA).alpha.max() > 0.05
 
 
 def test_discs_underfoot_fade_instead_of_rising_over_the_horizon():
     """A disc one deviation below the eye is drawn by no plane through its centre; one far off keeps its bits."""
     two = replace(made(2), means=np.array([[1, 0, -0.5], [8, 0, -2]], np.float32))
     two = replace(two, log_scales=np.zeros((2, 3), np.float32), opacity_logits=np.array([3, 3], np.float32))
-    seen = splats.projected(two, level(two), CAMERA, 0.01)
+    seen = splats.project(two, level(two), CAMERA, 0.01)
     assert seen.opacity_logits.tolist() == [3] and seen.depths[0] > 7
 
 
 def test_nothing_is_drawn_of_nothing():
     field = made(3)[:0]
-    seen = splats.blended(splats.joined([splats.NONE, splats.projected(field, level(field), CAMERA, 0.01)]), CAMERA)
-    assert not seen.alpha.any() and not len(splats.sorted_by_depth(splats.NONE))
+    seen = splats.blend(
+        splats.concatenate_splats([splats.EMPTY, splats.project(field, level(field), CAMERA, 0.01)]), CAMERA
+    )
+    assert not seen.alpha.any() and not len(splats.sort_by_depth(splats.EMPTY))
 
 
 def test_needles_keep_their_width():
     """A ratio of 1e6: the picture's determinant is a sum of squares, a difference would be noise."""
     needle = replace(made(1), means=np.array([[5, 0, 0]], np.float32))
     scales = np.log(np.array([[1.0, 1e-6, 1e-6]], np.float32))
-    seen = splats.projected(replace(needle, log_scales=scales), level(needle), CAMERA, 0.01)
+    seen = splats.project(replace(needle, log_scales=scales), level(needle), CAMERA, 0.01)
     assert np.exp(seen.log_scales[0, 0]) > 1 and 1e-6 < np.exp(seen.log_scales[0, 1]) < 1e-4

@@ -11,7 +11,7 @@ from dav_gswt.images import metrics
 from dav_gswt.raster.interface import RIM
 from dav_gswt.study.seams import crops, measure, places, rendering
 from dav_gswt.study.seams.spatial_index import SLOPES, Seen, Shelf
-from dav_gswt.terrain import heights, still
+from dav_gswt.terrain import heights, stills
 
 HILLS = {"kind": "hills", "height": 1.0, "wavelength": 8.0}
 
@@ -27,9 +27,11 @@ def first_of(laid, terrain, view, kind, rng, border=False):
 @pytest.mark.parametrize("view", crops.VIEWS, ids=lambda view: view.name)
 @pytest.mark.parametrize("surface", [{"kind": "flat"}, HILLS], ids=lambda entry: entry["kind"])
 def test_a_crop_is_the_terrain_s_own_picture(laid, view, surface, rng):
-    terrain = replace(laid.terrain, heights=heights.of_config(surface, laid.terrain.side))
+    terrain = replace(laid.terrain, heights=heights.surface_from_config(surface, laid.terrain.side))
     shown = first_of(laid, terrain, view, places.cuts, rng)
-    np.testing.assert_array_equal(shown.picture, still.draw(terrain, shown.crop.camera, rendering.SKY, laid.colour))
+    np.testing.assert_array_equal(
+        shown.picture, stills.render_view(terrain, shown.crop.camera, rendering.SKY, laid.colour)
+    )
 
 
 def test_across_every_border_the_patch_is_the_same(laid):

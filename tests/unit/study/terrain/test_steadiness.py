@@ -2,19 +2,18 @@
 
 import numpy as np
 import pytest
-from test_terrain_laid import PINK, SIDE, SKY, terrain_of, tile_of
+from fixtures.terrains import MAGENTA, SIDE, SKY, stony_terrain
 
 from dav_gswt.study.terrain import steadiness
-from dav_gswt.terrain import order
+from dav_gswt.terrain import draw_order
 
 BUDGET = 10**6
-TOLD = {"eye_floor": 1.0, "sky": SKY, "ground_colour": PINK}
+TOLD = {"eye_floor": 1.0, "sky": SKY, "ground_colour": MAGENTA}
 
 
 @pytest.fixture(scope="module")
 def stony():
-    """Discs and stones at one level: where orders change, something is in front of something else."""
-    return terrain_of({(0, t): tile_of(t, 0.25, 40) for t in range(16)}, [np.inf], [0.0])
+    return stony_terrain()
 
 
 def test_every_second_pair_of_frames_lies_across_a_border():
@@ -33,7 +32,7 @@ def test_a_slow_walk_in_pre_sorted_orders_jumps_no_more_than_twice_as_far(stony)
 def test_a_jump_is_found(stony, monkeypatch):
     """Orders that turn about from one frame to the next."""
     turns = iter(range(10**6))
-    monkeypatch.setattr(order, "nearest", lambda directions, kept, *_: next(turns) * 5 % len(kept))
+    monkeypatch.setattr(draw_order, "nearest_order", lambda directions, kept, *_: next(turns) * 5 % len(kept))
     assert steadiness.worst(steadiness.rows(stony, TOLD, 2, 1.0, 96, 54, BUDGET)) > steadiness.MOST
 
 

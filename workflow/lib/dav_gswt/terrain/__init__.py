@@ -1,1 +1,1 @@
-"""The endless terrain: which tile lies where, stills of it, and the page to walk in."""
+"""The endless terrain: tile choice, visibility, stills, and the page that shows it in a browser."""

@@ -1,24 +1,24 @@
-"""Which tile lies in which cell: an integer hash of its edges, the same on every visit and in every language.
+"""Tile choice: the Wang tile of every cell, by an integer hash of its edges.
 
-The page's `choice.js` computes the same integers; tests/golden/tile_choice.json holds both to it.
+The viewer's `choice.js` computes the same integers; tests/golden/tile_choice.json holds both to it.
 """
 
 import numpy as np
 from jaxtyping import Int64
 from numpy import ndarray as Array
 
-WEST, SOUTH, CENTRE = 0, 1, 2  # what a hash is for: the colour of the west edge, of the south edge, the centre variant
+WEST, SOUTH, CENTRE = 0, 1, 2  # axis of a hash: colour of the west edge, of the south edge, centre variant
 _MASK = 0xFFFFFFFF
 
 
-def hashed(
+def hash_cell(
     i: int | Int64[Array, "*cells"], j: int | Int64[Array, "*cells"], axis: int, salt: int
 ) -> int | Int64[Array, "*cells"]:
     """32 well mixed bits for cell (i, j): multiply the coordinates apart, then the finaliser of MurmurHash3.
 
     h = i 0x8da6b343 ^ j 0xd8163841 ^ axis 0xcb1ab31f ^ salt, all modulo 2^32: negative coordinates count in two's
-    complement, and cells 2^32 apart are the same cell. No edge cases: every integer is allowed. Products of arrays
-    wrap at 2^64, which leaves their low 32 bits as they are.
+    complement, and cells 2^32 apart are the same cell. Every integer is allowed. Products of arrays wrap at 2^64, which
+    keeps their low 32 bits.
     """
     h = (i * 0x8DA6B343 ^ j * 0xD8163841 ^ axis * 0xCB1AB31F ^ salt) & _MASK
     h = (h ^ h >> 16) * 0x85EBCA6B & _MASK
@@ -29,12 +29,12 @@ def hashed(
 def tile_at(i: int, j: int, salt: int, variants: int) -> int:
     """Number of the tile in cell (i, j): T = 16 c + 8 W + 4 N + 2 E + S.
 
-    A cell's east edge is its neighbour's west edge, its north edge the south edge of the cell above: each edge has one
-    colour, whoever asks. `variants` is C >= 1, the number of centres, so T is in [0, 16 C).
+    A cell's east edge is its neighbour's west edge, its north edge the south edge of the cell above, so each edge has
+    one colour. `variants` is C >= 1, the number of centres; T is in [0, 16 C).
 
-    A tile beside itself is what the eye finds first: where there are two centres or more, cells whose i + j is odd take
-    the next centre that makes them equal to none of their four neighbours, which are even and take what the hash
-    says; so no choice waits for another. Where neighbours have used every centre, the hash has the last word.
+    Equal neighbours are the most visible repetition. With two centres or more, a cell with odd i + j therefore takes
+    the next centre that differs from its four neighbours; these are even and take the centre of the hash, so no choice
+    depends on another. Where the neighbours use every centre, the centre of the hash is kept.
     """
     return int(_tile(int(i), int(j), salt, variants))
 
@@ -65,10 +65,10 @@ def _tile(i, j, salt: int, variants: int):
 
 
 def _edges(i, j, salt: int):
-    west, east = (hashed(i + step, j, WEST, salt) & 1 for step in (0, 1))
-    south, north = (hashed(i, j + step, SOUTH, salt) & 1 for step in (0, 1))
+    west, east = (hash_cell(i + step, j, WEST, salt) & 1 for step in (0, 1))
+    south, north = (hash_cell(i, j + step, SOUTH, salt) & 1 for step in (0, 1))
     return 8 * west + 4 * north + 2 * east + south
 
 
 def _centre(i, j, salt: int, variants: int):
-    return (hashed(i, j, CENTRE, salt) >> 1) % variants
+    return (hash_cell(i, j, CENTRE, salt) >> 1) % variants

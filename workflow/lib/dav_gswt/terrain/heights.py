@@ -1,7 +1,7 @@
-"""Height fields: where the surface of the terrain lies, and how steep it is, at any point.
+"""Height fields: height and slope of the terrain's surface at any point.
 
-The page computes the same numbers; tests/golden/heights.json holds both to them. All is sums, products, quotients and
-floor of float64, in the order written here.
+The viewer's `heights.js` computes the same numbers; tests/golden/heights.json holds both to them. Only sums, products,
+quotients and floor of float64 are used, in the order written here.
 """
 
 from dataclasses import dataclass
@@ -14,33 +14,38 @@ from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
-from dav_gswt.terrain.choice import hashed
+from dav_gswt.terrain.choice import hash_cell
 
-HILLS = 3  # what a hash is for, after west, south and centre: the gradient of octave 0, 1, ...
+HILLS = 3  # axis of the hash of octave 0, after west, south and centre; octave k uses HILLS + k
 GAIN = 0.4  # height of an octave over that of the one twice as wide
-SHIFT = (0.37, 0.71)  # of each octave against the last, in its own cells: or all would be 0 at the corners of the first
-STEEPEST = 2.75  # slope of the noise, per cell: the largest that any gradients at the corners give
-MOST_CELLS = 67_108_864  # of a height map: 8192 x 8192
+SHIFT = (0.37, 0.71)  # of each octave against the last, in its own cells; else all are 0 at the corners of the first
+STEEPEST = 2.75  # upper bound of the slope of the noise, per cell, over all gradients at the corners
+MAX_PIXELS = 67_108_864  # of a height map: 8192 x 8192
 
 
 @runtime_checkable
-class Heights(Protocol):
-    """A surface z = h(x, y) without overhangs, once differentiable, over the whole plane.
+class HeightField(Protocol):
+    """A surface z = h(x, y), once differentiable, over the whole plane.
 
-    low, high: h lies between them everywhere. steepest: no slope, the length of h's gradient, exceeds it.
+    low, high: bounds of h. steepest: upper bound of the length of h's gradient.
     """
 
-    low: float
-    high: float
-    steepest: float
+    @property
+    def low(self) -> float: ...
+
+    @property
+    def high(self) -> float: ...
+
+    @property
+    def steepest(self) -> float: ...
 
     def at(self, x: Float[Array, "n"], y: Float[Array, "n"]) -> tuple[Float[Array, "n"], Float[Array, "n 2"]]:
-        """h, and its derivatives by x and y, at points of the world."""
+        """h and its derivatives by x and y at points of the world."""
         ...
 
 
 @dataclass(frozen=True)
-class Flat:
+class FlatSurface:
     """h = 0."""
 
     low: float = 0.0
@@ -55,9 +60,9 @@ class Flat:
 class Hills:
     """Gradient noise: h = sum over octaves k of a_k n(2^k x / wavelength + k SHIFT), a_k ~ GAIN^k, sum a_k = height.
 
-    n is 0 at the corners of unit cells and has a hashed gradient g in [-1, 1]^2 there; in between the four corners'
-    planes g . (p - corner) are mixed by f(t) = t^3 (t (6 t - 15) + 10), so n is twice differentiable. With weights w
-    of the corners |n| <= sum w (|dx| + |dy|) <= 1, hence |h| <= height; the highest hills rise to half of that.
+    n is 0 at the corners of unit cells and has a hash_cell gradient g in [-1, 1]^2 there; in between the four corners'
+    planes g . (p - corner) are blended by f(t) = t^3 (t (6 t - 15) + 10), so n is twice differentiable. With weights w
+    of the corners |n| <= sum w (|dx| + |dy|) <= 1, hence |h| <= height; in practice hills reach half of that.
     """
 
     height: float
@@ -95,11 +100,11 @@ class Hills:
 
 
 @dataclass(frozen=True)
-class Relief:
-    """A height map, `width` world units wide, its middle at the world's origin, its first row the northern one.
+class HeightMap:
+    """A height map, `width` world units wide, centred on the world's origin, its first row the northern one.
 
-    Between the pixels h is their quadratic B-spline: once differentiable, never beyond the pixels around and hardly
-    smoother than they are. Beyond the map it goes on mirrored, or as the border's pixels (beyond = "clamp").
+    h is the quadratic B-spline of the pixels: once differentiable, within the range of the pixels around. Beyond the
+    map it is mirrored, or takes the pixels of the border (beyond = "clamp").
     """
 
     pixels: Float32[Array, "rows columns"]
@@ -116,7 +121,7 @@ class Relief:
 
     @property
     def steepest(self) -> float:
-        """A B-spline's slope is a mean of differences of neighbouring pixels."""
+        """The slope of a B-spline is a mean of differences of neighbouring pixels."""
         most = [np.abs(np.diff(self.pixels, axis=axis)).max(initial=0) for axis in (0, 1)]
         return float(np.hypot(*most)) * self.pixels.shape[1] / self.width
 
@@ -142,27 +147,27 @@ class Relief:
         return np.where(index < n, index, 2 * n - 1 - index)
 
 
-def of_config(entry: dict, side: float) -> Heights:
-    """The surface that the config's `heights` asks for; side: of a tile, the unit of hills.
+def surface_from_config(entry: dict, side: float) -> HeightField:
+    """The surface that the config's `heights` describes; side: of a tile, the unit of hills.
 
-    Raises: InputError: the image cannot be read, is no picture or too large, or has pixels that are not finite.
+    Raises: InputError: the image cannot be read, is not an image, is too large, or has pixels that are not finite.
     """
     if entry["kind"] == "flat":
-        return Flat()
+        return FlatSurface()
     if entry["kind"] == "hills":
         return Hills(entry["height"] * side, entry["wavelength"] * side, entry.get("octaves", 4), entry.get("seed", 0))
-    pixels = read_map(entry["file"]) * np.float32(entry["height"])
-    return Relief(pixels, float(entry["width"]), entry.get("beyond", "mirror"))
+    pixels = read_height_map(entry["file"]) * np.float32(entry["height"])
+    return HeightMap(pixels, float(entry["width"]), entry.get("beyond", "mirror"))
 
 
-def read_map(path: Path | str) -> Float32[Array, "rows columns"]:
-    """A height map's first channel: 0 to 1 where it is stored in integers, as it is where it is stored in floats.
+def read_height_map(path: Path | str) -> Float32[Array, "rows columns"]:
+    """The first channel of a height map: integers scaled to [0, 1], floats unchanged.
 
-    Raises: InputError: not readable, larger than MOST_CELLS (nothing is allocated then), or a pixel is not finite.
+    Raises: InputError: not readable, more than MAX_PIXELS (checked before allocation), or a pixel is not finite.
     """
     width, height = image_files.read_size(path)
-    if width * height > MOST_CELLS:
-        raise InputError(f"{path}: {width} x {height} heights; at most {MOST_CELLS} are read: shrink the image")
+    if width * height > MAX_PIXELS:
+        raise InputError(f"{path}: {width} x {height} heights; at most {MAX_PIXELS} are read: shrink the image")
     pixels = image_files.read_channel(path)
     if len(bad := np.argwhere(~np.isfinite(pixels))):
         row, column = bad[0]
@@ -171,7 +176,7 @@ def read_map(path: Path | str) -> Float32[Array, "rows columns"]:
 
 
 def _taps(u: Float[Array, "n"]):
-    """The pixel under each point, and weights of it and its two neighbours, with their derivatives."""
+    """The pixel under each point, the weights of it and its two neighbours, and their derivatives."""
     pixel = np.floor(u)
     t = u - pixel - 0.5
     before, after = 0.5 - t, 0.5 + t
@@ -188,7 +193,7 @@ def _noise(x: Float[Array, "n"], y: Float[Array, "n"], axis: int, salt: int):
     value, by_x, by_y = np.zeros(len(x)), np.zeros(len(x)), np.zeros(len(x))
     for b in (0, 1):
         for a in (0, 1):
-            bits = hashed(i + a, j + b, axis, salt)
+            bits = hash_cell(i + a, j + b, axis, salt)
             east, north = (bits & 0xFFFF) / 32767.5 - 1, (bits >> 16) / 32767.5 - 1
             plane = east * (u - a) + north * (v - b)
             across, along = (fade_x if a else 1 - fade_x), (fade_y if b else 1 - fade_y)

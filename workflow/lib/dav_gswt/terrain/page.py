@@ -1,4 +1,4 @@
-"""A page folder: the viewer, the manifest and its chunks, ready to be served or put on any web server."""
+"""Page folders: viewer, manifest and chunks together, ready for any web server."""
 
 import hashlib
 import os
@@ -9,30 +9,30 @@ from dav_gswt.bundle.manifest import FORMAT, VERSION
 from dav_gswt.bundle.manifest import NAME as MANIFEST
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json, whole_folder, write_json
-from dav_gswt.terrain.heights import Flat, Heights, Hills, Relief
+from dav_gswt.terrain.heights import FlatSurface, HeightField, HeightMap, Hills
 
 SURFACE = "heights.bin"
-MOST_PIXELS = 4096  # of a height map's side: graphics cards that take no larger texture are still in use
+MAX_SIDE = 4096  # pixels along a side of a height map: every WebGL2 device in use takes textures of this size
 
 
 def write_page(
-    bundle_dir: Path | str, viewer_dir: Path | str, out_dir: Path | str, surface: Heights | None = None
+    bundle_dir: Path | str, viewer_dir: Path | str, out_dir: Path | str, surface: HeightField | None = None
 ) -> None:
-    """Copy viewer, manifest and chunks to `out_dir`, which appears whole or not at all.
+    """Copy viewer, manifest and chunks to `out_dir`, atomically: an older page stays until the new one is complete.
 
-    An older page at `out_dir` stays until the new one is complete. Only the chunks that the manifest names are copied.
-    surface: what the tiles are laid over (default: level ground), written into the page's manifest as `heights`; the
-    pixels of a height map are heights.bin, float32, little-endian, rows from the north.
+    All files under `viewer_dir` are copied, and the chunks that the manifest names.
 
+    Args:   surface: height field of the terrain (default: level ground), stored in the page's manifest as `heights`;
+            the pixels of a height map are heights.bin, float32, little-endian, rows from the north.
     Raises: InputError: the manifest is missing or of another version, a chunk is missing, has another size than the
-        manifest says, or lies outside of the bundle; the viewer is incomplete; a height map is too large (`described`).
+            manifest says, or lies outside of the bundle; the viewer is incomplete; see also `describe_surface`.
     """
     bundle, viewer, out = Path(bundle_dir), Path(viewer_dir), Path(out_dir)
     if not (viewer / "index.html").is_file():
         raise InputError(f"{viewer}: no viewer here (index.html is missing)")
-    copies = [(path, path.name) for path in sorted(viewer.iterdir()) if path.is_file()]
-    copies += [(bundle / name, name) for name in chunk_names(bundle)]
-    heights, pixels = described(surface or Flat())
+    copies = [(path, str(path.relative_to(viewer))) for path in sorted(viewer.rglob("*")) if path.is_file()]
+    copies += [(bundle / name, name) for name in list_chunks(bundle)]
+    heights, pixels = describe_surface(surface or FlatSurface())
     with whole_folder(out) as part:
         for source, name in copies:
             _copy(source, part / name)
@@ -41,26 +41,26 @@ def write_page(
         write_json(part / MANIFEST, read_json(bundle / MANIFEST) | {"heights": heights})
 
 
-def described(surface: Heights) -> tuple[dict, bytes]:
-    """A surface as the page's manifest has it, and the bytes of its pixels (none where it has none).
+def describe_surface(surface: HeightField) -> tuple[dict, bytes]:
+    """The `heights` entry of the page's manifest, and the bytes of the height map's pixels (empty without one).
 
-    Raises: InputError: more than MOST_PIXELS along a side.
+    Raises: InputError: more than MAX_SIDE pixels along a side.
     """
     if isinstance(surface, Hills):
         names = ("height", "wavelength", "octaves", "salt")
         return {"kind": "hills"} | {name: getattr(surface, name) for name in names}, b""
-    if not isinstance(surface, Relief):
+    if not isinstance(surface, HeightMap):
         return {"kind": "flat"}, b""
     rows, columns = surface.pixels.shape
-    if max(rows, columns) > MOST_PIXELS:
-        raise InputError(f"heights: {columns} x {rows} pixels; the page takes {MOST_PIXELS} a side: shrink the image")
+    if max(rows, columns) > MAX_SIDE:
+        raise InputError(f"heights: {columns} x {rows} pixels; the page takes {MAX_SIDE} a side: shrink the image")
     data = surface.pixels.astype("<f4").tobytes()
     entry = {"kind": "image", "file": SURFACE, "rows": rows, "columns": columns}
     entry |= {"width": surface.width, "beyond": surface.beyond, "bytes": len(data)}
     return entry | {"sha256": hashlib.sha256(data).hexdigest()}, data
 
 
-def chunk_names(bundle: Path) -> list[str]:
+def list_chunks(bundle: Path) -> list[str]:
     """The chunk files that a bundle's manifest names, checked against the folder. Raises: InputError, as write_page."""
     manifest = read_json(bundle / MANIFEST)
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT or manifest.get("version") != VERSION:

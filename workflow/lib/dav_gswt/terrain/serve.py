@@ -10,15 +10,15 @@ from pathlib import Path
 
 from dav_gswt.errors import InputError
 
-HOST = "127.0.0.1"  # nobody else on the network is served
-CONTENT = ("davgswt.json", "trials.js")  # what a page shows: a terrain, or trials of the perceptual study
+HOST = "127.0.0.1"  # only this machine is served
+CONTENT = ("davgswt.json", "trials.js")  # a terrain, or the trials of the forced-choice study
 
 
 class _Handler(SimpleHTTPRequestHandler):
-    """Files of one folder: no listings, nothing that a link leads out to, and always the page as it is now."""
+    """Serve files of one folder: no listings, no symbolic links out of it, no caching."""
 
     protocol_version = "HTTP/1.1"
-    # said here, since a machine's own MIME table may call .js text/plain, which browsers refuse to run as a module
+    # fixed here: a system's MIME table may map .js to text/plain, which browsers refuse to run as a module
     extensions_map = {
         "": "application/octet-stream",
         ".html": "text/html; charset=utf-8",
@@ -45,20 +45,20 @@ class _Handler(SimpleHTTPRequestHandler):
         super().end_headers()
 
     def log_message(self, format, *arguments):
-        """Say nothing: the terminal shows the address and what went wrong, not every chunk."""
+        """Log no requests: the terminal shows the address and errors only."""
 
 
 class _Server(ThreadingHTTPServer):
     def handle_error(self, request, client_address):
-        """A browser that leaves in the middle of a chunk is no error; all else is shown."""
+        """Ignore connections that the browser closed; report everything else."""
         if not isinstance(sys.exception(), ConnectionError):
             super().handle_error(request, client_address)
 
 
-def server(folder: Path | str, port: int) -> ThreadingHTTPServer:
-    """A server of a page folder, bound to this machine's loopback address; port 0 takes any free port.
+def create_server(folder: Path | str, port: int) -> ThreadingHTTPServer:
+    """A server of a page folder, bound to the loopback address; port 0 takes any free port.
 
-    Raises: InputError: the folder holds no page, or the port cannot be had.
+    Raises: InputError: the folder holds no page, or the port cannot be bound.
     """
     folder = Path(folder)
     for names in (("index.html",), CONTENT):
@@ -83,7 +83,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--port", type=int, default=8000)
     options = parser.parse_args(arguments)
     try:
-        with server(options.dir, options.port) as http:
+        with create_server(options.dir, options.port) as http:
             print(f"Open http://{HOST}:{http.server_address[1]}/ in a browser. Ctrl-C stops.", flush=True)
             http.serve_forever()
     except InputError as error:

@@ -23,7 +23,7 @@ from dav_gswt.study.seams.ground import Laid
 from dav_gswt.study.seams.measure import GROUNDS
 from dav_gswt.study.seams.places import Place
 from dav_gswt.terrain import heights
-from dav_gswt.terrain.assemble import Terrain
+from dav_gswt.terrain.endless import EndlessTerrain
 
 PLAIN, CHECK = "plain", "check"  # of an attention check: the right answer and the wrong one
 TRIED = 300  # places of a comparison in a look, before there are too few
@@ -59,7 +59,7 @@ class Look:
     view: View
     ground: str
     size: int
-    laid: dict[str, tuple[Laid, Terrain]]
+    laid: dict[str, tuple[Laid, EndlessTerrain]]
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def drawn(sets: dict[str, Laid], asked: dict, weights: Weights | None) -> list[I
     looks, used, found = list(product(GROUNDS, crops.VIEWS)), set(), []
     side = next(iter(sets.values())).terrain.side
     for number, (ground, view) in enumerate(progress(looks, "draw pairs")):
-        surface = heights.of_config(GROUNDS[ground], side)
+        surface = heights.surface_from_config(GROUNDS[ground], side)
         laid = {name: (each, replace(each.terrain, heights=surface)) for name, each in sets.items()}
         look = Look(view, ground, asked["size"], laid)
         rng = np.random.default_rng([asked["seed"], number])

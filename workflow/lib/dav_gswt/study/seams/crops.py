@@ -12,7 +12,7 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.study.seams import rendering
 from dav_gswt.study.seams.ground import Laid
 from dav_gswt.study.seams.spatial_index import Seen
-from dav_gswt.terrain.assemble import Terrain
+from dav_gswt.terrain.endless import EndlessTerrain
 
 SIDE = 48  # pixels of a crop
 MOST = 3  # patches of a crop that are told apart
@@ -92,7 +92,7 @@ class Shown:
         return counts / counts.sum() if counts.sum() else np.full(len(counts), 1 / len(counts))
 
 
-def crop(laid: Laid, terrain: Terrain, view: View, at: tuple[int, int], side: int = SIDE) -> Crop | None:
+def crop(laid: Laid, terrain: EndlessTerrain, view: View, at: tuple[int, int], side: int = SIDE) -> Crop | None:
     """The crop around a point; None where a hill hides it, or it is seen at too flat an angle to be judged.
 
     side: in pixels; a larger one shows the same in its middle, and what lies around it.
@@ -115,7 +115,7 @@ def crop(laid: Laid, terrain: Terrain, view: View, at: tuple[int, int], side: in
     return Crop(at, camera, np.floor(hit[..., :2] / laid.spacing).astype(int))
 
 
-def _hidden(terrain: Terrain, eye: Float[Array, "3"], point: Float[Array, "3"]) -> bool:
+def _hidden(terrain: EndlessTerrain, eye: Float[Array, "3"], point: Float[Array, "3"]) -> bool:
     between = eye + np.linspace(0, 0.95, 40)[:, None] * (point - eye)
     surface, _ = terrain.heights.at(between[:, 0], between[:, 1])
     return bool((between[:, 2] < surface).any())
@@ -137,13 +137,13 @@ def meeting(laid: Laid, crop: Crop) -> list[int] | None:
     return patches if all(inside(laid, crop, laid.origins[p]) for p in patches) else None
 
 
-def picture(laid: Laid, terrain: Terrain, crop: Crop) -> Float32[Array, "h w 3"]:
+def picture(laid: Laid, terrain: EndlessTerrain, crop: Crop) -> Float32[Array, "h w 3"]:
     """The crop as the terrain shows it, and nothing more."""
     pieces = rendering.of_terrain(terrain, crop.camera, _seen(laid, crop), laid.tiles)
     return rendering.drawn(terrain, pieces, crop.camera, laid.colour)[0]
 
 
-def shown(laid: Laid, terrain: Terrain, crop: Crop, patches: list[int], border: bool = False) -> Shown:
+def shown(laid: Laid, terrain: EndlessTerrain, crop: Crop, patches: list[int], border: bool = False) -> Shown:
     """The crop as the terrain shows it, and its patches whole, each with the mean change that its cells have there.
 
     border: also tell which of the terrain's tiles each pixel shows.
@@ -161,7 +161,7 @@ def shown(laid: Laid, terrain: Terrain, crop: Crop, patches: list[int], border: 
 
 def whole(
     laid: Laid,
-    terrain: Terrain,
+    terrain: EndlessTerrain,
     crop: Crop,
     origin: Int[Array, "2"],
     changed: Float[Array, "4"],

@@ -16,7 +16,7 @@ from dav_gswt.bundle.build import Options as Bundled
 from dav_gswt.bundle.build import laying
 from dav_gswt.field import GaussianField
 from dav_gswt.study.seams.spatial_index import Shelf
-from dav_gswt.terrain import assemble
+from dav_gswt.terrain import endless
 from dav_gswt.terrain.choice import tiles_in
 from dav_gswt.tiles import build, layout, trends
 from dav_gswt.tiles.layout import Exemplar, Layout
@@ -49,7 +49,7 @@ class Laid:
 
     source: Source
     plan: Layout
-    terrain: assemble.Terrain
+    terrain: endless.EndlessTerrain
     tiles: dict[tuple[int, int], Shelf]
     eye_floor: float
     colour: list[float]
@@ -107,7 +107,7 @@ def laid(tiles: build.TileSet, source: Source, salt: int, tau: float) -> Laid:
     options = Bundled(tau=tau, salt=salt)
     rings = direction_search.climbed(tiles.fields[0], tiles.side, options.decibels).rings
     described = laying(tiles, options, rings)
-    terrain = replace(assemble.of_fields(tiles.fields, described, {"kind": "flat"}), reach=REACH)
+    terrain = replace(endless.terrain_from_fields(tiles.fields, described, {"kind": "flat"}), reach=REACH)
     plan = Layout.of(tiles.seams["layout"])
     first = -(WINDOW // 2)
     numbers = tiles_in(first, first, (WINDOW, WINDOW), salt, tiles.variants)

@@ -23,7 +23,7 @@ from dav_gswt.study.seams import crops, perceptual_distance, places
 from dav_gswt.study.seams.crops import Crop, Shown, View
 from dav_gswt.study.seams.ground import Laid
 from dav_gswt.terrain import heights
-from dav_gswt.terrain.assemble import Terrain
+from dav_gswt.terrain.endless import EndlessTerrain
 
 _log = logging.getLogger(__name__)
 
@@ -64,7 +64,7 @@ def measured(laid: Laid, straight: Laid, weights: Weights | None, seed: int) -> 
     rows = []
     views = [(ground, view) for ground in GROUNDS for view in crops.VIEWS]
     for ground, view in progress(views, "measure seams"):
-        surface = heights.of_config(GROUNDS[ground], laid.terrain.side)
+        surface = heights.surface_from_config(GROUNDS[ground], laid.terrain.side)
         draped, twin = (replace(each.terrain, heights=surface) for each in (laid, straight))
         rng = np.random.default_rng([seed, 7])
         taken = [*_borders(laid, draped, view, rng), *_cuts(laid, draped, (straight, twin), view, rng)]
@@ -77,7 +77,7 @@ def measured(laid: Laid, straight: Laid, weights: Weights | None, seed: int) -> 
     return rows
 
 
-def _borders(laid: Laid, terrain: Terrain, view: View, rng) -> list[Taken]:
+def _borders(laid: Laid, terrain: EndlessTerrain, view: View, rng) -> list[Taken]:
     """First those that show a border alone, and then, if these are too few, some with a cut as well."""
     alone, others = [], []
     for place in places.borders(laid, rng)[:LOOKED]:
@@ -93,7 +93,7 @@ def _borders(laid: Laid, terrain: Terrain, view: View, rng) -> list[Taken]:
     return _enough(found, BORDERS, "borders")
 
 
-def _cuts(laid: Laid, terrain: Terrain, straight: tuple[Laid, Terrain], view: View, rng) -> list[Taken]:
+def _cuts(laid: Laid, terrain: EndlessTerrain, straight: tuple[Laid, EndlessTerrain], view: View, rng) -> list[Taken]:
     """Each cut and then its ceiling."""
     found = []
     for place in places.cuts(laid, rng):
@@ -136,7 +136,9 @@ def likeness_of(taken: list[Taken], bank: Bank, weights: Weights) -> Iterator[tu
         )
 
 
-def exemplar_bank(laid: Laid, terrain: Terrain, seen: list[Crop], weights: Weights, rng: np.random.Generator) -> Bank:
+def exemplar_bank(
+    laid: Laid, terrain: EndlessTerrain, seen: list[Crop], weights: Weights, rng: np.random.Generator
+) -> Bank:
     """BANK crops of the exemplar, drawn at random, each laid under one of the crops in turn: on hills it has slopes
     as theirs.
     """

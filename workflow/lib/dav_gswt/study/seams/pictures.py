@@ -7,7 +7,7 @@ from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.study.seams.measure import GROUNDS
-from dav_gswt.terrain import assemble, still
+from dav_gswt.terrain import endless, stills
 from dav_gswt.tiles.build import TileSet
 
 TILES = 20  # a side of the picture from above
@@ -19,10 +19,10 @@ def drawn(tiles: TileSet, manifest: dict, shot: str, surface: str, size: dict) -
 
     size: of the walker's picture. From above the eye is so high that a picture 60 degrees wide shows that many tiles.
     """
-    terrain = assemble.of_fields(tiles.fields, manifest, GROUNDS[surface])
+    terrain = endless.terrain_from_fields(tiles.fields, manifest, GROUNDS[surface])
     if shot == "walker":
-        return still.taken(terrain, still.SHOTS[0], manifest, **size)
+        return stills.render_shot(terrain, stills.SHOTS[0], manifest, **size)
     high = 0.5 * TILES * tiles.side / np.tan(np.radians(30.0)) / manifest["eye_floor"]
-    above = still.Shot("grid", (0.5, 0.5), float(high), 90.0, 90.0)
+    above = stills.Shot("grid", (0.5, 0.5), float(high), 90.0, 90.0)
     far = replace(terrain, reach=2 * TILES + 8)  # all of it is nearer than what goes over into the far ground
-    return still.taken(far, above, manifest, SQUARE, SQUARE)
+    return stills.render_shot(far, above, manifest, SQUARE, SQUARE)

@@ -14,9 +14,9 @@ from numpy import ndarray as Array
 from dav_gswt.field import SH0, GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.study.seams.spatial_index import Seen, Shelf
-from dav_gswt.terrain import assemble, splats
-from dav_gswt.terrain.assemble import Terrain
+from dav_gswt.terrain import placement, splats, visibility
 from dav_gswt.terrain.backdrop import Backdrop
+from dav_gswt.terrain.endless import EndlessTerrain
 
 SKY = {"zenith": [0.0, 0.0, 0.0], "horizon": [0.0, 0.0, 0.0]}  # crops see none
 
@@ -36,17 +36,17 @@ class Piece:
     cell: tuple[int, int]
 
 
-def of_terrain(terrain: Terrain, camera: Camera, seen: Seen, tiles: dict[tuple[int, int], Shelf]) -> list[Piece]:
+def of_terrain(terrain: EndlessTerrain, camera: Camera, seen: Seen, tiles: dict[tuple[int, int], Shelf]) -> list[Piece]:
     """What of the terrain may show, cell by cell from back to front. tiles: by (level, tile number)."""
     eye, side, found = camera.centre, terrain.side, []
-    cells = assemble.visible(terrain, camera)
-    active = assemble.active(terrain, cells)
+    cells = visibility.visible_cells(terrain, camera)
+    active = visibility.active_levels(terrain, cells)
     for k in range(len(cells)):
         i, j, tile = int(cells.i[k]), int(cells.j[k]), int(cells.tile[k])
         corner = np.array([i * side, j * side, 0.0])
         parts = {int(level): tiles[level, tile].near(seen, corner) for level in np.flatnonzero(active[:, k])}
         if any(len(part) for part in parts.values()):
-            direction = assemble.along(terrain, i, j, tile, eye)
+            direction = placement.cell_direction(terrain, i, j, tile, eye)
             found.append(Piece(parts, corner, direction, bool(cells.close[k]), (i, j)))
     return found
 
@@ -65,25 +65,25 @@ def of_patch(
 
 
 def drawn(
-    terrain: Terrain, pieces: list[Piece], camera: Camera, ground, looks: Sequence[Look] = ()
+    terrain: EndlessTerrain, pieces: list[Piece], camera: Camera, ground, looks: Sequence[Look] = ()
 ) -> list[Float32[Array, "h w 3"]]:
     """The picture of pieces that stand back to front, and the same in other colours, over black, for each look.
 
     ground: colour of what lies behind.
     """
     eye, here = camera.centre, replace(camera, translation=np.zeros(3))
-    behind = Backdrop.of(terrain, eye, SKY, ground)
+    behind = Backdrop.for_eye(terrain, eye, SKY, ground)
     found = []  # of each piece: its splats, their colours by every look, whether it is about the eye
     for piece in pieces:
-        field, slope = assemble.placed(terrain, piece.parts, piece.corner, piece.direction, eye)
-        part, which = splats.indexed(behind.over(field), slope, here, terrain.near)
+        field, slope = placement.place_gaussians(terrain, piece.parts, piece.corner, piece.direction, eye)
+        part, which = splats.project_indexed(behind.blend_far(field), slope, here, terrain.near)
         found.append((part, [look(field, eye)[which] for look in looks], piece.close))
     found.sort(key=lambda each: each[2])  # those about the eye come last
-    stand = splats.joined([splats.NONE, *(part for part, _, _ in found)])
+    stand = splats.concatenate_splats([splats.EMPTY, *(part for part, _, _ in found)])
     first = sum(len(part) for part, _, close in found if not close)
-    order = np.concatenate([np.arange(first), first + splats.by_depth(stand[first:])])
+    order = np.concatenate([np.arange(first), first + splats.depth_order(stand[first:])])
     stand = stand[order]
-    seen = splats.blended(stand, here)
-    picture = np.clip(seen.colour + (1 - seen.alpha)[..., None] * behind.seen_along(here.rays()[1]), 0, 1)
+    seen = splats.blend(stand, here)
+    picture = np.clip(seen.colour + (1 - seen.alpha)[..., None] * behind.colours_along(here.rays()[1]), 0, 1)
     painted = (np.concatenate([own[k] for _, own, _ in found])[order] for k in range(len(looks)))
-    return [picture, *(splats.blended(replace(stand, colours=own), here).colour for own in painted)]
+    return [picture, *(splats.blend(replace(stand, colours=own), here).colour for own in painted)]

@@ -10,8 +10,8 @@ from dav_gswt.bundle import lod
 from dav_gswt.field import GaussianField
 from dav_gswt.study.stability.formula import LAW, SINGLE, Formula, Point, Tolerance
 from dav_gswt.study.stability.scoring import EXACT
-from dav_gswt.terrain import drape, weights
-from dav_gswt.terrain.choice import hashed
+from dav_gswt.terrain import displacement, weights
+from dav_gswt.terrain.choice import hash_cell
 from dav_gswt.terrain.heights import GAIN, HILLS, SHIFT, Hills
 
 BANDS = (0.0, 1e-12, 1e-3, 1.0, 1e6)
@@ -102,7 +102,7 @@ def _draped(quats: Array, scales: tuple, slope: Array) -> Array:
     field = GaussianField(
         np.zeros((n, 3), np.float32), logs, quats, zero, np.zeros((n, 1, 3), np.float32), zero, zero > 0
     )
-    return drape.axes(field, slope) / np.exp(logs.astype(np.float64))[:, None]
+    return displacement.displaced_axes(field, slope) / np.exp(logs.astype(np.float64))[:, None]
 
 
 def _draped_slowly(quats: Array, scales: tuple, slope: Array) -> Array:
@@ -158,7 +158,7 @@ def _octave(k: int, x: Fraction, y: Fraction) -> tuple[float, float, float]:
     value = by_x = by_y = Fraction(0)
     for a in (0, 1):
         for b in (0, 1):
-            bits = hashed(i + a, j + b, HILLS + k, 3)
+            bits = hash_cell(i + a, j + b, HILLS + k, 3)
             east, north = Fraction(bits & 0xFFFF) / Fraction(32767.5) - 1, Fraction(bits >> 16) / Fraction(32767.5) - 1
             (fx, tx), (fy, ty) = fade(u), fade(v)
             (fx, tx), (fy, ty) = (fx, tx) if a else (1 - fx, -tx), (fy, ty) if b else (1 - fy, -ty)
@@ -177,7 +177,7 @@ def _numbers() -> list[Point]:
 
 def _hash(i: Array, j: Array, salt: int) -> Array:
     with np.errstate(over="ignore"):
-        return hashed(i, j, 2, salt).astype(np.float64)
+        return hash_cell(i, j, 2, salt).astype(np.float64)
 
 
 def _hash_slowly(i: Array, j: Array, salt: int) -> Array:
@@ -200,7 +200,7 @@ FORMULAS = [
         "d 0 to 1e12, D 1e-3 to 1e6, Delta 0, 1e-12 to 1e6",
         "float32",
         _distances,
-        weights.finer,
+        weights.finer_share,
         _share_slowly,
         Tolerance(LAW[0], 1e-6, LAW[1]),
         _share_printed,
@@ -212,7 +212,7 @@ FORMULAS = [
         "the same",
         "float32",
         _distances,
-        lambda d, switch, band: weights.finer(d, switch, band, True),
+        lambda d, switch, band: weights.finer_share(d, switch, band, True),
         lambda d, switch, band: _share_slowly(d, switch, band, True),
         Tolerance(LAW[0], 1e-6, LAW[1]),
     ),
@@ -223,7 +223,7 @@ FORMULAS = [
         "five levels, bands that overlap",
         "float32",
         _chains,
-        lambda d, s, b: weights.of_levels(d, s, b).astype(np.float64).sum(0),
+        lambda d, s, b: weights.level_weights(d, s, b).astype(np.float64).sum(0),
         lambda d, s, b: np.ones(len(d)),
         Tolerance(0.0, 5 * SINGLE, "a rounding of float32 a level"),
     ),
@@ -245,7 +245,7 @@ FORMULAS = [
         "alpha 0 to 1, w 0 and 1e-12 to 1",
         "float32",
         _fades,
-        weights.crossfaded,
+        weights.crossfade_opacity,
         _fade_slowly,
         Tolerance(LAW[0], 1e-12, LAW[1]),
     ),
@@ -256,7 +256,7 @@ FORMULAS = [
         "alpha 1e-6 to 0.999, w 0 to 1",
         "float32",
         _halves,
-        lambda a, w: _over(weights.crossfaded, a, w),
+        lambda a, w: _over(weights.crossfade_opacity, a, w),
         lambda a, w: a.astype(np.float64),
         Tolerance(LAW[0], 1e-6, LAW[1]),
         lambda a, w: _over(lambda x, y: x * y, a, w),

@@ -30,7 +30,7 @@ def chromium_path() -> str | None:
 @contextmanager
 def served(folder: Path):
     """The address of a page folder while the block runs. Raises: InputError: there is no page."""
-    http = serve.server(folder, 0)
+    http = serve.create_server(folder, 0)
     thread = threading.Thread(target=http.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
     thread.start()
     try:

@@ -17,10 +17,10 @@ from dav_gswt.logs import progress
 from dav_gswt.study import csv_tables, figures
 from dav_gswt.study.tables import spread
 from dav_gswt.study.terrain import browser
-from dav_gswt.terrain import assemble, heights, still
-from dav_gswt.terrain.meter import Meter
+from dav_gswt.terrain import endless, heights, stills, visibility
 from dav_gswt.terrain.page import write_page
-from dav_gswt.terrain.still import Shot
+from dav_gswt.terrain.stills import Shot
+from dav_gswt.terrain.timing import FrameTiming
 
 PARTS = ("render", "sort", "update")
 LIBRARY, PAGE = "library", "page"
@@ -62,7 +62,7 @@ class Asked:
     budgets: list[int]
 
     def shots(self) -> list[Shot]:
-        return still.flight(**self.flight)
+        return stills.walk_shots(**self.flight)
 
 
 def of_library(bundle: Bundle, asked: Asked) -> list[dict]:
@@ -70,15 +70,15 @@ def of_library(bundle: Bundle, asked: Asked) -> list[dict]:
 
     update holds the orders, too, which the library makes again for every frame; the page reads them from the bundle.
     """
-    terrain, told, rows = assemble.of_bundle(bundle, asked.heights), bundle.manifest, []
+    terrain, told, rows = endless.terrain_from_bundle(bundle, asked.heights), bundle.manifest, []
     for budget in progress(asked.budgets, "measure frames of the library"):
         meters = []
         for shot in asked.shots():
-            meters.append(Meter())
-            camera = still.camera_of(shot, terrain, told["eye_floor"], asked.width, asked.height)
-            with meters[-1].of("update"):
-                coarser = assemble.coarsened(terrain, camera, budget)
-            still.draw(coarser, camera, told["sky"], told["ground_colour"], meter=meters[-1])
+            meters.append(FrameTiming())
+            camera = stills.shot_camera(shot, terrain, told["eye_floor"], asked.width, asked.height)
+            with meters[-1].measure("update"):
+                coarser = visibility.coarsen_to_budget(terrain, camera, budget)
+            stills.render_view(coarser, camera, told["sky"], told["ground_colour"], timing=meters[-1])
         times = {part: [meter.milliseconds[part] for meter in meters] for part in PARTS}
         rows.append(
             _row(asked, budget, times, [meter.gaussians for meter in meters], len(meters)) | _about(LIBRARY, "")
@@ -93,7 +93,7 @@ def of_page(bundle_dir: Path | str, viewer_dir: Path | str, manifest: dict, aske
     that something new had come for from the worker.
     Raises: InputError: see `browser.chromium`, `page.write_page`.
     """
-    surface, rows = heights.of_config(asked.heights, manifest["tile_side"]), []
+    surface, rows = heights.surface_from_config(asked.heights, manifest["tile_side"]), []
     places = [_place(shot, manifest) for shot in asked.shots()]
     first = ",".join(f"{places[0][key]:.6g}" for key in ("x", "y", "eye", "yaw", "pitch"))
     with tempfile.TemporaryDirectory() as folder, browser.chromium() as chromium:

@@ -14,9 +14,9 @@ from dav_gswt.bundle import order_directions
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.logs import progress
 from dav_gswt.study import figures
-from dav_gswt.terrain import assemble, still
-from dav_gswt.terrain.assemble import Terrain
-from dav_gswt.terrain.still import SHOTS, Shot
+from dav_gswt.terrain import endless, stills
+from dav_gswt.terrain.endless import EndlessTerrain
+from dav_gswt.terrain.stills import SHOTS, Shot
 from dav_gswt.tiles.build import TileSet
 
 VIEWS = (Shot("near", (0.5, 0.5), 1.0, 40.0, 60.0), *SHOTS[:2])  # walker and oblique: the stills'
@@ -46,12 +46,12 @@ def rows(tiles: TileSet, bundle: Bundle) -> list[dict]:
 def _pairs(tiles: TileSet, bundle: Bundle, shot: Shot) -> list[tuple[Picture, Picture]]:
     """Pictures with each shortcut and without it."""
     told, flat = bundle.manifest, {"kind": "flat"}
-    rounded = replace(assemble.of_bundle(bundle, flat), reach=REACH)
-    cut = replace(assemble.of_fields(tiles.fields, told, flat), reach=REACH)
+    rounded = replace(endless.terrain_from_bundle(bundle, flat), reach=REACH)
+    cut = replace(endless.terrain_from_fields(tiles.fields, told, flat), reach=REACH)
 
-    def drawn(terrain: Terrain, exact: bool) -> Picture:
-        camera = still.camera_of(shot, terrain, told["eye_floor"], WIDTH, HEIGHT)
-        return still.draw(terrain, camera, told["sky"], told["ground_colour"], exact)
+    def drawn(terrain: EndlessTerrain, exact: bool) -> Picture:
+        camera = stills.shot_camera(shot, terrain, told["eye_floor"], WIDTH, HEIGHT)
+        return stills.render_view(terrain, camera, told["sky"], told["ground_colour"], exact)
 
     page, sorted_, levels, reference = (
         drawn(rounded, False),
@@ -62,7 +62,7 @@ def _pairs(tiles: TileSet, bundle: Bundle, shot: Shot) -> list[tuple[Picture, Pi
     return [(page, sorted_), (levels, reference), (sorted_, levels), (page, reference)]
 
 
-def finest(terrain: Terrain) -> Terrain:
+def finest(terrain: EndlessTerrain) -> EndlessTerrain:
     """The same with its finest level alone."""
     tiles = {(level, tile): f for (level, tile), f in terrain.tiles.items() if level == 0}
     return replace(terrain, tiles=tiles, switches=[np.inf], bands=[0.0])

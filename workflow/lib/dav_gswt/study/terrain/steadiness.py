@@ -13,9 +13,10 @@ from numpy import ndarray as Array
 
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.logs import progress
-from dav_gswt.terrain import still
-from dav_gswt.terrain.assemble import Terrain, coarsened
-from dav_gswt.terrain.still import Shot
+from dav_gswt.terrain import stills
+from dav_gswt.terrain.endless import EndlessTerrain
+from dav_gswt.terrain.stills import Shot
+from dav_gswt.terrain.visibility import coarsen_to_budget
 
 STEP = 0.02  # eye floors from a frame to the next: the page's walking pace, 1.2 eye heights a second, at 60 frames
 MOST = 2.0  # times the exactly sorted walk's largest change
@@ -24,7 +25,7 @@ MOST = 2.0  # times the exactly sorted walk's largest change
 def pairs(count: int, length: float, step: float) -> list[tuple[Shot, Shot]]:
     """Pairs of consecutive frames of a flight `length` tiles long, `step` tiles apart; every second one is moved to
     where the way next enters another cell, half a step before it and half a step after it."""
-    way = still.flight(count, length, 1.0)
+    way = stills.walk_shots(count, length, 1.0)
     found = []
     for k, shot in enumerate(way):
         yaw = np.radians(shot.yaw)
@@ -42,23 +43,23 @@ def _to_border(at: Float[Array, "2"], ahead: Float[Array, "2"]) -> float:
 
 
 def rows(
-    terrain: Terrain, manifest: dict, count: int, length: float, width: int, height: int, budget: int
+    terrain: EndlessTerrain, manifest: dict, count: int, length: float, width: int, height: int, budget: int
 ) -> list[dict]:
     """A row a pair of frames: the largest and the mean difference of a pixel, in 8-bit steps, in pre-sorted orders
     (`largest`, `mean`) and sorted exactly (`exact_largest`, `exact_mean`); border: between its frames the eye enters
     another cell. budget: at most so many Gaussians are in view, in both frames at one coarseness."""
     floor, found = manifest["eye_floor"], []
     for k, shots in enumerate(progress(pairs(count, length, STEP * floor / terrain.side), "measure steadiness")):
-        cameras = [still.camera_of(shot, terrain, floor, width, height) for shot in shots]
+        cameras = [stills.shot_camera(shot, terrain, floor, width, height) for shot in shots]
         row = {"pair": k, "east": shots[0].at[0], "north": shots[0].at[1], "border": k % 2}
-        coarser = coarsened(terrain, cameras[0], budget)
+        coarser = coarsen_to_budget(terrain, cameras[0], budget)
         found.append(row | _changes(coarser, manifest, cameras, False) | _changes(coarser, manifest, cameras, True))
     return found
 
 
-def _changes(terrain: Terrain, manifest: dict, cameras: list[Camera], exact: bool) -> dict:
+def _changes(terrain: EndlessTerrain, manifest: dict, cameras: list[Camera], exact: bool) -> dict:
     told = manifest["sky"], manifest["ground_colour"]
-    before, after = (still.draw(terrain, camera, *told, exact=exact) for camera in cameras)
+    before, after = (stills.render_view(terrain, camera, *told, exact=exact) for camera in cameras)
     change, name = 255 * np.abs(after - before), "exact_" if exact else ""
     return {f"{name}largest": float(change.max()), f"{name}mean": float(change.mean())}
 

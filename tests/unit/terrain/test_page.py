@@ -7,7 +7,7 @@ import pytest
 
 from dav_gswt.errors import InputError
 from dav_gswt.terrain import page
-from dav_gswt.terrain.heights import Hills, Relief
+from dav_gswt.terrain.heights import HeightMap, Hills
 from dav_gswt.terrain.page import write_page
 
 
@@ -122,7 +122,7 @@ def test_the_page_knows_the_surface_and_the_bundle_does_not(tmp_path, viewer, bu
 
 def test_a_height_map_comes_with_its_pixels(tmp_path, viewer, bundle):
     pixels = np.arange(6, dtype=np.float32).reshape(2, 3)
-    write_page(bundle, viewer, tmp_path / "page", Relief(pixels, 7.5, "clamp"))
+    write_page(bundle, viewer, tmp_path / "page", HeightMap(pixels, 7.5, "clamp"))
     entry = surface_of(tmp_path / "page")
     stored = np.frombuffer((tmp_path / "page" / entry["file"]).read_bytes(), "<f4").reshape(2, 3)
     assert (stored == pixels).all() and entry["bytes"] == 24
@@ -130,7 +130,7 @@ def test_a_height_map_comes_with_its_pixels(tmp_path, viewer, bundle):
 
 
 def test_a_height_map_that_graphics_cards_refuse_is_named(tmp_path, viewer, bundle, monkeypatch):
-    monkeypatch.setattr(page, "MOST_PIXELS", 2)
+    monkeypatch.setattr(page, "MAX_SIDE", 2)
     with pytest.raises(InputError, match="heights: 3 x 2 pixels; the page takes 2 a side"):
-        write_page(bundle, viewer, tmp_path / "page", Relief(np.zeros((2, 3), np.float32), 7.5))
+        write_page(bundle, viewer, tmp_path / "page", HeightMap(np.zeros((2, 3), np.float32), 7.5))
     assert not (tmp_path / "page").exists()

@@ -1,0 +1,109 @@
+"""Stills of the endless terrain: rendered tile by tile as the viewer does, over a sky and a far ground."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float32
+from numpy import ndarray as Array
+
+from dav_gswt.geometry import cameras
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.terrain import splats
+from dav_gswt.terrain.backdrop import Backdrop
+from dav_gswt.terrain.endless import EndlessTerrain
+from dav_gswt.terrain.placement import place_cell
+from dav_gswt.terrain.timing import FrameTiming
+from dav_gswt.terrain.visibility import (
+    MAX_GAUSSIANS,
+    coarsen_to_budget,
+    count_gaussians,
+    drop_far_cells,
+    visible_cells,
+)
+
+
+@dataclass(frozen=True)
+class Shot:
+    """Viewpoint of a still: position in tiles, height above the surface in eye floors, viewing direction."""
+
+    name: str
+    at: tuple[float, float]  # tiles
+    height: float  # eye floors
+    pitch: float  # degrees below the horizon
+    yaw: float  # degrees from east
+
+
+SHOTS = (
+    Shot("walker", (0.5, 0.5), 1.0, 12.0, 60.0),
+    Shot("oblique", (3.3, 2.2), 3.0, 35.0, 20.0),
+    Shot("above", (-4.0, 5.0), 12.0, 90.0, 90.0),
+)
+
+
+def walk_shots(frames: int, length: float, height: float) -> list[Shot]:
+    """Shots of a straight walk from the walker's place: `length` in tiles, `height` in eye floors above the surface."""
+    walker = SHOTS[0]
+    yaw = np.radians(walker.yaw)
+    way = np.linspace(0, length, frames)[:, None] * [np.cos(yaw), np.sin(yaw)] + walker.at
+    return [replace(walker, name=f"{k:04d}", at=tuple(at), height=float(height)) for k, at in enumerate(way.tolist())]
+
+
+def shot_camera(shot: Shot, terrain: EndlessTerrain, floor: float, width: int, height: int) -> Camera:
+    """The camera of a shot, with a horizontal field of view of 60 degrees. floor: lowest height of the eye."""
+    x, y = (v * terrain.side for v in shot.at)
+    ground, _ = terrain.heights.at(np.array([x]), np.array([y]))
+    eye = np.array([x, y, ground[0] + shot.height * floor])
+    down, yaw = np.radians(min(shot.pitch, 89.99)), np.radians(shot.yaw)
+    ahead = np.array([np.cos(down) * np.cos(yaw), np.cos(down) * np.sin(yaw), -np.sin(down)])
+    return cameras.pinhole(eye, eye + ahead, width, height, 60.0)
+
+
+def render_shot(
+    terrain: EndlessTerrain, shot: Shot, manifest: dict[str, Any], width: int, height: int
+) -> Float32[Array, "h w 3"]:
+    """Render a shot with the eye floor, sky and ground colour of the bundle's manifest."""
+    camera = shot_camera(shot, terrain, manifest["eye_floor"], width, height)
+    return render_view(terrain, camera, manifest["sky"], manifest["ground_colour"])
+
+
+def render_view(
+    terrain: EndlessTerrain,
+    camera: Camera,
+    sky: dict[str, Any],
+    ground_colour,
+    exact: bool = False,
+    timing: FrameTiming | None = None,
+) -> Float32[Array, "h w 3"]:
+    """Render the terrain; pixels that no tile covers show the sky above the horizon and the far ground below it.
+
+    Tiles are drawn back to front, each in a pre-sorted order; the 3 x 3 block about the eye is drawn last and sorted by
+    depth.
+
+    Args:   exact: sort all Gaussians together by depth, as a reference. timing: filled with the milliseconds of
+            `update` (visible cells, and their Gaussians placed in order), `sort` and `render`.
+    Raises: ValueError: an orthographic camera, whose rays have no common origin.
+    """
+    if camera.orthographic:
+        raise ValueError("the terrain is drawn for a pinhole camera")
+    timing = timing or FrameTiming()
+    eye, here = camera.centre, replace(camera, translation=np.zeros(3))
+    with timing.measure("update"):
+        cells = visible_cells(terrain, camera)
+        if count_gaussians(terrain, cells).sum() > MAX_GAUSSIANS:  # coarser levels first, then fewer cells
+            terrain = coarsen_to_budget(terrain, camera, MAX_GAUSSIANS)
+            cells = drop_far_cells(terrain, cells)
+    backdrop = Backdrop.for_eye(terrain, eye, sky, ground_colour)
+    far, close = [splats.EMPTY], [splats.EMPTY]
+    for k in range(len(cells)):
+        with timing.measure("update"):
+            field, slope = place_cell(terrain, cells[k : k + 1], eye)
+        with timing.measure("render"):
+            part = splats.project(backdrop.blend_far(field), slope, here, terrain.near)
+        (close if exact or cells.close[k] else far).append(part)
+        timing.gaussians += len(field)
+    with timing.measure("sort"):
+        ordered = splats.concatenate_splats([*far, splats.sort_by_depth(splats.concatenate_splats(close))])
+    with timing.measure("render"):
+        seen = splats.blend(ordered, here)
+        return np.clip(seen.colour + (1 - seen.alpha)[..., None] * backdrop.colours_along(here.rays()[1]), 0, 1)

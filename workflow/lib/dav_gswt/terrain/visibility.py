@@ -1,0 +1,121 @@
+"""Visible cells: which cells of the endless terrain a camera may see, at which levels, within a budget of Gaussians."""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int64
+from numpy import ndarray as Array
+
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.terrain import draw_order
+from dav_gswt.terrain.choice import tiles_at
+from dav_gswt.terrain.endless import EndlessTerrain
+
+MAX_GAUSSIANS = 10_000_000  # in one picture
+PAD = 2.0  # pixels, rounded up, by which the rasterizer's dilation of splats reaches into the picture
+MIN_FACTOR, BISECTIONS = 1e-5, 16  # of the search for a factor on level distances
+
+
+@dataclass(frozen=True)
+class GridCells:
+    """Cells of the tile grid, back to front. close: in the 3 x 3 block about the eye. nearest, farthest: bounds of the
+    distances from the eye to the centres of a cell's Gaussians.
+    """
+
+    i: Int64[Array, "n"]
+    j: Int64[Array, "n"]
+    tile: Int64[Array, "n"]
+    close: Bool[Array, "n"]
+    nearest: Float[Array, "n"]
+    farthest: Float[Array, "n"]
+
+    def __len__(self) -> int:
+        return len(self.i)
+
+    def __getitem__(self, index) -> "GridCells":
+        return GridCells(*(getattr(self, f.name)[index] for f in fields(self)))
+
+
+def visible_cells(terrain: EndlessTerrain, camera: Camera) -> GridCells:
+    """The cells within reach of the eye that a pinhole camera may see, back to front.
+
+    A cell is culled where its bounding box (its square with the overhang, between the heights of its Gaussians) lies
+    wholly outside one plane of the frustum. The test is conservative: no visible Gaussian is lost.
+    """
+    eye, side = camera.centre, terrain.side
+    at = (int(np.floor(eye[0] / side)), int(np.floor(eye[1] / side)))
+    steps = np.arange(-terrain.reach, terrain.reach + 1, dtype=np.int64)
+    i, j = (v.ravel() for v in np.meshgrid(at[0] + steps, at[1] + steps))
+    x, y = (i + 0.5) * side, (j + 0.5) * side
+    low, high = terrain.height_range(x, y)
+    middle = np.stack([x, y, 0.5 * (low + high)], 1) - eye
+    half = np.stack([np.full(len(x), 0.5 * side), np.full(len(x), 0.5 * side), 0.5 * (high - low)], 1)
+    nearest = np.linalg.norm(np.maximum(np.abs(middle) - half, 0), axis=1)
+    farthest = np.linalg.norm(np.abs(middle) + half, axis=1)
+    wider = np.array([terrain.overhang, terrain.overhang, 0])
+    seen = (nearest < terrain.reach * side) & ~_outside_frustum(camera, terrain.near, middle, half + wider)
+    sequence, _ = draw_order.sort_cells(i, j, at)
+    sequence = sequence[seen[sequence]]
+    tile = tiles_at(i, j, terrain.salt, terrain.variants)
+    return GridCells(i, j, tile, draw_order.in_near_block(i, j, at), nearest, farthest)[sequence]
+
+
+def _outside_frustum(
+    camera: Camera, near: float, middle: Float[Array, "n 3"], half: Float[Array, "n 3"]
+) -> Bool[Array, "n"]:
+    """Which boxes (centre from the eye, half extents) lie wholly outside one plane of the frustum."""
+    right, down, ahead = camera.rotation
+    planes = np.array(
+        [
+            [*ahead, -near],
+            [*(camera.fx * right + (camera.cx + PAD) * ahead), 0],
+            [*((camera.width - camera.cx + PAD) * ahead - camera.fx * right), 0],
+            [*(camera.fy * down + (camera.cy + PAD) * ahead), 0],
+            [*((camera.height - camera.cy + PAD) * ahead - camera.fy * down), 0],
+        ]
+    )
+    most = middle @ planes[:, :3].T + half @ np.abs(planes[:, :3]).T + planes[:, 3]
+    return np.any(most < 0, axis=1)
+
+
+def active_levels(terrain: EndlessTerrain, cells: GridCells) -> Bool[Array, "levels n"]:
+    """Which levels have a weight somewhere in each cell."""
+    switch, band = np.array(terrain.switches)[:, None], np.array(terrain.bands)[:, None]
+    begin = np.concatenate([[[-np.inf]], (switch - band)[:-1]])
+    return (cells.nearest <= switch + band) & (cells.farthest >= begin)
+
+
+def count_gaussians(terrain: EndlessTerrain, cells: GridCells) -> Int64[Array, "n"]:
+    """Number of Gaussians in each cell, over its active levels."""
+    levels = range(len(terrain.switches))
+    counts = np.array([[len(terrain.tiles[level, t]) for t in cells.tile] for level in levels], np.int64)
+    return (counts * active_levels(terrain, cells)).sum(0)
+
+
+def drop_far_cells(terrain: EndlessTerrain, cells: GridCells, budget: int = MAX_GAUSSIANS) -> GridCells:
+    """The nearest cells whose Gaussians stay within a budget."""
+    nearest_first = np.argsort(cells.nearest, kind="stable")
+    count = np.cumsum(count_gaussians(terrain, cells)[nearest_first])
+    return cells[np.sort(nearest_first[count <= budget])]
+
+
+def coarsen_to_budget(terrain: EndlessTerrain, camera: Camera, budget: int) -> EndlessTerrain:
+    """Multiply all level distances by one factor, the largest with which a picture has at most `budget` Gaussians.
+
+    The viewer does the same and also moves the end of the ground nearer. Where the coarsest level alone exceeds the
+    budget, that level is used.
+    """
+    cells, low, high = visible_cells(terrain, camera), MIN_FACTOR, 1.0
+
+    def scale_distances(factor: float) -> EndlessTerrain:
+        return replace(
+            terrain, switches=[factor * s for s in terrain.switches], bands=[factor * b for b in terrain.bands]
+        )
+
+    if count_gaussians(terrain, cells).sum() <= budget:
+        return terrain
+    for _ in range(BISECTIONS):
+        middle = float(np.sqrt(low * high))
+        fits = count_gaussians(scale_distances(middle), cells).sum() <= budget
+        low, high = (middle, high) if fits else (low, middle)
+    return scale_distances(low)
