@@ -16,7 +16,7 @@ from dav_gswt.prior import conditions
 from dav_gswt.prior.training import examples
 from dav_gswt.prior.training.worlds import FLYING_HEIGHT, world
 from dav_gswt.views import prior_sampling, uncertainty
-from dav_gswt.views.prior_sampling import Asking
+from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.uncertainty.staging import TOP
 
 REPEATS = 7
@@ -71,7 +71,7 @@ def pools() -> dict[str, float]:
     field = examples.fitted(made, photos, rng)
     path = lpips_weights.found()
     given = lpips_weights.read(path) if path else None
-    model = prior_sampling.opened({"model": "terrain"})
+    model = prior_sampling.load_prior({"model": "terrain"})
     known = conditions.taken(photos, made.frame, model.size)
 
     def scored(count: int, staged: bool):
@@ -82,10 +82,10 @@ def pools() -> dict[str, float]:
         pool = [(poses.of_camera(f"pose_{i:04d}", c, made.frame), c) for i, c in enumerate(cameras)]
         start = time.perf_counter()
         told = conditions.condition(field, pool, known, FLYING_HEIGHT, model.size)
-        ask = Asking(model, 5, 8, 0.15, weights=given, staged=staged)
+        ask = PriorConfig(model, 5, 8, 0.15, weights=given, staged=staged)
         everywhere = np.ones((count, model.size, model.size), np.float32)
-        terms, _ = prior_sampling.terms(ask, told, [pose.name for pose, _ in pool], everywhere)
-        return time.perf_counter() - start, uncertainty.combined(
+        terms, _ = prior_sampling.sample_terms(ask, told, [pose.name for pose, _ in pool], everywhere)
+        return time.perf_counter() - start, uncertainty.combine_terms(
             terms.w2_sq, terms.lpips, 0.1, uncertainty.Scales.frozen(terms.named())
         )
 

@@ -68,7 +68,7 @@ def measured() -> dict[str, float]:
     cut = time.perf_counter()
     assert [len(found.fields), len(found.labels)] == [LEVELS, 16]
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
-    model = prior_sampling.opened({"model": "terrain", "samples": 1, "steps": 20, "lpips": False})
+    model = prior_sampling.load_prior({"model": "terrain", "samples": 1, "steps": 20, "lpips": False})
     by = repair.ByPrior.of(model, {"strength": STRENGTH}, 0)
     refine.refined(found, refine.Uncut(made.fields[0], exemplar), refine.Options(), by, model.size)
     return {

@@ -21,6 +21,6 @@ with logging_to(snakemake.log[0]):
     result = evaluation.evaluate(fitted, build.modelled(tests, grid), groups, perceptual)
     result |= {"round": params.t, "photos": len(split["start"]) + shots, "gaussians": len(fitted)}
     result |= {"fit": read_json(given.fit)}
-    result |= stopping.told_by(read_json(given.poses)) if given.get("poses") else {}
+    result |= stopping.decision_record(read_json(given.poses)) if given.get("poses") else {}
     inputs = {"field": given.field, "ground": given.ground, "views": given.views}
     write_json(snakemake.output.metrics, result | {"provenance": provenance.of(inputs, dict(params.quality))})

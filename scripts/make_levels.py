@@ -11,7 +11,7 @@ with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     finest, grid = read_field(given.field), ground.read(given.ground)
     if given.get("maps"):  # a prior was asked: what it doubts is what the tiles go by
-        finest = pose_maps.doubted(finest, pose_maps.read(given.maps)[1])
+        finest = pose_maps.apply_uncertainty(finest, pose_maps.read_pose_maps(given.maps)[1])
     steps = params.quality["level_steps"]
     levels = build.fitted(*merge.cropped(finest, grid, 1), params.levels, steps, params.seed, params.keep)
     inputs = {"field": given.field, "ground": given.ground}

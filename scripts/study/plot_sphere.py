@@ -11,7 +11,7 @@ with logging_to(snakemake.log[0]):
     frame, split = read_scene_frame(given.frame), read_json(given.views)
     captures, rounds = list(given.captures), []
     for t, (scored, asked) in enumerate(zip(given.scores, given.poses, strict=True), 1):
-        taken = candidates.taken(given.model, split, captures[: t - 1])
-        table = scores.read(scored)
-        rounds.append(sphere.of_round(t, table, read_json(asked), taken, frame, lam))
-    sphere.write_figure(snakemake.output.plot, rounds, sphere.shade(table, lam)[0])
+        taken = candidates.read_captured_cameras(given.model, split, captures[: t - 1])
+        table = scores.read_scores(scored)
+        rounds.append(sphere.read_round(t, table, read_json(asked), taken, frame, lam))
+    sphere.write_figure(snakemake.output.plot, rounds, sphere.candidate_values(table, lam)[0])

@@ -16,7 +16,7 @@ with logging_to(snakemake.log[0]):
     grid = made.grids[0]
     west, south, _ = grid.exemplar
     uncut = build.Uncut(made.fields[0], Exemplar(west, south, grid.spacing, grid.cells))
-    model = prior_sampling.opened(params.prior)
+    model = prior_sampling.load_prior(params.prior)
     by = repair.ByPrior.of(model, params.refine, params.seed)
     mended = build.refined(tiles, uncut, build.Options.of(params.refine), by, model.size)
     inputs = {name: given[name] for name in ("seams", "weights")} | {"level0": Path(given.levels, "level0.ply")}

@@ -96,16 +96,16 @@ def test_a_round_may_go_by_what_the_prior_doubts(snakemake, tiny, tmp_path):
     way = folder / "results/desert/seed0/draft/active_w2-lpips_terrain_pdrop0.15_lam0.1_k2/iter1"
     target = str((way / "levels").relative_to(folder))
     snakemake(folder, "--cores", "2", target, configs=(USUAL, TINY))
-    first = scores.read(folder / "results/desert/seed0/draft/coarse/scores_terrain_pdrop0.15/scores.csv")
+    first = scores.read_scores(folder / "results/desert/seed0/draft/coarse/scores_terrain_pdrop0.15/scores.csv")
     assert (first.term("w2_sq") > 0).all() and "lpips" not in first.terms and (first.steps == 2).all()
     chosen = [pose["name"] for pose in read_json(way / "poses.json")["poses"]]
     best = np.argsort(-first.term("w2_sq"), kind="stable")[:2]
     assert chosen == [first.names[i] for i in best]
     shown = image_files.read_exr_parts(way / "poses.exr")
     assert set(shown) == set(chosen) and all(set(channels) == {"opacity", "w2_sq"} for channels, _ in shown.values())
-    later = scores.read(way / "scores.csv")
+    later = scores.read_scores(way / "scores.csv")
     assert later.scales == first.scales and not set(later.names) & set(chosen)
-    doubt, level = pose_maps.read(way / "maps.npz")[1], read_field(way / "levels/level0.ply")
+    doubt, level = pose_maps.read_pose_maps(way / "maps.npz")[1], read_field(way / "levels/level0.ply")
     assert len(doubt) == len(read_field(way / "field.ply"))
     top = level.ground & (level.uncertainty > 0)  # the underlay of a level has none
     assert top.any() and np.isin(level.uncertainty[top], doubt).all()

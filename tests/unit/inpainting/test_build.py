@@ -17,7 +17,7 @@ from dav_gswt.prior.networks import Network
 from dav_gswt.prior.terrain import Terrain
 from dav_gswt.reconstruction import underlay
 from dav_gswt.views import pose_maps
-from dav_gswt.views.prior_sampling import Asking
+from dav_gswt.views.prior_sampling import PriorConfig
 
 MIDDLE = [1.6, 1.6, 0.0]
 FIRST = 20  # column of the first unseen cell
@@ -56,7 +56,7 @@ class Painting:
 
 
 def asked(prior=None, samples=2):
-    return Asking(prior or Painting(), samples, 2, 0.0)
+    return PriorConfig(prior or Painting(), samples, 2, 0.0)
 
 
 def half_seen():
@@ -309,5 +309,5 @@ def test_the_maps_of_a_prior_leave_what_was_imagined_in_full_doubt():
     field = concatenate_fields([patch.field()[:4], blob(MIDDLE, [0.1] * 3, [0.5] * 3)])
     marked = np.array([False, True, False, False, True])
     field = replace(field, imagined=marked, uncertainty=np.float32([0.1, 1, 0.1, 0.1, 1]))
-    told = pose_maps.doubted(field, np.float32([0.3, 0.3, 0.4, 0.5]))
+    told = pose_maps.apply_uncertainty(field, np.float32([0.3, 0.3, 0.4, 0.5]))
     assert told.uncertainty.tolist() == np.float32([0.3, 1, 0.4, 0.5, 1]).tolist()

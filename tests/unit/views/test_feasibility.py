@@ -45,7 +45,9 @@ PLACES = {
 
 def verdicts(grid=None, limits=None, **move):
     pool = [candidate(name, eye, **move) for name, eye in PLACES.items()]
-    return feasibility.rejected(pool, ground(**move) if grid is None else grid, limits, 0.15 * move.get("scale", 1.0))
+    return feasibility.find_infeasible(
+        pool, ground(**move) if grid is None else grid, limits, 0.15 * move.get("scale", 1.0)
+    )
 
 
 def kinds(reasons):
@@ -69,9 +71,9 @@ def test_what_is_in_sight_over_the_ridge_by_hand(height, columns):
     that is x <= (2.6 - RIDGE z) / (1 - z). The lattice's columns stand at (2 i - 8) / 9."""
     last = (2.6 - RIDGE * height) / (1 - height)
     assert np.sum((2 * np.arange(9) - 8) / 9 <= last) == columns
-    site = feasibility._site(ground())
+    site = feasibility._build_mesh(ground())
     camera = candidate("", (2.6, 0, height))[1]
-    shown, seen = feasibility._sight(site, [camera], camera.centre[None])
+    shown, seen = feasibility._count_visible(site, [camera], camera.centre[None])
     assert (shown[0], seen[0]) == (81, 9 * columns)
 
 
@@ -79,7 +81,7 @@ def test_the_distance_to_the_ground_is_not_the_height_over_it():
     """Beside a wall of 45 degrees that rises from x = 0: the distance is the height over the wall by the root of 2."""
     x = (np.arange(CELLS) + 0.5) * SPACING - 3
     wall = replace(ground(), heights=np.tile(np.maximum(x, 0), (CELLS, 1)))
-    site = feasibility._site(wall)
+    site = feasibility._build_mesh(wall)
     place = np.array([[1.0, 0.0, 1.3]])
     assert 2 * feasibility._distance(site, site.local(place))[0] == pytest.approx(0.3 / 2**0.5, rel=1e-6)
 
@@ -125,14 +127,14 @@ def test_pictures_that_miss_the_exemplar_or_all_ground_are_rejected():
         candidate("away", (-2, 0, 1), (-3, 0, 0), fov=40.0),
         candidate("half", (0, 0, 2), (0, 3, 1.5), fov=140.0),
     ]
-    found = feasibility.rejected(pool, ground(), clearance=0.1)
+    found = feasibility.find_infeasible(pool, ground(), clearance=0.1)
     assert kinds(found) == {"up": "off the exemplar", "away": "off the exemplar", "half": "past the ground"}
 
 
 def test_the_clearance_follows_from_the_flying_height_where_none_is_given():
     high = [candidate(f"{i}", (0, 0.01, 10)) for i in range(3)]
     low, lower = candidate("low", (0, 0.01, 0.52)), candidate("lower", (0, 0.01, 0.48))
-    assert list(feasibility.rejected([*high, low, lower], ground())) == ["lower"]
+    assert list(feasibility.find_infeasible([*high, low, lower], ground())) == ["lower"]
 
 
 def test_without_embree_the_answers_are_the_same(monkeypatch, caplog):
@@ -145,9 +147,9 @@ def test_without_embree_the_answers_are_the_same(monkeypatch, caplog):
 def test_what_is_kept_and_how_many_are_not_is_said(caplog):
     pool = [candidate(name, eye) for name, eye in PLACES.items()]
     with caplog.at_level("INFO"):
-        left = feasibility.kept(pool, ground(), clearance=0.15)
+        left = feasibility.filter_feasible(pool, ground(), clearance=0.15)
     assert [pose.name for pose, _ in left] == ["above", "aside", "over the ridge"]
     assert "6 of 9 candidate poses are left out: 2 hidden, 2 buried, 2 too near the ground" in caplog.text
-    assert feasibility.kept([], ground()) == []
+    assert feasibility.filter_feasible([], ground()) == []
     with pytest.raises(InputError, match="any of the 1 candidate poses: 1 buried"):
-        feasibility.kept([candidate("low", (0, 0, -1))], ground())
+        feasibility.filter_feasible([candidate("low", (0, 0, -1))], ground())

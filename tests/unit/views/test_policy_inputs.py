@@ -35,14 +35,14 @@ def files(tmp_path):
         picture = np.clip(render(true, camera).colour + np.float32(0.2 * (i == 2)), 0, 1)
         image_files.write_png(tmp_path / pose.name, picture)
         views.append(View(pose.name, camera, picture, np.ones((96, 96), np.float32)))
-    truth.write(tmp_path / "truth", iter(views[1:]))
+    truth.write_truth(tmp_path / "truth", iter(views[1:]))
     given = {"field": tmp_path / "field.ply", "ground": tmp_path / "ground.exr", "frame": tmp_path / "ground.json"}
     return given | {"images": tmp_path, "truth": tmp_path / "truth"}
 
 
 def errors(files, agent, policy="oracle"):
     scores = Scores([pose for pose, _ in pool()][::-1], {}, Scales({}), np.zeros(3, int))
-    return policy_inputs.errors(policy, scores, pool(), files, {"agent": agent}, 96)
+    return policy_inputs.measure_true_errors(policy, scores, pool(), files, {"agent": agent}, 96)
 
 
 def test_of_a_replayed_scene_every_photo_tells_in_the_order_of_the_scores(files):

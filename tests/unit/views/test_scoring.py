@@ -13,10 +13,10 @@ from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import Imagined
 from dav_gswt.raster import Rasterizer
 from dav_gswt.views import collision, fisher, frozen_scales, pose_maps, scores, scoring
-from dav_gswt.views.frozen_scales import Frozen
-from dav_gswt.views.prior_sampling import Asking
+from dav_gswt.views.frozen_scales import FrozenScales
+from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.uncertainty import Quantiles, Scales
-from dav_gswt.views.uncertainty.backprojection import carried
+from dav_gswt.views.uncertainty.backprojection import backproject_maps
 
 MIDDLE = [1.6, 1.6, 0.0]
 
@@ -51,7 +51,7 @@ def pool(*eyes, width=40, height=40):
 
 
 def scored(prior=None, **more):
-    return scoring.score(patch.field(), patch.grid(), pool(), patch.photos(), patch.FRAME, prior, **more)
+    return scoring.score_poses(patch.field(), patch.grid(), pool(), patch.photos(), patch.FRAME, prior, **more)
 
 
 def test_without_a_prior_there_are_geometric_terms_alone():
@@ -62,7 +62,7 @@ def test_without_a_prior_there_are_geometric_terms_alone():
 
 
 def test_a_prior_adds_what_its_samples_disagree_about():
-    still, doubting = (scored(Asking(Doubting(), 2, 4, p)) for p in (0.0, 0.2))
+    still, doubting = (scored(PriorConfig(Doubting(), 2, 4, p)) for p in (0.0, 0.2))
     assert not still.scores.terms["w2_sq"].any() and still.scores.scales.of["w2_sq"] == 0
     # two samples at +-d in four channels: 2 var(ddof=1) summed is 4 (2 d)^2, and d is .2 of a blue of about .4
     np.testing.assert_allclose(doubting.scores.terms["w2_sq"][0], 4 * (2 * 0.2 * 0.4) ** 2, rtol=0.2)
@@ -77,15 +77,17 @@ def test_a_latents_own_width_counts_where_it_is_asked_for():
         def variances(self, latents):
             return np.arange(latents.shape[1], dtype=np.float32)[None, :, None, None, None] + np.zeros_like(latents)
 
-    point, posterior = (scored(Asking(Doubting(), 2, 4, 0.2, posterior=p)).scores.terms["w2_sq"] for p in (False, True))
+    point, posterior = (
+        scored(PriorConfig(Doubting(), 2, 4, 0.2, posterior=p)).scores.terms["w2_sq"] for p in (False, True)
+    )
     assert np.array_equal(point, posterior)
-    wider = scored(Asking(Uneven(), 2, 4, 0.2, posterior=True)).scores.terms["w2_sq"]
+    wider = scored(PriorConfig(Uneven(), 2, 4, 0.2, posterior=True)).scores.terms["w2_sq"]
     np.testing.assert_allclose(wider - point, 4.0, rtol=1e-5)  # deviations 0 and 1, in four channels
 
 
 def test_the_residual_is_how_far_the_mean_of_the_samples_lies_from_the_render():
     """Samples to either side of nothing: their mean stays, whatever they differ by."""
-    little, much = (scored(Asking(Doubting(), 2, 4, p)).scores.terms["residual"] for p in (0.1, 0.4))
+    little, much = (scored(PriorConfig(Doubting(), 2, 4, p)).scores.terms["residual"] for p in (0.1, 0.4))
     np.testing.assert_allclose(little, much, rtol=1e-6)
     np.testing.assert_allclose(little[0], 4 * (0.5 * 0.4) ** 2, rtol=0.2)
 
@@ -95,13 +97,13 @@ def test_samples_may_start_from_noises_of_their_own():
         def samples(self, condition, m, p_drop, steps, seed, common=True):
             return super().samples(condition, m, 0.0 if common else 0.3, steps, seed)
 
-    common, own = (scored(Asking(Noisy(), 2, 4, 0.0, noises=n)).scores.terms["w2_sq"] for n in (False, True))
+    common, own = (scored(PriorConfig(Noisy(), 2, 4, 0.0, noises=n)).scores.terms["w2_sq"] for n in (False, True))
     assert not common.any() and (own > 0).all()
 
 
 def test_later_rounds_keep_the_scales_of_the_first():
-    first = Frozen(Scales(dict.fromkeys(scores.TERMS, 7.0)), Quantiles(0.0, 1.0))
-    assert scored(Asking(Doubting(), 2, 4, 0.2), frozen=first).scores.scales == first.scales
+    first = FrozenScales(Scales(dict.fromkeys(scores.TERMS, 7.0)), Quantiles(0.0, 1.0))
+    assert scored(PriorConfig(Doubting(), 2, 4, 0.2), frozen=first).scores.scales == first.scales
 
 
 def test_a_gaussian_gets_the_doubt_of_the_pixels_it_is_in():
@@ -109,11 +111,11 @@ def test_a_gaussian_gets_the_doubt_of_the_pixels_it_is_in():
     field, (_, camera) = patch.field(), pool()[0]
     half = np.zeros((16, 16), np.float32)
     half[:, :8] = 1
-    found = carried(field, [camera], half[None])
+    found = backproject_maps(field, [camera], half[None])
     column = camera.project(field.means.astype(float))[0][:, 0]
     drawn = np.isfinite(found)
     assert found[drawn & (column < 0.4 * 40)].min() > 0.95 and found[drawn & (column > 0.6 * 40)].max() < 0.05
-    one = carried(field, [camera], np.full((1, 16, 16), 0.25, np.float32))
+    one = backproject_maps(field, [camera], np.full((1, 16, 16), 0.25, np.float32))
     np.testing.assert_allclose(one[drawn], 0.25, rtol=1e-5)
 
 
@@ -121,7 +123,9 @@ def test_what_no_camera_sees_keeps_its_geometric_doubt():
     field = replace(patch.field(), uncertainty=np.full(len(patch.field()), 0.3, np.float32))
     tele = cameras.pinhole([0.3, 0.3, 5.0], [0.3, 0.3, 0.0], 40, 40, 4.0)
     one = [(poses.of_camera("p0", tele, patch.FRAME), tele)]
-    found = scoring.score(field, patch.grid(), one, patch.photos(), patch.FRAME, Asking(Doubting(), 2, 4, 0.2))
+    found = scoring.score_poses(
+        field, patch.grid(), one, patch.photos(), patch.FRAME, PriorConfig(Doubting(), 2, 4, 0.2)
+    )
     far = np.linalg.norm(field.means[:, :2] - 0.3, axis=1) > 1
     assert (found.gaussians[far] == np.float32(0.3)).all() and (found.gaussians[~far] != np.float32(0.3)).any()
 
@@ -130,21 +134,24 @@ def test_fisher_gain_is_the_squared_blend_weights_over_what_is_known():
     field, raster, camera = patch.field(), Rasterizer(), pool()[0][1]
     raster.forward(field.means, field.log_scales, field.quats, field.opacity_logits, field.sh, camera)
     seen = raster.contributions()
-    none, once = fisher.known(field, [], raster), fisher.known(field, [camera], raster)
-    assert fisher.gain(seen, none) == pytest.approx(float(seen.squared.sum()) / fisher.PRIOR)
+    none, once = (
+        fisher.accumulate_information(field, [], raster),
+        fisher.accumulate_information(field, [camera], raster),
+    )
+    assert fisher.information_gain(seen, none) == pytest.approx(float(seen.squared.sum()) / fisher.PRIOR)
     np.testing.assert_allclose(once - fisher.PRIOR, seen.squared, rtol=1e-6)
-    assert fisher.gain(seen, once) < fisher.gain(seen, none)
+    assert fisher.information_gain(seen, once) < fisher.information_gain(seen, none)
 
 
 def test_gathered_information_lowers_the_gain_of_what_overlaps_it():
-    field, cameras_ = patch.field(), [scoring.small(camera) for _, camera in pool()]
-    gathered = fisher.Gathered(field, [], cameras_)
+    field, cameras_ = patch.field(), [scoring.scoring_camera(camera) for _, camera in pool()]
+    gathered = fisher.FisherInformation(field, [], cameras_)
     before = [gathered.gain(i) for i in range(3)]
     gathered.take(0)
     after = [gathered.gain(i) for i in range(3)]
     assert all(a < b for a, b in zip(after, before, strict=True)) and after[0] / before[0] < after[2] / before[2]
     raster = Rasterizer()
-    np.testing.assert_allclose(gathered.known, fisher.known(field, cameras_[:1], raster))
+    np.testing.assert_allclose(gathered.known, fisher.accumulate_information(field, cameras_[:1], raster))
 
 
 def test_a_prior_sees_the_middle_square_and_the_nearest_photo():
@@ -178,18 +185,18 @@ def test_a_pose_that_no_photo_comes_from_is_named(eye, said):
     )
     camera = cameras.pinhole(eye, [1.6, 1.7, 5.0], 40, 40, 40.0)
     with pytest.raises(InputError, match=said):
-        collision.require([(poses.of_camera("p0", camera, patch.FRAME), camera)], block, patch.grid())
-    collision.require(pool(), block, patch.grid())
+        collision.require_free_positions([(poses.of_camera("p0", camera, patch.FRAME), camera)], block, patch.grid())
+    collision.require_free_positions(pool(), block, patch.grid())
 
 
 def test_maps_come_back_and_are_shown_with_their_pose(tmp_path):
-    found = scored(Asking(Doubting(), 2, 4, 0.2))
-    pose_maps.write(tmp_path / "maps.npz", found.maps, found.gaussians)
-    back, gaussians = pose_maps.read(tmp_path / "maps.npz")
+    found = scored(PriorConfig(Doubting(), 2, 4, 0.2))
+    pose_maps.write_pose_maps(tmp_path / "maps.npz", found.maps, found.gaussians)
+    back, gaussians = pose_maps.read_pose_maps(tmp_path / "maps.npz")
     assert back.names == ["p0", "p1", "p2"] and np.array_equal(gaussians, found.gaussians)
     assert np.array_equal(back.w2_sq, found.maps.w2_sq)
     np.testing.assert_allclose(back.opacity, found.maps.opacity, atol=1e-3)
-    image_files.write_exr_parts(tmp_path / "u.exr", scoring.parts(found, patch.field(), patch.grid()))
+    image_files.write_exr_parts(tmp_path / "u.exr", scoring.exr_parts(found, patch.field(), patch.grid()))
     read = image_files.read_exr_parts(tmp_path / "u.exr")
     assert set(read) == {"above", "p0", "p1", "p2"}
     channels, header = read["p1"]
@@ -207,16 +214,16 @@ def test_a_wide_pictures_map_knows_its_middle_square_alone():
 def test_maps_of_something_else_are_refused(tmp_path):
     (tmp_path / "maps.npz").write_bytes(b"PK nothing of the kind")
     with pytest.raises(InputError, match="maps.npz: not readable as maps"):
-        pose_maps.read(tmp_path / "maps.npz")
+        pose_maps.read_pose_maps(tmp_path / "maps.npz")
 
 
 def test_what_is_frozen_comes_back_to_the_bit(tmp_path):
-    first = Frozen(Scales({"w2_sq": 1 / 3, "fisher": 0.0}), Quantiles(0.1, 2 / 3))
-    frozen_scales.write(tmp_path / "scores.json", first, {"candidates": 3}, {}, {})
-    assert frozen_scales.read(tmp_path / "scores.json") == first
-    frozen_scales.write(tmp_path / "scores.json", replace(first, pixels=None), {}, {}, {})
-    assert frozen_scales.read(tmp_path / "scores.json").pixels is None
+    first = FrozenScales(Scales({"w2_sq": 1 / 3, "fisher": 0.0}), Quantiles(0.1, 2 / 3))
+    frozen_scales.write_frozen_scales(tmp_path / "scores.json", first, {"candidates": 3}, {}, {})
+    assert frozen_scales.read_frozen_scales(tmp_path / "scores.json") == first
+    frozen_scales.write_frozen_scales(tmp_path / "scores.json", replace(first, pixels=None), {}, {}, {})
+    assert frozen_scales.read_frozen_scales(tmp_path / "scores.json").pixels is None
     for bad in ("{}", '{"scales": [], "pixels": null}', '{"scales": {"w2_sq": -1}, "pixels": null}'):
         (tmp_path / "scores.json").write_text(bad)
         with pytest.raises(InputError, match="scores.json: does not hold the scales"):
-            frozen_scales.read(tmp_path / "scores.json")
+            frozen_scales.read_frozen_scales(tmp_path / "scores.json")

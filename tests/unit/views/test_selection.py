@@ -177,22 +177,22 @@ def test_spread_poses_are_far_apart_and_the_first_comes_first():
 
 def test_scores_come_back_to_the_bit(tmp_path):
     pool = scored(0.1, 33.3333333333, opacity=[1 / 3, 0.25], w2_sq=[1e-30, 7e20])
-    scores.write(tmp_path / "s.csv", pool)
-    back = scores.read(tmp_path / "s.csv")
+    scores.write_scores(tmp_path / "s.csv", pool)
+    back = scores.read_scores(tmp_path / "s.csv")
     assert (back.poses, back.scales, list(back.terms)) == (pool.poses, pool.scales, ["opacity", "w2_sq"])
     assert all(np.array_equal(back.terms[name], values) for name, values in pool.terms.items())
     assert np.array_equal(back.steps, pool.steps)
 
 
 def test_no_candidate_left_is_a_table_without_rows(tmp_path):
-    scores.write(tmp_path / "s.csv", scored())
-    assert len(scores.read(tmp_path / "s.csv")) == 0
+    scores.write_scores(tmp_path / "s.csv", scored())
+    assert len(scores.read_scores(tmp_path / "s.csv")) == 0
 
 
 def test_scores_that_are_not_finite_name_their_poses(tmp_path):
-    scores.write(tmp_path / "s.csv", scored(0, 1, opacity=[float("nan"), 0]))
+    scores.write_scores(tmp_path / "s.csv", scored(0, 1, opacity=[float("nan"), 0]))
     with pytest.raises(InputError, match="p0"):
-        scores.read(tmp_path / "s.csv")
+        scores.read_scores(tmp_path / "s.csv")
 
 
 @pytest.mark.parametrize(
@@ -201,7 +201,7 @@ def test_scores_that_are_not_finite_name_their_poses(tmp_path):
 def test_a_table_of_something_else_is_refused(tmp_path, line, reason):
     (tmp_path / "s.csv").write_text(",".join(scores.FIELDS) + "\n" + line + "\n")
     with pytest.raises(InputError, match=reason):
-        scores.read(tmp_path / "s.csv")
+        scores.read_scores(tmp_path / "s.csv")
 
 
 def test_a_pose_is_where_its_camera_is():

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from dav_gswt.files import write_json
 from dav_gswt.views import stopping
 from dav_gswt.views.marginal_gain import SHARE
-from dav_gswt.views.stopping import Known, decide
+from dav_gswt.views.stopping import StoppingState, decide
 
 
 def fit(*unseen, taken=True):
@@ -26,7 +26,7 @@ def behind(gap):
 
 
 def known(taken=8, fits=(), left=100, last=None, start=8):
-    return Known(start, taken, list(fits), left, last)
+    return StoppingState(start, taken, list(fits), left, last)
 
 
 def test_nothing_asked_stops_nothing():
@@ -111,12 +111,12 @@ def test_files_of_a_job(tmp_path):
     write_json(tmp_path / "poses.json", {"stopped": "enough", "expected": None, "poses": []})
     write_json(tmp_path / "fit.json", fit(20.0))
     later = SimpleNamespace(fits=[tmp_path / "fit.json"], last=tmp_path / "poses.json", get=lambda key: key)
-    assert stopping.known(later, 8, 9, 5) == Known(
+    assert stopping.read_state(later, 8, 9, 5) == StoppingState(
         8, 9, [fit(20.0)], 5, {"stopped": "enough", "expected": None, "poses": []}
     )
     first = SimpleNamespace(fits=[], get=lambda key: None)
-    assert stopping.known(first, 8, 8, 5) == Known(8, 8, [], 5, None)
-    assert stopping.told_by({"stopped": None, "expected": {"gain": 1}, "poses": [], "k": 4}) == {
+    assert stopping.read_state(first, 8, 8, 5) == StoppingState(8, 8, [], 5, None)
+    assert stopping.decision_record({"stopped": None, "expected": {"gain": 1}, "poses": [], "k": 4}) == {
         "stopped": None,
         "expected": {"gain": 1},
     }

@@ -27,7 +27,7 @@ def table():
     cells = [cell("dunes", 0), cell("dunes", 1), cell("beach", 0)]
     poor, good, best = judged(0.1, pixels=0.3), judged(0.5, pixels=0.4), judged(0.8, pixels=0.6)
     scores = [{"poor": poor, "best": good}, {"poor": poor, "best": best}, {"poor": poor, "dumb": NONE}]
-    return report.rows(cells, [{"poses": 40, "level": 0.9, "scores": one} for one in scores])
+    return report.tabulate_scores(cells, [{"poses": 40, "level": 0.9, "scores": one} for one in scores])
 
 
 def dots(axes):
@@ -53,11 +53,11 @@ def test_the_table_has_a_row_for_each_score_of_each_cell(tmp_path):
     assert set(wanted.split()) | {"pixel_ause"} <= set(back[0])
     assert back[3]["spearman"] == "0.8" and back[3]["poses"] == "40" and back[5]["spearman"] == ""
     with pytest.raises(ValueError):
-        report.rows([cell()], [])
+        report.tabulate_scores([cell()], [])
 
 
 def test_the_figure_shows_each_value_its_mean_and_chance_the_best_score_on_top():
-    figure = report.drawn(table(), 0.9)
+    figure = report.draw_figure(table(), 0.9)
     spearman, ause, coverage, by_pixel = figure.axes[:4]
     assert [text.get_text() for text in spearman.get_yticklabels()] == ["best", "poor", "dumb"]
     assert [text.get_text() for text in by_pixel.get_yticklabels()] == ["best", "poor"]
@@ -74,14 +74,14 @@ def test_the_figure_shows_each_value_its_mean_and_chance_the_best_score_on_top()
 
 
 def test_colours_are_scenes_and_marks_are_rounds():
-    found = {(line.get_color(), line.get_marker()) for line in report.drawn(table(), 0.9).axes[0].lines}
+    found = {(line.get_color(), line.get_marker()) for line in report.draw_figure(table(), 0.9).axes[0].lines}
     found = {(colour, mark) for colour, mark in found if mark in report.MARKS}
     assert len(found) == 3 and len({colour for colour, _ in found}) == len({mark for _, mark in found}) == 2
 
 
 def test_without_pixels_or_intervals_the_figure_says_what_it_can():
     scores = {"a": judged(0.4) | {"coverage": None, "width": None}}
-    figure = report.drawn(report.rows([cell()], [{"poses": 12, "level": 0.9, "scores": scores}]), 0.9)
+    figure = report.draw_figure(report.tabulate_scores([cell()], [{"poses": 12, "level": 0.9, "scores": scores}]), 0.9)
     assert len(figure.axes) == 3 and [text.get_text() for text in figure.axes[2].texts] == ["too few poses"]
 
 

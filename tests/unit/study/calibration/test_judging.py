@@ -18,7 +18,7 @@ from dav_gswt.raster import render
 from dav_gswt.study.calibration import controls, judging, truth
 from dav_gswt.study.prior.regressor import Regressor
 from dav_gswt.views import prior_sampling, scoring
-from dav_gswt.views.prior_sampling import Asking
+from dav_gswt.views.prior_sampling import PriorConfig
 
 AGENT = {"agent": "replay"}
 
@@ -50,15 +50,15 @@ def replayed(tmp_path):
     south = truth.means[:, 1] < 0.6
     colour = np.where(south[:, None, None], truth.sh + np.float32(0.8), truth.sh)
     wrong = replace(truth, sh=colour, uncertainty=np.where(south, 1, 0).astype(np.float32))
-    judged = judging.Judged(AGENT, wrong, patch.grid(), patch.FRAME, patch.photos(), 96)
+    judged = judging.CalibrationTarget(AGENT, wrong, patch.grid(), patch.FRAME, patch.photos(), 96)
     return judged, tmp_path
 
 
 def judge(replayed, prior=None, regressors=(), count=12):
     judged, folder = replayed
-    found = scoring.score(judged.field, judged.grid, pool(), judged.taken, judged.frame, prior)
-    some = judging.compared(judged, pool(), found.scores, {"images": folder}, count)
-    return judging.calibrated(judged, *some, (found.scores, found.maps), 0.1, 0, prior, regressors)
+    found = scoring.score_poses(judged.field, judged.grid, pool(), judged.taken, judged.frame, prior)
+    some = judging.choose_candidates(judged, pool(), found.scores, {"images": folder}, count)
+    return judging.calibrate_scores(judged, *some, (found.scores, found.maps), 0.1, 0, prior, regressors)
 
 
 def test_a_score_that_knows_where_the_field_is_wrong_ranks_well(replayed):
@@ -71,8 +71,8 @@ def test_a_score_that_knows_where_the_field_is_wrong_ranks_well(replayed):
 
 
 def test_with_a_prior_its_terms_and_its_controls_are_judged_too(replayed, files):
-    prior = Asking(Terrain.open(files["prior"]), 2, 2, 0.2)
-    regressors = controls.opened([files["regressor0"], files["regressor1"]])
+    prior = PriorConfig(Terrain.open(files["prior"]), 2, 2, 0.2)
+    regressors = controls.open_regressors([files["regressor0"], files["regressor1"]])
     found, table = judge(replayed, prior, regressors, count=9)
     others = {"spread", "residual", "regressor_dropout", "regressor_residual", "ensemble"}
     assert set(found["scores"]) == {"opacity", "fisher", "w2_sq", "gradient", "u", "low", "far"} | others
@@ -84,38 +84,40 @@ def test_with_a_prior_its_terms_and_its_controls_are_judged_too(replayed, files)
 
 def test_geometry_alone_is_what_a_score_has_to_beat():
     up, side = poses.Pose("", 90.0, 0.0, 2.0), poses.Pose("", 30.0, 0.0, 2.0)
-    found = judging.geometric([up, side], [up])
+    found = judging.geometric_baselines([up, side], [up])
     assert list(found["low"]) == [0, 60] and found["far"] == pytest.approx([0, 2.0])  # 60 degrees apart, 2 away
 
 
 def test_truth_that_was_drawn_once_is_what_is_compared(replayed, tmp_path):
     judged, folder = replayed
-    found = scoring.score(judged.field, judged.grid, pool(), judged.taken, judged.frame)
-    some, views = judging.compared(judged, pool(), found.scores, {"images": folder}, 5)
+    found = scoring.score_poses(judged.field, judged.grid, pool(), judged.taken, judged.frame)
+    some, views = judging.choose_candidates(judged, pool(), found.scores, {"images": folder}, 5)
     (tmp_path / "truth").mkdir()
-    truth.write(tmp_path / "truth", iter(views))
-    again = judging.compared(judged, pool(), found.scores, {"images": "", "truth": str(tmp_path / "truth")}, 12)
+    truth.write_truth(tmp_path / "truth", iter(views))
+    again = judging.choose_candidates(
+        judged, pool(), found.scores, {"images": "", "truth": str(tmp_path / "truth")}, 12
+    )
     assert {pose.name for pose, _ in again[0]} == {pose.name for pose, _ in some} and len(some) == 5
     by_name = {view.name: view.image for view in views}
     assert all(np.abs(view.image - by_name[view.name]).max() < 0.003 for view in again[1])
     image_files.write_png(tmp_path / "truth" / f"{some[0][0].name}.png", np.zeros((5, 5, 3), np.float32))
     with pytest.raises(InputError, match="5 x 5 pixels, not those of its pose"):
-        truth.kept(pool(), tmp_path / "truth")
+        truth.read_truth(pool(), tmp_path / "truth")
 
 
 def test_controls_are_what_they_say(files):
-    prior = Asking(Terrain.open(files["prior"]), 3, 2, 0.2, seed=4)
-    one, two = controls.opened([files["regressor0"], files["regressor1"]])
-    judged = judging.Judged(AGENT, patch.field(), patch.grid(), patch.FRAME, patch.photos(), 96)
-    condition, counts = scoring.told(judged.field, judged.grid, pool(2), judged.taken, judged.frame, 64)
-    found = controls.maps(prior, [one, two], condition)
+    prior = PriorConfig(Terrain.open(files["prior"]), 3, 2, 0.2, seed=4)
+    one, two = controls.open_regressors([files["regressor0"], files["regressor1"]])
+    judged = judging.CalibrationTarget(AGENT, patch.field(), patch.grid(), patch.FRAME, patch.photos(), 96)
+    condition, counts = scoring.build_conditions(judged.field, judged.grid, pool(2), judged.taken, judged.frame, 64)
+    found = controls.control_maps(prior, [one, two], condition)
     codes = [r.predicted(condition) for r in (one, two)]
     np.testing.assert_allclose(found["ensemble"], ((codes[0] - codes[1]) ** 2).sum(1), rtol=1e-4, atol=1e-6)
-    assert set(controls.maps(prior, [one], condition)) == set(found) - {"ensemble"}
-    assert set(controls.maps(prior, [], condition)) == {"spread", "residual"}
-    assert controls.maps(replace(prior, model=Other()), [], condition) == {}
+    assert set(controls.control_maps(prior, [one], condition)) == set(found) - {"ensemble"}
+    assert set(controls.control_maps(prior, [], condition)) == {"spread", "residual"}
+    assert controls.control_maps(replace(prior, model=Other()), [], condition) == {}
     assert counts.shape == (2, 64, 64) and 0 < counts.mean() < 1
-    assert prior_sampling.over(found["spread"], counts).shape == (2,)
+    assert prior_sampling.weighted_mean(found["spread"], counts).shape == (2,)
 
 
 class Other(SimpleNamespace):
@@ -134,5 +136,5 @@ class Other(SimpleNamespace):
 
 def test_a_priors_weights_are_no_regressors(files):
     with pytest.raises(InputError, match=r"prior\.safetensors: not the weights of a regressor"):
-        controls.opened([files["prior"]])
-    assert isinstance(controls.opened([files["regressor0"]])[0], Regressor)
+        controls.open_regressors([files["prior"]])
+    assert isinstance(controls.open_regressors([files["regressor0"]])[0], Regressor)

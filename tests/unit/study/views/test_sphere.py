@@ -33,31 +33,33 @@ def photo(*eye):
 
 def round_of(number=1, chosen=(5, 40, 2), photos=((0.0, 0.0, 5.0), (0.0, -3.0, 3.0)), high=1.0, count=60):
     taken = [photo(*eye) for eye in photos]
-    return sphere.of_round(number, scored(count, high), asked(*chosen), taken, FRAME, 0.0)
+    return sphere.read_round(number, scored(count, high), asked(*chosen), taken, FRAME, 0.0)
 
 
 def test_poses_lie_where_they_are_seen_from_above():
     poses = [Pose("", 90.0, 200.0, 5.0), Pose("", 0.0, 0.0, 5.0), Pose("", 30.0, 90.0, 9.0)]
-    np.testing.assert_allclose(sphere.on_disc(poses), [[np.radians(200), 0], [0, 1], [np.pi / 2, 0.5**0.5]], atol=1e-7)
+    np.testing.assert_allclose(
+        sphere.project_poses(poses), [[np.radians(200), 0], [0, 1], [np.pi / 2, 0.5**0.5]], atol=1e-7
+    )
 
 
 def test_candidates_even_over_the_hemisphere_are_even_over_the_figure():
     poses = [Pose("", *place) for place in camera_layouts.hemisphere(50, 0.0, 5.0)]
-    np.testing.assert_allclose(sphere.on_disc(poses)[:, 1] ** 2, (np.arange(50) + 0.5) / 50)
+    np.testing.assert_allclose(sphere.project_poses(poses)[:, 1] ** 2, (np.arange(50) + 0.5) / 50)
 
 
 def test_candidates_are_coloured_by_doubt_where_a_prior_was_asked_else_by_opacity():
-    label, values = sphere.shade(scored(), 0.1)
+    label, values = sphere.candidate_values(scored(), 0.1)
     assert "opaque" in label
     np.testing.assert_allclose(values, np.linspace(0, 2, 60))  # over its scale of a half
     w2, lpips = np.linspace(1, 2, 60), np.linspace(5, 3, 60)
-    label, values = sphere.shade(scored(w2_sq=w2, lpips=lpips), 0.1)
+    label, values = sphere.candidate_values(scored(w2_sq=w2, lpips=lpips), 0.1)
     assert "W2 + 0.1 LPIPS" in label
     np.testing.assert_allclose(values, 2 * (w2 + 0.1 * lpips))
-    assert "LPIPS" not in sphere.shade(scored(w2_sq=w2), 0.1)[0]
+    assert "LPIPS" not in sphere.candidate_values(scored(w2_sq=w2), 0.1)[0]
     agreed = scored(w2_sq=np.zeros(60))
     agreed.scales.of["w2_sq"] = 0.0
-    assert "opaque" in sphere.shade(agreed, 0.0)[0]
+    assert "opaque" in sphere.candidate_values(agreed, 0.0)[0]
 
 
 def test_a_round_holds_the_photos_before_it_and_its_choice_in_order():
@@ -73,7 +75,7 @@ def test_a_round_holds_the_photos_before_it_and_its_choice_in_order():
 
 def test_colours_are_on_one_scale_and_stars_stand_on_the_chosen_in_order():
     rounds = [round_of(), round_of(2, chosen=(7, 8, 50), high=0.5)]
-    figure = sphere.drawn(rounds, "doubt")
+    figure = sphere.draw_figure(rounds, "doubt")
     panels = figure.axes[:2]
     scales = {dots.norm for axes in panels for dots in axes.collections if dots.get_array() is not None}
     assert len(scales) == 1 and figure.axes[2].get_xlabel() == "doubt"
@@ -97,26 +99,26 @@ def test_colours_are_on_one_scale_and_stars_stand_on_the_chosen_in_order():
 
 def test_numbers_stand_where_nothing_else_does():
     apart = sphere.APART
-    lone = sphere.beside(np.array([[0.5, 0.0], [0.0, 0.0], [1.0, 0.0]]), np.zeros((0, 2)), 1.0)
+    lone = sphere.place_labels(np.array([[0.5, 0.0], [0.0, 0.0], [1.0, 0.0]]), np.zeros((0, 2)), 1.0)
     np.testing.assert_allclose(lone[:2], [[0.5 + apart, 0.0], [apart, 0.0]])
     assert np.linalg.norm(lone[2]) <= 1  # not outside
     stars = apart * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     taken = apart * np.array([[-1.0, 0.0], [0.0, -1.0]])
-    marks = np.concatenate([stars, taken, sphere.beside(stars, taken, 1.0)])
+    marks = np.concatenate([stars, taken, sphere.place_labels(stars, taken, 1.0)])
     between = np.linalg.norm(marks[:, None] - marks, axis=-1)[~np.eye(len(marks), dtype=bool)]
     # the sides of an octagon around the first star: any other place of its number is another's
     assert between.min() >= 2 * apart * np.sin(np.pi / 8) - 1e-9
 
 
 def test_many_chosen_are_not_numbered_and_none_is_said():
-    many = sphere.drawn([round_of(chosen=range(30))], "doubt").axes[0]
+    many = sphere.draw_figure([round_of(chosen=range(30))], "doubt").axes[0]
     assert len(many.texts) == 0 and len(many.collections[-1].get_offsets()) == 30
-    none = sphere.drawn([round_of(chosen=(), photos=((0.0, 0.0, 5.0),))], "doubt").axes[0]
+    none = sphere.draw_figure([round_of(chosen=(), photos=((0.0, 0.0, 5.0),))], "doubt").axes[0]
     assert none.get_title() == "round 1: no pose, after 1 photo" and not none.texts
 
 
 def test_candidates_all_alike_or_none_at_all_are_drawn(tmp_path):
-    alike = [round_of(high=0.0), sphere.of_round(2, scored(0), asked(), [photo(0.0, 0.0, 5.0)], FRAME, 0.0)]
+    alike = [round_of(high=0.0), sphere.read_round(2, scored(0), asked(), [photo(0.0, 0.0, 5.0)], FRAME, 0.0)]
     sphere.write_figure(tmp_path / "a.png", alike, "doubt")
     assert image_files.read_photo(tmp_path / "a.png").std() > 0.05
 

@@ -8,20 +8,20 @@ from fixtures import lpips_arrays
 
 from dav_gswt.prior.interface import Condition, Imagined
 from dav_gswt.views import prior_sampling
-from dav_gswt.views.prior_sampling import Asking
+from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.uncertainty import staging
-from dav_gswt.views.uncertainty.staging import TOP, Terms
+from dav_gswt.views.uncertainty.staging import TOP, PriorTerms
 
 ALL = np.ones((200, 32, 32), np.float32)  # every pixel counts
 
 
 def terms_of(w2, lpips=None):
     maps = np.broadcast_to(w2[:, None, None], (len(w2), 2, 2)).astype(np.float32)
-    return Terms(w2, lpips, w2 / 2, maps)
+    return PriorTerms(w2, lpips, w2 / 2, maps)
 
 
 def pick(terms, rows):
-    return Terms(*(None if v is None else v[rows] for v in vars(terms).values()))
+    return PriorTerms(*(None if v is None else v[rows] for v in vars(terms).values()))
 
 
 def made(n=400, noise=0.1, seed=0, lpips=True):
@@ -39,7 +39,7 @@ def run(full, cheap):
         asked.append(rows)
         return pick(full, rows)
 
-    found, done = staging.settled(len(full.w2_sq), lambda rows: pick(cheap, rows), fully)
+    found, done = staging.score_in_stages(len(full.w2_sq), lambda rows: pick(cheap, rows), fully)
     assert sorted(np.concatenate(asked)) == list(np.flatnonzero(done))  # none twice
     return found, done
 
@@ -115,8 +115,10 @@ def test_imagining_in_stages_costs_less_and_says_how_much(caplog):
     n, names = 200, [f"p{i}" for i in range(200)]
     with caplog.at_level(logging.INFO):
         whole, staged = Counting(), Counting()
-        full, steps = prior_sampling.terms(Asking(whole, 4, 8, 0.1, staged=False), condition(n), names, ALL[:n])
-        some, spent = prior_sampling.terms(Asking(staged, 4, 8, 0.1), condition(n), names, ALL[:n])
+        full, steps = prior_sampling.sample_terms(
+            PriorConfig(whole, 4, 8, 0.1, staged=False), condition(n), names, ALL[:n]
+        )
+        some, spent = prior_sampling.sample_terms(PriorConfig(staged, 4, 8, 0.1), condition(n), names, ALL[:n])
     assert whole.evaluations == n * 4 * 8 and (steps == 8).all()
     assert staged.evaluations == n * 4 * 2 + (spent == 8).sum() * 4 * 8 < 0.6 * whole.evaluations
     assert "of 200 poses were imagined in full" in caplog.text
@@ -127,29 +129,31 @@ def test_what_does_not_look_at_the_ground_does_not_count():
     maps = np.arange(8, dtype=np.float32).reshape(2, 2, 2)
     counts = np.zeros((2, 4, 4), np.float32)
     counts[0, :2, :2] = counts[0, 3, 3] = 1  # a whole cell, and a quarter of another
-    np.testing.assert_allclose(prior_sampling.over(maps, counts), [(0 * 1 + 3 * 0.25) / 1.25, 0])
+    np.testing.assert_allclose(prior_sampling.weighted_mean(maps, counts), [(0 * 1 + 3 * 0.25) / 1.25, 0])
 
 
 def test_few_poses_are_scored_in_full_at_once():
     """So few that the first stage would cost more than it can save."""
     prior, n = Counting(), prior_sampling.FEW
-    _, steps = prior_sampling.terms(Asking(prior, 2, 8, 0.1), condition(n), [f"p{i}" for i in range(n)], ALL[:n])
+    _, steps = prior_sampling.sample_terms(
+        PriorConfig(prior, 2, 8, 0.1), condition(n), [f"p{i}" for i in range(n)], ALL[:n]
+    )
     assert prior.evaluations == n * 2 * 8 and (steps == 8).all()
 
 
 def test_without_dropout_the_one_sample_is_compared_with_the_render():
     prior, told = Counting(), condition(3)
-    some = prior_sampling.terms(
-        Asking(prior, 2, 2, 0.0, weights=lpips_arrays.random()), told, ["a", "b", "c"], ALL[:3]
+    some = prior_sampling.sample_terms(
+        PriorConfig(prior, 2, 2, 0.0, weights=lpips_arrays.random()), told, ["a", "b", "c"], ALL[:3]
     )[0]
     assert (some.single > 0).all()  # grey is not the black that the render shows
-    hidden = prior_sampling.terms(
-        Asking(prior, 2, 2, 0.0, weights=lpips_arrays.random()), told, ["a"] * 3, 0 * ALL[:3]
+    hidden = prior_sampling.sample_terms(
+        PriorConfig(prior, 2, 2, 0.0, weights=lpips_arrays.random()), told, ["a"] * 3, 0 * ALL[:3]
     )[0]
     assert not hidden.single.any()
-    assert prior_sampling.terms(Asking(prior, 2, 2, 0.1), told, ["a", "b", "c"], ALL[:3])[0].single is None
+    assert prior_sampling.sample_terms(PriorConfig(prior, 2, 2, 0.1), told, ["a", "b", "c"], ALL[:3])[0].single is None
 
 
 def test_one_sample_has_no_pair():
     with pytest.raises(ValueError, match="at least 2 samples"):
-        prior_sampling.terms(Asking(Counting(), 1, 8, 0.1), condition(3), ["a", "b", "c"], ALL[:3])
+        prior_sampling.sample_terms(PriorConfig(Counting(), 1, 8, 0.1), condition(3), ["a", "b", "c"], ALL[:3])

@@ -226,16 +226,16 @@ def test_a_term_that_is_0_everywhere_is_said_and_weighs_nothing(caplog):
     assert "lpips is 0 at every candidate" in caplog.text and scales.of["lpips"] == 0
     later = np.linspace(0, 1, 40)  # at a later round it may be more than 0: it has no scale, so it still weighs nothing
     for lpips in (terms["lpips"], later):
-        u = un.combined(terms["w2_sq"], lpips, 5.0, scales)
+        u = un.combine_terms(terms["w2_sq"], lpips, 5.0, scales)
         np.testing.assert_array_equal(u, terms["w2_sq"] / scales.of["w2_sq"])
 
 
 def test_lam_0_ranks_by_w2_and_a_large_one_by_lpips():
     terms, scales = table()
     w2, lpips = terms["w2_sq"], terms["lpips"]
-    np.testing.assert_array_equal(np.argsort(un.combined(w2, lpips, 0.0, scales)), np.argsort(w2))
+    np.testing.assert_array_equal(np.argsort(un.combine_terms(w2, lpips, 0.0, scales)), np.argsort(w2))
     for lam in (1e12, 1e300):
-        np.testing.assert_array_equal(np.argsort(un.combined(w2, lpips, lam, scales)), np.argsort(lpips))
+        np.testing.assert_array_equal(np.argsort(un.combine_terms(w2, lpips, lam, scales)), np.argsort(lpips))
 
 
 @given(seed=st.integers(0, 1000), power=st.integers(-40, 40), lam=st.floats(0, 100))
@@ -246,22 +246,22 @@ def test_a_latent_space_in_other_units_ranks_alike(seed, power, lam):
     for factor in (1.0, 2.0**power):
         w2 = un.w2_sq(latents * np.float32(factor))[0]
         scales = un.Scales.frozen({"w2_sq": w2, "lpips": lpips})
-        ranks.append(np.argsort(un.combined(w2, lpips, lam, scales), kind="stable"))
+        ranks.append(np.argsort(un.combine_terms(w2, lpips, lam, scales), kind="stable"))
     np.testing.assert_array_equal(*ranks)
 
 
 def test_without_weights_the_term_is_left_out_and_said_if_it_was_asked_for(caplog):
     terms, scales = table()
-    u = un.combined(terms["w2_sq"], None, 0.0, scales)
+    u = un.combine_terms(terms["w2_sq"], None, 0.0, scales)
     np.testing.assert_array_equal(u, terms["w2_sq"] / scales.of["w2_sq"])
     assert not caplog.text
-    np.testing.assert_array_equal(un.combined(terms["w2_sq"], None, 0.1, scales), u)
+    np.testing.assert_array_equal(un.combine_terms(terms["w2_sq"], None, 0.1, scales), u)
     assert "LPIPS has no weights" in caplog.text
 
 
 def test_u_img_has_the_gradient_in_place_of_w2_and_the_appendix_adds_both():
     terms, scales = table()
-    u_img = un.combined_image(terms["gradient"], terms["lpips"], 0.1, scales)
+    u_img = un.combine_image_terms(terms["gradient"], terms["lpips"], 0.1, scales)
     expected = terms["gradient"] / scales.of["gradient"] + 0.1 * terms["lpips"] / scales.of["lpips"]
     np.testing.assert_allclose(u_img, expected, rtol=1e-12)
 
@@ -271,13 +271,13 @@ def test_sums_refuse_what_has_no_meaning():
     w2, lpips = terms["w2_sq"], terms["lpips"]
     for lam in (-0.1, math.nan, math.inf):
         with pytest.raises(ValueError, match="lam must be"):
-            un.combined(w2, lpips, lam, scales)
+            un.combine_terms(w2, lpips, lam, scales)
     with pytest.raises(ValueError, match="lpips has no frozen scale"):
-        un.combined(w2, lpips, 0.1, un.Scales({"w2_sq": 1.0}))
+        un.combine_terms(w2, lpips, 0.1, un.Scales({"w2_sq": 1.0}))
     lpips[[3, 5]] = np.nan
     names = [f"a{i}" for i in range(40)]
     for call in (
-        lambda: un.combined(w2, lpips, 0.1, scales, names),
+        lambda: un.combine_terms(w2, lpips, 0.1, scales, names),
         lambda: un.Scales.frozen({"w2_sq": w2, "lpips": lpips}, names),
     ):
         with pytest.raises(ValueError, match="not finite: lpips of pose a3, a5"):
@@ -314,17 +314,17 @@ def test_a_broken_file_of_quantiles_is_refused_by_name(tmp_path, content):
 
 def test_normalised_goes_from_0_at_the_low_quantile_to_1_at_the_high_one():
     quantiles = un.Quantiles(2.0, 4.0)
-    np.testing.assert_array_equal(un.normalised(np.array([-9.0, 2, 3, 4, 1e30]), quantiles), [0, 0, 0.5, 1, 1])
+    np.testing.assert_array_equal(un.normalise(np.array([-9.0, 2, 3, 4, 1e30]), quantiles), [0, 0, 0.5, 1, 1])
     maps = np.array([[[2.0, 3.0]], [[4.0, 5.0]]], np.float32)
-    np.testing.assert_array_equal(un.normalised(maps, quantiles), [[[0, 0.5]], [[1, 1]]])
+    np.testing.assert_array_equal(un.normalise(maps, quantiles), [[[0, 0.5]], [[1, 1]]])
     maps[1, 0, 1] = np.nan
     with pytest.raises(ValueError, match="of pose 1"):
-        un.normalised(maps, quantiles)
+        un.normalise(maps, quantiles)
 
 
 def test_normalised_of_a_scene_doubted_alike_everywhere_is_0_or_1_never_nan():
     quantiles = un.Quantiles.frozen(np.full(10, 3.0))
-    np.testing.assert_array_equal(un.normalised(np.array([2.0, 3.0, 3.1]), quantiles), [0, 0, 1])
+    np.testing.assert_array_equal(un.normalise(np.array([2.0, 3.0, 3.1]), quantiles), [0, 0, 1])
 
 
 def test_quantiles_are_those_of_the_candidates():

@@ -23,8 +23,8 @@ def capture(site: Site, split: dict, before: list, chosen: list[dict], folder: P
 
     before: the capture folders of earlier rounds. Where no pose was chosen no agent is asked for anything.
     """
-    pool = candidates.left(site.scene, site.frame, site.photos / "sparse", split, before)
-    asked = candidates.as_asked(pool, chosen)
+    pool = candidates.list_remaining(site.scene, site.frame, site.photos / "sparse", split, before)
+    asked = candidates.select_by_name(pool, chosen)
     folder.mkdir(parents=True, exist_ok=True)
     agent = site.scene["agent"]
     if not asked:

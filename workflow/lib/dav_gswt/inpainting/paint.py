@@ -10,7 +10,7 @@ from scipy.ndimage import gaussian_filter
 
 from dav_gswt.prior.interface import Condition, Prior
 from dav_gswt.threads import one_thread
-from dav_gswt.views.prior_sampling import Asking
+from dav_gswt.views.prior_sampling import PriorConfig
 
 CELL = 4  # pixels a side of a cell of the code: what a prior believes or not
 SPREAD = 0.1  # pictures: how far a difference of colour at the border of the unknown reaches into it
@@ -44,7 +44,9 @@ class Painted:
     inverse_depth: Float32[Array, "b s s"]
 
 
-def painted(asked: Asking, condition: Condition, unseen: Bool[Array, "b s s"], ground: Float[Array, "3"]) -> Painted:
+def painted(
+    asked: PriorConfig, condition: Condition, unseen: Bool[Array, "b s s"], ground: Float[Array, "3"]
+) -> Painted:
     """The mean of a prior's samples, without dropout, each from a noise of its own; levelled (see there).
 
     A mean, not one sample, which is sharper, but makes up what is not there (docs/prior.md has both). unseen: pixels

@@ -42,6 +42,6 @@ def cameras(
             elevation, azimuth, radius * frame.flying_height, target, size, size, FIELD_OF_VIEW
         )
         centre = camera.centre[None]
-        if not (collision.under(centre, grid) | collision.inside(centre, field)).any():
+        if not (collision.find_below_ground(centre, grid) | collision.find_inside_objects(centre, field)).any():
             found.append((of_camera(f"virtual_{elevation:g}_{azimuth:g}", camera, frame), camera))
     return found

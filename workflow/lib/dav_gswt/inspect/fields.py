@@ -44,11 +44,11 @@ def show_doubted(path: Path, asked: Asked) -> Scene:
     beside = next((f for f in (path.parent / "field.ply", path.parent.parent / "field.ply") if f.is_file()), None)
     if beside is None:
         raise InputError(f"{path}: there is no field.ply beside it; it tells of the Gaussians of one")
-    found, doubt = read_field(beside), pose_maps.read(path)[1]
+    found, doubt = read_field(beside), pose_maps.read_pose_maps(path)[1]
     if doubt.ndim != 1 or len(doubt) > len(found) or not np.isfinite(doubt).all():
         raise InputError(f"{path}: tells of other Gaussians than those of {beside}; score the poses again")
     asked = replace(asked, colour=asked.colour or "uncertainty")
-    return of_fields(str(path), [pose_maps.doubted(found, doubt.astype(np.float32))], [0], asked)
+    return of_fields(str(path), [pose_maps.apply_uncertainty(found, doubt.astype(np.float32))], [0], asked)
 
 
 def show_levels(path: Path, asked: Asked) -> Scene:

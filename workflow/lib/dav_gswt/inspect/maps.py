@@ -42,7 +42,7 @@ def show_posed(path: Path, asked: Asked) -> Scene:
     if asked.part is None and asked.channel is None:
         return fields.show_doubted(path, asked)
     asked.refuse(path, "part", "channel")
-    found, _ = posed.read(path)
+    found, _ = posed.read_pose_maps(path)
     with beside.told_by(path):
         parts = {}
         for i, name in enumerate(found.names):

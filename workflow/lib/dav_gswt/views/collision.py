@@ -10,32 +10,35 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.views.candidates import Candidates
-from dav_gswt.views.uncertainty.finite import named
+from dav_gswt.views.uncertainty.finite import format_names
 
 SOLID = 0.5  # opacity from which a Gaussian is something that one can be inside of
 
 
-def require(pool: Candidates, field: GaussianField, grid: Ground) -> None:
+def require_free_positions(pool: Candidates, field: GaussianField, grid: Ground) -> None:
     """Raises: InputError: candidates under the ground, or within one deviation of a solid Gaussian, by their names."""
     if not pool:
         return
     centres = np.stack([camera.centre for _, camera in pool])
-    checks = {"under the ground": under(centres, grid), "inside of what stands there": inside(centres, field)}
+    checks = {
+        "under the ground": find_below_ground(centres, grid),
+        "inside of what stands there": find_inside_objects(centres, field),
+    }
     for what, bad in checks.items():
         if bad.any():
-            names = named(bad, [pose.name for pose, _ in pool])
+            names = format_names(bad, [pose.name for pose, _ in pool])
             raise InputError(
                 f"pose {names}: {what}; no photo comes from there. Set `reach` or `lowest` of the scene, or look "
                 f"whether its ground is right"
             )
 
 
-def under(centres: Float[Array, "n 3"], grid: Ground) -> Bool[Array, "n"]:
+def find_below_ground(centres: Float[Array, "n 3"], grid: Ground) -> Bool[Array, "n"]:
     """Which places are at or below the surface; none beyond the grid, where there is no surface."""
     return grid.contains(centres) & (centres[:, 2] <= grid.height_at(centres))
 
 
-def inside(centres: Float[Array, "n 3"], field: GaussianField) -> Bool[Array, "n"]:
+def find_inside_objects(centres: Float[Array, "n 3"], field: GaussianField) -> Bool[Array, "n"]:
     """Which places are within one standard deviation of a solid Gaussian's centre."""
     solid = expit(field.opacity_logits) >= SOLID
     means, scales = field.means[solid].astype(float), np.exp(field.log_scales[solid].astype(float))

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Float64
 from numpy import ndarray as Array
 
-from dav_gswt.views.greedy import lazily
+from dav_gswt.views.greedy import lazy_greedy
 
 REACH = 0.5  # median distances of candidates from the middle, over which a photo tells about its neighbours
 
@@ -21,7 +21,7 @@ def similarity(a: Float[Array, "n 3"], b: Float[Array, "m 3"], reach: float) -> 
     return np.exp(-np.maximum(squares, 0) / (2 * reach**2))
 
 
-def reach_of(places: Float[Array, "n 3"]) -> float:
+def kernel_width(places: Float[Array, "n 3"]) -> float:
     """Raises: ValueError: all places lie in the middle."""
     if not len(places):
         return 1.0
@@ -31,19 +31,23 @@ def reach_of(places: Float[Array, "n 3"]) -> float:
     return REACH * usual
 
 
-def gains(near: Float64[Array, "n n"], covered: Float64[Array, "n"], u: Float64[Array, "n"]) -> Float64[Array, "n"]:
+def coverage_gains(
+    near: Float64[Array, "n n"], covered: Float64[Array, "n"], u: Float64[Array, "n"]
+) -> Float64[Array, "n"]:
     """What each candidate would add. near: similarity of candidates (rows) and choices (columns)."""
     return u @ np.maximum(near - covered[:, None], 0)
 
 
-def located(places: Float[Array, "n 3"], taken: Float[Array, "m 3"], u: Float[Array, "n"], k: int) -> list[int]:
+def select_facilities(
+    places: Float[Array, "n 3"], taken: Float[Array, "m 3"], u: Float[Array, "n"], k: int
+) -> list[int]:
     """The k candidates that greedy chooses, or all; ties by index.
 
     Raises: ValueError: u below 0 or not finite.
     """
     if not (np.isfinite(u).all() and (u >= 0).all()):
         raise ValueError("the weight of a candidate must be a number of at least 0")
-    reach = reach_of(places)
+    reach = kernel_width(places)
     near = similarity(places, places, reach)
     covered = similarity(places, taken, reach).max(1, initial=0.0)
     weight = u.astype(np.float64)
@@ -54,4 +58,4 @@ def located(places: Float[Array, "n 3"], taken: Float[Array, "m 3"], u: Float[Ar
     def take(i: int) -> None:
         np.maximum(covered, near[:, i], out=covered)
 
-    return lazily(gains(near, covered, weight), look, take, k)
+    return lazy_greedy(coverage_gains(near, covered, weight), look, take, k)

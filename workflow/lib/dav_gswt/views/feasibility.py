@@ -50,14 +50,14 @@ class _Site:
         return (places - self.middle) / self.side
 
 
-def kept(
+def filter_feasible(
     candidates: Candidates, grid: Ground, limits: dict | None = None, clearance: float | None = None
 ) -> Candidates:
-    """The candidates that are not `rejected`; how many are, and why, is logged.
+    """The candidates that are not `find_infeasible`; how many are, and why, is logged.
 
     Raises: InputError: all are.
     """
-    reasons = rejected(candidates, grid, limits, clearance)
+    reasons = find_infeasible(candidates, grid, limits, clearance)
     if not reasons:
         return candidates
     kinds = Counter(reason.split(":")[0] for reason in reasons.values())
@@ -68,7 +68,7 @@ def kept(
     return [(pose, camera) for pose, camera in candidates if pose.name not in reasons]
 
 
-def rejected(
+def find_infeasible(
     candidates: Candidates, grid: Ground, limits: dict | None = None, clearance: float | None = None
 ) -> dict[str, str]:
     """Why a pose is none, in words, by its name: what stands before the colon is the kind of reason.
@@ -80,18 +80,22 @@ def rejected(
     """
     if not candidates:
         return {}
-    site = _site(grid)
+    site = _build_mesh(grid)
     cameras = [camera for _, camera in candidates]
     centres = np.stack([camera.centre for camera in cameras])
     if clearance is None:
         clearance = CLEARANCE * float(np.median(np.linalg.norm(centres - site.middle, axis=1)))
     if not trimesh.ray.has_embree:
         _log.warning("embreex is not installed: rays go over the ground step by step, more slowly")
-    why = _hidden(site, cameras, centres) | _limited(site, centres, limits or {}) | _near(site, centres, clearance)
+    why = (
+        _find_hidden(site, cameras, centres)
+        | _find_outside_limits(site, centres, limits or {})
+        | _find_near(site, centres, clearance)
+    )
     return {candidates[i][0].name: why[i] for i in sorted(why)}
 
 
-def _site(grid: Ground) -> _Site:
+def _build_mesh(grid: Ground) -> _Site:
     west, south, side = grid.exemplar
     n, m, cells = grid.first_row, grid.first_column, grid.cells
     middle = np.array([west + side / 2, south + side / 2, np.median(grid.heights[n : n + cells, m : m + cells])])
@@ -117,14 +121,15 @@ def _faces(rows: int, columns: int) -> Int[Array, "n 3"]:
     return np.stack([a, b, d, a, d, c], 1).reshape(-1, 3)
 
 
-def _near(site: _Site, centres: Float[Array, "n 3"], clearance: float) -> dict[int, str]:
+def _find_near(site: _Site, centres: Float[Array, "n 3"], clearance: float) -> dict[int, str]:
     """Cameras below the surface or nearer to it than the clearance."""
     above = centres[:, 2] - site.grid.height_at(centres)
     away = np.minimum(np.abs(above), site.side * _distance(site, site.local(centres)))
     reasons = {
-        i: f"too near the ground: {away[i]:.3g} from it, {clearance:.3g} is the least" for i in _where(away < clearance)
+        i: f"too near the ground: {away[i]:.3g} from it, {clearance:.3g} is the least"
+        for i in _indices(away < clearance)
     }
-    return reasons | {i: f"buried: {-above[i]:.3g} below the ground" for i in _where(above <= 0)}
+    return reasons | {i: f"buried: {-above[i]:.3g} below the ground" for i in _indices(above <= 0)}
 
 
 def _distance(site: _Site, places: Float[Array, "n 3"]) -> Float[Array, "n"]:
@@ -142,7 +147,7 @@ def _distance(site: _Site, places: Float[Array, "n 3"]) -> Float[Array, "n"]:
     return np.linalg.norm(found - all_places, axis=1).reshape(faces.shape).min(1)
 
 
-def _limited(site: _Site, centres: Float[Array, "n 3"], limits: dict) -> dict[int, str]:
+def _find_outside_limits(site: _Site, centres: Float[Array, "n 3"], limits: dict) -> dict[int, str]:
     """Cameras lower, higher or farther than the limits."""
     above = centres[:, 2] - site.grid.height_at(centres)
     away = np.linalg.norm(centres - site.middle, axis=1)
@@ -150,27 +155,30 @@ def _limited(site: _Site, centres: Float[Array, "n 3"], limits: dict) -> dict[in
         limits.get(name, default)
         for name, default in (("lowest_height", -np.inf), ("highest_height", np.inf), ("farthest", np.inf))
     )
-    reasons = {int(i): f"too low: {above[i]:.3g} above the ground, {low:g} is the least" for i in _where(above < low)}
-    reasons |= {i: f"too high: {above[i]:.3g} above the ground, {high:g} is the most" for i in _where(above > high)}
-    return {i: f"too far: {away[i]:.3g} from the middle, {far:g} is the most" for i in _where(away > far)} | reasons
+    reasons = {int(i): f"too low: {above[i]:.3g} above the ground, {low:g} is the least" for i in _indices(above < low)}
+    reasons |= {i: f"too high: {above[i]:.3g} above the ground, {high:g} is the most" for i in _indices(above > high)}
+    return {i: f"too far: {away[i]:.3g} from the middle, {far:g} is the most" for i in _indices(away > far)} | reasons
 
 
-def _where(mask: Bool[Array, "n"]) -> list[int]:
+def _indices(mask: Bool[Array, "n"]) -> list[int]:
     return np.flatnonzero(mask).tolist()
 
 
-def _hidden(site: _Site, cameras: list[Camera], centres: Float[Array, "n 3"]) -> dict[int, str]:
+def _find_hidden(site: _Site, cameras: list[Camera], centres: Float[Array, "n 3"]) -> dict[int, str]:
     """Cameras that show too little of the exemplar, or no ground in the middle of the picture."""
-    shown, seen = _sight(site, cameras, centres)
-    ground = np.isfinite(_hits(site, site.local(centres), np.stack([camera.forward for camera in cameras])))
-    reasons = {i: "past the ground: the middle of the picture shows none" for i in _where(~ground)}
+    shown, seen = _count_visible(site, cameras, centres)
+    ground = np.isfinite(_cast_rays(site, site.local(centres), np.stack([camera.forward for camera in cameras])))
+    reasons = {i: "past the ground: the middle of the picture shows none" for i in _indices(~ground)}
     reasons |= {
-        i: f"hidden: {seen[i]} of {shown[i]} points of the exemplar are in sight" for i in _where(seen < SHARE * shown)
+        i: f"hidden: {seen[i]} of {shown[i]} points of the exemplar are in sight"
+        for i in _indices(seen < SHARE * shown)
     }
-    return reasons | {i: "off the exemplar: none of it is in the picture" for i in _where(shown == 0)}
+    return reasons | {i: "off the exemplar: none of it is in the picture" for i in _indices(shown == 0)}
 
 
-def _sight(site: _Site, cameras: list[Camera], centres: Float[Array, "n 3"]) -> tuple[Int[Array, "n"], Int[Array, "n"]]:
+def _count_visible(
+    site: _Site, cameras: list[Camera], centres: Float[Array, "n 3"]
+) -> tuple[Int[Array, "n"], Int[Array, "n"]]:
     """Of the lattice's points, how many lie in each camera's picture, and how many of these are in its sight."""
     world = site.middle + site.side * site.points
     shown = np.stack([_in_picture(camera, world) for camera in cameras])
@@ -178,7 +186,7 @@ def _sight(site: _Site, cameras: list[Camera], centres: Float[Array, "n 3"]) -> 
     start = site.points[point] + OFF * site.normals[point]
     way = site.local(centres)[which] - start
     length = np.linalg.norm(way, axis=1)
-    free = _hits(site, start, way / length[:, None]) >= length
+    free = _cast_rays(site, start, way / length[:, None]) >= length
     return shown.sum(1), np.bincount(which, weights=free, minlength=len(cameras)).round().astype(int)
 
 
@@ -187,10 +195,10 @@ def _in_picture(camera: Camera, points: Float[Array, "m 3"]) -> Bool[Array, "m"]
     return (depth > 0) & (at > 0).all(1) & (at[:, 0] < camera.width) & (at[:, 1] < camera.height)
 
 
-def _hits(site: _Site, origins: Float[Array, "n 3"], ways: Float[Array, "n 3"]) -> Float[Array, "n"]:
+def _cast_rays(site: _Site, origins: Float[Array, "n 3"], ways: Float[Array, "n 3"]) -> Float[Array, "n"]:
     """Distance to the ground along rays of unit direction, infinite where they miss it."""
     if not trimesh.ray.has_embree:
-        return _stepped(site, origins, ways)
+        return _march_rays(site, origins, ways)
     found = np.full(len(origins), np.inf)
     face = site.mesh.ray.intersects_first(origins, ways)
     hit = np.flatnonzero(face >= 0)
@@ -202,8 +210,8 @@ def _hits(site: _Site, origins: Float[Array, "n 3"], ways: Float[Array, "n 3"]) 
     return np.nan_to_num(found, nan=0.0, posinf=np.inf)
 
 
-def _stepped(site: _Site, origins: Float[Array, "n 3"], ways: Float[Array, "n 3"]) -> Float[Array, "n"]:
-    """As `_hits`, without embree: where a ray is first below the surface, tried in steps over the grid's box.
+def _march_rays(site: _Site, origins: Float[Array, "n 3"], ways: Float[Array, "n 3"]) -> Float[Array, "n"]:
+    """As `_cast_rays`, without embree: where a ray is first below the surface, tried in steps over the grid's box.
 
     It takes as many steps as the longer side has vertices, so a ray below a crest by a cell's width is stopped.
     """

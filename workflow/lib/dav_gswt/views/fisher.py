@@ -17,7 +17,7 @@ from dav_gswt.raster.interface import Contributions
 PRIOR = 1.0  # information on each Gaussian before any photo: one pixel that it fills
 
 
-def known(field: GaussianField, cameras: list[Camera], raster: Rasterizer) -> Float64[Array, "n"]:
+def accumulate_information(field: GaussianField, cameras: list[Camera], raster: Rasterizer) -> Float64[Array, "n"]:
     """Information on each Gaussian in photos that were taken, and a little before them."""
     total = np.full(len(field), PRIOR)
     for camera in cameras:
@@ -26,7 +26,7 @@ def known(field: GaussianField, cameras: list[Camera], raster: Rasterizer) -> Fl
     return total
 
 
-def gain(seen: Contributions, already: Float64[Array, "n"]) -> float:
+def information_gain(seen: Contributions, already: Float64[Array, "n"]) -> float:
     """Sum over Gaussians of a photo's information over what there is: the trace of H (H_known)^-1, both diagonal.
 
     Source: Jiang et al., FisherRF, ECCV 2024, of colours alone.
@@ -34,17 +34,17 @@ def gain(seen: Contributions, already: Float64[Array, "n"]) -> float:
     return float((seen.squared / already).sum())
 
 
-class Gathered:
+class FisherInformation:
     """The information on a field that photos give, growing as candidates are chosen (`policies.InformationGain`)."""
 
     def __init__(self, field: GaussianField, taken: list[Camera], candidates: list[Camera]):
         """taken, candidates: cameras at the size at which poses are scored."""
         self.field, self.candidates, self.raster = field, candidates, Rasterizer()
-        self.known = known(field, taken, self.raster)
+        self.known = accumulate_information(field, taken, self.raster)
 
     def gain(self, i: int) -> float:
         """Of a photo from candidate i, given all that was taken."""
-        return gain(self._seen(i), self.known)
+        return information_gain(self._seen(i), self.known)
 
     def take(self, i: int) -> None:
         """Candidate i is chosen."""

@@ -4,7 +4,7 @@ import heapq
 from collections.abc import Callable, Iterable
 
 
-def lazily(gains: Iterable[float], look: Callable[[int], float], take: Callable[[int], None], k: int) -> list[int]:
+def lazy_greedy(gains: Iterable[float], look: Callable[[int], float], take: Callable[[int], None], k: int) -> list[int]:
     """The k items that plain greedy chooses: one whose gain is still the largest after another look is the largest.
 
     gains: of each item before anything is chosen. look: its gain now. take: it is chosen. Ties by index.

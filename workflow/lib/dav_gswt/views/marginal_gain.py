@@ -20,7 +20,7 @@ SCENES = 4  # that these two are from: few, so another scene may be farther off 
 
 
 @dataclass(frozen=True)
-class Round:
+class RoundGaps:
     """fitted: photos that the field was fitted to before this round. gaps: dB by which it shows each photo of the round
     worse than those, on average."""
 
@@ -29,16 +29,16 @@ class Round:
 
 
 @dataclass(frozen=True)
-class History:
+class FitHistory:
     """fitted: photos that the field is fitted to now. coming: how many the next round would take."""
 
-    rounds: list[Round]
+    rounds: list[RoundGaps]
     fitted: int
     coming: int
 
 
 @dataclass(frozen=True)
-class Worth:
+class ExpectedGain:
     """What the next `photos` photos are expected to gain in all, in dB, and the ends of the 95 % interval. closes: how
     much of the gap they close, in dB: `gain` is a share of it."""
 
@@ -54,7 +54,7 @@ class Worth:
         return self.gain / self.photos
 
 
-def expected(history: History) -> Worth | None:
+def predict_gain(history: FitHistory) -> ExpectedGain | None:
     """The gain that a field fitted to n photos has to expect of k more.
 
     Model: the gap is c / n, c its mean over all new photos so far; k photos close c (1 / n - 1 / (n + k)) of it, and
@@ -70,13 +70,13 @@ def expected(history: History) -> Worth | None:
     part = 1 / n - 1 / (n + k)
     c, error = float(found.mean()), float(found.std(ddof=1) / np.sqrt(len(found)))
     if not c > 0:
-        return Worth(k, 0.0, 0.0, SHARE * part * max(0.0, c + reach * error), 0.0)
+        return ExpectedGain(k, 0.0, 0.0, SHARE * part * max(0.0, c + reach * error), 0.0)
     scene = float(stdtrit(SCENES - 1, (1 + LEVEL) / 2)) * OFF * np.sqrt(1 + 1 / SCENES)
     gain, wide = SHARE * part * c, float(np.exp(np.hypot(scene, reach * error / c)))
-    return Worth(k, gain, gain / wide, gain * wide, part * c)
+    return ExpectedGain(k, gain, gain / wide, gain * wide, part * c)
 
 
-def history(reports: list[dict], start: int, coming: int) -> History:
+def build_history(reports: list[dict], start: int, coming: int) -> FitHistory:
     """What the reports of the rounds so far (fit.json) tell. start: photos before the first round.
 
     Photos that were set aside because they contradict the others tell nothing: the field was never fitted to them.
@@ -87,6 +87,6 @@ def history(reports: list[dict], start: int, coming: int) -> History:
         if new["taken"] and new["photos"]:
             level = earlier["psnr_before"]
             unseen = [row["psnr_before"] for row in new["views"] if row["psnr_before"] is not None]
-            rounds.append(Round(fitted, [] if level is None else [level - value for value in unseen]))
+            rounds.append(RoundGaps(fitted, [] if level is None else [level - value for value in unseen]))
             fitted += new["photos"]
-    return History(rounds, fitted, coming)
+    return FitHistory(rounds, fitted, coming)

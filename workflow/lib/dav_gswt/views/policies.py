@@ -13,10 +13,10 @@ from numpy import ndarray as Array
 
 from dav_gswt.geometry.poses import Pose, place, spread
 from dav_gswt.views import facility_location
-from dav_gswt.views.greedy import lazily
+from dav_gswt.views.greedy import lazy_greedy
 from dav_gswt.views.policy_names import POLICY_NAMES
 from dav_gswt.views.scores import Scores
-from dav_gswt.views.uncertainty.weighting import combined, combined_image
+from dav_gswt.views.uncertainty.weighting import combine_image_terms, combine_terms
 
 RING = 45.0  # degrees of elevation that a ring keeps to
 TURN = 180 * (3 - 5**0.5)  # degrees between the starts of rings: the golden angle, so that none falls on another
@@ -96,7 +96,7 @@ def farthest(scores: Scores, inputs: SelectionInput) -> list[int]:
 @policy("diverse")
 def diverse(scores: Scores, inputs: SelectionInput) -> list[int]:
     """Facility location with equal weights: coverage alone."""
-    return facility_location.located(_places(scores.poses), inputs.captured, np.ones(len(scores)), inputs.k)
+    return facility_location.select_facilities(_places(scores.poses), inputs.captured, np.ones(len(scores)), inputs.k)
 
 
 @policy("opacity")
@@ -110,14 +110,14 @@ def fisher(scores: Scores, inputs: SelectionInput) -> list[int]:
     """Greedy choice of the largest information gain; every choice lowers the gain of the others."""
     if inputs.information is None:
         raise ValueError("fisher: needs the information that photos give about the field")
-    return lazily(scores.term("fisher"), inputs.information.gain, inputs.information.take, inputs.k)
+    return lazy_greedy(scores.term("fisher"), inputs.information.gain, inputs.information.take, inputs.k)
 
 
 @policy("grad-lpips")
 def grad_lpips(scores: Scores, inputs: SelectionInput) -> list[int]:
     """The k candidates of greatest u_img, an ablation: texture of the expected picture, and lam LPIPS."""
     gradient, lpips = scores.term("gradient"), scores.terms.get("lpips")
-    return top(combined_image(gradient, lpips, inputs.lam, scores.scales, scores.names), inputs.k)
+    return top(combine_image_terms(gradient, lpips, inputs.lam, scores.scales, scores.names), inputs.k)
 
 
 @policy("w2")
@@ -141,7 +141,9 @@ def residual(scores: Scores, inputs: SelectionInput) -> list[int]:
 @policy("residual-diverse")
 def residual_diverse(scores: Scores, inputs: SelectionInput) -> list[int]:
     """Facility location weighted by `residual`."""
-    return facility_location.located(_places(scores.poses), inputs.captured, scores.term("residual"), inputs.k)
+    return facility_location.select_facilities(
+        _places(scores.poses), inputs.captured, scores.term("residual"), inputs.k
+    )
 
 
 @policy("w2-lpips")
@@ -153,14 +155,16 @@ def w2_lpips(scores: Scores, inputs: SelectionInput) -> list[int]:
 @policy("w2-lpips-diverse")
 def w2_lpips_diverse(scores: Scores, inputs: SelectionInput) -> list[int]:
     """Facility location weighted by u: uncertain candidates get a photo nearby."""
-    return facility_location.located(_places(scores.poses), inputs.captured, uncertainty(scores, inputs.lam), inputs.k)
+    return facility_location.select_facilities(
+        _places(scores.poses), inputs.captured, uncertainty(scores, inputs.lam), inputs.k
+    )
 
 
 @policy("shuffled")
 def shuffled(scores: Scores, inputs: SelectionInput) -> list[int]:
     """As `w2_lpips_diverse`, with u permuted among the candidates: a control of u against diversity."""
     permuted = inputs.rng.permutation(uncertainty(scores, inputs.lam))
-    return facility_location.located(_places(scores.poses), inputs.captured, permuted, inputs.k)
+    return facility_location.select_facilities(_places(scores.poses), inputs.captured, permuted, inputs.k)
 
 
 @policy("oracle")
@@ -173,7 +177,7 @@ def oracle(scores: Scores, inputs: SelectionInput) -> list[int]:
 @policy("oracle-diverse")
 def oracle_diverse(scores: Scores, inputs: SelectionInput) -> list[int]:
     """Facility location weighted by the true error, 0 where it is unknown."""
-    return facility_location.located(
+    return facility_location.select_facilities(
         _places(scores.poses), inputs.captured, np.nan_to_num(_true_errors(inputs)), inputs.k
     )
 
@@ -186,7 +190,7 @@ def everything(scores: Scores, inputs: SelectionInput) -> list[int]:
 
 def uncertainty(scores: Scores, lam: float) -> Float64[Array, "n"]:
     """Return u = W2 + lam LPIPS of every candidate."""
-    return combined(scores.term("w2_sq"), scores.terms.get("lpips"), lam, scores.scales, scores.names)
+    return combine_terms(scores.term("w2_sq"), scores.terms.get("lpips"), lam, scores.scales, scores.names)
 
 
 def top(values: Float[Array, "n"], k: int) -> list[int]:

@@ -37,12 +37,12 @@ class PoseMaps:
         opacity = opacity[: int((~np.isnan(opacity[:, 0])).sum())]
         channels = {"opacity": opacity}
         if self.w2_sq is not None:
-            channels["w2_sq"] = _over(self.w2_sq[i], opacity.shape)
+            channels["w2_sq"] = _place_square(self.w2_sq[i], opacity.shape)
         header = {k: repr(getattr(scores.poses[row], k)) for k in ("elevation", "azimuth", "radius")}
         return channels, header | {k: repr(float(v[row])) for k, v in scores.terms.items()}
 
 
-def _over(square: Float32[Array, "s s"], shape: tuple[int, int]) -> Float32[Array, "h w"]:
+def _place_square(square: Float32[Array, "s s"], shape: tuple[int, int]) -> Float32[Array, "h w"]:
     """A map of the middle square, on a whole picture's pixels; NaN beside it."""
     h, w = shape
     side = min(h, w)
@@ -52,7 +52,7 @@ def _over(square: Float32[Array, "s s"], shape: tuple[int, int]) -> Float32[Arra
     return out
 
 
-def doubted(field: GaussianField, gaussians: Float32[Array, "g"]) -> GaussianField:
+def apply_uncertainty(field: GaussianField, gaussians: Float32[Array, "g"]) -> GaussianField:
     """The field with the uncertainty that maps gave its first Gaussians. What was imagined since stays as it is, in
     full doubt: the maps are of the field before."""
     doubt = field.uncertainty.copy()
@@ -60,7 +60,7 @@ def doubted(field: GaussianField, gaussians: Float32[Array, "g"]) -> GaussianFie
     return replace(field, uncertainty=doubt)
 
 
-def write(path: Path | str, maps: PoseMaps, gaussians: Float32[Array, "g"]) -> None:
+def write_pose_maps(path: Path | str, maps: PoseMaps, gaussians: Float32[Array, "g"]) -> None:
     """All maps in half precision (w2_sq in single), and the uncertainty that they give each Gaussian of the field."""
     values = {"names": np.array(maps.names, str), "opacity": maps.opacity.astype(np.float16), "gaussians": gaussians}
     if maps.w2_sq is not None:
@@ -69,8 +69,8 @@ def write(path: Path | str, maps: PoseMaps, gaussians: Float32[Array, "g"]) -> N
         np.savez_compressed(file, **values)
 
 
-def read(path: Path | str) -> tuple[PoseMaps, Float32[Array, "g"]]:
-    """Maps and Gaussians' uncertainty. Raises: InputError: not what `write` wrote."""
+def read_pose_maps(path: Path | str) -> tuple[PoseMaps, Float32[Array, "g"]]:
+    """Maps and Gaussians' uncertainty. Raises: InputError: not what `write_pose_maps` wrote."""
     try:
         with np.load(path, allow_pickle=False) as stored:
             w2_sq = stored.get("w2_sq")

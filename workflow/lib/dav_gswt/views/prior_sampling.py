@@ -13,7 +13,7 @@ from dav_gswt.logs import progress
 from dav_gswt.prior.interface import Condition, Prior
 from dav_gswt.views.uncertainty import staging
 from dav_gswt.views.uncertainty.disagreement import w2_sq
-from dav_gswt.views.uncertainty.staging import Terms
+from dav_gswt.views.uncertainty.staging import PriorTerms
 from dav_gswt.views.uncertainty.texture import image_gradient
 
 _log = logging.getLogger(__name__)
@@ -24,7 +24,7 @@ FEW = 2 * (staging.TOP + staging.BATCH)  # poses of which so many would be imagi
 
 
 @dataclass(frozen=True)
-class Asking:
+class PriorConfig:
     """A prior and how it is asked. samples of each pose; steps of denoising; p_drop: of its attention; weights: of
     LPIPS, None where they are not had; staged: cheaply first, in full where it matters; posterior: a sample is a
     distribution, as wide as the coder says, instead of a point; noises: each sample starts from its own."""
@@ -40,7 +40,9 @@ class Asking:
     noises: bool = False
 
 
-def asked(entry: dict | None, p_drop: float, seed: int, lpips_file: Path | str | None) -> Asking | None:
+def open_scoring_prior(
+    entry: dict | None, p_drop: float, seed: int, lpips_file: Path | str | None
+) -> PriorConfig | None:
     """A config's entry of `priors`; None for none. Without LPIPS's weights its term is absent, and that is said.
 
     Raises: InputError: the prior's weights, or LPIPS's, are missing or not what they should be.
@@ -51,15 +53,15 @@ def asked(entry: dict | None, p_drop: float, seed: int, lpips_file: Path | str |
         _log.warning("LPIPS is switched off: scores have no such term")
     weights = None if lpips_file is None else read(lpips_file)
     how = {name: entry[name] for name in ("samples", "steps", "staged", "posterior", "noises") if name in entry}
-    return Asking(opened(entry), p_drop=p_drop, seed=seed, weights=weights, **how)
+    return PriorConfig(load_prior(entry), p_drop=p_drop, seed=seed, weights=weights, **how)
 
 
-def painter(entry: dict, seed: int) -> Asking:
+def open_inpainting_prior(entry: dict, seed: int) -> PriorConfig:
     """A config's entry of `priors`, to be asked for pictures, without dropout."""
-    return Asking(opened(entry), entry["samples"], entry["steps"], 0.0, seed)
+    return PriorConfig(load_prior(entry), entry["samples"], entry["steps"], 0.0, seed)
 
 
-def opened(entry: dict) -> Prior:
+def load_prior(entry: dict) -> Prior:
     """The prior of a config's entry. Raises: InputError: its weights are missing or not to be trusted."""
     if entry["model"] == "terrain":
         from dav_gswt.prior.terrain import Terrain  # not above: diffusers takes seconds to load
@@ -71,9 +73,9 @@ def opened(entry: dict) -> Prior:
     return Zero123.open(entry["folder"], entry.get("guidance", GUIDANCE))
 
 
-def terms(
-    prior: Asking, condition: Condition, names: list[str], counts: Float32[Array, "n s s"]
-) -> tuple[Terms, Int[Array, "n"]]:
+def sample_terms(
+    prior: PriorConfig, condition: Condition, names: list[str], counts: Float32[Array, "n s s"]
+) -> tuple[PriorTerms, Int[Array, "n"]]:
     """The terms of every pose, and the steps of denoising that they rest on.
 
     counts: 1 for the pixels that matter, those that look at the modelled ground: w2_sq is the mean over these (0 where
@@ -82,14 +84,16 @@ def terms(
     """
     n = len(condition)
 
-    def of(rows: Int[Array, "k"], steps: int, what: str) -> Terms:
+    def of(rows: Int[Array, "k"], steps: int, what: str) -> PriorTerms:
         parts = [rows[i : i + AT_ONCE] for i in range(0, len(rows), AT_ONCE)]
-        made = (_some(prior, condition[r], [names[i] for i in r], steps, counts[r]) for r in progress(parts, what))
-        return _joined(list(made))
+        made = (
+            _sample_batch(prior, condition[r], [names[i] for i in r], steps, counts[r]) for r in progress(parts, what)
+        )
+        return _concatenate(list(made))
 
     if not prior.staged or n <= FEW or prior.steps <= CHEAP:
         return of(np.arange(n), prior.steps, "imagine poses"), np.full(n, prior.steps)
-    found, full = staging.settled(
+    found, full = staging.score_in_stages(
         n, lambda rows: of(rows, CHEAP, "imagine poses"), lambda rows: of(rows, prior.steps, "imagine best poses")
     )
     share = (n * CHEAP + int(full.sum()) * prior.steps) / (n * prior.steps)
@@ -97,7 +101,9 @@ def terms(
     return found, np.where(full, prior.steps, CHEAP)
 
 
-def _some(prior: Asking, condition: Condition, names: list[str], steps: int, counts: Float32[Array, "k s s"]) -> Terms:
+def _sample_batch(
+    prior: PriorConfig, condition: Condition, names: list[str], steps: int, counts: Float32[Array, "k s s"]
+) -> PriorTerms:
     asked = condition, prior.samples, prior.p_drop, steps, prior.seed
     latents = prior.model.samples(*asked, common=not prior.noises)
     wide = prior.model.variances(latents) if prior.posterior else None
@@ -112,16 +118,23 @@ def _some(prior: Asking, condition: Condition, names: list[str], steps: int, cou
             one, render = ((2 * p - 1) * counts[..., None] for p in (pictures[:, 0], condition.colour))
             single = lpips.distance(one, render, prior.weights)
     apart = ((latents.mean(1) - prior.model.shown(condition)) ** 2).sum(1)
-    return Terms(over(maps, counts), between, image_gradient(pictures, names=names), maps, single, over(apart, counts))
+    return PriorTerms(
+        weighted_mean(maps, counts),
+        between,
+        image_gradient(pictures, names=names),
+        maps,
+        single,
+        weighted_mean(apart, counts),
+    )
 
 
-def over(maps: Float32[Array, "n h w"], counts: Float32[Array, "n s s"]) -> Float64[Array, "n"]:
+def weighted_mean(maps: Float32[Array, "n h w"], counts: Float32[Array, "n s s"]) -> Float64[Array, "n"]:
     """Mean of each map over the pixels that count, those of a cell together; 0 where none does."""
     n, h, w = maps.shape
     cells = counts.reshape(n, h, counts.shape[1] // h, w, counts.shape[2] // w).mean((2, 4), dtype=np.float64)
     return (maps * cells).sum((1, 2)) / np.maximum(cells.sum((1, 2)), 1e-9)
 
 
-def _joined(parts: list[Terms]) -> Terms:
+def _concatenate(parts: list[PriorTerms]) -> PriorTerms:
     columns = zip(*(vars(p).values() for p in parts), strict=True)
-    return Terms(*(None if column[0] is None else np.concatenate(column) for column in columns))
+    return PriorTerms(*(None if column[0] is None else np.concatenate(column) for column in columns))

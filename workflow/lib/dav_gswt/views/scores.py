@@ -40,15 +40,15 @@ class Scores:
     def term(self, name: str) -> Float64[Array, "n"]:
         """Raises: InputError: the term is absent."""
         if name not in self.terms:
-            raise InputError(f"{name}: the poses were scored without it; it needs {_needed(name)} (docs/prior.md)")
+            raise InputError(f"{name}: the poses were scored without it; it needs {_requirement(name)} (docs/prior.md)")
         return self.terms[name]
 
 
-def _needed(name: str) -> str:
+def _requirement(name: str) -> str:
     return "a prior asked without dropout (p_drop 0), and LPIPS" if name == "single" else "a prior"
 
 
-def write(path: Path | str, scores: Scores) -> None:
+def write_scores(path: Path | str, scores: Scores) -> None:
     """One row a candidate; numbers as they are, so that reading gives the same bits."""
     with whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, FIELDS)
@@ -61,8 +61,8 @@ def write(path: Path | str, scores: Scores) -> None:
             table.writerow(row)
 
 
-def read(path: Path | str) -> Scores:
-    """What `write` wrote. Raises: InputError: not such a table, or scores that are not finite, naming the poses."""
+def read_scores(path: Path | str) -> Scores:
+    """Read scores.csv. Raises: InputError: not such a table, or scores that are not finite, naming the poses."""
     with Path(path).open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     try:

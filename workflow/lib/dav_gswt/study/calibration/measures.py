@@ -13,8 +13,8 @@ from dav_gswt.images import image_files, metrics
 from dav_gswt.photos.training_views import View
 from dav_gswt.raster import render
 from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.views.scoring import on_ground
-from dav_gswt.views.uncertainty import ause, calibrated, spearman
+from dav_gswt.views.scoring import ground_mask
+from dav_gswt.views.uncertainty import ause, calibrate_intervals, spearman
 
 LEVEL = 0.9  # of the intervals
 LEAST = 8  # poses, below which nothing is said
@@ -26,7 +26,7 @@ Maps = list[Float[Array, "_ _"]] | Float[Array, "n _ _"]
 Judgement = dict[str, float | None]
 
 
-def errors(
+def measure_errors(
     field: GaussianField, grid: Ground, views: list[View], size: int, corrected: bool = False
 ) -> tuple[Float64[Array, "n"], list[Float32[Array, "_ _"]]]:
     """RMSE between what the field shows and the true views, over the pixels that look at the modelled exemplar.
@@ -39,11 +39,11 @@ def errors(
     """
     error, maps = np.full(len(views), np.nan), []
     for i, view in enumerate(views):
-        weight = view.weight * on_ground(grid, view.camera)
+        weight = view.weight * ground_mask(grid, view.camera)
         counts = weight > 0
         squares = np.full(counts.shape, np.nan)
         if counts.any():
-            picture = _picture(field, view.camera, size)
+            picture = _render_at_size(field, view.camera, size)
             if corrected:
                 picture = np.clip(metrics.correct_colours(picture, view.image, weight), 0, 1)
             apart = picture[counts].astype(np.float64) - view.image[counts]
@@ -53,7 +53,7 @@ def errors(
     return error, maps
 
 
-def _picture(field: GaussianField, camera: Camera, size: int) -> Float32[Array, "h w 3"]:
+def _render_at_size(field: GaussianField, camera: Camera, size: int) -> Float32[Array, "h w 3"]:
     """What the field shows, drawn `size` pixels long, then shrunk to the camera's own."""
     width, height = camera.width, camera.height
     share = max(1.0, size / max(width, height))
@@ -62,7 +62,7 @@ def _picture(field: GaussianField, camera: Camera, size: int) -> Float32[Array, 
     return image_files.shrink_image(seen, width, height)
 
 
-def judged(
+def evaluate_scores(
     scores: dict[str, Float[Array, "n"]], error: Float[Array, "n"], seed: int, level: float = LEVEL
 ) -> dict[str, Judgement]:
     """Of each score of n poses: `spearman`, `ause`, and `coverage` and mean `width` of split-conformal intervals.
@@ -91,7 +91,7 @@ def _intervals(
         rng = np.random.default_rng([seed, split])
         order = rng.permutation(len(error))
         one, other = order[: len(error) // 2], order[len(error) // 2 :]
-        low, high = calibrated(score[one], error[one], rng, level).at(score[other])
+        low, high = calibrate_intervals(score[one], error[one], rng, level).at(score[other])
         inside.append(((low <= error[other]) & (error[other] <= high)).mean())
         width.append((high - low).mean())
     if not np.isfinite(width).all():
@@ -99,17 +99,17 @@ def _intervals(
     return float(np.mean(inside)), float(np.mean(width))
 
 
-def judged_pixels(maps: dict[str, Maps], error_maps: Maps) -> dict[str, Judgement]:
+def evaluate_pixels(maps: dict[str, Maps], error_maps: Maps) -> dict[str, Judgement]:
     """Of each kind of map: `pixel_spearman` and `pixel_ause` over the pixels of all poses whose error is known.
 
     A map as wide as its picture is of the whole of it (rows below a lower picture are left out), any other one of its
-    middle square: there the error is the mean over a cell of the map. `pixel_ause_chance`: as in `judged`. More than
+    middle square: there the error is the mean over a cell of the map. `pixel_ause_chance`: see `evaluate_scores`. Over
     PIXELS are thinned out evenly. None where no pixel is known, or score or error is constant.
     Raises: ValueError: a map that is not finite where the error is known, or finer than its picture.
     """
     found = {}
     for name, own in maps.items():
-        pairs = [_known(score, error) for score, error in zip(own, error_maps, strict=True)]
+        pairs = [_known_pixels(score, error) for score, error in zip(own, error_maps, strict=True)]
         score, error = np.concatenate([np.zeros((2, 0)), *pairs], axis=1)
         step = max(1, -(-len(error) // PIXELS))
         score, error = score[::step], error[::step]
@@ -120,18 +120,18 @@ def judged_pixels(maps: dict[str, Maps], error_maps: Maps) -> dict[str, Judgemen
     return found
 
 
-def _known(score: Float[Array, "_ _"], error: Float[Array, "_ _"]) -> Float64[Array, "2 pixels"]:
+def _known_pixels(score: Float[Array, "_ _"], error: Float[Array, "_ _"]) -> Float64[Array, "2 pixels"]:
     """Score and error of the pixels, or cells, whose error is known."""
     height, width = error.shape
     if score.shape[1] == width and score.shape[0] >= height:
         score = score[:height]
     else:
-        error = in_cells(error, *score.shape)
+        error = average_cells(error, *score.shape)
     known: Bool[Array, "h w"] = np.isfinite(error)
     return np.stack([score[known], error[known]]).astype(np.float64)
 
 
-def in_cells(error_map: Float[Array, "h w"], rows: int, columns: int) -> Float32[Array, "{rows} {columns}"]:
+def average_cells(error_map: Float[Array, "h w"], rows: int, columns: int) -> Float32[Array, "{rows} {columns}"]:
     """Mean error in each cell of a map of the picture's middle square; NaN where less than half of a cell is known.
 
     Raises: ValueError: cells smaller than pixels.
@@ -146,7 +146,7 @@ def in_cells(error_map: Float[Array, "h w"], rows: int, columns: int) -> Float32
     return np.where(enough, total / np.where(enough, share, 1), np.nan).astype(np.float32)
 
 
-def result(
+def summarise(
     scores: dict[str, Float[Array, "n"]],
     maps: dict[str, Maps],
     error: Float[Array, "n"],
@@ -156,8 +156,10 @@ def result(
 ) -> dict:
     """The content of calibration.json, of the poses whose error is known. maps: of those scores that have one."""
     seen = np.flatnonzero(~np.isnan(error))
-    found = judged({name: score[seen] for name, score in scores.items()}, error[seen], seed, level)
-    pixels = judged_pixels({name: [own[i] for i in seen] for name, own in maps.items()}, [error_maps[i] for i in seen])
+    found = evaluate_scores({name: score[seen] for name, score in scores.items()}, error[seen], seed, level)
+    pixels = evaluate_pixels(
+        {name: [own[i] for i in seen] for name, own in maps.items()}, [error_maps[i] for i in seen]
+    )
     return {
         "poses": len(seen),
         "error_mean": float(error[seen].mean()) if len(seen) else None,

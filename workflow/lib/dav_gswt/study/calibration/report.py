@@ -28,7 +28,7 @@ class Panel:
     chance: str | None = None
 
 
-def rows(cells: list[dict], results: list[dict]) -> list[dict]:
+def tabulate_scores(cells: list[dict], results: list[dict]) -> list[dict]:
     """A row for each score of each cell. cells: what CELL names. results: each one's calibration.json."""
     return [
         {key: cell[key] for key in CELL}
@@ -40,28 +40,28 @@ def rows(cells: list[dict], results: list[dict]) -> list[dict]:
 
 
 def write_figure(path: Path | str, table: list[dict], level: float) -> None:
-    """The figure of `rows`, as a PNG. level: of the intervals."""
-    figures.save(drawn(table, level), path)
+    """The figure of `tabulate_scores`, as a PNG. level: of the intervals."""
+    figures.save(draw_figure(table, level), path)
 
 
-def drawn(table: list[dict], level: float):
+def draw_figure(table: list[dict], level: float):
     """A panel a measure, of poses above and (where there are any) of pixels below: a row a score, the best on top; a
     dot a cell, its colour the scene, its shape the round; a black bar at the mean, a grey one at chance."""
     poses, pixels = _panels(level)
-    layers = [(poses, _ranked(table, "spearman")), (pixels, _ranked(table, "pixel_spearman", known=True))]
+    layers = [(poses, _rank_scores(table, "spearman")), (pixels, _rank_scores(table, "pixel_spearman", known=True))]
     layers = [(panels, names) for panels, names in layers if names]
     tall = [AROUND + ROW * len(names) for _, names in layers]
     figure = figures.blank(WIDE, sum(tall) + 0.4)
     figure.get_layout_engine().set(w_pad=0.08, h_pad=0.1)
     grid = figure.subplots(len(layers), 3, squeeze=False, height_ratios=tall)
-    looks = _looks(table)
+    looks = _assign_styles(table)
     for axes, (panels, names) in zip(grid, layers, strict=True):
         for side, panel in zip(axes, panels, strict=False):
-            _draw(side, panel, table, names, looks)
+            _draw_panel(side, panel, table, names, looks)
             side.tick_params(labelleft=side is axes[0])
         for empty in axes[len(panels) :]:
             empty.axis("off")
-    figure.legend(handles=_key(looks), loc="outside lower center", ncols=5, frameon=False, fontsize=11)
+    figure.legend(handles=_legend_handles(looks), loc="outside lower center", ncols=5, frameon=False, fontsize=11)
     return figure
 
 
@@ -80,7 +80,7 @@ def _panels(level: float) -> tuple[list[Panel], list[Panel]]:
     return poses, pixels
 
 
-def _ranked(table: list[dict], measure: str, known: bool = False) -> list[str]:
+def _rank_scores(table: list[dict], measure: str, known: bool = False) -> list[str]:
     """Scores, those of the greatest mean first; those without a value last, or (known) left out."""
     means = {row["score"]: _mean(table, row["score"], measure) for row in table}
     names = [name for name, mean in means.items() if mean is not None or not known]
@@ -92,7 +92,7 @@ def _mean(table: list[dict], score: str, measure: str) -> float | None:
     return float(np.mean(values)) if values else None
 
 
-def _draw(axes, panel: Panel, table: list[dict], names: list[str], looks: dict[str, dict]) -> None:
+def _draw_panel(axes, panel: Panel, table: list[dict], names: list[str], looks: dict[str, dict]) -> None:
     known = [row for row in table if row[panel.measure] is not None]
     for row in known:
         place = names.index(row["score"]) + looks["lane"][row["scene"]]
@@ -117,7 +117,7 @@ def _draw(axes, panel: Panel, table: list[dict], names: list[str], looks: dict[s
         axes.axhline(edge - 0.5, color="0.85", linewidth=0.8)
 
 
-def _looks(table: list[dict]) -> dict[str, dict]:
+def _assign_styles(table: list[dict]) -> dict[str, dict]:
     """Each scene's colour and lane within a row, each round's mark."""
     from matplotlib import colormaps
 
@@ -130,7 +130,7 @@ def _looks(table: list[dict]) -> dict[str, dict]:
     }
 
 
-def _key(looks: dict[str, dict]) -> list:
+def _legend_handles(looks: dict[str, dict]) -> list:
     from matplotlib.lines import Line2D
 
     dot = {"linestyle": "", "markersize": 8}

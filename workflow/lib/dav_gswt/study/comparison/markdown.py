@@ -7,13 +7,13 @@ from dav_gswt.study.comparison.tables import EVERY
 from dav_gswt.study.markdown import format_table
 
 
-def write(path: Path | str, compared: list[dict], baseline: str) -> None:
-    """The table of `text`, as a file."""
+def write_table(path: Path | str, compared: list[dict], baseline: str) -> None:
+    """The table of `format_table`, as a file."""
     with whole(path) as part:
-        part.write_text(text(compared, baseline), encoding="utf-8")
+        part.write_text(format_table(compared, baseline), encoding="utf-8")
 
 
-def text(compared: list[dict], baseline: str) -> str:
+def format_table(compared: list[dict], baseline: str) -> str:
     """Rows of nAUC less the baseline's in dB: a row a policy, best first, with a column for all scenes and one a scene
     and k; in brackets the 95 % interval, where there is more than one start.
     """
@@ -23,12 +23,12 @@ def text(compared: list[dict], baseline: str) -> str:
     best = sorted((row for row in compared if row["scene"] == EVERY), key=lambda row: -row["mean"])
     lines = []
     for row in best:
-        cells = [_cell(found.get((row["policy"], *column))) for column in columns]
+        cells = [_format_cell(found.get((row["policy"], *column))) for column in columns]
         lines.append([f"`{row['policy']}`", *cells, f"{row['wins']}, {row['ties']}, {row['losses']}"])
     return format_table(["less `" + baseline + "`, dB", *named, "wins, ties, losses"], lines)
 
 
-def _cell(row: dict | None) -> str:
+def _format_cell(row: dict | None) -> str:
     if row is None:
         return ""
     if row["low"] is None:

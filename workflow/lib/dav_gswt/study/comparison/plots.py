@@ -16,10 +16,10 @@ BASE, TRUTH = {"color": "black", "linewidth": 2.4}, {"color": "0.55", "linestyle
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito: told apart by everybody
 
 
-def write(path: Path | str, curves: list[dict], compared: list[dict], baseline: str) -> None:
+def write_figure(path: Path | str, curves: list[dict], compared: list[dict], baseline: str) -> None:
     """Above a panel a scene (and k): PSNR against photos, means over seeds; below every policy less the baseline."""
     panels = sorted({(row["scene"], row["k"]) for row in curves if row["policy"] == baseline})
-    policies = [row["policy"] for row in _ranked(compared)]
+    policies = [row["policy"] for row in _rank_policies(compared)]
     best = [p for p in policies if p not in ORACLES][: SHOWN - 2]
     looks = (
         {baseline: BASE}
@@ -32,17 +32,17 @@ def write(path: Path | str, curves: list[dict], compared: list[dict], baseline: 
     top, bottom = figure.subfigures(2, 1, height_ratios=[PANEL[1] * above, FOREST * len(policies) + 1.3])
     grid = top.subplots(above, columns, squeeze=False).ravel()
     for axes, (scene, k) in zip(grid, panels, strict=False):
-        _curves(axes, [row for row in curves if row["scene"] == scene], k, looks)
+        _draw_curves(axes, [row for row in curves if row["scene"] == scene], k, looks)
         axes.set_title(f"{scene}, {k} a round", fontsize=10, loc="left")
     for empty in grid[len(panels) :]:
         empty.axis("off")
     handles, labels = grid[0].get_legend_handles_labels()
     top.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
-    _forest(bottom.subplots(), compared, baseline)
+    _draw_forest(bottom.subplots(), compared, baseline)
     figures.save(figure, path)
 
 
-def _curves(axes, rows: list[dict], k: int, looks: dict[str, dict]) -> None:
+def _draw_curves(axes, rows: list[dict], k: int, looks: dict[str, dict]) -> None:
     for policy, look in looks.items():
         mine = [row for row in rows if row["policy"] == policy and row["k"] == k]
         photos = sorted({row["photos"] for row in mine})
@@ -71,13 +71,13 @@ def _mean(rows: list[dict], which: Callable[[dict], bool]) -> float:
     return float(np.mean([row["psnr"] for row in rows if which(row)]))
 
 
-def _ranked(compared: list[dict]) -> list[dict]:
+def _rank_policies(compared: list[dict]) -> list[dict]:
     return sorted((row for row in compared if row["scene"] == EVERY), key=lambda row: -row["mean"])
 
 
-def _forest(axes, compared: list[dict], baseline: str) -> None:
+def _draw_forest(axes, compared: list[dict], baseline: str) -> None:
     """A bar a policy, its 95 % interval over all scenes, and a dot a scene."""
-    ranked = _ranked(compared)
+    ranked = _rank_policies(compared)
     for place, row in enumerate(ranked):
         if row["low"] is not None:
             axes.plot([row["low"], row["high"]], [place, place], color="0.25", linewidth=2)

@@ -179,7 +179,7 @@ def _known() -> list[Point]:
 def _information(arrays: Arrays, camera: Camera, know: float) -> float:
     raster = Rasterizer()
     raster.forward(**arrays, camera=camera)
-    return fisher.gain(raster.contributions(), np.full(len(arrays["means"]), know))
+    return fisher.information_gain(raster.contributions(), np.full(len(arrays["means"]), know))
 
 
 def _information_slowly(arrays: Arrays, camera: Camera, know: float) -> float:

@@ -90,7 +90,7 @@ def _sums() -> list[Point]:
 
 
 def _combined(w2: Array, lpips: Array, lam: float) -> Array:
-    return un.combined(w2, lpips, lam, Scales.frozen({"w2_sq": w2, "lpips": lpips}))
+    return un.combine_terms(w2, lpips, lam, Scales.frozen({"w2_sq": w2, "lpips": lpips}))
 
 
 def _combined_slowly(w2: Array, lpips: Array, lam: float) -> Array:
@@ -123,7 +123,7 @@ def _spans() -> list[Point]:
 
 
 def _normalised(u: Array, low: float, high: float) -> Array:
-    return un.normalised(u, Quantiles(low, high))
+    return un.normalise(u, Quantiles(low, high))
 
 
 def _normalised_slowly(u: Array, low: float, high: float) -> Array:

@@ -27,7 +27,7 @@ def _poses() -> list[Point]:
 
 
 def _alike(places: Array, u: Array) -> Array:
-    return facility_location.similarity(places, places, facility_location.reach_of(places))
+    return facility_location.similarity(places, places, facility_location.kernel_width(places))
 
 
 def _alike_slowly(places: Array, u: Array) -> Array:
@@ -39,7 +39,9 @@ def _alike_slowly(places: Array, u: Array) -> Array:
 def _gains(places: Array, u: Array) -> Array:
     """Over the sum of the weights: what each pose adds to the first ten."""
     near = _alike(places, u)
-    return facility_location.gains(near.astype(np.float64), near[:, :10].max(1).astype(np.float64), u) / u.sum()
+    return (
+        facility_location.coverage_gains(near.astype(np.float64), near[:, :10].max(1).astype(np.float64), u) / u.sum()
+    )
 
 
 def _gains_slowly(places: Array, u: Array) -> Array:

@@ -85,8 +85,8 @@ def _shares() -> list[Point]:
 def _through_maps(values: Array) -> Array:
     with TemporaryDirectory() as folder:
         path = Path(folder, "maps.npz")
-        pose_maps.write(path, PoseMaps(["c0000"], values.reshape(1, 1, -1), None), values)
-        return pose_maps.read(path)[0].opacity.ravel()
+        pose_maps.write_pose_maps(path, PoseMaps(["c0000"], values.reshape(1, 1, -1), None), values)
+        return pose_maps.read_pose_maps(path)[0].opacity.ravel()
 
 
 def _halves() -> list[Point]:

@@ -80,7 +80,7 @@ def _views(path: str, corrected: bool) -> dict:
     told = read_json(path)
     about = told["provenance"]
     found = {key: told[key] for key in ("photos", "gaussians")}
-    found |= curves.measured(told, "psnr_colour_corrected" if corrected else "psnr")
+    found |= curves.select_metrics(told, "psnr_colour_corrected" if corrected else "psnr")
     return found | _origin(about) | {"field": about["inputs"]["field"][:12]}
 
 

@@ -1,18 +1,18 @@
-"""The uncertainty of a view, by what a prior imagines there: its terms, how they are weighed, how far to trust them.
+"""Uncertainty of a view from samples of a prior.
 
-`disagreement` and `texture` make the terms, `weighing` puts them together, `calibration` compares them with errors.
+`disagreement` and `texture` compute its terms, `weighting` combines them, `calibration` compares scores with errors.
 """
 
-from dav_gswt.views.uncertainty.calibration import Intervals, ause, calibrated, conformal_quantile, spearman
+from dav_gswt.views.uncertainty.calibration import Intervals, ause, calibrate_intervals, conformal_quantile, spearman
 from dav_gswt.views.uncertainty.disagreement import w2_sq, w2_sq_as_printed, w2_sq_by_pairs
 from dav_gswt.views.uncertainty.texture import gradient_map, image_gradient
 from dav_gswt.views.uncertainty.weighting import (
     Quantiles,
     Scales,
-    combined,
-    combined_image,
+    combine_image_terms,
+    combine_terms,
     gamma,
-    normalised,
+    normalise,
     robust_scale,
 )
 
@@ -21,14 +21,14 @@ __all__ = [
     "Quantiles",
     "Scales",
     "ause",
-    "calibrated",
-    "combined",
-    "combined_image",
+    "calibrate_intervals",
+    "combine_terms",
+    "combine_image_terms",
     "conformal_quantile",
     "gamma",
     "gradient_map",
     "image_gradient",
-    "normalised",
+    "normalise",
     "robust_scale",
     "spearman",
     "w2_sq",

@@ -13,7 +13,9 @@ SIDE = 64  # pixels of the pictures whose blend weights are taken
 SEEN = 0.05  # pixels of blend weight, over all pictures, from which a Gaussian counts as seen
 
 
-def carried(field: GaussianField, cameras: list[Camera], maps: Float32[Array, "n h w"]) -> Float32[Array, "gaussians"]:
+def backproject_maps(
+    field: GaussianField, cameras: list[Camera], maps: Float32[Array, "n h w"]
+) -> Float32[Array, "gaussians"]:
     """Mean over cameras and pixels of u, weighted by blend weight: sum of w_i(p) u(p) / sum of w_i(p); NaN where a
     Gaussian is not seen.
 

@@ -23,7 +23,7 @@ def spearman(u: Float[Array, "n"], error: Float[Array, "n"]) -> float | None:
     """
     from scipy.stats import spearmanr  # here, not above: slow to load, and scores do without
 
-    u, error = _checked(u, error)
+    u, error = _check_finite(u, error)
     if len(u) < 2 or np.ptp(u) == 0 or np.ptp(error) == 0:
         return None
     return float(spearmanr(u, error).statistic)
@@ -39,16 +39,16 @@ def ause(u: Float[Array, "n"], error: Float[Array, "n"]) -> float:
     Raises: ValueError: no sample, a value that is not finite, an error below 0.
     Source: Ilg et al., Uncertainty estimates and multi-hypotheses networks for optical flow, ECCV 2018.
     """
-    u, error = _checked(u, error)
+    u, error = _check_finite(u, error)
     if not len(u) or error.min() < 0:
         raise ValueError("sparsification needs samples, with errors of at least 0")
     if error.max() == 0 or len(u) == 1:
         return 0.0
     scaled = error / error.max()  # so that no sum leaves the range
-    return float(np.trapezoid(_curve(u, scaled) - _curve(scaled, scaled), dx=1 / len(u)))
+    return float(np.trapezoid(_sparsification_curve(u, scaled) - _sparsification_curve(scaled, scaled), dx=1 / len(u)))
 
 
-def _curve(by: Float64[Array, "n"], error: Float64[Array, "n"]) -> Float64[Array, "n"]:
+def _sparsification_curve(by: Float64[Array, "n"], error: Float64[Array, "n"]) -> Float64[Array, "n"]:
     """Mean error of what is left, over that of all, when 0, 1, ... n - 1 samples of the largest `by` are left out."""
     _, group = np.unique(by, return_inverse=True)
     alike = np.bincount(group, error) / np.bincount(group)
@@ -83,7 +83,7 @@ class Intervals:
         return np.maximum(middle, LEAST * float(self.expected.mean()) or 1.0)
 
 
-def calibrated(
+def calibrate_intervals(
     u: Float[Array, "n"], error: Float[Array, "n"], rng: np.random.Generator, level: float = 0.9
 ) -> Intervals:
     """Intervals from held-out samples: one random half says what |error| is expected at u, the other how far it strays.
@@ -92,7 +92,7 @@ def calibrated(
     """
     from scipy.optimize import isotonic_regression
 
-    u, error = _checked(u, np.abs(error))
+    u, error = _check_finite(u, np.abs(error))
     if len(u) < 2:
         raise ValueError(f"calibration needs at least 2 samples, not {len(u)}")
     order = rng.permutation(len(u))
@@ -118,7 +118,7 @@ def conformal_quantile(strays: Float[Array, "n"], level: float) -> float:
     return float(np.sort(strays)[rank - 1]) if rank <= len(strays) else np.inf
 
 
-def _checked(u: Float[Array, "n"], error: Float[Array, "n"]) -> tuple[Float64[Array, "n"], Float64[Array, "n"]]:
+def _check_finite(u: Float[Array, "n"], error: Float[Array, "n"]) -> tuple[Float64[Array, "n"], Float64[Array, "n"]]:
     require_finite(u, "the score")
     require_finite(error, "the error")
     return u.astype(np.float64), error.astype(np.float64)

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Float64
 from numpy import ndarray as Array
 
-from dav_gswt.views.uncertainty.finite import refuse, require_finite
+from dav_gswt.views.uncertainty.finite import reject_poses, require_finite
 
 CHUNK = 1 << 18  # numbers worked on at a time: what a second-level cache holds
 
@@ -39,7 +39,7 @@ def w2_sq(
         with np.errstate(over="ignore", invalid="ignore"):  # what that gives is refused below
             found = _twice_the_variance(means[rows])
             if variances is not None:
-                refuse((variances[rows] < 0).any((1, 2, 3, 4)), "variance below 0", names and names[rows])
+                reject_poses((variances[rows] < 0).any((1, 2, 3, 4)), "variance below 0", names and names[rows])
                 found = found + _twice_the_variance(np.sqrt(variances[rows], dtype=np.float64))
             maps[rows] = found
             scores[rows] = found.mean((1, 2), dtype=np.float64)

@@ -9,13 +9,13 @@ from numpy import ndarray as Array
 NAMED = 5  # poses in a message; of more the number is said
 
 
-def refuse(bad: Bool[Array, "n"], what: str, names: Sequence[str] | None = None) -> None:
+def reject_poses(bad: Bool[Array, "n"], what: str, names: Sequence[str] | None = None) -> None:
     """Raises: ValueError: any is bad; says what they are, and of which poses: by name, or by index without names."""
     if bad.any():
-        raise ValueError(f"{what} of pose {named(bad, names)}")
+        raise ValueError(f"{what} of pose {format_names(bad, names)}")
 
 
-def named(bad: Bool[Array, "n"], names: Sequence[str] | None = None) -> str:
+def format_names(bad: Bool[Array, "n"], names: Sequence[str] | None = None) -> str:
     """The first few that are bad, by name, or by index without names, and how many more."""
     found = [names[i] if names is not None else str(i) for i in np.flatnonzero(bad)]
     more = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""
@@ -24,4 +24,4 @@ def named(bad: Bool[Array, "n"], names: Sequence[str] | None = None) -> str:
 
 def require_finite(values: Float[Array, "n"], what: str, names: Sequence[str] | None = None) -> None:
     """Raises: ValueError: a value that is NaN or infinite, naming the poses."""
-    refuse(~np.isfinite(values), f"not finite: {what}", names)
+    reject_poses(~np.isfinite(values), f"not finite: {what}", names)

@@ -16,7 +16,7 @@ RANKING = ("w2_sq", "lpips", "single", "residual")  # terms by which policies ra
 
 
 @dataclass(frozen=True)
-class Terms:
+class PriorTerms:
     """Of n poses. lpips: None without its weights. single: LPIPS between the one sample that there is without dropout
     and the render itself; None with dropout. maps: of w2_sq, in cells of the latents. residual: squared distance of the
     samples' mean from the latents of the render itself."""
@@ -35,9 +35,12 @@ class Terms:
         return {name: values for name, values in found.items() if values is not None}
 
 
-def settled(
-    n: int, cheap: Callable[[Int[Array, "k"]], Terms], full: Callable[[Int[Array, "k"]], Terms], top: int = TOP
-) -> tuple[Terms, Bool[Array, "n"]]:
+def score_in_stages(
+    n: int,
+    cheap: Callable[[Int[Array, "k"]], PriorTerms],
+    full: Callable[[Int[Array, "k"]], PriorTerms],
+    top: int = TOP,
+) -> tuple[PriorTerms, Bool[Array, "n"]]:
     """Terms of all n poses, and which of them were scored in full.
 
     Poses go on to full scoring in the order of their best cheap rank, by any term and by the terms' sum, until for
@@ -48,31 +51,31 @@ def settled(
     first = found
     order = np.argsort(_best_rank(found), kind="stable")
     while len(rest := order[~done[order]]):
-        if done.sum() >= top and not _may_rise(found, first, done, top):
+        if done.sum() >= top and not _may_enter_top(found, first, done, top):
             break
         rows = np.sort(rest[: BATCH if done.any() else top + BATCH])
-        found, done = _put(found, rows, full(rows)), done.copy()
+        found, done = _insert_rows(found, rows, full(rows)), done.copy()
         done[rows] = True
-    return _levelled(found, first, done), done
+    return _rescale_cheap(found, first, done), done
 
 
-def _rankings(terms: Terms, scales: dict[str, float]) -> dict[str, Float64[Array, "n"]]:
+def _rankings(terms: PriorTerms, scales: dict[str, float]) -> dict[str, Float64[Array, "n"]]:
     """What poses may be ranked by."""
     named = {name: values for name, values in terms.named().items() if name in RANKING}
     total = sum(values / (scales[name] or 1) for name, values in named.items())
     return named | {"sum": total}
 
 
-def _scales(terms: Terms) -> dict[str, float]:
+def _scales(terms: PriorTerms) -> dict[str, float]:
     return {name: robust_scale(values) for name, values in terms.named().items()}
 
 
-def _best_rank(terms: Terms) -> Int[Array, "n"]:
+def _best_rank(terms: PriorTerms) -> Int[Array, "n"]:
     ranks = [np.argsort(np.argsort(-v, kind="stable")) for v in _rankings(terms, _scales(terms)).values()]
     return np.min(ranks, axis=0)
 
 
-def _may_rise(found: Terms, first: Terms, done: Bool[Array, "n"], top: int) -> bool:
+def _may_enter_top(found: PriorTerms, first: PriorTerms, done: Bool[Array, "n"], top: int) -> bool:
     """Whether a pose that was scored cheaply alone may belong to the best `top` by any ranking."""
     scales = _scales(first)
     now, before = _rankings(found, scales), _rankings(first, scales)
@@ -89,7 +92,7 @@ def _ratios(full: Float[Array, "k"], cheap: Float[Array, "k"]) -> Float64[Array,
     return full[there] / cheap[there] if there.any() else np.ones(1)
 
 
-def _put(into: Terms, rows: Int[Array, "k"], values: Terms) -> Terms:
+def _insert_rows(into: PriorTerms, rows: Int[Array, "k"], values: PriorTerms) -> PriorTerms:
     parts = {}
     for name, new in vars(values).items():
         if new is not None:
@@ -98,7 +101,7 @@ def _put(into: Terms, rows: Int[Array, "k"], values: Terms) -> Terms:
     return replace(into, **parts)
 
 
-def _levelled(found: Terms, first: Terms, done: Bool[Array, "n"]) -> Terms:
+def _rescale_cheap(found: PriorTerms, first: PriorTerms, done: Bool[Array, "n"]) -> PriorTerms:
     """Cheap values brought to the full ones' level: few steps disagree by another amount than many."""
     if done.all() or not done.any():
         return found

@@ -15,7 +15,7 @@ from scipy.special import expit
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json, write_json
-from dav_gswt.views.uncertainty.finite import refuse, require_finite
+from dav_gswt.views.uncertainty.finite import reject_poses, require_finite
 
 _log = logging.getLogger(__name__)
 
@@ -50,7 +50,7 @@ class Scales:
     @staticmethod
     def read(path: Path | str) -> "Scales":
         """Raises: InputError: not what `write` wrote."""
-        return Scales(_numbers(path, lambda scale: scale >= 0))
+        return Scales(_read_numbers(path, lambda scale: scale >= 0))
 
 
 @dataclass(frozen=True)
@@ -75,13 +75,13 @@ class Quantiles:
     @staticmethod
     def read(path: Path | str) -> "Quantiles":
         """Raises: InputError: not what `write` wrote."""
-        found = _numbers(path)
+        found = _read_numbers(path)
         if set(found) != {"low", "high"} or found["low"] > found["high"]:
             raise InputError(f"{path}: needs the numbers low <= high, and nothing else")
         return Quantiles(**found)
 
 
-def _numbers(path: Path | str, good=lambda number: True) -> dict[str, float]:
+def _read_numbers(path: Path | str, good=lambda number: True) -> dict[str, float]:
     """JSON of finite numbers by name. Raises: InputError: anything else."""
     found = read_json(path)
     if not isinstance(found, dict):
@@ -102,7 +102,7 @@ def robust_scale(values: Float[Array, "n"]) -> float:
     return float(np.median(size[size > 0])) if (size > 0).any() else 0.0
 
 
-def combined(
+def combine_terms(
     w2: Float[Array, "n"],
     lpips: Float[Array, "n"] | None,
     lam: float,
@@ -116,35 +116,35 @@ def combined(
     Raises: ValueError: lam below 0 or not finite; a term without scale; a value that is not finite, naming the poses.
     Source: DAV-GSWT, Eq. (uncert_latent).
     """
-    return _sum("w2_sq", w2, lpips, lam, scales, names)
+    return _weighted_sum("w2_sq", w2, lpips, lam, scales, names)
 
 
-def combined_image(
+def combine_image_terms(
     gradient: Float[Array, "n"],
     lpips: Float[Array, "n"] | None,
     lam: float,
     scales: Scales,
     names: Sequence[str] | None = None,
 ) -> Float64[Array, "n"]:
-    """u_img, an ablation: as `combined`, with the picture's gradient (scale `gradient`) in place of W2.
+    """u_img, an ablation: as `combine_terms`, with the picture's gradient (scale `gradient`) in place of W2.
 
     The appendix's aggregate of both is their sum. Source: DAV-GSWT, Eq. (uncert_img).
     """
-    return _sum("gradient", gradient, lpips, lam, scales, names)
+    return _weighted_sum("gradient", gradient, lpips, lam, scales, names)
 
 
-def _sum(name: str, first, lpips, lam: float, scales: Scales, names) -> Float64[Array, "n"]:
+def _weighted_sum(name: str, first, lpips, lam: float, scales: Scales, names) -> Float64[Array, "n"]:
     if not 0 <= lam < np.inf:
         raise ValueError(f"lam must be a number of at least 0, not {lam}")
-    total = _scaled(name, first, scales, names)
+    total = _divide_by_scale(name, first, scales, names)
     if lpips is not None:
-        return total + lam * _scaled("lpips", lpips, scales, names)
+        return total + lam * _divide_by_scale("lpips", lpips, scales, names)
     if lam > 0:
         _log.warning("LPIPS has no weights here: its term is left out, the uncertainty is %s alone", name)
     return total
 
 
-def _scaled(name: str, values: Float[Array, "n"], scales: Scales, names) -> Float64[Array, "n"]:
+def _divide_by_scale(name: str, values: Float[Array, "n"], scales: Scales, names) -> Float64[Array, "n"]:
     if name not in scales.of:
         raise ValueError(f"{name} has no frozen scale")
     require_finite(values, name, names)
@@ -152,7 +152,7 @@ def _scaled(name: str, values: Float[Array, "n"], scales: Scales, names) -> Floa
     return values.astype(np.float64) / scale if scale > 0 else np.zeros(len(values))
 
 
-def normalised(
+def normalise(
     u: Float[Array, "..."], quantiles: Quantiles, names: Sequence[str] | None = None
 ) -> Float32[Array, "..."]:
     """u brought to [0, 1], 0 at the low quantile and below, 1 at the high one and above; of poses or of maps.
@@ -160,7 +160,7 @@ def normalised(
     Where both quantiles are equal (a scene that is doubted alike everywhere) what lies above them is 1, the rest 0.
     Raises: ValueError: a value that is not finite, naming the poses (the first axis).
     """
-    refuse(~np.isfinite(u).reshape(u.shape[0] if u.ndim else 1, -1).all(1), "not finite: the uncertainty", names)
+    reject_poses(~np.isfinite(u).reshape(u.shape[0] if u.ndim else 1, -1).all(1), "not finite: the uncertainty", names)
     wide = u.astype(np.float64)
     span = quantiles.high - quantiles.low
     share = (wide - quantiles.low) / span if span > 0 else wide > quantiles.high
