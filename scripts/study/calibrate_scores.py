@@ -17,13 +17,13 @@ with logging_to(snakemake.log[0]):
     frame, split = read_scene_frame(given.frame), read_json(given.views)
     taken = training_views.taken(given.images, given.model, split["start"], captures, scoring.PHOTO)
     fitted = read_field(given.field), ground.read(given.ground)
-    judged = judging.Judged(params.scene, *fitted, frame, taken, params.size)
-    pool = candidates.left(params.scene, frame, given.model, split, captures)
-    prior = prior_sampling.asked(params.prior, params.p_drop, params.seed, given.get("lpips"))
-    others = controls.opened(given.get("regressors", []))
-    scored = scores.read(given.scores), pose_maps.read(given.maps)[0]
-    some = judging.compared(judged, pool, scored[0], given, params.poses)
-    found, rows = judging.calibrated(judged, *some, scored, params.lam, params.seed, prior, others)
+    judged = judging.CalibrationTarget(params.scene, *fitted, frame, taken, params.size)
+    pool = candidates.list_remaining(params.scene, frame, given.model, split, captures)
+    prior = prior_sampling.open_scoring_prior(params.prior, params.p_drop, params.seed, given.get("lpips"))
+    others = controls.open_regressors(given.get("regressors", []))
+    scored = scores.read_scores(given.scores), pose_maps.read_pose_maps(given.maps)[0]
+    some = judging.choose_candidates(judged, pool, scored[0], given, params.poses)
+    found, rows = judging.calibrate_scores(judged, *some, scored, params.lam, params.seed, prior, others)
     csv_tables.write_table(snakemake.output.poses, rows)
     inputs = {name: given[name] for name in ("field", "ground", "scores", "maps", "views")}
     about = {name: getattr(params, name) for name in ("prior", "p_drop", "lam", "seed", "poses")}

@@ -6,5 +6,5 @@ from dav_gswt.study.comparison import curves
 
 with logging_to(snakemake.log[0]):
     path = snakemake.output.curves
-    new = [row for cell in snakemake.params.cells for row in curves.rows(cell)]
-    csv_tables.write_table(path, curves.merged(curves.read(path), new))
+    new = [row for cell in snakemake.params.cells for row in curves.read_cell(cell)]
+    csv_tables.write_table(path, curves.merge_rows(curves.read_curves(path), new))

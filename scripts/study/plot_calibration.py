@@ -9,7 +9,7 @@ from dav_gswt.study.calibration import report
 with logging_to(snakemake.log[0]):
     out, paths = snakemake.output, snakemake.input.cells
     found = [read_json(path) for path in paths]
-    table = report.rows(snakemake.params.cells, found)
+    table = report.tabulate_scores(snakemake.params.cells, found)
     csv_tables.write_table(out.table, table)
     report.write_figure(out.plot, table, found[0]["level"])
     about = {path: f["provenance"]["parameters"] for path, f in zip(paths, found, strict=True)}

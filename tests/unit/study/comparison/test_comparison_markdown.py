@@ -22,7 +22,7 @@ def test_best_first_with_intervals_where_there_are_some():
         row("diverse", "every", "", 0.051, -0.0, 0.1, (2, 1, 0)),
         row("diverse", "grass_pool", 2, 0.049),
     ]
-    head, rule, *rows = collapse_spaces(markdown.text(compared, "farthest")).splitlines()
+    head, rule, *rows = collapse_spaces(markdown.format_comparison(compared, "farthest")).splitlines()
     assert set(rule) == set("|-")
     assert [head, *rows] == [
         "| less `farthest`, dB | all | grass, 2 a round | sand, 4 a round | wins, ties, losses |",

@@ -34,6 +34,6 @@ def test_what_is_no_curve_is_refused(photos, psnr):
 
 def test_photos_to_reach_lie_between_rounds():
     photos, psnr = curve(8, 12, 16), curve(20, 24, 28)
-    assert stats.to_reach(photos, psnr, best=30.0, way=0.6) == pytest.approx(14)  # 26 dB
-    assert stats.to_reach(photos, psnr, best=40.0, way=0.95) is None
-    assert stats.to_reach(photos, psnr, best=20.0) == 8
+    assert stats.photos_to_reach(photos, psnr, best=30.0, way=0.6) == pytest.approx(14)  # 26 dB
+    assert stats.photos_to_reach(photos, psnr, best=40.0, way=0.95) is None
+    assert stats.photos_to_reach(photos, psnr, best=20.0) == 8

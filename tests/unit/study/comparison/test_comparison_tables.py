@@ -47,15 +47,15 @@ def cell(folder, rounds=2, **given):
 
 
 def test_a_row_a_round_with_what_it_cost(tmp_path):
-    start, first = curves.rows(cell(tmp_path))
+    start, first = curves.read_cell(cell(tmp_path))
     assert (start["round"], start["photos"], start["psnr"], start["seconds"], start["evaluations"]) == (0, 8, 20, 0, 0)
     assert (first["round"], first["photos"], first["psnr"], first["seconds"]) == (1, 12, 21, 3)
     assert first["evaluations"] == 5 * (2 * 30 + 8 * 10) and first["field"] == 12 * "a"
-    assert curves.rows(cell(tmp_path, corrected=True))[0]["psnr"] == 21
+    assert curves.read_cell(cell(tmp_path, corrected=True))[0]["psnr"] == 21
 
 
 def test_what_a_round_was_expected_to_gain_rests_on_the_rounds_before_it_alone(tmp_path):
-    start, first, second = curves.rows(cell(tmp_path, rounds=3))
+    start, first, second = curves.read_cell(cell(tmp_path, rounds=3))
     assert start["expected"] is first["expected"] is None
     assert second["closes"] == pytest.approx(8 * 5.0 * (1 / 12 - 1 / 16))
     assert second["expected"] == pytest.approx(marginal_gain.SHARE * second["closes"])
@@ -66,7 +66,7 @@ def test_gains_are_checked_against_what_was_expected_of_them():
     told = rounds([20.0, 21.0, 21.4, 21.5], (8, 12, 16, 20)) + rounds([20.0, 23.0, 25.0], scene="grass") + ALL
     for row, (low, high) in zip((told[2], told[3], told[6]), ((0.2, 0.8), (0.2, 0.8), (1, 3)), strict=True):
         row |= {"closes": 1.0, "expected": 0.5, "expected_low": low, "expected_high": high}
-    every, flowers, grass = tables.worth(told)
+    every, flowers, grass = tables.check_predictions(told)
     assert [row["scene"] for row in (every, flowers, grass)] == ["every", "flowers", "grass"]
     assert (every["rounds"], flowers["rounds"], grass["rounds"]) == (3, 2, 1)
     assert flowers["gained"] == pytest.approx(0.25) and flowers["apart"] == pytest.approx(0.25)
@@ -77,49 +77,49 @@ def test_gains_are_checked_against_what_was_expected_of_them():
 def test_rounds_that_gain_nothing_count_for_the_interval_alone():
     told = rounds([20.0, 21.0, 20.9])
     told[2] |= {"closes": 1.0, "expected": 0.5, "expected_low": 0.2, "expected_high": 1.0}
-    (every, _) = tables.worth(told)
+    (every, _) = tables.check_predictions(told)
     assert every["covered"] == 0 and every["share"] is every["off"] is None
 
 
 def test_views_away_from_where_photos_may_be_taken_count_apart(tmp_path):
     group = {"psnr": 30.0, "psnr_colour_corrected": 31.0, "ssim": 0.9, "lpips": 0.1, "worst_decile": {"psnr": 29.0}}
-    row = curves.rows(cell(tmp_path) | {"metrics": [metrics(tmp_path, 0, high=group, walker={"psnr": 10.0})]})[0]
+    row = curves.read_cell(cell(tmp_path) | {"metrics": [metrics(tmp_path, 0, high=group, walker={"psnr": 10.0})]})[0]
     assert (row["psnr"], row["worst_psnr"], row["walker_psnr"]) == (30, 29, 10)
 
 
 def test_a_job_without_a_benchmark_leaves_no_time(tmp_path):
-    assert curves.rows(cell(tmp_path, times=[[str(tmp_path / "none.tsv")]]))[1]["seconds"] is None
+    assert curves.read_cell(cell(tmp_path, times=[[str(tmp_path / "none.tsv")]]))[1]["seconds"] is None
 
 
 def test_rows_survive_the_file_and_runs_add_up(tmp_path):
     path = tmp_path / "curves.csv"
-    assert curves.read(path) == []
+    assert curves.read_curves(path) == []
     old, other = rounds([20, 21, 22]), rounds([19, 20, 21], seed=1)
-    csv_tables.write_table(path, curves.merged(old, other))
-    assert curves.read(path) == old + other
-    again = curves.merged(curves.read(path), rounds([20, 23], (8, 12)))
+    csv_tables.write_table(path, curves.merge_rows(old, other))
+    assert curves.read_curves(path) == old + other
+    again = curves.merge_rows(curves.read_curves(path), rounds([20, 23], (8, 12)))
     assert [row["psnr"] for row in again if row["seed"] == 0] == [20, 23, 22] and len(again) == 6
 
 
 def test_results_by_hand():
-    (row,) = tables.results(rounds([20, 22, 24]) + ALL)
+    (row,) = tables.summarise_cells(rounds([20, 22, 24]) + ALL)
     assert row["nauc"] == 22 and row["gap"] == 2 and row["photos"] == 16
     assert row["to_reach"] is None and row["seconds"] == 4 and row["evaluations"] == 30
-    (near,) = tables.results(rounds([20, 25, 25.8]) + ALL)
+    (near,) = tables.summarise_cells(rounds([20, 25, 25.8]) + ALL)
     assert near["to_reach"] == pytest.approx(12 + 4 * 0.7 / 0.8)
-    (alone,) = tables.results(rounds([20, 22, 24]))
+    (alone,) = tables.summarise_cells(rounds([20, 22, 24]))
     assert alone["gap"] is None and alone["to_reach"] is None
 
 
 def test_all_photos_of_another_seed_are_no_goal():
-    (row,) = tables.results(rounds([20, 22, 24], seed=1) + ALL)
+    (row,) = tables.summarise_cells(rounds([20, 22, 24], seed=1) + ALL)
     assert row["gap"] is None
 
 
 def test_policies_are_paired_with_the_baseline():
     both = [rounds([20, 21, 22], seed=s) + rounds([20, 21 + s, 22], seed=s, policy="w2") for s in range(3)]
-    table = tables.results([row for rows in both for row in rows])
-    every, alone = tables.comparisons(table, "farthest")
+    table = tables.summarise_cells([row for rows in both for row in rows])
+    every, alone = tables.compare_to_baseline(table, "farthest")
     assert every["scene"] == tables.EVERY and (alone["scene"], alone["k"]) == ("flowers", 4)
     assert every["units"] == 3 and every["mean"] == pytest.approx(0.5)
     assert (every["wins"], every["ties"], every["losses"]) == (2, 1, 0)
@@ -127,8 +127,8 @@ def test_policies_are_paired_with_the_baseline():
 
 
 def test_one_cell_alone_has_no_interval():
-    table = tables.results(rounds([20, 21, 22]) + rounds([20, 22, 22], policy="w2"))
-    for row in tables.comparisons(table, "farthest"):
+    table = tables.summarise_cells(rounds([20, 21, 22]) + rounds([20, 22, 22], policy="w2"))
+    for row in tables.compare_to_baseline(table, "farthest"):
         assert row["mean"] == 0.5 and row["wins"] == 1
         assert row["low"] is row["high"] is row["p"] is row["holm"] is None
 
@@ -136,20 +136,20 @@ def test_one_cell_alone_has_no_interval():
 def test_cells_that_end_with_other_photos_or_start_elsewhere_are_not_paired():
     base = rounds([20, 21, 22])
     for other in (rounds([20, 21], (8, 12), policy="w2"), rounds([20, 21, 22], seed=1, policy="w2")):
-        assert tables.comparisons(tables.results(base + other), "farthest") == []
-    assert tables.comparisons(tables.results(rounds([20, 21, 22], policy="w2")), "farthest") == []
+        assert tables.compare_to_baseline(tables.summarise_cells(base + other), "farthest") == []
+    assert tables.compare_to_baseline(tables.summarise_cells(rounds([20, 21, 22], policy="w2")), "farthest") == []
 
 
 def test_settings_of_a_policy_are_policies_of_their_own():
     some = [rounds([20, 21, 22 + i], policy="w2-lpips", prior="terrain", lam=str(i)) for i in range(2)]
-    compared = tables.comparisons(tables.results(rounds([20, 21, 22]) + some[0] + some[1]), "farthest")
+    compared = tables.compare_to_baseline(tables.summarise_cells(rounds([20, 21, 22]) + some[0] + some[1]), "farthest")
     assert [(row["lam"], row["mean"]) for row in compared if row["scene"] == tables.EVERY] == [("0", 0), ("1", 0.25)]
 
 
 def test_the_figure_is_whole_and_the_same_twice(tmp_path):
     table = rounds([20, 22, 24]) + rounds([20, 21, 22], policy="random") + rounds([20, 23, 25], policy="oracle") + ALL
-    compared = tables.comparisons(tables.results(table), "farthest")
+    compared = tables.compare_to_baseline(tables.summarise_cells(table), "farthest")
     for name in ("a.png", "b.png"):
-        plots.write(tmp_path / name, table, compared, "farthest")
+        plots.write_figure(tmp_path / name, table, compared, "farthest")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")

@@ -18,7 +18,7 @@ EXPECTED = ("closes", "expected", "expected_low", "expected_high")  # of a round
 WORK = ("score", "select", "capture", "update")  # a round's jobs whose time counts; measuring does not
 
 
-def rows(cell: dict) -> list[dict]:
+def read_cell(cell: dict) -> list[dict]:
     """The rows of a cell, the start first.
 
     cell: what CELL names; `corrected`: PSNR after the photos' exposure is fitted; files: `metrics` of each round, the
@@ -29,25 +29,25 @@ def rows(cell: dict) -> list[dict]:
     for t, path in enumerate(cell["metrics"]):
         told = read_json(path)
         row = {key: cell[key] for key in CELL} | {"round": t, "photos": told["photos"]}
-        row |= measured(told, "psnr_colour_corrected" if cell["corrected"] else "psnr")
-        row |= _expected(found, fits, told["photos"])
+        row |= select_metrics(told, "psnr_colour_corrected" if cell["corrected"] else "psnr")
+        row |= _predict_gain(found, fits, told["photos"])
         if t:
             fits.append(told["fit"])
-        row |= {"seconds": _seconds(cell["times"][t - 1]) if t else 0.0}
-        row |= {"evaluations": _evaluations(cell["facts"][t - 1], cell["samples"]) if t else 0}
+        row |= {"seconds": _sum_seconds(cell["times"][t - 1]) if t else 0.0}
+        row |= {"evaluations": _count_evaluations(cell["facts"][t - 1], cell["samples"]) if t else 0}
         about = told["provenance"]
         renderer = " ".join(str(value) for value in about["renderer"].values())
         found.append(row | {"version": about["version"], "renderer": renderer, "field": about["inputs"]["field"][:12]})
     return found
 
 
-def merged(before: list[dict], new: list[dict]) -> list[dict]:
+def merge_rows(before: list[dict], new: list[dict]) -> list[dict]:
     """Rows of both, sorted; of a round that both hold the new one. Rounds beyond those of a new cell stay."""
     at = {_key(row): row for row in before} | {_key(row): row for row in new}
     return [at[key] for key in sorted(at)]
 
 
-def read(path: Path | str) -> list[dict]:
+def read_curves(path: Path | str) -> list[dict]:
     """Read the table of curves; no rows where there is no file yet."""
     integers = ("seed", "k", "round", "photos", "evaluations")
     return csv_tables.read_table(path, numbers=(*MEASURES, *EXPECTED, "seconds"), integers=integers, missing_ok=True)
@@ -57,7 +57,7 @@ def _key(row: dict) -> tuple:
     return tuple(row[key] for key in CELL) + (row["round"],)
 
 
-def measured(told: dict, psnr: str) -> dict:
+def select_metrics(told: dict, psnr: str) -> dict:
     """MEASURES of a metrics.json, PSNR by its key: over the test views from where photos may be taken, if they are a
     group of their own, else over all."""
     groups = told["groups"]
@@ -67,16 +67,18 @@ def measured(told: dict, psnr: str) -> dict:
     return found | {"walker_psnr": groups["walker"][psnr] if "walker" in groups else None}
 
 
-def _expected(before: list[dict], fits: list[dict], photos: int) -> dict:
-    """What could be said of a round's gain beforehand. before: rows of the rounds before it; fits: their reports."""
+def _predict_gain(before: list[dict], fits: list[dict], photos: int) -> dict:
+    """Predict a round's gain from the rounds before it. before: their rows; fits: their reports."""
     if not before:
         return dict.fromkeys(EXPECTED)
-    found = marginal_gain.expected(marginal_gain.history(fits, before[0]["photos"], photos - before[-1]["photos"]))
+    found = marginal_gain.predict_gain(
+        marginal_gain.build_history(fits, before[0]["photos"], photos - before[-1]["photos"])
+    )
     values = (found.closes, found.gain, found.low, found.high) if found else (None,) * len(EXPECTED)
     return dict(zip(EXPECTED, values, strict=True))
 
 
-def _seconds(files: list[str]) -> float | None:
+def _sum_seconds(files: list[str]) -> float | None:
     """Of a round's jobs together; None where one left no benchmark."""
     if not all(Path(file).is_file() for file in files):
         return None
@@ -87,7 +89,7 @@ def _seconds(files: list[str]) -> float | None:
     return total
 
 
-def _evaluations(facts: str, samples: int) -> int:
+def _count_evaluations(facts: str, samples: int) -> int:
     """Forward passes of the prior's network, for one pose each."""
     by_steps = read_json(facts)["poses_by_steps"]
     return samples * sum(int(steps) * poses for steps, poses in by_steps.items())

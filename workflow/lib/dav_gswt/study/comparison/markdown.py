@@ -7,13 +7,13 @@ from dav_gswt.study.comparison.tables import EVERY
 from dav_gswt.study.markdown import format_table
 
 
-def write_table(path: Path | str, compared: list[dict], baseline: str) -> None:
-    """The table of `format_table`, as a file."""
+def write_comparison(path: Path | str, compared: list[dict], baseline: str) -> None:
+    """Write the table of `format_comparison`."""
     with whole(path) as part:
-        part.write_text(format_table(compared, baseline), encoding="utf-8")
+        part.write_text(format_comparison(compared, baseline), encoding="utf-8")
 
 
-def format_table(compared: list[dict], baseline: str) -> str:
+def format_comparison(compared: list[dict], baseline: str) -> str:
     """Rows of nAUC less the baseline's in dB: a row a policy, best first, with a column for all scenes and one a scene
     and k; in brackets the 95 % interval, where there is more than one start.
     """

@@ -23,7 +23,7 @@ def nauc(photos: Float[Array, "t"], psnr: Float[Array, "t"]) -> float:
     return float(np.trapezoid(psnr, photos) / (photos[-1] - photos[0]))
 
 
-def to_reach(photos: Float[Array, "t"], psnr: Float[Array, "t"], best: float, way: float = WAY) -> float | None:
+def photos_to_reach(photos: Float[Array, "t"], psnr: Float[Array, "t"], best: float, way: float = WAY) -> float | None:
     """Photos until PSNR is `way` of the way from the start to `best`, linear between rounds; None if it never is."""
     goal = psnr[0] + way * (best - psnr[0])
     for t in range(len(photos)):

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from dav_gswt.study.comparison.curves import CELL
-from dav_gswt.study.comparison.stats import nauc, to_reach
+from dav_gswt.study.comparison.stats import nauc, photos_to_reach
 from dav_gswt.study.statistics import adjust_holm, bootstrap_paired
 
 EVERYTHING = "all"  # the policy that takes the whole pool: what there is to reach, and no curve
@@ -14,14 +14,14 @@ EVERY = "every"  # scene, in the rows over all of them
 UNIT = ("scene", "quality", "seed", "k")
 
 
-def results(curves: list[dict]) -> list[dict]:
+def summarise_cells(curves: list[dict]) -> list[dict]:
     """A row a cell: nAUC, PSNR and the other measures of its last round, photos to reach WAY of all, cost.
 
     gap: dB under all photos; empty, as `to_reach`, where all were not tried or were not reached.
     """
-    best = {unit[:3]: rounds[-1]["psnr"] for unit, policy, rounds in _cells(curves) if policy[0] == EVERYTHING}
+    best = {unit[:3]: rounds[-1]["psnr"] for unit, policy, rounds in _group_cells(curves) if policy[0] == EVERYTHING}
     table = []
-    for unit, policy, rounds in _cells(curves):
+    for unit, policy, rounds in _group_cells(curves):
         if policy[0] == EVERYTHING:
             continue
         photos, psnr = (np.array([row[key] for row in rounds], float) for key in ("photos", "psnr"))
@@ -29,53 +29,58 @@ def results(curves: list[dict]) -> list[dict]:
         row = {key: last[key] for key in CELL} | {"photos": last["photos"], "nauc": nauc(photos, psnr)}
         row |= {key: last[key] for key in ("psnr", "ssim", "lpips", "worst_psnr", "walker_psnr")}
         row |= {"gap": None if goal is None else goal - last["psnr"]}
-        row |= {"to_reach": None if goal is None else to_reach(photos, psnr, goal)}
+        row |= {"to_reach": None if goal is None else photos_to_reach(photos, psnr, goal)}
         seconds = [r["seconds"] for r in rounds[1:]]
         row |= {"seconds": None if None in seconds else sum(seconds)}
         table.append(row | {"evaluations": sum(r["evaluations"] for r in rounds)})
     return table
 
 
-def comparisons(table: list[dict], baseline: str) -> list[dict]:
+def compare_to_baseline(table: list[dict], baseline: str) -> list[dict]:
     """Every policy less the baseline, in dB of nAUC: over all scenes, and of each scene and k alone.
 
     Cells are paired by scene, quality, seed, k and the photos that they end with. holm: p values over all scenes,
     raised by how many policies were compared. One cell alone has neither interval nor p.
     """
     units = [(*(row[key] for key in UNIT), row["photos"]) for row in table]
-    cells = {(unit, _policy(row)): row["nauc"] for unit, row in zip(units, table, strict=True)}
+    cells = {(unit, _policy_key(row)): row["nauc"] for unit, row in zip(units, table, strict=True)}
     base = {unit: value for (unit, policy), value in cells.items() if policy[0] == baseline}
     rows = []
     for policy in sorted({policy for _, policy in cells if policy[0] != baseline}):
         pairs = {unit: cells[unit, policy] - base[unit] for unit in sorted(base) if (unit, policy) in cells}
         if not pairs:
             continue
-        rows.append(_compared(policy, EVERY, "", pairs))
+        rows.append(_comparison_row(policy, EVERY, "", pairs))
         for scene, k in sorted({(unit[0], unit[3]) for unit in pairs}):
-            rows.append(_compared(policy, scene, k, {u: v for u, v in pairs.items() if (u[0], u[3]) == (scene, k)}))
+            rows.append(
+                _comparison_row(policy, scene, k, {u: v for u, v in pairs.items() if (u[0], u[3]) == (scene, k)})
+            )
     raised = adjust_holm(
-        {" ".join(_policy(row)): row["p"] for row in rows if row["scene"] == EVERY and row["p"] is not None}
+        {" ".join(_policy_key(row)): row["p"] for row in rows if row["scene"] == EVERY and row["p"] is not None}
     )
-    return [row | {"holm": raised.get(" ".join(_policy(row))) if row["scene"] == EVERY else None} for row in rows]
+    return [row | {"holm": raised.get(" ".join(_policy_key(row))) if row["scene"] == EVERY else None} for row in rows]
 
 
-def worth(curves: list[dict]) -> list[dict]:
+def check_predictions(curves: list[dict]) -> list[dict]:
     """What rounds gained against what was expected of them, over all scenes and of each: see `active.worth`.
 
     share: of the gap that closes, what test views gained (geometric mean), off: standard deviation of its logarithm,
     both over rounds that gained something; covered: share of all rounds whose gain lies in the interval.
     """
     checked: dict[str, list[tuple[dict, float]]] = {}
-    for _, policy, rounds in _cells(curves):
+    for _, policy, rounds in _group_cells(curves):
         for before, row in pairwise(rounds):
             if row["expected"] is not None and policy[0] != EVERYTHING:
                 gained = row["psnr"] - before["psnr"]
                 for name in (EVERY, row["scene"]):
                     checked.setdefault(name, []).append((row, gained))
-    return [{"scene": name} | _checked(found) for name, found in sorted(checked.items(), key=lambda i: i[0] != EVERY)]
+    return [
+        {"scene": name} | _summarise_predictions(found)
+        for name, found in sorted(checked.items(), key=lambda i: i[0] != EVERY)
+    ]
 
 
-def _checked(found: list[tuple[dict, float]]) -> dict:
+def _summarise_predictions(found: list[tuple[dict, float]]) -> dict:
     logs = np.array([np.log(gain / row["closes"]) for row, gain in found if gain > 0 and row["closes"] > 0])
     inside = [row["expected_low"] <= gain <= row["expected_high"] for row, gain in found]
     return {
@@ -89,7 +94,7 @@ def _checked(found: list[tuple[dict, float]]) -> dict:
     }
 
 
-def _compared(policy: tuple[str, ...], scene: str, k: int | str, pairs: dict[tuple, float]) -> dict:
+def _comparison_row(policy: tuple[str, ...], scene: str, k: int | str, pairs: dict[tuple, float]) -> dict:
     by_scene: dict[str, list[float]] = {}
     for unit, value in pairs.items():
         by_scene.setdefault(unit[0], []).append(value)
@@ -100,13 +105,13 @@ def _compared(policy: tuple[str, ...], scene: str, k: int | str, pairs: dict[tup
     return named | {"scene": scene, "k": k, "units": len(pairs)} | found
 
 
-def _policy(row: dict) -> tuple[str, ...]:
+def _policy_key(row: dict) -> tuple[str, ...]:
     return tuple(str(row[key]) for key in ("policy", "prior", "p_drop", "lam"))
 
 
-def _cells(curves: list[dict]):
+def _group_cells(curves: list[dict]):
     """Unit, policy and rounds of every cell that has at least two rounds."""
     cells: dict[tuple, list[dict]] = {}
     for row in sorted(curves, key=lambda row: row["round"]):
-        cells.setdefault((tuple(row[key] for key in UNIT), _policy(row)), []).append(row)
+        cells.setdefault((tuple(row[key] for key in UNIT), _policy_key(row)), []).append(row)
     return [(unit, policy, rounds) for (unit, policy), rounds in sorted(cells.items()) if len(rounds) > 1]
