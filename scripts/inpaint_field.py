@@ -14,7 +14,7 @@ with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
     fitted, grid, names = read_field(given.field), ground.read(given.ground), read_json(given.views)["start"]
     taken = training_views.taken(given.images, given.model, names, list(given.captures), scoring.PHOTO)
-    asked = prior_sampling.painter(params.prior, params.seed)
+    asked = prior_sampling.open_inpainting_prior(params.prior, params.seed)
     made = build.complete(fitted, grid, read_scene_frame(given.frame), taken, asked)
     if made.field is fitted:
         copied(given.field, out.field)

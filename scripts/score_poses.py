@@ -15,18 +15,18 @@ with logging_to(snakemake.log[0]):
     captures = list(given.get("captures", []))
     scene, frame, split = params.scene, read_scene_frame(given.frame), read_json(given.views)
     fitted, grid = read_field(given.field), ground.read(given.ground)
-    pool = candidates.left(scene, frame, given.model, split, captures)
+    pool = candidates.list_remaining(scene, frame, given.model, split, captures)
     if scene["agent"] != "replay":  # whose frames were all taken, wherever they stand
         pool = serial_rig.within(scene, frame, pool) if scene["agent"] == "serial" else pool
-        pool = feasibility.kept(pool, grid, scene.get("reach"), feasibility.CLEARANCE * frame.flying_height)
+        pool = feasibility.filter_feasible(pool, grid, scene.get("reach"), feasibility.CLEARANCE * frame.flying_height)
     taken = training_views.taken(given.images, given.model, split["start"], captures, scoring.PHOTO)
-    prior = prior_sampling.asked(params.prior, params.p_drop, params.seed, given.get("lpips"))
-    first = frozen_scales.read(given.frozen) if given.get("frozen") else None
-    found = scoring.score(fitted, grid, pool, taken, frame, prior, first)
-    scores.write(out.scores, found.scores)
-    pose_maps.write(out.maps, found.maps, found.gaussians)
-    image_files.write_exr_parts(out.shown, scoring.parts(found, fitted, grid))
+    prior = prior_sampling.open_scoring_prior(params.prior, params.p_drop, params.seed, given.get("lpips"))
+    first = frozen_scales.read_frozen_scales(given.frozen) if given.get("frozen") else None
+    found = scoring.score_poses(fitted, grid, pool, taken, frame, prior, first)
+    scores.write_scores(out.scores, found.scores)
+    pose_maps.write_pose_maps(out.maps, found.maps, found.gaussians)
+    image_files.write_exr_parts(out.shown, scoring.exr_parts(found, fitted, grid))
     inputs = {name: given[name] for name in ("field", "ground", "views", "weights", "lpips") if given.get(name)}
     about = {"prior": params.prior, "p_drop": params.p_drop, "seed": params.seed}
     about["variance"] = "posterior" if prior and prior.posterior else "point"
-    frozen_scales.write(out.facts, found.frozen, found.facts(), inputs, about)
+    frozen_scales.write_frozen_scales(out.facts, found.frozen, found.facts(), inputs, about)

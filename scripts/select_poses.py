@@ -12,18 +12,18 @@ from dav_gswt.views.policies import SelectionInput
 
 with logging_to(snakemake.log[0]):
     given, params, policy = snakemake.input, snakemake.params, snakemake.params.policy
-    frame, split, scored = read_scene_frame(given.frame), read_json(given.views), scores.read(given.scores)
-    taken = candidates.taken(given.model, split, given.captures)
-    known = stopping.known(given, len(split["start"]), len(taken), len(scored))
+    frame, split, scored = read_scene_frame(given.frame), read_json(given.views), scores.read_scores(given.scores)
+    taken = candidates.read_captured_cameras(given.model, split, given.captures)
+    known = stopping.read_state(given, len(split["start"]), len(taken), len(scored))
     k, chosen = selection.poses_per_round(policy, params.k, len(scored)), []
     decided = stopping.decide(params.stop, k, params.scene.get("burst", 1), known)
     if not decided.stopped:
-        pool = candidates.left(params.scene, frame, given.model, split, given.captures)
-        places, rng = candidates.places(taken, frame), np.random.default_rng([params.seed, params.t])
-        information = policy_inputs.information(policy, scored, pool, taken, given.field)
-        errors = policy_inputs.errors(policy, scored, pool, given, params.scene, params.size)
+        pool = candidates.list_remaining(params.scene, frame, given.model, split, given.captures)
+        places, rng = candidates.camera_positions(taken, frame), np.random.default_rng([params.seed, params.t])
+        information = policy_inputs.build_information_gain(policy, scored, pool, taken, given.field)
+        errors = policy_inputs.measure_true_errors(policy, scored, pool, given, params.scene, params.size)
         inputs = SelectionInput(places, decided.poses, rng, params.lam, information, errors)
         chosen = selection.select(policy, scored, inputs)
     write_json(snakemake.output.poses, poses.to_json(chosen, policy, params.k) | decided.to_json())
-    shown = pose_maps.read(given.maps)[0].parts(scored, [pose.name for pose in chosen])
+    shown = pose_maps.read_pose_maps(given.maps)[0].parts(scored, [pose.name for pose in chosen])
     image_files.write_exr_parts(snakemake.output.shown, shown or pose_maps.NOTHING)

@@ -11,11 +11,11 @@ from dav_gswt.study.views import evolution
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    key, found = evolution.measure(read_scene_frame(given.frame)), []
+    key, found = evolution.psnr_key(read_scene_frame(given.frame)), []
     for name, *paths in zip(params.named, given.fields, given.grounds, given.metrics, given.crops, strict=True):
         fitted, surface, measured, crops = paths
         read = read_field(fitted), ground.read(surface), read_json(measured)
         found.append(evolution.Round(params.rounds, *read, title=name, note=estimators.note(crops)))
-    names = list(evolution.shown(found[0].metrics, key))
+    names = list(evolution.choose_test_views(found[0].metrics, key))
     tests = training_views.taken(given.images, given.model, names, [], params.size)
-    evolution.write_figure(snakemake.output.plot, evolution.strips(found, tests, key), found, key)
+    evolution.write_figure(snakemake.output.plot, evolution.build_strips(found, tests, key), found, key)

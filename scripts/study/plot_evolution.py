@@ -10,10 +10,10 @@ from dav_gswt.study.views import evolution
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    key, rounds = evolution.measure(read_scene_frame(given.frame)), []
+    key, rounds = evolution.psnr_key(read_scene_frame(given.frame)), []
     for t, *paths in zip(params.rounds, given.fields, given.grounds, given.metrics, strict=True):
         fitted, surface, measured = paths
         rounds.append(evolution.Round(t, read_field(fitted), ground.read(surface), read_json(measured)))
-    names = list(evolution.shown(rounds[0].metrics, key))
+    names = list(evolution.choose_test_views(rounds[0].metrics, key))
     tests = training_views.taken(given.images, given.model, names, [], params.size)
-    evolution.write_figure(snakemake.output.plot, evolution.strips(rounds, tests, key), rounds, key)
+    evolution.write_figure(snakemake.output.plot, evolution.build_strips(rounds, tests, key), rounds, key)

@@ -8,6 +8,6 @@ from dav_gswt.views import candidates
 
 with logging_to(snakemake.log[0]):
     scene = snakemake.params.scene
-    pool = candidates.hemisphere(scene, read_scene_frame(snakemake.input.frame))
+    pool = candidates.list_hemisphere(scene, read_scene_frame(snakemake.input.frame))
     with whole_folder(snakemake.output.truth) as folder:
-        truth.write(folder, truth.shown(scene, truth.spread(pool, snakemake.params.poses), ""))
+        truth.write_truth(folder, truth.render_truth(scene, truth.spread_candidates(pool, snakemake.params.poses), ""))

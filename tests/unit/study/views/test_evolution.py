@@ -60,27 +60,27 @@ def texts(figure):
     ],
 )
 def test_the_worst_and_the_median_view_are_shown(views, names):
-    assert list(evolution.shown(rows(**views), "psnr")) == names
+    assert list(evolution.choose_test_views(rows(**views), "psnr")) == names
 
 
 def test_the_choice_goes_by_the_measure_and_equal_pictures_are_the_best():
     found = rows(a=30.0, b=20.0, c=25.0)
-    assert list(evolution.shown(found, "psnr_colour_corrected")) == ["a", "c"]
+    assert list(evolution.choose_test_views(found, "psnr_colour_corrected")) == ["a", "c"]
     found["test_views"][1]["psnr"] = None
-    assert list(evolution.shown(found, "psnr")) == ["c", "a"]
-    assert evolution.measure(scene_frame(kind="photos")) == KEYS[1]
-    assert evolution.measure(scene_frame(kind="synthetic")) == KEYS[0]
+    assert list(evolution.choose_test_views(found, "psnr")) == ["c", "a"]
+    assert evolution.psnr_key(scene_frame(kind="photos")) == KEYS[1]
+    assert evolution.psnr_key(scene_frame(kind="synthetic")) == KEYS[0]
 
 
 def test_without_a_test_view_there_is_nothing_to_show():
     with pytest.raises(InputError, match="round 0: has no test view"):
-        evolution.shown({"test_views": []}, "psnr")
+        evolution.choose_test_views({"test_views": []}, "psnr")
 
 
 @pytest.mark.parametrize("key", KEYS)
 def test_errors_are_those_that_the_metrics_were_measured_by(key):
     one, view = round_of(1, 0.2), spoilt()[1]
-    found = evolution.look(one, view, key)
+    found = evolution.render_view(one, view, key)
     counts = modelled([view], patch.grid())[0].weight > 0
     assert 0.1 < counts.mean() < 0.99
     np.testing.assert_array_equal(np.isfinite(found.error), counts)
@@ -92,10 +92,10 @@ def test_what_does_not_count_is_greyed_out():
     picture = np.zeros((2, 2, 3), np.float32)
     picture[..., 0] = 1
     counts = np.array([[True, False], [False, True]])
-    found = evolution.faded(picture, counts)
+    found = evolution.fade_masked(picture, counts)
     np.testing.assert_array_equal(found[counts], picture[counts])
     assert np.abs(found[~counts] - evolution.GREY).max() <= 1 - evolution.FADED + 1e-6
-    figure = evolution.drawn(evolution.strips(cell(), spoilt(), "psnr"), cell(), "psnr")
+    figure = evolution.draw_figure(evolution.build_strips(cell(), spoilt(), "psnr"), cell(), "psnr")
     for shown in errors(figure):
         np.testing.assert_allclose(shown.cmap(np.nan)[:3], evolution.GREY)
         assert np.isnan(np.ma.filled(shown.get_array(), np.nan)).any()
@@ -103,23 +103,23 @@ def test_what_does_not_count_is_greyed_out():
 
 def test_the_same_views_are_shown_in_all_rounds_on_one_scale():
     rounds = cell()
-    found = evolution.strips(rounds, spoilt(), "psnr")
-    assert [strip.name for strip in found] == list(evolution.shown(rounds[0].metrics, "psnr"))
+    found = evolution.build_strips(rounds, spoilt(), "psnr")
+    assert [strip.name for strip in found] == list(evolution.choose_test_views(rounds[0].metrics, "psnr"))
     assert all(len(strip.looks) == len(rounds) for strip in found)
-    figure = evolution.drawn(found, rounds, "psnr")
+    figure = evolution.draw_figure(found, rounds, "psnr")
     maps = errors(figure)
-    assert len(maps) == 6 and {shown.get_clim() for shown in maps} == {(0, evolution.highest(found))}
+    assert len(maps) == 6 and {shown.get_clim() for shown in maps} == {(0, evolution.error_limit(found))}
     for shown, one in zip(maps, [one for strip in found for one in strip.looks], strict=True):
         np.testing.assert_array_equal(np.ma.filled(shown.get_array(), np.nan), one.error)
     every = np.concatenate([one.error.ravel() for strip in found for one in strip.looks])
-    assert evolution.highest(found) == pytest.approx(np.nanquantile(every, evolution.HIGHEST))
+    assert evolution.error_limit(found) == pytest.approx(np.nanquantile(every, evolution.HIGHEST))
     pictures = [shown.get_array() for axes in figure.axes for shown in axes.get_images()]
     assert len(pictures) == 2 * (1 + 3 + 3)
 
 
 def test_under_each_column_stand_its_photos_and_measures():
     rounds = cell()
-    figure = evolution.drawn(evolution.strips(rounds, spoilt(), KEYS[1]), rounds, KEYS[1])
+    figure = evolution.draw_figure(evolution.build_strips(rounds, spoilt(), KEYS[1]), rounds, KEYS[1])
     said = texts(figure)
     assert [text for text in said if text in ("photo", *(f"round {t}" for t in range(5)))] == [
         "photo", "round 0", "round 1", "round 3",
@@ -136,12 +136,12 @@ def test_a_round_that_lacks_a_view_is_named():
     rounds = cell()
     rounds[1].metrics["test_views"] = rounds[1].metrics["test_views"][:1]
     with pytest.raises(InputError, match="metrics.json of round 1: lacks the test view photo_"):
-        evolution.strips(rounds, spoilt(), "psnr")
+        evolution.build_strips(rounds, spoilt(), "psnr")
 
 
 def test_the_figure_is_wide_enough_to_read_and_the_same_each_time(tmp_path):
     rounds = cell()
-    found = evolution.strips(rounds, spoilt(), "psnr")
+    found = evolution.build_strips(rounds, spoilt(), "psnr")
     for name in ("a.png", "b.png"):
         evolution.write_figure(tmp_path / name, found, rounds, "psnr")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()

@@ -19,7 +19,7 @@ from dav_gswt.prior import conditions
 from dav_gswt.prior.conditions import Taken
 from dav_gswt.reconstruction import underlay
 from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.views.prior_sampling import Asking
+from dav_gswt.views.prior_sampling import PriorConfig
 
 _log = logging.getLogger(__name__)
 
@@ -43,7 +43,7 @@ class Completed:
         return counts | {"things": self.things, "exemplar": inside, "changed": bool(self.field.imagined.any())}
 
 
-def complete(field: GaussianField, grid: Ground, frame: SceneFrame, taken: list[View], asked: Asking) -> Completed:
+def complete(field: GaussianField, grid: Ground, frame: SceneFrame, taken: list[View], asked: PriorConfig) -> Completed:
     """Paint the ground that no photo saw, one picture from above after the other, each told of those before.
 
     Discs of such ground, and the underlay under them alone, take the painted colours and keep their places: a prior's
@@ -140,7 +140,12 @@ def _marked(field: GaussianField, marked: Bool[Array, "n"]) -> GaussianField:
 
 
 def _standing(
-    field: GaussianField, grid: Ground, frame: SceneFrame, known: Taken, targets: list[Float[Array, "3"]], asked: Asking
+    field: GaussianField,
+    grid: Ground,
+    frame: SceneFrame,
+    known: Taken,
+    targets: list[Float[Array, "3"]],
+    asked: PriorConfig,
 ) -> list[GaussianField]:
     """What stands on the painted ground about each target."""
     found, size = [], asked.model.size

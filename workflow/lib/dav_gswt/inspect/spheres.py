@@ -16,7 +16,7 @@ from dav_gswt.inspect.fields import colours, solid, thinned
 from dav_gswt.inspect.options import Asked
 from dav_gswt.inspect.scene import INK, Keys, Layer, Scene, Word, balls, bar_over, coloured
 from dav_gswt.inspect.sites import bounds, ground, looking
-from dav_gswt.study.views.sphere import HIGHEST, shade
+from dav_gswt.study.views.sphere import HIGHEST, candidate_values
 from dav_gswt.views import scores as tables
 from dav_gswt.views.scores import Scores
 
@@ -43,7 +43,7 @@ def of_scores(path: Path, poses: Path | None, asked: Asked, rounds: int) -> Scen
         raise InputError(
             f"{path}: its scene's photos/ground.json is in no folder above it; leave it in its result tree"
         )
-    frame, table = read_scene_frame(photos / "ground.json"), tables.read(path)
+    frame, table = read_scene_frame(photos / "ground.json"), tables.read_scores(path)
     if not len(table):
         raise InputError(f"{path}: no candidate is in it: none was left to choose from")
     label, values = shaded(table, asked.colour, beside.lam_of(poses or path))
@@ -75,7 +75,7 @@ def of_scores(path: Path, poses: Path | None, asked: Asked, rounds: int) -> Scen
 def shaded(table: Scores, name: str | None, lam: float) -> tuple[str, Float64[Array, "n"]]:
     """What to colour by, in words and numbers: a term, or what the round chose by. Raises: InputError: no such term."""
     if name is None:
-        return shade(table, lam)
+        return candidate_values(table, lam)
     if name not in table.terms:
         raise InputError(f"--colour {name}: these poses have {', '.join(table.terms)}")
     return name, table.terms[name]
@@ -128,4 +128,4 @@ def _taken(path: Path, photos: Path) -> list:
         return []
     split = read_json(up / "views.json")
     with beside.told_by(up / "views.json"):
-        return candidates.taken(photos / "sparse", split, captures)
+        return candidates.read_captured_cameras(photos / "sparse", split, captures)

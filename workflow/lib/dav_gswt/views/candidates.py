@@ -21,28 +21,28 @@ Candidates = list[tuple[Pose, Camera]]
 AROUND, LOWEST = 250, 30.0  # poses that devices and people may be asked for, and their least elevation in degrees
 
 
-def left(scene: dict, frame: SceneFrame, model_folder: Path | str, split: dict, captures: list) -> Candidates:
+def list_remaining(scene: dict, frame: SceneFrame, model_folder: Path | str, split: dict, captures: list) -> Candidates:
     """Every pose that can still be captured: the scene's candidates less those that captures have used."""
     if scene["agent"] == "render":
-        pool = hemisphere(scene, frame)
+        pool = list_hemisphere(scene, frame)
     else:
         known = model.read(model_folder)
         at = dict(zip(known.names, known.cameras, strict=True))
         if scene["agent"] == "replay":
             pool = [(of_camera(name, at[name], frame), at[name]) for name in split["pool"]]
         else:
-            pool = around(scene, frame, at[split["start"][0]])
-    used = {name for folder in captures for name in _names(folder)}
+            pool = list_orbit(scene, frame, at[split["start"][0]])
+    used = {name for folder in captures for name in _used_names(folder)}
     return [(pose, camera) for pose, camera in pool if pose.name not in used]
 
 
-def hemisphere(scene: dict, frame: SceneFrame) -> Candidates:
+def list_hemisphere(scene: dict, frame: SceneFrame) -> Candidates:
     """Poses spread evenly over the hemisphere from which a synthetic scene can be photographed."""
     found = synthetic.candidates(scene, middle(frame))
     return [(of_camera(f"pose_{i:04d}", camera, frame), camera) for i, camera in enumerate(found)]
 
 
-def around(scene: dict, frame: SceneFrame, like: Camera) -> Candidates:
+def list_orbit(scene: dict, frame: SceneFrame, like: Camera) -> Candidates:
     """Poses spread evenly over the hemisphere at the flying height, for devices and people. like: a camera whose lens
     they have. `lowest`: the least elevation, degrees."""
     places = camera_layouts.hemisphere(
@@ -53,29 +53,29 @@ def around(scene: dict, frame: SceneFrame, like: Camera) -> Candidates:
     return [(of_camera(f"pose_{i:04d}", camera, frame), replace(camera, **lens)) for i, camera in enumerate(found)]
 
 
-def taken(model_folder: Path | str, split: dict, captures: list) -> list[Camera]:
+def read_captured_cameras(model_folder: Path | str, split: dict, captures: list) -> list[Camera]:
     """The cameras of the photos taken so far."""
     known = model.read(model_folder)
     at = dict(zip(known.names, known.cameras, strict=True))
     start = [at[name] for name in split["start"]]
-    return start + [cameras.from_json(shot["got"]) for folder in captures for shot in _shots(folder)]
+    return start + [cameras.from_json(shot["got"]) for folder in captures for shot in _read_photos(folder)]
 
 
-def places(taken: list[Camera], frame: SceneFrame) -> Float[Array, "m 3"]:
+def camera_positions(taken: list[Camera], frame: SceneFrame) -> Float[Array, "m 3"]:
     """Where cameras stand, relative to the exemplar's centre."""
     return np.array([camera.centre - middle(frame) for camera in taken]).reshape(-1, 3)
 
 
-def as_asked(pool: Candidates, chosen: list[dict]) -> Candidates:
+def select_by_name(pool: Candidates, chosen: list[dict]) -> Candidates:
     """The candidates that poses.json names."""
     by_name = {pose.name: (pose, camera) for pose, camera in pool}
     return [by_name[pose["name"]] for pose in chosen]
 
 
-def _shots(folder: Path | str) -> list[dict]:
+def _read_photos(folder: Path | str) -> list[dict]:
     return read_json(Path(folder) / "capture.json")["shots"]
 
 
-def _names(folder: Path | str) -> list[str]:
+def _used_names(folder: Path | str) -> list[str]:
     """Names of poses asked for and of photos got: a frame got in place of another leaves the pool too."""
-    return [name for shot in _shots(folder) for name in (shot["asked"]["name"], shot["name"])]
+    return [name for shot in _read_photos(folder) for name in (shot["asked"]["name"], shot["name"])]

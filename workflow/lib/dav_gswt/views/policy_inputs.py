@@ -16,26 +16,28 @@ from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.policies import InformationGain
 from dav_gswt.views.policy_names import NEEDS_FIELD, ORACLES
 from dav_gswt.views.scores import Scores
-from dav_gswt.views.scoring import small
+from dav_gswt.views.scoring import scoring_camera
 
 
-def information(
+def build_information_gain(
     policy: str, scores: Scores, pool: Candidates, taken: list[Camera], file: Path | str
 ) -> InformationGain | None:
     """For `fisher`: the information that photos give about a field's file, candidates in the order of the scores."""
     if policy not in NEEDS_FIELD:
         return None
     at = {pose.name: camera for pose, camera in pool}
-    return fisher.Gathered(read_field(file), [small(c) for c in taken], [small(at[name]) for name in scores.names])
+    return fisher.FisherInformation(
+        read_field(file), [scoring_camera(c) for c in taken], [scoring_camera(at[name]) for name in scores.names]
+    )
 
 
-def errors(
+def measure_true_errors(
     policy: str, scores: Scores, pool: Candidates, files: dict[str, Path | str], scene: dict, size: int
 ) -> Float64[Array, "n"] | None:
     """For oracles: the true error at each candidate, NaN where its truth was not drawn.
 
     files: `field`, `ground`, `frame`, and `truth`, the folder of what candidates truly show; `images`, the photos of a
-    scene that is replayed. size: see `measures.errors`.
+    scene that is replayed. size: see `measures.measure_errors`.
     Raises: InputError: no candidate's truth is known.
     """
     if policy not in ORACLES:
@@ -43,11 +45,11 @@ def errors(
     from dav_gswt.study.calibration import measures, truth
 
     if scene["agent"] == "replay":
-        some, views = pool, list(truth.shown(scene, pool, files["images"]))
+        some, views = pool, list(truth.render_truth(scene, pool, files["images"]))
     else:
-        some, views = truth.kept(pool, files["truth"])
+        some, views = truth.read_truth(pool, files["truth"])
     corrected = read_scene_frame(files["frame"]).kind == "photos"  # which change their exposure
-    found, _ = measures.errors(read_field(files["field"]), ground.read(files["ground"]), views, size, corrected)
+    found, _ = measures.measure_errors(read_field(files["field"]), ground.read(files["ground"]), views, size, corrected)
     known = {pose.name: error for (pose, _), error in zip(some, found, strict=True)}
     if not known:
         raise InputError(f"{files['truth']}: shows no candidate that is left; make it again with more of them")

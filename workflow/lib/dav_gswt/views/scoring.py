@@ -20,12 +20,12 @@ from dav_gswt.reconstruction.opacity_uncertainty import render_uncertainty
 from dav_gswt.reconstruction.top_view import from_above
 from dav_gswt.views import collision, fisher, prior_sampling
 from dav_gswt.views.candidates import Candidates
-from dav_gswt.views.frozen_scales import Frozen
+from dav_gswt.views.frozen_scales import FrozenScales
 from dav_gswt.views.pose_maps import Part, PoseMaps
-from dav_gswt.views.prior_sampling import Asking
+from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.scores import Scores
-from dav_gswt.views.uncertainty.backprojection import carried
-from dav_gswt.views.uncertainty.weighting import Quantiles, Scales, normalised
+from dav_gswt.views.uncertainty.backprojection import backproject_maps
+from dav_gswt.views.uncertainty.weighting import Quantiles, Scales, normalise
 
 WIDTH = 96  # pixels of a picture that is only scored
 PHOTO = 384  # pixels across of a photo that priors are shown, before it is cut to its middle square and made smaller
@@ -33,12 +33,12 @@ OTHERS = 16  # candidates whose maps are shown
 
 
 @dataclass(frozen=True)
-class Scored:
+class ScoringResult:
     """All that scoring finds. gaussians: uncertainty of each of the field's Gaussians, in [0, 1]."""
 
     scores: Scores
     maps: PoseMaps
-    frozen: Frozen
+    frozen: FrozenScales
     gaussians: Float32[Array, "gaussians"]
 
     def facts(self) -> dict:
@@ -48,7 +48,7 @@ class Scored:
         return {"candidates": len(self.scores), "terms": list(self.scores.terms), "poses_by_steps": told}
 
 
-def parts(found: Scored, field: GaussianField, grid: Ground) -> dict[str, Part]:
+def exr_parts(found: ScoringResult, field: GaussianField, grid: Ground) -> dict[str, Part]:
     """The maps to show, as parts of an EXR: the ground from above, and candidates spread over the hemisphere."""
     above = from_above(replace(field, uncertainty=found.gaussians), grid).uncertainty[::-1]
     some = [found.scores.names[i] for i in spread(found.scores.poses, OTHERS)]
@@ -56,60 +56,60 @@ def parts(found: Scored, field: GaussianField, grid: Ground) -> dict[str, Part]:
     return {"above": ({"uncertainty": above}, {"camera": "straight above"})} | shown
 
 
-def small(camera: Camera) -> Camera:
+def scoring_camera(camera: Camera) -> Camera:
     """A candidate's camera at the size at which poses are scored."""
     return camera.resized(WIDTH, max(1, round(WIDTH * camera.height / camera.width)))
 
 
-def score(
+def score_poses(
     field: GaussianField,
     grid: Ground,
     pool: Candidates,
     taken: list[View],
     frame: SceneFrame,
-    prior: Asking | None = None,
-    frozen: Frozen | None = None,
-) -> Scored:
+    prior: PriorConfig | None = None,
+    frozen: FrozenScales | None = None,
+) -> ScoringResult:
     """Every candidate's terms (opacity and Fisher gain; with a prior also how much its samples disagree) and its maps.
 
     taken: the photos so far. prior: None: geometry alone. frozen: of the first round; None: this is the first.
     Raises: InputError: a candidate under the ground or inside of what stands on it, by name.
     """
-    collision.require(pool, field, grid)
-    terms, opacity = _geometric(field, grid, pool, [small(view.camera) for view in taken])
+    collision.require_free_positions(pool, field, grid)
+    terms, opacity = _score_geometry(field, grid, pool, [scoring_camera(view.camera) for view in taken])
     steps, w2_sq = np.zeros(len(pool), int), None
     if prior is not None and pool:
-        condition, counts = told(field, grid, pool, taken, frame, prior.model.size)
-        found, steps = prior_sampling.terms(prior, condition, [pose.name for pose, _ in pool], counts)
+        condition, counts = build_conditions(field, grid, pool, taken, frame, prior.model.size)
+        found, steps = prior_sampling.sample_terms(prior, condition, [pose.name for pose, _ in pool], counts)
         terms |= {name: values.astype(np.float64) for name, values in found.named().items()}
         w2_sq = found.maps
     poses, names = [pose for pose, _ in pool], [pose.name for pose, _ in pool]
-    frozen = frozen or _frozen(terms, w2_sq, names)
+    frozen = frozen or _freeze_scales(terms, w2_sq, names)
     scores, maps = Scores(poses, terms, frozen.scales, steps), PoseMaps(names, opacity, w2_sq)
-    return Scored(scores, maps, frozen, _gaussians(field, pool, w2_sq, frozen))
+    return ScoringResult(scores, maps, frozen, _gaussian_uncertainty(field, pool, w2_sq, frozen))
 
 
-def told(
+def build_conditions(
     field: GaussianField, grid: Ground, pool: Candidates, taken: list[View], frame: SceneFrame, size: int
 ) -> tuple[Condition, Float32[Array, "n s s"]]:
     """What a prior is told of candidates, and which of its pixels look at the modelled ground (1)."""
     known = conditions.taken(taken, frame, size)
     squares = [conditions.squared(camera).resized(size, size) for _, camera in pool]
-    counts = np.stack([on_ground(grid, camera) for camera in squares])
+    counts = np.stack([ground_mask(grid, camera) for camera in squares])
     return conditions.condition(field, pool, known, frame.flying_height, size), counts
 
 
-def _geometric(
+def _score_geometry(
     field: GaussianField, grid: Ground, pool: Candidates, taken: list[Camera]
 ) -> tuple[dict[str, Float64[Array, "n"]], Float32[Array, "n h w"]]:
     """opacity: mean of the opacity map over the pixels that look at the modelled ground; 0 where none does."""
     raster = Rasterizer()
-    already = fisher.known(field, taken, raster)
+    already = fisher.accumulate_information(field, taken, raster)
     terms, maps = {"opacity": np.zeros(len(pool)), "fisher": np.zeros(len(pool))}, []
     for i, (_, camera) in enumerate(progress(pool, "score poses")):
-        maps.append(render_uncertainty(field, small(camera), raster))
-        terms["fisher"][i] = fisher.gain(raster.contributions(), already)
-        weight = on_ground(grid, small(camera))
+        maps.append(render_uncertainty(field, scoring_camera(camera), raster))
+        terms["fisher"][i] = fisher.information_gain(raster.contributions(), already)
+        weight = ground_mask(grid, scoring_camera(camera))
         terms["opacity"][i] = float((maps[-1] * weight).sum() / max(1.0, weight.sum()))
     shape = (0, 1, 1) if not maps else (len(maps), *np.max([m.shape for m in maps], axis=0))
     out = np.full(shape, np.nan, np.float32)  # cameras of one pool may differ in their height
@@ -118,24 +118,26 @@ def _geometric(
     return terms, out
 
 
-def on_ground(grid: Ground, camera: Camera) -> Float32[Array, "h w"]:
+def ground_mask(grid: Ground, camera: Camera) -> Float32[Array, "h w"]:
     """1 for the pixels of a camera that look at the modelled ground."""
     shape = camera.height, camera.width
     blank = View("", camera, np.zeros((*shape, 3), np.float32), np.ones(shape, np.float32))
     return over_ground(blank, *grid.judged).weight
 
 
-def _frozen(terms: dict[str, Float64[Array, "n"]], w2_sq: Float32[Array, "n h w"] | None, names: list[str]) -> Frozen:
+def _freeze_scales(
+    terms: dict[str, Float64[Array, "n"]], w2_sq: Float32[Array, "n h w"] | None, names: list[str]
+) -> FrozenScales:
     pixels = None if w2_sq is None or not w2_sq.size else Quantiles.frozen(w2_sq.ravel())
-    return Frozen(Scales.frozen(terms, names), pixels)
+    return FrozenScales(Scales.frozen(terms, names), pixels)
 
 
-def _gaussians(
-    field: GaussianField, pool: Candidates, w2_sq: Float32[Array, "n h w"] | None, frozen: Frozen
+def _gaussian_uncertainty(
+    field: GaussianField, pool: Candidates, w2_sq: Float32[Array, "n h w"] | None, frozen: FrozenScales
 ) -> Float32[Array, "gaussians"]:
     """What the prior's maps say of each Gaussian; of those that no candidate sees, and without a prior, geometry."""
     if w2_sq is None or frozen.pixels is None:
         return field.uncertainty
     cameras = [conditions.squared(camera) for _, camera in pool]
-    found = carried(field, cameras, normalised(w2_sq, frozen.pixels))
+    found = backproject_maps(field, cameras, normalise(w2_sq, frozen.pixels))
     return np.where(np.isnan(found), field.uncertainty, found).astype(np.float32)

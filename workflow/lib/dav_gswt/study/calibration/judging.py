@@ -16,14 +16,14 @@ from dav_gswt.study.calibration import controls, measures, truth
 from dav_gswt.views import prior_sampling
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.pose_maps import PoseMaps
-from dav_gswt.views.prior_sampling import Asking
+from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.scores import Scores
-from dav_gswt.views.scoring import told
-from dav_gswt.views.uncertainty import combined
+from dav_gswt.views.scoring import build_conditions
+from dav_gswt.views.uncertainty import combine_terms
 
 
 @dataclass(frozen=True)
-class Judged:
+class CalibrationTarget:
     """The field whose scores are judged. taken: the photos so far. size: longer side of those that it was fitted to."""
 
     scene: dict
@@ -34,14 +34,14 @@ class Judged:
     size: int
 
 
-def calibrated(
-    judged: Judged,
+def calibrate_scores(
+    judged: CalibrationTarget,
     some: Candidates,
     views: list[View],
     scored: tuple[Scores, PoseMaps],
     lam: float,
     seed: int,
-    prior: Asking | None = None,
+    prior: PriorConfig | None = None,
     regressors: Sequence = (),
 ) -> tuple[dict, list[dict]]:
     """The content of calibration.json, and a row for each of some candidates that were scored.
@@ -50,53 +50,55 @@ def calibrated(
     how far from the nearest photo. prior, regressors: for `controls`, beside the scores that there are.
     """
     row = {name: i for i, name in enumerate(scored[0].names)}
-    terms, shown = _scored(*scored, [row[pose.name] for pose, _ in some], lam)
-    terms |= geometric([pose for pose, _ in some], [of_camera("", v.camera, judged.frame) for v in judged.taken])
+    terms, shown = _select_terms(*scored, [row[pose.name] for pose, _ in some], lam)
+    terms |= geometric_baselines(
+        [pose for pose, _ in some], [of_camera("", v.camera, judged.frame) for v in judged.taken]
+    )
     if prior is not None and some:
         given = judged.field, judged.grid, some, judged.taken, judged.frame
-        condition, counts = told(*given, prior.model.size)
-        others = controls.maps(prior, regressors, condition)
+        condition, counts = build_conditions(*given, prior.model.size)
+        others = controls.control_maps(prior, regressors, condition)
         shown |= others
         # `residual` takes the place of the scores' term: that of samples from other noises, whatever was asked for them
-        terms |= {name: prior_sampling.over(m, counts) for name, m in others.items()}
+        terms |= {name: prior_sampling.weighted_mean(m, counts) for name, m in others.items()}
     corrected = judged.frame.kind == "photos"  # which change their exposure
-    error, error_maps = measures.errors(judged.field, judged.grid, views, judged.size, corrected)
+    error, error_maps = measures.measure_errors(judged.field, judged.grid, views, judged.size, corrected)
     table = [
         {"pose": pose.name, "error": error[i]} | {name: values[i] for name, values in terms.items()}
         for i, (pose, _) in enumerate(some)
     ]
-    return measures.result(terms, shown, error, error_maps, seed), table
+    return measures.summarise(terms, shown, error, error_maps, seed), table
 
 
-def compared(
-    judged: Judged, pool: Candidates, scored: Scores, given: dict, count: int
+def choose_candidates(
+    judged: CalibrationTarget, pool: Candidates, scored: Scores, given: dict, count: int
 ) -> tuple[Candidates, list[View]]:
     """The candidates to compare, spread over those that were scored, and what they truly show.
 
-    given: folders, `images` of photos and, where a scene can be rendered, `truth` (see `truth.write`).
+    given: folders, `images` of photos and, where a scene can be rendered, `truth` (see `truth.write_truth`).
     """
     names = set(scored.names)
     known = [(pose, camera) for pose, camera in pool if pose.name in names]
     if given.get("truth"):
-        return truth.kept(known, given["truth"])
-    some = truth.spread(known, count)
-    return some, list(truth.shown(judged.scene, some, given["images"]))
+        return truth.read_truth(known, given["truth"])
+    some = truth.spread_candidates(known, count)
+    return some, list(truth.render_truth(judged.scene, some, given["images"]))
 
 
-def geometric(some: list[Pose], taken: list[Pose]) -> dict[str, Float64[Array, "n"]]:
+def geometric_baselines(some: list[Pose], taken: list[Pose]) -> dict[str, Float64[Array, "n"]]:
     """What any score has to beat: `low`, degrees under the zenith, and `far`, how far the nearest photo is."""
     at, photos = (np.array([place(pose) for pose in poses]).reshape(-1, 3) for poses in (some, taken))
     apart = np.linalg.norm(at[:, None] - photos, axis=-1).min(1, initial=np.inf)
     return {"low": np.array([90.0 - pose.elevation for pose in some]), "far": apart}
 
 
-def _scored(
+def _select_terms(
     scores: Scores, maps: PoseMaps, rows: list[int], lam: float
 ) -> tuple[dict[str, Float64[Array, "n"]], dict[str, Float32[Array, "n _ _"]]]:
     """The terms of some rows, u among them where a prior was asked, and their maps."""
     terms = {name: values[rows] for name, values in scores.terms.items()}
     shown = {"opacity": maps.opacity[rows]}
     if "w2_sq" in scores.terms:
-        u = combined(scores.term("w2_sq"), scores.terms.get("lpips"), lam, scores.scales, scores.names)
+        u = combine_terms(scores.term("w2_sq"), scores.terms.get("lpips"), lam, scores.scales, scores.names)
         terms, shown = terms | {"u": u[rows]}, shown | {"w2_sq": maps.w2_sq[rows]}
     return terms, shown

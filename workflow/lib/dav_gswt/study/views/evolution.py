@@ -66,12 +66,12 @@ class Strip:
     looks: list[Look]
 
 
-def measure(frame: SceneFrame) -> str:
+def psnr_key(frame: SceneFrame) -> str:
     """The key of PSNR in metrics.json: colour-corrected for photos, which change their exposure."""
     return "psnr_colour_corrected" if frame.kind == "photos" else "psnr"
 
 
-def shown(first: dict, key: str, named: str = "round 0") -> dict[str, str]:
+def choose_test_views(first: dict, key: str, named: str = "round 0") -> dict[str, str]:
     """The test views to show, by name, and why: the worst and the median one by PSNR. first: metrics.json of `named`.
 
     Of an even number the better one of the middle two; one test view is shown alone.
@@ -86,21 +86,21 @@ def shown(first: dict, key: str, named: str = "round 0") -> dict[str, str]:
     return {rows[i]["view"]: why for i, why in whys.items()}
 
 
-def strips(rounds: list[Round], tests: list[View], key: str) -> list[Strip]:
-    """The test views that `shown` chooses, after each round, the first of which is round 0. key: see `measure`.
+def build_strips(rounds: list[Round], tests: list[View], key: str) -> list[Strip]:
+    """Return the chosen test views after each round; the first round is round 0. key: see `psnr_key`.
 
     Raises: InputError: a round's metrics lack the view.
     """
     views = {view.name: view for view in tests}
     found = []
-    for name, why in shown(rounds[0].metrics, key, rounds[0].named).items():
-        looks = [look(one, views[name], key) for one in rounds]
+    for name, why in choose_test_views(rounds[0].metrics, key, rounds[0].named).items():
+        looks = [render_view(one, views[name], key) for one in rounds]
         counts = np.isfinite(looks[0].error)
-        found.append(Strip(name, why, faded(views[name].image, counts), looks))
+        found.append(Strip(name, why, fade_masked(views[name].image, counts), looks))
     return found
 
 
-def look(one: Round, view: View, key: str) -> Look:
+def render_view(one: Round, view: View, key: str) -> Look:
     """The view after a round, its colours corrected where its PSNR is that of corrected ones."""
     row = next((row for row in one.metrics["test_views"] if row["view"] == view.name), None)
     if row is None:
@@ -111,16 +111,16 @@ def look(one: Round, view: View, key: str) -> Look:
         picture = np.clip(metrics.correct_colours(picture, view.image, view.weight), 0, 1).astype(np.float32)
     counts = view.weight > 0
     error = np.where(counts, np.abs(picture - view.image).mean(-1), np.float32(np.nan))
-    return Look(faded(picture, counts), error, row)
+    return Look(fade_masked(picture, counts), error, row)
 
 
-def faded(picture: Float32[Array, "h w 3"], counts: Array) -> Float32[Array, "h w 3"]:
+def fade_masked(picture: Float32[Array, "h w 3"], counts: Array) -> Float32[Array, "h w 3"]:
     """The picture, nearly GREY where a pixel does not count."""
     grey = picture + np.float32(FADED) * (np.float32(GREY) - picture)
     return np.where(counts[..., None], picture, grey)
 
 
-def highest(found: list[Strip]) -> float:
+def error_limit(found: list[Strip]) -> float:
     """The error at which colours end, of all maps."""
     errors = np.concatenate([one.error[np.isfinite(one.error)] for strip in found for one in strip.looks])
     return float(np.quantile(errors, HIGHEST)) or 1.0
@@ -128,10 +128,10 @@ def highest(found: list[Strip]) -> float:
 
 def write_figure(path: Path | str, found: list[Strip], rounds: list[Round], key: str) -> None:
     """The figure of strips, as a PNG."""
-    figures.save(drawn(found, rounds, key), path)
+    figures.save(draw_figure(found, rounds, key), path)
 
 
-def drawn(found: list[Strip], rounds: list[Round], key: str):
+def draw_figure(found: list[Strip], rounds: list[Round], key: str):
     """Of each view the photo and a render a round, under these maps of the error on one scale, under these the view's
     measures; under each column the photos that the round had and its measures over all test views."""
     from matplotlib import colormaps
@@ -145,15 +145,15 @@ def drawn(found: list[Strip], rounds: list[Round], key: str):
     figure = figures.blank(WIDE, sum(tall) + HEAD + LABEL * len(found) + foot + KEY)
     figure.get_layout_engine().set(w_pad=0.02, h_pad=0.02, hspace=0.0, wspace=0.0)
     grid = figure.subplots(len(tall) + 2, columns, squeeze=False, height_ratios=[HEAD, *tall, foot])
-    colours = {"norm": Normalize(0, highest(found)), "cmap": colormaps[MAP].with_extremes(bad=str(GREY))}
+    colours = {"norm": Normalize(0, error_limit(found)), "cmap": colormaps[MAP].with_extremes(bad=str(GREY))}
     for axes in grid.flat:
         axes.set(xticks=[], yticks=[])
         axes.spines[:].set_visible(False)
     for axes, title in zip(grid[0], ["photo", *(one.named for one in rounds)], strict=True):
-        _say(axes, title, size=12)
+        _write_text(axes, title, size=12)
     for strip, pictures, maps in zip(found, grid[1:-1:2], grid[2:-1:2], strict=True):
-        _strip(strip, pictures, maps, colours, key)
-    _foot(grid[-1], rounds, key)
+        _draw_strip(strip, pictures, maps, colours, key)
+    _draw_footer(grid[-1], rounds, key)
     bar = figure.colorbar(
         ScalarMappable(**colours), ax=grid, location="bottom", extend="max", shrink=0.7, aspect=45, pad=0.01
     )
@@ -162,27 +162,29 @@ def drawn(found: list[Strip], rounds: list[Round], key: str):
     return figure
 
 
-def _strip(strip: Strip, pictures, maps, colours: dict, key: str) -> None:
+def _draw_strip(strip: Strip, pictures, maps, colours: dict, key: str) -> None:
     pictures[0].imshow(strip.photo)
-    _say(maps[0], f"{strip.name}:\n{strip.why}")
+    _write_text(maps[0], f"{strip.name}:\n{strip.why}")
     for one, above, below in zip(strip.looks, pictures[1:], maps[1:], strict=True):
         above.imshow(one.picture)
         below.imshow(one.error, **colours)
-        below.set_xlabel(_measured(one.row, key), fontsize=11)
+        below.set_xlabel(_format_metrics(one.row, key), fontsize=11)
 
 
-def _foot(row, rounds: list[Round], key: str) -> None:
+def _draw_footer(row, rounds: list[Round], key: str) -> None:
     count = len(rounds[0].metrics["test_views"])
     corrected = ",\nPSNR colour-corrected" if key == "psnr_colour_corrected" else ""
-    _say(row[0], (f"mean of {count} test views" if count > 1 else "the one test view") + corrected)
+    _write_text(row[0], (f"mean of {count} test views" if count > 1 else "the one test view") + corrected)
     for axes, one in zip(row[1:], rounds, strict=True):
-        _say(axes, f"{one.metrics['photos']} photos\n{_measured(one.metrics, key)}{one.note}", weight="bold")
+        _write_text(
+            axes, f"{one.metrics['photos']} photos\n{_format_metrics(one.metrics, key)}{one.note}", weight="bold"
+        )
 
 
-def _say(axes, text: str, **how) -> None:
+def _write_text(axes, text: str, **how) -> None:
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", **({"size": 11} | how))
 
 
-def _measured(row: dict, key: str) -> str:
+def _format_metrics(row: dict, key: str) -> str:
     psnr = "equal" if row[key] is None else f"{row[key]:.1f} dB"
     return f"{psnr}, SSIM {row['ssim']:.3f}"

@@ -35,9 +35,12 @@ STAR = {"marker": "*", "edgecolors": "black", "linewidths": 1.2}
 
 @dataclass(frozen=True)
 class Round:
-    """What a round chose from. values: of the candidates, by which they are coloured. candidates, taken: angle and
-    radius in the figure (`on_disc`), taken being the photos before the round. chosen: candidates, in order of choice.
-    lowest: elevation in degrees, of all that is shown."""
+    """The candidates of a round and its choice.
+
+    values: of the candidates, shown as colours. candidates, taken: angle and radius in the figure (`project_poses`);
+    taken are the photos before the round. chosen: indices of candidates, in order of choice. lowest: least elevation of
+    all, degrees.
+    """
 
     number: int
     values: Float64[Array, "n"]
@@ -47,7 +50,7 @@ class Round:
     lowest: float
 
 
-def on_disc(poses: list[Pose]) -> Float64[Array, "n 2"]:
+def project_poses(poses: list[Pose]) -> Float64[Array, "n 2"]:
     """Where poses lie in the figure: azimuth (radians, from east to north) and r = sqrt(1 - sin(elevation)).
 
     r is 0 straight above and 1 at the horizon, and r^2, as the area of a cap, grows by equal steps of height.
@@ -56,7 +59,7 @@ def on_disc(poses: list[Pose]) -> Float64[Array, "n 2"]:
     return np.stack([azimuth, np.sqrt(1 - np.sin(elevation))], -1)
 
 
-def shade(scores: Scores, lam: float) -> tuple[str, Float64[Array, "n"]]:
+def candidate_values(scores: Scores, lam: float) -> tuple[str, Float64[Array, "n"]]:
     """What candidates are coloured by, in words and in numbers: the doubt u, or opacity if no prior was asked (or one
     without dropout, whose samples all agree)."""
     if scores.scales.of.get("w2_sq", 0.0) > 0:
@@ -67,7 +70,7 @@ def shade(scores: Scores, lam: float) -> tuple[str, Float64[Array, "n"]]:
     return "not known to be opaque, in units of the scale frozen at round 1", values
 
 
-def of_round(number: int, scores: Scores, asked: dict, taken: list[Camera], frame: SceneFrame, lam: float) -> Round:
+def read_round(number: int, scores: Scores, asked: dict, taken: list[Camera], frame: SceneFrame, lam: float) -> Round:
     """scores: of the candidates before the round. asked: the round's poses.json. taken: cameras of all photos before.
 
     Raises: InputError: a pose was chosen that is not among the candidates.
@@ -79,15 +82,17 @@ def of_round(number: int, scores: Scores, asked: dict, taken: list[Camera], fram
         raise InputError(f"poses.json of round {number}: {strange[0]} is not among the scored poses; make it again")
     lowest = min((pose.elevation for pose in scores.poses + photos), default=0.0)
     chosen = [index[name] for name in names]
-    return Round(number, shade(scores, lam)[1], on_disc(scores.poses), on_disc(photos), chosen, lowest)
+    return Round(
+        number, candidate_values(scores, lam)[1], project_poses(scores.poses), project_poses(photos), chosen, lowest
+    )
 
 
 def write_figure(path: Path | str, rounds: list[Round], label: str) -> None:
     """The figure of rounds, as a PNG. label: what the colours are."""
-    figures.save(drawn(rounds, label), path)
+    figures.save(draw_figure(rounds, label), path)
 
 
-def drawn(rounds: list[Round], label: str):
+def draw_figure(rounds: list[Round], label: str):
     """A panel a round: each candidate a dot, its colour on one scale for all rounds; photos taken before the round are
     hollow squares, the poses it chose are stars, numbered as they were chosen."""
     from matplotlib.cm import ScalarMappable
@@ -97,9 +102,9 @@ def drawn(rounds: list[Round], label: str):
     figure.get_layout_engine().set(w_pad=0.06, h_pad=0.06)
     panels = figure.subplots(rows, columns, squeeze=False, subplot_kw={"projection": "polar"})
     rim = RING * int(min(one.lowest for one in rounds) // RING)
-    colours = {"norm": _scale(rounds), "cmap": "viridis"}
+    colours = {"norm": _colour_scale(rounds), "cmap": "viridis"}
     for axes, one in zip(panels.flat, rounds, strict=False):
-        _draw(axes, one, rim, colours)
+        _draw_panel(axes, one, rim, colours)
     for empty in panels.flat[len(rounds) :]:
         empty.set_axis_off()
     bar = figure.colorbar(
@@ -111,11 +116,11 @@ def drawn(rounds: list[Round], label: str):
         f"from above: azimuth around; elevation 90° in the middle, {RING}° less at each ring, {rim}° at the outermost"
     )
     key = {"frameon": False, "fontsize": 11, "title_fontsize": 11}
-    figure.legend(handles=_key(), loc="outside lower center", ncols=3, title=about, **key)
+    figure.legend(handles=_legend_handles(), loc="outside lower center", ncols=3, title=about, **key)
     return figure
 
 
-def _scale(rounds: list[Round]):
+def _colour_scale(rounds: list[Round]):
     """Colours from the least value of all rounds to nearly the greatest."""
     from matplotlib.colors import Normalize
 
@@ -124,7 +129,7 @@ def _scale(rounds: list[Round]):
     return Normalize(float(low), float(high) if high > low else float(low) + 1.0)
 
 
-def _draw(axes, one: Round, rim: int, colours: dict) -> None:
+def _draw_panel(axes, one: Round, rim: int, colours: dict) -> None:
     edge = float(np.sqrt(1 - np.sin(np.radians(rim))))
     axes.set_ylim(0, 1.04 * edge)
     axes.set_yticks(np.sqrt(1 - np.sin(np.radians(np.arange(rim, 90, RING)))), [])
@@ -139,23 +144,23 @@ def _draw(axes, one: Round, rim: int, colours: dict) -> None:
     stars, star = one.candidates[one.chosen], min(260, max(120, 8 * dot)) if numbered else 70
     axes.scatter(*stars.T, c=one.values[one.chosen], s=star, zorder=3, **STAR, **colours)
     if numbered and one.chosen:
-        _number(axes, stars, one.taken, edge)
+        _draw_labels(axes, stars, one.taken, edge)
     chosen = f"{len(one.chosen)} of {len(one.values)} poses" if one.chosen else "no pose"
     photos = "1 photo" if len(one.taken) == 1 else f"{len(one.taken)} photos"
     axes.set_title(f"round {one.number}: {chosen}, after {photos}", fontsize=12)
 
 
-def _number(axes, stars: Float64[Array, "k 2"], taken: Float64[Array, "m 2"], edge: float) -> None:
+def _draw_labels(axes, stars: Float64[Array, "k 2"], taken: Float64[Array, "m 2"], edge: float) -> None:
     from matplotlib.patheffects import withStroke
 
     halo = [withStroke(linewidth=2.5, foreground="white")]
-    for order, (x, y) in enumerate(beside(_flat(stars), _flat(taken), edge), 1):
+    for order, (x, y) in enumerate(place_labels(_to_cartesian(stars), _to_cartesian(taken), edge), 1):
         at = np.arctan2(y, x), np.hypot(x, y)
         how = {"ha": "center", "va": "center_baseline", "fontsize": 11, "weight": "bold"}
         axes.text(*at, f"{order}", zorder=4, path_effects=halo, **how)
 
 
-def beside(stars: Float64[Array, "k 2"], taken: Float64[Array, "m 2"], edge: float) -> Float64[Array, "k 2"]:
+def place_labels(stars: Float64[Array, "k 2"], taken: Float64[Array, "m 2"], edge: float) -> Float64[Array, "k 2"]:
     """Where numbers go, x and y: APART from their star, on that of eight sides where most is free of stars, photos
     and the numbers before; the first of equal ones, from the right and counter-clockwise. edge: radius of the disc,
     outside of which none stands."""
@@ -170,13 +175,13 @@ def beside(stars: Float64[Array, "k 2"], taken: Float64[Array, "m 2"], edge: flo
     return np.array(found)
 
 
-def _flat(polar: Float64[Array, "n 2"]) -> Float64[Array, "n 2"]:
+def _to_cartesian(polar: Float64[Array, "n 2"]) -> Float64[Array, "n 2"]:
     """Angle and radius as x and y."""
     angle, radius = polar.T
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], -1)
 
 
-def _key() -> list:
+def _legend_handles() -> list:
     from matplotlib.lines import Line2D
 
     edge = {"linestyle": "", "markeredgecolor": "black", "markerfacecolor": "none"}
