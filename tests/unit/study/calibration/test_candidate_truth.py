@@ -9,7 +9,7 @@ from dav_gswt.geometry.poses import Pose, place
 from dav_gswt.images import image_files
 from dav_gswt.photos.synthetic import desert, scene
 from dav_gswt.study.calibration import truth
-from dav_gswt.views.scoring import small
+from dav_gswt.views.scoring import scoring_camera
 
 ENTRY = {"family": "desert", "seed": 0, "agent": "render"}
 
@@ -36,7 +36,7 @@ def test_what_can_be_rendered_is_drawn_as_a_photo_then_shrunk(monkeypatch, size,
     taken = []
     monkeypatch.setattr(scene, "render", lambda world, camera: taken.append(camera) or noise(camera))
     pool = candidates(*size, count=2)
-    views = list(truth.shown(ENTRY, pool, "nowhere"))
+    views = list(truth.render_truth(ENTRY, pool, "nowhere"))
     assert [(camera.width, camera.height) for camera in taken] == [drawn] * 2
     assert [view.name for view in views] == ["p0.png", "p1.png"]
     for view, camera, (_, whole) in zip(views, taken, pool, strict=True):
@@ -52,7 +52,7 @@ def test_a_synthetic_scene_truly_shows_its_photo(monkeypatch):
     pytest.importorskip("mitsuba")
     monkeypatch.setattr(desert, "TEXELS", 256)
     pool = candidates(128, 128)
-    (view,) = truth.shown(ENTRY, pool, "nowhere")
+    (view,) = truth.render_truth(ENTRY, pool, "nowhere")
     photo = scene.render(scene.of_config(ENTRY), pool[0][1])
     scene._world.cache_clear()
     np.testing.assert_array_equal(view.image, image_files.shrink_image(photo, 96, 96))
@@ -65,26 +65,30 @@ def test_a_replayed_scene_truly_shows_its_frames_without_what_is_masked(tmp_path
     cover = np.ones((camera.height, camera.width), np.float32)
     cover[: camera.height // 2] = 0
     image_files.write_png(tmp_path / pose.name, np.dstack([noise(camera), cover]))
-    (view,) = truth.shown({"agent": "replay"}, pool, tmp_path)
-    assert vars(view.camera).keys() == vars(small(camera)).keys() and view.camera.fx == small(camera).fx
-    assert view.image.shape == (small(camera).height, 96, 3) == (*view.weight.shape, 3)
-    np.testing.assert_allclose(
-        view.image, image_files.shrink_image(noise(camera), 96, small(camera).height), atol=0.5 / 255
+    (view,) = truth.render_truth({"agent": "replay"}, pool, tmp_path)
+    assert (
+        vars(view.camera).keys() == vars(scoring_camera(camera)).keys() and view.camera.fx == scoring_camera(camera).fx
     )
-    middle = small(camera).height // 2
+    assert view.image.shape == (scoring_camera(camera).height, 96, 3) == (*view.weight.shape, 3)
+    np.testing.assert_allclose(
+        view.image, image_files.shrink_image(noise(camera), 96, scoring_camera(camera).height), atol=0.5 / 255
+    )
+    middle = scoring_camera(camera).height // 2
     assert (view.weight[: middle - 1] == 0).all() and (view.weight[middle + 1 :] == 1).all()
 
 
 def test_truth_is_not_known_where_photos_must_be_asked_for(tmp_path):
     with pytest.raises(InputError, match="handheld"):
-        list(truth.shown({"agent": "handheld"}, candidates(64, 64), tmp_path))
+        list(truth.render_truth({"agent": "handheld"}, candidates(64, 64), tmp_path))
     with pytest.raises(InputError, match=r"p0\.png"):
-        list(truth.shown({"agent": "replay"}, candidates(128, 96), tmp_path))
+        list(truth.render_truth({"agent": "replay"}, candidates(128, 96), tmp_path))
 
 
 def test_few_candidates_are_spread_and_always_the_same():
     pool = candidates(8, 8, count=12)
-    chosen = [pose.name for pose, _ in truth.spread(pool, 4)]
+    chosen = [pose.name for pose, _ in truth.spread_candidates(pool, 4)]
     assert chosen[:2] == ["p0.png", "p6.png"] and set(chosen[2:]) == {"p3.png", "p9.png"}
-    assert truth.spread(pool, 50) != [] and {p.name for p, _ in truth.spread(pool, 50)} == {p.name for p, _ in pool}
-    assert truth.spread([], 3) == []
+    assert truth.spread_candidates(pool, 50) != [] and {p.name for p, _ in truth.spread_candidates(pool, 50)} == {
+        p.name for p, _ in pool
+    }
+    assert truth.spread_candidates([], 3) == []

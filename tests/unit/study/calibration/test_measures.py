@@ -13,7 +13,7 @@ from dav_gswt.images import image_files
 from dav_gswt.photos.training_views import View
 from dav_gswt.raster import render
 from dav_gswt.study.calibration import measures
-from dav_gswt.views.scoring import on_ground
+from dav_gswt.views.scoring import ground_mask
 
 SIDE = 48
 GRID, FIELD = ground.grid(), ground.field()
@@ -30,40 +30,40 @@ def views():
 
 
 def test_a_field_has_no_error_against_its_own_pictures(views):
-    error, maps = measures.errors(FIELD, GRID, views, SIDE)
+    error, maps = measures.measure_errors(FIELD, GRID, views, SIDE)
     np.testing.assert_allclose(error, 0, atol=1e-6)
     for view, found in zip(views, maps, strict=True):
-        np.testing.assert_array_equal(np.isnan(found), on_ground(GRID, view.camera) == 0)
+        np.testing.assert_array_equal(np.isnan(found), ground_mask(GRID, view.camera) == 0)
         assert 0 < np.isnan(found).sum() < found.size
 
 
 def test_an_error_is_the_root_mean_square_over_channels_and_the_pixels_that_count(views):
     view = views[0]
-    counts = on_ground(GRID, view.camera) > 0
+    counts = ground_mask(GRID, view.camera) > 0
     columns = np.arange(SIDE) < 20
     off = np.where(counts & columns, np.float32(0.3), np.where(counts, np.float32(0), np.float32(0.7)))
     wrong = replace(view, image=view.image + off[..., None] * np.float32([0, 1, 0]))
-    (error,), (found,) = measures.errors(FIELD, GRID, [wrong], SIDE)
+    (error,), (found,) = measures.measure_errors(FIELD, GRID, [wrong], SIDE)
     np.testing.assert_allclose(found[counts & columns], 0.3 / 3**0.5, atol=1e-5)
     np.testing.assert_allclose(found[counts & ~columns], 0, atol=1e-5)
     assert error == pytest.approx(0.3 / 3**0.5 * (counts & columns).sum() ** 0.5 / counts.sum() ** 0.5, abs=1e-5)
     hidden = replace(wrong, weight=(~columns * np.ones((SIDE, 1))).astype(np.float32))
-    (error,), (found,) = measures.errors(FIELD, GRID, [hidden], SIDE)
+    (error,), (found,) = measures.measure_errors(FIELD, GRID, [hidden], SIDE)
     assert error == pytest.approx(0, abs=1e-5) and np.isnan(found[:, columns]).all()
 
 
 def test_another_exposure_is_an_error_unless_it_is_corrected(views):
     gain, offset = np.float32([0.8, 0.9, 0.7]), np.float32([0.1, 0.05, 0.0])
     other = [replace(view, image=gain * view.image + offset) for view in views]
-    assert (measures.errors(FIELD, GRID, other, SIDE)[0] > 0.02).all()
-    np.testing.assert_allclose(measures.errors(FIELD, GRID, other, SIDE, corrected=True)[0], 0, atol=1e-5)
+    assert (measures.measure_errors(FIELD, GRID, other, SIDE)[0] > 0.02).all()
+    np.testing.assert_allclose(measures.measure_errors(FIELD, GRID, other, SIDE, corrected=True)[0], 0, atol=1e-5)
 
 
 def test_a_view_of_nothing_that_is_modelled_has_no_error(views):
     aside = replace(views[0], camera=cameras.pinhole([90, 90, 4], [90, 90.1, 0], SIDE, SIDE, 40.0))
-    error, maps = measures.errors(FIELD, GRID, [aside, views[1]], SIDE)
+    error, maps = measures.measure_errors(FIELD, GRID, [aside, views[1]], SIDE)
     assert np.isnan(error[0]) and np.isnan(maps[0]).all() and np.isfinite(error[1])
-    assert len(measures.errors(FIELD, GRID, [], SIDE)[0]) == 0
+    assert len(measures.measure_errors(FIELD, GRID, [], SIDE)[0]) == 0
 
 
 def test_the_field_is_drawn_as_large_as_it_was_fitted(views):
@@ -72,15 +72,15 @@ def test_the_field_is_drawn_as_large_as_it_was_fitted(views):
     camera = views[0].camera
     photo = np.clip(render(fine, camera.resized(4 * SIDE, 4 * SIDE)).colour, 0, 1).astype(np.float32)
     view = replace(views[0], image=image_files.shrink_image(photo, SIDE, SIDE))
-    assert measures.errors(fine, large, [view], 4 * SIDE)[0][0] == pytest.approx(0, abs=1e-6)
-    assert measures.errors(fine, large, [view], SIDE)[0][0] > 1e-3
+    assert measures.measure_errors(fine, large, [view], 4 * SIDE)[0][0] == pytest.approx(0, abs=1e-6)
+    assert measures.measure_errors(fine, large, [view], SIDE)[0][0] > 1e-3
 
 
 def test_a_score_that_knows_the_errors_and_one_that_knows_nothing():
     rng = np.random.default_rng(0)
     error = rng.exponential(1, 300)
     scores = {"oracle": error**2, "reversed": -error, "nothing": rng.normal(size=300)}
-    found = measures.judged(scores, error, seed=0)
+    found = measures.evaluate_scores(scores, error, seed=0)
     assert list(found) == ["oracle", "reversed", "nothing"]
     assert found["oracle"]["spearman"] == pytest.approx(1) and found["oracle"]["ause"] == pytest.approx(0, abs=1e-12)
     assert found["reversed"]["spearman"] == pytest.approx(-1) and abs(found["nothing"]["spearman"]) < 0.15
@@ -96,9 +96,9 @@ def test_a_score_that_knows_the_errors_and_one_that_knows_nothing():
 def test_a_judgement_depends_on_its_seed_alone():
     rng = np.random.default_rng(1)
     scores, error = {"a": rng.normal(size=60)}, rng.exponential(1, 60)
-    one, same, other = (measures.judged(scores, error, seed)["a"] for seed in (0, 0, 1))
+    one, same, other = (measures.evaluate_scores(scores, error, seed)["a"] for seed in (0, 0, 1))
     assert one == same and one["width"] != other["width"] and one["spearman"] == other["spearman"]
-    assert measures.judged(scores, error, 0, level=0.5)["a"]["width"] < one["width"]
+    assert measures.evaluate_scores(scores, error, 0, level=0.5)["a"]["width"] < one["width"]
 
 
 @pytest.mark.parametrize(
@@ -112,26 +112,26 @@ def test_a_judgement_depends_on_its_seed_alone():
 )
 def test_nothing_is_said_of_too_few_poses(count, said):
     error = np.random.default_rng(2).exponential(1, count)
-    (found,) = measures.judged({"a": np.arange(count, dtype=float)}, error, 0).values()
+    (found,) = measures.evaluate_scores({"a": np.arange(count, dtype=float)}, error, 0).values()
     assert len(found) == 5 and {key for key, value in found.items() if value is not None} == said
 
 
 def test_nothing_is_said_of_a_constant_and_what_is_not_a_number_is_refused():
     error = np.arange(50.0)
-    found = measures.judged({"a": np.ones(50), "b": error}, error, 0)
+    found = measures.evaluate_scores({"a": np.ones(50), "b": error}, error, 0)
     assert set(found["a"].values()) == {None} and None not in found["b"].values()
     with pytest.raises(ValueError, match="not finite"):
-        measures.judged({"a": np.where(error == 3, np.nan, error)}, error, 0)
+        measures.evaluate_scores({"a": np.where(error == 3, np.nan, error)}, error, 0)
 
 
 def test_cells_are_means_over_the_middle_square_of_what_is_known():
     picture = np.arange(24.0).reshape(4, 6)  # the middle square: columns 1 to 4
-    np.testing.assert_allclose(measures.in_cells(picture, 2, 2), [[4.5, 6.5], [16.5, 18.5]])
-    np.testing.assert_allclose(measures.in_cells(picture.T, 2, 2), [[4.5, 16.5], [6.5, 18.5]])
+    np.testing.assert_allclose(measures.average_cells(picture, 2, 2), [[4.5, 6.5], [16.5, 18.5]])
+    np.testing.assert_allclose(measures.average_cells(picture.T, 2, 2), [[4.5, 16.5], [6.5, 18.5]])
     picture[0, 1] = picture[0, 2] = np.nan  # half of the first cell is left: 7 and 8
     picture[2:, 3] = picture[3, 4] = np.nan  # a quarter of the last
-    np.testing.assert_allclose(measures.in_cells(picture, 2, 2), [[7.5, 6.5], [16.5, np.nan]])
-    thirds = measures.in_cells(np.array([[1.0, 2, 3], [4, 5, 6], [7, 8, 9]]), 2, 2)
+    np.testing.assert_allclose(measures.average_cells(picture, 2, 2), [[7.5, 6.5], [16.5, np.nan]])
+    thirds = measures.average_cells(np.array([[1.0, 2, 3], [4, 5, 6], [7, 8, 9]]), 2, 2)
     # the first cell: 1 whole, halves of 2 and 4, a quarter of 5
     assert thirds[0, 0] == pytest.approx((1 + 0.5 * (2 + 4) + 0.25 * 5) / 2.25)
 
@@ -141,21 +141,21 @@ def test_pixels_are_compared_where_the_error_is_known():
     score, error = rng.uniform(size=(2, 5, 12, 16))
     error = error + score
     error[:, :, 12:] = np.nan
-    found = measures.judged_pixels({"a": score, "oracle": error.copy(), "flat": np.ones((5, 12, 16))}, error)
+    found = measures.evaluate_pixels({"a": score, "oracle": error.copy(), "flat": np.ones((5, 12, 16))}, error)
     known = np.isfinite(error)
     assert found["a"]["pixel_spearman"] == pytest.approx(spearmanr(score[known], error[known]).statistic)
     assert found["oracle"]["pixel_ause"] == pytest.approx(0, abs=1e-12)
     assert 0.01 < found["a"]["pixel_ause"] < found["a"]["pixel_ause_chance"]
     assert set(found["flat"].values()) == {None}
-    assert set(measures.judged_pixels({"a": score}, np.full_like(error, np.nan))["a"].values()) == {None}
+    assert set(measures.evaluate_pixels({"a": score}, np.full_like(error, np.nan))["a"].values()) == {None}
     with pytest.raises(ValueError, match="not finite"):
-        measures.judged_pixels({"a": np.where(score < 0.1, np.nan, score)}, error)
+        measures.evaluate_pixels({"a": np.where(score < 0.1, np.nan, score)}, error)
 
 
 def test_maps_of_the_middle_square_are_compared_by_cells():
     error = np.random.default_rng(4).uniform(size=(3, 12, 16))
-    square = np.stack([measures.in_cells(one, 4, 4) for one in error])
-    found = measures.judged_pixels({"oracle": square, "turned": square[:, ::-1]}, error)
+    square = np.stack([measures.average_cells(one, 4, 4) for one in error])
+    found = measures.evaluate_pixels({"oracle": square, "turned": square[:, ::-1]}, error)
     assert found["oracle"]["pixel_spearman"] == pytest.approx(1)
     assert abs(found["turned"]["pixel_spearman"]) < 0.6
 
@@ -166,14 +166,14 @@ def test_maps_of_lower_pictures_end_where_the_picture_does():
     padded = np.full((2, 12, 16), np.nan)
     for row, error in zip(padded, errors, strict=True):
         row[: len(error)] = error
-    assert measures.judged_pixels({"a": padded}, errors)["a"]["pixel_spearman"] == pytest.approx(1)
+    assert measures.evaluate_pixels({"a": padded}, errors)["a"]["pixel_spearman"] == pytest.approx(1)
 
 
 def test_of_many_pixels_some_are_taken_evenly(monkeypatch):
     rng = np.random.default_rng(6)
     score, error = rng.uniform(size=(2, 4, 50, 50))
     monkeypatch.setattr(measures, "PIXELS", 3000)
-    found = measures.judged_pixels({"a": score}, score + error)["a"]["pixel_spearman"]
+    found = measures.evaluate_pixels({"a": score}, score + error)["a"]["pixel_spearman"]
     assert found == pytest.approx(spearmanr(score.ravel()[::4], (score + error).ravel()[::4]).statistic)
 
 
@@ -182,10 +182,10 @@ def test_a_result_leaves_out_poses_without_error_and_is_json():
     error, maps = rng.uniform(0.1, 1, 12), rng.uniform(size=(12, 8, 8))
     score, pixels = error.copy(), maps.copy()
     error[3], maps[3], score[3] = np.nan, np.nan, 99.0
-    found = measures.result({"a": score, "b": -score}, {"a": pixels}, error, list(maps), seed=0)
+    found = measures.summarise({"a": score, "b": -score}, {"a": pixels}, error, list(maps), seed=0)
     assert found["poses"] == 11 and found["error_mean"] == pytest.approx(np.nanmean(error)) and found["level"] == 0.9
     assert found["scores"]["a"]["spearman"] == pytest.approx(1) == found["scores"]["a"]["pixel_spearman"]
     assert found["scores"]["b"]["spearman"] == pytest.approx(-1) and "pixel_spearman" not in found["scores"]["b"]
     assert json.loads(json.dumps(found, allow_nan=False)) == found
-    none = measures.result({"a": score[3:4]}, {"a": pixels[3:4]}, error[3:4], [maps[3]], seed=0)
+    none = measures.summarise({"a": score[3:4]}, {"a": pixels[3:4]}, error[3:4], [maps[3]], seed=0)
     assert none["poses"] == 0 and none["error_mean"] is None and set(none["scores"]["a"].values()) == {None}

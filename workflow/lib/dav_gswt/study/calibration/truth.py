@@ -15,14 +15,14 @@ from dav_gswt.logs import progress
 from dav_gswt.photos.synthetic import scene as synthetic
 from dav_gswt.photos.training_views import WHOLE, View
 from dav_gswt.views.candidates import Candidates
-from dav_gswt.views.scoring import WIDTH, small
+from dav_gswt.views.scoring import WIDTH, scoring_camera
 
 # A photo's pixels are noisy, clipped and encoded before they are shrunk: drawn at WIDTH at once, flowers come out 0.03
 # too bright. The rays that a picture this many times as wide takes are needed anyhow, to be rid of the noise.
 FINE = 4
 
 
-def shown(scene: dict, pool: Candidates, images_folder: Path | str) -> Iterator[View]:
+def render_truth(scene: dict, pool: Candidates, images_folder: Path | str) -> Iterator[View]:
     """The photo of each candidate in turn, WIDTH pixels across, named by its pose; weight 0 where it is masked.
 
     scene: its entry in the config. Of agent `render` it is the photo that would be taken, drawn at most FINE times as
@@ -32,27 +32,27 @@ def shown(scene: dict, pool: Candidates, images_folder: Path | str) -> Iterator[
     if scene["agent"] == "render":
         world = synthetic.of_config(scene)
         for pose, camera in progress(pool, "draw what candidates show"):
-            yield _shrunk(pose.name, camera, synthetic.render(world, _drawn(camera)))
+            yield _shrink_view(pose.name, camera, synthetic.render(world, _render_camera(camera)))
     elif scene["agent"] == "replay":
         for pose, camera in pool:
-            yield _shrunk(pose.name, camera, *image_files.read_photo_and_alpha(Path(images_folder) / pose.name))
+            yield _shrink_view(pose.name, camera, *image_files.read_photo_and_alpha(Path(images_folder) / pose.name))
     else:
         raise InputError(f"agent {scene['agent']}: what candidates truly show is known of `render` and `replay` alone")
 
 
-def write(folder: Path | str, views: Iterator[View]) -> None:
+def write_truth(folder: Path | str, views: Iterator[View]) -> None:
     """Keep what candidates show, as PNGs named by their poses."""
     for view in views:
         image_files.write_png(Path(folder) / f"{view.name}.png", view.image)
 
 
-def kept(pool: Candidates, folder: Path | str) -> tuple[Candidates, list[View]]:
-    """The candidates whose pictures `write` kept, and these. Raises: InputError: a picture of another size."""
+def read_truth(pool: Candidates, folder: Path | str) -> tuple[Candidates, list[View]]:
+    """The candidates whose pictures `write_truth` kept, and these. Raises: InputError: a picture of another size."""
     some = [(pose, camera) for pose, camera in pool if (Path(folder) / f"{pose.name}.png").is_file()]
     found = []
     for pose, camera in some:
         image = image_files.read_photo(path := Path(folder) / f"{pose.name}.png")
-        camera = small(camera)
+        camera = scoring_camera(camera)
         if image.shape != (camera.height, camera.width, 3):
             raise InputError(
                 f"{path}: {image.shape[1]} x {image.shape[0]} pixels, not those of its pose; make it again"
@@ -61,21 +61,21 @@ def kept(pool: Candidates, folder: Path | str) -> tuple[Candidates, list[View]]:
     return some, found
 
 
-def spread(pool: Candidates, count: int) -> Candidates:
+def spread_candidates(pool: Candidates, count: int) -> Candidates:
     """`count` candidates, or all, evenly spread: each the farthest from those before, the first one first."""
     return [pool[i] for i in poses.spread([pose for pose, _ in pool], count)]
 
 
-def _drawn(camera: Camera) -> Camera:
+def _render_camera(camera: Camera) -> Camera:
     """The candidate's own camera, unless that is wider than is needed, or too narrow."""
     across = min(max(camera.width, WIDTH), FINE * WIDTH)
     return camera.resized(across, max(1, round(across * camera.height / camera.width)))
 
 
-def _shrunk(
+def _shrink_view(
     name: str, camera: Camera, image: Float32[Array, "h w 3"], cover: Float32[Array, "h w"] | None = None
 ) -> View:
-    camera = small(camera)
+    camera = scoring_camera(camera)
     size = camera.width, camera.height
     weight = (
         np.ones(size[::-1], bool)
