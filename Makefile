@@ -5,7 +5,7 @@ PORT ?= 8000
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: run view test bench prior compiler
+.PHONY: run view test bench docs prior compiler
 .DELETE_ON_ERROR:
 
 run: .venv/installed
@@ -19,6 +19,10 @@ test: .venv/installed-test
 
 bench: .venv/installed-test
 	@for bench in benchmarks/*.py; do PYTHONPATH=tests:tests/browser $(BIN)/python $$bench || exit 1; done
+
+# the documentation as a site in site/; a warning is an error
+docs: .venv/installed-docs
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 
 # hours: the weights that come with the project were made so
 prior: .venv/installed
@@ -43,6 +47,10 @@ INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check
 	fi
 	@touch $@
 
-.venv/installed-test: .venv/installed requirements-test.lock
+.venv/installed-docs: .venv/installed requirements-docs.lock
+	@$(INSTALL) -r requirements-docs.lock
+	@touch $@
+
+.venv/installed-test: .venv/installed-docs requirements-test.lock
 	@$(INSTALL) -r requirements-test.lock
 	@touch $@

@@ -1,4 +1,4 @@
-"""Level weights and cross-faded opacities: numerics.md's rows, hand-worked values, the numbers shared with the page."""
+"""Level weights and cross-faded opacities: hand-worked values, the numbers shared with the page."""
 
 import json
 from pathlib import Path

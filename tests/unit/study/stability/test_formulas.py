@@ -29,8 +29,8 @@ def test_the_printed_w2_gives_what_the_notes_say():
     assert formula.error(found, found.printed).found == -131072
 
 
-def test_every_row_of_the_notes_on_numerics_has_a_formula_or_a_reason(shared):
-    notes = (shared / "design/numerics.md").read_text(encoding="utf-8").splitlines()
+def test_every_row_of_the_notes_on_numerics_has_a_formula_or_a_reason(root):
+    notes = (root / "docs/research/numerics.md").read_text(encoding="utf-8").splitlines()
     items = {line.split(" | ")[0].removeprefix("| ") for line in notes if line.startswith("| ")} - {"item"}
     assert len(items) > 15
     assert items - {found.item for found in ALL} == set(registry.WITHOUT)

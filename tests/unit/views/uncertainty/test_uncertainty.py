@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from dav_gswt.errors import InputError
 from dav_gswt.views import uncertainty as un
 
-FLOAT32 = 1e-5  # numerics.md's tolerance of a float32 kernel against float64
+FLOAT32 = 1e-5  # tolerance of a float32 kernel against float64: docs/research/numerics.md
 
 
 def normal(*shape, seed=0):

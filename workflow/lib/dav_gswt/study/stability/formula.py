@@ -8,7 +8,7 @@ from jaxtyping import Float64
 from numpy import ndarray as Array
 
 SINGLE = float(np.finfo(np.float32).eps)  # 1.2e-7, twice the largest rounding of a float32
-LAW = 1e-5, "numerics.md: float32 against float64"  # a tolerance, and where it comes from
+LAW = 1e-5, "float32 against float64 (docs/research/numerics.md)"  # a tolerance, and where it comes from
 
 
 @dataclass(frozen=True)

@@ -184,7 +184,7 @@ FORMULAS = [
     Formula(
         "PSNR",
         "PSNR over the pixels that count",
-        "evaluation.md",
+        "docs/research/evaluation.md",
         "differences 1e-7 to 1",
         "float32",
         _near,
@@ -195,7 +195,7 @@ FORMULAS = [
     Formula(
         "PSNR",
         "PSNR of equal pictures is null",
-        "evaluation.md",
+        "docs/research/evaluation.md",
         "pictures of 0, 1e-6, 1",
         "float32",
         _equal,
@@ -206,7 +206,7 @@ FORMULAS = [
     Formula(
         "PSNR",
         "a picture fitted to a photo by gain and offset",
-        "evaluation.md",
+        "docs/research/evaluation.md",
         "differences 1e-7 to 1",
         "float32",
         _near,

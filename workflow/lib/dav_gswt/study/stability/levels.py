@@ -230,7 +230,7 @@ FORMULAS = [
     Formula(
         ALPHA,
         "distance at which a level takes over",
-        "numerics.md",
+        "docs/research/numerics.md",
         "scales 1e-12 to 1e6",
         "float64",
         lambda: [Point(f"scale {s:g}", (s,)) for s in (1e-12, 1e-6, 1.0, 1e6)],

@@ -1,4 +1,4 @@
-"""All formulas that are compared with float64, and the rows of numerics.md that hold none."""
+"""All formulas that are compared with float64, and the rows of docs/research/numerics.md that hold none."""
 
 from dav_gswt.study.stability import cutting, image_metrics, levels, rendering, scoring, selection, stored
 
@@ -13,4 +13,4 @@ GROUPS = {
 }
 WITHOUT = {
     "Algorithm 1": "counts of photos: whole numbers, which the runs at k = pool try",
-}  # rows of numerics.md's table without a formula, and why
+}  # rows of its table without a formula, and why

@@ -1,4 +1,4 @@
-"""The rasterizer in use beside the oracle in float64, at what numerics.md names; and what follows from its weights."""
+"""The rasterizer in use beside the oracle in float64 (docs/research/numerics.md), and what follows from its weights."""
 
 import numpy as np
 from numpy import ndarray as Array

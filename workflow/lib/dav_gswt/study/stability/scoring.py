@@ -154,7 +154,7 @@ FORMULAS = [
         _latents,
         _ours_w2,
         un.w2_sq_by_pairs,
-        Tolerance(1e-5, 0.0, "numerics.md"),
+        Tolerance(1e-5, 0.0, "docs/research/numerics.md"),
     ),
     Formula(
         W2,
@@ -165,7 +165,7 @@ FORMULAS = [
         _deviations_of_numerics,
         _ours_w2,
         un.w2_sq_by_pairs,
-        Tolerance(1e-5, 0.0, "numerics.md"),
+        Tolerance(1e-5, 0.0, "docs/research/numerics.md"),
         un.w2_sq_as_printed,
     ),
     Formula(
@@ -177,7 +177,7 @@ FORMULAS = [
         _near_deviations,
         _ours_w2,
         un.w2_sq_by_pairs,
-        Tolerance(1e-5, 0.0, "numerics.md"),
+        Tolerance(1e-5, 0.0, "docs/research/numerics.md"),
         un.w2_sq_as_printed,
     ),
     Formula(
