@@ -22,7 +22,7 @@ bench: .venv/installed-test
 
 # the documentation as a site in site/; a warning is an error
 docs: .venv/installed-docs
-	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
 # hours: the weights that come with the project were made so
 prior: .venv/installed

@@ -1,0 +1,79 @@
+"""What a stranger reads: no dead link, no missing file, a README that one can take in, a site that builds."""
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+from fixtures import doc_pages
+
+PAGES = [pytest.param(page, id=str(page.relative_to(doc_pages.ROOT))) for page in doc_pages.pages()]
+MADE_BY_THE_SITE = {"reference/api.md"}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_no_link_is_dead(page):
+    dead = [target for target in doc_pages.links(page) if not (page.parent / target).exists()]
+    assert dead == []
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_path_that_a_page_names_exists(page):
+    if page.name == "CHANGELOG.md":
+        pytest.skip("names what was renamed")
+    missing = {path for path in doc_pages.named_paths(page) if not (doc_pages.ROOT / path).exists()}
+    assert missing == set()
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_no_page_cites_what_a_reader_cannot_have(page):
+    cited = re.findall(r"(?<![\w/])(?:\.\./)+shared/\S*", page.read_text(encoding="utf-8"))
+    assert cited == []
+
+
+def test_the_readme_is_short(root):
+    assert len((root / "README.md").read_text(encoding="utf-8").splitlines()) <= 130
+
+
+def test_every_make_target_that_a_page_names_is_in_the_makefile(root):
+    known = set(re.findall(r"^([a-z]+):", (root / "Makefile").read_text(encoding="utf-8"), re.M))
+    named = set().union(*(doc_pages.named_targets(page)["make"] for page in doc_pages.pages()))
+    assert {"run", "view", "test", "docs"} <= named <= known
+
+
+def test_targets_are_read_without_options_and_placeholders(tmp_path):
+    (tmp_path / "a.md").write_text(
+        "`make run SCENE=my_meadow`, `snakemake --cores 2 --config k=2 -- seams`, `snakemake results/x/<bundle>/a`\n"
+        "```sh\n.venv/bin/snakemake --profile workflow/profiles/slurm study   # all of it\n```\n"
+    )
+    assert doc_pages.named_targets(tmp_path / "a.md") == {"make": {"run"}, "snakemake": {"seams", "study"}}
+
+
+def test_every_page_of_the_site_is_in_its_navigation(root):
+    listed = set(re.findall(r"[\w/-]+\.md", (root / "mkdocs.yml").read_text(encoding="utf-8").split("\nnav:")[1]))
+    pages = {page.relative_to(root / "docs").as_posix() for page in (root / "docs").rglob("*.md")}
+    assert listed - MADE_BY_THE_SITE == {page for page in pages if not page.startswith("research/data/")}
+
+
+def test_the_site_builds_without_a_warning(root, tmp_path):
+    if not importlib.util.find_spec("material"):
+        pytest.skip("mkdocs-material is not installed: make docs")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", tmp_path]
+    env = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
+    done = subprocess.run(command, cwd=root, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "architecture.html").exists()
+
+
+def test_the_site_loads_nothing_from_a_network(root, tmp_path):
+    if not importlib.util.find_spec("material"):
+        pytest.skip("mkdocs-material is not installed: make docs")
+    command = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--site-dir", tmp_path]
+    subprocess.run(command, cwd=root, env=os.environ | {"NO_MKDOCS_2_WARNING": "1"}, check=True)
+    for page in tmp_path.rglob("*.html"):
+        loaded = re.findall(
+            r"<(?:script|link|img)[^>]+(?:src|href)=\"?(https?:[^\" >]+)", page.read_text(encoding="utf-8")
+        )
+        assert [url for url in loaded if "canonical" not in url] == [], page
