@@ -1,4 +1,4 @@
-"""Rule gather_extremes: what came of every run, in one table."""
+"""Rule gather_extremes: the outcomes of all runs, in one table."""
 
 from pathlib import Path
 
@@ -7,6 +7,6 @@ from dav_gswt.study import csv_tables
 from dav_gswt.study.stability import tables
 
 with logging_to(snakemake.log[0]):
-    rows = tables.runs(Path(snakemake.input.runs[0]).parent)
+    rows = tables.tabulate_runs(Path(snakemake.input.runs[0]).parent)
     for path in snakemake.output:
         csv_tables.write_table(path, rows)

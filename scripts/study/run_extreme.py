@@ -1,4 +1,4 @@
-"""Rule run_extreme: what comes of the whole workflow at one of its extremes?"""
+"""Rule run_extreme: run the whole workflow at one extreme."""
 
 from pathlib import Path
 
@@ -9,4 +9,4 @@ from dav_gswt.study.stability.extremes import EXTREMES
 with logging_to(snakemake.log[0]):
     extreme = EXTREMES[snakemake.wildcards.extreme]
     root, lpips = Path(snakemake.params.root), snakemake.input.get("lpips")
-    running.run(extreme, root, snakemake.output.folder, snakemake.threads, lpips)
+    running.run_extreme(extreme, root, snakemake.output.folder, snakemake.threads, lpips)

@@ -1,4 +1,4 @@
-"""Rule show_stability: the page about numbers at the extremes, and its figure."""
+"""Rule write_stability: the page about numerical stability, and its figure."""
 
 from dav_gswt.files import read_json
 from dav_gswt.logs import logging_to
@@ -8,5 +8,5 @@ from dav_gswt.study.stability import page, plots
 with logging_to(snakemake.log[0]):
     given = snakemake.input
     formulas, runs = csv_tables.read_table(given.formulas), csv_tables.read_table(given.runs)
-    plots.write(snakemake.output.plot, formulas)
-    page.write(snakemake.output.page, given.template, formulas, runs, read_json(given.facts))
+    plots.write_tolerance_plot(snakemake.output.plot, formulas)
+    page.write_stability_page(snakemake.output.page, given.template, formulas, runs, read_json(given.facts))

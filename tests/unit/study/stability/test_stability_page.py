@@ -1,4 +1,4 @@
-"""The page and the figure of numbers at the extremes are made of the tables alone."""
+"""The page and the figure of numerical stability are made from the tables alone."""
 
 import pytest
 from fixtures.markdown import collapse_spaces
@@ -51,17 +51,17 @@ def runs(tmp_path):
 
 
 def test_the_page_says_what_held_and_what_did_not(root, tmp_path, formulas, runs):
-    page.write(tmp_path / "a.md", root / "workflow/report/stability.md", formulas, runs, FACTS)
+    page.write_stability_page(tmp_path / "a.md", root / "workflow/report/stability.md", formulas, runs, FACTS)
     text = collapse_spaces((tmp_path / "a.md").read_text())
-    assert "renderer cpu, x86-64-v3. 1 of 2 formulas hold" in text and "1 of 2 runs came out as expected" in text
+    assert "renderer cpu, x86-64-v3. 1 of 2 formulas stay within" in text and "1 of 2 runs ended as expected" in text
     assert "| a\\|b | x = 0 | -131072 | 1 | 1e-07 |" in text
     assert "| x = 1 | 0.25 |" in text and "| x = 1 | **3** |" in text
     assert '| one Gaussian | stopped: "too few" | yes | | 4 | 169 |' in text
-    assert "2 with one that is not finite; stills as those of b to 52 dB | **no** |" in text
+    assert "2 with numbers that are not finite; stills equal those of b to 52 dB | **no** |" in text
 
 
 def test_the_figure_is_a_picture_and_the_same_each_time(tmp_path, formulas):
     for name in ("a.png", "b.png"):
-        plots.write(tmp_path / name, formulas)
+        plots.write_tolerance_plot(tmp_path / name, formulas)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert image_files.read_photo(tmp_path / "a.png").std() > 0.05

@@ -1,4 +1,4 @@
-"""The workflow at its extremes: what is laid over the smallest experiment, and what is expected to come of it."""
+"""Runs of the whole workflow at extreme settings, and the expected outcome of each."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -12,26 +12,26 @@ from dav_gswt.images import image_files
 COUNT = 160  # Gaussians along a side of a world that is given as a field
 SIDE = 10.0  # of that world, in its unit
 
-Prepare = Callable[[Path], None]
+PrepareFolder = Callable[[Path], None]
 
 
 @dataclass(frozen=True)
 class Extreme:
-    """One run. about: what is extreme. over: laid over config/test/config.yaml. prepare: makes files in its folder.
+    """One run. about: what is extreme. overrides: of config/test/config.yaml. prepare: writes files to its folder.
 
-    says: a regular expression that the message must match; None: the run must end, with all its numbers finite.
-    like: another run whose stills these must resemble.
+    error_pattern: a regular expression that the error message must match; None: the run must finish, with all numbers
+    finite. same_as: another run whose stills must look the same.
     """
 
     name: str
     about: str
-    over: dict = field(default_factory=dict)
-    prepare: Prepare | None = None
-    says: str | None = None
-    like: str | None = None
+    overrides: dict = field(default_factory=dict)
+    prepare: PrepareFolder | None = None
+    error_pattern: str | None = None
+    same_as: str | None = None
 
 
-def ground(count: int, side: float) -> GaussianField:
+def make_ground_field(count: int, side: float) -> GaussianField:
     """A finished field: count x count opaque flat discs on a gentle relief, in blotches of two colours."""
     rng = np.random.default_rng(0)
     step = side / count
@@ -53,62 +53,79 @@ def ground(count: int, side: float) -> GaussianField:
     )
 
 
-def world(count: int, side: float) -> Prepare:
-    """Such a field as the file of the scene `finished`."""
-    return lambda folder: write_field(ground(count, side), folder / "finished.ply")
+def write_world(count: int, side: float) -> PrepareFolder:
+    """A function that writes such a field as the file of the scene `finished`."""
+    return lambda folder: write_field(make_ground_field(count, side), folder / "finished.ply")
 
 
-def single(folder: Path) -> None:
-    write_field(ground(1, SIDE), folder / "finished.ply")
+def write_single_gaussian(folder: Path) -> None:
+    write_field(make_ground_field(1, SIDE), folder / "finished.ply")
 
 
-def two_photos(folder: Path) -> None:
+def write_two_photos(folder: Path) -> None:
     rng = np.random.default_rng(0)
     (folder / "photos").mkdir()
     for number in range(2):
         image_files.write_png(folder / f"photos/{number}.png", rng.uniform(0, 1, (96, 128, 3)).astype(np.float32))
 
 
-def desert(**keys) -> dict:
-    """Keys of the scene `desert`."""
+def override_desert(**keys) -> dict:
+    """Overrides of the scene `desert`."""
     return {"scenes": {"desert": keys}}
 
 
-def views(**keys) -> dict:
-    """The paper's own choice of views, which reads the prior."""
+def override_views(**keys) -> dict:
+    """Overrides of a config with the paper's policy, which uses the prior."""
     return {"policy": "w2-lpips", **keys}
 
 
-FINISHED = {"scene": "finished"}
-FOLDER = {"kind": "photos", "folder": "photos", "size": 128, "start": 3, "agent": "replay"}
-FOLDER |= {"quality": "draft", "seam": "semantic"}
+FIELD_SCENE = {"scene": "finished"}
+FOLDER_SCENE = {"kind": "photos", "folder": "photos", "size": 128, "start": 3, "agent": "replay"}
+FOLDER_SCENE |= {"quality": "draft", "seam": "semantic"}
 MILLION = {"size": 128, "spacing": 1.5, "cap": 2_000_000, "steps": 60, "steps_per_photo": 10, "level_steps": 4}
-MILLION_FINISHED = {"scenes": {"finished": {"quality": "million"}}, "qualities": {"million": MILLION}}
+MILLION_SCENE = {"scenes": {"finished": {"quality": "million"}}, "qualities": {"million": MILLION}}
 
 ALL = (
     Extreme(
-        "two-photos", "one synthetic photo too few", desert(photos=2), says=r"scenes\.desert\.photos: 2 is less than"
+        "two-photos",
+        "one synthetic photo too few",
+        override_desert(photos=2),
+        error_pattern=r"scenes\.desert\.photos: 2 is less than",
     ),
     Extreme(
         "two-in-folder",
         "one photo too few in a folder",
-        {"scene": "folder", "scenes": {"folder": FOLDER}},
-        two_photos,
-        says="at least 3 overlapping photos are needed",
+        {"scene": "folder", "scenes": {"folder": FOLDER_SCENE}},
+        write_two_photos,
+        error_pattern="at least 3 overlapping photos are needed",
     ),
-    Extreme("all-start", "start views ask for all photos: no pool", desert(agent="replay", photos=5, start=6)),
-    Extreme("k-pool", "k = pool", {"k": 6} | desert(candidates=6)),
-    Extreme("k-over-pool", "k far above the pool", {"k": 1000} | desert(candidates=6)),
-    Extreme("lam-0", "lambda 0", views(lam=0)),
-    Extreme("lam-1e6", "lambda 1e6", views(lam=1_000_000)),
+    Extreme("all-start", "start views ask for all photos: no pool", override_desert(agent="replay", photos=5, start=6)),
+    Extreme("k-pool", "k = pool", {"k": 6} | override_desert(candidates=6)),
+    Extreme("k-over-pool", "k far above the pool", {"k": 1000} | override_desert(candidates=6)),
+    Extreme("lam-0", "lambda 0", override_views(lam=0)),
+    Extreme("lam-1e6", "lambda 1e6", override_views(lam=1_000_000)),
     Extreme("tau-0", "tau 0: every tile keeps all orders", {"tau": 0}),
     Extreme("tau-1", "tau 1: none does", {"tau": 1}),
-    Extreme("pdrop-0", "no dropout: all samples are equal", views(p_drop=0)),
-    Extreme("pdrop-0.95", "19 of 20 of the attention dropped", views(p_drop=0.95)),
-    Extreme("one-gaussian", "a field of one Gaussian", FINISHED, single, says="1 opaque Gaussians"),
-    Extreme("world-1", "a world of usual size, to compare with", FINISHED, world(COUNT, SIDE)),
-    Extreme("world-1e-3", "the same, a thousandth as large", FINISHED, world(COUNT, 1e-3 * SIDE), like="world-1"),
-    Extreme("world-1e6", "the same, a million times as large", FINISHED, world(COUNT, 1e6 * SIDE), like="world-1"),
-    Extreme("million", "a million Gaussians", FINISHED | MILLION_FINISHED, world(1000, SIDE)),
+    Extreme("pdrop-0", "no dropout: all samples are equal", override_views(p_drop=0)),
+    Extreme("pdrop-0.95", "19 of 20 of the attention dropped", override_views(p_drop=0.95)),
+    Extreme(
+        "one-gaussian",
+        "a field of one Gaussian",
+        FIELD_SCENE,
+        write_single_gaussian,
+        error_pattern="1 opaque Gaussians",
+    ),
+    Extreme("world-1", "a world of usual size, to compare with", FIELD_SCENE, write_world(COUNT, SIDE)),
+    Extreme(
+        "world-1e-3", "the same, a thousandth as large", FIELD_SCENE, write_world(COUNT, 1e-3 * SIDE), same_as="world-1"
+    ),
+    Extreme(
+        "world-1e6",
+        "the same, a million times as large",
+        FIELD_SCENE,
+        write_world(COUNT, 1e6 * SIDE),
+        same_as="world-1",
+    ),
+    Extreme("million", "a million Gaussians", FIELD_SCENE | MILLION_SCENE, write_world(1000, SIDE)),
 )
 EXTREMES = {extreme.name: extreme for extreme in ALL}

@@ -1,4 +1,4 @@
-"""Formulas that say how alike pictures are: LPIPS, PSNR, structural similarity, and exposure between them."""
+"""Checks of image metrics: LPIPS, PSNR, colour correction, the loss of the fit; and of Adam."""
 
 import numpy as np
 from numpy import ndarray as Array
@@ -6,18 +6,17 @@ from numpy import ndarray as Array
 from dav_gswt import raster
 from dav_gswt.images import lpips_weights, metrics
 from dav_gswt.images.lpips_weights import Weights
-from dav_gswt.study.stability.formula import LAW, Formula, Point, Tolerance
-from dav_gswt.study.stability.scoring import EXACT
+from dav_gswt.study.stability.formula import FLOAT32, Case, Check
 
 DIFFERENCES = tuple(10.0**power for power in range(-7, 1))
 
 
-def pictures(count: int, side: int, seed: int = 0) -> Array:
+def random_images(count: int, side: int, seed: int = 0) -> Array:
     return np.random.default_rng(seed).uniform(0, 1, (count, side, side, 3)).astype(np.float32)
 
 
-def network() -> Weights:
-    """A network of LPIPS's shapes, its numbers as large as the published ones: what rounds does not depend on them."""
+def random_network() -> Weights:
+    """Random weights with the shapes and magnitudes of LPIPS's AlexNet: rounding does not depend on their values."""
     rng = np.random.default_rng(0)
     kernels = tuple(
         (rng.standard_normal(s) * (2 / np.prod(s[1:])) ** 0.5).astype(np.float32) for s in lpips_weights.KERNELS
@@ -27,38 +26,38 @@ def network() -> Weights:
     return Weights(kernels, biases, heads)
 
 
-def _pairs() -> list[Point]:
-    a = 2 * pictures(1, 48) - 1
-    b = 2 * pictures(1, 48, seed=1) - 1
-    found = [Point(f"noise mixed with {d:g} of another", (a, a + np.float32(d) * (b - a))) for d in DIFFERENCES]
+def _pair_cases() -> list[Case]:
+    a = 2 * random_images(1, 48) - 1
+    b = 2 * random_images(1, 48, seed=1) - 1
+    cases = [Case(f"noise mixed with {d:g} of another", (a, a + np.float32(d) * (b - a))) for d in DIFFERENCES]
     flat = [np.full_like(a, v) for v in (-1, 1)]
-    least = 2 * pictures(2, 31) - 1
-    found += [
-        Point("black and white", tuple(flat)),
-        Point("equal pictures", (a, a)),
-        Point("two greys", (0 * a, 0 * a)),
+    least = 2 * random_images(2, 31) - 1
+    cases += [
+        Case("black and white", tuple(flat)),
+        Case("equal pictures", (a, a)),
+        Case("two greys", (0 * a, 0 * a)),
     ]
-    return [*found, Point("31 pixels a side", (least[:1], least[1:]))]
+    return [*cases, Case("31 pixels a side", (least[:1], least[1:]))]
 
 
 def _lpips(a: Array, b: Array) -> Array:
     from dav_gswt.images import lpips
 
-    return lpips.distance(a, b, network())
+    return lpips.distance(a, b, random_network())
 
 
 def _lpips_pairwise(a: Array, b: Array) -> Array:
     from dav_gswt.images import lpips
 
-    return lpips.pairwise_mean(np.stack([a, b], 1), network())
+    return lpips.pairwise_mean(np.stack([a, b], 1), random_network())
 
 
-def _lpips_slowly(a: Array, b: Array) -> Array:
+def _lpips_reference(a: Array, b: Array) -> Array:
     """LPIPS in float64 by its definition."""
     import torch
     from torch.nn import functional
 
-    made, total = network(), 0.0
+    made, total = random_network(), 0.0
     shift, scale = (torch.tensor(v, dtype=torch.float64)[:, None, None] for v in (_SHIFT, _SCALE))
     x = torch.from_numpy(np.concatenate([a, b]).astype(np.float64)).movedim(-1, 1)
     x = (x - shift) / scale
@@ -76,16 +75,16 @@ def _lpips_slowly(a: Array, b: Array) -> Array:
 _SHIFT, _SCALE = (-0.030, -0.088, -0.188), (0.458, 0.448, 0.450)
 
 
-def _near() -> list[Point]:
-    a, b = pictures(2, 48)
+def _similar_cases() -> list[Case]:
+    a, b = random_images(2, 48)
     weight = np.random.default_rng(2).uniform(0, 1, (48, 48)).astype(np.float32)
-    found = [Point(f"a share {d:g} of another", (a, a + np.float32(d) * (b - a), weight)) for d in DIFFERENCES]
+    cases = [Case(f"a share {d:g} of another", (a, a + np.float32(d) * (b - a), weight)) for d in DIFFERENCES]
     single = np.zeros_like(weight)
     single[3, 4] = 1e-12
     return [
-        *found,
-        Point("a single pixel that counts 1e-12", (a, b, single)),
-        Point("black, white", (0 * a, 0 * a + 1, weight)),
+        *cases,
+        Case("a single pixel that counts 1e-12", (a, b, single)),
+        Case("black, white", (0 * a, 0 * a + 1, weight)),
     ]
 
 
@@ -93,21 +92,23 @@ def _psnr(a: Array, b: Array, weight: Array) -> float:
     return metrics.psnr(a, b, weight)
 
 
-def _psnr_slowly(a: Array, b: Array, weight: Array) -> float:
+def _psnr_reference(a: Array, b: Array, weight: Array) -> float:
     a, b, weight = (v.astype(np.float64) for v in (a, b, weight))
     return -10 * np.log10((((a - b) ** 2).mean(-1) * weight).sum() / weight.sum())
 
 
-def _equal() -> list[Point]:
+def _equal_cases() -> list[Case]:
     one = np.ones((48, 48), np.float32)
-    return [Point(f"equal pictures of {size:g}", (pictures(1, 48)[0] * np.float32(size), one)) for size in (0, 1e-6, 1)]
+    return [
+        Case(f"equal pictures of {size:g}", (random_images(1, 48)[0] * np.float32(size), one)) for size in (0, 1e-6, 1)
+    ]
 
 
-def _corrected(a: Array, b: Array, weight: Array) -> Array:
+def _colour_correct(a: Array, b: Array, weight: Array) -> Array:
     return metrics.correct_colours(a, b, weight)
 
 
-def _corrected_slowly(a: Array, b: Array, weight: Array) -> Array:
+def _colour_correct_reference(a: Array, b: Array, weight: Array) -> Array:
     keep, out = weight > 0, np.empty(a.shape)
     for c in range(3):
         x, y = a[keep, c].astype(np.float64), b[keep, c].astype(np.float64)
@@ -120,7 +121,7 @@ def _loss(a: Array, b: Array, weight: Array) -> float:
     return raster.loss(a, b, weight)[0]
 
 
-def _loss_slowly(a: Array, b: Array, weight: Array) -> float:
+def _loss_reference(a: Array, b: Array, weight: Array) -> float:
     """0.8 L1 + 0.2 (1 - SSIM) in float64, windows by dense sums."""
     from scipy.ndimage import convolve
 
@@ -138,9 +139,9 @@ def _loss_slowly(a: Array, b: Array, weight: Array) -> float:
     return float((w * (0.8 * np.abs(x - y) + 0.2 * (1 - ssim))).mean())
 
 
-def _steps() -> list[Point]:
+def _gradient_cases() -> list[Case]:
     sizes = 10.0 ** np.linspace(-30, 18, 97)
-    return [Point("gradient ", (sizes.astype(np.float32),), sizes)]
+    return [Case("gradient ", (sizes.astype(np.float32),), sizes)]
 
 
 def _adam(gradient: Array) -> Array:
@@ -150,7 +151,7 @@ def _adam(gradient: Array) -> Array:
     return value
 
 
-def _adam_slowly(gradient: Array) -> Array:
+def _adam_reference(gradient: Array) -> Array:
     g, value, m, v = gradient.astype(np.float64), 0.0, 0.0, 0.0
     for step in (1, 2, 3):
         m, v = 0.9 * m + 0.1 * g, 0.999 * v + 0.001 * g * g
@@ -158,82 +159,31 @@ def _adam_slowly(gradient: Array) -> Array:
     return value
 
 
-FORMULAS = [
-    Formula(
-        "LPIPS",
-        "LPIPS of two pictures",
-        "Zhang et al. 2018",
-        "differences 1e-7 to 1, black and white, 31 pixels",
-        "float32",
-        _pairs,
-        _lpips,
-        _lpips_slowly,
-        Tolerance(LAW[0], 1e-6, LAW[1] + "; 1e-6 is far below what is told apart"),
-    ),
-    Formula(
-        "LPIPS",
+CHECKS = [
+    Check("LPIPS of two pictures", _pair_cases, _lpips, _lpips_reference, relative=FLOAT32, absolute=1e-6),
+    Check(
         "LPIPS, mean over pairs as a variance",
-        "Zhang et al. 2018",
-        "the same",
-        "float32",
-        _pairs,
+        _pair_cases,
         _lpips_pairwise,
-        _lpips_slowly,
-        Tolerance(LAW[0], 1e-6, LAW[1] + "; 1e-6 is far below what is told apart"),
+        _lpips_reference,
+        relative=FLOAT32,
+        absolute=1e-6,
     ),
-    Formula(
-        "PSNR",
-        "PSNR over the pixels that count",
-        "docs/research/evaluation.md",
-        "differences 1e-7 to 1",
-        "float32",
-        _near,
-        _psnr,
-        _psnr_slowly,
-        Tolerance(LAW[0], 1e-4, LAW[1] + "; tables show 0.01 dB"),
-    ),
-    Formula(
-        "PSNR",
+    Check("PSNR over the pixels that count", _similar_cases, _psnr, _psnr_reference, relative=FLOAT32, absolute=1e-4),
+    Check(
         "PSNR of equal pictures is null",
-        "docs/research/evaluation.md",
-        "pictures of 0, 1e-6, 1",
-        "float32",
-        _equal,
+        _equal_cases,
         lambda a, weight: float(metrics.psnr(a, a, weight) is None),
         lambda a, weight: 1.0,
-        EXACT,
     ),
-    Formula(
-        "PSNR",
+    Check(
         "a picture fitted to a photo by gain and offset",
-        "docs/research/evaluation.md",
-        "differences 1e-7 to 1",
-        "float32",
-        _near,
-        _corrected,
-        _corrected_slowly,
-        Tolerance(LAW[0], 1e-6, LAW[1]),
+        _similar_cases,
+        _colour_correct,
+        _colour_correct_reference,
+        relative=FLOAT32,
+        absolute=1e-6,
     ),
-    Formula(
-        "fit",
-        "L1 and structural similarity",
-        "3DGS",
-        "differences 1e-7 to 1",
-        "float32",
-        _near,
-        _loss,
-        _loss_slowly,
-        Tolerance(1e-4, 1e-6, "variances are differences of squares: 6e-8 of 0.3 against 9e-4"),
-    ),
-    Formula(
-        "fit",
-        "three steps of Adam",
-        "Kingma and Ba 2015",
-        "gradients 1e-30 to 1e18",
-        "float32",
-        _steps,
-        _adam,
-        _adam_slowly,
-        Tolerance(LAW[0], 1e-9, LAW[1]),
-    ),
+    Check("L1 and structural similarity", _similar_cases, _loss, _loss_reference, relative=1e-4, absolute=1e-6),
+    Check("three steps of Adam", _gradient_cases, _adam, _adam_reference, relative=FLOAT32, absolute=1e-9),
 ]

@@ -1,4 +1,4 @@
-"""Formulas of the terrain: levels and their weights, the surface under it, which tile lies where."""
+"""Checks of the terrain: level weights, cross-fades, Gaussians on slopes, hills, the tile of a cell."""
 
 import math
 from fractions import Fraction
@@ -8,8 +8,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.bundle import lod
 from dav_gswt.field import GaussianField
-from dav_gswt.study.stability.formula import LAW, SINGLE, Formula, Point, Tolerance
-from dav_gswt.study.stability.scoring import EXACT
+from dav_gswt.study.stability.formula import FLOAT32, FLOAT32_EPS, Case, Check
 from dav_gswt.terrain import displacement, weights
 from dav_gswt.terrain.choice import hash_cell
 from dav_gswt.terrain.heights import GAIN, HILLS, SHIFT, Hills
@@ -19,83 +18,83 @@ SWITCHES = (2.0**-10, 1.0, 1024.0, 2.0**20)
 EYE = np.concatenate([[0.0], 10.0 ** np.linspace(-12, 12, 97)])
 
 
-def _distances() -> list[Point]:
-    found = []
+def _distance_cases() -> list[Case]:
+    cases = []
     for switch in SWITCHES:
         near = switch * (1 + np.linspace(-2, 2, 41))
         for band in BANDS:
             d = np.concatenate([EYE, near, switch + band * np.linspace(-1.5, 1.5, 31)]).clip(0).astype(np.float32)
-            found.append(Point(f"D {switch:g}, Delta {band:g}, d = ", (d, switch, band), d))
-    return found
+            cases.append(Case(f"D {switch:g}, Delta {band:g}, d = ", (d, switch, band), d))
+    return cases
 
 
-def _share_slowly(d: Array, switch: float, band: float, smooth: bool = False) -> Array:
-    found = []
+def _alpha_reference(d: Array, switch: float, band: float, smooth: bool = False) -> Array:
+    cases = []
     for x in d.astype(np.float64):
         if band > 0:
             s = min(max(0.5 - (x - switch) / (2 * band), 0.0), 1.0)
         else:
             s = 1.0 if x < switch else 0.0 if x > switch else 0.5
-        found.append(s * s * (3 - 2 * s) if smooth else s)
-    return np.array(found)
+        cases.append(s * s * (3 - 2 * s) if smooth else s)
+    return np.array(cases)
 
 
-def _share_printed(d: Array, switch: float, band: float) -> Array:
-    """0 outside its band."""
+def _alpha_printed(d: Array, switch: float, band: float) -> Array:
+    """As printed: 0 outside the band."""
     inside = (switch - band <= d) & (d < switch + band)
     return np.where(inside, np.float32(0.5) - (d - np.float32(switch)) / np.float32(2 * band), np.float32(0))
 
 
-def _chains() -> list[Point]:
-    found = []
+def _level_cases() -> list[Case]:
+    cases = []
     for band in BANDS:
         switches = [1.0, 2.0, 4.0, 1024.0, np.inf]
-        found.append(Point(f"five levels, Delta {band:g}, d = ", (EYE.astype(np.float32), switches, [band] * 5), EYE))
-    return found
+        cases.append(Case(f"five levels, Delta {band:g}, d = ", (EYE.astype(np.float32), switches, [band] * 5), EYE))
+    return cases
 
 
-def _fades() -> list[Point]:
+def _crossfade_cases() -> list[Case]:
     w = np.concatenate([[0.0, 1.0], 10.0 ** np.linspace(-12, 0, 49), 1 - 10.0 ** np.linspace(-7, -1, 13)])
     opaque = np.array([0.0, 1e-12, 1e-6, 1 / 255, 0.5, 0.9, 0.99, 1 - 1e-3, 1 - 1e-5, 1.0])
-    return [Point(f"alpha {a:.7g}, w = ", (np.full(len(w), a, np.float32), w.astype(np.float32)), w) for a in opaque]
+    return [Case(f"alpha {a:.7g}, w = ", (np.full(len(w), a, np.float32), w.astype(np.float32)), w) for a in opaque]
 
 
-def _fade_slowly(a: Array, w: Array) -> Array:
+def _crossfade_reference(a: Array, w: Array) -> Array:
     """1 - (1 - alpha)^w of the same arguments, alpha held below 1 - 1e-6."""
     most = float(np.float32(1 - 1e-6))
-    found = []
+    cases = []
     for x, y in zip(a.astype(np.float64).tolist(), w.astype(np.float64).tolist(), strict=True):
-        found.append(x if y == 1 else 0.0 if y == 0 else -math.expm1(y * math.log1p(-min(x, most))))
-    return np.array(found)
+        cases.append(x if y == 1 else 0.0 if y == 0 else -math.expm1(y * math.log1p(-min(x, most))))
+    return np.array(cases)
 
 
-def _over(fade, a: Array, w: Array) -> Array:
-    """Opacity of two equal Gaussians, drawn with w and 1 - w."""
+def _composite_twice(fade, a: Array, w: Array) -> Array:
+    """Opacity of two equal Gaussians, one weighted by w, the other by 1 - w."""
     one = np.ones_like(a)
     return one - (one - fade(a, w)) * (one - fade(a, one - w))
 
 
-def _halves() -> list[Point]:
+def _equal_splat_cases() -> list[Case]:
     w = np.linspace(0, 1, 33).astype(np.float32)
-    return [Point(f"alpha {a:g}, w = ", (np.full(33, a, np.float32), w), w) for a in (1e-6, 0.1, 0.9, 0.99, 0.999)]
+    return [Case(f"alpha {a:g}, w = ", (np.full(33, a, np.float32), w), w) for a in (1e-6, 0.1, 0.9, 0.99, 0.999)]
 
 
-def _switch(scale: float) -> float:
+def _switch_distance(scale: float) -> float:
     return lod.level_table([0.5 * scale, scale], 1.0, 0.1)[0]["distance"]
 
 
-def _shapes() -> list[Point]:
-    found, rng = [], np.random.default_rng(0)
+def _shape_cases() -> list[Case]:
+    cases, rng = [], np.random.default_rng(0)
     quats = rng.standard_normal((40, 4)).astype(np.float32)
     for scales in ((1e-12, 1e-12, 1e-12), (1e6, 1e6, 1e6), (1e6, 1.0, 1.0), (1.0, 1.0, 1e-6), (1e-12, 1.0, 1e6)):
         for steep in (0.0, 1.0, 1e3):
             slope = np.tile(np.array([steep, -0.5 * steep]), (40, 1))
-            found.append(Point(f"scales {scales}, slope {steep:g}", (quats, scales, slope)))
-    return found
+            cases.append(Case(f"scales {scales}, slope {steep:g}", (quats, scales, slope)))
+    return cases
 
 
-def _draped(quats: Array, scales: tuple, slope: Array) -> Array:
-    """The shape A of every Gaussian, each column over its own length: what A A^T is made of."""
+def _drape(quats: Array, scales: tuple, slope: Array) -> Array:
+    """The shape A of every Gaussian (its covariance is A A^T), each column over its scale."""
     n = len(quats)
     logs = np.tile(np.log(np.array(scales)).astype(np.float32), (n, 1))
     zero = np.zeros(n, np.float32)
@@ -105,8 +104,8 @@ def _draped(quats: Array, scales: tuple, slope: Array) -> Array:
     return displacement.displaced_axes(field, slope) / np.exp(logs.astype(np.float64))[:, None]
 
 
-def _draped_slowly(quats: Array, scales: tuple, slope: Array) -> Array:
-    found = []
+def _drape_reference(quats: Array, scales: tuple, slope: Array) -> Array:
+    cases = []
     for q, (east, north) in zip(quats.astype(np.float64), slope, strict=True):
         w, x, y, z = q / math.sqrt(sum(v * v for v in q))
         turn = np.array([
@@ -114,27 +113,27 @@ def _draped_slowly(quats: Array, scales: tuple, slope: Array) -> Array:
             [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ])  # fmt: skip
-        found.append(np.array([[1, 0, 0], [0, 1, 0], [east, north, 1]]) @ turn)
-    return np.array(found)
+        cases.append(np.array([[1, 0, 0], [0, 1, 0], [east, north, 1]]) @ turn)
+    return np.array(cases)
 
 
-def _places() -> list[Point]:
-    found, rng = [], np.random.default_rng(0)
+def _place_cases() -> list[Case]:
+    cases, rng = [], np.random.default_rng(0)
     for far in (0.0, 1e3, 1e6, 1e9):
         x, y = (np.floor(far + rng.uniform(0, 64, 24)) + rng.integers(0, 64, 24) / 64 for _ in range(2))
-        found.append(Point(f"{far:g} units from the origin", (x, y)))
-    return found
+        cases.append(Case(f"{far:g} units from the origin", (x, y)))
+    return cases
 
 
-def _surface(x: Array, y: Array) -> Array:
+def _hills(x: Array, y: Array) -> Array:
     height, slope = Hills(2.0, 8.0, 4, 3).at(x, y)
     return np.column_stack([height, slope])
 
 
-def _surface_slowly(x: Array, y: Array) -> Array:
-    """Height and slopes in whole fractions: no cell is missed however far out."""
+def _hills_reference(x: Array, y: Array) -> Array:
+    """Height and slopes in exact fractions, so that cells far from the origin are right as well."""
     shares = [GAIN**k for k in range(4)]
-    found = []
+    cases = []
     for at in zip(x.tolist(), y.tolist(), strict=True):
         parts = [
             np.array(_octave(k, *(Fraction(v) * 2**k / 8 + k * Fraction(s) for v, s in zip(at, SHIFT, strict=True))))
@@ -144,8 +143,8 @@ def _surface_slowly(x: Array, y: Array) -> Array:
             2.0 * a / sum(shares) * p * [1, 2**k / 8, 2**k / 8]
             for k, (a, p) in enumerate(zip(shares, parts, strict=True))
         )
-        found.append(total)
-    return np.array(found)
+        cases.append(total)
+    return np.array(cases)
 
 
 def _octave(k: int, x: Fraction, y: Fraction) -> tuple[float, float, float]:
@@ -169,10 +168,10 @@ def _octave(k: int, x: Fraction, y: Fraction) -> tuple[float, float, float]:
     return float(value), float(by_x), float(by_y)
 
 
-def _numbers() -> list[Point]:
+def _cell_cases() -> list[Case]:
     edge = [0, 1, -1, 2**31 - 1, -(2**31), 2**32, 2**53, -(2**53), 2**62, -(2**63)]
     i, j = (a.ravel() for a in np.meshgrid(np.array(edge, np.int64), np.array(edge, np.int64)))
-    return [Point(f"salt {salt}, i = ", (i, j, salt), i) for salt in (0, 1, 2**32 - 1)]
+    return [Case(f"salt {salt}, i = ", (i, j, salt), i) for salt in (0, 1, 2**32 - 1)]
 
 
 def _hash(i: Array, j: Array, salt: int) -> Array:
@@ -180,118 +179,69 @@ def _hash(i: Array, j: Array, salt: int) -> Array:
         return hash_cell(i, j, 2, salt).astype(np.float64)
 
 
-def _hash_slowly(i: Array, j: Array, salt: int) -> Array:
-    """In whole numbers without end."""
-    found = []
+def _hash_reference(i: Array, j: Array, salt: int) -> Array:
+    """In integers of any size."""
+    cases = []
     for a, b in zip(i.tolist(), j.tolist(), strict=True):
         h = (a * 0x8DA6B343 ^ b * 0xD8163841 ^ 2 * 0xCB1AB31F ^ salt) % 2**32
         h = (h ^ h >> 16) * 0x85EBCA6B % 2**32
         h = (h ^ h >> 13) * 0xC2B2AE35 % 2**32
-        found.append(h ^ h >> 16)
-    return np.array(found, np.float64)
+        cases.append(h ^ h >> 16)
+    return np.array(cases, np.float64)
 
 
-ALPHA, FADE, PLACE = "LOD alpha", "cross-fade of opacity", "surface and tiles"
-FORMULAS = [
-    Formula(
-        ALPHA,
+CHECKS = [
+    Check(
         "LOD alpha: clip(1/2 - (d - D) / (2 Delta), 0, 1)",
-        "Eq. (lod_blend)",
-        "d 0 to 1e12, D 1e-3 to 1e6, Delta 0, 1e-12 to 1e6",
-        "float32",
-        _distances,
+        _distance_cases,
         weights.finer_share,
-        _share_slowly,
-        Tolerance(LAW[0], 1e-6, LAW[1]),
-        _share_printed,
+        _alpha_reference,
+        relative=FLOAT32,
+        absolute=1e-6,
+        printed=_alpha_printed,
     ),
-    Formula(
-        ALPHA,
+    Check(
         "LOD alpha, smooth",
-        "Eq. (lod_blend)",
-        "the same",
-        "float32",
-        _distances,
+        _distance_cases,
         lambda d, switch, band: weights.finer_share(d, switch, band, True),
-        lambda d, switch, band: _share_slowly(d, switch, band, True),
-        Tolerance(LAW[0], 1e-6, LAW[1]),
+        lambda d, switch, band: _alpha_reference(d, switch, band, True),
+        relative=FLOAT32,
+        absolute=1e-6,
     ),
-    Formula(
-        ALPHA,
+    Check(
         "LOD: weights of all levels sum to 1",
-        "Eq. (lod_blend)",
-        "five levels, bands that overlap",
-        "float32",
-        _chains,
+        _level_cases,
         lambda d, s, b: weights.level_weights(d, s, b).astype(np.float64).sum(0),
         lambda d, s, b: np.ones(len(d)),
-        Tolerance(0.0, 5 * SINGLE, "a rounding of float32 a level"),
+        absolute=5 * FLOAT32_EPS,
     ),
-    Formula(
-        ALPHA,
+    Check(
         "distance at which a level takes over",
-        "docs/research/numerics.md",
-        "scales 1e-12 to 1e6",
-        "float64",
-        lambda: [Point(f"scale {s:g}", (s,)) for s in (1e-12, 1e-6, 1.0, 1e6)],
-        _switch,
+        lambda: [Case(f"scale {s:g}", (s,)) for s in (1e-12, 1e-6, 1.0, 1e6)],
+        _switch_distance,
         lambda s: s * 960 / math.tan(math.pi / 6),
-        Tolerance(1e-12, 0.0, "roundings of float64"),
+        relative=1e-12,
     ),
-    Formula(
-        FADE,
+    Check(
         "cross-fade: -expm1(w log1p(-alpha))",
-        "Eq. (lod_blend)",
-        "alpha 0 to 1, w 0 and 1e-12 to 1",
-        "float32",
-        _fades,
+        _crossfade_cases,
         weights.crossfade_opacity,
-        _fade_slowly,
-        Tolerance(LAW[0], 1e-12, LAW[1]),
+        _crossfade_reference,
+        relative=FLOAT32,
+        absolute=1e-12,
     ),
-    Formula(
-        FADE,
+    Check(
         "two equal splats, drawn with w and 1 - w",
-        "linear in the paper",
-        "alpha 1e-6 to 0.999, w 0 to 1",
-        "float32",
-        _halves,
-        lambda a, w: _over(weights.crossfade_opacity, a, w),
+        _equal_splat_cases,
+        lambda a, w: _composite_twice(weights.crossfade_opacity, a, w),
         lambda a, w: a.astype(np.float64),
-        Tolerance(LAW[0], 1e-6, LAW[1]),
-        lambda a, w: _over(lambda x, y: x * y, a, w),
+        relative=FLOAT32,
+        absolute=1e-6,
+        printed=lambda a, w: _composite_twice(lambda x, y: x * y, a, w),
     ),
-    Formula(
-        PLACE,
-        "J R S, a Gaussian's shape on a slope",
-        "height fields",
-        "scales 1e-12 to 1e6, needles, slopes to 1000",
-        "float64",
-        _shapes,
-        _draped,
-        _draped_slowly,
-        Tolerance(1e-9, 1e-12, "roundings of float64 times the slope"),
+    Check(
+        "J R S, a Gaussian's shape on a slope", _shape_cases, _drape, _drape_reference, relative=1e-9, absolute=1e-12
     ),
-    Formula(
-        PLACE,
-        "height and slopes of hills",
-        "height fields",
-        "to 1e9 units from the origin",
-        "float64",
-        _places,
-        _surface,
-        _surface_slowly,
-        Tolerance(0.0, 1e-5, "1e9 units hold 1e-7 of a unit; the steepest hill is 3"),
-    ),
-    Formula(
-        PLACE,
-        "which tile lies in a cell",
-        "integer hash",
-        "cells to 2^63, every salt",
-        "integer",
-        _numbers,
-        _hash,
-        _hash_slowly,
-        EXACT,
-    ),
+    Check("height and slopes of hills", _place_cases, _hills, _hills_reference, absolute=1e-5),
+    Check("which tile lies in a cell", _cell_cases, _hash, _hash_reference),
 ]

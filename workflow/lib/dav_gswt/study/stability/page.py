@@ -1,81 +1,82 @@
-"""The page docs/research/results/stability.md: a template's text, with the tables."""
+"""The page of numerical stability: a template filled with the tables of formulas and of runs."""
 
 from pathlib import Path
 
-from dav_gswt.files import whole
-from dav_gswt.study.markdown import format_table
+from dav_gswt.study.markdown import format_table, render_template, write_page
 
 
-def write(path: Path | str, template: Path | str, formulas: list[dict], runs: list[dict], facts: dict) -> None:
-    """Fill the template's places: {formulas}, {printed}, {runs}, {counts} and where it all comes from.
-
-    formulas, runs: rows as read from the tables. facts: their provenance.
-    """
-    text = Path(template).read_text(encoding="utf-8")
-    renderer = ", ".join(str(value) for value in facts["renderer"].values())
-    found = {
-        "formulas": formula_tables(formulas),
-        "printed": printed_table(formulas),
-        "runs": run_table(runs),
-        "held": sum(row["finite"] == "True" and float(row["share_of_tolerance"]) <= 1 for row in formulas),
-        "count": len(formulas),
-        "expected": sum(row["as_expected"] == "True" for row in runs),
-        "ran": len(runs),
+def write_stability_page(
+    path: Path | str, template: Path | str, formulas: list[dict], runs: list[dict], facts: dict
+) -> None:
+    """Write the page. formulas, runs: rows of the tables, as text. facts: their provenance."""
+    values = {
+        "formulas": format_formulas(formulas),
+        "printed": format_printed_forms(formulas),
+        "runs": format_runs(runs),
+        "within_tolerance": sum(row["finite"] == "True" and float(row["share_of_tolerance"]) <= 1 for row in formulas),
+        "formula_count": len(formulas),
+        "as_expected": sum(row["as_expected"] == "True" for row in runs),
+        "run_count": len(runs),
         "version": facts["version"],
-        "renderer": renderer,
+        "renderer": ", ".join(str(value) for value in facts["renderer"].values()),
     }
-    with whole(path) as part:
-        part.write_text(text.format(**found), encoding="utf-8")
+    write_page(path, render_template(template, values))
 
 
-def formula_tables(rows: list[dict]) -> str:
-    """A table for each group."""
+def format_formulas(rows: list[dict]) -> str:
+    """A table for each group of formulas."""
+    header = ("formula", "range", "type", "worst error", "relative", "where", "of its tolerance")
     parts = []
-    head = ("formula", "range", "kept or computed in", "worst error", "relative", "where", "of its tolerance")
     for group in dict.fromkeys(row["group"] for row in rows):
-        parts.append(f"### {group}\n\n{format_table(head, [_formula(row) for row in rows if row['group'] == group])}")
+        lines = [_format_formula(row) for row in rows if row["group"] == group]
+        parts.append(f"### {group}\n\n{format_table(header, lines)}")
     return "\n".join(parts)
 
 
-def _formula(row: dict) -> tuple[str, ...]:
-    name = f"{row['formula']} ({row['source']})"
+def _format_formula(row: dict) -> tuple[str, ...]:
     share = float(row["share_of_tolerance"])
-    held = f"{share:.2g}" if share <= 1 and row["finite"] == "True" else f"**{share:.2g}**"
-    numbers = (number(row["absolute_error"]), number(row["relative_error"]))
-    return name, row["range"], row["type"], *numbers, row["worst_at"] if share else "", held
+    text = f"{share:.2g}" if share <= 1 and row["finite"] == "True" else f"**{share:.2g}**"
+    errors = (shorten_number(row["absolute_error"]), shorten_number(row["relative_error"]))
+    return (
+        f"{row['formula']} ({row['source']})",
+        row["range"],
+        row["type"],
+        *errors,
+        row["worst_at"] * bool(share),
+        text,
+    )
 
 
-def printed_table(rows: list[dict]) -> str:
-    """What the forms give that are not used."""
+def format_printed_forms(rows: list[dict]) -> str:
+    """A table of what the printed forms give at their worst."""
     lines = []
     for row in rows:
         if row["printed_share_of_tolerance"]:
-            values = (number(row["printed_gives"]), number(row["printed_right"]), number(row["absolute_error"]))
-            lines.append((row["formula"], row["printed_at"], *values))
-    return format_table(("formula", "at", "gives", "right is", "ours is off by, at worst"), lines)
+            numbers = (row["printed_gives"], row["printed_right"], row["absolute_error"])
+            lines.append((row["formula"], row["printed_at"], *map(shorten_number, numbers)))
+    return format_table(("formula", "at", "gives", "expected", "our largest error"), lines)
 
 
-def run_table(rows: list[dict]) -> str:
-    """What came of each run."""
+def format_runs(rows: list[dict]) -> str:
+    """A table of the outcomes of all runs."""
     lines = []
     for row in rows:
-        good = "yes" if row["as_expected"] == "True" else "**no**"
-        lines.append(
-            (row["about"], _outcome(row), good, row["gaussians"], f"{float(row['seconds']):.0f}", row["peak_mb"])
-        )
-    return format_table(("run", "what came of it", "as expected", "Gaussians", "seconds", "MB"), lines)
+        expected = "yes" if row["as_expected"] == "True" else "**no**"
+        seconds = f"{float(row['seconds']):.0f}"
+        lines.append((row["about"], _format_outcome(row), expected, row["gaussians"], seconds, row["peak_mb"]))
+    return format_table(("run", "outcome", "as expected", "Gaussians", "seconds", "MB"), lines)
 
 
-def _outcome(row: dict) -> str:
+def _format_outcome(row: dict) -> str:
     if row["exit_code"] != "0":
         return f'stopped: "{row["message"]}"' + (" and a traceback" if row["traceback"] == "True" else "")
-    said = f"ended; {row['files_checked']} files of numbers, {row['not_finite']} with one that is not finite"
+    text = f"finished; {row['files_checked']} files checked, {row['not_finite']} with numbers that are not finite"
     if row["stills_psnr"]:
-        said += f"; stills as those of {row['like']} to {float(row['stills_psnr']):.0f} dB"
-    return said + (f"; said: {row['warnings']}" if row["warnings"] else "")
+        text += f"; stills equal those of {row['like']} to {float(row['stills_psnr']):.0f} dB"
+    return text + (f"; warned: {row['warnings']}" if row["warnings"] else "")
 
 
-def number(text: str) -> str:
-    """A number to two digits, longer where it is whole and short."""
+def shorten_number(text: str) -> str:
+    """A number with two significant digits; whole numbers below 1e7 in full."""
     value = float(text)
     return f"{value:.0f}" if value.is_integer() and abs(value) < 1e7 else f"{value:.2g}"
