@@ -120,7 +120,7 @@ class Rasterizer(interface.Rasterizer):
         return Contributions(*out)
 
     @property
-    def drawn(self) -> Bool[Array, "n"]:
+    def visible(self) -> Bool[Array, "n"]:
         found = np.empty(len(self._forwarded()[0]["means"]), bool)
         self._core.drawn(found)
         return found

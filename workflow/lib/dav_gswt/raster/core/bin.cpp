@@ -66,7 +66,7 @@ void Binning::count(const Splat* splats, size_t n, int threads) {
 #pragma omp parallel for num_threads(threads) schedule(static)
   for (ptrdiff_t i = 0; i < ptrdiff_t(n); i++) {
     uint32_t found = 0;
-    if (splats[i].drawn()) each_tile(splats[i], columns_, [&](int) { found++; });
+    if (splats[i].visible()) each_tile(splats[i], columns_, [&](int) { found++; });
     slots_[i + 1] = found;
   }
   keys_.clear();

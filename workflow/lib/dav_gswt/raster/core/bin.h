@@ -1,11 +1,11 @@
-// Which splats lie in which tile, front to back.
+// Binning: the splats of each tile, front to back.
 #pragma once
 #include "types.h"
 #include <vector>
 
 namespace raster {
 
-// The lists, and what making them needs; kept between calls, so that its memory is.
+// The lists and their working memory, which is kept between calls.
 class Binning {
  public:
   // Lists the splats of every tile of a width x height picture. Throws std::length_error beyond 2^31 intersections.

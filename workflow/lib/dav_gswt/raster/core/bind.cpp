@@ -150,7 +150,7 @@ NB_MODULE(_core, m) {
       .def("forward", &forward)
       .def("backward", &backward)
       .def("contributions", &contributions)
-      .def("drawn", [](const Context& context, Flags out) { context.drawn(out.size(), out.data()); })
+      .def("drawn", [](const Context& context, Flags out) { context.visible(out.size(), out.data()); })
       .def("pairs", &Context::pairs);
   m.def("loss", &loss);
   m.def("adam", &adam);

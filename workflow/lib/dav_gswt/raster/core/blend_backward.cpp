@@ -11,7 +11,7 @@
 namespace raster {
 namespace ISA {
 
-template <int C, bool DEPTH> static void unblend_tile(const Splat* splats, const Tiles& tiles, const Images& images,
+template <int C, bool DEPTH> static void backward_tile(const Splat* splats, const Tiles& tiles, const Images& images,
                                                       const ImageGradients& gradients, float* records, int tile) {
   constexpr int SIZE = MOMENTS + C + DEPTH;
   const TileFrame frame(tile, tiles, images);
@@ -38,54 +38,54 @@ template <int C, bool DEPTH> static void unblend_tile(const Splat* splats, const
     behind[b][lane] = sum;
   });
 
-  auto unblend = [&](uint32_t place, const Splat& s, Blocks blocks) {
-    const Brush brush(frame, s);
+  auto blend_back = [&](uint32_t place, const Splat& s, Blocks blocks) {
+    const TileSplat tile_splat(frame, s);
     Lanes record[SIZE] = {};
     for (; blocks; blocks &= blocks - 1) {
       const int b = __builtin_ctzll(blocks);
       const Lanes clear = transmittance[b];
-      Touch touch;
-      lay(frame, brush, b, transmittance[b], touch);
+      BlendSample sample;
+      blend_block(frame, tile_splat, b, transmittance[b], sample);
       Lanes share = C ? colour[0][b] * s.colour[0] : all(0);
       for (int c = 1; c < C; c++) share += colour[c][b] * s.colour[c];
       if (DEPTH) share += depth[b] * s.depth;
-      const Lanes rest = behind[b] - touch.weight * share;
+      const Lanes rest = behind[b] - sample.weight * share;
       behind[b] = rest;
-      const Lanes v = where(touch.on & touch.unclamped,
-                            touch.alpha * (clear * share - rest * reciprocal(1.f - touch.alpha)));
-      const Lanes vx = v * touch.dx, vy = v * touch.dy;
+      const Lanes v = where(sample.on & sample.unclamped,
+                            sample.alpha * (clear * share - rest * reciprocal(1.f - sample.alpha)));
+      const Lanes vx = v * sample.dx, vy = v * sample.dy;
       record[0] += v;
       record[1] += vx;
       record[2] += vy;
-      record[3] += vx * touch.dx;
-      record[4] += vx * touch.dy;
-      record[5] += vy * touch.dy;
-      for (int c = 0; c < C; c++) record[MOMENTS + c] += touch.weight * colour[c][b];
-      if (DEPTH) record[MOMENTS + C] += touch.weight * depth[b];
+      record[3] += vx * sample.dx;
+      record[4] += vx * sample.dy;
+      record[5] += vy * sample.dy;
+      for (int c = 0; c < C; c++) record[MOMENTS + c] += sample.weight * colour[c][b];
+      if (DEPTH) record[MOMENTS + C] += sample.weight * depth[b];
     }
     store_sums<SIZE>(records + (size_t)tiles.slot[place] * SIZE, record);
   };
   auto skip = [&](uint32_t place) { memset(records + (size_t)tiles.slot[place] * SIZE, 0, 4 * SIZE); };
-  walk(frame, splats, tiles, tile, transmittance, unblend, skip);
+  for_each_splat(frame, splats, tiles, tile, transmittance, blend_back, skip);
 }
 
-template <int C> static void unblend(const Splat* splats, const Tiles& tiles, const Images& images,
+template <int C> static void blend_backward_tiles(const Splat* splats, const Tiles& tiles, const Images& images,
                                      const ImageGradients& gradients, float* records, int threads) {
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 2)
   for (int tile = 0; tile < tiles.columns * tiles.rows; tile++) {
-    if (gradients.depth) unblend_tile<C, true>(splats, tiles, images, gradients, records, tile);
-    else unblend_tile<C, false>(splats, tiles, images, gradients, records, tile);
+    if (gradients.depth) backward_tile<C, true>(splats, tiles, images, gradients, records, tile);
+    else backward_tile<C, false>(splats, tiles, images, gradients, records, tile);
   }
 }
 
 void blend_backward(const Splat* splats, const Tiles& tiles, const Images& images, const ImageGradients& gradients,
                     float* records, int threads) {
   switch (images.group) {
-    case 0: return unblend<0>(splats, tiles, images, gradients, records, threads);
-    case 1: return unblend<1>(splats, tiles, images, gradients, records, threads);
-    case 2: return unblend<2>(splats, tiles, images, gradients, records, threads);
-    case 3: return unblend<3>(splats, tiles, images, gradients, records, threads);
-    default: return unblend<4>(splats, tiles, images, gradients, records, threads);
+    case 0: return blend_backward_tiles<0>(splats, tiles, images, gradients, records, threads);
+    case 1: return blend_backward_tiles<1>(splats, tiles, images, gradients, records, threads);
+    case 2: return blend_backward_tiles<2>(splats, tiles, images, gradients, records, threads);
+    case 3: return blend_backward_tiles<3>(splats, tiles, images, gradients, records, threads);
+    default: return blend_backward_tiles<4>(splats, tiles, images, gradients, records, threads);
   }
 }
 

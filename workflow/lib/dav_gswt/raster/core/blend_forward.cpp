@@ -1,4 +1,4 @@
-// Colour, alpha and depth of every pixel: splats from front to back, each weighted by alpha times what is still clear.
+// Colour, alpha and depth of every pixel: splats from front to back, each weighted by alpha times transmittance.
 #include "blocks.h"
 #include "kernels.h"
 
@@ -16,16 +16,16 @@ template <int C> static void blend_tile(const Splat* splats, const Tiles& tiles,
   frame.clear(transmittance);
 
   auto blend = [&](uint32_t, const Splat& s, Blocks blocks) {
-    const Brush brush(frame, s);
-    Touch touch;
+    const TileSplat tile_splat(frame, s);
+    BlendSample sample;
     for (; blocks; blocks &= blocks - 1) {
       const int b = __builtin_ctzll(blocks);
-      lay(frame, brush, b, transmittance[b], touch);
-      for (int c = 0; c < C; c++) colour[c][b] += touch.weight * s.colour[c];
-      depth[b] += touch.weight * s.depth;
+      blend_block(frame, tile_splat, b, transmittance[b], sample);
+      for (int c = 0; c < C; c++) colour[c][b] += sample.weight * s.colour[c];
+      depth[b] += sample.weight * s.depth;
     }
   };
-  walk(frame, splats, tiles, tile, transmittance, blend, [](uint32_t) {});
+  for_each_splat(frame, splats, tiles, tile, transmittance, blend, [](uint32_t) {});
 
   frame.each_pixel([&](int b, int lane, size_t pixel) {
     float* to = images.colour + pixel * images.channels + images.channel;

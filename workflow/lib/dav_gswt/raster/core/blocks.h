@@ -1,7 +1,7 @@
-// How a tile's pixels lie in lanes, and the walk over a tile's splats that the blending kernels share.
+// The layout of a tile's pixels in lanes, and the loop over a tile's splats that the blending kernels share.
 //
-// A tile is cut into blocks of LANES pixels, near squares: a small splat fills their lanes better than those of a row.
-// A pixel whose transmittance is used up keeps it with the sign turned: it takes no more splats.
+// A tile consists of blocks of LANES pixels, nearly square: a small splat fills more of their lanes than of a row's.
+// A saturated pixel (its transmittance is used up) keeps it with a negative sign and takes no more splats.
 #pragma once
 #include "lanes.h"
 
@@ -13,8 +13,8 @@ constexpr int BLOCK_HEIGHT = LANES / BLOCK_WIDTH;
 constexpr int BLOCKS_ACROSS = TILE / BLOCK_WIDTH;
 constexpr int BLOCKS_DOWN = TILE / BLOCK_HEIGHT;
 constexpr int BLOCKS = BLOCKS_ACROSS * BLOCKS_DOWN;
-constexpr int LOOK_AHEAD = 6;  // splats between the one that is blended and the one that is fetched
-constexpr int ROLL_CALL = 16;  // splats between two looks at which blocks are still alive
+constexpr int PREFETCH_AHEAD = 6;  // splats between the blended one and the prefetched one
+constexpr int CHECK_EVERY = 16;  // splats between two checks which blocks are still alive
 
 typedef uint64_t Blocks;  // a bit for each
 static_assert(BLOCKS <= 64, "a bit for each");
@@ -42,15 +42,15 @@ struct TileFrame {
           (size_t)(top + y) * images.width + left + x);
   }
 
-  // 1 within the image; used up from the start outside of it.
+  // 1 within the image; saturated outside of it.
   void clear(Lanes* transmittance) const {
     for (int b = 0; b < BLOCKS; b++) transmittance[b] = all(-1);
     each_pixel([&](int block, int lane, size_t) { transmittance[block][lane] = 1; });
   }
 };
 
-// Those blocks that still have a pixel which takes splats.
-static inline Blocks living(const Lanes* transmittance, Blocks among) {
+// The blocks that still have a pixel that is not saturated.
+static inline Blocks alive_blocks(const Lanes* transmittance, Blocks among) {
   Blocks found = 0;
   for (Blocks left = among; left; left &= left - 1) {
     const int b = __builtin_ctzll(left);
@@ -61,36 +61,37 @@ static inline Blocks living(const Lanes* transmittance, Blocks among) {
 
 static inline Blocks lowest(int count) { return count >= 64 ? ~Blocks(0) : (Blocks(1) << count) - 1; }
 
-static inline int within_tile(int pixel) { return pixel < 0 ? 0 : pixel > TILE - 1 ? TILE - 1 : pixel; }
+static inline int clamp_to_tile(int pixel) { return pixel < 0 ? 0 : pixel > TILE - 1 ? TILE - 1 : pixel; }
 
-// The blocks that the splat's box meets; it meets the tile, or would not be in its list.
-static inline Blocks touched(const TileFrame& frame, const Splat& s) {
-  const int left = within_tile(s.left - frame.left) / BLOCK_WIDTH;
-  const int right = within_tile(s.right - frame.left) / BLOCK_WIDTH;
-  const int top = within_tile(s.top - frame.top) / BLOCK_HEIGHT;
-  const int bottom = within_tile(s.bottom - frame.top) / BLOCK_HEIGHT;
+// The blocks that the splat's box meets. The box meets the tile, else the splat were not in its list.
+static inline Blocks blocks_met(const TileFrame& frame, const Splat& s) {
+  const int left = clamp_to_tile(s.left - frame.left) / BLOCK_WIDTH;
+  const int right = clamp_to_tile(s.right - frame.left) / BLOCK_WIDTH;
+  const int top = clamp_to_tile(s.top - frame.top) / BLOCK_HEIGHT;
+  const int bottom = clamp_to_tile(s.bottom - frame.top) / BLOCK_HEIGHT;
   constexpr Blocks FIRST_COLUMN = ~Blocks(0) / ((Blocks(1) << BLOCKS_ACROSS) - 1);  // a bit every BLOCKS_ACROSS
   const Blocks columns = (lowest(right + 1) & ~lowest(left)) * FIRST_COLUMN;
   return columns & lowest((bottom + 1) * BLOCKS_ACROSS) & ~lowest(top * BLOCKS_ACROSS);
 }
 
-// A splat, made ready for one tile.
-struct Brush {
+// A splat relative to one tile, its values in all lanes.
+struct TileSplat {
   Lanes x, y, xx, xy, yy, log2_opacity;
-  Brush(const TileFrame& frame, const Splat& s)
+  TileSplat(const TileFrame& frame, const Splat& s)
       : x(all(s.x - frame.left)), y(all(s.y - frame.top)), xx(all(s.xx)), xy(all(s.xy)), yy(all(s.yy)),
         log2_opacity(all(s.log2_opacity)) {}
 };
 
-// What a splat does to a block: the pixels that take it (`on`), its alpha there, its blend weight (0 elsewhere).
-struct Touch {
+// A splat blended over one block: the pixels that take it (`on`), its alpha there, its blend weight (0 elsewhere).
+struct BlendSample {
   Lanes dx, dy, alpha, weight;
   Mask on, unclamped;
 };
 
-// Lays a splat over a block. A fifth of the blocks are not reached at all (a corner of the splat's box), but a branch
-// to leave them out is mispredicted too often to pay.
-static inline void lay(const TileFrame& frame, const Brush& s, int block, Lanes& transmittance, Touch& t) {
+// Blends a splat over a block. A fifth of the blocks are not reached (a corner of the splat's box), but a branch that
+// skips them is mispredicted too often to pay.
+static inline void blend_block(const TileFrame& frame, const TileSplat& s, int block, Lanes& transmittance,
+                               BlendSample& t) {
   t.dx = frame.x[block % BLOCKS_ACROSS] - s.x;
   t.dy = frame.y[block / BLOCKS_ACROSS] - s.y;
   const Lanes log2_alpha = (s.xx * t.dx + s.xy * t.dy) * t.dx + (s.yy * t.dy * t.dy + s.log2_opacity);
@@ -100,25 +101,25 @@ static inline void lay(const TileFrame& frame, const Brush& s, int block, Lanes&
   t.unclamped = below(alpha, all(ALPHA_MAX));
   t.alpha = min(alpha, all(ALPHA_MAX));
   const Lanes weight = t.alpha * clear, rest = clear - weight;
-  t.on = reached & at_least(rest, all(CLEAR_MIN));  // never of a pixel that is used up: its rest is negative
+  t.on = reached & at_least(rest, all(CLEAR_MIN));  // never a saturated pixel: its rest is negative
   t.weight = where(t.on, weight);
   transmittance = select(t.on, rest, select(reached, negative(clear), clear));
 }
 
-// Walks over a tile's splats from front to back. at(place, splat, blocks) blends one over the blocks it touches;
-// skip(place) is called for the splats behind a tile whose pixels are all used up.
+// Goes over a tile's splats from front to back: at(place, splat, blocks) for each, with the blocks that it meets, then
+// skip(place) for the rest once all pixels are saturated.
 template <class At, class Skip>
-static inline void walk(const TileFrame& frame, const Splat* splats, const Tiles& tiles, int tile,
+static inline void for_each_splat(const TileFrame& frame, const Splat* splats, const Tiles& tiles, int tile,
                         const Lanes* transmittance, At at, Skip skip) {
   const uint32_t end = tiles.first[tile + 1];
   uint32_t place = tiles.first[tile];
-  Blocks alive = living(transmittance, lowest(BLOCKS));
+  Blocks alive = alive_blocks(transmittance, lowest(BLOCKS));
   for (int count = 1; place < end && alive; place++, count++) {
-    const uint32_t ahead = place + LOOK_AHEAD < end ? place + LOOK_AHEAD : end - 1;
+    const uint32_t ahead = place + PREFETCH_AHEAD < end ? place + PREFETCH_AHEAD : end - 1;
     __builtin_prefetch(&splats[tiles.splat[ahead]]);
     const Splat& s = splats[tiles.splat[place]];
-    at(place, s, touched(frame, s) & alive);
-    if (count % ROLL_CALL == 0) alive = living(transmittance, alive);
+    at(place, s, blocks_met(frame, s) & alive);
+    if (count % CHECK_EVERY == 0) alive = alive_blocks(transmittance, alive);
   }
   for (; place < end; place++) skip(place);
 }

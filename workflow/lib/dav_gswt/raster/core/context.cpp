@@ -1,5 +1,5 @@
 #include "context.h"
-#include "keep_apart.h"
+#include "thread_affinity.h"
 #include <algorithm>
 #include <cstring>
 #include <new>
@@ -52,7 +52,7 @@ void SplatStore::resize(size_t n) {
 
 namespace {
 
-// Calls f(channel, group) for each pass over the channels: once even if there are none.
+// Calls f(channel, group) for each pass over the channels; once if there are none.
 template <class F> void each_pass(int channels, F f) {
   int channel = 0;
   do f(channel, std::min(GROUP, channels - channel));
@@ -66,7 +66,7 @@ Images pass_of(const Images& images, int channel, int group) {
   return pass;
 }
 
-// Zeroes the rows of those chunks that hold others than candidates; candidates' own rows are written later.
+// Zeroes the rows of chunks that are not all candidates; the candidates' rows are written later.
 void clear(float* array, size_t columns, size_t n, const std::vector<uint32_t>& counts, int threads) {
 #pragma omp parallel for num_threads(threads) schedule(static)
   for (ptrdiff_t chunk = 0; chunk < ptrdiff_t(counts.size()); chunk++) {
@@ -80,7 +80,7 @@ bool features_seen(const Scene& scene) { return scene.features && scene.feature_
 }  // namespace
 
 Values Context::colours(const Scene& scene) const {
-  if (scene.coefficients) return {shown_.data(), nullptr, 3};
+  if (scene.coefficients) return {sh_colours_.data(), nullptr, 3};
   return {scene.colours, rows_.data(), scene.channels};
 }
 
@@ -88,7 +88,7 @@ Values Context::features(const Scene& scene) const {
   return {scene.features, rows_.data(), scene.feature_channels};
 }
 
-// The candidates of all chunks, behind each other.
+// Joins the candidates of all chunks.
 void Context::cull(const Scene& scene, int threads) {
   const size_t chunks = (scene.n + CHUNK - 1) / CHUNK;
   found_.resize(scene.n);
@@ -117,12 +117,12 @@ bool Context::draw(const Values& values, Images images, bool only_colour, int th
 }
 
 bool Context::forward(const Scene& scene, const View& view, const Pictures& pictures, int threads) {
-  processor_ = keep_apart(threads, processor_);
+  const ThreadAffinity affinity(threads);
   view_ = view;
   cull(scene, threads);
   splats_.resize(rows_.size());
-  if (scene.coefficients) shown_.resize(3 * rows_.size());
-  if (!kernels_.project(scene, view, candidates(), splats_.data(), shown_.data(), threads)) return false;
+  if (scene.coefficients) sh_colours_.resize(3 * rows_.size());
+  if (!kernels_.project(scene, view, candidates(), splats_.data(), sh_colours_.data(), threads)) return false;
   binning_.sort(splats_.data(), rows_.size(), view.width, view.height, threads);
   const Images images{view.width, view.height, 0, 0, 0, pictures.colour, pictures.alpha, pictures.depth};
   if (!draw(colours(scene), images, false, threads)) return false;
@@ -132,11 +132,11 @@ bool Context::forward(const Scene& scene, const View& view, const Pictures& pict
   return draw(features(scene), second, true, threads);
 }
 
-void Context::take_back(const Values& values, Images images, ImageGradients given, bool first, bool reload,
+void Context::backward_pass(const Values& values, Images images, ImageGradients given, bool first, bool reload,
                         float* gradients, int threads) {
   images.channels = values.channels;
   each_pass(values.channels, [&](int channel, int group) {
-    if (!first || channel > 0) given.alpha = given.depth = nullptr;  // they count once
+    if (!first || channel > 0) given.alpha = given.depth = nullptr;  // counted once
     const bool depth = given.depth != nullptr;
     records_.resize(binning_.intersections() * (MOMENTS + group + depth));
     if (reload) kernels_.load_values(values, rows_.size(), channel, group, splats_.data(), threads);
@@ -149,7 +149,7 @@ void Context::take_back(const Values& values, Images images, ImageGradients give
 
 void Context::backward(const Scene& scene, const Pictures& pictures, const PictureGradients& given,
                        const SceneGradients& out, int threads) {
-  processor_ = keep_apart(threads, processor_);
+  const ThreadAffinity affinity(threads);
   const size_t width = scene.coefficients ? 3 * scene.coefficients : scene.channels;
   clear(out.means, 3, scene.n, counts_, threads);
   clear(out.log_scales, 3, scene.n, counts_, threads);
@@ -158,25 +158,25 @@ void Context::backward(const Scene& scene, const Pictures& pictures, const Pictu
   clear(out.colours, width, scene.n, counts_, threads);
   sums_.resize(rows_.size() * (MOMENTS + 1));
   motions_.resize((rows_.size() + 3) / 4 * 6);
-  if (scene.coefficients) by_shown_.resize(3 * rows_.size());
+  if (scene.coefficients) by_sh_colours_.resize(3 * rows_.size());
 
   const bool reload = scene.channels > GROUP || features_seen(scene);  // the splats hold what was drawn last
   const Images images{view_.width, view_.height, 0, 0, 0, pictures.colour, pictures.alpha, pictures.depth};
-  take_back(colours(scene), images, {given.colour, given.alpha, given.depth}, true, reload,
-            scene.coefficients ? by_shown_.data() : out.colours, threads);
+  backward_pass(colours(scene), images, {given.colour, given.alpha, given.depth}, true, reload,
+            scene.coefficients ? by_sh_colours_.data() : out.colours, threads);
   if (features_seen(scene) && given.features) {
     clear(out.features, scene.feature_channels, scene.n, counts_, threads);
     Images second = images;
     second.colour = pictures.features;
-    take_back(features(scene), second, {given.features, nullptr, nullptr}, false, true, out.features, threads);
+    backward_pass(features(scene), second, {given.features, nullptr, nullptr}, false, true, out.features, threads);
   } else if (features_seen(scene)) {
     std::memset(out.features, 0, scene.n * scene.feature_channels * sizeof(float));
   }
-  kernels_.project_backward(scene, view_, candidates(), splats_.data(), sums_.data(), shown_.data(), by_shown_.data(),
-                            motions_.data(), out, threads);
+  kernels_.project_backward(scene, view_, candidates(), splats_.data(), sums_.data(), sh_colours_.data(),
+                            by_sh_colours_.data(), motions_.data(), out, threads);
 }
 
-void Context::contributions(const Scene& scene, const Images& map, const Shares& out, int threads) {
+void Context::contributions(const Scene& scene, const Images& map, const ContributionSums& out, int threads) {
   for (float* each : {out.total, out.squared, out.maximum}) clear(each, 1, scene.n, counts_, threads);
   clear(out.mapped, map.channels, scene.n, counts_, threads);
   each_pass(map.channels, [&](int channel, int group) {
@@ -187,7 +187,7 @@ void Context::contributions(const Scene& scene, const Images& map, const Shares&
   });
 }
 
-void Context::drawn(size_t n, bool* out) const {
+void Context::visible(size_t n, bool* out) const {
   std::memset(out, 0, n);
   const uint32_t* slots = binning_.tiles().slots;
   for (size_t i = 0; i < rows_.size(); i++) out[rows_[i]] = slots[i + 1] > slots[i];

@@ -1,4 +1,4 @@
-// One rasterizer: the memory that calls share, and the order in which the kernels run.
+// A rasterizer: its memory, reused from call to call, and the order in which the kernels run.
 #pragma once
 #include "bin.h"
 #include "types.h"
@@ -36,29 +36,28 @@ class Context {
   // Gradients at the last forward's scene and pictures, which must be the same and unchanged. Every row is written.
   void backward(const Scene&, const Pictures&, const PictureGradients&, const SceneGradients&, int threads);
   // Blend weights of the last forward; `map` has 0 or more channels in `colour`.
-  void contributions(const Scene&, const Images& map, const Shares&, int threads);
-  // Which Gaussians of the last forward lie in any tile.
-  void drawn(size_t n, bool* out) const;
-  // Pairs of a pixel and a splat that it takes, of the last forward.
+  void contributions(const Scene&, const Images& map, const ContributionSums&, int threads);
+  // Marks the Gaussians of the last forward that lie in a tile.
+  void visible(size_t n, bool* out) const;
+  // Pairs of a pixel and a splat blended into it, of the last forward.
   double pairs(int threads);
   size_t intersections() const { return binning_.intersections(); }
 
  private:
   Candidates candidates() const { return {rows_.size(), rows_.data()}; }
   void cull(const Scene&, int threads);
-  // What the layers of pictures are made of: colours, then features.
+  // What is blended: colours, then features.
   Values colours(const Scene&) const;
   Values features(const Scene&) const;
   bool draw(const Values&, Images, bool only_colour, int threads);
-  void take_back(const Values&, Images, ImageGradients, bool first, bool reload, float* gradients, int threads);
+  void backward_pass(const Values&, Images, ImageGradients, bool first, bool reload, float* gradients, int threads);
 
   const Kernels& kernels_;
-  int processor_ = -1;  // that the other threads keep off
   View view_{};
   std::vector<uint32_t> found_, counts_, rows_;  // by chunk; the candidates
   SplatStore splats_;
   Binning binning_;
-  std::vector<float> records_, sums_, shown_, by_shown_, motions_;
+  std::vector<float> records_, sums_, sh_colours_, by_sh_colours_, motions_;
   std::vector<double> by_tile_;
 };
 

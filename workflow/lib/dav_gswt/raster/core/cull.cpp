@@ -1,9 +1,9 @@
-// Which Gaussians may show in the picture, by a bound of their size: most of a large field's do not, and this is all
+// Culling: which Gaussians may be visible, by a bound of their size. Most of a large field's are not, and this is all
 // that they cost.
 //
 // Whatever way a splat's axes lie, S_xx <= s^2 |u|^2 + dilation with s the largest scale and u the first row of J R;
 // and alpha falls below 1/255 within sqrt(2 ln(255) S_xx) of the centre.
-#include "chain.h"
+#include "projection.h"
 #include "kernels.h"
 
 namespace raster {
@@ -21,13 +21,13 @@ static inline Three triples(const float* rows, size_t first, int count) {
 
 // Lanes of the Gaussians that certainly have no pixel.
 static inline Mask outside(const Scene& scene, const View& view, size_t first, int count) {
-  Chain c;
+  Projection c;
   c.mean = triples(scene.means, first, count);
   const Three log_scales = triples(scene.log_scales, first, count);
   Whole finite = finite_bits(all(0));
   for (int k = 0; k < 3; k++) finite &= finite_bits(c.mean[k]) & finite_bits(log_scales[k]);
   const Lanes log_scale = max(log_scales[0], max(log_scales[1], log_scales[2]));
-  place(c, view);
+  to_camera(c, view);
   const Lanes scale = exp(clamp(log_scale, -LOG_SCALE_MAX * 1.5f, LOG_SCALE_MAX)), ss = scale * scale;
   const Lanes half_x = SLACK * sqrt(REACH * (ss * dot(c.u, c.u) + view.dilation)) + ROUNDING;
   const Lanes half_y = SLACK * sqrt(REACH * (ss * dot(c.v, c.v) + view.dilation)) + ROUNDING;

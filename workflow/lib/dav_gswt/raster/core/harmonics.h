@@ -1,6 +1,6 @@
 // Real spherical harmonics up to degree 3, in the order and with the signs of 3DGS (harmonics.py), and their slopes.
 #pragma once
-#include "chain.h"
+#include "projection.h"
 
 namespace raster {
 namespace ISA {
@@ -10,11 +10,11 @@ constexpr int COEFFICIENTS = 16;  // at most
 constexpr float SH0 = 0.28209479f, SH1 = 0.48860251f, SH2A = 1.09254843f, SH2B = 0.31539157f;
 constexpr float SH3A = 0.59004359f, SH3B = 2.89061144f, SH3C = 0.45704580f, SH3D = 0.37317633f;
 
-// The direction in which the camera sees LANES Gaussians, and one over their distance (1 for a parallel view).
-struct Sight {
+// The unit directions from the camera to LANES Gaussians, and one over their distance (1 for an orthographic camera).
+struct ViewDirection {
   Three to;
   Lanes per_length;
-  Sight(const Three& mean, const View& view) {
+  ViewDirection(const Three& mean, const View& view) {
     if (view.orthographic) {
       for (int k = 0; k < 3; k++) to[k] = all(view.rotation[6 + k]);
     } else {
@@ -40,8 +40,8 @@ static inline void basis_of(const Three& to, int count, Lanes* out) {
   out[14] = 0.5f * SH3B * z * (xx - yy), out[15] = -SH3A * x * (xx - 3 * yy);
 }
 
-// Slope by the direction of the sum of w_k basis_k; its part along the direction means nothing.
-static inline Three slope_of(const Three& to, int count, const Lanes* w) {
+// Gradient by the direction of the sum of w_k basis_k; its component along the direction is meaningless.
+static inline Three basis_gradient(const Three& to, int count, const Lanes* w) {
   const Lanes x = to[0], y = to[1], z = to[2];
   Three g = {{all(0), all(0), all(0)}};
   if (count < 4) return g;
@@ -60,11 +60,11 @@ static inline Three slope_of(const Three& to, int count, const Lanes* w) {
 }
 
 // max(0, 1/2 + sum over k of basis_k sh_k). Clears `valid` where a coefficient is not finite.
-static inline Three shade(const Scene& scene, const View& view, const Rows& rows, const Three& mean, Mask drawn,
+static inline Three shade(const Scene& scene, const View& view, const Rows& rows, const Three& mean, Mask visible,
                           bool& valid) {
   const int count = scene.coefficients;
   Lanes basis[COEFFICIENTS];
-  basis_of(Sight(mean, view).to, count, basis);
+  basis_of(ViewDirection(mean, view).to, count, basis);
   Three colour = {{all(0.5f), all(0.5f), all(0.5f)}};
   Whole finite = finite_bits(all(0));
   for (int k = 0; k < count; k++)
@@ -73,19 +73,19 @@ static inline Three shade(const Scene& scene, const View& view, const Rows& rows
       finite &= finite_bits(sh);
       colour[c] += basis[k] * sh;
     }
-  valid = !any(drawn & ~mask_of(finite));
+  valid = !any(visible & ~mask_of(finite));
   for (int c = 0; c < 3; c++) colour[c] = max(colour[c], all(0));
   return colour;
 }
 
-// The way back from `by_colour`, 0 where the colour was cut off at 0: writes gradients by coefficients, returns those
-// by the place that the camera sees (a parallel view: by its direction).
-static inline Three unshade(const Scene& scene, const View& view, const Rows& rows, const Three& mean,
+// The backward pass of `shade` from `by_colour`, 0 where the colour was clamped at 0: writes the gradients by the
+// coefficients, returns those by the Gaussian's position (orthographic: by the view's direction).
+static inline Three shade_backward(const Scene& scene, const View& view, const Rows& rows, const Three& mean,
                             const Three& by_colour, float* out) {
   const int count = scene.coefficients;
-  const Sight sight(mean, view);
+  const ViewDirection direction(mean, view);
   Lanes basis[COEFFICIENTS], weight[COEFFICIENTS];
-  basis_of(sight.to, count, basis);
+  basis_of(direction.to, count, basis);
   for (int k = 0; k < count; k++) {
     weight[k] = all(0);
     for (int c = 0; c < 3; c++) {
@@ -93,9 +93,9 @@ static inline Three unshade(const Scene& scene, const View& view, const Rows& ro
       if (count > 1) weight[k] += by_colour[c] * rows.load(scene.colours + 3 * k + c, 3 * count);
     }
   }
-  Three slope = slope_of(sight.to, count, weight);
-  const Lanes along = dot(slope, sight.to);
-  for (int k = 0; k < 3; k++) slope[k] = (slope[k] - along * sight.to[k]) * sight.per_length;
+  Three slope = basis_gradient(direction.to, count, weight);
+  const Lanes along = dot(slope, direction.to);
+  for (int k = 0; k < 3; k++) slope[k] = (slope[k] - along * direction.to[k]) * direction.per_length;
   return slope;
 }
 

@@ -1,4 +1,4 @@
-// What this processor can do at most: fused multiply-adds on values that never leave its registers.
+// Benchmark: the peak rate of fused multiply-adds, on values that never leave the registers.
 #include "kernels.h"
 #include "lanes.h"
 

@@ -1,4 +1,4 @@
-// From Gaussians in the world to splats on the screen and the colours of those that are drawn; LANES at a time.
+// Projects Gaussians to splats on the screen and evaluates the colours of the visible ones; LANES at a time.
 #include "harmonics.h"
 #include "kernels.h"
 
@@ -12,26 +12,26 @@ static inline Whole ceiling(Lanes v) {
 }
 
 // Writes the splats; returns which of them have a pixel.
-static inline Mask store_splats(const Chain& c, const View& view, Splat* splats, int count) {
+static inline Mask store_splats(const Projection& c, const View& view, Splat* splats, int count) {
   const Lanes per_det = 1.f / c.det;
-  const Lanes log2_opacity = log2(max(c.opacity * c.kept, all(1e-37f)));
+  const Lanes log2_opacity = log2(max(c.opacity * c.compensation, all(1e-37f)));
   const Lanes reach = 2 * LN2 * (log2_opacity + LOG2_255);  // the quadratic form at the rim
   const Lanes half_x = sqrt(max(reach * c.sxx, all(0))), half_y = sqrt(max(reach * c.syy, all(0)));
   const Lanes x = view.fx * c.slope_x + view.cx, y = view.fy * c.slope_y + view.cy;
-  const Mask drawn = at_least(c.z, all(view.orthographic ? 1e-30f : view.near)) & at_least(reach, all(0)) &
+  const Mask visible = at_least(c.z, all(view.orthographic ? 1e-30f : view.near)) & at_least(reach, all(0)) &
                      at_least(c.det, all(1e-30f));
   // the first pixel whose centre lies in the box, and the first beyond it
   const float width = view.width, height = view.height;
   const Lanes end_x = clamp(x + half_x - 0.5f, 0, width), end_y = clamp(y + half_y - 0.5f, 0, height);
   const Whole boxes[] = {ceiling(clamp(x - half_x - 0.5f, 0, width)), ceiling(clamp(y - half_y - 0.5f, 0, height)),
-                         ceiling(select(drawn, end_x, all(0))), ceiling(end_y)};
+                         ceiling(select(visible, end_x, all(0))), ceiling(end_y)};
   const Lanes fields[] = {x, y, -0.5f * LOG2_E * (c.syy * per_det), LOG2_E * (c.sxy * per_det),
                           -0.5f * LOG2_E * (c.sxx * per_det), log2_opacity, half_x, half_y, c.z};
   float buffer[9][LANES];
   int box[4][LANES];
   for (int f = 0; f < 9; f++) store(buffer[f], fields[f]);
   memcpy(box, boxes, sizeof box);
-  Whole shown = {};
+  Whole has_pixel = {};
   for (int l = 0; l < count; l++) {
     Splat& s = splats[l];
     s.x = buffer[0][l], s.y = buffer[1][l];
@@ -40,14 +40,14 @@ static inline Mask store_splats(const Chain& c, const View& view, Splat* splats,
     s.half_x = buffer[6][l], s.half_y = buffer[7][l];
     s.depth = buffer[8][l];
     const bool any_pixel = box[0][l] < box[2][l] && box[1][l] < box[3][l];
-    shown[l] = -(int)any_pixel;
+    has_pixel[l] = -(int)any_pixel;
     s.left = box[0][l], s.top = box[1][l];
     s.right = any_pixel ? box[2][l] - 1 : -1, s.bottom = any_pixel ? box[3][l] - 1 : -1;
   }
-  return mask_of(shown);
+  return mask_of(has_pixel);
 }
 
-bool project(const Scene& scene, const View& view, const Candidates& candidates, Splat* splats, float* shown,
+bool project(const Scene& scene, const View& view, const Candidates& candidates, Splat* splats, float* sh_colours,
              int threads) {
   const ptrdiff_t groups = (candidates.count + LANES - 1) / LANES;
   int invalid = 0;
@@ -55,14 +55,14 @@ bool project(const Scene& scene, const View& view, const Candidates& candidates,
   for (ptrdiff_t g = 0; g < groups; g++) {
     const size_t first = g * LANES;
     const Rows rows(candidates, first);
-    const Chain c = chain(scene, view, rows);
+    const Projection c = project_lanes(scene, view, rows);
     invalid |= !c.valid;
-    const Mask drawn = store_splats(c, view, splats + first, rows.count);
-    if (!scene.coefficients || !any(drawn)) continue;
+    const Mask visible = store_splats(c, view, splats + first, rows.count);
+    if (!scene.coefficients || !any(visible)) continue;
     bool valid;
-    const Three colour = shade(scene, view, rows, c.mean, drawn, valid);
+    const Three colour = shade(scene, view, rows, c.mean, visible, valid);
     invalid |= !valid;
-    for (int k = 0; k < 3; k++) store_column(shown + k, 3, first, rows.count, colour[k]);
+    for (int k = 0; k < 3; k++) store_column(sh_colours + k, 3, first, rows.count, colour[k]);
   }
   return !invalid;
 }
@@ -71,7 +71,7 @@ bool load_values(const Values& values, size_t count, int channel, int group, Spl
   int invalid = 0;
 #pragma omp parallel for num_threads(threads) schedule(static) reduction(| : invalid)
   for (ptrdiff_t i = 0; i < (ptrdiff_t)count; i++) {
-    if (!splats[i].drawn()) continue;
+    if (!splats[i].visible()) continue;
     const float* from = values.from + values.row(i) * values.channels + channel;
     float colour[GROUP] = {};
     for (int k = 0; k < group; k++) {

@@ -1,7 +1,7 @@
-// The gradients' way back from splats on the screen to Gaussians in the world and to the camera; LANES at a time.
+// Gradients by the Gaussians and by the camera from those by their splats on the screen; LANES at a time.
 //
 // A small motion of the camera, q' = q + w x q + tau in its own frame, moves each Gaussian there, turns the axes that
-// are projected (R' = R + [w]R) and shifts the place that colours are seen from: gradients by w and tau are sums over
+// are projected (R' = R + [w]R) and shifts the point that colours are seen from: gradients by w and tau are sums over
 // all Gaussians, taken of groups in float32 and over the groups in float64, in their order.
 #include "harmonics.h"
 #include "kernels.h"
@@ -12,7 +12,7 @@ namespace ISA {
 // The inverse of a splat's covariance.
 struct Conic {
   Lanes xx, xy, yy, per_det;
-  explicit Conic(const Chain& c)
+  explicit Conic(const Projection& c)
       : xx(c.syy / c.det), xy(-c.sxy / c.det), yy(c.sxx / c.det), per_det(1.f / c.det) {}
 };
 
@@ -27,7 +27,8 @@ struct AxisGradients {
 // An antialiased splat's opacity adds sum(v) (S0^-1 - K) c_k, S0 = S - dilation I. With x_k = area S0^-1 c_k the cross
 // products as above and det = area + dilation (trace + dilation), the difference of the inverses is taken before it
 // cancels: dilation (x_k (trace + dilation) / area - c_k) / det.
-static inline AxisGradients unspread(const Chain& c, const View& view, const Conic& conic, const Lanes* moments) {
+static inline AxisGradients covariance_backward(const Projection& c, const View& view, const Conic& conic,
+                                                const Lanes* moments) {
   const float dilation = view.dilation;
   const Lanes xx = moments[3], xy = moments[4], yy = moments[5], *s = c.cxy;
   const Lanes px[3] = {c.q[1] * s[0] + c.q[2] * s[1], c.q[2] * s[2] - c.q[0] * s[0], -c.q[0] * s[1] - c.q[1] * s[2]};
@@ -52,8 +53,8 @@ static inline AxisGradients unspread(const Chain& c, const View& view, const Con
   return d;
 }
 
-// dL/dquaternion from d = dL/dturn, through the division by its length.
-static inline void unturn(const Chain& c, const Lanes d[9], Lanes out[4]) {
+// dL/dquaternion from d = dL/drotation, through the division by its length.
+static inline void rotation_backward(const Projection& c, const Lanes d[9], Lanes out[4]) {
   const Lanes w = c.quat[0], x = c.quat[1], y = c.quat[2], z = c.quat[3];
   const Lanes g[4] = {
       2 * (x * (d[7] - d[5]) + y * (d[2] - d[6]) + z * (d[3] - d[1])),
@@ -66,23 +67,23 @@ static inline void unturn(const Chain& c, const Lanes d[9], Lanes out[4]) {
 }
 
 // Vectors of the world in the camera's frame, and back.
-static inline Three turned(const View& view, const Three& a) {
+static inline Three to_camera_frame(const View& view, const Three& a) {
   const float* r = view.rotation;
   return {{r[0] * a[0] + r[1] * a[1] + r[2] * a[2], r[3] * a[0] + r[4] * a[1] + r[5] * a[2],
            r[6] * a[0] + r[7] * a[1] + r[8] * a[2]}};
 }
 
-static inline Three turned_back(const View& view, const Three& a) {
+static inline Three to_world_frame(const View& view, const Three& a) {
   const float* r = view.rotation;
   Three out;
   for (int k = 0; k < 3; k++) out[k] = r[k] * a[0] + r[3 + k] * a[1] + r[6 + k] * a[2];
   return out;
 }
 
-// dL by the place in the camera's frame from the gradients of the splat's centre (dx, dy), of its depth, and of the
+// dL by the position in the camera's frame from the gradients of the splat's centre (dx, dy), of its depth, and of the
 // Jacobian's rows, du and dv (in the camera's frame too).
-static inline Three unplace(const Chain& c, const View& view, Lanes dx, Lanes dy, Lanes dz, const Three& du,
-                            const Three& dv) {
+static inline Three position_backward(const Projection& c, const View& view, Lanes dx, Lanes dy, Lanes dz,
+                                      const Three& du, const Three& dv) {
   Three out = {{c.jxx * dx, c.jyy * dy, dz}};
   if (view.orthographic) return out;
   const Lanes dslope_x = where(mask_of(c.bound_x == c.slope_x), -c.jxx * du[2]);
@@ -95,87 +96,89 @@ static inline Three unplace(const Chain& c, const View& view, Lanes dx, Lanes dy
   return out;
 }
 
-// dL by (w, tau) from the gradient by the place in the camera's frame and those of the Jacobian's rows.
-static inline void unmove(const Chain& c, const Three& by_place, const Three& du, const Three& dv, Lanes out[6]) {
+// dL by (w, tau) from the gradient by the position in the camera's frame and those of the Jacobian's rows.
+static inline void motion_backward(const Projection& c, const Three& by_place, const Three& du, const Three& dv,
+                                   Lanes out[6]) {
   out[0] = c.y * by_place[2] - c.z * by_place[1] + du[1] * c.jxz + dv[1] * c.jyz - dv[2] * c.jyy;
   out[1] = c.z * by_place[0] - c.x * by_place[2] + du[2] * c.jxx - du[0] * c.jxz - dv[0] * c.jyz;
   out[2] = c.x * by_place[1] - c.y * by_place[0] - du[1] * c.jxx + dv[0] * c.jyy;
   for (int k = 0; k < 3; k++) out[3 + k] = by_place[k];
 }
 
-// The colours' part: adds to the gradients by mean and motion.
-static inline void unlight(const Scene& scene, const View& view, const Rows& rows, const Chain& c, size_t first,
-                           Mask drawn, const float* shown, const float* by_shown, const SceneGradients& out,
-                           Three& dmean, Lanes dmotion[6]) {
+// Adds what the colours contribute to the gradients by mean and motion.
+static inline void colour_backward(const Scene& scene, const View& view, const Rows& rows, const Projection& c,
+                                   size_t first, Mask visible, const float* sh_colours, const float* by_sh_colours,
+                                   const SceneGradients& out, Three& dmean, Lanes dmotion[6]) {
   Three by_colour;
   for (int k = 0; k < 3; k++) {
-    const Lanes colour = load_column(shown + k, 3, first, rows.count);
-    const Lanes by = load_column(by_shown + k, 3, first, rows.count);
-    by_colour[k] = where(drawn & below(all(0), colour), by);
+    const Lanes colour = load_column(sh_colours + k, 3, first, rows.count);
+    const Lanes by = load_column(by_sh_colours + k, 3, first, rows.count);
+    by_colour[k] = where(visible & below(all(0), colour), by);
   }
-  const Three by_sight = unshade(scene, view, rows, c.mean, by_colour, out.colours);
-  const Three h = turned(view, by_sight);
+  const Three by_direction = shade_backward(scene, view, rows, c.mean, by_colour, out.colours);
+  const Three h = to_camera_frame(view, by_direction);
   if (view.orthographic) {  // the view's direction, which is the third row of the rotation
-    dmotion[0] += where(drawn, h[1]);
-    dmotion[1] -= where(drawn, h[0]);
+    dmotion[0] += where(visible, h[1]);
+    dmotion[1] -= where(visible, h[0]);
     return;
   }
   for (int k = 0; k < 3; k++) {
-    dmean[k] += by_sight[k];
-    dmotion[3 + k] += where(drawn, h[k]);
+    dmean[k] += by_direction[k];
+    dmotion[3 + k] += where(visible, h[k]);
   }
 }
 
 static void project_backward_group(const Scene& scene, const View& view, const Candidates& candidates,
-                                   const Splat* splats, const float* sums, const float* shown, const float* by_shown,
-                                   float* motion, const SceneGradients& out, size_t first) {
+                                   const Splat* splats, const float* sums, const float* sh_colours,
+                                   const float* by_sh_colours, float* motion, const SceneGradients& out, size_t first) {
   const Rows rows(candidates, first);
-  const Chain c = chain(scene, view, rows);
+  const Projection c = project_lanes(scene, view, rows);
   Whole seen = {};
-  for (int l = 0; l < rows.count; l++) seen[l] = -(int)splats[first + l].drawn();
-  const Mask drawn = mask_of(seen);
+  for (int l = 0; l < rows.count; l++) seen[l] = -(int)splats[first + l].visible();
+  const Mask visible = mask_of(seen);
   Lanes moments[MOMENTS + 1];
   for (int k = 0; k <= MOMENTS; k++) moments[k] = load_column(sums + k, MOMENTS + 1, first, rows.count);
 
   const Conic conic(c);
-  const AxisGradients d = unspread(c, view, conic, moments);
-  Lanes dturn[9], dquat[4];
+  const AxisGradients d = covariance_backward(c, view, conic, moments);
+  Lanes drotation[9], dquat[4];
   Three du, dv;  // by the rows of J R, in the world
   for (int r = 0; r < 3; r++) {
     du[r] = dv[r] = all(0);
     for (int k = 0; k < 3; k++) {
-      dturn[3 * r + k] = c.scale[k] * (d.p[k] * c.u[r] + d.q[k] * c.v[r]);
-      du[r] += d.p[k] * c.scale[k] * c.turn[3 * r + k];
-      dv[r] += d.q[k] * c.scale[k] * c.turn[3 * r + k];
+      drotation[3 * r + k] = c.scale[k] * (d.p[k] * c.u[r] + d.q[k] * c.v[r]);
+      du[r] += d.p[k] * c.scale[k] * c.rotation[3 * r + k];
+      dv[r] += d.q[k] * c.scale[k] * c.rotation[3 * r + k];
     }
   }
-  unturn(c, dturn, dquat);
+  rotation_backward(c, drotation, dquat);
   const Lanes dx = conic.xx * moments[1] + conic.xy * moments[2], dy = conic.xy * moments[1] + conic.yy * moments[2];
-  du = turned(view, du), dv = turned(view, dv);
-  const Three by_place = unplace(c, view, dx, dy, moments[MOMENTS], du, dv);
-  Three dmean = turned_back(view, by_place);
+  du = to_camera_frame(view, du), dv = to_camera_frame(view, dv);
+  const Three by_place = position_backward(c, view, dx, dy, moments[MOMENTS], du, dv);
+  Three dmean = to_world_frame(view, by_place);
   Lanes dmotion[6];
-  unmove(c, by_place, du, dv, dmotion);
-  for (int k = 0; k < 6; k++) dmotion[k] = where(drawn, dmotion[k]);
+  motion_backward(c, by_place, du, dv, dmotion);
+  for (int k = 0; k < 6; k++) dmotion[k] = where(visible, dmotion[k]);
   if (scene.coefficients)
-    unlight(scene, view, rows, c, first, drawn, shown, by_shown, out, dmean, dmotion);
+    colour_backward(scene, view, rows, c, first, visible, sh_colours, by_sh_colours, out, dmean, dmotion);
 
   for (int k = 0; k < 3; k++) {
-    rows.store(out.means + k, 3, where(drawn, dmean[k]));
-    rows.store(out.log_scales + k, 3, where(drawn, d.log_scale[k]));
+    rows.store(out.means + k, 3, where(visible, dmean[k]));
+    rows.store(out.log_scales + k, 3, where(visible, d.log_scale[k]));
   }
-  for (int k = 0; k < 4; k++) rows.store(out.quats + k, 4, where(drawn, dquat[k]));
-  rows.store(out.opacity_logits, 1, where(drawn, moments[0] * (1.f - c.opacity)));
+  for (int k = 0; k < 4; k++) rows.store(out.quats + k, 4, where(visible, dquat[k]));
+  rows.store(out.opacity_logits, 1, where(visible, moments[0] * (1.f - c.opacity)));
   store_sums<6>(motion, dmotion);
 }
 
 void project_backward(const Scene& scene, const View& view, const Candidates& candidates, const Splat* splats,
-                      const float* sums, const float* shown, const float* by_shown, float* motions,
+                      const float* sums, const float* sh_colours, const float* by_sh_colours, float* motions,
                       const SceneGradients& out, int threads) {
   const ptrdiff_t groups = (candidates.count + LANES - 1) / LANES;
 #pragma omp parallel for num_threads(threads) schedule(static)
   for (ptrdiff_t g = 0; g < groups; g++)
-    project_backward_group(scene, view, candidates, splats, sums, shown, by_shown, motions + 6 * g, out, g * LANES);
+    project_backward_group(scene, view, candidates, splats, sums, sh_colours, by_sh_colours, motions + 6 * g, out,
+                           g * LANES);
   double total[6] = {};
   for (ptrdiff_t g = 0; g < groups; g++)
     for (int k = 0; k < 6; k++) total[k] += motions[6 * g + k];

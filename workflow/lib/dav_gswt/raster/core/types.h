@@ -1,4 +1,4 @@
-// What the parts of the rasterizer hand to each other: plain data and raw pointers, no code.
+// The data that the parts of the rasterizer share: plain structs and raw pointers, no code.
 //
 // The kernels are compiled once for every instruction set. A template of the standard library instantiated there would
 // leave one copy for all of them, with instructions that an older processor lacks: so kernels own no memory and see
@@ -31,7 +31,7 @@ struct View {
   bool antialiased;  // opacity is multiplied by sqrt(det S0 / det S), S0 without, S with the dilation
 };
 
-// n Gaussians as the caller holds them.
+// n Gaussians in the caller's arrays.
 struct Scene {
   size_t n;
   const float *means, *log_scales, *quats, *opacity_logits;  // n x 3, 3, 4, 1
@@ -47,7 +47,7 @@ struct SceneGradients {
   float* camera;  // 6: by w and tau of the motion q' = exp([w]x) q + tau
 };
 
-// The Gaussians that may show in the picture, in their order; all that follows knows them by their number in this list.
+// The Gaussians that may be visible, in their order; later stages refer to them by their index in this list.
 struct Candidates {
   size_t count;
   const uint32_t* row;  // in the scene's arrays
@@ -72,12 +72,12 @@ struct alignas(64) Splat {
   float colour[GROUP];
   int16_t left, top, right, bottom;  // pixels of the picture in that box, the last ones included; none: right = -1
 
-  bool drawn() const { return right >= 0; }
+  bool visible() const { return right >= 0; }
 };
 
-// Who lies in which tile. An intersection has a place (in its tile's list, front to back) and a slot (a splat's slots
-// follow each other, splats in their order): what a tile finds out about a splat goes into the slot, and is summed from
-// there in a fixed order.
+// The splats of each tile. An intersection has a place (in its tile's list, front to back) and a slot (a splat's slots
+// are contiguous, splats in their order). A tile writes its record of a splat into the slot; records are then summed in
+// a fixed order, so that the number of threads changes no bit.
 struct Tiles {
   int columns, rows;
   const uint32_t* first;  // tiles + 1: where a tile's list begins
@@ -110,8 +110,8 @@ struct PictureGradients {
 // and, where asked for, depth: sum of v, v dx, v dy, v dx^2, v dx dy, v dy^2; w g for each channel; w g_depth.
 constexpr int MOMENTS = 6;
 
-// What each Gaussian of the scene gives to a picture.
-struct Shares {
+// The contribution of each Gaussian of the scene to a picture, summed over its pixels.
+struct ContributionSums {
   float *total, *squared, *maximum, *mapped;
 };
 
@@ -146,12 +146,12 @@ struct AdamTask {
 // One instruction set's kernels. `threads` never changes a bit of any result.
 struct Kernels {
   const char* name;
-  // Candidates of each chunk of the scene: `rows` (from chunk * CHUNK on) and how many in `counts`. Whoever is left out
-  // has no pixel; a mean or a scale that is not finite is not left out.
+  // Candidates of each chunk of the scene: `rows` (from chunk * CHUNK on) and how many in `counts`. A Gaussian
+  // that is left out has no pixel; one with a mean or a scale that is not finite is kept.
   void (*cull)(const Scene&, const View&, uint32_t* rows, uint32_t* counts, int threads);
-  // Splats of the candidates and, of spherical harmonics, their colours as seen (`shown`, 3 each; else not written).
+  // Splats of the candidates and their colours by spherical harmonics (`sh_colours`, 3 each; else not written).
   // Returns false where an input is not finite or a quaternion is zero; what was written then means nothing.
-  bool (*project)(const Scene&, const View&, const Candidates&, Splat*, float* shown, int threads);
+  bool (*project)(const Scene&, const View&, const Candidates&, Splat*, float* sh_colours, int threads);
   // Returns false where a value is not finite.
   bool (*load_values)(const Values&, size_t splats, int channel, int group, Splat*, int threads);
   void (*blend_forward)(const Splat*, const Tiles&, const Images&, bool only_colour, int threads);
@@ -159,15 +159,15 @@ struct Kernels {
   // Sums records into `sums` (MOMENTS + 1 a splat, added to if `add`) and gradients by values (as Values has rows).
   void (*collect)(const Tiles&, size_t splats, const Values&, int channel, int group, bool depth, bool add,
                   const float* records, float* sums, float* gradients, int threads);
-  // `by_shown`: gradients by the colours that project gave; `motions`: room for 6 floats for every 4 candidates.
+  // `by_sh_colours`: gradients by the colours that project gave; `motions`: room for 6 floats for every 4 candidates.
   void (*project_backward)(const Scene&, const View&, const Candidates&, const Splat*, const float* sums,
-                           const float* shown, const float* by_shown, float* motions, const SceneGradients&,
+                           const float* sh_colours, const float* by_sh_colours, float* motions, const SceneGradients&,
                            int threads);
   // `records` has 3 + group floats a slot: maximum, sum and sum of squares of blend weights, weighted sums of `map`.
   void (*contribute)(const Splat*, const Tiles&, const Images& map, float* records, int threads);
   void (*collect_contributions)(const Tiles&, const Candidates&, int channels, int channel, int group,
-                                const float* records, const Shares&, int threads);
-  // How many pixels take a splat, summed over the splats of each tile.
+                                const float* records, const ContributionSums&, int threads);
+  // Pairs of a pixel and a splat blended into it, by tile.
   void (*count_pairs)(const Splat*, const Tiles&, const Images&, double* by_tile, int threads);
   void (*loss)(const LossTask&, int threads);
   void (*adam)(const AdamTask&, int threads);

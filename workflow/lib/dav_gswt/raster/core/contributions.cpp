@@ -1,5 +1,5 @@
-// What each Gaussian gives to the picture: its blend weights' sum, sum of squares and maximum, and a map carried back
-// by them.
+// The contribution of each Gaussian to the picture: sum, sum of squares and maximum of its blend weights, and sums of a
+// map weighted by them.
 #include "blocks.h"
 #include "kernels.h"
 
@@ -12,8 +12,8 @@ static inline float largest(Lanes v) {
   return found;
 }
 
-template <int C> static void weigh_tile(const Splat* splats, const Tiles& tiles, const Images& map, float* records,
-                                        int tile) {
+template <int C> static void contribute_tile(const Splat* splats, const Tiles& tiles, const Images& map,
+                                                     float* records, int tile) {
   constexpr int SIZE = 3 + C;
   const TileFrame frame(tile, tiles, map);
   Lanes transmittance[BLOCKS], values[C ? C : 1][BLOCKS] = {};
@@ -22,44 +22,44 @@ template <int C> static void weigh_tile(const Splat* splats, const Tiles& tiles,
     for (int c = 0; c < C; c++) values[c][b][lane] = map.colour[pixel * map.channels + map.channel + c];
   });
 
-  auto weigh = [&](uint32_t place, const Splat& s, Blocks blocks) {
-    const Brush brush(frame, s);
+  auto add = [&](uint32_t place, const Splat& s, Blocks blocks) {
+    const TileSplat tile_splat(frame, s);
     Lanes sums[2 + C] = {}, maximum = {};
-    Touch touch;
+    BlendSample sample;
     for (; blocks; blocks &= blocks - 1) {
       const int b = __builtin_ctzll(blocks);
-      lay(frame, brush, b, transmittance[b], touch);
-      sums[0] += touch.weight;
-      sums[1] += touch.weight * touch.weight;
-      maximum = max(maximum, touch.weight);
-      for (int c = 0; c < C; c++) sums[2 + c] += touch.weight * values[c][b];
+      blend_block(frame, tile_splat, b, transmittance[b], sample);
+      sums[0] += sample.weight;
+      sums[1] += sample.weight * sample.weight;
+      maximum = max(maximum, sample.weight);
+      for (int c = 0; c < C; c++) sums[2 + c] += sample.weight * values[c][b];
     }
     float* record = records + (size_t)tiles.slot[place] * SIZE;
     record[0] = largest(maximum);
     store_sums<2 + C>(record + 1, sums);
   };
   auto skip = [&](uint32_t place) { memset(records + (size_t)tiles.slot[place] * SIZE, 0, 4 * SIZE); };
-  walk(frame, splats, tiles, tile, transmittance, weigh, skip);
+  for_each_splat(frame, splats, tiles, tile, transmittance, add, skip);
 }
 
-template <int C> static void weigh(const Splat* splats, const Tiles& tiles, const Images& map, float* records,
-                                   int threads) {
+template <int C> static void contribute_tiles(const Splat* splats, const Tiles& tiles, const Images& map,
+                                                      float* records, int threads) {
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 2)
-  for (int tile = 0; tile < tiles.columns * tiles.rows; tile++) weigh_tile<C>(splats, tiles, map, records, tile);
+  for (int tile = 0; tile < tiles.columns * tiles.rows; tile++) contribute_tile<C>(splats, tiles, map, records, tile);
 }
 
 void contribute(const Splat* splats, const Tiles& tiles, const Images& map, float* records, int threads) {
   switch (map.group) {
-    case 0: return weigh<0>(splats, tiles, map, records, threads);
-    case 1: return weigh<1>(splats, tiles, map, records, threads);
-    case 2: return weigh<2>(splats, tiles, map, records, threads);
-    case 3: return weigh<3>(splats, tiles, map, records, threads);
-    default: return weigh<4>(splats, tiles, map, records, threads);
+    case 0: return contribute_tiles<0>(splats, tiles, map, records, threads);
+    case 1: return contribute_tiles<1>(splats, tiles, map, records, threads);
+    case 2: return contribute_tiles<2>(splats, tiles, map, records, threads);
+    case 3: return contribute_tiles<3>(splats, tiles, map, records, threads);
+    default: return contribute_tiles<4>(splats, tiles, map, records, threads);
   }
 }
 
 void collect_contributions(const Tiles& tiles, const Candidates& candidates, int channels, int channel, int group,
-                           const float* records, const Shares& out, int threads) {
+                           const float* records, const ContributionSums& out, int threads) {
   const int size = 3 + group;
 #pragma omp parallel for num_threads(threads) schedule(static)
   for (ptrdiff_t i = 0; i < (ptrdiff_t)candidates.count; i++) {
@@ -85,17 +85,17 @@ void count_pairs(const Splat* splats, const Tiles& tiles, const Images& images, 
     frame.clear(transmittance);
     double pairs = 0;
     auto count = [&](uint32_t, const Splat& s, Blocks blocks) {
-      const Brush brush(frame, s);
+      const TileSplat tile_splat(frame, s);
       Lanes taken = all(0);
-      Touch touch;
+      BlendSample sample;
       for (; blocks; blocks &= blocks - 1) {
         const int b = __builtin_ctzll(blocks);
-        lay(frame, brush, b, transmittance[b], touch);
-        taken += where(touch.on, all(1));
+        blend_block(frame, tile_splat, b, transmittance[b], sample);
+        taken += where(sample.on, all(1));
       }
       for (int l = 0; l < LANES; l++) pairs += taken[l];
     };
-    walk(frame, splats, tiles, tile, transmittance, count, [](uint32_t) {});
+    for_each_splat(frame, splats, tiles, tile, transmittance, count, [](uint32_t) {});
     by_tile[tile] = pairs;
   }
 }

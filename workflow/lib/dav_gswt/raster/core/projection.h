@@ -1,5 +1,4 @@
-// Every step from the parameters of LANES Gaussians to the screen: what the forward pass goes and the backward pass
-// goes again.
+// The projection of LANES Gaussians onto the screen, step by step, for the forward pass and for the backward pass.
 //
 // With c_k = (p_k, q_k) the image of the k-th axis under the linearised camera, the splat's covariance is
 // S = sum_k c_k c_k^T + dilation I. Its determinant is taken as |p x q|^2 + dilation (|p|^2 + |q|^2) + dilation^2
@@ -24,7 +23,7 @@ struct Three {
 
 static inline Lanes dot(const Three& a, const Three& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-// The rows of some candidates, LANES of them; with fewer left the last one is repeated.
+// The rows of LANES candidates; with fewer left the last one is repeated.
 struct Rows {
   size_t at[LANES];
   int count;
@@ -44,7 +43,7 @@ struct Rows {
   }
 };
 
-struct Chain {
+struct Projection {
   Three mean;                // in the world
   Lanes x, y, z;             // in the camera
   Lanes per_z;               // 1 / z, or 1
@@ -53,17 +52,17 @@ struct Chain {
   Lanes jxx, jxz, jyy, jyz;  // the camera's Jacobian
   Three u, v;                // its rows in the world: J R
   Lanes quat[4], quat_norm;  // unit quaternion; 1 / length
-  Lanes turn[9];             // rotation matrix
+  Lanes rotation[9];
   Three scale;
   Three p, q;                // images of the scaled axes
   Lanes cxy[3];              // p x q: components 01, 02, 12
   Lanes sxx, sxy, syy;
   Lanes area, trace, det;    // |p x q|^2, |p|^2 + |q|^2, det S
-  Lanes opacity, kept;       // kept: sqrt(det S0 / det S) of an antialiased splat
+  Lanes opacity, compensation;  // sqrt(det S0 / det S) of an antialiased splat, else 1
   bool valid;                // inputs are finite and no quaternion is zero
 };
 
-static inline void turn_of(const Lanes q[4], Lanes m[9]) {
+static inline void rotation_of(const Lanes q[4], Lanes m[9]) {
   const Lanes w = q[0], x = q[1], y = q[2], z = q[3];
   m[0] = 1 - 2 * (y * y + z * z), m[1] = 2 * (x * y - w * z), m[2] = 2 * (x * z + w * y);
   m[3] = 2 * (x * y + w * z), m[4] = 1 - 2 * (x * x + z * z), m[5] = 2 * (y * z - w * x);
@@ -71,7 +70,7 @@ static inline void turn_of(const Lanes q[4], Lanes m[9]) {
 }
 
 // From c.mean to the camera's frame and its Jacobian there.
-static inline void place(Chain& c, const View& view) {
+static inline void to_camera(Projection& c, const View& view) {
   const float *r = view.rotation, *t = view.translation;
   c.x = r[0] * c.mean[0] + r[1] * c.mean[1] + r[2] * c.mean[2] + t[0];
   c.y = r[3] * c.mean[0] + r[4] * c.mean[1] + r[5] * c.mean[2] + t[1];
@@ -92,12 +91,11 @@ static inline void place(Chain& c, const View& view) {
   }
 }
 
-static inline void spread(Chain& c, const View& view) {
+static inline void to_screen(Projection& c, const View& view) {
   for (int k = 0; k < 3; k++) {
-    c.p[k] = clamp(c.scale[k] * (c.u[0] * c.turn[k] + c.u[1] * c.turn[3 + k] + c.u[2] * c.turn[6 + k]), -AXIS_MAX,
-                   AXIS_MAX);
-    c.q[k] = clamp(c.scale[k] * (c.v[0] * c.turn[k] + c.v[1] * c.turn[3 + k] + c.v[2] * c.turn[6 + k]), -AXIS_MAX,
-                   AXIS_MAX);
+    const Lanes *r = &c.rotation[k];
+    c.p[k] = clamp(c.scale[k] * (c.u[0] * r[0] + c.u[1] * r[3] + c.u[2] * r[6]), -AXIS_MAX, AXIS_MAX);
+    c.q[k] = clamp(c.scale[k] * (c.v[0] * r[0] + c.v[1] * r[3] + c.v[2] * r[6]), -AXIS_MAX, AXIS_MAX);
   }
   c.cxy[0] = c.p[0] * c.q[1] - c.p[1] * c.q[0];
   c.cxy[1] = c.p[0] * c.q[2] - c.p[2] * c.q[0];
@@ -110,11 +108,11 @@ static inline void spread(Chain& c, const View& view) {
   c.area = c.cxy[0] * c.cxy[0] + c.cxy[1] * c.cxy[1] + c.cxy[2] * c.cxy[2];
   c.trace = pp + qq;
   c.det = c.area + dilation * c.trace + dilation * dilation;
-  c.kept = view.antialiased ? sqrt(select(below(c.det, all(DET_MAX)), c.area / c.det, all(1))) : all(1);
+  c.compensation = view.antialiased ? sqrt(select(below(c.det, all(DET_MAX)), c.area / c.det, all(1))) : all(1);
 }
 
-static inline Chain chain(const Scene& scene, const View& view, const Rows& rows) {
-  Chain c;
+static inline Projection project_lanes(const Scene& scene, const View& view, const Rows& rows) {
+  Projection c;
   c.mean = rows.load3(scene.means);
   const Three log_scale = rows.load3(scene.log_scales);
   for (int k = 0; k < 4; k++) c.quat[k] = rows.load(scene.quats + k, 4);
@@ -134,11 +132,11 @@ static inline Chain chain(const Scene& scene, const View& view, const Rows& rows
   for (int k = 0; k < 4; k++) c.quat[k] *= length;
   c.quat_norm = per_largest * length;
 
-  turn_of(c.quat, c.turn);
+  rotation_of(c.quat, c.rotation);
   for (int k = 0; k < 3; k++) c.scale[k] = exp(clamp(log_scale[k], -LOG_SCALE_MAX * 1.5f, LOG_SCALE_MAX));
   c.opacity = 1.f / (1.f + exp(-logit));
-  place(c, view);
-  spread(c, view);
+  to_camera(c, view);
+  to_screen(c, view);
   return c;
 }
 
