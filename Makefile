@@ -3,6 +3,8 @@ SCENE ?=
 CORES ?= 2
 PORT ?= 8000
 PYTHON ?= python3
+# Threads that wait sleep: other jobs use the processors too.
+export OMP_WAIT_POLICY ?= PASSIVE
 BIN := .venv/bin
 
 .PHONY: run view test bench docs prior compiler

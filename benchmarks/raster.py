@@ -87,7 +87,7 @@ def drawing(scene: Scene, isa: str, threads: int) -> tuple[float, float, int]:
     gradient = np.random.default_rng(1).normal(size=(scene.height, scene.width, 3)).astype(np.float32)
     raster = cpu.Rasterizer(threads=threads, instruction_set=isa)
     forward = milliseconds(lambda: raster.forward(**arrays, camera=camera))
-    return forward, milliseconds(lambda: raster.backward(gradient)), raster.pairs()
+    return forward, milliseconds(lambda: raster.backward(gradient)), raster.count_pairs()
 
 
 def share(pairs: int, milliseconds: float, isa: str, threads: int) -> tuple[float, float]:
@@ -148,7 +148,7 @@ def training_step() -> dict[str, float]:
             cpu.adam(values, getattr(gradients, name), *moments[name], rate=1e-9, step=1, threads=THREADS)
 
     name, took = "train_step_256x192_30k_ms", milliseconds(step)
-    tell(name, took, "ms", 15, f"{raster.pairs() / (256 * 192):.0f} live Gaussians a pixel")
+    tell(name, took, "ms", 15, f"{raster.count_pairs() / (256 * 192):.0f} live Gaussians a pixel")
     return {name: took}
 
 

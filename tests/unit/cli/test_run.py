@@ -9,7 +9,7 @@ from dav_gswt.raster import backends
 
 @pytest.fixture
 def without_core(monkeypatch):
-    real = backends.lacking
+    real = backends.explain_unavailable
     monkeypatch.delenv(backends.VARIABLE, raising=False)
     monkeypatch.setattr(backends, "lacking", lambda name: real(name) if name == "torch" else "it was not built")
 
@@ -21,8 +21,8 @@ def test_where_the_core_is_missing_a_smaller_size_is_said_and_laid_over(without_
 
 
 def test_where_torch_is_asked_for_that_is_the_reason(monkeypatch, capsys):
-    if backends.lacking("cpu"):
-        pytest.skip(f"cpu: {backends.lacking('cpu')}")
+    if backends.explain_unavailable("cpu"):
+        pytest.skip(f"cpu: {backends.explain_unavailable('cpu')}")
     monkeypatch.setenv(backends.VARIABLE, "torch")
     assert run.smaller(quietly=False) == [run.SMALLER]
     assert "DAV_GSWT_BACKEND asks for it" in capsys.readouterr().out

@@ -6,20 +6,20 @@ from dav_gswt.raster import backends
 
 OF_THE_CORE = ["test_adam.py", "test_antialiased.py", "test_camera_motion.py", "test_core_memory.py", "test_loss.py"]
 OF_THE_CORE += ["test_oracle.py", "test_rasterizer.py", "test_ranges.py", "test_threads.py"]
-collect_ignore = OF_THE_CORE if backends.lacking("cpu") else []  # test_choice_of_backend.py says so
+collect_ignore = OF_THE_CORE if backends.explain_unavailable("cpu") else []  # test_choice_of_backend.py says so
 
 
-@pytest.fixture(params=[] if backends.lacking("cpu") else backends.module("cpu").instruction_sets())
+@pytest.fixture(params=[] if backends.explain_unavailable("cpu") else backends.load_backend("cpu").instruction_sets())
 def isa(request):
     return request.param
 
 
 @pytest.fixture
 def raster(isa):
-    return backends.module("cpu").Rasterizer(instruction_set=isa)
+    return backends.load_backend("cpu").Rasterizer(instruction_set=isa)
 
 
 @pytest.fixture(params=["plain", "antialiased"])
 def either(request, isa):
     """A rasterizer of either mode."""
-    return backends.module("cpu").Rasterizer(antialiased=request.param == "antialiased", instruction_set=isa)
+    return backends.load_backend("cpu").Rasterizer(antialiased=request.param == "antialiased", instruction_set=isa)

@@ -57,7 +57,7 @@ def test_without_dilation_both_modes_are_the_same(isa):
 @pytest.mark.parametrize("scales", [(1e-12, 1e-12, 1e-12), (1.0, 1e-12, 1e-12), (1e-30, 1e-30, 1e-30)])
 def test_what_has_no_area_is_nowhere(raster, scales):
     seen = raster.forward(**one(scale=scales, opacity=0.99), camera=map_camera())
-    assert not seen.alpha.any() and not raster.drawn.any()
+    assert not seen.alpha.any() and not raster.visible.any()
     found = raster.backward(np.ones((16, 16, 3), np.float32))
     assert not any(np.any(g) for g in vars(found).values() if g is not None)
 

@@ -9,7 +9,7 @@ from fixtures.raster_scenes import NAMES, relative
 from dav_gswt.raster import backends, oracle
 from dav_gswt.raster.autograd import rasterize
 
-THERE = [name for name in backends.NAMES if not backends.lacking(name)]
+THERE = [name for name in backends.NAMES if not backends.explain_unavailable(name)]
 
 
 def leaves_of(name: str, kind: torch.dtype) -> dict[str, torch.Tensor]:

@@ -23,9 +23,9 @@ FAKED = "cuda through a made-up gsplat"
 def backend(request, monkeypatch):
     """A function that makes a Rasterizer with options."""
     if request.param != FAKED:
-        if why := backends.lacking(request.param):
+        if why := backends.explain_unavailable(request.param):
             pytest.skip(f"{request.param}: {why}")
-        yield backends.module(request.param).Rasterizer
+        yield backends.load_backend(request.param).Rasterizer
         return
     monkeypatch.setitem(sys.modules, "gsplat", fake_gsplat)
     monkeypatch.delitem(sys.modules, "dav_gswt.raster.cuda", raising=False)
@@ -85,7 +85,7 @@ def test_what_has_no_pixel_is_not_drawn_and_all_else_is(backend, name, scene):
     arrays = {parameter: a.copy() for parameter, a in scene.arrays.items()}
     arrays["means"][::3] += 1e6 * scene.camera.rotation[0].astype(np.float32)  # far to the right of the picture
     raster.forward(**arrays, camera=scene.camera)
-    drawn, given = raster.drawn, raster.contributions().total
+    drawn, given = raster.visible, raster.contributions().total
     assert drawn.shape == (len(arrays["means"]),) and drawn.dtype == bool
     assert drawn[given > 0].all() and drawn.sum() > 10
     assert not drawn[::3].any()
@@ -114,7 +114,7 @@ def test_what_lies_before_the_near_plane_or_behind_is_left_out(backend):
     arrays["means"] = np.array([[0, 0, z] for z in (-1, 0, 1e-8, 0.495, 0.505)], np.float32)
     raster = backend(near=0.5)
     raster.forward(**arrays, camera=camera)
-    assert raster.drawn.tolist() == [False] * 4 + [True]
+    assert raster.visible.tolist() == [False] * 4 + [True]
     found = raster.backward(np.ones((16, 16, 3), np.float32))
     assert all(np.isfinite(g).all() for g in vars(found).values() if g is not None)
 
@@ -132,7 +132,7 @@ def test_no_gaussians_make_an_empty_picture(backend, on_gpu):
         pytest.skip("gsplat is given at least one Gaussian by all that calls it")
     raster = backend()
     seen = raster.forward(**taken(gaussians(3), slice(0)), camera=CAMERAS["pinhole"])
-    assert not seen.alpha.any() and raster.drawn.shape == (0,)
+    assert not seen.alpha.any() and raster.visible.shape == (0,)
     found = raster.backward(np.ones_like(seen.colour))
     assert found.means.shape == (0, 3) and not found.camera.any()
 

@@ -67,7 +67,7 @@ def test_what_lies_outside_changes_no_bit_of_what_is_seen(raster):
     results = []
     for some in (arrays, taken(arrays, ~away)):
         seen = raster.forward(**some, camera=CAMERA)
-        results.append((seen, raster.drawn, raster.backward(*grad), raster.contributions(grad[0])))
+        results.append((seen, raster.visible, raster.backward(*grad), raster.contributions(grad[0])))
     (a, drawn, by, shares), (b, _, alone, shares_alone) = results
     assert drawn[~away].sum() > 300 and not drawn[away].any()
     for name in ("colour", "alpha", "depth"):
@@ -102,4 +102,4 @@ def test_a_coefficient_that_is_not_finite_is_named_with_its_index(raster, k):
 def raster_index(raster: cpu.Rasterizer, arrays) -> int:
     """A Gaussian that is seen."""
     raster.forward(**arrays, camera=CAMERA)
-    return int(np.flatnonzero(raster.drawn)[0])
+    return int(np.flatnonzero(raster.visible)[0])

@@ -129,7 +129,7 @@ def test_the_near_plane_cuts_by_the_centre(antialiased, near, share):
     arrays["log_scales"] = np.full((1, 3), np.log(0.1 * near), np.float32)
     raster = cpu.Rasterizer(near=near, antialiased=antialiased)
     seen = raster.forward(**arrays, camera=camera)
-    assert seen.alpha.any() == raster.drawn[0] == (depth >= np.float32(near))
+    assert seen.alpha.any() == raster.visible[0] == (depth >= np.float32(near))
     found = raster.backward(*image_gradients(camera, 3))
     assert all(np.isfinite(g).all() for g in vars(found).values() if g is not None)
 

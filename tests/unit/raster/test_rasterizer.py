@@ -261,7 +261,7 @@ def test_an_instruction_set_that_is_not_there_is_refused(monkeypatch):
     with pytest.raises(ValueError, match="DAV_GSWT_ISA=v9: this processor has"):
         cpu.Rasterizer()
     monkeypatch.setenv("DAV_GSWT_ISA", cpu.instruction_sets()[-1])
-    assert cpu.instruction_set() == cpu.instruction_sets()[-1]
+    assert cpu.default_instruction_set() == cpu.instruction_sets()[-1]
 
 
 def test_the_number_of_threads_can_be_set_from_outside(monkeypatch):

@@ -27,7 +27,7 @@ def field(n: int = 100, degree: int = 0) -> GaussianField:
 @pytest.mark.parametrize("view", CAMERAS)
 @pytest.mark.parametrize("degree", [0, 3])
 def test_both_backends_draw_the_same(view, degree):
-    if why := backends.lacking("cpu"):
+    if why := backends.explain_unavailable("cpu"):
         pytest.skip(f"cpu: {why}")
     core, oracle = (render(field(degree=degree), CAMERAS[view], (0.1, 0.5, 1), backend=b) for b in ("cpu", "torch"))
     for name in ("colour", "alpha", "depth"):

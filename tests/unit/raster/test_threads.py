@@ -8,7 +8,7 @@ from dav_gswt.geometry import cameras
 from dav_gswt.raster import cpu
 
 CAMERA = cameras.pinhole((0.3, -4, 1.5), (0, 0, 0), 150, 130, 60.0)
-N = 20_000  # enough that the second thread is used: see cpu.TINY
+N = 20_000  # enough that the second thread is used: see cpu.MIN_PARALLEL
 
 
 def everything(isa: str, threads: int) -> list[np.ndarray]:
@@ -37,8 +37,8 @@ def a_ground_mostly_outside(isa: str, threads: int) -> list[np.ndarray]:
     raster = cpu.Rasterizer(antialiased=True, instruction_set=isa, threads=threads)
     seen = raster.forward(**arrays, camera=CAMERA, features=extra)
     gradients = raster.backward(*image_gradients(CAMERA, 3), image_gradients(CAMERA, 5, seed=2)[0])
-    assert 100 < raster.drawn.sum() < N // 2
-    return [*vars(seen).values(), *vars(gradients).values(), raster.drawn, np.array(raster.pairs())]
+    assert 100 < raster.visible.sum() < N // 2
+    return [*vars(seen).values(), *vars(gradients).values(), raster.visible, np.array(raster.count_pairs())]
 
 
 @pytest.mark.parametrize("threads", [2, 3, 7])

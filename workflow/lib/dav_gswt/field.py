@@ -126,7 +126,7 @@ def read_field(path: Path | str) -> GaussianField:
     """
     path = Path(path)
     rows = _vertices(path)
-    rest = sum(name.startswith("f_rest_") for name in rows.dtype.names)
+    rest = sum(name.startswith("f_rest_") for name in _property_names(rows))
     k = 1 + rest // 3
     if rest % 3 or k not in (1, 4, 9, 16):
         raise InputError(f"{path}: {rest} f_rest properties; 0, 9, 24 or 45 make whole spherical harmonics")
@@ -137,7 +137,7 @@ def read_field(path: Path | str) -> GaussianField:
     n = len(rows)
     shs = np.concatenate([columns["dc"][:, None], columns["rest"].reshape(n, 3, k - 1).transpose(0, 2, 1)], 1)
     ours = ("uncertainty", "ground", "imagined")
-    extra = {name: rows[name] if name in rows.dtype.names else np.zeros(n) for name in ours}
+    extra = {name: rows[name] if name in _property_names(rows) else np.zeros(n) for name in ours}
     if len(bad := np.flatnonzero((extra["imagined"] != 0) & (extra["imagined"] != 1))):
         raise InputError(f"{path}: imagined of Gaussian {bad[0]} is neither 0 nor 1; write the field again")
     return GaussianField(
@@ -178,8 +178,12 @@ def _check_counts(path: Path) -> None:
         raise InputError(f"{path}: the header announces more than the file holds ({room} bytes); is it cut short?")
 
 
+def _property_names(rows: Array) -> tuple[str, ...]:
+    return rows.dtype.names or ()
+
+
 def _stack(rows: Array, names: list[str], path: Path) -> Float32[Array, "n m"]:
-    missing = [name for name in names if name not in rows.dtype.names]
+    missing = [name for name in names if name not in _property_names(rows)]
     if missing:
         raise InputError(f"{path}: property {missing[0]} is missing; a 3D Gaussian splatting .ply is needed")
     out = np.empty((len(rows), len(names)), np.float32)

@@ -13,7 +13,7 @@ def of(inputs: dict[str, Path | str | list], parameters: dict) -> dict:
     """A JSON value that says what a result was made from and with. Inputs: files, folders, or lists of both."""
     return {
         "version": dav_gswt.__version__,
-        "renderer": backends.described(),
+        "renderer": backends.describe_backend(),
         "parameters": parameters,
         "inputs": {name: digest(*_files(given)) for name, given in sorted(inputs.items())},
     }

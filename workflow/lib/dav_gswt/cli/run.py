@@ -45,10 +45,10 @@ def main(arguments: list[str] | None = None) -> int:
 
 def smaller(quietly: bool) -> list[Path]:
     """What is laid over the config where PyTorch draws, below the user's own; said unless quietly."""
-    if backends.in_use() != "torch":
+    if backends.select_backend() != "torch":
         return []
     if not quietly:
-        why = backends.lacking("cpu") or f"{backends.VARIABLE} asks for it"
+        why = backends.explain_unavailable("cpu") or f"{backends.VARIABLE} asks for it"
         print(f"PyTorch draws, many times slower, so at a smaller size ({SMALLER}): {why}", flush=True)
     return [SMALLER]
 

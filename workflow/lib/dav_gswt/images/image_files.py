@@ -68,8 +68,8 @@ def read_photo_and_alpha(path: Path | str) -> tuple[Float32[Array, "h w 3"], Flo
     alpha = np.ones(pixels.shape[:2], np.float32) if alpha is None else alpha
     if not np.isfinite(pixels).all():
         raise InputError(f"{path}: has pixels that are not finite; export it as 8 or 16 bit")
-    upright = (_apply_orientation(np.clip(part, 0, 1), _read_orientation(spec)) for part in (pixels, alpha))
-    return tuple(map(np.ascontiguousarray, upright))
+    pixels, alpha = (_apply_orientation(np.clip(part, 0, 1), _read_orientation(spec)) for part in (pixels, alpha))
+    return np.ascontiguousarray(pixels), np.ascontiguousarray(alpha)
 
 
 def read_channel(path: Path | str) -> Float32[Array, "h w"]:

@@ -4,6 +4,7 @@ Pictures are channels-last float32 in [-1, 1], of at least 31 pixels a side: les
 """
 
 from collections.abc import Iterator
+from functools import reduce
 
 import numpy as np
 import torch
@@ -33,7 +34,8 @@ def distance(a: Float32[Array, "n h w 3"], b: Float32[Array, "n h w 3"], weights
     with torch.inference_mode():
         for rows in _chunks(len(a), a.shape[1] * a.shape[2]):
             both = zip(_unit(_features(a[rows], weights)), _unit(_features(b[rows], weights)), heads, strict=True)
-            out[rows] = sum(_weighted(first - second, head) for first, second, head in both).numpy()
+            layers = (_weighted(first - second, head) for first, second, head in both)
+            out[rows] = reduce(torch.add, layers).numpy()
     return out
 
 

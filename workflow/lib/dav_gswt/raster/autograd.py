@@ -1,4 +1,4 @@
-"""The rasterizer as a function of PyTorch tensors that autograd goes through, whichever backend draws."""
+"""The rasterizer as a differentiable function of PyTorch tensors, by any backend."""
 
 import numpy as np
 import torch
@@ -22,27 +22,27 @@ def rasterize(
     backend: str | None = None,
     **options,
 ) -> tuple[Tensor, ...]:
-    """Colour, alpha, depth, and where features are given theirs, over black; `interface.Rasterizer` says what they are.
+    """Colour, alpha, depth and, with features, theirs, over black; see `interface.Rasterizer.forward`.
 
     motion: six zeros, whose gradient is that by a small motion of the camera (`interface.Gradients.camera`).
     backend: by default the one in use. options: of its Rasterizer (near, dilation, antialiased, threads).
-    Drawing is in float32 and by NumPy's memory; pictures and gradients have the type and the device of `means` and of
-    each parameter. Differentiable once.
-    Raises: ValueError: what the Rasterizer refuses, or a motion that is not zero.
+    It renders in float32 on NumPy arrays; images and gradients have the type and device of `means` and of each
+    parameter. Differentiable once.
+    Raises: ValueError: as `Rasterizer.forward`, or a motion that is not zero.
     """
     if motion is not None and motion.detach().abs().sum() > 0:
         raise ValueError("motion must be zero: move the camera itself, then ask for the gradient there")
-    raster = backends.module(backend).Rasterizer(**options)
+    raster = backends.load_backend(backend).Rasterizer(**options)
     images = _Rasterize.apply(raster, camera, motion, means, log_scales, quats, opacity_logits, colours, features)
     return images if features is not None else images[:3]
 
 
 class _Rasterize(torch.autograd.Function):
-    """A rasterizer of its own for each call: it keeps what its backward needs."""
+    """Each call has a rasterizer of its own, which keeps the state of its backward pass."""
 
     @staticmethod
     def forward(ctx, raster, camera, motion, *parameters):
-        arrays = [None if p is None else _array(p) for p in parameters]
+        arrays = [None if p is None else _to_array(p) for p in parameters]
         seen = raster.forward(*arrays[:5], camera=camera, features=arrays[5])
         ctx.raster, ctx.like = raster, (motion, *parameters)
         images = (seen.colour, seen.alpha, seen.depth, seen.features)
@@ -50,8 +50,8 @@ class _Rasterize(torch.autograd.Function):
 
     @staticmethod
     @once_differentiable
-    def backward(ctx, *by_images):
-        found = ctx.raster.backward(*(None if g is None else _array(g) for g in by_images))
+    def backward(ctx, *image_gradients):  # pyright: ignore[reportIncompatibleMethodOverride]  @once_differentiable
+        found = ctx.raster.backward(*(None if g is None else _to_array(g) for g in image_gradients))
         parts = (found.camera, *(getattr(found, name) for name in _NAMES))
         pairs = zip(parts, ctx.like, strict=True)
         return None, None, *(None if like is None else torch.from_numpy(g.copy()).to(like) for g, like in pairs)
@@ -60,5 +60,5 @@ class _Rasterize(torch.autograd.Function):
 _NAMES = ("means", "log_scales", "quats", "opacity_logits", "colours", "features")
 
 
-def _array(tensor: Tensor) -> np.ndarray:
+def _to_array(tensor: Tensor) -> np.ndarray:
     return np.ascontiguousarray(tensor.detach().cpu().numpy(), np.float32)

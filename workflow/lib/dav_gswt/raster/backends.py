@@ -1,22 +1,29 @@
-"""Which rasterizer draws: the C++ core, plain PyTorch, or gsplat on a GPU."""
+"""Selection of the rasterizer's backend: the C++ core, plain PyTorch, or gsplat on a GPU."""
 
 import os
 from functools import cache
 from importlib import import_module, metadata
 from importlib.util import find_spec
-from types import ModuleType
+from typing import TYPE_CHECKING, cast
 
+from dav_gswt import threads
 from dav_gswt.errors import InputError
+from dav_gswt.raster.interface import Backend
+
+if TYPE_CHECKING:
+    from dav_gswt.raster import cpu, cuda, torch
+
+    BACKENDS: tuple[Backend, ...] = cpu, torch, cuda  # each module fits the protocol
 
 NAMES = ("cpu", "torch", "cuda")
 VARIABLE = "DAV_GSWT_BACKEND"
 
 
 @cache
-def lacking(name: str) -> str | None:
-    """Why a backend cannot be used on this machine and what would help; None where it can.
+def explain_unavailable(name: str) -> str | None:
+    """Why this machine cannot use a backend, and the remedy; None if it can.
 
-    PyTorch is imported for `cuda` only, and there only where gsplat is installed: others need not wait for it.
+    PyTorch, which is slow to import, is imported only for `cuda`, and only if gsplat is installed.
     """
     if name not in NAMES:
         return f"choose from {', '.join(NAMES)}"
@@ -34,30 +41,32 @@ def lacking(name: str) -> str | None:
     return None
 
 
-def in_use() -> str:
-    """The backend's name: DAV_GSWT_BACKEND, else cuda where gsplat and a GPU are there, else cpu, else torch.
+def select_backend() -> str:
+    """Name of the backend in use: DAV_GSWT_BACKEND, else cuda with gsplat and a GPU, else cpu, else torch.
 
-    Raises: InputError: DAV_GSWT_BACKEND names one that is unknown or cannot be used here.
+    Raises: InputError: DAV_GSWT_BACKEND names one that is unknown or unavailable.
     """
     if given := os.environ.get(VARIABLE):
-        if why := lacking(given):
+        if why := explain_unavailable(given):
             raise InputError(f"{VARIABLE}={given}: {why}")
         return given
-    return next((name for name in ("cuda", "cpu") if not lacking(name)), "torch")
+    return next((name for name in ("cuda", "cpu") if not explain_unavailable(name)), "torch")
 
 
-def module(name: str | None = None) -> ModuleType:
-    """A backend's module, by default that of the one in use. Raises: ValueError: unknown, or cannot be used here."""
-    if name is not None and (why := lacking(name)):
+def load_backend(name: str | None = None) -> Backend:
+    """A backend's module, by default that of the one in use. Raises: ValueError: it is unknown or unavailable."""
+    if name is not None and (why := explain_unavailable(name)):
         raise ValueError(f"no backend '{name}': {why}")
-    return import_module(f"dav_gswt.raster.{name or in_use()}")
+    threads.let_waiting_threads_sleep()
+    return cast(Backend, import_module(f"dav_gswt.raster.{name or select_backend()}"))
 
 
-def described() -> dict[str, str]:
-    """The backend in use and what its last bits depend on, for the provenance of results."""
-    name = in_use()
+def describe_backend() -> dict[str, str]:
+    """The backend in use and all that its last bits depend on, for the provenance of results."""
+    name = select_backend()
     if name == "cpu":
-        return {"backend": name, "instruction_set": module(name).instruction_set()}
+        core = import_module("dav_gswt.raster.cpu")
+        return {"backend": name, "instruction_set": core.default_instruction_set()}
     torch = import_module("torch")
     if name == "torch":
         return {"backend": name, "torch": torch.__version__, "instruction_set": torch.backends.cpu.get_cpu_capability()}

@@ -1,11 +1,12 @@
-"""The rasterizer's C++ core as functions of NumPy arrays: float32, C-contiguous, never copied.
+"""The C++ rasterizer on NumPy arrays, without copies.
 
-Results have the same bits for any number of threads. They differ in the last bits between instruction sets
-(`instruction_set`). The environment variable DAV_GSWT_ISA fixes that, DAV_GSWT_THREADS the number of threads.
+Results have the same bits for any number of threads, but differ in the last bits between instruction sets. The
+environment variables DAV_GSWT_ISA and DAV_GSWT_THREADS set the instruction set and the number of threads.
 """
 
 import os
 import weakref
+from itertools import chain
 
 import numpy as np
 from jaxtyping import Bool, Float32
@@ -13,20 +14,19 @@ from numpy import ndarray as Array
 
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import _core, interface
-from dav_gswt.raster.interface import Contributions, Gradients, Rendering
+from dav_gswt.raster.interface import Contributions, Forward, GaussianArrays, Gradients, PictureGradients, Rendering
 
-TINY = 1 << 15  # Gaussians plus pixels below which a second thread costs more than it brings
-MOST_THREADS = 16
-NAMES = ("means", "log_scales", "quats", "opacity_logits", "colours", "features")
+MIN_PARALLEL = 1 << 15  # Gaussians plus pixels below which a second thread costs more than it gains
+MAX_THREADS = 16
 
 
 def instruction_sets() -> list[str]:
-    """Names of the instruction sets that this processor has and the core was built for, best first."""
+    """Instruction sets that this processor has and the core was built for, best first."""
     return _core.instruction_sets()
 
 
-def instruction_set() -> str:
-    """The instruction set in use: the best, or DAV_GSWT_ISA. Raises: ValueError: that one is not there."""
+def default_instruction_set() -> str:
+    """DAV_GSWT_ISA, or the best. Raises: ValueError: this processor lacks it."""
     names = instruction_sets()
     name = os.environ.get("DAV_GSWT_ISA") or names[0]
     if name not in names:
@@ -41,15 +41,14 @@ def default_threads() -> int:
             raise ValueError(f"DAV_GSWT_THREADS={given}: give a whole number from 1")
         return int(given)
     mine = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return min(mine, MOST_THREADS)
+    return min(mine, MAX_THREADS)
 
 
 class Rasterizer(interface.Rasterizer):
-    """See `interface.Rasterizer`. Its memory is kept from call to call, and that of gradients is used again once nobody
-    holds them any more.
+    """See `interface.Rasterizer`. Memory is reused from call to call, that of gradients once nothing refers to them.
 
-    What a Gaussian costs that cannot have a pixel is a look at its mean and its scales: whether its other values are
-    finite is not looked at. threads, instruction_set: see `default_threads`, `instruction_set`.
+    A Gaussian that cannot have a pixel is culled by its mean and scales; its other values are not checked.
+    threads, instruction_set: see `default_threads`, `default_instruction_set`.
     """
 
     def __init__(
@@ -62,89 +61,73 @@ class Rasterizer(interface.Rasterizer):
     ):
         super().__init__(near, dilation, antialiased, threads)
         self.threads = threads or default_threads()
-        self._core = _core.Context(instruction_set or globals()["instruction_set"]())
-        self._memory = _Memory()
+        self._core = _core.Context(instruction_set or default_instruction_set())
+        self._memory = _MemoryPool()
 
-    def forward(
-        self,
-        means: Float32[Array, "n 3"],
-        log_scales: Float32[Array, "n 3"],
-        quats: Float32[Array, "n 4"],
-        opacity_logits: Float32[Array, "n"],
-        colours: Float32[Array, "n c"] | Float32[Array, "n k 3"],
-        camera: Camera,
-        features: Float32[Array, "n f"] | None = None,
-    ) -> Rendering:
-        arrays = dict(zip(NAMES, (means, log_scales, quats, opacity_logits, colours, features), strict=True))
-        interface.check_camera(camera)
-        interface.check_shapes(arrays)
-        size = camera.height, camera.width
-        channels = [colours.shape[-1:], (), ()] + ([] if features is None else [features.shape[1:]])
-        images = [np.empty((*size, *c), np.float32) for c in channels] + [None] * (features is None)
-        threads = 1 if len(means) + size[0] * size[1] < TINY else self.threads
-        self._last = None
-        view = _numbers(camera, self.near, self.dilation), *size[::-1], bool(camera.orthographic), self.antialiased
-        if not self._core.forward(*arrays.values(), *view, *images, threads):
-            interface.find_invalid({name: array for name, array in arrays.items() if array is not None})
-        for image in images[: len(channels)]:  # backward needs them as they are
-            image.flags.writeable = False
-        self._last = arrays, images, threads
-        return Rendering(*images)
+    def _render(self, gaussians: GaussianArrays, camera: Camera) -> tuple[Rendering, int]:
+        arrays, size = vars(gaussians).values(), (camera.height, camera.width)
+        features = gaussians.features
+        rendering = Rendering(
+            np.empty((*size, gaussians.colours.shape[-1]), np.float32),
+            np.empty(size, np.float32),
+            np.empty(size, np.float32),
+            None if features is None else np.empty((*size, features.shape[1]), np.float32),
+        )
+        threads = 1 if len(gaussians.means) + size[0] * size[1] < MIN_PARALLEL else self.threads
+        view = _pack_camera(camera, self.near, self.dilation), *size[::-1], bool(camera.orthographic), self.antialiased
+        if not self._core.forward(*arrays, *view, *vars(rendering).values(), threads):
+            interface.find_invalid(gaussians)
+        return rendering, threads
 
-    def backward(
-        self,
-        grad_colour: Float32[Array, "h w c"],
-        grad_alpha: Float32[Array, "h w"] | None = None,
-        grad_depth: Float32[Array, "h w"] | None = None,
-        grad_features: Float32[Array, "h w f"] | None = None,
-    ) -> Gradients:
-        arrays, images, threads = self._forwarded()
-        given = (grad_colour, grad_alpha, grad_depth, grad_features)
-        if grad_features is not None and images[3] is None:
-            raise ValueError("grad_features is given, but forward was given no features")
-        for name, value, image in zip(("colour", "alpha", "depth", "features"), given, images, strict=True):
-            if value is not None:
-                interface.check(value, f"grad_{name}", image.shape)
-        out = {name: None if a is None else self._memory.of(name, a.shape) for name, a in arrays.items()}
-        out["camera"] = np.empty(6, np.float32)
-        self._core.backward(*arrays.values(), *images, *given, *out.values(), threads)
-        return Gradients(**out)
+    def _differentiate(self, last: Forward, given: PictureGradients) -> Gradients:
+        g = last.gaussians
+        out = Gradients(
+            self._memory.take("means", g.means.shape),
+            self._memory.take("log_scales", g.log_scales.shape),
+            self._memory.take("quats", g.quats.shape),
+            self._memory.take("opacity_logits", g.opacity_logits.shape),
+            self._memory.take("colours", g.colours.shape),
+            None if g.features is None else self._memory.take("features", g.features.shape),
+            np.empty(6, np.float32),
+        )
+        parts = (vars(part).values() for part in (g, last.rendering, given, out))
+        self._core.backward(*chain.from_iterable(parts), last.state)
+        return out
 
-    def contributions(self, weights: Float32[Array, "h w c"] | None = None) -> Contributions:
-        arrays, images, threads = self._forwarded()
-        n, size = len(arrays["means"]), images[1].shape
-        weights = np.empty((*size, 0), np.float32) if weights is None else weights
-        interface.check(weights, "weights", (*size, interface.columns(weights)))
-        out = [np.empty(n, np.float32) for _ in range(3)] + [np.empty((n, weights.shape[2]), np.float32)]
-        self._core.contributions(weights, *out, threads)
-        return Contributions(*out)
+    def _contribute(self, last: Forward, weights: Float32[Array, "h w c"]) -> Contributions:
+        n = len(last.gaussians.means)
+        total, squared, maximum = (np.empty(n, np.float32) for _ in range(3))
+        mapped = np.empty((n, weights.shape[2]), np.float32)
+        self._core.contributions(weights, total, squared, maximum, mapped, last.state)
+        return Contributions(total, squared, maximum, mapped)
 
-    @property
-    def visible(self) -> Bool[Array, "n"]:
-        found = np.empty(len(self._forwarded()[0]["means"]), bool)
+    def _visible(self, last: Forward) -> Bool[Array, "n"]:
+        found = np.empty(len(last.gaussians.means), bool)
         self._core.drawn(found)
         return found
 
-    def pairs(self) -> int:
-        """Of the last forward: how many pixels take a splat (alpha at least 1/255, not used up), summed over splats."""
-        return int(self._core.pairs(self._forwarded()[2]))
+    def count_pairs(self) -> int:
+        """Pairs of a pixel and a splat that is blended into it, of the last forward pass."""
+        return int(self._core.pairs(self._require_forward().state))
 
 
-class _Memory:
-    """Arrays whose memory is used again when nobody holds them, nor a view of them: fresh memory costs a page fault
-    every 4 kB, more than what is written to it."""
+class _MemoryPool:
+    """Arrays whose memory is reused once nothing refers to them or to a view of them.
+
+    Fresh memory costs a page fault every 4 kB, more than writing to it.
+    """
 
     def __init__(self):
         self._kept = {}  # by name: memory, and a weak reference to the array that all views of it hold on to
 
-    def of(self, name: str, shape: tuple[int, ...]) -> Float32[Array, "..."]:
-        """An array of this shape; its values mean nothing."""
+    def take(self, name: str, shape: tuple[int, ...]) -> Float32[Array, "..."]:
+        """An array of this shape, not initialised."""
         size = int(np.prod(shape))
         if not size:
             return np.empty(shape, np.float32)
         memory, last = self._kept.get(name, (None, None))
         if memory is None or len(memory) != size or last() is not None:
-            memory = memoryview(np.empty(size, np.float32))
+            memory = memoryview(np.empty(size, np.float32))  # pyright: ignore[reportArgumentType]  arrays are buffers
         root = np.frombuffer(memory, np.float32)  # its base is no array: views of it hold `root` itself
         self._kept[name] = memory, weakref.ref(root)
         return root.reshape(shape)
@@ -157,22 +140,14 @@ def loss(
     structure: float = 0.2,
     threads: int | None = None,
 ) -> tuple[float, Float32[Array, "h w c"]]:
-    """(1 - structure) L1 + structure (1 - SSIM), and its gradient by the image.
-
-    With weights w in [0, 1] (None: 1) over N = h w c values,
-    loss = 1/N sum of w [(1 - structure) |x - y| + structure (1 - SSIM)].
-    SSIM's local means, variances and covariance are those of the pixels that count: averages by an 11-tap Gaussian
-    (sigma 1.5) times w, divided by that window's sum of both; so neither pixels of weight 0 nor those beyond the
-    border have any influence, and a uniform weight w scales loss and gradient. Constants as usual for values in [0, 1]:
-    C1 = .01^2, C2 = .03^2. Raises: ValueError: an array's type, shape or layout.
-    """
-    interface.check(image, "image", (*image.shape[:2], interface.columns(image)))
+    """See `interface.Loss`."""
+    interface.check(image, "image", (*image.shape[:2], interface.count_columns(image)))
     interface.check(target, "target", image.shape)
     if weight is not None:
         interface.check(weight, "weight", image.shape[:2])
     gradient = np.empty(image.shape, np.float32)
-    threads = 1 if image.size < TINY else threads or default_threads()
-    return _core.loss(instruction_set(), image, target, weight, structure, gradient, threads), gradient
+    threads = 1 if image.size < MIN_PARALLEL else threads or default_threads()
+    return _core.loss(default_instruction_set(), image, target, weight, structure, gradient, threads), gradient
 
 
 def adam(
@@ -187,12 +162,7 @@ def adam(
     rows: Bool[Array, "n"] | None = None,
     threads: int | None = None,
 ) -> None:
-    """One step of Adam, in place: values, and the moments `first` and `second`, which start as zeros.
-
-    values -= rate m / (sqrt(v) + epsilon) with m = first / (1 - beta1^step), v = second / (1 - beta2^step).
-    rate: one for all, or one a column (values.size / n). step: counts from 1. rows: only these move; the moments of the
-    others stay. Raises: ValueError: an array's type, shape or layout, or a step below 1.
-    """
+    """See `interface.Adam`."""
     if step < 1:
         raise ValueError(f"step counts from 1, not {step}")
     for name, array in (("values", values), ("gradient", gradient), ("first", first), ("second", second)):
@@ -204,10 +174,10 @@ def adam(
     rates, columns = np.asarray(rate, np.float32).reshape(-1), values.size // max(1, len(values))
     if len(rates) not in (1, columns):
         raise ValueError(f"rate must be one number or {columns}, one a column, not {len(rates)}")
-    threads = 1 if values.size < TINY else threads or default_threads()
-    _core.adam(instruction_set(), values, gradient, first, second, rows, step, rates, *betas, epsilon, threads)
+    threads = 1 if values.size < MIN_PARALLEL else threads or default_threads()
+    _core.adam(default_instruction_set(), values, gradient, first, second, rows, step, rates, *betas, epsilon, threads)
 
 
-def _numbers(camera: Camera, near: float, dilation: float) -> Float32[Array, "18"]:
+def _pack_camera(camera: Camera, near: float, dilation: float) -> Float32[Array, "18"]:
     inner = [camera.fx, camera.fy, camera.cx, camera.cy, near, dilation]
     return np.concatenate([np.ravel(camera.rotation), np.ravel(camera.translation), inner]).astype(np.float32)

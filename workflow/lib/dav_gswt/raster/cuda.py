@@ -1,18 +1,18 @@
-"""The rasterizer on an NVIDIA GPU, by gsplat (the extra `cuda`; written against its version 1.5).
+"""The rasterizer on an NVIDIA GPU, by gsplat (the extra `cuda`; written for version 1.5).
 
-Figures on a GPU, of speed and of agreement, are not taken yet: what is tested is everything on this side of gsplat.
-gsplat shares our conventions (pixel centres at half integers, covariance plus dilation, 1/255, 1e-4, the rim at which
-the projection is linearised, harmonics), with these differences:
-- alpha stops at .999, ours at .99: where opacities exceed .99 a weight may differ by .009, else by float32 roundings.
-- covariances are inverted with differences of large numbers, in float32: a splat a thousand times as long as wide keeps
-  some three digits, and standard deviations beyond 1e18 pixels or units none.
+Tests run on the CPU, with a stand-in for gsplat. gsplat shares this library's conventions (pixel centres at half
+integers, covariance plus dilation, 1/255, 1e-4, the rim at which the projection is linearised, harmonics), but for:
+- alpha is clamped at .999, not .99: a weight may differ by .009 where opacities exceed .99, else by float32 roundings.
+- covariances are inverted by differences of large numbers in float32: a splat a thousand times as long as wide keeps
+  about three digits, and standard deviations beyond 1e18 pixels or units none.
 - sums are atomic: two runs differ in the last bits.
-Arrays travel to the GPU and back in each call; `adam` runs where they are, on the CPU.
+Each call copies arrays to the GPU and back; `adam` runs on the CPU.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
-import gsplat
+import gsplat  # pyright: ignore[reportMissingImports]  an extra
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Float32, Int
@@ -21,30 +21,28 @@ from torch import Tensor
 
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import interface, oracle
-from dav_gswt.raster.interface import Contributions, Gradients, Rendering
-from dav_gswt.raster.torch import NAMES, adam, apart, gradients_of, loss_on, together
+from dav_gswt.raster.interface import Contributions, Forward, GaussianArrays, Gradients, PictureGradients, Rendering
+from dav_gswt.raster.torch import adam, compute_loss, join_gradients, split_channels, to_gradients
 
 __all__ = ["Rasterizer", "adam", "loss"]
 
 ALPHA_MAX = 0.999  # gsplat's
-ANY_DEPTH = 1e-37, 3e38  # near and far plane that leave out nothing before the camera: the ends of float32
+ANY_DEPTH = 1e-37, 3e38  # near and far plane that keep all before the camera: the limits of float32
 
 
 @dataclass(frozen=True)
-class Drawn:
-    """What backward and contributions need of a forward."""
+class GsplatForward:
+    """A forward pass of gsplat: its autograd graph and intermediate results."""
 
-    camera: Camera
     leaves: dict[str, Tensor]
     view: Float32[Tensor, "4 4"]
     picture: Float32[Tensor, "1 h w c"]
     alpha: Float32[Tensor, "1 h w 1"]
-    images: tuple[Array, ...]
-    meta: dict
+    meta: dict[str, Any]
 
 
 class Rasterizer(interface.Rasterizer):
-    """See `interface.Rasterizer`. device: where gsplat draws. threads mean nothing here."""
+    """See `interface.Rasterizer`. device: where gsplat runs. threads: not used."""
 
     def __init__(
         self,
@@ -58,75 +56,53 @@ class Rasterizer(interface.Rasterizer):
         self.device = torch.device(device)
 
     @torch.enable_grad()
-    def forward(
-        self,
-        means: Float32[Array, "n 3"],
-        log_scales: Float32[Array, "n 3"],
-        quats: Float32[Array, "n 4"],
-        opacity_logits: Float32[Array, "n"],
-        colours: Float32[Array, "n c"] | Float32[Array, "n k 3"],
-        camera: Camera,
-        features: Float32[Array, "n f"] | None = None,
-    ) -> Rendering:
-        arrays = dict(zip(NAMES, (means, log_scales, quats, opacity_logits, colours, features), strict=True))
-        interface.check_camera(camera)
-        interface.check_gaussians(arrays)
-        self._last = None
-        given = {name: array for name, array in arrays.items() if array is not None}
+    def _render(self, gaussians: GaussianArrays, camera: Camera) -> tuple[Rendering, Any]:
+        interface.find_invalid(gaussians)
+        given = gaussians.by_name()
         leaves = {name: torch.tensor(array, device=self.device).requires_grad_() for name, array in given.items()}
         view = torch.eye(4, device=self.device)
         view[:3, :3] = torch.as_tensor(np.asarray(camera.rotation))
         view[:3, 3] = torch.as_tensor(np.asarray(camera.translation))
         view.requires_grad_()
-        picture, alpha, meta = self._by_gsplat(leaves, view, camera)
-        c = colours.shape[-1]
-        whole = torch.cat([picture[0, ..., :c], alpha[0], picture[0, ..., -1:], picture[0, ..., c:-1]], 2)
-        images = apart(whole, c, features is not None)
-        self._last = Drawn(camera, leaves, view, picture, alpha, images, meta)
-        return Rendering(*images)
+        picture, alpha, meta = self._call_gsplat(leaves, view, camera)
+        c = gaussians.colours.shape[-1]
+        channels = torch.cat([picture[0, ..., :c], alpha[0], picture[0, ..., -1:], picture[0, ..., c:-1]], 2)
+        rendering = split_channels(channels, c, gaussians.features is not None)
+        return rendering, GsplatForward(leaves, view, picture, alpha, meta)
 
-    def backward(
-        self,
-        grad_colour: Float32[Array, "h w c"],
-        grad_alpha: Float32[Array, "h w"] | None = None,
-        grad_depth: Float32[Array, "h w"] | None = None,
-        grad_features: Float32[Array, "h w f"] | None = None,
-    ) -> Gradients:
-        last: Drawn = self._forwarded()
-        whole = together(last.images, (grad_colour, grad_alpha, grad_depth, grad_features)).to(self.device)
-        c = last.images[0].shape[2]
-        by_picture = torch.cat([whole[..., :c], whole[..., c + 2 :], whole[..., c + 1 : c + 2]], 2)
+    def _differentiate(self, last: Forward, given: PictureGradients) -> Gradients:
+        state = last.state
+        by_channel = join_gradients(last.rendering, given).to(self.device)
+        c = last.rendering.colour.shape[2]
+        by_picture = torch.cat([by_channel[..., :c], by_channel[..., c + 2 :], by_channel[..., c + 1 : c + 2]], 2)
         found = torch.autograd.grad(
-            (last.picture, last.alpha),
-            (*last.leaves.values(), last.view),
-            (by_picture[None], whole[None, ..., c : c + 1]),
+            (state.picture, state.alpha),
+            (*state.leaves.values(), state.view),
+            (by_picture[None], by_channel[None, ..., c : c + 1]),
             retain_graph=True,
             materialize_grads=True,
         )
-        by_camera = motion_of(last.view.detach(), found[-1])
-        return gradients_of(dict(zip(last.leaves, found[:-1], strict=True)) | {"camera": by_camera})
+        by_camera = motion_gradient(state.view.detach(), found[-1])
+        return to_gradients(dict(zip(state.leaves, found[:-1], strict=True)) | {"camera": by_camera})
 
-    def contributions(self, weights: Float32[Array, "h w c"] | None = None) -> Contributions:
-        last: Drawn = self._forwarded()
+    def _contribute(self, last: Forward, weights: Float32[Array, "h w c"]) -> Contributions:
+        state = last.state
         h, w = last.camera.height, last.camera.width
-        weights = np.empty((h, w, 0), np.float32) if weights is None else weights
-        interface.check(weights, "weights", (h, w, interface.columns(weights)))
         with torch.no_grad():
-            gaussians, pixels, blend = pairs(last.meta, w, h)
+            gaussians, pixels, blend = list_pairs(state.meta, w, h)
             maps = torch.as_tensor(weights, device=self.device).reshape(h * w, -1)
-            n = len(last.leaves["means"])
+            n = len(state.leaves["means"])
             zero = torch.zeros(n, device=self.device)
             total, squared = (zero.index_add(0, gaussians, value) for value in (blend, blend * blend))
-            most = zero.scatter_reduce(0, gaussians, blend, "amax")
+            maximum = zero.scatter_reduce(0, gaussians, blend, "amax")
             mapped = [zero.index_add(0, gaussians, blend * m[pixels]) for m in maps.T]
-        mapped = torch.stack(mapped, 1) if mapped else zero[:, None][:, :0]
-        return Contributions(*(a.cpu().numpy() for a in (total, squared, most, mapped)))
+        table = torch.stack(mapped, 1) if mapped else zero[:, None][:, :0]
+        return Contributions(*(a.cpu().numpy() for a in (total, squared, maximum, table)))
 
-    @property
-    def drawn(self) -> Bool[Array, "n"]:
-        return (self._forwarded().meta["radii"][0] > 0).all(-1).cpu().numpy()
+    def _visible(self, last: Forward) -> Bool[Array, "n"]:
+        return (last.state.meta["radii"][0] > 0).all(-1).cpu().numpy()
 
-    def _by_gsplat(self, leaves: dict[str, Tensor], view: Float32[Tensor, "4 4"], camera: Camera):
+    def _call_gsplat(self, leaves: dict[str, Tensor], view: Float32[Tensor, "4 4"], camera: Camera):
         """gsplat's picture (colours, features, depth), alpha and intermediate results."""
         colours, features, degree = leaves["colours"], leaves.get("features"), None
         if colours.ndim == 3:
@@ -159,7 +135,7 @@ class Rasterizer(interface.Rasterizer):
         )
 
 
-def motion_of(view: Float[Tensor, "4 4"], by_view: Float[Tensor, "4 4"]) -> Float[Tensor, "6"]:
+def motion_gradient(view: Float[Tensor, "4 4"], by_view: Float[Tensor, "4 4"]) -> Float[Tensor, "6"]:
     """dL by the camera's small motion q' = exp([w]x) q + tau from dL by the matrix V of q = V (p, 1).
 
     A column v of V moves by w x v, the last one by tau too: dL/dw = sum over columns of v x dL/dv.
@@ -168,7 +144,9 @@ def motion_of(view: Float[Tensor, "4 4"], by_view: Float[Tensor, "4 4"]) -> Floa
     return torch.cat([torch.linalg.cross(v.T, g.T).sum(0), g[:, 3]])
 
 
-def pairs(meta: dict, width: int, height: int) -> tuple[Int[Tensor, "m"], Int[Tensor, "m"], Float32[Tensor, "m"]]:
+def list_pairs(
+    meta: dict[str, Any], width: int, height: int
+) -> tuple[Int[Tensor, "m"], Int[Tensor, "m"], Float32[Tensor, "m"]]:
     """Every Gaussian that a pixel blends, pixel after pixel from front to back: Gaussian, pixel, blend weight.
 
     The weight is alpha times the product of 1 - alpha over those before it in the same pixel, as the difference of two
@@ -201,5 +179,5 @@ def loss(
     structure: float = 0.2,
     threads: int | None = None,
 ) -> tuple[float, Float32[Array, "h w c"]]:
-    """See `cpu.loss`; on the GPU in float64, by autograd."""
-    return loss_on(torch.device("cuda"), image, target, weight, structure)
+    """See `interface.Loss`; on the GPU in float64, by autograd."""
+    return compute_loss(torch.device("cuda"), image, target, weight, structure)

@@ -1,9 +1,9 @@
-"""The rasterizer in plain PyTorch, for machines where the C++ core cannot be built. Same pictures, many times slower.
+"""The rasterizer in plain PyTorch, for machines that cannot build the C++ core: the same pictures, many times slower.
 
-Gaussians are brought onto the screen by the oracle's functions in float64 (which keeps a needle's digits and costs
-little) and blended in float32, in squares of 8 x 8 pixels, each with the splats whose box meets it; squares with about
-as many splats go together. `backward` blends once more: no picture's intermediate values are kept. Results have the
-same bits for the same number of threads.
+Gaussians are projected by the oracle's functions in float64 (exact for needles, and cheap) and blended in float32, in
+squares of 8 x 8 pixels, each with the splats whose box meets it. Squares with similar numbers of splats are batched.
+The backward pass blends again, so that no intermediate values are kept. Results have the same bits for the same number
+of threads.
 """
 
 from dataclasses import dataclass
@@ -16,183 +16,173 @@ from torch import Tensor
 
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import interface, oracle
-from dav_gswt.raster.interface import Contributions, Gradients, Rendering
+from dav_gswt.raster.interface import Contributions, Forward, GaussianArrays, Gradients, PictureGradients, Rendering
 from dav_gswt.raster.oracle import ALPHA_MAX, ALPHA_MIN, CLEAR_MIN, Splats
 
 SIDE = 8  # pixels: smaller squares mean more lists, larger ones more splats that miss most of their square
-TOGETHER = 1 << 19  # splats times pixels that are blended at a time: a few MB an intermediate value
-NAMES = ("means", "log_scales", "quats", "opacity_logits", "colours", "features")
-FARTHEST, STEEPEST = 1e18, 1e12  # pixels, and one over pixels: float32 ends at 3e38
+BATCH = 1 << 19  # splats times pixels that are blended at a time: a few MB an intermediate value
+MAX_CENTRE, MAX_ROOT = 1e18, 1e12  # pixels, and one over pixels: float32 ends at 3e38
 
 
 @dataclass(frozen=True)
-class Squares:
-    """Squares of the picture that are blended together. corners: column and row of their first pixels. rows: which rows
-    of the splats' tables are theirs, from front to back; shorter lists are filled with the last row, which is empty."""
+class SquareGroup:
+    """Squares of the picture that are blended together.
+
+    corners: column and row of their first pixels. rows: their rows in the splats' tables, front to back; shorter lists
+    are padded with the last row, which is empty.
+    """
 
     corners: Int[Tensor, "b 2"]
     rows: Int[Tensor, "b length"]
 
 
+@dataclass(frozen=True)
+class BinnedSplats:
+    """The splats of a forward pass by squares. index: which Gaussian each is."""
+
+    groups: list[SquareGroup]
+    index: Int[Tensor, "m"]
+
+
 class Rasterizer(interface.Rasterizer):
     """See `interface.Rasterizer`. The number of threads is PyTorch's own (torch.set_num_threads)."""
 
-    def forward(
-        self,
-        means: Float32[Array, "n 3"],
-        log_scales: Float32[Array, "n 3"],
-        quats: Float32[Array, "n 4"],
-        opacity_logits: Float32[Array, "n"],
-        colours: Float32[Array, "n c"] | Float32[Array, "n k 3"],
-        camera: Camera,
-        features: Float32[Array, "n f"] | None = None,
-    ) -> Rendering:
-        arrays = dict(zip(NAMES, (means, log_scales, quats, opacity_logits, colours, features), strict=True))
-        interface.check_camera(camera)
-        interface.check_gaussians(arrays)
-        self._last = None
+    def _render(self, gaussians: GaussianArrays, camera: Camera) -> tuple[Rendering, BinnedSplats]:
+        interface.find_invalid(gaussians)
         with torch.no_grad():
-            splats, shapes, values = self._on_screen(leaves_of(arrays), camera, None)
-            squares = _squares(splats, camera)
-            picture = torch.zeros(*_padded(camera), values.shape[1])
-            for some in squares:
-                _put(picture, some.corners, _weights(shapes[some.rows], some.corners) @ values[some.rows])
-        images = apart(picture[: camera.height, : camera.width], colours.shape[-1], features is not None)
-        self._last = arrays, camera, images, squares, splats.index
-        return Rendering(*images)
+            splats, shapes, values = self._project(to_leaves(gaussians), camera, None)
+            groups = _group_squares(splats, camera)
+            picture = torch.zeros(*_padded_size(camera), values.shape[1])
+            for group in groups:
+                _put_squares(
+                    picture, group.corners, _blend_weights(shapes[group.rows], group.corners) @ values[group.rows]
+                )
+        images = split_channels(
+            picture[: camera.height, : camera.width], gaussians.colours.shape[-1], gaussians.features is not None
+        )
+        return images, BinnedSplats(groups, splats.index)
 
     @torch.enable_grad()
-    def backward(
-        self,
-        grad_colour: Float32[Array, "h w c"],
-        grad_alpha: Float32[Array, "h w"] | None = None,
-        grad_depth: Float32[Array, "h w"] | None = None,
-        grad_features: Float32[Array, "h w f"] | None = None,
-    ) -> Gradients:
-        arrays, camera, images, squares, _ = self._forwarded()
-        by_picture = torch.zeros(*_padded(camera), sum(columns_of(i) for i in images))
-        by_picture[: camera.height, : camera.width] = together(
-            images, (grad_colour, grad_alpha, grad_depth, grad_features)
-        )
-        leaves = {name: leaf.requires_grad_() for name, leaf in leaves_of(arrays).items()}
+    def _differentiate(self, last: Forward, given: PictureGradients) -> Gradients:
+        camera, binned = last.camera, last.state
+        by_pixel = join_gradients(last.rendering, given)
+        by_picture = torch.zeros(*_padded_size(camera), by_pixel.shape[2])
+        by_picture[: camera.height, : camera.width] = by_pixel
+        leaves = {name: leaf.requires_grad_() for name, leaf in to_leaves(last.gaussians).items()}
         motion = torch.zeros(6, dtype=torch.float64, requires_grad=True)
-        _, *tables = self._on_screen(leaves, camera, motion)
+        _, *tables = self._project(leaves, camera, motion)
         by_tables = [torch.zeros_like(table) for table in tables]
-        for some in squares:
-            shapes, values = (table.detach()[some.rows].requires_grad_() for table in tables)
-            seen = _weights(shapes, some.corners) @ values
-            found = torch.autograd.grad(seen, (shapes, values), _taken(by_picture, some.corners))
-            for total, part in zip(by_tables, found, strict=True):
-                total.index_add_(0, some.rows.flatten(), part.flatten(0, 1))
+        for group in binned.groups:
+            shapes, values = (table.detach()[group.rows].requires_grad_() for table in tables)
+            blended = _blend_weights(shapes, group.corners) @ values
+            parts = torch.autograd.grad(blended, (shapes, values), _take_squares(by_picture, group.corners))
+            for total, part in zip(by_tables, parts, strict=True):
+                total.index_add_(0, group.rows.flatten(), part.flatten(0, 1))
         found = torch.autograd.grad(tables, (*leaves.values(), motion), by_tables, materialize_grads=True)
-        return gradients_of(dict(zip((*leaves, "camera"), found, strict=True)))
+        return to_gradients(dict(zip((*leaves, "camera"), found, strict=True)))
 
-    def contributions(self, weights: Float32[Array, "h w c"] | None = None) -> Contributions:
-        arrays, camera, _, squares, index = self._forwarded()
+    def _contribute(self, last: Forward, weights: Float32[Array, "h w c"]) -> Contributions:
+        camera, binned = last.camera, last.state
         height, width = camera.height, camera.width
-        weights = np.empty((height, width, 0), np.float32) if weights is None else weights
-        interface.check(weights, "weights", (height, width, interface.columns(weights)))
-        maps = torch.zeros(*_padded(camera), 1 + weights.shape[2])
+        maps = torch.zeros(*_padded_size(camera), 1 + weights.shape[2])
         maps[:height, :width] = torch.as_tensor(np.concatenate([np.ones((height, width, 1), np.float32), weights], 2))
         with torch.no_grad():
-            _, shapes, _ = self._on_screen(leaves_of(arrays), camera, None)
+            _, shapes, _ = self._project(to_leaves(last.gaussians), camera, None)
             sums = torch.zeros(len(shapes), maps.shape[2])
-            squared, most = torch.zeros(2, len(shapes))
-            for some in squares:
-                at, w = some.rows.flatten(), _weights(shapes[some.rows], some.corners)
-                w = w * _taken(maps[..., :1], some.corners)  # what lies beyond the picture's rim counts for nothing
-                sums.index_add_(0, at, (w.mT @ _taken(maps, some.corners)).flatten(0, 1))
+            squared, maximum = torch.zeros(2, len(shapes))
+            for group in binned.groups:
+                at, w = group.rows.flatten(), _blend_weights(shapes[group.rows], group.corners)
+                w = w * _take_squares(maps[..., :1], group.corners)  # the padding beyond the picture counts for nothing
+                sums.index_add_(0, at, (w.mT @ _take_squares(maps, group.corners)).flatten(0, 1))
                 squared.index_add_(0, at, (w * w).sum(1).flatten())
-                most.scatter_reduce_(0, at, w.amax(1).flatten(), "amax")
-        found = torch.zeros(len(arrays["means"]), maps.shape[2] + 2)
-        found[index] = torch.cat([sums, squared[:, None], most[:, None]], 1)[:-1]
+                maximum.scatter_reduce_(0, at, w.amax(1).flatten(), "amax")
+        found = torch.zeros(len(last.gaussians.means), maps.shape[2] + 2)
+        found[binned.index] = torch.cat([sums, squared[:, None], maximum[:, None]], 1)[:-1]
         return Contributions(*(np.ascontiguousarray(found[:, i]) for i in (0, -2, -1, slice(1, -2))))
 
-    @property
-    def drawn(self) -> Bool[Array, "n"]:
-        arrays, _, _, squares, index = self._forwarded()
-        drawn = np.zeros(len(arrays["means"]) + 1, bool)
-        where = torch.cat([index, torch.tensor([len(drawn) - 1])])
-        for some in squares:
-            drawn[where[some.rows.flatten()].numpy()] = True
-        return drawn[:-1]
+    def _visible(self, last: Forward) -> Bool[Array, "n"]:
+        visible = np.zeros(len(last.gaussians.means) + 1, bool)
+        where = torch.cat([last.state.index, torch.tensor([len(visible) - 1])])
+        for group in last.state.groups:
+            visible[where[group.rows.flatten()].numpy()] = True
+        return visible[:-1]
 
-    def _on_screen(self, leaves: dict[str, Tensor], camera: Camera, motion: Float[Tensor, "6"] | None):
-        """The splats, and what blending needs of them as tables of float32 with an empty row below: centre, root and
-        opacity; colours, 1, depth and features."""
+    def _project(self, leaves: dict[str, Tensor], camera: Camera, motion: Float[Tensor, "6"] | None):
+        """The splats, and two float32 tables of them that end in an empty row: centre, root and opacity; colours, 1,
+        depth and features."""
         view = oracle.moved(camera, motion, leaves["means"])
         features = leaves.get("features")
         given = {name: leaf for name, leaf in leaves.items() if name != "features"}
         splats = oracle.project(
             **given, camera=camera, view=view, near=self.near, dilation=self.dilation, antialiased=self.antialiased
         )
-        root = splats.roots.flatten(1)[:, [0, 1, 3]].clamp(-STEEPEST, STEEPEST)
-        shapes = torch.cat([splats.centres.clamp(-FARTHEST, FARTHEST), root, splats.opacity[:, None]], 1)
+        root = splats.roots.flatten(1)[:, [0, 1, 3]].clamp(-MAX_ROOT, MAX_ROOT)
+        shapes = torch.cat([splats.centres.clamp(-MAX_CENTRE, MAX_CENTRE), root, splats.opacity[:, None]], 1)
         values = [splats.colours, torch.ones_like(splats.depth)[:, None], splats.depth[:, None]]
         values = torch.cat(values if features is None else [*values, features[splats.index]], 1)
         return splats, *(torch.nn.functional.pad(table, (0, 0, 0, 1)).float() for table in (shapes, values))
 
 
-def leaves_of(arrays: dict[str, Array | None]) -> dict[str, Tensor]:
-    """Gaussians as tensors of float64; features only if there are any."""
-    return {name: torch.as_tensor(array).double() for name, array in arrays.items() if array is not None}
+def to_leaves(gaussians: GaussianArrays) -> dict[str, Tensor]:
+    """Gaussians as float64 tensors; features only if there are any."""
+    return {name: torch.as_tensor(array).double() for name, array in gaussians.by_name().items()}
 
 
-def columns_of(image: Array) -> int:
-    return image.shape[2] if image.ndim == 3 else 1
+def split_channels(picture: Float[Tensor, "h w c"], colours: int, features: bool) -> Rendering:
+    """Colour, alpha, depth and perhaps features from the channels of one picture, in this order."""
+    array = picture.detach().cpu().numpy()
+    parts = [array[..., :colours], array[..., colours], array[..., colours + 1], array[..., colours + 2 :]]
+    return Rendering(*(np.ascontiguousarray(part) for part in parts[: 4 if features else 3]))
 
 
-def apart(picture: Float[Tensor, "h w c"], colours: int, features: bool) -> tuple[Float32[Array, "..."], ...]:
-    """Colour, alpha, depth and perhaps features, read-only, from the channels of one picture in this order."""
-    picture = picture.detach().cpu().numpy()
-    parts = [picture[..., :colours], picture[..., colours], picture[..., colours + 1], picture[..., colours + 2 :]]
-    images = tuple(np.ascontiguousarray(part) for part in parts[: 4 if features else 3])
-    for image in images:  # as the core's, whose backward reads them
-        image.flags.writeable = False
-    return images
+def join_gradients(rendering: Rendering, given: PictureGradients) -> Float[Tensor, "h w c"]:
+    """The gradients by the images as those by the channels of one picture."""
+    parts = []
+    for name, image in vars(rendering).items():
+        if image is not None:
+            gradient = getattr(given, name)
+            parts.append((np.zeros_like(image) if gradient is None else gradient).reshape(*image.shape[:2], -1))
+    return torch.as_tensor(np.concatenate(parts, 2))
 
 
-def together(images: tuple[Array, ...], gradients: tuple[Array | None, ...]) -> Float[Tensor, "h w c"]:
-    """The gradients by colour, alpha, depth and features as those by one picture's channels.
-
-    Raises: ValueError: one does not fit its image, or is of features that were not drawn.
-    """
-    names = ("colour", "alpha", "depth", "features")
-    if gradients[3] is not None and len(images) < 4:
-        raise ValueError("grad_features is given, but forward was given no features")
-    for name, value, image in zip(names, gradients, images, strict=False):
-        if value is not None:
-            interface.check(value, f"grad_{name}", image.shape)
-    whole = [np.zeros_like(i) if g is None else g for i, g in zip(images, gradients, strict=False)]
-    return torch.as_tensor(np.concatenate([w.reshape(*w.shape[:2], -1) for w in whole], 2))
-
-
-def gradients_of(found: dict[str, Tensor]) -> Gradients:
+def to_gradients(found: dict[str, Tensor]) -> Gradients:
     arrays = {name: np.ascontiguousarray(g.detach().cpu().numpy(), np.float32) for name, g in found.items()}
-    return Gradients(**({"features": None} | arrays))
+    return Gradients(
+        arrays["means"],
+        arrays["log_scales"],
+        arrays["quats"],
+        arrays["opacity_logits"],
+        arrays["colours"],
+        arrays.get("features"),
+        arrays["camera"],
+    )
 
 
-def _padded(camera: Camera) -> tuple[int, int]:
-    """Rows and columns of a picture of whole squares."""
+def _padded_size(camera: Camera) -> tuple[int, int]:
+    """Rows and columns of a picture padded to whole squares."""
     return -(-camera.height // SIDE) * SIDE, -(-camera.width // SIDE) * SIDE
 
 
-def _by_squares(picture: Float[Tensor, "h w c"]) -> Float[Tensor, "rows columns side side c"]:
+def _view_squares(picture: Float[Tensor, "h w c"]) -> Float[Tensor, "rows columns side side c"]:
     return picture.unflatten(1, (-1, SIDE)).unflatten(0, (-1, SIDE)).transpose(1, 2)
 
 
-def _put(picture: Float[Tensor, "h w c"], corners: Int[Tensor, "b 2"], seen: Float[Tensor, "b pixels c"]) -> None:
+def _put_squares(
+    picture: Float[Tensor, "h w c"], corners: Int[Tensor, "b 2"], seen: Float[Tensor, "b pixels c"]
+) -> None:
     column, row = (corners // SIDE).unbind(1)
-    _by_squares(picture)[row, column] = seen.unflatten(1, (SIDE, SIDE))
+    _view_squares(picture)[row, column] = seen.unflatten(1, (SIDE, SIDE))
 
 
-def _taken(picture: Float[Tensor, "h w c"], corners: Int[Tensor, "b 2"]) -> Float[Tensor, "b pixels c"]:
+def _take_squares(picture: Float[Tensor, "h w c"], corners: Int[Tensor, "b 2"]) -> Float[Tensor, "b pixels c"]:
     column, row = (corners // SIDE).unbind(1)
-    return _by_squares(picture)[row, column].flatten(1, 2)
+    return _view_squares(picture)[row, column].flatten(1, 2)
 
 
-def _weights(shapes: Float32[Tensor, "b length 6"], corners: Int[Tensor, "b 2"]) -> Float32[Tensor, "b pixels length"]:
-    """Blend weights in some squares; `oracle.weights` says what they are."""
+def _blend_weights(
+    shapes: Float32[Tensor, "b length 6"], corners: Int[Tensor, "b 2"]
+) -> Float32[Tensor, "b pixels length"]:
+    """Blend weights in some squares; see `oracle.weights`."""
     x, y, r00, r01, r11, opacity = shapes[:, None].unbind(-1)
     steps = torch.arange(SIDE) + 0.5
     dx, dy = (corners[:, i, None, None] + steps[:, None] - c for i, c in ((0, x), (1, y)))
@@ -205,14 +195,14 @@ def _weights(shapes: Float32[Tensor, "b length 6"], corners: Int[Tensor, "b 2"])
     return torch.where(clear >= CLEAR_MIN, alpha * before, 0)
 
 
-def _squares(splats: Splats, camera: Camera) -> list[Squares]:
-    """The squares of the picture that splats meet, in groups of about as many splats."""
-    low, high = (bound // SIDE for bound in _boxes(splats, camera))
+def _group_squares(splats: Splats, camera: Camera) -> list[SquareGroup]:
+    """The squares of the picture that splats meet, in groups with similar numbers of splats."""
+    low, high = (bound // SIDE for bound in _bound_boxes(splats, camera))
     size = (high - low + 1).clamp(min=0)
     count = size.prod(1)
     rows = torch.repeat_interleave(torch.arange(len(count)), count)
     nth = torch.arange(len(rows)) - (torch.cumsum(count, 0) - count)[rows]
-    width = _padded(camera)[1] // SIDE
+    width = _padded_size(camera)[1] // SIDE
     square = (low[rows, 1] + nth // size[rows, 0]) * width + low[rows, 0] + nth % size[rows, 0]
     rows = rows[torch.argsort(square, stable=True)]  # stable: from front to back in each square
     lengths = torch.bincount(square)
@@ -222,16 +212,16 @@ def _squares(splats: Splats, camera: Camera) -> list[Squares]:
     groups, done = [], 0
     while done < len(order):
         longest = int(lengths[order[done]])
-        some = order[done : done + max(1, TOGETHER // (longest * SIDE * SIDE))]
+        some = order[done : done + max(1, BATCH // (longest * SIDE * SIDE))]
         place = torch.arange(longest)
         at = (first[some, None] + place).clamp(max=len(rows) - 1)
         theirs = torch.where(place < lengths[some, None], rows[at], len(count))
-        groups.append(Squares(torch.stack([some % width, some // width], 1) * SIDE, theirs))
+        groups.append(SquareGroup(torch.stack([some % width, some // width], 1) * SIDE, theirs))
         done += len(some)
     return groups
 
 
-def _boxes(splats: Splats, camera: Camera) -> tuple[Int[Tensor, "m 2"], Int[Tensor, "m 2"]]:
+def _bound_boxes(splats: Splats, camera: Camera) -> tuple[Int[Tensor, "m 2"], Int[Tensor, "m 2"]]:
     """First and last column and row of the pixels where a splat's alpha can reach 1/255; first > last for none."""
     reach = 2 * torch.log(splats.opacity / ALPHA_MIN)  # the exponent where alpha falls below it
     r00, r01, r11 = splats.roots.flatten(1)[:, [0, 1, 3]].unbind(1)
@@ -253,22 +243,24 @@ def loss(
     structure: float = 0.2,
     threads: int | None = None,
 ) -> tuple[float, Float32[Array, "h w c"]]:
-    """See `cpu.loss`; in float64, by autograd."""
-    return loss_on(torch.device("cpu"), image, target, weight, structure)
+    """See `interface.Loss`; in float64, by autograd."""
+    return compute_loss(torch.device("cpu"), image, target, weight, structure)
 
 
 @torch.enable_grad()
-def loss_on(device: torch.device, image, target, weight, structure: float) -> tuple[float, Float32[Array, "h w c"]]:
-    """`loss`, computed on a device."""
-    interface.check(image, "image", (*image.shape[:2], interface.columns(image)))
+def compute_loss(
+    device: torch.device, image, target, weight, structure: float
+) -> tuple[float, Float32[Array, "h w c"]]:
+    """`loss` on a device."""
+    interface.check(image, "image", (*image.shape[:2], interface.count_columns(image)))
     interface.check(target, "target", image.shape)
     if weight is None:
         weight = np.ones(image.shape[:2], np.float32)
     interface.check(weight, "weight", image.shape[:2])
     x, y, w = (torch.as_tensor(a).to(device, torch.float64) for a in (image, target, weight[..., None]))
     x.requires_grad_()
-    n = _local(w)
-    mean = torch.stack([_local(w * f) / torch.where(n > 0, n, 1) for f in (x, y, x * x, y * y, x * y)])
+    n = _window_sums(w)
+    mean = torch.stack([_window_sums(w * f) / torch.where(n > 0, n, 1) for f in (x, y, x * x, y * y, x * y)])
     a, b = mean[0], mean[1]
     vaa, vbb, vab = mean[2] - a * a, mean[3] - b * b, mean[4] - a * b
     c1, c2 = 0.01**2, 0.03**2
@@ -278,7 +270,7 @@ def loss_on(device: torch.device, image, target, weight, structure: float) -> tu
     return value.item(), np.ascontiguousarray(gradient.cpu().numpy(), np.float32)
 
 
-def _local(values: Float[Tensor, "h w c"]) -> Float[Tensor, "h w c"]:
+def _window_sums(values: Float[Tensor, "h w c"]) -> Float[Tensor, "h w c"]:
     """Sums over each pixel's window of 11 x 11, weighted by a Gaussian of sigma 1.5."""
     taps = torch.exp(-((torch.arange(11, dtype=torch.float64) - 5) ** 2) / (2 * 1.5**2)).to(values)
     taps = taps / taps.sum()
@@ -299,7 +291,7 @@ def adam(
     rows: Bool[Array, "n"] | None = None,
     threads: int | None = None,
 ) -> None:
-    """See `cpu.adam`; NumPy does it."""
+    """See `interface.Adam`; by NumPy."""
     if step < 1:
         raise ValueError(f"step counts from 1, not {step}")
     for name, array in (("values", values), ("gradient", gradient), ("first", first), ("second", second)):

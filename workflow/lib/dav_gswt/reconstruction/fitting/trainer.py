@@ -211,7 +211,7 @@ def _adam(run: Run, task: Task, gradients) -> None:
     rates = {name: rate * falling**0.5 for name, rate in RATES.items()}
     rates["means"] = DRIFT * task.rules.reach * falling
     rates["colours"] = COLOUR * falling**0.5 * (directed if k > 1 else 1.0)
-    drawn = task.raster.drawn
+    drawn = task.raster.visible
     for name, value in run.state.values.items():
         moments = run.state.first[name], run.state.second[name]
         raster.adam(
