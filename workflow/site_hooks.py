@@ -4,6 +4,7 @@ Nothing is imported, so the site builds without the library's dependencies.
 """
 
 import ast
+import re
 from pathlib import Path
 
 from mkdocs.structure.files import File, Files
@@ -50,6 +51,7 @@ def _module(path: Path) -> list[str]:
 
 
 def _summary(node: ast.Module | ast.ClassDef | ast.FunctionDef) -> str:
-    """The docstring's first paragraph on one line, without what Markdown would take for HTML."""
-    paragraph = (ast.get_docstring(node) or "").split("\n\n")[0]
-    return " ".join(paragraph.split()).replace("<", "&lt;").replace("*", "\\*").replace("[", "\\[").replace("_", "\\_")
+    """The docstring's first paragraph on one line; outside of code spans, Markdown's own characters are escaped."""
+    paragraph = " ".join((ast.get_docstring(node) or "").split("\n\n")[0].split())
+    parts = paragraph.split("`")
+    return "`".join(part if number % 2 else re.sub(r"([<*_\[])", r"\\\1", part) for number, part in enumerate(parts))
