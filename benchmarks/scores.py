@@ -14,7 +14,7 @@ from dav_gswt.images import lpips, lpips_weights
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.prior import conditions
 from dav_gswt.prior.training import examples
-from dav_gswt.prior.training.worlds import FLYING_HEIGHT, world
+from dav_gswt.prior.training.worlds import FLYING_HEIGHT, make_world
 from dav_gswt.views import prior_sampling, uncertainty
 from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.uncertainty.staging import TOP
@@ -66,13 +66,13 @@ def perceptual() -> dict[str, float]:
 
 def pools() -> dict[str, float]:
     """A field fitted from few photos and hemispheres of poses over it, from conditions to terms: M = 5, 8 steps."""
-    made, rng = world(WORLD), np.random.default_rng(0)
-    photos = examples.taken(made, rng)
-    field = examples.fitted(made, photos, rng)
+    made, rng = make_world(WORLD), np.random.default_rng(0)
+    photos = examples.take_photos(made, rng)
+    field = examples.fit_field(made, photos, rng)
     path = lpips_weights.found()
     given = lpips_weights.read(path) if path else None
     model = prior_sampling.load_prior({"model": "terrain"})
-    known = conditions.taken(photos, made.frame, model.size)
+    known = conditions.prepare_photos(photos, made.frame, model.size)
 
     def scored(count: int, staged: bool):
         places = camera_layouts.hemisphere(count, 30.0, FLYING_HEIGHT)
@@ -81,7 +81,7 @@ def pools() -> dict[str, float]:
         ]
         pool = [(poses.of_camera(f"pose_{i:04d}", c, made.frame), c) for i, c in enumerate(cameras)]
         start = time.perf_counter()
-        told = conditions.condition(field, pool, known, FLYING_HEIGHT, model.size)
+        told = conditions.build_condition(field, pool, known, FLYING_HEIGHT, model.size)
         ask = PriorConfig(model, 5, 8, 0.15, weights=given, staged=staged)
         everywhere = np.ones((count, model.size, model.size), np.float32)
         terms, _ = prior_sampling.sample_terms(ask, told, [pose.name for pose, _ in pool], everywhere)

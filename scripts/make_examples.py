@@ -1,15 +1,15 @@
-"""Rule make_examples: what do fields fitted from few photos show of made-up worlds, and what is there?"""
+"""Rule make_examples: training examples of the prior, from procedural worlds."""
 
 import logging
 import os
 
 from dav_gswt.logs import logging_to, progress
-from dav_gswt.prior.training import examples
+from dav_gswt.prior.training import example_files, examples
 
-os.environ.setdefault("DAV_GSWT_THREADS", str(snakemake.threads))  # parts are made beside each other
+os.environ.setdefault("DAV_GSWT_THREADS", str(snakemake.threads))  # other parts are made at the same time
 
 with logging_to(snakemake.log[0]):
-    for part in ("coarse", "fitting"):
-        logging.getLogger(f"dav_gswt.{part}").setLevel(logging.WARNING)  # else five lines a world
-    made = [examples.examples(s, snakemake.params.views) for s in progress(snakemake.params.seeds, "make examples")]
-    examples.write(snakemake.output.examples, examples.joined(made))
+    logging.getLogger("dav_gswt.reconstruction").setLevel(logging.WARNING)  # else five lines per world
+    seeds, views = snakemake.params.seeds, snakemake.params.views
+    parts = [examples.make_examples(seed, views) for seed in progress(seeds, "make examples")]
+    example_files.write_examples(snakemake.output.examples, example_files.concatenate(parts))

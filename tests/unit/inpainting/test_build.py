@@ -12,9 +12,9 @@ from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.geometry import cameras, poses
 from dav_gswt.inpainting import build, evaluation, occluders, paint, unseen, viewpoints
 from dav_gswt.prior import conditions
-from dav_gswt.prior.interface import Imagined
+from dav_gswt.prior.interface import DecodedViews
 from dav_gswt.prior.networks import Network
-from dav_gswt.prior.terrain import Terrain
+from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt.reconstruction import underlay
 from dav_gswt.views import pose_maps
 from dav_gswt.views.prior_sampling import PriorConfig
@@ -34,7 +34,7 @@ class Painting:
     def __init__(self, spoil=None, depth=True):
         self.spoil, self.depth = spoil, depth
 
-    def samples(self, condition, m, p_drop, steps, seed, known=None, common=True):
+    def sample(self, condition, m, p_drop, steps, seed, known=None, common=True):
         assert p_drop == 0 and not common
         hidden = np.kron(~known, np.ones((1, paint.CELL, paint.CELL), bool))[..., None]
         bands = PAINTS[np.arange(self.size) // BAND % 2][None, :, None]
@@ -42,17 +42,17 @@ class Painting:
         planes = [colour, condition.alpha[..., None], condition.inverse_depth[..., None]]
         return np.repeat(np.concatenate(planes, -1).transpose(0, 3, 1, 2)[:, None], m, 1).astype(np.float32)
 
-    def shown(self, condition):
+    def encode_render(self, condition):
         return np.concatenate([condition.colour, condition.alpha[..., None]], -1).transpose(0, 3, 1, 2)
 
-    def variances(self, latents):
+    def estimate_variances(self, latents):
         return np.zeros_like(latents)
 
-    def decoded(self, latents):
+    def decode(self, latents):
         planes = np.ascontiguousarray(latents.transpose(0, 1, 3, 4, 2))
         if self.spoil is not None:
             planes[0, 0, 3, 4, self.spoil] = np.nan
-        return Imagined(planes[..., :4], planes[..., 4] if self.depth else None)
+        return DecodedViews(planes[..., :4], planes[..., 4] if self.depth else None)
 
 
 def asked(prior=None, samples=2):
@@ -124,9 +124,9 @@ def test_colours_join_their_surroundings():
     """A prior that paints all a third too dark, what is known included, leaves no step at the border."""
 
     class Dark(Painting):
-        def samples(self, condition, m, p_drop, steps, seed, known=None, common=True):
+        def sample(self, condition, m, p_drop, steps, seed, known=None, common=True):
             dark = replace(condition, colour=np.float32(0.66) * true.colour)
-            return super().samples(dark, m, p_drop, steps, seed, np.ones_like(known), common)
+            return super().sample(dark, m, p_drop, steps, seed, np.ones_like(known), common)
 
     field, grid = half_seen()
     pool = seen_by([1.6, 1.6, 4.0])
@@ -195,7 +195,7 @@ def test_a_prior_without_depth_is_refused():
 @pytest.fixture(scope="module")
 def terrain():
     torch.manual_seed(5)
-    return Terrain(Network())
+    return TerrainPrior(Network())
 
 
 def test_the_projects_own_prior_paints_the_same_bytes_on_any_number_of_threads(terrain):
@@ -227,8 +227,8 @@ def seen_by(*eyes):
 
 def told(field, pool):
     """What is known of views, and a painting that shows the field itself."""
-    photos = conditions.taken(patch.photos(), patch.FRAME, 32)
-    c = conditions.condition(field, pool, photos, patch.FRAME.flying_height, 32)
+    photos = conditions.prepare_photos(patch.photos(), patch.FRAME, 32)
+    c = conditions.build_condition(field, pool, photos, patch.FRAME.flying_height, 32)
     return c, paint.Painted(c.colour, c.alpha, c.inverse_depth)
 
 

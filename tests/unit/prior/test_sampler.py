@@ -4,6 +4,7 @@ import torch
 from diffusers import DDIMScheduler, UNet2DConditionModel
 
 from dav_gswt.prior import dropout, sampler
+from dav_gswt.prior.sampler import Sampling
 
 SHAPE = (4, 8, 8)
 
@@ -27,7 +28,7 @@ def network():
 
 @pytest.fixture(scope="module")
 def layers(network):
-    return dropout.held(network)
+    return dropout.replace_dropout(network)
 
 
 def drawn(network, layers, views=3, m=4, p=0.2, steps=3, seed=1, batch=8, common=True):
@@ -39,7 +40,7 @@ def drawn(network, layers, views=3, m=4, p=0.2, steps=3, seed=1, batch=8, common
         return network(latents, time, told[some].repeat_interleave(each, 0)).sample
 
     schedule = DDIMScheduler(num_train_timesteps=100, prediction_type="v_prediction")
-    return sampler.sampled(denoise, layers, schedule, views, SHAPE, m, p, steps, seed, batch, common)
+    return sampler.sample_latents(denoise, layers, schedule, views, SHAPE, Sampling(m, p, steps, seed, batch, common))
 
 
 def test_without_dropout_all_samples_are_equal_to_the_bit(network, layers):
@@ -112,7 +113,7 @@ def test_latents_that_are_not_finite_are_refused_by_the_view(layers):
         return torch.full_like(latents, float("nan"))
 
     with pytest.raises(ValueError, match="view 0"):
-        sampler.sampled(denoise, layers, DDIMScheduler(), 1, SHAPE, 2, 0.1, 2, 0)
+        sampler.sample_latents(denoise, layers, DDIMScheduler(), 1, SHAPE, Sampling(2, 0.1, 2, 0))
 
 
 def exact(latents, time, some):
@@ -124,11 +125,15 @@ def exact(latents, time, some):
 DDIM = DDIMScheduler(prediction_type="v_prediction", timestep_spacing="trailing", clip_sample=False)
 
 
+def repair(denoise, layers, latents, strength, steps, batch=32):
+    return sampler.repair_latents(denoise, layers, DDIM, latents, strength, Sampling(1, 0.0, steps, 0, batch))
+
+
 def test_a_repair_without_strength_is_the_code_itself_and_a_perfect_denoiser_undoes_the_noise(layers):
     codes = torch.zeros(3, *SHAPE)
     codes[1] += 1
-    np.testing.assert_array_equal(sampler.repaired(exact, layers, DDIM, codes, 0.0, 2, 0), codes.numpy())
-    found = sampler.repaired(exact, layers, DDIM, torch.zeros(3, *SHAPE), 0.3, 3, 0)
+    np.testing.assert_array_equal(repair(exact, layers, codes, 0.0, 2), codes.numpy())
+    found = repair(exact, layers, torch.zeros(3, *SHAPE), 0.3, 3)
     np.testing.assert_allclose(found, 0, atol=1e-5)  # float32 over three steps
 
 
@@ -139,7 +144,7 @@ def test_a_repair_starts_at_its_share_of_the_schedule_with_one_noise_for_all_vie
         asked.append((int(time), latents.clone()))
         return latents
 
-    sampler.repaired(listen, layers, DDIM, torch.zeros(4, *SHAPE), 0.2, 2, 0, batch=3)
+    repair(listen, layers, torch.zeros(4, *SHAPE), 0.2, 2, batch=3)
     assert [time for time, _ in asked] == [199, 99] * 2
     first = asked[0][1]
     assert torch.equal(first[0], first[1]) and torch.equal(first[0], asked[2][1][0])
@@ -150,7 +155,7 @@ def test_a_repair_starts_at_its_share_of_the_schedule_with_one_noise_for_all_vie
 @pytest.mark.parametrize("strength, steps", [(-0.1, 2), (1.5, 2), (0.2, 0)])
 def test_a_repair_that_cannot_be_is_refused(layers, strength, steps):
     with pytest.raises(ValueError, match="strength"):
-        sampler.repaired(exact, layers, DDIM, torch.zeros(1, *SHAPE), strength, steps, 0)
+        repair(exact, layers, torch.zeros(1, *SHAPE), strength, steps)
 
 
 def test_a_repair_that_is_not_finite_names_its_view(layers):
@@ -160,4 +165,4 @@ def test_a_repair_that_is_not_finite_names_its_view(layers):
         return latents
 
     with pytest.raises(ValueError, match="view 1"):
-        sampler.repaired(spoiled, layers, DDIM, torch.zeros(3, *SHAPE), 0.2, 2, 0)
+        repair(spoiled, layers, torch.zeros(3, *SHAPE), 0.2, 2)

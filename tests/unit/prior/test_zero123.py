@@ -14,9 +14,9 @@ from diffusers import AutoencoderKL, DDIMScheduler, UNet2DConditionModel
 from safetensors.torch import load_file, save_file
 
 from dav_gswt.errors import InputError
-from dav_gswt.prior import dropout, zero123_folder
+from dav_gswt.prior import dropout, zero123_weights
 from dav_gswt.prior.interface import Condition, Prior
-from dav_gswt.prior.zero123 import LATENT, SIZE, Zero123, for_clip, sized, without_white
+from dav_gswt.prior.zero123 import LATENT, SIZE, Zero123, preprocess_for_clip, remove_white, resize_photos
 
 transformers = pytest.importorskip("transformers", reason="needs transformers: pip install transformers==5.23.0")
 
@@ -66,7 +66,7 @@ def written(folder, place, pipeline):
     schedule = DDIMScheduler(1000, 0.00085, 0.012, "scaled_linear", set_alpha_to_one=False, steps_offset=1)
     schedule.save_pretrained(folder / "scheduler")
     (folder / place).mkdir()
-    prefix = zero123_folder.PROJECTIONS[place]
+    prefix = zero123_weights.PROJECTIONS[place]
     save_file({prefix + name: v for name, v in projection.state_dict().items()}, folder / place / UNET)
     (folder / "model_index.json").write_text(json.dumps({"_class_name": pipeline, place: ["x", "y"]}))
     return folder
@@ -109,10 +109,10 @@ def condition(count=2, side=64, seed=0):
 
 
 def test_it_is_a_prior_of_the_published_sizes(prior):
-    found = prior.samples(condition(), 3, 0.2, 2, 0)
+    found = prior.sample(condition(), 3, 0.2, 2, 0)
     assert isinstance(prior, Prior) and (prior.name, prior.size) == ("zero123", 256)
     assert found.shape == (2, 3, 4, 32, 32) and found.dtype == np.float32
-    made = prior.decoded(found[:1])
+    made = prior.decode(found[:1])
     assert made.rgba.shape == (1, 3, 256, 256, 4) and made.inverse_depth is None
     assert made.rgba.min() >= 0 and made.rgba.max() <= 1
 
@@ -122,53 +122,53 @@ def test_both_layouts_hold_the_same_prior(prior, tmp_path):
     for path in other.rglob("*.safetensors"):  # in half precision, under that variant's name
         changed(path, lambda values: {name: v.half() for name, v in values.items()})
         path.rename(path.with_suffix(".fp16.safetensors"))
-    found = Zero123.open(other).samples(condition(), 1, 0.0, 2, 0)
-    np.testing.assert_allclose(found, prior.samples(condition(), 1, 0.0, 2, 0), atol=0.05)  # halves have 3 digits
+    found = Zero123.open(other).sample(condition(), 1, 0.0, 2, 0)
+    np.testing.assert_allclose(found, prior.sample(condition(), 1, 0.0, 2, 0), atol=0.05)  # halves have 3 digits
 
 
 def test_no_dropout_gives_samples_equal_to_the_bit_and_dropout_others(prior):
-    still = prior.samples(condition(), 3, 0.0, 2, 0)
+    still = prior.sample(condition(), 3, 0.0, 2, 0)
     assert all(np.array_equal(still[:, 0], still[:, i]) for i in range(3))
-    one, again = (prior.samples(condition(), 3, 0.3, 2, 0) for _ in range(2))
+    one, again = (prior.sample(condition(), 3, 0.3, 2, 0) for _ in range(2))
     assert (one.var(axis=1).mean((1, 2, 3)) > 0).all()
     np.testing.assert_array_equal(one, again)
-    assert not np.allclose(one, prior.samples(condition(), 3, 0.3, 2, 1))
+    assert not np.allclose(one, prior.sample(condition(), 3, 0.3, 2, 1))
 
 
 def test_a_view_does_not_depend_on_the_others(prior):
-    together = prior.samples(condition(5), 3, 0.2, 2, 0)
+    together = prior.sample(condition(5), 3, 0.2, 2, 0)
     for i in (0, 4):
-        alone = prior.samples(condition(5)[i : i + 1], 3, 0.2, 2, 0)
+        alone = prior.sample(condition(5)[i : i + 1], 3, 0.2, 2, 0)
         np.testing.assert_allclose(together[i], alone[0], atol=1e-5)
 
 
 def test_photo_and_pose_have_a_say_and_the_render_has_none(prior):
     told, other = condition(1), condition(1, seed=1)
-    found = prior.samples(told, 1, 0.0, 2, 0)
+    found = prior.sample(told, 1, 0.0, 2, 0)
     for name, matters in (("photo", True), ("relative", True), ("colour", False), ("alpha", False)):
-        changed_one = prior.samples(replace(told, **{name: getattr(other, name)}), 1, 0.0, 2, 0)
+        changed_one = prior.sample(replace(told, **{name: getattr(other, name)}), 1, 0.0, 2, 0)
         assert np.array_equal(found, changed_one) != matters, name
 
 
 def test_the_pose_is_told_as_in_training(prior):
     seen = []
-    hook = prior.parts.projection.register_forward_pre_hook(lambda _, given: seen.append(given[0]))
+    hook = prior.networks.projection.register_forward_pre_hook(lambda _, given: seen.append(given[0]))
     up, right = np.radians(20), np.radians(90)
     relative = np.float32([[up, np.sin(right), np.cos(right), 0.2]])  # higher up, a quarter round, farther away
-    prior.samples(replace(condition(1), relative=relative), 1, 0.0, 1, 0)
+    prior.sample(replace(condition(1), relative=relative), 1, 0.0, 1, 0)
     hook.remove()
     np.testing.assert_allclose(seen[0][0, -4:], [-np.pi / 9, 1, 0, 0.2 * 1.85], atol=1e-6)
 
 
 def test_the_denoiser_sees_the_coders_mode_as_it_is_and_without_the_photo_nothing(prior):
     told, seen = condition(1, side=SIZE), []
-    hook = prior.parts.unet.register_forward_pre_hook(lambda _, given: seen.append(given))
-    prior.samples(told, 1, 0.0, 1, 0)
+    hook = prior.networks.unet.register_forward_pre_hook(lambda _, given: seen.append(given))
+    prior.sample(told, 1, 0.0, 1, 0)
     hook.remove()
     planes, _, tokens = seen[0]
     with torch.inference_mode():
         photo = torch.from_numpy(told.photo.transpose(0, 3, 1, 2).copy())
-        mode = prior.parts.coder.encode(2 * photo - 1).latent_dist.mode()
+        mode = prior.networks.vae.encode(2 * photo - 1).latent_dist.mode()
     assert planes.shape == (2, 8, 32, 32) and tokens.shape == (2, 1, WIDTH)
     assert torch.equal(planes[0, :4], planes[1, :4]) and not planes[0, 4:].any() and not tokens[0].any()
     torch.testing.assert_close(planes[1, 4:], mode[0])
@@ -176,7 +176,7 @@ def test_the_denoiser_sees_the_coders_mode_as_it_is_and_without_the_photo_nothin
 
 def test_it_samples_as_the_authors_write_it_down(prior):
     """The plain twin: their preparation by kornia, their loop over DDIM's formula, no sampler of ours."""
-    told, steps, parts = condition(1, side=SIZE), 3, prior.parts
+    told, steps, parts = condition(1, side=SIZE), 3, prior.networks
     photo = 2 * torch.from_numpy(told.photo.transpose(0, 3, 1, 2).copy()) - 1
     seen = kornia.geometry.resize(photo, (28, 28), interpolation="bicubic", align_corners=True, antialias=False)
     mean, spread = torch.tensor([0.48145466, 0.4578275, 0.40821073]), torch.tensor([0.26862954, 0.26130258, 0.27577711])
@@ -185,8 +185,8 @@ def test_it_samples_as_the_authors_write_it_down(prior):
     pose = torch.tensor([[-elevation, sine, cosine, 1.85 * radius]])
     left = torch.linspace(0.00085**0.5, 0.012**0.5, 1000).square().neg().add(1).cumprod(0)
     with torch.inference_mode():
-        token = parts.projection(torch.cat([parts.eye(seen).image_embeds, pose], 1))[:, None]
-        latent = parts.coder.encode(photo).latent_dist.mode()
+        token = parts.projection(torch.cat([parts.image_encoder(seen).image_embeds, pose], 1))[:, None]
+        latent = parts.vae.encode(photo).latent_dist.mode()
         x = torch.randn(LATENT, generator=torch.Generator().manual_seed(5))[None]
         times = [1 + i * (1000 // steps) for i in range(steps)]
         for i in reversed(range(steps)):
@@ -195,15 +195,15 @@ def test_it_samples_as_the_authors_write_it_down(prior):
             noise = alone + 3.0 * (parts.unet(torch.cat([x, latent], 1), t, token).sample - alone)
             now, then = left[times[i]], left[times[i - 1]] if i else left[0]
             x = then.sqrt() * (x - (1 - now).sqrt() * noise) / now.sqrt() + (1 - then).sqrt() * noise
-    np.testing.assert_allclose(prior.samples(told, 1, 0.0, steps, 5)[:, 0], x, rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(prior.sample(told, 1, 0.0, steps, 5)[:, 0], x, rtol=1e-4, atol=1e-4)
 
 
 def test_latents_are_scaled(prior):
     latents = np.random.default_rng(0).normal(size=(1, *LATENT)).astype(np.float32)
     with torch.inference_mode():
-        painted = prior.parts.coder.decode(torch.from_numpy(latents) / 0.18215).sample / 2 + 0.5
-    expected = without_white(painted.clamp(0, 1).numpy().transpose(0, 2, 3, 1))
-    np.testing.assert_allclose(prior.decoded(latents).rgba, expected, atol=1e-6)
+        painted = prior.networks.vae.decode(torch.from_numpy(latents) / 0.18215).sample / 2 + 0.5
+    expected = remove_white(painted.clamp(0, 1).numpy().transpose(0, 2, 3, 1))
+    np.testing.assert_allclose(prior.decode(latents).rgba, expected, atol=1e-6)
 
 
 def test_what_the_field_shows_is_a_latent_too(prior):
@@ -211,27 +211,27 @@ def test_what_the_field_shows_is_a_latent_too(prior):
     given = condition(1)
     clear = replace(given, colour=np.zeros_like(given.colour), alpha=np.zeros_like(given.alpha))
     with torch.inference_mode():
-        expected = prior.parts.coder.encode(torch.ones(1, 3, SIZE, SIZE)).latent_dist.mode() * 0.18215
-    np.testing.assert_allclose(prior.shown(clear), expected.numpy(), atol=1e-5)
-    assert np.abs(prior.shown(given) - expected.numpy()).max() > 1e-3
+        expected = prior.networks.vae.encode(torch.ones(1, 3, SIZE, SIZE)).latent_dist.mode() * 0.18215
+    np.testing.assert_allclose(prior.encode_render(clear), expected.numpy(), atol=1e-5)
+    assert np.abs(prior.encode_render(given) - expected.numpy()).max() > 1e-3
 
 
 def test_samples_may_start_from_noises_of_their_own(prior):
-    own = prior.samples(condition(1), 2, 0.0, 2, 0, common=False)
-    np.testing.assert_allclose(own[:, 0], prior.samples(condition(1), 1, 0.0, 2, 0)[:, 0], atol=1e-4)
+    own = prior.sample(condition(1), 2, 0.0, 2, 0, common=False)
+    np.testing.assert_allclose(own[:, 0], prior.sample(condition(1), 1, 0.0, 2, 0)[:, 0], atol=1e-4)
     assert np.abs(own[:, 0] - own[:, 1]).mean() > 0.01
 
 
 def test_a_latent_stands_for_as_much_as_the_coder_says(prior):
     latents = np.random.default_rng(0).normal(size=(1, 2, *LATENT)).astype(np.float32)
     with torch.inference_mode():
-        painted = prior.parts.coder.decode(torch.from_numpy(latents[0]) / 0.18215).sample.clamp(-1, 1)
-        expected = prior.parts.coder.encode(painted).latent_dist.std * 0.18215
-    np.testing.assert_allclose(np.sqrt(prior.variances(latents)[0]), expected.numpy(), rtol=1e-4)
+        painted = prior.networks.vae.decode(torch.from_numpy(latents[0]) / 0.18215).sample.clamp(-1, 1)
+        expected = prior.networks.vae.encode(painted).latent_dist.std * 0.18215
+    np.testing.assert_allclose(np.sqrt(prior.estimate_variances(latents)[0]), expected.numpy(), rtol=1e-4)
 
 
 def test_guidance_of_one_is_none(prior):
-    found = [Zero123(prior.parts, g).samples(condition(1), 2, 0.3, 2, 0) for g in (1.0, 1 + 1e-6, 3.0)]
+    found = [Zero123(prior.networks, g).sample(condition(1), 2, 0.3, 2, 0) for g in (1.0, 1 + 1e-6, 3.0)]
     np.testing.assert_allclose(found[1], found[0], atol=1e-4)
     assert not np.allclose(found[2], found[0], atol=1e-3)
 
@@ -242,39 +242,39 @@ def test_a_sample_has_one_mask_with_and_without_the_photo(prior):
     nothing = torch.zeros_like(noise), torch.zeros(6, 1, WIDTH)
     found = []
     for guidance in (1.0, 3.0):
-        one = Zero123(prior.parts, guidance)
-        with torch.inference_mode(), dropout.masks(one.parts.layers, 3, 0.4, 0):
-            found.append(one._predicted(noise, torch.tensor(500), *nothing))
+        one = Zero123(prior.networks, guidance)
+        with torch.inference_mode(), dropout.hold_masks(one.networks.layers, 3, 0.4, 0):
+            found.append(one._predict_noise(noise, torch.tensor(500), *nothing))
     torch.testing.assert_close(*found, atol=1e-5, rtol=0)
 
 
 @pytest.mark.parametrize("guidance", [0.5, float("nan"), float("inf")])
 def test_a_guidance_that_makes_no_sense_is_refused(prior, guidance):
     with pytest.raises(ValueError, match="guidance is"):
-        Zero123(prior.parts, guidance)
+        Zero123(prior.networks, guidance)
 
 
 def test_what_is_not_finite_is_refused_by_name(prior):
     told = condition()
     told.photo[1, 0, 0] = np.nan
     with pytest.raises(ValueError, match="photo of view 1"):
-        prior.samples(told, 2, 0.1, 2, 0)
+        prior.sample(told, 2, 0.1, 2, 0)
     with pytest.raises(ValueError, match="p_drop is 1"):
-        prior.samples(condition(), 2, 1.0, 2, 0)
+        prior.sample(condition(), 2, 1.0, 2, 0)
 
 
 @pytest.mark.parametrize("side", [100, 256, 300])
 def test_photos_of_any_size_keep_their_colours(side):
     grey = np.full((1, side, side, 3), 0.25, np.float32)
-    assert sized(grey).shape == (1, 3, SIZE, SIZE)
-    np.testing.assert_allclose(sized(grey), 0.25, atol=1e-6)
-    noisy = sized(np.random.default_rng(0).integers(0, 2, (1, side, side, 3)).astype(np.float32))
+    assert resize_photos(grey).shape == (1, 3, SIZE, SIZE)
+    np.testing.assert_allclose(resize_photos(grey), 0.25, atol=1e-6)
+    noisy = resize_photos(np.random.default_rng(0).integers(0, 2, (1, side, side, 3)).astype(np.float32))
     assert noisy.min() >= 0 and noisy.max() <= 1
 
 
 def test_clip_sees_corners_and_its_own_normalisation():
     ramp = torch.linspace(0, 1, 9).expand(1, 3, 9, 9)
-    seen = for_clip(ramp, 5)
+    seen = preprocess_for_clip(ramp, 5)
     assert seen.shape == (1, 3, 5, 5)
     np.testing.assert_allclose(seen[0, 0, 0, [0, -1]] * 0.26862954 + 0.48145466, [0, 1], atol=1e-6)
 
@@ -282,7 +282,7 @@ def test_clip_sees_corners_and_its_own_normalisation():
 def test_drawn_over_white_the_picture_is_what_was_painted():
     painted = np.random.default_rng(0).uniform(0.8, 1, (2, 5, 5, 3)).astype(np.float32)
     painted[0, 0, 0], painted[0, 0, 1], painted[0, 0, 2] = 1, (0.95, 1, 1), (0.9, 1, 1)
-    rgba = without_white(painted)
+    rgba = remove_white(painted)
     np.testing.assert_allclose(rgba[0, 0, :3, 3], [0, 0.5, 1], atol=1e-6)
     np.testing.assert_allclose(rgba[..., :3] + (1 - rgba[..., 3:]), painted, atol=1e-6)
 
@@ -307,7 +307,7 @@ DAMAGES = {
     "extra": ("vae", "more is not of this network"),
     "shape": ("cc_projection", r"projection.weight has the shape \(3, 3\), not \(16, 20\)"),
     "nan": ("image_encoder", "visual_projection.weight holds numbers that are not finite"),
-    "whole": ("unet", "conv_in.bias is of the kind I32"),
+    "whole": ("unet", "conv_in.bias has the type I32"),
 }
 
 
@@ -347,8 +347,8 @@ def test_pickles_become_readable_as_the_documentation_says(folder, prior, root, 
     told = (root / "docs" / "prior.md").read_text(encoding="utf-8").split("<<'END'\n")[1].split("\nEND\n")[0]
     monkeypatch.setattr(sys, "argv", ["-", str(copied)])
     exec(told, {})
-    found = Zero123.open(copied).samples(condition(1), 1, 0.0, 1, 0)
-    np.testing.assert_array_equal(found, prior.samples(condition(1), 1, 0.0, 1, 0))
+    found = Zero123.open(copied).sample(condition(1), 1, 0.0, 1, 0)
+    np.testing.assert_array_equal(found, prior.sample(condition(1), 1, 0.0, 1, 0))
 
 
 CONFIGS = {
@@ -380,7 +380,7 @@ def test_a_folder_of_something_else_is_refused_by_what_it_is(tmp_path):
 
 
 def test_too_many_bytes_are_refused_before_any_is_read(folder, monkeypatch):
-    monkeypatch.setattr(zero123_folder, "MOST_BYTES", 1000)
+    monkeypatch.setattr(zero123_weights, "MOST_BYTES", 1000)
     with pytest.raises(InputError, match="GiB of weights"):
         Zero123.open(folder)
 

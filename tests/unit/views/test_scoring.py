@@ -10,7 +10,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras, poses
 from dav_gswt.images import image_files
 from dav_gswt.prior import conditions
-from dav_gswt.prior.interface import Imagined
+from dav_gswt.prior.interface import DecodedViews
 from dav_gswt.raster import Rasterizer
 from dav_gswt.views import collision, fisher, frozen_scales, pose_maps, scores, scoring
 from dav_gswt.views.frozen_scales import FrozenScales
@@ -26,20 +26,20 @@ class Doubting:
 
     name, size = "doubting", 32
 
-    def samples(self, condition, m, p_drop, steps, seed, common=True):
+    def sample(self, condition, m, p_drop, steps, seed, common=True):
         blue = condition.colour[..., 2]
         signs = np.where(np.arange(m) % 2, -1.0, 1.0)[None, :, None, None, None]
         return (p_drop * signs * blue[:, None, None]).repeat(4, 2).astype(np.float32)
 
-    def shown(self, condition):
+    def encode_render(self, condition):
         return 0.5 * condition.colour[..., 2:].repeat(4, -1).transpose(0, 3, 1, 2)
 
-    def variances(self, latents):
+    def estimate_variances(self, latents):
         return np.zeros_like(latents)
 
-    def decoded(self, latents):
+    def decode(self, latents):
         pictures = np.clip(0.5 + latents, 0, 1).transpose(0, 1, 3, 4, 2)
-        return Imagined(np.ascontiguousarray(pictures), None)
+        return DecodedViews(np.ascontiguousarray(pictures), None)
 
 
 def pool(*eyes, width=40, height=40):
@@ -74,7 +74,7 @@ def test_a_latents_own_width_counts_where_it_is_asked_for():
     """Here all are equally wide (0), so it changes nothing; a prior whose samples differ in width disagrees more."""
 
     class Uneven(Doubting):
-        def variances(self, latents):
+        def estimate_variances(self, latents):
             return np.arange(latents.shape[1], dtype=np.float32)[None, :, None, None, None] + np.zeros_like(latents)
 
     point, posterior = (
@@ -94,8 +94,8 @@ def test_the_residual_is_how_far_the_mean_of_the_samples_lies_from_the_render():
 
 def test_samples_may_start_from_noises_of_their_own():
     class Noisy(Doubting):
-        def samples(self, condition, m, p_drop, steps, seed, common=True):
-            return super().samples(condition, m, 0.0 if common else 0.3, steps, seed)
+        def sample(self, condition, m, p_drop, steps, seed, common=True):
+            return super().sample(condition, m, 0.0 if common else 0.3, steps, seed)
 
     common, own = (scored(PriorConfig(Noisy(), 2, 4, 0.0, noises=n)).scores.terms["w2_sq"] for n in (False, True))
     assert not common.any() and (own > 0).all()
@@ -156,16 +156,21 @@ def test_gathered_information_lowers_the_gain_of_what_overlaps_it():
 
 def test_a_prior_sees_the_middle_square_and_the_nearest_photo():
     wide, square = pool([1.6, 1.6, 5.0], width=60)[0][1], pool([1.6, 1.6, 5.0])[0][1]
-    cut = conditions.squared(wide)
+    cut = conditions.crop_camera(wide)
     assert (cut.width, cut.height) == (40, 40) and cut.cx == wide.cx - 10
     np.testing.assert_allclose(cut.rays()[1], wide.rays()[1][:, 10:50])
     picture = np.random.default_rng(0).random((40, 60, 3), np.float32)
-    assert np.array_equal(conditions.middle_square(picture), picture[:, 10:50])
+    assert np.array_equal(conditions.crop_image(picture), picture[:, 10:50])
     photos = patch.photos()
-    assert conditions.taken(photos, patch.FRAME, 64).photos.shape == (3, 64, 64, 3)  # smaller photos are enlarged
-    known = conditions.taken(photos, patch.FRAME, 24)
+    assert conditions.prepare_photos(photos, patch.FRAME, 64).photos.shape == (
+        3,
+        64,
+        64,
+        3,
+    )  # smaller photos are enlarged
+    known = conditions.prepare_photos(photos, patch.FRAME, 24)
     near = photos[1].camera.centre + [0, 0, 0.1]
-    told = conditions.condition(patch.field(), pool(near), known, 6.0, 24)
+    told = conditions.build_condition(patch.field(), pool(near), known, 6.0, 24)
     assert np.array_equal(told.photo[0], known.photos[1])
     assert told.relative[0] == pytest.approx([0, 0, 1, 0], abs=0.05) and told.colour.shape == (1, 24, 24, 3)
     assert square.width == 40

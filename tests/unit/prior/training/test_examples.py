@@ -11,7 +11,7 @@ from dav_gswt.geometry.poses import Pose
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import Condition
-from dav_gswt.prior.training import examples
+from dav_gswt.prior.training import example_files, examples
 from dav_gswt.reconstruction.build import Quality
 
 SEED, COUNT = 4, 3
@@ -19,13 +19,13 @@ SEED, COUNT = 4, 3
 
 @pytest.fixture(scope="module")
 def made():
-    return examples.examples(SEED, COUNT)
+    return examples.make_examples(SEED, COUNT)
 
 
 @pytest.fixture
 def stored(tmp_path, made):
     path = tmp_path / "part0.npz"
-    examples.write(path, made)
+    example_files.write_examples(path, made)
     return path
 
 
@@ -35,11 +35,11 @@ def same(a, b) -> bool:
 
 
 def test_a_seed_makes_the_same_examples(made):
-    assert same(made, examples.examples(SEED, COUNT))
+    assert same(made, examples.make_examples(SEED, COUNT))
 
 
 def test_another_seed_makes_others(made):
-    assert not same(made, examples.examples(3, COUNT))
+    assert not same(made, examples.make_examples(3, COUNT))
 
 
 def test_examples_are_what_a_prior_takes(made):
@@ -51,7 +51,7 @@ def test_examples_are_what_a_prior_takes(made):
 
 
 def test_truth_shows_ground_and_the_fit_resembles_it(made):
-    assert (made.rgba[..., 3].mean((1, 2)) >= examples.LEAST_SHOWN).all()
+    assert (made.rgba[..., 3].mean((1, 2)) >= examples.LEAST_COVER).all()
     both = (made.condition.alpha > 0.95) & (made.rgba[..., 3] > 0.95)
     apart = np.abs(made.condition.colour - made.rgba[..., :3])[both]
     assert both.mean() > 0.2
@@ -69,7 +69,7 @@ def test_depth_and_colour_of_a_disc_straight_below():
         np.zeros(1, np.float32),
         np.ones(1, bool),
     )
-    seen = conditions.shown(disc, camera_layouts.orbit(90, 0, 3.5, (0, 0, 0), 8, 8, 55), 7.0)
+    seen = conditions.render_view(disc, camera_layouts.orbit(90, 0, 3.5, (0, 0, 0), 8, 8, 55), 7.0)
     np.testing.assert_allclose(seen.inverse_depth, 2, rtol=1e-5)
     np.testing.assert_allclose(seen.alpha, 0.99, atol=1e-3)  # as opaque as one Gaussian gets
     np.testing.assert_allclose(seen.colour, np.broadcast_to(0.99 * np.array([0.2, 0.4, 0.6]), (8, 8, 3)), atol=2e-3)
@@ -77,46 +77,46 @@ def test_depth_and_colour_of_a_disc_straight_below():
 
 def test_where_nothing_is_inverse_depth_is_0(made):
     away = camera_layouts.orbit(-90, 0, 5, (0, 0, 20), 8, 8, 55)
-    seen = conditions.shown(examples.world(0).field, away, 7.0)
+    seen = conditions.render_view(examples.make_world(0).field, away, 7.0)
     assert not seen.alpha.any() and not seen.inverse_depth.any()
 
 
 def test_the_relative_pose_is_from_the_photo_to_the_pose():
     photo, pose = Pose("photo", 60.0, 350.0, 7.0), Pose("pose", 30.0, 20.0, 3.5)
-    found = conditions.relative(photo, pose, 7.0)
+    found = conditions.relative_pose(photo, pose, 7.0)
     np.testing.assert_allclose(found, [-np.pi / 6, 0.5, np.sqrt(3) / 2, -0.5], rtol=1e-6)
 
 
 def test_the_nearest_photo_is_the_one_whose_camera_is_nearest():
     places = [Pose("above", 90.0, 0.0, 7.0), Pose("west", 20.0, 180.0, 7.0), Pose("east", 20.0, 0.0, 7.0)]
-    assert conditions.nearest(Pose("", 30.0, 350.0, 6.0), places) == 2
-    assert conditions.nearest(Pose("", 80.0, 180.0, 6.0), places) == 0
+    assert conditions.find_nearest(Pose("", 30.0, 350.0, 6.0), places) == 2
+    assert conditions.find_nearest(Pose("", 80.0, 180.0, 6.0), places) == 0
 
 
 def test_a_camera_inside_a_thing_is_known(made):
-    field = examples.world(0).field
-    assert examples.stands_free(field, camera_layouts.orbit(90, 0, 7.0, (0, 0, 0), 8, 8, 55))
+    field = examples.make_world(0).field
+    assert examples.is_clear(field, camera_layouts.orbit(90, 0, 7.0, (0, 0, 0), 8, 8, 55))
     inside = camera_layouts.orbit(90, 0, 0.1, field.means[0], 8, 8, 55)
-    assert not examples.stands_free(field, inside)
+    assert not examples.is_clear(field, inside)
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_a_rig_has_3_to_12_places_above_the_ground(seed):
-    rig = examples.some_rig(np.random.default_rng(seed))
+    rig = examples.draw_rig(np.random.default_rng(seed))
     assert 3 <= len(rig) <= 12
     assert all(30 <= place[0] <= 90 and 6 <= place[2] <= 7.5 for place, _ in rig)
 
 
 def test_a_turned_camera_stays_where_it_is():
     camera = camera_layouts.orbit(40, 30, 5, (0, 0, 0), 8, 8, 55)
-    turned = examples.turned(camera, np.array([1.0, 2.0, 0.0]))
+    turned = examples.aim_camera(camera, np.array([1.0, 2.0, 0.0]))
     np.testing.assert_allclose(turned.centre, camera.centre, atol=1e-9)
     towards = np.array([1.0, 2.0, 0.0]) - camera.centre
     np.testing.assert_allclose(turned.forward, towards / np.linalg.norm(towards), atol=1e-9)
 
 
 def test_stored_examples_come_back_to_the_bytes_precision(stored, made):
-    again = examples.read(stored)
+    again = example_files.read_examples(stored)
     np.testing.assert_allclose(again.rgba, made.rgba, atol=0.5 / 255 + 1e-6)
     np.testing.assert_allclose(again.condition.colour, made.condition.colour, atol=0.5 / 255 + 1e-6)
     np.testing.assert_allclose(again.inverse_depth, made.inverse_depth, rtol=1e-3, atol=1e-4)
@@ -125,14 +125,14 @@ def test_stored_examples_come_back_to_the_bytes_precision(stored, made):
 
 
 def test_a_file_has_the_same_bytes_every_time(stored, tmp_path, made):
-    examples.write(tmp_path / "again.npz", made)
+    example_files.write_examples(tmp_path / "again.npz", made)
     assert stored.read_bytes() == (tmp_path / "again.npz").read_bytes()
 
 
 def test_no_examples_can_be_stored_and_joined(tmp_path, made):
-    examples.write(tmp_path / "none.npz", examples.none())
-    assert len(examples.read(tmp_path / "none.npz")) == 0
-    assert same(examples.joined([examples.none(), made]), made)
+    example_files.write_examples(tmp_path / "none.npz", example_files.empty_examples())
+    assert len(example_files.read_examples(tmp_path / "none.npz")) == 0
+    assert same(example_files.concatenate([example_files.empty_examples(), made]), made)
 
 
 def broken(stored, name, value):
@@ -160,7 +160,7 @@ def broken(stored, name, value):
 def test_wrong_arrays_are_refused_by_name(stored, name, value, message):
     broken(stored, name, value)
     with pytest.raises(InputError, match=message):
-        examples.read(stored)
+        example_files.read_examples(stored)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 0.999])
@@ -168,16 +168,16 @@ def test_a_file_cut_short_is_refused(stored, share):
     whole = stored.read_bytes()
     stored.write_bytes(whole[: int(share * len(whole))])
     with pytest.raises(InputError, match="not readable as examples"):
-        examples.read(stored)
+        example_files.read_examples(stored)
 
 
 def test_a_pickle_is_never_read(tmp_path):
     path = tmp_path / "part0.npz"
     path.write_bytes(pickle.dumps({"colour": 1}))
     with pytest.raises(InputError, match="not readable as examples"):
-        examples.read(path)
+        example_files.read_examples(path)
     with pytest.raises(InputError, match="not readable as examples"):
-        examples.read(tmp_path / "missing.npz")
+        example_files.read_examples(tmp_path / "missing.npz")
 
 
 def test_damaged_bytes_are_refused_or_give_whole_examples(stored):
@@ -185,13 +185,13 @@ def test_damaged_bytes_are_refused_or_give_whole_examples(stored):
     for at in rng.integers(0, len(whole), 60):
         stored.write_bytes(whole[:at] + bytes([whole[at] ^ 0xFF]) + whole[at + 1 :])
         with suppress(InputError):
-            assert len(examples.read(stored)) == COUNT
+            assert len(example_files.read_examples(stored)) == COUNT
 
 
 def test_what_is_not_finite_is_not_written(tmp_path, made):
     bad = replace(made, condition=replace(made.condition, relative=np.full((COUNT, 4), np.nan, np.float32)))
     with pytest.raises(ValueError, match="relative of view 0"):
-        examples.write(tmp_path / "bad.npz", bad)
+        example_files.write_examples(tmp_path / "bad.npz", bad)
 
 
 def test_a_fit_stays_under_its_cap(monkeypatch):
@@ -204,7 +204,7 @@ def test_a_fit_stays_under_its_cap(monkeypatch):
 
     monkeypatch.setattr(examples.build, "fit", fit)
     with pytest.raises(InterruptedError):
-        examples.examples(7, 1)
+        examples.make_examples(7, 1)
     quality, points, photos, east = seen[0]
-    assert quality.cap <= 50_000 and quality.steps <= 90 and quality.size in examples.ACROSS
+    assert quality.cap <= 50_000 and quality.steps <= 90 and quality.size in examples.PHOTO_SIZES
     assert 3 <= photos <= 12 and 50 < points < 2000 and 3 < east < 6

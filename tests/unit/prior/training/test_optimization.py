@@ -1,9 +1,9 @@
 import pytest
 import torch
 
-from dav_gswt.prior.networks import CODE, PLANES, SIZE, Network
+from dav_gswt.prior.networks import LATENT, PLANES, SIZE, Network
 from dav_gswt.prior.training import optimization
-from dav_gswt.prior.training.optimization import Codes, Plan
+from dav_gswt.prior.training.optimization import EncodedExamples, TrainingPlan
 
 
 def pictures(count=24):
@@ -15,8 +15,10 @@ def pictures(count=24):
 
 def codes(count=16):
     rng = torch.Generator().manual_seed(1)
-    truth = torch.randn((count, *CODE), generator=rng)
-    return Codes(truth, truth + 0.1, torch.ones((count, 1, *CODE[1:])), truth.flip(0), torch.zeros((count, 4)))
+    truth = torch.randn((count, *LATENT), generator=rng)
+    return EncodedExamples(
+        truth, truth + 0.1, torch.ones((count, 1, *LATENT[1:])), truth.flip(0), torch.zeros((count, 4))
+    )
 
 
 def network():
@@ -26,18 +28,18 @@ def network():
 
 def test_the_coder_learns_and_its_codes_get_unit_variance(tmp_path):
     made = network()
-    losses = optimization.train_coder(made, pictures(), Plan(12, 4, 3e-3, 0), tmp_path / "coder")
+    losses = optimization.train_autoencoder(made, pictures(), TrainingPlan(12, 4, 3e-3, 0), tmp_path / "coder")
     assert len(losses) == 12 and sum(losses[-3:]) < sum(losses[:3])
     with torch.inference_mode():
-        assert made.encoded(pictures().float() / 255).std() == pytest.approx(1, rel=0.05)
+        assert made.encode(pictures().float() / 255).std() == pytest.approx(1, rel=0.05)
 
 
 def test_a_training_that_was_killed_ends_with_the_same_weights(tmp_path, monkeypatch):
-    monkeypatch.setattr(optimization, "KEEP", 2)
-    plan, whole = Plan(5, 4, 1e-3, 7), network()
+    monkeypatch.setattr(optimization, "CHECKPOINT_STEPS", 2)
+    plan, whole = TrainingPlan(5, 4, 1e-3, 7), network()
     expected = optimization.train_denoiser(whole, codes(), plan, tmp_path / "a")
     killed, left = network(), 3
-    true = killed.denoised
+    true = killed.predict_velocity
 
     def denoised(*given):
         nonlocal left
@@ -46,7 +48,7 @@ def test_a_training_that_was_killed_ends_with_the_same_weights(tmp_path, monkeyp
         left -= 1
         return true(*given)
 
-    monkeypatch.setattr(killed, "denoised", denoised)
+    monkeypatch.setattr(killed, "predict_velocity", denoised)
     with pytest.raises(KeyboardInterrupt):
         optimization.train_denoiser(killed, codes(), plan, tmp_path / "b")
     again = network()
@@ -57,12 +59,12 @@ def test_a_training_that_was_killed_ends_with_the_same_weights(tmp_path, monkeyp
 
 
 def test_the_regressor_learns_to_copy(tmp_path):
-    losses = optimization.train_denoiser(network(), codes(), Plan(10, 4, 2e-3, 0), tmp_path / "r", regress=True)
+    losses = optimization.train_denoiser(network(), codes(), TrainingPlan(10, 4, 2e-3, 0), tmp_path / "r", regress=True)
     assert losses[-1] < losses[0]
 
 
 def test_masks_hide_bands_and_blocks_of_some_examples():
-    known = optimization._known(400, torch.Generator().manual_seed(0))
+    known = optimization.draw_masks(400, torch.Generator().manual_seed(0))
     hidden = (known == 0).any(dim=(1, 2, 3))
     assert 0.25 < hidden.float().mean() < 0.45
     across = (known[:, 0] == 0).all(2).any(1) | (known[:, 0] == 0).all(1).any(1)

@@ -2,9 +2,10 @@ import numpy as np
 
 from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.networks import SIZE
-from dav_gswt.prior.terrain import Terrain
-from dav_gswt.prior.training import examples, optimization, pipeline
-from dav_gswt.prior.training.optimization import Plan
+from dav_gswt.prior.terrain import TerrainPrior
+from dav_gswt.prior.training import example_files, optimization, pipeline
+from dav_gswt.prior.training.example_files import Examples
+from dav_gswt.prior.training.optimization import TrainingPlan
 from dav_gswt.study.prior.regressor import Regressor
 
 
@@ -16,46 +17,47 @@ def part(path, seed, count=6):
 
     s = (SIZE, SIZE)
     known = Condition(drawn(*s, 3), drawn(*s), 3 * drawn(*s), drawn(*s, 3), drawn(4))
-    examples.write(path, examples.Examples(known, drawn(*s, 4), drawn(*s)))
+    example_files.write_examples(path, Examples(known, drawn(*s, 4), drawn(*s)))
     return path
 
 
-def test_examples_become_weights_and_a_killed_lesson_goes_on(tmp_path, monkeypatch):
+def test_examples_become_weights_and_an_interrupted_training_resumes(tmp_path, monkeypatch):
     parts = [part(tmp_path / f"{i}.npz", i) for i in range(2)]
-    coder, denoiser = Plan(2, 2, 1e-3, 0), Plan(3, 2, 1e-3, 1)
+    plans = TrainingPlan(2, 2, 1e-3, 0), TrainingPlan(3, 2, 1e-3, 1)
 
-    def learn(name, **more):
-        return pipeline.learn(parts, tmp_path / f"{name}.safetensors", coder, denoiser, tmp_path / name, **more)
+    def train(name):
+        return pipeline.train_prior(parts, tmp_path / f"{name}.safetensors", plans, tmp_path / name)
 
-    losses = learn("whole")
-    assert len(losses["coder"]) == 2 and len(losses["denoiser"]) == 3
+    losses = train("whole")
+    assert len(losses.autoencoder) == 2 and len(losses.denoiser) == 3
     true = optimization.train_denoiser
     monkeypatch.setattr(optimization, "train_denoiser", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
     try:
-        learn("killed")
+        train("killed")
     except KeyboardInterrupt:
         monkeypatch.setattr(optimization, "train_denoiser", true)
-    assert learn("killed") == losses  # the coder was not trained again
-    one, two = (Terrain.open(tmp_path / f"{name}.safetensors") for name in ("whole", "killed"))
+    assert train("killed") == losses  # the autoencoder was not trained again
+    one, two = (TerrainPrior.open(tmp_path / f"{name}.safetensors") for name in ("whole", "killed"))
     for (name, a), b in zip(one.network.state_dict().items(), two.network.state_dict().values(), strict=True):
         np.testing.assert_array_equal(a.numpy(), b.numpy(), name)
     assert one.facts == {"examples": "12", "regressor": "False"}
 
 
-def test_a_regressor_takes_the_coder_that_is_there(tmp_path):
+def test_a_regressor_takes_the_given_autoencoder(tmp_path):
     parts = [part(tmp_path / "0.npz", 0)]
-    plan = Plan(1, 2, 1e-3, 0)
-    pipeline.learn(parts, tmp_path / "prior.safetensors", plan, plan, tmp_path / "a")
+    plan = TrainingPlan(1, 2, 1e-3, 0)
+    pipeline.train_prior(parts, tmp_path / "prior.safetensors", (plan, plan), tmp_path / "a")
     given = tmp_path / "prior.safetensors"
-    pipeline.learn(parts, tmp_path / "regressor.safetensors", plan, plan, tmp_path / "b", given, regress=True)
-    one, two = Terrain.open(given).network, Regressor.open(tmp_path / "regressor.safetensors").network
-    assert np.array_equal(one.coder.decoder[0].weight, two.coder.decoder[0].weight)
-    assert not np.array_equal(one.told.place, two.told.place)
+    losses = pipeline.train_prior(parts, tmp_path / "regressor.safetensors", (plan, plan), tmp_path / "b", given)
+    assert losses.autoencoder == [] and len(losses.denoiser) == 1
+    one, two = TerrainPrior.open(given).network, Regressor.open(tmp_path / "regressor.safetensors").network
+    assert np.array_equal(one.autoencoder.decoder[0].weight, two.autoencoder.decoder[0].weight)
+    assert not np.array_equal(one.condition_encoder.place, two.condition_encoder.place)
 
 
-def test_pictures_are_stored_as_bytes_and_near_things_stay_within(tmp_path):
-    pictures = pipeline.pictures_of([part(tmp_path / "0.npz", 0)])
-    made = examples.read(tmp_path / "0.npz")
+def test_pictures_are_stored_as_bytes_and_near_depths_are_clipped(tmp_path):
+    pictures = pipeline.load_pictures([part(tmp_path / "0.npz", 0)])
+    made = example_files.read_examples(tmp_path / "0.npz")
     assert len(pictures) == 6 and pictures.truth.shape == (6, 5, SIZE, SIZE)
     expected = np.clip(0.5 * made.condition.inverse_depth, 0, 1)
     np.testing.assert_allclose(pictures.render[:, 4].numpy() / 255, expected, atol=0.5 / 255 + 1e-6)

@@ -18,14 +18,14 @@ def same(a: GaussianField, b: GaussianField) -> bool:
 
 
 def test_a_seed_makes_one_world_and_another_seed_another():
-    made = worlds.world(3)
-    assert same(made.field, worlds.world(3).field)
-    assert not same(made.field, worlds.world(4).field)
+    made = worlds.make_world(3)
+    assert same(made.field, worlds.make_world(3).field)
+    assert not same(made.field, worlds.make_world(4).field)
 
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_world_can_be_drawn_and_fills_a_photo_from_above(seed):
-    made = worlds.world(seed)
+    made = worlds.make_world(seed)
     assert 40_000 < len(made.field) < 250_000
     assert all(np.isfinite(getattr(made.field, f.name)).all() for f in fields(GaussianField))
     assert made.field.base_colours.min() >= -1e-6 and made.field.base_colours.max() <= 1 + 1e-6
@@ -34,8 +34,8 @@ def test_a_world_can_be_drawn_and_fills_a_photo_from_above(seed):
     assert 0.05 < seen.colour.mean() < 0.9
 
 
-def test_worlds_differ_in_colour_relief_and_what_stands():
-    made = [worlds.world(seed).field for seed in range(10)]
+def test_worlds_differ_in_colour_relief_and_objects():
+    made = [worlds.make_world(seed).field for seed in range(10)]
     greys = [f.base_colours[f.ground].mean() for f in made]
     near = [f.ground & (np.abs(f.means[:, :2]).max(1) < 3) for f in made]
     assert np.ptp(greys) > 0.2
@@ -45,64 +45,66 @@ def test_worlds_differ_in_colour_relief_and_what_stands():
 
 def test_no_family_that_priors_are_judged_on_is_imported():
     code = (
-        "import sys, dav_gswt.prior.worlds, dav_gswt.prior.examples;"
-        "print([m for m in sys.modules if m.startswith('dav_gswt.photos.')])"
+        "import sys, dav_gswt.prior.training.examples;"
+        "print([m for m in sys.modules if m.startswith('dav_gswt.photos.synthetic.')])"
     )
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert "dav_gswt.photos.synthetic.noise" in loaded
-    assert not [name for name in FAMILIES if f"dav_gswt.photos.{name}" in loaded]
+    assert not [name for name in FAMILIES if f"dav_gswt.photos.synthetic.{name}" in loaded]
 
 
 def test_the_sky_is_the_horizons_colour_level_and_the_zeniths_straight_up():
     sky = worlds.Sky(np.array([0.1, 0.2, 0.3]), np.array([0.7, 0.8, 0.9]))
-    level = sky.behind(camera_layouts.orbit(0, 0, 5, (0, 0, 0), 33, 33, 55))
-    up = sky.behind(camera_layouts.orbit(-90, 0, 5, (0, 0, 0), 33, 33, 55))
+    level = sky.render(camera_layouts.orbit(0, 0, 5, (0, 0, 0), 33, 33, 55))
+    up = sky.render(camera_layouts.orbit(-90, 0, 5, (0, 0, 0), 33, 33, 55))
     np.testing.assert_allclose(level[16, 16], [0.7, 0.8, 0.9], atol=1e-4)
     np.testing.assert_allclose(up[16, 16], [0.1, 0.2, 0.3], atol=1e-4)
 
 
-def light(elevation: float) -> worlds_light.Light:
+def sun_at(elevation: float) -> worlds_light.Light:
     up = np.radians(elevation)
     return worlds_light.Light(np.array([np.cos(up), 0, np.sin(up)]), np.ones(3), 0.5 * np.ones(3), 0.01)
 
 
 def flat_with_a_wall():
     """A flat ground with a wall 1 m high along x = 1, at the map's cells."""
-    x, _ = worlds_light.cells()
-    return worlds_light.Shade(np.where(np.abs(x - 1) < 0.1, 1.0, 0.0).astype(np.float32), np.ones(x.shape, np.float32))
+    x, _ = worlds_light.cell_centres()
+    return worlds_light.ShadowMap(
+        np.where(np.abs(x - 1) < 0.1, 1.0, 0.0).astype(np.float32), np.ones(x.shape, np.float32)
+    )
 
 
 def test_a_wall_casts_a_shadow_as_long_as_it_is_high_under_a_sun_at_45_degrees():
     x = np.array([-2.0, -0.5, 0.3, 0.7, 1.5])
     points = np.stack([x, np.zeros(5), np.zeros(5)], 1)
-    found = worlds_light.sunlit(light(45), flat_with_a_wall(), points)
+    found = worlds_light.sun_visibility(sun_at(45), flat_with_a_wall(), points)
     np.testing.assert_allclose(found, [1, 1, 0, 0, 1], atol=0.05)
 
 
 def test_the_foot_of_a_wall_sees_less_sky_than_open_ground():
-    seen = worlds_light.open_sky(flat_with_a_wall(), np.array([[0.85, 0, 0], [-3.0, 0, 0], [1.0, 0, 1.0]]))
+    seen = worlds_light.sky_visibility(flat_with_a_wall(), np.array([[0.85, 0, 0], [-3.0, 0, 0], [1.0, 0, 1.0]]))
     assert seen[0] < 0.7
     np.testing.assert_allclose(seen[1:], 1, atol=1e-3)
 
 
 def test_a_lit_level_surface_reflects_sun_and_sky():
     one = np.array([[-3.0, 0, 0]])
-    up, albedo = np.array([[0, 0, 1.0]]), np.full((1, 3), 0.4)
-    found = worlds_light.lit(light(30), flat_with_a_wall(), one, up, albedo, np.ones(1), np.zeros(3))
+    surface = worlds_light.Surface(one, np.array([[0, 0, 1.0]]), np.full((1, 3), 0.4), np.ones(1))
+    found = worlds_light.reflect(sun_at(30), flat_with_a_wall(), surface, np.zeros(3))
     np.testing.assert_allclose(found, 0.4 * (0.5 + 0.5), rtol=1e-3)  # sin 30 of the sun, all of the sky
 
 
-def test_the_skin_of_a_sharp_box_lies_on_its_faces():
+def test_the_surface_of_a_sharp_box_lies_on_its_faces():
     planes, away = np.concatenate([np.eye(3), -np.eye(3)]), np.full(6, 0.5)
     rng = np.random.default_rng(0)
-    points, normals, apart = worlds_objects.skin(rng, 600, planes, away, 200.0, np.array([2.0, 1.0, 0.5]))
+    points, normals, spacing = worlds_objects.sample_surface(rng, 600, planes, away, 200.0, np.array([2.0, 1.0, 0.5]))
     np.testing.assert_allclose(np.abs(points / [1, 0.5, 0.25]).max(1), 1, atol=0.01)
     assert np.median(np.abs(normals).max(1)) > 0.999
-    assert apart == pytest.approx(np.sqrt(2 * (2 * 1 + 2 * 0.5 + 1 * 0.5) / 600), rel=0.05)
+    assert spacing == pytest.approx(np.sqrt(2 * (2 * 1 + 2 * 0.5 + 1 * 0.5) / 600), rel=0.05)
 
 
 @pytest.mark.parametrize("name", worlds_objects.KINDS)
-def test_a_thing_stands_on_the_ground_and_has_as_many_gaussians_as_its_kind_says(name):
+def test_an_object_stands_on_the_ground_and_has_as_many_gaussians_as_its_kind_says(name):
     kind = worlds_objects.KINDS[name]
     one = kind.make(np.random.default_rng(1), kind.gaussians)
     assert len(one) == kind.gaussians
@@ -113,7 +115,7 @@ def test_a_thing_stands_on_the_ground_and_has_as_many_gaussians_as_its_kind_says
 
 
 def test_noise_has_deviation_1_wherever_it_is_asked():
-    wave = worlds_ground.waves(np.random.default_rng(0), 0.5, 0.1, 1.0, 2.0)
+    wave = worlds_ground.make_noise(np.random.default_rng(0), 0.5, 0.1, 1.0, 2.0)
     x, y = np.random.default_rng(1).uniform(-40, 40, (2, 20_000))
     assert wave(x, y).std() == pytest.approx(1, abs=0.15)  # bilinear sampling takes a little off
 
@@ -121,8 +123,8 @@ def test_noise_has_deviation_1_wherever_it_is_asked():
 def test_pools_are_level_and_lie_lowest():
     """Some seed among the first has pools; there many discs share the least height."""
     for seed in range(40):
-        land = worlds_ground.terrain(np.random.default_rng(seed))
-        heights = land.height(*np.meshgrid(*2 * [np.linspace(-3, 3, 64)])).ravel()
+        relief = worlds_ground.draw_relief(np.random.default_rng(seed))
+        heights = relief.height(*np.meshgrid(*2 * [np.linspace(-3, 3, 64)])).ravel()
         if (heights == heights.min()).mean() > 0.04:
             return
     raise AssertionError("no pools in 40 worlds")

@@ -13,7 +13,7 @@ from dav_gswt.geometry import poses
 from dav_gswt.images import image_files
 from dav_gswt.prior import weights
 from dav_gswt.prior.networks import Network
-from dav_gswt.prior.terrain import Terrain
+from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt.raster import render
 from dav_gswt.study.calibration import controls, judging, truth
 from dav_gswt.study.prior.regressor import Regressor
@@ -33,7 +33,7 @@ def files(tmp_path_factory):
         found[name] = folder / f"{name}.safetensors"
         network.denoiser = Network().denoiser
         torch.nn.init.normal_(network.denoiser.conv_out.weight, std=0.1)
-        weights.save(network, found[name], {"regressor": str(name != "prior")})
+        weights.save_weights(network, found[name], {"regressor": str(name != "prior")})
     return found
 
 
@@ -71,7 +71,7 @@ def test_a_score_that_knows_where_the_field_is_wrong_ranks_well(replayed):
 
 
 def test_with_a_prior_its_terms_and_its_controls_are_judged_too(replayed, files):
-    prior = PriorConfig(Terrain.open(files["prior"]), 2, 2, 0.2)
+    prior = PriorConfig(TerrainPrior.open(files["prior"]), 2, 2, 0.2)
     regressors = controls.open_regressors([files["regressor0"], files["regressor1"]])
     found, table = judge(replayed, prior, regressors, count=9)
     others = {"spread", "residual", "regressor_dropout", "regressor_residual", "ensemble"}
@@ -106,12 +106,12 @@ def test_truth_that_was_drawn_once_is_what_is_compared(replayed, tmp_path):
 
 
 def test_controls_are_what_they_say(files):
-    prior = PriorConfig(Terrain.open(files["prior"]), 3, 2, 0.2, seed=4)
+    prior = PriorConfig(TerrainPrior.open(files["prior"]), 3, 2, 0.2, seed=4)
     one, two = controls.open_regressors([files["regressor0"], files["regressor1"]])
     judged = judging.CalibrationTarget(AGENT, patch.field(), patch.grid(), patch.FRAME, patch.photos(), 96)
     condition, counts = scoring.build_conditions(judged.field, judged.grid, pool(2), judged.taken, judged.frame, 64)
     found = controls.control_maps(prior, [one, two], condition)
-    codes = [r.predicted(condition) for r in (one, two)]
+    codes = [r.predict(condition) for r in (one, two)]
     np.testing.assert_allclose(found["ensemble"], ((codes[0] - codes[1]) ** 2).sum(1), rtol=1e-4, atol=1e-6)
     assert set(controls.control_maps(prior, [one], condition)) == set(found) - {"ensemble"}
     assert set(controls.control_maps(prior, [], condition)) == {"spread", "residual"}
@@ -125,13 +125,13 @@ class Other(SimpleNamespace):
 
     name, size = "other", 64
 
-    def samples(self, condition, m, p_drop, steps, seed, common=True): ...
+    def sample(self, condition, m, p_drop, steps, seed, common=True): ...
 
-    def decoded(self, latents): ...
+    def decode(self, latents): ...
 
-    def shown(self, condition): ...
+    def encode_render(self, condition): ...
 
-    def variances(self, latents): ...
+    def estimate_variances(self, latents): ...
 
 
 def test_a_priors_weights_are_no_regressors(files):

@@ -4,9 +4,9 @@ import torch
 
 from dav_gswt.images import image_files
 from dav_gswt.prior.interface import Condition
-from dav_gswt.prior.networks import CODE, SIZE, Network
-from dav_gswt.prior.terrain import Terrain
-from dav_gswt.prior.training.examples import Examples
+from dav_gswt.prior.networks import LATENT, SIZE, Network
+from dav_gswt.prior.terrain import TerrainPrior
+from dav_gswt.prior.training.example_files import Examples
 from dav_gswt.study import csv_tables
 from dav_gswt.study.prior import plots
 from dav_gswt.study.prior.regressor import Regressor
@@ -50,7 +50,7 @@ def test_a_gallery_shows_what_was_given_what_is_true_and_what_was_guessed(tmp_pa
     drawn = [rng.uniform(0, 1, shape).astype(np.float32) for shape in shapes]
     drawn[5][..., 3] = drawn[5][..., 3] > 0.5
     torch.manual_seed(0)
-    prior, regressor = Terrain(Network()), Regressor(Network())
+    prior, regressor = TerrainPrior(Network()), Regressor(Network())
     columns = plots.gallery(Examples(Condition(*drawn[:5]), *drawn[5:]), prior, regressor, Setting(m=4, steps=1))
     assert list(columns)[:3] == ["photo given", "render given", "truth"]
     assert list(columns)[3:8] == ["sample 1", "sample 2", "sample 3", "mean of 4", "regressor"]
@@ -58,7 +58,7 @@ def test_a_gallery_shows_what_was_given_what_is_true_and_what_was_guessed(tmp_pa
     assert not np.allclose(columns["sample 1"], columns["sample 2"])
     error, doubt = columns["error of render"], columns["doubt (w2_sq)"]
     np.testing.assert_array_equal(np.isnan(error), drawn[5][..., 3] == 0)
-    assert doubt.shape == (2, *CODE[1:]) and doubt.min() > 0
+    assert doubt.shape == (2, *LATENT[1:]) and doubt.min() > 0
     plots.samples(columns, tmp_path / "a.png")
     picture = image_files.read_photo(tmp_path / "a.png")
     assert picture.shape[1] > 1.4 * SIZE * len(columns)  # no picture is shown smaller than it is

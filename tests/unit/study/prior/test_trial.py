@@ -9,9 +9,9 @@ import torch
 from dav_gswt.errors import InputError
 from dav_gswt.images import lpips, lpips_weights
 from dav_gswt.prior.interface import Condition
-from dav_gswt.prior.networks import CODE, SIZE, Network
-from dav_gswt.prior.terrain import Terrain
-from dav_gswt.prior.training.examples import Examples
+from dav_gswt.prior.networks import LATENT, SIZE, Network
+from dav_gswt.prior.terrain import TerrainPrior
+from dav_gswt.prior.training.example_files import Examples
 from dav_gswt.study.prior import trial
 from dav_gswt.study.prior.regressor import Regressor
 from dav_gswt.study.prior.trial import COLUMNS, Guess, Setting
@@ -36,7 +36,7 @@ def made(count=4, seed=0):
 @pytest.fixture(scope="module")
 def prior():
     torch.manual_seed(7)
-    return Terrain(Network())
+    return TerrainPrior(Network())
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def regressors(prior):
     for seed in (8, 9):
         torch.manual_seed(seed)
         network = Network()
-        network.coder.load_state_dict(prior.network.coder.state_dict())
+        network.autoencoder.load_state_dict(prior.network.autoencoder.state_dict())
         found.append(Regressor(network))
     return found
 
@@ -96,7 +96,7 @@ def test_a_view_without_anything_opaque_is_refused_and_passed_over():
 
 
 def test_a_doubt_that_is_the_error_ranks_perfectly_and_its_opposite_does_not():
-    error = np.arange(1, 5)[:, None, None] * np.ones((4, *CODE[1:]))
+    error = np.arange(1, 5)[:, None, None] * np.ones((4, *LATENT[1:]))
     right, wrong = of_cells(error, made()), of_cells(-error, made())
     for by in ("", "ground_", "cell_"):
         assert right[f"{by}spearman"] == pytest.approx(1) and right[f"{by}ause"] == pytest.approx(0, abs=1e-9)
@@ -108,7 +108,7 @@ def test_a_doubt_that_is_the_error_ranks_perfectly_and_its_opposite_does_not():
 def test_doubt_about_the_sky_counts_for_the_picture_but_not_for_the_ground():
     views = made()
     views.rgba[:, :32, :, 3] = 0.0  # and the less of it is wrong below, the more is doubted above
-    doubt = np.zeros((4, *CODE[1:]))
+    doubt = np.zeros((4, *LATENT[1:]))
     doubt[:, 8:] = np.arange(1, 5)[:, None, None]
     doubt[:, :8] = 10 * np.arange(4, 0, -1)[:, None, None]
     row = of_cells(doubt, views)
@@ -120,7 +120,7 @@ def test_covered_cells_are_those_that_the_render_covers():
     views = made()
     views.condition.alpha[:] = 1.0
     views.condition.alpha[:, :32] = 0.5
-    doubt = np.arange(1, 5)[:, None, None] * np.ones((4, *CODE[1:]))
+    doubt = np.arange(1, 5)[:, None, None] * np.ones((4, *LATENT[1:]))
     doubt[:, :8] = 5 - doubt[:, :8]
     row = of_cells(doubt, views)
     assert row["covered_spearman"] == pytest.approx(1) and abs(row["cell_spearman"]) < 0.1
@@ -188,8 +188,8 @@ def test_the_field_as_it_is_has_the_values_worked_by_hand(rows):
 def test_pictures_in_the_table_are_those_of_the_networks(rows, prior, regressors, random_weights):
     views = made()
     truth = views.rgba[..., :3]
-    single = prior.decoded(prior.samples(views.condition, 1, 0.0, 4, 0)).rgba[:, 0, ..., :3]
-    both = [r.decoded(r.predicted(views.condition)).rgba[..., :3] for r in regressors]
+    single = prior.decode(prior.sample(views.condition, 1, 0.0, 4, 0)).rgba[:, 0, ..., :3]
+    both = [r.decode(r.predict(views.condition)).rgba[..., :3] for r in regressors]
     mean = np.mean(both, 0)
     expected = {
         ("sample", "steps=4"): single,
@@ -227,11 +227,11 @@ def test_views_are_tried_a_few_at_a_time_to_the_same_end(rows, prior, regressors
 
 def test_a_residual_is_0_where_the_render_is_what_is_predicted(prior):
     views = made(2)
-    code = prior.encoded(trial.planes_of_render(views.condition)).numpy()
+    code = prior.encode(trial.pack_render(views.condition)).numpy()
     assert trial.residual(prior, views, code).max() == 0
     code[1, 2, 5, 6] += 2
     apart = trial.residual(prior, views, code)
-    assert apart[1, 5, 6] == pytest.approx(4 / CODE[0], rel=1e-5) and np.count_nonzero(apart) == 1
+    assert apart[1, 5, 6] == pytest.approx(4 / LATENT[0], rel=1e-5) and np.count_nonzero(apart) == 1
 
 
 def test_a_regressor_with_another_coder_is_refused_by_its_number(prior, regressors):

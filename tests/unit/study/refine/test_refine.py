@@ -8,9 +8,9 @@ import pytest
 import torch
 
 from dav_gswt.field import SH0, GaussianField, concatenate_fields
-from dav_gswt.prior.interface import Condition, Imagined
+from dav_gswt.prior.interface import Condition, DecodedViews
 from dav_gswt.prior.networks import Network
-from dav_gswt.prior.terrain import Terrain
+from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt.study.refine import build, limits, repair
 from dav_gswt.study.refine.build import Options, Uncut
 from dav_gswt.tiles.build import TileSet
@@ -149,7 +149,7 @@ def test_a_tile_without_a_cut_is_left_alone():
 @pytest.fixture(scope="module")
 def prior():
     torch.manual_seed(0)
-    return Terrain(Network())
+    return TerrainPrior(Network())
 
 
 def one_tile(by):
@@ -183,22 +183,22 @@ class Telling:
 
     name, size = "telling", 32
 
-    def repaired(self, condition, strength, steps, seed, known=None):
+    def repair(self, condition, strength, steps, seed, known=None):
         self.told = (strength, steps, seed, known)
-        return self.shown(condition)
+        return self.encode_render(condition)
 
-    def samples(self, condition, m, p_drop, steps, seed, common=True):
+    def sample(self, condition, m, p_drop, steps, seed, common=True):
         raise AssertionError("a repair asks for no samples")
 
-    def variances(self, latents):
+    def estimate_variances(self, latents):
         raise AssertionError("nor for variances")
 
-    def shown(self, condition):
+    def encode_render(self, condition):
         return condition.colour.transpose(0, 3, 1, 2)
 
-    def decoded(self, latents):
+    def decode(self, latents):
         colour = np.ascontiguousarray(latents.transpose(0, 2, 3, 1))
-        return Imagined(np.concatenate([colour, np.ones_like(colour[..., :1])], -1), None)
+        return DecodedViews(np.concatenate([colour, np.ones_like(colour[..., :1])], -1), None)
 
 
 def test_the_prior_is_told_not_to_believe_the_render_beside_the_cut():
@@ -237,6 +237,6 @@ def test_neighbours_are_what_a_tile_is_seen_among(monkeypatch):
     tiles = tile_set()
     build._tile(tiles, 0, UNCUT, FEW, look, 32)
     bright = replace(tiles.fields[0][0], sh=tiles.fields[0][0].sh + 1)
-    monkeypatch.setattr(build.looking, "assembly", lambda *_: concatenate_fields([bright]))
+    monkeypatch.setattr(build.viewpoints, "assembly", lambda *_: concatenate_fields([bright]))
     build._tile(tiles, 0, UNCUT, FEW, look, 32)
     assert np.abs(seen[0] - seen[1]).max() > 0.05

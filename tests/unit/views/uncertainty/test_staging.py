@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fixtures import lpips_arrays
 
-from dav_gswt.prior.interface import Condition, Imagined
+from dav_gswt.prior.interface import Condition, DecodedViews
 from dav_gswt.views import prior_sampling
 from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.uncertainty import staging
@@ -88,20 +88,20 @@ class Counting:
     def __init__(self):
         self.evaluations = 0
 
-    def samples(self, condition, m, p_drop, steps, seed, common=True):
+    def sample(self, condition, m, p_drop, steps, seed, common=True):
         self.evaluations += len(condition) * m * steps
         signs = np.where(np.arange(m) % 2, -1.0, 1.0)[None, :, None, None, None]
         size = condition.relative[:, 0, None, None, None, None] * (1 + 0.01 * steps)
         return (size * signs * np.ones((1, m, 4, 32, 32))).astype(np.float32)
 
-    def shown(self, condition):
+    def encode_render(self, condition):
         return np.zeros((len(condition), 4, 32, 32), np.float32)
 
-    def variances(self, latents):
+    def estimate_variances(self, latents):
         return np.zeros_like(latents)
 
-    def decoded(self, latents):
-        return Imagined(np.full((*latents.shape[:2], 32, 32, 4), 0.5, np.float32), None)
+    def decode(self, latents):
+        return DecodedViews(np.full((*latents.shape[:2], 32, 32, 4), 0.5, np.float32), None)
 
 
 def condition(n):

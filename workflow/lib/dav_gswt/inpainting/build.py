@@ -16,7 +16,7 @@ from dav_gswt.inpainting.paint import LEAST_ALPHA, painted
 from dav_gswt.logs import progress
 from dav_gswt.photos.training_views import View
 from dav_gswt.prior import conditions
-from dav_gswt.prior.conditions import Taken
+from dav_gswt.prior.conditions import ReferencePhotos
 from dav_gswt.reconstruction import underlay
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.views.prior_sampling import PriorConfig
@@ -60,11 +60,11 @@ def complete(field: GaussianField, grid: Ground, frame: SceneFrame, taken: list[
     if not there.any():
         return Completed(field, there, there, 0)
     targets = viewpoints.blocks(grid, there, frame.flying_height)
-    known = conditions.taken(taken, frame, asked.model.size)
+    known = conditions.prepare_photos(taken, frame, asked.model.size)
     told, todo, ground = field, there, _ground_colour(field, grid)
     for target in progress(targets, "paint unseen ground"):
         for pose, camera in viewpoints.cameras(viewpoints.ABOVE, target, told, grid, frame, asked.model.size):
-            condition = conditions.condition(told, [(pose, camera)], known, frame.flying_height, asked.model.size)
+            condition = conditions.build_condition(told, [(pose, camera)], known, frame.flying_height, asked.model.size)
             sees, seeks = (unseen.share(told, unseen.gaussians(field, grid, cells), camera) for cells in (there, todo))
             made = painted(asked, condition, seeks[None] > unseen.TOUCHES, ground)
             good = (sees > unseen.LOOKS) & (made.alpha[0] > LEAST_ALPHA)
@@ -143,7 +143,7 @@ def _standing(
     field: GaussianField,
     grid: Ground,
     frame: SceneFrame,
-    known: Taken,
+    known: ReferencePhotos,
     targets: list[Float[Array, "3"]],
     asked: PriorConfig,
 ) -> list[GaussianField]:
@@ -152,7 +152,7 @@ def _standing(
     for target in progress(targets, "look at it from aside"):
         pool = viewpoints.cameras(viewpoints.ABOVE + viewpoints.ASIDE, target, field, grid, frame, size)
         if len(pool) > 1:
-            condition = conditions.condition(field, pool, known, frame.flying_height, size)
+            condition = conditions.build_condition(field, pool, known, frame.flying_height, size)
             nothing = np.zeros((len(pool), size, size), bool)
             made = painted(asked, condition, nothing, _ground_colour(field, grid))
             found.append(occluders.things(field, grid, pool, condition, made, frame.flying_height))

@@ -22,7 +22,7 @@ LEAST_ALPHA = 0.5  # by which a colour over black is divided, at least
 class Painter(Prior, Protocol):
     """A prior that can be told which cells of a render not to believe, and that knows depth."""
 
-    def samples(
+    def sample(
         self,
         condition: Condition,
         m: int,
@@ -32,7 +32,7 @@ class Painter(Prior, Protocol):
         known: Bool[Array, "b h w"] | None = None,
         common: bool = True,
     ) -> Float32[Array, "b m c hz wz"]:
-        """As `Prior.samples`. known: cells of CELL x CELL pixels whose render is to be believed; None: all."""
+        """As `Prior.sample`. known: cells of CELL x CELL pixels whose render is to be believed; None: all."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +56,8 @@ def painted(
     b, size = len(condition), condition.colour.shape[1]
     known = ~unseen.reshape(b, size // CELL, CELL, size // CELL, CELL).any((2, 4))
     with one_thread():
-        latents = asked.model.samples(condition, asked.samples, 0.0, asked.steps, asked.seed, known=known, common=False)
-        made = asked.model.decoded(latents)
+        latents = asked.model.sample(condition, asked.samples, 0.0, asked.steps, asked.seed, known=known, common=False)
+        made = asked.model.decode(latents)
     if made.inverse_depth is None:
         raise ValueError(f"the prior {asked.model.name} has no depth: it cannot say what it painted where")
     rgba, inverse_depth = (a.mean(1, dtype=np.float32) for a in (made.rgba, made.inverse_depth))

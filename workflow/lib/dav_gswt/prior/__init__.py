@@ -1,1 +1,1 @@
-"""Generative priors: what a view may show that no photo has shown."""
+"""Generative priors: models that sample what a view may show, given the field's render and the nearest photo."""

@@ -1,7 +1,4 @@
-"""What a prior is told of a view: the field as it shows there, and the nearest photo taken so far.
-
-The same for the examples that it learns from and for the poses that are scored.
-"""
+"""Conditions of a prior: the field rendered at a pose, and the nearest photo. Training and scoring share this code."""
 
 from dataclasses import dataclass, replace
 
@@ -19,13 +16,13 @@ from dav_gswt.photos.training_views import View
 from dav_gswt.prior.interface import Condition
 from dav_gswt.raster import Rasterizer, to_raster_arrays
 
-FINE = 2  # pictures are drawn so many times as large and averaged: edges are soft, as in a photo made smaller
-CLEAR = 0.05  # opacity below which a pixel has no depth
+SUPERSAMPLING = 2  # renders are this many times larger and averaged: edges are soft, as in a photo made smaller
+LEAST_ALPHA = 0.05  # a pixel of less opacity has no depth
 
 
 @dataclass(frozen=True)
-class Shown:
-    """A field seen from a pose; colours over black, inverse depth as in Condition."""
+class RenderedView:
+    """A field rendered at a pose; colour over black, inverse depth as in Condition."""
 
     colour: Float32[Array, "h w 3"]
     alpha: Float32[Array, "h w"]
@@ -33,73 +30,80 @@ class Shown:
 
 
 @dataclass(frozen=True)
-class Taken:
-    """The photos taken so far, as priors see them: where from, and their middle squares at the prior's size."""
+class ReferencePhotos:
+    """The photos captured so far: their poses, and their centre squares at the size of the prior."""
 
-    places: list[Pose]
+    poses: list[Pose]
     photos: Float32[Array, "n s s 3"]
 
 
-def taken(views: list[View], frame: SceneFrame, size: int) -> Taken:
-    """Of photos at any size."""
-    small = [_sized(middle_square(view.image), size) for view in views]
-    return Taken([poses.of_camera(view.name, view.camera, frame) for view in views], np.stack(small))
+def prepare_photos(views: list[View], frame: SceneFrame, size: int) -> ReferencePhotos:
+    """Crop and resize captured photos of any size for a prior of `size` pixels."""
+    small = [_resize(crop_image(view.image), size) for view in views]
+    return ReferencePhotos([poses.of_camera(view.name, view.camera, frame) for view in views], np.stack(small))
 
 
-def _sized(square: Float32[Array, "s s 3"], size: int) -> Float32[Array, "{size} {size} 3"]:
+def _resize(square: Float32[Array, "s s 3"], size: int) -> Float32[Array, "{size} {size} 3"]:
     if len(square) >= size:
         return image_files.shrink_image(square, size, size)
     return np.stack([image_files.enlarge_map(square[..., c], size, size) for c in range(3)], -1)
 
 
-def condition(
-    field: GaussianField, pool: list[tuple[Pose, Camera]], known: Taken, flying_height: float, size: int
+def build_condition(
+    field: GaussianField, pool: list[tuple[Pose, Camera]], known: ReferencePhotos, flying_height: float, size: int
 ) -> Condition:
-    """The condition of every candidate, at size x size pixels of the middle square of its picture."""
-    seen = [shown(field, squared(camera).resized(size, size), flying_height) for _, camera in pool]
-    at = [nearest(pose, known.places) for pose, _ in pool]
-    apart = [relative(known.places[i], pose, flying_height) for i, (pose, _) in zip(at, pool, strict=True)]
-    parts = ([getattr(s, name) for s in seen] for name in ("colour", "alpha", "inverse_depth"))
-    return Condition(*(np.stack(p) for p in parts), known.photos[at], np.stack(apart))
+    """The condition of every candidate, at size x size pixels of the centre square of its picture."""
+    renders = [render_view(field, crop_camera(camera).resized(size, size), flying_height) for _, camera in pool]
+    at = [find_nearest(pose, known.poses) for pose, _ in pool]
+    relative = [relative_pose(known.poses[i], pose, flying_height) for i, (pose, _) in zip(at, pool, strict=True)]
+    return Condition(
+        np.stack([r.colour for r in renders]),
+        np.stack([r.alpha for r in renders]),
+        np.stack([r.inverse_depth for r in renders]),
+        known.photos[at],
+        np.stack(relative),
+    )
 
 
-def shown(field: GaussianField, camera: Camera, flying_height: float) -> Shown:
-    """What a field shows to a camera: the field's part of a Condition. All that asks a prior draws fields with this."""
-    large = camera.resized(FINE * camera.width, FINE * camera.height)
-    seen = Rasterizer().forward(**to_raster_arrays(field), camera=large)
-    colour, alpha, depth = (pooled(a) for a in (seen.colour, seen.alpha, seen.depth))
-    there = alpha > CLEAR
-    inverse = np.where(there, flying_height * alpha / np.where(there, depth, 1), 0)
-    return Shown(np.clip(colour, 0, 1), np.clip(alpha, 0, 1), inverse.astype(np.float32))
+def render_view(field: GaussianField, camera: Camera, flying_height: float) -> RenderedView:
+    """Render the field's part of a Condition. Everything that queries a prior renders fields by this function."""
+    large = camera.resized(SUPERSAMPLING * camera.width, SUPERSAMPLING * camera.height)
+    render = Rasterizer().forward(**to_raster_arrays(field), camera=large)
+    colour, alpha, depth = (_downsample(a) for a in (render.colour, render.alpha, render.depth))
+    solid = alpha > LEAST_ALPHA
+    inverse = np.where(solid, flying_height * alpha / np.where(solid, depth, 1), 0)
+    return RenderedView(np.clip(colour, 0, 1), np.clip(alpha, 0, 1), inverse.astype(np.float32))
 
 
-def pooled(image: Float32[Array, "h w *c"]) -> Float32[Array, "h2 w2 *c"]:
-    """Mean over blocks of FINE x FINE pixels."""
+def _downsample(image: Float32[Array, "h w *c"]) -> Float32[Array, "h2 w2 *c"]:
+    """Mean over blocks of SUPERSAMPLING x SUPERSAMPLING pixels."""
     h, w, *rest = image.shape
-    return image.reshape(h // FINE, FINE, w // FINE, FINE, *rest).mean((1, 3), dtype=np.float32)
+    blocks = image.reshape(h // SUPERSAMPLING, SUPERSAMPLING, w // SUPERSAMPLING, SUPERSAMPLING, *rest)
+    return blocks.mean((1, 3), dtype=np.float32)
 
 
-def nearest(pose: Pose, places: list[Pose]) -> int:
-    """Which of the places is nearest to the pose."""
-    return int(np.argmin([np.linalg.norm(poses.place(p) - poses.place(pose)) for p in places]))
+def find_nearest(pose: Pose, references: list[Pose]) -> int:
+    """The index of the reference pose nearest to a pose."""
+    return int(np.argmin([np.linalg.norm(poses.place(r) - poses.place(pose)) for r in references]))
 
 
-def relative(photo: Pose, pose: Pose, flying_height: float) -> Float32[Array, "4"]:
-    """From a photo to a pose, as a Condition has it."""
+def relative_pose(photo: Pose, pose: Pose, flying_height: float) -> Float32[Array, "4"]:
+    """A pose relative to that of a photo, see `Condition`."""
     turn = np.radians(pose.azimuth - photo.azimuth)
     rise = np.radians(pose.elevation - photo.elevation)
-    return np.float32([rise, np.sin(turn), np.cos(turn), (pose.radius - photo.radius) / flying_height])
+    farther = (pose.radius - photo.radius) / flying_height
+    return np.array([rise, np.sin(turn), np.cos(turn), farther], np.float32)
 
 
-def squared(camera: Camera) -> Camera:
-    """The camera of the middle square of a camera's picture."""
+def crop_camera(camera: Camera) -> Camera:
+    """The camera of the centre square of a camera's picture."""
     side = min(camera.width, camera.height)
     left, top = (camera.width - side) // 2, (camera.height - side) // 2
     return replace(camera, cx=camera.cx - left, cy=camera.cy - top, width=side, height=side)
 
 
-def middle_square(image: Float32[Array, "h w c"]) -> Float32[Array, "s s c"]:
-    """What `squared` sees of a picture."""
+def crop_image(image: Float32[Array, "h w c"]) -> Float32[Array, "s s c"]:
+    """The centre square of a picture, as `crop_camera` sees it."""
     h, w = image.shape[:2]
     side = min(h, w)
     left, top = (w - side) // 2, (h - side) // 2

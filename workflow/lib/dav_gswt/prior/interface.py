@@ -1,4 +1,4 @@
-"""What every prior is: something that, told what is known of a view, imagines several times what else it may show."""
+"""The interface of a generative prior: it samples several possible pictures of a view, given what is known of it."""
 
 from dataclasses import dataclass, fields
 from typing import Protocol, runtime_checkable
@@ -12,9 +12,9 @@ from numpy import ndarray as Array
 class Condition:
     """What is known of b views, of s x s pixels each; colours sRGB in [0, 1].
 
-    colour, alpha: the field as it is, drawn at the pose (colour over black). inverse_depth: flying heights over depth,
-    0 where nothing is. photo: the captured photo nearest to the pose. relative: from that photo to the pose:
-    difference of elevation in radians, sine and cosine of the difference of azimuth, difference of the radius over the
+    colour, alpha: the field rendered at the pose, colour over black. inverse_depth: flying height over depth, 0 where
+    the render is empty. photo: the captured photo nearest to the pose. relative: the pose relative to that photo:
+    difference of elevation in radians, sine and cosine of the difference of azimuth, difference of radius over the
     flying height.
     """
 
@@ -31,7 +31,7 @@ class Condition:
         return Condition(*(getattr(self, f.name)[rows] for f in fields(self)))
 
     def check(self) -> None:
-        """Raises: ValueError: something that is not finite, by its name and the first view that has it."""
+        """Raises: ValueError: a value is not finite; the message names the array and the first such view."""
         for f in fields(self):
             values = getattr(self, f.name)
             good = np.isfinite(values).reshape(len(self), -1).all(1)
@@ -40,9 +40,9 @@ class Condition:
 
 
 @dataclass(frozen=True)
-class Imagined:
-    """What a decoder makes of latents. rgba: colours over nothing, and opacity. inverse_depth: as in Condition; None
-    where the prior knows no depth."""
+class DecodedViews:
+    """Pictures decoded from latents. rgba: colours over black, and opacity. inverse_depth: as in Condition; None if the
+    prior has no depth."""
 
     rgba: Float32[Array, "*n s s 4"]
     inverse_depth: Float32[Array, "*n s s"] | None
@@ -50,29 +50,34 @@ class Imagined:
 
 @runtime_checkable
 class Prior(Protocol):
-    """A generative model of views. name: as in the config. size: pixels a side of its pictures."""
+    """A generative model of views. name: as in the config. size: pixels per side of its pictures."""
 
     name: str
     size: int
 
-    def samples(
+    def sample(
         self, condition: Condition, m: int, p_drop: float, steps: int, seed: int, common: bool = True
     ) -> Float32[Array, "b m c hz wz"]:
-        """m latents of each view: the same initial noise and eta = 0 for all, other attention dropout for each.
+        """Draw m latents of each view by DDIM with eta = 0, each under an attention dropout mask of its own.
 
-        common: False gives each of the m its own initial noise, the same for every view: what the prior holds for
-        possible, rather than how firm it is.
+        One mask holds for a whole trajectory. p_drop = 0 with common noise gives m equal latents, to the bit. The
+        latents of a view do not depend on its batch (to 1e-5).
 
-        One dropout mask holds for a whole trajectory. p_drop = 0 gives m equal latents, to the bit. A view's latents
-        do not depend on its batch (to 1e-5). Raises: ValueError: m < 1, steps < 1, or p_drop outside [0, 1).
+        Args:    common: all samples start from one noise and differ by dropout alone. False: each of the m samples
+                 starts from a noise of its own, the same for every view.
+        Raises:  ValueError: m < 1, steps < 1, or p_drop outside [0, 1).
         """
+        ...
 
-    def decoded(self, latents: Float32[Array, "*n c hz wz"]) -> Imagined:
+    def decode(self, latents: Float32[Array, "*n c hz wz"]) -> DecodedViews:
         """The pictures of latents."""
+        ...
 
-    def shown(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
-        """The latents of what the field itself shows: what samples are, where it shows what the prior expects."""
+    def encode_render(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
+        """The latents of the field's render: samples equal them where the render is what the prior expects."""
+        ...
 
-    def variances(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n c hz wz"]:
-        """How wide a distribution each latent stands for, where it is not taken for a point: the variance that the
-        coder gives the code of its picture, in the latents' units."""
+    def estimate_variances(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n c hz wz"]:
+        """The variance of each latent, if it stands for a distribution: that of the encoder's posterior for the decoded
+        picture, in units of the latents."""
+        ...

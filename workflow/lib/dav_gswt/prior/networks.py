@@ -1,36 +1,43 @@
-"""The networks of the project's own prior: a coder of pictures, a denoiser of codes, and what tells it of a view.
+"""Networks of the terrain prior: an autoencoder of pictures, a denoiser of latents, an encoder of the condition.
 
-Pictures are 64 x 64 with five channels (colour, opacity, inverse depth); codes are 8 x 16 x 16. The denoiser sees the
-noisy code, the code of the field's render, its opacity, and where anything is known at all; the nearest photo and the
-relative pose reach it through attention.
+Pictures are 64 x 64 with five channels (colour, opacity, inverse depth); latents are 8 x 16 x 16. The input of the
+denoiser is the noisy latent, the latent of the field's render, its opacity, and a mask of the cells where the render is
+valid. The nearest photo and the relative pose enter through cross-attention.
 """
 
+from typing import Any
+
 import torch
-from diffusers import DDIMScheduler, UNet2DConditionModel
 from diffusers.models.autoencoders.vae import DiagonalGaussianDistribution
+from diffusers.models.unets.unet_2d_condition import UNet2DConditionModel
+from diffusers.schedulers.scheduling_ddim import DDIMScheduler
 from jaxtyping import Float
 from torch import Tensor, nn
 
-SIZE = 64  # pixels a side
-CODE = (8, 16, 16)
+SIZE = 64  # pixels per side
+LATENT = (8, 16, 16)
+CELL = SIZE // LATENT[1]  # pixels per side of a cell of a latent
 PLANES = 5  # of a picture: red, green, blue, opacity, inverse depth
-INNER, DEPTH = 96, 3  # channels and residual blocks of the coder, each way
-SURE = -5.0  # log-variance of codes before training
-PATCH = 2  # cells a side of the photo's code that make one token
+HIDDEN, BLOCKS = 96, 3  # channels and residual blocks of the encoder, and of the decoder
+INITIAL_LOG_VARIANCE = -5.0  # of latents before training
+PATCH = 2  # cells per side of the photo's latent that make one token
 WIDTH = 64  # of a token
-TIMES = 1000
+TIMES = 1000  # steps of the diffusion in training
 
 
 class Network(nn.Module):
-    """Everything that is trained. The same shape serves the diffusion model and the regressor it is compared with."""
+    """All trained networks. The diffusion model and the regressor that it is compared with have this architecture."""
+
+    denoiser: nn.Module
+    scale: Tensor
 
     def __init__(self):
         super().__init__()
-        self.coder = Coder()
+        self.autoencoder = Autoencoder()
         self.denoiser = UNet2DConditionModel(
-            sample_size=CODE[1],
-            in_channels=2 * CODE[0] + 2,
-            out_channels=CODE[0],
+            sample_size=LATENT[1],
+            in_channels=2 * LATENT[0] + 2,
+            out_channels=LATENT[0],
             down_block_types=("DownBlock2D", "CrossAttnDownBlock2D", "CrossAttnDownBlock2D"),
             up_block_types=("CrossAttnUpBlock2D", "CrossAttnUpBlock2D", "UpBlock2D"),
             block_out_channels=(32, 64, 96),
@@ -39,22 +46,22 @@ class Network(nn.Module):
             attention_head_dim=8,
             norm_num_groups=16,
         )
-        self.told = Told()
-        self.register_buffer("scale", torch.ones(()))  # codes times it have unit variance
+        self.condition_encoder = ConditionEncoder()
+        self.register_buffer("scale", torch.ones(()))  # latents times it have unit variance
 
     def posterior(self, planes: Float[Tensor, "n 5 s s"]) -> DiagonalGaussianDistribution:
-        """What the coder makes of pictures: a normal distribution of codes, not scaled."""
-        return DiagonalGaussianDistribution(self.coder.encode(2 * planes - 1))
+        """The encoder's normal distribution of unscaled latents of pictures."""
+        return DiagonalGaussianDistribution(self.autoencoder.encode(2 * planes - 1))
 
-    def encoded(self, planes: Float[Tensor, "n 5 s s"]) -> Float[Tensor, "n 8 h w"]:
-        """Codes of pictures, the mode of the coder's posterior, scaled."""
+    def encode(self, planes: Float[Tensor, "n 5 s s"]) -> Float[Tensor, "n 8 h w"]:
+        """Latents of pictures: the mode of the posterior, scaled."""
         return self.posterior(planes).mode() * self.scale
 
-    def decoded(self, codes: Float[Tensor, "n 8 h w"]) -> Float[Tensor, "n 5 s s"]:
-        """Pictures of codes, in [0, 1]."""
-        return ((self.coder.decode(codes / self.scale) + 1) / 2).clamp(0, 1)
+    def decode(self, latents: Float[Tensor, "n 8 h w"]) -> Float[Tensor, "n 5 s s"]:
+        """Pictures of latents, in [0, 1]."""
+        return ((self.autoencoder.decode(latents / self.scale) + 1) / 2).clamp(0, 1)
 
-    def denoised(
+    def predict_velocity(
         self,
         noisy: Float[Tensor, "n 8 h w"],
         time: Tensor,
@@ -62,81 +69,84 @@ class Network(nn.Module):
         known: Float[Tensor, "n 2 h w"],
         tokens: Float[Tensor, "n t width"],
     ) -> Float[Tensor, "n 8 h w"]:
-        """The denoiser's prediction (velocity). known: opacity of the render, and 1 where it is to be believed."""
+        """The output of the denoiser. known: opacity of the render, and 1 in cells where the render is valid."""
         return self.denoiser(torch.cat([noisy, render, known], 1), time, tokens).sample
 
 
-class Coder(nn.Module):
-    """A variational autoencoder whose only change of resolution is a fold: cells of 4 x 4 pixels become channels.
+class Autoencoder(nn.Module):
+    """A variational autoencoder that changes resolution once: cells of 4 x 4 pixels are folded into channels.
 
-    Without normalisation, which would cost it the colours: a linear code of a cell (a principal component analysis) is
-    within its reach from the first step, and better ones follow.
+    It has no normalisation, which would lose absolute colours.
     """
 
     def __init__(self):
         super().__init__()
-        cell = SIZE // CODE[1]
-        folded = PLANES * cell * cell
+        folded = PLANES * CELL * CELL
         self.encoder = nn.Sequential(
-            nn.PixelUnshuffle(cell),
-            nn.Conv2d(folded, INNER, 3, padding=1),
-            *(Residual(INNER) for _ in range(DEPTH)),
-            nn.Conv2d(INNER, 2 * CODE[0], 1),
+            nn.PixelUnshuffle(CELL),
+            nn.Conv2d(folded, HIDDEN, 3, padding=1),
+            *(Residual(HIDDEN) for _ in range(BLOCKS)),
+            nn.Conv2d(HIDDEN, 2 * LATENT[0], 1),
         )
         self.decoder = nn.Sequential(
-            nn.Conv2d(CODE[0], INNER, 3, padding=1),
-            *(Residual(INNER) for _ in range(DEPTH)),
-            nn.Conv2d(INNER, folded, 3, padding=1),
-            nn.PixelShuffle(cell),
+            nn.Conv2d(LATENT[0], HIDDEN, 3, padding=1),
+            *(Residual(HIDDEN) for _ in range(BLOCKS)),
+            nn.Conv2d(HIDDEN, folded, 3, padding=1),
+            nn.PixelShuffle(CELL),
         )
-        with torch.no_grad():  # it begins nearly sure of its codes
-            self.encoder[-1].weight[CODE[0] :] = 0
-            self.encoder[-1].bias[CODE[0] :] = SURE
+        last = self.encoder[-1]
+        assert isinstance(last, nn.Conv2d) and last.bias is not None
+        with torch.no_grad():  # small variances at first
+            last.weight[LATENT[0] :] = 0
+            last.bias[LATENT[0] :] = INITIAL_LOG_VARIANCE
 
     def encode(self, pictures: Float[Tensor, "n 5 s s"]) -> Float[Tensor, "n 16 h w"]:
-        """Means and log-variances of codes, of pictures in [-1, 1]."""
+        """Means and log-variances of latents, of pictures in [-1, 1]."""
         return self.encoder(pictures)
 
-    def decode(self, codes: Float[Tensor, "n 8 h w"]) -> Float[Tensor, "n 5 s s"]:
+    def decode(self, latents: Float[Tensor, "n 8 h w"]) -> Float[Tensor, "n 5 s s"]:
         """Pictures, about in [-1, 1]."""
-        return self.decoder(codes)
+        return self.decoder(latents)
 
 
 class Residual(nn.Module):
-    """x + f(x), f 0 at first."""
+    """x + f(x), with f = 0 before training."""
 
     def __init__(self, width: int):
         super().__init__()
         self.first, self.second = (nn.Conv2d(width, width, 3, padding=1) for _ in range(2))
-        nn.init.zeros_(self.second.weight)
-        nn.init.zeros_(self.second.bias)
+        for parameter in self.second.parameters():
+            nn.init.zeros_(parameter)
 
     def forward(self, x: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c h w"]:
         silu = nn.functional.silu
         return x + self.second(silu(self.first(silu(x))))
 
 
-class Told(nn.Module):
-    """Tokens for the denoiser's attention: patches of the nearest photo's code, and the relative pose."""
+class ConditionEncoder(nn.Module):
+    """Tokens for the cross-attention: patches of the nearest photo's latent, and the relative pose."""
 
     def __init__(self):
         super().__init__()
-        cells = CODE[1] // PATCH
-        self.photo = nn.Linear(CODE[0] * PATCH * PATCH, WIDTH)
-        self.place = nn.Parameter(0.02 * torch.randn(cells * cells, WIDTH))
+        patches = LATENT[1] // PATCH
+        self.photo = nn.Linear(LATENT[0] * PATCH * PATCH, WIDTH)
+        self.place = nn.Parameter(0.02 * torch.randn(patches * patches, WIDTH))  # position embedding
         self.pose = nn.Sequential(nn.Linear(4, WIDTH), nn.SiLU(), nn.Linear(WIDTH, WIDTH))
 
     def forward(
         self, photo: Float[Tensor, "n 8 h w"], relative: Float[Tensor, "n 4"]
     ) -> Float[Tensor, "n tokens width"]:
-        """Every patch knows the pose too: where it lands in the view depends on it."""
+        """The pose is added to every patch, since it decides where the patch lands in the view."""
         patches = nn.functional.unfold(photo, PATCH, stride=PATCH).transpose(1, 2)
         pose = self.pose(relative)[:, None]
         return torch.cat([self.photo(patches) + self.place + pose, pose], 1)
 
 
-def schedule() -> DDIMScheduler:
-    """Velocity prediction on a cosine schedule that ends in pure noise, steps from there backwards."""
+def make_schedule() -> Any:
+    """Velocity prediction on a cosine schedule that ends in pure noise, sampled backwards from there.
+
+    Returns: a DDIMScheduler. Any: its annotations reject the tensors that it takes.
+    """
     return DDIMScheduler(
         num_train_timesteps=TIMES,
         beta_schedule="squaredcos_cap_v2",

@@ -1,10 +1,11 @@
-"""From noise to latents: DDIM without added noise (eta = 0), so that only dropout tells samples apart."""
+"""DDIM sampling without added noise (eta = 0): with common initial noise, samples differ by dropout alone."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
-from diffusers import DDIMScheduler
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 from torch import Tensor
@@ -12,121 +13,122 @@ from torch import Tensor
 from dav_gswt.prior import dropout
 from dav_gswt.prior.dropout import HeldDropout
 
-Denoise = Callable[[Tensor, Tensor, slice], Tensor]  # latents, time, which views: the network's prediction
-Run = Callable[[Tensor, slice], Tensor]  # where latents start, which views: where they end
+Denoiser = Callable[[Tensor, Tensor, slice], Tensor]  # latents, time, rows of the views -> the network's prediction
+Schedule = Any  # a DDIMScheduler of diffusers, whose annotations reject the tensors that it takes
+Trajectory = Callable[[Tensor, slice], Tensor]  # initial latents, rows of the views -> final latents
 
 
-def sampled(
-    denoise: Denoise,
+@dataclass(frozen=True)
+class Sampling:
+    """How to sample.
+
+    m: samples per view. batch: latents at a time; changes results by rounding only. common: one initial noise for all
+    samples; else one per sample, the same for every view, of which the first is the common one.
+    """
+
+    m: int
+    p_drop: float
+    steps: int
+    seed: int
+    batch: int = 32
+    common: bool = True
+
+
+def sample_latents(
+    denoise: Denoiser,
     layers: list[HeldDropout],
-    schedule: DDIMScheduler,
+    schedule: Schedule,
     views: int,
     shape: tuple[int, ...],
-    m: int,
-    p_drop: float,
-    steps: int,
-    seed: int,
-    batch: int = 32,
-    common: bool = True,
+    sampling: Sampling,
 ) -> Float32[Array, "b m c h w"]:
-    """Latents of `views` views, m of each: one common noise, one mask a sample and trajectory.
+    """Sample m latents of each of `views` views, one dropout mask per sample and trajectory.
 
-    denoise: predicts for latents of whole views, m of each, one after the other. shape: of a latent. batch: latents at
-    a time; changes no result beyond rounding. common: one noise for all samples; else one a sample, the same for every
-    view, the first of them the common one. p_drop = 0 with the common noise: one trajectory, m times the same bits.
-    Raises: ValueError: m < 1, steps < 1, p_drop outside [0, 1), or latents that are not finite, naming the view.
+    With p_drop = 0 and common noise one trajectory is run and repeated m times.
+
+    Args:    denoise: takes latents of whole views, m of each, one view after the other. shape: of a latent.
+    Raises:  ValueError: m < 1, steps < 1, p_drop outside [0, 1), or a latent is not finite, naming the view.
     """
-    if steps < 1 or m < 1:
-        raise ValueError(f"steps is {steps} and m is {m}; there is at least one of each")
-    generator = torch.Generator().manual_seed(seed)
-    noises = torch.stack([torch.randn(shape, generator=generator) for _ in range(1 if common else m)])
+    s = sampling
+    if s.steps < 1 or s.m < 1:
+        raise ValueError(f"steps is {s.steps} and m is {s.m}; there is at least one of each")
+    generator = torch.Generator().manual_seed(s.seed)
+    noises = torch.stack([torch.randn(shape, generator=generator) for _ in range(1 if s.common else s.m)])
 
-    def run(start: Tensor, some: slice) -> Tensor:
-        return _trajectory(denoise, schedule, start, steps, some)
+    def run(start: Tensor, rows: slice) -> Tensor:
+        schedule.set_timesteps(s.steps)
+        return _denoise_steps(denoise, schedule, start, schedule.timesteps, rows)
 
-    return masked(run, layers, noises, views, m, p_drop, seed, batch)
+    return run_with_masks(run, layers, noises, views, sampling)
 
 
-def repaired(
-    denoise: Denoise,
+def run_with_masks(
+    run: Trajectory, layers: list[HeldDropout], starts: Float[Tensor, "k c h w"], views: int, sampling: Sampling
+) -> Float32[Array, "b m c h w"]:
+    """Run m trajectories of each of `views` views, each under a dropout mask that it holds throughout.
+
+    Args:    starts: initial latents, one per sample or one for all. With one and p_drop = 0 a view is run once.
+    Raises:  ValueError: m < 1, p_drop outside [0, 1), or a latent is not finite, naming the view.
+    """
+    m, p_drop = sampling.m, sampling.p_drop
+    with torch.inference_mode(), dropout.hold_masks(layers, m, p_drop, sampling.seed):
+        distinct = m if p_drop > 0 else len(starts)
+        out = np.empty((views, distinct, *starts.shape[1:]), np.float32)
+        each = max(1, sampling.batch // distinct)
+        for first in range(0, views, each):
+            rows = slice(first, min(first + each, views))
+            count = rows.stop - rows.start
+            for layer in layers:
+                layer.m = distinct
+            latents = run(starts.expand(distinct, -1, -1, -1).repeat(count, 1, 1, 1), rows)
+            out[rows] = latents.view(count, distinct, *starts.shape[1:]).float().numpy()
+    _require_finite(out)
+    return np.repeat(out, m // distinct, axis=1)
+
+
+def repair_latents(
+    denoise: Denoiser,
     layers: list[HeldDropout],
-    schedule: DDIMScheduler,
-    codes: Float[Tensor, "b c h w"],
+    schedule: Schedule,
+    latents: Float[Tensor, "b c h w"],
     strength: float,
-    steps: int,
-    seed: int,
-    batch: int = 32,
+    sampling: Sampling,
 ) -> Float32[Array, "b c h w"]:
-    """Codes to which a little noise is added, the same to all, and which are denoised from there (SDEdit).
+    """Add a little noise to latents, the same to all, and denoise them from there (SDEdit), without dropout.
 
-    strength: the share of the schedule to go back by; 0: the codes themselves, 1: from noise alone. Without dropout
-    and added noise (eta = 0), in `steps` steps, the last ones of a schedule with steps / strength of them.
-    Raises: ValueError: steps < 1, strength outside [0, 1], or latents that are not finite, naming the view.
-    Source: Meng et al., SDEdit, 2022.
+    Args:    strength: share of the schedule to go back by; 0: the latents themselves, 1: from noise alone. The `steps`
+             steps are the last ones of a schedule of steps / strength.
+    Raises:  ValueError: steps < 1, strength outside [0, 1], or a latent is not finite, naming the view.
+    Source:  Meng et al., SDEdit, 2022.
     """
+    steps = sampling.steps
     if steps < 1 or not 0 <= strength <= 1:
         raise ValueError(f"steps is {steps} and strength {strength}; at least one step, a strength from 0 to 1")
     if strength == 0:
-        return codes.numpy()
-    noise = torch.randn(codes.shape[1:], generator=torch.Generator().manual_seed(seed))
-    out = []
-    with torch.inference_mode(), dropout.masks(layers, 1, 0.0, seed):
-        for first in range(0, len(codes), batch):
-            some = slice(first, min(first + batch, len(codes)))
+        return latents.numpy()
+    noise = torch.randn(latents.shape[1:], generator=torch.Generator().manual_seed(sampling.seed))
+    parts = []
+    with torch.inference_mode(), dropout.hold_masks(layers, 1, 0.0, sampling.seed):
+        for first in range(0, len(latents), sampling.batch):
+            rows = slice(first, min(first + sampling.batch, len(latents)))
             schedule.set_timesteps(round(steps / strength))
             times = schedule.timesteps[-steps:]
-            latents = schedule.add_noise(codes[some], noise[None], times[:1])
-            out.append(_denoised(denoise, schedule, latents, times, some))
-    found = torch.cat(out).numpy()
-    bad = ~np.isfinite(found).reshape(len(found), -1).all(1)
+            noisy = schedule.add_noise(latents[rows], noise[None], times[:1])
+            parts.append(_denoise_steps(denoise, schedule, noisy, times, rows))
+    out = torch.cat(parts).numpy()
+    _require_finite(out)
+    return out
+
+
+def _require_finite(latents: Float32[Array, "b *rest"]) -> None:
+    bad = ~np.isfinite(latents).reshape(len(latents), -1).all(1)
     if bad.any():
         raise ValueError(f"the prior's latents of view {int(np.argmax(bad))} are not finite")
-    return found
 
 
-def masked(
-    run: Run,
-    layers: list[HeldDropout],
-    starts: Float[Tensor, "k c h w"],
-    views: int,
-    m: int,
-    p_drop: float,
-    seed: int,
-    batch: int = 32,
-) -> Float32[Array, "b m c h w"]:
-    """Where m latents of each of `views` views end, each under a dropout mask of its own that it holds throughout.
-
-    starts: of the samples, m or one for all; one and p_drop = 0: it is run once, m times the same bits.
-    Raises: ValueError: m < 1, p_drop outside [0, 1), or latents that are not finite, naming the view.
-    """
-    with torch.inference_mode(), dropout.masks(layers, m, p_drop, seed):
-        drawn = m if p_drop > 0 else len(starts)
-        out = np.empty((views, drawn, *starts.shape[1:]), np.float32)
-        each = max(1, batch // drawn)
-        for first in range(0, views, each):
-            some = slice(first, min(first + each, views))
-            count = some.stop - some.start
-            for layer in layers:
-                layer.m = drawn
-            found = run(starts.expand(drawn, -1, -1, -1).repeat(count, 1, 1, 1), some)
-            out[some] = found.view(count, drawn, *starts.shape[1:]).float().numpy()
-    bad = ~np.isfinite(out).reshape(views, -1).all(1)
-    if bad.any():
-        raise ValueError(f"the prior's latents of view {int(np.argmax(bad))} are not finite")
-    return np.repeat(out, m // drawn, axis=1)
-
-
-def _trajectory(
-    denoise: Denoise, schedule: DDIMScheduler, latents: Float[Tensor, "n c h w"], steps: int, some: slice
-) -> Float[Tensor, "n c h w"]:
-    schedule.set_timesteps(steps)
-    return _denoised(denoise, schedule, latents, schedule.timesteps, some)
-
-
-def _denoised(
-    denoise: Denoise, schedule: DDIMScheduler, latents: Float[Tensor, "n c h w"], times: Tensor, some: slice
+def _denoise_steps(
+    denoise: Denoiser, schedule: Schedule, latents: Float[Tensor, "n c h w"], times: Tensor, rows: slice
 ) -> Float[Tensor, "n c h w"]:
     for time in times:
-        predicted = denoise(latents, time, some)
-        latents = schedule.step(predicted, time, latents, eta=0.0).prev_sample
+        latents = schedule.step(denoise(latents, time, rows), time, latents, eta=0.0).prev_sample
     return latents

@@ -1,6 +1,7 @@
-"""The project's own prior: a small latent diffusion model of terrain seen from any side."""
+"""The terrain prior, trained by this project: a small latent diffusion model of terrain seen from any side."""
 
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import torch
@@ -10,93 +11,99 @@ from torch import Tensor
 
 from dav_gswt.errors import InputError
 from dav_gswt.prior import dropout, sampler, weights
-from dav_gswt.prior.interface import Condition, Imagined
-from dav_gswt.prior.networks import CODE, SIZE, Network, schedule
-from dav_gswt.prior.sampler import Denoise
+from dav_gswt.prior.interface import Condition, DecodedViews
+from dav_gswt.prior.networks import CELL, LATENT, SIZE, Network, make_schedule
+from dav_gswt.prior.sampler import Denoiser, Sampling
 
-NEARNESS = 0.5  # of an inverse depth: as a plane it is 1 at half a flying height, and no more
-AT_ONCE = 256  # pictures that are coded at a time
+DEPTH_SCALE = 0.5  # of inverse depth: the plane is 1 at half a flying height, where it is clipped
+BATCH = 256  # pictures that are encoded or decoded at a time
+
+Model = TypeVar("Model", bound="LatentModel")
 
 
-class Learned:
-    """What the prior and a regressor of its shape share: a network from a file, what it is told, pictures of codes.
+class LatentModel:
+    """What the terrain prior and the regressor share: a network from a file, its condition, encoding and decoding.
 
-    facts: what the file says of its training.
+    facts: metadata of the file about its training.
     """
 
     size = SIZE
-    regresses = False  # what a file has to say of itself
+    is_regressor = False  # what the metadata of a file must say
 
     def __init__(self, network: Network, facts: dict[str, str] | None = None):
-        network.denoiser.to(
-            memory_format=torch.channels_last
-        )  # a fifth faster on processors, the same but for rounding
+        # a fifth faster on CPUs, equal but for rounding
+        network.denoiser.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]: torch lacks it
         self.network, self.facts = network.eval().requires_grad_(False), facts or {}
-        self.layers = dropout.held(network.denoiser)
+        self.layers = dropout.replace_dropout(network.denoiser)
 
     @classmethod
-    def open(cls, path: Path | str) -> "Learned":
-        """Raises: InputError: see weights.load; or a regressor's weights where the prior's belong, or the reverse."""
+    def open(cls: type[Model], path: Path | str) -> Model:
+        """Raises: InputError: see weights.load_weights; or the file is a regressor's and should be the prior's, or the
+        reverse."""
         network = Network()
-        facts = weights.load(network, path)
-        if facts.get("regressor", "False") != str(cls.regresses):
-            kinds = ("a regressor", "the prior") if cls.regresses else ("the prior", "a regressor")
+        facts = weights.load_weights(network, path)
+        if facts.get("regressor", "False") != str(cls.is_regressor):
+            kinds = ("a regressor", "the prior") if cls.is_regressor else ("the prior", "a regressor")
             raise InputError(f"{path}: not the weights of {kinds[0]} but of {kinds[1]}; they have the same shape")
         return cls(network, facts)
 
-    def encoded(self, planes: Tensor) -> Float32[Tensor, "n c hz wz"]:
-        """Codes of pictures; see `planes_of_render`."""
+    def encode(self, planes: Float32[Tensor, "n 5 s s"]) -> Float32[Tensor, "n c hz wz"]:
+        """Latents of pictures; see `pack_render`."""
         with torch.inference_mode():
-            return torch.cat([self.network.encoded(part) for part in planes.split(AT_ONCE)])
+            return torch.cat([self.network.encode(part) for part in planes.split(BATCH)])
 
-    def decoded(self, latents: Float32[Array, "*n c hz wz"]) -> Imagined:
+    def decode(self, latents: Float32[Array, "*n c hz wz"]) -> DecodedViews:
         """See `Prior`."""
-        flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *CODE)))
+        flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *LATENT)))
         with torch.inference_mode():
-            planes = torch.cat([self.network.decoded(part) for part in flat.split(AT_ONCE)])
-        made = planes.numpy().transpose(0, 2, 3, 1).reshape(*latents.shape[:-3], SIZE, SIZE, -1)
-        return Imagined(np.ascontiguousarray(made[..., :4]), made[..., 4] / np.float32(NEARNESS))
+            planes = torch.cat([self.network.decode(part) for part in flat.split(BATCH)])
+        images = planes.numpy().transpose(0, 2, 3, 1).reshape(*latents.shape[:-3], SIZE, SIZE, -1)
+        return DecodedViews(np.ascontiguousarray(images[..., :4]), images[..., 4] / np.float32(DEPTH_SCALE))
 
-    def shown(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
+    def encode_render(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
         """See `Prior`."""
-        return self.encoded(planes_of_render(condition)).numpy()
+        return self.encode(pack_render(condition)).numpy()
 
-    def variances(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n c hz wz"]:
+    def estimate_variances(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n c hz wz"]:
         """See `Prior`."""
-        flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *CODE)))
+        flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *LATENT)))
         with torch.inference_mode():
-            made = [self.network.posterior(self.network.decoded(part)).var for part in flat.split(AT_ONCE)]
-            return (torch.cat(made) * self.network.scale**2).numpy().reshape(latents.shape)
+            parts = [self.network.posterior(self.network.decode(part)).var for part in flat.split(BATCH)]
+            return (torch.cat(parts) * self.network.scale**2).numpy().reshape(latents.shape)
 
-    def told(self, condition: Condition, known: Bool[Array, "b h w"] | None = None) -> Denoise:
-        """The denoiser, told of views. known: cells of the code (16 x 16) where the render is to be believed; None:
-        all. Raises: ValueError: a condition that is not finite, by name."""
+    def make_denoiser(self, condition: Condition, known: Bool[Array, "b h w"] | None = None) -> Denoiser:
+        """The denoiser with the condition of the views bound.
+
+        Args:    known: cells of the latent (16 x 16) where the render is valid; None: all.
+        Raises:  ValueError: the condition is not finite, see `Condition.check`.
+        """
         condition.check()
-        render, photo = (self.encoded(p) for p in (planes_of_render(condition), planes_of_photo(condition.photo)))
-        opacity = pooled(torch.from_numpy(condition.alpha))
-        trusted = torch.ones_like(opacity) if known is None else torch.from_numpy(known).float()[:, None]
+        render, photo = (self.encode(p) for p in (pack_render(condition), pack_photo(condition.photo)))
+        opacity = average_opacity(torch.from_numpy(condition.alpha))
+        valid = torch.ones_like(opacity) if known is None else torch.from_numpy(known).float()[:, None]
         with torch.inference_mode():
-            tokens = self.network.told(photo, torch.from_numpy(condition.relative))
-        everything = render * trusted, torch.cat([opacity * trusted, trusted], 1), tokens
+            tokens = self.network.condition_encoder(photo, torch.from_numpy(condition.relative))
+        inputs = render * valid, torch.cat([opacity * valid, valid], 1), tokens
 
-        def denoise(latents: Tensor, time: Tensor, some: slice) -> Tensor:
-            each = len(latents) // (some.stop - some.start)
-            told = (part[some].repeat_interleave(each, 0) for part in everything)
-            return self.network.denoised(latents, time, *told)
+        def denoise(latents: Tensor, time: Tensor, rows: slice) -> Tensor:
+            each = len(latents) // (rows.stop - rows.start)
+            return self.network.predict_velocity(
+                latents, time, *(part[rows].repeat_interleave(each, 0) for part in inputs)
+            )
 
         return denoise
 
 
-class Terrain(Learned):
-    """A `Prior` from a file of weights."""
+class TerrainPrior(LatentModel):
+    """The `Prior` of the model in a weights file."""
 
     name = "terrain"
 
     def __init__(self, network: Network, facts: dict[str, str] | None = None):
         super().__init__(network, facts)
-        self.schedule = schedule()
+        self.schedule = make_schedule()
 
-    def samples(
+    def sample(
         self,
         condition: Condition,
         m: int,
@@ -106,11 +113,12 @@ class Terrain(Learned):
         known: Bool[Array, "b h w"] | None = None,
         common: bool = True,
     ) -> Float32[Array, "b m c hz wz"]:
-        """See `Prior`. known: see `told`. common: one initial noise for all m samples; else each has its own."""
-        how = len(condition), CODE, m, p_drop, steps, seed
-        return sampler.sampled(self.told(condition, known), self.layers, self.schedule, *how, common=common)
+        """See `Prior`. known: see `make_denoiser`."""
+        sampling = Sampling(m, p_drop, steps, seed, common=common)
+        denoise = self.make_denoiser(condition, known)
+        return sampler.sample_latents(denoise, self.layers, self.schedule, len(condition), LATENT, sampling)
 
-    def repaired(
+    def repair(
         self,
         condition: Condition,
         strength: float,
@@ -118,30 +126,29 @@ class Terrain(Learned):
         seed: int,
         known: Bool[Array, "b h w"] | None = None,
     ) -> Float32[Array, "b c hz wz"]:
-        """What the field shows, with a little noise that is then taken away; see `sampler.repaired` and `told`."""
-        codes = self.encoded(planes_of_render(condition))
-        return sampler.repaired(self.told(condition, known), self.layers, self.schedule, codes, strength, steps, seed)
+        """Add a little noise to the latents of the render and remove it again: `sampler.repair_latents`."""
+        latents = self.encode(pack_render(condition))
+        denoise, sampling = self.make_denoiser(condition, known), Sampling(1, 0.0, steps, seed)
+        return sampler.repair_latents(denoise, self.layers, self.schedule, latents, strength, sampling)
 
 
-def planes_of_render(condition: Condition) -> Tensor:
-    """The five planes of what the field shows."""
-    parts = [condition.colour, condition.alpha[..., None], NEARNESS * condition.inverse_depth[..., None]]
-    return torch.from_numpy(np.concatenate(parts, -1).transpose(0, 3, 1, 2).clip(0, 1))
+def pack_render(condition: Condition) -> Float32[Tensor, "b 5 s s"]:
+    """The five planes of the field's render."""
+    return pack_truth(np.concatenate([condition.colour, condition.alpha[..., None]], -1), condition.inverse_depth)
 
 
-def planes_of_truth(rgba: Float32[Array, "b s s 4"], inverse_depth: Float32[Array, "b s s"]) -> Tensor:
-    """The five planes of a view as it truly is."""
-    return torch.from_numpy(
-        np.concatenate([rgba, NEARNESS * inverse_depth[..., None]], -1).transpose(0, 3, 1, 2).clip(0, 1)
-    )
+def pack_truth(rgba: Float32[Array, "b s s 4"], inverse_depth: Float32[Array, "b s s"]) -> Float32[Tensor, "b 5 s s"]:
+    """The five planes of true pictures."""
+    planes = np.concatenate([rgba, DEPTH_SCALE * inverse_depth[..., None]], -1)
+    return torch.from_numpy(planes.transpose(0, 3, 1, 2).clip(0, 1))
 
 
-def planes_of_photo(photo: Float32[Array, "b s s 3"]) -> Tensor:
-    """The five planes of a photo: opaque, of unknown depth."""
-    rest = np.broadcast_to(np.float32([1.0, 0.0]), (*photo.shape[:-1], 2))
+def pack_photo(photo: Float32[Array, "b s s 3"]) -> Float32[Tensor, "b 5 s s"]:
+    """The five planes of photos: opaque, of unknown depth."""
+    rest = np.broadcast_to(np.array([1.0, 0.0], np.float32), (*photo.shape[:-1], 2))
     return torch.from_numpy(np.concatenate([photo, rest], -1).transpose(0, 3, 1, 2).copy())
 
 
-def pooled(alpha: Tensor) -> Tensor:
-    """Mean opacity in each cell of the code."""
-    return torch.nn.functional.avg_pool2d(alpha[:, None], SIZE // CODE[1])
+def average_opacity(alpha: Float32[Tensor, "b s s"]) -> Float32[Tensor, "b 1 h w"]:
+    """Mean opacity in each cell of the latent."""
+    return torch.nn.functional.avg_pool2d(alpha[:, None], CELL)

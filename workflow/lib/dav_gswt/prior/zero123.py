@@ -1,16 +1,16 @@
-"""Zero-1-to-3 as a prior: one photo of an object and a change of the pose, and it paints what is seen from there.
+"""Zero-1-to-3 as a prior: given one photo of an object and a change of pose, it generates the view from the new pose.
 
-Liu et al., Zero-1-to-3 (ICCV 2023), with the published weights (`zero123_folder`), 256 x 256. It knows neither the
-field's render nor depth: of a `Condition` it takes the photo and the relative pose. Its own code's conventions, all of
-them kept (cvlab-columbia/zero123, gradio_new.py and ldm/data/simple.py):
+Liu et al., Zero-1-to-3 (ICCV 2023), with the published weights (`zero123_weights`), 256 x 256. It uses neither the
+field's render nor depth: of a `Condition` it takes the photo and the relative pose. The conventions are those of the
+authors' code (cvlab-columbia/zero123, gradio_new.py and ldm/data/simple.py):
 
-- The pose is (polar angle in radians, sine and cosine of the azimuth, radius), each pose's minus photo's. The polar
+- The pose is (polar angle in radians, sine and cosine of the azimuth, radius), each relative to the photo's. The polar
   angle is counted from the zenith, so it falls where elevation rises; azimuth runs from x to y in both.
-- Radii were between 1.5 and 2.2 sides of the object's box. Ours are over the flying height; a flying height counts as
-  the middle of these, `RADIUS`.
-- CLIP's eye sees the photo through its own bicubic resampling, corners aligned, without antialiasing.
-- The photo's latent, four more channels of the denoiser's input, is the coder's mode and is *not* scaled; what is
-  painted is in the scaled space.
+- In training, radii were between 1.5 and 2.2 sides of the object's box. Ours are over the flying height; a flying
+  height counts as the middle of that range, `RADIUS`.
+- CLIP sees the photo through a bicubic resampling of its own, corners aligned, without antialiasing.
+- The photo's latent, four more channels of the denoiser's input, is the mode of the VAE and is *not* scaled; the
+  generated latent is in the scaled space.
 - Without a photo: zeros for that latent and for the one token, after the projection.
 """
 
@@ -24,110 +24,115 @@ from torch import Tensor
 from torch.nn import functional
 
 from dav_gswt.images import image_files
-from dav_gswt.prior import sampler, zero123_folder
-from dav_gswt.prior.interface import Condition, Imagined
-from dav_gswt.prior.zero123_folder import CODE, Parts
+from dav_gswt.prior import sampler, zero123_weights
+from dav_gswt.prior.interface import Condition, DecodedViews
+from dav_gswt.prior.sampler import Sampling
+from dav_gswt.prior.zero123_weights import CHANNELS, Zero123Networks
 
 SIZE = 256
-LATENT = (CODE, SIZE // 8, SIZE // 8)
+LATENT = (CHANNELS, SIZE // 8, SIZE // 8)
 GUIDANCE = 3.0  # the authors' choice
 RADIUS = 1.85
-AS_TRAINED = -1.0, 1.0, 1.0, RADIUS  # times our relative pose gives theirs
-MEAN, SPREAD = (0.48145466, 0.4578275, 0.40821073), (0.26862954, 0.26130258, 0.27577711)  # of CLIP's pictures
-WHITE = 0.1  # colours nearer to white than this let it shine through
-AT_ONCE = 4  # pictures that are coded at a time
-BATCH = 8  # latents that are denoised at a time; with guidance each is there twice
+POSE_FACTORS = -1.0, 1.0, 1.0, RADIUS  # from our relative pose to that of the training
+CLIP_MEAN, CLIP_STD = (0.48145466, 0.4578275, 0.40821073), (0.26862954, 0.26130258, 0.27577711)
+WHITE = 0.1  # colours nearer to white than this are partly transparent
+VAE_BATCH = 4  # pictures
+DENOISER_BATCH = 8  # latents; with guidance each is there twice
 
 
 class Zero123:
     """A `Prior` from a folder of published weights.
 
-    guidance: how far to go beyond what it would paint without the photo; 1 saves that pass. device: of PyTorch.
+    guidance: of classifier-free guidance; 1 is none and saves a pass. device: of PyTorch.
     """
 
     name, size = "zero123", SIZE
 
-    def __init__(self, parts: Parts, guidance: float = GUIDANCE, device: str = "cpu"):
+    def __init__(self, networks: Zero123Networks, guidance: float = GUIDANCE, device: str = "cpu"):
         """Raises: ValueError: a guidance below 1 or not finite."""
         if not 1 <= guidance < float("inf"):
             raise ValueError(f"guidance is {guidance}; it must be at least 1 (none)")
-        self.parts, self.guidance, self.device = parts, guidance, device
-        for part in (parts.unet, parts.coder, parts.eye, parts.projection):
-            part.to(device)
+        self.networks, self.guidance, self.device = networks, guidance, device
+        for network in (networks.unet, networks.vae, networks.image_encoder, networks.projection):
+            network.to(device)
 
     @classmethod
     def open(cls, folder: Path | str, guidance: float = GUIDANCE, device: str = "cpu") -> "Zero123":
-        """Raises: InputError: see zero123_folder.opened. ValueError: see __init__."""
-        return cls(zero123_folder.opened(folder), guidance, device)
+        """Raises: InputError: see zero123_weights.load_networks. ValueError: see __init__."""
+        return cls(zero123_weights.load_networks(folder), guidance, device)
 
-    def samples(
+    def sample(
         self, condition: Condition, m: int, p_drop: float, steps: int, seed: int, common: bool = True
     ) -> Float32[Array, "b m c hz wz"]:
         """See `Prior`. With guidance, a sample has one mask for the passes with and without the photo."""
         condition.check()
-        photo, tokens = self._told(condition)
+        photo, tokens = self._encode_condition(condition)
 
-        def denoise(latents: Tensor, time: Tensor, some: slice) -> Tensor:
-            each = len(latents) // (some.stop - some.start)
-            told = (part[some].repeat_interleave(each, 0) for part in (photo, tokens))
-            return self._predicted(latents.to(self.device), time, *told).cpu()
+        def denoise(latents: Tensor, time: Tensor, rows: slice) -> Tensor:
+            each = len(latents) // (rows.stop - rows.start)
+            inputs = (part[rows].repeat_interleave(each, 0) for part in (photo, tokens))
+            return self._predict_noise(latents.to(self.device), time, *inputs).cpu()
 
-        how = len(condition), LATENT, m, p_drop, steps, seed, BATCH, common
-        return sampler.sampled(denoise, self.parts.layers, self.parts.schedule, *how)
+        sampling = Sampling(m, p_drop, steps, seed, DENOISER_BATCH, common)
+        layers, schedule = self.networks.layers, self.networks.schedule
+        return sampler.sample_latents(denoise, layers, schedule, len(condition), LATENT, sampling)
 
-    def decoded(self, latents: Float32[Array, "*n c hz wz"]) -> Imagined:
-        """See `Prior`. Depth it knows none; opacity is what the white background leaves."""
-        flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *LATENT))).to(self.device)
-        scale = self.parts.coder.config.scaling_factor
+    def decode(self, latents: Float32[Array, "*n c hz wz"]) -> DecodedViews:
+        """See `Prior`. There is no depth; opacity follows from the white background."""
+        vae = self.networks.vae
         with torch.inference_mode():
-            made = [self.parts.coder.decode(part / scale).sample.cpu() for part in flat.split(AT_ONCE)]
-        painted = ((torch.cat(made) + 1) / 2).clamp(0, 1).numpy().transpose(0, 2, 3, 1)
-        return Imagined(without_white(painted).reshape(*latents.shape[:-3], SIZE, SIZE, 4), None)
+            parts = [vae.decode(part / vae.config.scaling_factor).sample.cpu() for part in self._split(latents)]
+        pictures = ((torch.cat(parts) + 1) / 2).clamp(0, 1).numpy().transpose(0, 2, 3, 1)
+        return DecodedViews(remove_white(pictures).reshape(*latents.shape[:-3], SIZE, SIZE, 4), None)
 
-    def shown(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
-        """See `Prior`: the render over white, as its pictures are."""
+    def encode_render(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
+        """See `Prior`: the render over white, the background of its pictures."""
         over_white = np.clip(condition.colour + (1 - condition.alpha)[..., None], 0, 1)
-        coder, parts = self.parts.coder, sized(over_white).to(self.device).split(AT_ONCE)
+        vae, parts = self.networks.vae, resize_photos(over_white).to(self.device).split(VAE_BATCH)
         with torch.inference_mode():
-            made = [coder.encode(2 * part - 1).latent_dist.mode().cpu() for part in parts]
-        return (torch.cat(made) * coder.config.scaling_factor).numpy()
+            modes = [vae.encode(2 * part - 1).latent_dist.mode().cpu() for part in parts]
+        return (torch.cat(modes) * vae.config.scaling_factor).numpy()
 
-    def variances(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n c hz wz"]:
+    def estimate_variances(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n c hz wz"]:
         """See `Prior`."""
-        flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *LATENT))).to(self.device)
-        coder, scale = self.parts.coder, self.parts.coder.config.scaling_factor
+        vae = self.networks.vae
+        scale = vae.config.scaling_factor
         with torch.inference_mode():
-            painted = (coder.decode(part / scale).sample for part in flat.split(AT_ONCE))
-            made = [coder.encode(picture.clamp(-1, 1)).latent_dist.var.cpu() for picture in painted]
-        return (torch.cat(made) * scale**2).numpy().reshape(latents.shape)
+            pictures = (vae.decode(part / scale).sample for part in self._split(latents))
+            parts = [vae.encode(picture.clamp(-1, 1)).latent_dist.var.cpu() for picture in pictures]
+        return (torch.cat(parts) * scale**2).numpy().reshape(latents.shape)
 
-    def _told(self, condition: Condition) -> tuple[Tensor, Tensor]:
-        """The photos' latents, and one token each."""
-        photo = sized(condition.photo).to(self.device)
-        pose = (torch.from_numpy(condition.relative) * torch.tensor(AS_TRAINED)).to(self.device)
-        coder, eye = self.parts.coder, self.parts.eye
+    def _split(self, latents: Float32[Array, "*n c hz wz"]) -> tuple[Tensor, ...]:
+        flat = torch.from_numpy(np.ascontiguousarray(latents.reshape(-1, *LATENT))).to(self.device)
+        return flat.split(VAE_BATCH)
+
+    def _encode_condition(self, condition: Condition) -> tuple[Tensor, Tensor]:
+        """The latents of the photos, and one token each."""
+        photo = resize_photos(condition.photo).to(self.device)
+        pose = (torch.from_numpy(condition.relative) * torch.tensor(POSE_FACTORS)).to(self.device)
+        vae, clip = self.networks.vae, self.networks.image_encoder
         with torch.inference_mode():
-            parts = photo.split(AT_ONCE)
-            latents = torch.cat([coder.encode(2 * part - 1).latent_dist.mode() for part in parts])
-            seen = torch.cat([eye(for_clip(part, eye.config.image_size)).image_embeds for part in parts])
-            tokens = self.parts.projection(torch.cat([seen, pose], 1))[:, None]
+            parts = photo.split(VAE_BATCH)
+            latents = torch.cat([vae.encode(2 * part - 1).latent_dist.mode() for part in parts])
+            embeddings = [clip(preprocess_for_clip(part, clip.config.image_size)).image_embeds for part in parts]
+            tokens = self.networks.projection(torch.cat([torch.cat(embeddings), pose], 1))[:, None]
         return latents, tokens
 
-    def _predicted(
+    def _predict_noise(
         self, latents: Float[Tensor, "n c h w"], time: Tensor, photo: Float[Tensor, "n c h w"], tokens: Tensor
     ) -> Float[Tensor, "n c h w"]:
-        """The denoiser's prediction; with guidance from a batch of all without the photo, then all with it."""
-        unet = self.parts.unet
+        """The denoiser's prediction; with guidance from one batch: all without the photo, then all with it."""
+        unet = self.networks.unet
         if self.guidance == 1:
             return unet(torch.cat([latents, photo], 1), time, tokens).sample
         twice = torch.cat([latents, latents]), torch.cat([torch.zeros_like(photo), photo])
-        found = unet(torch.cat(twice, 1), time, torch.cat([torch.zeros_like(tokens), tokens])).sample
-        alone, told = found.chunk(2)
-        return alone + self.guidance * (told - alone)
+        both = unet(torch.cat(twice, 1), time, torch.cat([torch.zeros_like(tokens), tokens])).sample
+        without, conditional = both.chunk(2)
+        return without + self.guidance * (conditional - without)
 
 
-def sized(photo: Float32[Array, "b s s 3"]) -> Float[Tensor, "b 3 size size"]:
-    """Photos of any size as the coder takes them: means over areas of larger ones, smaller ones bicubic."""
+def resize_photos(photo: Float32[Array, "b s s 3"]) -> Float[Tensor, "b 3 size size"]:
+    """Photos at the size of the VAE: area means of larger photos, bicubic interpolation of smaller ones."""
     side = photo.shape[1]
     if side > SIZE:
         photo = np.stack([image_files.shrink_image(one, SIZE, SIZE) for one in photo])
@@ -137,19 +142,18 @@ def sized(photo: Float32[Array, "b s s 3"]) -> Float[Tensor, "b 3 size size"]:
     return planes.clamp(0, 1)
 
 
-def for_clip(photo: Float[Tensor, "b 3 h w"], side: int) -> Float[Tensor, "b 3 side side"]:
-    """Photos as CLIP's eye saw them in training."""
-    seen = functional.interpolate(photo, (side, side), mode="bicubic", align_corners=True)
-    mean, spread = (torch.tensor(values).to(photo)[:, None, None] for values in (MEAN, SPREAD))
-    return (seen - mean) / spread
+def preprocess_for_clip(photo: Float[Tensor, "b 3 h w"], side: int) -> Float[Tensor, "b 3 side side"]:
+    """Photos as CLIP saw them in the training of Zero-1-to-3."""
+    resized = functional.interpolate(photo, (side, side), mode="bicubic", align_corners=True)
+    mean, std = (torch.tensor(values).to(photo)[:, None, None] for values in (CLIP_MEAN, CLIP_STD))
+    return (resized - mean) / std
 
 
-def without_white(painted: Float32[Array, "n h w 3"]) -> Float32[Array, "n h w 4"]:
-    """Colours over nothing, and opacity, of pictures on white.
+def remove_white(pictures: Float32[Array, "n h w 3"]) -> Float32[Array, "n h w 4"]:
+    """Colours over black, and opacity, of pictures on a white background.
 
-    A colour's distance from white is that of its darkest channel; opacity grows with it and is 1 from WHITE on. The
-    white that shines through is taken away, so drawn over white the picture is the same. Light sand is never white
-    enough to matter; snow and clouds are, and are lost.
+    The distance of a colour from white is that of its darkest channel; opacity grows with it and is 1 from WHITE on.
+    The white that shows through is subtracted, so the result over white is the picture. Snow and clouds are lost.
     """
-    opacity = np.clip((1 - painted.min(-1, keepdims=True)) / np.float32(WHITE), 0, 1)
-    return np.concatenate([painted - (1 - opacity), opacity], -1).astype(np.float32).clip(0, 1)
+    opacity = np.clip((1 - pictures.min(-1, keepdims=True)) / np.float32(WHITE), 0, 1)
+    return np.concatenate([pictures - (1 - opacity), opacity], -1).astype(np.float32).clip(0, 1)

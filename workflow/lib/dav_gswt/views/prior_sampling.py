@@ -64,10 +64,10 @@ def open_inpainting_prior(entry: dict, seed: int) -> PriorConfig:
 def load_prior(entry: dict) -> Prior:
     """The prior of a config's entry. Raises: InputError: its weights are missing or not to be trusted."""
     if entry["model"] == "terrain":
-        from dav_gswt.prior.terrain import Terrain  # not above: diffusers takes seconds to load
-        from dav_gswt.prior.weights import TERRAIN
+        from dav_gswt.prior.terrain import TerrainPrior  # not above: diffusers takes seconds to load
+        from dav_gswt.prior.weights import TERRAIN_WEIGHTS
 
-        return Terrain.open(entry.get("weights", TERRAIN))
+        return TerrainPrior.open(entry.get("weights", TERRAIN_WEIGHTS))
     from dav_gswt.prior.zero123 import GUIDANCE, Zero123
 
     return Zero123.open(entry["folder"], entry.get("guidance", GUIDANCE))
@@ -105,10 +105,10 @@ def _sample_batch(
     prior: PriorConfig, condition: Condition, names: list[str], steps: int, counts: Float32[Array, "k s s"]
 ) -> PriorTerms:
     asked = condition, prior.samples, prior.p_drop, steps, prior.seed
-    latents = prior.model.samples(*asked, common=not prior.noises)
-    wide = prior.model.variances(latents) if prior.posterior else None
+    latents = prior.model.sample(*asked, common=not prior.noises)
+    wide = prior.model.estimate_variances(latents) if prior.posterior else None
     _, maps = w2_sq(latents, wide, names)
-    pictures = prior.model.decoded(latents).rgba[..., :3]
+    pictures = prior.model.decode(latents).rgba[..., :3]
     between = single = None
     if prior.weights is not None:
         from dav_gswt.images import lpips  # not above: torch takes seconds to load, and most scoring does without
@@ -117,7 +117,7 @@ def _sample_batch(
         if prior.p_drop == 0 and not prior.noises:
             one, render = ((2 * p - 1) * counts[..., None] for p in (pictures[:, 0], condition.colour))
             single = lpips.distance(one, render, prior.weights)
-    apart = ((latents.mean(1) - prior.model.shown(condition)) ** 2).sum(1)
+    apart = ((latents.mean(1) - prior.model.encode_render(condition)) ** 2).sum(1)
     return PriorTerms(
         weighted_mean(maps, counts),
         between,

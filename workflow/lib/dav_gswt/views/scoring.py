@@ -93,10 +93,10 @@ def build_conditions(
     field: GaussianField, grid: Ground, pool: Candidates, taken: list[View], frame: SceneFrame, size: int
 ) -> tuple[Condition, Float32[Array, "n s s"]]:
     """What a prior is told of candidates, and which of its pixels look at the modelled ground (1)."""
-    known = conditions.taken(taken, frame, size)
-    squares = [conditions.squared(camera).resized(size, size) for _, camera in pool]
+    known = conditions.prepare_photos(taken, frame, size)
+    squares = [conditions.crop_camera(camera).resized(size, size) for _, camera in pool]
     counts = np.stack([ground_mask(grid, camera) for camera in squares])
-    return conditions.condition(field, pool, known, frame.flying_height, size), counts
+    return conditions.build_condition(field, pool, known, frame.flying_height, size), counts
 
 
 def _score_geometry(
@@ -138,6 +138,6 @@ def _gaussian_uncertainty(
     """What the prior's maps say of each Gaussian; of those that no candidate sees, and without a prior, geometry."""
     if w2_sq is None or frozen.pixels is None:
         return field.uncertainty
-    cameras = [conditions.squared(camera) for _, camera in pool]
+    cameras = [conditions.crop_camera(camera) for _, camera in pool]
     found = backproject_maps(field, cameras, normalise(w2_sq, frozen.pixels))
     return np.where(np.isnan(found), field.uncertainty, found).astype(np.float32)

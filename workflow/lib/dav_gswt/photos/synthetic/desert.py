@@ -10,7 +10,7 @@ from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.photos.synthetic import land, meshes, noise
-from dav_gswt.photos.synthetic.land import Land, Light, scattered, step
+from dav_gswt.photos.synthetic.land import Land, Light, scattered, smoothstep
 
 PERIOD = 16.0  # metres after which sand and ripples repeat; the undulation of the far ground does not
 TEXELS = 2048  # a side of the period: 7.8 mm a texel
@@ -87,8 +87,8 @@ def _sand(rng, o: Options) -> tuple[Float32[Array, "n n 3"], Float[Array, "n n"]
     """The sand's colour and its small heights: ripples, fading out where gravel lies bare, and roughness."""
     n, p = TEXELS, PERIOD
     phase, strength = noise.ripples(rng, n, p, o.ripple_length, np.radians(o.wind))
-    bare = step(0.75, 1.5, noise.band(rng, n, p, 3.5, 0.25, 1.0))
-    calm = step(-0.4, 1.0, noise.band(rng, n, p, 5.0, 1.5, 1.0))
+    bare = smoothstep(0.75, 1.5, noise.band(rng, n, p, 3.5, 0.25, 1.0))
+    calm = smoothstep(-0.4, 1.0, noise.band(rng, n, p, 5.0, 1.5, 1.0))
     strength = strength * (1 - bare) * (0.35 + 0.65 * calm)
     profile = noise.ripple_profile(phase) * strength
     mottle = noise.band(rng, n, p, 1.2, 0.08, 0.7)
@@ -96,7 +96,7 @@ def _sand(rng, o: Options) -> tuple[Float32[Array, "n n 3"], Float[Array, "n n"]
     speck = noise.band(rng, n, p, 0.12, 0.03, 0.3)
     rough = noise.band(rng, n, p, 0.30, 0.04, 1.0)
     heights = 0.5 * o.ripple_height * profile + (0.0016 + 0.002 * bare) * rough
-    silt = step(0.2, 1.6, noise.band(rng, n, p, 4.5, 0.5, 1.0))
+    silt = smoothstep(0.2, 1.6, noise.band(rng, n, p, 4.5, 0.5, 1.0))
     mix = (0.62 * bare * (0.75 + 0.25 * np.tanh(grain)))[..., None]
     colour = SAND + 0.55 * silt[..., None] * (SILT - SAND)
     colour = colour * (1 - mix) + GRAVEL * mix
@@ -108,9 +108,9 @@ def _sand(rng, o: Options) -> tuple[Float32[Array, "n n 3"], Float[Array, "n n"]
 def _height(x, y, large, small, mounds, o: Options):
     """Ground height before it is levelled: undulation, ripples near the middle, far dunes, and sand blown to plants."""
     r = np.hypot(x, y)
-    z = noise.sample(large, PERIOD, x, y) * (1 - step(12.0, 30.0, r))
-    z = z + noise.sample(small, PERIOD, x, y) * (1 - step(7.0, 8.5, r))
-    far = step(14.0, 70.0, r) * o.undulation * 9
+    z = noise.sample(large, PERIOD, x, y) * (1 - smoothstep(12.0, 30.0, r))
+    z = z + noise.sample(small, PERIOD, x, y) * (1 - smoothstep(7.0, 8.5, r))
+    far = smoothstep(14.0, 70.0, r) * o.undulation * 9
     z = z + far * (np.sin(0.071 * x + 0.043 * y + 1.0) + np.sin(0.031 * x - 0.083 * y) + 0.7 * np.sin(0.09 * y + 0.4))
     for px, py, size in mounds:
         near = np.abs(x - px) + np.abs(y - py) < 4 * size

@@ -11,7 +11,7 @@ from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.photos.synthetic import blooms, herbage, land, noise, scattering
-from dav_gswt.photos.synthetic.land import Land, Light, step
+from dav_gswt.photos.synthetic.land import Land, Light, smoothstep
 from dav_gswt.photos.synthetic.meshes import Mesh
 from dav_gswt.photos.synthetic.scattering import CELLS, PERIOD
 
@@ -126,9 +126,9 @@ def _albedo(rng, soil) -> Float32[Array, "n n 3"]:
 def _height(x, y, large, small, o: Options):
     """Ground height before it is levelled: gently rolling, crumbly near the middle, and far hills."""
     r = np.hypot(x, y)
-    z = noise.sample(large, PERIOD, x, y) * (1 - step(14.0, 45.0, r))
-    z = z + noise.sample(small, PERIOD, x, y) * (1 - step(7.0, 9.0, r))
-    far = step(14.0, 130.0, r) * o.undulation * 18
+    z = noise.sample(large, PERIOD, x, y) * (1 - smoothstep(14.0, 45.0, r))
+    z = z + noise.sample(small, PERIOD, x, y) * (1 - smoothstep(7.0, 9.0, r))
+    far = smoothstep(14.0, 130.0, r) * o.undulation * 18
     return z + far * (
         np.sin(0.029 * x + 0.033 * y + 0.9) + np.sin(0.021 * x - 0.041 * y + 2.0) + 0.7 * np.sin(0.05 * y + 1.0)
     )
@@ -158,5 +158,5 @@ def _flowering(rng, o: Options, sort: Sort, soil):
         made = [blooms.swathe(rng, plants, many, tuple(h / size for h in sort.heights)) for _ in range(kinds)]
         share = thick * size**2 * np.pi / 4 / many * 0.74**2 * 1.27
         found = scattering.laid(rng, scattering.thinning(scattering.at(share), 0.5 * FAR, FAR), inner, outer, size)
-        found[:, 2] *= 1 - 0.5 * step(0.6 * FAR, FAR, np.hypot(*found[:, :2].T))
+        found[:, 2] *= 1 - 0.5 * smoothstep(0.6 * FAR, FAR, np.hypot(*found[:, :2].T))
         yield made, found

@@ -10,7 +10,7 @@ from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.photos.synthetic import grasses, land, noise, scattering
-from dav_gswt.photos.synthetic.land import Land, Light, step
+from dav_gswt.photos.synthetic.land import Land, Light, smoothstep
 from dav_gswt.photos.synthetic.scattering import CELLS, PERIOD
 
 TEXELS = 2048  # a side of the period: 7.8 mm a texel
@@ -119,7 +119,7 @@ def _path(rng, half: float) -> Float[Array, "n n"]:
     x, y = rng.uniform(-1.5, 1.5, (2, 1))
     away = np.abs(f - noise.sample(f, PERIOD, x, y)) / np.maximum(slope, 0.15)
     ragged = 1.0 + 0.25 * noise.band(rng, CELLS, PERIOD, 1.2, 0.2, 0.8)
-    return 1 - step(0.75 * half, 1.25 * half, away * ragged) if half else np.zeros((CELLS, CELLS))
+    return 1 - smoothstep(0.75 * half, 1.25 * half, away * ragged) if half else np.zeros((CELLS, CELLS))
 
 
 def _albedo(rng, sward: Sward) -> Float32[Array, "n n 3"]:
@@ -140,9 +140,9 @@ def _albedo(rng, sward: Sward) -> Float32[Array, "n n 3"]:
 def _height(x, y, large, small, o: Options):
     """Ground height before it is levelled: rolling, hummocks near the middle, and far hills."""
     r = np.hypot(x, y)
-    z = noise.sample(large, PERIOD, x, y) * (1 - step(16.0, 50.0, r))
-    z = z + noise.sample(small, PERIOD, x, y) * (1 - step(7.0, 9.0, r))
-    far = step(14.0, 130.0, r) * o.undulation * 13
+    z = noise.sample(large, PERIOD, x, y) * (1 - smoothstep(16.0, 50.0, r))
+    z = z + noise.sample(small, PERIOD, x, y) * (1 - smoothstep(7.0, 9.0, r))
+    far = smoothstep(14.0, 130.0, r) * o.undulation * 13
     return z + far * (
         np.sin(0.037 * x - 0.021 * y + 2.1) + np.sin(0.023 * x + 0.043 * y) + 0.7 * np.sin(0.055 * y + 0.3)
     )
@@ -175,7 +175,7 @@ def _laid(rng, o: Options, sward: Sward):
         x, y = found[:, :2].T
         shares = np.cumsum([scattering.at(sward.stands * share)(x, y) for share in sward.tints], axis=0)
         kind = (rng.uniform(size=len(found)) > shares).sum(axis=0)
-        found[:, 2] *= 1 - 0.8 * step(0.55 * FAR, FAR, np.hypot(x, y))
+        found[:, 2] *= 1 - 0.8 * smoothstep(0.55 * FAR, FAR, np.hypot(x, y))
         found[kind < len(shares), 2] *= (0.45 + 0.55 * scattering.at(sward.tall)(x, y))[kind < len(shares)]
         width = (0.0050 + 0.0015 * size) / size
         made = [[grasses.stand(rng, count, o.grass / size, width, t) for _ in range(kinds)] for t in grasses.TINTS]

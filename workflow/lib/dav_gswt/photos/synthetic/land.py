@@ -139,7 +139,7 @@ def sown(rng: np.random.Generator, density: Height, most: float, reach: float) -
     return thrown[stays & (np.hypot(*thrown.T) < reach)]
 
 
-def step(low: float, high: float, x):
+def smoothstep(low: float, high: float, x):
     """0 below low, 1 above high, smooth between."""
     t = np.clip((x - low) / (high - low), 0, 1)
     return t * t * (3 - 2 * t)

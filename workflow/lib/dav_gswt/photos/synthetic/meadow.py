@@ -10,7 +10,7 @@ from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.photos.synthetic import herbage, land, noise
-from dav_gswt.photos.synthetic.land import Height, Land, Light, sown, step
+from dav_gswt.photos.synthetic.land import Height, Land, Light, smoothstep, sown
 
 PERIOD = 16.0  # metres after which the ground's colours and what grows where repeat; far hills do not
 TEXELS = 2048  # a side of the period: 7.8 mm a texel
@@ -89,8 +89,8 @@ def _cover(rng, o: Options) -> tuple[Float[Array, "n n"], Float[Array, "n n"]]:
     worn = noise.band(rng, n, PERIOD, 3.0, 0.18, 1.1)
     edge = np.quantile(worn, 1 - o.bare)
     spread = noise.band(rng, n, PERIOD, 5.5, 0.7, 1.2)
-    cover = 1.0 - step(edge - 0.35, edge + 0.35, worn) if 0 < o.bare < 1 else np.full((n, n), 1.0 - o.bare)
-    return cover, step(-1.3, 1.5, spread) * cover
+    cover = 1.0 - smoothstep(edge - 0.35, edge + 0.35, worn) if 0 < o.bare < 1 else np.full((n, n), 1.0 - o.bare)
+    return cover, smoothstep(-1.3, 1.5, spread) * cover
 
 
 def _albedo(rng, cover, lush) -> Float32[Array, "n n 3"]:
@@ -112,9 +112,9 @@ def _albedo(rng, cover, lush) -> Float32[Array, "n n 3"]:
 def _height(x, y, large, small, o: Options):
     """Ground height before it is levelled: rolling, hummocks near the middle, and far hills."""
     r = np.hypot(x, y)
-    z = noise.sample(large, PERIOD, x, y) * (1 - step(14.0, 40.0, r))
-    z = z + noise.sample(small, PERIOD, x, y) * (1 - step(7.0, 9.0, r))
-    far = step(12.0, 120.0, r) * o.undulation * 12
+    z = noise.sample(large, PERIOD, x, y) * (1 - smoothstep(14.0, 40.0, r))
+    z = z + noise.sample(small, PERIOD, x, y) * (1 - smoothstep(7.0, 9.0, r))
+    far = smoothstep(12.0, 120.0, r) * o.undulation * 12
     return z + far * (
         np.sin(0.041 * x + 0.023 * y + 0.6) + np.sin(0.019 * x - 0.047 * y) + 0.7 * np.sin(0.06 * y + 1.4)
     )
@@ -139,7 +139,7 @@ def _grown(rng, o: Options, cover, lush):
 def _patches(rng, share: float, longest: float) -> Float[Array, "n n"]:
     """1 in patches that hold about `share` of the ground, 0 elsewhere, smooth between."""
     raster = noise.band(rng, COVER, PERIOD, longest, 0.35, 1.1)
-    return step(*np.quantile(raster, [1 - 1.6 * share, 1 - 0.4 * share]), raster)
+    return smoothstep(*np.quantile(raster, [1 - 1.6 * share, 1 - 0.4 * share]), raster)
 
 
 def _at(raster) -> Height:
@@ -148,7 +148,7 @@ def _at(raster) -> Height:
 
 def _thinning(density: Height) -> Height:
     """Less and less of it towards FAR."""
-    return lambda x, y: density(x, y) * (1 - step(0.4 * FAR, FAR, np.hypot(x, y)))
+    return lambda x, y: density(x, y) * (1 - smoothstep(0.4 * FAR, FAR, np.hypot(x, y)))
 
 
 def _laid(rng, density: Height, inner: float, outer: float, size: float) -> Float[Array, "n 4"]:

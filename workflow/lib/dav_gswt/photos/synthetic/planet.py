@@ -10,7 +10,7 @@ from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.photos.synthetic import land, noise, rocks
-from dav_gswt.photos.synthetic.land import Height, Land, Light, sown, step
+from dav_gswt.photos.synthetic.land import Height, Land, Light, smoothstep, sown
 from dav_gswt.photos.synthetic.meshes import Colours
 
 PERIOD = 20.0  # metres after which the ground's colours and roughness repeat; craters and rocks do not
@@ -100,8 +100,8 @@ def _ground(rng, o: Options) -> tuple[Float32[Array, "n n 3"], Float[Array, "n n
     n, p = TEXELS, PERIOD
     spread = noise.band(rng, n, p, 4.0, 0.4, 1.1)
     edges = np.quantile(spread, [max(0.0, 0.82 - o.dust), min(1.0, 1.18 - o.dust)])
-    dust = step(*edges, spread)
-    grit = step(0.5, 1.6, noise.band(rng, n, p, 2.2, 0.2, 0.9)) * (1 - dust)
+    dust = smoothstep(*edges, spread)
+    grit = smoothstep(0.5, 1.6, noise.band(rng, n, p, 2.2, 0.2, 0.9)) * (1 - dust)
     phase, strength = noise.ripples(rng, n, p, o.ripple_length, np.radians(o.wind))
     profile = noise.ripple_profile(phase) * strength * dust
     clods = noise.band(rng, n, p, 0.6, 0.04, 1.0)
@@ -118,12 +118,12 @@ def _ground(rng, o: Options) -> tuple[Float32[Array, "n n 3"], Float[Array, "n n
 def _height(x, y, large, small, cratered, o: Options):
     """Ground height before it is levelled: rolling, roughness near the middle, craters, and far ridges."""
     r = np.hypot(x, y)
-    z = noise.sample(large, PERIOD, x, y) * (1 - step(16.0, 45.0, r))
-    z = z + noise.sample(small, PERIOD, x, y) * (1 - step(8.0, 11.0, r))
+    z = noise.sample(large, PERIOD, x, y) * (1 - smoothstep(16.0, 45.0, r))
+    z = z + noise.sample(small, PERIOD, x, y) * (1 - smoothstep(8.0, 11.0, r))
     z = z + rocks.cratered(x, y, *cratered)
-    far = step(20.0, 160.0, r) * o.undulation * 12
+    far = smoothstep(20.0, 160.0, r) * o.undulation * 12
     z = z + far * (np.sin(0.047 * x + 0.031 * y + 1.0) + np.sin(0.029 * x - 0.053 * y) + 0.6 * np.sin(0.11 * y + 0.4))
-    return z + step(150.0, 400.0, r) * _ridges(x, y)
+    return z + smoothstep(150.0, 400.0, r) * _ridges(x, y)
 
 
 def _ridges(x, y):
@@ -142,7 +142,7 @@ def _strewn(rng, count: float, reach: float, craters) -> Float[Array, "n 2"]:
     share = 0.008 * count * np.clip(np.exp(0.7 * fields - 0.25), 0, 4)
 
     def density(x, y):
-        return noise.sample(share, PERIOD, x, y) * (1 - step(0.5 * reach, reach, np.hypot(x, y)))
+        return noise.sample(share, PERIOD, x, y) * (1 - smoothstep(0.5 * reach, reach, np.hypot(x, y)))
 
     lying = sown(rng, density, share.max(), reach)
     weight = craters[:, 3] * craters[:, 2] ** 1.5 * (np.hypot(*craters[:, :2].T) < reach)

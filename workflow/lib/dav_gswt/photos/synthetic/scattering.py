@@ -10,7 +10,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.photos.synthetic import noise
-from dav_gswt.photos.synthetic.land import Height, sown, step
+from dav_gswt.photos.synthetic.land import Height, smoothstep, sown
 
 PERIOD = 16.0  # metres after which what grows where repeats
 CELLS = 512  # a side of such a raster: 3.1 cm a cell
@@ -22,7 +22,7 @@ def patches(rng: np.random.Generator, share: float, longest: float, shortest: fl
     longest, shortest: wavelengths in metres of the patches and of their outlines' bays.
     """
     raster = noise.band(rng, CELLS, PERIOD, longest, shortest, 1.1)
-    return step(*np.quantile(raster, [max(0.0, 1 - 1.6 * share), min(1.0, 1 - 0.4 * share)]), raster)
+    return smoothstep(*np.quantile(raster, [max(0.0, 1 - 1.6 * share), min(1.0, 1 - 0.4 * share)]), raster)
 
 
 def at(raster: Float[Array, "n n"]) -> Height:
@@ -32,7 +32,7 @@ def at(raster: Float[Array, "n n"]) -> Height:
 
 def thinning(density: Height, start: float, end: float) -> Height:
     """Less and less of it from `start` to `end` metres from the origin, where there is none."""
-    return lambda x, y: density(x, y) * (1 - step(start, end, np.hypot(x, y)))
+    return lambda x, y: density(x, y) * (1 - smoothstep(start, end, np.hypot(x, y)))
 
 
 def laid(

@@ -1,1 +1,1 @@
-"""Training of the project's own prior: synthetic worlds, examples made of them, optimization."""
+"""Training pipeline of the terrain prior: procedural worlds, examples rendered from them, optimization."""

@@ -1,7 +1,7 @@
-"""Training of the prior: first the coder of pictures, then the denoiser of their codes (or the regressor).
+"""Optimization of the prior's networks: first the autoencoder, then the denoiser of its latents (or the regressor).
 
-Every step draws its batch, noise, masks and dropout from the seed and the step's number alone, so a training that was
-killed goes on from its checkpoint and ends with the same weights. The weights kept are running means.
+Every step draws its batch, noise, masks and dropout from the seed and the number of the step alone, so an interrupted
+training resumes from its checkpoint and ends with the same weights. The final weights are running means.
 """
 
 import logging
@@ -10,30 +10,30 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, UInt8
 from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
 
 from dav_gswt.files import whole
 from dav_gswt.logs import progress
 from dav_gswt.prior import dropout
-from dav_gswt.prior.networks import CODE, TIMES, Network, schedule
+from dav_gswt.prior.networks import LATENT, TIMES, Network, make_schedule
 
 _log = logging.getLogger(__name__)
 
-KEEP = 250  # steps between two checkpoints
-WARM = 200  # steps until the full rate
-MEAN = 0.998  # of the running mean of weights, at most
-DECAY = 0.01  # of the weights
-CLIP = 1.0  # longest gradient
-DIVERGENCE = 1e-6  # weight of the coder's Kullback-Leibler term: codes stay near a normal distribution
-DROPS = 0.3  # greatest attention dropout in training; each batch draws its own share, a third of them none
-MASKED = 0.35  # share of examples of which a part of the render is hidden, as where two tiles are joined
+CHECKPOINT_STEPS = 250  # between two checkpoints
+WARM_UP = 200  # steps until the full learning rate
+MEAN_DECAY = 0.998  # of the running mean of weights, at most
+WEIGHT_DECAY = 0.01
+GRADIENT_NORM = 1.0  # longer gradients are clipped
+KL_WEIGHT = 1e-6  # of the Kullback-Leibler term of the autoencoder
+MOST_DROPOUT = 0.3  # of attention in training; each batch draws its own rate, a third of them none
+MASKED = 0.35  # share of examples with a part of the render hidden, as where two tiles are joined
 
 
 @dataclass(frozen=True)
-class Plan:
-    """How long and how fast. steps; batch: examples a step; rate: of AdamW at its height; seed."""
+class TrainingPlan:
+    """batch: examples per step. rate: peak learning rate of AdamW."""
 
     steps: int
     batch: int
@@ -42,8 +42,8 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Codes:
-    """Examples as the denoiser sees them. relative: see `Condition`."""
+class EncodedExamples:
+    """Training examples as latents. opacity: of the render, per cell. relative: see `Condition`."""
 
     truth: Float[Tensor, "n 8 h w"]
     render: Float[Tensor, "n 8 h w"]
@@ -55,50 +55,23 @@ class Codes:
         return len(self.truth)
 
 
-def train(
-    part: nn.Module, loss: Callable[[int, torch.Generator], Tensor], plan: Plan, keep: Path, what: str
+def train_autoencoder(
+    network: Network, pictures: UInt8[Tensor, "n 5 s s"], plan: TrainingPlan, checkpoint: Path
 ) -> list[float]:
-    """Train a part of a network, in place, to its running mean; returns the loss of every step.
+    """Train the autoencoder on pictures in bytes, then set the scale of its latents; returns the loss of every step.
 
-    loss: of a step's number, with that step's random numbers. keep: where the checkpoint lies meanwhile.
-    """
-    adam = torch.optim.AdamW(part.parameters(), plan.rate, weight_decay=DECAY)
-    mean = {name: v.detach().clone() for name, v in part.named_parameters()}
-    losses, begun = _resumed(part, adam, mean, keep)
-    for step in progress(range(begun, plan.steps), what):
-        for group in adam.param_groups:
-            group["lr"] = plan.rate * _share(step, plan.steps)
-        value = loss(step, torch.Generator().manual_seed(plan.seed * 1_000_003 + step))
-        adam.zero_grad()
-        value.backward()
-        nn.utils.clip_grad_norm_(part.parameters(), CLIP)
-        adam.step()
-        share = min(MEAN, (1 + step) / (10 + step))
-        for name, v in part.named_parameters():
-            mean[name].lerp_(v.detach(), 1 - share)
-        losses.append(float(value.detach()))
-        if (step + 1) % KEEP == 0:
-            _keep(part, adam, mean, losses, keep)
-    part.load_state_dict(mean, strict=False)
-    keep.unlink(missing_ok=True)
-    return losses
-
-
-def train_coder(network: Network, pictures: Tensor, plan: Plan, keep: Path) -> list[float]:
-    """Train the coder on pictures (n 5 s s, bytes), then set the scale of its codes.
-
-    Loss: absolute difference, and a little divergence.
+    Loss: mean absolute error plus KL_WEIGHT times the Kullback-Leibler divergence.
     """
 
     def loss(step: int, rng: torch.Generator) -> Tensor:
         rows = torch.randint(len(pictures), (plan.batch,), generator=rng)
         true = pictures[rows].float() / 255
         posterior = network.posterior(true)
-        code = posterior.mean + posterior.std * torch.randn(posterior.mean.shape, generator=rng)
-        made = (network.coder.decode(code) + 1) / 2
-        return (made - true).abs().mean() + DIVERGENCE * posterior.kl().mean()
+        latent = posterior.mean + posterior.std * torch.randn(posterior.mean.shape, generator=rng)
+        decoded = (network.autoencoder.decode(latent) + 1) / 2
+        return (decoded - true).abs().mean() + KL_WEIGHT * posterior.kl().mean()
 
-    losses = train(network.coder, loss, plan, keep, "train coder")
+    losses = train(network.autoencoder, loss, plan, checkpoint, "train autoencoder")
     network.eval()
     with torch.inference_mode():
         some = pictures[:: max(1, len(pictures) // 2048)].float() / 255
@@ -106,53 +79,94 @@ def train_coder(network: Network, pictures: Tensor, plan: Plan, keep: Path) -> l
     return losses
 
 
-def train_denoiser(network: Network, codes: Codes, plan: Plan, keep: Path, regress: bool = False) -> list[float]:
-    """Train the denoiser to tell the velocity of noisy codes; regress: to tell the code itself from no noise at all."""
-    steps, layers = schedule(), dropout.held(network.denoiser)
-    trained = nn.ModuleDict({"denoiser": network.denoiser, "told": network.told})
+def train_denoiser(
+    network: Network, examples: EncodedExamples, plan: TrainingPlan, checkpoint: Path, regress: bool = False
+) -> list[float]:
+    """Train the denoiser to predict the velocity of noisy latents; returns the loss of every step.
+
+    regress: train a regressor instead, which predicts the latent itself from zeros at time 0.
+    """
+    schedule, layers = make_schedule(), dropout.replace_dropout(network.denoiser)
+    trained = nn.ModuleDict({"denoiser": network.denoiser, "condition_encoder": network.condition_encoder})
 
     def loss(step: int, rng: torch.Generator) -> Tensor:
-        rows = torch.randint(len(codes), (plan.batch,), generator=rng)
-        truth, noise = codes.truth[rows], torch.randn((plan.batch, *CODE), generator=rng)
+        rows = torch.randint(len(examples), (plan.batch,), generator=rng)
+        truth, noise = examples.truth[rows], torch.randn((plan.batch, *LATENT), generator=rng)
         time = torch.randint(TIMES, (plan.batch,), generator=rng)
-        known = _known(plan.batch, rng)
-        opacity = torch.cat([codes.opacity[rows] * known, known], 1)
-        told = codes.render[rows] * known, opacity, network.told(codes.photo[rows], codes.relative[rows])
-        drop = DROPS * max(0.0, 1.5 * float(torch.rand((), generator=rng)) - 0.5)
-        with dropout.masks(layers, plan.batch, drop, plan.seed * 1_000_003 + step):
+        known = draw_masks(plan.batch, rng)
+        opacity = torch.cat([examples.opacity[rows] * known, known], 1)
+        tokens = network.condition_encoder(examples.photo[rows], examples.relative[rows])
+        inputs = examples.render[rows] * known, opacity, tokens
+        p_drop = MOST_DROPOUT * max(0.0, 1.5 * float(torch.rand((), generator=rng)) - 0.5)
+        with dropout.hold_masks(layers, plan.batch, p_drop, plan.seed * 1_000_003 + step):
             if regress:
                 zero = torch.zeros_like(time)
-                return (network.denoised(torch.zeros_like(truth), zero, *told) - truth).square().mean()
-            noisy, wanted = steps.add_noise(truth, noise, time), steps.get_velocity(truth, noise, time)
-            return (network.denoised(noisy, time, *told) - wanted).square().mean()
+                return (network.predict_velocity(torch.zeros_like(truth), zero, *inputs) - truth).square().mean()
+            noisy, velocity = schedule.add_noise(truth, noise, time), schedule.get_velocity(truth, noise, time)
+            return (network.predict_velocity(noisy, time, *inputs) - velocity).square().mean()
 
-    return train(trained, loss, plan, keep, "train regressor" if regress else "train denoiser")
+    return train(trained, loss, plan, checkpoint, "train regressor" if regress else "train denoiser")
 
 
-def _known(count: int, rng: torch.Generator) -> Float[Tensor, "n 1 h w"]:
-    """1 where the render is to be believed: everywhere, or all but a band or a block."""
-    known = torch.ones((count, 1, *CODE[1:]))
-    side = CODE[1]
+def draw_masks(count: int, rng: torch.Generator) -> Float[Tensor, "n 1 h w"]:
+    """Random masks of the render's valid cells (1): all, or all but a band or a block."""
+    known = torch.ones((count, 1, *LATENT[1:]))
+    side = LATENT[1]
     for i in range(count):
         kind, a, b, c, d = torch.rand(5, generator=rng).tolist()
         if kind < MASKED:
             top, left = int(a * side), int(b * side)
-            high, wide = (1 + int(v * 0.7 * side) for v in (c, d))
-            if kind < MASKED / 2:  # a band right across
-                left, wide = 0, side
-            known[i, :, top : top + high, left : left + wide] = 0
+            height, width = (1 + int(v * 0.7 * side) for v in (c, d))
+            if kind < MASKED / 2:  # a band from side to side
+                left, width = 0, side
+            known[i, :, top : top + height, left : left + width] = 0
             if kind < MASKED / 4:
                 known[i] = known[i].transpose(1, 2).clone()
     return known
 
 
-def _share(step: int, steps: int) -> float:
-    """Of the rate: it warms up, then falls along a half cosine to a fiftieth."""
+def train(
+    part: nn.Module,
+    loss: Callable[[int, torch.Generator], Tensor],
+    plan: TrainingPlan,
+    checkpoint: Path,
+    what: str,
+) -> list[float]:
+    """Train a part of a network in place, to the running mean of its weights; returns the loss of every step.
+
+    Args:    loss: of the number of a step and that step's random numbers. checkpoint: a file, deleted at the end.
+    """
+    adam = torch.optim.AdamW(part.parameters(), plan.rate, weight_decay=WEIGHT_DECAY)
+    mean = {name: v.detach().clone() for name, v in part.named_parameters()}
+    losses = _load_checkpoint(part, adam, mean, checkpoint)
+    for step in progress(range(len(losses), plan.steps), what):
+        for group in adam.param_groups:
+            group["lr"] = plan.rate * _rate_factor(step, plan.steps)
+        value = loss(step, torch.Generator().manual_seed(plan.seed * 1_000_003 + step))
+        adam.zero_grad()
+        value.backward()
+        nn.utils.clip_grad_norm_(part.parameters(), GRADIENT_NORM)
+        adam.step()
+        share = min(MEAN_DECAY, (1 + step) / (10 + step))
+        for name, v in part.named_parameters():
+            mean[name].lerp_(v.detach(), 1 - share)
+        losses.append(float(value.detach()))
+        if (step + 1) % CHECKPOINT_STEPS == 0:
+            _save_checkpoint(part, adam, mean, losses, checkpoint)
+    part.load_state_dict(mean, strict=False)
+    checkpoint.unlink(missing_ok=True)
+    return losses
+
+
+def _rate_factor(step: int, steps: int) -> float:
+    """Factor of the learning rate: a linear warm-up, then half a cosine down to a fiftieth."""
     falling = 0.5 * (1 + torch.cos(torch.tensor(torch.pi * step / steps)).item())
-    return min(1.0, (step + 1) / WARM) * max(0.02, falling)
+    return min(1.0, (step + 1) / WARM_UP) * max(0.02, falling)
 
 
-def _keep(part: nn.Module, adam: torch.optim.Optimizer, mean: dict[str, Tensor], losses: list[float], path: Path):
+def _save_checkpoint(
+    part: nn.Module, adam: torch.optim.Optimizer, mean: dict[str, Tensor], losses: list[float], path: Path
+) -> None:
     values = {f"part.{name}": v.detach() for name, v in part.named_parameters()}
     values |= {f"mean.{name}": v for name, v in mean.items()}
     for i, state in adam.state_dict()["state"].items():
@@ -162,9 +176,10 @@ def _keep(part: nn.Module, adam: torch.optim.Optimizer, mean: dict[str, Tensor],
         save_file({name: v.contiguous() for name, v in values.items()}, str(temporary))
 
 
-def _resumed(part: nn.Module, adam, mean: dict[str, Tensor], path: Path) -> tuple[list[float], int]:
+def _load_checkpoint(part: nn.Module, adam: torch.optim.Optimizer, mean: dict[str, Tensor], path: Path) -> list[float]:
+    """Restore a checkpoint, if there is one, in place; returns the losses of the steps that are done."""
     if not path.exists():
-        return [], 0
+        return []
     values = load_file(str(path))
     part.load_state_dict({name: values[f"part.{name}"] for name, _ in part.named_parameters()}, strict=False)
     for name in mean:
@@ -176,5 +191,5 @@ def _resumed(part: nn.Module, adam, mean: dict[str, Tensor], path: Path) -> tupl
             state.setdefault(int(i), {})[key] = value
     adam.load_state_dict({"state": state, "param_groups": adam.state_dict()["param_groups"]})
     losses = values["losses"].tolist()
-    _log.info("training goes on from step %d", len(losses))
-    return losses, len(losses)
+    _log.info("training resumes at step %d", len(losses))
+    return losses

@@ -1,94 +1,121 @@
-"""From files of examples to weights: the whole training of the prior, or of a regressor to compare it with."""
+"""The training pipeline: from files of examples to the weights of the prior, or of a regressor to compare it with."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import pandas as pd
 import torch
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
 from torch import Tensor
 
+from dav_gswt.files import whole
 from dav_gswt.prior import weights
 from dav_gswt.prior.networks import Network
-from dav_gswt.prior.terrain import planes_of_photo, planes_of_render, planes_of_truth, pooled
-from dav_gswt.prior.training import examples, optimization
-from dav_gswt.prior.training.examples import Examples
-from dav_gswt.prior.training.optimization import Codes, Plan
+from dav_gswt.prior.terrain import average_opacity, pack_photo, pack_render, pack_truth
+from dav_gswt.prior.training import example_files, optimization
+from dav_gswt.prior.training.example_files import Examples
+from dav_gswt.prior.training.optimization import EncodedExamples, TrainingPlan
 
-AT_ONCE = 128  # pictures that are coded at a time
+BATCH = 128  # pictures that are encoded at a time
 
 
 @dataclass(frozen=True)
 class Pictures:
-    """All that is learned from, in bytes to save memory; see `terrain.planes_of_render` for the planes."""
+    """All examples as planes, in bytes to save memory; see `terrain.pack_render`. relative: see `Condition`."""
 
     truth: UInt8[Tensor, "n 5 s s"]
     render: UInt8[Tensor, "n 5 s s"]
     photo: UInt8[Tensor, "n 5 s s"]
-    relative: Tensor
+    relative: Float[Tensor, "n 4"]
 
     def __len__(self) -> int:
         return len(self.truth)
 
 
-def learn(
-    parts: list[Path | str],
+@dataclass(frozen=True)
+class Losses:
+    """The loss of every step. autoencoder: empty if its weights were given."""
+
+    autoencoder: list[float]
+    denoiser: list[float]
+
+
+def train_prior(
+    files: Sequence[Path | str],
     out: Path | str,
-    coder: Plan,
-    denoiser: Plan,
-    keep: Path,
-    coded: Path | str | None = None,
-    regress: bool = False,
-) -> dict[str, list[float]]:
-    """Train on the examples of some files and write the weights; returns the losses of every step, by what was trained.
+    plans: tuple[TrainingPlan, TrainingPlan],
+    checkpoints: Path,
+    given_autoencoder: Path | str | None = None,
+) -> Losses:
+    """Train on the examples of some files and write the weights.
 
-    keep: a folder for checkpoints. coded: weights whose coder is taken instead of training one. regress: see
-    `training.train_denoiser`.
+    Args:    plans: of the autoencoder and of the denoiser. checkpoints: a folder. given_autoencoder: a file of weights:
+             take its autoencoder and train a regressor (see `train_denoiser`) on its latents.
     """
-    torch.manual_seed(coder.seed)
-    network, pictures = Network(), pictures_of(parts)
-    keep.mkdir(parents=True, exist_ok=True)
-    losses = {}
-    if coded:
-        weights.load(network, coded)
-        torch.manual_seed(denoiser.seed)
+    plan, denoiser_plan = plans
+    torch.manual_seed(plan.seed)
+    network, pictures = Network(), load_pictures(files)
+    checkpoints.mkdir(parents=True, exist_ok=True)
+    losses, done = [], checkpoints / "autoencoder_done.safetensors"
+    if given_autoencoder:
+        weights.load_weights(network, given_autoencoder)
+        torch.manual_seed(denoiser_plan.seed)
         fresh = Network()
-        network.denoiser, network.told = fresh.denoiser, fresh.told
-    elif not (done := keep / "coder_done.safetensors").exists():
-        mixed = torch.cat([pictures.truth, pictures.render, pictures.photo])
-        losses["coder"] = optimization.train_coder(network, mixed, coder, keep / "coder.safetensors")
-        weights.save(network, done, {"losses": json.dumps(losses["coder"])}, torch.float32)
+        network.denoiser, network.condition_encoder = fresh.denoiser, fresh.condition_encoder
+    elif not done.exists():
+        every = torch.cat([pictures.truth, pictures.render, pictures.photo])
+        losses = optimization.train_autoencoder(network, every, plan, checkpoints / "autoencoder.safetensors")
+        weights.save_weights(network, done, {"losses": json.dumps(losses)}, torch.float32)
     else:
-        losses["coder"] = json.loads(weights.load(network, done)["losses"])
-    codes = codes_of(network, pictures)
-    losses["denoiser"] = optimization.train_denoiser(network, codes, denoiser, keep / "denoiser.safetensors", regress)
-    weights.save(network, out, {"examples": str(len(pictures)), "regressor": str(regress)})
-    (keep / "coder_done.safetensors").unlink(missing_ok=True)
-    return losses
-
-
-def pictures_of(parts: list[Path | str]) -> Pictures:
-    """The pictures of all files, in their order."""
-    found = [_bytes(examples.read(part)) for part in parts]
-    return Pictures(*(torch.cat(column) for column in zip(*found, strict=True)))
-
-
-def _bytes(made: Examples) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    planes = (
-        planes_of_truth(made.rgba, made.inverse_depth),
-        planes_of_render(made.condition),
-        planes_of_photo(made.condition.photo),
+        losses = json.loads(weights.load_weights(network, done)["losses"])
+    regress = bool(given_autoencoder)
+    denoiser_losses = optimization.train_denoiser(
+        network, encode_pictures(network, pictures), denoiser_plan, checkpoints / "denoiser.safetensors", regress
     )
-    return *((255 * p.clamp(0, 1)).round().to(torch.uint8) for p in planes), torch.from_numpy(made.condition.relative)
+    weights.save_weights(network, out, {"examples": str(len(pictures)), "regressor": str(regress)})
+    done.unlink(missing_ok=True)
+    return Losses(losses, denoiser_losses)
 
 
-def codes_of(network: Network, pictures: Pictures) -> Codes:
-    """Codes of all pictures, and how opaque the renders are in the codes' cells."""
+def write_losses(path: Path | str, losses: Losses) -> None:
+    """Write the loss of every step as CSV: what was trained, step, loss."""
+    tables = [
+        pd.DataFrame({"trained": name, "step": range(1, len(values) + 1), "loss": values})
+        for name, values in (("coder", losses.autoencoder), ("denoiser", losses.denoiser))
+    ]
+    with whole(path) as part:
+        pd.concat(tables).to_csv(part, index=False, float_format="%.5g", lineterminator="\n")
 
-    def coded(planes: Tensor) -> Tensor:
+
+def load_pictures(files: Sequence[Path | str]) -> Pictures:
+    """The pictures of all files, in their order."""
+    parts = [_to_bytes(example_files.read_examples(file)) for file in files]
+    return Pictures(*(torch.cat(column) for column in zip(*parts, strict=True)))
+
+
+def _to_bytes(examples: Examples) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    condition = examples.condition
+    truth, render, photo = (
+        (255 * planes.clamp(0, 1)).round().to(torch.uint8)
+        for planes in (
+            pack_truth(examples.rgba, examples.inverse_depth),
+            pack_render(condition),
+            pack_photo(condition.photo),
+        )
+    )
+    return truth, render, photo, torch.from_numpy(condition.relative)
+
+
+def encode_pictures(network: Network, pictures: Pictures) -> EncodedExamples:
+    """The latents of all pictures, and the opacity of the renders in the cells of the latents."""
+
+    def encode(planes: Tensor) -> Tensor:
         with torch.inference_mode():
-            return torch.cat([network.encoded(part.float() / 255) for part in planes.split(AT_ONCE)]).clone()
+            return torch.cat([network.encode(part.float() / 255) for part in planes.split(BATCH)]).clone()
 
     network.eval()
-    opacity = torch.cat([pooled(part[:, 3].float() / 255) for part in pictures.render.split(AT_ONCE)])
-    return Codes(coded(pictures.truth), coded(pictures.render), opacity, coded(pictures.photo), pictures.relative)
+    opacity = torch.cat([average_opacity(part[:, 3].float() / 255) for part in pictures.render.split(BATCH)])
+    truth, render, photo = (encode(planes) for planes in (pictures.truth, pictures.render, pictures.photo))
+    return EncodedExamples(truth, render, opacity, photo, pictures.relative)

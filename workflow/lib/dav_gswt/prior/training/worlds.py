@@ -1,7 +1,7 @@
-"""Made-up worlds to train the prior on: dense Gaussian fields of random ground with random things on it.
+"""Procedural worlds to train the prior on: dense Gaussian fields of random ground with random objects on it.
 
-They are mixed from ingredients of their own: none is a family that synthetic scenes come from, since priors are judged
-on those. True views are the field drawn, in milliseconds. Same seed: same world, to the bit.
+They share no generator with the families of synthetic scenes, since priors are evaluated on those. A true view is a
+render of the field, which takes milliseconds. The same seed gives the same world, to the bit.
 """
 
 from dataclasses import dataclass
@@ -15,26 +15,26 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square
 from dav_gswt.prior.training import worlds_ground as ground
 from dav_gswt.prior.training import worlds_light as light
-from dav_gswt.prior.training import worlds_objects as things
+from dav_gswt.prior.training import worlds_objects as objects
 from dav_gswt.prior.training.worlds_objects import Cloud
 from dav_gswt.reconstruction.discs import quaternions
 
-FLYING_HEIGHT = 7.0  # metres, as synthetic scenes have it
-THICK = 0.1  # of a disc, in its spacings
+FLYING_HEIGHT = 7.0  # metres, as of synthetic scenes
+THICKNESS = 0.1  # of a disc, in its spacings
 OPACITY = 0.98  # of the ground's discs
-GREY = 0.09, 0.4  # mean light of the middle of a photo, linear: the exposure is drawn between
-WHITE = 0.95  # most of the ground's light that a photo holds, as a share of it
+MEAN_LIGHT = 0.09, 0.4  # linear, of the middle of a photo: the range from which the exposure is drawn
+WHITE = 0.95  # the brightest light of the ground (its 0.95 quantile) after exposure
 
 
 @dataclass(frozen=True)
 class Sky:
-    """Colours straight up and at the horizon, sRGB."""
+    """sRGB colours at the zenith and at the horizon."""
 
     zenith: Float[Array, "3"]
     horizon: Float[Array, "3"]
 
-    def behind(self, camera: Camera) -> Float32[Array, "h w 3"]:
-        """What a camera sees where nothing stands."""
+    def render(self, camera: Camera) -> Float32[Array, "h w 3"]:
+        """The sky as a camera sees it."""
         direction = camera.rays()[1]
         up = np.clip(direction[..., 2] / np.linalg.norm(direction, axis=-1), 0, 1)[..., None] ** 0.6
         return (self.horizon + up * (self.zenith - self.horizon)).astype(np.float32)
@@ -42,76 +42,80 @@ class Sky:
 
 @dataclass(frozen=True)
 class World:
-    """A world with its light in its colours."""
+    """A world whose colours include its light. frame: as in ground.json."""
 
     field: GaussianField
     frame: SceneFrame
     sky: Sky
 
 
-def world(seed: int) -> World:
+def make_world(seed: int) -> World:
     """The world of a seed. Raises: ValueError: a negative seed."""
     rng = np.random.default_rng([seed, 20_000])
-    land = ground.terrain(rng)
-    flat, cloud = ground.discs(rng, land), things.things(rng, land.height)
-    sun = light.some_light(rng)
+    relief = ground.draw_relief(rng)
+    discs, cloud = ground.make_discs(rng, relief), objects.scatter_objects(rng, relief.height)
+    sun = light.draw_light(rng)
     areas = 4 * cloud.scales[:, 0] * cloud.scales[:, 1] * cloud.opacity
-    shaded = light.shade(land.height(*light.cells()), cloud.means, areas, cloud.scales[:, 0])
-    around = flat.albedo.mean(0)
-    below, above = _lit_ground(sun, shaded, flat, around), _lit_things(sun, shaded, cloud, around)
-    near = np.abs(flat.means[:, :2]).max(1) < ground.EXEMPLAR / 2
-    mean = np.exp(rng.uniform(*np.log(GREY))) / below[near].mean()
+    shadows = light.map_shadows(relief.height(*light.cell_centres()), cloud.means, areas, cloud.scales[:, 0])
+    around = discs.albedo.mean(0)
+    below, above = _light_ground(sun, shadows, discs, around), _light_objects(sun, shadows, cloud, around)
+    near = np.abs(discs.means[:, :2]).max(1) < ground.EXEMPLAR / 2
+    mean = np.exp(rng.uniform(*np.log(MEAN_LIGHT))) / below[near].mean()
     exposure = min(mean, WHITE / np.quantile(below[near], 0.95))
-    field = concatenate_fields([_ground(flat, ground.encoded(exposure * below)), _things(cloud, exposure * above)])
-    return World(field, _frame(), _sky(rng, sun))
+    field = concatenate_fields([_make_ground(discs, exposure * below), _make_objects(cloud, exposure * above)])
+    return World(field, _make_frame(), _draw_sky(rng, sun))
 
 
-def _lit_ground(
-    sun: light.Light, shaded: light.Shade, flat: ground.Discs, around: Float[Array, "3"]
+def _light_ground(
+    sun: light.Light, shadows: light.ShadowMap, discs: ground.Discs, around: Float[Array, "3"]
 ) -> Float[Array, "n 3"]:
-    normals = np.stack([-flat.east, -flat.north, np.ones_like(flat.east)], 1)
+    normals = np.stack([-discs.east, -discs.north, np.ones_like(discs.east)], 1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return light.lit(sun, shaded, flat.means, normals, flat.albedo, np.ones(len(normals)), around)
+    return light.reflect(sun, shadows, light.Surface(discs.means, normals, discs.albedo, np.ones(len(normals))), around)
 
 
-def _lit_things(sun: light.Light, shaded: light.Shade, cloud: Cloud, around: Float[Array, "3"]) -> Float[Array, "n 3"]:
+def _light_objects(
+    sun: light.Light, shadows: light.ShadowMap, cloud: Cloud, around: Float[Array, "3"]
+) -> Float[Array, "n 3"]:
     x, y, z, w = cloud.quats.T
     normals = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], 1)
-    return light.lit(sun, shaded, cloud.means, normals, cloud.albedo, cloud.firm, around)
+    return light.reflect(sun, shadows, light.Surface(cloud.means, normals, cloud.albedo, cloud.opaque), around)
 
 
-def _ground(flat: ground.Discs, colours: Float[Array, "n 3"]) -> GaussianField:
-    n = len(colours)
-    stretch = np.stack([np.sqrt(1 + flat.east**2), np.sqrt(1 + flat.north**2)], 1)
-    scales = np.column_stack([ground.WIDTH * flat.sizes * stretch, THICK * flat.sizes.min(1)])
-    return _field(flat.means, scales, quaternions(flat.east, flat.north), np.full(n, OPACITY), colours, True)
+def _make_ground(discs: ground.Discs, radiance: Float[Array, "n 3"]) -> GaussianField:
+    stretch = np.stack([np.sqrt(1 + discs.east**2), np.sqrt(1 + discs.north**2)], 1)
+    scales = np.column_stack([ground.WIDTH * discs.sizes * stretch, THICKNESS * discs.sizes.min(1)])
+    opacity = np.full(len(radiance), OPACITY)
+    return _make_field(discs.means, scales, quaternions(discs.east, discs.north), opacity, radiance, True)
 
 
-def _things(cloud: Cloud, shine: Float[Array, "n 3"]) -> GaussianField:
-    return _field(cloud.means, cloud.scales, cloud.quats[:, [3, 0, 1, 2]], cloud.opacity, ground.encoded(shine), False)
+def _make_objects(cloud: Cloud, radiance: Float[Array, "n 3"]) -> GaussianField:
+    return _make_field(cloud.means, cloud.scales, cloud.quats[:, [3, 0, 1, 2]], cloud.opacity, radiance, False)
 
 
-def _field(means, scales, quats, opacity, colours, is_ground: bool) -> GaussianField:
+def _make_field(
+    means: Array, scales: Array, quats: Array, opacity: Array, radiance: Float[Array, "n 3"], is_ground: bool
+) -> GaussianField:
     n = len(means)
     return GaussianField(
         means.astype(np.float32),
         np.log(scales).astype(np.float32),
         quats.astype(np.float32),
         np.log(opacity / (1 - opacity)).astype(np.float32),
-        rgb_to_sh(colours),
+        rgb_to_sh(ground.encode_light(radiance)),
         np.zeros(n, np.float32),
         np.full(n, is_ground),
     )
 
 
-def _frame() -> SceneFrame:
+def _make_frame() -> SceneFrame:
     half = ground.EXEMPLAR / 2
     reach = 1.25 * half
     exemplar, extent = Square(-half, -half, ground.EXEMPLAR), Extent(-reach, -reach, reach, reach)
     return SceneFrame("synthetic", "metre", FLYING_HEIGHT, exemplar, extent)
 
 
-def _sky(rng: np.random.Generator, sun: light.Light) -> Sky:
+def _draw_sky(rng: np.random.Generator, sun: light.Light) -> Sky:
     blue = np.clip((sun.sun.mean() * sun.towards[2]) / 0.9, 0, 1)
     cloudy = np.full(3, rng.uniform(0.6, 0.95))
     zenith = cloudy + blue * (np.array([0.25, 0.45, 0.8]) * rng.uniform(0.8, 1.2) - cloudy)

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.prior.terrain import Terrain
-from dav_gswt.prior.training.examples import Examples
+from dav_gswt.prior.terrain import TerrainPrior
+from dav_gswt.prior.training.example_files import Examples
 from dav_gswt.study import csv_tables, figures
 from dav_gswt.study.prior.regressor import Regressor
 from dav_gswt.study.prior.trial import Setting, opaque
@@ -51,22 +51,22 @@ def losses(curves: dict[str, Float[Array, "_"]], path: Path | str) -> None:
     figures.save(figure, path)
 
 
-def gallery(made: Examples, prior: Terrain, regressor: Regressor | None, setting: Setting) -> dict[str, Array]:
+def gallery(made: Examples, prior: TerrainPrior, regressor: Regressor | None, setting: Setting) -> dict[str, Array]:
     """Columns of pictures (n s s 3) and maps (n h w) by title: what was given, what is true, what was guessed.
 
     The error of the render is NaN where the truth is not opaque.
     """
     given, truth = made.condition, made.rgba
     asked = setting.steps, setting.seed
-    noises = prior.decoded(prior.samples(given, setting.m, 0.0, *asked, common=False)).rgba
-    doubt = w2_sq(prior.samples(given, setting.m, setting.p_drop, *asked))[1]
+    noises = prior.decode(prior.sample(given, setting.m, 0.0, *asked, common=False)).rgba
+    doubt = w2_sq(prior.sample(given, setting.m, setting.p_drop, *asked))[1]
     apart = np.sqrt(((given.colour - truth[..., :3]) ** 2).mean(-1))
     render = np.concatenate([given.colour, given.alpha[..., None]], -1)
     columns = {"photo given": given.photo, "render given": over_grey(render), "truth": over_grey(truth)}
     columns |= {f"sample {i + 1}": over_grey(noises[:, i]) for i in range(min(SHOWN, setting.m))}
     columns[f"mean of {setting.m}"] = over_grey(noises.mean(1))
     if regressor is not None:
-        columns["regressor"] = over_grey(regressor.decoded(regressor.predicted(given)).rgba)
+        columns["regressor"] = over_grey(regressor.decode(regressor.predict(given)).rgba)
     return columns | {"error of render": np.where(opaque(made), apart, np.nan), "doubt (w2_sq)": doubt}
 
 

@@ -1,7 +1,7 @@
-"""A deterministic regressor of the prior's shape: the control that diffusion has to beat to earn its cost.
+"""A deterministic regressor with the architecture of the prior: the control that diffusion has to beat.
 
-It tells the code of a view in one pass, from zero noise at time 0: the mean of what may be there, so blurred where
-much may be. See `training.train_denoiser`.
+It predicts the latent of a view in one pass, from zeros at time 0: the mean of all possible views, so blurred where
+they differ. See `optimization.train_denoiser`.
 """
 
 import numpy as np
@@ -12,27 +12,28 @@ from torch import Tensor
 
 from dav_gswt.prior import sampler
 from dav_gswt.prior.interface import Condition
-from dav_gswt.prior.networks import CODE
-from dav_gswt.prior.terrain import Learned
+from dav_gswt.prior.networks import LATENT
+from dav_gswt.prior.sampler import Sampling
+from dav_gswt.prior.terrain import LatentModel
 
 
-class Regressor(Learned):
-    """A regressor from a file of weights that `lesson.learn(..., regress=True)` wrote."""
+class Regressor(LatentModel):
+    """The regressor of a weights file that `pipeline.train_prior` wrote."""
 
-    name, regresses = "regressor", True
+    name, is_regressor = "regressor", True
 
-    def predicted(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
-        """The code of each view, without dropout."""
-        return np.ascontiguousarray(self.samples(condition, 1, 0.0, 0)[:, 0])
+    def predict(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
+        """The latent of each view, without dropout."""
+        return np.ascontiguousarray(self.sample(condition, 1, 0.0, 0)[:, 0])
 
-    def samples(self, condition: Condition, m: int, p_drop: float, seed: int) -> Float32[Array, "b m c hz wz"]:
-        """m predictions of each view, of another attention dropout each; p_drop = 0: m times the same bits.
+    def sample(self, condition: Condition, m: int, p_drop: float, seed: int) -> Float32[Array, "b m c hz wz"]:
+        """m predictions of each view, each under an attention dropout mask of its own; p_drop = 0: m equal predictions.
 
-        A view's do not depend on its batch (to 1e-5). Raises: ValueError: m < 1, or p_drop outside [0, 1).
+        They do not depend on the batch (to 1e-5). Raises: ValueError: m < 1, or p_drop outside [0, 1).
         """
-        denoise = self.told(condition)
+        denoise, sampling = self.make_denoiser(condition), Sampling(m, p_drop, 1, seed)
 
-        def run(nothing: Tensor, some: slice) -> Tensor:
-            return denoise(nothing, torch.tensor(0), some)
+        def run(zeros: Tensor, rows: slice) -> Tensor:
+            return denoise(zeros, torch.tensor(0), rows)
 
-        return sampler.masked(run, self.layers, torch.zeros(1, *CODE), len(condition), m, p_drop, seed)
+        return sampler.run_with_masks(run, self.layers, torch.zeros(1, *LATENT), len(condition), sampling)

@@ -18,9 +18,9 @@ from dav_gswt.errors import InputError
 from dav_gswt.images import lpips, metrics
 from dav_gswt.images.lpips_weights import Weights
 from dav_gswt.logs import progress
-from dav_gswt.prior.networks import CODE, SIZE
-from dav_gswt.prior.terrain import Learned, Terrain, planes_of_render, planes_of_truth
-from dav_gswt.prior.training.examples import Examples
+from dav_gswt.prior.networks import LATENT, SIZE
+from dav_gswt.prior.terrain import LatentModel, TerrainPrior, pack_render, pack_truth
+from dav_gswt.prior.training.example_files import Examples
 from dav_gswt.study.prior.regressor import Regressor
 from dav_gswt.views.uncertainty import ause, gradient_map, spearman, w2_sq
 from dav_gswt.views.uncertainty.texture import LUMINANCE
@@ -29,7 +29,7 @@ OPAQUE = 0.99  # opacity of the truth from which on a pixel counts
 P_DROPS = 0.05, 0.1, 0.15, 0.2, 0.3
 STEPS = 2, 4, 8, 16
 AT_ONCE = 32  # views that are imagined at a time: decoded samples take memory
-SIDE = SIZE // CODE[1]  # pixels of a cell
+SIDE = SIZE // LATENT[1]  # pixels of a cell
 COVERED = 0.9  # opacity of the render from which on a cell is covered
 RANKED = "", "ground_", "cell_", "covered_"
 COLUMNS = "psnr", "lpips", *(f"{by}{how}" for by in RANKED for how in ("spearman", "ause")), "seconds"
@@ -111,7 +111,7 @@ def evenly(made: Examples, count: int) -> Examples:
 
 def tried(
     made: Examples,
-    prior: Terrain,
+    prior: TerrainPrior,
     regressors: Sequence[Regressor] = (),
     setting: Setting | None = None,
     weights: Weights | None = None,
@@ -122,7 +122,7 @@ def tried(
     error; ground_: of its mean over the cells where the truth is opaque, as poses are scored by what they see of the
     ground; cell_: of cells, all views together; covered_: of cells that the render covers, where opacity has little to
     say. seconds: of a view.
-    weights: of LPIPS. Raises: ValueError: no view; see `truth_of`, `Terrain.samples`. InputError: a regressor with
+    weights: of LPIPS. Raises: ValueError: no view; see `truth_of`, `TerrainPrior.sample`. InputError: a regressor with
     another coder than the prior's, by its number.
     """
     setting = setting or Setting()
@@ -142,15 +142,15 @@ def tried(
     ]
 
 
-def _require_one_coder(prior: Terrain, regressors: Sequence[Regressor]) -> None:
+def _require_one_coder(prior: TerrainPrior, regressors: Sequence[Regressor]) -> None:
     for i, regressor in enumerate(regressors):
-        both = ([*n.coder.parameters(), n.scale] for n in (prior.network, regressor.network))
+        both = ([*n.autoencoder.parameters(), n.scale] for n in (prior.network, regressor.network))
         if not all(torch.equal(a, b) for a, b in zip(*both, strict=True)):
             raise InputError(f"regressor {i} has another coder than the prior: train it on the prior's codes")
 
 
 def guesses(
-    made: Examples, prior: Terrain, regressors: Sequence[Regressor], setting: Setting, weights: Weights | None
+    made: Examples, prior: TerrainPrior, regressors: Sequence[Regressor], setting: Setting, weights: Weights | None
 ) -> Iterator[Guess]:
     """What all methods make of the views, in the order of the table."""
     yield Guess("render", "", 0.0, picture=made.condition.colour)
@@ -163,32 +163,32 @@ def guesses(
     yield from _of_regressors(made, regressors, setting)
 
 
-def _code_of_truth(made: Examples, prior: Terrain) -> Float32[Array, "b c h w"]:
-    return prior.encoded(planes_of_truth(made.rgba, made.inverse_depth)).numpy()
+def _code_of_truth(made: Examples, prior: TerrainPrior) -> Float32[Array, "b c h w"]:
+    return prior.encode(pack_truth(made.rgba, made.inverse_depth)).numpy()
 
 
-def _of_noises(made: Examples, prior: Terrain, setting: Setting) -> Iterator[Guess]:
+def _of_noises(made: Examples, prior: TerrainPrior, setting: Setting) -> Iterator[Guess]:
     """No dropout: one sample, and how far samples from other noises lie from each other."""
     for steps in sorted({*STEPS, setting.steps}):
-        latents, seconds = timed(prior.samples, made.condition, 1, 0.0, steps, setting.seed)
+        latents, seconds = timed(prior.sample, made.condition, 1, 0.0, steps, setting.seed)
         picture, more = timed(pictures, prior, latents[:, 0])
         yield Guess("sample", f"steps={steps}", seconds + more, picture=picture)
     how = f"m={setting.m} noises steps={setting.steps}"
     asked = setting.m, 0.0, setting.steps, setting.seed
-    latents, seconds = timed(prior.samples, made.condition, *asked, common=False)
+    latents, seconds = timed(prior.sample, made.condition, *asked, common=False)
     mean, more = timed(lambda: pictures(prior, latents).mean(1))
     yield Guess("mean of samples", how, seconds + more, picture=mean)
     yield Guess("spread", how, seconds, cells=w2_sq(latents)[1])
     yield Guess("residual of samples", how, seconds, cells=residual(prior, made, latents.mean(1)))
 
 
-def _of_dropout(made: Examples, prior: Terrain, setting: Setting, weights: Weights | None) -> Iterator[Guess]:
+def _of_dropout(made: Examples, prior: TerrainPrior, setting: Setting, weights: Weights | None) -> Iterator[Guess]:
     """One noise: how far samples under other dropout masks lie from each other, over the shares and over the steps."""
     middle = setting.p_drop, setting.steps
     around = [(p, setting.steps) for p in P_DROPS] + [(setting.p_drop, n) for n in STEPS]
     for p_drop, steps in sorted({middle, *around}):
         how = f"m={setting.m} p_drop={p_drop} steps={steps}"
-        latents, seconds = timed(prior.samples, made.condition, setting.m, p_drop, steps, setting.seed)
+        latents, seconds = timed(prior.sample, made.condition, setting.m, p_drop, steps, setting.seed)
         yield Guess("w2_sq", how, seconds, cells=w2_sq(latents)[1])
         if (p_drop, steps) == middle:
             decoded, more = timed(pictures, prior, latents)
@@ -210,7 +210,7 @@ def _of_pictures(
 def _of_regressors(made: Examples, regressors: Sequence[Regressor], setting: Setting) -> Iterator[Guess]:
     codes, shown, total, drawn = [], [], 0.0, 0.0
     for i, regressor in enumerate(regressors):
-        code, seconds = timed(regressor.predicted, made.condition)
+        code, seconds = timed(regressor.predict, made.condition)
         picture, more = timed(pictures, regressor, code)
         yield Guess("regressor", f"member={i}", seconds + more, picture=picture)
         yield Guess("residual of regressor", f"member={i}", seconds, cells=residual(regressor, made, code))
@@ -218,7 +218,7 @@ def _of_regressors(made: Examples, regressors: Sequence[Regressor], setting: Set
         shown.append(picture)
         total, drawn = total + seconds, drawn + more
     for p_drop in P_DROPS if regressors else ():
-        latents, seconds = timed(regressors[0].samples, made.condition, setting.m, p_drop, setting.seed)
+        latents, seconds = timed(regressors[0].sample, made.condition, setting.m, p_drop, setting.seed)
         yield Guess("dropout of regressor", f"m={setting.m} p_drop={p_drop}", seconds, cells=w2_sq(latents)[1])
     if len(regressors) > 1:
         how = f"members={len(regressors)}"
@@ -233,15 +233,15 @@ def timed(function: Callable, *given, **named):
     return value, time.perf_counter() - begun
 
 
-def pictures(learned: Learned, latents: Float32[Array, "*n c h w"]) -> Float32[Array, "*n s s 3"]:
+def pictures(learned: LatentModel, latents: Float32[Array, "*n c h w"]) -> Float32[Array, "*n s s 3"]:
     """Colours of latents, over black as the truth's."""
-    return np.ascontiguousarray(learned.decoded(latents).rgba[..., :3])
+    return np.ascontiguousarray(learned.decode(latents).rgba[..., :3])
 
 
-def residual(learned: Learned, made: Examples, code: Float32[Array, "b c h w"]) -> Float32[Array, "b h w"]:
+def residual(learned: LatentModel, made: Examples, code: Float32[Array, "b c h w"]) -> Float32[Array, "b h w"]:
     """Mean squared difference between a code of the view and that of the render as it is: by how much the field would
     have to change."""
-    return ((code - learned.encoded(planes_of_render(made.condition)).numpy()) ** 2).mean(1)
+    return ((code - learned.encode(pack_render(made.condition)).numpy()) ** 2).mean(1)
 
 
 def judged(guess: Guess, truth: Truth, weights: Weights | None) -> dict[str, Array]:

@@ -113,7 +113,9 @@ def _photos(
     there = uncut.field[viewpoints.near(uncut.field, at + by, viewpoints.SPREAD * width)]
     rise = viewpoints.ground_height(there, at + by, 0.1 * width) - place.middle[2]
     seen = [
-        conditions.shown(there, viewpoints.shifted(camera, np.array([*by, rise])), viewpoints.flying_height(width))
+        conditions.render_view(
+            there, viewpoints.shifted(camera, np.array([*by, rise])), viewpoints.flying_height(width)
+        )
         for camera in place.cameras
     ]
     return [np.clip(s.colour / np.maximum(s.alpha, SOLID)[..., None], 0, 1).astype(np.float32) for s in seen]
@@ -134,7 +136,7 @@ def _wanted(
         both = concatenate_fields([field[place.own], place.around])
         share = np.zeros((len(both), 1), np.float32)
         share[: len(place.own), 0] = bounds.share[place.own]
-        shown.append(conditions.shown(both, camera, flying_height))
+        shown.append(conditions.render_view(both, camera, flying_height))
         now.append(drawn.forward(**to_raster_arrays(both), camera=camera).colour)
         near.append(np.clip(drawn.forward(**to_raster_arrays(both, share), camera=camera).colour[..., 0], 0, 1))
     parts = (np.stack([getattr(s, name) for s in shown]) for name in ("colour", "alpha", "inverse_depth"))

@@ -24,7 +24,7 @@ Repair = Callable[[Condition, Float32[Array, "b s s"]], Float32[Array, "b s s 3"
 class Repairer(Prior, Protocol):
     """A prior that goes on from a picture to which a little noise was added."""
 
-    def repaired(
+    def repair(
         self,
         condition: Condition,
         strength: float,
@@ -60,8 +60,10 @@ class ByPrior:
         cells = near.reshape(b, size // CELL, CELL, size // CELL, CELL).max((2, 4))
         known = None if self.believed else cells <= TOUCHED
         with one_thread():
-            made = self.model.repaired(condition, self.strength, self.steps, self.seed, known)
-            after, before = (self.model.decoded(codes).rgba[..., :3] for codes in (made, self.model.shown(condition)))
+            made = self.model.repair(condition, self.strength, self.steps, self.seed, known)
+            after, before = (
+                self.model.decode(codes).rgba[..., :3] for codes in (made, self.model.encode_render(condition))
+            )
         return after - before
 
 
