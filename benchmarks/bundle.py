@@ -34,29 +34,29 @@ def tile_set(cells: int, levels: int) -> TileSet:
 def presorting(tiles: TileSet, threads: int) -> tuple[float, float, int]:
     """Seconds of the search for directions and of sorting, and how many directions there are."""
     start = time.perf_counter()
-    rings = direction_search.climbed(tiles.fields[0], tiles.side, build.Options.decibels).rings
+    rings = direction_search.search_directions(tiles.fields[0], tiles.side, build.BundleOptions.decibels).rings
     searched = time.perf_counter() - start
     along = rings.directions()
-    kept = [along[rings.kept(doubt, 0.5)] for doubt in tiles.uncertainty]
+    kept = [along[rings.select(doubt, 0.5)] for doubt in tiles.uncertainty]
     jobs = [(f.means, kept[tile]) for row in tiles.fields for tile, f in enumerate(row)]
     start = time.perf_counter()
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(lambda job: orders.presorted(*job), jobs))
+        list(pool.map(lambda job: orders.presort(*job), jobs))
     return searched, time.perf_counter() - start, len(along)
 
 
 def walker(tiles: TileSet) -> float | None:
     """PSNR of a walker's still in pre-sorted orders against all Gaussians sorted exactly."""
     with tempfile.TemporaryDirectory() as folder:
-        build.write_bundle(tiles, Path(folder, "bundle"), build.Options(tau=0.5), SCHEMA, {})
-        bundle = store.read(Path(folder, "bundle"), SCHEMA)
+        build.write_bundle(tiles, Path(folder, "bundle"), build.BundleOptions(tau=0.5), SCHEMA, {})
+        bundle = store.read_bundle(Path(folder, "bundle"), SCHEMA)
         terrain = endless.terrain_from_bundle(bundle, {"kind": "flat"})
     value = bundle.manifest
     camera = stills.shot_camera(stills.SHOTS[0], terrain, value["eye_floor"], 960, 540)
     pictures = [
         stills.render_view(terrain, camera, value["sky"], value["ground_colour"], exact) for exact in (False, True)
     ]
-    return order_directions.decibels([tuple(pictures)])
+    return order_directions.compute_psnr([tuple(pictures)])
 
 
 def main() -> int:

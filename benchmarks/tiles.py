@@ -58,12 +58,12 @@ def made_up() -> tuple[GaussianField, Ground]:
 def measured() -> dict[str, float]:
     field, grid = made_up()
     start = time.perf_counter()
-    made = levels.fitted(field, grid, LEVELS, STEPS, 0)
+    made = levels.build_levels(field, grid, LEVELS, STEPS, 0)
     fitted = time.perf_counter()
     above = top_view.over_exemplar(made.fields[0], grid)
     west, south, _ = grid.exemplar
     exemplar = Exemplar(west, south, grid.spacing, grid.cells)
-    options, rng = tiles.Options(levels=made.wanted), np.random.default_rng(0)
+    options, rng = tiles.TilingOptions(levels=made.wanted), np.random.default_rng(0)
     found = tiles.cut_tiles(made.fields, exemplar, above.known_colour(), above.uncertainty, options, rng)
     cut = time.perf_counter()
     assert [len(found.fields), len(found.labels)] == [LEVELS, 16]

@@ -15,9 +15,9 @@ with logging_to(snakemake.log[0]):
     told = {"tiles": read_json(given.seams), "levels": read_json(Path(given.levels, "levels.json"))}
     source = provenance.of(inputs, {"tau": params.tau, "seed": params.seed})
     build.write_bundle(
-        store.read(given.tiles, given.seams),
+        store.read_tiles(given.tiles, given.seams),
         Path(snakemake.output.manifest).parent,
-        build.Options(tau=params.tau, salt=params.seed, unit=frame.unit, threads=snakemake.threads),
+        build.BundleOptions(tau=params.tau, salt=params.seed, unit=frame.unit, threads=snakemake.threads),
         params.schema,
         source | {name: table["provenance"] for name, table in told.items()},
     )

@@ -4,4 +4,4 @@ from dav_gswt.export import splats
 from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):
-    splats.convert(snakemake.input.plys, snakemake.wildcards.kind, snakemake.output.splats)
+    splats.convert_plys(snakemake.input.plys, snakemake.wildcards.kind, snakemake.output.splats)

@@ -13,7 +13,7 @@ with logging_to(snakemake.log[0]):
     if given.get("maps"):  # a prior was asked: what it doubts is what the tiles go by
         finest = pose_maps.apply_uncertainty(finest, pose_maps.read_pose_maps(given.maps)[1])
     steps = params.quality["level_steps"]
-    levels = build.fitted(*merge.cropped(finest, grid, 1), params.levels, steps, params.seed, params.keep)
+    levels = build.build_levels(*merge.crop_to_blocks(finest, grid, 1), params.levels, steps, params.seed, params.keep)
     inputs = {"field": given.field, "ground": given.ground}
     asked = {"levels": params.levels, "level_steps": steps, "seed": params.seed}
-    store.write(levels, snakemake.output.levels, provenance.of(inputs, asked))
+    store.write_levels(levels, snakemake.output.levels, provenance.of(inputs, asked))

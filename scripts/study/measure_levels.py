@@ -6,5 +6,5 @@ from dav_gswt.study import csv_tables
 from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
-    tiles, used = store.read(snakemake.input.tiles, snakemake.input.seams), build.Options
-    csv_tables.write_table(snakemake.output.table, fidelity.rows(tiles, used.level_pixels, used.band))
+    tiles, used = store.read_tiles(snakemake.input.tiles, snakemake.input.seams), build.BundleOptions
+    csv_tables.write_table(snakemake.output.table, fidelity.measure_levels(tiles, used.level_pixels, used.band))

@@ -6,5 +6,5 @@ from dav_gswt.study import csv_tables
 from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
-    tiles = store.read(snakemake.input.tiles, snakemake.input.seams)
-    csv_tables.write_table(snakemake.output.table, direction_search.rows(tiles, build.Options.decibels))
+    tiles = store.read_tiles(snakemake.input.tiles, snakemake.input.seams)
+    csv_tables.write_table(snakemake.output.table, direction_search.measure_orders(tiles, build.BundleOptions.decibels))

@@ -10,5 +10,5 @@ from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
     given = snakemake.input
-    bundle = bundles.read(Path(given.manifest).parent, snakemake.params.schema)
-    csv_tables.write_table(snakemake.output.table, shortcuts.rows(store.read(given.tiles, given.seams), bundle))
+    bundle = bundles.read_bundle(Path(given.manifest).parent, snakemake.params.schema)
+    csv_tables.write_table(snakemake.output.table, shortcuts.rows(store.read_tiles(given.tiles, given.seams), bundle))

@@ -8,8 +8,8 @@ from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
-    known = exemplar.Known.of(levels.read(given.levels))
-    tiles = store.read(given.tiles, given.seams)
+    known = exemplar.Known.of(levels.read_levels(given.levels))
+    tiles = store.read_tiles(given.tiles, given.seams)
     source = known.flattened(tiles, params.seam)
     fields = [shelf.field for shelf in source.levels]
     found = repetition.repeats(tiles, fields, source.exemplar.cells * tiles.spacing, params.seed)

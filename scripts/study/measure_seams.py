@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
-
 from dav_gswt import provenance
 from dav_gswt.files import write_json
 from dav_gswt.images import lpips_weights
@@ -16,11 +14,11 @@ from dav_gswt.tiles import build, semantics, store
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    known = exemplar.Known.of(levels.read(given.levels))
+    known = exemplar.Known.of(levels.read_levels(given.levels))
     alexnet = lpips_weights.read(given.lpips) if given.get("lpips") else None
-    tiles = store.read(given.tiles, given.seams)
-    rng = np.random.default_rng(build.seeds(params.seed, params.seam))
-    source = semantics.Source(alexnet, given.get("sam2"))
+    tiles = store.read_tiles(given.tiles, given.seams)
+    rng = build.make_generator(params.seed, params.seam)
+    source = semantics.SemanticSource(alexnet, given.get("sam2"))
     both = tiles, known.cut_straight(params.seam, source, rng)
     patches = known.flattened(tiles, params.seam)
     laid = [terrain.laid(each, patches, params.seed, params.tau) for each in both]

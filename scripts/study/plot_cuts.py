@@ -6,5 +6,5 @@ from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
     given = snakemake.input
-    pair = [store.read(*files) for files in zip(given.tiles, given.seams, strict=True)]
+    pair = [store.read_tiles(*files) for files in zip(given.tiles, given.seams, strict=True)]
     plots.write_cuts(snakemake.output.plot, dict(zip(("colour", "semantic"), pair, strict=True)))

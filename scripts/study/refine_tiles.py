@@ -12,7 +12,7 @@ from dav_gswt.views import prior_sampling
 
 with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
-    tiles, made = store.read(given.tiles, given.seams), levels.read(given.levels)
+    tiles, made = store.read_tiles(given.tiles, given.seams), levels.read_levels(given.levels)
     grid = made.grids[0]
     west, south, _ = grid.exemplar
     uncut = build.Uncut(made.fields[0], Exemplar(west, south, grid.spacing, grid.cells))
@@ -21,4 +21,4 @@ with logging_to(snakemake.log[0]):
     mended = build.refined(tiles, uncut, build.Options.of(params.refine), by, model.size)
     inputs = {name: given[name] for name in ("seams", "weights")} | {"level0": Path(given.levels, "level0.ply")}
     about = {"refine": dict(params.refine), "prior": dict(params.prior), "seed": params.seed}
-    store.write(mended, out.tiles, out.seams, provenance.of(inputs, about))
+    store.write_tiles(mended, out.tiles, out.seams, provenance.of(inputs, about))

@@ -10,7 +10,7 @@ from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
     given, bundle = snakemake.input, read_json(snakemake.input.manifest)
-    tiles = store.read(given.tiles, given.seams)
+    tiles = store.read_tiles(given.tiles, given.seams)
     for path in progress(snakemake.output.pictures, "draw grids"):
         shot, surface = Path(path).stem.split("_")
         image_files.write_png(path, pictures.drawn(tiles, bundle, shot, surface, snakemake.params.size))

@@ -8,5 +8,5 @@ from dav_gswt.study import csv_tables
 from dav_gswt.study.terrain import frames
 
 with logging_to(snakemake.log[0]):
-    bundle = store.read(Path(snakemake.input.manifest).parent, snakemake.params.schema)
+    bundle = store.read_bundle(Path(snakemake.input.manifest).parent, snakemake.params.schema)
     csv_tables.write_table(snakemake.output.table, frames.of_library(bundle, frames.Asked(**snakemake.params.asked)))

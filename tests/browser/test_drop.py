@@ -65,7 +65,7 @@ def test_a_dropped_bundle_takes_the_place_of_the_pages_own(visit, plain, page_of
 
 def test_a_gswt_zip_of_the_public_renderer_is_shown(visit, plain, other, tmp_path):
     manifest = json.loads((other / "davgswt.json").read_text())
-    gswt.write(Bundle(other, manifest).fields(), OTHER.side, tmp_path / "gswt.zip")
+    gswt.write_gswt(Bundle(other, manifest).fields(), OTHER.side, tmp_path / "gswt.zip")
     seen = visit(160, 100).open(f"{plain}?still")
     drop(seen, "gswt.zip", (tmp_path / "gswt.zip").read_bytes())
     seen.until("davgswt.state.opened === 2")
@@ -78,7 +78,7 @@ def test_a_gswt_zip_of_the_public_renderer_is_shown(visit, plain, other, tmp_pat
 def test_the_page_rounds_a_set_as_the_library_does(visit, plain):
     rng = np.random.default_rng(4)
     fields = [rounded_before(rng, n) for n in (40, 300)]
-    encoding = Encoding.of(fields, 4.0, 0.01)
+    encoding = Encoding.fit(fields, 4.0, 0.01)
     lists = [[bytes_of(f), *(v.ravel().tolist() for v in (f.means, f.log_scales, f.quats))] for f in fields]
     page = visit(160, 100).open(f"{plain}?still").page
     told, found = page.evaluate(
@@ -97,10 +97,10 @@ def test_the_page_rounds_a_set_as_the_library_does(visit, plain):
         }""",
         lists,
     )
-    for key, values in encoding.json().items():
+    for key, values in encoding.to_dict().items():
         np.testing.assert_allclose(told[key], values, rtol=1e-12, err_msg=key)
     for field, own in zip(fields, found, strict=True):
-        assert bytes(own) == encoding.encoded(field).tobytes()
+        assert bytes(own) == encoding.encode(field).tobytes()
 
 
 def rounded_before(rng, n: int) -> GaussianField:

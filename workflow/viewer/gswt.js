@@ -1,5 +1,5 @@
 // A gswt.zip: tiles as PLY files for the public GSWT renderer. It holds no orders, distances or surface, so these are
-// worked out here as the pipeline does for a bundle (dav_gswt/bundle/lod.py, orders.py), but for one number of
+// worked out here as the pipeline does for a bundle (dav_gswt/bundle/level_distances.py, orders.py), but for one number of
 // directions: what they cost is not measured.
 
 import { NAME } from "./bundle.js";

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dav_gswt.bundle import build, gswt, lod, manifest, store
+from dav_gswt.bundle import build, gswt, level_distances, manifest, store
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.terrain import endless, stills
@@ -43,32 +43,38 @@ def tiles():
 @pytest.fixture(scope="module")
 def bundle(tiles, tmp_path_factory):
     folder = tmp_path_factory.mktemp("bundle") / "b"
-    return folder, build.write_bundle(tiles, folder, build.Options(tau=0.5, salt=7), SCHEMA, {"from": "a test"})
+    return folder, build.write_bundle(tiles, folder, build.BundleOptions(tau=0.5, salt=7), SCHEMA, {"from": "a test"})
 
 
 def test_a_level_ends_where_the_next_one_has_its_size_in_pixels():
     # f = 960 / tan 30 degrees = 1662.77 px: 0.3 units cover 2 px at 249.4 units
-    table = lod.level_table([0.1, 0.3], pixels=2.0, band=0.1)
+    table = level_distances.compute_levels([0.1, 0.3], pixels=2.0, band=0.1)
     assert table[0]["distance"] == pytest.approx(249.415, abs=1e-3)
     assert table[0]["band"] == pytest.approx(24.9415, abs=1e-4)
     assert table[1]["distance"] is None
     # a scene in other units is the same scene
-    assert lod.level_table([1.0, 3.0], 2.0, 0.1)[0]["distance"] == pytest.approx(10 * table[0]["distance"])
+    assert level_distances.compute_levels([1.0, 3.0], 2.0, 0.1)[0]["distance"] == pytest.approx(
+        10 * table[0]["distance"]
+    )
     with pytest.raises(InputError, match="level 1"):
-        lod.level_table([0.1, 0.1], 1.0, 0.1)
+        level_distances.compute_levels([0.1, 0.1], 1.0, 0.1)
 
 
 def test_eye_floor_shows_the_nearest_disc_at_the_size_asked_for():
-    height = lod.eye_floor(spacing=0.01, pixels=8.0)
+    height = level_distances.compute_eye_floor(spacing=0.01, pixels=8.0)
     v = np.arctan(9 / 16 * np.tan(np.radians(30)))  # half of the picture's height
     ray = height / np.sin(np.radians(30) + v)  # to the ground at the picture's lower edge
     assert 0.01 * 1662.768775 / (ray * np.cos(v)) == pytest.approx(8.0)
-    assert lod.eye_floor(0.02, 8.0) == pytest.approx(2 * height) == pytest.approx(lod.eye_floor(0.01, 4.0))
+    assert (
+        level_distances.compute_eye_floor(0.02, 8.0)
+        == pytest.approx(2 * height)
+        == pytest.approx(level_distances.compute_eye_floor(0.01, 4.0))
+    )
 
 
 def test_a_bundle_reads_back_as_the_tiles_it_was_made_of(bundle, tiles):
     folder, written = bundle
-    read = store.read(folder, SCHEMA)
+    read = store.read_bundle(folder, SCHEMA)
     assert read.manifest == json.loads(json.dumps(written))
     error, along = written["error"], np.array(written["directions"])
     for number, tile in enumerate(read.manifest["tiles"]):
@@ -90,7 +96,7 @@ def test_a_bundle_reads_back_as_the_tiles_it_was_made_of(bundle, tiles):
 
 
 def test_the_terrain_of_a_bundle_is_that_of_its_tiles_but_for_the_rounding(bundle, tiles):
-    read = store.read(bundle[0], SCHEMA)
+    read = store.read_bundle(bundle[0], SCHEMA)
     rounded = endless.terrain_from_bundle(read, {"kind": "flat"})
     exact = endless.terrain_from_fields(tiles.fields, read.manifest, {"kind": "flat"})
     assert (rounded.side, rounded.tile_orders, rounded.z[0]) == (
@@ -116,7 +122,7 @@ def test_the_errors_stated_are_those_of_16_bytes(bundle):
 @pytest.mark.parametrize("threads", [1, 3])
 def test_the_same_tiles_give_the_same_bytes_whatever_the_threads(bundle, tiles, tmp_path, threads):
     folder, _ = bundle
-    options = build.Options(tau=0.5, salt=7, threads=threads)
+    options = build.BundleOptions(tau=0.5, salt=7, threads=threads)
     build.write_bundle(tiles, tmp_path / "again", options, SCHEMA, {"from": "a test"})
     names = sorted(p.relative_to(folder) for p in folder.rglob("*.*"))
     assert len(names) == 2 + 32
@@ -139,7 +145,7 @@ def test_the_zip_holds_what_the_public_renderer_reads(bundle, tiles):
 
 
 def test_the_zip_reads_back_as_the_tiles(bundle, tiles):
-    fields = gswt.read(bundle[0] / "gswt.zip", SIDE)
+    fields = gswt.read_gswt(bundle[0] / "gswt.zip", SIDE)
     assert [len(level) for level in fields] == [16, 16]
     for mine, source in zip(fields[1], tiles.fields[1], strict=True):
         np.testing.assert_allclose(mine.means, source.means, atol=1e-6)
@@ -180,14 +186,14 @@ def first(change):
 def test_an_archive_that_is_no_tile_set_is_refused(copy_of, change, message):
     rezipped(copy_of / "gswt.zip", change)
     with pytest.raises(InputError, match=message):
-        gswt.read(copy_of / "gswt.zip", SIDE)
+        gswt.read_gswt(copy_of / "gswt.zip", SIDE)
 
 
 def test_a_damaged_archive_is_refused_by_name(copy_of):
     path = copy_of / "gswt.zip"
     path.write_bytes(path.read_bytes()[:-50])
     with pytest.raises(InputError, match=r"gswt\.zip: not readable"):
-        gswt.read(path, SIDE)
+        gswt.read_gswt(path, SIDE)
 
 
 @pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
@@ -204,29 +210,29 @@ def test_what_each_method_says_of_damage_is_one_message(tmp_path, method, place)
         else whole[:start] + b"\xff" + whole[start + 1 :]
     )
     with pytest.raises(InputError, match=r"gswt\.zip: not readable"):
-        gswt.read(path, SIDE)
+        gswt.read_gswt(path, SIDE)
 
 
 def test_entries_with_other_names_are_skipped(copy_of):
     rezipped(copy_of / "gswt.zip", lambda entries: entries.append(("notes.txt", b"x")))
-    assert len(gswt.read(copy_of / "gswt.zip", SIDE)) == 2
+    assert len(gswt.read_gswt(copy_of / "gswt.zip", SIDE)) == 2
 
 
 def test_a_tile_without_splats_is_refused_and_nothing_is_left(tiles, tmp_path):
     fields = [list(level) for level in tiles.fields]
     fields[0][3] = fields[0][3][:0]
     with pytest.raises(InputError, match="level 0, tile 3"):
-        gswt.write(fields, SIDE, tmp_path / "gswt.zip")
+        gswt.write_gswt(fields, SIDE, tmp_path / "gswt.zip")
     broken = TileSet(**{**vars(tiles), "fields": fields})
     with pytest.raises(InputError):
-        build.write_bundle(broken, tmp_path / "b", build.Options(tau=0.5), SCHEMA, {})
+        build.write_bundle(broken, tmp_path / "b", build.BundleOptions(tau=0.5), SCHEMA, {})
     assert not (tmp_path / "b").exists() and not (tmp_path / ".b.part").exists()
 
 
 def test_more_splats_than_the_renderer_takes_are_refused(tiles, tmp_path, monkeypatch):
     monkeypatch.setattr(gswt, "MOST", 100)
     with pytest.raises(InputError, match="the renderer takes 100"):
-        gswt.write(tiles.fields, SIDE, tmp_path / "gswt.zip")
+        gswt.write_gswt(tiles.fields, SIDE, tmp_path / "gswt.zip")
 
 
 def test_a_new_bundle_replaces_the_old_one_and_leaves_its_neighbours(tiles, tmp_path):
@@ -234,7 +240,7 @@ def test_a_new_bundle_replaces_the_old_one_and_leaves_its_neighbours(tiles, tmp_
     (out / "chunks").mkdir(parents=True)
     (out / "chunks" / "stale.bin").write_bytes(b"x")
     (out / "terrain").mkdir()
-    build.write_bundle(tiles, out, build.Options(tau=1.0), SCHEMA, {})
+    build.write_bundle(tiles, out, build.BundleOptions(tau=1.0), SCHEMA, {})
     assert sorted(p.name for p in out.iterdir()) == ["chunks", "davgswt.json", "gswt.zip", "terrain"]
     assert not (out / "chunks" / "stale.bin").exists()
 
@@ -303,7 +309,7 @@ def huge(value):
 def test_a_spoilt_bundle_is_refused_by_name(copy_of, spoil, message):
     spoil(copy_of)
     with pytest.raises(InputError, match=message):
-        store.read(copy_of, SCHEMA).chunk(0, 0)
+        store.read_bundle(copy_of, SCHEMA).chunk(0, 0)
 
 
 def cut(folder, end, more=b""):
@@ -314,7 +320,7 @@ def cut(folder, end, more=b""):
 def test_a_manifest_as_large_as_no_manifest_is_not_read(copy_of, monkeypatch):
     monkeypatch.setattr(manifest, "LARGEST", 1000)
     with pytest.raises(InputError, match="bytes are no manifest"):
-        store.read(copy_of, SCHEMA)
+        store.read_bundle(copy_of, SCHEMA)
 
 
 @pytest.mark.parametrize(
@@ -337,4 +343,4 @@ def test_a_manifest_that_contradicts_itself_or_its_schema_is_refused(bundle, key
     value = copy.deepcopy(bundle[1])
     change(value)
     with pytest.raises(InputError, match=f"(?i){key}"):
-        manifest.check(value, SCHEMA)
+        manifest.check_manifest(value, SCHEMA)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from dav_gswt.bundle.encoding import SIZES, STEEPEST, Encoding, Errors, smallest_turns
+from dav_gswt.bundle.encoding import MAX_COMPONENT, SCALE_STEPS, Encoding, EncodingErrors, find_smallest_rotations
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, rgb_to_sh
 
@@ -39,14 +39,14 @@ def test_a_splat_is_stored_as_its_16_bytes():
     # a quarter turn about z is none with x and y swapped
     turned = field_of([[0.5, 2, 3]], [[np.exp(-2), 1, np.exp(-1)]], [[-2, 0, 0, 2]], 0.5, [[1, 0.5, 0]])
     corners = field_of([[0, 0, 1], [2, 2, 5]], np.exp([[-2.0] * 3, [0.0] * 3]))
-    coding = Encoding.of([turned, corners], SIDE, PIXEL)
+    coding = Encoding.fit([turned, corners], SIDE, PIXEL)
     assert coding.origin == [0, 0, 1] and coding.step == [2 / 65535, 2 / 65535, pytest.approx(4 / 65535)]
     assert coding.log_scale == [pytest.approx(-2), pytest.approx(2 / 255)]
     # 0.5 of 2: 16383.75, the top, half-way up (to even); 0, -2, -1 of -2 to 0; no turn; 255, 127.5 to even, 0, 127.5
     expected = np.uint16([16384, 65535, 32768]).astype("<u2").tobytes() + bytes([255, 0, 128])
     expected += bytes([127, 127, 127]) + bytes([255, 128, 0, 128])
-    assert coding.encoded(turned).tobytes() == expected
-    back = coding.decoded(coding.encoded(turned))
+    assert coding.encode(turned).tobytes() == expected
+    back = coding.decode(coding.encode(turned))
     np.testing.assert_allclose(
         covariance(back.quats, back.log_scales)[0], np.diag([1, np.exp(-4), np.exp(-2)]), rtol=0.01
     )
@@ -56,18 +56,18 @@ def test_a_splat_is_stored_as_its_16_bytes():
 def test_the_smallest_turn_is_the_same_ellipsoid_within_an_eighth_of_a_turn(seed):
     rng = np.random.default_rng(seed)
     quats, sizes = rng.normal(size=(20, 4)), rng.normal(size=(20, 3))
-    turn, axes = smallest_turns(quats)
+    turn, axes = find_smallest_rotations(quats)
     np.testing.assert_allclose(
         covariance(turn, np.take_along_axis(sizes, axes, 1)), covariance(quats, sizes), rtol=1e-9
     )
-    assert (turn[:, 0] > 0).all() and np.abs(turn[:, 1:]).max() <= STEEPEST + 1e-9
-    same, _ = smallest_turns(-7 * quats)
+    assert (turn[:, 0] > 0).all() and np.abs(turn[:, 1:]).max() <= MAX_COMPONENT + 1e-9
+    same, _ = find_smallest_rotations(-7 * quats)
     np.testing.assert_allclose(same, turn, atol=1e-12)
 
 
 def test_no_turn_has_no_axes():
     with pytest.raises(ValueError, match="quaternion 1 has length 0"):
-        smallest_turns(np.array([[1.0, 0, 0, 0], [0, 0, 0, 0]]))
+        find_smallest_rotations(np.array([[1.0, 0, 0, 0], [0, 0, 0, 0]]))
 
 
 @settings(max_examples=60)
@@ -84,9 +84,9 @@ def test_what_is_read_back_errs_no_more_than_is_stated(seed, count, height, size
     deviations = 10 ** rng.uniform(*sizes, (count, 3))
     opacities = rng.choice([0.0, 1.0, 0.3, rng.random()], count)
     field = field_of(means, deviations, rng.normal(size=(count, 4)), opacities, rng.uniform(-0.2, 1.2, (count, 3)))
-    coding = Encoding.of([field], SIDE, PIXEL)
-    rows = coding.encoded(field)
-    told, back = Errors.of(coding, field, rows, PIXEL), coding.decoded(rows)
+    coding = Encoding.fit([field], SIDE, PIXEL)
+    rows = coding.encode(field)
+    told, back = EncodingErrors.measure(coding, field, rows, PIXEL), coding.decode(rows)
     assert all(
         np.isfinite(getattr(back, name)).all() for name in ("means", "log_scales", "quats", "opacity_logits", "sh")
     )
@@ -94,7 +94,7 @@ def test_what_is_read_back_errs_no_more_than_is_stated(seed, count, height, size
     room = 0.5 * np.array(coding.step) + 1e-7 * np.abs(field.means).max(0) + 1e-12
     away = np.abs(back.means.astype(float) - field.means)
     assert (away <= room).all() and np.linalg.norm(away, axis=1).max() <= told.position * (1 + 1e-9)
-    turn, axes = smallest_turns(field.quats)
+    turn, axes = find_smallest_rotations(field.quats)
     exact, read = (Rotation.from_quat(q.astype(float), scalar_first=True) for q in (turn, back.quats))
     assert np.degrees((exact.inv() * read).magnitude()).max() <= told.angle_degrees + 1e-5 <= 0.38
     wanted = np.take_along_axis(field.log_scales.astype(float), axes, 1)
@@ -113,9 +113,9 @@ def test_gaussians_that_meet_across_a_border_are_moved_alike():
     means = rng.uniform(-0.2, SIDE + 0.3, (500, 3))
     here = field_of(means, np.full((500, 3), 0.1))
     beside = field_of(means - [SIDE, 0, 0], np.full((500, 3), 0.1))
-    coding = Encoding.of([here, beside], SIDE, PIXEL)
+    coding = Encoding.fit([here, beside], SIDE, PIXEL)
     assert SIDE / coding.step[0] == pytest.approx(round(SIDE / coding.step[0]), abs=1e-9)
-    left, right = (coding.decoded(coding.encoded(field)).means.astype(float) for field in (here, beside))
+    left, right = (coding.decode(coding.encode(field)).means.astype(float) for field in (here, beside))
     moved = np.abs(left - [SIDE, 0, 0] - right).max(1)
     # equal but where float32 rounds the source to the other side of half a step
     assert (moved < 1e-6).mean() > 0.98 and moved.max() <= coding.step[0] + 1e-6
@@ -123,20 +123,20 @@ def test_gaussians_that_meet_across_a_border_are_moved_alike():
 
 def test_a_side_s_both_ends_are_places_of_the_grid():
     field = field_of([[0, 0, 0], [SIDE, SIDE, 0], [-0.3, 1, 0]], np.full((3, 3), 0.1))
-    coding = Encoding.of([field], SIDE, PIXEL)
-    np.testing.assert_allclose(coding.decoded(coding.encoded(field)).means[:2], field.means[:2], atol=1e-7)
+    coding = Encoding.fit([field], SIDE, PIXEL)
+    np.testing.assert_allclose(coding.decode(coding.encode(field)).means[:2], field.means[:2], atol=1e-7)
 
 
 def test_a_ladder_of_one_size_has_one_rung():
     field = field_of([[1, 1, 0]], [[0.1] * 3])
-    coding = Encoding.of([field], SIDE, PIXEL)
+    coding = Encoding.fit([field], SIDE, PIXEL)
     assert coding.log_scale[1] == 0 and coding.step[2] == 0
-    back = coding.decoded(coding.encoded(field))
+    back = coding.decode(coding.encode(field))
     np.testing.assert_allclose(back.log_scales, field.log_scales, atol=1e-6)
-    assert SIZES == 255
+    assert SCALE_STEPS == 255
 
 
 def test_a_splat_miles_from_its_tile_is_refused():
     field = field_of([[1, 1, 0], [1e4, 1, 0]], np.full((2, 3), 0.1))
     with pytest.raises(InputError, match="5000 tile sides"):
-        Encoding.of([field], SIDE, PIXEL)
+        Encoding.fit([field], SIDE, PIXEL)

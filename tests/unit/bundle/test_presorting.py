@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dav_gswt.bundle import direction_search, order_directions, orders
-from dav_gswt.bundle.orders import Rings
+from dav_gswt.bundle.orders import DirectionRings
 from dav_gswt.field import GaussianField, rgb_to_sh
 
 SIDE = 2.0
@@ -32,7 +32,7 @@ def ground(seed, stones=300, colours=1.0):
 
 
 def test_directions_start_in_the_east_go_north_and_end_straight_down():
-    found = Rings((20.0, 45.0), 16).directions()
+    found = DirectionRings((20.0, 45.0), 16).directions()
     down = np.radians(20)
     np.testing.assert_allclose(found[0], [np.cos(down), 0, -np.sin(down)], atol=1e-15)
     np.testing.assert_allclose(found[4], [0, np.cos(down), -np.sin(down)], atol=1e-15)
@@ -42,31 +42,31 @@ def test_directions_start_in_the_east_go_north_and_end_straight_down():
 
 
 def test_tau_zero_keeps_every_tile_deep_tau_one_none_and_it_never_rises():
-    rings = Rings()
+    rings = DirectionRings()
     for u in (0.0, 0.3, 1.0):
-        assert len(rings.kept(u, 0.0)) == 17 and len(rings.kept(u, 1.0)) == 9
-        counts = [len(rings.kept(u, tau)) for tau in (0.0, 0.2, 0.3, 0.31, 0.9, 1.0)]
+        assert len(rings.select(u, 0.0)) == 17 and len(rings.select(u, 1.0)) == 9
+        counts = [len(rings.select(u, tau)) for tau in (0.0, 0.2, 0.3, 0.31, 0.9, 1.0)]
         assert counts == sorted(counts, reverse=True)
-    assert rings.kept(0.1, 0.5) == [0, 2, 4, 6, 8, 10, 12, 14, 16]
-    assert Rings((20.0, 45.0), 8).kept(0.1, 0.5) == [0, 2, 4, 6, 8, 10, 12, 14, 16]
+    assert rings.select(0.1, 0.5) == [0, 2, 4, 6, 8, 10, 12, 14, 16]
+    assert DirectionRings((20.0, 45.0), 8).select(0.1, 0.5) == [0, 2, 4, 6, 8, 10, 12, 14, 16]
     with pytest.raises(ValueError, match="uncertainty"):
-        rings.kept(float("nan"), 0.5)
+        rings.select(float("nan"), 0.5)
 
 
 def test_order_runs_from_back_to_front_and_is_stable():
     means = np.float32([[0, 0, 0], [2, 0, 5], [1, 0, 0], [2, 9, 0]])
     # looking east the largest x is at the back; 1 and 3 are equally deep
     along = np.array([[1.0, 0, 0], [0, 0, -1]])
-    assert orders.presorted(means, along).tolist() == [[1, 3, 2, 0], [0, 2, 3, 1]]
-    assert [orders.back_to_front(means, a).tolist() for a in along] == [[1, 3, 2, 0], [0, 2, 3, 1]]
+    assert orders.presort(means, along).tolist() == [[1, 3, 2, 0], [0, 2, 3, 1]]
+    assert [orders.sort_back_to_front(means, a).tolist() for a in along] == [[1, 3, 2, 0], [0, 2, 3, 1]]
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 300), st.sampled_from([0.0, 1e-30, 1.0, 1e30]))
 def test_orders_are_permutations_by_depth_to_a_65535th(seed, count, size):
     rng = np.random.default_rng(seed)
     means = (size * rng.normal(size=(count, 3))).astype(np.float32)
-    along = Rings((45.0,), 4).directions()
-    found = orders.presorted(means, along)
+    along = DirectionRings((45.0,), 4).directions()
+    found = orders.presort(means, along)
     assert found.dtype == np.uint16 and (np.sort(found, axis=1) == np.arange(count)).all()
     for order, direction in zip(found, along, strict=True):
         depth = means[order].astype(float) @ direction
@@ -79,49 +79,56 @@ def test_so_many_splats_as_two_bytes_count_need_four():
     assert orders.index_type(65535).itemsize == 2 and orders.index_type(65536).itemsize == 4
     means = np.zeros((65536, 3), np.float32)
     means[:, 0] = np.arange(65536)
-    found = orders.presorted(means, np.array([[1.0, 0, 0]]))
+    found = orders.presort(means, np.array([[1.0, 0, 0]]))
     assert found.dtype == np.uint32 and found[0, 0] == 65535 and (np.sort(found[0]) == np.arange(65536)).all()
 
 
 @given(st.floats(-np.pi, np.pi), st.floats(0, 90), st.sampled_from([(20.0,), (20.0, 45.0)]))
 def test_with_more_directions_the_nearest_is_never_farther(azimuth, down, elevations):
-    to = orders.towards(np.array([azimuth]), np.radians(down))[0]
-    nearest = [(Rings(elevations, n).directions() @ to).max() for n in (4, 8, 16, 32, 64)]
-    nearest.append((Rings((5.0, *elevations), 64).directions() @ to).max())
+    to = orders.unit_vectors(np.array([azimuth]), np.radians(down))[0]
+    nearest = [(DirectionRings(elevations, n).directions() @ to).max() for n in (4, 8, 16, 32, 64)]
+    nearest.append((DirectionRings((5.0, *elevations), 64).directions() @ to).max())
     assert (np.diff(nearest) >= -1e-12).all()
 
 
 def test_with_more_directions_a_picture_is_never_worse():
     fields = [ground(seed) for seed in range(4)]
     views = [(down, 7 + 360 * k / 23) for down in order_directions.ELEVATIONS.values() for k in range(23)]
-    sample = [order_directions.Sight(k % 4, azimuth, down) for k, (down, azimuth) in enumerate(views)]
+    sample = [order_directions.TileView(k % 4, azimuth, down) for k, (down, azimuth) in enumerate(views)]
     told = []
     for azimuths in (4, 8, 16, 64):
-        along = Rings(tuple(order_directions.ELEVATIONS.values()), azimuths).directions()
+        along = DirectionRings(tuple(order_directions.ELEVATIONS.values()), azimuths).directions()
         told.append(
-            order_directions.decibels([direction_search.in_two_orders(fields[s.tile], SIDE, s, along) for s in sample])
+            order_directions.compute_psnr(
+                [direction_search.render_in_two_orders(fields[s.tile], SIDE, s, along) for s in sample]
+            )
         )
     assert told == sorted(told) and told[-1] > told[0] + 3
 
 
 def test_a_picture_in_its_own_order_is_the_rasterizer_s():
-    field, sight = ground(1), order_directions.Sight(0, 37.0, 45.0)
-    exact, same = (order_directions.drawn(field, SIDE, sight.direction, 0.01, o) for o in (None, sight.direction))
+    field, sight = ground(1), order_directions.TileView(0, 37.0, 45.0)
+    exact, same = (
+        order_directions.render_in_order(field, SIDE, sight.direction, 0.01, o) for o in (None, sight.direction)
+    )
     assert (exact == same).all() and exact.max() > 0.5
-    backwards = order_directions.drawn(field, SIDE, sight.direction, 0.01, -sight.direction)
+    backwards = order_directions.render_in_order(field, SIDE, sight.direction, 0.01, -sight.direction)
     assert np.abs(backwards - exact).max() > 0.1
 
 
 def test_one_colour_needs_the_fewest_directions():
-    found = direction_search.climbed([ground(0, colours=0.0)], SIDE, 40.0)
-    assert found.rings == Rings((20.0,), 2 * direction_search.FEWEST) and set(found.decibels) == {"walker", "oblique"}
+    found = direction_search.search_directions([ground(0, colours=0.0)], SIDE, 40.0)
+    assert found.rings == DirectionRings((20.0,), 2 * direction_search.MIN_AZIMUTHS) and set(found.decibels) == {
+        "walker",
+        "oblique",
+    }
 
 
 def test_directions_are_added_until_the_error_is_small_or_the_room_is_full():
     fields = [ground(seed) for seed in range(2)]
     wanted = [15.0, 25.0, 60.0]
-    found = [direction_search.climbed(fields, SIDE, w) for w in wanted]
-    counts = [len(f.rings.kept(0.0, 1.0)) for f in found]
-    assert counts == sorted(counts) and counts[0] < counts[-1] <= direction_search.MOST
+    found = [direction_search.search_directions(fields, SIDE, w) for w in wanted]
+    counts = [len(f.rings.select(0.0, 1.0)) for f in found]
+    assert counts == sorted(counts) and counts[0] < counts[-1] <= direction_search.MAX_ORDERS
     assert min(found[0].decibels.values()) >= 15.0
     assert min(found[-1].decibels.values()) < 60.0, "no room for what this asks for"

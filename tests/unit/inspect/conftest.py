@@ -13,7 +13,7 @@ def drawable():
     pytest.importorskip("pyvista", reason="the extra inspect is not installed")
     pytest.importorskip("trame_vtk", reason="the extra inspect is not installed")
     try:
-        saving.prepare()
+        saving.prepare_rendering()
     except InputError as error:
         pytest.skip(str(error))
 

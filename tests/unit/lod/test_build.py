@@ -4,17 +4,18 @@ import numpy as np
 import pytest
 from fixtures import ground as made
 
+from dav_gswt import field as field_module
 from dav_gswt.errors import InputError
-from dav_gswt.field import mean_scale, write_field
 from dav_gswt.geometry import cameras
 from dav_gswt.lod import build, merge, store
+from dav_gswt.lod.levels import AUTO, Levels
 from dav_gswt.raster import render
 
 
 @pytest.fixture(scope="module")
 def levels():
-    field, grid = merge.cropped(made.field(), made.grid(), 4)
-    coarse = build.coarser(field, grid, 12, np.random.default_rng(0))
+    field, grid = merge.crop_to_blocks(made.field(), made.grid(), 4)
+    coarse = build.fit_coarser_level(field, grid, 12, np.random.default_rng(0))
     return (field, grid), coarse
 
 
@@ -26,13 +27,13 @@ def test_a_coarser_level_has_a_quarter_of_the_discs_and_a_larger_mean_scale(leve
 
 
 def test_discs_keep_the_mean_heights_of_what_they_cover():
-    field, grid = merge.cropped(made.field(), made.grid(), 4)
+    field, grid = merge.crop_to_blocks(made.field(), made.grid(), 4)
     hills = 0.1 * np.sin(5 * grid.centres[:, 0])
     n = grid.heights.size
     means = field.means.copy()
     means[:n, 2] += hills.astype(np.float32)
     grid = replace(grid, heights=grid.heights + hills.reshape(grid.shape))
-    level, coarse = build.coarser(replace(field, means=means), grid, 5, np.random.default_rng(0))
+    level, coarse = build.fit_coarser_level(replace(field, means=means), grid, 5, np.random.default_rng(0))
     rows, columns = coarse.shape
     four = grid.heights.reshape(rows, 2, columns, 2).mean((1, 3))
     np.testing.assert_allclose(level.means[: four.size, 2].reshape(four.shape), four, atol=1e-6)
@@ -40,34 +41,34 @@ def test_discs_keep_the_mean_heights_of_what_they_cover():
 
 def test_levels_are_fitted_while_the_exemplar_has_room():
     field, grid = made.field(), made.grid()
-    made_levels = build.fitted(field, grid, build.AUTO, 3, seed=0)
+    made_levels = build.build_levels(field, grid, AUTO, 3, seed=0)
     widths = [g.cells for g in made_levels.grids]
     assert widths == [grid.cells >> number for number in range(len(widths))] and len(widths) > 1
-    assert widths[-1] < 2 * build.ROOM and made_levels.wanted == build.AUTO
-    scales = [mean_scale([f]) for f in made_levels.fields]
+    assert widths[-1] < 2 * build.MIN_CELLS and made_levels.wanted == AUTO
+    scales = [field_module.mean_scale([f]) for f in made_levels.fields]
     assert scales == sorted(scales) and "tiles make it" in made_levels.stopped
-    two = build.fitted(field, grid, 2, 3, seed=0)
+    two = build.build_levels(field, grid, 2, 3, seed=0)
     assert len(two.fields) == 2 and two.wanted == 2
 
 
 def test_a_level_that_saves_nothing_is_not_made(monkeypatch):
     field, grid = made.field(), made.grid()
     monkeypatch.setattr(build, "SAVES", 0.1)  # a quarter is left
-    alone = build.fitted(field, grid, build.AUTO, 1, seed=0)
+    alone = build.build_levels(field, grid, AUTO, 1, seed=0)
     assert len(alone.fields) == 1 and alone.wanted == 1 and "saves too little" in alone.stopped
-    assert len(build.fitted(field, grid, 2, 1, seed=0).fields) == 2  # but where it is asked for
+    assert len(build.build_levels(field, grid, 2, 1, seed=0).fields) == 2  # but where it is asked for
 
 
 def test_levels_that_were_written_read_back(levels, tmp_path):
     fields, grids = zip(*levels, strict=True)
-    store.write(build.Levels(list(fields), list(grids), build.AUTO, "why"), tmp_path / "levels", {})
-    back = store.read(tmp_path / "levels")
-    assert back.wanted == build.AUTO and back.stopped == "why" and len(back.fields) == 2
+    store.write_levels(Levels(list(fields), list(grids), AUTO, "why"), tmp_path / "levels", {})
+    back = store.read_levels(tmp_path / "levels")
+    assert back.wanted == AUTO and back.stopped == "why" and len(back.fields) == 2
     np.testing.assert_array_equal(back.fields[1].means, fields[1].means)
     assert back.grids[1].spacing == grids[1].spacing
-    write_field(fields[0], tmp_path / "levels/level1.ply")
+    field_module.write_field(fields[0], tmp_path / "levels/level1.ply")
     with pytest.raises(InputError, match="levels.json tells of"):
-        store.read(tmp_path / "levels")
+        store.read_levels(tmp_path / "levels")
 
 
 def test_from_afar_a_coarser_level_looks_like_its_finer_neighbour(levels):
@@ -82,7 +83,7 @@ def test_from_afar_a_coarser_level_looks_like_its_finer_neighbour(levels):
 def test_a_finished_field_gets_a_ground_on_its_first_coarser_level():
     field, grid = made.field(), made.grid()
     finished = replace(field, ground=np.zeros(len(field), bool))
-    half, coarse = merge.halved(*merge.cropped(finished, grid, 2))
+    half, coarse = merge.halve_resolution(*merge.crop_to_blocks(finished, grid, 2))
     assert half.ground.sum() == coarse.heights.size
     inner = np.arange(coarse.heights.size).reshape(coarse.shape)[2:-2, 2:-2].ravel()
     true = made.look(*half.means[inner, :2].T)

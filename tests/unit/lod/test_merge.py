@@ -35,15 +35,15 @@ def things(n, seed=0):
 
 def test_a_crop_keeps_discs_and_grid_in_step_and_the_exemplar_in_place(scene):
     field, grid = scene
-    small, cut = merge.cropped(field, grid, 8)
+    small, cut = merge.crop_to_blocks(field, grid, 8)
     assert cut.first_row % 8 == cut.first_column % 8 == 0
     assert cut.exemplar == pytest.approx(grid.exemplar)
     np.testing.assert_allclose(small.means[: cut.heights.size, :2], cut.centres[:, :2], atol=1e-5)
 
 
 def test_four_discs_become_one_of_their_mean(scene):
-    field, grid = merge.cropped(*scene, 8)
-    half, coarse = merge.halved(field, grid)
+    field, grid = merge.crop_to_blocks(*scene, 8)
+    half, coarse = merge.halve_resolution(field, grid)
     n = coarse.heights.size
     assert 4 * n == grid.heights.size
     assert coarse.spacing == pytest.approx(2 * grid.spacing)
@@ -56,9 +56,9 @@ def test_four_discs_become_one_of_their_mean(scene):
 
 def test_merging_one_gaussian_gives_it_back():
     one = things(1)
-    back = merge.merged(one, voxel=0.5)
+    back = merge.merge_by_voxel(one, voxel=0.5)
     np.testing.assert_allclose(back.means, one.means, atol=1e-6)
-    np.testing.assert_allclose(merge.covariances(back), merge.covariances(one), rtol=1e-4, atol=1e-7)
+    np.testing.assert_allclose(merge.compute_covariances(back), merge.compute_covariances(one), rtol=1e-4, atol=1e-7)
     np.testing.assert_allclose(back.opacity_logits, one.opacity_logits, atol=1e-4)
     np.testing.assert_allclose(back.sh, one.sh, atol=1e-5)
 
@@ -68,20 +68,20 @@ def test_merged_moments_are_those_of_the_mixture():
     upright = np.tile(np.array([1, 0, 0, 0], np.float32), (2, 1))
     a = replace(a, means=np.array([[0.1, 0, 0], [0.3, 0, 0]], np.float32), quats=upright)
     a = replace(a, log_scales=np.full((2, 3), np.log(0.05), np.float32), opacity_logits=np.zeros(2, np.float32))
-    back = merge.merged(a, voxel=1.0)
+    back = merge.merge_by_voxel(a, voxel=1.0)
     np.testing.assert_allclose(back.means, [[0.2, 0, 0]], atol=1e-6)
     # variance along x: 0.05^2 + 0.1^2, across: 0.05^2
-    np.testing.assert_allclose(np.diag(merge.covariances(back)[0]), [0.0125, 0.0025, 0.0025], rtol=1e-4)
+    np.testing.assert_allclose(np.diag(merge.compute_covariances(back)[0]), [0.0125, 0.0025, 0.0025], rtol=1e-4)
 
 
 def test_merging_does_not_depend_on_the_order(scene):
     many = things(50, seed=3)
     turned = many[np.random.default_rng(0).permutation(50)]
-    a, b = merge.merged(many, 0.5), merge.merged(turned, 0.5)
+    a, b = merge.merge_by_voxel(many, 0.5), merge.merge_by_voxel(turned, 0.5)
     np.testing.assert_allclose(a.means, b.means, atol=1e-6)
     np.testing.assert_allclose(a.opacity_logits, b.opacity_logits, atol=1e-5)
     assert len(a) < 50
 
 
 def test_nothing_merges_to_nothing():
-    assert len(merge.merged(things(1)[:0], 0.5)) == 0
+    assert len(merge.merge_by_voxel(things(1)[:0], 0.5)) == 0

@@ -29,7 +29,7 @@ def test_cells_stand_in_the_order_shared_with_the_page(entry):
 
 def test_orders_are_those_shared_with_the_page():
     along = np.array(GOLDEN["along"])
-    np.testing.assert_allclose(along, orders.Rings().directions(), atol=1e-15)
+    np.testing.assert_allclose(along, orders.DirectionRings().directions(), atol=1e-15)
     for entry in GOLDEN["orders"]:
         to, slope = np.array(entry["to"], float), np.array(entry["slope"], float)
         assert draw_order.nearest_order(along, entry["kept"], to, slope) == entry["position"]
@@ -72,7 +72,7 @@ def test_the_cells_about_the_eye_are_nine():
 
 
 def test_on_level_ground_the_nearest_direction_is_that_of_the_least_angle():
-    along = orders.Rings().directions()
+    along = orders.DirectionRings().directions()
     east = np.array([1.0, 0.0, -np.tan(np.radians(20.0))])
     assert draw_order.nearest_order(along, list(range(17)), east, np.zeros(2)) == 0
     assert draw_order.nearest_order(along, [8, 16, 4, 0], east, np.zeros(2)) == 3, "a position in what is kept"
@@ -83,7 +83,7 @@ def test_on_level_ground_the_nearest_direction_is_that_of_the_least_angle():
 def test_on_a_slope_the_order_is_that_of_the_slope(east, north, seed):
     """Seen along one of the directions' images under J^-T, depths on the slope are that direction's on level ground."""
     rng = np.random.default_rng(seed)
-    along, which = orders.Rings().directions(), int(rng.integers(17))
+    along, which = orders.DirectionRings().directions(), int(rng.integers(17))
     flat = rng.normal(size=(30, 3))
     slope = np.array([east, north])
     draped = flat + (flat[:, :2] @ slope)[:, None] * [0, 0, 1]

@@ -30,7 +30,7 @@ def tile():
 
 
 def test_four_discs_become_one_of_their_means(tile):
-    half = coarse_levels.coarser(tile, CELLS, SPACING)
+    half = coarse_levels.merge_cells(tile, CELLS, SPACING)
     flat, fine = half[half.ground], tile[tile.ground]
     assert len(flat) == CELLS**2 // 4
     for disc in (0, 9, 37):
@@ -44,11 +44,11 @@ def test_four_discs_become_one_of_their_means(tile):
 
 
 def test_the_underlay_is_renewed_and_nothing_else_is_taken_for_it(tile):
-    assert coarse_levels.underneath(tile, SPACING).sum() == CELLS**2 // 4
-    half = coarse_levels.coarser(tile, CELLS, SPACING)
-    assert coarse_levels.underneath(half, 2 * SPACING).sum() == CELLS**2 // 16
-    bare = coarse_levels.coarser(tile[~coarse_levels.underneath(tile, SPACING)], CELLS, SPACING)
-    assert not coarse_levels.underneath(bare, 2 * SPACING).any() and bare.ground.sum() == half.ground.sum()
+    assert coarse_levels.find_underlay(tile, SPACING).sum() == CELLS**2 // 4
+    half = coarse_levels.merge_cells(tile, CELLS, SPACING)
+    assert coarse_levels.find_underlay(half, 2 * SPACING).sum() == CELLS**2 // 16
+    bare = coarse_levels.merge_cells(tile[~coarse_levels.find_underlay(tile, SPACING)], CELLS, SPACING)
+    assert not coarse_levels.find_underlay(bare, 2 * SPACING).any() and bare.ground.sum() == half.ground.sum()
 
 
 def test_each_level_is_a_coarser_and_smaller_one_as_bright_as_the_one_before(tile):
@@ -56,13 +56,13 @@ def test_each_level_is_a_coarser_and_smaller_one_as_bright_as_the_one_before(til
     camera = cameras.top_down(0.5, 0.5, 48, 48, 3.0 / 48, 50.0)
     means, counts, scales = [], [], []
     # things hide ground by chance: brightness is compared without them
-    level = tile[tile.ground | coarse_levels.underneath(tile, SPACING)]
+    level = tile[tile.ground | coarse_levels.find_underlay(tile, SPACING)]
     for number in range(3):
         seen = Rasterizer().forward(**to_raster_arrays(level), camera=camera)
         means.append((seen.colour / seen.alpha[..., None]).mean((0, 1)))
         counts.append(len(level))
         scales.append(np.exp(level.log_scales.astype(float)).mean())
-        level = coarse_levels.coarser(level, CELLS >> number, SPACING * 2**number)
+        level = coarse_levels.merge_cells(level, CELLS >> number, SPACING * 2**number)
     assert scales[0] < scales[1] < scales[2] and counts[0] == 4 * counts[1] == 16 * counts[2]
     # uniform noise of 0.17 a disc, averaged over 12 x 12: 0.015 at three standard deviations with the rim's share
     np.testing.assert_allclose(means, [means[0]] * 3, atol=0.015)
@@ -70,20 +70,20 @@ def test_each_level_is_a_coarser_and_smaller_one_as_bright_as_the_one_before(til
 
 def test_a_cell_without_a_disc_stays_empty(tile):
     inside = (tile.means[:, :2] < 2 * SPACING).all(1) & tile.ground
-    half = coarse_levels.coarser(tile[~inside], CELLS, SPACING)
+    half = coarse_levels.merge_cells(tile[~inside], CELLS, SPACING)
     assert half.ground.sum() == CELLS**2 // 4 - 1 and np.isfinite(half.means).all()
 
 
 @pytest.mark.parametrize("cells", [7, 2, 0])
 def test_cells_that_do_not_halve_are_refused(tile, cells):
     with pytest.raises(ValueError, match=f"{cells} cells"):
-        coarse_levels.coarser(tile, cells, SPACING)
+        coarse_levels.merge_cells(tile, cells, SPACING)
 
 
 @pytest.fixture(scope="module")
 def five(made_up):
     """Tiles at five levels, of which the exemplar gives three."""
-    options = build.Options(share=0.5, strip=0.17, candidates=20, tries=1, levels=5)
+    options = build.TilingOptions(share=0.5, strip=0.17, candidates=20, tries=1, levels=5)
     return build.cut_tiles(
         made_up.levels, made_up.exemplar, made_up.colour, np.zeros((96, 96)), options, np.random.default_rng(2)
     )

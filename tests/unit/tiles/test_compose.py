@@ -7,7 +7,7 @@ import pytest
 
 from dav_gswt.errors import InputError
 from dav_gswt.tiles import build, compose, store
-from dav_gswt.tiles.layout import CENTRE, colours
+from dav_gswt.tiles.layout import CENTRE, edge_colours
 
 
 def cells(field, spacing):
@@ -51,7 +51,7 @@ def test_a_strip_goes_on_over_the_border_as_one_piece_of_the_exemplar(tiles, mad
     """The two halves of a vertical strip, seen in two tiles, are neighbours in the exemplar."""
     n, columns = tiles.labels.shape[1], made_up.exemplar.cells
     left, right = 2, 8  # E = 1 of the one is W = 1 of the other
-    assert colours(left)[2] == colours(right)[0] == 1
+    assert edge_colours(left)[2] == edge_colours(right)[0] == 1
     rows = np.arange(n)
     source = [
         tiles.shifts[tile][tiles.labels[tile][rows, x]] + np.stack([np.full(n, x), rows], 1)
@@ -87,16 +87,16 @@ def test_levelling_vanishes_at_the_border_in_value_and_slope():
 
 def test_a_coarse_cell_takes_the_label_of_most_of_its_cells():
     labels = np.array([[1, 1, 0, 2], [1, 3, 2, 0]], np.uint8)
-    np.testing.assert_array_equal(compose.coarser(np.concatenate([labels, labels]), 2), [[1, 0], [1, 0]])
+    np.testing.assert_array_equal(compose.coarsen_labels(np.concatenate([labels, labels]), 2), [[1, 0], [1, 0]])
 
 
 def test_things_follow_the_cell_under_their_centre(made_up):
-    level = compose.binned(made_up.levels[0], made_up.exemplar, 1)
+    level = compose.bin_gaussians(made_up.levels[0], made_up.exemplar, 1)
     n, shift = 8, np.zeros((9, 2), int)
     shift[1] = [16, 4]
     labels = np.zeros((n, n), np.uint8)
     labels[:, 4:] = 1
-    tile = compose.composed(level, labels, shift)
+    tile = compose.compose_tile(level, labels, shift)
     found = tile[~tile.ground].means[:, :2].astype(float)
     field, e = made_up.levels[0], made_up.exemplar
     at = field[~field.ground].means[:, :2].astype(float) - [e.west, e.south]
@@ -109,7 +109,7 @@ def test_things_follow_the_cell_under_their_centre(made_up):
 
 
 def test_the_same_seed_gives_the_same_tiles(tiles, made_up):
-    options = build.Options(share=0.5, strip=0.17, candidates=40, tries=2)
+    options = build.TilingOptions(share=0.5, strip=0.17, candidates=40, tries=2)
     again = build.cut_tiles(
         made_up.levels, made_up.exemplar, made_up.colour, np.zeros((96, 96)), options, np.random.default_rng(2)
     )
@@ -119,7 +119,7 @@ def test_the_same_seed_gives_the_same_tiles(tiles, made_up):
 
 
 def test_variants_are_other_centres_in_the_same_frames(made_up):
-    options = build.Options(share=0.5, strip=0.17, variants=2, candidates=40, tries=1)
+    options = build.TilingOptions(share=0.5, strip=0.17, variants=2, candidates=40, tries=1)
     two = build.cut_tiles(
         made_up.levels, made_up.exemplar, made_up.colour, np.zeros((96, 96)), options, np.random.default_rng(2)
     )
@@ -132,7 +132,7 @@ def test_variants_are_other_centres_in_the_same_frames(made_up):
 def test_doubtful_ground_is_not_shown_where_sure_ground_serves(made_up):
     doubt = np.zeros((96, 96))
     doubt[:, :30] = 1
-    options = build.Options(share=0.5, strip=0.17, candidates=400, tries=1)
+    options = build.TilingOptions(share=0.5, strip=0.17, candidates=400, tries=1)
     found = build.cut_tiles(made_up.levels, made_up.exemplar, made_up.colour, doubt, options, np.random.default_rng(2))
     # a patch may be up to SURE more doubtful than the surest one, which is not at all
     assert found.uncertainty.max() < 0.1
@@ -140,8 +140,8 @@ def test_doubtful_ground_is_not_shown_where_sure_ground_serves(made_up):
 
 def test_a_set_that_was_written_reads_back_and_repeats_its_bytes(tiles, tmp_path):
     for name in ("a", "b"):
-        store.write(tiles, tmp_path / name / "tiles", tmp_path / name / "seams.json", {"from": "a test"})
-    back = store.read(tmp_path / "a" / "tiles", tmp_path / "a" / "seams.json")
+        store.write_tiles(tiles, tmp_path / name / "tiles", tmp_path / name / "seams.json", {"from": "a test"})
+    back = store.read_tiles(tmp_path / "a" / "tiles", tmp_path / "a" / "seams.json")
     np.testing.assert_array_equal(back.labels, tiles.labels)
     np.testing.assert_array_equal(back.shifts, tiles.shifts)
     np.testing.assert_array_equal(back.fields[1][3].means, tiles.fields[1][3].means)
@@ -151,10 +151,10 @@ def test_a_set_that_was_written_reads_back_and_repeats_its_bytes(tiles, tmp_path
 
 
 def test_a_set_with_a_missing_tile_names_it(tiles, tmp_path):
-    store.write(tiles, tmp_path / "tiles", tmp_path / "seams.json", {})
+    store.write_tiles(tiles, tmp_path / "tiles", tmp_path / "seams.json", {})
     (tmp_path / "tiles" / "lod1_tile_07.ply").unlink()
     with pytest.raises(InputError, match="lod1_tile_07.ply"):
-        store.read(tmp_path / "tiles", tmp_path / "seams.json")
+        store.read_tiles(tmp_path / "tiles", tmp_path / "seams.json")
 
 
 def test_a_level_from_elsewhere_is_refused(made_up):
@@ -165,6 +165,6 @@ def test_a_level_from_elsewhere_is_refused(made_up):
             made_up.exemplar,
             made_up.colour,
             np.zeros((96, 96)),
-            build.Options(tries=1, candidates=5),
+            build.TilingOptions(tries=1, candidates=5),
             np.random.default_rng(0),
         )

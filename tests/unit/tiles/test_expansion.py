@@ -18,8 +18,8 @@ def exemplar(seed, side=14):
     rng = np.random.default_rng(seed)
     colour = rng.random((side, side, 3))
     segments = rng.integers(0, 9, (side, side))
-    both = energy.colours(colour), semantics.of_segments(segments, colour, None, {})
-    return energy.Energy("expansion", 2.0, *both).terms(0.6)
+    both = energy.make_colour_layer(colour), semantics.describe_segments(segments, colour, None, {})
+    return energy.SeamEnergy("expansion", 2.0, *both).terms(0.6)
 
 
 def laid(seed, count, shape):
@@ -36,13 +36,13 @@ def laid(seed, count, shape):
 def test_the_energy_never_rises_and_is_that_of_the_labels(seed, count):
     terms, patches = exemplar(seed), laid(seed, count, (6, 7))
     start = np.random.default_rng(seed).integers(0, count, (6, 7)).astype(np.uint8)
-    found = expansion.expanded(start, patches, terms)
+    found = expansion.expand_labels(start, patches, terms)
     assert (np.diff(found.energies) < 0).all()
     for labels, told in ((start, found.energies[0]), (found.labels, found.energies[-1])):
         assert told == pytest.approx(cost(terms, labels, patches.rows, patches.columns), abs=71 * HALF)
     assert 0 <= found.broken <= found.tested
     np.testing.assert_array_equal(found.labels[0], start[0])  # where nothing else is allowed
-    again = expansion.expanded(found.labels, patches, terms)
+    again = expansion.expand_labels(found.labels, patches, terms)
     assert len(again.energies) == 1  # no move is left
 
 
@@ -55,7 +55,7 @@ def test_of_two_patches_it_is_as_cheap_as_the_best_of_all_labellings(seed):
         labels = start.copy()
         labels[1:-1, 1:-1] = np.reshape(bits, (2, 3))
         best = min(best, cost(terms, labels, patches.rows, patches.columns))
-    found = expansion.expanded(start, patches, terms)
+    found = expansion.expand_labels(start, patches, terms)
     assert found.energies[-1] == pytest.approx(best, abs=31 * HALF) and found.broken == 0
 
 
@@ -64,9 +64,9 @@ class Apart:
 
     def __init__(self, distance):
         self.distance, n = np.array(distance, float), len(distance)
-        self.slope, self.unit = np.zeros((1, n, 2)), energy.Scales(2.0, 1.0)
+        self.slope, self.unit = np.zeros((1, n, 2)), energy.LayerScales(2.0, 1.0)
 
-    def apart(self, first, second):
+    def distances(self, first, second):
         return self.distance[first[1], second[1]]
 
 
@@ -81,18 +81,18 @@ def test_edges_that_break_the_triangle_are_counted_and_do_no_harm():
     # from 0 to 1 costs 10, over 2 it costs 1 + 1
     terms = [(1.0, Apart([[0, 10, 1], [10, 0, 1], [1, 1, 0]]))]
     labels, patches = row([0, 0, 1, 1], [[0] * 4, [0] * 4, [0, 1, 1, 0]])
-    found = expansion.expanded(labels, patches, terms)
+    found = expansion.expand_labels(labels, patches, terms)
     np.testing.assert_array_equal(found.labels, [[0, 2, 2, 1]])
     assert found.energies == [10.0, 2.0] and (found.broken, found.tested) == (1, 1)
 
 
 def test_one_patch_alone_stays():
     labels, patches = row([0, 0, 0], [[1, 1, 1]])
-    found = expansion.expanded(labels, patches, [(1.0, Apart([[0]]))])
-    assert (found.labels == 0).all() and found.record()["moves"] == 0 and found.energies == [0.0]
+    found = expansion.expand_labels(labels, patches, [(1.0, Apart([[0]]))])
+    assert (found.labels == 0).all() and found.describe()["moves"] == 0 and found.energies == [0.0]
 
 
 def test_identical_patches_cost_nothing():
     labels, patches = row([0, 1, 0, 1], [[1] * 4, [1] * 4])
-    found = expansion.expanded(labels, patches, [(1.0, Apart([[0, 0], [0, 0]]))])
+    found = expansion.expand_labels(labels, patches, [(1.0, Apart([[0, 0], [0, 0]]))])
     assert found.energies == [0.0] and found.broken == 0

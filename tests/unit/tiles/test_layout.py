@@ -5,10 +5,10 @@ import pytest
 
 from dav_gswt.errors import InputError
 from dav_gswt.tiles import layout
-from dav_gswt.tiles.layout import NE, NW, SE, SW, E, Layout, N, Places, S, W
+from dav_gswt.tiles.layout import NE, NW, SE, SW, E, Layout, N, PatchPlaces, S, W
 
 PLAN = Layout(exemplar=40, levels=1, side=10, strip=2, corner=3)
-PLACES = Places(
+PLACES = PatchPlaces(
     np.array([30, 20]),
     np.array([[0, 1], [5, 2]]),
     np.array([[3, 30], [4, 25]]),
@@ -18,14 +18,14 @@ PLACES = Places(
 
 def test_edge_colours_are_the_bits_of_the_tile_number():
     # 16 c + 8 W + 4 N + 2 E + S, in the order W N E S
-    assert layout.colours(16 + 8 + 1) == (1, 0, 0, 1)
-    assert layout.colours(4 + 2) == (0, 1, 1, 0)
+    assert layout.edge_colours(16 + 8 + 1) == (1, 0, 0, 1)
+    assert layout.edge_colours(4 + 2) == (0, 1, 1, 0)
 
 
 @pytest.mark.parametrize("levels", [1, 2, 3, 4])
 @pytest.mark.parametrize("strip", [0.05, 0.16, 0.3])
 def test_every_size_is_a_multiple_of_the_coarsest_cell_and_leaves_room(levels, strip):
-    plan = layout.plan(200, levels, 0.5, strip)
+    plan = layout.plan_layout(200, levels, 0.5, strip)
     assert not any(v % plan.block for v in (plan.side, plan.strip, plan.corner))
     assert plan.block < plan.strip < plan.corner < plan.side / 2
 
@@ -34,44 +34,46 @@ def test_every_size_is_a_multiple_of_the_coarsest_cell_and_leaves_room(levels, s
 @pytest.mark.parametrize("exemplar", [32, 64, 100, 224, 448, 1000])
 @pytest.mark.parametrize("share", [0.3, 0.5])
 def test_a_tile_is_whole_in_the_cells_of_every_level(exemplar, levels, share):
-    plan = layout.plan(exemplar, levels, share, 0.125, fitted=3)
+    plan = layout.plan_layout(exemplar, levels, share, 0.125, fitted=3)
     assert plan.side <= exemplar and plan.side % 2 ** (plan.levels - 1) == 0
-    assert plan.laid <= 3 and plan.block == 2 ** (plan.laid - 1) and plan.side >= layout.LEAST * plan.block
+    assert plan.composed_levels <= 3 and plan.block == 2 ** (plan.composed_levels - 1)
+    assert plan.side >= layout.MIN_BLOCKS * plan.block
     assert not any(v % plan.block for v in (plan.strip, plan.corner))
-    assert plan.laid > 1 or plan.levels == 1 or plan.side < 2 * layout.LEAST  # the first coarser level is laid
+    # the first coarser level is composed of patches, too
+    assert plan.composed_levels > 1 or plan.levels == 1 or plan.side < 2 * layout.MIN_BLOCKS
 
 
 def test_coarse_levels_do_not_make_tiles_large():
     # 224 / 2 = 112 cells: three and a half of 32; the nearest whole number is four
-    assert layout.plan(224, 6, 0.5, 0.125).side == 128
-    assert layout.plan(224, 3, 0.5, 0.125).side == 112
-    assert layout.plan(224, 6, 0.5, 0.125).block == layout.plan(224, 3, 0.5, 0.125).block == 4
+    assert layout.plan_layout(224, 6, 0.5, 0.125).side == 128
+    assert layout.plan_layout(224, 3, 0.5, 0.125).side == 112
+    assert layout.plan_layout(224, 6, 0.5, 0.125).block == layout.plan_layout(224, 3, 0.5, 0.125).block == 4
 
 
 @pytest.mark.parametrize("side, levels", [(128, 6), (112, 6), (96, 5), (60, 5), (32, 4), (20, 3)])
 def test_auto_makes_the_levels_that_are_ever_drawn(side, levels):
     # at least 3.5 cells of the coarsest level, rounded to four: 112 / 32 = 3.5, 96 / 32 = 3
-    plan = layout.plan(4 * side, layout.AUTO, 0.25, 0.125)
+    plan = layout.plan_layout(4 * side, layout.AUTO, 0.25, 0.125)
     assert plan.levels == levels and abs(plan.side - side) <= 2 ** (levels - 2)
 
 
 def test_levels_that_the_ground_does_not_hold_are_left_out_with_a_warning(caplog):
     with caplog.at_level("WARNING"):
-        plan = layout.plan(40, 8, 0.5, 0.16)
+        plan = layout.plan_layout(40, 8, 0.5, 0.16)
     assert plan.levels == 5 and plan.side == 32
     assert "the exemplar's 40 cells a side hold tiles with 5 levels, not 8" in caplog.text
     caplog.clear()
-    layout.plan(40, layout.AUTO, 0.5, 0.16)
+    layout.plan_layout(40, layout.AUTO, 0.5, 0.16)
     assert not caplog.text
 
 
 def test_an_exemplar_smaller_than_any_tile_is_refused():
     with pytest.raises(InputError, match="needs 10 ground cells a side and the exemplar has 9"):
-        layout.plan(9, 3, 0.5, 0.16)
+        layout.plan_layout(9, 3, 0.5, 0.16)
 
 
 def test_a_vertical_strip_goes_on_from_a_tile_into_its_right_neighbour():
-    left, right = layout.offsets(PLAN, PLACES, 2), layout.offsets(PLAN, PLACES, 8)
+    left, right = layout.label_shifts(PLAN, PLACES, 2), layout.label_shifts(PLAN, PLACES, 8)
     y, n = 4, PLAN.side
     for step in (1, 2):  # cells from the border: strip columns 1, 0 on the left and 2, 3 on the right
         np.testing.assert_array_equal(left[E] + [n - step, y], PLACES.vertical[1] + [2 - step, y])
@@ -79,13 +81,13 @@ def test_a_vertical_strip_goes_on_from_a_tile_into_its_right_neighbour():
 
 
 def test_a_horizontal_strip_goes_on_from_a_tile_into_the_one_above():
-    below, above = layout.offsets(PLAN, PLACES, 4), layout.offsets(PLAN, PLACES, 1)
+    below, above = layout.label_shifts(PLAN, PLACES, 4), layout.label_shifts(PLAN, PLACES, 1)
     np.testing.assert_array_equal(below[N] + [3, PLAN.side - 1], PLACES.horizontal[1] + [3, 1])
     np.testing.assert_array_equal(above[S] + [3, 0], PLACES.horizontal[1] + [3, 2])
 
 
 def test_the_corner_patch_is_whole_where_four_tiles_meet():
-    shift = layout.offsets(PLAN, PLACES, 0)
+    shift = layout.label_shifts(PLAN, PLACES, 0)
     n, middle = PLAN.side, PLACES.corner + PLAN.corner
     np.testing.assert_array_equal(shift[SW] + [0, 0], middle)
     np.testing.assert_array_equal(shift[SE] + [n - 1, 0], middle + [-1, 0])
@@ -98,7 +100,7 @@ def test_a_frame_holds_strips_at_its_sides_and_the_corner_patch_in_its_corners()
     mask = np.zeros((2, n, 2 * b), bool)
     mask[:, :b] = mask[:, n - b :] = True
     mask[1, b, b] = True  # colour 1: the corner patch reaches one cell further, right of the edge
-    labels = layout.frame(PLAN, mask, mask.swapaxes(1, 2), 8)
+    labels = layout.frame_labels(PLAN, mask, mask.swapaxes(1, 2), 8)
     assert (labels[:b, :b] == SW).all() and (labels[:b, n - b :] == SE).all()
     assert (labels[n - b :, :b] == NW).all() and (labels[n - b :, n - b :] == NE).all()
     assert (labels[:b, b : n - b] == S).all() and (labels[n - b :, b : n - b] == N).all()
@@ -108,7 +110,7 @@ def test_a_frame_holds_strips_at_its_sides_and_the_corner_patch_in_its_corners()
 
 
 def test_every_cell_may_show_some_patch_but_for_the_rim_and_only_where_it_reaches():
-    reach = layout.reach(PLAN)
+    reach = layout.allowed_cells(PLAN)
     n, k = PLAN.side, PLAN.block
     inner = np.zeros((n, n), bool)
     inner[k : n - k, k : n - k] = True
@@ -126,8 +128,8 @@ def test_every_cell_may_show_some_patch_but_for_the_rim_and_only_where_it_reache
 
 
 def test_what_reaches_a_cell_lies_in_the_exemplar():
-    shift = layout.offsets(PLAN, PLACES, 5)
-    for label, cells in enumerate(layout.reach(PLAN)):
+    shift = layout.label_shifts(PLAN, PLACES, 5)
+    for label, cells in enumerate(layout.allowed_cells(PLAN)):
         y, x = np.nonzero(cells)
         assert ((shift[label] + np.stack([x, y], 1)) >= 0).all()
         assert ((shift[label] + np.stack([x, y], 1)) < PLAN.exemplar).all()

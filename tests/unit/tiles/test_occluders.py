@@ -33,7 +33,7 @@ def a_field(*rows):
 def test_cover_is_the_opaque_area_over_a_cell():
     # over cells (0, 0) and (2, 1), far up or just over half a cell
     field = a_field([-0.9, 2.1, 9.0, 0.05, 0.8], [0.2, 2.6, 0.26, 0.1, 0.5], [0.2, 2.6, 0.26, 0.1, 0.5])
-    found = occluders.cover(field, EXEMPLAR, np.zeros((4, 4)))
+    found = occluders.compute_cover(field, EXEMPLAR, np.zeros((4, 4)))
     expected = np.zeros((4, 4))
     expected[0, 0] = 0.8 * 2 * np.pi * 0.05**2 / 0.25
     expected[1, 2] = 2 * 0.5 * 2 * np.pi * 0.1**2 / 0.25
@@ -42,28 +42,30 @@ def test_cover_is_the_opaque_area_over_a_cell():
 
 def test_what_lies_on_the_ground_or_under_it_hides_nothing():
     field = a_field([-0.9, 2.1, 0.2, 1.0, 0.9], [-0.4, 2.1, -3.0, 1.0, 0.9])
-    assert not occluders.cover(field, EXEMPLAR, np.zeros((4, 4))).any()
-    assert occluders.cover(field, EXEMPLAR, np.full((4, 4), -4.0)).any()  # of a ground below them they stand
+    assert not occluders.compute_cover(field, EXEMPLAR, np.zeros((4, 4))).any()
+    assert occluders.compute_cover(field, EXEMPLAR, np.full((4, 4), -4.0)).any()  # of a ground below them they stand
 
 
 def test_cover_is_at_most_one_and_nothing_stands_on_ground_that_is_not_known():
     field = a_field([-0.9, 2.1, 5.0, 9.0, 0.99], [-0.4, 2.1, 5.0, 9.0, 0.99])
     height = np.zeros((4, 4))
     height[0, 1] = np.nan
-    found = occluders.cover(field, EXEMPLAR, height)
+    found = occluders.compute_cover(field, EXEMPLAR, height)
     assert found[0, 0] == 1 and found.sum() == 1
 
 
 def test_a_field_without_ground_does_not_tell_what_stands():
     field = a_field([-0.9, 2.1, 5.0, 0.1, 0.9])
     without = replace(field, ground=np.zeros(2, bool))
-    assert occluders.cover(field, EXEMPLAR, np.zeros((4, 4))).any()
-    assert not occluders.cover(without, EXEMPLAR, np.zeros((4, 4))).any()
+    assert occluders.compute_cover(field, EXEMPLAR, np.zeros((4, 4))).any()
+    assert not occluders.compute_cover(without, EXEMPLAR, np.zeros((4, 4))).any()
 
 
 def test_nothing_that_stands_is_no_layer():
-    assert energy.standing(np.zeros((3, 3))) is None
-    plain = energy.Energy("colour", 2.0, energy.colours(np.random.default_rng(0).random((3, 3, 3))), None, None)
+    assert energy.make_occluder_layer(np.zeros((3, 3))) is None
+    plain = energy.SeamEnergy(
+        "colour", 2.0, energy.make_colour_layer(np.random.default_rng(0).random((3, 3, 3))), None, None
+    )
     assert len(plain.terms(1.0)) == 1
 
 
@@ -71,14 +73,14 @@ def test_nothing_that_stands_is_no_layer():
 def test_parting_a_thing_costs_what_it_hides_whatever_gamma_is(share):
     cover = np.zeros((2, 4))
     cover[:, 1] = 0.75
-    flat = energy.colours(np.full((2, 4, 3), 0.5))
-    priced = energy.Energy("semantic", 2.0, flat, flat, energy.standing(cover))
+    flat = energy.make_colour_layer(np.full((2, 4, 3), 0.5))
+    priced = energy.SeamEnergy("semantic", 2.0, flat, flat, energy.make_occluder_layer(cover))
     rows, columns = np.mgrid[:2, :2]
-    right, upper = energy.weights(priced.terms(share), (rows, columns), (rows, columns + 2))
+    right, upper = energy.compute_edge_costs(priced.terms(share), (rows, columns), (rows, columns + 2))
     # of the four things in an edge's two cells one hides .75, and two do along the second column
-    np.testing.assert_allclose(right, energy.STAND * 0.75 / energy.EPS)
-    np.testing.assert_allclose(upper, np.array([[0, energy.STAND * 1.5]]) / energy.EPS)
-    same = energy.weights(priced.terms(share), (rows, columns), (rows, columns))
+    np.testing.assert_allclose(right, energy.OCCLUDER_WEIGHT * 0.75 / energy.EPS)
+    np.testing.assert_allclose(upper, np.array([[0, energy.OCCLUDER_WEIGHT * 1.5]]) / energy.EPS)
+    same = energy.compute_edge_costs(priced.terms(share), (rows, columns), (rows, columns))
     assert not any(w.any() for w in same)  # a shrub that goes on in both patches is not parted
 
 
@@ -88,13 +90,13 @@ def test_a_seam_goes_around_a_shrub_that_looks_like_the_ground():
     cover[2:5, 2:5] = 1
     rows, columns = np.mgrid[:7, :7]
     colour[:, 7:, 0] += 0.02 * np.abs(columns - 3)
-    colours = energy.Colours(colour, np.zeros((7, 14, 2)), energy.Scales(1.0, 1.0))
+    colours = energy.ColourLayer(colour, np.zeros((7, 14, 2)), energy.LayerScales(1.0, 1.0))
     shrub = cover[:, :7] > 0
 
     def parted(stands):
-        terms = energy.Energy("colour", 2.0, colours, None, stands).terms(1.0)
-        costs = energy.weights(terms, (rows, columns), (rows, columns + 7))
-        labels = cuts.cut(*costs, columns == 0, columns == 6).labels
+        terms = energy.SeamEnergy("colour", 2.0, colours, None, stands).terms(1.0)
+        costs = energy.compute_edge_costs(terms, (rows, columns), (rows, columns + 7))
+        labels = cuts.find_cut(*costs, columns == 0, columns == 6).labels
         return 0 < labels[shrub].sum() < shrub.sum()
 
-    assert parted(None) and not parted(energy.standing(cover))
+    assert parted(None) and not parted(energy.make_occluder_layer(cover))

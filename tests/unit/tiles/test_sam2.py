@@ -68,7 +68,7 @@ def picture():
 
 
 def test_masks_lie_on_the_exemplars_cells_and_are_not_alike(folder, picture, lenient):
-    found = sam2.masks(sam2.opened(folder), picture)
+    found = sam2.predict_masks(sam2.load_model(folder), picture)
     assert found and all(mask.shape == (40, 40) and mask.dtype == bool for mask in found)
     assert all(mask.sum() >= sam2.LEAST for mask in found)
     for i, one in enumerate(found):
@@ -77,12 +77,12 @@ def test_masks_lie_on_the_exemplars_cells_and_are_not_alike(folder, picture, len
 
 
 def test_what_learned_nothing_is_sure_of_nothing(folder, picture):
-    assert sam2.masks(sam2.opened(folder), picture) == []
+    assert sam2.predict_masks(sam2.load_model(folder), picture) == []
 
 
 def test_with_masks_the_semantics_are_of_them_and_of_superpixels_between(folder, picture, lenient):
-    first, again = (semantics.semantics(picture, semantics.Source(sam2=folder)) for _ in range(2))
-    plain = semantics.semantics(picture, semantics.Source())
+    first, again = (semantics.make_semantic_layer(picture, semantics.SemanticSource(sam2=folder)) for _ in range(2))
+    plain = semantics.make_semantic_layer(picture, semantics.SemanticSource())
     assert first.said["segments"] == "sam2 and slic" and first.said["masks"] > 0
     assert (first.segments != plain.segments).any()
     np.testing.assert_array_equal(first.distance, again.distance)
@@ -103,7 +103,7 @@ def test_stability_is_the_overlap_at_two_thresholds():
 def test_the_published_folders_for_videos_are_read_too(copy):
     config = json.loads((copy / "config.json").read_text())
     (copy / "config.json").write_text(json.dumps(config | {"model_type": "sam2_video"}))
-    assert sam2.opened(copy).config.prompt_encoder_config.image_size == 64
+    assert sam2.load_model(copy).config.prompt_encoder_config.image_size == 64
 
 
 def cut_short(path):
@@ -152,10 +152,10 @@ def of_another(path):
 def test_a_folder_that_is_not_right_is_named(copy, change, said):
     change(copy)
     with pytest.raises(InputError, match=said):
-        sam2.opened(copy)
+        sam2.load_model(copy)
 
 
 def test_without_transformers_it_says_what_to_install(folder, monkeypatch):
     monkeypatch.setitem(sys.modules, "transformers", None)
     with pytest.raises(InputError, match="pip install 'transformers=="):
-        sam2.opened(folder)
+        sam2.load_model(folder)

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dav_gswt.tiles import cuts, energy, semantics
-from dav_gswt.tiles.energy import Colours, Scales
+from dav_gswt.tiles.energy import ColourLayer, LayerScales
 
-UNIT = Scales(1.0, 1.0)
+UNIT = LayerScales(1.0, 1.0)
 SHARES = st.sampled_from([0.0, 0.25, 0.5, 0.731, 1.0])
 
 
@@ -21,8 +21,8 @@ def where(x, y, h=4, w=4):
 def patches(*values):
     """Colours of an exemplar that shows patches side by side, gradients of each for itself; and where they lie."""
     h, w = values[0].shape[:2]
-    slope = np.concatenate([energy.gradients(v) for v in values], 1)
-    layer = Colours(np.concatenate(values, 1), slope, UNIT)
+    slope = np.concatenate([energy.compute_gradients(v) for v in values], 1)
+    layer = ColourLayer(np.concatenate(values, 1), slope, UNIT)
     return layer, [where(i * w, 0, h, w) for i in range(len(values))]
 
 
@@ -31,22 +31,25 @@ def made_up(seed, kind="semantic", side=12, dtype=float):
     rng = np.random.default_rng(seed)
     colour = rng.random((side, side, 3)).astype(dtype)
     segments = np.kron(np.arange((side // 3) ** 2).reshape(side // 3, -1), np.ones((3, 3), int))
-    return energy.Energy(
-        kind, 2.0, energy.colours(colour), semantics.of_segments(segments, colour.astype(float), None, {})
+    return energy.SeamEnergy(
+        kind,
+        2.0,
+        energy.make_colour_layer(colour),
+        semantics.describe_segments(segments, colour.astype(float), None, {}),
     )
 
 
 def test_weight_of_two_flat_patches_is_their_difference_over_eps():
     layer, (a, b) = patches(np.full((2, 2, 1), 0.5), np.full((2, 2, 1), 0.6))
     # d = 0.1 at both cells, no gradient: D / (0 + EPS)
-    for cost in energy.weights([(1.0, layer)], a, b):
+    for cost in energy.compute_edge_costs([(1.0, layer)], a, b):
         np.testing.assert_allclose(cost, 0.2 / energy.EPS, rtol=1e-12)
 
 
 def test_a_gradient_across_an_edge_makes_only_that_edge_cheaper():
     ramp = np.broadcast_to(np.arange(3.0)[None, :, None], (3, 3, 1))
     layer, (a, b) = patches(ramp, ramp + 0.1)
-    right, upper = energy.weights([(1.0, layer)], a, b)
+    right, upper = energy.compute_edge_costs([(1.0, layer)], a, b)
     # four gradients of 1 along x, none along y
     np.testing.assert_allclose(right, 0.2 / (4 + energy.EPS), rtol=1e-12)
     np.testing.assert_allclose(upper, 0.2 / energy.EPS, rtol=1e-12)
@@ -55,20 +58,23 @@ def test_a_gradient_across_an_edge_makes_only_that_edge_cheaper():
 def test_both_terms_are_weighed_above_and_below():
     nothing, (a, b) = patches(np.zeros((2, 2, 1)), np.zeros((2, 2, 1)))
     step = np.array([0.0, 0, 1, 1])[None, :, None]
-    one = Colours(nothing.values + step, np.full((2, 4, 2), 0.5), Scales(2.0, 4.0))
-    other = Colours(nothing.values + 3 * step, np.full((2, 4, 2), 1.0), Scales(3.0, 2.0))
+    one = ColourLayer(nothing.values + step, np.full((2, 4, 2), 0.5), LayerScales(2.0, 4.0))
+    other = ColourLayer(nothing.values + 3 * step, np.full((2, 4, 2), 1.0), LayerScales(3.0, 2.0))
     # D = 2 / 2 and 6 / 3, G = 4 * 0.5 / 4 and 4 * 1 / 2
-    for cost in energy.weights([(0.25, one), (0.75, other)], a, b):
+    for cost in energy.compute_edge_costs([(0.25, one), (0.75, other)], a, b):
         np.testing.assert_allclose(cost, (0.25 * 1 + 0.75 * 2) / (0.25 * 0.5 + 0.75 * 2 + energy.EPS), rtol=1e-12)
 
 
 def test_equal_patches_cost_nothing_and_no_scale_is_zero():
     flat = np.full((6, 6, 3), 0.4)
-    every = energy.Energy(
-        "semantic", 2.0, energy.colours(flat), semantics.of_segments(np.zeros((6, 6), int), flat, None, {})
+    every = energy.SeamEnergy(
+        "semantic",
+        2.0,
+        energy.make_colour_layer(flat),
+        semantics.describe_segments(np.zeros((6, 6), int), flat, None, {}),
     )
     for share in (0.0, 0.5, 1.0):
-        for cost in energy.weights(every.terms(share), where(0, 0), where(2, 1)):
+        for cost in energy.compute_edge_costs(every.terms(share), where(0, 0), where(2, 1)):
             assert (cost == 0).all()
 
 
@@ -76,27 +82,29 @@ def test_equal_patches_cost_nothing_and_no_scale_is_zero():
 @settings(max_examples=60)
 def test_weights_are_symmetric_finite_not_negative_and_0_for_the_same_patch(seed, share, place):
     terms, (x, y, u, v) = made_up(seed).terms(share), place
-    there, back = (energy.weights(terms, *p) for p in ((where(x, y), where(u, v)), (where(u, v), where(x, y))))
+    there, back = (
+        energy.compute_edge_costs(terms, *p) for p in ((where(x, y), where(u, v)), (where(u, v), where(x, y)))
+    )
     for a, b in zip(there, back, strict=True):
         np.testing.assert_array_equal(a, b)
         assert np.isfinite(a).all() and (a >= 0).all()
-    for same in energy.weights(terms, where(x, y), where(x, y)):
+    for same in energy.compute_edge_costs(terms, where(x, y), where(x, y)):
         assert (same == 0).all()
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_gamma_1_ignores_semantics_and_gamma_0_ignores_colour(seed):
     one, other = made_up(seed), made_up(seed + 1)
-    mixed = energy.Energy("semantic", 2.0, one.colours, other.semantics)
+    mixed = energy.SeamEnergy("semantic", 2.0, one.colours, other.semantics)
     pair = where(0, 0, 6, 6), where(5, 3, 6, 6)
     for share, like, unlike in ((1.0, one, other), (0.0, other, one)):
-        found, same, another = (energy.weights(e.terms(share), *pair)[0] for e in (mixed, like, unlike))
+        found, same, another = (energy.compute_edge_costs(e.terms(share), *pair)[0] for e in (mixed, like, unlike))
         np.testing.assert_array_equal(found, same)
         assert (found != another).any()
 
 
 def test_colour_alone_is_gamma_1_whatever_is_doubted():
-    colour = energy.Energy("colour", 2.0, made_up(1).colours, None)
+    colour = energy.SeamEnergy("colour", 2.0, made_up(1).colours, None)
     assert colour.gamma(0.9) == 1 and colour.terms(1.0) == [(1.0, colour.colours)]
 
 
@@ -117,7 +125,7 @@ def test_gamma_of_what_is_not_a_number_is_refused(kind):
 def test_weights_do_not_depend_on_the_unit_of_colour():
     values = np.random.default_rng(1).random((9, 9, 3))
     pair = where(0, 0), where(4, 3)
-    small, large = (energy.weights([(1.0, energy.colours(k * values))], *pair) for k in (1, 9))
+    small, large = (energy.compute_edge_costs([(1.0, energy.make_colour_layer(k * values))], *pair) for k in (1, 9))
     for a, b in zip(small, large, strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-12)
 
@@ -125,9 +133,15 @@ def test_weights_do_not_depend_on_the_unit_of_colour():
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 def test_weights_in_single_precision_agree_with_double(share):
     wide = made_up(4)
-    narrow = energy.Energy("semantic", 2.0, energy.colours(wide.colours.values.astype(np.float32)), wide.semantics)
+    narrow = energy.SeamEnergy(
+        "semantic", 2.0, energy.make_colour_layer(wide.colours.values.astype(np.float32)), wide.semantics
+    )
     pair = where(0, 0), where(6, 5)
-    for a, b in zip(energy.weights(wide.terms(share), *pair), energy.weights(narrow.terms(share), *pair), strict=True):
+    for a, b in zip(
+        energy.compute_edge_costs(wide.terms(share), *pair),
+        energy.compute_edge_costs(narrow.terms(share), *pair),
+        strict=True,
+    ):
         # colours up to 1 rounded to 2^-24, differences of them from 0.05 on, scales a sum over 144 cells
         np.testing.assert_allclose(a, b, rtol=2e-5)
 
@@ -135,21 +149,21 @@ def test_weights_in_single_precision_agree_with_double(share):
 @pytest.mark.parametrize("axis", [0, 1])
 def test_single_edges_cost_what_they_cost_in_a_grid(axis):
     e, pair = made_up(5), (where(0, 0), where(7, 4))
-    grid = energy.weights(e.terms(0.6), *pair)[axis]
+    grid = energy.compute_edge_costs(e.terms(0.6), *pair)[axis]
     tails = tuple(np.indices(grid.shape).reshape(2, -1))
     heads = tails[0] + axis, tails[1] + 1 - axis
     ends = [tuple((rows[cells], columns[cells]) for rows, columns in pair) for cells in (tails, heads)]
-    found = energy.along(e.terms(0.6), *ends, np.full(grid.size, axis))
+    found = energy.compute_costs_along(e.terms(0.6), *ends, np.full(grid.size, axis))
     np.testing.assert_allclose(found.reshape(grid.shape), grid, rtol=1e-12)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.731, 1.0])
 @pytest.mark.parametrize("seed", range(3))
 def test_the_cut_of_a_small_grid_is_as_cheap_as_the_best_of_all_partitions(seed, share):
-    right, upper = energy.weights(made_up(seed).terms(share), where(0, 0), where(6, 7))
+    right, upper = energy.compute_edge_costs(made_up(seed).terms(share), where(0, 0), where(6, 7))
     first, second = np.zeros((4, 4), bool), np.zeros((4, 4), bool)
     first[:, 0], second[:, -1] = True, True
-    found = cuts.cut(right, upper, first, second)
+    found = cuts.find_cut(right, upper, first, second)
     # capacities are rounded to 2^-32 of the largest: 24 edges lose at most 24 halves of that
     limit = 24 * 2.0**-32 * max(right.max(), upper.max())
     assert found.energy == pytest.approx(cheapest(right, upper, first, second), abs=limit)

@@ -8,7 +8,7 @@ import torch
 from fixtures import lpips_arrays
 
 from dav_gswt.tiles import energy, semantics
-from dav_gswt.tiles.semantics import Source, covered, of_segments, superpixels
+from dav_gswt.tiles.semantics import SemanticSource, describe_segments, overlay_masks, segment_superpixels
 
 
 @pytest.fixture(scope="module")
@@ -32,26 +32,28 @@ def at(*cells):
 
 
 def test_cells_of_one_segment_are_not_apart_and_distances_are_symmetric(stones, weights):
-    found = of_segments(superpixels(stones, 6.0), stones, weights, {})
-    assert isinstance(found, energy.Layer)
+    found = describe_segments(segment_superpixels(stones, 6.0), stones, weights, {})
+    assert isinstance(found, energy.CostLayer)
     assert (np.diag(found.distance) == 0).all() and (found.distance == found.distance.T).all()
     cells = np.arange(48), np.arange(48)
-    assert (found.apart(cells, cells) == 0).all()
+    assert (found.distances(cells, cells) == 0).all()
 
 
 def test_stone_is_far_from_sand_and_near_to_other_stones(stones):
-    found = of_segments(superpixels(stones, 6.0), stones, None, {})
+    found = describe_segments(segment_superpixels(stones, 6.0), stones, None, {})
     stone, other, sand, far = at((12, 12)), at((30, 34)), at((12, 30)), at((44, 44))
-    assert found.apart(stone, sand)[0] > 5 * max(found.apart(stone, other)[0], found.apart(sand, far)[0])
+    assert found.distances(stone, sand)[0] > 5 * max(found.distances(stone, other)[0], found.distances(sand, far)[0])
     # a step where the stone begins, nothing within the sand
     assert found.slope[12, 14:20, 0].max() > 0 and found.slope[20:24, 20:24].max() == 0
 
 
 @pytest.mark.parametrize("alexnet", [False, True])
 def test_other_numbers_for_the_same_segments_change_nothing(stones, weights, alexnet):
-    segments = superpixels(stones, 6.0)
+    segments = segment_superpixels(stones, 6.0)
     names = np.random.default_rng(0).permutation(10 * segments.max() + 10) - 7
-    first, second = (of_segments(s, stones, weights if alexnet else None, {}) for s in (segments, names[segments]))
+    first, second = (
+        describe_segments(s, stones, weights if alexnet else None, {}) for s in (segments, names[segments])
+    )
     np.testing.assert_array_equal(first.segments, second.segments)
     np.testing.assert_array_equal(first.distance, second.distance)
     np.testing.assert_array_equal(first.slope, second.slope)
@@ -62,7 +64,7 @@ def test_gradients_are_central_differences_of_the_features():
     # three segments in columns 0-1, 2, 3-5 with colours 0, 1, 3: distances are those of one channel times a scale
     segments = np.tile([0, 0, 1, 2, 2, 2], (6, 1))
     colour = np.tile(np.array([0.0, 0, 1, 3, 3, 3])[:, None] / 3, (6, 1, 3))
-    found = of_segments(segments, colour, None, {})
+    found = describe_segments(segments, colour, None, {})
     table = found.distance
     x = segments[0]
     expected = [table[x[0], x[1]], *(table[x[i - 1], x[i + 1]] / 2 for i in range(1, 5)), table[x[4], x[5]]]
@@ -73,7 +75,7 @@ def test_gradients_are_central_differences_of_the_features():
 def test_grain_of_one_kind_of_ground_is_no_distance():
     rng = np.random.default_rng(1)
     sand = np.clip(0.5 + 0.05 * rng.normal(size=(40, 40, 3)), 0, 1)
-    found = of_segments(np.kron(np.arange(100).reshape(10, 10), np.ones((4, 4), int)), sand, None, {})
+    found = describe_segments(np.kron(np.arange(100).reshape(10, 10), np.ones((4, 4), int)), sand, None, {})
     # three neighbours in four are no more apart than that, and most others are no other kind
     assert np.mean(found.distance == 0) > 0.6
 
@@ -81,8 +83,8 @@ def test_grain_of_one_kind_of_ground_is_no_distance():
 @pytest.mark.parametrize("alexnet", [False, True])
 def test_one_segment_alone_and_flat_ground_are_finite(weights, alexnet):
     flat = np.full((40, 40, 3), 0.5)
-    for segments in (np.zeros((40, 40), int), superpixels(flat, 8.0)):
-        found = of_segments(segments, flat, weights if alexnet else None, {})
+    for segments in (np.zeros((40, 40), int), segment_superpixels(flat, 8.0)):
+        found = describe_segments(segments, flat, weights if alexnet else None, {})
         assert np.isfinite(found.distance).all() and np.isfinite(found.slope).all()
         assert found.unit.difference > 0 and found.unit.gradient > 0
 
@@ -93,17 +95,17 @@ def test_a_segment_has_the_features_of_the_place_where_it_lies(weights):
     y, x = np.mgrid[:48, :48]
     colour[:, 32:] += 0.3 * np.where((y + x) % 4 < 2, 1, -1)[:, 32:, None]
     segments = np.kron(np.arange(36).reshape(6, 6), np.ones((8, 8), int))
-    blind, seeing = (of_segments(segments, colour, w, {}) for w in (None, weights))
+    blind, seeing = (describe_segments(segments, colour, w, {}) for w in (None, weights))
     flat, near, rough = at((12, 4)), at((28, 12)), at((28, 44))
-    assert blind.apart(flat, rough)[0] < 1e-6
-    assert seeing.apart(flat, rough)[0] > 3 * seeing.apart(flat, near)[0]
+    assert blind.distances(flat, rough)[0] < 1e-6
+    assert seeing.distances(flat, rough)[0] > 3 * seeing.distances(flat, near)[0]
 
 
 def test_the_same_bytes_on_any_number_of_threads(stones, weights):
     found, before = [], torch.get_num_threads()
     for threads in (1, 2):
         torch.set_num_threads(threads)
-        found.append(semantics.semantics(stones, Source(weights)))
+        found.append(semantics.make_semantic_layer(stones, SemanticSource(weights)))
         assert torch.get_num_threads() == threads
     torch.set_num_threads(before)
     np.testing.assert_array_equal(found[0].distance, found[1].distance)
@@ -111,16 +113,16 @@ def test_the_same_bytes_on_any_number_of_threads(stones, weights):
 
 def test_without_weights_it_says_that_colours_and_superpixels_are_all(stones, caplog):
     with caplog.at_level(logging.INFO):
-        found = semantics.semantics(stones, Source())
+        found = semantics.make_semantic_layer(stones, SemanticSource())
     assert "not at hand" in caplog.text
     assert found.said == {"alexnet": False, "segments": "slic", "count": len(found.distance)}
 
 
 def test_superpixels_have_about_the_size_asked_and_never_too_many(stones):
-    assert 30 < superpixels(stones, 8.0).max() < 60  # 36 of 8 x 8
+    assert 30 < segment_superpixels(stones, 8.0).max() < 60  # 36 of 8 x 8
     noise = np.random.default_rng(0).random((120, 120, 3))
     assert (
-        len(semantics.semantics(noise, Source()).distance) <= 1.2 * 120**2 / semantics.LEAST**2
+        len(semantics.make_semantic_layer(noise, SemanticSource()).distance) <= 1.2 * 120**2 / semantics.MIN_WIDTH**2
     )  # SLIC takes it roughly
 
 
@@ -128,6 +130,6 @@ def test_of_two_masks_over_one_another_the_smaller_lies_on_top():
     large, small = np.zeros((6, 6), bool), np.zeros((6, 6), bool)
     large[1:5, 1:5], small[2:4, 2:4] = True, True
     for masks in ([large, small], [small, large]):
-        found = covered(np.zeros((6, 6), int), masks)
+        found = overlay_masks(np.zeros((6, 6), int), masks)
         assert len({found[0, 0], found[1, 1], found[2, 2]}) == 3 and (found[2:4, 2:4] == found[2, 2]).all()
-    np.testing.assert_array_equal(covered(np.eye(6, dtype=int), []), np.eye(6))
+    np.testing.assert_array_equal(overlay_masks(np.eye(6, dtype=int), []), np.eye(6))

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from dav_gswt.lod.merge import covariances
-from dav_gswt.tiles import membrane, trends
+from dav_gswt.lod.merge import compute_covariances
+from dav_gswt.tiles import poisson_blending, trends
 from dav_gswt.tiles.layout import Exemplar, Layout
 
 EXEMPLAR = Exemplar(0.0, 0.0, 0.5, 64)
@@ -15,22 +15,22 @@ def test_a_plane_is_its_own_trend():
     y, x = np.mgrid[:64, :64]
     plane = 0.3 * x - 0.2 * y + 5
     # least squares in double precision over values around 20
-    np.testing.assert_allclose(trends.low_pass(plane, KNOWN, 8.0), plane, atol=1e-10)
+    np.testing.assert_allclose(trends.fit_low_pass(plane, KNOWN, 8.0), plane, atol=1e-10)
 
 
 def test_grain_and_single_bushes_are_no_trend():
     values = np.where(np.indices((64, 64)).sum(0) % 2, 1.0, -1.0)
-    assert np.abs(trends.low_pass(values, KNOWN, 6.0)).max() < 0.1  # a checkerboard's one-sided mean at the border
+    assert np.abs(trends.fit_low_pass(values, KNOWN, 6.0)).max() < 0.1  # a checkerboard's one-sided mean at the border
     bush = np.zeros((64, 64))
     bush[30:34, 30:34] = 1
     # a plain average would take 16 / (2 pi 6^2) = 0.07 of it
-    assert trends.low_pass(bush, KNOWN, 6.0).max() < 0.01
+    assert trends.fit_low_pass(bush, KNOWN, 6.0).max() < 0.01
 
 
 def test_unknown_cells_take_no_part():
     values, known = np.full((64, 64), 2.0), KNOWN.copy()
     values[:20], known[:20] = 99, False
-    np.testing.assert_allclose(trends.low_pass(values, known, 6.0), 2, atol=1e-9)
+    np.testing.assert_allclose(trends.fit_low_pass(values, known, 6.0), 2, atol=1e-9)
 
 
 def test_detrending_flattens_a_slope_and_keeps_mean_and_cover(made_up):
@@ -40,11 +40,11 @@ def test_detrending_flattens_a_slope_and_keeps_mean_and_cover(made_up):
     x = np.mgrid[: e.cells, : e.cells][1] * e.spacing
     tilted = ground.means.copy()
     tilted[:, 2] = 0.4 * x.ravel()
-    trend = trends.trend_of(np.full((e.cells, e.cells, 3), np.nan), 0.4 * x, e, 10.0)
-    flat = trends.detrended(type(ground)(**{**vars(ground), "means": tilted}), trend)
+    trend = trends.fit_trend(np.full((e.cells, e.cells, 3), np.nan), 0.4 * x, e, 10.0)
+    flat = trends.remove_trend(type(ground)(**{**vars(ground), "means": tilted}), trend)
     np.testing.assert_allclose(flat.means[:, 2], 0.4 * x.mean(), atol=1e-5)  # float32 heights up to 5
     # z' = z - 0.4 x shears a flat disc: var z' = 0.16 var x + var z, cov = -0.4 var x
-    before, after = covariances(ground)[0], covariances(flat)[0]
+    before, after = compute_covariances(ground)[0], compute_covariances(flat)[0]
     np.testing.assert_allclose(after[0, 0], before[0, 0], rtol=1e-4)  # float32 logarithms
     np.testing.assert_allclose(after[0, 2], -0.4 * before[0, 0], rtol=1e-4)
     np.testing.assert_allclose(after[2, 2], 0.16 * before[0, 0] + before[2, 2], rtol=1e-4)
@@ -58,7 +58,7 @@ def flat_ground(step):
     """An exemplar whose right half is brighter by `step`, far under the limit."""
     values = np.full((64, 64, 4), 0.5)
     values[:, 32:] += step
-    return membrane.Ground(values, 1e3)
+    return poisson_blending.SoftMaps(values, 1e3)
 
 
 def patched():
@@ -72,20 +72,22 @@ def patched():
 
 def test_a_bright_patch_in_a_dark_frame_is_darkened_by_the_step():
     labels, shift = patched()
-    found = membrane.tile(labels, shift, np.zeros((24, 24, 4)), PLAN, flat_ground(0.1))
+    found = poisson_blending.solve_tile(labels, shift, np.zeros((24, 24, 4)), PLAN, flat_ground(0.1))
     # the source is divergence of an exact gradient, so its solution is the step itself; limit 1e3 takes 1e-8 of it
     np.testing.assert_allclose(found, np.where(labels[..., None], -0.1, 0) * np.ones(4), atol=1e-7)
 
 
 def test_equal_patches_are_not_corrected():
     labels, shift = patched()
-    found = membrane.tile(labels, shift, np.zeros((24, 24, 4)), PLAN, flat_ground(0.0))
+    found = poisson_blending.solve_tile(labels, shift, np.zeros((24, 24, 4)), PLAN, flat_ground(0.0))
     assert (found == 0).all()
 
 
 def test_a_tile_takes_the_correction_of_its_border():
     ring = np.full((24, 24, 4), 0.25)
-    found = membrane.tile(np.zeros((24, 24), np.uint8), np.zeros((9, 2), int), ring, PLAN, flat_ground(0.1))
+    found = poisson_blending.solve_tile(
+        np.zeros((24, 24), np.uint8), np.zeros((9, 2), int), ring, PLAN, flat_ground(0.1)
+    )
     np.testing.assert_allclose(found, 0.25, atol=1e-12)  # Laplace's equation with a constant border
 
 
@@ -94,14 +96,14 @@ def test_a_strip_is_fitted_to_the_corner_patch_at_its_ends(upright):
     labels = np.ones((24, 12), np.uint8)
     labels[8:16] = 0
     labels = labels if upright else np.ascontiguousarray(labels.T)
-    found = membrane.strip(labels, np.array([[38, 0], [0, 0]]), PLAN, flat_ground(0.1))
+    found = poisson_blending.solve_strip(labels, np.array([[38, 0], [0, 0]]), PLAN, flat_ground(0.1))
     np.testing.assert_allclose(found, np.where(labels[..., None] == 0, -0.1, 0) * np.ones(4), atol=1e-7)
 
 
 def test_a_step_beyond_the_limit_counts_less():
     labels, shift = patched()
     ground = flat_ground(1.0)
-    weak = membrane.Ground(ground.values, 0.1)
-    found = membrane.tile(labels, shift, np.zeros((24, 24, 4)), PLAN, weak)
+    weak = poisson_blending.SoftMaps(ground.values, 0.1)
+    found = poisson_blending.solve_tile(labels, shift, np.zeros((24, 24, 4)), PLAN, weak)
     # J = 1 / (1 + (1 / 0.1)^2) for colour; a step of height left in the ground would be a gap
     np.testing.assert_allclose(found[12, 12], [-1 / 101] * 3 + [-1], rtol=1e-9)

@@ -11,7 +11,7 @@ from dav_gswt.tiles import build, energy, layout
 from dav_gswt.tiles.layout import CENTRE
 
 NO_DOUBT = np.zeros((96, 96))
-FEW = build.Options(share=0.5, strip=0.17, candidates=20, tries=1)
+FEW = build.TilingOptions(share=0.5, strip=0.17, candidates=20, tries=1)
 
 
 def cut(made_up, kind, colour=None, doubt=NO_DOUBT, options=FEW, levels=None):
@@ -30,7 +30,7 @@ def test_every_way_says_what_it_used(every):
         assert told["kind"] == kind and told["eps"] == energy.EPS
         assert ("semantics" in told["scales"]) == ("semantics" in told) == (kind != "colour")
         assert len(found.seams["tile_energy"]) == len(found.seams["tile_gamma"]) == 16
-        assert told["standing"] == energy.STAND
+        assert told["standing"] == energy.OCCLUDER_WEIGHT
         assert ("expansion" in found.seams) == (kind == "expansion")
         gamma = {"colour": 1.0, "semantic-nogamma": 0.5}.get(kind, 0.7310585786)  # of no doubt: 1 / (1 + exp(-1))
         assert found.seams["tile_gamma"] + found.seams["strip_gamma"] == pytest.approx([gamma] * 20)
@@ -44,7 +44,7 @@ def test_a_straight_seam_costs_more_than_the_cheapest_one_between_the_same_patch
 
 
 def test_without_a_cut_seams_are_straight_and_in_the_middle_of_the_overlap(every):
-    plan = layout.plan(96, 3, 0.5, 0.17)
+    plan = layout.plan_layout(96, 3, 0.5, 0.17)
     depth = (plan.block + plan.strip) // 2
     for labels in every["none"].labels:
         inner = np.zeros_like(labels, bool)
@@ -66,7 +66,7 @@ def test_expansion_starts_at_the_exact_cuts_and_never_costs_more(every):
 
 
 def test_after_an_expansion_every_patch_lies_within_its_reach(every):
-    reach = layout.reach(layout.plan(96, 3, 0.5, 0.17))
+    reach = layout.allowed_cells(layout.plan_layout(96, 3, 0.5, 0.17))
     for labels in every["expansion"].labels:
         for label in range(9):
             assert not (labels[4:-4, 4:-4] == label)[~reach[label][4:-4, 4:-4]].any()
@@ -136,8 +136,10 @@ def test_a_finest_level_from_elsewhere_is_refused(made_up):
 
 def test_options_are_those_of_the_configs_entry():
     seam = {"tile": 0.4, "strip": 0.1, "candidates": 7, "variants": 3, "energy": "expansion", "slope": 4.0, "sam2": "a"}
-    found = build.Options.of(seam, FEW.source)
+    found = build.TilingOptions.from_config(seam, FEW.source)
     assert (found.share, found.strip, found.candidates, found.variants) == (0.4, 0.1, 7, 3)
     assert (found.kind, found.slope) == ("expansion", 4.0)
-    older = build.Options.of({key: seam[key] for key in ("tile", "strip", "candidates", "variants")}, FEW.source)
+    older = build.TilingOptions.from_config(
+        {key: seam[key] for key in ("tile", "strip", "candidates", "variants")}, FEW.source
+    )
     assert (older.kind, older.slope) == ("semantic", 2.0)

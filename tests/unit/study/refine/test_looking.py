@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dav_gswt.study.refine import limits, viewpoints
-from dav_gswt.tiles.layout import CENTRE, W, colours
+from dav_gswt.tiles.layout import CENTRE, W, edge_colours
 
 
 def test_every_part_of_a_cut_is_near_a_place():
@@ -23,9 +23,9 @@ def test_edge_colours_meet_all_around_a_tile(tile):
     assert around[1, 1] == tile and (around // 16 == tile // 16).all()
     for j in range(3):
         for i in range(3):
-            _, north, east, _ = colours(int(around[j, i]))
-            assert i == 2 or east == colours(int(around[j, i + 1]))[0]
-            assert j == 2 or north == colours(int(around[j + 1, i]))[3]
+            _, north, east, _ = edge_colours(int(around[j, i]))
+            assert i == 2 or east == edge_colours(int(around[j, i + 1]))[0]
+            assert j == 2 or north == edge_colours(int(around[j + 1, i]))[3]
 
 
 def test_cameras_look_at_their_middle_from_as_high_as_is_said():

@@ -94,13 +94,13 @@ def test_a_number_that_is_not_finite_is_found_in_a_field(tmp_path):
 def test_a_number_that_is_not_finite_is_found_in_a_chunk(tmp_path):
     given, path = make_ground_field(3, 1.0), tmp_path / "chunks/lod0_tile_00.bin"
     path.parent.mkdir()
-    code = Encoding.of([given], 1.0, 0.01)
-    entry = chunks.write(code.encoded(given), np.arange(len(given))[None], path)
+    code = Encoding.fit([given], 1.0, 0.01)
+    entry = chunks.write_chunk(code.encode(given), np.arange(len(given))[None], path)
     tiles = [{"chunks": [entry | {"file": "chunks/lod0_tile_00.bin", "orders": [0]}]}]
-    write_json(tmp_path / "davgswt.json", {"tiles": tiles, "encoding": code.json()})
+    write_json(tmp_path / "davgswt.json", {"tiles": tiles, "encoding": code.to_dict()})
     assert running.is_finite(path)
     beyond = replace(code, log_scale=[1000.0, 1.0])  # the exponential of it is no number
-    write_json(tmp_path / "davgswt.json", {"tiles": tiles, "encoding": beyond.json()})
+    write_json(tmp_path / "davgswt.json", {"tiles": tiles, "encoding": beyond.to_dict()})
     assert not running.is_finite(path)
 
 

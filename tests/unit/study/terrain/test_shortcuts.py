@@ -29,8 +29,8 @@ def small(monkeypatch):
 
 
 def bundled(tiles, folder, **more):
-    build.write_bundle(tiles, folder, build.Options(tau=1.0, **more), SCHEMA, {})
-    return store.read(folder, SCHEMA)
+    build.write_bundle(tiles, folder, build.BundleOptions(tau=1.0, **more), SCHEMA, {})
+    return store.read_bundle(folder, SCHEMA)
 
 
 def of(rows, shortcut):

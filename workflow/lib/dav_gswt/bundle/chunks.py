@@ -13,19 +13,19 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 
 
-def size_of(count: int, orders: int) -> int:
+def chunk_size(count: int, orders: int) -> int:
     """Bytes of a chunk: two a splat and order, four from 65536 splats on."""
     return count * (RECORD.itemsize + orders * index_type(count).itemsize)
 
 
-def write(rows: Array, order: Integer[Array, "d n"], path: Path) -> dict:
+def write_chunk(rows: Array, order: Integer[Array, "d n"], path: Path) -> dict:
     """Write records and orders; returns what the manifest says of the file's bytes."""
     data = rows.tobytes() + order.astype(index_type(len(rows))).tobytes()
     path.write_bytes(data)
     return {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest(), "count": len(rows)}
 
 
-def read(folder: Path | str, entry: dict, encoding: Encoding) -> tuple[GaussianField, Integer[Array, "d n"]]:
+def read_chunk(folder: Path | str, entry: dict, encoding: Encoding) -> tuple[GaussianField, Integer[Array, "d n"]]:
     """Splats (as they were rounded, nothing known of ground or doubt) and orders of one manifest entry.
 
     Raises: InputError: the file lies outside of the folder, is missing, has another size (looked at before anything
@@ -37,7 +37,7 @@ def read(folder: Path | str, entry: dict, encoding: Encoding) -> tuple[GaussianF
         raise InputError(f"{path}: lies outside of the bundle; make the bundle again")
     try:
         size = path.stat().st_size
-        if size != entry["bytes"] or size != size_of(count, kept):
+        if size != entry["bytes"] or size != chunk_size(count, kept):
             raise InputError(f"{path}: {size} bytes where the manifest says {entry['bytes']}; make the bundle again")
         data = path.read_bytes()
     except OSError as error:
@@ -48,4 +48,4 @@ def read(folder: Path | str, entry: dict, encoding: Encoding) -> tuple[GaussianF
     order = np.frombuffer(data, index_type(count), offset=count * RECORD.itemsize).reshape(kept, count)
     if kept and (np.sort(order, axis=1, kind="stable") != np.arange(count)).any():
         raise InputError(f"{path}: an order does not hold every splat once; make the bundle again")
-    return encoding.decoded(rows), order
+    return encoding.decode(rows), order

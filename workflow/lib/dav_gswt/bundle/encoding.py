@@ -17,16 +17,16 @@ from dav_gswt.field import GaussianField, rgb_to_sh
 
 RECORD = np.dtype([("position", "<u2", 3), ("scale", "u1", 3), ("turn", "u1", 3), ("rgba", "u1", 4)])
 assert RECORD.itemsize == 16
-PLACES = 65535  # steps of the grid along an axis
-LEAST = 1024  # of them a tile's side is wide
-SIZES = 255  # steps of a logarithm of a standard deviation
-STEEPEST = np.sin(np.pi / 8)  # of the smallest of the 24 turns, the largest component beside w
-TURNS = 127  # steps of it either way
-SLIGHTEST = 1 / 64  # pixels: a thinner axis is as good as none, as every splat is widened by half a pixel
-WIDEST = (
+POSITION_STEPS = 65535  # steps of the grid along an axis
+MIN_STEPS_PER_TILE = 1024  # of them a tile's side is wide
+SCALE_STEPS = 255  # steps of a logarithm of a standard deviation
+MAX_COMPONENT = np.sin(np.pi / 8)  # of the smallest of the 24 turns, the largest component beside w
+ROTATION_STEPS = 127  # steps of it either way
+MIN_PIXELS = 1 / 64  # pixels: a thinner axis is as good as none, as every splat is widened by half a pixel
+MAX_TILE_SIDES = (
     4.0  # tile sides: a longer axis is cut to that, as tiles farther away are not drawn for what reaches out of them
 )
-MIDDLE = 0.5 / 255  # of opacity: bytes 0 and 255 stand for all up to half a step inside 0 and 1
+HALF_STEP = 0.5 / 255  # of opacity: bytes 0 and 255 stand for all up to half a step inside 0 and 1
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Encoding:
     log_scale: list[float]
 
     @classmethod
-    def of(cls, parts: list[GaussianField], side: float, pixel: float) -> "Encoding":
+    def fit(cls, parts: list[GaussianField], side: float, pixel: float) -> "Encoding":
         """The finest grid that holds all these Gaussians; pixel: the width of one on the nearest ground in sight.
 
         Raises: InputError: they spread over so many tile sides that a side has less than LEAST steps.
@@ -48,38 +48,42 @@ class Encoding:
         places = [f.means.astype(float) for f in parts if len(f)]
         low, high = np.min([p.min(0) for p in places], 0), np.max([p.max(0) for p in places], 0)
         west, east = min(0.0, float(low[:2].min())), max(side, float(high[:2].max()))
-        many = np.floor((PLACES - (west < 0)) * side / (east - west))  # one more where the rim is rounded outwards
-        if many < LEAST:
+        many = np.floor(
+            (POSITION_STEPS - (west < 0)) * side / (east - west)
+        )  # one more where the rim is rounded outwards
+        if many < MIN_STEPS_PER_TILE:
             raise InputError(f"tiles: a splat lies {(east - west) / side:.0f} tile sides from another; cut them again")
         step = float(side / many)
         west = -float(np.ceil(-west / step)) * step if west < 0 else 0.0
-        rise = float(high[2] - low[2]) / PLACES
+        rise = float(high[2] - low[2]) / POSITION_STEPS
         sizes = np.concatenate([f.log_scales.ravel() for f in parts]).astype(float)
-        sizes = np.clip(sizes, np.log(SLIGHTEST * pixel), np.log(WIDEST * side))
+        sizes = np.clip(sizes, np.log(MIN_PIXELS * pixel), np.log(MAX_TILE_SIDES * side))
         least = float(sizes.min())
-        ladder = [least, float(sizes.max() - least) / SIZES]
+        ladder = [least, float(sizes.max() - least) / SCALE_STEPS]
         return cls([west, west, float(low[2])], [step, step, rise], ladder)
 
-    def encoded(self, field: GaussianField) -> Array:
+    def encode(self, field: GaussianField) -> Array:
         """The records of a field; what lies outside of the grid goes to its rim."""
         rows = np.empty(len(field), RECORD)
         step = np.array(self.step)
         place = (field.means.astype(float) - self.origin) / np.where(step > 0, step, 1)
-        rows["position"] = np.clip(np.rint(place), 0, PLACES)
-        turn, axes = smallest_turns(field.quats)
+        rows["position"] = np.clip(np.rint(place), 0, POSITION_STEPS)
+        turn, axes = find_smallest_rotations(field.quats)
         sizes = np.take_along_axis(field.log_scales.astype(float), axes, 1)
-        rows["scale"] = np.clip(np.rint((sizes - self.log_scale[0]) / (self.log_scale[1] or 1)), 0, SIZES)
-        rows["turn"] = TURNS + np.clip(np.rint(turn[:, 1:] * (TURNS / STEEPEST)), -TURNS, TURNS)
+        rows["scale"] = np.clip(np.rint((sizes - self.log_scale[0]) / (self.log_scale[1] or 1)), 0, SCALE_STEPS)
+        rows["turn"] = ROTATION_STEPS + np.clip(
+            np.rint(turn[:, 1:] * (ROTATION_STEPS / MAX_COMPONENT)), -ROTATION_STEPS, ROTATION_STEPS
+        )
         opacity = expit(field.opacity_logits.astype(float))
         rgba = np.concatenate([field.base_colours.astype(float), opacity[:, None]], 1)
         rows["rgba"] = np.rint(255 * np.clip(rgba, 0, 1))
         return rows
 
-    def decoded(self, rows: Array) -> GaussianField:
+    def decode(self, rows: Array) -> GaussianField:
         """The Gaussians of records, as the page sees them; nothing is known of ground or doubt."""
-        turn = (rows["turn"].astype(float) - TURNS) * (STEEPEST / TURNS)
+        turn = (rows["turn"].astype(float) - ROTATION_STEPS) * (MAX_COMPONENT / ROTATION_STEPS)
         whole = np.sqrt(np.maximum(1 - (turn**2).sum(1, keepdims=True), 0))
-        opacity = np.clip(rows["rgba"][:, 3] / 255, MIDDLE, 1 - MIDDLE)
+        opacity = np.clip(rows["rgba"][:, 3] / 255, HALF_STEP, 1 - HALF_STEP)
         return GaussianField(
             (np.array(self.origin) + rows["position"] * np.array(self.step)).astype(np.float32),
             (self.log_scale[0] + self.log_scale[1] * rows["scale"]).astype(np.float32),
@@ -90,16 +94,16 @@ class Encoding:
             np.zeros(len(rows), bool),
         )
 
-    def json(self) -> dict:
+    def to_dict(self) -> dict:
         return asdict(self)
 
     @classmethod
-    def of_json(cls, told: dict) -> "Encoding":
+    def from_dict(cls, told: dict) -> "Encoding":
         """Of what a manifest says of it."""
         return cls(**{own.name: told[own.name] for own in fields(cls)})
 
 
-def smallest_turns(quats: Float[Array, "n 4"]) -> tuple[Float64[Array, "n 4"], Int[Array, "n 3"]]:
+def find_smallest_rotations(quats: Float[Array, "n 4"]) -> tuple[Float64[Array, "n 4"], Int[Array, "n 3"]]:
     """Unit quaternions, w > 0, of the same ellipsoids whose axes are named so that they are turned least, and of each
     new axis which old one it is.
 
@@ -115,19 +119,19 @@ def smallest_turns(quats: Float[Array, "n 4"]) -> tuple[Float64[Array, "n 4"], I
     g = cube.as_quat(scalar_first=True)
     real = q @ (g * [1, -1, -1, -1]).T  # w of every product
     best = np.argmax(np.round(np.abs(real), 12), axis=1)  # of equals the first, whatever the last bits
-    turned = _product(q, g[best])
+    turned = _multiply_quaternions(q, g[best])
     turned *= np.where(turned[:, :1] < 0, -1, 1)
     axes = np.abs(cube.as_matrix()).argmax(1)  # of each column, the row that is not 0
     return turned, axes[best]
 
 
-def _product(p: Float[Array, "n 4"], q: Float[Array, "n 4"]) -> Float[Array, "n 4"]:
+def _multiply_quaternions(p: Float[Array, "n 4"], q: Float[Array, "n 4"]) -> Float[Array, "n 4"]:
     a, u, b, v = p[:, :1], p[:, 1:], q[:, :1], q[:, 1:]
     return np.concatenate([a * b - (u * v).sum(1, keepdims=True), a * v + b * u + np.cross(u, v)], 1)
 
 
 @dataclass(frozen=True)
-class Errors:
+class EncodingErrors:
     """The largest difference between Gaussians and what is read back: position in world units and in pixels of the
     nearest ground in sight, deviations in percent, the turn in degrees, channels of colour and opacity from 0 to 1.
 
@@ -143,15 +147,15 @@ class Errors:
     clipped: int = 0
 
     @classmethod
-    def of(cls, encoding: Encoding, field: GaussianField, rows: Array, pixel: float) -> "Errors":
+    def measure(cls, encoding: Encoding, field: GaussianField, rows: Array, pixel: float) -> "EncodingErrors":
         """Those of a field's records."""
-        back, (turn, axes) = encoding.decoded(rows), smallest_turns(field.quats)
+        back, (turn, axes) = encoding.decode(rows), find_smallest_rotations(field.quats)
         away = float(np.linalg.norm(back.means.astype(float) - field.means, axis=1).max(initial=0.0))
         sizes = np.take_along_axis(field.log_scales.astype(float), axes, 1)
-        low, high = encoding.log_scale[0], encoding.log_scale[0] + SIZES * encoding.log_scale[1]
+        low, high = encoding.log_scale[0], encoding.log_scale[0] + SCALE_STEPS * encoding.log_scale[1]
         inside = (sizes >= low - 1e-6) & (sizes <= high + 1e-6)
         grown = np.abs(back.log_scales - sizes)[inside]
-        half = np.linalg.norm(_product(turn * [1, -1, -1, -1], back.quats.astype(float))[:, 1:], axis=1)
+        half = np.linalg.norm(_multiply_quaternions(turn * [1, -1, -1, -1], back.quats.astype(float))[:, 1:], axis=1)
         opacity = expit(field.opacity_logits.astype(float))
         return cls(
             position=away,
@@ -163,7 +167,7 @@ class Errors:
             clipped=int((~inside).sum()),
         )
 
-    def joined(self, more: "Errors") -> "Errors":
+    def joined(self, more: "EncodingErrors") -> "EncodingErrors":
         """The worse of each; axes that were clipped are counted."""
         worst = {name: max(value, getattr(more, name)) for name, value in asdict(self).items()}
-        return Errors(**worst | {"clipped": self.clipped + more.clipped})
+        return EncodingErrors(**worst | {"clipped": self.clipped + more.clipped})

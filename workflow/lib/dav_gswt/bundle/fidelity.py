@@ -13,7 +13,7 @@ from jaxtyping import Float32, Int, UInt8
 from numpy import ndarray as Array
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from dav_gswt.bundle import lod
+from dav_gswt.bundle import level_distances
 from dav_gswt.field import GaussianField, concatenate_fields, mean_scale
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
@@ -30,7 +30,7 @@ AZIMUTH = np.radians(25.0)  # of the eye: along no row of cells
 ROOM = 1.2  # width of the picture over that of the sixteen tiles
 
 
-def rows(tiles: TileSet, pixels: float, band: float) -> list[dict]:
+def measure_levels(tiles: TileSet, pixels: float, band: float) -> list[dict]:
     """One row a tile and level: mean scale, count, from which distance the level is used, and the errors there.
 
     Per view `{view}_db`, the PSNR against the finest level, `{view}_change`, the largest difference in 8-bit steps, and
@@ -38,11 +38,11 @@ def rows(tiles: TileSet, pixels: float, band: float) -> list[dict]:
     equal pictures, and of a tile that no pixel looks at.
     Args: pixels, band: see `bundle.build.Options`.
     """
-    table = lod.level_table([mean_scale(level) for level in tiles.fields], pixels, band)
+    table = level_distances.compute_levels([mean_scale(level) for level in tiles.fields], pixels, band)
     found = []
     for level, fields in enumerate(progress(tiles.fields, "measure levels")):
         distance = table[level - 1]["distance"] if level else 0.0
-        errors = errors_of(tiles, level, distance) if level else {}
+        errors = measure_errors(tiles, level, distance) if level else {}
         for tile, field in enumerate(fields):
             row = {"tile": tile, "level": level, "mean_scale": mean_scale([field]), "count": len(field)}
             told = {
@@ -54,23 +54,23 @@ def rows(tiles: TileSet, pixels: float, band: float) -> list[dict]:
     return found
 
 
-def errors_of(tiles: TileSet, level: int, distance: float) -> dict[tuple[int, str], dict]:
+def measure_errors(tiles: TileSet, level: int, distance: float) -> dict[tuple[int, str], dict]:
     """By tile and view: a level's errors against the finest one, seen from a distance."""
     found = {}
     for variant in range(tiles.variants):
-        torus = laid(variant)
-        finest, coarse = (assembled(tiles.fields[number], torus, tiles.side) for number in (0, level))
+        torus = arrange_torus(variant)
+        finest, coarse = (join_tiles(tiles.fields[number], torus, tiles.side) for number in (0, level))
         for view, elevation in ELEVATIONS.items():
             camera = _camera(tiles.side, distance, elevation, float(finest.means[:, 2].mean()))
-            picture = [averaged(field, camera, 2**level) for field in (finest, coarse)]
-            tile, cut = _looks_at(tiles, torus, camera, float(finest.means[:, 2].mean()), 2**level)
+            picture = [render_averaged(field, camera, 2**level) for field in (finest, coarse)]
+            tile, cut = _find_tiles(tiles, torus, camera, float(finest.means[:, 2].mean()), 2**level)
             error = picture[1] - picture[0]
             for number in range(EDGES * variant, EDGES * (variant + 1)):
-                found[number, view] = _told(error[tile == number], cut[tile == number])
+                found[number, view] = _summarize(error[tile == number], cut[tile == number])
     return found
 
 
-def laid(variant: int) -> Int[Array, "6 6"]:
+def arrange_torus(variant: int) -> Int[Array, "6 6"]:
     """Tile numbers of the torus's sixteen cells, row 0 in the south, and a ring of the same around them."""
     lines = np.array(LINES)[np.arange(-1, 6) % len(LINES)]
     west, south = np.meshgrid(lines[:-1], lines[:-1])
@@ -78,7 +78,7 @@ def laid(variant: int) -> Int[Array, "6 6"]:
     return EDGES * variant + 8 * west + 4 * north + 2 * east + south
 
 
-def assembled(fields: list[GaussianField], torus: Int[Array, "6 6"], side: float) -> GaussianField:
+def join_tiles(fields: list[GaussianField], torus: Int[Array, "6 6"], side: float) -> GaussianField:
     """Tiles side by side; the south-western corner of the sixteen is the origin."""
     parts = []
     for (row, column), tile in np.ndenumerate(torus):
@@ -87,7 +87,7 @@ def assembled(fields: list[GaussianField], torus: Int[Array, "6 6"], side: float
     return concatenate_fields(parts)
 
 
-def averaged(field: GaussianField, camera: Camera, factor: int) -> Float32[Array, "h w 3"]:
+def render_averaged(field: GaussianField, camera: Camera, factor: int) -> Float32[Array, "h w 3"]:
     """A picture drawn `factor` times as large and averaged. What shines through is not the field's: divided out."""
     large = camera.resized(factor * camera.width, factor * camera.height)
     seen = Rasterizer(near=1e-6, antialiased=True).forward(**to_raster_arrays(field), camera=large)
@@ -99,13 +99,13 @@ def _camera(side: float, distance: float, elevation: float, height: float) -> Ca
     """From so far away onto the middle of the sixteen tiles, at the reference picture's focal length."""
     middle = np.array([2 * side, 2 * side, height])
     flat = np.cos(elevation) * np.array([np.cos(AZIMUTH), np.sin(AZIMUTH)])
-    width = max(8, int(np.ceil(ROOM * 2**0.5 * len(LINES) * side * lod.FOCAL / distance)))
+    width = max(8, int(np.ceil(ROOM * 2**0.5 * len(LINES) * side * level_distances.FOCAL / distance)))
     lower = max(4, int(np.ceil(width * np.sin(elevation))))
-    fov = 2 * np.degrees(np.arctan(0.5 * width / lod.FOCAL))
+    fov = 2 * np.degrees(np.arctan(0.5 * width / level_distances.FOCAL))
     return cameras.pinhole(middle + distance * np.array([*flat, np.sin(elevation)]), middle, width, lower, fov)
 
 
-def _looks_at(
+def _find_tiles(
     tiles: TileSet, torus: Int[Array, "6 6"], camera: Camera, height: float, near: int
 ) -> tuple[Int[Array, "h w"], UInt8[Array, "h w"]]:
     """Which tile each pixel's ray meets at a height, -1: none of the sixteen; and 1 where that is within `near` cells
@@ -123,7 +123,7 @@ def _looks_at(
     return np.where(inside, tile, -1), (cuts[tile, row, column] & inside).astype(np.uint8)
 
 
-def _told(error: Float32[Array, "n 3"], cut: UInt8[Array, "n"]) -> dict:
+def _summarize(error: Float32[Array, "n 3"], cut: UInt8[Array, "n"]) -> dict:
     change = float(255 * np.abs(error).max()) if len(error) else None
     return {"db": _decibels(error), "change": change, "cut_db": _decibels(error[cut > 0])}
 

@@ -17,9 +17,9 @@ from dav_gswt.field import GaussianField
 from dav_gswt.files import UNREADABLE
 from dav_gswt.logs import progress
 
-WIDTH = 4.0
-MOST = 8_388_608
-NAMED = re.compile(r"lod(\d{1,3})_tile_(\d{1,4}).*\.ply")  # as the renderer looks for them
+TILE_WIDTH = 4.0
+MAX_SPLATS = 8_388_608
+TILE_NAME = re.compile(r"lod(\d{1,3})_tile_(\d{1,4}).*\.ply")  # as the renderer looks for them
 STAMP = (1980, 1, 1, 0, 0, 0)  # the earliest a zip knows: the same tiles give the same bytes
 PROPERTIES = [
     *("x", "y", "z", "nx", "ny", "nz"),
@@ -31,12 +31,12 @@ PROPERTIES = [
 ]
 
 
-def rows(field: GaussianField, side: float) -> Float32[Array, "n 62"]:
+def to_rows(field: GaussianField, side: float) -> Float32[Array, "n 62"]:
     """Splats of a tile `side` wide, scaled to WIDTH; view-dependent colour is left out, quaternions have length 1."""
-    scale = WIDTH / side
+    scale = TILE_WIDTH / side
     out = np.zeros((len(field), len(PROPERTIES)), np.float32)
     out[:, :3] = field.means.astype(float) * scale
-    out[:, :2] = np.clip(out[:, :2], 0, WIDTH)
+    out[:, :2] = np.clip(out[:, :2], 0, TILE_WIDTH)
     out[:, 6:9] = field.sh[:, 0]
     out[:, 54] = field.opacity_logits
     out[:, 55:58] = field.log_scales + np.log(scale)
@@ -45,35 +45,37 @@ def rows(field: GaussianField, side: float) -> Float32[Array, "n 62"]:
     return out
 
 
-def ply(values: Float32[Array, "n 62"]) -> bytes:
+def format_ply(values: Float32[Array, "n 62"]) -> bytes:
     """The renderer's PLY: 65 header lines before end_header, no comment."""
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(values)}"]
     lines += [f"property float {name}" for name in PROPERTIES]
     return "\n".join([*lines, "end_header\n"]).encode("ascii") + values.astype("<f4").tobytes()
 
 
-def write(fields: list[list[GaussianField]], side: float, path: Path) -> None:
+def write_gswt(fields: list[list[GaussianField]], side: float, path: Path) -> None:
     """Write fields[level][tile] as lod{L}_tile_{T}.ply entries, in a fixed order with a fixed time.
 
     Raises: InputError: a tile has no splat, there are more than the renderer takes, or a value is not finite.
     """
     total = sum(len(field) for level in fields for field in level)
-    if total > MOST:
-        raise InputError(f"{path.name}: {total} splats, the renderer takes {MOST}; use smaller tiles or fewer variants")
+    if total > MAX_SPLATS:
+        raise InputError(
+            f"{path.name}: {total} splats, the renderer takes {MAX_SPLATS}; use smaller tiles or fewer variants"
+        )
     flat = [(level, tile, field) for level, tiles in enumerate(fields) for tile, field in enumerate(tiles)]
     with zipfile.ZipFile(path, "w") as archive:
         for level, tile, field in progress(flat, "write gswt.zip"):
             if not len(field):
                 raise InputError(f"level {level}, tile {tile}: no splat in it; the field has a hole as wide as a tile")
-            values = rows(field, side)
+            values = to_rows(field, side)
             if not np.isfinite(values).all():
                 raise InputError(f"level {level}, tile {tile}: a value is not finite")
             entry = zipfile.ZipInfo(f"lod{level}_tile_{tile:02d}.ply", STAMP)
             entry.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(entry, ply(values), compresslevel=1)
+            archive.writestr(entry, format_ply(values), compresslevel=1)
 
 
-def read(path: Path | str, side: float) -> list[list[GaussianField]]:
+def read_gswt(path: Path | str, side: float) -> list[list[GaussianField]]:
     """fields[level][tile] of an archive that `write` made, or anybody else, for tiles `side` wide.
 
     What an entry says of its size is compared with its header before it is unpacked, and all of it with the most that
@@ -85,11 +87,11 @@ def read(path: Path | str, side: float) -> list[list[GaussianField]]:
     try:
         with zipfile.ZipFile(path) as archive:
             for entry in archive.infolist():
-                if match := NAMED.search(Path(entry.filename).name):
+                if match := TILE_NAME.search(Path(entry.filename).name):
                     key = int(match[1]), int(match[2])
                     if key in found:
                         raise InputError(f"{path}: {entry.filename} is there twice")
-                    found[key] = _field(archive, entry, side, MOST - sum(map(len, found.values())))
+                    found[key] = _read_entry(archive, entry, side, MAX_SPLATS - sum(map(len, found.values())))
     except UNREADABLE as error:
         raise InputError(f"{path}: not readable ({error}); make the bundle again") from error
     levels, tiles = ({key[axis] for key in found} for axis in (0, 1))
@@ -98,10 +100,10 @@ def read(path: Path | str, side: float) -> list[list[GaussianField]]:
     return [[found[level, tile] for tile in range(len(tiles))] for level in range(len(levels))]
 
 
-def _field(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, side: float, room: int) -> GaussianField:
+def _read_entry(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, side: float, room: int) -> GaussianField:
     """An entry's Gaussians; room: how many are left of MOST."""
     name = f"{archive.filename}: {entry.filename}"
-    none = ply(np.zeros((0, len(PROPERTIES)), np.float32))
+    none = format_ply(np.zeros((0, len(PROPERTIES)), np.float32))
     with archive.open(entry) as file:
         head = file.read(len(none) + 8)
         count = re.match(rb"ply\nformat binary_little_endian 1\.0\nelement vertex (\d{1,8})\n", head)
@@ -117,7 +119,7 @@ def _field(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, side: float, room: 
     values = np.frombuffer(data, "<f4").reshape(n, len(PROPERTIES)).astype(np.float32)
     if not np.isfinite(values).all():
         raise InputError(f"{name}: a value is not finite; make the bundle again")
-    scale = WIDTH / side
+    scale = TILE_WIDTH / side
     return GaussianField(
         (values[:, :3] / scale).astype(np.float32),
         (values[:, 55:58] - np.log(scale)).astype(np.float32),

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.bundle import lod, orders
+from dav_gswt.bundle import level_distances, orders
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images.metrics import mse_to_psnr
@@ -22,7 +22,7 @@ VIEWS = 8  # a view and elevation
 
 
 @dataclass(frozen=True)
-class Sight:
+class TileView:
     """A tile's number, and from where it is looked at: degrees from the east, degrees below the horizon."""
 
     tile: int
@@ -31,37 +31,37 @@ class Sight:
 
     @property
     def direction(self) -> Float[Array, "3"]:
-        return orders.towards(np.radians([self.azimuth]), np.radians(self.elevation))[0]
+        return orders.unit_vectors(np.radians([self.azimuth]), np.radians(self.elevation))[0]
 
 
-def spread(tiles: int, elevation: float, azimuths: int = 1) -> list[Sight]:
+def spread_views(tiles: int, elevation: float, azimuths: int = 1) -> list[TileView]:
     """VIEWS sights of different tiles, evenly around, each half-way between two of so many azimuths."""
     around = [round(azimuths * k / VIEWS) + 0.5 for k in range(VIEWS)]
-    return [Sight(5 * k % tiles, 360 / azimuths * a % 360, elevation) for k, a in enumerate(around)]
+    return [TileView(5 * k % tiles, 360 / azimuths * a % 360, elevation) for k, a in enumerate(around)]
 
 
-def nearest_pixel(side: float) -> float:
+def pixel_size(side: float) -> float:
     """What a pixel of the reference picture covers a tile's side away: nearer tiles are sorted exactly."""
-    return side / lod.FOCAL
+    return side / level_distances.FOCAL
 
 
-def drawn(
+def render_in_order(
     field: GaussianField, side: float, along: Float[Array, "3"], pixel: float, order: Float[Array, "3"] | None = None
 ) -> Float32[Array, "h w 3"]:
     """The middle of a tile seen along a direction, in the order of another one, pixels `pixel` wide; black behind."""
     middle = np.array([side / 2, side / 2, np.median(field.means[:, 2])])
     camera = _camera(along, pixel)
-    field = field[_shown(field, middle, camera)]
+    field = field[_visible(field, middle, camera)]
     means = field.means.astype(float) - middle
     place = np.empty(len(field))
-    place[orders.back_to_front(field.means, along if order is None else order)] = np.arange(len(field), 0, -1)
+    place[orders.sort_back_to_front(field.means, along if order is None else order)] = np.arange(len(field), 0, -1)
     depth = side * (1 + place / max(len(field), 1))
     means += (depth - means @ along)[:, None] * along
     moved = replace(field, means=means.astype(np.float32))
     return Rasterizer(near=1e-6).forward(**to_raster_arrays(moved), camera=camera).colour
 
 
-def _shown(field: GaussianField, middle: Float[Array, "3"], camera: Camera) -> Bool[Array, "n"]:
+def _visible(field: GaussianField, middle: Float[Array, "3"], camera: Camera) -> Bool[Array, "n"]:
     """Which Gaussians reach into the picture, four deviations about their centres."""
     x, y, z = (field.means - middle.astype(np.float32)).T
     a, b, c = field.log_scales.T
@@ -71,7 +71,7 @@ def _shown(field: GaussianField, middle: Float[Array, "3"], camera: Camera) -> B
     return shown
 
 
-def decibels(pairs: list[tuple[Float32[Array, "h w 3"], Float32[Array, "h w 3"]]]) -> float | None:
+def compute_psnr(pairs: list[tuple[Float32[Array, "h w 3"], Float32[Array, "h w 3"]]]) -> float | None:
     """PSNR of pictures against others, over all pixels of all; None: they are equal."""
     square = float(np.mean([((a.astype(float) - b) ** 2).mean() for a, b in pairs]))
     return mse_to_psnr(square)

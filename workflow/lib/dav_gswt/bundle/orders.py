@@ -10,14 +10,14 @@ import numpy as np
 from jaxtyping import Float, Float32, UInt16, UInt32
 from numpy import ndarray as Array
 
-KEYS = (
+DEPTH_STEPS = (
     65535  # steps of depth across a tile: a sixteen-bit key is sorted by its digits, in time that grows with the count
 )
-WIDE = 65536  # from so many splats on an index takes four bytes
+WIDE_INDEX = 65536  # from so many splats on an index takes four bytes
 
 
 @dataclass(frozen=True)
-class Rings:
+class DirectionRings:
     """Viewing directions: rings of `azimuths` each, at elevations in degrees below the horizon, and straight down.
 
     Only deep tiles keep all; the others keep every second azimuth.
@@ -29,10 +29,10 @@ class Rings:
     def directions(self) -> Float[Array, "d 3"]:
         """Unit vectors, ring after ring, each from the east to the north; straight down comes last."""
         azimuth = 2 * np.pi * np.arange(self.azimuths) / self.azimuths
-        rings = [towards(azimuth, np.radians(down)) for down in self.elevations]
+        rings = [unit_vectors(azimuth, np.radians(down)) for down in self.elevations]
         return np.concatenate([*rings, [[0.0, 0.0, -1.0]]])
 
-    def kept(self, uncertainty: float, tau: float) -> list[int]:
+    def select(self, uncertainty: float, tau: float) -> list[int]:
         """Indices into directions() that a tile keeps: all if it is deep, else every second azimuth and straight down.
 
         Deep is u >= tau for tau < 1: at tau = 0 every tile is, at tau = 1 none, and a larger tau never adds one.
@@ -45,7 +45,7 @@ class Rings:
         return [*(r + k for r in range(0, last, self.azimuths) for k in range(0, self.azimuths, step)), last]
 
 
-def towards(azimuth: Float[Array, "n"], down: float) -> Float[Array, "n 3"]:
+def unit_vectors(azimuth: Float[Array, "n"], down: float) -> Float[Array, "n 3"]:
     """Unit vectors at azimuths from the east to the north, so far below the horizon; in radians."""
     flat = np.stack([np.cos(azimuth), np.sin(azimuth)], 1) * np.cos(down)
     return np.concatenate([flat, np.full((len(azimuth), 1), -np.sin(down))], 1)
@@ -53,15 +53,15 @@ def towards(azimuth: Float[Array, "n"], down: float) -> Float[Array, "n 3"]:
 
 def index_type(count: int) -> np.dtype:
     """How an order's indices are stored: two bytes each where that is enough."""
-    return np.dtype("<u2" if count < WIDE else "<u4")
+    return np.dtype("<u2" if count < WIDE_INDEX else "<u4")
 
 
-def back_to_front(means: Float32[Array, "n 3"], along: Float[Array, "3"]) -> UInt32[Array, "n"]:
+def sort_back_to_front(means: Float32[Array, "n 3"], along: Float[Array, "3"]) -> UInt32[Array, "n"]:
     """Indices by falling depth along a viewing direction; of equal depths the smaller index comes first."""
     return np.argsort(-(means.astype(float) @ along), kind="stable").astype(np.uint32)
 
 
-def presorted(means: Float32[Array, "n 3"], along: Float[Array, "d 3"]) -> UInt16[Array, "d n"] | UInt32[Array, "d n"]:
+def presort(means: Float32[Array, "n 3"], along: Float[Array, "d 3"]) -> UInt16[Array, "d n"] | UInt32[Array, "d n"]:
     """The order of each direction as it is stored: `back_to_front`, but that depths within a KEYS-th of all the tile's
     count as equal. So it is ten times as fast.
     """
@@ -70,6 +70,6 @@ def presorted(means: Float32[Array, "n 3"], along: Float[Array, "d 3"]) -> UInt1
     for order, (right, ahead, up) in zip(found, along.astype(np.float32), strict=True):
         depth = x * right + y * ahead + z * up
         top, low = depth.max(initial=-np.inf), depth.min(initial=np.inf)
-        key = (top - depth) / (top - low) * KEYS if top > low else np.zeros_like(depth)
+        key = (top - depth) / (top - low) * DEPTH_STEPS if top > low else np.zeros_like(depth)
         order[:] = np.argsort(key.astype(np.uint16), kind="stable")
     return found

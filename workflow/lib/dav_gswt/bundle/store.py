@@ -21,11 +21,11 @@ class Bundle:
 
     @property
     def encoding(self) -> Encoding:
-        return Encoding.of_json(self.manifest["encoding"])
+        return Encoding.from_dict(self.manifest["encoding"])
 
     def chunk(self, tile: int, level: int) -> tuple[GaussianField, Integer[Array, "d n"]]:
         """A tile's Gaussians at a level, and their orders. Raises: InputError: see `chunks.read`."""
-        return chunks.read(self.folder, self.manifest["tiles"][tile]["chunks"][level], self.encoding)
+        return chunks.read_chunk(self.folder, self.manifest["tiles"][tile]["chunks"][level], self.encoding)
 
     def fields(self) -> list[list[GaussianField]]:
         """fields[level][tile] of the whole set."""
@@ -33,6 +33,6 @@ class Bundle:
         return [[self.chunk(t, level)[0] for t in tiles] for level in progress(levels, "read levels")]
 
 
-def read(folder: Path | str, schema: Path | str) -> Bundle:
+def read_bundle(folder: Path | str, schema: Path | str) -> Bundle:
     """A bundle whose manifest is sound. Raises: InputError: see `manifest.read`."""
-    return Bundle(Path(folder), manifest.read(folder, schema))
+    return Bundle(Path(folder), manifest.read_manifest(folder, schema))

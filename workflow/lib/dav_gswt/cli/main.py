@@ -10,7 +10,7 @@ from dav_gswt.inspect import command as inspect
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; its exit status, 1 with a message where what was given cannot be used."""
     parser = argparse.ArgumentParser(prog="dav-gswt", description=__doc__)
-    inspect.add(parser.add_subparsers(title="commands", required=True, metavar="COMMAND"))
+    inspect.add_command(parser.add_subparsers(title="commands", required=True, metavar="COMMAND"))
     options = parser.parse_args(arguments)
     try:
         return options.run(options)

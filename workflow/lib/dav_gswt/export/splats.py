@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from dav_gswt.bundle import gswt
-from dav_gswt.bundle.fidelity import laid
+from dav_gswt.bundle.fidelity import arrange_torus
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, concatenate_fields, write_field
 from dav_gswt.files import whole_folder
@@ -21,28 +21,28 @@ from dav_gswt.logs import progress
 from dav_gswt.tiles.layout import EDGES
 
 PACKAGE = "@playcanvas/splat-transform@2.7.1"
-ROW = 4  # tiles
+TILES_PER_ROW = 4  # tiles
 
 
-def patch(fields: list[GaussianField], side: float) -> GaussianField:
+def assemble_patch(fields: list[GaussianField], side: float) -> GaussianField:
     """One level's tiles, side by side; the south-western corner is the origin."""
     parts = []
     for variant in range(len(fields) // EDGES):
-        for (row, column), tile in np.ndenumerate(laid(variant)[1:-1, 1:-1]):
-            corner = np.array([(ROW * variant + column) * side, row * side, 0.0], np.float32)
+        for (row, column), tile in np.ndenumerate(arrange_torus(variant)[1:-1, 1:-1]):
+            corner = np.array([(TILES_PER_ROW * variant + column) * side, row * side, 0.0], np.float32)
             parts.append(replace(fields[tile], means=fields[tile].means + corner))
     return concatenate_fields(parts)
 
 
 def write_plys(archive: Path | str, side: float, out: Path | str) -> None:
     """Write level{l}.ply of every level of a gswt.zip to a folder. Raises: InputError: see `gswt.read`."""
-    fields = gswt.read(archive, side)
+    fields = gswt.read_gswt(archive, side)
     with whole_folder(out) as folder:
         for level, tiles in enumerate(progress(fields, "write patches")):
-            write_field(patch(tiles, side), folder / f"level{level}.ply")
+            write_field(assemble_patch(tiles, side), folder / f"level{level}.ply")
 
 
-def convert(plys: Path | str, kind: str, out: Path | str) -> None:
+def convert_plys(plys: Path | str, kind: str, out: Path | str) -> None:
     """Convert a folder of level{l}.ply: spz gives level{l}.spz, sog a set that streams its levels, lod-meta.json.
 
     By PACKAGE, which npx fetches the first time. Raises: InputError: no Node.js, or what the program complains of.
@@ -51,13 +51,13 @@ def convert(plys: Path | str, kind: str, out: Path | str) -> None:
     with whole_folder(out) as folder:
         if kind == "sog":
             tagged = [word for level, name in enumerate(names) for word in (str(name), "-l", str(level))]
-            _run([*tagged, str(folder / "lod-meta.json"), "-g", "cpu"], kind)
+            _run_converter([*tagged, str(folder / "lod-meta.json"), "-g", "cpu"], kind)
         else:
             for name in names:
-                _run([str(name), str(folder / f"{name.stem}.spz"), "--spz-version", "3"], kind)
+                _run_converter([str(name), str(folder / f"{name.stem}.spz"), "--spz-version", "3"], kind)
 
 
-def _run(arguments: list[str], kind: str) -> None:
+def _run_converter(arguments: list[str], kind: str) -> None:
     npx = shutil.which("npx")
     if npx is None:
         raise InputError(

@@ -6,15 +6,15 @@ import re
 from pathlib import Path
 
 from dav_gswt.errors import InputError
-from dav_gswt.inspect.options import MOST, Asked
+from dav_gswt.inspect.options import MAX_DRAWN, ViewOptions
 
-NEEDED = ("pyvista", "trame_vtk")
+REQUIRED = ("pyvista", "trame_vtk")
 FORMATS = (".png", ".html")
 SIZE = (1280, 800)
-MOST_PIXELS = 8192  # of a picture's side
+MAX_PIXELS = 8192  # of a picture's side
 
 
-def add(commands) -> None:
+def add_command(commands) -> None:
     """Add the command to a parser's commands."""
     about = "a field, poses, photos, tiles or maps in three dimensions (docs/inspect.md)"
     parser = commands.add_parser("inspect", help=about, description=__doc__)
@@ -32,21 +32,25 @@ def add(commands) -> None:
         "--poses", type=Path, metavar="FILE", help="with scores.csv: the poses.json whose poses are marked"
     )
     parser.add_argument(
-        "--size", type=_size, default=SIZE, metavar="WxH", help="of window and picture (default: 1280x800)"
+        "--size", type=_parse_size, default=SIZE, metavar="WxH", help="of window and picture (default: 1280x800)"
     )
     parser.add_argument(
-        "--most", type=_natural, default=MOST, metavar="N", help=f"Gaussians that are drawn (default: {MOST})"
+        "--most",
+        type=_parse_natural,
+        default=MAX_DRAWN,
+        metavar="N",
+        help=f"Gaussians that are drawn (default: {MAX_DRAWN})",
     )
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run_inspect)
 
 
-def run(options: argparse.Namespace) -> int:
+def run_inspect(options: argparse.Namespace) -> int:
     """Show or save; the exit status. Raises: InputError: whatever stands in the way."""
-    asked = Asked(**{name: getattr(options, name) for name in vars(Asked())})
+    asked = ViewOptions(**{name: getattr(options, name) for name in vars(ViewOptions())})
     if options.save is not None and options.save.suffix not in FORMATS:
         raise InputError(f"--save {options.save}: pictures end in .png and pages in .html")
-    require()
-    from dav_gswt.inspect import kinds, saving  # below the check: they load what is drawn with
+    require_extra()
+    from dav_gswt.inspect import saving  # below the check: they load what is drawn with
 
     if options.save is None and not saving.has_display():
         raise InputError("there is no display for a window here: add --save FILE.png or --save FILE.html")
@@ -60,21 +64,21 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def require() -> None:
+def require_extra() -> None:
     """Raises: InputError: the extra is not installed."""
-    if missing := [name for name in NEEDED if importlib.util.find_spec(name) is None]:
+    if missing := [name for name in REQUIRED if importlib.util.find_spec(name) is None]:
         how = '.venv/bin/pip install --no-build-isolation -e ".[inspect]"'
         raise InputError(f"inspect: {', '.join(missing)} is not installed: {how}")
 
 
-def _size(text: str) -> tuple[int, int]:
+def _parse_size(text: str) -> tuple[int, int]:
     found = re.fullmatch(r"([1-9]\d{1,3})x([1-9]\d{1,3})", text)
-    if not found or max(size := (int(found[1]), int(found[2]))) > MOST_PIXELS:
-        raise argparse.ArgumentTypeError(f"{text!r} is no size like 1280x800, at most {MOST_PIXELS} a side")
+    if not found or max(size := (int(found[1]), int(found[2]))) > MAX_PIXELS:
+        raise argparse.ArgumentTypeError(f"{text!r} is no size like 1280x800, at most {MAX_PIXELS} a side")
     return size
 
 
-def _natural(text: str) -> int:
+def _parse_natural(text: str) -> int:
     if not re.fullmatch(r"[1-9]\d{0,8}", text):
         raise argparse.ArgumentTypeError(f"{text!r} is no number of at least 1")
     return int(text)

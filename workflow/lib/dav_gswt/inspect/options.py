@@ -5,11 +5,11 @@ from pathlib import Path
 
 from dav_gswt.errors import InputError
 
-MOST = 300_000  # Gaussians or pixels that are drawn: what a browser without a GPU still turns
+MAX_DRAWN = 300_000  # Gaussians or pixels that are drawn: what a browser without a GPU still turns
 
 
 @dataclass(frozen=True)
-class Asked:
+class ViewOptions:
     """None: what suits the artefact. colour: by what. level: of levels and tiles. part, channel: of maps. poses: a
     poses.json. most: Gaussians, or pixels a map, at most."""
 
@@ -18,22 +18,22 @@ class Asked:
     part: str | None = None
     channel: str | None = None
     poses: Path | None = None
-    most: int = MOST
+    most: int = MAX_DRAWN
 
-    def refuse(self, path: Path, *known: str) -> None:
+    def reject_others(self, path: Path, *known: str) -> None:
         """Raises: InputError: something is asked that means nothing here, by name."""
         for name in ("colour", "level", "part", "channel", "poses"):
             if getattr(self, name) is not None and name not in known:
                 can = ", ".join(f"--{k}" for k in known) or "none of its options"
                 raise InputError(f"--{name}: means nothing for {path}; it knows {can}")
 
-    def one_of(self, names: tuple[str, ...], what: str) -> str:
+    def choose_colour(self, names: tuple[str, ...], what: str) -> str:
         """What to colour by; the first of names where nothing is asked. Raises: InputError: another name."""
         if self.colour is not None and self.colour not in names:
             raise InputError(f"--colour {self.colour}: {what} has {', '.join(names)}")
         return self.colour or names[0]
 
-    def levels_of(self, count: int, path: Path) -> list[int]:
+    def choose_levels(self, count: int, path: Path) -> list[int]:
         """All levels, or the one asked for. Raises: InputError: there is no such level."""
         if self.level is None:
             return list(range(count))

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import whole
-from dav_gswt.inspect.scene import Bar, Keys, Scene, bytes_of
+from dav_gswt.inspect.scene import ColourBar, ColourKey, Scene, to_bytes
 
 WINDOWS = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")  # what VTK can draw in where there is no display
 PACKAGES = "libegl1 libgl1-mesa-dri"  # for the first; libosmesa6 for the second, with the same pictures
@@ -43,7 +43,7 @@ def has_display() -> bool:
     return sys.platform in ("darwin", "win32") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def prepare() -> None:
+def prepare_rendering() -> None:
     """Choose how VTK draws without a display; to be called before VTK is loaded.
 
     Raises: InputError: this machine has no way to, with the packages that bring one. It is tried out in a process of
@@ -65,9 +65,8 @@ def prepare() -> None:
     )
 
 
-def save(scene: Scene, path: Path, size: tuple[int, int]) -> None:
+def save_scene(scene: Scene, path: Path, size: tuple[int, int]) -> None:
     """Write a .png or a .html file; it appears whole or not at all."""
-    from dav_gswt.inspect import drawing
 
     with whole(path) as part:
         if path.suffix == ".png":
@@ -75,33 +74,32 @@ def save(scene: Scene, path: Path, size: tuple[int, int]) -> None:
             drawn.screenshot(str(part))
         else:
             drawn = drawing.plotter(scene, size, off_screen=True, legend=False)
-            part.write_text(page(scene, drawn.render_window), encoding="utf-8")
+            part.write_text(format_page(scene, drawn.render_window), encoding="utf-8")
         drawn.close()
 
 
-def window(scene: Scene, size: tuple[int, int]) -> None:
+def open_window(scene: Scene, size: tuple[int, int]) -> None:
     """Show until the window is closed."""
-    from dav_gswt.inspect import drawing
 
     drawing.plotter(scene, size, off_screen=False).show(title=scene.title)
 
 
-def page(scene: Scene, render_window) -> str:
+def format_page(scene: Scene, render_window) -> str:
     """The scene in a page of its own, VTK's viewer for browsers in it; the policy in its head forbids all requests."""
     from trame_vtk.tools.vtksz2html import write_html
 
     render_window.Render()
     text = io.StringIO()
-    write_html(_packed(render_window), text)
+    write_html(_pack_scene(render_window), text)
     head = (
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}" />\n<title>{html.escape(scene.title)}</title>'
     )
     text = re.sub(r"<title>.*?</title>", lambda _: head, text.getvalue().replace(ICON, "data:,"), count=1, flags=re.S)
     before, body, after = text.rpartition("</body>")
-    return f"{before}{STAGE}\n{_overlay(scene)}\n{body}{after}"
+    return f"{before}{STAGE}\n{_format_overlay(scene)}\n{body}{after}"
 
 
-def _packed(render_window) -> bytes:
+def _pack_scene(render_window) -> bytes:
     """The scene as VTK's viewer reads it: the same bytes for the same scene."""
     from trame_vtk.modules.vtk import serializers as vtk
 
@@ -116,11 +114,11 @@ def _packed(render_window) -> bytes:
     with zipfile.ZipFile(packed, "w") as archive:
         entry = zipfile.ZipInfo("index.json", STAMP)
         entry.compress_type = zipfile.ZIP_DEFLATED
-        archive.writestr(entry, json.dumps({"hashes": arrays, "scene": _renamed(state)}))
+        archive.writestr(entry, json.dumps({"hashes": arrays, "scene": _renumber(state)}))
     return packed.getvalue()
 
 
-def _renamed(state: dict) -> dict:
+def _renumber(state: dict) -> dict:
     """Objects numbered as they come, in place of their addresses in memory; without the times of their changes."""
     text = json.dumps(state)
     numbers: dict[str, str] = {}
@@ -128,7 +126,7 @@ def _renamed(state: dict) -> dict:
     return json.loads(re.sub(r'"mtime": \d+', '"mtime": 1', text))
 
 
-def _overlay(scene: Scene) -> str:
+def _format_overlay(scene: Scene) -> str:
     """Title, notes and legend, above the picture."""
     lines = [
         f"<b>{html.escape(scene.title)}</b>",
@@ -136,23 +134,25 @@ def _overlay(scene: Scene) -> str:
         "drag to turn, shift-drag to move, wheel to zoom",
     ]
     for entry in scene.legend:
-        lines += [_bar(entry)] if isinstance(entry, Bar) else _keys(entry)
+        lines += [_format_bar(entry)] if isinstance(entry, ColourBar) else _format_keys(entry)
     style = "position:fixed;left:8px;top:8px;z-index:9;font:13px sans-serif;color:#191919;pointer-events:none"
     return f'<div id="about" style="{style}">{"<br>".join(lines)}</div>'
 
 
-def _bar(bar: Bar) -> str:
+def _format_bar(bar: ColourBar) -> str:
     from matplotlib import colormaps
 
-    stops = ",".join(_css(c) for c in bytes_of(colormaps[bar.colours].resampled(STOPS)(range(STOPS))[:, :3]).tolist())
+    stops = ",".join(
+        _format_colour(c) for c in to_bytes(colormaps[bar.colours].resampled(STOPS)(range(STOPS))[:, :3]).tolist()
+    )
     look = f"display:inline-block;width:140px;height:10px;background:linear-gradient(90deg,{stops})"
     return f'{html.escape(bar.title)}: {bar.low:.3g} <span style="{look}"></span> {bar.high:.3g}'
 
 
-def _keys(keys: Keys) -> list[str]:
+def _format_keys(keys: ColourKey) -> list[str]:
     box = "display:inline-block;width:10px;height:10px;background:"
-    return [f'<span style="{box}{_css(c)}"></span> {html.escape(name)}' for name, c in keys.named.items()]
+    return [f'<span style="{box}{_format_colour(c)}"></span> {html.escape(name)}' for name, c in keys.named.items()]
 
 
-def _css(colour) -> str:
+def _format_colour(colour) -> str:
     return "rgb({},{},{})".format(*colour)

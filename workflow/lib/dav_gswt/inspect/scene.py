@@ -6,10 +6,10 @@ import numpy as np
 from jaxtyping import Float, Float32, Int, UInt8
 from numpy import ndarray as Array
 
-DOUBT = "coolwarm"  # blue where all is known, red where nothing is
+UNCERTAINTY_MAP = "coolwarm"  # blue where all is known, red where nothing is
 UNKNOWN = (150, 150, 150)  # the colour of what is NaN
-INK = (25, 25, 25)
-LARGE = 4096  # entries of a colour map: more steps than eight bits tell apart
+BLACK = (25, 25, 25)
+MAP_ENTRIES = 4096  # entries of a colour map: more steps than eight bits tell apart
 
 
 @dataclass(frozen=True)
@@ -21,34 +21,34 @@ class Layer:
     kind: str
     points: Float32[Array, "n 3"]
     cells: Int[Array, "m k"] | None = None
-    colours: UInt8[Array, "m 3"] | tuple[int, int, int] = INK
+    colours: UInt8[Array, "m 3"] | tuple[int, int, int] = BLACK
     width: float = 2.0
     picture: UInt8[Array, "h w 3"] | None = None
 
 
 @dataclass(frozen=True)
-class Word:
+class Label:
     """Letters in the scene, `height` world units tall, centred at a place. standing: upright, towards the viewer that
     the scene starts with; else they lie on the ground."""
 
     text: str
     place: tuple[float, float, float]
     height: float
-    standing: bool = True
+    upright: bool = True
 
 
 @dataclass(frozen=True)
-class Bar:
+class ColourBar:
     """Colours that stand for numbers, from `low` to `high`."""
 
     title: str
     low: float
     high: float
-    colours: str = DOUBT
+    colours: str = UNCERTAINTY_MAP
 
 
 @dataclass(frozen=True)
-class Keys:
+class ColourKey:
     """Colours that stand for names."""
 
     named: dict[str, tuple[int, int, int]]
@@ -64,64 +64,66 @@ class Scene:
     low: Float[Array, "3"]
     high: Float[Array, "3"]
     notes: list[str] = field(default_factory=list)
-    words: list[Word] = field(default_factory=list)
-    legend: list[Bar | Keys] = field(default_factory=list)
+    words: list[Label] = field(default_factory=list)
+    legend: list[ColourBar | ColourKey] = field(default_factory=list)
     seen_from: tuple[float, float, float] = (-0.45, -1.0, 0.75)
     flat: bool = False
 
 
-def bytes_of(colours: Float[Array, "*n 3"]) -> UInt8[Array, "*n 3"]:
+def to_bytes(colours: Float[Array, "*n 3"]) -> UInt8[Array, "*n 3"]:
     """Colours in [0, 1] as bytes; beyond they are clipped."""
     return np.rint(np.clip(colours, 0, 1) * 255).astype(np.uint8)
 
 
-def coloured(values: Float[Array, "*n"], bar: Bar) -> UInt8[Array, "*n 3"]:
+def map_colours(values: Float[Array, "*n"], bar: ColourBar) -> UInt8[Array, "*n 3"]:
     """The bar's colours of values; UNKNOWN where they are NaN."""
     from matplotlib import colormaps
 
     known = np.isfinite(values)
     span = bar.high - bar.low
     share = (np.where(known, values, bar.low) - bar.low) / (span if span > 0 else 1.0)
-    table = bytes_of(colormaps[bar.colours].resampled(LARGE)(np.arange(LARGE))[:, :3])
-    found = table[np.rint(np.clip(share, 0, 1) * (LARGE - 1)).astype(int)]
+    table = to_bytes(colormaps[bar.colours].resampled(MAP_ENTRIES)(np.arange(MAP_ENTRIES))[:, :3])
+    found = table[np.rint(np.clip(share, 0, 1) * (MAP_ENTRIES - 1)).astype(int)]
     found[~known] = UNKNOWN
     return found
 
 
-def bar_over(title: str, values: Float[Array, "*n"], colours: str = DOUBT, most: float = 1.0) -> Bar:
+def make_bar(title: str, values: Float[Array, "*n"], colours: str = UNCERTAINTY_MAP, most: float = 1.0) -> ColourBar:
     """A bar from the least value to the quantile `most`; of a constant or of nothing one unit wide."""
     known = values[np.isfinite(values)]
     low, high = (float(known.min()), float(np.quantile(known, most))) if known.size else (0.0, 1.0)
-    return Bar(title, low, high if high > low else low + 1.0, colours)
+    return ColourBar(title, low, high if high > low else low + 1.0, colours)
 
 
-def moved(layer: Layer, by: Float[Array, "3"]) -> Layer:
+def move_layer(layer: Layer, by: Float[Array, "3"]) -> Layer:
     """The layer elsewhere."""
     return replace(layer, points=(layer.points + by).astype(np.float32))
 
 
-def outline(west: float, south: float, east: float, north: float, z: float, colour: tuple[int, int, int]) -> Layer:
+def make_outline(west: float, south: float, east: float, north: float, z: float, colour: tuple[int, int, int]) -> Layer:
     """A level rectangle's border."""
     corners = np.float32([[west, south, z], [east, south, z], [east, north, z], [west, north, z]])
     return Layer("lines", corners, np.array([[0, 1], [1, 2], [2, 3], [3, 0]]), colour, 3.0)
 
 
-def balls(centres: Float[Array, "n 3"], radius: float, colours: UInt8[Array, "n 3"]) -> Layer:
+def make_balls(centres: Float[Array, "n 3"], radius: float, colours: UInt8[Array, "n 3"]) -> Layer:
     """A ball at each place."""
     from trimesh.creation import icosphere
 
     shape = icosphere(subdivisions=2, radius=radius)
-    return copies(np.asarray(shape.vertices)[None] + centres[:, None], np.asarray(shape.faces), colours)
+    return copy_shape(np.asarray(shape.vertices)[None] + centres[:, None], np.asarray(shape.faces), colours)
 
 
-def copies(points: Float[Array, "n v 3"], faces: Int[Array, "f k"], colours: UInt8[Array, "n 3"]) -> Layer:
+def copy_shape(points: Float[Array, "n v 3"], faces: Int[Array, "f k"], colours: UInt8[Array, "n 3"]) -> Layer:
     """One shape many times over: its corners in each copy, its faces, a colour a copy."""
     n, v = points.shape[:2]
     cells = (faces[None] + v * np.arange(n)[:, None, None]).reshape(-1, faces.shape[1])
     return Layer("faces", points.reshape(-1, 3).astype(np.float32), cells, np.repeat(colours, len(faces), 0))
 
 
-def hung(picture: UInt8[Array, "h w 3"], corner: Float[Array, "3"], right: Float[Array, "3"], down: Float[Array, "3"]):
+def hang_picture(
+    picture: UInt8[Array, "h w 3"], corner: Float[Array, "3"], right: Float[Array, "3"], down: Float[Array, "3"]
+):
     """A picture on a parallelogram, from its top left corner along its upper and its left border."""
     points = np.array([corner, corner + right, corner + right + down, corner + down])
     return Layer("picture", points.astype(np.float32), np.array([[0, 1, 2, 3]]), picture=picture)

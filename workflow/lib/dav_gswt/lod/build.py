@@ -6,7 +6,6 @@ cells they cover: fitted from above they come out rough, and low over the ground
 """
 
 import logging
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,8 @@ from dav_gswt.field import GaussianField, mean_scale
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
-from dav_gswt.lod.merge import cropped, halved
+from dav_gswt.lod.levels import AUTO, MAX_LEVELS, Levels
+from dav_gswt.lod.merge import crop_to_blocks, halve_resolution
 from dav_gswt.photos.training_views import View
 from dav_gswt.raster import Gradients, to_raster_arrays
 from dav_gswt.reconstruction.build import modelled
@@ -25,30 +25,20 @@ from dav_gswt.reconstruction.fitting import trainer
 from dav_gswt.reconstruction.fitting.plan import Plan
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.ground_constraints import OnGround
-from dav_gswt.tiles.layout import AUTO, MOST
 
 _log = logging.getLogger(__name__)
 
-ROOM = 32  # cells that the exemplar is wide at least at a level that is fitted: coarser ones are made tile by tile
-SAVES = 0.5  # of a level's Gaussians that the next one must do without, or it is not worth having
+MIN_CELLS = 32  # cells that the exemplar is wide at least at a level that is fitted: coarser ones are made tile by tile
+MAX_SHARE = 0.5  # of a level's Gaussians that the next one must do without, or it is not worth having
 ELEVATIONS = (90.0, 50.0, 20.0, 6.0)  # degrees: pictures the coarser level is fitted to, down to a walker's
-AROUND = 6  # azimuths of each elevation but the zenith's
+AZIMUTHS = 6  # azimuths of each elevation but the zenith's
 CLEARANCE = 2.0  # discs that a thing may rise above the highest it starts from
-PIXELS = 2.0  # of a picture for one coarse disc: at the distance where a level is used a disc is about a pixel wide
+PIXELS_PER_DISC = (
+    2.0  # of a picture for one coarse disc: at the distance where a level is used a disc is about a pixel wide
+)
 
 
-@dataclass(frozen=True)
-class Levels:
-    """A field's levels with their grids, finest first. wanted: how many its tiles are to have, a number or AUTO.
-    stopped: why none coarser than these was fitted."""
-
-    fields: list[GaussianField]
-    grids: list[Ground]
-    wanted: int | str
-    stopped: str
-
-
-class Still(OnGround):
+class FixedHeights(OnGround):
     """A ground with things on it whose discs keep their heights."""
 
     def guide(self, gradients: Gradients) -> None:
@@ -56,7 +46,7 @@ class Still(OnGround):
         gradients.means[: self.discs, 2] = 0
 
 
-def fitted(
+def build_levels(
     field: GaussianField, grid: Ground, asked: int | str, steps: int, seed: int, keep: Path | str | None = None
 ) -> Levels:
     """The field and as many coarser levels as are asked for and as its exemplar has room for.
@@ -68,14 +58,14 @@ def fitted(
     Raises: InputError: so many levels were asked for, and the mean scale of one does not rise.
     """
     fields, grids = [field], [grid]
-    most, stopped = (MOST if asked == AUTO else asked), "no more are wanted"
+    most, stopped = (MAX_LEVELS if asked == AUTO else asked), "no more are wanted"
     for number in range(1, most):
         finer, laid = fields[-1], grids[-1]
-        if laid.cells % 2 or (number > 1 and laid.cells // 2 < ROOM):
+        if laid.cells % 2 or (number > 1 and laid.cells // 2 < MIN_CELLS):
             stopped = f"level {number} would be {laid.cells / 2:g} cells wide; tiles make it from their own cells"
             break
-        level, coarse = coarser(finer, laid, steps, np.random.default_rng([seed, number]), keep)
-        if asked == AUTO and (fault := _useless(finer, level)):
+        level, coarse = fit_coarser_level(finer, laid, steps, np.random.default_rng([seed, number]), keep)
+        if asked == AUTO and (fault := _reason_to_drop(finer, level)):
             asked, stopped = number, f"level {number}: {fault}"
             break
         if not mean_scale([level]) > mean_scale([finer]):
@@ -86,40 +76,40 @@ def fitted(
     return Levels(fields, grids, asked, stopped)
 
 
-def _useless(finer: GaussianField, level: GaussianField) -> str | None:
+def _reason_to_drop(finer: GaussianField, level: GaussianField) -> str | None:
     """Why a level is not worth having, if it is not."""
     if not mean_scale([level]) > mean_scale([finer]):
         return "its mean scale does not rise"
-    if len(level) > SAVES * len(finer):
+    if len(level) > MAX_SHARE * len(finer):
         return f"it saves too little ({len(finer)} to {len(level)} Gaussians)"
     return None
 
 
-def coarser(
+def fit_coarser_level(
     field: GaussianField, grid: Ground, steps: int, rng: np.random.Generator, keep: Path | str | None = None
 ) -> tuple[GaussianField, Ground]:
     """The next level: half the resolution, about a quarter of the Gaussians, fitted for `steps` steps."""
-    start, coarse = halved(*cropped(field, grid, 2))
-    views = modelled(neighbour_views(field, coarse), coarse)
+    start, coarse = halve_resolution(*crop_to_blocks(field, grid, 2))
+    views = modelled(render_neighbour_views(field, coarse), coarse)
     stand = start[~start.ground]
     top = CLEARANCE * coarse.spacing
     if len(stand):
         top += float((stand.means[:, 2] - coarse.height_at(stand.means)).max())
-    rules, plan = Still(coarse, np.full(coarse.shape, top)), Plan(steps, len(start))
+    rules, plan = FixedHeights(coarse, np.full(coarse.shape, top)), Plan(steps, len(start))
     level = trainer.fit(start, views, plan, rules, rng, f"fit level of {len(start)} Gaussians", keep).field
     scales = mean_scale([field]), mean_scale([level])
     _log.info("mean scale %.4g to %.4g, %d to %d Gaussians", *scales, len(field), len(level))
     return level, coarse
 
 
-def neighbour_views(field: GaussianField, coarse: Ground) -> list[View]:
+def render_neighbour_views(field: GaussianField, coarse: Ground) -> list[View]:
     """Pictures of a field, PIXELS pixels a coarse disc, drawn at twice that and averaged so that they do not alias.
 
     Drawn once, splats finer than a pixel are wider than they are: level 1 of flowers of a seed for development is then
     .03 lighter than test photos at half their size, 16.6 dB from them; so it is .01 lighter, 17.6 dB.
     """
     drawn, views = raster.Rasterizer(), []
-    for number, camera in enumerate(_cameras(coarse)):
+    for number, camera in enumerate(_neighbour_cameras(coarse)):
         fine = camera.resized(2 * camera.width, 2 * camera.height)
         seen = drawn.forward(**to_raster_arrays(field), camera=fine)
         # what shines through is not the field's colour: divide it out
@@ -129,17 +119,17 @@ def neighbour_views(field: GaussianField, coarse: Ground) -> list[View]:
     return views
 
 
-def _cameras(grid: Ground) -> list[Camera]:
+def _neighbour_cameras(grid: Ground) -> list[Camera]:
     rows, columns = grid.shape
     width, height = columns * grid.spacing, rows * grid.spacing
     centre = np.array([grid.west + width / 2, grid.south + height / 2, float(grid.heights.mean())])
-    side = int(np.clip(PIXELS * max(rows, columns), 64, 1024))
+    side = int(np.clip(PIXELS_PER_DISC * max(rows, columns), 64, 1024))
     fov = 40.0
     radius = 0.6 * max(width, height) / np.tan(np.radians(fov / 2))
     found = []
     for elevation in ELEVATIONS:
-        for step in range(1 if elevation == 90.0 else AROUND):
-            azimuth = np.radians(360 / AROUND * (step + 0.5 * (elevation < 50)))
+        for step in range(1 if elevation == 90.0 else AZIMUTHS):
+            azimuth = np.radians(360 / AZIMUTHS * (step + 0.5 * (elevation < 50)))
             e = np.radians(elevation)
             away = radius * np.array([np.cos(e) * np.cos(azimuth), np.cos(e) * np.sin(azimuth), np.sin(e)])
             found.append(cameras.pinhole(centre + away, centre, side, side, fov))

@@ -13,7 +13,7 @@ from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.top_view import from_above
 
 
-def cropped(field: GaussianField, grid: Ground, block: int) -> tuple[GaussianField, Ground]:
+def crop_to_blocks(field: GaussianField, grid: Ground, block: int) -> tuple[GaussianField, Ground]:
     """Field and grid cut down to whole blocks of cells that start at the exemplar's corner."""
     under = underlay.rows(field, grid)
     had = under.stop > under.start
@@ -40,7 +40,7 @@ def cropped(field: GaussianField, grid: Ground, block: int) -> tuple[GaussianFie
     ), small
 
 
-def halved(field: GaussianField, grid: Ground) -> tuple[GaussianField, Ground]:
+def halve_resolution(field: GaussianField, grid: Ground) -> tuple[GaussianField, Ground]:
     """Twice the spacing: four discs become one with their mean colour, height and uncertainty; things merge likewise.
 
     The grid's shape, first_row, first_column and cells must be even (see cropped).
@@ -65,10 +65,10 @@ def halved(field: GaussianField, grid: Ground) -> tuple[GaussianField, Ground]:
         things = field[above > discs.STANDS * coarse.spacing]
     base = discs.ground_discs(coarse, _mean4(colours.astype(float)).reshape(-1, 3))
     base = replace(base, uncertainty=_mean4(doubt.astype(float)).ravel().astype(np.float32))
-    return concatenate_fields([base, underlay.beneath(coarse, base), merged(things, coarse.spacing)]), coarse
+    return concatenate_fields([base, underlay.beneath(coarse, base), merge_by_voxel(things, coarse.spacing)]), coarse
 
 
-def merged(field: GaussianField, voxel: float) -> GaussianField:
+def merge_by_voxel(field: GaussianField, voxel: float) -> GaussianField:
     """Gaussians of one voxel as one Gaussian with their common mean, covariance, colour and opaque area.
 
     Weights are opacity times the area of the two larger axes: what a picture of them shows. The merged opacity keeps
@@ -88,7 +88,7 @@ def merged(field: GaussianField, voxel: float) -> GaussianField:
 
     centre = mean(field.means.astype(float))
     away = field.means - centre[cell]
-    spread = covariances(field) + away[:, :, None] * away[:, None, :]
+    spread = compute_covariances(field) + away[:, :, None] * away[:, None, :]
     variance, axes = np.linalg.eigh(mean(spread.reshape(-1, 9)).reshape(-1, 3, 3))
     axes[np.linalg.det(axes) < 0, :, 0] *= -1
     size = np.sqrt(np.maximum(variance, 1e-20))
@@ -104,7 +104,7 @@ def merged(field: GaussianField, voxel: float) -> GaussianField:
     )
 
 
-def covariances(field: GaussianField) -> Float[Array, "n 3 3"]:
+def compute_covariances(field: GaussianField) -> Float[Array, "n 3 3"]:
     """World covariances R diag(sigma^2) R^T."""
     axes = Rotation.from_quat(field.quats.astype(float), scalar_first=True).as_matrix()
     half = axes * np.exp(field.log_scales.astype(float))[:, None, :]

@@ -5,11 +5,11 @@ from pathlib import Path
 from dav_gswt.errors import InputError
 from dav_gswt.field import mean_scale, read_field, write_field
 from dav_gswt.files import read_json, whole_folder, write_json
-from dav_gswt.lod.build import Levels
+from dav_gswt.lod.levels import Levels
 from dav_gswt.reconstruction import ground
 
 
-def write(levels: Levels, folder: Path | str, provenance: dict) -> None:
+def write_levels(levels: Levels, folder: Path | str, provenance: dict) -> None:
     """Write the levels; the folder appears whole or not at all."""
     with whole_folder(folder) as part:
         for number, (fitted, grid) in enumerate(zip(levels.fields, levels.grids, strict=True)):
@@ -23,7 +23,7 @@ def write(levels: Levels, folder: Path | str, provenance: dict) -> None:
         write_json(part / "levels.json", told)
 
 
-def read(folder: Path | str) -> Levels:
+def read_levels(folder: Path | str) -> Levels:
     """Read what `write` wrote. Raises: InputError: a file is missing or not what levels.json says."""
     folder = Path(folder)
     told = read_json(folder / "levels.json")

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.bundle.orders import back_to_front
+from dav_gswt.bundle.orders import sort_back_to_front
 from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.terrain import draw_order, weights
 from dav_gswt.terrain.displacement import displace_means
@@ -44,7 +44,7 @@ def place_gaussians(
         np.repeat(list(parts), [len(part) for part in parts.values()]),
         concatenate_fields(list(parts.values())),
     )
-    sequence = back_to_front(flat.means, direction)
+    sequence = sort_back_to_front(flat.means, direction)
     field, slope = displace_means(flat[sequence], terrain.heights, corner, eye)
     level, distance = level[sequence], np.linalg.norm(field.means.astype(float), axis=1)
     shares = weights.level_weights(distance, terrain.switches, terrain.bands, terrain.smooth)

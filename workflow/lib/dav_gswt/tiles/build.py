@@ -1,7 +1,9 @@
 """The tile set of a field: trends out, places searched, strips and centres cut, every level composed."""
 
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
@@ -10,29 +12,30 @@ from scipy.ndimage import distance_transform_edt
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import SH0, GaussianField
+from dav_gswt.lod.levels import AUTO
 from dav_gswt.logs import progress
 from dav_gswt.tiles import (
     coarse_levels,
     compose,
     energy,
     layout,
-    membrane,
     occluders,
     patches,
+    poisson_blending,
     search,
     semantics,
     texture,
     trends,
 )
-from dav_gswt.tiles.layout import AUTO, EDGES, Exemplar, Layout
+from dav_gswt.tiles.layout import EDGES, Exemplar, Layout
 
 _log = logging.getLogger(__name__)
 
-DOUBTFUL = 0.5  # mean uncertainty of a tile that is said
+WARN_UNCERTAINTY = 0.5  # mean uncertainty of a tile that is said
 
 
 @dataclass(frozen=True)
-class Options:
+class TilingOptions:
     """share: tile side over the exemplar's. strip: half-width of the strips over the tile's side, below 1/5. Either may
     be layout.AUTO: by the scale of the exemplar's texture. variants: centres per edge colouring. trend: width of the
     low-pass in tile sides. candidates: places that a search compares; tries: of them, how many are cut before the best
@@ -48,21 +51,23 @@ class Options:
     tries: int = 4
     kind: str = "semantic"
     slope: float = 2.0
-    source: semantics.Source = semantics.Source()
+    source: semantics.SemanticSource = semantics.SemanticSource()
     levels: int | str | None = None
     corrected: bool = True
 
     @classmethod
-    def of(cls, seam: dict, source: semantics.Source, levels: int | str | None = None) -> "Options":
-        """Of an entry of the config's `seams`."""
+    def from_config(
+        cls, tiling: Mapping[str, Any], source: semantics.SemanticSource, levels: int | str | None = None
+    ) -> "TilingOptions":
+        """The options that an entry of the config's tilings asks for."""
         own = {"share": "tile", "kind": "energy"}
-        given = {key: seam[name] for key in vars(cls()) if (name := own.get(key, key)) in seam}
+        given = {key: tiling[name] for key in vars(cls()) if (name := own.get(key, key)) in tiling}
         return cls(**given, source=source, levels=levels)
 
 
-def seeds(seed: int, seam: dict) -> list[int]:
-    """What the generator of a tile set starts from: the workflow's seed and, if not 0, the `draw` of the entry."""
-    return [seed, seam["draw"]] if seam.get("draw") else [seed]
+def make_generator(seed: int, tiling: Mapping[str, Any]) -> np.random.Generator:
+    """The generator of a tile set, from the workflow's seed and, where it is not 0, the tiling's replicate number."""
+    return np.random.default_rng([seed, tiling["draw"]] if tiling.get("draw") else [seed])
 
 
 @dataclass(frozen=True)
@@ -92,7 +97,7 @@ def cut_tiles(
     exemplar: Exemplar,
     colour: Float[Array, "m m 3"],
     uncertainty: Float[Array, "m m"],
-    options: Options,
+    options: TilingOptions,
     rng: np.random.Generator,
 ) -> TileSet:
     """Make the tile set of a field.
@@ -109,46 +114,49 @@ def cut_tiles(
     shape = (exemplar.cells, exemplar.cells)
     if colour.shape[:2] != shape or uncertainty.shape != shape:
         raise ValueError(f"maps of {colour.shape[:2]} and {uncertainty.shape} cells for an exemplar of {shape}")
-    known, doubt = _without_holes(colour, uncertainty)
-    scale = texture.scale(known)
-    plan = layout.plan(exemplar.cells, options.levels or len(levels), *_sizes(options, scale, exemplar), len(levels))
-    _, height = ground_maps(levels[0], exemplar)
-    trend = trends.trend_of(colour, height, exemplar, options.trend * plan.side)
+    known, doubt = _fill_holes(colour, uncertainty)
+    scale = texture.measure_texture_scale(known)
+    plan = layout.plan_layout(
+        exemplar.cells, options.levels or len(levels), *_choose_sizes(options, scale, exemplar), len(levels)
+    )
+    _, height = compute_ground_maps(levels[0], exemplar)
+    trend = trends.fit_trend(colour, height, exemplar, options.trend * plan.side)
     binned = [
-        _checked(compose.binned(trends.detrended(field, trend), exemplar, 2**number), number)
-        for number, field in enumerate(levels[: plan.laid])
+        _check_level(compose.bin_gaussians(trends.remove_trend(field, trend), exemplar, 2**number), number)
+        for number, field in enumerate(levels[: plan.composed_levels])
     ]
-    stands = energy.standing(occluders.cover(levels[0], exemplar, height))
+    stands = energy.make_occluder_layer(occluders.compute_cover(levels[0], exemplar, height))
     colour = np.clip(known - trend.colour, 0, 1).astype(float)
     height = np.nan_to_num(height - trend.height, nan=float(np.nanmean(height)))
-    meant = None if options.kind == "colour" else semantics.semantics(colour, options.source)
-    priced = energy.Energy(options.kind, options.slope, energy.colours(colour), meant, stands)
-    guide = patches.guide(colour, height, doubt, plan)
-    sketch = search.Sketch(plan, guide, priced, options.candidates, options.tries)
-    found = search.search(sketch, options.variants, rng)
+    meant = None if options.kind == "colour" else semantics.make_semantic_layer(colour, options.source)
+    priced = energy.SeamEnergy(options.kind, options.slope, energy.make_colour_layer(colour), meant, stands)
+    guide = patches.make_guidance(colour, height, doubt, plan)
+    sketch = search.SearchProblem(plan, guide, priced, options.candidates, options.tries)
+    found = search.search_patches(sketch, options.variants, rng)
     labels = found.labels
-    shifts = np.stack([layout.offsets(plan, found.places, tile) for tile in range(len(labels))])
-    corrections = _corrections(plan, found, shifts, membrane.ground(colour, height))
+    shifts = np.stack([layout.label_shifts(plan, found.places, tile) for tile in range(len(labels))])
+    corrections = _solve_corrections(plan, found, shifts, poisson_blending.make_soft_maps(colour, height))
     corrections *= options.corrected
     tiles = [
-        [_tile(level, labels[tile], shifts[tile], corrections[tile]) for level in binned]
+        [_compose_level(level, labels[tile], shifts[tile], corrections[tile]) for level in binned]
         for tile in progress(range(len(labels)), "compose tiles")
     ]
     side = plan.side * exemplar.spacing
-    tiles, raised = compose.levelled(tiles, side)
-    tiles = [_merged(tile, plan, exemplar.spacing) for tile in tiles]
-    seams = found.record() | {
+    tiles, raised = compose.equalise_heights(tiles, side)
+    tiles = [_append_merged_levels(tile, plan, exemplar.spacing) for tile in tiles]
+    seams = found.describe() | {
         "layout": {
-            k: int(getattr(plan, k)) for k in ("exemplar", "levels", "laid", "side", "strip", "corner", "block")
+            key: int(getattr(plan, "composed_levels" if key == "laid" else key))
+            for key in ("exemplar", "levels", "laid", "side", "strip", "corner", "block")
         },
         "texture": scale * exemplar.spacing,
         "raised": raised.tolist(),
-        "energy": priced.record(),
+        "energy": priced.describe(),
         "trend": {"colour": float(np.ptp(trend.colour)), "height": float(np.ptp(trend.height))},
         "correction": np.abs(corrections).max((0, 1, 2)).tolist(),
     }
-    shown = [doubt[layout.sources(labels[t], shifts[t])].mean() for t in range(len(labels))]
-    if max(shown) > DOUBTFUL:
+    shown = [doubt[layout.source_cells(labels[t], shifts[t])].mean() for t in range(len(labels))]
+    if max(shown) > WARN_UNCERTAINTY:
         _log.warning(
             "the tiles show ground in doubt (mean uncertainty %.2f to %.2f): a smaller `tile` in the config's seams "
             "would show surer ground, or more photos",
@@ -159,9 +167,9 @@ def cut_tiles(
     return TileSet(side, exemplar.spacing, fields, labels, shifts, np.array(shown), seams)
 
 
-def _sizes(options: Options, scale: float, exemplar: Exemplar) -> tuple[float, float]:
+def _choose_sizes(options: TilingOptions, scale: float, exemplar: Exemplar) -> tuple[float, float]:
     """What the options ask for as `share` and `strip`, by the texture's scale in cells where that is left to it."""
-    by_texture = texture.sizes(scale / exemplar.cells)
+    by_texture = texture.choose_sizes(scale / exemplar.cells)
     asked = options.share, options.strip
     share, strip = (own if given == AUTO else given for given, own in zip(asked, by_texture, strict=True))
     if AUTO in asked:
@@ -169,7 +177,7 @@ def _sizes(options: Options, scale: float, exemplar: Exemplar) -> tuple[float, f
     return share, strip
 
 
-def _without_holes(colour: Array, uncertainty: Array) -> tuple[Float[Array, "m m 3"], Float[Array, "m m"]]:
+def _fill_holes(colour: Array, uncertainty: Array) -> tuple[Float[Array, "m m 3"], Float[Array, "m m"]]:
     """Colours where all are known, and uncertainties in [0, 1]; a hole has the nearest cell's colour and is in doubt.
 
     Raises: InputError: there is nothing but holes, or nothing but ground in doubt.
@@ -188,7 +196,9 @@ def _without_holes(colour: Array, uncertainty: Array) -> tuple[Float[Array, "m m
     return colour, doubt
 
 
-def _corrections(plan: Layout, found: search.Found, shifts: Array, ground: membrane.Ground) -> Float[Array, "t n n 4"]:
+def _solve_corrections(
+    plan: Layout, found: search.SearchResult, shifts: Array, ground: poisson_blending.SoftMaps
+) -> Float[Array, "t n n 4"]:
     """What every tile's cells are changed by so that no step is left along its seams; the strips' part first."""
     strips = []
     for upright, masks, places in (
@@ -199,33 +209,37 @@ def _corrections(plan: Layout, found: search.Found, shifts: Array, ground: membr
             layout.strip_labels(plan, mask, place, found.places.corner, upright)
             for mask, place in zip(masks, places, strict=True)
         ]
-        strips.append(np.stack([membrane.strip(labels, shift, plan, ground) for labels, shift in pair]))
+        strips.append(np.stack([poisson_blending.solve_strip(labels, shift, plan, ground) for labels, shift in pair]))
     out = []
     for tile, (labels, shift) in enumerate(zip(found.labels, shifts, strict=True)):
-        out.append(membrane.tile(labels, shift, membrane.ring(plan, *strips, tile), plan, ground))
+        out.append(
+            poisson_blending.solve_tile(
+                labels, shift, poisson_blending.border_values(plan, *strips, tile), plan, ground
+            )
+        )
     return np.stack(out)
 
 
-def _tile(level: compose.Binned, labels: Array, shift: Array, correction: Array) -> GaussianField:
+def _compose_level(level: compose.BinnedLevel, labels: Array, shift: Array, correction: Array) -> GaussianField:
     """One tile at one level, corrected; a coarser level follows the finest one's labels by majority."""
-    majority = compose.coarser(labels, level.cell)
-    splats = compose.composed(level, majority, shift)
-    change = membrane.coarser(correction, labels, majority)
-    return membrane.applied(splats, change, level.cell * level.exemplar.spacing)
+    majority = compose.coarsen_labels(labels, level.cell)
+    splats = compose.compose_tile(level, majority, shift)
+    change = poisson_blending.coarsen_correction(correction, labels, majority)
+    return poisson_blending.apply_correction(splats, change, level.cell * level.exemplar.spacing)
 
 
-def _merged(tile: list[GaussianField], plan: Layout, spacing: float) -> list[GaussianField]:
+def _append_merged_levels(tile: list[GaussianField], plan: Layout, spacing: float) -> list[GaussianField]:
     """A tile's levels with those that are coarser than a block."""
     for number in range(len(tile), plan.levels):
         cell = 2 ** (number - 1)
-        tile = [*tile, coarse_levels.coarser(tile[-1], plan.side // cell, cell * spacing)]
+        tile = [*tile, coarse_levels.merge_cells(tile[-1], plan.side // cell, cell * spacing)]
     return tile
 
 
-def ground_maps(field: GaussianField, exemplar: Exemplar) -> tuple[Float[Array, "m m 3"], Float[Array, "m m"]]:
+def compute_ground_maps(field: GaussianField, exemplar: Exemplar) -> tuple[Float[Array, "m m 3"], Float[Array, "m m"]]:
     """Mean colour and height of each finest cell's ground discs (all Gaussians', if none is ground); NaN for none."""
     ground = field[field.ground] if field.ground.any() else field
-    level = compose.binned(ground, exemplar, 1)
+    level = compose.bin_gaussians(ground, exemplar, 1)
     count = np.diff(level.start)
     cell = np.repeat(np.arange(len(count)), count)
     values = [*level.field.sh[:, 0].T * SH0 + 0.5, level.field.means[:, 2]]
@@ -234,10 +248,10 @@ def ground_maps(field: GaussianField, exemplar: Exemplar) -> tuple[Float[Array, 
     return np.stack(maps[:3], -1), maps[3]
 
 
-def _checked(level: compose.Binned, number: int) -> compose.Binned:
+def _check_level(level: compose.BinnedLevel, number: int) -> compose.BinnedLevel:
     if not len(level.field):
         raise InputError(f"level {number}: no Gaussian lies over the exemplar; is its field from another ground.json?")
-    held = compose.discs(level)
+    held = compose.count_discs(level)
     if held.any() and (held != 1).any():
         _log.warning("level %d: %d of %d cells do not hold one ground disc", number, (held != 1).sum(), held.size)
     return level

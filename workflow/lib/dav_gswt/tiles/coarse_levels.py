@@ -12,13 +12,13 @@ from numpy import ndarray as Array
 from scipy.ndimage import distance_transform_edt
 
 from dav_gswt.field import GaussianField, concatenate_fields
-from dav_gswt.lod.merge import merged
+from dav_gswt.lod.merge import merge_by_voxel
 from dav_gswt.reconstruction import discs, underlay
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.ground_constraints import DISC_SIZES
 
 
-def coarser(tile: GaussianField, cells: int, spacing: float) -> GaussianField:
+def merge_cells(tile: GaussianField, cells: int, spacing: float) -> GaussianField:
     """The next level of a tile of `cells` x `cells` cells, an even number, each `spacing` wide.
 
     The discs of four cells become one with their mean colour, height, opacity and uncertainty, twice as wide and
@@ -29,8 +29,8 @@ def coarser(tile: GaussianField, cells: int, spacing: float) -> GaussianField:
     """
     if cells % 2 or cells < 4:
         raise ValueError(f"{cells} cells do not make a coarser level: an even number is needed, at least 4")
-    under = underneath(tile, spacing)
-    known, (*colour, height, doubt, logit, size) = _means(tile[tile.ground], cells // 2, 2 * spacing)
+    under = find_underlay(tile, spacing)
+    known, (*colour, height, doubt, logit, size) = _average_discs(tile[tile.ground], cells // 2, 2 * spacing)
     grid = Ground(0.0, 0.0, 2 * spacing, 0, 0, cells // 2, height, known)
     layer = discs.ground_discs(grid, np.stack(colour, -1).reshape(-1, 3))
     scales = layer.log_scales.copy()
@@ -41,17 +41,19 @@ def coarser(tile: GaussianField, cells: int, spacing: float) -> GaussianField:
         opacity_logits=logit.ravel().astype(np.float32),
         uncertainty=doubt.ravel().astype(np.float32),
     )
-    parts = [layer[known.ravel()], merged(tile[~tile.ground & ~under], 2 * spacing)]
+    parts = [layer[known.ravel()], merge_by_voxel(tile[~tile.ground & ~under], 2 * spacing)]
     return concatenate_fields([parts[0], underlay.beneath(grid, layer), parts[1]] if under.any() else parts)
 
 
-def underneath(tile: GaussianField, spacing: float) -> Bool[Array, "n"]:
+def find_underlay(tile: GaussianField, spacing: float) -> Bool[Array, "n"]:
     """Which Gaussians of a tile are underlay, in any order: opaque as nothing else is that is so large."""
     large = tile.log_scales.max(1) > np.log(0.9 * underlay.WIDTH * underlay.STRIDE * spacing)
     return ~tile.ground & (tile.opacity_logits == underlay.SOLID) & large
 
 
-def _means(layer: GaussianField, cells: int, spacing: float) -> tuple[Bool[Array, "k k"], list[Float[Array, "k k"]]]:
+def _average_discs(
+    layer: GaussianField, cells: int, spacing: float
+) -> tuple[Bool[Array, "k k"], list[Float[Array, "k k"]]]:
     """Which cells hold discs, and the means of these: red, green, blue, height, uncertainty, opacity's logit, logarithm
     of the width; the nearest cell's where there are none."""
     column, row = (np.clip((layer.means[:, i] / spacing).astype(int), 0, cells - 1) for i in (0, 1))

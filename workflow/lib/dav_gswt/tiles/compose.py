@@ -7,11 +7,11 @@ from jaxtyping import Float, Int, UInt8
 from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
-from dav_gswt.tiles.layout import LABELS, Exemplar, sources
+from dav_gswt.tiles.layout import LABELS, Exemplar, source_cells
 
 
 @dataclass(frozen=True)
-class Binned:
+class BinnedLevel:
     """A level's Gaussians sorted by the exemplar's cells (row-major from the south-west): cell k holds
     start[k]:start[k+1].
     """
@@ -26,7 +26,7 @@ class Binned:
         return self.exemplar.cells // self.cell
 
 
-def binned(field: GaussianField, exemplar: Exemplar, cell: int) -> Binned:
+def bin_gaussians(field: GaussianField, exemplar: Exemplar, cell: int) -> BinnedLevel:
     """Sort a level's Gaussians by cell; those outside the exemplar are left out."""
     count = exemplar.cells // cell
     size = exemplar.spacing * cell
@@ -36,16 +36,16 @@ def binned(field: GaussianField, exemplar: Exemplar, cell: int) -> Binned:
     key = row[inside] * count + column[inside]
     order = np.argsort(key, kind="stable")
     start = np.searchsorted(key[order], np.arange(count * count + 1))
-    return Binned(field[inside[order]], exemplar, cell, start)
+    return BinnedLevel(field[inside[order]], exemplar, cell, start)
 
 
-def discs(level: Binned) -> Int[Array, "m m"]:
+def count_discs(level: BinnedLevel) -> Int[Array, "m m"]:
     """How many ground discs each cell holds."""
     total = np.concatenate([[0], np.cumsum(level.field.ground)])
     return np.diff(total[level.start]).reshape(level.cells, level.cells)
 
 
-def coarser(labels: UInt8[Array, "n n"], factor: int) -> UInt8[Array, "k k"]:
+def coarsen_labels(labels: UInt8[Array, "n n"], factor: int) -> UInt8[Array, "k k"]:
     """Labels of cells `factor` times as wide: the majority inside, of equal ones the first in LABELS."""
     k = len(labels) // factor
     blocks = labels.reshape(k, factor, k, factor)
@@ -53,12 +53,12 @@ def coarser(labels: UInt8[Array, "n n"], factor: int) -> UInt8[Array, "k k"]:
     return counts.argmax(0).astype(np.uint8)
 
 
-def composed(level: Binned, labels: UInt8[Array, "n n"], shift: Int[Array, "9 2"]) -> GaussianField:
+def compose_tile(level: BinnedLevel, labels: UInt8[Array, "n n"], shift: Int[Array, "9 2"]) -> GaussianField:
     """A tile's Gaussians at one level, cell by cell from the south-west; x and y from its south-western corner, z kept.
 
     labels: of this level's cells (see coarser); shift in finest cells.
     """
-    row, column = sources(labels, shift, level.cell)
+    row, column = source_cells(labels, shift, level.cell)
     key = (row * level.cells + column).ravel()
     first, count = level.start[key], level.start[key + 1] - level.start[key]
     # the c-th Gaussian of a cell is the c-th after the first: positions within runs of varying length
@@ -79,7 +79,9 @@ def bump(points: Float[Array, "n d"], side: float) -> Float[Array, "n"]:
     return s[:, 0] * s[:, 1]
 
 
-def levelled(tiles: list[list[GaussianField]], side: float) -> tuple[list[list[GaussianField]], Float[Array, "tiles"]]:
+def equalise_heights(
+    tiles: list[list[GaussianField]], side: float
+) -> tuple[list[list[GaussianField]], Float[Array, "tiles"]]:
     """Give all tiles the same mean height at the finest level; tiles[t][l] is level l of tile t.
 
     A rigid shift would tear borders apart, so a tile is raised by A_t bump(x, y) in all its levels alike; A_t makes
@@ -91,12 +93,12 @@ def levelled(tiles: list[list[GaussianField]], side: float) -> tuple[list[list[G
     for levels, mean in zip(tiles, heights, strict=True):
         share = bump(levels[0].means, side).mean()
         amount = (goal - mean) / share if share > 0 else 0.0
-        raised.append([_raised(field, amount, side) for field in levels])
+        raised.append([_raise_tile(field, amount, side) for field in levels])
         amounts.append(amount)
     return raised, np.array(amounts)
 
 
-def _raised(field: GaussianField, amount: float, side: float) -> GaussianField:
+def _raise_tile(field: GaussianField, amount: float, side: float) -> GaussianField:
     means = field.means.copy()
     means[:, 2] += (amount * bump(field.means, side)).astype(np.float32)
     return replace(field, means=means)

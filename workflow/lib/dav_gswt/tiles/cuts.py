@@ -11,7 +11,7 @@ QUANTA = 2.0**32  # capacities are whole numbers, the largest this big: the flow
 
 
 @dataclass(frozen=True)
-class Zone:
+class OverlapZone:
     """Where two patches lie over one another. keep, take: cells that must show the first and the second patch; a seam
     runs through the others. straight: what shows the second patch where none is cut, to the middle of the overlap.
     """
@@ -33,7 +33,7 @@ class Cut:
     cost: int
 
 
-def cut(
+def find_cut(
     right: Float[Array, "h w1"], upper: Float[Array, "h1 w"], first: Bool[Array, "h w"], second: Bool[Array, "h w"]
 ) -> Cut:
     """The cheapest partition of a grid into two patches, exactly (max-flow). All of it may be one patch.
@@ -45,7 +45,7 @@ def cut(
     """
     if (first & second).any():
         raise ValueError("a cell is forced to both patches")
-    right, upper, unit = _whole(right, upper)
+    right, upper, unit = _quantize(right, upper)
     node = np.cumsum(~(first | second)).reshape(first.shape) - 1
     free = int(node[-1, -1]) + 1
     node[first], node[second] = -1, -2
@@ -59,21 +59,25 @@ def cut(
         nodes = graph.add_nodes(free)
         inner = (tails >= 0) & (heads >= 0) & (costs > 0)
         graph.add_edges(tails[inner], heads[inner], costs[inner], costs[inner])
-        graph.add_grid_tedges(nodes, _to(-1, tails, heads, costs, free), _to(-2, tails, heads, costs, free))
+        graph.add_grid_tedges(
+            nodes,
+            _terminal_capacities(-1, tails, heads, costs, free),
+            _terminal_capacities(-2, tails, heads, costs, free),
+        )
         flow += graph.maxflow()
         labels[node >= 0] = graph.get_grid_segments(nodes)
-    cost = _along(labels, right, upper)
+    cost = _sum_costs(labels, right, upper)
     return Cut(labels, float(cost / unit), int(flow), cost)
 
 
-def straight(right: Float[Array, "h w1"], upper: Float[Array, "h1 w"], labels: Bool[Array, "h w"]) -> Cut:
+def price_cut(right: Float[Array, "h w1"], upper: Float[Array, "h1 w"], labels: Bool[Array, "h w"]) -> Cut:
     """What a seam that is there already costs. Raises: ValueError: a cost is negative or not finite."""
-    right, upper, unit = _whole(right, upper)
-    cost = _along(labels, right, upper)
+    right, upper, unit = _quantize(right, upper)
+    cost = _sum_costs(labels, right, upper)
     return Cut(labels, float(cost / unit), cost, cost)
 
 
-def _whole(right: Array, upper: Array) -> tuple[Array, Array, float]:
+def _quantize(right: Array, upper: Array) -> tuple[Array, Array, float]:
     """Costs in whole quanta, and how many of them one is."""
     largest = max(right.max(initial=0), upper.max(initial=0))
     if not (np.isfinite(largest) and min(right.min(initial=0), upper.min(initial=0)) >= 0):
@@ -82,11 +86,11 @@ def _whole(right: Array, upper: Array) -> tuple[Array, Array, float]:
     return *(np.rint(w * unit).astype(np.int64) for w in (right, upper)), unit
 
 
-def _along(labels: Array, right: Array, upper: Array) -> int:
+def _sum_costs(labels: Array, right: Array, upper: Array) -> int:
     return int(right[labels[:, 1:] != labels[:, :-1]].sum() + upper[labels[1:] != labels[:-1]].sum())
 
 
-def _to(terminal: int, tails: Array, heads: Array, costs: Array, free: int) -> Array:
+def _terminal_capacities(terminal: int, tails: Array, heads: Array, costs: Array, free: int) -> Array:
     """Capacity from each free node to a terminal: the sum over its neighbours that are forced to it.
 
     Summed in whole numbers: bincount's weights are floating.

@@ -24,7 +24,7 @@ from numpy import ndarray as Array
 from dav_gswt.views.uncertainty import gamma
 
 KINDS = ("none", "colour", "semantic", "semantic-nogamma", "expansion")
-STAND = 2.0  # D of a thing that hides the ground, beside bare ground; in units of two random colours
+OCCLUDER_WEIGHT = 2.0  # D of a thing that hides the ground, beside bare ground; in units of two random colours
 EPS = 1.0  # of the mean gradient: with less, a cut through a bush (steep everywhere) is as cheap as one through sand
 ROUNDING = 1e-9  # of colours, which are about 1
 
@@ -32,7 +32,7 @@ Cells = tuple[Array, Array]  # rows and columns of the exemplar's cells, of any 
 
 
 @dataclass(frozen=True)
-class Scales:
+class LayerScales:
     """Units of difference and gradient, frozen once for an exemplar."""
 
     difference: float
@@ -40,72 +40,72 @@ class Scales:
 
 
 @runtime_checkable
-class Layer(Protocol):
+class CostLayer(Protocol):
     """A way to look at an exemplar: how far apart cells are, and how steep it is along x and along y in each."""
 
     slope: Float[Array, "h w 2"]
-    unit: Scales
+    unit: LayerScales
 
-    def apart(self, first: Cells, second: Cells) -> Float[Array, "..."]: ...
+    def distances(self, first: Cells, second: Cells) -> Float[Array, "..."]: ...
 
 
 @dataclass(frozen=True)
-class Colours:
+class ColourLayer:
     """Colours of the exemplar's cells, and their gradients; cells are as far apart as their colours (2-norm)."""
 
     values: Float[Array, "h w c"]
     slope: Float[Array, "h w 2"]
-    unit: Scales
+    unit: LayerScales
 
-    def apart(self, first: Cells, second: Cells) -> Float[Array, "..."]:
+    def distances(self, first: Cells, second: Cells) -> Float[Array, "..."]:
         return np.linalg.norm(self.values[first] - self.values[second], axis=-1)
 
 
-def colours(values: Float[Array, "h w c"]) -> Colours:
-    return Colours(values, gradients(values), scales(values))
+def make_colour_layer(values: Float[Array, "h w c"]) -> ColourLayer:
+    return ColourLayer(values, compute_gradients(values), measure_scales(values))
 
 
-def standing(cover: Float[Array, "h w"]) -> Colours | None:
+def make_occluder_layer(cover: Float[Array, "h w"]) -> ColourLayer | None:
     """How much of each cell is hidden, in [0, 1], as a layer without gradient; None where nothing stands."""
     if not cover.any():
         return None
-    return Colours(cover[..., None], np.zeros((*cover.shape, 2)), Scales(1.0, 1.0))
+    return ColourLayer(cover[..., None], np.zeros((*cover.shape, 2)), LayerScales(1.0, 1.0))
 
 
-def gradients(values: Float[Array, "h w c"]) -> Float[Array, "h w 2"]:
+def compute_gradients(values: Float[Array, "h w c"]) -> Float[Array, "h w 2"]:
     """Change per cell along x and along y (central differences, 2-norm over channels)."""
     return np.stack([np.linalg.norm(np.gradient(values, axis=axis), axis=-1) for axis in (1, 0)], -1)
 
 
-def scales(values: Float[Array, "h w c"]) -> Scales:
+def measure_scales(values: Float[Array, "h w c"]) -> LayerScales:
     """Scales of an exemplar: the root mean square of D between two places drawn at random, and the mean of G."""
     spread = float(np.sqrt(2 * values.reshape(-1, values.shape[-1]).var(0).sum()))
-    return frozen(spread, gradients(values))
+    return make_scales(spread, compute_gradients(values))
 
 
-def frozen(spread: float, slope: Float[Array, "h w 2"]) -> Scales:
+def make_scales(spread: float, slope: Float[Array, "h w 2"]) -> LayerScales:
     """spread: root mean square distance of two cells."""
-    return Scales(scale(2 * spread), scale(4 * float(slope.mean())))
+    return LayerScales(safe_unit(2 * spread), safe_unit(4 * float(slope.mean())))
 
 
-def scale(value: float) -> float:
+def safe_unit(value: float) -> float:
     """A unit to measure by; what is the same everywhere, but for rounding, has none: 1 then."""
     return value if value > ROUNDING else 1.0
 
 
 @dataclass(frozen=True)
-class Energy:
+class SeamEnergy:
     """How seams are cut (one of KINDS), and the layers that they are priced by; semantics are None for colour alone.
 
-    slope: of gamma; 2 is the paper's. standing: how much of each cell is hidden by what stands over it;
+    slope: of gamma; 2 is the paper's. occluders: how much of each cell is hidden by what stands over it;
     None for nothing.
     """
 
     kind: str
     slope: float
-    colours: Layer
-    semantics: Layer | None
-    standing: Layer | None = None
+    colours: CostLayer
+    semantics: CostLayer | None
+    occluders: CostLayer | None = None
 
     def gamma(self, doubt: float) -> float:
         """Weight of colour in the seams of a patch whose mean uncertainty (of 0 to 1) is `doubt`.
@@ -117,28 +117,28 @@ class Energy:
             return 1.0
         return 0.5 if self.kind == "semantic-nogamma" else found
 
-    def terms(self, share: float) -> list[tuple[float, Layer]]:
+    def terms(self, share: float) -> list[tuple[float, CostLayer]]:
         """The layers with their weights, at a weight of colour of `share`; one that weighs nothing is left out.
 
         What stands weighs the same however sure the ground is.
         """
         both = (share, self.colours), (1 - share, self.semantics)
-        stand = [(STAND, self.standing)] if self.standing is not None else []
+        stand = [(OCCLUDER_WEIGHT, self.occluders)] if self.occluders is not None else []
         return [(weight, layer) for weight, layer in both if weight > 0] + stand
 
-    def record(self) -> dict:
+    def describe(self) -> dict:
         """What seams were priced by, as JSON."""
         used = {"colour": self.colours} | ({"semantics": self.semantics} if self.semantics is not None else {})
         out = {"kind": self.kind, "scales": {name: vars(layer.unit) for name, layer in used.items()}, "eps": EPS}
-        out |= {"standing": STAND} if self.standing is not None else {}
+        out |= {"standing": OCCLUDER_WEIGHT} if self.occluders is not None else {}
         if self.semantics is None:
             return out
         gamma = {"gamma": 0.5} if self.kind == "semantic-nogamma" else {"slope": self.slope}
         return out | gamma | {"semantics": self.semantics.said}
 
 
-def weights(
-    terms: Sequence[tuple[float, Layer]], first: Cells, second: Cells
+def compute_edge_costs(
+    terms: Sequence[tuple[float, CostLayer]], first: Cells, second: Cells
 ) -> tuple[Float[Array, "h w1"], Float[Array, "h1 w"]]:
     """W between every cell of a grid and its right neighbour, and between every cell and its upper one.
 
@@ -146,15 +146,15 @@ def weights(
     """
     right, upper = [], []
     for share, layer in terms:
-        d = layer.apart(first, second) * share
+        d = layer.distances(first, second) * share
         g = (layer.slope[first] + layer.slope[second]) * share
         right.append((d[:, :-1] + d[:, 1:], g[:, :-1, 0] + g[:, 1:, 0], layer.unit))
         upper.append((d[:-1] + d[1:], g[:-1, :, 1] + g[1:, :, 1], layer.unit))
-    return _ratio(right), _ratio(upper)
+    return _divide_terms(right), _divide_terms(upper)
 
 
-def along(
-    terms: Sequence[tuple[float, Layer]],
+def compute_costs_along(
+    terms: Sequence[tuple[float, CostLayer]],
     tails: tuple[Cells, Cells],
     heads: tuple[Cells, Cells],
     axis: Int[Array, "edges"],
@@ -162,13 +162,13 @@ def along(
     """W of single edges: what the first and the second patch show at each one's tail and head; axis 0 is along x."""
     parts = []
     for share, layer in terms:
-        d = (layer.apart(*tails) + layer.apart(*heads)) * share
+        d = (layer.distances(*tails) + layer.distances(*heads)) * share
         (a, b), (e, f) = ([layer.slope[(*cells, axis)] for cells in end] for end in (tails, heads))
         parts.append((d, ((a + b) + (e + f)) * share, layer.unit))
-    return _ratio(parts)
+    return _divide_terms(parts)
 
 
-def _ratio(parts: list[tuple[Array, Array, Scales]]) -> Array:
+def _divide_terms(parts: list[tuple[Array, Array, LayerScales]]) -> Array:
     """Eq. (graphcut_main) from each layer's weighed D and G."""
     difference = sum(d / unit.difference for d, _, unit in parts)
     return difference / (sum(g / unit.gradient for _, g, unit in parts) + EPS)

@@ -31,7 +31,7 @@ class Patches:
 
 
 @dataclass(frozen=True)
-class Expanded:
+class ExpansionResult:
     """labels: of the last move. energies: of all seams, before the first move and after each that was made. broken:
     edges of all moves tried where the triangle did not hold, of `tested`.
     """
@@ -41,7 +41,7 @@ class Expanded:
     broken: int
     tested: int
 
-    def record(self) -> dict:
+    def describe(self) -> dict:
         return {"before": self.energies[0], "after": self.energies[-1], "moves": len(self.energies) - 1} | {
             "triangles_broken": self.broken,
             "triangles_tested": self.tested,
@@ -62,7 +62,7 @@ class _Edges:
         return _Edges(self.tails[pick], self.heads[pick], self.axis[pick])
 
 
-def expanded(labels: UInt8[Array, "h w"], patches: Patches, terms: list) -> Expanded:
+def expand_labels(labels: UInt8[Array, "h w"], patches: Patches, terms: list) -> ExpansionResult:
     """Expand every patch in turn until none lowers the energy; of one patch alone nothing changes.
 
     terms: see energy.Energy.terms. Cells where no other patch is allowed keep theirs.
@@ -81,7 +81,7 @@ def expanded(labels: UInt8[Array, "h w"], patches: Patches, terms: list) -> Expa
             energies.append(energies[-1] + move.change)
         if idle == n:
             break
-    return Expanded(found.reshape(labels.shape).astype(np.uint8), [e / QUANTA for e in energies], broken, tested)
+    return ExpansionResult(found.reshape(labels.shape).astype(np.uint8), [e / QUANTA for e in energies], broken, tested)
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class _Price:
         pair = at_tail[seams], at_head[seams]
         ends = (edges.tails[seams], edges.heads[seams])
         shown = [tuple((self.rows[label, end], self.columns[label, end]) for label in pair) for end in ends]
-        out[seams] = np.rint(energy.along(self.terms, *shown, edges.axis[seams]) * QUANTA)
+        out[seams] = np.rint(energy.compute_costs_along(self.terms, *shown, edges.axis[seams]) * QUANTA)
         return out
 
 

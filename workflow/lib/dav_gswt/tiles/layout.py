@@ -19,17 +19,16 @@ from jaxtyping import Bool, Int, Integer, UInt8
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
+from dav_gswt.lod.levels import AUTO, MAX_LEVELS
 
 _log = logging.getLogger(__name__)
 
 LABELS = ("centre", "W", "E", "S", "N", "SW", "SE", "NW", "NE")  # a label's number is its index
 CENTRE, W, E, S, N, SW, SE, NW, NE = range(9)
-LEAST = 10  # blocks that a tile is wide at least: two corners, and something between them
-COARSE, PLACES = 4, 32  # a block is at most so many cells, or a tile's side over so many: patches need places
-AUTO = "auto"
-MOST = 6  # levels, where it is left to the tile
-SMALLEST = 4  # cells of the coarsest level that a tile is wide at least then: a coarser one is never drawn
-NARROWEST = 2  # and in any case: the least that has a slope
+MIN_BLOCKS = 10  # blocks that a tile is wide at least: two corners, and something between them
+MAX_BLOCK, MIN_PLACES = 4, 32  # a block is at most so many cells, or a tile's side over so many: patches need places
+SMALLEST_DRAWN = 4  # cells of the coarsest level that a tile is wide at least then: a coarser one is never drawn
+SMALLEST_LEVEL = 2  # and in any case: the least that has a slope
 EDGES = 16  # tiles of one centre variant: two colours on each of four sides
 
 
@@ -60,18 +59,18 @@ class Layout:
     block: int = 1
 
     @classmethod
-    def of(cls, told: dict) -> "Layout":
+    def from_dict(cls, told: dict) -> "Layout":
         """Of what seams.json says of it."""
         return cls(**{own.name: told[own.name] for own in fields(cls)})
 
     @property
-    def laid(self) -> int:
+    def composed_levels(self) -> int:
         """How many levels are composed of patches; the others are merged from the tile's own cells."""
         return self.block.bit_length()
 
 
 @dataclass(frozen=True)
-class Places:
+class PatchPlaces:
     """South-western cells (x, y) of the patches in the exemplar: a corner, two strips a direction, a centre a tile."""
 
     corner: Int[Array, "2"]
@@ -80,7 +79,7 @@ class Places:
     centres: Int[Array, "tiles 2"]
 
 
-def plan(exemplar: int, levels: int | str, share: float, strip: float, fitted: int = MOST) -> Layout:
+def plan_layout(exemplar: int, levels: int | str, share: float, strip: float, fitted: int = MAX_LEVELS) -> Layout:
     """Sizes for an exemplar of `exemplar` cells: tiles about `share` of it wide, strips `strip` of a tile either side.
 
     Args:   levels: of the tiles, or AUTO: as many as are ever drawn (see SMALLEST), at most MOST. share: tile side as a
@@ -89,18 +88,18 @@ def plan(exemplar: int, levels: int | str, share: float, strip: float, fitted: i
     Where the exemplar holds no tile with so many levels there are fewer, and a warning says so.
     Raises: InputError: the exemplar cannot hold any tile.
     """
-    most = _drawn(exemplar * share) if levels == AUTO else levels
-    sizes = ((number, _side(exemplar, number, share)) for number in range(most, 0, -1))
+    most = _count_drawn_levels(exemplar * share) if levels == AUTO else levels
+    sizes = ((number, _choose_side(exemplar, number, share)) for number in range(most, 0, -1))
     number, side = next(((n, s) for n, s in sizes if s <= exemplar), (0, 0))
     if not number:
         raise InputError(
-            f"tiles: a tile needs {LEAST} ground cells a side and the exemplar has {exemplar}: use a finer quality or "
-            "photos of a larger ground"
+            f"tiles: a tile needs {MIN_BLOCKS} ground cells a side and the exemplar has {exemplar}: use a finer "
+            "quality or photos of a larger ground"
         )
     if levels not in (AUTO, number):
         _log.warning("the exemplar's %d cells a side hold tiles with %d levels, not %d", exemplar, number, levels)
     block = 2 ** (min(number, fitted) - 1)
-    while block > 1 and (block > max(COARSE, side // PLACES) or side < LEAST * block):
+    while block > 1 and (block > max(MAX_BLOCK, side // MIN_PLACES) or side < MIN_BLOCKS * block):
         block //= 2
     widest = side // 2 // block - 1  # of a corner, in blocks: a strip shows something between its two
     half = min(max(2, round(side * strip / block)), widest - 1)
@@ -108,28 +107,30 @@ def plan(exemplar: int, levels: int | str, share: float, strip: float, fitted: i
     return Layout(exemplar, number, side, half * block, corner * block, block)
 
 
-def _drawn(side: float) -> int:
+def _count_drawn_levels(side: float) -> int:
     """How many levels of tiles about so many cells wide are ever drawn, at most MOST."""
-    return max([1, *(n for n in range(1, MOST + 1) if side / 2 ** (n - 1) >= SMALLEST - 0.5)])
+    return max([1, *(n for n in range(1, MAX_LEVELS + 1) if side / 2 ** (n - 1) >= SMALLEST_DRAWN - 0.5)])
 
 
-def _side(exemplar: int, levels: int, share: float) -> int:
+def _choose_side(exemplar: int, levels: int, share: float) -> int:
     """The tile's side nearest to `share` of the exemplar's that is a whole number of the coarsest level's cells."""
     cell = 2 ** (levels - 1)
-    least = max(min(cell, NARROWEST), -(-LEAST * min(cell, 2) // cell))  # a level beside the finest needs blocks of two
+    least = max(
+        min(cell, SMALLEST_LEVEL), -(-MIN_BLOCKS * min(cell, 2) // cell)
+    )  # a level beside the finest needs blocks of two
     most = max(least, exemplar // cell)
     return min(max(int(exemplar * share / cell + 0.5), least), most) * cell
 
 
-def colours(tile: int) -> tuple[int, int, int, int]:
+def edge_colours(tile: int) -> tuple[int, int, int, int]:
     """Edge colours (W, N, E, S) of a tile number 16 c + 8 W + 4 N + 2 E + S."""
     return tile >> 3 & 1, tile >> 2 & 1, tile >> 1 & 1, tile & 1
 
 
-def offsets(layout: Layout, places: Places, tile: int) -> Int[Array, "9 2"]:
+def label_shifts(layout: Layout, places: PatchPlaces, tile: int) -> Int[Array, "9 2"]:
     """What to add to a cell (x, y) of a tile to get the exemplar's cell that each label shows there."""
     n, b, a = layout.side, layout.strip, layout.corner
-    west, north, east, south = colours(tile)
+    west, north, east, south = edge_colours(tile)
     return np.array(
         [
             places.centres[tile],
@@ -163,7 +164,7 @@ def strip_labels(
     )
 
 
-def frame(
+def frame_labels(
     layout: Layout, vertical: Bool[Array, "2 side width"], horizontal: Bool[Array, "2 width side"], tile: int
 ) -> UInt8[Array, "side side"]:
     """Labels of a tile's frame, `strip` cells wide; the centre inside it.
@@ -172,7 +173,7 @@ def frame(
     the first `strip` cells at each end are the corner's, so two strips never claim the same cell.
     """
     n, b = layout.side, layout.strip
-    west, north, east, south = colours(tile)
+    west, north, east, south = edge_colours(tile)
     upper = np.arange(n) >= n // 2  # the farther of a strip's two corners
     labels = np.full((n, n), CENTRE, np.uint8)
     labels[:b] = np.where(horizontal[south][b:], np.where(upper, SE, SW), S)
@@ -184,7 +185,7 @@ def frame(
     return labels
 
 
-def reach(layout: Layout) -> Bool[Array, "9 n n"]:
+def allowed_cells(layout: Layout) -> Bool[Array, "9 n n"]:
     """Where each label's patch may come to lie in a tile: the centre anywhere, a strip along its side but for the
     corners, a corner patch in its corner. The outermost `block` cells are the frame's: their neighbours are in other
     tiles.
@@ -203,7 +204,7 @@ def reach(layout: Layout) -> Bool[Array, "9 n n"]:
     return out & inner[:, None] & inner
 
 
-def sources(
+def source_cells(
     labels: Integer[Array, "h w"], shift: Int[Array, "k 2"], cell: int = 1
 ) -> tuple[Int[Array, "h w"], Int[Array, "h w"]]:
     """Rows and columns of the exemplar's cells that a label map shows, on a grid whose cells are `cell` finest ones."""

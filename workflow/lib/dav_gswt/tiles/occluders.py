@@ -1,7 +1,7 @@
 """What stands on the ground, seen from above: which cells of an exemplar it hides.
 
 Gaussians follow the label of the cell that their centre is in, so a cut through a shrub leaves half a shrub, and one
-under a flower's head a stalk without a head. Such cells are dear to cut (`energy.standing`).
+under a flower's head a stalk without a head. Such cells are dear to cut (`energy.make_occluder_layer`).
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from dav_gswt.tiles.layout import Exemplar
 ABOVE = 0.5  # cells over the ground discs' mean height: a rough ground's discs do not stand
 
 
-def cover(field: GaussianField, exemplar: Exemplar, height: Float[Array, "m m"]) -> Float[Array, "m m"]:
+def compute_cover(field: GaussianField, exemplar: Exemplar, height: Float[Array, "m m"]) -> Float[Array, "m m"]:
     """Share of each cell that is hidden by what stands over it, at whatever height, in [0, 1].
 
     sum of opacity x 2 pi sigma_1 sigma_2 over the Gaussians whose centre is over the cell, sigma_1 and sigma_2 their
@@ -24,7 +24,7 @@ def cover(field: GaussianField, exemplar: Exemplar, height: Float[Array, "m m"])
     """
     if not field.ground.any():
         return np.zeros(height.shape)
-    level = compose.binned(field, exemplar, 1)
+    level = compose.bin_gaussians(field, exemplar, 1)
     cell = np.repeat(np.arange(height.size), np.diff(level.start))
     above = level.field.means[:, 2] - height.ravel()[cell]
     up = above > ABOVE * exemplar.spacing

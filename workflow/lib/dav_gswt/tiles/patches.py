@@ -14,25 +14,25 @@ from scipy.ndimage import gaussian_filter
 
 from dav_gswt.tiles.layout import Layout
 
-SURE = 0.05  # of mean uncertainty above the surest candidate's: still as good as sure
-REPEAT = 0.5  # charge for ground shown twice, a median seam's cost
-FITS = 1.75  # times the best seam's cost: as good as the best
+UNCERTAINTY_MARGIN = 0.05  # of mean uncertainty above the surest candidate's: still as good as sure
+REPEAT_COST = 0.5  # charge for ground shown twice, a median seam's cost
+FIT_FACTOR = 1.75  # times the best seam's cost: as good as the best
 OUTLIER = 2.0  # times the mean squared distance from the median colour: more is no grain
-NEAR = 0.25  # of a patch's shorter side: nearer places show nearly the same
+NEAR_SHARE = 0.25  # of a patch's shorter side: nearer places show nearly the same
 SAMPLES = 3000  # cells of a seam zone that are compared
 
 
 @dataclass(frozen=True)
-class Guide:
+class GuidanceMaps:
     """What a search looks at, per finest cell of the exemplar: features to match, and uncertainty in [0, 1]."""
 
     features: Float[Array, "m m k"]
     uncertainty: Float[Array, "m m"]
 
 
-def guide(
+def make_guidance(
     colour: Float[Array, "m m 3"], height: Float[Array, "m m"], uncertainty: Float[Array, "m m"], layout: Layout
-) -> Guide:
+) -> GuidanceMaps:
     """Features: colour, its average over a quarter strip (the eye finds a step of brightness before a broken grain),
     and height over its own spread, as much as one channel of colour.
     """
@@ -41,17 +41,17 @@ def guide(
     spread = float(colour.std(axis=(0, 1)).mean())
     relief = height - gaussian_filter(height, layout.side / 3, mode="nearest")
     height = relief * (spread / (relief.std() or 1.0))
-    return Guide(np.concatenate([colour, 2 * soft, height[..., None]], -1), uncertainty)
+    return GuidanceMaps(np.concatenate([colour, 2 * soft, height[..., None]], -1), uncertainty)
 
 
-def candidates(layout: Layout, size: tuple[int, int], count: int, rng: np.random.Generator) -> Int[Array, "n 2"]:
+def draw_candidates(layout: Layout, size: tuple[int, int], count: int, rng: np.random.Generator) -> Int[Array, "n 2"]:
     """At most `count` different places (x, y) for a patch of `size` (width, height) cells, on the coarsest grid."""
     columns, rows = ((layout.exemplar - s) // layout.block + 1 for s in size)
     pick = rng.permutation(columns * rows)[:count] if columns * rows > count else np.arange(columns * rows)
     return np.stack([pick % columns, pick // columns], 1) * layout.block
 
 
-def means(values: Float[Array, "m m"], places: Int[Array, "n 2"], size: tuple[int, int]) -> Float[Array, "n"]:
+def patch_means(values: Float[Array, "m m"], places: Int[Array, "n 2"], size: tuple[int, int]) -> Float[Array, "n"]:
     """Mean of a map over a patch of `size` at each place."""
     total = np.zeros((values.shape[0] + 1, values.shape[1] + 1))
     total[1:, 1:] = values.cumsum(0).cumsum(1)
@@ -61,13 +61,13 @@ def means(values: Float[Array, "m m"], places: Int[Array, "n 2"], size: tuple[in
     return box / (width * height)
 
 
-def sure(guide: Guide, places: Int[Array, "n 2"], size: tuple[int, int]) -> Int[Array, "m 2"]:
+def keep_certain(guide: GuidanceMaps, places: Int[Array, "n 2"], size: tuple[int, int]) -> Int[Array, "m 2"]:
     """The places that are about as sure as the surest of them."""
-    doubt = means(guide.uncertainty, places, size)
-    return places[doubt <= doubt.min() + SURE]
+    doubt = patch_means(guide.uncertainty, places, size)
+    return places[doubt <= doubt.min() + UNCERTAINTY_MARGIN]
 
 
-def overlap(
+def overlap_share(
     places: Int[Array, "n 2"], size: tuple[int, int], other: Int[Array, "2"], other_size: tuple[int, int]
 ) -> Float[Array, "n"]:
     """Ground that patches share with another one, as a share of the smaller of the two."""
@@ -75,7 +75,7 @@ def overlap(
     return np.maximum(high - low, 0).prod(1) / min(np.prod(size), np.prod(other_size))
 
 
-def oddness(guide: Guide) -> Float[Array, "m m"]:
+def compute_saliency(guide: GuidanceMaps) -> Float[Array, "m m"]:
     """How far each cell is from what is everywhere.
 
     The squared distance of its soft colour from the median one, over that distance's mean, plus a quarter of its
@@ -92,29 +92,29 @@ def oddness(guide: Guide) -> Float[Array, "m m"]:
     return soft + 0.25 * soft**2 + 0.25 * np.maximum(grain - OUTLIER, 0) ** 2
 
 
-def conspicuous(guide: Guide, places: Int[Array, "n 2"], size: tuple[int, int]) -> Float[Array, "n"]:
+def patch_saliency(guide: GuidanceMaps, places: Int[Array, "n 2"], size: tuple[int, int]) -> Float[Array, "n"]:
     """Mean oddness of a patch at each place, at least the places' median.
 
     A strip with a landmark is a row of landmarks; but one barer than half of the ground is a bare line along every
     border, which the eye finds from farther: nothing is gained by it. (flowers, desert of seeds for development: the
     strongest row of local contrast in the mean tile falls from .65, .38 of the tiles' deviation to .23, .17)
     """
-    odd = means(oddness(guide), places, size)
+    odd = patch_means(compute_saliency(guide), places, size)
     return np.maximum(odd, np.median(odd))
 
 
-def blandest(guide: Guide, layout: Layout) -> Int[Array, "2"]:
+def find_least_salient(guide: GuidanceMaps, layout: Layout) -> Int[Array, "2"]:
     """Place of the corner patch: it comes back at every corner, so it should show no landmark.
 
     Every place on the coarsest grid is tried; of equal ones the most south-western.
     """
     size = (2 * layout.corner, 2 * layout.corner)
-    places = sure(guide, candidates(layout, size, layout.exemplar**2, np.random.default_rng(0)), size)
-    return places[np.argmin(means(oddness(guide), places, size))]
+    places = keep_certain(guide, draw_candidates(layout, size, layout.exemplar**2, np.random.default_rng(0)), size)
+    return places[np.argmin(patch_means(compute_saliency(guide), places, size))]
 
 
-def mismatch(
-    guide: Guide, zone: tuple[Array, Array], shown: tuple[Array, Array], places: Int[Array, "n 2"]
+def compute_mismatch(
+    guide: GuidanceMaps, zone: tuple[Array, Array], shown: tuple[Array, Array], places: Int[Array, "n 2"]
 ) -> Float[Array, "n"]:
     """What a seam against a patch at each place would cost at least: the squared feature difference, at its smallest
     along each of many lines that the seam has to cross, in the mean over the lines.
@@ -136,22 +136,22 @@ def mismatch(
     return np.array([cost(int(py * columns + px)) for px, py in places])
 
 
-def fitting(cost: Float[Array, "n"]) -> Int[Array, "k"]:
+def find_fitting(cost: Float[Array, "n"]) -> Int[Array, "k"]:
     """Which places fit about as well as the best: variety is sought among these alone.
 
     In a texture that is nearly all of them. Where the exemplar holds what cannot go on (a road that ends at a tile's
     border), it is the rest: a centre that comes back is seen less than a road cut off.
     """
-    return np.flatnonzero(cost <= FITS * np.quantile(cost, 0.02))
+    return np.flatnonzero(cost <= FIT_FACTOR * np.quantile(cost, 0.02))
 
 
-def relative(cost: Float[Array, "n"]) -> Float[Array, "n"]:
+def divide_by_median(cost: Float[Array, "n"]) -> Float[Array, "n"]:
     """Costs in units of their median; unchanged if that is 0."""
     middle = np.median(cost)
     return cost / middle if middle > 0 else cost
 
 
-def ranked(
+def rank_places(
     places: Int[Array, "n 2"],
     cost: Float[Array, "n"],
     size: tuple[int, int],
@@ -165,14 +165,14 @@ def ranked(
     """
     score = cost.copy()
     for place, other in used:
-        score += REPEAT * overlap(places, size, place, other)
+        score += REPEAT_COST * overlap_share(places, size, place, other)
     for place in taken:
-        score += REPEAT * overlap(places, size, place, size) / len(taken)
-        score += 10 * REPEAT * np.maximum(0, 1 - np.abs(places - place).max(1) / (NEAR * min(size)))
+        score += REPEAT_COST * overlap_share(places, size, place, size) / len(taken)
+        score += 10 * REPEAT_COST * np.maximum(0, 1 - np.abs(places - place).max(1) / (NEAR_SHARE * min(size)))
     return places[np.argsort(score, kind="stable")]
 
 
-def paired(
+def rank_pairs(
     places: Int[Array, "n 2"],
     cost: Float[Array, "n"],
     together: Float[Array, "n n"],
@@ -185,10 +185,10 @@ def paired(
     the same come last.
     """
     for place, other in used:
-        cost = cost + REPEAT * overlap(places, size, place, other)
+        cost = cost + REPEAT_COST * overlap_share(places, size, place, other)
     first, second = np.triu_indices(len(places), len(places) > 1)
     apart = np.abs(places[first] - places[second])
     common = np.maximum(np.subtract(size, apart), 0).prod(1) / np.prod(size)
-    score = cost[first] + cost[second] + together[first, second] + REPEAT * common
-    order = np.lexsort((score, apart.max(1) < NEAR * min(size)))
+    score = cost[first] + cost[second] + together[first, second] + REPEAT_COST * common
+    order = np.lexsort((score, apart.max(1) < NEAR_SHARE * min(size)))
     return np.stack([places[first[order]], places[second[order]]], 1)

@@ -31,7 +31,7 @@ COMPARED = 128  # pixels a side at which masks are compared
 LEAST = 9  # cells of a mask
 
 
-def opened(folder: Path | str) -> nn.Module:
+def load_model(folder: Path | str) -> nn.Module:
     """The network in a folder, in single precision on the CPU.
 
     Raises: InputError: no folder, another model's, weights that are pickles, missing or one short, not finite, or of
@@ -65,7 +65,7 @@ def opened(folder: Path | str) -> nn.Module:
     return model.eval()
 
 
-def masks(model: nn.Module, colour: Float[Array, "m m 3"]) -> list[Bool[Array, "m m"]]:
+def predict_masks(model: nn.Module, colour: Float[Array, "m m 3"]) -> list[Bool[Array, "m m"]]:
     """Masks of what a picture (values in [0, 1]) shows, the surest first; there may be none."""
     cells = len(colour)
     side = int(np.ravel(model.config.prompt_encoder_config.image_size)[0])

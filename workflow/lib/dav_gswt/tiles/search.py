@@ -7,39 +7,39 @@ from jaxtyping import Bool, Int, UInt8
 from numpy import ndarray as Array
 
 from dav_gswt.logs import progress
-from dav_gswt.tiles import cuts, expansion, layout, patches, repeats
-from dav_gswt.tiles.energy import Energy, weights
-from dav_gswt.tiles.layout import CENTRE, EDGES, LABELS, Layout, Places
+from dav_gswt.tiles import cuts, expansion, layout, patches, repetition
+from dav_gswt.tiles.energy import SeamEnergy, compute_edge_costs
+from dav_gswt.tiles.layout import CENTRE, EDGES, LABELS, Layout, PatchPlaces
 
-FEW = 4  # times as many places as are tried: among fewer there is no choice
-PAIRED = 200  # strips, at most, of which every two are looked at together
-PERIODIC = 2.0  # charge for what comes back with every tile, where a median seam costs 1
+MIN_FITTING = 4  # times as many places as are tried: among fewer there is no choice
+MAX_PAIRED = 200  # strips, at most, of which every two are looked at together
+REPETITION_COST = 2.0  # charge for what comes back with every tile, where a median seam costs 1
 
 
 @dataclass(frozen=True)
-class Sketch:
+class SearchProblem:
     """An exemplar as the search sees it: places by the guide, cuts by the energy."""
 
     plan: Layout
-    guide: patches.Guide
-    energy: Energy
+    guide: patches.GuidanceMaps
+    energy: SeamEnergy
     candidates: int
     tries: int
 
     def gamma(self, place: Int[Array, "2"], size: tuple[int, int]) -> float:
         """Weight of colour in the seams of a patch: by its mean uncertainty."""
-        return self.energy.gamma(float(patches.means(self.guide.uncertainty, place[None], size)[0]))
+        return self.energy.gamma(float(patches.patch_means(self.guide.uncertainty, place[None], size)[0]))
 
-    def cut(self, first: tuple, second: tuple, gamma: float, zone: cuts.Zone) -> cuts.Cut:
+    def cut(self, first: tuple, second: tuple, gamma: float, zone: cuts.OverlapZone) -> cuts.Cut:
         """Cut two patches, given by the exemplar's cells (rows, columns) that they show."""
-        costs = weights(self.energy.terms(gamma), first, second)
+        costs = compute_edge_costs(self.energy.terms(gamma), first, second)
         if self.energy.kind == "none":
-            return cuts.straight(*costs, zone.straight)
-        return cuts.cut(*costs, zone.keep, zone.take)
+            return cuts.price_cut(*costs, zone.straight)
+        return cuts.find_cut(*costs, zone.keep, zone.take)
 
 
 @dataclass(frozen=True)
-class Laid:
+class PlacedPatch:
     """A patch in its place, what its seam looks like, and the weight that colour had in it."""
 
     place: Int[Array, "2"]
@@ -48,31 +48,31 @@ class Laid:
 
 
 @dataclass(frozen=True)
-class Tile:
+class CutTile:
     """A tile's label map. expanded: what alpha-expansion did to it, as JSON, where it was asked for."""
 
-    centre: Laid
+    centre: PlacedPatch
     labels: UInt8[Array, "n n"]
     expanded: dict | None
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """Places and cuts. vertical, horizontal: by colour, where the corner lies in a strip. strips: vertical 0, 1, then
     horizontal 0, 1.
     """
 
-    places: Places
+    places: PatchPlaces
     vertical: Bool[Array, "2 n w"]
     horizontal: Bool[Array, "2 w n"]
-    strips: list[Laid]
-    tiles: list[Tile]
+    strips: list[PlacedPatch]
+    tiles: list[CutTile]
 
     @property
     def labels(self) -> UInt8[Array, "tiles n n"]:
         return np.stack([tile.labels for tile in self.tiles])
 
-    def record(self) -> dict:
+    def describe(self) -> dict:
         """What was chosen and what it cost, as JSON; strips are vertical 0, 1, then horizontal 0, 1."""
         names = ("corner", "vertical", "horizontal", "centres")
         out = {
@@ -86,20 +86,20 @@ class Found:
         return out | ({"expansion": expanded} if expanded else {})
 
 
-def search(sketch: Sketch, variants: int, rng: np.random.Generator) -> Found:
+def search_patches(sketch: SearchProblem, variants: int, rng: np.random.Generator) -> SearchResult:
     """All places and cuts of 16 `variants` tiles."""
-    corner = patches.blandest(sketch.guide, sketch.plan)
+    corner = patches.find_least_salient(sketch.guide, sketch.plan)
     used = [(corner, (2 * sketch.plan.corner, 2 * sketch.plan.corner))]
-    upright, flat = (_strips(sketch, corner, way, used, rng) for way in (True, False))
+    upright, flat = (_search_strips(sketch, corner, way, used, rng) for way in (True, False))
     sides = [np.stack([strip.place for strip in pair]) for pair in (upright, flat)]
     masks = [np.stack([~strip.seam.labels for strip in pair]) for pair in (upright, flat)]
-    places = Places(corner, *sides, np.zeros((EDGES * variants, 2), int))
-    tiles = _tiles(sketch, places, masks, rng)
-    places = Places(corner, *sides, np.stack([tile.centre.place for tile in tiles]))
-    return Found(places, *masks, upright + flat, tiles)
+    places = PatchPlaces(corner, *sides, np.zeros((EDGES * variants, 2), int))
+    tiles = _search_centres(sketch, places, masks, rng)
+    places = PatchPlaces(corner, *sides, np.stack([tile.centre.place for tile in tiles]))
+    return SearchResult(places, *masks, upright + flat, tiles)
 
 
-def _strips(sketch: Sketch, corner: Array, upright: bool, used: list, rng) -> list[Laid]:
+def _search_strips(sketch: SearchProblem, corner: Array, upright: bool, used: list, rng) -> list[PlacedPatch]:
     """Two strips of one direction, each with its cut against the corner patch; they join the patches `used`."""
     plan = sketch.plan
     n, b, a = plan.side, plan.strip, plan.corner
@@ -108,75 +108,77 @@ def _strips(sketch: Sketch, corner: Array, upright: bool, used: list, rng) -> li
     along = y if upright else x
     depth = np.minimum(along, n - 1 - along)
     ends_at = (a + b) // 2  # where a cut without looking lies, and the others about there
-    free = cuts.Zone(depth < b, depth >= a, depth >= ends_at)
+    free = cuts.OverlapZone(depth < b, depth >= a, depth >= ends_at)
     ends = np.where(along < n // 2, 1, 2)
     shift = layout.strip_shifts(plan, np.zeros(2, int), corner, upright)
-    shown = tuple(np.clip(v, 0, plan.exemplar - 1) for v in layout.sources(ends, shift))
+    shown = tuple(np.clip(v, 0, plan.exemplar - 1) for v in layout.source_cells(ends, shift))
     zone = _end_lines(plan, upright)
-    places = patches.sure(sketch.guide, patches.candidates(plan, size, sketch.candidates, rng), size)
-    cost = patches.mismatch(sketch.guide, zone, tuple(v[zone] for v in shown), places)
-    odd = patches.conspicuous(sketch.guide, places, size)
-    fits = np.intersect1d(patches.fitting(cost), patches.fitting(odd))
-    cost = patches.relative(cost) + patches.relative(odd)
-    if len(fits) < FEW * sketch.tries:  # the best of both is all there is to choose from
-        fits = np.argsort(cost, kind="stable")[: FEW * sketch.tries]
-    fits = fits[np.argsort(cost[fits], kind="stable")[:PAIRED]]
+    places = patches.keep_certain(sketch.guide, patches.draw_candidates(plan, size, sketch.candidates, rng), size)
+    cost = patches.compute_mismatch(sketch.guide, zone, tuple(v[zone] for v in shown), places)
+    odd = patches.patch_saliency(sketch.guide, places, size)
+    fits = np.intersect1d(patches.find_fitting(cost), patches.find_fitting(odd))
+    cost = patches.divide_by_median(cost) + patches.divide_by_median(odd)
+    if len(fits) < MIN_FITTING * sketch.tries:  # the best of both is all there is to choose from
+        fits = np.argsort(cost, kind="stable")[: MIN_FITTING * sketch.tries]
+    fits = fits[np.argsort(cost[fits], kind="stable")[:MAX_PAIRED]]
     places, cost = places[fits], cost[fits]
-    seen = repeats.nothing(sketch.guide.features[..., :3], n, size, fast=(depth < ends_at, shown))
-    pairs = patches.paired(places, cost, PERIODIC * seen.pairs(places), size, used)[: sketch.tries]
-    laid = [[_laid(sketch, shown, place, size, free) for place in pair] for pair in pairs]
+    seen = repetition.start_overlay(sketch.guide.features[..., :3], n, size, fast=(depth < ends_at, shown))
+    pairs = patches.rank_pairs(places, cost, REPETITION_COST * seen.pair_costs(places), size, used)[: sketch.tries]
+    laid = [[_place_patch(sketch, shown, place, size, free) for place in pair] for pair in pairs]
     found = min(laid, key=lambda strips: sum(strip.seam.energy for strip in strips))
     used += [(strip.place, size) for strip in found]
     return found
 
 
-def _tiles(sketch: Sketch, places: Places, masks: list, rng) -> list[Tile]:
+def _search_centres(sketch: SearchProblem, places: PatchPlaces, masks: list, rng) -> list[CutTile]:
     """Every tile with a centre of its own."""
     plan = sketch.plan
     n, b = plan.side, plan.strip
     y, x = np.mgrid[:n, :n]
     depth = np.minimum(np.minimum(x, n - 1 - x), np.minimum(y, n - 1 - y))
     frame = (plan.block + b) // 2  # how wide it is where a cut does not look
-    free = cuts.Zone(depth < plan.block, depth >= b, depth >= frame)
+    free = cuts.OverlapZone(depth < plan.block, depth >= b, depth >= frame)
     zone = _ring_lines(plan)
     size = (n, n)
-    choice = patches.sure(sketch.guide, patches.candidates(plan, size, sketch.candidates, rng), size)
-    seen = repeats.nothing(sketch.guide.features[..., :3], n, size, (frame, frame))
+    choice = patches.keep_certain(sketch.guide, patches.draw_candidates(plan, size, sketch.candidates, rng), size)
+    seen = repetition.start_overlay(sketch.guide.features[..., :3], n, size, (frame, frame))
     found = []
     for tile in progress(range(len(places.centres)), "cut tiles"):
-        west, north, east, south = layout.colours(tile)
-        around = layout.frame(plan, *masks, tile)
-        shift = layout.offsets(plan, places, tile)
+        west, north, east, south = layout.edge_colours(tile)
+        around = layout.frame_labels(plan, *masks, tile)
+        shift = layout.label_shifts(plan, places, tile)
         # inside, where the centre is forced, the frame shows anything
-        shown = tuple(np.clip(v, 0, plan.exemplar - 1) for v in layout.sources(around, shift))
-        cost = patches.mismatch(sketch.guide, zone, tuple(v[zone] for v in shown), choice)
-        fits = patches.fitting(cost)
-        cost = patches.relative(cost[fits]) + PERIODIC * seen.charge(choice[fits])
+        shown = tuple(np.clip(v, 0, plan.exemplar - 1) for v in layout.source_cells(around, shift))
+        cost = patches.compute_mismatch(sketch.guide, zone, tuple(v[zone] for v in shown), choice)
+        fits = patches.find_fitting(cost)
+        cost = patches.divide_by_median(cost[fits]) + REPETITION_COST * seen.cost_of(choice[fits])
         beside = [(places.vertical[c], (2 * b, n)) for c in sorted({west, east})]
         beside += [(places.horizontal[c], (n, 2 * b)) for c in sorted({south, north})]
         taken = np.array([tile.centre.place for tile in found], int).reshape(-1, 2)
-        order = patches.ranked(choice[fits], cost, size, beside, taken)
+        order = patches.rank_places(choice[fits], cost, size, beside, taken)
         variants = {tuple(other.centre.place) for other in found[tile % EDGES :: EDGES]}  # a centre of its own
         order = np.array([place for place in order if tuple(place) not in variants] or order)
-        centre = _best(sketch, shown, order, size, free)
+        centre = _place_best(sketch, shown, order, size, free)
         labels = np.where(centre.seam.labels, CENTRE, around).astype(np.uint8)
         shift[CENTRE] = centre.place
         found.append(_expanded(sketch, centre, labels, shift))
-        seen = seen.plus(centre.place)
+        seen = seen.with_patch(centre.place)
     return found
 
 
-def _expanded(sketch: Sketch, centre: Laid, labels: UInt8[Array, "n n"], shift: Int[Array, "9 2"]) -> Tile:
+def _expanded(
+    sketch: SearchProblem, centre: PlacedPatch, labels: UInt8[Array, "n n"], shift: Int[Array, "9 2"]
+) -> CutTile:
     """The tile; where expansion is asked for, all its patches are expanded from the exact cuts on."""
     if sketch.energy.kind != "expansion":
-        return Tile(centre, labels, None)
+        return CutTile(centre, labels, None)
     whole = [np.full(labels.shape, label) for label in range(len(LABELS))]
     # where a patch may not lie, it shows anything
-    shown = np.stack([np.clip(layout.sources(one, shift), 0, sketch.plan.exemplar - 1) for one in whole], 1)
-    found = expansion.expanded(
-        labels, expansion.Patches(*shown, layout.reach(sketch.plan)), sketch.energy.terms(centre.gamma)
+    shown = np.stack([np.clip(layout.source_cells(one, shift), 0, sketch.plan.exemplar - 1) for one in whole], 1)
+    found = expansion.expand_labels(
+        labels, expansion.Patches(*shown, layout.allowed_cells(sketch.plan)), sketch.energy.terms(centre.gamma)
     )
-    return Tile(centre, found.labels, found.record())
+    return CutTile(centre, found.labels, found.describe())
 
 
 def _end_lines(plan: Layout, upright: bool) -> tuple[Array, Array]:
@@ -200,14 +202,18 @@ def _ring_lines(plan: Layout) -> tuple[Array, Array]:
     return y, x
 
 
-def _best(sketch: Sketch, shown: tuple, order: Int[Array, "n 2"], size: tuple[int, int], zone: cuts.Zone) -> Laid:
+def _place_best(
+    sketch: SearchProblem, shown: tuple, order: Int[Array, "n 2"], size: tuple[int, int], zone: cuts.OverlapZone
+) -> PlacedPatch:
     """Of the first `tries` places the one whose seam is cheapest."""
-    found = (_laid(sketch, shown, place, size, zone) for place in order[: sketch.tries])
+    found = (_place_patch(sketch, shown, place, size, zone) for place in order[: sketch.tries])
     return min(found, key=lambda laid: laid.seam.energy)
 
 
-def _laid(sketch: Sketch, shown: tuple, place: Int[Array, "2"], size: tuple[int, int], zone: cuts.Zone) -> Laid:
+def _place_patch(
+    sketch: SearchProblem, shown: tuple, place: Int[Array, "2"], size: tuple[int, int], zone: cuts.OverlapZone
+) -> PlacedPatch:
     """A patch in its place, cut against what is shown."""
     y, x = np.mgrid[: size[1], : size[0]]
     gamma = sketch.gamma(place, size)
-    return Laid(place, sketch.cut(shown, (y + place[1], x + place[0]), gamma, zone), gamma)
+    return PlacedPatch(place, sketch.cut(shown, (y + place[1], x + place[0]), gamma, zone), gamma)

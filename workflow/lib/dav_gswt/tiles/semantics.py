@@ -17,20 +17,20 @@ from scipy.spatial.distance import pdist, squareform
 
 from dav_gswt.images import lpips_weights
 from dav_gswt.threads import one_thread
-from dav_gswt.tiles.energy import Cells, Scales, frozen, scale
+from dav_gswt.tiles.energy import Cells, LayerScales, make_scales, safe_unit
 
 _log = logging.getLogger(__name__)
 
-PIECES = 2000  # superpixels of an exemplar: their distances are a table
-LEAST = 6.0  # cells that they are wide at least
-KIND = 0.75  # of neighbouring segments are taken to be of one kind of ground
+SUPERPIXELS = 2000  # superpixels of an exemplar: their distances are a table
+MIN_WIDTH = 6.0  # cells that they are wide at least
+SAME_KIND = 0.75  # of neighbouring segments are taken to be of one kind of ground
 LAYERS = 2  # of AlexNet, the finest first: the others see more than a bush at a time
-ENLARGED = 2  # pixels a cell that AlexNet looks at: its second layer has a value every 8 pixels
+PIXELS_PER_CELL = 2  # pixels a cell that AlexNet looks at: its second layer has a value every 8 pixels
 MARGIN = 32  # pixels of mirrored picture around, for AlexNet takes what is beyond for black
 
 
 @dataclass(frozen=True)
-class Source:
+class SemanticSource:
     """What describes an exemplar beside its colours: AlexNet (LPIPS's weights), the folder of a segmenter; or None."""
 
     alexnet: lpips_weights.Weights | None = None
@@ -38,38 +38,38 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Semantics:
+class SemanticLayer:
     """An energy.Layer. distance: between the features of two segments. said: what they are made of, as JSON."""
 
     segments: Int[Array, "m m"]
     distance: Float32[Array, "s s"]
     slope: Float[Array, "m m 2"]
-    unit: Scales
+    unit: LayerScales
     said: dict
 
-    def apart(self, first: Cells, second: Cells) -> Float[Array, "..."]:
+    def distances(self, first: Cells, second: Cells) -> Float[Array, "..."]:
         return self.distance[self.segments[first], self.segments[second]].astype(float)
 
 
-def semantics(colour: Float[Array, "m m 3"], source: Source) -> Semantics:
+def make_semantic_layer(colour: Float[Array, "m m 3"], source: SemanticSource) -> SemanticLayer:
     """Describe an exemplar. colour: in [0, 1].
 
     Raises: InputError: see sam2.opened.
     """
-    segments = superpixels(colour, max(LEAST, len(colour) / PIECES**0.5))
+    segments = segment_superpixels(colour, max(MIN_WIDTH, len(colour) / SUPERPIXELS**0.5))
     said = {"alexnet": source.alexnet is not None, "segments": "slic"}
     if source.sam2 is not None:
         from dav_gswt.tiles import sam2
 
         with one_thread():
             masks = sam2.masks(sam2.opened(source.sam2), colour)
-        segments, said = covered(segments, masks), said | {"segments": "sam2 and slic", "masks": len(masks)}
+        segments, said = overlay_masks(segments, masks), said | {"segments": "sam2 and slic", "masks": len(masks)}
     if source.alexnet is None:
         _log.info("LPIPS's weights are not at hand: seams know colours and superpixels, not what AlexNet sees")
-    return of_segments(segments, colour, source.alexnet, said)
+    return describe_segments(segments, colour, source.alexnet, said)
 
 
-def superpixels(colour: Float[Array, "m m 3"], side: float) -> Int[Array, "m m"]:
+def segment_superpixels(colour: Float[Array, "m m 3"], side: float) -> Int[Array, "m m"]:
     """SLIC (Achanta et al. 2012): segments of about side x side cells that keep to the edges of things.
 
     The picture is softened by a cell: single grains would tear segments, and the torn ones are merged into huge ones.
@@ -79,7 +79,7 @@ def superpixels(colour: Float[Array, "m m 3"], side: float) -> Int[Array, "m m"]
     return slic(colour, n_segments=max(1, round((len(colour) / side) ** 2)), start_label=0, sigma=1)
 
 
-def covered(segments: Integer[Array, "m m"], masks: list[Array]) -> Int[Array, "m m"]:
+def overlay_masks(segments: Integer[Array, "m m"], masks: list[Array]) -> Int[Array, "m m"]:
     """Segments with masks laid over them, larger ones first: where two overlap, the smaller is the thing on top."""
     out = np.array(segments, np.int64)
     for mask in sorted(masks, key=lambda mask: -mask.sum()):
@@ -87,25 +87,25 @@ def covered(segments: Integer[Array, "m m"], masks: list[Array]) -> Int[Array, "
     return out
 
 
-def of_segments(
+def describe_segments(
     segments: Integer[Array, "m m"], colour: Float[Array, "m m 3"], alexnet: lpips_weights.Weights | None, said: dict
-) -> Semantics:
+) -> SemanticLayer:
     """Describe an exemplar that has been segmented; the segments may have any numbers.
 
     Colour and AlexNet's features count alike: each over the root mean square distance of two cells drawn at random.
     """
-    index, count = _in_order(segments)
+    index, count = _renumber(segments)
     mean = csr_array((1 / count[index.ravel()], (index.ravel(), np.arange(index.size))))
-    parts = [mean @ colour.reshape(-1, 3)] + ([_seen(mean, colour, alexnet)] if alexnet else [])
-    parts = [part / scale(_spread(part, count)) for part in parts]
-    distance = _beyond_kind(squareform(pdist(np.concatenate(parts, 1))), index).astype(np.float32)
-    slope = np.stack([_slope(index.T, distance).T, _slope(index, distance)], -1)
+    parts = [mean @ colour.reshape(-1, 3)] + ([_alexnet_features(mean, colour, alexnet)] if alexnet else [])
+    parts = [part / safe_unit(_rms_distance(part, count)) for part in parts]
+    distance = _subtract_kind(squareform(pdist(np.concatenate(parts, 1))), index).astype(np.float32)
+    slope = np.stack([_feature_gradient(index.T, distance).T, _feature_gradient(index, distance)], -1)
     share = count / count.sum()
     spread = float(np.sqrt(share @ distance.astype(float) ** 2 @ share))
-    return Semantics(index, distance, slope, frozen(spread, slope), said | {"count": len(count)})
+    return SemanticLayer(index, distance, slope, make_scales(spread, slope), said | {"count": len(count)})
 
 
-def _beyond_kind(distance: Float[Array, "s s"], index: Int[Array, "m m"]) -> Float[Array, "s s"]:
+def _subtract_kind(distance: Float[Array, "s s"], index: Int[Array, "m m"]) -> Float[Array, "s s"]:
     """Distances less what two segments of one kind of ground differ by: sqrt(max(0, d^2 - d0^2)).
 
     Features are many, and grain makes any two segments of the same sand differ in some of them. d0 is what KIND of
@@ -115,23 +115,23 @@ def _beyond_kind(distance: Float[Array, "s s"], index: Int[Array, "m m"]) -> Flo
     pairs = np.concatenate([np.stack([a.ravel(), b.ravel()], 1) for a, b in sides])
     pairs = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], 1), axis=0)
     near = distance[pairs[:, 0], pairs[:, 1]]
-    return np.sqrt(np.maximum(0, distance**2 - (np.quantile(near, KIND) ** 2 if len(near) else 0.0)))
+    return np.sqrt(np.maximum(0, distance**2 - (np.quantile(near, SAME_KIND) ** 2 if len(near) else 0.0)))
 
 
-def _in_order(segments: Integer[Array, "m m"]) -> tuple[Int[Array, "m m"], Int[Array, "s"]]:
+def _renumber(segments: Integer[Array, "m m"]) -> tuple[Int[Array, "m m"], Int[Array, "s"]]:
     """Segments numbered as they come, and how many cells each has: whatever they were called, sums run the same way."""
     _, first, index, count = np.unique(segments, return_index=True, return_inverse=True, return_counts=True)
     order = np.argsort(first)
     return np.argsort(order)[index].reshape(segments.shape), count[order]
 
 
-def _spread(features: Float[Array, "s k"], count: Int[Array, "s"]) -> float:
+def _rms_distance(features: Float[Array, "s k"], count: Int[Array, "s"]) -> float:
     """Root mean square distance of two cells drawn at random; count: cells of each segment."""
     away = features - count @ features / count.sum()
     return float(np.sqrt(2 * (count @ away**2).sum() / count.sum()))
 
 
-def _slope(index: Int[Array, "n m"], distance: Float32[Array, "s s"]) -> Float[Array, "n m"]:
+def _feature_gradient(index: Int[Array, "n m"], distance: Float32[Array, "s s"]) -> Float[Array, "n m"]:
     """Change of the features per cell along the first axis, central differences as numpy.gradient's."""
     after, before = np.concatenate([index[1:], index[-1:]]), np.concatenate([index[:1], index[:-1]])
     steps = np.full(len(index), 2.0)
@@ -139,16 +139,18 @@ def _slope(index: Int[Array, "n m"], distance: Float32[Array, "s s"]) -> Float[A
     return distance[after, before] / steps[:, None]
 
 
-def _seen(mean: csr_array, colour: Float[Array, "m m 3"], alexnet: lpips_weights.Weights) -> Float[Array, "s k"]:
+def _alexnet_features(
+    mean: csr_array, colour: Float[Array, "m m 3"], alexnet: lpips_weights.Weights
+) -> Float[Array, "s k"]:
     """Mean over each segment of AlexNet's features, of unit length and weighed by channel as LPIPS does."""
     from dav_gswt.images import lpips  # here, not above: PyTorch takes seconds to load
 
     m = len(colour)
     with one_thread():
-        large = lpips.resized(2 * colour[None].astype(np.float32) - 1, ENLARGED * m)[0]
+        large = lpips.resized(2 * colour[None].astype(np.float32) - 1, PIXELS_PER_CELL * m)[0]
         framed = np.pad(large, ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)), mode="symmetric")
         layers = lpips.layers(framed[None], alexnet)[:LAYERS]
-    middle = MARGIN + ENLARGED * (np.arange(m) + 0.5) - 0.5  # of each cell, in pixels
+    middle = MARGIN + PIXELS_PER_CELL * (np.arange(m) + 0.5) - 0.5  # of each cell, in pixels
     parts = []
     for number, (layer, head) in enumerate(zip(layers, alexnet.heads, strict=False)):
         stride = 4 * 2**number

@@ -17,18 +17,18 @@ from dav_gswt.tiles.build import TileSet
 STAMP = (1980, 1, 1, 0, 0, 0)  # NumPy's own npz carries no better time either
 
 
-def name(level: int, tile: int) -> str:
+def tile_file_name(level: int, tile: int) -> str:
     return f"lod{level}_tile_{tile:02d}.ply"
 
 
-def write(tiles: TileSet, folder: Path | str, seams: Path | str, provenance: dict) -> None:
+def write_tiles(tiles: TileSet, folder: Path | str, seams: Path | str, provenance: dict) -> None:
     """Write the set; `folder` and `seams` appear whole or not at all, the folder first."""
     folder, seams = Path(folder), Path(seams)
     seams.unlink(missing_ok=True)
     with whole_folder(folder) as part:
         for level, fields in enumerate(tiles.fields):
             for tile, splats in enumerate(progress(fields, f"write tiles of level {level}")):
-                write_field(splats, part / name(level, tile))
+                write_field(splats, part / tile_file_name(level, tile))
         _write_npz(part / "labels.npz", labels=tiles.labels, shifts=tiles.shifts)
     table = {
         "side": tiles.side,
@@ -41,7 +41,7 @@ def write(tiles: TileSet, folder: Path | str, seams: Path | str, provenance: dic
     write_json(seams, table | {"seams": tiles.seams, "provenance": provenance})
 
 
-def read(folder: Path | str, seams: Path | str) -> TileSet:
+def read_tiles(folder: Path | str, seams: Path | str) -> TileSet:
     """Read what `write` wrote. Raises: InputError: a file is missing or not what seams.json says."""
     folder, table = Path(folder), read_json(seams)
     try:
@@ -50,7 +50,7 @@ def read(folder: Path | str, seams: Path | str) -> TileSet:
     except (KeyError, TypeError) as error:
         raise InputError(f"{seams}: {error} is missing; cut the tiles again") from None
     side, spacing, uncertainty, chosen, counts = values
-    fields = [[read_field(folder / name(level, tile)) for tile in range(count)] for level in range(levels)]
+    fields = [[read_field(folder / tile_file_name(level, tile)) for tile in range(count)] for level in range(levels)]
     if [[len(f) for f in level] for level in fields] != counts:
         raise InputError(f"{folder}: the tiles are not those that {seams} tells of; cut them again")
     try:

@@ -21,7 +21,7 @@ AROUND = 1.6  # half-width of a strip over the scale: a cut can go around what l
 STRIPS = 0.06, 0.125  # of a tile's side: narrower ones hardly hold a cut, wider ones are the same in too many tiles
 
 
-def scale(colour: Float[Array, "m m c"]) -> float:
+def measure_texture_scale(colour: Float[Array, "m m c"]) -> float:
     """Radius in cells of a disc as large as the area over which colours go together; 0 where all are the same.
 
     That area is 2 pi sum_d r(d) d with the autocorrelation r at a distance of d cells, in the mean over all directions,
@@ -30,7 +30,7 @@ def scale(colour: Float[Array, "m m c"]) -> float:
     m = len(colour)
     rest = np.stack([v - gaussian_filter(v, TREND * m, mode="nearest") for v in np.moveaxis(colour, -1, 0)], -1)
     rest -= rest.mean((0, 1))
-    together = _products(rest) / np.maximum(_products(np.ones((m, m, 1))), 1)
+    together = _autocorrelate(rest) / np.maximum(_autocorrelate(np.ones((m, m, 1))), 1)
     x = np.minimum(np.arange(2 * m), 2 * m - np.arange(2 * m))
     distance = np.rint(np.hypot(x[:, None], x)).astype(int).ravel()
     count = int(m * FARTHEST) + 1
@@ -42,14 +42,14 @@ def scale(colour: Float[Array, "m m c"]) -> float:
     return float(np.sqrt(2 * (r * np.arange(count))[:end].sum()))
 
 
-def sizes(scale: float) -> tuple[float, float]:
+def choose_sizes(scale: float) -> tuple[float, float]:
     """A tile's side over the exemplar's, and the half-width of its strips over the tile's, for a texture's scale over
     the exemplar's side."""
     tile = float(np.interp(scale, SCALES, TILES))
     return tile, float(np.clip(AROUND * scale / tile, *STRIPS))
 
 
-def _products(values: Float[Array, "m m c"]) -> Float[Array, "k k"]:
+def _autocorrelate(values: Float[Array, "m m c"]) -> Float[Array, "k k"]:
     """Sums of products of all cells that are so far apart (rows, columns; from 0, cyclic in twice the side)."""
     shape = (2 * values.shape[0], 2 * values.shape[1])
     spectrum = np.fft.rfft2(values, s=shape, axes=(0, 1))

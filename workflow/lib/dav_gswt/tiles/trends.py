@@ -46,7 +46,7 @@ class Trend:
         return colour, sample(self.height), np.stack([sample(east), sample(north)], 1)
 
 
-def low_pass(values: Float[Array, "m m"], known: Bool[Array, "m m"], width: float) -> Float[Array, "m m"]:
+def fit_low_pass(values: Float[Array, "m m"], known: Bool[Array, "m m"], width: float) -> Float[Array, "m m"]:
     """Plane plus robust Gaussian average (standard deviation `width` cells) of the known cells.
 
     The plane carries a slope right to the border, where a one-sided average would flatten it. Weights are
@@ -68,19 +68,21 @@ def low_pass(values: Float[Array, "m m"], known: Bool[Array, "m m"], width: floa
     return plane + mean
 
 
-def trend_of(colour: Float[Array, "m m 3"], height: Float[Array, "m m"], exemplar: Exemplar, width: float) -> Trend:
+def fit_trend(colour: Float[Array, "m m 3"], height: Float[Array, "m m"], exemplar: Exemplar, width: float) -> Trend:
     """The trend of an exemplar from its maps; NaN where a map knows nothing. Each part's mean is left to the field."""
     parts = []
     for values in (*np.moveaxis(colour, -1, 0), height):
         known = np.isfinite(values)
         trend = (
-            low_pass(np.where(known, values, 0).astype(float), known, width) if known.any() else np.zeros_like(values)
+            fit_low_pass(np.where(known, values, 0).astype(float), known, width)
+            if known.any()
+            else np.zeros_like(values)
         )
         parts.append(trend - trend.mean())
     return Trend(exemplar, np.stack(parts[:3], -1), parts[3])
 
 
-def detrended(field: GaussianField, trend: Trend) -> GaussianField:
+def remove_trend(field: GaussianField, trend: Trend) -> GaussianField:
     """The field without the trend: ground and what stands on it move and change colour alike; local relief stays.
 
     Gaussians follow the slope that is taken out (z' = z - h(x, y) shears their covariance), so that discs stay closed.
@@ -90,10 +92,10 @@ def detrended(field: GaussianField, trend: Trend) -> GaussianField:
     sh[:, 0] -= (colour / SH0).astype(np.float32)
     means = field.means.copy()
     means[:, 2] -= height.astype(np.float32)
-    return sheared(replace(field, means=means, sh=sh), -slope)
+    return shear_covariances(replace(field, means=means, sh=sh), -slope)
 
 
-def sheared(field: GaussianField, slope: Float[Array, "n 2"]) -> GaussianField:
+def shear_covariances(field: GaussianField, slope: Float[Array, "n 2"]) -> GaussianField:
     """Covariances under z' = z + slope . (x, y), for the Gaussians whose slope matters (STEEP)."""
     steep = np.flatnonzero(np.linalg.norm(slope, axis=1) > STEEP)
     if not len(steep):

@@ -16,7 +16,7 @@ from dav_gswt.study.refine import limits, refit, viewpoints
 from dav_gswt.study.refine.refit import Wanted
 from dav_gswt.study.refine.repair import Repair
 from dav_gswt.study.refine.viewpoints import Place
-from dav_gswt.tiles import compose, membrane
+from dav_gswt.tiles import compose, poisson_blending
 from dav_gswt.tiles.build import TileSet
 from dav_gswt.tiles.layout import CENTRE, Exemplar
 
@@ -156,7 +156,7 @@ def _follows(tiles: TileSet, level: int, number: int, finest: GaussianField) -> 
     np.add.at(change, (row, column), np.pad(finest.sh[:, 0] - before.sh[:, 0], [(0, 0), (0, 1)]))
     np.add.at(count, (row, column), 1)
     change /= np.maximum(count, 1)
-    coarse = membrane.coarser(change, labels, compose.coarser(labels, 2**level))
+    coarse = poisson_blending.coarsen_correction(change, labels, compose.coarsen_labels(labels, 2**level))
     by = limits.in_cells(field, coarse[..., :3], tiles.side)
     rows = np.flatnonzero(by.any(1) & (limits.clearance(field, tiles.side) > 0))
     sh = field.sh.copy()

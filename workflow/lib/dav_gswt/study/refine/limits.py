@@ -13,7 +13,7 @@ from numpy import ndarray as Array
 from scipy.ndimage import distance_transform_edt
 
 from dav_gswt.field import GaussianField
-from dav_gswt.lod.merge import covariances
+from dav_gswt.lod.merge import compute_covariances
 from dav_gswt.raster.interface import RIM
 from dav_gswt.tiles.layout import CENTRE
 
@@ -71,7 +71,7 @@ def shares(labels: UInt8[Array, "n n"], reach: float, margin: float) -> Float[Ar
 
 def clearance(field: GaussianField, side: float) -> Float[Array, "n"]:
     """From where each Gaussian ends to its tile's nearest border, in world units; negative where it reaches over it."""
-    ends = RIM * np.sqrt(np.diagonal(covariances(field), axis1=1, axis2=2)[:, :2])
+    ends = RIM * np.sqrt(np.diagonal(compute_covariances(field), axis1=1, axis2=2)[:, :2])
     place = field.means[:, :2].astype(float)
     return (np.minimum(place, side - place) - ends).min(1)
 

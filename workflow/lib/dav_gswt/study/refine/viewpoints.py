@@ -10,7 +10,7 @@ from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.study.refine.limits import seam
-from dav_gswt.tiles.layout import EDGES, colours
+from dav_gswt.tiles.layout import EDGES, edge_colours
 
 FOV = 40.0  # degrees
 ELEVATION = 60.0  # degrees above the ground
@@ -46,7 +46,7 @@ def neighbours(tile: int) -> Int[Array, "3 3"]:
 
     Beside it lie tiles with its western and eastern colours exchanged, above and below it those with the other two.
     """
-    west, north, east, south = colours(tile)
+    west, north, east, south = edge_colours(tile)
     out = np.empty((3, 3), int)
     for j in range(3):
         for i in range(3):

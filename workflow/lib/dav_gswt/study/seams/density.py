@@ -18,7 +18,7 @@ def of_tiles(tiles: TileSet, source: Source) -> float:
     counted by patch. Source: DAV-GSWT speaks of "seam density around object boundaries" without a formula.
     """
     colour = source.ground[..., :3]
-    steep = np.linalg.norm(energy.gradients(np.nan_to_num(colour, nan=float(np.nanmean(colour)))), axis=-1)
+    steep = np.linalg.norm(energy.compute_gradients(np.nan_to_num(colour, nan=float(np.nanmean(colour)))), axis=-1)
     strong = steep > np.quantile(steep, STRONG)
     found = [_along(strong, tiles.labels[t], tiles.shifts[t]) for t in range(len(tiles.labels))]
     edges = np.concatenate(found)
@@ -27,7 +27,7 @@ def of_tiles(tiles: TileSet, source: Source) -> float:
 
 def _along(strong: Bool[Array, "m m"], labels: UInt8[Array, "n n"], shift: Array) -> Float[Array, "edges"]:
     """For each end of each edge that is cut, whether what is shown there is steep."""
-    rows, columns = layout.sources(labels, shift)
+    rows, columns = layout.source_cells(labels, shift)
     here, out = strong[rows, columns].astype(float), []
     for axis in (0, 1):
         labels, here = (np.swapaxes(v, 0, axis) for v in (labels, here))

@@ -7,7 +7,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
-from dav_gswt.lod.build import Levels
+from dav_gswt.lod.levels import Levels
 from dav_gswt.reconstruction import top_view
 from dav_gswt.study.seams.ground import Source, source_of
 from dav_gswt.tiles import build, semantics
@@ -41,17 +41,22 @@ class Known:
             above.uncertainty,
         )
 
-    def cut_straight(self, seam: dict, source: semantics.Source, rng: np.random.Generator) -> build.TileSet:
+    def cut_straight(self, seam: dict, source: semantics.SemanticSource, rng: np.random.Generator) -> build.TileSet:
         """Tiles of the same sizes laid without looking: the ceiling of every measure.
 
         Straight seams where patches happen to lie (the first of BLIND places), and steps of brightness and height left
         as they are: with the search and the corrections straight seams are hardly worse than cut ones.
         """
-        options = build.Options.of(dict(seam) | {"energy": "none", "candidates": BLIND}, source, self.wanted)
+        options = build.TilingOptions.from_config(
+            dict(seam) | {"energy": "none", "candidates": BLIND}, source, self.wanted
+        )
         options = replace(options, tries=1, corrected=False)
         return build.cut_tiles(self.levels, self.exemplar, self.colour, self.uncertainty, options, rng)
 
     def flattened(self, tiles: build.TileSet, seam: dict) -> Source:
         """The exemplar without the trend that was taken out for a tile set."""
-        width = build.Options.of(dict(seam), semantics.Source()).trend * tiles.seams["layout"]["side"]
+        width = (
+            build.TilingOptions.from_config(dict(seam), semantics.SemanticSource()).trend
+            * tiles.seams["layout"]["side"]
+        )
         return source_of(self.levels, self.exemplar, self.colour, width)

@@ -29,7 +29,7 @@ def borders(laid: Laid, rng: np.random.Generator) -> list[Place]:
             for along in range(0, size):
                 if a <= along % n < n - a:
                     x, y = (edge, along) if upright else (along, edge)
-                    west, _, _, south = layout.colours(int(laid.tile[y, x]) % layout.EDGES)
+                    west, _, _, south = layout.edge_colours(int(laid.tile[y, x]) % layout.EDGES)
                     name = f"v{west}" if upright else f"h{south}"
                     found.append(Place((x + laid.first, y + laid.first), f"{name}:{along % n // BIN}"))
     return _shuffled(found, rng)
@@ -49,7 +49,7 @@ def cuts(laid: Laid, rng: np.random.Generator) -> list[Place]:
         else:  # of a strip against its corner: the same in every tile that has the strip
             labels = laid.label[y - 1 : y + 1, x - 1 : x + 1].ravel()
             side = LABELS[min(v for v in labels if v != CENTRE)]
-            colour = dict(zip("WNES", layout.colours(tile % layout.EDGES), strict=True)).get(side, 0)
+            colour = dict(zip("WNES", layout.edge_colours(tile % layout.EDGES), strict=True)).get(side, 0)
             name = f"{'v' if side in 'WE' else 'h'}{colour}:{'start' if min(x % n, y % n) < n // 2 else 'end'}"
         found.append(Place((x + laid.first, y + laid.first), name))
     turn: dict[str, int] = {}

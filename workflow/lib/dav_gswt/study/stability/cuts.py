@@ -29,9 +29,9 @@ def _cells(shift: int) -> tuple[Array, Array]:
 
 
 def _weights(colour: Array, ground: Array, share: float, shift: int) -> Array:
-    layers = energy.colours(colour), energy.colours(ground)
+    layers = energy.make_colour_layer(colour), energy.make_colour_layer(ground)
     terms = [(weight, layer) for weight, layer in zip((share, 1 - share), layers, strict=True) if weight > 0]
-    return _concatenate_edges(*energy.weights(terms, _cells(0), _cells(shift)))
+    return _concatenate_edges(*energy.compute_edge_costs(terms, _cells(0), _cells(shift)))
 
 
 def _concatenate_edges(right: Array, upper: Array) -> Array:
@@ -45,7 +45,7 @@ def _gradient_terms(colour: Array, ground: Array, share: float, shift: int, kind
         values = layers.astype(kind)
         slope = [np.sqrt((np.gradient(values, axis=axis) ** 2).sum(-1)) for axis in (1, 0)]
         spread = np.sqrt(2 * values.reshape(-1, 3).astype(np.float64).var(0).sum())
-        units = energy.scale(2 * float(spread)), energy.scale(4 * float(np.mean(slope, dtype=np.float64)))
+        units = energy.safe_unit(2 * float(spread)), energy.safe_unit(4 * float(np.mean(slope, dtype=np.float64)))
         apart = np.sqrt(((values[_cells(0)] - values[_cells(shift)]) ** 2).sum(-1))
         sides = [s[_cells(0)] + s[_cells(shift)] for s in slope]
         d += kind(weight) * _concatenate_edges(apart[:, :-1] + apart[:, 1:], apart[:-1] + apart[1:]) / kind(units[0])
@@ -83,7 +83,7 @@ FIRST[:, 0], SECOND[:, 3] = True, True
 
 def _cut_energy(right: Array, upper: Array) -> float:
     """Energy of the minimum cut over the largest cost."""
-    return cuts.cut(right, upper, FIRST, SECOND).energy / max(right.max(), upper.max())
+    return cuts.find_cut(right, upper, FIRST, SECOND).energy / max(right.max(), upper.max())
 
 
 def _cut_energy_reference(right: Array, upper: Array) -> float:
@@ -104,7 +104,7 @@ def _ground_cases() -> list[Case]:
 
 
 def _segment_distance(number: Array, colour: Array) -> Array:
-    return semantics.of_segments(number, colour, None, {}).distance
+    return semantics.describe_segments(number, colour, None, {}).distance
 
 
 def _segment_distance_reference(number: Array, colour: Array) -> Array:
@@ -115,13 +115,13 @@ def _segment_distance_reference(number: Array, colour: Array) -> Array:
     count = np.array([(index == i).sum() for i in order])
     middle = (count[:, None] * mean).sum(0) / count.sum()
     spread = np.sqrt(2 * (count[:, None] * (mean - middle) ** 2).sum() / count.sum())
-    distance = np.sqrt(((mean[:, None] - mean[None]) ** 2).sum(-1)) / energy.scale(float(spread))
+    distance = np.sqrt(((mean[:, None] - mean[None]) ** 2).sum(-1)) / energy.safe_unit(float(spread))
     place = np.argsort(order)[index]
     pairs = np.concatenate(
         [np.stack([a.ravel(), b.ravel()], 1) for a, b in ((place[:, 1:], place[:, :-1]), (place[1:], place[:-1]))]
     )
     pairs = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], 1), axis=0)
-    kind = np.quantile(distance[pairs[:, 0], pairs[:, 1]], semantics.KIND)
+    kind = np.quantile(distance[pairs[:, 0], pairs[:, 1]], semantics.SAME_KIND)
     return np.sqrt(np.maximum(0, distance**2 - kind**2))
 
 

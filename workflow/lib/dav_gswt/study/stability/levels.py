@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 from numpy import ndarray as Array
 
-from dav_gswt.bundle import lod
+from dav_gswt.bundle import level_distances
 from dav_gswt.field import GaussianField
 from dav_gswt.study.stability.formula import FLOAT32, FLOAT32_EPS, Case, Check
 from dav_gswt.terrain import displacement, weights
@@ -80,7 +80,7 @@ def _equal_splat_cases() -> list[Case]:
 
 
 def _switch_distance(scale: float) -> float:
-    return lod.level_table([0.5 * scale, scale], 1.0, 0.1)[0]["distance"]
+    return level_distances.compute_levels([0.5 * scale, scale], 1.0, 0.1)[0]["distance"]
 
 
 def _shape_cases() -> list[Case]:

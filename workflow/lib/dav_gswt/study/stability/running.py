@@ -106,7 +106,7 @@ def _is_chunk_finite(path: Path) -> bool:
     manifest = read_json(path.parents[1] / "davgswt.json")
     entries = [chunk for tile in manifest["tiles"] for chunk in tile["chunks"]]
     entry = next(entry for entry in entries if entry["file"] == f"chunks/{path.name}")
-    field, _ = chunks.read(path.parents[1], entry, Encoding.of_json(manifest["encoding"]))
+    field, _ = chunks.read_chunk(path.parents[1], entry, Encoding.from_dict(manifest["encoding"]))
     with np.errstate(over="ignore"):
         deviations = np.exp(field.log_scales)
     return all(np.isfinite(part).all() for part in (field.means, deviations, field.quats, field.opacity_logits))

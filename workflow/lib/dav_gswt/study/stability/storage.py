@@ -25,7 +25,7 @@ def make_splats(side: float = 1.0) -> GaussianField:
     of any length, scales over the whole range of a record.
     """
     rng = np.random.default_rng(0)
-    thinnest, widest = np.log(encoding.SLIGHTEST * side / PIXELS), np.log(encoding.WIDEST * side)
+    thinnest, widest = np.log(encoding.MIN_PIXELS * side / PIXELS), np.log(encoding.MAX_TILE_SIDES * side)
     sizes = np.linspace(thinnest, widest, COUNT)
     return GaussianField(
         (rng.uniform(-0.5, 1.5, (COUNT, 3)) * side).astype(np.float32),
@@ -42,10 +42,10 @@ def make_splats(side: float = 1.0) -> GaussianField:
 def round_trip(side: float = 1.0) -> GaussianField:
     """The same splats after writing and reading a chunk."""
     field = make_splats(side)
-    code = encoding.Encoding.of([field], side, side / PIXELS)
+    code = encoding.Encoding.fit([field], side, side / PIXELS)
     with TemporaryDirectory() as folder:
-        entry = chunks.write(code.encoded(field), np.empty((0, COUNT), np.uint16), Path(folder, "chunk.bin"))
-        return chunks.read(folder, entry | {"file": "chunk.bin", "orders": []}, code)[0]
+        entry = chunks.write_chunk(code.encode(field), np.empty((0, COUNT), np.uint16), Path(folder, "chunk.bin"))
+        return chunks.read_chunk(folder, entry | {"file": "chunk.bin", "orders": []}, code)[0]
 
 
 def _all_splats(along: Array | None = None, at: str = "all splats") -> list[Case]:
@@ -70,7 +70,7 @@ def _normalise_quats(quats: Array) -> Array:
 
 def _rotation_error() -> Array:
     """Sine of half the angle between each stored and decoded rotation, axes permuted as in the record."""
-    a, b = encoding.smallest_turns(make_splats().quats)[0], _normalise_quats(round_trip().quats)
+    a, b = encoding.find_smallest_rotations(make_splats().quats)[0], _normalise_quats(round_trip().quats)
     return np.sqrt(np.clip(1 - (a * b).sum(1) ** 2, 0, None))
 
 
@@ -100,7 +100,7 @@ def _mean_of_halves(values: Array) -> float:
 
 
 def _public_quats() -> Array:
-    return gswt.rows(make_splats(), 4.0)[:, 58:].astype(np.float64)
+    return gswt.to_rows(make_splats(), 4.0)[:, 58:].astype(np.float64)
 
 
 def _depth_cases() -> list[Case]:
@@ -108,7 +108,7 @@ def _depth_cases() -> list[Case]:
     for size in (1e-12, 1.0, 1e6):
         means = (rng.uniform(-1, 1, (300, 3)) * size).astype(np.float32)
         means[100:200] = means[:100]  # equal depths: the smaller index first
-        cases.append(Case(f"splats {size:g} apart", (means, orders.Rings().directions()[3])))
+        cases.append(Case(f"splats {size:g} apart", (means, orders.DirectionRings().directions()[3])))
     return cases
 
 
@@ -117,8 +117,14 @@ def _order_reference(means: Array, along: Array) -> list[int]:
     return sorted(range(len(means)), key=lambda i: (-depth[i], i))
 
 
-SIZE = float(np.expm1(np.log(encoding.WIDEST * PIXELS / encoding.SLIGHTEST) / (2 * encoding.SIZES) + 4 * FLOAT32_EPS))
-TURN = float(np.sqrt(3) * encoding.STEEPEST / (2 * encoding.TURNS) / np.sqrt(1 - 3 * encoding.STEEPEST**2))
+SIZE = float(
+    np.expm1(
+        np.log(encoding.MAX_TILE_SIDES * PIXELS / encoding.MIN_PIXELS) / (2 * encoding.SCALE_STEPS) + 4 * FLOAT32_EPS
+    )
+)
+TURN = float(
+    np.sqrt(3) * encoding.MAX_COMPONENT / (2 * encoding.ROTATION_STEPS) / np.sqrt(1 - 3 * encoding.MAX_COMPONENT**2)
+)
 CHECKS = [
     Check(
         "mean of values kept in half precision",
@@ -142,7 +148,7 @@ CHECKS = [
         lambda side: round_trip(side).means.astype(np.float64) / side,
         lambda side: make_splats(side).means.astype(np.float64) / side,
         relative=FLOAT32_EPS,
-        absolute=2 / encoding.PLACES,
+        absolute=2 / encoding.POSITION_STEPS,
     ),
     Check(
         "standard deviations, in tile sides",
@@ -179,5 +185,5 @@ CHECKS = [
         lambda: _normalise_quats(make_splats().quats) * np.where(make_splats().quats[:, :1] < 0, -1, 1),
         absolute=4 * FLOAT32_EPS,
     ),
-    Check("order from back to front", _depth_cases, orders.back_to_front, _order_reference),
+    Check("order from back to front", _depth_cases, orders.sort_back_to_front, _order_reference),
 ]

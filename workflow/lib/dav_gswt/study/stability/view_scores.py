@@ -3,7 +3,7 @@
 import numpy as np
 from numpy import ndarray as Array
 
-from dav_gswt.bundle.orders import Rings
+from dav_gswt.bundle.orders import DirectionRings
 from dav_gswt.study.stability.formula import FLOAT32, FLOAT32_EPS, Case, Check
 from dav_gswt.views import uncertainty as un
 from dav_gswt.views.uncertainty.weighting import Quantiles, Scales
@@ -137,7 +137,7 @@ def _threshold_cases() -> list[Case]:
 
 
 def _order_count(u: Array, tau: float) -> Array:
-    return np.array([len(Rings().kept(float(x), tau)) for x in u])
+    return np.array([len(DirectionRings().select(float(x), tau)) for x in u])
 
 
 def _order_count_reference(u: Array, tau: float) -> Array:

@@ -38,7 +38,7 @@ def rows(tiles: TileSet, bundle: Bundle) -> list[dict]:
     found = []
     for shot in progress(VIEWS, "measure shortcuts"):
         for shortcut, pair in zip(SHORTCUTS, _pairs(tiles, bundle, shot), strict=True):
-            row = {"view": shot.name, "shortcut": shortcut, "psnr": order_directions.decibels([pair])}
+            row = {"view": shot.name, "shortcut": shortcut, "psnr": order_directions.compute_psnr([pair])}
             found.append(row | {"change": 255 * float(np.abs(pair[0] - pair[1]).max())})
     return found
 

@@ -15,7 +15,7 @@ SCORED = re.compile(r"scores_([a-z0-9_-]+)_pdrop([0-9.]+)")
 
 
 @contextmanager
-def told_by(path: Path):
+def blaming(path: Path):
     """Values of a file from outside: what is not there, or not of its kind, is the file's fault."""
     try:
         yield
@@ -25,36 +25,36 @@ def told_by(path: Path):
         ) from error
 
 
-def photos_of(path: Path) -> Path | None:
+def find_photos(path: Path) -> Path | None:
     """The folder photos/ of the scene that a file belongs to."""
     found = (folder / "photos" for folder in path.resolve().parents)
     return next((folder for folder in found if (folder / "ground.json").is_file()), None)
 
 
-def shots_of(path: Path) -> list[tuple[str, Camera]]:
+def read_shots(path: Path) -> list[tuple[str, Camera]]:
     """The cameras of a capture.json, by name."""
     told = read_json(path)
-    with told_by(path):
+    with blaming(path):
         return [(str(shot["name"]), cameras.from_json(shot["got"])) for shot in told["shots"]]
 
 
-def round_of(path: Path) -> int | None:
+def parse_round(path: Path) -> int | None:
     """Which round's folder a file lies in."""
     found = ROUND.fullmatch(path.resolve().parent.name)
     return int(found[1]) if found else None
 
 
-def lam_of(path: Path) -> float:
+def parse_lam(path: Path) -> float:
     """lam of the branch that a file lies in; 0 where it lies in none."""
     found = next((m for p in path.resolve().parents if (m := ACTIVE.fullmatch(p.name))), None)
-    with told_by(path):
+    with blaming(path):
         return float(found[3]) if found else 0.0
 
 
-def poses_by(scores: Path) -> list[Path]:
+def find_poses(scores: Path) -> list[Path]:
     """The poses.json of the rounds that chose by some scores: one of a round's, any number of the coarse field's."""
     scores = scores.resolve()
-    if (number := round_of(scores)) is not None:
+    if (number := parse_round(scores)) is not None:
         found = scores.parents[1] / f"iter{number + 1}" / "poses.json"
         return [found] if found.is_file() else []
     name = SCORED.fullmatch(scores.parent.name)
@@ -64,10 +64,10 @@ def poses_by(scores: Path) -> list[Path]:
     return sorted(path for path in branches if ACTIVE.fullmatch(path.parents[1].name))
 
 
-def scores_behind(poses: Path) -> Path:
+def find_scores(poses: Path) -> Path:
     """The scores that a round's poses were chosen by. Raises: InputError: not where the workflow puts them."""
     poses = poses.resolve()
-    number, branch = round_of(poses), ACTIVE.fullmatch(poses.parents[1].name)
+    number, branch = parse_round(poses), ACTIVE.fullmatch(poses.parents[1].name)
     if number is None or branch is None:
         raise InputError(f"{poses}: lies in no round of the result tree; give scores.csv and --poses {poses}")
     found = poses.parents[1] / f"iter{number - 1}" / "scores.csv"

@@ -9,16 +9,16 @@ from fixtures import result_tree
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json, write_json
 from dav_gswt.geometry.poses import place
-from dav_gswt.inspect import scene, spheres
-from dav_gswt.inspect.options import Asked
-from dav_gswt.inspect.scene import Bar
+from dav_gswt.inspect import pose_scenes, scene
+from dav_gswt.inspect.options import ViewOptions
+from dav_gswt.inspect.scene import ColourBar
 
 POSES = result_tree.poses()
 
 
 def centres(layer):
     """Middles of a layer's balls, each of as many corners."""
-    corners = len(scene.balls(np.zeros((1, 3)), 1.0, np.zeros((1, 3), np.uint8)).points)
+    corners = len(scene.make_balls(np.zeros((1, 3)), 1.0, np.zeros((1, 3), np.uint8)).points)
     return layer.points.reshape(-1, corners, 3).mean(1)
 
 
@@ -27,15 +27,15 @@ def at(numbers):
 
 
 def test_scores_and_poses_find_each_other_and_show_the_same(tree):
-    by_scores = spheres.show(tree.scored / "scores.csv", Asked())
-    by_poses = spheres.show_chosen(tree.round / "poses.json", Asked())
+    by_scores = pose_scenes.build_scores(tree.scored / "scores.csv", ViewOptions())
+    by_poses = pose_scenes.build_poses(tree.round / "poses.json", ViewOptions())
     for one, other in zip(by_scores.layers, by_poses.layers, strict=True):
         np.testing.assert_array_equal(one.points, other.points)
     assert [word.text for word in by_poses.words] == ["1", "2"]
 
 
 def test_candidates_stand_where_they_are_and_the_chosen_are_marked_in_order(tree):
-    shown = spheres.show_chosen(tree.round / "poses.json", Asked())
+    shown = pose_scenes.build_poses(tree.round / "poses.json", ViewOptions())
     rest = [i for i in range(result_tree.CANDIDATES) if i not in result_tree.CHOSEN]
     np.testing.assert_allclose(centres(shown.layers[0]), at(rest), atol=1e-4)
     stems = next(layer for layer in shown.layers if layer.kind == "lines" and len(layer.cells) == 2)
@@ -46,14 +46,14 @@ def test_candidates_stand_where_they_are_and_the_chosen_are_marked_in_order(tree
 
 
 def test_colours_are_the_doubt_by_which_was_chosen_or_any_column(tree):
-    doubt = spheres.show(tree.scored / "scores.csv", Asked())
-    assert isinstance(doubt.legend[0], Bar) and "W2" in doubt.legend[0].title
-    opacity = spheres.show(tree.scored / "scores.csv", Asked(colour="opacity"))
+    doubt = pose_scenes.build_scores(tree.scored / "scores.csv", ViewOptions())
+    assert isinstance(doubt.legend[0], ColourBar) and "W2" in doubt.legend[0].title
+    opacity = pose_scenes.build_scores(tree.scored / "scores.csv", ViewOptions(colour="opacity"))
     first = opacity.layers[0].colours[0].astype(int)
     assert first[2] > first[0]  # cool: the first candidate has the least, and the most of the other
     assert doubt.layers[0].colours[0][0] > doubt.layers[0].colours[0][2]
     with pytest.raises(InputError, match="--colour hue: these poses have opacity, w2_sq"):
-        spheres.show(tree.scored / "scores.csv", Asked(colour="hue"))
+        pose_scenes.build_scores(tree.scored / "scores.csv", ViewOptions(colour="hue"))
 
 
 def test_where_several_branches_chose_none_is_marked_until_one_is_named(tree, tmp_path):
@@ -62,9 +62,9 @@ def test_where_several_branches_chose_none_is_marked_until_one_is_named(tree, tm
     twin = draft / result_tree.BRANCH.replace("k2", "k3")
     shutil.copytree(draft / result_tree.BRANCH, twin)
     scores = draft / "coarse/scores_terrain_pdrop0.15/scores.csv"
-    shown = spheres.show(scores, Asked())
+    shown = pose_scenes.build_scores(scores, ViewOptions())
     assert not shown.words and "2 branches" in shown.notes[0]
-    assert len(spheres.show(scores, Asked(poses=twin / "iter1/poses.json")).words) == 2
+    assert len(pose_scenes.build_scores(scores, ViewOptions(poses=twin / "iter1/poses.json")).words) == 2
 
 
 def test_poses_of_other_scores_are_refused(tree, tmp_path):
@@ -72,16 +72,16 @@ def test_poses_of_other_scores_are_refused(tree, tmp_path):
     strange["poses"][0]["name"] = "pose_9999"
     write_json(tmp_path / "poses.json", strange)
     with pytest.raises(InputError, match="pose_9999 is not among"):
-        spheres.show(tree.scored / "scores.csv", Asked(poses=tmp_path / "poses.json"))
+        pose_scenes.build_scores(tree.scored / "scores.csv", ViewOptions(poses=tmp_path / "poses.json"))
     (tmp_path / "poses.json").write_text('{"poses": 3}')
     with pytest.raises(InputError, match="poses.json: not as the workflow writes it"):
-        spheres.show(tree.scored / "scores.csv", Asked(poses=tmp_path / "poses.json"))
+        pose_scenes.build_scores(tree.scored / "scores.csv", ViewOptions(poses=tmp_path / "poses.json"))
 
 
 def test_poses_outside_the_result_tree_are_said(tree, tmp_path):
     shutil.copy(tree.round / "poses.json", tmp_path)
     with pytest.raises(InputError, match="lies in no round"):
-        spheres.show_chosen(tmp_path / "poses.json", Asked())
+        pose_scenes.build_poses(tmp_path / "poses.json", ViewOptions())
     shutil.copy(tree.scored / "scores.csv", tmp_path)
     with pytest.raises(InputError, match="leave it in its result tree"):
-        spheres.show(tmp_path / "scores.csv", Asked())
+        pose_scenes.build_scores(tmp_path / "scores.csv", ViewOptions())

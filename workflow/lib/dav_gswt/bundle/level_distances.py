@@ -12,7 +12,7 @@ FOCAL = 0.5 * WIDTH / np.tan(np.radians(FOV / 2))  # pixels
 ASPECT = 9 / 16
 
 
-def level_table(scales: list[float], pixels: float, band: float) -> list[dict]:
+def compute_levels(scales: list[float], pixels: float, band: float) -> list[dict]:
     """The manifest's levels from their mean scales, finest first.
 
     Level l gives way to l + 1 at the distance D_l = scale_{l+1} f / pixels, where the coarser one's mean standard
@@ -33,7 +33,7 @@ def level_table(scales: list[float], pixels: float, band: float) -> list[dict]:
     return [*table, {"level": len(scales) - 1, "mean_scale": scales[-1], "distance": None, "band": 0.0}]
 
 
-def eye_floor(spacing: float, pixels: float, pitch: float = 30.0) -> float:
+def compute_eye_floor(spacing: float, pixels: float, pitch: float = 30.0) -> float:
     """Lowest sensible eye height: the nearest ground in sight then shows a finest disc `pixels` wide.
 
     Looking `pitch` degrees down, the picture's lower edge looks v further, tan v = 9/16 tan 30. A disc `spacing` wide

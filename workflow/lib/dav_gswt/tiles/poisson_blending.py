@@ -17,27 +17,27 @@ from scipy.fft import dct, dst, idct, idst
 from scipy.ndimage import gaussian_filter
 
 from dav_gswt.field import SH0, GaussianField
-from dav_gswt.tiles.layout import Layout, colours
+from dav_gswt.tiles.layout import Layout, edge_colours
 
-SOFT = (2.0, 2.0, 2.0, 0.5)  # cells: grain is not a step; a surface is smooth already
+BLUR = (2.0, 2.0, 2.0, 0.5)  # cells: grain is not a step; a surface is smooth already
 
 
 @dataclass(frozen=True)
-class Ground:
+class SoftMaps:
     """Soft colour and height of the exemplar's cells, and how large a step of colour may be before it counts less."""
 
     values: Float[Array, "m m 4"]
     limit: float
 
 
-def ground(colour: Float[Array, "m m 3"], height: Float[Array, "m m"]) -> Ground:
+def make_soft_maps(colour: Float[Array, "m m 3"], height: Float[Array, "m m"]) -> SoftMaps:
     """The limit is the exemplar's own standard deviation, one for all colour channels."""
     values = np.concatenate([colour, height[..., None]], -1)
-    soft = np.stack([gaussian_filter(values[..., c], SOFT[c], mode="nearest") for c in range(4)], -1)
-    return Ground(soft, float(colour.std((0, 1)).mean()))
+    soft = np.stack([gaussian_filter(values[..., c], BLUR[c], mode="nearest") for c in range(4)], -1)
+    return SoftMaps(soft, float(colour.std((0, 1)).mean()))
 
 
-def steps(labels: UInt8[Array, "h w"], shift: Int[Array, "k 2"], ground: Ground) -> Float[Array, "h w 4"]:
+def sum_steps(labels: UInt8[Array, "h w"], shift: Int[Array, "k 2"], ground: SoftMaps) -> Float[Array, "h w 4"]:
     """Sum over a cell's neighbours t of J_st, the step from its own patch to theirs.
 
     shift[label] is what to add to a cell (x, y) for the exemplar's cell. J = d for height and d / (1 + |d / limit|^2)
@@ -62,10 +62,12 @@ def steps(labels: UInt8[Array, "h w"], shift: Int[Array, "k 2"], ground: Ground)
     return total
 
 
-def strip(labels: UInt8[Array, "h w"], shift: Int[Array, "k 2"], plan: Layout, ground: Ground) -> Float[Array, "h w 4"]:
+def solve_strip(
+    labels: UInt8[Array, "h w"], shift: Int[Array, "k 2"], plan: Layout, ground: SoftMaps
+) -> Float[Array, "h w 4"]:
     """Correction of a strip along its longer side: 0 in the corners' forced ends, free at the long sides."""
     upright = labels.shape[0] > labels.shape[1]
-    source = -steps(labels, shift, ground)
+    source = -sum_steps(labels, shift, ground)
     source = source if upright else source.swapaxes(0, 1)
     out, ends = np.zeros_like(source), slice(plan.strip, len(source) - plan.strip)
     rows, columns = source[ends].shape[:2]
@@ -75,14 +77,14 @@ def strip(labels: UInt8[Array, "h w"], shift: Int[Array, "k 2"], plan: Layout, g
     return out if upright else out.swapaxes(0, 1)
 
 
-def tile(
-    labels: UInt8[Array, "n n"], shift: Int[Array, "9 2"], ring: Float[Array, "n n 4"], plan: Layout, ground: Ground
+def solve_tile(
+    labels: UInt8[Array, "n n"], shift: Int[Array, "9 2"], ring: Float[Array, "n n 4"], plan: Layout, ground: SoftMaps
 ) -> Float[Array, "n n 4"]:
     """Correction of a tile whose outermost `block` cells take the values of `ring`."""
     k, n = plan.block, plan.side
     out, inner = ring.copy(), slice(k, n - k)
     out[inner, inner] = 0
-    source = -steps(labels, shift, ground)
+    source = -sum_steps(labels, shift, ground)
     around = np.zeros_like(out)  # known neighbours
     around[1:] += out[:-1]
     around[:-1] += out[1:]
@@ -94,12 +96,12 @@ def tile(
     return out
 
 
-def ring(
+def border_values(
     plan: Layout, vertical: Float[Array, "2 n w 4"], horizontal: Float[Array, "2 w n 4"], number: int
 ) -> Float[Array, "n n 4"]:
     """The strips' corrections along a tile's border, by its edge colours; 0 in the corners."""
     n, b = plan.side, plan.strip
-    west, north, east, south = colours(number)
+    west, north, east, south = edge_colours(number)
     out = np.zeros((n, n, 4))
     ends = slice(b, n - b)
     out[ends, :b], out[ends, n - b :] = vertical[west][ends, b:], vertical[east][ends, :b]
@@ -107,7 +109,7 @@ def ring(
     return out
 
 
-def applied(field: GaussianField, correction: Float[Array, "n n 4"], cell: float) -> GaussianField:
+def apply_correction(field: GaussianField, correction: Float[Array, "n n 4"], cell: float) -> GaussianField:
     """A tile's Gaussians with the correction of the cell they are in, `cell` world units wide."""
     column, row = (np.minimum((field.means[:, i] / cell).astype(int), len(correction) - 1) for i in (0, 1))
     change = correction[row, column]
@@ -117,7 +119,7 @@ def applied(field: GaussianField, correction: Float[Array, "n n 4"], cell: float
     return replace(field, sh=sh, means=means)
 
 
-def coarser(
+def coarsen_correction(
     correction: Float[Array, "n n 4"], labels: UInt8[Array, "n n"], coarse: UInt8[Array, "k k"]
 ) -> Float[Array, "k k 4"]:
     """The correction on a coarser grid: its mean over the finest cells that carry the coarse cell's label."""

@@ -11,34 +11,34 @@ from dav_gswt.field import read_field
 from dav_gswt.files import read_json
 from dav_gswt.geometry import poses as places
 from dav_gswt.geometry.scene_frame import read_scene_frame
-from dav_gswt.inspect import beside
-from dav_gswt.inspect.fields import colours, solid, thinned
-from dav_gswt.inspect.options import Asked
-from dav_gswt.inspect.scene import INK, Keys, Layer, Scene, Word, balls, bar_over, coloured
-from dav_gswt.inspect.sites import bounds, ground, looking
+from dav_gswt.inspect import result_files
+from dav_gswt.inspect.field_scenes import compute_colours, make_solids, thin_field
+from dav_gswt.inspect.options import ViewOptions
+from dav_gswt.inspect.photo_scenes import compute_bounds, make_frustum, outline_ground
+from dav_gswt.inspect.scene import BLACK, ColourKey, Label, Layer, Scene, make_balls, make_bar, map_colours
 from dav_gswt.study.views.sphere import HIGHEST, candidate_values
 from dav_gswt.views import scores as tables
 from dav_gswt.views.scores import Scores
 
 BALL, CHOSEN, LETTER = 0.018, 0.03, 0.07  # radii and height, in radii of the hemisphere
-TAKEN = (0, 0, 0)
-REACH = 0.05  # flying heights: the pyramid of a photo that was taken
+TAKEN_COLOUR = (0, 0, 0)
+FRUSTUM_DEPTH = 0.05  # flying heights: the pyramid of a photo that was taken
 
 
-def show(path: Path, asked: Asked) -> Scene:
+def build_scores(path: Path, asked: ViewOptions) -> Scene:
     """scores.csv: with the poses that were chosen by it, where one round alone did or --poses names it."""
-    found = [asked.poses] if asked.poses else beside.poses_by(path)
-    return of_scores(path, found[0] if len(found) == 1 else None, asked, len(found))
+    found = [asked.poses] if asked.poses else result_files.find_poses(path)
+    return arrange_poses(path, found[0] if len(found) == 1 else None, asked, len(found))
 
 
-def show_chosen(path: Path, asked: Asked) -> Scene:
+def build_poses(path: Path, asked: ViewOptions) -> Scene:
     """poses.json: with the scores that it was chosen by."""
-    return of_scores(beside.scores_behind(path), path, asked, 1)
+    return arrange_poses(result_files.find_scores(path), path, asked, 1)
 
 
-def of_scores(path: Path, poses: Path | None, asked: Asked, rounds: int) -> Scene:
+def arrange_poses(path: Path, poses: Path | None, asked: ViewOptions, rounds: int) -> Scene:
     """rounds: that chose by these scores."""
-    photos = beside.photos_of(path)
+    photos = result_files.find_photos(path)
     if photos is None:
         raise InputError(
             f"{path}: its scene's photos/ground.json is in no folder above it; leave it in its result tree"
@@ -46,33 +46,33 @@ def of_scores(path: Path, poses: Path | None, asked: Asked, rounds: int) -> Scen
     frame, table = read_scene_frame(photos / "ground.json"), tables.read_scores(path)
     if not len(table):
         raise InputError(f"{path}: no candidate is in it: none was left to choose from")
-    label, values = shaded(table, asked.colour, beside.lam_of(poses or path))
+    label, values = choose_values(table, asked.colour, result_files.parse_lam(poses or path))
     label, _, unit = label.partition(", ")
-    bar = bar_over(label, values, most=HIGHEST)
+    bar = make_bar(label, values, most=HIGHEST)
     middle = places.middle(frame)
     at = middle + np.array([places.place(pose) for pose in table.poses])
     radius = float(np.median(np.linalg.norm(at - middle, axis=1)))
-    chosen = _chosen(table, poses)
+    chosen = _read_chosen(table, poses)
     rest = np.setdiff1d(np.arange(len(table)), chosen)
-    tint = coloured(values, bar)
-    layers = [balls(at[rest], BALL * radius, tint[rest]), *ground(frame), *_field(path, asked)]
+    tint = map_colours(values, bar)
+    layers = [make_balls(at[rest], BALL * radius, tint[rest]), *outline_ground(frame), *_field_layers(path, asked)]
     words = []
     if chosen:
-        layers.append(balls(at[chosen], CHOSEN * radius, tint[chosen]))
+        layers.append(make_balls(at[chosen], CHOSEN * radius, tint[chosen]))
         stems = np.concatenate([middle[None], at[chosen]]).astype(np.float32)
-        layers.append(Layer("lines", stems, np.array([[0, i + 1] for i in range(len(chosen))]), INK, 2.0))
+        layers.append(Layer("lines", stems, np.array([[0, i + 1] for i in range(len(chosen))]), BLACK, 2.0))
         up = np.array([0.0, 0.0, (CHOSEN + LETTER) * radius])
-        words = [Word(f"{i}", tuple(at[k] + up), LETTER * radius) for i, k in enumerate(chosen, 1)]
-    taken, known = _taken(path, photos), "taken before" if round_before(path) else "taken at the start"
+        words = [Label(f"{i}", tuple(at[k] + up), LETTER * radius) for i, k in enumerate(chosen, 1)]
+    taken, known = _taken_cameras(path, photos), "taken before" if parse_round_before(path) else "taken at the start"
     for camera in taken:
-        layers += looking(camera, REACH * frame.flying_height, TAKEN, None)
-    low, high = bounds(frame, at)
-    keys = [Keys({f"{len(taken)} photos {known}": TAKEN})] * bool(taken)
-    about = [_about(table, chosen, poses, rounds), *([f"{label}: {unit}"] * bool(unit))]
+        layers += make_frustum(camera, FRUSTUM_DEPTH * frame.flying_height, TAKEN_COLOUR, None)
+    low, high = compute_bounds(frame, at)
+    keys = [ColourKey({f"{len(taken)} photos {known}": TAKEN_COLOUR})] * bool(taken)
+    about = [_describe(table, chosen, poses, rounds), *([f"{label}: {unit}"] * bool(unit))]
     return Scene(str(poses or path), layers, low, high, about, words, [bar, *keys])
 
 
-def shaded(table: Scores, name: str | None, lam: float) -> tuple[str, Float64[Array, "n"]]:
+def choose_values(table: Scores, name: str | None, lam: float) -> tuple[str, Float64[Array, "n"]]:
     """What to colour by, in words and numbers: a term, or what the round chose by. Raises: InputError: no such term."""
     if name is None:
         return candidate_values(table, lam)
@@ -81,11 +81,11 @@ def shaded(table: Scores, name: str | None, lam: float) -> tuple[str, Float64[Ar
     return name, table.terms[name]
 
 
-def _chosen(table: Scores, poses: Path | None) -> list[int]:
+def _read_chosen(table: Scores, poses: Path | None) -> list[int]:
     if poses is None:
         return []
     told = read_json(poses)
-    with beside.told_by(poses):
+    with result_files.blaming(poses):
         names = [str(pose["name"]) for pose in told["poses"]]
     index = {name: i for i, name in enumerate(table.names)}
     if strange := [name for name in names if name not in index]:
@@ -93,7 +93,7 @@ def _chosen(table: Scores, poses: Path | None) -> list[int]:
     return [index[name] for name in names]
 
 
-def _about(table: Scores, chosen: list[int], poses: Path | None, rounds: int) -> str:
+def _describe(table: Scores, chosen: list[int], poses: Path | None, rounds: int) -> str:
     if poses is None and rounds > 1:
         return f"{len(table)} candidates; {rounds} branches chose by these scores: --poses says whose are marked"
     if poses is None:
@@ -102,30 +102,32 @@ def _about(table: Scores, chosen: list[int], poses: Path | None, rounds: int) ->
     return f"{len(table)} candidates; {len(chosen)} chosen, numbered in order, by {by}"
 
 
-def round_before(path: Path) -> int:
+def parse_round_before(path: Path) -> int:
     """The round that left the scores; 0: the coarse field."""
-    return beside.round_of(path) or 0
+    return result_files.parse_round(path) or 0
 
 
-def _field(path: Path, asked: Asked) -> list[Layer]:
+def _field_layers(path: Path, asked: ViewOptions) -> list[Layer]:
     """The field that was scored, where it lies beside its scores."""
     path = path.resolve()
-    found = path.parent / "field.ply" if beside.round_of(path) is not None else path.parent.parent / "field.ply"
+    found = (
+        path.parent / "field.ply" if result_files.parse_round(path) is not None else path.parent.parent / "field.ply"
+    )
     if not found.is_file():
         return []
-    some = thinned(read_field(found), asked.most)
-    return solid(some, colours(some, "colour")) if len(some) else []
+    some = thin_field(read_field(found), asked.most)
+    return make_solids(some, compute_colours(some, "colour")) if len(some) else []
 
 
-def _taken(path: Path, photos: Path) -> list:
+def _taken_cameras(path: Path, photos: Path) -> list:
     """Cameras of the photos that the scored field was made of, as far as they are there."""
     from dav_gswt.views import candidates  # here, not above: it loads pycolmap and the synthetic scenes
 
     path = path.resolve()
     up = next((p for p in path.parents if (p / "views.json").is_file()), None)
-    captures = [path.parents[1] / f"iter{t}" / "capture" for t in range(1, round_before(path) + 1)]
+    captures = [path.parents[1] / f"iter{t}" / "capture" for t in range(1, parse_round_before(path) + 1)]
     if up is None or not all((folder / "capture.json").is_file() for folder in captures):
         return []
     split = read_json(up / "views.json")
-    with beside.told_by(up / "views.json"):
+    with result_files.blaming(up / "views.json"):
         return candidates.read_captured_cameras(photos / "sparse", split, captures)

@@ -5,9 +5,9 @@ import pyvista as pv
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.inspect.scene import INK, Bar, Keys, Layer, Scene, Word
+from dav_gswt.inspect.scene import BLACK, ColourBar, ColourKey, Label, Layer, Scene
 
-PAPER = "white"
+BACKGROUND = "white"
 VIEW = 30.0  # degrees: of the picture's height
 PAGE = 1.2, 0.85  # width over height of a browser's window, and the share of it below the words, as it may be
 CLOSE = 0.95  # of the picture that the box may fill
@@ -15,21 +15,21 @@ ROW, BAR = 50, 320  # pixels: height and width of a colour bar
 LINE, LETTER, POINTS = 20, 8, 14  # pixels a line and a letter, points of letters
 
 
-def plotter(scene: Scene, size: tuple[int, int], off_screen: bool, legend: bool = True) -> pv.Plotter:
+def make_plotter(scene: Scene, size: tuple[int, int], off_screen: bool, legend: bool = True) -> pv.Plotter:
     """All of a scene, seen as it is to be seen first. legend: title, notes and colours are drawn, too."""
     drawn = pv.Plotter(off_screen=off_screen, window_size=list(size))
-    drawn.set_background(PAPER)
+    drawn.set_background(BACKGROUND)
     for layer in scene.layers:
-        _add(drawn, layer)
+        _add_layer(drawn, layer)
     for word in scene.words:
-        drawn.add_mesh(_letters(word, scene), color=_unit(INK), lighting=False)
+        drawn.add_mesh(_make_letters(word, scene), color=_to_unit(BLACK), lighting=False)
     if legend:
-        _label(drawn, scene, size)
-    _stand(drawn, scene, size, legend)
+        _add_legend(drawn, scene, size)
+    _set_camera(drawn, scene, size, legend)
     return drawn
 
 
-def mesh(layer: Layer) -> pv.PolyData:
+def make_mesh(layer: Layer) -> pv.PolyData:
     """A layer as VTK's polygons, lines or points, with its colours as the array `rgb` where there are several."""
     if layer.cells is None:
         found = pv.PolyData(layer.points)
@@ -43,83 +43,83 @@ def mesh(layer: Layer) -> pv.PolyData:
     return found
 
 
-def _add(drawn: pv.Plotter, layer: Layer) -> None:
+def _add_layer(drawn: pv.Plotter, layer: Layer) -> None:
     how = {"lighting": False, "show_scalar_bar": False}
     if layer.picture is not None:
         texture = pv.Texture(np.ascontiguousarray(layer.picture))
-        drawn.add_mesh(mesh(layer), texture=texture, **how)
+        drawn.add_mesh(make_mesh(layer), texture=texture, **how)
         return
     if isinstance(layer.colours, tuple):
-        how["color"] = _unit(layer.colours)
+        how["color"] = _to_unit(layer.colours)
     else:
         how |= {"scalars": "rgb", "rgb": True}
     if layer.kind == "lines":
         how["line_width"] = layer.width
     if layer.kind == "points":
         how |= {"style": "points", "point_size": layer.width}
-    drawn.add_mesh(mesh(layer), **how)
+    drawn.add_mesh(make_mesh(layer), **how)
 
 
-def _unit(colour: tuple[int, int, int]) -> tuple[float, ...]:
+def _to_unit(colour: tuple[int, int, int]) -> tuple[float, ...]:
     return tuple(c / 255 for c in colour)
 
 
-def _letters(word: Word, scene: Scene) -> pv.PolyData:
+def _make_letters(word: Label, scene: Scene) -> pv.PolyData:
     """Letters as a mesh, so that a page has them, too."""
     flat = np.array([scene.seen_from[0], scene.seen_from[1], 0.0])
-    normal = tuple(flat / np.linalg.norm(flat)) if word.standing and flat.any() else (0.0, 0.0, 1.0)
+    normal = tuple(flat / np.linalg.norm(flat)) if word.upright and flat.any() else (0.0, 0.0, 1.0)
     shape = pv.Text3D(word.text, depth=0.0)
     low, high = np.array(shape.bounds).reshape(3, 2).T
-    centred = (np.asarray(shape.points) - (low + high) / 2) * (word.height / _cap())
-    across = np.cross([0.0, 0.0, 1.0], normal) if word.standing and flat.any() else np.array([1.0, 0.0, 0.0])
+    centred = (np.asarray(shape.points) - (low + high) / 2) * (word.height / _digit_height())
+    across = np.cross([0.0, 0.0, 1.0], normal) if word.upright and flat.any() else np.array([1.0, 0.0, 0.0])
     upright = np.stack([across, np.cross(normal, across), normal])
     shape.points = (centred @ upright + word.place).astype(np.float32)
     return shape
 
 
-def _cap() -> float:
+def _digit_height() -> float:
     """Height of a digit in the letters' own unit."""
     low, high = np.array(pv.Text3D("0", depth=0.0).bounds).reshape(3, 2).T
     return float((high - low)[1])
 
 
-def _label(drawn: pv.Plotter, scene: Scene, size: tuple[int, int]) -> None:
+def _add_legend(drawn: pv.Plotter, scene: Scene, size: tuple[int, int]) -> None:
     for i, line in enumerate([scene.title, *scene.notes], 1):
-        _write(drawn, _short(line, size[0]), (8, size[1] - i * LINE), INK)
-    bars = [entry for entry in scene.legend if isinstance(entry, Bar)]
+        _add_text(drawn, _shorten(line, size[0]), (8, size[1] - i * LINE), BLACK)
+    bars = [entry for entry in scene.legend if isinstance(entry, ColourBar)]
     for i, bar in enumerate(bars):
         _add_bar(drawn, bar, i, size)
-    named = [pair for entry in scene.legend if isinstance(entry, Keys) for pair in entry.named.items()]
+    named = [pair for entry in scene.legend if isinstance(entry, ColourKey) for pair in entry.named.items()]
     left = size[0] - 50 - LETTER * max((len(name) for name, _ in named), default=0)
     for i, (name, colour) in enumerate(reversed(named)):
-        swatch = _write(drawn, "MM", (left, 10 + i * LINE), colour)
-        swatch.prop.background_color, swatch.prop.background_opacity = _unit(colour), 1.0
-        _write(drawn, name, (left + 38, 10 + i * LINE), INK)
+        swatch = _add_text(drawn, "MM", (left, 10 + i * LINE), colour)
+        swatch.prop.background_color, swatch.prop.background_opacity = _to_unit(colour), 1.0
+        _add_text(drawn, name, (left + 38, 10 + i * LINE), BLACK)
 
 
-def _write(drawn: pv.Plotter, text: str, at: tuple[int, int], colour: tuple[int, int, int]) -> pv.Text:
+def _add_text(drawn: pv.Plotter, text: str, at: tuple[int, int], colour: tuple[int, int, int]) -> pv.Text:
     """Letters at pixels from the lower left."""
     letters = pv.Text(text)
-    letters.prop.font_size, letters.prop.color = POINTS, _unit(colour)
+    letters.prop.font_size, letters.prop.color = POINTS, _to_unit(colour)
     letters.SetPosition(*at)
     drawn.add_actor(letters, render=False)
     return letters
 
 
-def _short(text: str, width: int) -> str:
+def _shorten(text: str, width: int) -> str:
     """A line that fits: the end says most of a path."""
     most = max(20, width // LETTER)
     return text if len(text) <= most else f"...{text[3 - most :]}"
 
 
-def _add_bar(drawn: pv.Plotter, bar: Bar, place: int, size: tuple[int, int]) -> None:
+def _add_bar(drawn: pv.Plotter, bar: ColourBar, place: int, size: tuple[int, int]) -> None:
     """Bars stand side by side along the lower border."""
     mapper = pv.DataSetMapper()
     mapper.lookup_table = pv.LookupTable(bar.colours, n_values=256, scalar_range=(bar.low, bar.high))
     drawn.add_scalar_bar(
         title=f"{bar.title}{' ' * place}",  # a title is also a key: two bars may not share one
         mapper=mapper,
-        color=_unit(INK),
+        color=_to_unit(BLACK),
         n_labels=2,
         fmt="%.3g",
         title_font_size=POINTS,
@@ -132,22 +132,22 @@ def _add_bar(drawn: pv.Plotter, bar: Bar, place: int, size: tuple[int, int]) -> 
     )
 
 
-def _stand(drawn: pv.Plotter, scene: Scene, size: tuple[int, int], legend: bool) -> None:
+def _set_camera(drawn: pv.Plotter, scene: Scene, size: tuple[int, int], legend: bool) -> None:
     """The first view: the scene's box whole, from the direction that it says, between title and legend."""
     middle, half = (scene.low + scene.high) / 2, (scene.high - scene.low) / 2
     up = (0.0, 1.0, 0.0) if scene.flat else (0.0, 0.0, 1.0)
     towards = np.array(scene.seen_from) / np.linalg.norm(scene.seen_from)
     above = LINE * (len(scene.notes) + 1) * legend
-    below = (ROW + 14) * (legend and any(isinstance(entry, Bar) for entry in scene.legend))
+    below = (ROW + 14) * (legend and any(isinstance(entry, ColourBar) for entry in scene.legend))
     aspect, share = (size[0] / size[1], max(0.3, (size[1] - above - below) / size[1])) if legend else PAGE
-    away = _distance(half, towards, up, aspect, share)
+    away = _fit_distance(half, towards, up, aspect, share)
     drawn.camera_position = [tuple(middle + away * towards), tuple(middle), up]
     drawn.camera.view_angle = VIEW
     drawn.camera.SetWindowCenter(0.0, (above - below) / size[1])
     drawn.reset_camera_clipping_range()
 
 
-def _distance(
+def _fit_distance(
     half: Float[Array, "3"], towards: Float[Array, "3"], up: tuple[float, ...], aspect: float, share: float
 ) -> float:
     """From where all corners of a box lie inside the picture's width and a share of its height, with a little room."""

@@ -8,8 +8,8 @@ import pytest
 from dav_gswt.cli.main import main
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
-from dav_gswt.inspect import command, kinds, saving
-from dav_gswt.inspect.options import Asked
+from dav_gswt.inspect import artifacts, command, saving
+from dav_gswt.inspect.options import ViewOptions
 
 
 @pytest.fixture(autouse=True)
@@ -41,7 +41,7 @@ def nowhere(monkeypatch):
 )
 def test_every_artefact_is_known_by_its_name(tree, where, shown):
     path = where.format(**vars(tree), tiles=tree.tiles)
-    found = kinds.scene_of(type(tree.photos)(path), Asked())
+    found = artifacts.build_scene(type(tree.photos)(path), ViewOptions())
     assert any(shown in note for note in found.notes), found.notes
     assert found.layers and (found.high >= found.low).all()
 
@@ -50,11 +50,11 @@ def test_what_is_not_understood_is_answered_with_what_is(tree, tmp_path):
     (tmp_path / "notes.txt").write_text("x")
     for path in (tmp_path, tmp_path / "notes.txt"):
         with pytest.raises(InputError, match="understood are fields"):
-            kinds.scene_of(path, Asked())
+            artifacts.build_scene(path, ViewOptions())
     with pytest.raises(InputError, match="no such file or folder"):
-        kinds.scene_of(tmp_path / "nothing.ply", Asked())
+        artifacts.build_scene(tmp_path / "nothing.ply", ViewOptions())
     with pytest.raises(InputError, match="--channel: means nothing .* knows --colour"):
-        kinds.scene_of(tree.round / "field.ply", Asked(channel="Z"))
+        artifacts.build_scene(tree.round / "field.ply", ViewOptions(channel="Z"))
 
 
 def test_without_the_extra_one_line_says_how_to_install_it(tree, tmp_path, monkeypatch, capsys):

@@ -11,99 +11,101 @@ from dav_gswt.files import read_json
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
 from dav_gswt.images import image_files
-from dav_gswt.inspect import beside
-from dav_gswt.inspect.options import Asked
-from dav_gswt.inspect.scene import Keys, Layer, Scene, bytes_of, hung, outline
+from dav_gswt.inspect import result_files
+from dav_gswt.inspect.options import ViewOptions
+from dav_gswt.inspect.scene import ColourKey, Layer, Scene, hang_picture, make_outline, to_bytes
 
-EDGE = 0.12  # flying heights from a camera to its picture
-PICTURE = 160  # pixels of a photo's longer side
+DEPTH = 0.12  # flying heights from a camera to its picture
+MAX_SIDE = 160  # pixels of a photo's longer side
 ROLES = {"start": (34, 136, 51), "pool": (68, 119, 170), "test": (238, 102, 119), "photo": (90, 90, 90)}
-CAPTURED = {"taken for a round": (170, 51, 119)}
+CAPTURE_ROLE = {"taken for a round": (170, 51, 119)}
 EXEMPLAR, EXTENT = (230, 140, 0), (120, 120, 120)
 
 
-def show(path: Path, asked: Asked) -> Scene:
+def build_photos(path: Path, asked: ViewOptions) -> Scene:
     """photos/: its ground.json, model, photos, and views.json where one seed alone says what each is for."""
     found = sorted(path.parent.glob("seed*/views.json"))
-    return of_photos(path, found[0] if len(found) == 1 else None, str(path), [])
+    return arrange_photos(path, found[0] if len(found) == 1 else None, str(path), [])
 
 
-def show_split(path: Path, asked: Asked) -> Scene:
+def build_split(path: Path, asked: ViewOptions) -> Scene:
     """views.json: the photos by what they are for."""
-    return of_photos(_photos(path), path, str(path), [])
+    return arrange_photos(_require_photos(path), path, str(path), [])
 
 
-def show_captured(path: Path, asked: Asked) -> Scene:
+def build_capture(path: Path, asked: ViewOptions) -> Scene:
     """capture.json: the photos of a round among those of the scene."""
-    return of_photos(_photos(path), None, str(path), [(camera, path.parent / name) for name, camera in _safe(path)])
+    return arrange_photos(
+        _require_photos(path), None, str(path), [(camera, path.parent / name) for name, camera in _check_shots(path)]
+    )
 
 
-def _photos(path: Path) -> Path:
-    if (found := beside.photos_of(path)) is None:
+def _require_photos(path: Path) -> Path:
+    if (found := result_files.find_photos(path)) is None:
         raise InputError(
             f"{path}: its scene's photos/ground.json is in no folder above it; leave it in its result tree"
         )
     return found
 
 
-def _safe(path: Path) -> list[tuple[str, Camera]]:
-    shots = beside.shots_of(path)
+def _check_shots(path: Path) -> list[tuple[str, Camera]]:
+    shots = result_files.read_shots(path)
     for name, _ in shots:
         if Path(name).name != name:
             raise InputError(f"{path}: {name!r} is no file's name; take the photos again")
     return shots
 
 
-def of_photos(folder: Path, split: Path | None, title: str, captured: list[tuple[Camera, Path]]) -> Scene:
+def arrange_photos(folder: Path, split: Path | None, title: str, captured: list[tuple[Camera, Path]]) -> Scene:
     """A photos/ folder. split: views.json. captured: further cameras, and their photos."""
     from dav_gswt.photos import model  # here, not above: it loads pycolmap
 
     frame = read_scene_frame(folder / "ground.json")
     found = model.read(folder / "sparse")
-    roles = _roles(split)
-    reach = EDGE * frame.flying_height
-    layers, used = ground(frame), {}
+    roles = _read_roles(split)
+    reach = DEPTH * frame.flying_height
+    layers, used = outline_ground(frame), {}
     for name, camera in zip(found.names, found.cameras, strict=True):
         role = roles.get(name, "photo")
         used |= {role: ROLES[role]}
-        layers += looking(camera, reach, ROLES[role], folder / "images" / name)
+        layers += make_frustum(camera, reach, ROLES[role], folder / "images" / name)
     for camera, file in captured:
-        used |= CAPTURED
-        layers += looking(camera, reach, *CAPTURED.values(), file)
+        used |= CAPTURE_ROLE
+        layers += make_frustum(camera, reach, *CAPTURE_ROLE.values(), file)
     if len(found.points):
-        layers.append(Layer("points", found.points.astype(np.float32), colours=bytes_of(found.colours), width=3.0))
+        layers.append(Layer("points", found.points.astype(np.float32), colours=to_bytes(found.colours), width=3.0))
     eyes = np.array([c.centre for c in [*found.cameras, *(camera for camera, _ in captured)]]).reshape(-1, 3)
-    low, high = bounds(frame, eyes)
-    keys = Keys(used | {"exemplar": EXEMPLAR, "seen by a photo": EXTENT})
+    low, high = compute_bounds(frame, eyes)
+    keys = ColourKey(used | {"exemplar": EXEMPLAR, "seen by a photo": EXTENT})
     about = f"{len(eyes)} cameras, {len(found.points)} points; unit: {frame.unit[:40]}"
     return Scene(title, layers, low, high, [about], legend=[keys])
 
 
-def _roles(split: Path | None) -> dict[str, str]:
+def _read_roles(split: Path | None) -> dict[str, str]:
     if split is None:
         return {}
     told = read_json(split)
-    with beside.told_by(split):
+    with result_files.blaming(split):
         return {str(name): role for role in ("start", "pool", "test") for name in told[role]}
 
 
-def ground(frame: SceneFrame) -> list[Layer]:
+def outline_ground(frame: SceneFrame) -> list[Layer]:
     """The exemplar's border and that of all ground that is seen, at height 0."""
     square, extent = frame.exemplar, frame.extent
     return [
-        outline(square.west, square.south, square.east, square.north, 0.0, EXEMPLAR),
-        outline(extent.west, extent.south, extent.east, extent.north, 0.0, EXTENT),
+        make_outline(square.west, square.south, square.east, square.north, 0.0, EXEMPLAR),
+        make_outline(extent.west, extent.south, extent.east, extent.north, 0.0, EXTENT),
     ]
 
 
-def bounds(frame: SceneFrame, eyes: Float[Array, "n 3"]) -> tuple[Float[Array, "3"], Float[Array, "3"]]:
+def compute_bounds(frame: SceneFrame, eyes: Float[Array, "n 3"]) -> tuple[Float[Array, "3"], Float[Array, "3"]]:
     """The box of the exemplar and of places."""
     square = frame.exemplar
     points = np.concatenate([eyes, [[square.west, square.south, 0.0], [square.east, square.north, 0.0]]])
     return points.min(0), points.max(0)
 
 
-def looking(camera: Camera, reach: float, colour: tuple[int, int, int], photo: Path | None) -> list[Layer]:
+def make_frustum(camera: Camera, reach: float, colour: tuple[int, int, int], photo: Path | None) -> list[Layer]:
     """A camera as the pyramid of what it sees, `reach` deep, its photo as the base, where there is one."""
     w, h = camera.width, camera.height
     pixels = np.array([[0, 0], [w, 0], [w, h], [0, h]])
@@ -114,7 +116,7 @@ def looking(camera: Camera, reach: float, colour: tuple[int, int, int], photo: P
     found = [Layer("lines", points, edges, colour)]
     if photo is not None and photo.is_file():
         picture = image_files.read_photo(photo)
-        share = min(1.0, PICTURE / max(picture.shape[:2]))
+        share = min(1.0, MAX_SIDE / max(picture.shape[:2]))
         small = image_files.shrink_image(picture, *(max(1, round(n * share)) for n in picture.shape[1::-1]))
-        found.append(hung(bytes_of(small), corners[0], corners[1] - corners[0], corners[3] - corners[0]))
+        found.append(hang_picture(to_bytes(small), corners[0], corners[1] - corners[0], corners[3] - corners[0]))
     return found

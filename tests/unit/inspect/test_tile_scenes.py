@@ -5,28 +5,28 @@ import pytest
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json, write_json
-from dav_gswt.inspect import tiles as seen
-from dav_gswt.inspect.options import Asked
+from dav_gswt.inspect import tile_scenes as seen
+from dav_gswt.inspect.options import ViewOptions
 from dav_gswt.tiles import store
-from dav_gswt.tiles.layout import colours
+from dav_gswt.tiles.layout import edge_colours
 
 
 @pytest.fixture(scope="module")
 def cut(tree):
-    return store.read(tree.tiles / "tiles", tree.tiles / "seams.json")
+    return store.read_tiles(tree.tiles / "tiles", tree.tiles / "seams.json")
 
 
 def test_neighbours_meet_at_edges_of_one_colour():
-    at = {tuple(np.rint(corner[:2]).astype(int)): tile for tile, corner in seen.placed(16, 1.0)}
+    at = {tuple(np.rint(corner[:2]).astype(int)): tile for tile, corner in seen.place_tiles(16, 1.0)}
     assert sorted(at.values()) == list(range(16))
     for (x, y), tile in at.items():
         west, south = at[(x - 1) % 4, y], at[x, (y - 1) % 4]
-        assert colours(west)[2] == colours(tile)[0] and colours(south)[1] == colours(tile)[3]
+        assert edge_colours(west)[2] == edge_colours(tile)[0] and edge_colours(south)[1] == edge_colours(tile)[3]
 
 
 def test_a_cut_is_a_ribbon_wherever_labels_change_just_above_the_ground(cut):
     labels = cut.labels[5]
-    layer = seen.cuts(cut, 5, 0)
+    layer = seen.make_cuts(cut, 5, 0)
     assert len(layer.cells) == (labels[1:] != labels[:-1]).sum() + (labels[:, 1:] != labels[:, :-1]).sum() > 0
     middle = layer.points.reshape(-1, 4, 3).mean(1)
     cells = middle[:, :2] / cut.spacing
@@ -34,14 +34,14 @@ def test_a_cut_is_a_ribbon_wherever_labels_change_just_above_the_ground(cut):
     across = np.where(upright[:, None], [0.5, 0.0], [0.0, 0.5])
     one, other = (np.floor(cells + sign * across).astype(int) for sign in (-1, 1))
     assert (labels[one[:, 1], one[:, 0]] != labels[other[:, 1], other[:, 0]]).all()
-    ground = seen.heights(cut.fields[0][5], len(labels), cut.spacing)
+    ground = seen.compute_heights(cut.fields[0][5], len(labels), cut.spacing)
     lift = middle[:, 2] - np.maximum(ground[one[:, 1], one[:, 0]], ground[other[:, 1], other[:, 0]])
-    np.testing.assert_allclose(lift, seen.LIFT * cut.spacing, atol=1e-5)
+    np.testing.assert_allclose(lift, seen.CUT_LIFT * cut.spacing, atol=1e-5)
 
 
 def test_gaussians_have_the_patch_of_the_cell_they_lie_over(cut):
     some = cut.fields[0][3]
-    found = seen.patch_of(some, cut, 3)
+    found = seen.find_patches(some, cut, 3)
     inside = (some.means[:, :2] >= 0).all(1) & (some.means[:, :2] < cut.side).all(1)
     for i in np.flatnonzero(inside)[::97]:
         x, y = (some.means[i, :2] / cut.spacing).astype(int)
@@ -49,13 +49,13 @@ def test_gaussians_have_the_patch_of_the_cell_they_lie_over(cut):
 
 
 def test_sixteen_tiles_are_laid_with_their_numbers_and_all_levels_if_levels_are_asked(tree, cut):
-    plain = seen.show(tree.tiles, Asked())
+    plain = seen.build_tiles(tree.tiles, ViewOptions())
     assert sorted(int(word.text) for word in plain.words) == list(range(16))
-    assert sum(layer.colours == seen.CUT for layer in plain.layers if isinstance(layer.colours, tuple)) == 16
-    all_ = seen.show(tree.tiles, Asked(colour="level"))
+    assert sum(layer.colours == seen.CUT_COLOUR for layer in plain.layers if isinstance(layer.colours, tuple)) == 16
+    all_ = seen.build_tiles(tree.tiles, ViewOptions(colour="level"))
     assert list(all_.legend[0].named) == [f"level {n}" for n in range(len(cut.fields))]
     assert all_.high[0] > 2 * plain.high[0]
-    patches = seen.show(tree.tiles, Asked(colour="patch", level=1))
+    patches = seen.build_tiles(tree.tiles, ViewOptions(colour="patch", level=1))
     assert "NE" in patches.legend[0].named and patches.notes[-1] == "level 1"
 
 
@@ -69,4 +69,4 @@ def test_tiles_that_are_not_what_seams_json_says_are_refused(tree, tmp_path):
     ):
         write_json(tmp_path / "seams.json", told | change)
         with pytest.raises(InputError, match=message):
-            seen.show(tmp_path, Asked())
+            seen.build_tiles(tmp_path, ViewOptions())

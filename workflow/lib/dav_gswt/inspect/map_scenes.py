@@ -9,87 +9,87 @@ from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
-from dav_gswt.inspect import beside, fields
-from dav_gswt.inspect.options import Asked
-from dav_gswt.inspect.scene import DOUBT, Bar, Layer, Scene, Word, bar_over, coloured, hung
+from dav_gswt.inspect import field_scenes, result_files
+from dav_gswt.inspect.options import ViewOptions
+from dav_gswt.inspect.scene import UNCERTAINTY_MAP, ColourBar, Label, Layer, Scene, hang_picture, make_bar, map_colours
 from dav_gswt.reconstruction import ground
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.study.views.sphere import HIGHEST
 from dav_gswt.views import pose_maps as posed
 from dav_gswt.views.pose_maps import Part
 
-WIDE = 1.6  # of all pictures side by side, over their height
-MOST_PICTURES = 60
-SHARP = 1024  # pixels of a picture's longer side
+ASPECT = 1.6  # of all pictures side by side, over their height
+MAX_PICTURES = 60
+MAX_SIDE = 1024  # pixels of a picture's longer side
 ROOM, LETTER = 0.12, 0.05  # below a picture and between two; letters: in picture widths
 HEIGHTS = "viridis"
-DOUBTS = ("opacity", "w2_sq", "uncertainty")  # channels that say what is not known: warm where much
+UNCERTAINTY_CHANNELS = ("opacity", "w2_sq", "uncertainty")  # channels that say what is not known: warm where much
 ABOVE = "above"  # the part of uncertainty.exr that lies over the ground
 
 
-def show(path: Path, asked: Asked) -> Scene:
+def build_map(path: Path, asked: ViewOptions) -> Scene:
     """An EXR file: a ground's as its surface, and so the part `above` where it is asked for; all else as pictures."""
     parts = image_files.read_exr_parts(path)
     if len(parts) == 1 and "ground_west" in (only := next(iter(parts.values())))[1]:
-        return _of_grid(path, ground.read(path), only[0], asked)
+        return _build_surface(path, ground.read(path), only[0], asked)
     if asked.part == ABOVE and ABOVE in parts:
-        return _of_grid(path, _grid_beside(path), parts[ABOVE][0], asked)
-    return of_pictures(path, _picked(parts, asked, path), asked)
+        return _build_surface(path, _find_grid(path), parts[ABOVE][0], asked)
+    return arrange_pictures(path, _select_channels(parts, asked, path), asked)
 
 
-def show_posed(path: Path, asked: Asked) -> Scene:
+def build_pose_maps(path: Path, asked: ViewOptions) -> Scene:
     """maps.npz: the field by the uncertainty that its maps gave it; with --part or --channel the maps themselves."""
     if asked.part is None and asked.channel is None:
-        return fields.show_doubted(path, asked)
-    asked.refuse(path, "part", "channel")
+        return field_scenes.build_uncertain_field(path, asked)
+    asked.reject_others(path, "part", "channel")
     found, _ = posed.read_pose_maps(path)
-    with beside.told_by(path):
+    with result_files.blaming(path):
         parts = {}
         for i, name in enumerate(found.names):
             channels = {"opacity": found.opacity[i]} | ({} if found.w2_sq is None else {"w2_sq": found.w2_sq[i]})
             if any(values.ndim != 2 for values in channels.values()):
                 raise ValueError(f"the maps of {name} are no pictures")
             parts[name] = (channels, {})
-    return of_pictures(path, _picked(parts, asked, path), asked)
+    return arrange_pictures(path, _select_channels(parts, asked, path), asked)
 
 
-def _picked(parts: dict[str, Part], asked: Asked, path: Path) -> dict[str, dict[str, Array]]:
+def _select_channels(parts: dict[str, Part], asked: ViewOptions, path: Path) -> dict[str, dict[str, Array]]:
     """Channels by part, as far as they are asked for. Raises: InputError: no such part or channel."""
     if asked.part is not None and asked.part not in parts:
-        raise InputError(f"--part {asked.part}: {path} has {_some([n or 'one without a name' for n in parts])}")
+        raise InputError(f"--part {asked.part}: {path} has {_list_some([n or 'one without a name' for n in parts])}")
     names = [asked.part] if asked.part is not None else list(parts)
     found = {
         name: {k: v for k, v in parts[name][0].items() if asked.channel in (None, k) and v.ndim == 2} for name in names
     }
     if not any(found.values()):
         known = sorted({k for name in names for k in parts[name][0]})
-        raise InputError(f"--channel {asked.channel}: {path} has {_some(known)}")
+        raise InputError(f"--channel {asked.channel}: {path} has {_list_some(known)}")
     return found
 
 
-def _some(names: list[str]) -> str:
+def _list_some(names: list[str]) -> str:
     return ", ".join(names[:20]) + (f" and {len(names) - 20} more" if len(names) > 20 else "")
 
 
-def of_pictures(path: Path, parts: dict[str, dict[str, Array]], asked: Asked) -> Scene:
+def arrange_pictures(path: Path, parts: dict[str, dict[str, Array]], asked: ViewOptions) -> Scene:
     """Each channel of each part, in rows from the top left; one scale a channel."""
     shown = [(part, channel, values) for part, own in parts.items() for channel, values in own.items()]
-    left, shown = max(0, len(shown) - MOST_PICTURES), shown[:MOST_PICTURES]
+    left, shown = max(0, len(shown) - MAX_PICTURES), shown[:MAX_PICTURES]
     channels = list(dict.fromkeys(channel for _, channel, _ in shown))
     bars = {
-        name: bar_over(name, np.concatenate([v.ravel() for _, c, v in shown if c == name]), _colours(name), HIGHEST)
+        name: make_bar(name, np.concatenate([v.ravel() for _, c, v in shown if c == name]), _colour_map(name), HIGHEST)
         for name in channels
     }
     aspect = max(v.shape[0] / v.shape[1] for _, _, v in shown)
-    columns = min(len(shown), ceil((len(shown) * WIDE * aspect) ** 0.5))
+    columns = min(len(shown), ceil((len(shown) * ASPECT * aspect) ** 0.5))
     step = np.array([1 + ROOM, aspect + ROOM + LETTER])
     layers, words = [], []
     for i, (part, channel, values) in enumerate(shown):
         x, y = (i % columns) * step[0], -(i // columns) * step[1]
         tall = values.shape[0] / values.shape[1]
-        picture = coloured(thinned(values), bars[channel])
-        layers.append(hung(picture, np.array([x, y, 0.0]), np.array([1.0, 0, 0]), np.array([0, -tall, 0.0])))
-        words.append(Word(f"{part} {channel}".strip(), (x + 0.5, y - tall - 0.05, 0.0), LETTER, standing=False))
+        picture = map_colours(subsample(values), bars[channel])
+        layers.append(hang_picture(picture, np.array([x, y, 0.0]), np.array([1.0, 0, 0]), np.array([0, -tall, 0.0])))
+        words.append(Label(f"{part} {channel}".strip(), (x + 0.5, y - tall - 0.05, 0.0), LETTER, upright=False))
     rows = ceil(len(shown) / columns)
     low, high = np.array([0.0, -rows * step[1], 0.0]), np.array([columns * step[0] - ROOM, 0.0, 0.0])
     holes = any(not np.isfinite(values).all() for _, _, values in shown)
@@ -99,17 +99,17 @@ def of_pictures(path: Path, parts: dict[str, dict[str, Array]], asked: Asked) ->
     return Scene(str(path), layers, low, high, notes, words, list(bars.values()), (0.0, 0.0, 1.0), flat=True)
 
 
-def thinned(values: Float32[Array, "h w"]) -> Float32[Array, "h2 w2"]:
+def subsample(values: Float32[Array, "h w"]) -> Float32[Array, "h2 w2"]:
     """Every so manyth pixel of a large map."""
-    step = ceil(max(values.shape) / SHARP)
+    step = ceil(max(values.shape) / MAX_SIDE)
     return values[::step, ::step]
 
 
-def _colours(channel: str) -> str:
-    return DOUBT if channel in DOUBTS else HEIGHTS
+def _colour_map(channel: str) -> str:
+    return UNCERTAINTY_MAP if channel in UNCERTAINTY_CHANNELS else HEIGHTS
 
 
-def _grid_beside(path: Path) -> Ground:
+def _find_grid(path: Path) -> Ground:
     """The ground of the field that the maps are of."""
     for folder in (path.parent, path.parent.parent):
         if (folder / "ground.exr").is_file():
@@ -117,22 +117,22 @@ def _grid_beside(path: Path) -> Ground:
     raise InputError(f"{path}: there is no ground.exr beside it to lay its part {ABOVE} over")
 
 
-def _of_grid(path: Path, grid: Ground, channels: dict[str, Array], asked: Asked) -> Scene:
+def _build_surface(path: Path, grid: Ground, channels: dict[str, Array], asked: ViewOptions) -> Scene:
     """The ground's surface, coloured by a channel; rows of a channel run from the north, as in the file."""
     name = asked.channel or next((n for n in ("Z", "uncertainty") if n in channels), next(iter(channels)))
     if name not in channels:
-        raise InputError(f"--channel {name}: {path} has {_some(sorted(channels))}")
+        raise InputError(f"--channel {name}: {path} has {_list_some(sorted(channels))}")
     values = channels[name]
     if values.shape != grid.shape:
         raise InputError(f"{path}: is of {values.shape} cells and the ground beside it of {grid.shape}; score again")
-    bar = Bar(name, 0.0, 1.0) if name in ("uncertainty", "seen") else bar_over(name, values, _colours(name))
-    layer = surface(grid, values[::-1].astype(float), bar, asked.most)
+    bar = ColourBar(name, 0.0, 1.0) if name in ("uncertainty", "seen") else make_bar(name, values, _colour_map(name))
+    layer = make_surface(grid, values[::-1].astype(float), bar, asked.most)
     rows, columns = grid.shape
     about = f"{columns} x {rows} cells of {grid.spacing:.4g}; surface by {name}"
     return Scene(str(path), [layer], layer.points.min(0), layer.points.max(0), [about], legend=[bar])
 
 
-def surface(grid: Ground, values: Float[Array, "rows columns"], bar: Bar, most: int) -> Layer:
+def make_surface(grid: Ground, values: Float[Array, "rows columns"], bar: ColourBar, most: int) -> Layer:
     """A quad a cell, through heights averaged at the cells' corners; of more than `most` cells every so manyth."""
     step = ceil((values.size / most) ** 0.5) if values.size > most else 1
     heights, values, spacing = grid.heights[::step, ::step], values[::step, ::step], grid.spacing * step
@@ -143,4 +143,4 @@ def surface(grid: Ground, values: Float[Array, "rows columns"], bar: Bar, most: 
     points = np.stack([x.ravel(), y.ravel(), np.nan_to_num(z.ravel())], 1).astype(np.float32)
     first = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).ravel()
     cells = first[:, None] + np.array([0, 1, columns + 2, columns + 1])
-    return Layer("faces", points, cells, coloured(values.ravel(), bar))
+    return Layer("faces", points, cells, map_colours(values.ravel(), bar))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dav_gswt.tiles import layout, patches, repeats
+from dav_gswt.tiles import layout, patches, repetition
 
 
 @pytest.fixture
@@ -16,7 +16,7 @@ def exemplar(seed=0, m=40):
 
 
 def test_ground_has_mean_zero_and_variance_one():
-    shown = repeats.nothing(exemplar(), 16, (16, 16))
+    shown = repetition.start_overlay(exemplar(), 16, (16, 16))
     np.testing.assert_allclose(shown.ground.mean((0, 1)), 0, atol=1e-12)
     assert (shown.ground**2).sum(-1).mean() == pytest.approx(1)
 
@@ -24,7 +24,7 @@ def test_ground_has_mean_zero_and_variance_one():
 def power(picture):
     """Of a mean tile, per sample: its squares, and those of its rows' and columns' means, LINES times."""
     squares = [(part**2).sum(-1).mean() for part in (picture, picture.mean(0), picture.mean(1))]
-    return squares[0] + repeats.LINES * (squares[1] + squares[2])
+    return squares[0] + repetition.LINE_WEIGHT * (squares[1] + squares[2])
 
 
 def own(picture):
@@ -33,21 +33,21 @@ def own(picture):
 
 
 def test_charges_sum_to_the_power_of_what_comes_back_but_for_the_patches_own():
-    shown = repeats.nothing(exemplar(), 16, (16, 16))
+    shown = repetition.start_overlay(exemplar(), 16, (16, 16))
     places, total = np.array([[0, 0], [8, 4], [20, 24]]), 0.0
     for place in places:
-        total += shown.charge(place[None])[0]
-        shown = shown.plus(place)
+        total += shown.cost_of(place[None])[0]
+        shown = shown.with_patch(place)
     tiles = [shown.ground[y : y + 16, x : x + 16] for x, y in places]
     assert total == pytest.approx(power(np.sum(tiles, 0)) - sum(own(tile) for tile in tiles))
 
 
 def test_only_what_shows_counts():
-    shown = repeats.nothing(exemplar(), 16, (16, 12), (4, 3))
+    shown = repetition.start_overlay(exemplar(), 16, (16, 12), (4, 3))
     x, y = place = np.array([8, 4])
     tile = np.zeros((16, 16, 3))  # what does not show adds nothing to a row's mean
     tile[:6, :8] = shown.ground[y + 3 : y + 9, x + 4 : x + 12]
-    assert shown.charge(place[None])[0] == pytest.approx((power(tile) - own(tile)) * 16 * 16 / (6 * 8))
+    assert shown.cost_of(place[None])[0] == pytest.approx((power(tile) - own(tile)) * 16 * 16 / (6 * 8))
 
 
 @pytest.mark.parametrize("upright", [True, False])
@@ -56,8 +56,8 @@ def test_what_adds_up_to_a_line_is_dearer_than_the_same_strewn_about(rng, uprigh
     dots = colour[:, :32] if upright else colour[:32].swapaxes(0, 1)  # [along, across]: a line, and as much at random
     dots[:, 2] = 1
     dots[np.arange(64), 12 + rng.integers(0, 8, 64)] = 1
-    shown = repeats.nothing(colour, 64, (8, 64) if upright else (64, 8))
-    line, strewn = shown.charge(np.array([[0, 0], [12, 0]]) if upright else np.array([[0, 0], [0, 12]]))
+    shown = repetition.start_overlay(colour, 64, (8, 64) if upright else (64, 8))
+    line, strewn = shown.cost_of(np.array([[0, 0], [12, 0]]) if upright else np.array([[0, 0], [0, 12]]))
     assert line > 1.3 * strewn > 0
 
 
@@ -65,26 +65,26 @@ def test_the_same_landmark_at_the_same_place_is_dearer_than_at_another():
     """A dot on plain ground: a second tile that shows it there, beside there, or not at all."""
     colour = np.full((60, 60, 3), 0.5)
     colour[30:34, 30:34] = 0
-    shown = repeats.nothing(colour, 20, (20, 20)).plus(np.array([22, 22]))
-    there, beside, none = shown.charge(np.array([[22, 22], [14, 26], [0, 0]]))
+    shown = repetition.start_overlay(colour, 20, (20, 20)).with_patch(np.array([22, 22]))
+    there, beside, none = shown.cost_of(np.array([[22, 22], [14, 26], [0, 0]]))
     assert there > 2 * beside > 2 * none
 
 
 @pytest.mark.parametrize("value", [0.0, 0.3])
 def test_ground_of_one_colour_costs_nothing(value):
-    shown = repeats.nothing(np.full((30, 30, 3), value), 16, (16, 16))
-    assert shown.charge(np.array([[0, 0], [3, 3]])).tolist() == pytest.approx([0, 0], abs=1e-12)
+    shown = repetition.start_overlay(np.full((30, 30, 3), value), 16, (16, 16))
+    assert shown.cost_of(np.array([[0, 0], [3, 3]])).tolist() == pytest.approx([0, 0], abs=1e-12)
 
 
 def test_large_tiles_are_sampled_more_coarsely():
-    shown = repeats.nothing(exemplar(m=400), 200, (200, 200))
+    shown = repetition.start_overlay(exemplar(m=400), 200, (200, 200))
     assert shown.sample == 3 and shown.crop(np.array([100, 100])).shape == (66, 66, 3)
 
 
 def test_pairs_are_charged_what_both_bring_back_but_for_their_own():
-    empty = repeats.nothing(exemplar(), 16, (16, 16))
+    empty = repetition.start_overlay(exemplar(), 16, (16, 16))
     places = np.array([[0, 0], [8, 4], [20, 24]])
-    charges = empty.pairs(places)
+    charges = empty.pair_costs(places)
     for i, j in np.ndindex(charges.shape):
         tiles = [empty.crop(places[k]) for k in (i, j)]
         assert charges[i, j] == pytest.approx(power(sum(tiles)) - sum(own(tile) for tile in tiles))
@@ -94,7 +94,7 @@ def test_what_lies_over_a_patch_shows_in_its_place():
     over = np.zeros((16, 8), bool)
     over[:3] = over[-2:] = True
     rows, columns = (v + k for v, k in zip(np.mgrid[:16, :8], (20, 30), strict=True))
-    shown = repeats.nothing(exemplar(), 16, (8, 16), fast=(over, (rows, columns)))
+    shown = repetition.start_overlay(exemplar(), 16, (8, 16), fast=(over, (rows, columns)))
     crop = shown.crop(np.array([4, 6]))
     np.testing.assert_array_equal(crop[over], shown.ground[20:36, 30:38][over])
     np.testing.assert_array_equal(crop[~over], shown.ground[6:22, 4:12][~over])
@@ -104,27 +104,27 @@ def test_of_two_strips_one_makes_good_what_the_other_lacks():
     """Light ground, dark ground, and light once more."""
     colour = np.full((60, 60, 3), 0.5)
     colour[:, :20], colour[:, 20:40] = 0.7, 0.3
-    shown = repeats.nothing(colour, 20, (8, 20))
+    shown = repetition.start_overlay(colour, 20, (8, 20))
     light, dark, other = np.array([[4, 0], [28, 0], [10, 0]])
-    charges = shown.pairs(np.stack([light, dark, other]))
+    charges = shown.pair_costs(np.stack([light, dark, other]))
     assert charges[0, 1] < 0 < charges[0, 2]
-    pairs = patches.paired(np.stack([light, dark, other]), np.zeros(3), charges, (8, 20), [])
+    pairs = patches.rank_pairs(np.stack([light, dark, other]), np.zeros(3), charges, (8, 20), [])
     assert pairs[0].tolist() == [light.tolist(), dark.tolist()]
 
 
 def test_two_strips_of_a_direction_never_show_nearly_the_same():
     places = np.array([[0, 0], [2, 0], [8, 1], [9, 40]])
     size = (12, 80)
-    pairs = patches.paired(places, np.array([0.0, 0, 1, 5]), np.zeros((4, 4)), size, [])
+    pairs = patches.rank_pairs(places, np.array([0.0, 0, 1, 5]), np.zeros((4, 4)), size, [])
     # nearer than a quarter of the shorter side is the same, however cheap; then costs decide, then ground shown twice
     assert [pair.tolist() for pair in pairs[[0, 1, -1]]] == [places[k].tolist() for k in ([0, 2], [1, 2], [0, 1])]
-    alone = patches.paired(places[:1], np.zeros(1), np.zeros((1, 1)), size, [])
+    alone = patches.rank_pairs(places[:1], np.zeros(1), np.zeros((1, 1)), size, [])
     assert alone.tolist() == [[[0, 0], [0, 0]]]  # rather than none
 
 
 def test_ground_seen_beside_a_strip_is_dearer():
     places = np.array([[0, 0], [20, 0], [40, 0]])
-    pairs = patches.paired(places, np.zeros(3), np.zeros((3, 3)), (10, 30), [(places[0], (10, 10))])
+    pairs = patches.rank_pairs(places, np.zeros(3), np.zeros((3, 3)), (10, 30), [(places[0], (10, 10))])
     assert pairs[0].tolist() == [[20, 0], [40, 0]]
 
 
@@ -133,10 +133,10 @@ def test_a_strip_is_no_better_for_being_barer_than_the_ground(rng):
     colour[20:] -= 0.2 * (rng.random((40, 60, 1)) < 0.1)  # flowers on two thirds of it
     colour[40:44, 4:8] = 0
     plan = layout.Layout(60, 1, 20, 2, 3)
-    guide = patches.guide(colour, np.zeros((60, 60)), np.zeros((60, 60)), plan)
+    guide = patches.make_guidance(colour, np.zeros((60, 60)), np.zeros((60, 60)), plan)
     places = np.array([(x, y) for x in range(8, 56, 4) for y in range(0, 41, 5)] + [(4, 36)])
-    odd = patches.conspicuous(guide, places, (4, 20))
-    plain = patches.means(patches.oddness(guide), places, (4, 20))
+    odd = patches.patch_saliency(guide, places, (4, 20))
+    plain = patches.patch_means(patches.compute_saliency(guide), places, (4, 20))
     bare = places[:, 1] == 0
     assert plain[bare].max() < np.median(plain)
     assert set(odd[bare]) == {odd.min()} == {np.median(plain)}

@@ -5,11 +5,12 @@ import pytest
 from fixtures import tile_sets
 from scipy.spatial.transform import Rotation
 
+from dav_gswt import field as fields
 from dav_gswt.errors import InputError
-from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh, write_field
-from dav_gswt.inspect import fields as seen
+from dav_gswt.field import GaussianField, rgb_to_sh
+from dav_gswt.inspect import field_scenes as seen
 from dav_gswt.inspect import scene
-from dav_gswt.inspect.options import Asked
+from dav_gswt.inspect.options import ViewOptions
 
 
 def one(sigma, ground=False, turn=None, opacity=4.0, uncertainty=0.0):
@@ -32,7 +33,7 @@ def volume(layer):
 
 def test_a_round_gaussian_is_a_solid_of_its_ellipsoids_volume_with_its_sides_outwards():
     turn = Rotation.from_euler("xyz", [20, 50, 80], degrees=True)
-    (layer,) = seen.solid(one([0.3, 0.1, 0.2], turn=turn), np.uint8([[9, 8, 7]]))
+    (layer,) = seen.make_solids(one([0.3, 0.1, 0.2], turn=turn), np.uint8([[9, 8, 7]]))
     assert abs(volume(layer)) == pytest.approx(4 / 3 * np.pi * 0.3 * 0.1 * 0.2, rel=1e-5)
     long = layer.points - layer.points.mean(0)
     along = long[np.linalg.norm(long, axis=1).argmax()]
@@ -42,7 +43,7 @@ def test_a_round_gaussian_is_a_solid_of_its_ellipsoids_volume_with_its_sides_out
 
 def test_a_disc_is_a_hexagon_of_its_ellipses_area_across_its_least_axis():
     turn = Rotation.from_euler("y", 30, degrees=True)
-    (layer,) = seen.solid(one([0.2, 0.001, 0.1], ground=True, turn=turn), np.uint8([[9, 8, 7]]))
+    (layer,) = seen.make_solids(one([0.2, 0.001, 0.1], ground=True, turn=turn), np.uint8([[9, 8, 7]]))
     ring = layer.points.astype(float) - [1, 2, 3]
     np.testing.assert_allclose(ring @ turn.as_matrix()[:, 1], 0, atol=1e-6)
     area = np.linalg.norm(np.cross(ring, np.roll(ring, -1, 0)).sum(0)) / 2
@@ -51,53 +52,52 @@ def test_a_disc_is_a_hexagon_of_its_ellipses_area_across_its_least_axis():
 
 
 def test_faint_gaussians_are_left_out_and_large_fields_are_thinned_evenly():
-    many = concatenate_fields(
+    many = fields.concatenate_fields(
         [one([0.1] * 3, opacity=-9.0)] + [one([0.1] * 3, uncertainty=i / 100) for i in range(100)]
     )
-    assert len(seen.thinned(many, 1000)) == 100
-    np.testing.assert_allclose(seen.thinned(many, 4).uncertainty, [0, 0.33, 0.66, 0.99], atol=1e-6)
+    assert len(seen.thin_field(many, 1000)) == 100
+    np.testing.assert_allclose(seen.thin_field(many, 4).uncertainty, [0, 0.33, 0.66, 0.99], atol=1e-6)
 
 
 def test_a_field_is_coloured_by_what_is_asked(tmp_path):
     path = tmp_path / "level2_of.ply"
-    write_field(one([0.1] * 3, uncertainty=1.0), path)
-    shown = {by: seen.show(path, Asked(colour=by)).layers[0].colours[0] for by in seen.NAMES}
+    fields.write_field(one([0.1] * 3, uncertainty=1.0), path)
+    shown = {by: seen.build_field(path, ViewOptions(colour=by)).layers[0].colours[0] for by in seen.COLOUR_NAMES}
     np.testing.assert_array_equal(shown["colour"], [51, 102, 153])
-    np.testing.assert_array_equal(shown["uncertainty"], scene.coloured(np.ones(1), scene.Bar("", 0.0, 1.0))[0])
+    np.testing.assert_array_equal(shown["uncertainty"], scene.map_colours(np.ones(1), scene.ColourBar("", 0.0, 1.0))[0])
     np.testing.assert_array_equal(shown["level"], seen.level_colour(2))
     with pytest.raises(InputError, match="--colour hue: .* has colour, uncertainty, level"):
-        seen.show(path, Asked(colour="hue"))
+        seen.build_field(path, ViewOptions(colour="hue"))
 
 
 def test_a_field_whose_name_tells_no_level_has_none(tmp_path):
-    write_field(one([0.1] * 3), tmp_path / "field.ply")
+    fields.write_field(one([0.1] * 3), tmp_path / "field.ply")
     with pytest.raises(InputError, match="no level by its name"):
-        seen.show(tmp_path / "field.ply", Asked(colour="level"))
+        seen.build_field(tmp_path / "field.ply", ViewOptions(colour="level"))
 
 
 def test_a_field_of_nothing_opaque_is_said(tmp_path):
-    write_field(one([0.1] * 3, opacity=-9.0), tmp_path / "field.ply")
+    fields.write_field(one([0.1] * 3, opacity=-9.0), tmp_path / "field.ply")
     with pytest.raises(InputError, match="nothing is to be seen"):
-        seen.show(tmp_path / "field.ply", Asked())
+        seen.build_field(tmp_path / "field.ply", ViewOptions())
 
 
 def test_levels_stand_side_by_side_and_one_can_be_picked(tree):
-    both = seen.show_levels(tree.round / "levels", Asked(colour="level"))
+    both = seen.build_levels_scene(tree.round / "levels", ViewOptions(colour="level"))
     assert list(both.legend[0].named) == ["level 0", "level 1"]
     finest, coarse = both.layers[0], both.layers[2]
     assert finest.points[:, 0].max() < coarse.points[:, 0].min()
     assert len(coarse.cells) == (tile_sets.CELLS // 2) ** 2
-    single = seen.show_levels(tree.round / "levels", Asked(level=1))
+    single = seen.build_levels_scene(tree.round / "levels", ViewOptions(level=1))
     assert sum(len(layer.cells) for layer in single.layers) < sum(len(layer.cells) for layer in both.layers)
     with pytest.raises(InputError, match="levels 0 to 1"):
-        seen.show_levels(tree.round / "levels", Asked(level=2))
+        seen.build_levels_scene(tree.round / "levels", ViewOptions(level=2))
 
 
 def test_maps_of_poses_colour_the_field_beside_them(tree):
-    from dav_gswt.inspect import maps
 
-    shown = maps.show_posed(tree.round / "maps.npz", Asked())
+    shown = maps.show_posed(tree.round / "maps.npz", ViewOptions())
     ground = shown.layers[0].colours
     cool, warm = ground[0].astype(int), ground[-1].astype(int)
     assert cool[2] > cool[0] and warm[0] > cool[0]  # doubt grows along the file
-    assert shown.legend == [scene.Bar("uncertainty", 0.0, 1.0)]
+    assert shown.legend == [scene.ColourBar("uncertainty", 0.0, 1.0)]

@@ -6,13 +6,13 @@ from fixtures import result_tree
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import write_json
-from dav_gswt.inspect import beside, sites
-from dav_gswt.inspect.options import Asked
+from dav_gswt.inspect import photo_scenes, result_files
+from dav_gswt.inspect.options import ViewOptions
 
 
 def test_a_camera_is_a_pyramid_whose_base_fills_its_picture():
     camera = result_tree.camera(result_tree.poses()[3])
-    (layer,) = sites.looking(camera, 0.5, (1, 2, 3), None)
+    (layer,) = photo_scenes.make_frustum(camera, 0.5, (1, 2, 3), None)
     np.testing.assert_allclose(layer.points[0], camera.centre, atol=1e-5)
     pixels, depth = camera.project(layer.points[1:].astype(float))
     np.testing.assert_allclose(pixels, [[0, 0], [24, 0], [24, 16], [0, 16]], atol=1e-3)
@@ -20,7 +20,7 @@ def test_a_camera_is_a_pyramid_whose_base_fills_its_picture():
 
 
 def test_photos_hang_in_their_pyramids_with_the_points_and_the_exemplar(tree):
-    shown = sites.show(tree.photos, Asked())
+    shown = photo_scenes.build_photos(tree.photos, ViewOptions())
     hung = [layer for layer in shown.layers if layer.picture is not None]
     assert [int(layer.picture[0, 0, 0]) for layer in hung] == [204, 51, 128]  # test_00, view_00, view_01
     points = next(layer for layer in shown.layers if layer.kind == "points")
@@ -30,7 +30,7 @@ def test_photos_hang_in_their_pyramids_with_the_points_and_the_exemplar(tree):
 
 
 def test_the_photos_of_a_round_join_those_of_the_scene(tree):
-    shown = sites.show_captured(tree.round / "capture/capture.json", Asked())
+    shown = photo_scenes.build_capture(tree.round / "capture/capture.json", ViewOptions())
     assert "taken for a round" in shown.legend[0].named
     assert sum(layer.picture is not None for layer in shown.layers) == 5
 
@@ -39,13 +39,13 @@ def test_names_that_lead_out_of_the_folder_are_refused(tree, tmp_path):
     shot = {"name": "../../secret.png", "got": {}}
     write_json(tmp_path / "capture.json", {"shots": [shot]})
     with pytest.raises(InputError, match="not as the workflow writes it"):
-        beside.shots_of(tmp_path / "capture.json")
+        result_files.read_shots(tmp_path / "capture.json")
     from dav_gswt.geometry import cameras
 
     shot["got"] = cameras.to_json(result_tree.camera(result_tree.poses()[0]))
     write_json(tree.start / "capture.json", {"shots": [shot]})
     try:
         with pytest.raises(InputError, match="is no file's name"):
-            sites.show_captured(tree.start / "capture.json", Asked())
+            photo_scenes.build_capture(tree.start / "capture.json", ViewOptions())
     finally:
         (tree.start / "capture.json").unlink()

@@ -7,45 +7,57 @@ from jaxtyping import Float, Integer
 from numpy import ndarray as Array
 
 from dav_gswt.bundle import store as bundles
-from dav_gswt.bundle.fidelity import laid
+from dav_gswt.bundle.fidelity import arrange_torus
 from dav_gswt.errors import InputError
-from dav_gswt.export.splats import ROW
+from dav_gswt.export.splats import TILES_PER_ROW
 from dav_gswt.field import GaussianField
-from dav_gswt.inspect import beside
-from dav_gswt.inspect.fields import LEVELS, NAMES, colours, level_colour, shaded, solid, thinned
-from dav_gswt.inspect.options import Asked
-from dav_gswt.inspect.scene import Bar, Keys, Layer, Scene, Word, moved
+from dav_gswt.inspect import result_files
+from dav_gswt.inspect.field_scenes import (
+    COLOUR_NAMES,
+    LEVEL_COLOURS,
+    compute_colours,
+    level_colour,
+    make_solids,
+    shade_colours,
+    thin_field,
+)
+from dav_gswt.inspect.options import ViewOptions
+from dav_gswt.inspect.scene import ColourBar, ColourKey, Label, Layer, Scene, move_layer
 from dav_gswt.tiles import store
 from dav_gswt.tiles.build import TileSet
 from dav_gswt.tiles.layout import EDGES, LABELS
 
 GAP, LETTER = 0.2, 0.1  # tile sides
-WIDE, LEAST, LIFT = 0.35, 0.012, 0.6  # a cut's width in finest cells, and at least in tiles; its height in a level's
-CUT = (255, 214, 10)
-PATCHES = [(187, 187, 187), *LEVELS[:4], (102, 204, 238), (170, 51, 119), (153, 102, 51), (0, 0, 0)]
+CUT_WIDTH, MIN_CUT_WIDTH, CUT_LIFT = (
+    0.35,
+    0.012,
+    0.6,
+)  # a cut's width in finest cells, and at least in tiles; its height in a level's
+CUT_COLOUR = (255, 214, 10)
+PATCH_COLOURS = [(187, 187, 187), *LEVEL_COLOURS[:4], (102, 204, 238), (170, 51, 119), (153, 102, 51), (0, 0, 0)]
 SCHEMA = Path(__file__).parents[3] / "schemas" / "davgswt.schema.json"
 
 
-def show(path: Path, asked: Asked) -> Scene:
+def build_tiles(path: Path, asked: ViewOptions) -> Scene:
     """A folder of tiles, or its seams.json."""
     seams = path / "seams.json"
-    with beside.told_by(seams):
-        found = store.read(path / "tiles", seams)
-        _check(found, seams)
-    return of_tiles(str(path), found.fields, found.side, found, asked)
+    with result_files.blaming(seams):
+        found = store.read_tiles(path / "tiles", seams)
+        _check_labels(found, seams)
+    return arrange_tiles(str(path), found.fields, found.side, found, asked)
 
 
-def show_bundle(path: Path, asked: Asked) -> Scene:
+def build_bundle(path: Path, asked: ViewOptions) -> Scene:
     """A bundle's folder: the tiles as they were rounded; it keeps no cuts."""
     if not SCHEMA.is_file():
         raise InputError(f"{path}: bundles are read by {SCHEMA}, which is not there; install from a checkout")
-    found = bundles.read(path, SCHEMA)
-    with beside.told_by(path / "davgswt.json"):
+    found = bundles.read_bundle(path, SCHEMA)
+    with result_files.blaming(path / "davgswt.json"):
         side = float(found.manifest["tile_side"])
-    return of_tiles(str(path), found.fields(), side, None, asked)
+    return arrange_tiles(str(path), found.fields(), side, None, asked)
 
 
-def _check(found: TileSet, seams: Path) -> None:
+def _check_labels(found: TileSet, seams: Path) -> None:
     labels = found.labels
     fits = labels.ndim == 3 and labels.shape[1] == labels.shape[2] and labels.dtype.kind in "ui"
     if not fits or len(labels) % EDGES or labels.max(initial=0) >= len(LABELS):
@@ -54,83 +66,85 @@ def _check(found: TileSet, seams: Path) -> None:
         raise InputError(f"{seams}: its tiles are {found.side} wide and their maps are not; cut them again")
 
 
-def of_tiles(title: str, found: list[list[GaussianField]], side: float, cut: TileSet | None, asked: Asked) -> Scene:
+def arrange_tiles(
+    title: str, found: list[list[GaussianField]], side: float, cut: TileSet | None, asked: ViewOptions
+) -> Scene:
     """All tiles of a level, or at `level` all levels in a row, the finest in the west. cut: where seams run."""
-    by = asked.one_of((*NAMES, "patch") if cut else NAMES, title)
-    numbers = asked.levels_of(len(found), Path(title))
+    by = asked.choose_colour((*COLOUR_NAMES, "patch") if cut else COLOUR_NAMES, title)
+    numbers = asked.choose_levels(len(found), Path(title))
     if asked.level is None and by != "level":
         numbers = numbers[:1]
-    step, tall = side * (1 + GAP), ROW * side * (1 + GAP)
+    step, tall = side * (1 + GAP), TILES_PER_ROW * side * (1 + GAP)
     wide = tall * (len(found[0]) // EDGES)
     layers, words = [], []
     for place, number in enumerate(numbers):
-        for tile, corner in placed(len(found[0]), step):
+        for tile, corner in place_tiles(len(found[0]), step):
             corner = corner + [place * (wide + 2 * GAP * side), 0.0, 0.0]
-            some = thinned(found[number][tile], asked.most // len(found[0]) // len(numbers))
-            layers += [moved(layer, corner) for layer in _drawn(some, by, number, tile, cut)]
+            some = thin_field(found[number][tile], asked.most // len(found[0]) // len(numbers))
+            layers += [move_layer(layer, corner) for layer in _tile_layers(some, by, number, tile, cut)]
             if cut and by != "patch":
-                layers.append(moved(cuts(cut, tile, number), corner))
+                layers.append(move_layer(make_cuts(cut, tile, number), corner))
             if place == 0:
                 middle = float(np.median(some.means[:, 2])) if len(some) else 0.0
                 at = corner + [0.5 * side, -0.6 * GAP * side, middle]
-                words.append(Word(f"{tile}", tuple(at), LETTER * side, standing=False))
+                words.append(Label(f"{tile}", tuple(at), LETTER * side, upright=False))
     low = np.array([0.0, -GAP * side, 0.0])
     high = np.array([wide + (len(numbers) - 1) * (wide + 2 * GAP * side), tall - GAP * side, 0.2 * side])
     about = f"{len(found[0])} tiles, {len(found)} levels, {side:.4g} wide; by {by}"
     shown = "levels " + ", ".join(map(str, numbers)) if len(numbers) > 1 else f"level {numbers[0]}"
-    return Scene(title, layers, low, high, [about, shown], words, _legend(by, numbers, cut), (-0.25, -1.0, 1.3))
+    return Scene(title, layers, low, high, [about, shown], words, _make_legend(by, numbers, cut), (-0.25, -1.0, 1.3))
 
 
-def placed(count: int, step: float) -> list[tuple[int, Float[Array, "3"]]]:
+def place_tiles(count: int, step: float) -> list[tuple[int, Float[Array, "3"]]]:
     """Tiles and their south-western corners: each variant's sixteen four by four, neighbours' edges of one colour."""
     return [
-        (int(tile), np.array([(ROW * variant + column) * step, row * step, 0.0]))
+        (int(tile), np.array([(TILES_PER_ROW * variant + column) * step, row * step, 0.0]))
         for variant in range(count // EDGES)
-        for (row, column), tile in np.ndenumerate(laid(variant)[1:-1, 1:-1])
+        for (row, column), tile in np.ndenumerate(arrange_torus(variant)[1:-1, 1:-1])
     ]
 
 
-def _drawn(some: GaussianField, by: str, level: int, tile: int, cut: TileSet | None) -> list[Layer]:
+def _tile_layers(some: GaussianField, by: str, level: int, tile: int, cut: TileSet | None) -> list[Layer]:
     if not len(some):
         return []
     if by != "patch":
-        return solid(some, colours(some, by, level))
-    return solid(some, shaded(np.array(PATCHES)[patch_of(some, cut, tile)], some))
+        return make_solids(some, compute_colours(some, by, level))
+    return make_solids(some, shade_colours(np.array(PATCH_COLOURS)[find_patches(some, cut, tile)], some))
 
 
-def patch_of(some: GaussianField, cut: TileSet, tile: int) -> Integer[Array, "n"]:
+def find_patches(some: GaussianField, cut: TileSet, tile: int) -> Integer[Array, "n"]:
     """The label of the cell that each Gaussian lies over; of the nearest one, beyond the tile."""
     last = cut.labels.shape[1] - 1
     column, row = np.clip(some.means[:, :2] / cut.spacing, 0, last).astype(int).T
     return cut.labels[tile][row, column]
 
 
-def cuts(cut: TileSet, tile: int, level: int) -> Layer:
+def make_cuts(cut: TileSet, tile: int, level: int) -> Layer:
     """Where a tile's labels change, as ribbons a little above the highest ground of the two cells that part there.
 
     Ribbons, not lines: browsers draw lines one pixel wide.
     """
     labels, spacing = cut.labels[tile], cut.spacing
-    height = heights(cut.fields[level][tile], len(labels), spacing)
+    height = compute_heights(cut.fields[level][tile], len(labels), spacing)
     rows, columns = np.nonzero(labels[:, 1:] != labels[:, :-1])  # a border that runs north
     upright = np.stack([columns + 1.0, rows + 0.0, np.maximum(height[rows, columns], height[rows, columns + 1])], -1)
     rows, columns = np.nonzero(labels[1:] != labels[:-1])  # one that runs east
     eastward = np.stack([columns + 0.0, rows + 1.0, np.maximum(height[rows, columns], height[rows + 1, columns])], -1)
-    half = 0.5 * max(WIDE, LEAST * len(labels))
+    half = 0.5 * max(CUT_WIDTH, MIN_CUT_WIDTH * len(labels))
     tall = np.array([[-half, -half], [half, -half], [half, 1 + half], [-half, 1 + half]])
-    corners = [_ribbons(upright, tall, spacing), _ribbons(eastward, tall[:, ::-1], spacing)]
+    corners = [_make_ribbons(upright, tall, spacing), _make_ribbons(eastward, tall[:, ::-1], spacing)]
     points = np.concatenate(corners).reshape(-1, 3).astype(np.float32)
-    points[:, 2] += LIFT * spacing * 2**level
-    return Layer("faces", points, np.arange(len(points)).reshape(-1, 4), CUT)
+    points[:, 2] += CUT_LIFT * spacing * 2**level
+    return Layer("faces", points, np.arange(len(points)).reshape(-1, 4), CUT_COLOUR)
 
 
-def _ribbons(starts: Float[Array, "n 3"], shape: Float[Array, "4 2"], spacing: float) -> Float[Array, "n 4 3"]:
+def _make_ribbons(starts: Float[Array, "n 3"], shape: Float[Array, "4 2"], spacing: float) -> Float[Array, "n 4 3"]:
     points = np.repeat(starts[:, None], 4, 1)
     points[..., :2] = (points[..., :2] + shape) * spacing
     return points
 
 
-def heights(some: GaussianField, cells: int, spacing: float) -> Float[Array, "cells cells"]:
+def compute_heights(some: GaussianField, cells: int, spacing: float) -> Float[Array, "cells cells"]:
     """The ground's height over a tile's finest cells: the highest disc's, of the nearest cell where there is none."""
     from scipy.ndimage import distance_transform_edt
 
@@ -144,11 +158,11 @@ def heights(some: GaussianField, cells: int, spacing: float) -> Float[Array, "ce
     return out[tuple(nearest)]
 
 
-def _legend(by: str, numbers: list[int], cut: TileSet | None) -> list[Bar | Keys]:
+def _make_legend(by: str, numbers: list[int], cut: TileSet | None) -> list[ColourBar | ColourKey]:
     if by == "uncertainty":
-        bars = [Bar("uncertainty", 0.0, 1.0)]
+        bars = [ColourBar("uncertainty", 0.0, 1.0)]
     elif by == "level":
-        bars = [Keys({f"level {n}": level_colour(n) for n in numbers})]
+        bars = [ColourKey({f"level {n}": level_colour(n) for n in numbers})]
     else:
-        bars = [Keys(dict(zip(LABELS, PATCHES, strict=True)))] * (by == "patch")
-    return bars + [Keys({"cut": CUT})] * (cut is not None and by != "patch")
+        bars = [ColourKey(dict(zip(LABELS, PATCH_COLOURS, strict=True)))] * (by == "patch")
+    return bars + [ColourKey({"cut": CUT_COLOUR})] * (cut is not None and by != "patch")
