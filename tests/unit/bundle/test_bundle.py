@@ -230,7 +230,7 @@ def test_a_tile_without_splats_is_refused_and_nothing_is_left(tiles, tmp_path):
 
 
 def test_more_splats_than_the_renderer_takes_are_refused(tiles, tmp_path, monkeypatch):
-    monkeypatch.setattr(gswt, "MOST", 100)
+    monkeypatch.setattr(gswt, "MAX_SPLATS", 100)
     with pytest.raises(InputError, match="the renderer takes 100"):
         gswt.write_gswt(tiles.fields, SIDE, tmp_path / "gswt.zip")
 
@@ -318,7 +318,7 @@ def cut(folder, end, more=b""):
 
 
 def test_a_manifest_as_large_as_no_manifest_is_not_read(copy_of, monkeypatch):
-    monkeypatch.setattr(manifest, "LARGEST", 1000)
+    monkeypatch.setattr(manifest, "MAX_BYTES", 1000)
     with pytest.raises(InputError, match="bytes are no manifest"):
         store.read_bundle(copy_of, SCHEMA)
 

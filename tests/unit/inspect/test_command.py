@@ -65,7 +65,7 @@ def test_without_the_extra_one_line_says_how_to_install_it(tree, tmp_path, monke
 
 
 def test_without_a_display_a_file_is_asked_for(tree, monkeypatch, capsys):
-    monkeypatch.setattr(command, "require", lambda: None)
+    monkeypatch.setattr(command, "require_extra", lambda: None)
     monkeypatch.setattr(saving.sys, "platform", "linux")
     assert main(["inspect", str(tree.photos)]) == 1
     assert "add --save FILE.png or --save FILE.html" in capsys.readouterr().err

@@ -95,8 +95,9 @@ def test_levels_stand_side_by_side_and_one_can_be_picked(tree):
 
 
 def test_maps_of_poses_colour_the_field_beside_them(tree):
+    from dav_gswt.inspect import map_scenes
 
-    shown = maps.show_posed(tree.round / "maps.npz", ViewOptions())
+    shown = map_scenes.build_pose_maps(tree.round / "maps.npz", ViewOptions())
     ground = shown.layers[0].colours
     cool, warm = ground[0].astype(int), ground[-1].astype(int)
     assert cool[2] > cool[0] and warm[0] > cool[0]  # doubt grows along the file

@@ -53,7 +53,7 @@ def test_levels_are_fitted_while_the_exemplar_has_room():
 
 def test_a_level_that_saves_nothing_is_not_made(monkeypatch):
     field, grid = made.field(), made.grid()
-    monkeypatch.setattr(build, "SAVES", 0.1)  # a quarter is left
+    monkeypatch.setattr(build, "MAX_SHARE", 0.1)  # a quarter is left
     alone = build.build_levels(field, grid, AUTO, 1, seed=0)
     assert len(alone.fields) == 1 and alone.wanted == 1 and "saves too little" in alone.stopped
     assert len(build.build_levels(field, grid, 2, 1, seed=0).fields) == 2  # but where it is asked for

@@ -50,16 +50,16 @@ def run_inspect(options: argparse.Namespace) -> int:
     if options.save is not None and options.save.suffix not in FORMATS:
         raise InputError(f"--save {options.save}: pictures end in .png and pages in .html")
     require_extra()
-    from dav_gswt.inspect import saving  # below the check: they load what is drawn with
+    from dav_gswt.inspect import artifacts, saving  # below the check: they load what is drawn with
 
     if options.save is None and not saving.has_display():
         raise InputError("there is no display for a window here: add --save FILE.png or --save FILE.html")
-    scene = kinds.scene_of(options.path, asked)
+    scene = artifacts.build_scene(options.path, asked)
     if options.save is None:
-        saving.window(scene, options.size)
+        saving.open_window(scene, options.size)
     else:
-        saving.prepare()
-        saving.save(scene, options.save, options.size)
+        saving.prepare_rendering()
+        saving.save_scene(scene, options.save, options.size)
         print(options.save)
     return 0
 

@@ -67,21 +67,23 @@ def prepare_rendering() -> None:
 
 def save_scene(scene: Scene, path: Path, size: tuple[int, int]) -> None:
     """Write a .png or a .html file; it appears whole or not at all."""
+    from dav_gswt.inspect import plotting  # here, not above: it loads VTK
 
     with whole(path) as part:
         if path.suffix == ".png":
-            drawn = drawing.plotter(scene, size, off_screen=True)
+            drawn = plotting.make_plotter(scene, size, off_screen=True)
             drawn.screenshot(str(part))
         else:
-            drawn = drawing.plotter(scene, size, off_screen=True, legend=False)
+            drawn = plotting.make_plotter(scene, size, off_screen=True, legend=False)
             part.write_text(format_page(scene, drawn.render_window), encoding="utf-8")
         drawn.close()
 
 
 def open_window(scene: Scene, size: tuple[int, int]) -> None:
     """Show until the window is closed."""
+    from dav_gswt.inspect import plotting  # here, not above: it loads VTK
 
-    drawing.plotter(scene, size, off_screen=False).show(title=scene.title)
+    plotting.make_plotter(scene, size, off_screen=False).show(title=scene.title)
 
 
 def format_page(scene: Scene, render_window) -> str:

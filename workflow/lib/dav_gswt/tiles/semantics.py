@@ -54,7 +54,7 @@ class SemanticLayer:
 def make_semantic_layer(colour: Float[Array, "m m 3"], source: SemanticSource) -> SemanticLayer:
     """Describe an exemplar. colour: in [0, 1].
 
-    Raises: InputError: see sam2.opened.
+    Raises: InputError: see `sam2.load_model`.
     """
     segments = segment_superpixels(colour, max(MIN_WIDTH, len(colour) / SUPERPIXELS**0.5))
     said = {"alexnet": source.alexnet is not None, "segments": "slic"}
@@ -62,7 +62,7 @@ def make_semantic_layer(colour: Float[Array, "m m 3"], source: SemanticSource) -
         from dav_gswt.tiles import sam2
 
         with one_thread():
-            masks = sam2.masks(sam2.opened(source.sam2), colour)
+            masks = sam2.predict_masks(sam2.load_model(source.sam2), colour)
         segments, said = overlay_masks(segments, masks), said | {"segments": "sam2 and slic", "masks": len(masks)}
     if source.alexnet is None:
         _log.info("LPIPS's weights are not at hand: seams know colours and superpixels, not what AlexNet sees")
