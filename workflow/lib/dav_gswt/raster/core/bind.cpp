@@ -45,8 +45,15 @@ View view_of(const In& numbers, int width, int height, bool orthographic, bool a
 Scene scene_of(const In& means, const In& log_scales, const In& quats, const In& logits, const In& colours,
                const MaybeIn& features) {
   const bool harmonics = colours.ndim() == 3;
-  return {means.shape(0), means.data(), log_scales.data(), quats.data(), logits.data(), colours.data(),
-          harmonics ? 3 : int(colours.shape(1)), harmonics ? int(colours.shape(1)) : 0, pointer(features),
+  return {means.shape(0),
+          means.data(),
+          log_scales.data(),
+          quats.data(),
+          logits.data(),
+          colours.data(),
+          harmonics ? 3 : int(colours.shape(1)),
+          harmonics ? int(colours.shape(1)) : 0,
+          pointer(features),
           features ? int(features->shape(1)) : 0};
 }
 
@@ -68,11 +75,11 @@ void backward(Context& context, In means, In log_scales, In quats, In logits, In
               MaybeIn grad_features, Out d_means, Out d_log_scales, Out d_quats, Out d_logits, Out d_colours,
               MaybeOut d_features, Out d_camera, int threads) {
   const Scene scene = scene_of(means, log_scales, quats, logits, colours, features);
-  const Pictures pictures{int(colour.shape(1)), int(colour.shape(0)), unread(colour), unread(alpha), unread(depth),
-                          features_seen ? unread(*features_seen) : nullptr};
+  const Pictures pictures{int(colour.shape(1)), int(colour.shape(0)), unread(colour),
+                          unread(alpha),        unread(depth),        features_seen ? unread(*features_seen) : nullptr};
   const PictureGradients given{grad_colour.data(), pointer(grad_alpha), pointer(grad_depth), pointer(grad_features)};
-  const SceneGradients out{d_means.data(), d_log_scales.data(), d_quats.data(), d_logits.data(), d_colours.data(),
-                           pointer(d_features), d_camera.data()};
+  const SceneGradients out{d_means.data(),   d_log_scales.data(), d_quats.data(), d_logits.data(),
+                           d_colours.data(), pointer(d_features), d_camera.data()};
   nb::gil_scoped_release release;
   context.backward(scene, pictures, given, out, threads);
 }
@@ -89,8 +96,8 @@ double loss(const std::string& isa, In image, In target, MaybeIn weight, float s
   const Kernels& kernels = kernels_of(isa);
   const int height = image.shape(0), width = image.shape(1), channels = image.shape(2);
   nb::gil_scoped_release release;
-  LossTask task{width, height, channels, image.data(), target.data(), pointer(weight), structure, gradient.data(),
-                nullptr, nullptr};
+  LossTask task{width,           height,    channels,        image.data(), target.data(),
+                pointer(weight), structure, gradient.data(), nullptr,      nullptr};
   const std::unique_ptr<float[]> scratch(new float[4 * size_t(height) * loss_stride(task)]);
   std::vector<double> rows(height);
   task.scratch = scratch.get();
@@ -111,11 +118,11 @@ void adam(const std::string& isa, Out values, In gradient, Out first, Out second
   nb::gil_scoped_release release;
   std::vector<float> pattern(each ? PATTERN * columns : 0);
   for (size_t i = 0; i < pattern.size(); i++) pattern[i] = rates.data()[i % columns];
-  kernels.adam({rows, columns, values.data(), gradient.data(), first.data(), second.data(),
-                moved ? moved->data() : nullptr, each ? 0 : rates.data()[0], each ? pattern.data() : nullptr,
-                float(beta1), float(beta2), epsilon, float(1 / (1 - std::pow(beta1, step))),
-                float(1 / (1 - std::pow(beta2, step)))},
-               threads);
+  kernels.adam(
+      {rows, columns, values.data(), gradient.data(), first.data(), second.data(), moved ? moved->data() : nullptr,
+       each ? 0 : rates.data()[0], each ? pattern.data() : nullptr, float(beta1), float(beta2), epsilon,
+       float(1 / (1 - std::pow(beta1, step))), float(1 / (1 - std::pow(beta2, step)))},
+      threads);
 }
 
 // Fused multiply-adds a second that threads do together, for about `seconds`; the best of some tries.

@@ -11,8 +11,9 @@
 namespace raster {
 namespace ISA {
 
-template <int C, bool DEPTH> static void backward_tile(const Splat* splats, const Tiles& tiles, const Images& images,
-                                                      const ImageGradients& gradients, float* records, int tile) {
+template <int C, bool DEPTH>
+static void backward_tile(const Splat* splats, const Tiles& tiles, const Images& images,
+                          const ImageGradients& gradients, float* records, int tile) {
   constexpr int SIZE = MOMENTS + C + DEPTH;
   const TileFrame frame(tile, tiles, images);
   Lanes transmittance[BLOCKS], behind[BLOCKS], colour[C ? C : 1][BLOCKS], depth[DEPTH ? BLOCKS : 1];
@@ -51,8 +52,8 @@ template <int C, bool DEPTH> static void backward_tile(const Splat* splats, cons
       if (DEPTH) share += depth[b] * s.depth;
       const Lanes rest = behind[b] - sample.weight * share;
       behind[b] = rest;
-      const Lanes v = where(sample.on & sample.unclamped,
-                            sample.alpha * (clear * share - rest * reciprocal(1.f - sample.alpha)));
+      const Lanes v =
+          where(sample.on & sample.unclamped, sample.alpha * (clear * share - rest * reciprocal(1.f - sample.alpha)));
       const Lanes vx = v * sample.dx, vy = v * sample.dy;
       record[0] += v;
       record[1] += vx;
@@ -69,8 +70,9 @@ template <int C, bool DEPTH> static void backward_tile(const Splat* splats, cons
   for_each_splat(frame, splats, tiles, tile, transmittance, blend_back, skip);
 }
 
-template <int C> static void blend_backward_tiles(const Splat* splats, const Tiles& tiles, const Images& images,
-                                     const ImageGradients& gradients, float* records, int threads) {
+template <int C>
+static void blend_backward_tiles(const Splat* splats, const Tiles& tiles, const Images& images,
+                                 const ImageGradients& gradients, float* records, int threads) {
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 2)
   for (int tile = 0; tile < tiles.columns * tiles.rows; tile++) {
     if (gradients.depth) backward_tile<C, true>(splats, tiles, images, gradients, records, tile);

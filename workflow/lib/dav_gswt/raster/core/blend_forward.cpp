@@ -5,8 +5,8 @@
 namespace raster {
 namespace ISA {
 
-template <int C> static void blend_tile(const Splat* splats, const Tiles& tiles, const Images& images,
-                                        bool only_colour, int tile) {
+template <int C>
+static void blend_tile(const Splat* splats, const Tiles& tiles, const Images& images, bool only_colour, int tile) {
   const TileFrame frame(tile, tiles, images);
   Lanes transmittance[BLOCKS], colour[C ? C : 1][BLOCKS], depth[BLOCKS];
   for (int b = 0; b < BLOCKS; b++) {
@@ -36,11 +36,10 @@ template <int C> static void blend_tile(const Splat* splats, const Tiles& tiles,
   });
 }
 
-template <int C> static void blend(const Splat* splats, const Tiles& tiles, const Images& images, bool only_colour,
-                                   int threads) {
+template <int C>
+static void blend(const Splat* splats, const Tiles& tiles, const Images& images, bool only_colour, int threads) {
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 2)
-  for (int tile = 0; tile < tiles.columns * tiles.rows; tile++)
-    blend_tile<C>(splats, tiles, images, only_colour, tile);
+  for (int tile = 0; tile < tiles.columns * tiles.rows; tile++) blend_tile<C>(splats, tiles, images, only_colour, tile);
 }
 
 void blend_forward(const Splat* splats, const Tiles& tiles, const Images& images, bool only_colour, int threads) {

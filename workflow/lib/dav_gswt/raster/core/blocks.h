@@ -110,7 +110,7 @@ static inline void blend_block(const TileFrame& frame, const TileSplat& s, int b
 // skip(place) for the rest once all pixels are saturated.
 template <class At, class Skip>
 static inline void for_each_splat(const TileFrame& frame, const Splat* splats, const Tiles& tiles, int tile,
-                        const Lanes* transmittance, At at, Skip skip) {
+                                  const Lanes* transmittance, At at, Skip skip) {
   const uint32_t end = tiles.first[tile + 1];
   uint32_t place = tiles.first[tile];
   Blocks alive = alive_blocks(transmittance, lowest(BLOCKS));

@@ -84,9 +84,7 @@ Values Context::colours(const Scene& scene) const {
   return {scene.colours, rows_.data(), scene.channels};
 }
 
-Values Context::features(const Scene& scene) const {
-  return {scene.features, rows_.data(), scene.feature_channels};
-}
+Values Context::features(const Scene& scene) const { return {scene.features, rows_.data(), scene.feature_channels}; }
 
 // Joins the candidates of all chunks.
 void Context::cull(const Scene& scene, int threads) {
@@ -133,15 +131,15 @@ bool Context::forward(const Scene& scene, const View& view, const Pictures& pict
 }
 
 void Context::backward_pass(const Values& values, Images images, ImageGradients given, bool first, bool reload,
-                        float* gradients, int threads) {
+                            float* gradients, int threads) {
   images.channels = values.channels;
   each_pass(values.channels, [&](int channel, int group) {
     if (!first || channel > 0) given.alpha = given.depth = nullptr;  // counted once
     const bool depth = given.depth != nullptr;
     records_.resize(binning_.intersections() * (MOMENTS + group + depth));
     if (reload) kernels_.load_values(values, rows_.size(), channel, group, splats_.data(), threads);
-    kernels_.blend_backward(splats_.data(), binning_.tiles(), pass_of(images, channel, group), given,
-                            records_.data(), threads);
+    kernels_.blend_backward(splats_.data(), binning_.tiles(), pass_of(images, channel, group), given, records_.data(),
+                            threads);
     kernels_.collect(binning_.tiles(), rows_.size(), values, channel, group, depth, !first || channel > 0,
                      records_.data(), sums_.data(), gradients, threads);
   });
@@ -163,7 +161,7 @@ void Context::backward(const Scene& scene, const Pictures& pictures, const Pictu
   const bool reload = scene.channels > GROUP || features_seen(scene);  // the splats hold what was drawn last
   const Images images{view_.width, view_.height, 0, 0, 0, pictures.colour, pictures.alpha, pictures.depth};
   backward_pass(colours(scene), images, {given.colour, given.alpha, given.depth}, true, reload,
-            scene.coefficients ? by_sh_colours_.data() : out.colours, threads);
+                scene.coefficients ? by_sh_colours_.data() : out.colours, threads);
   if (features_seen(scene) && given.features) {
     clear(out.features, scene.feature_channels, scene.n, counts_, threads);
     Images second = images;

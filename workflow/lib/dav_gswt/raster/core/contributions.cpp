@@ -12,8 +12,8 @@ static inline float largest(Lanes v) {
   return found;
 }
 
-template <int C> static void contribute_tile(const Splat* splats, const Tiles& tiles, const Images& map,
-                                                     float* records, int tile) {
+template <int C>
+static void contribute_tile(const Splat* splats, const Tiles& tiles, const Images& map, float* records, int tile) {
   constexpr int SIZE = 3 + C;
   const TileFrame frame(tile, tiles, map);
   Lanes transmittance[BLOCKS], values[C ? C : 1][BLOCKS] = {};
@@ -42,8 +42,8 @@ template <int C> static void contribute_tile(const Splat* splats, const Tiles& t
   for_each_splat(frame, splats, tiles, tile, transmittance, add, skip);
 }
 
-template <int C> static void contribute_tiles(const Splat* splats, const Tiles& tiles, const Images& map,
-                                                      float* records, int threads) {
+template <int C>
+static void contribute_tiles(const Splat* splats, const Tiles& tiles, const Images& map, float* records, int threads) {
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 2)
   for (int tile = 0; tile < tiles.columns * tiles.rows; tile++) contribute_tile<C>(splats, tiles, map, records, tile);
 }

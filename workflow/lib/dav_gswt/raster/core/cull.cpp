@@ -15,7 +15,8 @@ constexpr float SLACK = 1.001f, ROUNDING = 0.01f;  // wider, and further by pixe
 static inline Three triples(const float* rows, size_t first, int count) {
   Three out;
   if (count == LANES) load_triples(rows + 3 * first, out.v);
-  else for (int k = 0; k < 3; k++) out[k] = load_column(rows + k, 3, first, count);
+  else
+    for (int k = 0; k < 3; k++) out[k] = load_column(rows + k, 3, first, count);
   return out;
 }
 

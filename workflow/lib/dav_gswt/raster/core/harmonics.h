@@ -54,8 +54,7 @@ static inline Three basis_gradient(const Three& to, int count, const Lanes* w) {
   const Lanes flat = x * x - y * y, high = 5 * z * z - 1, xy = x * y, yz = y * z, xz = x * z;
   g[0] += SH3B * (w[10] * yz + w[14] * xz) - SH3C * w[13] * high - 3 * SH3A * (2 * w[9] * xy + w[15] * flat);
   g[1] += SH3B * (w[10] * xz - w[14] * yz) - SH3C * w[11] * high - 3 * SH3A * (w[9] * flat - 2 * w[15] * xy);
-  g[2] += SH3B * (w[10] * xy + 0.5f * w[14] * flat) - 10 * SH3C * (w[11] * yz + w[13] * xz) +
-          3 * SH3D * w[12] * high;
+  g[2] += SH3B * (w[10] * xy + 0.5f * w[14] * flat) - 10 * SH3C * (w[11] * yz + w[13] * xz) + 3 * SH3D * w[12] * high;
   return g;
 }
 
@@ -81,7 +80,7 @@ static inline Three shade(const Scene& scene, const View& view, const Rows& rows
 // The backward pass of `shade` from `by_colour`, 0 where the colour was clamped at 0: writes the gradients by the
 // coefficients, returns those by the Gaussian's position (orthographic: by the view's direction).
 static inline Three shade_backward(const Scene& scene, const View& view, const Rows& rows, const Three& mean,
-                            const Three& by_colour, float* out) {
+                                   const Three& by_colour, float* out) {
   const int count = scene.coefficients;
   const ViewDirection direction(mean, view);
   Lanes basis[COEFFICIENTS], weight[COEFFICIENTS];

@@ -4,10 +4,13 @@
 namespace raster {
 namespace ISA {
 
-extern const Kernels table = {ISA_NAME,         cull,       project,
-                       load_values,      blend_forward, blend_backward, collect,
-                       project_backward, contribute,    collect_contributions,
-                       count_pairs,      loss,          adam,           peak};
+extern const Kernels table = {ISA_NAME,      cull,
+                              project,       load_values,
+                              blend_forward, blend_backward,
+                              collect,       project_backward,
+                              contribute,    collect_contributions,
+                              count_pairs,   loss,
+                              adam,          peak};
 
 }  // namespace ISA
 }  // namespace raster

@@ -16,8 +16,8 @@ void project_backward(const Scene&, const View&, const Candidates&, const Splat*
                       const float* sh_colours, const float* by_sh_colours, float* motions, const SceneGradients&,
                       int threads);
 void contribute(const Splat*, const Tiles&, const Images& map, float* records, int threads);
-void collect_contributions(const Tiles&, const Candidates&, int channels, int channel, int group,
-                           const float* records, const ContributionSums&, int threads);
+void collect_contributions(const Tiles&, const Candidates&, int channels, int channel, int group, const float* records,
+                           const ContributionSums&, int threads);
 void count_pairs(const Splat*, const Tiles&, const Images&, double* by_tile, int threads);
 void loss(const LossTask&, int threads);
 void adam(const AdamTask&, int threads);

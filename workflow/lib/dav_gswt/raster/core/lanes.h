@@ -88,7 +88,7 @@ static inline bool every(Mask m) { return !any(~m); }
 
 static inline Lanes clamp(Lanes v, float low, float high) { return min(max(v, all(low)), all(high)); }
 static inline Whole finite_bits(Lanes v) { return ((Whole)v & 0x7f800000) != 0x7f800000; }  // -1 or 0
-static inline Lanes negative(Lanes v) { return (Lanes)((Whole)v | (int)0x80000000); }      // -|v|
+static inline Lanes negative(Lanes v) { return (Lanes)((Whole)v | (int)0x80000000); }  // -|v|
 
 // 2^x for x in [-126, 126], relative error 2e-7. x = n + f, |f| <= 1/2: a polynomial for 2^f, n into the exponent.
 // Adding 1.5 2^23 rounds to a whole number and leaves it in the low bits.
@@ -171,8 +171,10 @@ template <int COUNT> static inline void store_sums(float* to, const Lanes* v) {
 static inline Lanes load_column(const float* column, int stride, size_t row, int rows) {
   float buffer[LANES];
   column += row * stride;
-  if (rows >= LANES) for (int l = 0; l < LANES; l++) buffer[l] = column[l * stride];
-  else for (int l = 0; l < LANES; l++) buffer[l] = column[(l < rows ? l : rows - 1) * stride];
+  if (rows >= LANES)
+    for (int l = 0; l < LANES; l++) buffer[l] = column[l * stride];
+  else
+    for (int l = 0; l < LANES; l++) buffer[l] = column[(l < rows ? l : rows - 1) * stride];
   return load(buffer);
 }
 
@@ -194,8 +196,10 @@ static inline void store_column(float* column, int stride, size_t row, int rows,
   float buffer[LANES];
   store(buffer, v);
   column += row * stride;
-  if (rows >= LANES) for (int l = 0; l < LANES; l++) column[l * stride] = buffer[l];
-  else for (int l = 0; l < rows; l++) column[l * stride] = buffer[l];
+  if (rows >= LANES)
+    for (int l = 0; l < LANES; l++) column[l * stride] = buffer[l];
+  else
+    for (int l = 0; l < rows; l++) column[l * stride] = buffer[l];
 }
 
 }  // namespace ISA

@@ -18,7 +18,9 @@ namespace ISA {
 constexpr int RADIUS = 5, SUMS = 6, SLOPES = 3;
 constexpr float C1 = 1e-4f, C2 = 9e-4f;
 
-struct Taps { float at[RADIUS + 1]; };  // by distance
+struct Taps {
+  float at[RADIUS + 1];
+};  // by distance
 
 static Taps gaussian() {
   Taps t;
@@ -60,9 +62,7 @@ static inline Lanes load_some(const float* from, int count) {
   return load(buffer);
 }
 
-static inline void store_some(float* to, int count, Lanes v) {
-  memcpy(to, &v, 4 * (count < LANES ? count : LANES));
-}
+static inline void store_some(float* to, int count, Lanes v) { memcpy(to, &v, 4 * (count < LANES ? count : LANES)); }
 
 static inline float sum_of(Lanes v) {
   float sum = 0;

@@ -19,14 +19,21 @@ static inline Mask store_splats(const Projection& c, const View& view, Splat* sp
   const Lanes half_x = sqrt(max(reach * c.sxx, all(0))), half_y = sqrt(max(reach * c.syy, all(0)));
   const Lanes x = view.fx * c.slope_x + view.cx, y = view.fy * c.slope_y + view.cy;
   const Mask visible = at_least(c.z, all(view.orthographic ? 1e-30f : view.near)) & at_least(reach, all(0)) &
-                     at_least(c.det, all(1e-30f));
+                       at_least(c.det, all(1e-30f));
   // the first pixel whose centre lies in the box, and the first beyond it
   const float width = view.width, height = view.height;
   const Lanes end_x = clamp(x + half_x - 0.5f, 0, width), end_y = clamp(y + half_y - 0.5f, 0, height);
   const Whole boxes[] = {ceiling(clamp(x - half_x - 0.5f, 0, width)), ceiling(clamp(y - half_y - 0.5f, 0, height)),
                          ceiling(select(visible, end_x, all(0))), ceiling(end_y)};
-  const Lanes fields[] = {x, y, -0.5f * LOG2_E * (c.syy * per_det), LOG2_E * (c.sxy * per_det),
-                          -0.5f * LOG2_E * (c.sxx * per_det), log2_opacity, half_x, half_y, c.z};
+  const Lanes fields[] = {x,
+                          y,
+                          -0.5f * LOG2_E * (c.syy * per_det),
+                          LOG2_E * (c.sxy * per_det),
+                          -0.5f * LOG2_E * (c.sxx * per_det),
+                          log2_opacity,
+                          half_x,
+                          half_y,
+                          c.z};
   float buffer[9][LANES];
   int box[4][LANES];
   for (int f = 0; f < 9; f++) store(buffer[f], fields[f]);

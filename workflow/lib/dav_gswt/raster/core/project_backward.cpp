@@ -91,8 +91,8 @@ static inline Three position_backward(const Projection& c, const View& view, Lan
   out[0] += dslope_x * c.per_z;
   out[1] += dslope_y * c.per_z;
   const Lanes along_x = view.fx * dx + dslope_x, along_y = view.fy * dy + dslope_y;
-  out[2] -= c.per_z * (c.jxx * du[0] + c.jxz * du[2] + c.jyy * dv[1] + c.jyz * dv[2] + c.slope_x * along_x +
-                       c.slope_y * along_y);
+  out[2] -= c.per_z *
+            (c.jxx * du[0] + c.jxz * du[2] + c.jyy * dv[1] + c.jyz * dv[2] + c.slope_x * along_x + c.slope_y * along_y);
   return out;
 }
 

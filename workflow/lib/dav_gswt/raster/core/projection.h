@@ -10,10 +10,10 @@
 namespace raster {
 namespace ISA {
 
-constexpr float MARGIN = 0.15f;      // of the picture's side: further out the camera is linearised at this rim
+constexpr float MARGIN = 0.15f;  // of the picture's side: further out the camera is linearised at this rim
 constexpr float LOG_SCALE_MAX = 46;  // 1e20, so that no product below is infinite
-constexpr float AXIS_MAX = 1e11f;    // pixels; beyond this a splat is flat over any picture
-constexpr float DET_MAX = 3e38f;     // above is infinity: the square of an area beyond any picture
+constexpr float AXIS_MAX = 1e11f;  // pixels; beyond this a splat is flat over any picture
+constexpr float DET_MAX = 3e38f;  // above is infinity: the square of an area beyond any picture
 
 struct Three {
   Lanes v[3];
@@ -44,22 +44,22 @@ struct Rows {
 };
 
 struct Projection {
-  Three mean;                // in the world
-  Lanes x, y, z;             // in the camera
-  Lanes per_z;               // 1 / z, or 1
-  Lanes slope_x, slope_y;    // x / z, y / z
-  Lanes bound_x, bound_y;    // the same within the picture and its margin
+  Three mean;  // in the world
+  Lanes x, y, z;  // in the camera
+  Lanes per_z;  // 1 / z, or 1
+  Lanes slope_x, slope_y;  // x / z, y / z
+  Lanes bound_x, bound_y;  // the same within the picture and its margin
   Lanes jxx, jxz, jyy, jyz;  // the camera's Jacobian
-  Three u, v;                // its rows in the world: J R
+  Three u, v;  // its rows in the world: J R
   Lanes quat[4], quat_norm;  // unit quaternion; 1 / length
   Lanes rotation[9];
   Three scale;
-  Three p, q;                // images of the scaled axes
-  Lanes cxy[3];              // p x q: components 01, 02, 12
+  Three p, q;  // images of the scaled axes
+  Lanes cxy[3];  // p x q: components 01, 02, 12
   Lanes sxx, sxy, syy;
-  Lanes area, trace, det;    // |p x q|^2, |p|^2 + |q|^2, det S
+  Lanes area, trace, det;  // |p x q|^2, |p|^2 + |q|^2, det S
   Lanes opacity, compensation;  // sqrt(det S0 / det S) of an antialiased splat, else 1
-  bool valid;                // inputs are finite and no quaternion is zero
+  bool valid;  // inputs are finite and no quaternion is zero
 };
 
 static inline void rotation_of(const Lanes q[4], Lanes m[9]) {
@@ -93,7 +93,7 @@ static inline void to_camera(Projection& c, const View& view) {
 
 static inline void to_screen(Projection& c, const View& view) {
   for (int k = 0; k < 3; k++) {
-    const Lanes *r = &c.rotation[k];
+    const Lanes* r = &c.rotation[k];
     c.p[k] = clamp(c.scale[k] * (c.u[0] * r[0] + c.u[1] * r[3] + c.u[2] * r[6]), -AXIS_MAX, AXIS_MAX);
     c.q[k] = clamp(c.scale[k] * (c.v[0] * r[0] + c.v[1] * r[3] + c.v[2] * r[6]), -AXIS_MAX, AXIS_MAX);
   }

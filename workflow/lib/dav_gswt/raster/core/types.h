@@ -9,12 +9,12 @@
 
 namespace raster {
 
-constexpr int TILE = 16;             // pixels a side
-constexpr int GROUP = 4;             // channels that one pass over the tiles blends
-constexpr int CHUNK = 256;           // Gaussians that are culled together
+constexpr int TILE = 16;  // pixels a side
+constexpr int GROUP = 4;  // channels that one pass over the tiles blends
+constexpr int CHUNK = 256;  // Gaussians that are culled together
 constexpr float ALPHA_MIN = 1.f / 255;  // a splat ends where its alpha falls below this
-constexpr float ALPHA_MAX = 0.99f;   // keeps 1 / (1 - alpha) finite
-constexpr float CLEAR_MIN = 1e-4f;   // a pixel takes no splat that would leave it less transmittance than this
+constexpr float ALPHA_MAX = 0.99f;  // keeps 1 / (1 - alpha) finite
+constexpr float CLEAR_MIN = 1e-4f;  // a pixel takes no splat that would leave it less transmittance than this
 constexpr float LOG2_255 = 7.994353437f;
 constexpr float LOG2_E = 1.442695041f;
 constexpr float LN2 = 0.6931471806f;
@@ -22,9 +22,9 @@ constexpr float LN2 = 0.6931471806f;
 // A camera, and how Gaussians are drawn by it.
 struct View {
   float rotation[9], translation[3];  // world to camera: x right, y down, z forward
-  float centre[3];                    // the camera's place in the world
+  float centre[3];  // the camera's place in the world
   float fx, fy, cx, cy;
-  float near;      // Gaussians whose centre is nearer are left out
+  float near;  // Gaussians whose centre is nearer are left out
   float dilation;  // variance added on the screen, in square pixels
   int width, height;
   bool orthographic;
@@ -35,9 +35,9 @@ struct View {
 struct Scene {
   size_t n;
   const float *means, *log_scales, *quats, *opacity_logits;  // n x 3, 3, 4, 1
-  const float* colours;                                      // n x channels, or n x coefficients x 3
-  int channels;                                              // of a colour: 3 where there are coefficients
-  int coefficients;       // of spherical harmonics: 1, 4, 9 or 16; 0: colours are plain channels
+  const float* colours;  // n x channels, or n x coefficients x 3
+  int channels;  // of a colour: 3 where there are coefficients
+  int coefficients;  // of spherical harmonics: 1, 4, 9 or 16; 0: colours are plain channels
   const float* features;  // n x feature_channels; null if there are none
   int feature_channels;
 };
@@ -64,9 +64,9 @@ struct Values {
 // A Gaussian on the screen, one cache line. With (dx, dy) a pixel's offset from (x, y),
 // log2 alpha = log2_opacity + xx dx^2 + xy dx dy + yy dy^2.
 struct alignas(64) Splat {
-  float x, y;            // pixels
-  float xx, xy, yy;      // log2(e) times the conic: negative definite
-  float log2_opacity;    // of the peak
+  float x, y;  // pixels
+  float xx, xy, yy;  // log2(e) times the conic: negative definite
+  float log2_opacity;  // of the peak
   float half_x, half_y;  // half sides of the box around alpha >= ALPHA_MIN
   float depth;
   float colour[GROUP];
@@ -82,7 +82,7 @@ struct Tiles {
   int columns, rows;
   const uint32_t* first;  // tiles + 1: where a tile's list begins
   const uint32_t* splat;  // by place
-  const uint32_t* slot;   // by place
+  const uint32_t* slot;  // by place
   const uint32_t* slots;  // splats + 1: where a splat's slots begin
 };
 
@@ -120,8 +120,8 @@ struct LossTask {
   const float *image, *target, *weight;  // weight may be null: 1
   float structure;
   float* gradient;
-  float* scratch;     // 4 planes of height rows of loss_stride floats
-  double* row_sums;   // height
+  float* scratch;  // 4 planes of height rows of loss_stride floats
+  double* row_sums;  // height
 };
 
 // Floats from row to row of a plane: whole vectors of the widest kind, and an odd number of them, or the rows above
