@@ -2,18 +2,18 @@
 
 from pathlib import Path
 
-from dav_gswt import capture
+from dav_gswt.capture.agents import capture_views
 from dav_gswt.capture.site import Site
-from dav_gswt.capture.store import Store
+from dav_gswt.capture.store import PhotoStore
 from dav_gswt.files import read_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):
     given, name = snakemake.input, snakemake.wildcards.scene
-    store = Store(Path("captures") / name)
+    store = PhotoStore(Path("captures") / name)
     photos = Path(given.images).parent
     site = Site(name, snakemake.params.scene, read_scene_frame(given.frame), photos, store, given.get("field"))
     before = list(given.captures)
     chosen = read_json(given.poses)["poses"]
-    capture.capture(site, read_json(given.views), before, chosen, Path(snakemake.output.capture))
+    capture_views(site, read_json(given.views), before, chosen, Path(snakemake.output.capture))

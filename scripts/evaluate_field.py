@@ -7,6 +7,7 @@ from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import lpips_weights
 from dav_gswt.logs import logging_to
 from dav_gswt.photos import training_views
+from dav_gswt.photos.capture_record import read_capture_record
 from dav_gswt.reconstruction import build, evaluation, ground
 from dav_gswt.views import stopping
 
@@ -14,12 +15,12 @@ with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     split, captures = read_json(given.views), list(given.get("captures", []))
     tests = training_views.taken(given.images, given.model, split["test"], [], params.quality["size"])
-    shots = sum(len(read_json(f"{folder}/capture.json")["shots"]) for folder in captures)
+    photos = len(split["start"]) + sum(len(read_capture_record(folder)) for folder in captures)
     fitted, grid = read_field(given.field), ground.read(given.ground)
     perceptual = lpips_weights.read(given.lpips) if given.get("lpips") else None
     groups = read_scene_frame(given.frame).test_groups
     result = evaluation.evaluate(fitted, build.modelled(tests, grid), groups, perceptual)
-    result |= {"round": params.t, "photos": len(split["start"]) + shots, "gaussians": len(fitted)}
+    result |= {"round": params.t, "photos": photos, "gaussians": len(fitted)}
     result |= {"fit": read_json(given.fit)}
     result |= stopping.decision_record(read_json(given.poses)) if given.get("poses") else {}
     inputs = {"field": given.field, "ground": given.ground, "views": given.views}

@@ -17,7 +17,7 @@ with logging_to(snakemake.log[0]):
     fitted, grid = read_field(given.field), ground.read(given.ground)
     pool = candidates.list_remaining(scene, frame, given.model, split, captures)
     if scene["agent"] != "replay":  # whose frames were all taken, wherever they stand
-        pool = serial_rig.within(scene, frame, pool) if scene["agent"] == "serial" else pool
+        pool = serial_rig.filter_reachable(scene, frame, pool) if scene["agent"] == "serial" else pool
         pool = feasibility.filter_feasible(pool, grid, scene.get("reach"), feasibility.CLEARANCE * frame.flying_height)
     taken = training_views.taken(given.images, given.model, split["start"], captures, scoring.PHOTO)
     prior = prior_sampling.open_scoring_prior(params.prior, params.p_drop, params.seed, given.get("lpips"))

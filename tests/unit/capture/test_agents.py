@@ -1,23 +1,26 @@
-"""Agents that answer at once, the store that devices and people fill, and photos that are dropped into a folder."""
+"""Tests of the capture agents, the photo store and the drop folder."""
 
 import json
 import os
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from fixtures.frames import scene_frame
 
-from dav_gswt import capture
-from dav_gswt.capture import drop_folder, render, replay, shots
+from dav_gswt.capture import agents, drop_folder
+from dav_gswt.capture.agents import AGENTS, StoreAgent
+from dav_gswt.capture.interface import CaptureRequest
 from dav_gswt.capture.site import Site
-from dav_gswt.capture.store import Store, key
+from dav_gswt.capture.store import PhotoStore, pose_key
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
 from dav_gswt.photos import training_views
+from dav_gswt.photos.capture_record import read_capture_record, write_capture_record
 from dav_gswt.photos.sfm import localization
+from dav_gswt.photos.synthetic import scene as synthetic
 
 WHEN = "2026-05-04T10:00:00"
 
@@ -26,7 +29,7 @@ def at(x, y=0.0, z=5.0):
     return cameras.pinhole([x, y, z], [x, y, 0], 8, 8, 40.0)
 
 
-def asked(*places):
+def requested(*places):
     return [(Pose(f"a{i}", 90.0, 0.0, 5.0), at(x)) for i, x in enumerate(places)]
 
 
@@ -39,75 +42,102 @@ def picture(path, value=0.5):
 def site(tmp_path):
     (tmp_path / "photos").mkdir()
     frame = scene_frame(flying_height=5.0)
-    return Site("dune", {"agent": "handheld"}, frame, tmp_path / "photos", Store(tmp_path / "captures"))
+    return Site("dune", {"agent": "handheld"}, frame, tmp_path / "photos", PhotoStore(tmp_path / "captures"))
 
 
-def pool(tmp_path):
-    (tmp_path / "images").mkdir()
-    frames = {f"{x}.png": at(x) for x in (0, 1, 2)}
-    for name in frames:
-        (tmp_path / "images" / name).write_text(name)
-    (tmp_path / "capture").mkdir()
-    return frames
+def capture(site, agent, poses, pool=(), **scene):
+    """The photos that an agent takes of poses, in a capture folder beside the photos."""
+    folder = site.photos.parent / "capture"
+    folder.mkdir(exist_ok=True)
+    site = replace(site, scene=site.scene | {"agent": agent} | scene)
+    return AGENTS[agent](CaptureRequest(site, poses, list(pool), folder))
 
 
-def test_replay_takes_the_nearest_unseen_frame_once_and_says_how_far_it_was(tmp_path):
-    found = replay.take(tmp_path, pool(tmp_path), asked(0.9, 0.9, 0.9, 0.9), 1, tmp_path / "capture", unit=5.0)
-    assert [shot.name for shot in found] == ["1.png", "0.png", "2.png"]
-    np.testing.assert_allclose([shot.apart for shot in found], [0.1 / 5, 0.9 / 5, 1.1 / 5], atol=1e-6)
-    shots.write(tmp_path / "capture", "replay", found)
+def photo_pool(site):
+    (site.photos / "images").mkdir()
+    pool = [(Pose(f"{x}.png", 90.0, 0.0, 5.0), at(x)) for x in (0, 1, 2)]
+    for pose, _ in pool:
+        (site.photos / "images" / pose.name).write_text(pose.name)
+    return pool
+
+
+def test_replay_takes_the_nearest_unused_photo_once_and_records_the_distance(site, tmp_path):
+    photos = capture(site, "replay", requested(0.9, 0.9, 0.9, 0.9), photo_pool(site))
+    assert [photo.name for photo in photos] == ["1.png", "0.png", "2.png"]
+    np.testing.assert_allclose([photo.distance for photo in photos], [0.1 / 5, 0.9 / 5, 1.1 / 5], atol=1e-6)
+    write_capture_record(tmp_path / "capture", "replay", photos)
     record = json.loads((tmp_path / "capture" / "capture.json").read_text())
     assert [s["name"] for s in record["shots"]] == ["1.png", "0.png", "2.png"] and record["agent"] == "replay"
     assert (tmp_path / "capture" / "1.png").read_text() == "1.png"
 
 
-def test_a_burst_takes_several_photos_of_a_pose(tmp_path):
-    found = replay.take(tmp_path, pool(tmp_path), asked(0.9, 0.9), 2, tmp_path / "capture", unit=5.0)
-    assert [(shot.name, shot.pose.name) for shot in found] == [("1.png", "a0"), ("0.png", "a0"), ("2.png", "a1")]
-    made = render.take(lambda _, i: np.full((8, 8, 3), i / 4, np.float32), asked(0.0), 3, tmp_path)
-    assert [shot.name for shot in made] == ["a0_0.png", "a0_1.png", "a0_2.png"]
-    assert image_files.read_photo(tmp_path / "a0_2.png")[0, 0, 0] == pytest.approx(0.5, abs=0.01)
+def test_the_record_of_a_capture_comes_back(site, tmp_path):
+    photos = capture(site, "replay", requested(0.9), photo_pool(site))
+    write_capture_record(tmp_path, "replay", photos)
+    (back,) = read_capture_record(tmp_path)
+    assert (back.name, back.pose, back.distance, back.taken) == ("1.png", photos[0].pose, photos[0].distance, None)
+    np.testing.assert_array_equal(back.camera.centre, photos[0].camera.centre)
+
+
+@pytest.mark.parametrize("content", ["[]", "{}", '{"shots": [{"name": "a"}]}'])
+def test_something_else_is_not_the_record_of_a_capture(tmp_path, content):
+    (tmp_path / "capture.json").write_text(content)
+    with pytest.raises(InputError, match=r"capture\.json: not the record"):
+        read_capture_record(tmp_path)
+
+
+def test_a_burst_of_a_replayed_scene_takes_several_photos_of_a_pose(site):
+    photos = capture(site, "replay", requested(0.9, 0.9), photo_pool(site), burst=2)
+    assert [(photo.name, photo.pose.name) for photo in photos] == [("1.png", "a0"), ("0.png", "a0"), ("2.png", "a1")]
+
+
+def test_a_burst_of_a_rendered_scene_repeats_the_photo_with_other_noise(site, tmp_path, monkeypatch):
+    monkeypatch.setattr(synthetic, "of_config", lambda entry: None)
+    monkeypatch.setattr(synthetic, "render", lambda world, camera, again: np.full((8, 8, 3), again / 4, np.float32))
+    photos = capture(site, "render", requested(0.0), burst=3)
+    assert [photo.name for photo in photos] == ["a0_0.png", "a0_1.png", "a0_2.png"]
+    assert image_files.read_photo(tmp_path / "capture/a0_2.png")[0, 0, 0] == pytest.approx(0.5, abs=0.01)
 
 
 def test_the_store_gives_a_poses_photos_back_and_no_others(tmp_path):
-    store, (one, two) = Store(tmp_path / "captures"), asked(0.0, 1.0)
-    assert store.of(one[1]) == []
+    store, (one, two) = PhotoStore(tmp_path / "captures"), requested(0.0, 1.0)
+    assert store.photos_of(one[1]) == []
     for value in (0.2, 0.4):
-        store.add(picture(tmp_path / "in.PNG", value), "serial", *one, at(0.1), WHEN)
-    found = store.of(one[1])
+        store.add(picture(tmp_path / "in.PNG", value), "serial", one, at(0.1), WHEN)
+    found = store.photos_of(one[1])
     assert [round(float(image_files.read_photo(s.photo)[0, 0, 0]), 1) for s in found] == [0.2, 0.4]
-    assert found[0].got.centre[0] == pytest.approx(0.1) and found[0].taken == WHEN
-    assert store.of(two[1]) == [] and len(store.records()) == 2
+    assert found[0].camera.centre[0] == pytest.approx(0.1) and found[0].taken == WHEN
+    assert store.photos_of(two[1]) == [] and len(store.records()) == 2
 
 
 def test_a_photo_that_cannot_be_kept_whole_is_not_kept(tmp_path):
-    store, (one,) = Store(tmp_path / "captures"), asked(0.0)
+    store, (one,) = PhotoStore(tmp_path / "captures"), requested(0.0)
     with pytest.raises(OSError):
-        store.add(tmp_path / "gone.png", "serial", *one, one[1], WHEN)
-    assert store.of(one[1]) == [] and not list((tmp_path / "captures").glob(".part-*"))
+        store.add(tmp_path / "gone.png", "serial", one, one[1], WHEN)
+    assert store.photos_of(one[1]) == [] and not list((tmp_path / "captures").glob(".part-*"))
 
 
 def test_a_stored_photo_that_was_changed_is_refused_by_name(tmp_path):
-    store, (one,) = Store(tmp_path / "captures"), asked(0.0)
-    kept = store.add(picture(tmp_path / "in.png"), "serial", *one, one[1], WHEN)
+    store, (one,) = PhotoStore(tmp_path / "captures"), requested(0.0)
+    kept = store.add(picture(tmp_path / "in.png"), "serial", one, one[1], WHEN)
     picture(kept.photo, 0.9)
     with pytest.raises(InputError, match=r"photo\.png.*put it back"):
-        store.of(one[1])
+        store.photos_of(one[1])
 
 
 def test_poses_are_told_apart_but_not_by_rounding():
-    assert key(at(0.0)) == key(at(1e-9)) and key(at(0.0)) != key(at(1e-3)) and len(key(at(0.0))) == 24
+    assert (
+        pose_key(at(0.0)) == pose_key(at(1e-9))
+        and pose_key(at(0.0)) != pose_key(at(1e-3))
+        and len(pose_key(at(0.0))) == 24
+    )
 
 
 def test_one_run_at_a_time_holds_the_device(tmp_path):
-    with Store(tmp_path).locked(), pytest.raises(InputError, match="another run"), Store(tmp_path).locked():
+    with PhotoStore(tmp_path).locked(), pytest.raises(InputError, match="another run"), PhotoStore(tmp_path).locked():
         pass
-    with Store(tmp_path).locked():
+    with PhotoStore(tmp_path).locked():
         pass
-
-
-def device(monkeypatch, take):
-    monkeypatch.setattr(capture, "import_module", lambda name: SimpleNamespace(take=take))
 
 
 def test_what_the_store_holds_is_not_taken_again(site, tmp_path, monkeypatch):
@@ -115,18 +145,18 @@ def test_what_the_store_holds_is_not_taken_again(site, tmp_path, monkeypatch):
 
     def take(site, missing):
         calls.append([pose.name for pose, _ in missing])
-        for pose, camera in missing:
-            site.store.add(picture(tmp_path / "in.png"), "handheld", pose, camera, at(0.25), WHEN)
+        for pose in missing:
+            site.store.add(picture(tmp_path / "in.png"), "handheld", pose, at(0.25), WHEN)
 
-    device(monkeypatch, take)
-    both = asked(0.0, 1.0)
-    site.store.add(picture(tmp_path / "in.png"), "handheld", *both[0], both[0][1], WHEN)
+    monkeypatch.setitem(AGENTS, "handheld", StoreAgent(take))
+    both = requested(0.0, 1.0)
+    site.store.add(picture(tmp_path / "in.png"), "handheld", both[0], both[0][1], WHEN)
     for _ in range(2):
-        found = capture._by_device(site, both, tmp_path)
+        found = capture(site, "handheld", both)
     assert calls == [["a1"]]
-    assert [shot.name for shot in found] == ["a0.png", "a1.png"]
-    assert found[1].apart == pytest.approx(0.75 / 5) and found[1].taken == WHEN
-    assert image_files.read_size(tmp_path / "a1.png") == (8, 8)
+    assert [photo.name for photo in found] == ["a0.png", "a1.png"]
+    assert found[1].distance == pytest.approx(0.75 / 5) and found[1].taken == WHEN
+    assert image_files.read_size(tmp_path / "capture/a1.png") == (8, 8)
 
 
 @pytest.mark.parametrize("agent", ["render", "replay", "serial", "plan", "handheld"])
@@ -134,13 +164,11 @@ def test_where_no_pose_was_chosen_nobody_is_asked_for_anything(agent, tmp_path, 
     def no_one(*_):
         raise AssertionError("somebody was asked for photos")
 
-    device(monkeypatch, no_one)
-    monkeypatch.setattr(render, "take", no_one)
-    monkeypatch.setattr(replay, "take", no_one)
-    monkeypatch.setattr(capture.candidates, "left", lambda *_: asked(0.0))
+    monkeypatch.setitem(AGENTS, agent, no_one)
+    monkeypatch.setattr(agents.candidates, "list_remaining", lambda *_: requested(0.0))
     scene = {"agent": agent, "kind": "photos"}
-    site = Site("dune", scene, scene_frame(flying_height=5.0), tmp_path / "photos", Store(tmp_path / "captures"))
-    capture.capture(site, {}, [], [], tmp_path / "capture")
+    site = Site("dune", scene, scene_frame(flying_height=5.0), tmp_path / "photos", PhotoStore(tmp_path / "captures"))
+    agents.capture_views(site, {}, [], [], tmp_path / "capture")
     assert [path.name for path in (tmp_path / "capture").iterdir()] == ["capture.json"]
     assert json.loads((tmp_path / "capture/capture.json").read_text()) == {"agent": agent, "shots": []}
     assert training_views.captured(tmp_path / "capture", 8) == [] and not (tmp_path / "captures").exists()
@@ -148,18 +176,18 @@ def test_where_no_pose_was_chosen_nobody_is_asked_for_anything(agent, tmp_path, 
 
 def test_what_was_taken_before_a_failure_stays(site, tmp_path, monkeypatch):
     def take(site, missing):
-        site.store.add(picture(tmp_path / "in.png"), "handheld", *missing[0], missing[0][1], WHEN)
+        site.store.add(picture(tmp_path / "in.png"), "handheld", missing[0], missing[0][1], WHEN)
         raise InputError("the battery is empty")
 
-    device(monkeypatch, take)
+    monkeypatch.setitem(AGENTS, "handheld", StoreAgent(take))
     with pytest.raises(InputError, match="battery"):
-        capture._by_device(site, asked(0.0, 1.0), tmp_path)
-    assert len(site.store.of(at(0.0))) == 1 and not site.store.of(at(1.0))
+        capture(site, "handheld", requested(0.0, 1.0))
+    assert len(site.store.photos_of(at(0.0))) == 1 and not site.store.photos_of(at(1.0))
 
 
 def drop(site, places, monkeypatch):
     """Put photos into the drop folder, and say where each was taken."""
-    folder = drop_folder.folder_of(site)
+    folder = drop_folder.make_drop_folder(site)
     for i, name in enumerate(places):
         os.utime(picture(folder / name, 0.1 * i), (0, 0))
     at_places = {name: value if value is None else at(value) for name, value in places.items()}
@@ -168,21 +196,24 @@ def drop(site, places, monkeypatch):
 
 def test_dropped_photos_go_to_the_poses_that_they_were_taken_for(site, monkeypatch, caplog):
     drop(site, {"x.png": 1.1, "y.png": 0.05, "lost.png": None, "far.png": 9.0}, monkeypatch)
-    both = asked(0.0, 1.0, 4.0)
-    missing = drop_folder.collect(site, both, "handheld")
+    both = requested(0.0, 1.0, 4.0)
+    missing = drop_folder.import_dropped_photos(site, both, "handheld")
     assert [pose.name for pose, _ in missing] == ["a2"]
-    assert site.store.of(at(0.0))[0].got.centre[0] == pytest.approx(0.05)
-    assert [r["source"] for r in site.store.records()] and site.store.of(at(1.0))[0].taken.startswith("1970-01-01")
-    assert "lost.png: its place" in caplog.text and "far.png: no pose" in caplog.text
-    assert (drop_folder.folder_of(site) / "x.png").exists()  # people's own files stay
+    assert site.store.photos_of(at(0.0))[0].camera.centre[0] == pytest.approx(0.05)
+    assert [r["source"] for r in site.store.records()] and site.store.photos_of(at(1.0))[0].taken.startswith(
+        "1970-01-01"
+    )
+    assert "lost.png: it could not be localised" in caplog.text
+    assert "far.png: it is near no requested pose" in caplog.text
+    assert (drop_folder.make_drop_folder(site) / "x.png").exists()  # people's own files stay
 
 
 def test_a_photo_is_taken_over_once(site, monkeypatch):
     drop(site, {"x.png": 0.1, "y.png": 0.2}, monkeypatch)
     for _ in range(2):
-        assert drop_folder.collect(site, asked(0.0), "handheld") == []
+        assert drop_folder.import_dropped_photos(site, requested(0.0), "handheld") == []
     assert len(site.store.records()) == 1
 
 
 def test_an_empty_drop_folder_leaves_all_poses_missing(site):
-    assert len(drop_folder.collect(site, asked(0.0, 1.0), "plan")) == 2
+    assert len(drop_folder.import_dropped_photos(site, requested(0.0, 1.0), "plan")) == 2

@@ -7,7 +7,7 @@ from fixtures.frames import scene_frame
 
 from dav_gswt.capture import drone, drop_folder, qgc_plan
 from dav_gswt.capture.site import Site
-from dav_gswt.capture.store import Store
+from dav_gswt.capture.store import PhotoStore
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.georeference import Georeference
@@ -32,14 +32,14 @@ def asked():
 
 @pytest.fixture
 def site(tmp_path, monkeypatch):
-    monkeypatch.setattr(drop_folder, "collect", lambda site, asked, agent: asked)
-    return Site("moor", {"agent": "plan", "burst": 2}, FRAME, tmp_path, Store(tmp_path / "captures" / "moor"))
+    monkeypatch.setattr(drop_folder, "import_dropped_photos", lambda site, asked, agent: asked)
+    return Site("moor", {"agent": "plan", "burst": 2}, FRAME, tmp_path, PhotoStore(tmp_path / "captures" / "moor"))
 
 
 @pytest.fixture
 def items(site, asked):
     with pytest.raises(InputError):
-        drone.take(site, asked)
+        drone.take_photos(site, asked)
     return json.loads((site.store.folder / "mission.plan").read_text())["mission"]["items"]
 
 
@@ -53,7 +53,7 @@ def places(items):
 
 def test_the_file_has_what_qgroundcontrol_reads(site, asked):
     with pytest.raises(InputError):
-        drone.take(site, asked)
+        drone.take_photos(site, asked)
     content = json.loads((site.store.folder / "mission.plan").read_text())
     flown = content["mission"]
     items = flown.pop("items")
@@ -108,7 +108,7 @@ def test_photos_are_taken_from_the_poses_with_their_views(items, asked):
 def test_looking_straight_down_the_nose_points_to_the_top_of_the_picture():
     rotation, translation = cameras.look_at([0, 0, 5.0], [0, 0, 0.0])  # the picture's top is the world's +y
     camera = cameras.Camera(rotation, translation, 50.0, 50.0, 32.0, 24.0, 64, 48)
-    assert qgc_plan.nose_and_tilt(camera, PLACE) == pytest.approx((30.0, -90.0))
+    assert qgc_plan.heading_and_pitch(camera, PLACE) == pytest.approx((30.0, -90.0))
 
 
 def test_sideways_ways_stay_above_the_clearance(items):
@@ -122,35 +122,35 @@ def test_sideways_ways_stay_above_the_clearance(items):
 
 def test_detours_are_only_made_where_they_are_needed():
     a, low, high = np.array([0, 0, 9.0]), np.array([4, 0, 2.0]), np.array([4, 0, 12.0])
-    assert qgc_plan.detour(a, high, 5.0) == []
-    assert qgc_plan.detour(low, high, 5.0) == []  # straight up
-    np.testing.assert_array_equal(qgc_plan.detour(a, low, 5.0), [[4, 0, 5]])
-    np.testing.assert_array_equal(qgc_plan.detour(low, low + [1, 0, 0], 5.0), [[4, 0, 5], [5, 0, 5]])
+    assert qgc_plan.plan_detour(a, high, 5.0) == []
+    assert qgc_plan.plan_detour(low, high, 5.0) == []  # straight up
+    np.testing.assert_array_equal(qgc_plan.plan_detour(a, low, 5.0), [[4, 0, 5]])
+    np.testing.assert_array_equal(qgc_plan.plan_detour(low, low + [1, 0, 0], 5.0), [[4, 0, 5], [5, 0, 5]])
 
 
 def test_the_message_says_what_to_fly_what_is_missing_and_where_to_put_it(site, asked):
     with pytest.raises(InputError) as said:
-        drone.take(site, asked[:2])
+        drone.take_photos(site, asked[:2])
     for part in ("mission.plan", "4 photos are missing, of 2 poses (pose_0, pose_1)", "drop", "same command again"):
         assert part in str(said.value)
 
 
 def test_nothing_is_written_when_nothing_is_missing(site, asked, monkeypatch):
-    monkeypatch.setattr(drop_folder, "collect", lambda site, asked, agent: [])
-    assert drone.take(site, asked) is None
+    monkeypatch.setattr(drop_folder, "import_dropped_photos", lambda site, asked, agent: [])
+    assert drone.take_photos(site, asked) is None
     assert not (site.store.folder / "mission.plan").exists()
 
 
 def test_a_scene_without_gps_is_refused(site, asked):
     bare = Site("moor", site.scene, replace(FRAME, georeference=None), site.photos, site.store)
     with pytest.raises(InputError, match="GPS positions in their EXIF"):
-        drone.take(bare, asked)
+        drone.take_photos(bare, asked)
 
 
 def test_poses_that_are_too_low_are_refused_by_name(site, asked):
     low = Site("moor", {"flight": {"least_altitude": 3.6}}, FRAME, site.photos, site.store)
     with pytest.raises(InputError, match=r"pose_4, pose_5: lower than 3.6 m"):
-        drone.take(low, asked)
+        drone.take_photos(low, asked)
 
 
 def test_ground_too_steep_for_altitudes_above_a_plane_is_refused(site, asked):
@@ -160,25 +160,25 @@ def test_ground_too_steep_for_altitudes_above_a_plane_is_refused(site, asked):
 
     # the farthest pose is 1.3 x 20 m from where the drone takes off: 10 degrees are 4.7 m, 2 degrees 0.9 m
     with pytest.raises(InputError, match=r"slopes by 10.0 degrees, .* up to 4\.\d m"):
-        drone.take(on(10.0), asked)
+        drone.take_photos(on(10.0), asked)
     with pytest.raises(InputError, match="fly this mission"):
-        drone.take(on(10.0, clearance=12), asked)
+        drone.take_photos(on(10.0, clearance=12), asked)
     with pytest.raises(InputError, match="fly this mission"):
-        drone.take(on(2.0), asked)
+        drone.take_photos(on(2.0), asked)
 
 
 def test_the_same_poses_give_the_same_file(site, asked):
     written = []
     for _ in range(2):
         with pytest.raises(InputError):
-            drone.take(site, asked)
+            drone.take_photos(site, asked)
         written.append((site.store.folder / "mission.plan").read_bytes())
     assert written[0] == written[1]
 
 
 def test_a_pose_is_flown_whatever_its_place_in_the_list(asked):
     views = [(pose.name, camera) for pose, camera in asked]
-    flown = qgc_plan.flight(views, PLACE, np.array([0.0, -0.5]), qgc_plan.Rules())
+    flown = qgc_plan.plan_flight(views, PLACE, np.array([0.0, -0.5]), qgc_plan.FlightRules())
     assert sorted(flown.names) == sorted(pose.name for pose, _ in asked)
     assert flown.highest == pytest.approx(20.0)
     assert flown.duration > flown.length / 3

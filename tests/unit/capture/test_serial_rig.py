@@ -2,7 +2,7 @@
 
 import re
 import signal
-import sys
+from dataclasses import MISSING, fields
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from dav_gswt import config
 from dav_gswt.capture import inbox, rig_limits, serial_protocol, serial_rig
 from dav_gswt.capture.rig_geometry import Mount
 from dav_gswt.capture.site import Site
-from dav_gswt.capture.store import Store
+from dav_gswt.capture.store import PhotoStore
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import look_at
 from dav_gswt.geometry.poses import Pose
@@ -48,7 +48,7 @@ def no_long_waits(monkeypatch):
 def shoot(tmp_path):
     """Have places photographed by a rig with faults; returns the rig, what it ended with, and the store."""
     (tmp_path / "inbox").mkdir()
-    store = Store(tmp_path / "captures")
+    store = PhotoStore(tmp_path / "captures")
 
     def shot(faults=None, places=PLACES, burst=1, seed=0, **changed):
         scene = {"agent": "serial", "burst": burst}
@@ -57,9 +57,9 @@ def shoot(tmp_path):
             scene["rig"] = RIG | {"port": device.port, "inbox": str(tmp_path / "inbox")} | changed
             site = Site("meadow", scene, FRAME, tmp_path / "photos", store)
             asked = [posed(i, place) for i, place in enumerate(places)]
-            missing = [(pose, camera) for pose, camera in asked if len(store.of(camera)) < burst]
+            missing = [(pose, camera) for pose, camera in asked if len(store.photos_of(camera)) < burst]
             try:
-                serial_rig.take(site, missing)
+                serial_rig.take_photos(site, missing)
                 ended = ""
             except InputError as error:
                 ended = str(error)
@@ -74,7 +74,7 @@ def posed(i, place):
 
 def held(store, places=PLACES):
     """How many photos of each place the store holds."""
-    return [len(store.of(posed(0, place)[1])) for place in places]
+    return [len(store.photos_of(posed(0, place)[1])) for place in places]
 
 
 def test_each_pose_is_photographed_once_from_where_it_was_asked_for(shoot):
@@ -83,11 +83,13 @@ def test_each_pose_is_photographed_once_from_where_it_was_asked_for(shoot):
     assert [record["pose"]["name"] for record in store.records()].count("pose_0000") == 1
     for i, place in enumerate(PLACES):
         camera = posed(i, place)[1]
-        [stored] = store.of(camera)
+        [stored] = store.photos_of(camera)
         assert image_files.read_photo(stored.photo).shape == (48, 64, 3)
-        np.testing.assert_allclose(stored.got.rotation, camera.rotation, atol=2e-5)  # the line's thousandth of a degree
-        np.testing.assert_allclose(stored.got.centre, camera.centre, atol=1e-4)
-        assert stored.got.fx == camera.fx
+        np.testing.assert_allclose(
+            stored.camera.rotation, camera.rotation, atol=2e-5
+        )  # the line's thousandth of a degree
+        np.testing.assert_allclose(stored.camera.centre, camera.centre, atol=1e-4)
+        assert stored.camera.fx == camera.fx
 
 
 @pytest.mark.parametrize(
@@ -126,7 +128,7 @@ def test_what_passes_costs_no_photo_and_takes_none_twice(shoot, faults):
         pytest.param(Faults(answers={"WHERE": "OK stopped 0 0 0"}), {}, "stop button", id="stopped before"),
         pytest.param(Faults(answers={"WHERE": "OK still nan 1e9 0"}), {}, "is none of docs", id="no numbers"),
         pytest.param(Faults(answers={"WHERE": "OK moving 0 60 5000"}), {"move_timeout": 0.2}, "still moves", id="slow"),
-        pytest.param(Faults(stuck=(1,)), {}, "does something bar it", id="stuck half-way"),
+        pytest.param(Faults(stuck=(1,)), {}, "is it blocked", id="stuck half-way"),
         pytest.param(Faults(boot_during_move=(1, 2, 3, 4)), {}, "restarted 4 times", id="restarts again and again"),
         pytest.param(Faults(camera="none"), {"photo_timeout": 0.2}, "no photo came into", id="no photo"),
         pytest.param(Faults(camera="cut"), {"photo_timeout": 0.6}, "cut short", id="half a photo"),
@@ -168,22 +170,22 @@ def test_a_burst_goes_on_where_it_was_left(shoot):
     device, ended, store = shoot(places=places, burst=3)
     assert (ended, device.photos, held(store, places)) == ("", 2, [3])
     assert len(device.verbs("MOVE")) == 1  # the rig stays where it is
-    assert len({stored.photo.read_bytes() for stored in store.of(posed(0, places[0])[1])}) == 3
+    assert len({stored.photo.read_bytes() for stored in store.photos_of(posed(0, places[0])[1])}) == 3
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_run_that_is_ended_stops_the_rig_and_keeps_the_photos(shoot, monkeypatch, tmp_path, number):
-    where = serial_protocol.Line.where
+    where = serial_protocol.SerialLine.where
 
     def interrupted(self):
         if shoot.device.photos == 2 and shoot.device.verbs("MOVE")[2:]:
             signal.raise_signal(number)
         return where(self)
 
-    monkeypatch.setattr(serial_protocol.Line, "where", interrupted)
+    monkeypatch.setattr(serial_protocol.SerialLine, "where", interrupted)
     with pytest.raises(KeyboardInterrupt):
         shoot()
-    assert (shoot.device.last, held(Store(tmp_path / "captures"))) == ("STOP", [1, 1, 0, 0])
+    assert (shoot.device.last, held(PhotoStore(tmp_path / "captures"))) == ("STOP", [1, 1, 0, 0])
 
 
 def test_a_repeated_release_takes_one_photo(shoot):
@@ -214,9 +216,9 @@ def test_a_pose_that_looks_elsewhere_is_refused(shoot, tmp_path):
     pose, camera = posed(0, PLACES[0])
     rotation, translation = look_at(camera.centre, [3.0, 0.5, 0.0])
     mount = Mount(np.array(CENTRE), 1000.0, 0.0, 0.0)
-    assert mount.trouble(camera) is None
+    assert mount.find_violation(camera) is None
     turned = type(camera)(rotation, translation, 1.0, 1.0, 1.0, 1.0, 2, 2)
-    assert "degrees away from how the rig looks" in mount.trouble(turned)
+    assert "degrees away from how the rig looks" in mount.find_violation(turned)
 
 
 NO_GO = {
@@ -258,7 +260,7 @@ def test_a_dry_run_moves_nothing_and_says_every_move(shoot, caplog):
 
 
 def test_a_config_without_dry_run_is_one(shoot):
-    device, ended, _ = shoot(dry_run=serial_rig.DEFAULTS["dry_run"])
+    device, ended, _ = shoot(dry_run=serial_rig.RigSettings.dry_run)
     assert "dry run" in ended and device.photos == 0
 
 
@@ -273,48 +275,43 @@ def test_what_was_in_the_inbox_before_is_not_taken_for_a_photo(shoot, tmp_path):
 
 def test_a_photo_written_over_another_is_new(tmp_path):
     image_files.write_png(tmp_path / "capt.png", np.zeros((48, 64, 3)))
-    before = inbox.listing(tmp_path)
-    assert inbox.arrived(tmp_path, before, 0.0) is None
+    before = inbox.list_photos(tmp_path)
+    assert inbox.wait_for_photo(tmp_path, before, 0.0) is None
     image_files.write_png(tmp_path / "capt.png", np.random.default_rng(0).random((48, 64, 3)))
-    assert inbox.arrived(tmp_path, before, 5.0) == tmp_path / "capt.png"
+    assert inbox.wait_for_photo(tmp_path, before, 5.0) == tmp_path / "capt.png"
 
 
 def test_a_missing_inbox_port_or_table_is_said(shoot, tmp_path):
     assert "rig.inbox" in shoot(inbox=str(tmp_path / "none"))[1]
     assert "does not open" in shoot(port=str(tmp_path / "none"))[1]
     assert "did not answer HELLO" in shoot(port="loop://", retries=1)[1]  # an echo is no answer
-    site = Site("meadow", {"agent": "serial"}, FRAME, tmp_path, Store(tmp_path))
+    site = Site("meadow", {"agent": "serial"}, FRAME, tmp_path, PhotoStore(tmp_path))
     with pytest.raises(InputError, match="scenes.meadow.rig"):
-        serial_rig.take(site, [])
-
-
-def test_without_pyserial_the_message_says_how_to_get_it(shoot, monkeypatch):
-    monkeypatch.setitem(sys.modules, "serial", None)
-    assert "pip install pyserial" in shoot()[1]
+        serial_rig.take_photos(site, [])
 
 
 def test_a_port_that_is_in_use_is_refused(tmp_path):
     with (
         SimulatedRig(tmp_path) as device,
-        serial_protocol.opened(device.port, 115200, 1.0, 1),
+        serial_protocol.open_line(device.port, 115200, 1.0, 1),
         pytest.raises(InputError, match="does not open"),
-        serial_protocol.opened(device.port, 115200, 1.0, 1),
+        serial_protocol.open_line(device.port, 115200, 1.0, 1),
     ):
         pass
 
 
 def test_the_checksum_is_that_of_the_standard():
-    assert serial_protocol.framed("123456789") == b"123456789*29B1\n"
+    assert serial_protocol.frame_line("123456789") == b"123456789*29B1\n"
 
 
 @given(st.text(st.characters(min_codepoint=32, max_codepoint=126), min_size=1, max_size=100), st.data())
 def test_a_line_survives_and_a_damaged_one_does_not(text, data):
-    sent = serial_protocol.framed(text)
-    assert serial_protocol.unframed(sent) == text
+    sent = serial_protocol.frame_line(text)
+    assert serial_protocol.unframe_line(sent) == text
     at = data.draw(st.integers(0, len(sent) - 1))
-    assert serial_protocol.unframed(sent[:at] + sent[at + 1 :]) in (None, text)
+    assert serial_protocol.unframe_line(sent[:at] + sent[at + 1 :]) in (None, text)
     byte = data.draw(st.integers(0, 255).filter(lambda b: b != sent[at]))
-    assert serial_protocol.unframed(sent[:at] + bytes([byte]) + sent[at + 1 :]) in (
+    assert serial_protocol.unframe_line(sent[:at] + bytes([byte]) + sent[at + 1 :]) in (
         None,
         text,
     )  # text: a digit in lower case
@@ -323,20 +320,21 @@ def test_a_line_survives_and_a_damaged_one_does_not(text, data):
 @given(st.binary(max_size=200))
 def test_noise_is_no_line(noise):
     assert (
-        serial_protocol.unframed(noise) is None
-        or serial_protocol.framed(serial_protocol.unframed(noise))[:-1].lower() in noise.lower()
+        serial_protocol.unframe_line(noise) is None
+        or serial_protocol.frame_line(serial_protocol.unframe_line(noise))[:-1].lower() in noise.lower()
     )
 
 
 @given(*[st.tuples(*[st.floats(-10, 10, width=32) for _ in range(3)]) for _ in range(2)])
 def test_the_exact_test_of_a_move_agrees_with_many_points_on_it(a, b):
     limits = {axis: [-20, 20] for axis in rig_limits.AXES}
-    there = rig_limits.reach(limits, [{"pan": [-3, 1], "tilt": [0, 2], "radius": [-1, 4]}], np.array([[-20.0, 20]] * 3))
+    zones = [{"pan": [-3, 1], "tilt": [0, 2], "radius": [-1, 4]}]
+    there = rig_limits.combine_limits(limits, zones, np.array([[-20.0, 20]] * 3))
     a, b = np.array(a), np.array(b)
     points = a + np.linspace(0, 1, 2001)[:, None] * (b - a)
     box = there.zones[0]
     depth = np.minimum(points - box[:, 0], box[:, 1] - points).min(1).max()  # how deep the deepest point is inside
-    met = rig_limits._met(there, a, b)[0]
+    met = rig_limits._touched_zones(there, a, b)[0]
     apart = 0.5 * np.abs(b - a).max() / 2000
     assert met if depth >= 0 else True
     assert not met or depth >= -apart - 1e-9
@@ -354,7 +352,8 @@ def test_the_exact_test_of_a_move_agrees_with_many_points_on_it(a, b):
 )
 def test_the_configs_schema_knows_a_rig(root, changed, said):
     experiment = config.read([root / "config/config.yaml"])
-    optional = {k: v for k, v in serial_rig.DEFAULTS.items() if k != "no_go"} | {"no_go": [{"pan": [-10, 10]}]}
+    defaults = {f.name: f.default for f in fields(serial_rig.RigSettings) if f.default is not MISSING}
+    optional = defaults | {"no_go": [{"pan": [-10, 10]}]}
     table = optional | {"port": "/dev/ttyUSB0", "inbox": "in", "millimetres": 250, "limits": RIG["limits"]} | changed
     scene = {"kind": "photos", "folder": "x", "size": 512, "start": 8, "agent": "serial", "rig": table}
     experiment["scenes"]["meadow"] = scene | {"quality": "draft", "seam": "semantic"}
@@ -374,17 +373,18 @@ def test_limits_that_leave_nothing_are_named(shoot, wrong, said):
 def test_axes_and_cameras_are_each_others_inverse(place):
     camera = posed(0, place)[1]
     mount = Mount(np.array(CENTRE), 250.0, 33.0, -5.0)
-    axes = mount.axes(camera)
+    axes = mount.axes_of(camera)
     np.testing.assert_allclose(axes, [(place[1] + 33.0) % 360, place[0] - 5.0, 250.0 * place[2]], atol=1e-3)
-    back = mount.camera(axes, camera)
+    back = mount.camera_at(axes, camera)
     np.testing.assert_allclose(back.rotation, camera.rotation, atol=2e-5)
     np.testing.assert_allclose(back.translation, camera.translation, atol=1e-4)
-    assert mount.trouble(camera) is None
+    assert mount.find_violation(camera) is None
 
 
 def test_a_pan_goes_the_short_way_round_where_the_limits_let_it():
-    there = rig_limits.reach({"pan": [-270, 270], "tilt": [0, 90], "radius": [1, 9]}, [], np.array([[-1e6, 1e6]] * 3))
-    [stop] = rig_limits.route(there, np.array([-170.0, 45.0, 5.0]), np.array([170.0, 45.0, 5.0]))
+    limits = {"pan": [-270, 270], "tilt": [0, 90], "radius": [1, 9]}
+    there = rig_limits.combine_limits(limits, [], np.array([[-1e6, 1e6]] * 3))
+    [stop] = rig_limits.plan_route(there, np.array([-170.0, 45.0, 5.0]), np.array([170.0, 45.0, 5.0]))
     assert stop[0] == -190.0
 
 
@@ -393,9 +393,9 @@ def test_only_poses_where_the_rig_may_stand_are_candidates():
     radius = 5.0 * RIG["millimetres"]
     limits = RIG["limits"] | {"radius": [0.9 * radius, 1.1 * radius]}
     zone = {"pan": [80, 100]}
-    scene = {"rig": RIG | {"limits": limits, "no_go": [zone]}}
-    assert [pose.name for pose, _ in serial_rig.within(scene, FRAME, pool)] == ["pose_0000"]
+    scene = {"rig": RIG | {"port": "p", "inbox": "in", "limits": limits, "no_go": [zone]}}
+    assert [pose.name for pose, _ in serial_rig.filter_reachable(scene, FRAME, pool)] == ["pose_0000"]
     scene["rig"]["limits"] = limits | {"radius": [1, 2]}
     with pytest.raises(InputError, match="none of the candidate poses"):
-        serial_rig.within(scene, FRAME, pool)
-    assert serial_rig.within({}, FRAME, pool) == pool  # `take` says what is missing
+        serial_rig.filter_reachable(scene, FRAME, pool)
+    assert serial_rig.filter_reachable({}, FRAME, pool) == pool  # `take_photos` names the missing key

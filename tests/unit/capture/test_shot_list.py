@@ -8,7 +8,7 @@ from fixtures import ground as made
 
 from dav_gswt.capture import directions, drop_folder, handheld, shot_list_map, shot_list_page
 from dav_gswt.capture.site import Site
-from dav_gswt.capture.store import Store
+from dav_gswt.capture.store import PhotoStore
 from dav_gswt.errors import InputError
 from dav_gswt.field import write_field
 from dav_gswt.geometry import cameras
@@ -26,8 +26,8 @@ ORBITS = [(40, 0, 2.0), (35, 180, 2.4), (90, 0, 1.8), (30, 90, 2.5)]
 
 @pytest.fixture
 def site(tmp_path, monkeypatch):
-    monkeypatch.setattr(drop_folder, "collect", lambda site, asked, agent: asked)
-    return Site("moor", {"agent": "handheld", "burst": 2}, FRAME, tmp_path, Store(tmp_path / "captures" / "moor"))
+    monkeypatch.setattr(drop_folder, "import_dropped_photos", lambda site, asked, agent: asked)
+    return Site("moor", {"agent": "handheld", "burst": 2}, FRAME, tmp_path, PhotoStore(tmp_path / "captures" / "moor"))
 
 
 @pytest.fixture
@@ -41,7 +41,7 @@ def listed(site, asked, tmp_path):
     """The page's folder and its text."""
     write_field(made.field(), tmp_path / "field.ply")
     with pytest.raises(InputError):
-        handheld.take(site, asked, tmp_path / "field.ply")
+        handheld.take_photos(site, asked, tmp_path / "field.ply")
     folder = site.store.folder / "shot-list"
     return folder, (folder / "index.html").read_text()
 
@@ -110,14 +110,14 @@ def test_the_expected_picture_is_the_field_over_sky_and_ground(listed):
     picture = image_files.read_photo(listed[0] / "place_001.png")
     assert picture.shape == (540, 720, 3)
     low = cameras.pinhole([1.6, -3.0, 0.5], [1.6, 1.6, 0.9], 40, 30, 60.0)
-    drawn = shot_list_page.expected(made.field(), low)
+    drawn = shot_list_page.render_expected(made.field(), low)
     assert drawn[0, :, 2].min() > 0.6  # blue above
     assert drawn[-1].mean() < 0.6
 
 
 def test_without_a_field_the_page_has_a_map_and_words_but_no_pictures(site, asked):
     with pytest.raises(InputError):
-        handheld.take(site, asked)
+        handheld.take_photos(site, asked)
     folder = site.store.folder / "shot-list"
     assert sorted(p.name for p in folder.iterdir()) == ["index.html", "map.png"]
     assert "picture expected" not in (folder / "index.html").read_text()
@@ -125,32 +125,32 @@ def test_without_a_field_the_page_has_a_map_and_words_but_no_pictures(site, aske
 
 def test_the_message_says_what_is_missing_and_where_to_put_it(site, asked):
     with pytest.raises(InputError) as said:
-        handheld.take(site, asked[:1])
+        handheld.take_photos(site, asked[:1])
     for part in ("shot-list/index.html", "2 photos are missing, of 1 pose (pose_0)", "drop", "same command again"):
         assert part in str(said.value)
 
 
 def test_an_older_list_goes_and_photos_stay(site, asked):
     with pytest.raises(InputError):
-        handheld.take(site, asked)
-    photo = drop_folder.folder_of(site) / "a.jpg"
+        handheld.take_photos(site, asked)
+    photo = drop_folder.make_drop_folder(site) / "a.jpg"
     photo.write_text("photo")
     with pytest.raises(InputError):
-        handheld.take(site, asked[:1])
+        handheld.take_photos(site, asked[:1])
     assert photo.read_text() == "photo"
     assert (site.store.folder / "shot-list" / "index.html").read_text().count("<article") == 1
 
 
 def test_nothing_is_written_when_nothing_is_missing(site, asked, monkeypatch):
-    monkeypatch.setattr(drop_folder, "collect", lambda site, asked, agent: [])
-    assert handheld.take(site, asked) is None
+    monkeypatch.setattr(drop_folder, "import_dropped_photos", lambda site, asked, agent: [])
+    assert handheld.take_photos(site, asked) is None
     assert not (site.store.folder / "shot-list").exists()
 
 
 def test_names_are_text_not_markup(site, asked):
     odd = Site("a<b>&", site.scene, FRAME, site.photos, site.store)
     with pytest.raises(InputError):
-        handheld.take(odd, asked)
+        handheld.take_photos(odd, asked)
     text = (site.store.folder / "shot-list" / "index.html").read_text()
     assert "a&lt;b&gt;&amp;" in text
     assert "<b>&" not in text
@@ -158,43 +158,43 @@ def test_names_are_text_not_markup(site, asked):
 
 def test_words_say_where_to_stand_and_where_to_look():
     camera = camera_layouts.orbit(40, 0, 2.0, MIDDLE, 64, 48, 60)  # to the right on the map, 1.53 away, 1.29 up
-    assert directions.told(camera, UNKNOWN, directions.ruler(UNKNOWN)) == (
+    assert directions.describe_pose(camera, UNKNOWN, directions.make_ruler(UNKNOWN)) == (
         "Stand 1.0 flying height from the middle, towards the right of the map, camera 0.8 flying heights above the "
         "ground; face the middle, which is to the left of the map; look down 40 degrees."
     )
-    assert directions.told(camera, FRAME, directions.ruler(FRAME)).startswith(
+    assert directions.describe_pose(camera, FRAME, directions.make_ruler(FRAME)).startswith(
         "Stand 1.5 m from the middle, towards the right of the map, camera 1.3 m above the ground"
     )
     known = replace(FRAME, georeference=NORTH)  # +y is east: the right of the map is south
-    assert directions.told(camera, known, directions.ruler(known)) == (
+    assert directions.describe_pose(camera, known, directions.make_ruler(known)) == (
         "Stand 3.1 m south of the middle, camera 2.6 m above the ground; face the middle, which is to the north; "
         "look down 40 degrees."
     )
 
 
 def test_words_for_cameras_that_do_not_look_at_the_middle():
-    by = directions.ruler(FRAME)
+    by = directions.make_ruler(FRAME)
     aside = cameras.pinhole([0.5, 3.0, 1.5], [3.0, 5.5, 1.5], 48, 64, 60.0)
-    assert "face the upper right of the map; look level." in directions.told(aside, FRAME, by)
+    assert "face the upper right of the map; look level." in directions.describe_pose(aside, FRAME, by)
     down = camera_layouts.orbit(90, 270, 1.8, MIDDLE, 64, 48, 60)
-    assert directions.told(down, FRAME, by) == (
+    assert directions.describe_pose(down, FRAME, by) == (
         "Stand in the middle, camera 1.8 m above the ground; turn the top of the picture to the top of the map; "
         "look straight down."
     )
-    assert directions.walked(aside, down, by) == "go 1.8 m towards the lower right of the map"
-    assert directions.walked(down, down, by) == "stay where you are"
+    assert directions.describe_walk(aside, down, by) == "go 1.8 m towards the lower right of the map"
+    assert directions.describe_walk(down, down, by) == "stay where you are"
 
 
 def test_numbers_on_the_map_do_not_cover_each_other():
     at = np.array([[10.0, 10], [10, 10], [12, 11], [200, 10]])
-    moved = shot_list_map.apart(at, 40.0)
+    moved = shot_list_map.spread_apart(at, 40.0)
     gaps = np.linalg.norm(moved[:, None] - moved[None], axis=-1) + 1e3 * np.eye(4)
     assert gaps.min() > 39
     np.testing.assert_allclose(moved[3], at[3], atol=0.01)  # who is alone stays
 
 
 def test_the_map_shows_the_exemplar_and_every_pose(asked):
-    drawn = shot_list_map.draw([camera for _, camera in asked], FRAME, directions.ruler(FRAME), None)
+    drawn = shot_list_map.draw_map([camera for _, camera in asked], FRAME, directions.make_ruler(FRAME), None)
     inside = drawn.camera.project(np.array([[0, 0, 0], [3.2, 3.2, 0], *(c.centre for _, c in asked)]))[0]
     assert (inside > 0).all()
     assert (inside < [drawn.camera.width, drawn.camera.height]).all()
@@ -202,4 +202,4 @@ def test_the_map_shows_the_exemplar_and_every_pose(asked):
     assert drawn.drawing.count('class="arrow"') == 3  # the fourth looks straight down
     assert "N</text>" not in drawn.drawing
     known = replace(FRAME, georeference=NORTH)
-    assert "N</text>" in shot_list_map.draw([asked[0][1]], known, directions.ruler(known), None).drawing
+    assert "N</text>" in shot_list_map.draw_map([asked[0][1]], known, directions.make_ruler(known), None).drawing

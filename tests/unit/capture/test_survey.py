@@ -35,41 +35,43 @@ def test_overlap_of_photos_straight_down_is_that_of_their_rectangles():
     for away in (0.5, 2.0, 6.0):
         b = lens.camera(90.0, 0.0, 10.0, away)
         # azimuth 0: the picture's top is west, its shorter side runs east; rays sample it in 24 rows
-        shorter = 2 * 10 * lens.shorter
-        assert survey.shared(a, b) == pytest.approx(1 - away / shorter, abs=1 / 24)
+        shorter = 2 * 10 * lens.half_tangent
+        assert survey.overlap_share(a, b) == pytest.approx(1 - away / shorter, abs=1 / 24)
 
 
 def test_neighbours_on_every_circle_overlap_enough():
-    views = survey.exhaustive(20.0, [12.0, 6.0], LENS)
+    views = survey.plan_exhaustive(20.0, [12.0, 6.0], LENS)
     rings = circles(views)
     assert {key[0] for key in rings} == {12.0, 6.0}
     assert len({key[1] for key in rings}) == 3
     for ring in rings.values():
         for a, b in zip(ring, ring[1:] + ring[:1], strict=True):
             if len(ring) > 1:
-                assert min(survey.shared(a, b), survey.shared(b, a)) >= 0.7
+                assert min(survey.overlap_share(a, b), survey.overlap_share(b, a)) >= 0.7
                 assert a.forward @ b.forward >= np.cos(np.radians(30.001))
 
 
 def test_circles_of_one_height_overlap_with_the_next():
     rings = [
-        ring[0] for (_, down, _), ring in sorted(circles(survey.exhaustive(20.0, [8.0], LENS)).items()) if down == 1
+        ring[0]
+        for (_, down, _), ring in sorted(circles(survey.plan_exhaustive(20.0, [8.0], LENS)).items())
+        if down == 1
     ]
     assert len(rings) >= 3
     for a, b in zip(rings[:-1], rings[1:], strict=True):
-        assert survey.shared(a, b) >= 0.7
+        assert survey.overlap_share(a, b) >= 0.7
 
 
 def test_an_exhaustive_flight_shows_every_place_often_and_a_start_flight_all_of_it():
-    assert survey.seen(survey.exhaustive(20.0, [8.0], LENS), 20.0) >= 8
-    height = survey.height_for(20.0, LENS)
-    assert survey.seen(survey.start(8, [height], LENS), 20.0) >= 3
-    above = survey.start(8, [height], LENS)[0][1]
+    assert survey.count_least_views(survey.plan_exhaustive(20.0, [8.0], LENS), 20.0) >= 8
+    height = survey.covering_height(20.0, LENS)
+    assert survey.count_least_views(survey.plan_start(8, [height], LENS), 20.0) >= 3
+    above = survey.plan_start(8, [height], LENS)[0][1]
     assert height * (above.height / 2 / above.fy) >= 10.0  # half a side, on the ground
 
 
 def test_a_start_flight_has_a_photo_from_straight_above_and_a_circle_at_each_height():
-    views = survey.start(12, [20.0, 12.0], LENS)
+    views = survey.plan_start(12, [20.0, 12.0], LENS)
     assert len(views) == 12
     np.testing.assert_allclose(views[0][1].centre, [0, 0, 20], atol=1e-9)
     heights = [round(camera.centre[2], 6) for _, camera in views[1:]]
@@ -80,11 +82,11 @@ def test_a_start_flight_has_a_photo_from_straight_above_and_a_circle_at_each_hei
 
 def test_too_few_photos_are_refused_with_the_number_that_is_enough():
     with pytest.raises(InputError, match=r"take at least (\d+)") as said:
-        survey.start(4, [20.0], LENS)
+        survey.plan_start(4, [20.0], LENS)
     enough = int(str(said.value).split()[-1])
-    assert len(survey.start(enough, [20.0], LENS)) == enough
+    assert len(survey.plan_start(enough, [20.0], LENS)) == enough
     with pytest.raises(InputError):
-        survey.start(enough - 1, [20.0], LENS)
+        survey.plan_start(enough - 1, [20.0], LENS)
 
 
 @pytest.mark.parametrize("kind, count", [("start", 8), ("exhaustive", None)])
@@ -92,7 +94,7 @@ def test_the_plan_that_is_written_has_the_cameras_that_were_meant(tmp_path, kind
     out = tmp_path / "flight.plan"
     more = ["--heights", "20", "--north", "25", "--minutes", "60"]
     assert survey.main([kind, str(out), *WHERE, *more]) == 0
-    views = survey.start(8, [20.0], LENS) if kind == "start" else survey.exhaustive(20.0, [20.0], LENS)
+    views = survey.plan_start(8, [20.0], LENS) if kind == "start" else survey.plan_exhaustive(20.0, [20.0], LENS)
     assert count in (None, len(views))
     mission = json.loads(out.read_text())["mission"]
     items = mission["items"]
@@ -109,7 +111,7 @@ def test_the_plan_that_is_written_has_the_cameras_that_were_meant(tmp_path, kind
 
 
 def test_a_flight_longer_than_a_battery_becomes_several_files(tmp_path):
-    views = survey.exhaustive(20.0, [20.0], LENS)
+    views = survey.plan_exhaustive(20.0, [20.0], LENS)
     assert survey.main(["exhaustive", str(tmp_path / "all.plan"), *WHERE, "--heights", "20", "--minutes", "4"]) == 0
     written = sorted(tmp_path.iterdir())
     assert [path.name for path in written] == [f"all_{i + 1}.plan" for i in range(len(written))]
@@ -121,7 +123,7 @@ def test_a_flight_longer_than_a_battery_becomes_several_files(tmp_path):
 
 def test_more_photos_than_anyone_flies_are_refused():
     with pytest.raises(InputError, match="more than 2000 photos"):
-        survey.exhaustive(500.0, [5.0], LENS)
+        survey.plan_exhaustive(500.0, [5.0], LENS)
 
 
 def test_what_cannot_be_flown_is_said(tmp_path, capsys):

@@ -1,4 +1,4 @@
-"""How to get to a pose, in words: for people who have a map and no instruments."""
+"""Directions to a pose in words, for people with a map and no instruments."""
 
 from dataclasses import dataclass
 
@@ -13,52 +13,52 @@ from dav_gswt.geometry.scene_frame import SceneFrame
 
 COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 ON_MAP = ("top", "upper right", "right", "lower right", "bottom", "lower left", "left", "upper left")
-HERE = 0.05  # flying heights: less is no way to go
-STEEP = 80.0  # degrees: below the horizon, from which a camera looks straight down
-FACING = 15.0  # degrees: who looks past the middle by less, faces it
+HERE = 0.05  # flying heights: shorter walks are not mentioned
+STEEP = 80.0  # degrees below the horizon from which a camera counts as looking straight down
+FACING = 15.0  # degrees: largest angle past the middle that still counts as facing it
 
 
 @dataclass(frozen=True)
 class Ruler:
-    """Lengths and directions of a scene for people. unit: the flying height in world units."""
+    """Formats lengths and directions of a scene. unit: the flying height in world units. metres: per world unit."""
 
     unit: float
-    metres: float | None  # in a world unit, where that is known
+    metres: float | None
     place: Georeference | None
 
-    def length(self, of: float) -> str:
-        """A length of the world, in metres where these are known, else in flying heights."""
+    def format_length(self, length: float) -> str:
+        """A length in world units as metres, or as flying heights if metres are not known."""
         if self.metres is None:
-            return self.heights(of)
-        many = of * self.metres
-        return f"{many:.0f} m" if many >= 20 else f"{many:.1f} m"
+            return self.format_heights(length)
+        metres = length * self.metres
+        return f"{metres:.0f} m" if metres >= 20 else f"{metres:.1f} m"
 
-    def heights(self, of: float) -> str:
-        """A length of the world in flying heights."""
-        many = f"{of / self.unit:.1f}"
-        return f"{many} flying height{'' if many == '1.0' else 's'}"
+    def format_heights(self, length: float) -> str:
+        """A length in world units as flying heights."""
+        count = f"{length / self.unit:.1f}"
+        return f"{count} flying height{'' if count == '1.0' else 's'}"
 
-    def towards(self, direction: Float[Array, "d"]) -> str:
-        """A direction: of the compass where north is known, else on the map."""
+    def format_direction(self, direction: Float[Array, "d"]) -> str:
+        """A compass direction, or a direction on the map if north is not known."""
         if self.place:
             return COMPASS[round(self.place.azimuth(direction) / 45) % 8]
         return f"the {ON_MAP[round(np.degrees(np.arctan2(direction[0], direction[1])) / 45) % 8]} of the map"
 
 
-def ruler(frame: SceneFrame) -> Ruler:
-    """The ruler of a scene, from its ground.json."""
+def make_ruler(frame: SceneFrame) -> Ruler:
+    """Build the ruler of a scene."""
     place = frame.georeference
     metres = place.metres_per_unit if place else 1.0 if frame.unit == "metre" else None
     return Ruler(frame.flying_height, metres, place)
 
 
 def tilt(camera: Camera) -> float:
-    """Degrees below the horizon that a camera looks."""
+    """Angle of the viewing direction below the horizon, degrees."""
     return float(-np.degrees(np.arcsin(np.clip(camera.forward[2], -1, 1))))
 
 
-def looking(camera: Camera) -> str:
-    """How far down or up a camera looks."""
+def describe_tilt(camera: Camera) -> str:
+    """Say how far down or up a camera looks."""
     down = round(tilt(camera))
     if down >= STEEP:
         return "straight down" if down >= 89 else f"down {down} degrees, nearly straight down"
@@ -66,14 +66,14 @@ def looking(camera: Camera) -> str:
 
 
 def heading(camera: Camera) -> Float[Array, "3"]:
-    """The level direction that whoever holds the camera faces: ahead, or the picture's top where it looks down."""
+    """The level direction that the photographer faces: ahead, or the picture's top if the camera looks down."""
     return -camera.rotation[1] if abs(tilt(camera)) >= STEEP else camera.forward
 
 
-def facing(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
-    """Where to turn to."""
+def describe_facing(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
+    """Say which way to face."""
     ahead, inwards = heading(camera)[:2], (middle(frame) - camera.centre)[:2]
-    towards = by.towards(ahead)
+    towards = by.format_direction(ahead)
     if abs(tilt(camera)) >= STEEP:
         return f"turn the top of the picture to {towards}"
     across = ahead[0] * inwards[1] - ahead[1] * inwards[0]
@@ -83,25 +83,30 @@ def facing(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
     return f"face the middle, which is to {'the ' if by.place else ''}{towards}"
 
 
-def standing(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
-    """Where to stand."""
+def describe_position(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
+    """Say where to stand."""
     out = (camera.centre - middle(frame))[:2]
     away = float(np.linalg.norm(out))
     if away < HERE * by.unit:
         return "Stand in the middle"
     if by.place:
-        return f"Stand {by.length(away)} {by.towards(out)} of the middle"
-    return f"Stand {by.length(away)} from the middle, towards {by.towards(out)}"
+        return f"Stand {by.format_length(away)} {by.format_direction(out)} of the middle"
+    return f"Stand {by.format_length(away)} from the middle, towards {by.format_direction(out)}"
 
 
-def told(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
-    """The whole of it: where to stand, how high the camera is, where it looks."""
-    up = f"camera {by.length(float(camera.centre[2]))} above the ground"
-    return f"{standing(camera, frame, by)}, {up}; {facing(camera, frame, by)}; look {looking(camera)}."
+def describe_pose(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
+    """Say where to stand, how high to hold the camera, and where it looks."""
+    up = f"camera {by.format_length(float(camera.centre[2]))} above the ground"
+    position, facing = describe_position(camera, frame, by), describe_facing(camera, frame, by)
+    return f"{position}, {up}; {facing}; look {describe_tilt(camera)}."
 
 
-def walked(a: Camera, b: Camera, by: Ruler) -> str:
-    """How to get from one pose to the next."""
+def describe_walk(a: Camera, b: Camera, by: Ruler) -> str:
+    """Say how to walk from one pose to the next."""
     way = (b.centre - a.centre)[:2]
     far = float(np.linalg.norm(way))
-    return "stay where you are" if far < HERE * by.unit else f"go {by.length(far)} towards {by.towards(way)}"
+    return (
+        "stay where you are"
+        if far < HERE * by.unit
+        else f"go {by.format_length(far)} towards {by.format_direction(way)}"
+    )

@@ -1,24 +1,24 @@
-"""The agent plan: a drone flies a mission, its photos are dropped into a folder."""
+"""The agent `plan`: writes a mission for a drone, whose photos come through the drop folder."""
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.capture import drop_folder, qgc_plan, requests
-from dav_gswt.capture.shots import Asked
+from dav_gswt.capture import drop_folder, missing_photos, qgc_plan
+from dav_gswt.capture.interface import RequestedPose
 from dav_gswt.capture.site import Site
 from dav_gswt.errors import InputError
 from dav_gswt.files import write_json
 from dav_gswt.geometry.georeference import Georeference
 
 
-def take(site: Site, asked: list[Asked]) -> None:
-    """Take over what was dropped; for what is still missing write a mission, and say what to do with it.
+def take_photos(site: Site, requested: list[RequestedPose]) -> None:
+    """Import dropped photos; for those still missing write a mission.
 
-    Raises: InputError: photos are missing (which, and what to fly), the scene's place on earth is not known, its
-        ground is too steep, or a pose is too low to fly to.
+    Raises: InputError: photos are missing (the message says which, and what to fly), the scene has no georeference,
+        its ground is too steep, or a pose is too low to fly to.
     """
-    missing = drop_folder.collect(site, asked, "plan")
+    missing = drop_folder.import_dropped_photos(site, requested, "plan")
     if not missing:
         return
     place = site.frame.georeference
@@ -29,21 +29,25 @@ def take(site: Site, asked: list[Asked]) -> None:
         )
     exemplar = site.frame.exemplar
     home = np.array([exemplar.west + exemplar.side / 2, exemplar.south])
-    rules = qgc_plan.Rules(**{key: float(value) for key, value in site.scene.get("flight", {}).items()})
+    rules = qgc_plan.FlightRules(**{key: float(value) for key, value in site.scene.get("flight", {}).items()})
     _check_level(site, place, missing, home, rules)
-    flown = qgc_plan.flight([(pose.name, camera) for pose, camera in missing], place, home, rules, site.burst)
+    flown = qgc_plan.plan_flight([(pose.name, camera) for pose, camera in missing], place, home, rules, site.burst)
     path = site.store.folder / "mission.plan"
     write_json(path, flown.content)
     raise InputError(
-        f"{path}: fly this mission (QGroundControl: Plan, Open): {requests.lacking(site, missing)}. "
-        f"It is a flight of {flown.told()}; take off from the ground near {flown.start()}. Then {requests.bring(site)}"
+        f"{path}: fly this mission (QGroundControl: Plan, Open): {missing_photos.describe_missing(site, missing)}. "
+        f"It is a flight of {flown.describe()}; take off from the ground near {flown.describe_home()}. "
+        f"Then {missing_photos.describe_delivery(site)}"
     )
 
 
 def _check_level(
-    site: Site, place: Georeference, missing: list[Asked], home: Float[Array, "2"], rules: qgc_plan.Rules
+    site: Site, place: Georeference, missing: list[RequestedPose], home: Float[Array, "2"], rules: qgc_plan.FlightRules
 ) -> None:
-    """A mission takes the plane of the ground for level. Raises: InputError: that is wrong by half the clearance."""
+    """Check that the ground is level enough, as a mission assumes.
+
+    Raises: InputError: altitudes would be wrong by more than half the clearance.
+    """
     reach = max(float(np.linalg.norm(camera.centre[:2] - home)) for _, camera in missing) * place.metres_per_unit
     off = reach * np.tan(np.radians(place.slope))
     if off > rules.clearance / 2:

@@ -1,14 +1,14 @@
-"""Photos that people or drones bring: dropped into a folder, found a place in the model, given to the poses asked for.
+"""The drop folder: photos by people and drones are localised in the model and assigned to the requested poses.
 
-A dropped photo stays where it is; what is taken over is copied into the store. One that finds no place, or that no
-asked pose is near to, is named with its reason and waits.
+Assigned photos are copied into the store; the dropped files stay. A photo that cannot be localised, or is near to no
+requested pose, is logged with the reason.
 """
 
 import logging
 from datetime import UTC, datetime
 from pathlib import Path
 
-from dav_gswt.capture.shots import Asked, apart
+from dav_gswt.capture.interface import RequestedPose, view_distance
 from dav_gswt.capture.site import Site
 from dav_gswt.files import digest
 from dav_gswt.images import image_files
@@ -17,39 +17,41 @@ from dav_gswt.photos.sfm import localization
 
 _log = logging.getLogger(__name__)
 
-NEAR = 0.6  # `shots.apart` of a photo from the pose that it is taken for: farther, it shows something else
+NEAR = 0.6  # greatest `view_distance` of a photo from its pose: beyond, it shows something else
 
 
-def folder_of(site: Site) -> Path:
-    """Where photos are to be dropped; made if it is not there."""
+def make_drop_folder(site: Site) -> Path:
+    """Return the drop folder; create it if it does not exist."""
     folder = site.store.folder / "drop"
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 
 
-def collect(site: Site, asked: list[Asked], agent: str) -> list[Asked]:
-    """Take over what was dropped, nearest photos first; returns the poses that still lack photos."""
+def import_dropped_photos(site: Site, requested: list[RequestedPose], agent: str) -> list[RequestedPose]:
+    """Copy dropped photos into the store, nearest first. Returns the poses that still lack photos."""
     known = {record["sha256"] for record in site.store.records()}
-    folder = folder_of(site)
+    folder = make_drop_folder(site)
     here = image_files.list_photos(folder) if any(not p.name.startswith(".") for p in folder.iterdir()) else []
     paths = [p for p in here if digest(p) not in known]  # cameras use names again
     found = [(p, camera) for p, camera in zip(paths, localization.located(site.photos, paths), strict=True) if camera]
     for path in sorted(set(paths) - {p for p, _ in found}):
-        _log.warning("%s: its place in the scene was not found; it must overlap photos that are there", path.name)
-    need = {pose.name: site.burst - len(site.store.of(camera)) for pose, camera in asked}
-    pairs = [(apart(camera, got, site.unit), pose.name, path) for path, got in found for pose, camera in asked]
-    places, given = dict(found), {}
-    for far, name, path in sorted(pairs, key=lambda p: (p[0], p[1], p[2].name)):
-        if path not in given and need[name] > 0 and far <= NEAR:
-            given[path] = name
+        _log.warning("%s: it could not be localised; it must overlap photos of the scene", path.name)
+    need = {pose.name: site.missing_photos(camera) for pose, camera in requested}
+    pairs = [
+        (view_distance(camera, got, site.unit), pose.name, path) for path, got in found for pose, camera in requested
+    ]
+    places, assigned = dict(found), {}
+    for distance, name, path in sorted(pairs, key=lambda p: (p[0], p[1], p[2].name)):
+        if path not in assigned and need[name] > 0 and distance <= NEAR:
+            assigned[path] = name
             need[name] -= 1
-    for pose, camera in asked:
-        for path in sorted(p for p, name in given.items() if name == pose.name):
-            site.store.add(path, agent, pose, camera, places[path], _taken(path))
-    for path in sorted(set(places) - set(given)):
-        _log.warning("%s: no pose that is asked for is near its place; it is not used", path.name)
-    return [(pose, camera) for pose, camera in asked if need[pose.name] > 0]
+    for pose, camera in requested:
+        for path in sorted(p for p, name in assigned.items() if name == pose.name):
+            site.store.add(path, agent, (pose, camera), places[path], _read_time(path))
+    for path in sorted(set(places) - set(assigned)):
+        _log.warning("%s: it is near no requested pose; it is not used", path.name)
+    return [(pose, camera) for pose, camera in requested if need[pose.name] > 0]
 
 
-def _taken(path: Path) -> str:
+def _read_time(path: Path) -> str:
     return exif.taken(path) or datetime.fromtimestamp(path.stat().st_mtime, UTC).isoformat(timespec="seconds")

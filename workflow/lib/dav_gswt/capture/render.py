@@ -1,25 +1,19 @@
-"""The agent of synthetic scenes: photos are taken exactly where they were asked for."""
+"""The agent of synthetic scenes: renders each photo exactly at its requested pose."""
 
-from collections.abc import Callable
-from pathlib import Path
-
-from jaxtyping import Float32
-from numpy import ndarray as Array
-
-from dav_gswt.capture.shots import Asked, Shot
-from dav_gswt.geometry.cameras import Camera
+from dav_gswt.capture.interface import CaptureRequest, photo_name
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
+from dav_gswt.photos.capture_record import CapturedPhoto
+from dav_gswt.photos.synthetic import scene as synthetic
 
 
-def take(
-    picture: Callable[[Camera, int], Float32[Array, "h w 3"]], asked: list[Asked], burst: int, folder: Path
-) -> list[Shot]:
-    """`burst` photos of each pose. picture: a photo, and which of its burst it is (they differ in their noise)."""
-    shots = []
-    for pose, camera in progress(asked, "render photos"):
+def capture_rendered(request: CaptureRequest) -> list[CapturedPhoto]:
+    """Render `burst` photos of each pose; photos of a burst differ in their noise."""
+    world, burst = synthetic.of_config(request.site.scene), request.site.burst
+    photos = []
+    for pose, camera in progress(request.poses, "render photos"):
         for i in range(burst):
-            name = f"{pose.name}.png" if burst == 1 else f"{pose.name}_{i}.png"
-            image_files.write_png(folder / name, picture(camera, i))
-            shots.append(Shot(name, pose, camera, camera, 0.0))
-    return shots
+            name = photo_name(pose, i, burst)
+            image_files.write_png(request.folder / name, synthetic.render(world, camera, again=i))
+            photos.append(CapturedPhoto(name, pose, camera, camera, 0.0))
+    return photos

@@ -1,21 +1,19 @@
-"""The agent of a photo set: for each pose the nearest frame that was not used yet."""
+"""The agent of a photo set: takes the nearest unused photo for each requested pose."""
 
 import shutil
-from pathlib import Path
 
-from dav_gswt.capture.shots import Asked, Shot, apart
-from dav_gswt.geometry.cameras import Camera
+from dav_gswt.capture.interface import CaptureRequest, view_distance
+from dav_gswt.photos.capture_record import CapturedPhoto
 
 
-def take(
-    photos: Path, pool: dict[str, Camera], asked: list[Asked], burst: int, folder: Path, unit: float
-) -> list[Shot]:
-    """The `burst` nearest frames of each pose (`shots.apart`, ties by name); fewer where the pool ends."""
-    left, shots = dict(pool), []
-    for pose, camera in asked:
-        for _ in range(min(burst, len(left))):
-            far = {name: apart(camera, other, unit) for name, other in left.items()}
-            name = min(far, key=lambda n: (far[n], n))
-            shutil.copyfile(photos / "images" / name, folder / name)
-            shots.append(Shot(name, pose, camera, left.pop(name), far[name]))
-    return shots
+def capture_replayed(request: CaptureRequest) -> list[CapturedPhoto]:
+    """Copy the `burst` photos nearest to each pose by `view_distance`, ties by name; fewer where the pool ends."""
+    site, remaining = request.site, {pose.name: camera for pose, camera in request.pool}
+    photos = []
+    for pose, camera in request.poses:
+        for _ in range(min(site.burst, len(remaining))):
+            distance = {name: view_distance(camera, other, site.unit) for name, other in remaining.items()}
+            name = min(distance, key=lambda n: (distance[n], n))
+            shutil.copyfile(site.photos / "images" / name, request.folder / name)
+            photos.append(CapturedPhoto(name, pose, camera, remaining.pop(name), distance[name]))
+    return photos

@@ -1,18 +1,18 @@
-"""An order of places that is short to walk or to fly."""
+"""Short routes through places."""
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy import ndarray as Array
 
-LEAST = 1e-9  # a shortening, as a share of the whole way, below which two orders count as equally long
+LEAST = 1e-9  # relative shortening below which two orders count as equally long
 
 
-def order(
+def order_stops(
     places: Float[Array, "n d"], start: Float[Array, "d"] | None = None, end: Float[Array, "d"] | None = None
 ) -> tuple[int, ...]:
-    """The order in which to visit places: nearest neighbour, then 2-opt. Without `start` or `end` these are free.
+    """Order in which to visit places: nearest neighbour, then 2-opt. Without `start` or `end` these are free.
 
-    Always the same for the same places: ties go to the first. No stretch of the way can be turned round to shorten it.
+    Deterministic, ties go to the first; no reversal of a stretch shortens the result.
     Source: Croes, A Method for Solving Traveling-Salesman Problems (1958).
     """
     n = len(places)
@@ -21,25 +21,25 @@ def order(
     far = np.linalg.norm(stops[:, None] - stops[None], axis=-1)
     if start is None:
         far[n], far[:, n] = 0.0, 0.0  # a start that is as near to every place
-    return tuple(int(i) for i in _turned(_nearest(far, n), far, closed=end is not None)[1 : n + 1])
+    return tuple(int(i) for i in _two_opt(_nearest_neighbour_path(far, n), far, closed=end is not None)[1 : n + 1])
 
 
-def length(places: Float[Array, "n d"]) -> float:
-    """How long the way through places is, in their order."""
+def path_length(places: Float[Array, "n d"]) -> float:
+    """Length of the path through places in their order."""
     return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
 
 
-def _nearest(far: Float[Array, "m m"], n: int) -> list[int]:
-    """From the start (stop n) always to the nearest place not visited yet, at last to the end if there is one."""
-    way, left = [n], list(range(n))
-    while left:
-        way.append(left.pop(int(np.argmin(far[way[-1], left]))))
-    return way + list(range(n + 1, len(far)))
+def _nearest_neighbour_path(far: Float[Array, "m m"], n: int) -> list[int]:
+    """From the start (stop n) always to the nearest unvisited place, then to the end if there is one."""
+    path, unvisited = [n], list(range(n))
+    while unvisited:
+        path.append(unvisited.pop(int(np.argmin(far[path[-1], unvisited]))))
+    return path + list(range(n + 1, len(far)))
 
 
-def _turned(way: list[int], far: Float[Array, "m m"], closed: bool) -> Array:
-    """Turn stretches of the way round as long as that shortens it; the start stays first, the end (if closed) last."""
-    way = np.array(way)
+def _two_opt(path: list[int], far: Float[Array, "m m"], closed: bool) -> Int[Array, "m"]:
+    """Reverse stretches while that shortens the path; the start stays first, the end (if closed) last."""
+    way = np.array(path)
     least = LEAST * (1 + far[way[:-1], way[1:]].sum())
     last = len(way) - (1 if closed else 0)  # stretches [i, j] lie within 1 .. last - 1
     shorter = True

@@ -1,23 +1,25 @@
-"""The agent of a motorised camera rig: drives to each pose, releases the camera, keeps the photo.
+"""The agent `serial`: a motorised camera rig drives to each pose and releases the camera.
 
-Every pose and every move is checked before the first one. What goes wrong stops the rig and ends the run; the photos
-that were taken until then are in the store, and the next run takes only the others.
+All poses and moves are checked before the first move. A fault stops the rig and ends the run; photos taken until then
+are in the store, and the next run takes only the others.
 """
 
 import logging
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from dav_gswt.capture import inbox, rig_limits, serial_protocol
+from dav_gswt.capture.interface import RequestedPose
 from dav_gswt.capture.rig_geometry import Mount
-from dav_gswt.capture.rig_limits import Axes, Reach
-from dav_gswt.capture.shots import Asked
+from dav_gswt.capture.rig_limits import Axes, AxisRanges, RigLimits
 from dav_gswt.capture.site import Site
 from dav_gswt.errors import InputError
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import middle
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import image_files
@@ -26,200 +28,223 @@ from dav_gswt.photos import lenses
 
 _log = logging.getLogger(__name__)
 
-DEFAULTS = {
-    "baud": 115200,
-    "pan_zero": 0.0,
-    "tilt_zero": 0.0,
-    "no_go": [],
-    "settle": 1.0,
-    "timeout": 2.0,
-    "retries": 3,
-    "move_timeout": 120.0,
-    "photo_timeout": 30.0,
-    "dry_run": True,
-}
-RESTARTS = 3  # of the rig in one run: one that restarts more often has trouble that homing does not mend
-POLL = 0.05  # seconds between questions where it is
+RESTARTS = 3  # restarts of the rig that one run tolerates
+POLL = 0.05  # seconds between queries of the position
 
 
-def take(site: Site, asked: list[Asked]) -> None:
-    """Put the photos that the poses still lack into the site's store.
+@dataclass(frozen=True)
+class RigSettings:
+    """The `rig` entry of a scene; config/README.md describes its keys."""
 
-    Raises: InputError: a pose that the rig cannot reach (all are named, nothing has moved), a fault of the rig, its
-    line or its camera, or a dry run.
+    port: str
+    inbox: Path
+    millimetres: float
+    limits: AxisRanges
+    baud: int = 115200
+    pan_zero: float = 0.0
+    tilt_zero: float = 0.0
+    no_go: tuple[AxisRanges, ...] = ()
+    settle: float = 1.0
+    timeout: float = 2.0
+    retries: int = 3
+    move_timeout: float = 120.0
+    photo_timeout: float = 30.0
+    dry_run: bool = True
+
+    @staticmethod
+    def from_config(entry: dict) -> "RigSettings":
+        return TypeAdapter(RigSettings).validate_python(entry)
+
+    def build_mount(self, frame: SceneFrame) -> Mount:
+        return Mount(middle(frame), self.millimetres, self.pan_zero, self.tilt_zero)
+
+
+def take_photos(site: Site, requested: list[RequestedPose]) -> None:
+    """Take the photos that the store lacks.
+
+    Raises: InputError: a pose is out of reach (all such are named, nothing moves), a fault of the rig, its line or its
+    camera, or a dry run.
     """
     if "rig" not in site.scene:
         raise InputError(f"config: scenes.{site.name}.rig: the agent serial needs it (config/README.md has its keys)")
-    rig = DEFAULTS | site.scene["rig"]
-    inbox.listing(Path(rig["inbox"]))  # is it there?
-    mount = Mount(middle(site.frame), float(rig["millimetres"]), float(rig["pan_zero"]), float(rig["tilt_zero"]))
-    with serial_protocol.opened(rig["port"], rig["baud"], float(rig["timeout"]), rig["retries"]) as wire:
-        device = wire.hello()
-        there = rig_limits.reach(rig["limits"], rig["no_go"], device.limits)
-        stops = _checked(there, device.home, mount, asked)
-        if not rig["dry_run"]:
-            _drive(site, Driver(rig, wire, there, device.home), mount, asked)
-    if rig["dry_run"]:
-        raise InputError(_rehearsed(site, stops))
+    settings = RigSettings.from_config(site.scene["rig"])
+    inbox.list_photos(settings.inbox)  # raises if the folder does not exist
+    mount = settings.build_mount(site.frame)
+    with serial_protocol.open_line(settings.port, settings.baud, settings.timeout, settings.retries) as line:
+        device = line.hello()
+        limits = rig_limits.combine_limits(settings.limits, settings.no_go, device.limits)
+        stops = _plan_stops(limits, device.home, mount, requested)
+        if not settings.dry_run:
+            _photograph_poses(site, SerialRig(settings, line, limits, device.home), mount, requested)
+    if settings.dry_run:
+        raise InputError(_describe_dry_run(site, stops))
 
 
-def within(scene: dict, frame: SceneFrame, pool: list[Asked]) -> list[Asked]:
-    """The poses where the rig may stand by the config's limits: it is asked for no others. Its own come with `take`.
+def filter_reachable(scene: dict, frame: SceneFrame, pool: list[RequestedPose]) -> list[RequestedPose]:
+    """Keep the poses within the limits of the config. The rig's own limits are checked by `take_photos`.
 
-    Raises: InputError: there is none.
+    Raises: InputError: no pose is left.
     """
-    rig = DEFAULTS | scene.get("rig", {})
-    if "limits" not in rig:
+    if "limits" not in scene.get("rig", {}):
         return pool
-    mount = Mount(middle(frame), float(rig["millimetres"]), float(rig["pan_zero"]), float(rig["tilt_zero"]))
-    there = rig_limits.reach(rig["limits"], rig["no_go"], np.array([[-np.inf, np.inf]] * 3))
+    settings = RigSettings.from_config(scene["rig"])
+    mount = settings.build_mount(frame)
+    limits = rig_limits.combine_limits(settings.limits, settings.no_go, np.array([[-np.inf, np.inf]] * 3))
 
-    def stands(camera) -> bool:
-        places = rig_limits.turns(there, mount.axes(camera), 0.0)
-        return any(rig_limits.trouble(there, place) is None for place in places)
+    def is_allowed(camera: Camera) -> bool:
+        places = rig_limits.list_turns(limits, mount.axes_of(camera), 0.0)
+        return any(rig_limits.find_violation(limits, place) is None for place in places)
 
-    found = [(pose, camera) for pose, camera in pool if not mount.trouble(camera) and stands(camera)]
+    found = [(pose, camera) for pose, camera in pool if not mount.find_violation(camera) and is_allowed(camera)]
     _log.info("the rig can stand at %d of %d candidate poses", len(found), len(pool))
     if pool and not found:
         raise InputError(
             "the rig can stand at none of the candidate poses: their radius is the flying height, "
-            f"{frame.flying_height * rig['millimetres']:.0f} mm; check rig.limits and rig.millimetres"
+            f"{frame.flying_height * settings.millimetres:.0f} mm; check rig.limits and rig.millimetres"
         )
     return found
 
 
-def _checked(there: Reach, home: Axes, mount: Mount, asked: list[Asked]) -> list[tuple[str, list[Axes]]]:
-    """The stops on the way to each pose by name, from home through all of them in order.
+def _plan_stops(
+    limits: RigLimits, home: Axes, mount: Mount, requested: list[RequestedPose]
+) -> list[tuple[str, list[Axes]]]:
+    """Plan the stops on the way to each pose, from home through all poses in order.
 
     Raises: InputError: names every pose that cannot be reached, and why.
     """
-    if why := rig_limits.trouble(there, home):
-        raise InputError(f"config: rig: the rig's home ({told(home)}) cannot be used: {why}; nothing was moved")
+    if why := rig_limits.find_violation(limits, home):
+        raise InputError(
+            f"config: rig: the rig's home ({describe_axes(home)}) cannot be used: {why}; nothing was moved"
+        )
     at, found, barred = home, [], []
-    for pose, camera in asked:
-        stops = mount.trouble(camera) or rig_limits.route(there, at, mount.axes(camera))
+    for pose, camera in requested:
+        stops = mount.find_violation(camera) or rig_limits.plan_route(limits, at, mount.axes_of(camera))
         if isinstance(stops, str):
-            barred.append(f"{pose.name} ({told(mount.axes(camera))}): {stops}")
+            barred.append(f"{pose.name} ({describe_axes(mount.axes_of(camera))}): {stops}")
             continue
         found.append((pose.name, stops))
         at = stops[-1] if stops else at
     if barred:
         raise InputError(
-            f"the rig cannot reach {len(barred)} of {len(asked)} poses, so nothing was moved; change rig.limits or "
+            f"the rig cannot reach {len(barred)} of {len(requested)} poses, so nothing was moved; change rig.limits or "
             "rig.no_go if it may go there, or ask for other poses (the scene's lowest, k):\n  " + "\n  ".join(barred)
         )
     return found
 
 
-def _rehearsed(site: Site, stops: list[tuple[str, list[Axes]]]) -> str:
-    """Say each move; returns what to do to have them done."""
-    for name, way in stops:
-        _log.info("%s: %s", name, "; then ".join(told(place) for place in way) or "where it stands")
+def _describe_dry_run(site: Site, stops: list[tuple[str, list[Axes]]]) -> str:
+    """Log each move. Returns the message that ends a dry run."""
+    for name, path in stops:
+        _log.info("%s: %s", name, "; then ".join(describe_axes(place) for place in path) or "no move")
     return (
         f"a dry run: the rig can reach all {len(stops)} poses, nothing was moved and no photo was taken; "
         f"with scenes.{site.name}.rig.dry_run: false it takes them"
     )
 
 
-def told(axes: Axes) -> str:
-    """A place of the axes for people."""
+def describe_axes(axes: Axes) -> str:
+    """Format a position of the axes."""
     return f"pan {axes[0]:.1f}, tilt {axes[1]:.1f} degrees, radius {axes[2]:.0f} mm"
 
 
 @dataclass
-class Driver:
-    """A rig on its way. at: the place where it was sent to and stands; None until it is homed."""
+class SerialRig:
+    """Drives a rig. at: its last commanded position; None until it is homed."""
 
-    rig: dict
-    wire: serial_protocol.Line
-    there: Reach
+    settings: RigSettings
+    line: serial_protocol.SerialLine
+    limits: RigLimits
     home: Axes
     at: Axes | None = None
-    restarts: int = field(default=0)
+    restarts: int = 0
 
-    def go(self, name: str, wanted: Axes) -> Axes:
-        """Stand still at a pose, over its stops, from home if the place was lost; returns where the axes say it is.
+    def move_to(self, name: str, target: Axes) -> Axes:
+        """Move to a pose along its stops, from home if the position was lost. Returns the reported position.
 
-        Raises: Rebooted: on the way; call `restarted`, then go again. InputError: no free way, or it gets elsewhere.
+        Raises: RigRestarted: on the way; call `recover`, then move again. InputError: no free path, or the rig ends
+        elsewhere.
         """
         if self.at is None:
-            self.wire.home()
-            self._arrived(self.home)
-        stops = rig_limits.route(self.there, self.at, wanted)
+            self.line.home()
+            self._wait_until_still(self.home)
+        start = self.home if self.at is None else self.at
+        stops = rig_limits.plan_route(self.limits, start, target)
         if isinstance(stops, str):
-            raise InputError(f"the rig cannot go on to {name} ({told(wanted)}): {stops}")
+            raise InputError(f"the rig cannot go on to {name} ({describe_axes(target)}): {stops}")
         for stop in stops:
-            self.wire.move(stop)
-            self._arrived(stop)
-        time.sleep(float(self.rig["settle"]))
-        return self._arrived(self.at)
+            self.line.move(stop)
+            self._wait_until_still(stop)
+        time.sleep(self.settings.settle)
+        return self._wait_until_still(stops[-1] if stops else start)
 
-    def restarted(self) -> None:
-        """After a restart: stand still, and begin from home again. Raises: InputError: too often."""
+    def recover(self) -> None:
+        """Stop after a restart; the next move begins with homing. Raises: InputError: too many restarts."""
         self.at = None
         self.restarts += 1
         if self.restarts > RESTARTS:
-            raise InputError(f"{self.rig['port']}: the rig restarted {self.restarts} times; check its power and cables")
-        _log.warning("the rig restarted and lost its place: homing it again")
-        self.wire.stop()
+            raise InputError(
+                f"{self.settings.port}: the rig restarted {self.restarts} times; check its power and cables"
+            )
+        _log.warning("the rig restarted and lost its position: homing it again")
+        self.line.stop()
 
-    def _arrived(self, goal: Axes) -> Axes:
-        """Wait until it stands still; it must be at the goal."""
-        until = time.monotonic() + self.rig["move_timeout"]
-        while (reported := self.wire.where())[0]:
+    def _wait_until_still(self, goal: Axes) -> Axes:
+        """Wait until the rig stands still at the goal. Returns the reported position."""
+        until = time.monotonic() + self.settings.move_timeout
+        while (reported := self.line.where())[0]:
             if time.monotonic() > until:
                 raise InputError(
-                    f"the rig still moves after {self.rig['move_timeout']:g} s, to {told(goal)}; if it is that slow, "
-                    "raise rig.move_timeout"
+                    f"the rig still moves after {self.settings.move_timeout:g} s, to {describe_axes(goal)}; "
+                    "if it is that slow, raise rig.move_timeout"
                 )
             time.sleep(POLL)
         if (np.abs(reported[1] - goal) > rig_limits.SLACK).any():
             raise InputError(
-                f"the rig stands at {told(reported[1])}, but was sent to {told(goal)}; does something bar it?"
+                f"the rig stands at {describe_axes(reported[1])}, but was sent to {describe_axes(goal)}; is it blocked?"
             )
         self.at = goal
         return reported[1]
 
 
-def _drive(site: Site, driver: Driver, mount: Mount, asked: list[Asked]) -> None:
-    """Take what the store lacks, pose by pose; each photo is in the store before the rig moves on."""
-    for pose, camera in progress(asked, "photos by the rig"):
-        while len(site.store.of(camera)) < site.burst:
-            photo, axes, taken = _photo(driver, pose.name, mount.axes(camera))
-            got = mount.camera(axes, camera)
-            _usable(photo, site, got)
-            site.store.add(photo, "serial", pose, camera, got, taken)
+def _photograph_poses(site: Site, rig: SerialRig, mount: Mount, requested: list[RequestedPose]) -> None:
+    """Take the missing photos pose by pose; each photo is stored before the rig moves on."""
+    for pose, camera in progress(requested, "photos by the rig"):
+        while site.missing_photos(camera) > 0:
+            photo, axes, taken = _take_photo(rig, pose.name, mount.axes_of(camera))
+            actual = mount.camera_at(axes, camera)
+            _check_photo(photo, site, actual)
+            site.store.add(photo, "serial", (pose, camera), actual, taken)
 
 
-def _photo(driver: Driver, name: str, wanted: Axes) -> tuple[Path, Axes, str]:
-    """One photo of a pose: its file, where the axes were, and when.
+def _take_photo(rig: SerialRig, name: str, target: Axes) -> tuple[Path, Axes, str]:
+    """Take one photo of a pose. Returns its file, the position of the axes, and the time.
 
-    Where the rig restarts, the pose is begun again, but the camera is not released again if the photo came meanwhile.
+    After a restart the pose is begun again; the camera is not released again if the photo came meanwhile.
     """
-    folder, patience = Path(driver.rig["inbox"]), float(driver.rig["photo_timeout"])
-    before, axes, taken = None, None, ""
+    folder, patience = rig.settings.inbox, rig.settings.photo_timeout
+    before, axes, taken = None, target, ""
     while True:
         try:
-            stands = driver.go(name, wanted)
-            if before is None or not inbox.new(folder, before):
-                before = inbox.listing(folder) if before is None else before
-                axes, taken = stands, datetime.now(UTC).isoformat(timespec="seconds")
-                driver.wire.shoot()
-            if photo := inbox.arrived(folder, before, patience):
+            position = rig.move_to(name, target)
+            if before is None or not inbox.list_new_photos(folder, before):
+                before = inbox.list_photos(folder) if before is None else before
+                axes, taken = position, datetime.now(UTC).isoformat(timespec="seconds")
+                rig.line.shoot()
+            if photo := inbox.wait_for_photo(folder, before, patience):
                 return photo, axes, taken
             raise InputError(
                 f"{name}: the camera was released, but no photo came into {folder} within {patience:g} s; check the "
                 "camera and the software that saves its photos there, and rig.photo_timeout"
             )
-        except serial_protocol.Rebooted:
-            driver.restarted()
-            if before is not None and (photo := inbox.arrived(folder, before, patience)):
+        except serial_protocol.RigRestarted:
+            rig.recover()
+            if before is not None and (photo := inbox.wait_for_photo(folder, before, patience)):
                 return photo, axes, taken
 
 
-def _usable(photo: Path, site: Site, got) -> None:
-    """A photo that the scene's lens did not take is better refused now than after all others."""
+def _check_photo(photo: Path, site: Site, camera: Camera) -> None:
+    """Raises: InputError: the photo is not of the scene's lens. Checked now rather than after all other photos."""
     try:
-        lenses.developed(image_files.read_photo(photo), site.photos, got)
+        lenses.developed(image_files.read_photo(photo), site.photos, camera)
     except (InputError, ValueError) as error:
         raise InputError(f"{photo}: {error}") from error

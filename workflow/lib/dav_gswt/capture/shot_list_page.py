@@ -1,4 +1,4 @@
-"""The shot list as a web page: no scripts, nothing from the net, read from a file on a phone."""
+"""The shot list as a web page without scripts or network access, to be opened from a file on a phone."""
 
 from dataclasses import dataclass
 from html import escape
@@ -20,13 +20,13 @@ from dav_gswt.raster import render
 
 LONGER = 720  # pixels of an expected picture's longer side
 ZENITH, HORIZON = np.array([0.42, 0.6, 0.85]), np.array([0.85, 0.9, 0.95])
-GROUND = np.array([0.5, 0.5, 0.5])  # where nothing is known of the ground
-CLOSE, TURNED = 0.2, 15  # flying heights, degrees: a photo nearer than this to its pose is certainly taken for it
+GROUND = np.array([0.5, 0.5, 0.5])  # where the ground is not known
+CLOSE, TURNED = 0.2, 15  # flying heights, degrees: a photo nearer than this to its pose is always assigned to it
 
 
 @dataclass(frozen=True)
 class Station:
-    """A place to take photos at. photos: how many are still missing."""
+    """A place to take photos at. photos: how many are missing."""
 
     name: str
     camera: Camera
@@ -34,8 +34,8 @@ class Station:
 
 
 @dataclass(frozen=True)
-class Errand:
-    """What a shot list is about. drop: where photos are put. length: of the walk, in world units."""
+class ShotList:
+    """Header of a shot list. drop: folder for the photos. length: of the walk, in world units."""
 
     scene: str
     frame: SceneFrame
@@ -44,25 +44,25 @@ class Errand:
     length: float
 
 
-def write(folder: Path, errand: Errand, stations: list[Station], field: GaussianField | None) -> None:
-    """index.html, map.png and, where there is a field, the picture expected of every station, into `folder`."""
-    by = errand.ruler
-    drawn = shot_list_map.draw([station.camera for station in stations], errand.frame, by, field)
+def write_page(folder: Path, shot_list: ShotList, stations: list[Station], field: GaussianField | None) -> None:
+    """Write index.html, map.png and, if there is a field, the expected picture of every station."""
+    by = shot_list.ruler
+    drawn = shot_list_map.draw_map([station.camera for station in stations], shot_list.frame, by, field)
     image_files.write_png(folder / "map.png", drawn.picture)
     cards = []
     for i, station in enumerate(stations):
         if field is not None:
-            image_files.write_png(folder / _file(i), expected(field, station.camera))
+            image_files.write_png(folder / _picture_name(i), render_expected(field, station.camera))
         before = stations[i - 1].camera if i else None
-        cards.append(_card(i, station, before, errand, field is not None))
+        cards.append(_format_card(i, station, before, shot_list, field is not None))
     photos = sum(station.photos for station in stations)
     text = PAGE.substitute(
-        scene=escape(errand.scene),
-        summary=_summary(photos, len(stations), errand),
-        unit=_unit(by),
+        scene=escape(shot_list.scene),
+        summary=_format_summary(photos, len(stations), shot_list),
+        unit=_explain_unit(by),
         picture=PICTURE if field is not None else "",
-        near=f"{by.length(CLOSE * by.unit)} and {TURNED} degrees",
-        drop=escape(str(errand.drop)),
+        near=f"{by.format_length(CLOSE * by.unit)} and {TURNED} degrees",
+        drop=escape(str(shot_list.drop)),
         width=drawn.camera.width,
         height=drawn.camera.height,
         drawing=drawn.drawing,
@@ -71,15 +71,15 @@ def write(folder: Path, errand: Errand, stations: list[Station], field: Gaussian
     (folder / "index.html").write_text(text, encoding="utf-8")
 
 
-def expected(field: GaussianField, camera: Camera) -> Float32[Array, "h w 3"]:
-    """What the field shows from a camera, over a sky and a ground of its mean colour."""
+def render_expected(field: GaussianField, camera: Camera) -> Float32[Array, "h w 3"]:
+    """Render the field over a sky and a ground of its mean colour."""
     scale = LONGER / max(camera.width, camera.height)
     view = camera.resized(max(round(camera.width * scale), 16), max(round(camera.height * scale), 16))
     seen = render(field, view)
-    return np.clip(seen.colour + (1 - seen.alpha)[..., None] * _behind(view, field), 0, 1)
+    return np.clip(seen.colour + (1 - seen.alpha)[..., None] * _backdrop(view, field), 0, 1)
 
 
-def _behind(camera: Camera, field: GaussianField) -> Float32[Array, "h w 3"]:
+def _backdrop(camera: Camera, field: GaussianField) -> Float32[Array, "h w 3"]:
     step = camera.rays()[1]
     rise = (step[..., 2] / np.linalg.norm(step, axis=-1))[..., None]
     sky = HORIZON + (ZENITH - HORIZON) * np.clip(rise, 0, 1) ** 0.5
@@ -88,21 +88,22 @@ def _behind(camera: Camera, field: GaussianField) -> Float32[Array, "h w 3"]:
     return np.where(rise > 0, sky, below).astype(np.float32)
 
 
-def _file(i: int) -> str:
+def _picture_name(i: int) -> str:
     return f"place_{i + 1:03d}.png"
 
 
-def _count(many: int, of: str) -> str:
+def _format_count(many: int, of: str) -> str:
     return f"{many} {of}" if many == 1 else f"{many} {of}s"
 
 
-def _summary(photos: int, places: int, errand: Errand) -> str:
-    by = errand.ruler
-    walk = by.length(errand.length) + (f" ({by.heights(errand.length)})" if by.metres is not None else "")
-    return f"{_count(photos, 'photo')} from {_count(places, 'place')}; the walk from the first to the last is {walk}."
+def _format_summary(photos: int, places: int, shot_list: ShotList) -> str:
+    by, length = shot_list.ruler, shot_list.length
+    walk = by.format_length(length) + (f" ({by.format_heights(length)})" if by.metres is not None else "")
+    counts = f"{_format_count(photos, 'photo')} from {_format_count(places, 'place')}"
+    return f"{counts}; the walk from the first to the last is {walk}."
 
 
-def _unit(by: Ruler) -> str:
+def _explain_unit(by: Ruler) -> str:
     if by.metres is not None:
         return ""
     return (
@@ -111,33 +112,33 @@ def _unit(by: Ruler) -> str:
     )
 
 
-def _card(i: int, station: Station, before: Camera | None, errand: Errand, pictured: bool) -> str:
-    camera, by = station.camera, errand.ruler
-    said = directions.told(camera, errand.frame, by)
-    out = camera.centre - middle(errand.frame)
+def _format_card(i: int, station: Station, before: Camera | None, shot_list: ShotList, pictured: bool) -> str:
+    camera, by = station.camera, shot_list.ruler
+    said = directions.describe_pose(camera, shot_list.frame, by)
+    out = camera.centre - middle(shot_list.frame)
     facts = {
-        "Height above the ground": by.length(float(out[2])),
-        "Distance to the middle": by.length(float(np.linalg.norm(out[:2]))),
-        "Tilt": directions.looking(camera),
-        "Picture": _shape(camera),
+        "Height above the ground": by.format_length(float(out[2])),
+        "Distance to the middle": by.format_length(float(np.linalg.norm(out[:2]))),
+        "Tilt": directions.describe_tilt(camera),
+        "Picture": _describe_shape(camera),
     }
     if by.place:
         ahead = directions.heading(camera)
-        facts["Compass"] = f"{by.place.azimuth(ahead):.0f} degrees ({by.towards(ahead)})"
+        facts["Compass"] = f"{by.place.azimuth(ahead):.0f} degrees ({by.format_direction(ahead)})"
     facts["Name"] = station.name
     alt = f"Expected picture from place {i + 1}. {said}"
     size = f'width="{camera.width}" height="{camera.height}"'
     return CARD.substitute(
         number=i + 1,
-        picture=f'<img src="{_file(i)}" {size} alt="{escape(alt)}">' if pictured else "",
-        way=f"From place {i}: {directions.walked(before, camera, by)}." if before else "Start here.",
+        picture=f'<img src="{_picture_name(i)}" {size} alt="{escape(alt)}">' if pictured else "",
+        way=f"From place {i}: {directions.describe_walk(before, camera, by)}." if before else "Start here.",
         said=escape(said),
         photos=f"<p><b>Take {station.photos} photos from here.</b></p>" if station.photos > 1 else "",
         facts="".join(f"<div><dt>{escape(k)}</dt><dd>{escape(v)}</dd></div>" for k, v in facts.items()),
     )
 
 
-def _shape(camera: Camera) -> str:
+def _describe_shape(camera: Camera) -> str:
     if camera.width == camera.height:
         return "square, or its middle"
     return "landscape (wider than high)" if camera.width > camera.height else "portrait (higher than wide)"

@@ -1,9 +1,10 @@
-"""What an agent knows of the place that it photographs."""
+"""The scene that an agent photographs."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
-from dav_gswt.capture.store import Store
+from dav_gswt.capture.store import PhotoStore
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import SceneFrame
 
 
@@ -11,24 +12,27 @@ from dav_gswt.geometry.scene_frame import SceneFrame
 class Site:
     """A scene to photograph.
 
-    name, scene: its name and its entry in the config. frame: ground.json. photos: its photos/ folder. store: where
-    photos by devices are kept; photos that people bring are dropped into store.folder / "drop". field: what is known
-    of the scene so far, a .ply.
+    name, scene: its name and entry in the config. photos: its photos/ folder. store: photos taken by devices and
+    people. field: the reconstruction so far, a .ply.
     """
 
     name: str
     scene: dict
     frame: SceneFrame
     photos: Path
-    store: Store
+    store: PhotoStore
     field: Path | str | None = None
 
     @property
     def burst(self) -> int:
-        """Photos of each pose; every one counts against the budget."""
+        """Photos per pose; each counts against the budget."""
         return self.scene.get("burst", 1)
 
     @property
     def unit(self) -> float:
-        """The flying height, in units of the world."""
+        """The flying height in world units."""
         return self.frame.flying_height
+
+    def missing_photos(self, camera: Camera) -> int:
+        """Number of photos of a pose that the store lacks."""
+        return self.burst - len(self.store.photos_of(camera))

@@ -1,7 +1,7 @@
-"""Photos that a device took, kept for good: outside any rule's outputs, by pose, added to and never changed.
+"""The photo store: photos by devices and people, kept outside of all rule outputs, by pose, never changed.
 
-captures/{scene}/{key}/{n}/ holds a photo as the device delivered it and shot.json. A round that is asked for the same
-pose again, because something before it was computed anew or a run was killed, finds the photos here and takes none.
+captures/{scene}/{key}/{n}/ holds a photo as delivered and shot.json. If a round requests the same pose again, because
+an earlier stage was computed anew or a run was killed, the stored photos are used.
 """
 
 import fcntl
@@ -20,31 +20,32 @@ from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import Pose
 
-PLACES = 6  # decimals of a camera's numbers that tell poses apart: far below what a device can repeat
+PLACES = 6  # decimals of a camera's numbers in its key: finer than any device repeats a pose
 
 
 @dataclass(frozen=True)
-class Stored:
-    """A photo in the store. photo: its file. got: the camera that took it. taken: when, ISO 8601."""
+class StoredPhoto:
+    """A photo in the store. photo: its file. camera: the one that took it. taken: time, ISO 8601."""
 
     photo: Path
-    got: Camera
+    camera: Camera
     taken: str
 
 
-class Store:
-    """A scene's photos by devices. folder: captures/{scene}."""
+class PhotoStore:
+    """The stored photos of a scene. folder: captures/{scene}."""
 
     def __init__(self, folder: Path | str):
         self.folder = Path(folder)
 
-    def of(self, asked: Camera) -> list[Stored]:
-        """The photos taken for a pose, oldest first. Raises: InputError: one that was changed since, by name."""
-        return [_read(place) for place in sorted((self.folder / key(asked)).glob("[0-9]*"))]
+    def photos_of(self, requested: Camera) -> list[StoredPhoto]:
+        """Photos of a requested pose, oldest first. Raises: InputError: a file was changed since, by name."""
+        return [_read_photo(place) for place in sorted((self.folder / pose_key(requested)).glob("[0-9]*"))]
 
-    def add(self, photo: Path, agent: str, pose: Pose, asked: Camera, got: Camera, taken: str) -> Stored:
-        """Keep a photo: whole or not at all, beside those of the same pose."""
-        home = self.folder / key(asked)
+    def add(self, photo: Path, agent: str, requested: tuple[Pose, Camera], camera: Camera, taken: str) -> StoredPhoto:
+        """Copy a photo into the store, whole or not at all. camera: the one that took it."""
+        pose, pinhole = requested
+        home = self.folder / pose_key(pinhole)
         home.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".part-", dir=self.folder) as part:
             made = Path(part) / "shot"
@@ -52,19 +53,19 @@ class Store:
             name = f"photo{photo.suffix.lower()}"
             shutil.copyfile(photo, made / name)
             record = {"agent": agent, "pose": asdict(pose), "taken": taken, "source": photo.name, "photo": name}
-            record |= {"asked": cameras.to_json(asked), "got": cameras.to_json(got), "sha256": digest(made / name)}
+            record |= {"asked": cameras.to_json(pinhole), "got": cameras.to_json(camera), "sha256": digest(made / name)}
             write_json(made / "shot.json", record)
             place = home / f"{len(list(home.glob('[0-9]*'))):03d}"
             made.rename(place)
-        return _read(place)
+        return _read_photo(place)
 
     def records(self) -> list[dict]:
-        """Every photo's shot.json."""
+        """Read shot.json of every photo."""
         return [read_json(path) for path in sorted(self.folder.glob("*/[0-9]*/shot.json"))]
 
     @contextmanager
     def locked(self):
-        """One device at a time, and one run. Raises: InputError: another run holds the device."""
+        """Hold the lock of the scene's devices. Raises: InputError: another run holds it."""
         self.folder.mkdir(parents=True, exist_ok=True)
         with (self.folder / ".lock").open("w") as file:
             try:
@@ -74,17 +75,17 @@ class Store:
             yield self
 
 
-def key(camera: Camera) -> str:
-    """A pose's name in the store: a digest of where the camera stands, how it is turned and what it resolves."""
+def pose_key(camera: Camera) -> str:
+    """A pose's folder name in the store: a digest of the camera's numbers."""
     numbers = [*camera.rotation.ravel(), *camera.translation, camera.fx, camera.fy, camera.cx, camera.cy]
     numbers += [camera.width, camera.height]
     rounded = np.round(np.array(numbers, float), PLACES) + 0.0  # + 0.0: no negative zeros
     return hashlib.sha256(rounded.astype("<f8").tobytes()).hexdigest()[:24]
 
 
-def _read(place: Path) -> Stored:
+def _read_photo(place: Path) -> StoredPhoto:
     record = read_json(place / "shot.json")
     photo = place / record["photo"]
     if not photo.is_file() or digest(photo) != record["sha256"]:
         raise InputError(f"{photo}: is not the photo that was stored; put it back, or remove {place} to take it again")
-    return Stored(photo, cameras.from_json(record["got"]), record["taken"])
+    return StoredPhoto(photo, cameras.from_json(record["got"]), record["taken"])

@@ -7,12 +7,11 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.files import read_json
-from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import Pose, middle, of_camera
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos import model
+from dav_gswt.photos.capture_record import read_capture_record
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.photos.synthetic import scene as synthetic
 
@@ -58,7 +57,7 @@ def read_captured_cameras(model_folder: Path | str, split: dict, captures: list)
     known = model.read(model_folder)
     at = dict(zip(known.names, known.cameras, strict=True))
     start = [at[name] for name in split["start"]]
-    return start + [cameras.from_json(shot["got"]) for folder in captures for shot in _read_photos(folder)]
+    return start + [photo.camera for folder in captures for photo in read_capture_record(folder)]
 
 
 def camera_positions(taken: list[Camera], frame: SceneFrame) -> Float[Array, "m 3"]:
@@ -72,10 +71,6 @@ def select_by_name(pool: Candidates, chosen: list[dict]) -> Candidates:
     return [by_name[pose["name"]] for pose in chosen]
 
 
-def _read_photos(folder: Path | str) -> list[dict]:
-    return read_json(Path(folder) / "capture.json")["shots"]
-
-
 def _used_names(folder: Path | str) -> list[str]:
-    """Names of poses asked for and of photos got: a frame got in place of another leaves the pool too."""
-    return [name for shot in _read_photos(folder) for name in (shot["asked"]["name"], shot["name"])]
+    """Names of requested poses and of captured photos: a photo taken in place of another leaves the pool too."""
+    return [name for photo in read_capture_record(folder) for name in (photo.pose.name, photo.name)]

@@ -113,8 +113,8 @@ def _score_geometry(
         terms["opacity"][i] = float((maps[-1] * weight).sum() / max(1.0, weight.sum()))
     shape = (0, 1, 1) if not maps else (len(maps), *np.max([m.shape for m in maps], axis=0))
     out = np.full(shape, np.nan, np.float32)  # cameras of one pool may differ in their height
-    for row, m in zip(out, maps, strict=True):
-        row[: m.shape[0], : m.shape[1]] = m
+    for i, m in enumerate(maps):
+        out[i, : m.shape[0], : m.shape[1]] = m
     return terms, out
 
 

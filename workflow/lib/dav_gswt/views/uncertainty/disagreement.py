@@ -39,7 +39,7 @@ def w2_sq(
         with np.errstate(over="ignore", invalid="ignore"):  # what that gives is refused below
             found = _twice_the_variance(means[rows])
             if variances is not None:
-                reject_poses((variances[rows] < 0).any((1, 2, 3, 4)), "variance below 0", names and names[rows])
+                reject_poses(np.any(variances[rows] < 0, axis=(1, 2, 3, 4)), "variance below 0", names and names[rows])
                 found = found + _twice_the_variance(np.sqrt(variances[rows], dtype=np.float64))
             maps[rows] = found
             scores[rows] = found.mean((1, 2), dtype=np.float64)
@@ -62,7 +62,10 @@ def w2_sq_by_pairs(
     mu = means.astype(np.float64)
     s = np.zeros_like(mu) if variances is None else np.sqrt(variances, dtype=np.float64)
     pairs = list(combinations(range(mu.shape[1]), 2))
-    return sum(((mu[:, i] - mu[:, j]) ** 2 + (s[:, i] - s[:, j]) ** 2).sum(1) for i, j in pairs) / len(pairs)
+    total = np.zeros((len(mu), *mu.shape[3:]))
+    for i, j in pairs:
+        total += ((mu[:, i] - mu[:, j]) ** 2 + (s[:, i] - s[:, j]) ** 2).sum(1)
+    return total / len(pairs)
 
 
 def w2_sq_as_printed(

@@ -17,7 +17,7 @@ def reject_poses(bad: Bool[Array, "n"], what: str, names: Sequence[str] | None =
 
 def format_names(bad: Bool[Array, "n"], names: Sequence[str] | None = None) -> str:
     """The first few that are bad, by name, or by index without names, and how many more."""
-    found = [names[i] if names is not None else str(i) for i in np.flatnonzero(bad)]
+    found = [names[i] if names is not None else str(i) for i in np.flatnonzero(bad).tolist()]
     more = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""
     return ", ".join(found[:NAMED]) + more
 

@@ -62,7 +62,9 @@ def score_in_stages(
 def _rankings(terms: PriorTerms, scales: dict[str, float]) -> dict[str, Float64[Array, "n"]]:
     """What poses may be ranked by."""
     named = {name: values for name, values in terms.named().items() if name in RANKING}
-    total = sum(values / (scales[name] or 1) for name, values in named.items())
+    total = np.zeros(len(terms.w2_sq))
+    for name, values in named.items():
+        total += values / (scales[name] or 1)
     return named | {"sum": total}
 
 

@@ -1,0 +1,57 @@
+"""capture.json: the photos of a round, with the camera that was requested and the one that took each photo."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from dav_gswt.errors import InputError
+from dav_gswt.files import read_json, write_json
+from dav_gswt.geometry import cameras
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.poses import Pose
+
+
+@dataclass(frozen=True)
+class CapturedPhoto:
+    """A photo of a capture folder.
+
+    name: its file. pose, requested: what was asked for. camera: the one that took it. distance: between the two, see
+    `view_distance`. taken: time (ISO 8601), where a device took it.
+    """
+
+    name: str
+    pose: Pose
+    requested: Camera
+    camera: Camera
+    distance: float
+    taken: str | None = None
+
+
+def write_capture_record(folder: Path, agent: str, photos: list[CapturedPhoto]) -> None:
+    """Write capture.json."""
+    rows = [
+        {
+            "name": photo.name,
+            "asked": asdict(photo.pose) | {"camera": cameras.to_json(photo.requested)},
+            "got": cameras.to_json(photo.camera),
+            "asked_to_got": photo.distance,
+            "taken": photo.taken,
+        }
+        for photo in photos
+    ]
+    write_json(folder / "capture.json", {"agent": agent, "shots": rows})
+
+
+def read_capture_record(folder: Path | str) -> list[CapturedPhoto]:
+    """Read capture.json. Raises: InputError: not such a record."""
+    path = Path(folder) / "capture.json"
+    try:
+        return [_parse_photo(row) for row in read_json(path)["shots"]]
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{path}: not the record of a capture ({error}); make it again") from error
+
+
+def _parse_photo(row: dict) -> CapturedPhoto:
+    pose = dict(row["asked"])
+    requested = cameras.from_json(pose.pop("camera"))
+    camera = cameras.from_json(row["got"])
+    return CapturedPhoto(row["name"], Pose(**pose), requested, camera, row["asked_to_got"], row["taken"])
