@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from record import tell
 
-from dav_gswt.photos.sfm import registration
+from dav_gswt.photos.sfm.registration import SfmOptions, register_photos
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.photos.synthetic import scene as synthetic
 
@@ -21,7 +21,7 @@ VIEWS = 3  # of each family, from the side, where most is seen
 def copr() -> dict[str, float]:
     """Quick structure from motion, from photos on disk to the undistorted model."""
     start = time.perf_counter()
-    found = registration.register(COPR, registration.Options(threads=2))
+    found = register_photos(COPR, SfmOptions(threads=2))
     seconds = time.perf_counter() - start
     print(f"copr_dunes: {len(found.model.names)} of 41 photos placed, focal length {found.focal_ratio:.3f} of EXIF's")
     return {"sfm_copr_seconds": seconds}

@@ -10,6 +10,7 @@ import numpy as np
 from record import tell
 
 from dav_gswt.geometry import poses
+from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.images import lpips, lpips_weights
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.prior import conditions
@@ -79,7 +80,7 @@ def pools() -> dict[str, float]:
         cameras = [
             camera_layouts.orbit(*place, poses.middle(made.frame), 96, 96, examples.FIELD_OF_VIEW) for place in places
         ]
-        pool = [(poses.of_camera(f"pose_{i:04d}", c, made.frame), c) for i, c in enumerate(cameras)]
+        pool = [(pose_of_camera(f"pose_{i:04d}", c, made.frame), c) for i, c in enumerate(cameras)]
         start = time.perf_counter()
         told = conditions.build_condition(field, pool, known, FLYING_HEIGHT, model.size)
         ask = PriorConfig(model, 5, 8, 0.15, weights=given, staged=staged)

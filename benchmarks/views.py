@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from record import tell
 
-from dav_gswt.geometry.poses import Pose, place
+from dav_gswt.geometry.poses import Pose, pose_offset
 from dav_gswt.images import lpips_weights
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.views.policies import POLICIES, SelectionInput
@@ -39,7 +39,7 @@ def selection() -> dict[str, float]:
     rng = np.random.default_rng(0)
     terms = {name: rng.uniform(0, 1, CANDIDATES) for name in TERMS}
     scores = Scores(found, terms, Scales.frozen(terms), np.full(CANDIDATES, 8))
-    captured = np.array([place(pose) for pose in found[:PHOTOS]])
+    captured = np.array([pose_offset(pose) for pose in found[:PHOTOS]])
     out = {}
     for name, policy in POLICIES.items():
         if name in MORE_THAN_SCORES:

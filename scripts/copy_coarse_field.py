@@ -1,8 +1,8 @@
 """Rule begin_active: round 0 is the coarse field."""
 
-from dav_gswt.files import copied
+from dav_gswt.files import copy_file
 from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):
     for source, target in zip(snakemake.input, snakemake.output, strict=True):
-        copied(source, target)
+        copy_file(source, target)

@@ -1,19 +1,19 @@
 """Rule evaluate_completed: what the test photos say about a field before and after it was completed."""
 
-from dav_gswt import provenance
 from dav_gswt.field import read_field
 from dav_gswt.files import read_json, write_json
 from dav_gswt.images import lpips_weights
 from dav_gswt.inpainting import evaluation
 from dav_gswt.logs import logging_to
-from dav_gswt.photos import training_views
+from dav_gswt.photos.training_views import read_training_views
+from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction import build, ground
 
 with logging_to(snakemake.log[0]):
     given, quality = snakemake.input, snakemake.params.quality
     names, grid = read_json(given.views)["test"], ground.read(given.ground)
-    tests = build.modelled(training_views.taken(given.images, given.model, names, [], quality["size"]), grid)
+    tests = build.modelled(read_training_views(given.images, given.model, names, [], quality["size"]), grid)
     perceptual = lpips_weights.read(given.lpips) if given.get("lpips") else None
     result = evaluation.judged(read_field(given.before), read_field(given.after), tests, perceptual)
     inputs = {name: given[name] for name in ("before", "after", "ground", "views")}
-    write_json(snakemake.output.metrics, result | {"provenance": provenance.of(inputs, dict(quality))})
+    write_json(snakemake.output.metrics, result | {"provenance": record_provenance(inputs, dict(quality))})

@@ -1,26 +1,26 @@
 """Rule complete_field: what no photo saw, painted by a prior."""
 
-from dav_gswt import provenance
 from dav_gswt.field import read_field, write_field
-from dav_gswt.files import copied, read_json, write_json
+from dav_gswt.files import copy_file, read_json, write_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.inpainting import build
 from dav_gswt.logs import logging_to
-from dav_gswt.photos import training_views
+from dav_gswt.photos.training_views import read_training_views
+from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction import ground
 from dav_gswt.views import prior_sampling, scoring
 
 with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
     fitted, grid, names = read_field(given.field), ground.read(given.ground), read_json(given.views)["start"]
-    taken = training_views.taken(given.images, given.model, names, list(given.captures), scoring.PHOTO)
+    taken = read_training_views(given.images, given.model, names, list(given.captures), scoring.PHOTO)
     asked = prior_sampling.open_inpainting_prior(params.prior, params.seed)
     made = build.complete(fitted, grid, read_scene_frame(given.frame), taken, asked)
     if made.field is fitted:
-        copied(given.field, out.field)
+        copy_file(given.field, out.field)
     else:
         write_field(made.field, out.field)
-    copied(given.ground, out.ground)
+    copy_file(given.ground, out.ground)
     inputs = {name: given[name] for name in ("field", "ground", "views", "weights")}
     about = {"prior": params.prior, "seed": params.seed}
-    write_json(out.facts, made.facts(grid) | {"provenance": provenance.of(inputs, about)})
+    write_json(out.facts, made.facts(grid) | {"provenance": record_provenance(inputs, about)})

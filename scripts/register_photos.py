@@ -3,11 +3,11 @@
 from pathlib import Path
 
 from dav_gswt.logs import logging_to
-from dav_gswt.photos import photo_set
-from dav_gswt.photos.sfm import registration
+from dav_gswt.photos.photo_set import prepare_photos
+from dav_gswt.photos.sfm.registration import choose_sfm_options
 
 with logging_to(snakemake.log[0]):
     scene = snakemake.params.scene
-    options = registration.options_of(scene, snakemake.threads)
+    options = choose_sfm_options(scene, snakemake.threads)
     out = Path(snakemake.output.frame).parent
-    photo_set.from_photos(scene["folder"], out, options, scene.get("model"), scene.get("masks"))
+    prepare_photos(scene["folder"], out, options, scene.get("model"), scene.get("masks"))

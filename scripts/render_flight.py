@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from dav_gswt.bundle import store
-from dav_gswt.files import whole_folder
+from dav_gswt.files import atomic_folder
 from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to, progress
 from dav_gswt.terrain import endless, stills
@@ -12,7 +12,7 @@ with logging_to(snakemake.log[0]):
     params = snakemake.params
     bundle = store.read_bundle(Path(snakemake.input.manifest).parent, params.schema)
     terrain = endless.terrain_from_bundle(bundle, params.heights)
-    with whole_folder(snakemake.output.frames) as folder:
+    with atomic_folder(snakemake.output.frames) as folder:
         for shot in progress(stills.walk_shots(**params.flight), "render flight"):
             image_files.write_png(
                 folder / f"{shot.name}.png", stills.render_shot(terrain, shot, bundle.manifest, **params.size)

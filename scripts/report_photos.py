@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from dav_gswt.logs import logging_to
-from dav_gswt.photos.report import page
+from dav_gswt.photos.report.page import write_report
 
 with logging_to(snakemake.log[0]):
     given = snakemake.input
-    page.write(Path(given.frame).parent, given.template, snakemake.wildcards.scene, snakemake.output.page)
+    write_report(Path(given.frame).parent, given.template, snakemake.wildcards.scene, snakemake.output.page)

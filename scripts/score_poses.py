@@ -6,7 +6,7 @@ from dav_gswt.files import read_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to
-from dav_gswt.photos import training_views
+from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.reconstruction import ground
 from dav_gswt.views import candidates, feasibility, frozen_scales, pose_maps, prior_sampling, scores, scoring
 
@@ -19,7 +19,7 @@ with logging_to(snakemake.log[0]):
     if scene["agent"] != "replay":  # whose frames were all taken, wherever they stand
         pool = serial_rig.filter_reachable(scene, frame, pool) if scene["agent"] == "serial" else pool
         pool = feasibility.filter_feasible(pool, grid, scene.get("reach"), feasibility.CLEARANCE * frame.flying_height)
-    taken = training_views.taken(given.images, given.model, split["start"], captures, scoring.PHOTO)
+    taken = read_training_views(given.images, given.model, split["start"], captures, scoring.PHOTO)
     prior = prior_sampling.open_scoring_prior(params.prior, params.p_drop, params.seed, given.get("lpips"))
     first = frozen_scales.read_frozen_scales(given.frozen) if given.get("frozen") else None
     found = scoring.score_poses(fitted, grid, pool, taken, frame, prior, first)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from dav_gswt.files import read_json, write_json
-from dav_gswt.geometry import poses
+from dav_gswt.geometry.poses import poses_to_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to
@@ -24,6 +24,6 @@ with logging_to(snakemake.log[0]):
         errors = policy_inputs.measure_true_errors(policy, scored, pool, given, params.scene, params.size)
         inputs = SelectionInput(places, decided.poses, rng, params.lam, information, errors)
         chosen = selection.select(policy, scored, inputs)
-    write_json(snakemake.output.poses, poses.to_json(chosen, policy, params.k) | decided.to_json())
+    write_json(snakemake.output.poses, poses_to_json(chosen, policy, params.k) | decided.to_json())
     shown = pose_maps.read_pose_maps(given.maps)[0].parts(scored, [pose.name for pose in chosen])
     image_files.write_exr_parts(snakemake.output.shown, shown or pose_maps.NOTHING)

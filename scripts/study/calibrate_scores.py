@@ -1,11 +1,11 @@
 """Rules calibrate_coarse and calibrate_round: do scores say where the field is wrong?"""
 
-from dav_gswt import provenance
 from dav_gswt.field import read_field
 from dav_gswt.files import read_json, write_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
-from dav_gswt.photos import training_views
+from dav_gswt.photos.training_views import read_training_views
+from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction import ground
 from dav_gswt.study import csv_tables
 from dav_gswt.study.calibration import controls, judging
@@ -15,7 +15,7 @@ with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     captures = list(given.get("captures", []))
     frame, split = read_scene_frame(given.frame), read_json(given.views)
-    taken = training_views.taken(given.images, given.model, split["start"], captures, scoring.PHOTO)
+    taken = read_training_views(given.images, given.model, split["start"], captures, scoring.PHOTO)
     fitted = read_field(given.field), ground.read(given.ground)
     judged = judging.CalibrationTarget(params.scene, *fitted, frame, taken, params.size)
     pool = candidates.list_remaining(params.scene, frame, given.model, split, captures)
@@ -27,4 +27,4 @@ with logging_to(snakemake.log[0]):
     csv_tables.write_table(snakemake.output.poses, rows)
     inputs = {name: given[name] for name in ("field", "ground", "scores", "maps", "views")}
     about = {name: getattr(params, name) for name in ("prior", "p_drop", "lam", "seed", "poses")}
-    write_json(snakemake.output.found, found | {"provenance": provenance.of(inputs, about)})
+    write_json(snakemake.output.found, found | {"provenance": record_provenance(inputs, about)})

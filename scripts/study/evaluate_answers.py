@@ -1,8 +1,8 @@
 """Rule gather_answers: what people chose, and what the model observer does."""
 
-from dav_gswt import provenance
 from dav_gswt.files import write_json
 from dav_gswt.logs import logging_to
+from dav_gswt.provenance import record_provenance
 from dav_gswt.study import csv_tables
 from dav_gswt.study.forced_choice import answers, plots, results
 
@@ -13,5 +13,5 @@ with logging_to(snakemake.log[0]):
     rows = results.table(key, people.participants)
     csv_tables.write_table(out.table, rows)
     plots.write(out.plot, rows)
-    origin = provenance.of({"key": given.key, "answers": files}, {"study": key["study"]})
+    origin = record_provenance({"key": given.key, "answers": files}, {"study": key["study"]})
     write_json(out.facts, people.facts | {"provenance": origin})

@@ -1,8 +1,8 @@
 """Rule measure_formulas: compare every formula with float64."""
 
-from dav_gswt import provenance
 from dav_gswt.files import write_json
 from dav_gswt.logs import logging_to
+from dav_gswt.provenance import record_provenance
 from dav_gswt.study import csv_tables
 from dav_gswt.study.stability import registry
 
@@ -10,4 +10,4 @@ with logging_to(snakemake.log[0]):
     rows = [registry.measure_formula(about) for about in registry.read_descriptions()]
     for path in (snakemake.output.table, snakemake.output.kept):
         csv_tables.write_table(path, rows)
-    write_json(snakemake.output.facts, provenance.of({}, {}) | {"source": snakemake.params.source})
+    write_json(snakemake.output.facts, record_provenance({}, {}) | {"source": snakemake.params.source})

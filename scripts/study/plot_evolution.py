@@ -4,7 +4,7 @@ from dav_gswt.field import read_field
 from dav_gswt.files import read_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
-from dav_gswt.photos import training_views
+from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.reconstruction import ground
 from dav_gswt.study.views import evolution
 
@@ -15,5 +15,5 @@ with logging_to(snakemake.log[0]):
         fitted, surface, measured = paths
         rounds.append(evolution.Round(t, read_field(fitted), ground.read(surface), read_json(measured)))
     names = list(evolution.choose_test_views(rounds[0].metrics, key))
-    tests = training_views.taken(given.images, given.model, names, [], params.size)
+    tests = read_training_views(given.images, given.model, names, [], params.size)
     evolution.write_figure(snakemake.output.plot, evolution.build_strips(rounds, tests, key), rounds, key)

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from dav_gswt import provenance
 from dav_gswt.files import write_json
 from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to
+from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction import build
 from dav_gswt.study import csv_tables, fit_profile
 
@@ -19,4 +19,4 @@ with logging_to(snakemake.log[0]):
     for name, picture in fit_profile.stills(found.made, photos.frame).items():
         image_files.write_png(out[name], picture)
     inputs = {"frame": snakemake.input.frame}
-    write_json(out.facts, fit_profile.facts(found, photos) | {"provenance": provenance.of(inputs, settings)})
+    write_json(out.facts, fit_profile.facts(found, photos) | {"provenance": record_provenance(inputs, settings)})

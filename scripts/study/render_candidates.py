@@ -1,6 +1,6 @@
 """Rule show_candidates: what do some candidates truly show?"""
 
-from dav_gswt.files import whole_folder
+from dav_gswt.files import atomic_folder
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.study.calibration import truth
@@ -9,5 +9,5 @@ from dav_gswt.views import candidates
 with logging_to(snakemake.log[0]):
     scene = snakemake.params.scene
     pool = candidates.list_hemisphere(scene, read_scene_frame(snakemake.input.frame))
-    with whole_folder(snakemake.output.truth) as folder:
+    with atomic_folder(snakemake.output.truth) as folder:
         truth.write_truth(folder, truth.render_truth(scene, truth.spread_candidates(pool, snakemake.params.poses), ""))

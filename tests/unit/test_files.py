@@ -2,12 +2,13 @@ import pytest
 
 from dav_gswt import files
 from dav_gswt.errors import InputError
+from dav_gswt.files import atomic_file, atomic_folder, digest_files
 
 
 def test_an_output_that_fails_leaves_what_was_there(tmp_path):
     target = tmp_path / "a.txt"
     target.write_text("old")
-    with pytest.raises(OSError, match="full"), files.whole(target) as part:
+    with pytest.raises(OSError, match="full"), atomic_file(target) as part:
         part.write_text("half")
         raise OSError("disk full")
     assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
@@ -28,10 +29,10 @@ def test_broken_json_is_named(tmp_path):
 
 def test_the_digest_is_that_of_the_bytes(tmp_path):
     (tmp_path / "a").write_bytes(b"abc")
-    assert files.digest(tmp_path / "a").startswith("ba7816bf8f01cfea")  # FIPS 180-2, example B.1
+    assert digest_files(tmp_path / "a").startswith("ba7816bf8f01cfea")  # FIPS 180-2, example B.1
 
 
-@pytest.mark.parametrize("write", [files.whole, files.whole_folder])
+@pytest.mark.parametrize("write", [atomic_file, atomic_folder])
 def test_a_full_disk_is_told_with_the_name_of_what_was_written(tmp_path, write):
     """The system's calls on open files know no name."""
     with pytest.raises(OSError) as full, write(tmp_path / "field"):
@@ -44,7 +45,7 @@ def test_a_folder_comes_back_if_its_replacement_cannot_be_moved_in(tmp_path):
     target = tmp_path / "set"
     target.mkdir()
     (target / "a").write_text("old")
-    with pytest.raises(OSError), files.whole_folder(target) as part:
+    with pytest.raises(OSError), atomic_folder(target) as part:
         (part / "a").write_text("new")
         part.rename(tmp_path / "gone")  # so that the last step fails, after the old folder was moved away
     assert (target / "a").read_text() == "old"
@@ -54,6 +55,6 @@ def test_a_folder_comes_back_if_its_replacement_cannot_be_moved_in(tmp_path):
 def test_a_folder_that_a_killed_run_had_moved_away_is_not_lost(tmp_path):
     (tmp_path / ".set.old").mkdir()
     (tmp_path / ".set.old" / "a").write_text("old")
-    with pytest.raises(RuntimeError), files.whole_folder(tmp_path / "set"):
+    with pytest.raises(RuntimeError), atomic_folder(tmp_path / "set"):
         raise RuntimeError
     assert (tmp_path / "set" / "a").read_text() == "old"

@@ -2,8 +2,8 @@
 
 import pytest
 
-from dav_gswt import provenance
-from dav_gswt.files import digest
+from dav_gswt.files import digest_files
+from dav_gswt.provenance import record_provenance
 
 
 @pytest.fixture
@@ -14,13 +14,13 @@ def photos(tmp_path):
 
 
 def told(*given):
-    return provenance.of({"photos": given[0] if len(given) == 1 else list(given)}, {})["inputs"]["photos"]
+    return record_provenance({"photos": given[0] if len(given) == 1 else list(given)}, {})["inputs"]["photos"]
 
 
 def test_a_folder_is_its_files_by_name(photos):
-    assert told(photos) == digest(photos / "a.png", photos / "b.png")
-    assert told(photos / "a.png") == digest(photos / "a.png")
-    assert told(photos / "b.png", photos) == digest(*(photos / f"{n}.png" for n in "bab"))
+    assert told(photos) == digest_files(photos / "a.png", photos / "b.png")
+    assert told(photos / "a.png") == digest_files(photos / "a.png")
+    assert told(photos / "b.png", photos) == digest_files(*(photos / f"{n}.png" for n in "bab"))
 
 
 def test_every_photo_counts(photos):

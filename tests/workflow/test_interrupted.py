@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from fixtures.runs import TINY
 
-from dav_gswt.files import digest
+from dav_gswt.files import digest_files
 
 ARGUMENTS = ("--cores", "1", "--configfile", TINY)
 ALONE = {"DAV_GSWT_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -128,7 +128,7 @@ def test_interruptions_and_threads_leave_no_trace_in_the_bytes(story, tiny):
     """The same seed gives the same bytes, whether in one go on two threads or in three on one."""
     made = [p for p in (tiny.folder / "results/desert").rglob("*") if p.is_file() and not p.name.startswith(".")]
     assert {"field.ply", "gswt.zip", "davgswt.json", "walker.png", "uncertainty.exr"} <= {p.name for p in made}
-    differ = [p for p in made if digest(p) != digest(story.folder / p.relative_to(tiny.folder))]
+    differ = [p for p in made if digest_files(p) != digest_files(story.folder / p.relative_to(tiny.folder))]
     assert not differ
 
 
@@ -190,7 +190,7 @@ def test_a_full_disk_is_named_and_the_next_run_goes_on(cramp, tiny, checkout, sn
         assert not [name for name in files(folder) if name.startswith(f"{BRANCH}/coarse")]
         (folder / "filler").unlink(missing_ok=True)
         snakemake(folder, "--cores", "1", f"{BRANCH}/coarse/field.ply", configs=("config/config.yaml", TINY))
-        assert digest(folder / BRANCH / "coarse/field.ply") == digest(tiny.coarse / "field.ply")
+        assert digest_files(folder / BRANCH / "coarse/field.ply") == digest_files(tiny.coarse / "field.ply")
     finally:
         if cramp is small_disk:
             subprocess.run(["umount", "--lazy", folder], check=False)

@@ -12,9 +12,9 @@ from fixtures.runs import TINY, USUAL
 from jsonschema import Draft202012Validator
 
 from dav_gswt.field import read_field
-from dav_gswt.files import digest, read_json
+from dav_gswt.files import digest_files, read_json
 from dav_gswt.images import image_files
-from dav_gswt.photos import model
+from dav_gswt.photos.colmap_model import read_colmap_model
 from dav_gswt.reconstruction import ground
 from dav_gswt.study.tables import spread
 from dav_gswt.terrain.stills import SHOTS
@@ -40,7 +40,7 @@ def tiny_config(root):
 
 def test_photos_and_their_cameras_are_there(tiny, tiny_config):
     scene = tiny_config["scenes"]["desert"]
-    known, frame = model.read(tiny.photos / "sparse"), read_json(tiny.photos / "ground.json")
+    known, frame = read_colmap_model(tiny.photos / "sparse"), read_json(tiny.photos / "ground.json")
     assert {p.name for p in (tiny.photos / "images").glob("[!.]*")} == set(known.names)
     assert len(known.names) == scene["photos"] + scene["test"] and len(frame["test"]) == scene["test"]
     for name in known.names:
@@ -120,7 +120,7 @@ def test_a_budget_ends_inside_a_round_and_later_rounds_hand_the_field_on(snakema
     targets = [str((r / "metrics.json").relative_to(folder)) for r in (first, then)]
     snakemake(folder, "--cores", "2", *targets, configs=(USUAL, TINY))
     for name in ("field.ply", "ground.exr"):
-        assert digest(first / name) == digest(then / name) != digest(tiny.coarse / name)
+        assert digest_files(first / name) == digest_files(then / name) != digest_files(tiny.coarse / name)
     assert [len(read_json(r / "poses.json")["poses"]) for r in (first, then)] == [1, 0]
     assert read_json(then / "capture/capture.json")["shots"] == []
     before, after = read_json(first / "metrics.json"), read_json(then / "metrics.json")
@@ -138,7 +138,7 @@ def test_a_bundle_keeps_its_contract(tiny, root):
     for chunk in chunks:
         path = tiny.bundle / chunk["file"]
         assert path.stat().st_size == chunk["bytes"] == chunk["count"] * (16 + 2 * len(chunk["orders"]))
-        assert digest(path) == chunk["sha256"]
+        assert digest_files(path) == chunk["sha256"]
     source = bundle["provenance"]
     assert {"frame", "levels", "photos", "seams", "tiles"} == set(source["inputs"]) and "level0" in source["tiles"][
         "inputs"
@@ -182,7 +182,7 @@ def test_a_page_holds_all_that_it_needs(made, request):
     made = request.getfixturevalue(made)
     page = made.terrain / "page"
     for chunk in (made.bundle / "chunks").glob("[!.]*"):
-        assert digest(page / "chunks" / chunk.name) == digest(chunk)
+        assert digest_files(page / "chunks" / chunk.name) == digest_files(chunk)
     assert {"index.html", "main.js", "davgswt.json"} <= {p.name for p in page.iterdir()}
 
 
@@ -257,8 +257,8 @@ def test_a_field_is_completed_beside_its_round_and_levels_go_on_from_it(tiny, sn
     facts, found = read_json(folder / made / "completion.json"), read_json(folder / made / "metrics.json")
     before, after = (read_field(path / "field.ply") for path in (tiny.round, folder / made))
     assert facts["painted"] <= facts["unseen"] < facts["cells"] and facts["changed"] == bool(after.imagined.any())
-    assert facts["changed"] or digest(tiny.round / "field.ply") == digest(folder / made / "field.ply")
-    assert digest(tiny.round / "ground.exr") == digest(folder / made / "ground.exr")
+    assert facts["changed"] or digest_files(tiny.round / "field.ply") == digest_files(folder / made / "field.ply")
+    assert digest_files(tiny.round / "ground.exr") == digest_files(folder / made / "ground.exr")
     known = ~after.imagined[: len(before)]
     assert (
         np.array_equal(before.sh[known], after[: len(before)].sh[known])

@@ -12,7 +12,7 @@ import pytest
 from fixtures.runs import TINY, USUAL
 from fixtures.slurm_node import NotStarted, slurm
 
-from dav_gswt.files import digest, read_json, write_json
+from dav_gswt.files import digest_files, read_json, write_json
 
 COARSE = "results/desert/seed{}/draft/coarse"
 FEW = (
@@ -90,7 +90,7 @@ def test_a_cluster_makes_the_bytes_of_the_local_run(sweep, tiny):
     made = sweep.folder / COARSE.format(0)
     assert made.is_dir(), sweep.out
     for name in ("field.ply", "ground.exr", "fit.json", "metrics.json"):
-        assert digest(made / name) == digest(tiny.coarse / name), name
+        assert digest_files(made / name) == digest_files(tiny.coarse / name), name
 
 
 def test_a_job_that_runs_out_of_memory_is_submitted_again_with_more(sweep):

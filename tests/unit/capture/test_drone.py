@@ -11,7 +11,7 @@ from dav_gswt.capture.store import PhotoStore
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.geometry.poses import of_camera
+from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.photos.synthetic import camera_layouts
 
 PLACE = Georeference(47.1, 8.2, 430.0, 30.0, 20.0)  # a world unit is 20 m
@@ -27,7 +27,7 @@ ORBITS = [(90, 0, 1.0), (60, 10, 1.0), (45, 200, 1.2), (30, 100, 0.8), (10, 45, 
 @pytest.fixture
 def asked():
     found = [camera_layouts.orbit(*orbit, [0, 0, 0], 64, 48, 60) for orbit in ORBITS]
-    return [(of_camera(f"pose_{i}", camera, FRAME), camera) for i, camera in enumerate(found)]
+    return [(pose_of_camera(f"pose_{i}", camera, FRAME), camera) for i, camera in enumerate(found)]
 
 
 @pytest.fixture

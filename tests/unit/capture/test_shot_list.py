@@ -13,7 +13,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import write_field
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.geometry.poses import of_camera
+from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.images import image_files
 from dav_gswt.photos.synthetic import camera_layouts
 
@@ -33,7 +33,7 @@ def site(tmp_path, monkeypatch):
 @pytest.fixture
 def asked():
     found = [camera_layouts.orbit(*orbit, MIDDLE, 64, 48, 60) for orbit in ORBITS]
-    return [(of_camera(f"pose_{i}", camera, FRAME), camera) for i, camera in enumerate(found)]
+    return [(pose_of_camera(f"pose_{i}", camera, FRAME), camera) for i, camera in enumerate(found)]
 
 
 @pytest.fixture

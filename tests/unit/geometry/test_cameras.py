@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from dav_gswt.geometry import cameras
+from dav_gswt.geometry.cameras import camera_from_json, camera_to_json
 
 
 def test_a_pinhole_sees_its_target_in_the_middle_and_up_is_up():
@@ -51,7 +52,7 @@ def test_an_eye_at_its_target_is_refused():
 
 def test_a_camera_comes_back_from_json_as_it_was():
     camera = cameras.pinhole([1.0, -2, 3], [0, 0, 0], 64, 48, 50.0)
-    back = cameras.from_json(cameras.to_json(camera))
+    back = camera_from_json(camera_to_json(camera))
     np.testing.assert_array_equal(back.rotation, camera.rotation)
     np.testing.assert_array_equal(back.translation, camera.translation)
     assert (back.fx, back.width, back.orthographic) == (camera.fx, 64, False)

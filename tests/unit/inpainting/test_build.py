@@ -9,7 +9,8 @@ import torch
 from fixtures import ground as patch
 
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
-from dav_gswt.geometry import cameras, poses
+from dav_gswt.geometry import cameras
+from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.inpainting import build, evaluation, occluders, paint, unseen, viewpoints
 from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import DecodedViews
@@ -222,7 +223,7 @@ def blob(place, sizes, colour):
 
 def seen_by(*eyes):
     found = [cameras.pinhole(eye, MIDDLE, 32, 32, 55.0) for eye in eyes]
-    return [(poses.of_camera(f"p{i}", c, patch.FRAME), c) for i, c in enumerate(found)]
+    return [(pose_of_camera(f"p{i}", c, patch.FRAME), c) for i, c in enumerate(found)]
 
 
 def told(field, pool):

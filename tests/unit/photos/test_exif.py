@@ -7,6 +7,7 @@ import OpenImageIO as oiio
 import pytest
 
 from dav_gswt.photos import exif
+from dav_gswt.photos.exif import read_focal_length
 
 
 def photo(path, width, height, **tags):
@@ -38,13 +39,13 @@ def with_block(path, entries, order="<"):
 
 def test_the_35_mm_equivalent_compares_diagonals(tmp_path):
     # 3:2 like the film itself: 24 mm on 36 x 24 mm is 24 / 36 of the width.
-    assert exif.focal_length(photo(tmp_path / "a.jpg", 360, 240, FocalLengthIn35mmFilm=24)) == pytest.approx(240, 1e-4)
-    assert exif.focal_length(photo(tmp_path / "b.jpg", 240, 360, FocalLengthIn35mmFilm=24)) == pytest.approx(240, 1e-4)
+    assert read_focal_length(photo(tmp_path / "a.jpg", 360, 240, FocalLengthIn35mmFilm=24)) == pytest.approx(240, 1e-4)
+    assert read_focal_length(photo(tmp_path / "b.jpg", 240, 360, FocalLengthIn35mmFilm=24)) == pytest.approx(240, 1e-4)
 
 
 def test_a_16_to_9_photo_is_cut_from_a_4_to_3_sensor(tmp_path):
-    narrow = exif.focal_length(photo(tmp_path / "a.jpg", 320, 240, FocalLengthIn35mmFilm=20))
-    wide = exif.focal_length(photo(tmp_path / "b.jpg", 320, 180, FocalLengthIn35mmFilm=20))
+    narrow = read_focal_length(photo(tmp_path / "a.jpg", 320, 240, FocalLengthIn35mmFilm=20))
+    wide = read_focal_length(photo(tmp_path / "b.jpg", 320, 180, FocalLengthIn35mmFilm=20))
     assert wide == narrow == pytest.approx(20 / 43.2666 * 400, rel=1e-6)
 
 
@@ -53,22 +54,22 @@ def test_a_16_to_9_photo_is_cut_from_a_4_to_3_sensor(tmp_path):
 def test_the_pixel_pitch_counts_before_the_equivalent(tmp_path, order, pitch):
     entries = {0x920A: (5, "II", (254, 100)), 0xA20E: pitch, 0xA210: (3, "H", (2,)), 0xA405: (3, "H", (99,))}
     # 2.54 mm at 10000 pixels an inch.
-    assert exif.focal_length(with_block(tmp_path / "a.jpg", entries, order)) == pytest.approx(1000)
+    assert read_focal_length(with_block(tmp_path / "a.jpg", entries, order)) == pytest.approx(1000)
 
 
 def test_a_photo_that_was_shrunk_after_it_was_tagged(tmp_path):
     entries = {0x920A: (5, "II", (254, 100)), 0xA20E: (5, "II", (10000, 1)), 0xA002: (4, "I", (800,))}
-    assert exif.focal_length(with_block(tmp_path / "a.jpg", entries)) == pytest.approx(500)
+    assert read_focal_length(with_block(tmp_path / "a.jpg", entries)) == pytest.approx(500)
 
 
 @pytest.mark.parametrize("film", [0, 2, 60000])
 def test_a_focal_length_that_cannot_be_is_passed_over(tmp_path, film):
-    assert exif.focal_length(photo(tmp_path / "a.jpg", 360, 240, FocalLengthIn35mmFilm=film)) is None
+    assert read_focal_length(photo(tmp_path / "a.jpg", 360, 240, FocalLengthIn35mmFilm=film)) is None
 
 
 def test_without_exif_there_is_none(tmp_path):
-    assert exif.focal_length(photo(tmp_path / "a.jpg", 360, 240)) is None
-    assert exif.focal_length(photo(tmp_path / "a.png", 360, 240)) is None
+    assert read_focal_length(photo(tmp_path / "a.jpg", 360, 240)) is None
+    assert read_focal_length(photo(tmp_path / "a.png", 360, 240)) is None
 
 
 @pytest.mark.parametrize("cut", range(12, 60, 6))
@@ -82,4 +83,4 @@ def test_a_damaged_block_is_passed_over(tmp_path, cut):
 @pytest.mark.parametrize("name, pixels", [("brighton_beach", 592), ("copr_dunes", 1377), ("caliterra_earthworks", 743)])
 def test_the_real_sets_have_the_focal_lengths_that_their_notes_give(photo_sets, name, pixels):
     first = min((photo_sets / name / "images").iterdir())
-    assert exif.focal_length(first) == pytest.approx(pixels, abs=1)
+    assert read_focal_length(first) == pytest.approx(pixels, abs=1)

@@ -10,7 +10,14 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 from dav_gswt.errors import InputError
-from dav_gswt.photos import ground_frame, model
+from dav_gswt.photos.colmap_model import reprojection_errors, transform_model
+from dav_gswt.photos.ground_frame import (
+    count_coverage,
+    find_largest_square,
+    find_visible_points,
+    fit_ground_frame,
+    fit_plane,
+)
 
 
 @pytest.fixture
@@ -28,12 +35,12 @@ def tossed(scene, rng):
     """The scene in an arbitrary frame, as structure from motion leaves it."""
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
-    return model.similar(scene, 7.0, turn, np.array([30.0, -20.0, 11.0]))
+    return transform_model(scene, 7.0, turn, np.array([30.0, -20.0, 11.0]))
 
 
 def test_the_plane_through_points_on_a_plane_by_hand(rng):
     points = np.c_[rng.uniform(-1, 1, (50, 2)), np.full(50, 3.0)]
-    normal, offset, spread = ground_frame.plane(points, rng)
+    normal, offset, spread = fit_plane(points, rng)
     assert np.abs(normal) == pytest.approx([0, 0, 1], abs=1e-9)
     assert offset * normal[2] == pytest.approx(3, abs=1e-9) and spread < 1e-9
 
@@ -41,7 +48,7 @@ def test_the_plane_through_points_on_a_plane_by_hand(rng):
 def test_four_in_ten_points_above_the_ground_do_not_tilt_the_plane(rng):
     points = made_up.plain(1000, 1.0, rng, relief=0.005)
     points[:400, 2] += rng.uniform(0.05, 0.8, 400) * (points[:400, 0] + 1)  # trees, on one side more than on the other
-    normal, offset, spread = ground_frame.plane(points, rng)
+    normal, offset, spread = fit_plane(points, rng)
     # An unweighted fit tilts by 0.1. Here 600 normal heights of 0.005 fix the tilt to about 0.005 / sqrt(600 / 3),
     # and the lowest of the trees, which nothing tells from ground, add their share.
     assert np.hypot(*normal[:2]) < 0.005 and abs(offset) < 0.003
@@ -51,8 +58,8 @@ def test_four_in_ten_points_above_the_ground_do_not_tilt_the_plane(rng):
 def test_the_plane_moves_with_the_points(rng):
     points = made_up.plain(300, 1.0, rng, relief=0.02)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    here = ground_frame.plane(points, np.random.default_rng(1))
-    there = ground_frame.plane(4 * points @ turn.T + [1e3, 2e3, -5e2], np.random.default_rng(1))
+    here = fit_plane(points, np.random.default_rng(1))
+    there = fit_plane(4 * points @ turn.T + [1e3, 2e3, -5e2], np.random.default_rng(1))
     sign = np.sign((turn @ here[0]) @ there[0])
     assert there[0] == pytest.approx(sign * turn @ here[0], abs=1e-6)
     assert there[2] == pytest.approx(4 * here[2], rel=1e-6)
@@ -61,35 +68,35 @@ def test_the_plane_moves_with_the_points(rng):
 @pytest.mark.parametrize("points", [np.zeros((2, 3)), np.outer(np.arange(9.0), [1, 2, 3])], ids=["two", "a line"])
 def test_points_that_fix_no_plane_are_refused(points, rng):
     with pytest.raises(InputError, match="points"):
-        ground_frame.plane(points, rng)
+        fit_plane(points, rng)
 
 
 def test_the_frame_has_z_up_the_ground_at_0_and_the_flying_height_as_unit(flown, rng):
-    framed, facts = ground_frame.frame(tossed(flown, rng), rng)
+    framed, facts = fit_ground_frame(tossed(flown, rng), rng)
     heights = np.array([c.centre[2] for c in framed.cameras])
     assert np.median(heights) == pytest.approx(1, abs=1e-9)
     assert all(c.forward[2] < -0.9 for c in framed.cameras)
     # 3000 heights of 0.01: their robust mean is within 0.001.
     assert np.median(framed.points[:, 2]) == pytest.approx(0, abs=1e-3)
     assert facts.relief == pytest.approx(0.01, rel=0.2)
-    assert model.errors(framed).max() < 1e-9  # pixels: a similarity changes no picture
+    assert reprojection_errors(framed).max() < 1e-9  # pixels: a similarity changes no picture
 
 
 def test_the_frame_does_not_depend_on_the_frame_before(flown, rng):
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
-    one, a = ground_frame.frame(flown, np.random.default_rng(0))
-    two, b = ground_frame.frame(model.similar(flown, 3.0, turn, np.ones(3)), np.random.default_rng(0))
+    one, a = fit_ground_frame(flown, np.random.default_rng(0))
+    two, b = fit_ground_frame(transform_model(flown, 3.0, turn, np.ones(3)), np.random.default_rng(0))
     assert two.points == pytest.approx(one.points, abs=1e-6)
     assert b.exemplar.side == pytest.approx(a.exemplar.side, abs=1e-6)
 
 
 def test_every_point_of_the_exemplar_is_seen_often_enough(flown, rng):
-    framed, facts = ground_frame.frame(tossed(flown, rng), rng)
+    framed, facts = fit_ground_frame(tossed(flown, rng), rng)
     square = facts.exemplar
     corner = np.array([square.west, square.south, 0])
     probes = corner + np.c_[rng.random((2000, 2)), np.zeros(2000)] * square.side
-    assert sum(ground_frame.seen(c, probes).astype(int) for c in framed.cameras).min() >= 3
+    assert sum(find_visible_points(c, probes).astype(int) for c in framed.cameras).min() >= 3
     extent = facts.extent
     assert extent.west <= square.west and extent.south <= square.south
     assert extent.east >= square.west + square.side and extent.north >= square.south + square.side
@@ -100,8 +107,8 @@ def test_the_x_axis_turns_so_that_the_square_is_large(rng):
     cameras = made_up.flight(4, 4, tilt=0)
     straight = made_up.model(cameras, made_up.plain(4000, 1.2, rng))
     c = np.sqrt(0.5)
-    diagonal = model.similar(straight, 1.0, np.array([[c, -c, 0], [c, c, 0], [0, 0, 1]]), np.zeros(3))
-    sides = [ground_frame.frame(m, np.random.default_rng(0))[1].exemplar.side for m in (straight, diagonal)]
+    diagonal = transform_model(straight, 1.0, np.array([[c, -c, 0], [c, c, 0], [0, 0, 1]]), np.zeros(3))
+    sides = [fit_ground_frame(m, np.random.default_rng(0))[1].exemplar.side for m in (straight, diagonal)]
     assert sides[1] == pytest.approx(sides[0], rel=0.03)  # two cells of about 70
 
 
@@ -109,8 +116,8 @@ def test_ground_without_points_is_not_well_seen(rng):
     """The northern half is water: photos see it, but nothing in it holds still."""
     points = made_up.plain(4000, 1.0, rng)
     cameras = made_up.flight(4, 5, tilt=0)
-    all_over = ground_frame.frame(made_up.model(cameras, points), rng)[1].exemplar
-    half = ground_frame.frame(made_up.model(cameras, points[points[:, 1] < 0]), rng)[1].exemplar
+    all_over = fit_ground_frame(made_up.model(cameras, points), rng)[1].exemplar
+    half = fit_ground_frame(made_up.model(cameras, points[points[:, 1] < 0]), rng)[1].exemplar
     assert half.side < 0.8 * all_over.side
 
 
@@ -119,14 +126,14 @@ def test_photos_that_look_along_a_wall_are_refused(rng):
     points = made_up.plain(500, 1.0, rng, relief=0.05)
     cameras = [made_up.camera((x, -3.0, 0.01), (x, 0, 0)) for x in np.linspace(-0.5, 0.5, 8)]
     with pytest.raises(InputError, match="ground"):
-        ground_frame.frame(made_up.model(cameras, points), rng)
+        fit_ground_frame(made_up.model(cameras, points), rng)
 
 
 def test_photos_that_see_no_common_ground_are_refused(rng):
     cameras = [made_up.camera((3.0 * i, 0, 1)) for i in range(4)]
     points = np.concatenate([made_up.plain(100, 0.3, rng) + [3.0 * i, 0, 0] for i in range(4)])
     with pytest.raises(InputError, match="no ground"):
-        ground_frame.frame(made_up.model(cameras, points), rng)
+        fit_ground_frame(made_up.model(cameras, points), rng)
 
 
 def test_coverage_counts_photos_by_hand():
@@ -134,7 +141,7 @@ def test_coverage_counts_photos_by_hand():
     width, height = 320 / 300, 240 / 300
     cameras = (made_up.camera((0, 0, 1)), made_up.camera((width / 2, 0, 1)))
     corners = np.array([[-width, -height, 0], [1.5 * width, height, 0]])
-    grid = ground_frame.coverage(cameras, corners, cells=400)
+    grid = count_coverage(cameras, corners, cells=400)
     area = grid.cell**2
     assert (grid.counts == 2).sum() * area == pytest.approx(width * height / 2, rel=0.02)  # a cell of about 100
     assert (grid.counts == 1).sum() * area == pytest.approx(width * height, rel=0.02)
@@ -143,7 +150,7 @@ def test_coverage_counts_photos_by_hand():
 def test_what_is_behind_or_too_far_is_not_seen():
     camera = made_up.camera((0, 0, 1), (1, 0, 1.0))  # looks along the ground
     points = np.array([[2.0, 0, 0.9], [2.99, 0, 0.99], [3.01, 0, 1.0], [-1.0, 0, 1.0]])
-    assert ground_frame.seen(camera, points).tolist() == [True, True, False, False]
+    assert find_visible_points(camera, points).tolist() == [True, True, False, False]
 
 
 @pytest.mark.parametrize(
@@ -156,7 +163,7 @@ def test_what_is_behind_or_too_far_is_not_seen():
     ],
 )
 def test_the_largest_square_by_hand(rows, answer):
-    assert ground_frame.largest_square(np.array([[c == "1" for c in row] for row in rows])) == answer
+    assert find_largest_square(np.array([[c == "1" for c in row] for row in rows])) == answer
 
 
 def brute_force(mask):
@@ -175,7 +182,7 @@ def brute_force(mask):
     arrays(bool, array_shapes(min_dims=2, max_dims=2, max_side=9), elements=st.sampled_from([True, True, True, False]))
 )
 def test_the_largest_square_equals_brute_force(mask):
-    row, column, side = ground_frame.largest_square(mask)
+    row, column, side = find_largest_square(mask)
     assert side == brute_force(mask)
     assert mask[row : row + side, column : column + side].all()
 
@@ -184,5 +191,5 @@ def test_few_photos_need_two_looks_and_many_need_three(flown, rng):
     few = replace(flown, names=flown.names[:8], cameras=flown.cameras[:8])
     keep = few_obs = flown.image_of < 8
     few = replace(few, point_of=flown.point_of[keep], image_of=flown.image_of[few_obs], pixels=flown.pixels[keep])
-    assert ground_frame.frame(few, rng)[1].photos_per_cell == 2
-    assert ground_frame.frame(flown, rng)[1].photos_per_cell == 3
+    assert fit_ground_frame(few, rng)[1].photos_per_cell == 2
+    assert fit_ground_frame(flown, rng)[1].photos_per_cell == 3

@@ -8,7 +8,10 @@ from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
-from dav_gswt.photos import folder, masks, training_views
+from dav_gswt.photos import masks
+from dav_gswt.photos.folder import write_photo_folder
+from dav_gswt.photos.masks import undistort_masks
+from dav_gswt.photos.training_views import read_training_view
 
 
 @pytest.fixture
@@ -33,27 +36,27 @@ def masked(tmp_path, name="photo.png", shape=(120, 160)):
 
 @pytest.mark.parametrize("name", ["photo.png", "photo.png.png"])
 def test_black_does_not_count_nor_does_its_edge(found, tmp_path, name):
-    cover = masks.undistorted(found, masked(tmp_path, name))["000.png"]
+    cover = undistort_masks(found, masked(tmp_path, name))["000.png"]
     assert not cover[:, : 160 + masks.MARGIN].any()
     assert cover[:, 160 + masks.MARGIN + 1 :].all()
 
 
 def test_masks_go_with_the_pictures_as_their_alpha_and_views_do_not_count_them(found, tmp_path):
-    covers = masks.undistorted(found, masked(tmp_path))
+    covers = undistort_masks(found, masked(tmp_path))
     picture = np.random.default_rng(0).uniform(0, 1, (240, 320, 3)).astype(np.float32)
-    folder.write(tmp_path / "photos", found.model, [("000.png", picture)], scene_frame(), None, covers)
+    write_photo_folder(tmp_path / "photos", found.model, [("000.png", picture)], scene_frame(), None, covers)
     path = tmp_path / "photos" / "images" / "000.png"
     np.testing.assert_allclose(image_files.read_photo(path), picture, atol=0.5 / 255 + 1e-6)  # also under the mask
     for size in (320, 160):
-        view = training_views.read("000.png", found.model.cameras[0], path, size)
+        view = read_training_view("000.png", found.model.cameras[0], path, size)
         assert not view.weight[:, : size // 2].any() and view.weight[:, size // 2 + 3 :].all()
 
 
 def test_a_mask_of_another_shape_is_refused_by_name(found, tmp_path):
     with pytest.raises(InputError, match=r"photo.png.*160 x 160"):
-        masks.undistorted(found, masked(tmp_path, shape=(160, 160)))
+        undistort_masks(found, masked(tmp_path, shape=(160, 160)))
 
 
 def test_masks_of_no_photo_are_refused(found, tmp_path):
     with pytest.raises(InputError, match="named like a photo"):
-        masks.undistorted(found, masked(tmp_path, "other.png"))
+        undistort_masks(found, masked(tmp_path, "other.png"))

@@ -8,7 +8,15 @@ from fixtures import photos as made_up
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
-from dav_gswt.photos import model as models
+from dav_gswt.photos.colmap_model import (
+    count_shared_points,
+    read_colmap_model,
+    reprojection_errors,
+    transform_model,
+    triangulate_model,
+    triangulate_points,
+    write_colmap_model,
+)
 
 
 @pytest.fixture
@@ -26,13 +34,13 @@ def test_two_rays_that_cross_meet_where_they_cross_by_hand():
     # From (-1, 0, 1) and (1, 0, 1), 45 degrees each: the rays cross at the origin.
     cameras = [made_up.camera((-1, 0, 1), (0, 0, 0)), made_up.camera((1, 0, 1), (0, 0, 0))]
     pair = made_up.model(cameras, np.zeros((1, 3)))
-    points, colours = models.points_seen_by(pair, pair.names)
+    points, colours = triangulate_points(pair, pair.names)
     assert points == pytest.approx(np.zeros((1, 3)), abs=1e-12)
     assert colours.tolist() == [[0.5, 0.5, 0.5]]
 
 
 def test_exact_rays_give_the_points_back(flown):
-    part = models.triangulated(flown, flown.names)
+    part = triangulate_model(flown, flown.names)
     twice = np.bincount(flown.point_of, minlength=len(flown.points)) >= 2
     assert part.points == pytest.approx(flown.points[twice], abs=1e-9)  # conditioning: 1 / sin^2 of the least angle
 
@@ -44,7 +52,7 @@ def test_points_do_not_change_when_other_images_change(flown, rng):
     pixels = flown.pixels.copy()
     pixels[outside] += rng.normal(0, 50, (outside.sum(), 2))
     other = replace(flown, pixels=pixels, points=flown.points + 1.0, colours=1 - flown.colours)
-    for one, two in zip(models.points_seen_by(flown, names), models.points_seen_by(other, names), strict=True):
+    for one, two in zip(triangulate_points(flown, names), triangulate_points(other, names), strict=True):
         assert np.array_equal(one, two)
 
 
@@ -52,18 +60,18 @@ def test_moving_the_world_moves_the_points_with_it(flown, rng):
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
     shift = np.array([5.0, -3.0, 2.0])
-    moved = models.similar(flown, 2.5, turn, shift)
-    here, there = (models.triangulated(m, flown.names[:5]).points for m in (flown, moved))
+    moved = transform_model(flown, 2.5, turn, shift)
+    here, there = (triangulate_model(m, flown.names[:5]).points for m in (flown, moved))
     assert there == pytest.approx(2.5 * here @ turn.T + shift, abs=1e-8)
-    assert models.errors(moved) == pytest.approx(models.errors(flown), abs=1e-8)
+    assert reprojection_errors(moved) == pytest.approx(reprojection_errors(flown), abs=1e-8)
 
 
 def test_a_wrong_match_is_left_out(flown):
     twice = np.flatnonzero(np.bincount(flown.point_of, minlength=len(flown.points)) >= 3)
     pixels = flown.pixels.copy()
     pixels[np.flatnonzero(flown.point_of == twice[0])[0]] += [40, 0]
-    good = models.triangulated(flown, flown.names)
-    assert len(models.triangulated(replace(flown, pixels=pixels), flown.names).points) == len(good.points) - 1
+    good = triangulate_model(flown, flown.names)
+    assert len(triangulate_model(replace(flown, pixels=pixels), flown.names).points) == len(good.points) - 1
 
 
 def test_rays_that_are_nearly_parallel_are_left_out():
@@ -71,26 +79,26 @@ def test_rays_that_are_nearly_parallel_are_left_out():
     wide = [made_up.camera((x, 0, 1), (0, 0, 0)) for x in (0.0, 0.03)]  # 1.7 degrees
     for cameras, count in ((near, 0), (wide, 1)):
         pair = made_up.model(cameras, np.zeros((1, 3)))
-        assert len(models.triangulated(pair, pair.names).points) == count
+        assert len(triangulate_model(pair, pair.names).points) == count
 
 
 def test_no_common_point_gives_no_points():
     cameras = [made_up.camera((x, 0, 1)) for x in (-5.0, 5.0)]
     pair = made_up.model(cameras, np.array([[-5.0, 0, 0], [5.0, 0, 0]]))
-    points, colours = models.points_seen_by(pair, pair.names)
+    points, colours = triangulate_points(pair, pair.names)
     assert points.shape == colours.shape == (0, 3)
 
 
 def test_fewer_images_than_asked_for_leave_a_point_out(flown):
     counts = np.bincount(flown.point_of, minlength=len(flown.points))
-    assert len(models.triangulated(flown, flown.names, at_least=4).points) == (counts >= 4).sum()
+    assert len(triangulate_model(flown, flown.names, at_least=4).points) == (counts >= 4).sum()
     with pytest.raises(ValueError, match="two rays"):
-        models.triangulated(flown, flown.names, at_least=1)
+        triangulate_model(flown, flown.names, at_least=1)
 
 
 def test_an_image_that_is_not_in_the_model_is_named(flown):
     with pytest.raises(InputError, match="nowhere.png"):
-        models.points_seen_by(flown, ["000.png", "nowhere.png"])
+        triangulate_points(flown, ["000.png", "nowhere.png"])
     with pytest.raises(InputError, match="nowhere.png"):
         flown.camera("nowhere.png")
 
@@ -98,19 +106,19 @@ def test_an_image_that_is_not_in_the_model_is_named(flown):
 def test_colours_come_from_the_named_images_alone(flown, tmp_path):
     for i, name in enumerate(flown.names):
         image_files.write_png(tmp_path / name, np.full((made_up.HEIGHT, made_up.WIDTH, 3), 0.2 if i < 3 else 1.0))
-    _, colours = models.points_seen_by(flown, flown.names[:3], tmp_path)
+    _, colours = triangulate_points(flown, flown.names[:3], tmp_path)
     assert colours == pytest.approx(np.full(colours.shape, 0.2), abs=1e-6)
 
 
 def test_pairs_share_the_points_that_both_see(flown):
-    shared = models.shared_points(flown)
+    shared = count_shared_points(flown)
     sees = [set(flown.point_of[flown.image_of == i]) for i in range(9)]
     assert shared.tolist() == [[len(a & b) for b in sees] for a in sees]
 
 
 def test_a_model_comes_back_from_disk_as_it_was(flown, tmp_path):
-    models.write(flown, tmp_path)
-    back = models.read(tmp_path)
+    write_colmap_model(flown, tmp_path)
+    back = read_colmap_model(tmp_path)
     assert back.names == flown.names
     assert np.array_equal(back.points, flown.points) and np.array_equal(back.point_of, flown.point_of)
     assert back.colours == pytest.approx(flown.colours, abs=0.51 / 255)  # stored in 8 bits
@@ -124,15 +132,15 @@ def test_a_model_comes_back_from_disk_as_it_was(flown, tmp_path):
 def test_writing_a_model_twice_gives_the_same_bytes(flown, tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
-        models.write(flown, tmp_path / name)
+        write_colmap_model(flown, tmp_path / name)
     files = sorted(p.name for p in (tmp_path / "a").iterdir())
     assert files and all((tmp_path / "a" / f).read_bytes() == (tmp_path / "b" / f).read_bytes() for f in files)
 
 
 def test_a_missing_or_damaged_model_is_refused_by_name(flown, tmp_path):
     with pytest.raises(InputError, match="nowhere"):
-        models.read(tmp_path / "nowhere")
-    models.write(flown, tmp_path)
+        read_colmap_model(tmp_path / "nowhere")
+    write_colmap_model(flown, tmp_path)
     (tmp_path / "images.bin").write_bytes((tmp_path / "images.bin").read_bytes()[:100])
     with pytest.raises(InputError, match=tmp_path.name):
-        models.read(tmp_path)
+        read_colmap_model(tmp_path)

@@ -8,7 +8,8 @@ from fixtures import photos as made_up
 from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
-from dav_gswt.photos import split as views
+from dav_gswt.photos import view_split
+from dav_gswt.photos.view_split import find_aim_point, ground_bounds, measure_visible_share, split_views
 
 FRAME = scene_frame(exemplar=(-0.6, -0.6, 1.2))
 
@@ -26,7 +27,7 @@ def first(model, count):
 
 
 def split(model, seed=0, start=8, frame=FRAME):
-    return views.split(model, frame, start, np.random.default_rng(seed))
+    return split_views(model, frame, start, np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize("photos", [3, 5, 6, 8, 9, 12, 30])
@@ -55,7 +56,7 @@ def test_test_views_are_the_same_for_every_seed_and_start_views_are_not(flown):
 
 def test_test_views_look_at_the_inner_exemplar_and_stay_apart(flown):
     chosen = [flown.camera(name) for name in split(flown)["test"]]
-    aims = np.array([views.aim(camera) for camera in chosen])
+    aims = np.array([find_aim_point(camera) for camera in chosen])
     assert np.abs(aims).max() <= 0.6 * 0.5**0.5
     apart = np.linalg.norm(aims[:, None] - aims[None], axis=2)[~np.eye(len(aims), dtype=bool)]
     assert apart.min() > 0.25  # more than the step between neighbours in a flight line
@@ -67,7 +68,7 @@ def test_start_views_are_connected_by_points(flown):
     for seed in range(8):
         start = [flown.names.index(name) for name in split(flown, seed)["start"]]
         for k in range(1, len(start)):
-            assert max(len(sees[start[k]] & sees[j]) for j in start[:k]) >= views.LINK
+            assert max(len(sees[start[k]] & sees[j]) for j in start[:k]) >= view_split.LINK
 
 
 def test_start_views_are_more_spread_than_random_ones(flown):
@@ -94,15 +95,18 @@ def test_photos_of_other_ground_take_no_part(flown):
     parts = split(flown, start=4, frame=frame)
     named = [name for part in parts.values() for name in part]
     assert 6 <= len(named) < 30
-    assert all(views.sight(flown.camera(name), views.bounds(frame, whole=False)) >= views.LEAST_SIGHT for name in named)
+    assert all(
+        measure_visible_share(flown.camera(name), ground_bounds(frame, whole=False)) >= view_split.LEAST_SIGHT
+        for name in named
+    )
 
 
 def test_sight_is_the_share_of_the_square_by_hand():
     # From height 1 the picture covers 320 / 300 by 240 / 300 of ground, centred under the camera.
     camera = made_up.camera((0, 0, 1))
-    assert views.sight(camera, (-0.3, -0.3, 0.3, 0.3)) == 1
-    assert views.sight(camera, (0.0, -0.4, 0.8, 0.4)) == pytest.approx(160 / 300 / 0.8, abs=1 / 16)
-    assert views.sight(camera, (5.0, 5.0, 6.0, 6.0)) == 0
+    assert measure_visible_share(camera, (-0.3, -0.3, 0.3, 0.3)) == 1
+    assert measure_visible_share(camera, (0.0, -0.4, 0.8, 0.4)) == pytest.approx(160 / 300 / 0.8, abs=1 / 16)
+    assert measure_visible_share(camera, (5.0, 5.0, 6.0, 6.0)) == 0
 
 
 def test_the_test_views_that_ground_json_names_are_taken(flown):
@@ -121,7 +125,7 @@ def test_a_named_test_view_that_is_no_image_is_refused(flown):
 def test_photos_of_all_ground_take_part_where_all_of_it_is_in_question(flown):
     """The same corner, but every photo sees some of the whole; tests are spread over the whole, too."""
     frame = scene_frame(exemplar=(-0.9, -0.9, 0.6), extent=(-1.2, -1.2, 1.2, 1.2))
-    parts = views.split(flown, frame, 4, np.random.default_rng(0), whole=True)
+    parts = split_views(flown, frame, 4, np.random.default_rng(0), whole=True)
     assert sum(len(part) for part in parts.values()) == 30
-    aims = np.array([views.aim(flown.camera(name)) for name in parts["test"]])
+    aims = np.array([find_aim_point(flown.camera(name)) for name in parts["test"]])
     assert np.ptp(aims[:, 0]) > 0.6

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from fixtures.raster_scenes import CAMERAS, gaussians, relative
 
-from dav_gswt import provenance, raster
+from dav_gswt import raster
 from dav_gswt.errors import InputError
+from dav_gswt.provenance import record_provenance
 from dav_gswt.raster import backends
 
 WITHOUT_CORE = """
@@ -52,7 +53,7 @@ def test_the_backend_asked_for_draws_and_stands_in_the_provenance(monkeypatch, n
     drawing = raster.Rasterizer(near=0.5, dilation=0.2)
     assert isinstance(drawing, raster.Rasterizer) and type(drawing) is backends.load_backend(name).Rasterizer
     assert (drawing.near, drawing.dilation) == (0.5, 0.2)
-    assert provenance.of({}, {})["renderer"]["backend"] == name
+    assert record_provenance({}, {})["renderer"]["backend"] == name
 
 
 def test_loss_and_adam_are_those_of_the_backend_in_use(monkeypatch):

@@ -6,7 +6,7 @@ from fixtures import ground as made
 
 from dav_gswt.field import rgb_to_sh
 from dav_gswt.geometry import cameras
-from dav_gswt.photos import training_views
+from dav_gswt.photos.training_views import TrainingView, mask_outside_ground
 from dav_gswt.raster import render
 from dav_gswt.reconstruction import build, top_view, underlay
 from dav_gswt.reconstruction.evaluation import evaluate
@@ -89,8 +89,8 @@ def test_no_sky_shines_through_the_ground_between_shrunken_discs():
     scales[: grid.heights.size, :2] = np.log(0.2 * grid.spacing)
     grains = replace(field, log_scales=scales)
     camera = cameras.pinhole([1.6, 0.0, 0.8], [1.6, 1.6, 0], 96, 96, 40.0)
-    inside = training_views.over_ground(
-        training_views.View("", camera, np.zeros((96, 96, 3), np.float32), np.ones((96, 96), np.float32)),
+    inside = mask_outside_ground(
+        TrainingView("", camera, np.zeros((96, 96, 3), np.float32), np.ones((96, 96), np.float32)),
         0.4,
         0.4,
         2.8,
@@ -114,7 +114,7 @@ def test_a_scene_without_a_ground_is_fitted_as_free_gaussians():
         camera = cameras.pinhole([1.6 + 5 * np.cos(i), 1.6 + 5 * np.sin(i), 3.0], [1.6, 1.6, 1.6], 48, 48, 40.0)
         seen = render(truth, camera)
         image = np.clip(seen.colour / np.maximum(seen.alpha, 0.5)[..., None], 0, 1).astype(np.float32)
-        photos.append(training_views.View(f"photo_{i}", camera, image, (seen.alpha > 0.5).astype(np.float32)))
+        photos.append(TrainingView(f"photo_{i}", camera, image, (seen.alpha > 0.5).astype(np.float32)))
     frame = replace(made.FRAME, kind="synthetic", flying_height=3.0)
     quality = replace(QUALITY, cap=2000, steps=150)
     found = build.fit(frame, photos, points, np.full((400, 3), 0.5, np.float32), quality, np.random.default_rng(0))

@@ -5,7 +5,7 @@ import pytest
 from fixtures import ground as made
 
 from dav_gswt.geometry import cameras
-from dav_gswt.photos import training_views as views
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import objects, plane_sweep
 from dav_gswt.reconstruction.ground import Ground
 
@@ -35,7 +35,7 @@ def photo(eye, size=96):
     x, y = at(TALL)
     top = (x > BOX[0]) & (x < BOX[1]) & (y > BOX[0]) & (y < BOX[1])
     image = np.where(top[..., None], texture(x, y, 1), texture(*at(0.0), 2)).astype(np.float32)
-    return views.View(str(eye), camera, image, np.ones((size, size), np.float32))
+    return TrainingView(str(eye), camera, image, np.ones((size, size), np.float32))
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from fixtures import ground as made
 
 from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry import cameras
-from dav_gswt.photos import training_views
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import render
 from dav_gswt.reconstruction import build, sky
 from dav_gswt.reconstruction.fitting import trainer
@@ -37,7 +37,7 @@ def low(count=4, size=64, thing=True):
         directions = step / np.linalg.norm(step, axis=-1, keepdims=True)
         seen = render(field, camera)
         image = np.clip(seen.colour + (1 - seen.alpha)[..., None] * heavens(directions), 0, 1).astype(np.float32)
-        found.append(training_views.View(f"low_{i}", camera, image, np.ones((size, size), np.float32)))
+        found.append(TrainingView(f"low_{i}", camera, image, np.ones((size, size), np.float32)))
     return found
 
 

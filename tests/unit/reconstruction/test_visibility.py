@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dav_gswt.geometry import cameras
-from dav_gswt.photos import training_views
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import visibility
 from dav_gswt.reconstruction.ground import Ground
 
@@ -22,7 +22,7 @@ def ground(heights=None, cells=40):
 def photo(eye, at=(0.0, 0.0, 0.0), weight=1.0):
     camera = cameras.pinhole(list(eye), list(at), SIZE, SIZE, 80.0)
     blank = np.zeros((SIZE, SIZE, 3), np.float32)
-    return training_views.View("photo", camera, blank, np.full((SIZE, SIZE), weight, np.float32))
+    return TrainingView("photo", camera, blank, np.full((SIZE, SIZE), weight, np.float32))
 
 
 def eastings(grid):

@@ -7,7 +7,7 @@ from fixtures import ground as made
 from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry.scene_frame import write_scene_frame
 from dav_gswt.images import image_files
-from dav_gswt.photos import model as models
+from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
 from dav_gswt.reconstruction import build
 from dav_gswt.reconstruction.objects import blobs
 from dav_gswt.study import fit_profile
@@ -17,7 +17,7 @@ QUALITY = build.Quality(size=48, spacing=1.0, cap=5000, steps=12, steps_per_phot
 
 def photo_set(tests):
     none = np.zeros(0, int)
-    empty = models.Model((), (), np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2)))
+    empty = ColmapModel((), (), np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2)))
     frame = replace(made.FRAME, kind="synthetic")
     return fit_profile.PhotoSet(frame, empty, made.photos(4), {"test": tests})
 
@@ -31,8 +31,8 @@ def test_the_sixth_photo_and_every_tenth_after_it_are_for_testing(tmp_path):
     none = np.zeros(0, int)
     cameras = tuple(photo.camera for photo in photos)
     (tmp_path / "sparse").mkdir()
-    models.write(
-        models.Model(names, cameras, np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2))),
+    write_colmap_model(
+        ColmapModel(names, cameras, np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2))),
         tmp_path / "sparse",
     )
     write_scene_frame(tmp_path / "ground.json", made.FRAME)

@@ -10,7 +10,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import write_field
 from dav_gswt.geometry.scene_frame import write_scene_frame
 from dav_gswt.images import image_files
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import render
 from dav_gswt.reconstruction import ground
 from dav_gswt.study.calibration import truth
@@ -34,7 +34,7 @@ def files(tmp_path):
     for i, (pose, camera) in enumerate(pool()):
         picture = np.clip(render(true, camera).colour + np.float32(0.2 * (i == 2)), 0, 1)
         image_files.write_png(tmp_path / pose.name, picture)
-        views.append(View(pose.name, camera, picture, np.ones((96, 96), np.float32)))
+        views.append(TrainingView(pose.name, camera, picture, np.ones((96, 96), np.float32)))
     truth.write_truth(tmp_path / "truth", iter(views[1:]))
     given = {"field": tmp_path / "field.ply", "ground": tmp_path / "ground.exr", "frame": tmp_path / "ground.json"}
     return given | {"images": tmp_path, "truth": tmp_path / "truth"}

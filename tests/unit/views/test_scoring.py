@@ -7,7 +7,8 @@ import pytest
 from fixtures import ground as patch
 
 from dav_gswt.errors import InputError
-from dav_gswt.geometry import cameras, poses
+from dav_gswt.geometry import cameras
+from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.images import image_files
 from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import DecodedViews
@@ -46,7 +47,7 @@ def pool(*eyes, width=40, height=40):
     found = []
     for i, eye in enumerate(eyes or ([1.6, 1.6, 5.0], [4.0, 1.6, 4.0], [1.6, 4.5, 4.0])):
         camera = cameras.pinhole(eye, MIDDLE, width, height, 40.0)
-        found.append((poses.of_camera(f"p{i}", camera, patch.FRAME), camera))
+        found.append((pose_of_camera(f"p{i}", camera, patch.FRAME), camera))
     return found
 
 
@@ -122,7 +123,7 @@ def test_a_gaussian_gets_the_doubt_of_the_pixels_it_is_in():
 def test_what_no_camera_sees_keeps_its_geometric_doubt():
     field = replace(patch.field(), uncertainty=np.full(len(patch.field()), 0.3, np.float32))
     tele = cameras.pinhole([0.3, 0.3, 5.0], [0.3, 0.3, 0.0], 40, 40, 4.0)
-    one = [(poses.of_camera("p0", tele, patch.FRAME), tele)]
+    one = [(pose_of_camera("p0", tele, patch.FRAME), tele)]
     found = scoring.score_poses(
         field, patch.grid(), one, patch.photos(), patch.FRAME, PriorConfig(Doubting(), 2, 4, 0.2)
     )
@@ -190,7 +191,7 @@ def test_a_pose_that_no_photo_comes_from_is_named(eye, said):
     )
     camera = cameras.pinhole(eye, [1.6, 1.7, 5.0], 40, 40, 40.0)
     with pytest.raises(InputError, match=said):
-        collision.require_free_positions([(poses.of_camera("p0", camera, patch.FRAME), camera)], block, patch.grid())
+        collision.require_free_positions([(pose_of_camera("p0", camera, patch.FRAME), camera)], block, patch.grid())
     collision.require_free_positions(pool(), block, patch.grid())
 
 

@@ -5,8 +5,7 @@ import pytest
 from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
-from dav_gswt.geometry import poses
-from dav_gswt.geometry.poses import Pose
+from dav_gswt.geometry.poses import Pose, pose_of_camera, pose_offset, select_farthest_poses
 from dav_gswt.views import policies, scores, selection
 from dav_gswt.views.policies import POLICIES, SelectionInput
 from dav_gswt.views.policy_names import POLICY_NAMES
@@ -171,8 +170,8 @@ def test_a_pool_that_is_too_small_is_taken_whole_and_said_so(policy, caplog):
 
 
 def test_spread_poses_are_far_apart_and_the_first_comes_first():
-    assert poses.spread(scored(0, 5, 180, 90).poses, 3) == [0, 2, 3]
-    assert poses.spread(scored(0, 0).poses, 5) == [0, 1]
+    assert select_farthest_poses(scored(0, 5, 180, 90).poses, 3) == [0, 2, 3]
+    assert select_farthest_poses(scored(0, 0).poses, 5) == [0, 1]
 
 
 def test_scores_come_back_to_the_bit(tmp_path):
@@ -209,6 +208,6 @@ def test_a_pose_is_where_its_camera_is():
 
     frame = scene_frame(exemplar=(1.0, 2.0, 2.0))
     camera = cameras.pinhole([2.0, 3 + 3.0, 4.0], [2, 3, 0], 10, 10, 40.0)
-    pose = poses.of_camera("x", camera, frame)
+    pose = pose_of_camera("x", camera, frame)
     assert (pose.azimuth, pose.radius) == (pytest.approx(90), pytest.approx(5))
-    np.testing.assert_allclose(poses.place(pose), [0, 3, 4], atol=1e-12)
+    np.testing.assert_allclose(pose_offset(pose), [0, 3, 4], atol=1e-12)

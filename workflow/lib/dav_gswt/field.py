@@ -10,7 +10,7 @@ from numpy import ndarray as Array
 from plyfile import PlyData, PlyElement, PlyParseError
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import whole
+from dav_gswt.files import atomic_file
 
 SH0 = 0.28209479177387814  # the constant real spherical harmonic, 1 / (2 sqrt(pi))
 HEADER_BYTES = 1 << 16  # a header is no longer than this
@@ -114,7 +114,7 @@ def write_field(field: GaussianField, path: Path | str) -> None:
     rows["uncertainty"], rows["ground"] = field.uncertainty, field.ground
     if field.imagined.any():
         rows["imagined"] = field.imagined
-    with whole(path) as part:
+    with atomic_file(path) as part:
         PlyData([PlyElement.describe(rows, "vertex")], byte_order="<").write(str(part))
 
 

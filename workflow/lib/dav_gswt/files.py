@@ -29,7 +29,7 @@ UNREADABLE = (  # what reading a damaged archive, or arrays in one, may end in
 
 
 @contextmanager
-def whole(path: Path | str):
+def atomic_file(path: Path | str):
     """A path beside `path` to write to; it takes `path`'s place when the block ends well, and goes when it does not.
 
     Raises: OSError: of the block or of writing, with `path` as its file name where it had none.
@@ -48,14 +48,14 @@ def whole(path: Path | str):
         part.unlink(missing_ok=True)
 
 
-def copied(source: Path | str, target: Path | str) -> None:
+def copy_file(source: Path | str, target: Path | str) -> None:
     """A file's bytes at another path, whole or not at all."""
-    with whole(target) as part:
+    with atomic_file(target) as part:
         shutil.copyfile(source, part)
 
 
 @contextmanager
-def whole_folder(path: Path | str):
+def atomic_folder(path: Path | str):
     """A folder beside `path` to fill; it takes `path`'s place when the block ends well, and goes when it does not.
 
     What stood at `path` stays until then, also if the last step fails.
@@ -92,7 +92,7 @@ def _named(error: OSError, path: Path) -> OSError:
 def write_json(path: Path | str, value) -> None:
     """Write JSON; NaN and infinity are refused, since JSON has neither."""
     text = json.dumps(value, indent=1, allow_nan=False) + "\n"
-    with whole(path) as part:
+    with atomic_file(path) as part:
         part.write_text(text, encoding="utf-8")
 
 
@@ -104,7 +104,7 @@ def read_json(path: Path | str):
         raise InputError(f"{path}: not readable as JSON ({error})") from error
 
 
-def digest(*paths: Path | str) -> str:
+def digest_files(*paths: Path | str) -> str:
     """SHA-256 over the bytes of files, in the order given."""
     state = hashlib.sha256()
     for path in paths:

@@ -5,17 +5,17 @@ import platform
 from pathlib import Path
 
 import dav_gswt
-from dav_gswt.files import digest
+from dav_gswt.files import digest_files
 from dav_gswt.raster import backends
 
 
-def of(inputs: dict[str, Path | str | list], parameters: dict) -> dict:
+def record_provenance(inputs: dict[str, Path | str | list], parameters: dict) -> dict:
     """A JSON value that says what a result was made from and with. Inputs: files, folders, or lists of both."""
     return {
         "version": dav_gswt.__version__,
         "renderer": backends.describe_backend(),
         "parameters": parameters,
-        "inputs": {name: digest(*_files(given)) for name, given in sorted(inputs.items())},
+        "inputs": {name: digest_files(*_files(given)) for name, given in sorted(inputs.items())},
     }
 
 
@@ -26,7 +26,7 @@ def _files(given: Path | str | list) -> list[Path]:
     return [file for files in found for file in files]
 
 
-def machine() -> dict:
+def describe_machine() -> dict:
     """The processor's name and how many cores it has: what seconds are to be read with."""
     info = Path("/proc/cpuinfo")
     lines = info.read_text(encoding="utf-8").splitlines() if info.exists() else []

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.photos import importers
+from dav_gswt.photos.importers import import_model
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +28,7 @@ def photos(tmp_path_factory):
 
 def refused(path, photos, match):
     with pytest.raises(InputError, match=match) as caught:
-        importers.read(path, photos, made.OPTIONS)
+        import_model(path, photos, made.OPTIONS)
     assert path.name in str(caught.value) and "\n" not in str(caught.value)
 
 
@@ -153,7 +154,7 @@ def test_files_that_are_not_there_or_too_large_are_refused(photos, tmp_path):
         file.truncate(1 << 40)
     refused(tmp_path / "huge.json", photos, "bytes; at most")
     with pytest.raises(InputError, match="nowhere: there is no such folder of photos"):
-        importers.read(tmp_path / "empty", tmp_path / "nowhere", made.OPTIONS)
+        import_model(tmp_path / "empty", tmp_path / "nowhere", made.OPTIONS)
 
 
 def test_a_link_out_of_the_folder_is_not_followed_for_points(photos, tmp_path):
@@ -182,7 +183,7 @@ def test_clouds_that_cannot_be_are_refused_by_name(photos, tmp_path, content, ma
     (tmp_path / "c.ply").write_bytes(content)
     path = made.write_json(tmp_path / "t.json", made.transforms() | {"ply_file_path": "c.ply"})
     with pytest.raises(InputError, match=rf"c.ply: .*{match}"):
-        importers.read(path, photos, made.OPTIONS)
+        import_model(path, photos, made.OPTIONS)
 
 
 @pytest.mark.parametrize(
@@ -217,7 +218,7 @@ def test_text_models_that_cannot_be_are_refused_by_line(photos, tmp_path, file, 
     assert old in text
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(InputError, match=rf"{file if 'no point' not in match else 'points3D'}.txt: .*{match}"):
-        importers.read(tmp_path / "m", photos, made.OPTIONS)
+        import_model(tmp_path / "m", photos, made.OPTIONS)
 
 
 @pytest.fixture(scope="module")
@@ -251,7 +252,7 @@ def write_binary(folder, files):
 def test_damaged_binary_models_are_refused_by_file(photos, tmp_path, binary, file, damage):
     folder = write_binary(tmp_path / "m", binary | {file: damage(binary[file])})
     with pytest.raises(InputError, match=rf"{file}.bin: "):
-        importers.read(folder, photos, made.OPTIONS)
+        import_model(folder, photos, made.OPTIONS)
 
 
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -7,7 +7,8 @@ import test_imported_models as made
 from plyfile import PlyData, PlyElement
 
 from dav_gswt.photos import importers
-from dav_gswt.photos.importers import undistortion
+from dav_gswt.photos.importers import import_model
+from dav_gswt.photos.importers.photo_matching import PhotoFolder
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +22,7 @@ def test_of_several_reconstructions_the_largest_is_taken_and_the_others_are_said
     whole, rest = made.reconstruction()[0], made.reconstruction()[0]
     whole["shots"] = dict(list(whole["shots"].items())[:6])
     rest["shots"] = dict(list(rest["shots"].items())[6:])
-    found = importers.read(made.write_json(tmp_path / "r.json", [rest, whole]), photos, made.OPTIONS)
+    found = import_model(made.write_json(tmp_path / "r.json", [rest, whole]), photos, made.OPTIONS)
     assert found.model.names == made.SCENE.names[:6]
     assert [n for n, _ in found.left_out] == list(made.SCENE.names[6:])
     assert all("another, smaller reconstruction" in reason for _, reason in found.left_out)
@@ -31,7 +32,7 @@ def test_of_several_reconstructions_the_largest_is_taken_and_the_others_are_said
 def test_a_reference_makes_the_world_metric(photos, tmp_path):
     values = made.reconstruction()
     values[0]["reference_lla"] = {"latitude": 48.1, "longitude": 11.5, "altitude": 520.0}
-    found = importers.read(made.write_json(tmp_path / "r.json", values), photos, made.OPTIONS)
+    found = import_model(made.write_json(tmp_path / "r.json", values), photos, made.OPTIONS)
     assert (found.positions.about.latitude, found.positions.about.metres_per_unit) == (48.1, 1.0)
     assert found.positions.at == pytest.approx(np.array([c.centre for c in found.model.cameras]))
 
@@ -40,7 +41,7 @@ def test_frames_may_have_intrinsics_of_their_own_and_a_field_of_view_instead(pho
     values = made.transforms()
     angle = 2 * np.arctan(0.5 * made.WIDTH / 310.0)
     values["frames"][3] |= {"camera_angle_x": angle, "fl_y": 311.0, "cx": 150.0, "k1": 0.0, "camera_model": "OPENCV"}
-    given = importers.nerfstudio.read(tmp_path / "t.json", values, photos, undistortion.Folder(photos).stored_size)
+    given = importers.nerfstudio.read(tmp_path / "t.json", values, photos, PhotoFolder(photos).stored_size)
     assert given.shots[3].lens.params == pytest.approx(
         np.array([310, 311, 150, *made.NUMBERS[3:4], 0, *made.NUMBERS[5:]])
     )
@@ -54,7 +55,7 @@ def test_a_file_without_sizes_takes_those_of_the_photos(photos, tmp_path):
     }
     for frame in values["frames"]:
         frame["file_path"] = "./train/" + frame["file_path"].removesuffix(".png")  # Blender's scenes name no suffix
-    given = importers.nerfstudio.read(tmp_path / "t.json", values, photos, undistortion.Folder(photos).stored_size)
+    given = importers.nerfstudio.read(tmp_path / "t.json", values, photos, PhotoFolder(photos).stored_size)
     assert given.shots[0].lens.model_name == "PINHOLE"
     assert given.shots[0].lens.params == pytest.approx(np.array([300, 300, made.WIDTH / 2, made.HEIGHT / 2]))
     assert given.shots[4].translation == pytest.approx(made.SCENE.translations[4])
@@ -67,7 +68,7 @@ def test_an_applied_scale_is_undone_too(photos, tmp_path):
         matrix[:3, 3] *= 2.5
         frame["transform_matrix"] = matrix.tolist()
     values["applied_scale"] = 2.5
-    given = importers.nerfstudio.read(tmp_path / "t.json", values, photos, undistortion.Folder(photos).stored_size)
+    given = importers.nerfstudio.read(tmp_path / "t.json", values, photos, PhotoFolder(photos).stored_size)
     assert np.array([s.translation for s in given.shots]) == pytest.approx(made.SCENE.translations)
 
 
@@ -81,7 +82,7 @@ def test_points_beside_transforms_are_brought_into_the_cameras_world(photos, tmp
     rows["red"], rows["green"], rows["blue"] = 51, 102, 204
     PlyData([PlyElement.describe(rows, "vertex")], text=text).write(str(tmp_path / "sparse_pc.ply"))
     values = made.transforms() | {"ply_file_path": "sparse_pc.ply"}
-    given = importers.nerfstudio.read(tmp_path / "t.json", values, photos, undistortion.Folder(photos).stored_size)
+    given = importers.nerfstudio.read(tmp_path / "t.json", values, photos, PhotoFolder(photos).stored_size)
     assert given.points == pytest.approx(made.SCENE.points, abs=1e-5)
     assert given.colours[0] == pytest.approx([0.2, 0.4, 0.8], abs=1e-6)
 

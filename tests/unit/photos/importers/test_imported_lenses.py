@@ -6,6 +6,14 @@ import pytest
 
 from dav_gswt.errors import InputError
 from dav_gswt.photos.importers import lens_models, nerfstudio, opensfm
+from dav_gswt.photos.importers.lens_models import (
+    fit_camera_to_photo,
+    make_camera,
+    make_fisheye_camera,
+    make_perspective_camera,
+    undistort_camera,
+    unproject_pixels,
+)
 
 W, H = 400, 300
 RNG = np.random.default_rng(11)
@@ -96,7 +104,7 @@ def test_a_turned_lens_sees_turned_rays_at_turned_places(name, turns, orientatio
     if len(plain.focal_length_idxs()) == 2:
         params[plain.focal_length_idxs()[1]] += 4
     plain.params = params
-    turned, count = lens_models.fitted(plain, (W, H), orientation, "there")
+    turned, count = fit_camera_to_photo(plain, (W, H), orientation, "there")
     at = np.asarray(plain.img_from_cam(RAYS))
     size = np.array([W, H])
     for _ in range(turns):
@@ -107,14 +115,14 @@ def test_a_turned_lens_sees_turned_rays_at_turned_places(name, turns, orientatio
 
 
 def test_a_lens_that_fits_the_upright_photo_alone_is_not_turned():
-    camera = lens_models.perspective(H, W, (320.0, 320.0, H / 2, W / 2))
-    same, turns = lens_models.fitted(camera, (W, H), 6, "there")
+    camera = make_perspective_camera(H, W, (320.0, 320.0, H / 2, W / 2))
+    same, turns = fit_camera_to_photo(camera, (W, H), 6, "there")
     assert turns == 0 and (same.width, same.height) == (H, W)
 
 
 def test_mirrored_photos_are_refused():
     with pytest.raises(InputError, match="there: its EXIF orientation mirrors"):
-        lens_models.fitted(lens_models.perspective(W, H, (320.0, 320.0, 200.0, 150.0)), (W, H), 2, "there")
+        fit_camera_to_photo(make_perspective_camera(W, H, (320.0, 320.0, 200.0, 150.0)), (W, H), 2, "there")
 
 
 @pytest.mark.parametrize(
@@ -123,18 +131,18 @@ def test_mirrored_photos_are_refused():
      ((300, 400), False), ((401, 300), True), ((4000, 2980), False)],
 )  # fmt: skip
 def test_a_scaled_copy_fits_and_another_shape_does_not(size, fits):
-    camera = lens_models.perspective(W, H, (320.0, 320.0, 200.0, 150.0))
+    camera = make_perspective_camera(W, H, (320.0, 320.0, 200.0, 150.0))
     if fits:
-        found, _ = lens_models.fitted(camera, size, 1, "there")
+        found, _ = fit_camera_to_photo(camera, size, 1, "there")
         assert found.focal_length_x == pytest.approx(320 * size[0] / W)
     else:
         with pytest.raises(InputError, match="there: the photo has"):
-            lens_models.fitted(camera, size, 1, "there")
+            fit_camera_to_photo(camera, size, 1, "there")
 
 
 def test_a_wide_fisheye_becomes_a_pinhole_that_sees_nothing_but_the_photo():
-    wide = lens_models.fisheye(W, H, (150.0, 150.0, 200.0, 150.0), (0.01, 0.002))  # 190 degrees across the diagonal
-    small, pinhole = lens_models.pinhole(wide, 200, "there")
+    wide = make_fisheye_camera(W, H, (150.0, 150.0, 200.0, 150.0), (0.01, 0.002))  # 190 degrees across the diagonal
+    small, pinhole = undistort_camera(wide, 200, "there")
     assert max(pinhole.width, pinhole.height) <= 200 and max(small.width, small.height) == 200
     corners = np.array([[0, 0], [pinhole.width, 0], [0, pinhole.height], [pinhole.width, pinhole.height]], float)
     seen = small.img_from_cam(np.c_[pinhole.cam_from_img(corners), np.ones(4)])
@@ -142,8 +150,8 @@ def test_a_wide_fisheye_becomes_a_pinhole_that_sees_nothing_but_the_photo():
 
 
 def test_pixels_without_a_ray_have_none():
-    wide = lens_models.fisheye(W, H, (100.0, 100.0, 200.0, 150.0))
-    found = lens_models.rays(wide, np.array([[200.0, 250.0], [0.0, 0.0]]))  # 57 and 143 degrees off the axis
+    wide = make_fisheye_camera(W, H, (100.0, 100.0, 200.0, 150.0))
+    found = unproject_pixels(wide, np.array([[200.0, 250.0], [0.0, 0.0]]))  # 57 and 143 degrees off the axis
     assert found[0] == pytest.approx([0.0, np.tan(1.0)]) and np.isnan(found[1]).all()
 
 
@@ -153,9 +161,9 @@ def test_pixels_without_a_ray_have_none():
     ids=["wild", "k1", "huge", "k2"],
 )
 def test_a_distortion_that_folds_over_is_refused(k, p):
-    camera = lens_models.perspective(W, H, (200.0, 200.0, 200.0, 150.0), k, p)
+    camera = make_perspective_camera(W, H, (200.0, 200.0, 200.0, 150.0), k, p)
     with pytest.raises(InputError, match="there: the distortion of its camera cannot be undone"):
-        lens_models.pinhole(camera, W, "there")
+        undistort_camera(camera, W, "there")
 
 
 @pytest.mark.parametrize(
@@ -174,4 +182,4 @@ def test_a_distortion_that_folds_over_is_refused(k, p):
 )
 def test_numbers_that_no_lens_has_are_refused(model, width, height, params):
     with pytest.raises(InputError, match="^there: "):
-        lens_models.lens(model, width, height, params, "there")
+        make_camera(model, width, height, params, "there")

@@ -14,16 +14,18 @@ from scipy.spatial.transform import Rotation
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
-from dav_gswt.photos import importers, model, photo_set
-from dav_gswt.photos.importers import points, undistortion
-from dav_gswt.photos.importers.undistortion import Placed
-from dav_gswt.photos.sfm import registration
+from dav_gswt.photos.colmap_model import read_colmap_model, reprojection_errors, triangulate_points
+from dav_gswt.photos.importers import import_model, points
+from dav_gswt.photos.importers.photo_matching import MatchedPhoto, PhotoFolder
+from dav_gswt.photos.importers.points import find_near_pairs
+from dav_gswt.photos.photo_set import prepare_photos
+from dav_gswt.photos.sfm.registration import SfmOptions, undistort_image
 
 HALF = 1.0  # of the made-up ground
 WIDTH, HEIGHT = 320, 240
 # fx, fy, cx, cy, k1, k2, p1, p2
 NUMBERS = (300.0, 302.0, 163.2, 117.4, -0.08, 0.02, 0.001, -0.0007)
-OPTIONS = registration.Options(size=320, features=1024, side=320)
+OPTIONS = SfmOptions(size=320, features=1024, side=320)
 MOVE = np.array([[1.0, 0, 0, 0.3], [0, 0, 1, -0.2], [0, -1, 0, 0.5]])  # what nerfstudio does to a world, and a shift
 WORLD = Rotation.from_rotvec([0.3, -0.2, 0.4]).as_matrix()  # so that no axis of the scene is an axis of the file
 
@@ -176,7 +178,7 @@ def three(photos, tmp_path_factory):
         "nerfstudio": write_json(folder / "transforms.json", transforms()),
         "opensfm": write_json(folder / "reconstruction.json", reconstruction()),
     }
-    return {kind: importers.read(path, photos, OPTIONS) for kind, path in sources.items()}
+    return {kind: import_model(path, photos, OPTIONS) for kind, path in sources.items()}
 
 
 @pytest.mark.parametrize("kind", ["colmap", "nerfstudio", "opensfm"])
@@ -195,7 +197,7 @@ def test_all_formats_give_the_same_pictures_and_points(three, kind):
     for i in (0, 5):
         a, b = one.model.cameras[i], two.model.cameras[i]
         assert [a.fx, a.fy, a.cx, a.cy, a.width, a.height] == pytest.approx([b.fx, b.fy, b.cx, b.cy, b.width, b.height])
-        assert registration.undistorted(one, i) == pytest.approx(registration.undistorted(two, i), abs=1e-5)
+        assert undistort_image(one, i) == pytest.approx(undistort_image(two, i), abs=1e-5)
     n = len(one.model.points)
     assert two.model.points[:n] == pytest.approx(one.model.points, abs=1e-5)
 
@@ -205,14 +207,14 @@ def test_points_found_under_the_given_cameras_lie_on_the_ground(three):
     assert len(found.model.points) > 200
     # Features lie a fifth of a pixel of 1/300 off; over base lines of a fifth of the height that is five times as much.
     assert np.median(np.abs(found.model.points @ WORLD[:, 2])) < 0.003
-    assert found.error < 0.7 and np.median(model.errors(found.model)) < 0.7
+    assert found.error < 0.7 and np.median(reprojection_errors(found.model)) < 0.7
 
 
 def test_an_undistorted_picture_is_that_of_its_pinhole_camera(three):
     found, ground = three["opensfm"], made_up.texture(np.random.default_rng(4))
     c = found.model.cameras[2]
     exact = pycolmap.Camera(model="PINHOLE", width=c.width, height=c.height, params=[c.fx, c.fy, c.cx, c.cy])
-    assert alike(registration.undistorted(found, 2), photograph(exact, c.rotation, c.translation, ground))
+    assert alike(undistort_image(found, 2), photograph(exact, c.rotation, c.translation, ground))
 
 
 def test_points_that_nobody_is_known_to_see_follow_the_others(three):
@@ -225,7 +227,7 @@ def test_points_that_nobody_is_known_to_see_follow_the_others(three):
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_run_repeats_to_the_bit(three, photos, tmp_path, threads):
     path = write_json(tmp_path / "t.json", transforms())
-    again = importers.read(path, photos, replace(OPTIONS, threads=threads))
+    again = import_model(path, photos, replace(OPTIONS, threads=threads))
     for name in ("points", "colours", "point_of", "image_of", "pixels"):
         assert np.array_equal(getattr(again.model, name), getattr(three["nerfstudio"].model, name)), name
 
@@ -237,21 +239,21 @@ def test_observations_of_a_colmap_model_are_its_own(photos, tmp_path, binary):
         stored = pycolmap.Reconstruction(str(tmp_path / "sparse" / "0"))
         (tmp_path / "b").mkdir()
         stored.write_binary(str(tmp_path / "b"))
-    found = importers.read(tmp_path / "b" if binary else tmp_path, photos, OPTIONS)
+    found = import_model(tmp_path / "b" if binary else tmp_path, photos, OPTIONS)
     assert found.model.points == pytest.approx(SCENE.points, abs=1e-12)
     assert found.model.colours == pytest.approx(np.tile([0.2, 0.4, 0.8], (60, 1)), abs=1e-6)
-    assert found.error < 1e-6 and model.errors(found.model).max() < 1e-4
+    assert found.error < 1e-6 and reprojection_errors(found.model).max() < 1e-4
     assert len(found.model.pixels) > 0.7 * 60 * 8
 
 
 def test_photos_may_be_smaller_than_the_models_and_pictures_smaller_still(tmp_path):
     shoot(tmp_path / "half", 0.5)
     write_colmap(tmp_path / "m", sees=True)
-    found = importers.read(tmp_path / "m", tmp_path / "half", replace(OPTIONS, side=100))
+    found = import_model(tmp_path / "m", tmp_path / "half", replace(OPTIONS, side=100))
     assert max(found.lenses[0].width, found.lenses[0].height) == 100
     assert max(found.model.cameras[0].width, found.model.cameras[0].height) <= 100
-    assert model.errors(found.model).max() < 1e-4
-    assert registration.undistorted(found, 0).shape == (found.model.cameras[0].height, found.model.cameras[0].width, 3)
+    assert reprojection_errors(found.model).max() < 1e-4
+    assert undistort_image(found, 0).shape == (found.model.cameras[0].height, found.model.cameras[0].width, 3)
 
 
 def test_photos_of_another_shape_are_refused_by_name(tmp_path, photos):
@@ -259,7 +261,7 @@ def test_photos_of_another_shape_are_refused_by_name(tmp_path, photos):
         image_files.write_png(tmp_path / "cut" / path.name, image_files.read_photo(path)[:200])
     write_colmap(tmp_path / "m", sees=True)
     with pytest.raises(InputError, match=r"000.png: the photo has 320 x 200 pixels, .* 320 x 240"):
-        importers.read(tmp_path / "m", tmp_path / "cut", OPTIONS)
+        import_model(tmp_path / "m", tmp_path / "cut", OPTIONS)
 
 
 def test_photos_and_images_without_each_other_are_left_out_with_the_reason(tmp_path):
@@ -269,7 +271,7 @@ def test_photos_and_images_without_each_other_are_left_out_with_the_reason(tmp_p
     (tmp_path / "photos" / "thumbs").mkdir()  # has nothing of the model: not worth telling
     image_files.write_png(tmp_path / "photos" / "thumbs" / "x.png", np.zeros((4, 4, 3)))
     write_colmap(tmp_path / "m", sees=True)
-    found = importers.read(tmp_path / "m", tmp_path / "photos", OPTIONS)
+    found = import_model(tmp_path / "m", tmp_path / "photos", OPTIONS)
     assert found.model.names == tuple(n for n in SCENE.names if n not in ("001.png", "007.png"))
     reasons = dict(found.left_out)
     assert set(reasons) == {"001.png", "007.png", "other.png"}
@@ -284,7 +286,7 @@ def test_names_are_found_by_path_then_file_name_then_stem(tmp_path):
     for name in files:
         (tmp_path / name).parent.mkdir(exist_ok=True)
         image_files.write_png(tmp_path / name, np.zeros((4, 4, 3)))
-    found = undistortion.Folder(tmp_path)
+    found = PhotoFolder(tmp_path)
     assert [found.find(n) for n in ("a/1.jpg", "b/1", "x/2.png", "2.JPG", "3.v2")] == [
         *("a/1.jpg", "b/1.jpg", "b/2.png", "b/2.png", "c/3.v2.jpg")
     ]
@@ -295,7 +297,7 @@ def test_photos_of_equal_names_in_two_folders_become_pictures_of_two_names(tmp_p
     names = [f"{'ab'[i % 2]}/{i // 2}.png" for i in range(8)]
     shoot(tmp_path / "photos", names=names)
     write_colmap(tmp_path / "m", names, sees=True)
-    found = importers.read(tmp_path / "m", tmp_path / "photos", OPTIONS)
+    found = import_model(tmp_path / "m", tmp_path / "photos", OPTIONS)
     assert sorted(found.model.names) == sorted(f"{n.replace('/', '_').replace('.', '_')}.png" for n in names)
     assert [s.relative_to(tmp_path / "photos").as_posix() for s in found.sources] == sorted(names)
 
@@ -304,14 +306,14 @@ def test_one_photo_of_two_images_is_refused(tmp_path, photos):
     values = transforms()
     values["frames"][1]["file_path"] = "elsewhere/000.jpg"
     with pytest.raises(InputError, match=r"are one photo: 000.png"):
-        importers.read(write_json(tmp_path / "t.json", values), photos, OPTIONS)
+        import_model(write_json(tmp_path / "t.json", values), photos, OPTIONS)
 
 
 def test_fewer_than_three_photos_are_too_few(tmp_path):
     shoot(tmp_path / "photos", names=SCENE.names[:2])
     write_colmap(tmp_path / "m")
     with pytest.raises(InputError, match="2 of its 8 images have a photo"):
-        importers.read(tmp_path / "m", tmp_path / "photos", OPTIONS)
+        import_model(tmp_path / "m", tmp_path / "photos", OPTIONS)
 
 
 @pytest.mark.parametrize("orientation", [3, 6, 8])
@@ -327,13 +329,13 @@ def test_a_turned_photo_is_turned_back_with_its_camera(tmp_path, orientation):
         file.write_image(np.rint(image_files.read_photo(path) * 255).astype(np.uint8))
         file.close()
     write_colmap(tmp_path / "m", [f"{n[:3]}.tif" for n in SCENE.names], sees=True)
-    found = importers.read(tmp_path / "m", tmp_path / "tagged", OPTIONS)
+    found = import_model(tmp_path / "m", tmp_path / "tagged", OPTIONS)
     upright = image_files.read_size(tmp_path / "tagged" / "000.tif")
     assert (found.lenses[0].width, found.lenses[0].height) == upright
-    assert model.errors(found.model).max() < 1e-4
+    assert reprojection_errors(found.model).max() < 1e-4
     ground, c = made_up.texture(np.random.default_rng(4)), found.model.cameras[0]
     exact = pycolmap.Camera(model="PINHOLE", width=c.width, height=c.height, params=[c.fx, c.fy, c.cx, c.cy])
-    assert alike(registration.undistorted(found, 0), photograph(exact, c.rotation, c.translation, ground))
+    assert alike(undistort_image(found, 0), photograph(exact, c.rotation, c.translation, ground))
 
 
 def test_a_world_of_large_coordinates_keeps_its_points_sharp(three, photos, tmp_path):
@@ -342,7 +344,7 @@ def test_a_world_of_large_coordinates_keeps_its_points_sharp(three, photos, tmp_
     for i, shot in enumerate(values[0]["shots"].values()):
         shot["translation"] = (SCENE.translations[i] - SCENE.rotations[i] @ far).tolist()
     del values[0]["points"]
-    found = importers.read(write_json(tmp_path / "r.json", values), photos, OPTIONS)
+    found = import_model(write_json(tmp_path / "r.json", values), photos, OPTIONS)
     near = three["colmap"].model
     assert abs(len(found.model.points) - len(near.points)) <= 0.01 * len(near.points)
     assert np.median(np.abs((found.model.points - far) @ WORLD[:, 2])) < 0.003
@@ -351,31 +353,31 @@ def test_a_world_of_large_coordinates_keeps_its_points_sharp(three, photos, tmp_
 def test_many_photos_are_matched_with_those_near_them_only():
     def place(x, turned):
         turn = np.diag([1.0, -1, -1]) if turned else np.eye(3)
-        return Placed(Path(), "", 0, lens(), 0, turn, -turn @ [x, 0.0, 0.0])
+        return MatchedPhoto(Path(), "", 0, lens(), 0, turn, -turn @ [x, 0.0, 0.0])
 
     line = [place(float(i), False) for i in range(61)]
-    pairs = points.near_pairs(line)
+    pairs = find_near_pairs(line)
     assert all(i < j for i, j in pairs) and len(set(pairs)) == len(pairs)
     assert {j for i, j in pairs if i == 30} | {i for i, j in pairs if j == 30} >= set(range(20, 41)) - {30}
     assert max(j - i for i, j in pairs) <= points.NEAREST
-    assert len(points.near_pairs(line[:60])) == 60 * 59 // 2
+    assert len(find_near_pairs(line[:60])) == 60 * 59 // 2
     opposed = [place(float(i), i % 2 == 1) for i in range(61)]
-    assert all((j - i) % 2 == 0 for i, j in points.near_pairs(opposed))
+    assert all((j - i) % 2 == 0 for i, j in find_near_pairs(opposed))
 
 
 def test_the_stage_goes_on_from_a_given_model(photos, tmp_path):
     write_colmap(tmp_path / "m", sees=False)
-    facts = photo_set.from_photos(photos, tmp_path / "out", OPTIONS, tmp_path / "m")
+    facts = prepare_photos(photos, tmp_path / "out", OPTIONS, tmp_path / "m")
     assert facts.registered == 8 and facts.relief < 0.02
-    stored = model.read(tmp_path / "out" / "sparse")
+    stored = read_colmap_model(tmp_path / "out" / "sparse")
     assert len(stored.points) == facts.points
     assert np.median([c.centre[2] for c in stored.cameras]) == pytest.approx(1, abs=1e-9)
 
 
 def test_loose_points_are_stored_with_the_others(photos, tmp_path):
     path = write_json(tmp_path / "r.json", reconstruction())
-    facts = photo_set.from_photos(photos, tmp_path / "out", OPTIONS, path)
-    stored = model.read(tmp_path / "out" / "sparse")
+    facts = prepare_photos(photos, tmp_path / "out", OPTIONS, path)
+    stored = read_colmap_model(tmp_path / "out" / "sparse")
     assert len(stored.points) == facts.points and np.isfinite(stored.points).all()
-    places, colours = model.points_seen_by(stored, stored.names)
+    places, colours = triangulate_points(stored, stored.names)
     assert 100 < len(places) < len(stored.points)

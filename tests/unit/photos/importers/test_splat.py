@@ -7,8 +7,9 @@ from scipy.spatial.transform import Rotation
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, write_field
-from dav_gswt.photos import photo_set
 from dav_gswt.photos.importers import splat
+from dav_gswt.photos.importers.splat import fit_field_frame
+from dav_gswt.photos.photo_set import import_field
 
 
 def ground_field(rng, n=6000, degree=0):
@@ -43,7 +44,7 @@ def entered(rng):
     """A ground lying as COLMAP leaves it (y down), ten times as large, off the origin; and what came of it."""
     upright = ground_field(rng, degree=1)
     lying = splat._moved(upright, np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), 10.0, np.array([3.0, 50, -7]))
-    return lying, *splat.enter(lying, rng)
+    return lying, *fit_field_frame(lying, rng)
 
 
 def test_the_ground_lies_at_0_and_bushes_stand_up(entered):
@@ -96,7 +97,7 @@ def test_quaternions_of_any_length_mean_the_same(rng):
     long = GaussianField(
         field.means, field.log_scales, field.quats * np.float32(1e30), *(field[:].__dict__[k] for k in REST)
     )
-    one, two = (splat.enter(f, np.random.default_rng(0), (0, 0, 1))[0] for f in (field, long))
+    one, two = (fit_field_frame(f, np.random.default_rng(0), (0, 0, 1))[0] for f in (field, long))
     assert np.array_equal(one.quats, two.quats)
 
 
@@ -105,20 +106,20 @@ REST = ("opacity_logits", "sh", "uncertainty", "ground")
 
 def test_up_says_which_side_is_up(rng):
     field = ground_field(rng)
-    above, _ = splat.enter(field, np.random.default_rng(0), (0, 0, 1))
-    below, _ = splat.enter(field, np.random.default_rng(0), (0, 0, -1))
+    above, _ = fit_field_frame(field, np.random.default_rng(0), (0, 0, 1))
+    below, _ = fit_field_frame(field, np.random.default_rng(0), (0, 0, -1))
     assert above.means[:, 2].max() > 0.05 and below.means[:, 2].min() < -0.05
 
 
 def test_up_along_the_ground_is_refused_and_says_what_to_give(rng):
     with pytest.raises(InputError, match="up"):
-        splat.enter(ground_field(rng), rng, (0, -1, 0))
+        fit_field_frame(ground_field(rng), rng, (0, -1, 0))
 
 
 @pytest.mark.parametrize("up", [(0, 0, 0), (0, float("nan"), 1)])
 def test_up_that_is_no_direction_is_refused(rng, up):
     with pytest.raises(InputError, match="no direction"):
-        splat.enter(ground_field(rng), rng, up)
+        fit_field_frame(ground_field(rng), rng, up)
 
 
 def test_a_field_without_a_surface_is_refused_by_file_name(rng, tmp_path):
@@ -130,13 +131,13 @@ def test_a_field_without_a_surface_is_refused_by_file_name(rng, tmp_path):
     )
     write_field(haze, tmp_path / "haze.ply")
     with pytest.raises(InputError, match="haze.ply.*opaque"):
-        photo_set.from_field(tmp_path / "haze.ply", tmp_path / "out.ply", tmp_path / "ground.json")
+        import_field(tmp_path / "haze.ply", tmp_path / "out.ply", tmp_path / "ground.json")
     assert not (tmp_path / "out.ply").exists() and not (tmp_path / "ground.json").exists()
 
 
 def test_the_same_file_gives_the_same_bytes(rng, tmp_path):
     write_field(ground_field(rng), tmp_path / "in.ply")
     for name in ("a", "b"):
-        photo_set.from_field(tmp_path / "in.ply", tmp_path / f"{name}.ply", tmp_path / f"{name}.json", (0, 0, 1))
+        import_field(tmp_path / "in.ply", tmp_path / f"{name}.ply", tmp_path / f"{name}.json", (0, 0, 1))
     assert (tmp_path / "a.ply").read_bytes() == (tmp_path / "b.ply").read_bytes()
     assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()

@@ -12,9 +12,12 @@ from fixtures.frames import scene_frame
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.scene_frame import FocalLength, LeftOutPhoto, Square
-from dav_gswt.photos import folder, model
-from dav_gswt.photos.report import facts, figures
+from dav_gswt.photos.colmap_model import transform_model
+from dav_gswt.photos.folder import write_photo_folder
 from dav_gswt.photos.report import page as report
+from dav_gswt.photos.report.facts import PhotoFacts, collect_facts, find_weaknesses, list_weak_spots
+from dav_gswt.photos.report.figures import bin_coverage, camera_footprint, make_thumbnails
+from dav_gswt.photos.report.page import write_report
 
 FRAME = scene_frame(
     kind="photos",
@@ -59,7 +62,7 @@ def made(flown, tmp_path):
         pictures = (
             (n, np.full((c.height, c.width, 3), 0.5)) for n, c in zip(sparse.names, sparse.cameras, strict=True)
         )
-        folder.write(tmp_path / name, sparse, pictures, frame, None, covers)
+        write_photo_folder(tmp_path / name, sparse, pictures, frame, None, covers)
         return tmp_path / name
 
     return make
@@ -75,7 +78,7 @@ def page(template, tmp_path):
     """Writes a report and returns its text."""
 
     def write(photos):
-        report.write(photos, template, SCENE, tmp_path / "report.html")
+        write_report(photos, template, SCENE, tmp_path / "report.html")
         return (tmp_path / "report.html").read_text()
 
     return write
@@ -162,8 +165,8 @@ def test_a_set_without_weak_spots_says_so(page, made):
     ],
 )
 def test_what_makes_a_photo_weak(points, error, shared, said):
-    photo = facts.Photo("a", points, error, 1.0, 0.0, "b", shared, 3, False, ())
-    assert facts.weak_photo(photo, 300.0) == said
+    photo = PhotoFacts("a", points, error, 1.0, 0.0, "b", shared, 3, False, ())
+    assert find_weaknesses(photo, 300.0) == said
 
 
 @pytest.mark.parametrize(
@@ -173,12 +176,12 @@ def test_what_makes_a_photo_weak(points, error, shared, said):
 def test_a_corner_that_few_photos_see_is_named_by_the_compass_or_the_map(made, flown, north, part):
     """Of twelve photos only three see the corner in the north-west of the sheet."""
     frame = FRAME if north is None else replace(FRAME, georeference=replace(PLACE, north=north))
-    found = facts.read(made(frame=frame), SCENE)
+    found = collect_facts(made(frame=frame), SCENE)
     counts = np.full(found.cover.counts.shape, 8)
     y = found.cover.south + (np.arange(counts.shape[0]) + 0.5) * found.cover.cell
     x = found.cover.west + (np.arange(counts.shape[1]) + 0.5) * found.cover.cell
     counts[np.ix_(y > 0.2, x < -0.2)] = 3
-    spots = facts.weak_spots(replace(found, cover=replace(found.cover, counts=counts)))
+    spots = list_weak_spots(replace(found, cover=replace(found.cover, counts=counts)))
     said = [spot for spot in spots if "exemplar" in spot]
     assert said == [
         f"The {part} of the exemplar is mostly seen by 3 photos only. More photos of it make it sharper and surer."
@@ -190,15 +193,15 @@ def test_a_doubtful_focal_length_is_a_weak_spot(made):
     held = FocalLength(300.0, 300.0, 330.0, 3.0, "EXIF's")
     none = FocalLength(None, 300.0, None, 3.0, "found by the photos alone")
     for lens, said in ((held, "1.10 times that of EXIF"), (none, "focal length is unsure")):
-        found = facts.read(made(frame=replace(FRAME, focal=lens)), SCENE)
-        assert any(said in spot for spot in facts.weak_spots(found))
+        found = collect_facts(made(frame=replace(FRAME, focal=lens)), SCENE)
+        assert any(said in spot for spot in list_weak_spots(found))
 
 
 def test_coverage_does_not_depend_on_the_unit(made, flown):
     """A world in metres, 40 of them a flying height: the same photos see the same places."""
-    metres = model.similar(flown, 40.0, np.eye(3), np.zeros(3))
+    metres = transform_model(flown, 40.0, np.eye(3), np.zeros(3))
     frame = replace(FRAME, unit="metre", flying_height=40.0, exemplar=Square(-20.0, -20.0, 40.0))
-    one, two = facts.read(made(), SCENE), facts.read(made("metres", frame, metres), SCENE)
+    one, two = collect_facts(made(), SCENE), collect_facts(made("metres", frame, metres), SCENE)
     assert np.array_equal(one.cover.counts, two.cover.counts)
     assert two.cover.cell == pytest.approx(40 * one.cover.cell)
     assert (one.length(0.5), two.length(20.0), two.length(3.0)) == ("0.50 flying heights", "20 m", "3.0 m")
@@ -206,23 +209,23 @@ def test_coverage_does_not_depend_on_the_unit(made, flown):
 
 def test_a_footprint_by_hand():
     """From height 2 a picture of 320 x 240 at focal length 300 covers 640 / 300 by 480 / 300."""
-    outline = figures.footprint(made_up.camera((1, 0, 2)), 9.0)
+    outline = camera_footprint(made_up.camera((1, 0, 2)), 9.0)
     assert np.ptp(outline, axis=0) == pytest.approx([640 / 300, 480 / 300])
     assert (outline.max(0) + outline.min(0)) / 2 == pytest.approx([1, 0])
 
 
 def test_a_footprint_over_the_horizon_ends_in_reach():
-    outline = figures.footprint(made_up.camera((0, 0, 1), (1, 0, 1)), 3.0)
+    outline = camera_footprint(made_up.camera((0, 0, 1), (1, 0, 1)), 3.0)
     assert np.linalg.norm(outline, axis=1).max() <= 3.0 + 1e-9 and np.isfinite(outline).all()
 
 
 @pytest.mark.parametrize("most, need", [(0, 3), (2, 3), (3, 3), (12, 3), (44, 2), (200, 3), (1, 1)])
 def test_every_number_of_photos_has_one_colour(made, most, need):
-    found = facts.read(made(), SCENE)
+    found = collect_facts(made(), SCENE)
     found = replace(found, need=need, cover=replace(found.cover, counts=np.full((4, 4), most)))
-    numbers = [n for low, high, _ in figures.bins(found) for n in range(low, high + 1)]
+    numbers = [n for low, high, _ in bin_coverage(found) for n in range(low, high + 1)]
     assert numbers == list(range(1, max(most, need) + 1))
-    assert len({colour for *_, colour in figures.bins(found)}) == len(figures.bins(found)) <= 11
+    assert len({colour for *_, colour in bin_coverage(found)}) == len(bin_coverage(found)) <= 11
 
 
 def test_masks_and_the_place_on_earth_are_told(page, made, flown):
@@ -238,7 +241,7 @@ def test_photos_that_only_test_are_marked_and_do_not_count(page, made, flown):
     sparse = replace(flown, **{k: getattr(flown, k)[own] for k in ("point_of", "image_of", "pixels")})
     frame = replace(FRAME, kind="synthetic", test=flown.names[8:], left_out=(), focal_ratio=None)
     photos = made(sparse=sparse, frame=frame)
-    found = facts.read(photos, SCENE)
+    found = collect_facts(photos, SCENE)
     assert found.cover.counts.max() <= 8 and len(found.placed) == 8
     assert not any(photo.weak for photo in found.photos if photo.tests)
     text = page(photos)
@@ -256,12 +259,12 @@ def test_a_template_that_asks_for_what_is_not_there_is_refused(made, template, t
     wrong = tmp_path / "wrong.html"
     wrong.write_text(template.read_text() + "$nothing")
     with pytest.raises(InputError, match="wrong.html: not a template of this report .*nothing"):
-        report.write(made(), wrong, SCENE, tmp_path / "report.html")
+        write_report(made(), wrong, SCENE, tmp_path / "report.html")
     assert not (tmp_path / "report.html").exists()
 
 
 def test_the_template_uses_all_that_the_report_has(made, template):
-    found = facts.read(made(), SCENE)
-    smalls = figures.all_shrunk(made() / "images", [photo.name for photo in found.photos])
+    found = collect_facts(made(), SCENE)
+    smalls = make_thumbnails(made() / "images", [photo.name for photo in found.photos])
     used = set(re.findall(r"\$(\w+)", template.read_text()))
     assert used == set(report.parts(found, smalls))

@@ -8,8 +8,8 @@ from fixtures import photos as made_up
 
 from dav_gswt.files import write_json
 from dav_gswt.images import image_files
-from dav_gswt.photos import model as models
-from dav_gswt.photos.sfm import localization
+from dav_gswt.photos.colmap_model import write_colmap_model
+from dav_gswt.photos.sfm.localization import localize_photos
 
 HALF = 1.0
 
@@ -27,7 +27,7 @@ def photos(tmp_path_factory, ground):
     known = made_up.model(cameras, made_up.plain(4000, 0.8, np.random.default_rng(1)))
     made_up.shoot(out / "images", cameras, ground, HALF)
     (out / "sparse").mkdir()
-    models.write(known, out / "sparse")
+    write_colmap_model(known, out / "sparse")
     write_json(out / "ground.json", {})
     return out
 
@@ -37,7 +37,7 @@ def test_further_photos_find_their_places_and_others_do_not(photos, ground, tmp_
     made_up.shoot(tmp_path, asked, ground, HALF)
     other = made_up.photograph(made_up.camera((0, 0, 1)), made_up.texture(np.random.default_rng(99)), HALF)
     image_files.write_png(tmp_path / "other.png", other)
-    found = localization.located(photos, sorted(tmp_path.iterdir()))
+    found = localize_photos(photos, sorted(tmp_path.iterdir()))
     assert found[2] is None
     for camera, true in zip(found[:2], asked, strict=True):
         assert np.linalg.norm(camera.centre - true.centre) < 0.01
@@ -45,11 +45,11 @@ def test_further_photos_find_their_places_and_others_do_not(photos, ground, tmp_
 
 
 def test_no_photo_asks_for_nothing(photos):
-    assert localization.located(photos, []) == []
+    assert localize_photos(photos, []) == []
 
 
 def test_a_photo_of_another_camera_is_named(photos, tmp_path, caplog):
     image_files.write_png(tmp_path / "square.png", np.full((200, 200, 3), 0.5))
     with caplog.at_level(logging.WARNING):
-        assert localization.located(photos, [tmp_path / "square.png"]) == [None]
+        assert localize_photos(photos, [tmp_path / "square.png"]) == [None]
     assert "square.png" in caplog.text and "same camera" in caplog.text

@@ -12,12 +12,14 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import image_files
-from dav_gswt.photos import model, photo_set
+from dav_gswt.photos.colmap_model import read_colmap_model, reprojection_errors
+from dav_gswt.photos.photo_set import prepare_photos
 from dav_gswt.photos.sfm import registration
+from dav_gswt.photos.sfm.registration import Registration, SfmOptions, register_photos, undistort_image
 
 HALF = 1.0  # of the made-up ground
 FILM = made_up.FOCAL / np.hypot(made_up.WIDTH, made_up.HEIGHT) * 43.2666  # 35 mm equivalent of the made-up camera
-OPTIONS = registration.Options(size=320, features=1024, side=320)
+OPTIONS = SfmOptions(size=320, features=1024, side=320)
 
 
 def flight():
@@ -57,7 +59,7 @@ def photos(tmp_path_factory, ground):
 
 @pytest.fixture(scope="module")
 def registered(photos):
-    return registration.register(photos, OPTIONS)
+    return register_photos(photos, OPTIONS)
 
 
 def apart(found, true) -> float:
@@ -73,7 +75,7 @@ def test_all_photos_find_the_places_they_were_taken_from(registered):
     assert registered.model.names == tuple(f"{i:03d}.png" for i in range(8)) and not registered.left_out
     # EXIF's 32 mm are rounded from 32.45, so cameras of different heights lie 1.4 % of that difference wrong.
     assert apart(registered.model.cameras, flight()) < 0.005
-    assert registered.error < 0.7 and np.median(model.errors(registered.model)) < 0.7
+    assert registered.error < 0.7 and np.median(reprojection_errors(registered.model)) < 0.7
 
 
 def test_the_focal_length_of_exif_is_held(registered):
@@ -83,7 +85,7 @@ def test_the_focal_length_of_exif_is_held(registered):
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_run_repeats_to_the_bit_whatever_the_threads(photos, registered, threads):
-    again = registration.register(photos, replace(OPTIONS, threads=threads))
+    again = register_photos(photos, replace(OPTIONS, threads=threads))
     for name in ("points", "colours", "point_of", "image_of", "pixels"):
         assert np.array_equal(getattr(again.model, name), getattr(registered.model, name)), name
     for one, two in zip(again.model.cameras, registered.model.cameras, strict=True):
@@ -91,21 +93,21 @@ def test_a_run_repeats_to_the_bit_whatever_the_threads(photos, registered, threa
 
 
 def test_the_global_mapper_finds_the_same_places(photos):
-    found = registration.register(photos, replace(OPTIONS, mapper="global"))
+    found = register_photos(photos, replace(OPTIONS, mapper="global"))
     assert len(found.model.names) == 8 and found.positions is None
     assert apart(found.model.cameras, flight()) < 0.01
-    again = registration.register(photos, replace(OPTIONS, mapper="global"))
+    again = register_photos(photos, replace(OPTIONS, mapper="global"))
     assert np.array_equal(found.model.points, again.model.points)
 
 
 def test_each_photo_can_have_a_camera_of_its_own(photos):
-    found = registration.register(photos, replace(OPTIONS, cameras="each"))
+    found = register_photos(photos, replace(OPTIONS, cameras="each"))
     assert len({tuple(lens.params) for lens in found.lenses}) == 8
     assert apart(found.model.cameras, flight()) < 0.02
 
 
 def test_a_given_focal_length_takes_the_place_of_exifs(photos):
-    found = registration.register(photos, replace(OPTIONS, focal=1.02 * FILM))
+    found = register_photos(photos, replace(OPTIONS, focal=1.02 * FILM))
     assert found.focal.exif == pytest.approx(1.02 * made_up.FOCAL, rel=1e-6)
 
 
@@ -118,7 +120,7 @@ def test_oblique_views_fix_a_focal_length_that_exif_has_wrong(tmp_path, ground):
     for i, camera in enumerate(cameras):
         film = {"Exif:FocalLengthIn35mmFilm": round(1.08 * FILM)}
         as_jpeg(tmp_path / f"{i:03d}.jpg", made_up.photograph(camera, ground, HALF), **film)
-    found = registration.register(tmp_path, OPTIONS)
+    found = register_photos(tmp_path, OPTIONS)
     assert "from the side" in found.focal.decision
     assert found.focal.used == pytest.approx(made_up.FOCAL, rel=0.02)
     assert found.focal_ratio == pytest.approx(found.focal.used / found.focal.exif)
@@ -136,10 +138,10 @@ def test_positions_by_gps_give_metres_and_north(tmp_path, ground):
     world = Georeference(46.8, -92.0, 180.0, 0.0, 1.0)
     for i, (camera, place) in enumerate(zip(flight(), world.to_earth(at), strict=True)):
         as_jpeg(tmp_path / f"{i:03d}.jpg", made_up.photograph(camera, ground, HALF), **gps_tags(place))
-    made = photo_set.from_photos(tmp_path, tmp_path / "out", OPTIONS)
+    made = prepare_photos(tmp_path, tmp_path / "out", OPTIONS)
     assert made.unit == "metre" and made.flying_height == pytest.approx(np.median(true[:, 2]), rel=0.02)
     reference = made.georeference
-    stored = model.read(tmp_path / "out" / "sparse")
+    stored = read_colmap_model(tmp_path / "out" / "sparse")
     back = world.to_world(reference.to_earth(np.array([c.centre for c in stored.cameras])))
     assert np.abs(back - at).max() < 1.0  # of flights of 100 metres: features are read to half a pixel, 0.2 m here
     assert (tmp_path / "out" / "lenses.json").exists()
@@ -150,7 +152,7 @@ def test_positions_that_contradict_the_photos_are_not_used(tmp_path, ground, cap
     at = np.random.default_rng(5).normal(0, 60, (8, 3))
     for i, (camera, place) in enumerate(zip(flight(), world.to_earth(at), strict=True)):
         as_jpeg(tmp_path / f"{i:03d}.jpg", made_up.photograph(camera, ground, HALF), **gps_tags(place))
-    found = registration.register(tmp_path, OPTIONS)
+    found = register_photos(tmp_path, OPTIONS)
     assert found.positions is None and "GPS" in caplog.text
     assert apart(found.model.cameras, flight()) < 0.01
 
@@ -168,7 +170,7 @@ def gps_tags(place):
 
 def test_without_exif_the_focal_length_is_found(tmp_path, ground):
     made_up.shoot(tmp_path, flight(), ground, HALF)
-    found = registration.register(tmp_path, OPTIONS)
+    found = register_photos(tmp_path, OPTIONS)
     assert found.focal_ratio is None and len(found.model.names) == 8
     # The guess is 28 % long; heights that differ by a fifth fix it to about the noise of features, 0.1 of 30 pixels.
     assert found.model.cameras[0].fx == pytest.approx(made_up.FOCAL, rel=0.02)
@@ -179,7 +181,7 @@ def test_photos_with_and_without_exif_go_together(tmp_path, ground):
     for i, camera in enumerate(flight()):
         film = {"Exif:FocalLengthIn35mmFilm": round(FILM)} if i % 2 else {}
         as_jpeg(tmp_path / f"{i:03d}.jpg", made_up.photograph(camera, ground, HALF), **film)
-    one, two = registration.register(tmp_path, OPTIONS), registration.register(tmp_path, OPTIONS)
+    one, two = register_photos(tmp_path, OPTIONS), register_photos(tmp_path, OPTIONS)
     assert one.focal_ratio == pytest.approx(1, abs=0.02) and len(one.model.names) == 8
     assert [c.fx for c in one.model.cameras] == pytest.approx([made_up.FOCAL] * 8, rel=0.02)
     assert all(lens.params[3] != 0 for lens in one.lenses)
@@ -192,7 +194,7 @@ def test_photos_of_two_sizes_get_a_camera_each(tmp_path, ground):
             camera = camera.resized(240, 180)
         film = {"Exif:FocalLengthIn35mmFilm": round(FILM)}
         as_jpeg(tmp_path / f"{i:03d}.jpg", made_up.photograph(camera, ground, HALF), **film)
-    found = registration.register(tmp_path, OPTIONS)
+    found = register_photos(tmp_path, OPTIONS)
     assert len(found.model.names) == 8
     assert all(abs(c.width - (240 if i % 2 else 320)) <= 4 for i, c in enumerate(found.model.cameras))
     assert apart(found.model.cameras, flight()) < 0.03
@@ -203,7 +205,7 @@ def test_a_photo_of_something_else_is_left_out_with_the_reason(photos, tmp_path)
         (tmp_path / path.name).symlink_to(path)
     other = made_up.texture(np.random.default_rng(77))
     as_jpeg(tmp_path / "other.jpg", made_up.photograph(made_up.camera((0, 0, 1)), other, HALF))
-    found = registration.register(tmp_path, OPTIONS)
+    found = register_photos(tmp_path, OPTIONS)
     assert [name for name, _ in found.left_out] == ["other.jpg"] and "matches no photo" in found.left_out[0][1]
     assert "other.png" not in found.model.names
 
@@ -226,7 +228,7 @@ def test_an_undistorted_picture_is_what_a_pinhole_camera_sees(tmp_path, k):
         cy=pinhole.principal_point_y, width=pinhole.width, height=pinhole.height,
     )  # fmt: skip
     one = replace(made_up.model([flat], np.zeros((1, 3))), names=("a.png",))
-    seen = registration.undistorted(registration.Registered(one, (tmp_path / "a.png",), (lens,), (), None, 0.0), 0)
+    seen = undistort_image(Registration(one, (tmp_path / "a.png",), (lens,), (), None, 0.0), 0)
     x, y = np.meshgrid(np.arange(flat.width) + 0.5, np.arange(flat.height) + 0.5)
     # 8 bits round by 1 / 510; cubic splines on waves of 100 pixels add less.
     assert seen == pytest.approx(scene((x - flat.cx) / flat.fx, (y - flat.cy) / flat.fy), abs=0.004)
@@ -234,7 +236,7 @@ def test_an_undistorted_picture_is_what_a_pinhole_camera_sees(tmp_path, k):
 
 def test_observations_lie_where_the_pictures_show_their_points(registered, photos):
     """A point's pixels in two pictures show the same colour: model and undistorted pictures belong together."""
-    pictures = [registration.undistorted(registered, i) for i in range(8)]
+    pictures = [undistort_image(registered, i) for i in range(8)]
     part = registered.model
     column, row = part.pixels.astype(int).T
     colour = np.array([pictures[i][r, c] for i, r, c in zip(part.image_of, row, column, strict=True)])
@@ -251,7 +253,7 @@ def test_pictures_of_equal_stem_keep_apart(tmp_path):
 def test_two_photos_are_refused_by_name(tmp_path, ground):
     made_up.shoot(tmp_path, flight()[:2], ground, HALF)
     with pytest.raises(InputError, match="000.png and 001.png.*at least 3"):
-        registration.register(tmp_path, OPTIONS)
+        register_photos(tmp_path, OPTIONS)
 
 
 def test_photos_that_do_not_overlap_are_refused_with_how_many_were_placed(tmp_path):
@@ -259,14 +261,14 @@ def test_photos_that_do_not_overlap_are_refused_with_how_many_were_placed(tmp_pa
         texture = made_up.texture(np.random.default_rng(100 + i))
         image_files.write_png(tmp_path / f"{i}.png", made_up.photograph(made_up.camera((0, 0, 1)), texture, HALF))
     with pytest.raises(InputError, match="0 of 4 photos.*overlap"):
-        registration.register(tmp_path, OPTIONS)
+        register_photos(tmp_path, OPTIONS)
 
 
 def test_photos_without_texture_are_refused(tmp_path):
     for i in range(4):
         image_files.write_png(tmp_path / f"{i}.png", np.full((60, 80, 3), 0.5))
     with pytest.raises(InputError, match="0 of 4 photos.*texture"):
-        registration.register(tmp_path, OPTIONS)
+        register_photos(tmp_path, OPTIONS)
 
 
 def test_a_half_written_photo_is_refused_by_name_and_nothing_is_left(photos, tmp_path):
@@ -274,18 +276,18 @@ def test_a_half_written_photo_is_refused_by_name_and_nothing_is_left(photos, tmp
         (tmp_path / path.name).write_bytes(path.read_bytes())
     (tmp_path / "004.jpg").write_bytes((tmp_path / "004.jpg").read_bytes()[:9000])
     with pytest.raises(InputError, match="004.jpg"):
-        photo_set.from_photos(tmp_path, tmp_path / "out", OPTIONS)
+        prepare_photos(tmp_path, tmp_path / "out", OPTIONS)
     assert not [p for p in tmp_path.iterdir() if p.suffix != ".jpg"]
 
 
 def test_the_photos_folder_is_whole(photos, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "old").touch()
-    facts = photo_set.from_photos(photos, tmp_path / "out", OPTIONS)
+    facts = prepare_photos(photos, tmp_path / "out", OPTIONS)
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["ground.json", "images", "lenses.json", "sparse"]
     assert read_scene_frame(tmp_path / "out" / "ground.json") == facts
-    stored = model.read(tmp_path / "out" / "sparse")
+    stored = read_colmap_model(tmp_path / "out" / "sparse")
     assert (facts.images, facts.registered, facts.points) == (8, 8, len(stored.points))
     for name, camera in zip(stored.names, stored.cameras, strict=True):
         assert image_files.read_size(tmp_path / "out" / "images" / name) == (camera.width, camera.height)
@@ -293,6 +295,6 @@ def test_the_photos_folder_is_whole(photos, tmp_path):
 
 
 def test_brighton_beach_registers_at_half_size(photo_sets):
-    found = registration.register(photo_sets / "brighton_beach/images", registration.Options(512, 2048, side=512))
+    found = register_photos(photo_sets / "brighton_beach/images", SfmOptions(512, 2048, side=512))
     assert len(found.model.names) == 18 and not found.left_out
     assert found.focal_ratio == pytest.approx(1, abs=1e-12) and found.error < 0.5

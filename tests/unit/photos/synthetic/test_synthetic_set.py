@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from dav_gswt.geometry.scene_frame import read_scene_frame
-from dav_gswt.photos import model
-from dav_gswt.photos.model import Model
+from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
 from dav_gswt.photos.synthetic import photo_set, truth
 from dav_gswt.photos.synthetic import scene as synthetic
 
@@ -19,7 +18,7 @@ def dark(monkeypatch):
     def nothing(folder, shots, seed):
         names, cameras = (tuple(column) for column in zip(*shots, strict=True))
         none = np.zeros(0, int)
-        return Model(names, cameras, np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2)))
+        return ColmapModel(names, cameras, np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2)))
 
     monkeypatch.setattr(synthetic, "render", lambda scene, camera: np.zeros((64, 64, 3), np.float32))
     monkeypatch.setattr(truth, "write", lambda path, scene, camera: path.write_text(str(camera.centre.tolist())))
@@ -47,7 +46,7 @@ def test_test_views_are_written_by_group(tmp_path, given, groups):
     frame = read_scene_frame(tmp_path / "ground.json")
     assert frame.test_groups == {group: tuple(names) for group, names in groups.items()}
     assert frame.test == tuple(name for group in groups.values() for name in group)
-    stored = model.read(tmp_path / "sparse")
+    stored = read_colmap_model(tmp_path / "sparse")
     for name, camera in zip(frame.test, synthetic.test_views(ENTRY | given), strict=True):
         assert stored.cameras[stored.names.index(name)].centre == pytest.approx(camera.centre)
 

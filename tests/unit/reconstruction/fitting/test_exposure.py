@@ -5,7 +5,7 @@ import pytest
 from fixtures.frames import scene_frame
 
 from dav_gswt.geometry import cameras
-from dav_gswt.photos import training_views
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import ground
 from dav_gswt.reconstruction.fitting import exposure
 from dav_gswt.reconstruction.fitting.photo_colours import median_colours
@@ -21,7 +21,7 @@ def grid():
 def photo(colour, name="photo", eye=(2.0, 2, 6)):
     camera = cameras.pinhole(eye, [eye[0], eye[1], 0], 40, 40, 60.0)
     image = np.broadcast_to(np.asarray(colour, np.float32), (40, 40, 3)).copy()
-    return training_views.View(name, camera, image, np.ones((40, 40), np.float32))
+    return TrainingView(name, camera, image, np.ones((40, 40), np.float32))
 
 
 def test_the_median_ignores_one_photo_that_differs(grid):

@@ -5,7 +5,7 @@ import pytest
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
-from dav_gswt.geometry.poses import Pose, place
+from dav_gswt.geometry.poses import Pose, pose_offset
 from dav_gswt.images import image_files
 from dav_gswt.photos.synthetic import desert, scene
 from dav_gswt.study.calibration import truth
@@ -17,7 +17,7 @@ ENTRY = {"family": "desert", "seed": 0, "agent": "render"}
 def candidates(width, height, count=1):
     """Places around the middle, at 45 degrees."""
     found = [Pose(f"p{i}.png", 45.0, 360.0 * i / count, 5.0) for i in range(count)]
-    return [(pose, cameras.pinhole(place(pose), [0, 0, 0], width, height, 50.0)) for pose in found]
+    return [(pose, cameras.pinhole(pose_offset(pose), [0, 0, 0], width, height, 50.0)) for pose in found]
 
 
 def noise(camera):

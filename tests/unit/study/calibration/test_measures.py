@@ -10,7 +10,7 @@ from scipy.stats import spearmanr
 
 from dav_gswt.geometry import cameras
 from dav_gswt.images import image_files
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import render
 from dav_gswt.study.calibration import measures
 from dav_gswt.views.scoring import ground_mask
@@ -26,7 +26,7 @@ def views():
     at = [cameras.pinhole(eye, [1.6, 1.6, 0], SIDE, SIDE, 60.0) for eye in eyes]
     pictures = [np.clip(render(FIELD, camera).colour, 0, 1) for camera in at]
     whole = np.ones((SIDE, SIDE), np.float32)
-    return [View(f"photo_{i}", *both, whole) for i, both in enumerate(zip(at, pictures, strict=True))]
+    return [TrainingView(f"photo_{i}", *both, whole) for i, both in enumerate(zip(at, pictures, strict=True))]
 
 
 def test_a_field_has_no_error_against_its_own_pictures(views):

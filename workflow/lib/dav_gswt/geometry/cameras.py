@@ -98,13 +98,13 @@ def top_down(west: float, south: float, width: int, height: int, cell: float, to
     return Camera(rotation, -rotation @ eye, 1 / cell, 1 / cell, width / 2, height / 2, width, height, True)
 
 
-def to_json(camera: Camera) -> dict:
+def camera_to_json(camera: Camera) -> dict:
     """A camera as plain JSON values."""
     values = {f.name: getattr(camera, f.name) for f in fields(Camera)}
     return values | {"rotation": camera.rotation.tolist(), "translation": camera.translation.tolist()}
 
 
-def from_json(values: dict) -> Camera:
+def camera_from_json(values: dict) -> Camera:
     """The camera that `to_json` wrote."""
     arrays = {k: np.array(values[k], float) for k in ("rotation", "translation")}
     return Camera(**(values | arrays))

@@ -25,7 +25,7 @@ def middle(frame: SceneFrame) -> Float[Array, "3"]:
     return frame.exemplar.centre
 
 
-def of_camera(name: str, camera: Camera, frame: SceneFrame) -> Pose:
+def pose_of_camera(name: str, camera: Camera, frame: SceneFrame) -> Pose:
     """Where a camera stands, as a pose about the exemplar's centre."""
     x, y, z = camera.centre - middle(frame)
     radius = float(np.sqrt(x * x + y * y + z * z))
@@ -33,18 +33,18 @@ def of_camera(name: str, camera: Camera, frame: SceneFrame) -> Pose:
     return Pose(name, elevation, float(np.degrees(np.arctan2(y, x)) % 360), radius)
 
 
-def place(pose: Pose) -> Float[Array, "3"]:
+def pose_offset(pose: Pose) -> Float[Array, "3"]:
     """The pose's position relative to the exemplar's centre."""
     e, a = np.radians(pose.elevation), np.radians(pose.azimuth)
     return pose.radius * np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
 
 
-def spread(candidates: list[Pose], count: int, taken: Float[Array, "m 3"] | None = None) -> list[int]:
+def select_farthest_poses(candidates: list[Pose], count: int, taken: Float[Array, "m 3"] | None = None) -> list[int]:
     """`count` of the candidates, or all, each the farthest from those before and from the places taken; ties by index.
 
     taken: relative to the exemplar's centre.
     """
-    places = np.array([place(p) for p in candidates]).reshape(-1, 3)
+    places = np.array([pose_offset(p) for p in candidates]).reshape(-1, 3)
     nearest, chosen = np.full(len(places), np.inf), []
     for at in [] if taken is None else taken:
         nearest = np.minimum(nearest, np.linalg.norm(places - at, axis=1))
@@ -55,6 +55,6 @@ def spread(candidates: list[Pose], count: int, taken: Float[Array, "m 3"] | None
     return chosen
 
 
-def to_json(chosen: list[Pose], policy: str, k: int) -> dict:
+def poses_to_json(chosen: list[Pose], policy: str, k: int) -> dict:
     """The content of poses.json: what was asked, and the poses in the order they were chosen."""
     return {"policy": policy, "k": k, "poses": [asdict(pose) for pose in chosen]}

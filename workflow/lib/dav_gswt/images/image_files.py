@@ -12,7 +12,7 @@ from scipy.ndimage import map_coordinates
 from scipy.sparse import csr_array
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import whole
+from dav_gswt.files import atomic_file
 
 _log = logging.getLogger(__name__)
 
@@ -92,7 +92,7 @@ def write_png(path: Path | str, image: Float[Array, "h w c"]) -> None:
     spec["oiio:UnassociatedAlpha"] = 1
     spec["oiio:ColorSpace"] = "srgb_rec709_scene"
     spec["compression"] = "zip:4"
-    with whole(path) as part:
+    with atomic_file(path) as part:
         file = oiio.ImageOutput.create(str(part))
         if file is None:
             raise ValueError(f"{path}: {_first_line(oiio.geterror())}")
@@ -146,7 +146,7 @@ def write_exr_parts(path: Path | str, parts: dict[str, tuple[dict[str, Array], d
         texts = {k: str(v) for k, v in header.items()}
         fixed = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
         written.append(OpenEXR.Part(texts | fixed | window, own, name))
-    with whole(path) as part:
+    with atomic_file(path) as part:
         try:
             OpenEXR.File(written).write(str(part))
         except RuntimeError as error:

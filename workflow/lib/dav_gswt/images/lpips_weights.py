@@ -18,7 +18,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load_file, save
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import whole
+from dav_gswt.files import atomic_file
 from dav_gswt.images.lpips_package import MEMBER, MEMBER_SHA256, PACKAGE, downloaded, member, require_digest
 
 _log = logging.getLogger(__name__)
@@ -118,7 +118,7 @@ def of_names(named: dict[str, Array], source: Path | str) -> Weights:
 
 def write(path: Path | str, weights: Weights) -> None:
     """As safetensors."""
-    with whole(path) as part:
+    with atomic_file(path) as part:
         part.write_bytes(save(weights.named(), {"source": f"{PACKAGE}, {MEMBER}, BSD"}))
 
 

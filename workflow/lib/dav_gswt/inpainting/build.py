@@ -14,7 +14,7 @@ from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.inpainting import occluders, unseen, viewpoints
 from dav_gswt.inpainting.paint import LEAST_ALPHA, painted
 from dav_gswt.logs import progress
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.prior import conditions
 from dav_gswt.prior.conditions import ReferencePhotos
 from dav_gswt.reconstruction import underlay
@@ -43,7 +43,9 @@ class Completed:
         return counts | {"things": self.things, "exemplar": inside, "changed": bool(self.field.imagined.any())}
 
 
-def complete(field: GaussianField, grid: Ground, frame: SceneFrame, taken: list[View], asked: PriorConfig) -> Completed:
+def complete(
+    field: GaussianField, grid: Ground, frame: SceneFrame, taken: list[TrainingView], asked: PriorConfig
+) -> Completed:
     """Paint the ground that no photo saw, one picture from above after the other, each told of those before.
 
     Discs of such ground, and the underlay under them alone, take the painted colours and keep their places: a prior's

@@ -9,11 +9,13 @@ from numpy import ndarray as Array
 from dav_gswt.field import GaussianField
 from dav_gswt.images.lpips_weights import Weights
 from dav_gswt.inpainting import unseen
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import evaluation
 
 
-def judged(before: GaussianField, after: GaussianField, tests: list[View], weights: Weights | None = None) -> dict:
+def judged(
+    before: GaussianField, after: GaussianField, tests: list[TrainingView], weights: Weights | None = None
+) -> dict:
     """Metrics (`evaluation.evaluate`) over `all` pixels that look at the ground, and over those that look at `imagined`
     ground alone, of the field before and after; how many pixels that is.
 
@@ -33,6 +35,6 @@ def judged(before: GaussianField, after: GaussianField, tests: list[View], weigh
     return out | {"gaussians": {"before": len(before), "after": len(after), "imagined": int(after.imagined.sum())}}
 
 
-def _over(view: View, field: GaussianField, painted: Bool[Array, "n"]) -> View:
+def _over(view: TrainingView, field: GaussianField, painted: Bool[Array, "n"]) -> TrainingView:
     looks = unseen.looking(field, painted, view.camera)
     return replace(view, weight=np.where(looks, view.weight, np.float32(0)))

@@ -5,7 +5,7 @@ from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
-from dav_gswt.geometry.poses import of_camera
+from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.photos.synthetic.camera_layouts import Place
@@ -43,5 +43,5 @@ def cameras(
         )
         centre = camera.centre[None]
         if not (collision.find_below_ground(centre, grid) | collision.find_inside_objects(centre, field)).any():
-            found.append((of_camera(f"virtual_{elevation:g}_{azimuth:g}", camera, frame), camera))
+            found.append((pose_of_camera(f"virtual_{elevation:g}_{azimuth:g}", camera, frame), camera))
     return found

@@ -10,6 +10,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import read_field
 from dav_gswt.files import read_json
 from dav_gswt.geometry import poses as places
+from dav_gswt.geometry.poses import pose_offset
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.inspect import result_files
 from dav_gswt.inspect.field_scenes import compute_colours, make_solids, thin_field
@@ -50,7 +51,7 @@ def arrange_poses(path: Path, poses: Path | None, asked: ViewOptions, rounds: in
     label, _, unit = label.partition(", ")
     bar = make_bar(label, values, most=HIGHEST)
     middle = places.middle(frame)
-    at = middle + np.array([places.place(pose) for pose in table.poses])
+    at = middle + np.array([pose_offset(pose) for pose in table.poses])
     radius = float(np.median(np.linalg.norm(at - middle, axis=1)))
     chosen = _read_chosen(table, poses)
     rest = np.setdiff1d(np.arange(len(table)), chosen)

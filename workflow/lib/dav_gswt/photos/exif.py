@@ -15,7 +15,7 @@ _FORMATS = {3: "H", 4: "I", 5: "II", 9: "i", 10: "ii", 11: "f", 12: "d"}  # TIFF
 _EXIF_IFD, _FOCAL, _PLANE_X, _PLANE_UNIT, _FILM, _WIDTH = 0x8769, 0x920A, 0xA20E, 0xA210, 0xA405, 0xA002
 
 
-def focal_length(path: Path | str) -> float | None:
+def read_focal_length(path: Path | str) -> float | None:
     """Focal length in pixels of the stored picture, or None where EXIF does not say.
 
     From the focal length and the sensor's pixel pitch where both are there, else from the 35 mm equivalent f by the
@@ -42,7 +42,7 @@ def focal_length(path: Path | str) -> float | None:
     return pixels if 0.13 * width < pixels < 100 * width else None
 
 
-def position(path: Path | str) -> tuple[float, float, float] | None:
+def read_gps_position(path: Path | str) -> tuple[float, float, float] | None:
     """Latitude and longitude in degrees and altitude in metres, or None where EXIF does not have all three."""
     spec = oiio.ImageInput.open(str(path)).spec()
     angles = []
@@ -60,7 +60,7 @@ def position(path: Path | str) -> tuple[float, float, float] | None:
     return angles[0], angles[1], -float(altitude) if spec.getattribute("GPS:AltitudeRef") == 1 else float(altitude)
 
 
-def taken(path: Path | str) -> str | None:
+def read_capture_time(path: Path | str) -> str | None:
     """When the photo was taken, ISO 8601 without a time zone, or None where EXIF does not say."""
     text = oiio.ImageInput.open(str(path)).spec().getattribute("Exif:DateTimeOriginal")
     try:

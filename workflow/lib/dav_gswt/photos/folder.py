@@ -7,18 +7,16 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.files import whole_folder
+from dav_gswt.files import atomic_folder
 from dav_gswt.geometry.scene_frame import SceneFrame, write_scene_frame
 from dav_gswt.images import image_files
-from dav_gswt.photos import lenses
-from dav_gswt.photos import model as models
-from dav_gswt.photos.lenses import Lens
-from dav_gswt.photos.model import Model
+from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
+from dav_gswt.photos.lenses import Lens, write_lenses
 
 
-def write(
+def write_photo_folder(
     path: Path | str,
-    model: Model,
+    model: ColmapModel,
     pictures: Iterable[tuple[str, Float[Array, "h w 3"]]],
     frame: SceneFrame,
     kinds: list[Lens] | None = None,
@@ -30,13 +28,13 @@ def write(
     does not count: they become the pictures' alpha, and go with them wherever they go.
     """
     covers = covers or {}
-    with whole_folder(path) as part:
+    with atomic_folder(path) as part:
         (part / "images").mkdir()
         for name, image in pictures:
             cover = covers.get(name)
             image_files.write_png(part / "images" / name, image if cover is None else np.dstack([image, cover]))
         (part / "sparse").mkdir()
-        models.write(model, part / "sparse")
+        write_colmap_model(model, part / "sparse")
         if kinds:
-            lenses.write(part, kinds)
+            write_lenses(part, kinds)
         write_scene_frame(part / "ground.json", frame)

@@ -12,9 +12,8 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square
-from dav_gswt.photos import model as models
-from dav_gswt.photos.model import Model
-from dav_gswt.photos.sfm.gps import Positions
+from dav_gswt.photos.colmap_model import ColmapModel, transform_model
+from dav_gswt.photos.sfm.gps import GpsPositions
 
 _log = logging.getLogger(__name__)
 
@@ -37,7 +36,9 @@ class Coverage:
     counts: Int[Array, "rows columns"]
 
 
-def frame(model: Model, rng: np.random.Generator, positions: Positions | None = None) -> tuple[Model, SceneFrame]:
+def fit_ground_frame(
+    model: ColmapModel, rng: np.random.Generator, positions: GpsPositions | None = None
+) -> tuple[ColmapModel, SceneFrame]:
     """The model in its ground frame, and this frame.
 
     z points from the robust plane through all points to the cameras' side; the unit of length is the flying height, the
@@ -52,17 +53,17 @@ def frame(model: Model, rng: np.random.Generator, positions: Positions | None = 
     need = 3 if len(flat.names) >= 9 else 2
     turns = np.arange(0.0, 90.0, TURN)
     flat = _turned(flat, turns[np.argmax([_square(_turned(flat, turn), need, COARSE_CELLS)[2] for turn in turns])])
-    grid = coverage(flat.cameras, flat.points)
+    grid = count_coverage(flat.cameras, flat.points)
     well = _well_seen(flat, grid, need)
     if not well.any():
         raise InputError(f"no ground is seen by {need} photos; take more photos that overlap from closer positions")
     rows, columns = np.nonzero(well)
     middle = np.array([grid.west, grid.south]) + grid.cell * (np.array([columns.mean(), rows.mean()]) + 0.5)
-    flat = models.similar(flat, 1.0, np.eye(3), np.array([-middle[0], -middle[1], 0.0]))
+    flat = transform_model(flat, 1.0, np.eye(3), np.array([-middle[0], -middle[1], 0.0]))
     west, south, side = _square(flat, need)
     unit = height if positions else 1.0  # of the world, in flying heights; below, lengths are brought to it
-    extent = _extent(coverage(flat.cameras, flat.points), unit)
-    flat = models.similar(flat, unit, np.eye(3), np.zeros(3))
+    extent = _extent(count_coverage(flat.cameras, flat.points), unit)
+    flat = transform_model(flat, unit, np.eye(3), np.zeros(3))
     _log.info("well-seen square of ground: %.2f flying heights wide; relief %.3f", side, relief)
     return flat, SceneFrame(
         kind="photos",
@@ -76,7 +77,7 @@ def frame(model: Model, rng: np.random.Generator, positions: Positions | None = 
     )
 
 
-def _georeference(east_north_up: Model, flat: Model, positions: Positions) -> Georeference:
+def _georeference(east_north_up: ColmapModel, flat: ColmapModel, positions: GpsPositions) -> Georeference:
     """Where the world's origin lies and how its +y is turned: from the move of one model to the other."""
     old, new = east_north_up.cameras[0], flat.cameras[0]
     turn = new.rotation.T @ old.rotation  # from east, north, up to the world; both in metres
@@ -90,7 +91,7 @@ def _georeference(east_north_up: Model, flat: Model, positions: Positions) -> Ge
     )
 
 
-def plane(
+def fit_plane(
     points: Float[Array, "n 3"], rng: np.random.Generator, up: Float[Array, "3"] | None = None
 ) -> tuple[Float[Array, "3"], float, float]:
     """A robust plane through points: unit normal n and offset d of n . p = d, and the points' spread about it.
@@ -131,14 +132,14 @@ def plane(
     return normal, float(offset + normal @ middle), float(scale)
 
 
-def upright(normal: Float[Array, "3"], east: Float[Array, "3"]) -> Float[Array, "3 3"]:
+def make_upright_rotation(normal: Float[Array, "3"], east: Float[Array, "3"]) -> Float[Array, "3 3"]:
     """The rotation into a frame with z along `normal` and x along the part of `east` that lies in the plane."""
     x = east - (east @ normal) * normal
     x = x / np.linalg.norm(x)
     return np.stack([x, np.cross(normal, x), normal])
 
 
-def coverage(cameras: tuple[Camera, ...], points: Float[Array, "n 3"], cells: int = CELLS) -> Coverage:
+def count_coverage(cameras: tuple[Camera, ...], points: Float[Array, "n 3"], cells: int = CELLS) -> Coverage:
     """Count the photos that see each cell's centre on the plane z = 0, at most REACH flying heights away.
 
     points: the grid spans them (their 1st to 99th percentile), since ground beyond the last point is guesswork.
@@ -152,11 +153,11 @@ def coverage(cameras: tuple[Camera, ...], points: Float[Array, "n 3"], cells: in
     centres = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], 1)
     counts = np.zeros(x.size, int)
     for camera in cameras:
-        counts += seen(camera, centres)
+        counts += find_visible_points(camera, centres)
     return Coverage(float(low[0]), float(low[1]), cell, counts.reshape(rows, columns))
 
 
-def seen(camera: Camera, points: Float[Array, "n 3"]) -> Bool[Array, "n"]:
+def find_visible_points(camera: Camera, points: Float[Array, "n 3"]) -> Bool[Array, "n"]:
     """Which points lie inside the picture, before the camera and within REACH."""
     at, depth = camera.project(points)
     x, y = at.T
@@ -165,7 +166,7 @@ def seen(camera: Camera, points: Float[Array, "n 3"]) -> Bool[Array, "n"]:
     return (depth > 0) & (x > 0) & (x < camera.width) & (y > 0) & (y < camera.height) & near
 
 
-def largest_square(mask: Bool[Array, "rows columns"]) -> tuple[int, int, int]:
+def find_largest_square(mask: Bool[Array, "rows columns"]) -> tuple[int, int, int]:
     """First row, first column and side of the largest square of true cells; (0, 0, 0) where none is true.
 
     Every cell knows the side of the largest square that ends in it: 1 + the least of its three neighbours before it.
@@ -189,10 +190,10 @@ def largest_square(mask: Bool[Array, "rows columns"]) -> tuple[int, int, int]:
     return int(row), int(column), side
 
 
-def _levelled(model: Model, rng: np.random.Generator) -> tuple[Model, float, float]:
+def _levelled(model: ColmapModel, rng: np.random.Generator) -> tuple[ColmapModel, float, float]:
     """The model with z up from its plane and the flying height as unit; the points' spread about the plane in it; and
     the flying height in units of before."""
-    normal, offset, spread = plane(model.points, rng)
+    normal, offset, spread = fit_plane(model.points, rng)
     heights = np.array([camera.centre @ normal for camera in model.cameras]) - offset
     if np.median(heights) < 0:
         normal, offset, heights = -normal, -offset, -heights
@@ -205,17 +206,17 @@ def _levelled(model: Model, rng: np.random.Generator) -> tuple[Model, float, flo
     # On a circle around the place the pictures' mean right is nothing; the first picture's serves as well then.
     first, mean = model.cameras[0].rotation, np.mean([camera.rotation[0] for camera in model.cameras], axis=0)
     east = next(v for v in (mean, first[0], first[1]) if np.linalg.norm(np.cross(v, normal)) > 0.3)
-    turn = upright(normal, east)
-    level = models.similar(model, 1 / height, turn, np.array([0.0, 0.0, -offset / height]))
+    turn = make_upright_rotation(normal, east)
+    level = transform_model(model, 1 / height, turn, np.array([0.0, 0.0, -offset / height]))
     return level, spread / height, height
 
 
-def _turned(model: Model, degrees: float) -> Model:
+def _turned(model: ColmapModel, degrees: float) -> ColmapModel:
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    return models.similar(model, 1.0, np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]]), np.zeros(3))
+    return transform_model(model, 1.0, np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]]), np.zeros(3))
 
 
-def _well_seen(model: Model, grid: Coverage, need: int) -> Bool[Array, "rows columns"]:
+def _well_seen(model: ColmapModel, grid: Coverage, need: int) -> Bool[Array, "rows columns"]:
     """Cells that enough photos see and that have a point nearby."""
     rows, columns = grid.counts.shape
     x = grid.west + (np.arange(columns) + 0.5) * grid.cell
@@ -225,10 +226,10 @@ def _well_seen(model: Model, grid: Coverage, need: int) -> Bool[Array, "rows col
     return (grid.counts >= need) & np.isfinite(distance).reshape(rows, columns)
 
 
-def _square(model: Model, need: int, cells: int = CELLS) -> tuple[float, float, float]:
+def _square(model: ColmapModel, need: int, cells: int = CELLS) -> tuple[float, float, float]:
     """West, south and side of the largest well-seen square, a little inside it."""
-    grid = coverage(model.cameras, model.points, cells)
-    row, column, side = largest_square(_well_seen(model, grid, need))
+    grid = count_coverage(model.cameras, model.points, cells)
+    row, column, side = find_largest_square(_well_seen(model, grid, need))
     inset = INSET * side * grid.cell
     west, south = grid.west + column * grid.cell + inset, grid.south + row * grid.cell + inset
     return float(west), float(south), float(side * grid.cell - 2 * inset)

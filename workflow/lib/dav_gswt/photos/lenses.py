@@ -30,12 +30,12 @@ class Lens:
     pinhole: tuple[float, ...]
 
 
-def pinhole(camera: Camera) -> tuple[float, ...]:
+def pinhole_parameters(camera: Camera) -> tuple[float, ...]:
     """What of a camera is its lens, not its place."""
     return (camera.fx, camera.fy, camera.cx, camera.cy, float(camera.width), float(camera.height))
 
 
-def write(folder: Path | str, lenses: list[Lens]) -> None:
+def write_lenses(folder: Path | str, lenses: list[Lens]) -> None:
     """Write lenses.json into a photos/ folder, the lens of most pictures first."""
     rows = [
         {
@@ -50,7 +50,7 @@ def write(folder: Path | str, lenses: list[Lens]) -> None:
     write_json(Path(folder) / "lenses.json", rows)
 
 
-def read(folder: Path | str) -> list[Lens]:
+def read_lenses(folder: Path | str) -> list[Lens]:
     """The lenses of a photos/ folder; none where its cameras are exact pinholes."""
     path = Path(folder) / "lenses.json"
     if not path.exists():
@@ -64,13 +64,15 @@ def read(folder: Path | str) -> list[Lens]:
     return made
 
 
-def developed(photo: Float32[Array, "h w 3"], folder: Path | str, camera: Camera) -> Float32[Array, "r c 3"]:
+def undistort_scene_photo(
+    photo: Float32[Array, "h w 3"], folder: Path | str, camera: Camera
+) -> Float32[Array, "r c 3"]:
     """The picture that the scene's pinhole `camera` would have taken, from a photo by the scene's lens.
 
     Raises: InputError: a photo of another shape, or of a lens that the scene does not have.
     """
-    lenses = read(folder)
-    own = next((lens for lens in lenses if np.allclose(lens.pinhole, pinhole(camera), atol=SAME)), None)
+    lenses = read_lenses(folder)
+    own = next((lens for lens in lenses if np.allclose(lens.pinhole, pinhole_parameters(camera), atol=SAME)), None)
     if lenses and own is None:
         raise InputError(
             f"{folder}/lenses.json: has no lens of such a picture; take photos with the scene's own camera"
@@ -82,10 +84,10 @@ def developed(photo: Float32[Array, "h w 3"], folder: Path | str, camera: Camera
             f"({width} x {height}); take photos with the same camera, uncropped and not turned"
         )
     photo = image_files.shrink_image(photo, width, height)
-    return undistorted(photo, own.camera, camera) if own else photo
+    return undistort_photo(photo, own.camera, camera) if own else photo
 
 
-def undistorted(photo: Float32[Array, "h w 3"], lens: pycolmap.Camera, camera: Camera) -> Float32[Array, "r c 3"]:
+def undistort_photo(photo: Float32[Array, "h w 3"], lens: pycolmap.Camera, camera: Camera) -> Float32[Array, "r c 3"]:
     """A photo as a pinhole camera would have taken it: cubic splines, each channel alone. lens: of the photo's size."""
     x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     rays = np.stack([(x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, np.ones_like(x)], -1).reshape(-1, 3)

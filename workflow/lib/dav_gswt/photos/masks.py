@@ -15,7 +15,7 @@ from scipy.ndimage import minimum_filter
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
-from dav_gswt.photos import lenses
+from dav_gswt.photos.lenses import undistort_photo
 
 _log = logging.getLogger(__name__)
 
@@ -24,7 +24,7 @@ MARGIN = 2  # pixels around what is masked that do not count either: its blurred
 ASPECT = 0.01  # a mask whose sides differ more from its photo's is of another photo
 
 
-def undistorted(found, folder: Path | str) -> dict[str, Float32[Array, "h w"]]:
+def undistort_masks(found, folder: Path | str) -> dict[str, Float32[Array, "h w"]]:
     """Masks of a registration's pictures, by name: 1 where a picture counts, 0 where it does not.
 
     found: an `sfm.Registered`. Raises: InputError: no folder, a mask of another shape than its photo, or none that
@@ -51,5 +51,5 @@ def _cover(mask, lens, camera) -> Float32[Array, "h w"]:
     rows = (np.arange(lens.height) + 0.5) * mask.shape[0] // lens.height
     columns = (np.arange(lens.width) + 0.5) * mask.shape[1] // lens.width
     there = (mask[rows.astype(int)][:, columns.astype(int)].mean(-1, keepdims=True) >= HALF).astype(np.float32)
-    seen = lenses.undistorted(np.repeat(there, 3, axis=2), lens, camera)[..., 0]
+    seen = undistort_photo(np.repeat(there, 3, axis=2), lens, camera)[..., 0]
     return minimum_filter((seen > HALF).astype(np.float32), 2 * MARGIN + 1)

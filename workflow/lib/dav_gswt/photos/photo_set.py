@@ -11,18 +11,19 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import read_field, write_field
 from dav_gswt.geometry.scene_frame import LeftOutPhoto, SceneFrame, write_scene_frame
 from dav_gswt.logs import progress
-from dav_gswt.photos import folder, ground_frame, importers, lenses
-from dav_gswt.photos import masks as masking
-from dav_gswt.photos.importers import splat
-from dav_gswt.photos.lenses import Lens
-from dav_gswt.photos.sfm import registration
-from dav_gswt.photos.sfm.registration import Options
+from dav_gswt.photos.folder import write_photo_folder
+from dav_gswt.photos.ground_frame import fit_ground_frame
+from dav_gswt.photos.importers import import_model, splat
+from dav_gswt.photos.importers.splat import fit_field_frame
+from dav_gswt.photos.lenses import Lens, pinhole_parameters
+from dav_gswt.photos.masks import undistort_masks
+from dav_gswt.photos.sfm.registration import Registration, SfmOptions, register_photos, undistort_image
 
 
-def from_photos(
+def prepare_photos(
     source: Path | str,
     out: Path | str,
-    options: Options,
+    options: SfmOptions,
     given: Path | str | None = None,
     masks: Path | str | None = None,
 ) -> SceneFrame:
@@ -31,8 +32,8 @@ def from_photos(
     given: a model of another program, taken as it is. masks: a folder, see `masks`. Returns what ground.json holds.
     Raises: InputError: see sfm.register, imported.read, masks.read and ground.frame.
     """
-    found = importers.read(given, source, options) if given else registration.register(source, options)
-    model, frame = ground_frame.frame(found.model, np.random.default_rng(options.seed), found.positions)
+    found = import_model(given, source, options) if given else register_photos(source, options)
+    model, frame = fit_ground_frame(found.model, np.random.default_rng(options.seed), found.positions)
     frame = replace(
         frame,
         images=len(model.names) + len(found.left_out),
@@ -44,20 +45,20 @@ def from_photos(
         points=len(model.points),
     )
     numbers = progress(range(len(model.names)), "undistort photos")
-    pictures = ((model.names[i], registration.undistorted(found, i)) for i in numbers)
-    covers = masking.undistorted(found, masks) if masks else {}
-    folder.write(out, model, pictures, frame, lenses_of(found), covers)
+    pictures = ((model.names[i], undistort_image(found, i)) for i in numbers)
+    covers = undistort_masks(found, masks) if masks else {}
+    write_photo_folder(out, model, pictures, frame, list_lenses(found), covers)
     return frame
 
 
-def lenses_of(found: registration.Registered) -> list[Lens]:
+def list_lenses(found: Registration) -> list[Lens]:
     """The lenses of a registration, that of most pictures first."""
-    pairs = [(lenses.pinhole(c), lens) for c, lens in zip(found.model.cameras, found.lenses, strict=True)]
+    pairs = [(pinhole_parameters(c), lens) for c, lens in zip(found.model.cameras, found.lenses, strict=True)]
     order = [pinhole for pinhole, _ in Counter(pinhole for pinhole, _ in pairs).most_common()]
     return [Lens(next(lens for p, lens in pairs if p == pinhole), pinhole) for pinhole in order]
 
 
-def from_field(
+def import_field(
     source: Path | str,
     out: Path | str,
     ground: Path | str,
@@ -70,7 +71,7 @@ def from_field(
     """
     given = read_field(source)
     try:
-        entered, frame = splat.enter(given, np.random.default_rng(seed), up)
+        entered, frame = fit_field_frame(given, np.random.default_rng(seed), up)
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     write_field(entered, out)

@@ -8,15 +8,14 @@ from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.files import read_json
-from dav_gswt.geometry import cameras
-from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.cameras import Camera, camera_from_json
 from dav_gswt.images import image_files
 
 WHOLE = 0.99  # of a shrunk pixel that must not be masked for it to count
 
 
 @dataclass(frozen=True)
-class View:
+class TrainingView:
     """A photo and its camera on the same pixel grid.
 
     weight: 1 where the photo counts, 0 where it is not fitted. behind: the colour behind all that can be modelled, NaN
@@ -30,13 +29,13 @@ class View:
     behind: Float32[Array, "h w 3"] | None = None
 
 
-def of(
+def make_training_view(
     name: str,
     camera: Camera,
     image: Float32[Array, "h w 3"],
     size: int,
     cover: Float32[Array, "h w"] | None = None,
-) -> View:
+) -> TrainingView:
     """A view at most `size` pixels wide or high; photos are never enlarged. cover: 0 where the photo is masked."""
     share = min(1.0, size / max(camera.width, camera.height))
     width, height = max(1, round(camera.width * share)), max(1, round(camera.height * share))
@@ -44,23 +43,23 @@ def of(
         image, camera = image_files.shrink_image(image, width, height), camera.resized(width, height)
         cover = cover if cover is None else image_files.shrink_image(cover[..., None], width, height)[..., 0]
     weight = np.ones(image.shape[:2]) if cover is None else cover > WHOLE
-    return View(name, camera, image, weight.astype(np.float32))
+    return TrainingView(name, camera, image, weight.astype(np.float32))
 
 
-def read(name: str, camera: Camera, path: Path | str, size: int) -> View:
+def read_training_view(name: str, camera: Camera, path: Path | str, size: int) -> TrainingView:
     """The view of a picture file; what its alpha masks does not count."""
     image, cover = image_files.read_photo_and_alpha(path)
-    return of(name, camera, image, size, cover)
+    return make_training_view(name, camera, image, size, cover)
 
 
-def captured(folder: Path | str, size: int) -> list[View]:
+def read_captured_views(folder: Path | str, size: int) -> list[TrainingView]:
     """The photos that one round's capture/ folder holds, in the order they were taken."""
     folder = Path(folder)
     shots = read_json(folder / "capture.json")["shots"]
-    return [read(s["name"], cameras.from_json(s["got"]), folder / s["name"], size) for s in shots]
+    return [read_training_view(s["name"], camera_from_json(s["got"]), folder / s["name"], size) for s in shots]
 
 
-def over_ground(view: View, west: float, south: float, east: float, north: float) -> View:
+def mask_outside_ground(view: TrainingView, west: float, south: float, east: float, north: float) -> TrainingView:
     """The view with weight 0 where its ray does not meet the plane z = 0 inside the rectangle."""
     origin, step = view.camera.rays()
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -70,11 +69,13 @@ def over_ground(view: View, west: float, south: float, east: float, north: float
     return replace(view, weight=view.weight * hit.astype(np.float32))
 
 
-def taken(images_folder: Path | str, model: Path | str, names: list[str], captures: list, size: int) -> list[View]:
+def read_training_views(
+    images_folder: Path | str, model: Path | str, names: list[str], captures: list, size: int
+) -> list[TrainingView]:
     """The photos captured so far: those named in the model, then every capture folder's, in their order."""
-    from dav_gswt.photos import model as models  # not above: it loads pycolmap
+    from dav_gswt.photos.colmap_model import read_colmap_model  # not above: it loads pycolmap
 
-    known = models.read(model)
+    known = read_colmap_model(model)
     at = {name: camera for name, camera in zip(known.names, known.cameras, strict=True)}
-    start = [read(name, at[name], Path(images_folder) / name, size) for name in names]
-    return start + [view for folder in captures for view in captured(folder, size)]
+    start = [read_training_view(name, at[name], Path(images_folder) / name, size) for name in names]
+    return start + [view for folder in captures for view in read_captured_views(folder, size)]

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from dav_gswt import raster
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.geometry.scene_frame import SceneFrame
-from dav_gswt.photos.training_views import View, over_ground
+from dav_gswt.photos.training_views import TrainingView, mask_outside_ground
 from dav_gswt.raster import to_raster_arrays
 from dav_gswt.reconstruction import discs, distractors, ground, objects, regression_guard, sky, underlay
 from dav_gswt.reconstruction.fitting import exposure, trainer
@@ -63,7 +63,7 @@ class Made:
 
 def fit(
     frame: SceneFrame,
-    views: list[View],
+    views: list[TrainingView],
     points: Float[Array, "n 3"],
     colours: Float[Array, "n 3"],
     quality: Quality,
@@ -107,8 +107,8 @@ def refine(
     field: GaussianField,
     grid: Ground,
     frame: SceneFrame,
-    before: list[View],
-    new: list[View],
+    before: list[TrainingView],
+    new: list[TrainingView],
     quality: Quality,
     rng: np.random.Generator,
     keep: Path | None = None,
@@ -141,12 +141,17 @@ class _Begun:
 
     field: GaussianField
     grid: Ground
-    views: list[View]
+    views: list[TrainingView]
     rules: Rules
 
 
 def _begun(
-    field: GaussianField, grid: Ground, frame: SceneFrame, views: list[View], quality: Quality, rng: np.random.Generator
+    field: GaussianField,
+    grid: Ground,
+    frame: SceneFrame,
+    views: list[TrainingView],
+    quality: Quality,
+    rng: np.random.Generator,
 ) -> _Begun:
     """The field with what photos show and it lacks; its first Gaussians are the grid's, as before."""
     if not field.ground.any():
@@ -167,7 +172,7 @@ def _begun(
     return _Begun(replace(field, sh=sh), grid, masked, _rules(grid, scene.relief, there, frame))
 
 
-def _steps(quality: Quality, views: list[View]) -> int:
+def _steps(quality: Quality, views: list[TrainingView]) -> int:
     """How many a first fit takes."""
     return STEPS_PER_PHOTO * len(views) if quality.steps == AUTO else quality.steps
 
@@ -185,11 +190,11 @@ def _plan(quality: Quality, field: GaussianField, before: int, new: int) -> Plan
 class _Scene:
     """What photos say before any fit: their exposure levelled, what moves masked, what stands."""
 
-    views: list[View]
+    views: list[TrainingView]
     relief: Relief
 
 
-def _look(frame: SceneFrame, grid: Ground, views: list[View], pixel: float) -> _Scene:
+def _look(frame: SceneFrame, grid: Ground, views: list[TrainingView], pixel: float) -> _Scene:
     if frame.kind == "photos":
         views = exposure.levelled(views, _spread(grid))
     relief = sweep(grid, views, frame.flying_height, pixel)
@@ -200,7 +205,7 @@ def _look(frame: SceneFrame, grid: Ground, views: list[View], pixel: float) -> _
 
 
 def _ground_colours(
-    grid: Ground, views: list[View], stand: GaussianField
+    grid: Ground, views: list[TrainingView], stand: GaussianField
 ) -> tuple[Float[Array, "n 3"], Bool[Array, "r c"]]:
     """The ground's median colours, and which cells a photo sees with nothing standing in between."""
     if len(stand):
@@ -226,11 +231,11 @@ def _without_ground(grid, views, points, colours, quality, rng, keep, watch) -> 
     return _made(trainer.fit(start, views, plan, rules, rng, "fit free field", keep, watch), grid, views)
 
 
-def _made(fitted: trainer.Fitted, grid: Ground, views: list[View]) -> Made:
+def _made(fitted: trainer.Fitted, grid: Ground, views: list[TrainingView]) -> Made:
     return replace(_finished(fitted.field, grid, views), report=vars(fitted.report))
 
 
-def _finished(fitted: GaussianField, grid: Ground, views: list[View]) -> Made:
+def _finished(fitted: GaussianField, grid: Ground, views: list[TrainingView]) -> Made:
     """A field with its uncertainty, over the surface that its discs have."""
     field = underlay.as_sure(estimate_uncertainty(fitted, views), grid)
     return Made(field, surface_of(field, grid) if field.ground.any() else grid, {})
@@ -279,12 +284,12 @@ def _like(part: GaussianField, field: GaussianField) -> GaussianField:
     return replace(part, sh=sh)
 
 
-def modelled(views: list[View], grid: Ground) -> list[View]:
+def modelled(views: list[TrainingView], grid: Ground) -> list[TrainingView]:
     """The views, counting only where they look at the grid."""
     rows, columns = grid.shape
     inset = 2 * grid.spacing
     east, north = grid.west + columns * grid.spacing, grid.south + rows * grid.spacing
-    return [over_ground(v, grid.west + inset, grid.south + inset, east - inset, north - inset) for v in views]
+    return [mask_outside_ground(v, grid.west + inset, grid.south + inset, east - inset, north - inset) for v in views]
 
 
 def surface_of(field: GaussianField, grid: Ground) -> Ground:

@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 from scipy.ndimage import binary_dilation
 
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction.fitting.photo_colours import CHUNK, middle, samples
 
 _log = logging.getLogger(__name__)
@@ -24,7 +24,7 @@ LEAST_FAR = 0.12  # and at least so much of the range of colours
 MOST = 0.2  # of a photo's pixels: more is no distractor, but a photo that fits nowhere
 
 
-def without(views: list[View], points: Float[Array, "n 3"]) -> list[View]:
+def without(views: list[TrainingView], points: Float[Array, "n 3"]) -> list[TrainingView]:
     """The views with weight 0 where they disagree with all others about the surface's points."""
     masks = [np.zeros(v.image.shape[:2], bool) for v in views]
     for start in range(0, len(points), CHUNK):

@@ -11,7 +11,7 @@ from numpy import ndarray as Array
 from dav_gswt.field import GaussianField
 from dav_gswt.images import metrics
 from dav_gswt.images.lpips_weights import Weights
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import render
 
 _log = logging.getLogger(__name__)
@@ -22,7 +22,7 @@ WORST = 0.1  # of the views, at least one: how bad it is where it is bad
 
 def evaluate(
     field: GaussianField,
-    tests: list[View],
+    tests: list[TrainingView],
     groups: Mapping[str, Sequence[str]] | None = None,
     weights: Weights | None = None,
 ) -> dict:
@@ -44,7 +44,7 @@ def _summed(rows: list[dict]) -> dict:
     return _means(rows) | {"worst_decile": _worst(rows)}
 
 
-def _row(field: GaussianField, view: View, weights: Weights | None) -> dict:
+def _row(field: GaussianField, view: TrainingView, weights: Weights | None) -> dict:
     seen = np.clip(render(field, view.camera).colour, 0, 1)
     level = np.clip(metrics.correct_colours(seen, view.image, view.weight), 0, 1).astype(np.float32)
     return {
@@ -56,7 +56,7 @@ def _row(field: GaussianField, view: View, weights: Weights | None) -> dict:
     }
 
 
-def _lpips(seen: Float32[Array, "h w 3"], view: View, weights: Weights) -> float:
+def _lpips(seen: Float32[Array, "h w 3"], view: TrainingView, weights: Weights) -> float:
     """LPIPS of the picture, the photo's own pixels standing where none counts; over the area that does."""
     from dav_gswt.images import lpips  # here, not above: torch takes seconds to load
 

@@ -7,7 +7,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial import cKDTree
 
 from dav_gswt.field import GaussianField, rgb_to_sh
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction.fitting.photo_colours import median_colours
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.plane_sweep import Relief
@@ -20,7 +20,7 @@ ALONE = 4.0  # spacings to its neighbours from which a point in the air is taken
 LONE = 1.5  # spacings above the surface from which a point is that of a thing
 
 
-def shell(relief: Relief, views: list[View]) -> GaussianField:
+def shell(relief: Relief, views: list[TrainingView]) -> GaussianField:
     """Round Gaussians over the cells where something stands, and below each down to its lowest neighbour."""
     grid, cell = relief.grid, relief.grid.spacing
     tops = np.where(relief.stands, relief.above, 0)

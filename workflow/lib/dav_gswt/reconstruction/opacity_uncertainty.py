@@ -12,13 +12,13 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import Rasterizer, to_raster_arrays
 
 MIN_WEIGHT = 0.05  # pixels of blend weight from which a photo counts as seeing a Gaussian
 
 
-def estimate_uncertainty(field: GaussianField, views: list[View]) -> GaussianField:
+def estimate_uncertainty(field: GaussianField, views: list[TrainingView]) -> GaussianField:
     """The field with uncertainty u_i = 1 - max over views of (sum of w_i alpha / sum of w_i), 1 where none sees it."""
     known = np.zeros(len(field), np.float32)
     raster = Rasterizer()

@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 from scipy.ndimage import gaussian_filter, label, map_coordinates
 
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import visibility
 from dav_gswt.reconstruction.ground import Ground
 
@@ -55,7 +55,7 @@ class Relief:
         return map_coordinates(values.astype(float), [row, column], order=1, mode="nearest").reshape(grid.shape)
 
 
-def sweep(grid: Ground, views: list[View], flying_height: float, pixel: float) -> Relief:
+def sweep(grid: Ground, views: list[TrainingView], flying_height: float, pixel: float) -> Relief:
     """Sweep heights LOW to HIGH over the grid's surface, in steps of `pixel`, a pixel's size on the ground."""
     stride = max(1, int(np.ceil(np.sqrt(grid.heights.size / MOST_CELLS))))
     coarse = thinned(grid, stride)
@@ -115,7 +115,7 @@ def padded(grid: Ground, cells: int) -> Ground:
 
 
 def disagreement(
-    grid: Ground, views: list[View], heights: Float[Array, "h"]
+    grid: Ground, views: list[TrainingView], heights: Float[Array, "h"]
 ) -> tuple[Float32[Array, "h rows columns"], Float32[Array, "rows columns"]]:
     """Standard deviation of the photos' colours at each height over each cell, averaged over a window of cells.
 
@@ -145,7 +145,7 @@ def disagreement(
 def see_through(
     costs: Float32[Array, "h rows columns"],
     grid: Ground,
-    views: list[View],
+    views: list[TrainingView],
     heights: Float[Array, "h"],
     surface: Float32[Array, "rows columns"],
     lowest: float,
@@ -169,7 +169,7 @@ def see_through(
 
 
 def _spread(
-    views: list[View], starts: list[Array], height: np.float32
+    views: list[TrainingView], starts: list[Array], height: np.float32
 ) -> tuple[Float32[Array, "n"], Float32[Array, "n"]]:
     n = len(starts[0])
     total, squares, count = np.zeros((n, 3), np.float32), np.zeros(n, np.float32), np.zeros(n, np.float32)
@@ -183,7 +183,7 @@ def _spread(
     return np.sqrt(np.maximum(variance, 0)), count
 
 
-def _bilinear(view: View, q: Float32[Array, "n 3"]) -> tuple[Array, Float32[Array, "m 3"]]:
+def _bilinear(view: TrainingView, q: Float32[Array, "n 3"]) -> tuple[Array, Float32[Array, "m 3"]]:
     """Rows of the points (in the camera's frame) that the photo sees, and its colours there."""
     camera = view.camera
     rows, x, y = visibility.seen(view, q)

@@ -15,7 +15,7 @@ import numpy as np
 from dav_gswt import raster
 from dav_gswt.field import GaussianField
 from dav_gswt.images import metrics
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import to_raster_arrays
 from dav_gswt.reconstruction.fitting.plan import Plan
 from dav_gswt.reconstruction.fitting.trainer import Fitted
@@ -45,8 +45,8 @@ class Update:
 def update(
     field: GaussianField,
     start: GaussianField,
-    earlier: list[View],
-    new: list[View],
+    earlier: list[TrainingView],
+    new: list[TrainingView],
     plan: Plan,
     fit: Callable[[GaussianField, Plan], Fitted],
 ) -> Update:
@@ -111,14 +111,14 @@ def set_aside(reports: Iterable[dict]) -> set[str]:
     return {row["view"] for rows in refused for row in rows}
 
 
-def shown(field: GaussianField, views: list[View]) -> list[float | None]:
+def shown(field: GaussianField, views: list[TrainingView]) -> list[float | None]:
     """How well a field shows each photo: PSNR in dB, the picture's gain and offset per channel fitted to the photo,
     over the pixels that count; None where none does."""
     drawn = raster.Rasterizer()
     return [_psnr(drawn, field, view) if view.weight.any() else None for view in views]
 
 
-def _psnr(drawn: raster.Rasterizer, field: GaussianField, view: View) -> float:
+def _psnr(drawn: raster.Rasterizer, field: GaussianField, view: TrainingView) -> float:
     seen = drawn.forward(**to_raster_arrays(field), camera=view.camera)
     picture = seen.colour
     if view.behind is not None:
@@ -128,7 +128,7 @@ def _psnr(drawn: raster.Rasterizer, field: GaussianField, view: View) -> float:
     return SAME if found is None else min(SAME, float(found))
 
 
-def _of_new(new: list[View], field: GaussianField, kept: GaussianField, taken: bool) -> dict:
+def _of_new(new: list[TrainingView], field: GaussianField, kept: GaussianField, taken: bool) -> dict:
     """A new photo is an honest test of the field from before it: nothing was fitted to it yet."""
     before = shown(field, new)
     after = shown(kept, new) if taken else before

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 from scipy.ndimage import binary_dilation
 
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import harmonics
 
 _log = logging.getLogger(__name__)
@@ -29,7 +29,7 @@ SPLIT = 0.08  # median deviation from which there is no one sky: broken clouds, 
 EDGE = 2  # pixels around what stands against the sky that are neither
 
 
-def behind(views: list[View], modelled: list[View]) -> list[View]:
+def behind(views: list[TrainingView], modelled: list[TrainingView]) -> list[TrainingView]:
     """The modelled views with the sky behind them, where they see it.
 
     views: the photos, counting wherever a photo may be trusted. modelled: the same, counting only over the ground.
@@ -66,14 +66,14 @@ def fitted(directions: Float[Array, "n 3"], colours: Float32[Array, "n 3"]) -> t
     return coefficients, float(np.median(residual))
 
 
-def _rising(view: View) -> tuple[Float[Array, "h w 3"], Bool[Array, "h w"]]:
+def _rising(view: TrainingView) -> tuple[Float[Array, "h w 3"], Bool[Array, "h w"]]:
     """Unit directions of a view's rays, and which of them rise above the horizon and count."""
     _, step = view.camera.rays()
     direction = step / np.linalg.norm(step, axis=-1, keepdims=True)
     return direction, (direction[..., 2] > 0) & (view.weight > 0)
 
 
-def _with(modelled: View, view: View, directions, rising, coefficients, bound: float) -> View:
+def _with(modelled: TrainingView, view: TrainingView, directions, rising, coefficients, bound: float) -> TrainingView:
     sky = np.full(view.image.shape, np.nan, np.float32)
     sky[rising] = np.clip(harmonics.basis(directions[rising], DEGREE) @ coefficients, 0, 1)
     with np.errstate(invalid="ignore"):

@@ -8,14 +8,18 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction.ground import Ground
 
 LOOKS = 3  # at the height of the ground where a ray meets it, each from where the last one was
 
 
 def behind(
-    grid: Ground, values: Float32[Array, "rows columns"], places: Float32[Array, "n 3"], views: list[View], least: int
+    grid: Ground,
+    values: Float32[Array, "rows columns"],
+    places: Float32[Array, "n 3"],
+    views: list[TrainingView],
+    least: int,
 ) -> Float32[Array, "n"]:
     """Of each place the median of the ground's values behind it, over the photos that see it; nan where fewer than
     `least` of them see ground with a value. values: nan where there is none."""
@@ -32,7 +36,7 @@ def behind(
     return np.where(number >= least, median, np.float32(np.nan))
 
 
-def seen(view: View, q: Float32[Array, "n 3"]) -> tuple[Array, Float32[Array, "m"], Float32[Array, "m"]]:
+def seen(view: TrainingView, q: Float32[Array, "n 3"]) -> tuple[Array, Float32[Array, "m"], Float32[Array, "m"]]:
     """Rows of the points (in the camera's frame) where the photo counts, and their places in it, pixels from the centre
     of the first; each has a pixel to its right and below."""
     camera = view.camera

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from dav_gswt.files import whole
+from dav_gswt.files import atomic_file
 
 
 def write_table(path: Path | str, rows: Iterable[dict]) -> None:
@@ -18,7 +18,7 @@ def write_table(path: Path | str, rows: Iterable[dict]) -> None:
     Raises: ValueError: a row has a column that the first one lacks.
     """
     rows = list(rows)
-    with whole(path) as part:
+    with atomic_file(path) as part:
         if not rows:
             part.touch()
             return

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dav_gswt.files import copied, whole
+from dav_gswt.files import atomic_file, copy_file
 from dav_gswt.images import image_files
 
 QUALITY = 88  # of JPEGs
@@ -21,7 +21,7 @@ def save(figure, path: Path | str) -> None:
 
     FigureCanvasAgg(figure)
     as_photo = Path(path).suffix == ".jpg"
-    with whole(path) as part:
+    with atomic_file(path) as part:
         if as_photo:
             figure.savefig(part, format="jpg", pil_kwargs={"quality": QUALITY})
         else:
@@ -33,11 +33,11 @@ def kept(source: Path | str, target: Path | str) -> None:
     ending.
     """
     if Path(target).suffix != ".jpg":
-        copied(source, target)
+        copy_file(source, target)
     else:
         from matplotlib.image import imsave
 
-        with whole(target) as part:
+        with atomic_file(target) as part:
             imsave(part, image_files.read_photo(source), format="jpg", pil_kwargs={"quality": QUALITY})
 
 

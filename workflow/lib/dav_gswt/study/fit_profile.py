@@ -19,8 +19,8 @@ from dav_gswt.field import GaussianField
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.scene_frame import SceneFrame, Square, read_scene_frame
 from dav_gswt.images import metrics
-from dav_gswt.photos import model as models
-from dav_gswt.photos.training_views import View, over_ground, read
+from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
+from dav_gswt.photos.training_views import TrainingView, mask_outside_ground, read_training_view
 from dav_gswt.reconstruction import build
 from dav_gswt.reconstruction.build import Made, Quality
 from dav_gswt.reconstruction.ground import WHOLE, Ground
@@ -37,9 +37,9 @@ class PhotoSet:
     """A photos/ folder, split for a trial. tests: groups of test views by name."""
 
     frame: SceneFrame
-    model: models.Model
-    train: list[View]
-    tests: dict[str, list[View]]
+    model: ColmapModel
+    train: list[TrainingView]
+    tests: dict[str, list[TrainingView]]
     margin: float = WHOLE
 
 
@@ -58,8 +58,11 @@ def opened(folder: Path | str, size: int, margin: float = WHOLE) -> PhotoSet:
     else those that look at the exemplar: at the border of what is modelled relief hides and shows what is not.
     """
     folder = Path(folder)
-    frame, model = read_scene_frame(folder / "ground.json"), models.read(folder / "sparse")
-    known = {n: read(n, c, folder / "images" / n, size) for n, c in zip(model.names, model.cameras, strict=True)}
+    frame, model = read_scene_frame(folder / "ground.json"), read_colmap_model(folder / "sparse")
+    known = {
+        n: read_training_view(n, c, folder / "images" / n, size)
+        for n, c in zip(model.names, model.cameras, strict=True)
+    }
     names = sorted(known)
     groups = frame.test_groups or {"test": frame.test or names[FIRST_TEST::EACH]}
     out = {name for group in groups.values() for name in group}
@@ -69,8 +72,8 @@ def opened(folder: Path | str, size: int, margin: float = WHOLE) -> PhotoSet:
     return PhotoSet(frame, model, [known[n] for n in names if n not in out], tests, margin)
 
 
-def _over_exemplar(views: list[View], square: Square) -> list[View]:
-    seen = [over_ground(v, square.west, square.south, square.east, square.north) for v in views]
+def _over_exemplar(views: list[TrainingView], square: Square) -> list[TrainingView]:
+    seen = [mask_outside_ground(v, square.west, square.south, square.east, square.north) for v in views]
     return [v for v in seen if v.weight.any()]
 
 
@@ -99,7 +102,7 @@ def run(photos: PhotoSet, quality: Quality, seed: int = 0, every: int = 25) -> T
     return Trial(made, curve)
 
 
-def quality_of(draw: Callable[[View], Float32[Array, "h w 3"]], tests: list[View]) -> dict[str, float]:
+def quality_of(draw: Callable[[TrainingView], Float32[Array, "h w 3"]], tests: list[TrainingView]) -> dict[str, float]:
     """Mean PSNR of what is drawn, raw and colour-corrected, over the pixels of weight > 0."""
     raw, level = [], []
     for view in tests:

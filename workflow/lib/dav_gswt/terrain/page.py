@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 from dav_gswt.bundle.manifest import FORMAT, VERSION
 from dav_gswt.bundle.manifest import NAME as MANIFEST
 from dav_gswt.errors import InputError
-from dav_gswt.files import read_json, whole_folder, write_json
+from dav_gswt.files import atomic_folder, read_json, write_json
 from dav_gswt.terrain.heights import FlatSurface, HeightField, HeightMap, Hills
 
 SURFACE = "heights.bin"
@@ -33,7 +33,7 @@ def write_page(
     copies = [(path, str(path.relative_to(viewer))) for path in sorted(viewer.rglob("*")) if path.is_file()]
     copies += [(bundle / name, name) for name in list_chunks(bundle)]
     heights, pixels = describe_surface(surface or FlatSurface())
-    with whole_folder(out) as part:
+    with atomic_folder(out) as part:
         for source, name in copies:
             _copy(source, part / name)
         if pixels:

@@ -10,7 +10,7 @@ import numpy as np
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import read_field, write_field
-from dav_gswt.files import UNREADABLE, read_json, whole_folder, write_json
+from dav_gswt.files import UNREADABLE, atomic_folder, read_json, write_json
 from dav_gswt.logs import progress
 from dav_gswt.tiles.build import TileSet
 
@@ -25,7 +25,7 @@ def write_tiles(tiles: TileSet, folder: Path | str, seams: Path | str, provenanc
     """Write the set; `folder` and `seams` appear whole or not at all, the folder first."""
     folder, seams = Path(folder), Path(seams)
     seams.unlink(missing_ok=True)
-    with whole_folder(folder) as part:
+    with atomic_folder(folder) as part:
         for level, fields in enumerate(tiles.fields):
             for tile, splats in enumerate(progress(fields, f"write tiles of level {level}")):
                 write_field(splats, part / tile_file_name(level, tile))

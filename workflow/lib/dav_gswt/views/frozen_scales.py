@@ -3,9 +3,9 @@
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from dav_gswt import provenance
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json, write_json
+from dav_gswt.provenance import record_provenance
 from dav_gswt.views.uncertainty.weighting import Quantiles, Scales
 
 
@@ -33,4 +33,4 @@ def write_frozen_scales(
 ) -> None:
     """facts: what more is to be said of a scoring."""
     scales, pixels = frozen.scales.of, frozen.pixels and asdict(frozen.pixels)
-    write_json(path, facts | {"scales": scales, "pixels": pixels, "provenance": provenance.of(inputs, parameters)})
+    write_json(path, facts | {"scales": scales, "pixels": pixels, "provenance": record_provenance(inputs, parameters)})

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, Float64
 from numpy import ndarray as Array
 
-from dav_gswt.geometry.poses import Pose, place, spread
+from dav_gswt.geometry.poses import Pose, pose_offset, select_farthest_poses
 from dav_gswt.views import facility_location
 from dav_gswt.views.greedy import lazy_greedy
 from dav_gswt.views.policy_names import POLICY_NAMES
@@ -80,7 +80,7 @@ def ring(scores: Scores, inputs: SelectionInput) -> list[int]:
     places, chosen = _places(scores.poses), []
     radius = float(np.median(np.linalg.norm(places, axis=1)))
     for i in range(inputs.k):
-        at = place(Pose("", RING, (len(inputs.captured) * TURN + 360 * i / inputs.k) % 360, radius))
+        at = pose_offset(Pose("", RING, (len(inputs.captured) * TURN + 360 * i / inputs.k) % 360, radius))
         apart = np.linalg.norm(places - at, axis=1)
         apart[chosen] = np.inf
         chosen.append(int(np.argmin(apart)))
@@ -90,7 +90,7 @@ def ring(scores: Scores, inputs: SelectionInput) -> list[int]:
 @policy("farthest")
 def farthest(scores: Scores, inputs: SelectionInput) -> list[int]:
     """Farthest point sampling: the candidate farthest from all views so far; ties by index."""
-    return spread(scores.poses, inputs.k, inputs.captured)
+    return select_farthest_poses(scores.poses, inputs.k, inputs.captured)
 
 
 @policy("diverse")
@@ -205,4 +205,4 @@ def _true_errors(inputs: SelectionInput) -> Float64[Array, "n"]:
 
 
 def _places(poses: list[Pose]) -> Float64[Array, "n 3"]:
-    return np.array([place(pose) for pose in poses], float).reshape(-1, 3)
+    return np.array([pose_offset(pose) for pose in poses], float).reshape(-1, 3)

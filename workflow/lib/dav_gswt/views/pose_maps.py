@@ -9,7 +9,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
-from dav_gswt.files import UNREADABLE, whole
+from dav_gswt.files import UNREADABLE, atomic_file
 from dav_gswt.images.image_files import enlarge_map
 from dav_gswt.views.scores import Scores
 
@@ -65,7 +65,7 @@ def write_pose_maps(path: Path | str, maps: PoseMaps, gaussians: Float32[Array, 
     values = {"names": np.array(maps.names, str), "opacity": maps.opacity.astype(np.float16), "gaussians": gaussians}
     if maps.w2_sq is not None:
         values["w2_sq"] = maps.w2_sq
-    with whole(path) as part, part.open("wb") as file:
+    with atomic_file(path) as part, part.open("wb") as file:
         np.savez_compressed(file, **values)
 
 

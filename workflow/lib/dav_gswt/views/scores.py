@@ -12,7 +12,7 @@ from jaxtyping import Float64, Int
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import whole
+from dav_gswt.files import atomic_file
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.views.uncertainty.weighting import Scales
 
@@ -50,7 +50,7 @@ def _requirement(name: str) -> str:
 
 def write_scores(path: Path | str, scores: Scores) -> None:
     """One row a candidate; numbers as they are, so that reading gives the same bits."""
-    with whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+    with atomic_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, FIELDS)
         table.writeheader()
         for i, pose in enumerate(scores.poses):

@@ -8,10 +8,10 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.geometry.poses import spread
+from dav_gswt.geometry.poses import select_farthest_poses
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.logs import progress
-from dav_gswt.photos.training_views import View, over_ground
+from dav_gswt.photos.training_views import TrainingView, mask_outside_ground
 from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import Condition
 from dav_gswt.raster import Rasterizer
@@ -51,7 +51,7 @@ class ScoringResult:
 def exr_parts(found: ScoringResult, field: GaussianField, grid: Ground) -> dict[str, Part]:
     """The maps to show, as parts of an EXR: the ground from above, and candidates spread over the hemisphere."""
     above = from_above(replace(field, uncertainty=found.gaussians), grid).uncertainty[::-1]
-    some = [found.scores.names[i] for i in spread(found.scores.poses, OTHERS)]
+    some = [found.scores.names[i] for i in select_farthest_poses(found.scores.poses, OTHERS)]
     shown = found.maps.parts(found.scores, some)
     return {"above": ({"uncertainty": above}, {"camera": "straight above"})} | shown
 
@@ -65,7 +65,7 @@ def score_poses(
     field: GaussianField,
     grid: Ground,
     pool: Candidates,
-    taken: list[View],
+    taken: list[TrainingView],
     frame: SceneFrame,
     prior: PriorConfig | None = None,
     frozen: FrozenScales | None = None,
@@ -90,7 +90,7 @@ def score_poses(
 
 
 def build_conditions(
-    field: GaussianField, grid: Ground, pool: Candidates, taken: list[View], frame: SceneFrame, size: int
+    field: GaussianField, grid: Ground, pool: Candidates, taken: list[TrainingView], frame: SceneFrame, size: int
 ) -> tuple[Condition, Float32[Array, "n s s"]]:
     """What a prior is told of candidates, and which of its pixels look at the modelled ground (1)."""
     known = conditions.prepare_photos(taken, frame, size)
@@ -121,8 +121,8 @@ def _score_geometry(
 def ground_mask(grid: Ground, camera: Camera) -> Float32[Array, "h w"]:
     """1 for the pixels of a camera that look at the modelled ground."""
     shape = camera.height, camera.width
-    blank = View("", camera, np.zeros((*shape, 3), np.float32), np.ones(shape, np.float32))
-    return over_ground(blank, *grid.judged).weight
+    blank = TrainingView("", camera, np.zeros((*shape, 3), np.float32), np.ones(shape, np.float32))
+    return mask_outside_ground(blank, *grid.judged).weight
 
 
 def _freeze_scales(

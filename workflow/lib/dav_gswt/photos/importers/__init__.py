@@ -15,22 +15,32 @@ from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.photos.importers import checks, colmap, lens_models, nerfstudio, opensfm, points, undistortion
-from dav_gswt.photos.importers.imported_model import Given
-from dav_gswt.photos.importers.points import Seen
-from dav_gswt.photos.importers.undistortion import Placed
-from dav_gswt.photos.model import Model
-from dav_gswt.photos.sfm.gps import Positions
-from dav_gswt.photos.sfm.registration import LEAST_PHOTOS, Options, Registered
+from dav_gswt.photos.colmap_model import ColmapModel
+from dav_gswt.photos.importers.checks import read_untrusted_json
+from dav_gswt.photos.importers.colmap import find_colmap_folder, import_colmap
+from dav_gswt.photos.importers.imported_model import ImportedModel
+from dav_gswt.photos.importers.lens_models import camera_key, undistort_camera
+from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
+from dav_gswt.photos.importers.opensfm import import_opensfm
+from dav_gswt.photos.importers.photo_matching import MatchedPhoto, PhotoFolder, match_photos_to_images
+from dav_gswt.photos.importers.points import (
+    Observations,
+    collect_observations,
+    find_visible_points,
+    keep_observations,
+    triangulate_features,
+)
+from dav_gswt.photos.sfm.gps import GpsPositions
+from dav_gswt.photos.sfm.registration import LEAST_PHOTOS, Registration, SfmOptions
 
-__all__ = ["read"]
+__all__ = ["import_model"]
 
 _log = logging.getLogger(__name__)
 
 MOST_LOOSE = 50_000  # points that no image is known to see
 
 
-def read(path: Path | str, folder: Path | str, options: Options) -> Registered:
+def import_model(path: Path | str, folder: Path | str, options: SfmOptions) -> Registration:
     """The photos of a folder with the cameras of a model.
 
     A photo belongs to the image of the same name: the path below the folder, else the file name, else the stem. It may
@@ -39,9 +49,9 @@ def read(path: Path | str, folder: Path | str, options: Options) -> Registered:
     tell where ground is.
     Raises: InputError: not a model, damaged, one that is not read, or fewer than three photos have a camera in it.
     """
-    path, photos = Path(path), undistortion.Folder(Path(folder))
+    path, photos = Path(path), PhotoFolder(Path(folder))
     given = _given(path, photos)
-    placed, left_out = undistortion.placed(given, photos, path)
+    placed, left_out = match_photos_to_images(given, photos, path)
     if len(placed) < LEAST_PHOTOS:
         raise InputError(
             f"{path}: {len(placed)} of its {len(given.shots)} images have a photo in {folder}; at least {LEAST_PHOTOS} "
@@ -49,7 +59,7 @@ def read(path: Path | str, folder: Path | str, options: Options) -> Registered:
         )
     for name, reason in left_out:
         _log.warning("%s is left out: %s", name, reason)
-    seen = points.observed(given, placed) if len(given.point_of) else points.triangulated(placed, options)
+    seen = collect_observations(given, placed) if len(given.point_of) else triangulate_features(placed, options)
     pairs = _pinholes(placed, options.side, path)
     model = _model(placed, [pinhole for _, pinhole in pairs], seen)
     if not len(model.points):
@@ -60,47 +70,47 @@ def read(path: Path | str, folder: Path | str, options: Options) -> Registered:
     if not len(given.point_of):
         model = _with_loose(model, *_thinned(given.points, given.colours, placed))
     centres = np.stack([camera.centre for camera in model.cameras])
-    return Registered(
+    return Registration(
         model=model,
         sources=tuple(p.path for p in placed),
         lenses=tuple(lens for lens, _ in pairs),
         left_out=left_out,
         focal=None,
         error=seen.error,
-        positions=Positions(given.about, centres) if given.about else None,
+        positions=GpsPositions(given.about, centres) if given.about else None,
     )
 
 
-def _given(path: Path, photos: undistortion.Folder) -> Given:
+def _given(path: Path, photos: PhotoFolder) -> ImportedModel:
     """What a file says, whichever kind it is of."""
     if path.is_dir():
-        if model := colmap.found(path):
-            return colmap.read(model, photos.folder)
+        if model := find_colmap_folder(path):
+            return import_colmap(model, photos.folder)
         raise InputError(
             f"{path}: no COLMAP model in this folder (cameras and images, as .bin or .txt); of other programs name the "
             "file itself, transforms.json or reconstruction.json"
         )
-    values = checks.read_json(path)
+    values = read_untrusted_json(path)
     if isinstance(values, dict) and "frames" in values:
-        return nerfstudio.read(path, values, photos.folder, photos.stored_size)
+        return import_nerfstudio(path, values, photos.folder, photos.stored_size)
     if isinstance(values, list) and values and isinstance(values[0], dict) and "shots" in values[0]:
-        return opensfm.read(path, values, photos.folder)
+        return import_opensfm(path, values, photos.folder)
     raise InputError(
         f"{path}: neither a transforms.json (an object with `frames`) nor a reconstruction.json (a list of objects "
         "with `shots`); name one of these, or a folder of COLMAP's"
     )
 
 
-def _pinholes(placed: Sequence[Placed], side: int, path: Path) -> list[tuple[pycolmap.Camera, pycolmap.Camera]]:
+def _pinholes(placed: Sequence[MatchedPhoto], side: int, path: Path) -> list[tuple[pycolmap.Camera, pycolmap.Camera]]:
     """Of each photo the lens at the size of its picture, and the pinhole camera of that; equal lenses share one."""
     made = {}
     for place in placed:
-        if (key := lens_models.key(place.lens)) not in made:
-            made[key] = lens_models.pinhole(place.lens, side, f"{path}: {place.path.name}")
-    return [made[lens_models.key(place.lens)] for place in placed]
+        if (key := camera_key(place.lens)) not in made:
+            made[key] = undistort_camera(place.lens, side, f"{path}: {place.path.name}")
+    return [made[camera_key(place.lens)] for place in placed]
 
 
-def _model(placed: Sequence[Placed], pinholes: list[pycolmap.Camera], seen: Seen) -> Model:
+def _model(placed: Sequence[MatchedPhoto], pinholes: list[pycolmap.Camera], seen: Observations) -> ColmapModel:
     """Pinhole cameras, and the observations that fall into their pictures; points that have none are left out."""
     focal, middle, size = (
         np.array(column, float)
@@ -110,14 +120,14 @@ def _model(placed: Sequence[Placed], pinholes: list[pycolmap.Camera], seen: Seen
     pixels = seen.rays * focal[own] + middle[own]
     with np.errstate(invalid="ignore"):
         inside = (pixels >= 0).all(1) & (pixels <= size[own]).all(1)
-    kept = points.only(seen, inside)
+    kept = keep_observations(seen, inside)
     order = np.lexsort((kept.image_of, kept.point_of))
     cameras = (
         Camera(p.rotation, p.translation, *map(float, h.params), h.width, h.height)
         for p, h in zip(placed, pinholes, strict=True)
     )
     names = tuple(p.key for p in placed)
-    return Model(
+    return ColmapModel(
         names,
         tuple(cameras),
         kept.points,
@@ -129,22 +139,22 @@ def _model(placed: Sequence[Placed], pinholes: list[pycolmap.Camera], seen: Seen
 
 
 def _thinned(
-    places: Float[Array, "n 3"], colours: Float32[Array, "n 3"], placed: Sequence[Placed]
+    places: Float[Array, "n 3"], colours: Float32[Array, "n 3"], placed: Sequence[MatchedPhoto]
 ) -> tuple[Float[Array, "k 3"], Float32[Array, "k 3"]]:
     """The points that lie in two photos or more, every n-th where there are many."""
     step = -(-len(places) // MOST_LOOSE) or 1
     places, colours = places[::step], colours[::step]
     count = np.zeros(len(places), int)
     for place in placed:
-        count += points.sees(place.lens, place.rotation, place.translation, places)
+        count += find_visible_points(place.lens, place.rotation, place.translation, places)
     if len(places) and (count < 2).mean() > 0.5:
         _log.warning("%d of the model's %d points lie in no two photos", int((count < 2).sum()), len(places))
     return places[count >= 2], colours[count >= 2]
 
 
-def _with_loose(model: Model, places: Float[Array, "k 3"], colours: Float32[Array, "k 3"]) -> Model:
+def _with_loose(model: ColmapModel, places: Float[Array, "k 3"], colours: Float32[Array, "k 3"]) -> ColmapModel:
     """The model and further points that nothing observes."""
-    return Model(
+    return ColmapModel(
         model.names,
         model.cameras,
         np.concatenate([model.points, places]),

@@ -24,7 +24,7 @@ ORTHONORMAL = 1e-3  # greatest entry of R R^T - I: files with few digits pass, s
 _DRIVE = re.compile(r"^[A-Za-z]:")
 
 
-def sized(path: Path, most: int) -> int:
+def check_size(path: Path, most: int) -> int:
     """The size of a file. Raises: InputError: there is none, or it is larger than `most` bytes."""
     if not path.is_file():
         raise InputError(f"{path}: there is no such file")
@@ -33,7 +33,7 @@ def sized(path: Path, most: int) -> int:
     return size
 
 
-def read_json(path: Path):
+def read_untrusted_json(path: Path):
     """The JSON of a file, in which no object has a key twice. Raises: InputError: malformed or too large."""
 
     def unique(pairs: list) -> dict:
@@ -43,14 +43,14 @@ def read_json(path: Path):
             raise InputError(f"{path}: the key {twice[:80]!r} is there twice; remove one")
         return values
 
-    sized(path, LARGEST_JSON)
+    check_size(path, LARGEST_JSON)
     try:
         return json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=unique)
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path}: not readable as JSON ({error}); export or copy it again") from error
 
 
-def entry(values, key: str, kind: type, where: str):
+def check_entry(values, key: str, kind: type, where: str):
     """The value of an object's key. Raises: InputError: no object, it is missing, or not of this kind."""
     if not isinstance(values, dict) or key not in values:
         raise InputError(f"{where}: {key} is missing; export the file again")
@@ -62,7 +62,7 @@ def entry(values, key: str, kind: type, where: str):
 _KINDS = {dict: "an object", list: "a list", str: "a text"}
 
 
-def number(value, where: str) -> float:
+def check_number(value, where: str) -> float:
     """A finite number. Raises: InputError."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         try:
@@ -73,23 +73,23 @@ def number(value, where: str) -> float:
     raise InputError(f"{where} is {str(value)[:40]!r}, which is no finite number; correct it or export the file again")
 
 
-def numbers(values, shape: tuple[int, ...], where: str) -> Array:
+def check_numbers(values, shape: tuple[int, ...], where: str) -> Array:
     """Nested lists of finite numbers as an array. Raises: InputError: another shape, or a number that is not finite."""
     if not isinstance(values, list) or len(values) != shape[0]:
         raise InputError(f"{where} does not hold {' x '.join(map(str, shape))} numbers; export the file again")
     if len(shape) == 1:
-        return np.array([number(v, where) for v in values])
-    return np.array([numbers(row, shape[1:], where) for row in values])
+        return np.array([check_number(v, where) for v in values])
+    return np.array([check_numbers(row, shape[1:], where) for row in values])
 
 
-def finite(values: Array, where: str) -> Array:
+def check_finite(values: Array, where: str) -> Array:
     """The array itself. Raises: InputError: some number in it is not finite."""
     if not np.isfinite(values).all():
         raise InputError(f"{where}: a number is not finite; remove that entry or export the file again")
     return values
 
 
-def rotation(matrix: Float[Array, "3 3"], where: str) -> Float[Array, "3 3"]:
+def nearest_rotation(matrix: Float[Array, "3 3"], where: str) -> Float[Array, "3 3"]:
     """The rotation nearest to a matrix that is one but for rounding. Raises: InputError: sheared, scaled, mirrored."""
     with np.errstate(over="ignore", invalid="ignore"):
         off = np.abs(matrix @ matrix.T - np.eye(3)).max()
@@ -102,7 +102,7 @@ def rotation(matrix: Float[Array, "3 3"], where: str) -> Float[Array, "3 3"]:
     return u @ vt
 
 
-def name(value: str, folder: Path, where: str) -> str:
+def check_image_name(value: str, folder: Path, where: str) -> str:
     """The name of an image, relative to the photos' folder and with slashes.
 
     Raises: InputError: it leads out of the folder, or is no name.
@@ -121,7 +121,7 @@ def name(value: str, folder: Path, where: str) -> str:
     return str(path)
 
 
-def distinct(names: list[str], where: str) -> None:
+def check_distinct(names: list[str], where: str) -> None:
     """Raises: InputError: a name is there twice."""
     seen = set()
     for each in names:

@@ -13,8 +13,10 @@ import pycolmap
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
-from dav_gswt.photos.importers import checks, lens_models
-from dav_gswt.photos.importers.imported_model import Given, Shot
+from dav_gswt.photos.importers import checks
+from dav_gswt.photos.importers.checks import check_distinct, check_finite, check_image_name, check_size
+from dav_gswt.photos.importers.imported_model import ImportedImage, ImportedModel
+from dav_gswt.photos.importers.lens_models import make_camera
 
 _PLACES = ("", "sparse", "sparse/0", "0")  # where a model lies below the folder that is given
 _MODELS = {int(number): name for name, number in pycolmap.CameraModelId.__members__.items() if name != "INVALID"}
@@ -23,13 +25,13 @@ _NO_POINT = -1
 MOST_NUMBER = 2**53  # of points: below, numbers are exact in tables of floats
 
 
-def found(folder: Path) -> Path | None:
+def find_colmap_folder(folder: Path) -> Path | None:
     """The folder at or below this one that holds a model, if any."""
     places = [folder / place for place in _PLACES]
     return next((p for p in places if any(_both(p, kind) for kind in ("bin", "txt"))), None)
 
 
-def read(folder: Path, photos: Path) -> Given:
+def import_colmap(folder: Path, photos: Path) -> ImportedModel:
     """Read a model. Raises: InputError: damaged, or what it says cannot be."""
     kind = "bin" if _both(folder, "bin") else "txt"
     cameras = _cameras(folder / f"cameras.{kind}", {"bin": _binary_cameras, "txt": _text_cameras}[kind])
@@ -38,12 +40,12 @@ def read(folder: Path, photos: Path) -> Given:
     )
     path = folder / f"points3D.{kind}"
     if not path.is_file():
-        return Given(shots)
+        return ImportedModel(shots)
     rows = {"bin": _binary_points, "txt": _text_points}[kind](path)
     ids, order = np.unique(rows[:, 0], return_index=True)
     if len(ids) < len(rows):
         raise InputError(f"{path}: a point is there twice; export the model again")
-    points, colours = checks.finite(rows[order, 1:4], str(path)), (rows[order, 4:7] / 255).astype(np.float32)
+    points, colours = check_finite(rows[order, 1:4], str(path)), (rows[order, 4:7] / 255).astype(np.float32)
     owners = np.repeat(np.arange(len(shots)), [len(s) for s in seen])
     flat = np.concatenate(seen) if seen else np.zeros((0, 3))
     wanted = flat[:, 2]
@@ -55,7 +57,7 @@ def read(folder: Path, photos: Path) -> Given:
         raise InputError(
             f"{path}: has no point {wanted[k]:.0f}, which {shots[owners[k]].name} sees; export the model again"
         )
-    return Given(shots, points, colours, place, owners, flat[:, :2])
+    return ImportedModel(shots, points, colours, place, owners, flat[:, :2])
 
 
 def _both(folder: Path, kind: str) -> bool:
@@ -68,22 +70,22 @@ def _cameras(path: Path, rows: Callable) -> dict[int, pycolmap.Camera]:
         where = f"{path}: camera {number}"
         if number in cameras:
             raise InputError(f"{where} is there twice; export the model again")
-        cameras[number] = lens_models.lens(model, width, height, params, where)
+        cameras[number] = make_camera(model, width, height, params, where)
     return cameras
 
 
-def _images(path: Path, rows: Callable, cameras: dict, photos: Path) -> tuple[tuple[Shot, ...], list[Array]]:
+def _images(path: Path, rows: Callable, cameras: dict, photos: Path) -> tuple[tuple[ImportedImage, ...], list[Array]]:
     """Shots, and of each what it sees: column, row and point."""
     shots, seen = [], []
     for pose, camera, label, points in rows(path):
-        name = checks.name(label, photos, str(path))
+        name = check_image_name(label, photos, str(path))
         where = f"{path}: image {name}"
         if camera not in cameras:
             raise InputError(f"{where}: there is no camera {camera}; export the model again")
-        rotation = _rotation(checks.finite(np.array(pose), where)[:4], where)
-        shots.append(Shot(name, cameras[camera], rotation, np.array(pose[4:])))
-        seen.append(checks.finite(points[points[:, 2] != _NO_POINT], where))
-    checks.distinct([s.name for s in shots], str(path))
+        rotation = _rotation(check_finite(np.array(pose), where)[:4], where)
+        shots.append(ImportedImage(name, cameras[camera], rotation, np.array(pose[4:])))
+        seen.append(check_finite(points[points[:, 2] != _NO_POINT], where))
+    check_distinct([s.name for s in shots], str(path))
     return tuple(shots), seen
 
 
@@ -107,7 +109,7 @@ class _Bytes:
     """A binary file that is read from its start to its end; no count in it is believed beyond what is there."""
 
     def __init__(self, path: Path):
-        checks.sized(path, checks.LARGEST)
+        check_size(path, checks.LARGEST)
         self.path, self.data, self.at = path, path.read_bytes(), 0
 
     def take(self, form: str) -> tuple:
@@ -176,7 +178,7 @@ def _binary_points(path: Path) -> Array:
 
 def _lines(path: Path) -> Iterator[str]:
     """The lines of a text file without its comments; empty lines stay."""
-    checks.sized(path, checks.LARGEST)
+    check_size(path, checks.LARGEST)
     with path.open(encoding="utf-8", errors="replace") as file:
         for line in file:
             if not line.startswith("#"):

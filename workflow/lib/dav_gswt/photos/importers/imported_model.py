@@ -12,7 +12,7 @@ from dav_gswt.geometry.georeference import Georeference
 
 
 @dataclass(frozen=True)
-class Shot:
+class ImportedImage:
     """One image of the model. A world point p has camera coordinates rotation @ p + translation (x right, y down).
 
     name: relative to the photos' folder, with slashes. lens: at the size that the model gives, of the picture as it is
@@ -26,14 +26,14 @@ class Shot:
 
 
 @dataclass(frozen=True)
-class Given:
+class ImportedModel:
     """The images of a model, n points, and m observations: image image_of[k] sees point point_of[k] at pixels[k].
 
     colours: sRGB in [0, 1]. reasons: of images that the file has, but that cannot be taken with the others.
     about: the place of the world's origin, where the world is known to be metres east, north and up.
     """
 
-    shots: tuple[Shot, ...]
+    shots: tuple[ImportedImage, ...]
     points: Float[Array, "n 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     colours: Float32[Array, "n 3"] = field(default_factory=lambda: np.zeros((0, 3), np.float32))
     point_of: Int[Array, "m"] = field(default_factory=lambda: np.zeros(0, int))

@@ -18,7 +18,7 @@ _SWAPPED = {"fx": "fy", "fy": "fx", "cy": "cx"}
 _MODELS = pycolmap.CameraModelId.__members__
 
 
-def perspective(
+def make_perspective_camera(
     width: int, height: int, pinhole: tuple, k: tuple = (), p: tuple = (), where: str = ""
 ) -> pycolmap.Camera:
     """A lens after Brown. pinhole: fx, fy, cx, cy. k: up to three radial terms; p: OpenCV's two tangential ones.
@@ -29,18 +29,18 @@ def perspective(
     k1, k2, k3 = (*k, 0.0, 0.0, 0.0)[:3]
     p1, p2 = (*p, 0.0, 0.0)[:2]
     if k3:
-        return lens("FULL_OPENCV", width, height, (*pinhole, k1, k2, p1, p2, k3, 0.0, 0.0, 0.0), where)
+        return make_camera("FULL_OPENCV", width, height, (*pinhole, k1, k2, p1, p2, k3, 0.0, 0.0, 0.0), where)
     if k1 or k2 or p1 or p2:
-        return lens("OPENCV", width, height, (*pinhole, k1, k2, p1, p2), where)
-    return lens("PINHOLE", width, height, pinhole, where)
+        return make_camera("OPENCV", width, height, (*pinhole, k1, k2, p1, p2), where)
+    return make_camera("PINHOLE", width, height, pinhole, where)
 
 
-def fisheye(width: int, height: int, pinhole: tuple, k: tuple = (), where: str = "") -> pycolmap.Camera:
+def make_fisheye_camera(width: int, height: int, pinhole: tuple, k: tuple = (), where: str = "") -> pycolmap.Camera:
     """A fisheye after Kannala and Brandt: a ray at the angle t off the axis lands at t (1 + k1 t^2 + ... + k4 t^8)."""
-    return lens("OPENCV_FISHEYE", width, height, (*pinhole, *(*k, 0.0, 0.0, 0.0, 0.0)[:4]), where)
+    return make_camera("OPENCV_FISHEYE", width, height, (*pinhole, *(*k, 0.0, 0.0, 0.0, 0.0)[:4]), where)
 
 
-def lens(model: str, width: int, height: int, params: tuple, where: str) -> pycolmap.Camera:
+def make_camera(model: str, width: int, height: int, params: tuple, where: str) -> pycolmap.Camera:
     """A camera of one of COLMAP's models. Raises: InputError: unknown, spherical, or numbers that no lens has."""
     if model not in _MODELS or model in ("INVALID", "EQUIRECTANGULAR"):
         raise InputError(f"{where}: pictures of a camera {model} are not read; export pictures of a perspective camera")
@@ -59,7 +59,7 @@ def lens(model: str, width: int, height: int, params: tuple, where: str) -> pyco
     return camera
 
 
-def fitted(
+def fit_camera_to_photo(
     camera: pycolmap.Camera, stored: tuple[int, int], orientation: int, where: str
 ) -> tuple[pycolmap.Camera, int]:
     """The lens at the size of its photo as it is seen upright, and the quarter turns clockwise that this took.
@@ -84,12 +84,12 @@ def fitted(
     )
 
 
-def pinhole(camera: pycolmap.Camera, side: int, where: str) -> tuple[pycolmap.Camera, pycolmap.Camera]:
+def undistort_camera(camera: pycolmap.Camera, side: int, where: str) -> tuple[pycolmap.Camera, pycolmap.Camera]:
     """The lens at the size of the picture, at most `side` pixels long, and the pinhole camera that replaces it.
 
     Raises: InputError: the distortion folds over within the picture, so that it cannot be undone.
     """
-    small = shrunk(camera, side)
+    small = shrink_camera(camera, side)
     limits = pycolmap.UndistortCameraOptions(blank_pixels=0, max_image_size=side)
     found = pycolmap.undistort_camera(limits, small)
     if not _undone(small, found):
@@ -100,13 +100,13 @@ def pinhole(camera: pycolmap.Camera, side: int, where: str) -> tuple[pycolmap.Ca
     return small, found
 
 
-def shrunk(camera: pycolmap.Camera, side: int) -> pycolmap.Camera:
+def shrink_camera(camera: pycolmap.Camera, side: int) -> pycolmap.Camera:
     """The lens of the picture shrunk to at most `side` pixels; pictures are never enlarged."""
     share = min(1.0, side / max(camera.width, camera.height))
     return _scaled(camera, max(1, round(camera.width * share)), max(1, round(camera.height * share)))
 
 
-def rays(camera: pycolmap.Camera, pixels: Float[Array, "m 2"]) -> Float[Array, "m 2"]:
+def unproject_pixels(camera: pycolmap.Camera, pixels: Float[Array, "m 2"]) -> Float[Array, "m 2"]:
     """Where rays cross depth 1; NaN where the lens has no such ray (the library then gives anything)."""
     found = np.array(camera.cam_from_img(np.ascontiguousarray(pixels)), float).reshape(-1, 2)
     back = np.asarray(camera.img_from_cam(np.c_[found, np.ones(len(found))])).reshape(-1, 2)
@@ -115,7 +115,7 @@ def rays(camera: pycolmap.Camera, pixels: Float[Array, "m 2"]) -> Float[Array, "
     return found
 
 
-def key(camera: pycolmap.Camera) -> tuple:
+def camera_key(camera: pycolmap.Camera) -> tuple:
     """What two equal lenses have in common."""
     return camera.model_name, camera.width, camera.height, *camera.params.tolist()
 

@@ -14,9 +14,19 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
-from dav_gswt.photos.importers import checks, lens_models, point_ply
-from dav_gswt.photos.importers.imported_model import Given, Shot
-from dav_gswt.photos.importers.points import share_seen
+from dav_gswt.photos.importers import lens_models
+from dav_gswt.photos.importers.checks import (
+    check_distinct,
+    check_entry,
+    check_image_name,
+    check_number,
+    check_numbers,
+    nearest_rotation,
+)
+from dav_gswt.photos.importers.imported_model import ImportedImage, ImportedModel
+from dav_gswt.photos.importers.lens_models import make_fisheye_camera, make_perspective_camera
+from dav_gswt.photos.importers.point_ply import read_point_ply
+from dav_gswt.photos.importers.points import measure_visible_share
 
 _log = logging.getLogger(__name__)
 
@@ -25,26 +35,28 @@ FISHEYE = "OPENCV_FISHEYE"
 OPENGL = np.array([1.0, -1.0, -1.0])  # its camera looks along -z with y up
 
 
-def read(path: Path, values: dict, photos: Path, size_of: Callable[[str], tuple[int, int] | None]) -> Given:
+def import_nerfstudio(
+    path: Path, values: dict, photos: Path, size_of: Callable[[str], tuple[int, int] | None]
+) -> ImportedModel:
     """Shots, and the points of the file that `ply_file_path` names; nobody says which image sees them.
 
     size_of: of a photo by its name, for files that give no size. Raises: InputError: with file, frame and key.
     """
-    frames = checks.entry(values, "frames", list, str(path))
+    frames = check_entry(values, "frames", list, str(path))
     world, scale = _moved(values, path)
     shots, lens_of = [], {}
     for i, frame in enumerate(frames):
-        label = checks.entry(frame, "file_path", str, f"{path}: frame {i}")
-        name = checks.name(label, photos, f"{path}: frame {i}")
+        label = check_entry(frame, "file_path", str, f"{path}: frame {i}")
+        name = check_image_name(label, photos, f"{path}: frame {i}")
         where = f"{path}: frame {name}"
         rotation, translation = _pose(frame, world, scale, where)
         wanted = _intrinsics(values, frame, name, size_of, where)
         if wanted is not None and wanted not in lens_of:
             lens_of[wanted] = _lens(dict(wanted), where)
-        shots.append(Shot(name, lens_of.get(wanted), rotation, translation))
-    checks.distinct([s.name for s in shots], str(path))
+        shots.append(ImportedImage(name, lens_of.get(wanted), rotation, translation))
+    check_distinct([s.name for s in shots], str(path))
     points, colours = _points(path, values, shots, world, scale)
-    return Given(tuple(shots), points, colours)
+    return ImportedModel(tuple(shots), points, colours)
 
 
 def _moved(values: dict, path: Path) -> tuple[Float[Array, "4 4"], float]:
@@ -57,10 +69,10 @@ def _moved(values: dict, path: Path) -> tuple[Float[Array, "4 4"], float]:
         if not determinant > 1e-18:
             raise InputError(f"{where} mirrors or flattens the world; export the file again")
         scale = determinant ** (1 / 3)
-        matrix[:3, :3] = checks.rotation(matrix[:3, :3] / scale, where)
+        matrix[:3, :3] = nearest_rotation(matrix[:3, :3] / scale, where)
         matrix[:3, 3] /= scale
     if values.get("applied_scale") is not None:
-        factor = checks.number(values["applied_scale"], f"{path}: applied_scale")
+        factor = check_number(values["applied_scale"], f"{path}: applied_scale")
         if not factor > 1e-9:
             raise InputError(f"{path}: applied_scale is {factor:g}; it must be positive")
         scale *= factor
@@ -73,7 +85,7 @@ def _affine(values, where: str) -> Float[Array, "4 4"]:
     """A matrix of three rows, or of four of which the last is 0 0 0 1."""
     rows = 4 if isinstance(values, list) and len(values) == 4 else 3
     matrix = np.eye(4)
-    matrix[:rows] = checks.numbers(values, (rows, 4), where)
+    matrix[:rows] = check_numbers(values, (rows, 4), where)
     if np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-6:
         raise InputError(f"{where}: its last row is not 0 0 0 1; export the file again")
     return matrix
@@ -81,8 +93,8 @@ def _affine(values, where: str) -> Float[Array, "4 4"]:
 
 def _pose(frame: dict, world: Array, scale: float, where: str) -> tuple[Float[Array, "3 3"], Float[Array, "3"]]:
     """Rotation and translation into the camera, with x right and y down, from the undone world."""
-    matrix = _affine(checks.entry(frame, "transform_matrix", list, where), f"{where}: transform_matrix")
-    turn = world[:3, :3] @ checks.rotation(matrix[:3, :3], f"{where}: transform_matrix") * OPENGL
+    matrix = _affine(check_entry(frame, "transform_matrix", list, where), f"{where}: transform_matrix")
+    turn = world[:3, :3] @ nearest_rotation(matrix[:3, :3], f"{where}: transform_matrix") * OPENGL
     return turn.T, -turn.T @ (world[:3, :3] @ matrix[:3, 3] / scale + world[:3, 3])
 
 
@@ -94,7 +106,7 @@ def _intrinsics(values: dict, frame: dict, name: str, size_of: Callable, where: 
         for source in (frame, values):
             for key in keys:
                 if source.get(key) is not None:
-                    return {key: checks.number(source[key], f"{where}: {key}")}
+                    return {key: check_number(source[key], f"{where}: {key}")}
         return {}
 
     out = {}
@@ -126,10 +138,10 @@ def _lens(said: dict, where: str) -> pycolmap.Camera:
     p = [said.get(key, 0.0) for key in ("p1", "p2")]
     if said["model"] == FISHEYE:
         _unused(said, ("k5", "k6", "p1", "p2"), where)
-        return lens_models.fisheye(width, height, pinhole, tuple(k[:4]), where)
+        return make_fisheye_camera(width, height, pinhole, tuple(k[:4]), where)
     if said["model"] in PERSPECTIVE:
         _unused(said, ("k4", "k5", "k6"), where)  # programs differ about what they mean
-        return lens_models.perspective(width, height, pinhole, tuple(k[:3]), tuple(p), where)
+        return make_perspective_camera(width, height, pinhole, tuple(k[:3]), tuple(p), where)
     known = ", ".join((*PERSPECTIVE, FISHEYE))
     raise InputError(
         f"{where}: camera_model {said['model'][:40]} is not read, only {known}; undistort the pictures first"
@@ -148,7 +160,7 @@ def _unused(said: dict, keys: tuple[str, ...], where: str) -> None:
             raise InputError(f"{where}: {key} is not read with camera_model {said['model']}; calibrate without it")
 
 
-def _points(path: Path, values: dict, shots: list[Shot], world: Array, scale: float) -> tuple[Array, Array]:
+def _points(path: Path, values: dict, shots: list[ImportedImage], world: Array, scale: float) -> tuple[Array, Array]:
     """Points in the undone world. Programs disagree whether the file's points were moved with the cameras.
 
     So they are taken as the photos see more of them.
@@ -157,13 +169,13 @@ def _points(path: Path, values: dict, shots: list[Shot], world: Array, scale: fl
     if values.get("ply_file_path") is None:
         return none
     where = f"{path}: ply_file_path"
-    label = checks.entry(values, "ply_file_path", str, str(path))
-    file = path.parent / checks.name(label, path.parent, where)
+    label = check_entry(values, "ply_file_path", str, str(path))
+    file = path.parent / check_image_name(label, path.parent, where)
     if not file.is_file():
         _log.warning("%s: there is no file %s; points come from the photos alone", where, file)
         return none
     if not file.resolve().is_relative_to(path.parent.resolve()):
         raise InputError(f"{where}: {label[:80]!r} leads out of {path.parent}; put the file beside transforms.json")
-    points, colours = point_ply.read(file)
+    points, colours = read_point_ply(file)
     undone = points / scale @ world[:3, :3].T + world[:3, 3]
-    return (points if share_seen(points, shots) > share_seen(undone, shots) else undone), colours
+    return (points if measure_visible_share(points, shots) > measure_visible_share(undone, shots) else undone), colours

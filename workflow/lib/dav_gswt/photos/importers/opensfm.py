@@ -13,8 +13,17 @@ from scipy.spatial.transform import Rotation
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.photos.importers import checks, lens_models
-from dav_gswt.photos.importers.imported_model import Given, Shot
+from dav_gswt.photos.importers import checks
+from dav_gswt.photos.importers.checks import (
+    check_distinct,
+    check_entry,
+    check_finite,
+    check_image_name,
+    check_number,
+    check_numbers,
+)
+from dav_gswt.photos.importers.imported_model import ImportedImage, ImportedModel
+from dav_gswt.photos.importers.lens_models import make_fisheye_camera, make_perspective_camera
 
 _log = logging.getLogger(__name__)
 
@@ -24,13 +33,13 @@ FISHEYE = {"fisheye": 2, "fisheye_opencv": 4}
 _ONE_FOCAL = ("perspective", "fisheye")
 
 
-def read(path: Path, values: list, photos: Path) -> Given:
+def import_opensfm(path: Path, values: list, photos: Path) -> ImportedModel:
     """The largest of the file's reconstructions; its points are known, but not which image sees them.
 
     Raises: InputError: with file, camera or shot, and key.
     """
     for i, part in enumerate(values):
-        checks.entry(part, "shots", dict, f"{path}: reconstruction {i}")
+        check_entry(part, "shots", dict, f"{path}: reconstruction {i}")
     best = max(range(len(values)), key=lambda i: len(values[i]["shots"]))
     others = {}
     for i, part in enumerate(values):
@@ -43,11 +52,11 @@ def read(path: Path, values: list, photos: Path) -> Given:
     chosen = values[best]
     cameras = {
         key: _lens(camera, f"{path}: camera {key[:80]!r}")
-        for key, camera in checks.entry(chosen, "cameras", dict, str(path)).items()
+        for key, camera in check_entry(chosen, "cameras", dict, str(path)).items()
     }
     shots = tuple(_shot(name, shot, cameras, photos, path) for name, shot in chosen["shots"].items())
-    checks.distinct([s.name for s in shots], str(path))
-    return Given(shots, *_points(chosen.get("points"), path), reasons=others, about=_about(chosen, path))
+    check_distinct([s.name for s in shots], str(path))
+    return ImportedModel(shots, *_points(chosen.get("points"), path), reasons=others, about=_about(chosen, path))
 
 
 def _about(chosen: dict, path: Path) -> Georeference | None:
@@ -55,9 +64,9 @@ def _about(chosen: dict, path: Path) -> Georeference | None:
     if chosen.get("reference_lla") is None:
         return None
     where = f"{path}: reference_lla"
-    place = checks.entry(chosen, "reference_lla", dict, str(path))
+    place = check_entry(chosen, "reference_lla", dict, str(path))
     latitude, longitude, altitude = (
-        checks.number(place.get(key), f"{where}: {key}") for key in ("latitude", "longitude", "altitude")
+        check_number(place.get(key), f"{where}: {key}") for key in ("latitude", "longitude", "altitude")
     )
     if not (abs(latitude) < 89.9 and abs(longitude) <= 360 and abs(altitude) < 1e5):
         raise InputError(f"{where}: {latitude:g}, {longitude:g}, {altitude:g} is no place on earth; correct it")
@@ -79,7 +88,7 @@ def _lens(camera, where: str) -> pycolmap.Camera:
     def said(key: str, default: float | None = None) -> float:
         if default is None and key not in camera:
             raise InputError(f"{where}: {key} is missing; export the file again")
-        return checks.number(camera.get(key, default), f"{where}: {key}")
+        return check_number(camera.get(key, default), f"{where}: {key}")
 
     width, height = (round(said(key)) for key in ("width", "height"))
     side = max(width, height)
@@ -88,24 +97,24 @@ def _lens(camera, where: str) -> pycolmap.Camera:
     pinhole = (fx * side, fy * side, cx * side + width / 2, cy * side + height / 2)
     k = tuple(said(f"k{i + 1}", 0.0) for i in range((RADIAL | FISHEYE)[kind]))
     if kind in FISHEYE:
-        return lens_models.fisheye(width, height, pinhole, k, where)
+        return make_fisheye_camera(width, height, pinhole, k, where)
     p = (said("p1", 0.0), said("p2", 0.0)) if kind == "brown" else ()
-    return lens_models.perspective(width, height, pinhole, k, p, where)
+    return make_perspective_camera(width, height, pinhole, k, p, where)
 
 
-def _shot(label: str, shot, cameras: dict[str, pycolmap.Camera], photos: Path, path: Path) -> Shot:
-    name = checks.name(label, photos, str(path))
+def _shot(label: str, shot, cameras: dict[str, pycolmap.Camera], photos: Path, path: Path) -> ImportedImage:
+    name = check_image_name(label, photos, str(path))
     where = f"{path}: shot {name}"
-    camera = checks.entry(shot, "camera", str, where)
+    camera = check_entry(shot, "camera", str, where)
     if camera not in cameras:
         raise InputError(f"{where}: there is no camera {camera[:80]!r}; export the file again")
-    axis = checks.numbers(checks.entry(shot, "rotation", list, where), (3,), f"{where}: rotation")
-    shift = checks.numbers(checks.entry(shot, "translation", list, where), (3,), f"{where}: translation")
+    axis = check_numbers(check_entry(shot, "rotation", list, where), (3,), f"{where}: rotation")
+    shift = check_numbers(check_entry(shot, "translation", list, where), (3,), f"{where}: translation")
     if not np.abs(axis).max() < 100:  # a few full turns at most, in radians
         raise InputError(
             f"{where}: rotation {axis.tolist()} is no axis times an angle in radians; export the file again"
         )
-    return Shot(name, cameras[camera], Rotation.from_rotvec(axis).as_matrix(), shift)
+    return ImportedImage(name, cameras[camera], Rotation.from_rotvec(axis).as_matrix(), shift)
 
 
 def _points(points, path: Path) -> tuple[Array, Array]:
@@ -121,5 +130,5 @@ def _points(points, path: Path) -> tuple[Array, Array]:
         raise InputError(
             f"{where}: one has not 3 coordinates and a color of 3 numbers; export the file again"
         ) from None
-    checks.finite(table, where)
+    check_finite(table, where)
     return table[:, :3], (np.clip(table[:, 3:], 0, 255) / 255).astype(np.float32)

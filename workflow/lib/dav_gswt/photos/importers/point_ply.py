@@ -9,14 +9,15 @@ from plyfile import PlyData, PlyParseError
 
 from dav_gswt.errors import InputError
 from dav_gswt.photos.importers import checks
+from dav_gswt.photos.importers.checks import check_finite, check_size
 
 
-def read(path: Path) -> tuple[Float[Array, "n 3"], Float32[Array, "n 3"]]:
+def read_point_ply(path: Path) -> tuple[Float[Array, "n 3"], Float32[Array, "n 3"]]:
     """Positions, and colours as sRGB in [0, 1]: mid-grey where the file has none.
 
     Raises: InputError: not a PLY of points, promises more than it holds, or a number is not finite.
     """
-    size = checks.sized(path, checks.LARGEST)
+    size = check_size(path, checks.LARGEST)
     try:
         with path.open("rb") as file:
             header = PlyData._parse_header(file)
@@ -33,4 +34,4 @@ def read(path: Path) -> tuple[Float[Array, "n 3"], Float32[Array, "n 3"]]:
             colours = np.clip(stack / (np.iinfo(rows.dtype["red"]).max if whole else 1), 0, 1)
     except (PlyParseError, ValueError, KeyError, TypeError, UnicodeDecodeError, OSError) as error:
         raise InputError(f"{path}: not readable as a PLY of points ({error}); export or copy it again") from error
-    return checks.finite(places, str(path)), checks.finite(colours.astype(np.float32), str(path))
+    return check_finite(places, str(path)), check_finite(colours.astype(np.float32), str(path))

@@ -18,10 +18,11 @@ from scipy.spatial import cKDTree
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos.importers import lens_models
-from dav_gswt.photos.importers.imported_model import Given, Shot
-from dav_gswt.photos.importers.undistortion import Placed
-from dav_gswt.photos.sfm import features
-from dav_gswt.photos.sfm.registration import Options
+from dav_gswt.photos.importers.imported_model import ImportedImage, ImportedModel
+from dav_gswt.photos.importers.lens_models import camera_key, shrink_camera, unproject_pixels
+from dav_gswt.photos.importers.photo_matching import MatchedPhoto
+from dav_gswt.photos.sfm.features import extract_features, match_image_pairs
+from dav_gswt.photos.sfm.registration import SfmOptions
 
 ALL_PAIRS = 60  # photos up to which each is matched with every other
 NEAREST = 20  # photos with which each is matched otherwise
@@ -30,7 +31,7 @@ SAMPLE = 2000  # points, and a tenth as many shots, from which it is told how mu
 
 
 @dataclass(frozen=True)
-class Seen:
+class Observations:
     """n points and m observations of them: rays[k] is where photo image_of[k] sees point point_of[k] at depth 1.
 
     error: mean distance in pixels of the observations from the points' projections.
@@ -44,13 +45,13 @@ class Seen:
     error: float
 
 
-def observed(given: Given, placed: Sequence[Placed]) -> Seen:
+def collect_observations(given: ImportedModel, placed: Sequence[MatchedPhoto]) -> Observations:
     """The model's own observations, of those of its images that have a photo."""
     seen, error, out = [], [], []
     for i, place in enumerate(placed):
         shot = given.shots[place.index]
         own = np.flatnonzero(given.image_of == place.index)
-        rays, pixels = lens_models.rays(shot.lens, given.pixels[own]), given.pixels[own]
+        rays, pixels = unproject_pixels(shot.lens, given.pixels[own]), given.pixels[own]
         known = np.isfinite(rays).all(1)
         own, rays = own[known], rays[known]
         at = given.points[given.point_of[own]] @ shot.rotation.T + shot.translation
@@ -59,10 +60,10 @@ def observed(given: Given, placed: Sequence[Placed]) -> Seen:
         out.append(rays @ turned.T)
         seen.append(np.stack([given.point_of[own], np.full(len(own), i)], -1))
     pairs = np.concatenate(seen)
-    return Seen(given.points, given.colours, pairs[:, 0], pairs[:, 1], np.concatenate(out), _mean(error))
+    return Observations(given.points, given.colours, pairs[:, 0], pairs[:, 1], np.concatenate(out), _mean(error))
 
 
-def triangulated(placed: Sequence[Placed], options: Options) -> Seen:
+def triangulate_features(placed: Sequence[MatchedPhoto], options: SfmOptions) -> Observations:
     """Points where rays through matched SIFT features cross; cameras stay as they are.
 
     The world is moved to the cameras' mean meanwhile: coordinates of a map projection run to millions.
@@ -73,9 +74,9 @@ def triangulated(placed: Sequence[Placed], options: Options) -> Seen:
         known = _entered(placed, middle, database, options.size)
         names = [known.images[i + 1].name for i in range(len(placed))]
         _shrink(placed, known, folder)
-        features.find(len(names), folder, database, options.size, options.features, options.threads)
-        pairs = [(names[i], names[j]) for i, j in near_pairs(placed)]
-        features.match_pairs(pairs, database, options.threads, options.seed)
+        extract_features(len(names), folder, database, options.size, options.features, options.threads)
+        pairs = [(names[i], names[j]) for i, j in find_near_pairs(placed)]
+        match_image_pairs(pairs, database, options.threads, options.seed)
         choice = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=options.seed)
         choice.triangulation.random_seed = choice.mapper.random_seed = options.seed
         choice.mapper.num_threads = 1
@@ -83,7 +84,7 @@ def triangulated(placed: Sequence[Placed], options: Options) -> Seen:
         return _seen(found, len(placed), middle)
 
 
-def near_pairs(placed: Sequence[Placed]) -> list[tuple[int, int]]:
+def find_near_pairs(placed: Sequence[MatchedPhoto]) -> list[tuple[int, int]]:
     """Pairs of photos to match, the lower number first: all, or those near each other that look the same way.
 
     Beyond ALL_PAIRS photos each is paired with the NEAREST ones whose viewing direction differs by less than WIDEST.
@@ -101,17 +102,17 @@ def near_pairs(placed: Sequence[Placed]) -> list[tuple[int, int]]:
     return sorted(pairs)
 
 
-def share_seen(points: Float[Array, "n 3"], shots: Sequence[Shot]) -> float:
+def measure_visible_share(points: Float[Array, "n 3"], shots: Sequence[ImportedImage]) -> float:
     """Which share of points lies in the pictures of some shot; from a sample spread evenly over both."""
     few = points[:: max(1, len(points) // SAMPLE)]
     known = [s for s in shots if s.lens is not None]
     inside = np.zeros(len(few), bool)
     for shot in known[:: max(1, len(known) * 10 // SAMPLE)]:
-        inside |= sees(shot.lens, shot.rotation, shot.translation, few)
+        inside |= find_visible_points(shot.lens, shot.rotation, shot.translation, few)
     return float(inside.mean()) if len(inside) else 0.0
 
 
-def sees(
+def find_visible_points(
     lens: pycolmap.Camera, rotation: Float[Array, "3 3"], translation: Float[Array, "3"], points: Float[Array, "n 3"]
 ) -> Bool[Array, "n"]:
     """Which points lie before a camera and within its picture."""
@@ -123,13 +124,13 @@ def sees(
     return (pixels > 0).all(1) & (pixels < [lens.width, lens.height]).all(1)
 
 
-def _entered(placed: Sequence[Placed], middle: Array, database: Path, size: int) -> pycolmap.Reconstruction:
+def _entered(placed: Sequence[MatchedPhoto], middle: Array, database: Path, size: int) -> pycolmap.Reconstruction:
     """Cameras and images by numbers from 1 on, the same in a new database and in a reconstruction without points."""
     known, numbers = pycolmap.Reconstruction(), {}
     with closing(pycolmap.Database.open(database)) as store:
         for i, place in enumerate(placed, 1):
-            lens = lens_models.shrunk(place.lens, size)
-            if (key := lens_models.key(lens)) not in numbers:
+            lens = shrink_camera(place.lens, size)
+            if (key := camera_key(lens)) not in numbers:
                 numbers[key] = lens.camera_id = len(numbers) + 1
                 rig = pycolmap.Rig(rig_id=lens.camera_id)
                 rig.add_ref_sensor(lens.sensor_id)
@@ -146,7 +147,7 @@ def _entered(placed: Sequence[Placed], middle: Array, database: Path, size: int)
     return known
 
 
-def _shrink(placed: Sequence[Placed], known: pycolmap.Reconstruction, folder: Path) -> None:
+def _shrink(placed: Sequence[MatchedPhoto], known: pycolmap.Reconstruction, folder: Path) -> None:
     """Write what features are looked for in: the photos upright, shrunk by area means."""
     for i in progress(range(len(placed)), "read photos"):
         image = known.images[i + 1]
@@ -156,7 +157,7 @@ def _shrink(placed: Sequence[Placed], known: pycolmap.Reconstruction, folder: Pa
         )
 
 
-def _seen(found: pycolmap.Reconstruction, photos: int, middle: Array) -> Seen:
+def _seen(found: pycolmap.Reconstruction, photos: int, middle: Array) -> Observations:
     """Arrays of a reconstruction whose images are numbered from 1 on."""
     ids = np.array(sorted(found.points3D), np.int64)
     points = np.array([found.points3D[i].xyz for i in ids]).reshape(-1, 3)
@@ -168,10 +169,10 @@ def _seen(found: pycolmap.Reconstruction, photos: int, middle: Array) -> Seen:
         place = np.searchsorted(ids, own[:, 0].astype(np.int64))
         pose = image.cam_from_world().matrix()
         error.append(_errors(image.camera, points[place] @ pose[:, :3].T + pose[:, 3], own[:, 1:]))
-        out.append(lens_models.rays(image.camera, own[:, 1:]))
+        out.append(unproject_pixels(image.camera, own[:, 1:]))
         seen.append(np.stack([place, np.full(len(own), i)], -1))
     pairs = np.concatenate(seen)
-    return Seen(points + middle, colours, pairs[:, 0], pairs[:, 1], np.concatenate(out), _mean(error))
+    return Observations(points + middle, colours, pairs[:, 0], pairs[:, 1], np.concatenate(out), _mean(error))
 
 
 def _errors(lens: pycolmap.Camera, at: Float[Array, "k 3"], pixels: Float[Array, "k 2"]) -> Array:
@@ -186,7 +187,7 @@ def _mean(errors: list[Array]) -> float:
     return float(every.mean()) if len(every) else 0.0
 
 
-def only(seen: Seen, kept: Bool[Array, "m"]) -> Seen:
+def keep_observations(seen: Observations, kept: Bool[Array, "m"]) -> Observations:
     """Some of the observations, and the points that they are of."""
     own = np.unique(seen.point_of[kept])
     return replace(

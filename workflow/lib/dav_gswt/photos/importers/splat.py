@@ -15,6 +15,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square
 from dav_gswt.photos import ground_frame
+from dav_gswt.photos.ground_frame import find_largest_square, fit_plane, make_upright_rotation
 
 _log = logging.getLogger(__name__)
 
@@ -31,7 +32,9 @@ DISC = 2.0  # standard deviations of a disc that count as covered ground
 WIDEST_DISC = 6  # cells, the most that a single Gaussian covers
 
 
-def enter(field: GaussianField, rng: np.random.Generator, up: Sequence = UP) -> tuple[GaussianField, SceneFrame]:
+def fit_field_frame(
+    field: GaussianField, rng: np.random.Generator, up: Sequence = UP
+) -> tuple[GaussianField, SceneFrame]:
     """The field in its ground frame, and this frame.
 
     z points from the robust plane through the opaque Gaussians to the side of `up`, three numbers of any length; x and
@@ -95,7 +98,7 @@ def _levelled(field: GaussianField, up: Float[Array, "3"], rng: np.random.Genera
     """The field with z up and its plane at 0; and its surface's spread about the plane."""
     surface = field.means[expit(field.opacity_logits) >= OPAQUE].astype(float)
     size = float(np.ptp(np.percentile(surface, ROBUST, axis=0), axis=0).max())
-    normal, offset, spread = ground_frame.plane(surface, rng, up)
+    normal, offset, spread = fit_plane(surface, rng, up)
     if spread > ROUGHEST * size:
         raise InputError(
             "the field has no ground across the direction `up`; give the direction that points up in the file "
@@ -103,7 +106,7 @@ def _levelled(field: GaussianField, up: Float[Array, "3"], rng: np.random.Genera
         )
     axes = np.eye(3)
     east = axes[0] if abs(normal[0]) < 0.9 else axes[1]
-    return _moved(field, ground_frame.upright(normal, east), 1.0, np.array([0.0, 0.0, -offset])), spread
+    return _moved(field, make_upright_rotation(normal, east), 1.0, np.array([0.0, 0.0, -offset])), spread
 
 
 def _moved(
@@ -162,6 +165,6 @@ def _opaque_ground(
 def _square(places: Float[Array, "m 2"], widths: Float[Array, "m"], cells: int) -> tuple[float, float, float]:
     """West, south and side of the largest square of opaque ground, a little inside it."""
     mask, west, south, cell = _opaque_ground(places, widths, cells)
-    row, column, side = ground_frame.largest_square(mask)
+    row, column, side = find_largest_square(mask)
     inset = ground_frame.INSET * side * cell
     return west + column * cell + inset, south + row * cell + inset, side * cell - 2 * inset

@@ -9,11 +9,16 @@ from numpy import ndarray as Array
 
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
-from dav_gswt.photos import ground_frame, split
-from dav_gswt.photos import model as models
-from dav_gswt.photos.ground_frame import Coverage
-from dav_gswt.photos.model import Model
-from dav_gswt.photos.sfm import focal
+from dav_gswt.photos import view_split
+from dav_gswt.photos.colmap_model import (
+    ColmapModel,
+    count_shared_points,
+    read_colmap_model,
+    reprojection_errors,
+    transform_model,
+)
+from dav_gswt.photos.ground_frame import Coverage, count_coverage
+from dav_gswt.photos.sfm import focal_length
 
 LEAST_POINTS, LEAST_SHARE = 100, 0.2  # points that hold a photo: as a number, and of the set's median
 WORST_ERROR = 2.0  # pixels: a photo's mean, beyond which its place is doubtful or its lens another
@@ -25,7 +30,7 @@ ON_MAP = ("upper", "upper right", "right", "lower right", "lower", "lower left",
 
 
 @dataclass(frozen=True)
-class Photo:
+class PhotoFacts:
     """points: how many hold it. error: their mean distance from where they should be, pixels; None without points.
 
     height: above z = 0, world units. tilt: degrees off straight down. partner, shared: the photo that shares most
@@ -46,13 +51,13 @@ class Photo:
 
 
 @dataclass(frozen=True)
-class Found:
+class ReportFacts:
     """A scene's photos. need: photos that must see a place. cover: in world units, without those that only test."""
 
     scene: str
     frame: SceneFrame
-    model: Model
-    photos: tuple[Photo, ...]
+    model: ColmapModel
+    photos: tuple[PhotoFacts, ...]
     need: int
     cover: Coverage
     place: Georeference | None
@@ -63,7 +68,7 @@ class Found:
         return square.west, square.south, square.side
 
     @property
-    def placed(self) -> tuple[Photo, ...]:
+    def placed(self) -> tuple[PhotoFacts, ...]:
         """The photos that are not there only to test."""
         return tuple(photo for photo in self.photos if not photo.tests)
 
@@ -79,24 +84,24 @@ class Found:
         return f"{first} to {last}"
 
 
-def read(folder: Path | str, scene: str) -> Found:
+def collect_facts(folder: Path | str, scene: str) -> ReportFacts:
     """The facts of a photos/ folder. Raises: InputError: what it holds is not readable."""
     folder = Path(folder)
-    frame, model = read_scene_frame(folder / "ground.json"), models.read(folder / "sparse")
+    frame, model = read_scene_frame(folder / "ground.json"), read_colmap_model(folder / "sparse")
     tests = set(frame.test or ())
     unit = frame.flying_height
-    flat = models.similar(model, 1 / unit, np.eye(3), np.zeros(3))
+    flat = transform_model(model, 1 / unit, np.eye(3), np.zeros(3))
     cameras = tuple(c for name, c in zip(model.names, flat.cameras, strict=True) if name not in tests)
     empty = Coverage(0.0, 0.0, 1.0, np.zeros((1, 1), int))
-    grid = ground_frame.coverage(cameras, flat.points) if len(flat.points) else empty
+    grid = count_coverage(cameras, flat.points) if len(flat.points) else empty
     cover = replace(grid, west=unit * grid.west, south=unit * grid.south, cell=unit * grid.cell)
     need = frame.photos_per_cell or (3 if len(cameras) >= 9 else 2)
-    return Found(scene, frame, model, photos(model, tests), need, cover, frame.georeference)
+    return ReportFacts(scene, frame, model, assess_photos(model, tests), need, cover, frame.georeference)
 
 
-def photos(model: Model, tests: set[str]) -> tuple[Photo, ...]:
+def assess_photos(model: ColmapModel, tests: set[str]) -> tuple[PhotoFacts, ...]:
     """Each photo of the model, and what is weak about it. tests: names of those that only test."""
-    shared, off = models.shared_points(model), models.errors(model)
+    shared, off = count_shared_points(model), reprojection_errors(model)
     points = np.diag(shared).copy()
     np.fill_diagonal(shared, 0)
     usual = np.median([n for n, name in zip(points, model.names, strict=True) if name not in tests] or [0])
@@ -104,7 +109,7 @@ def photos(model: Model, tests: set[str]) -> tuple[Photo, ...]:
     for i, (name, camera) in enumerate(zip(model.names, model.cameras, strict=True)):
         own = off[model.image_of == i]
         most = int(shared[i].max())
-        photo = Photo(
+        photo = PhotoFacts(
             name,
             int(points[i]),
             float(own.mean()) if len(own) else None,
@@ -112,27 +117,27 @@ def photos(model: Model, tests: set[str]) -> tuple[Photo, ...]:
             float(np.degrees(np.arccos(np.clip(-camera.forward[2], -1, 1)))),
             model.names[int(shared[i].argmax())] if most else None,
             most,
-            int((shared[i] >= split.LINK).sum()),
+            int((shared[i] >= view_split.LINK).sum()),
             name in tests,
             (),
         )
-        found.append(photo if photo.tests else replace(photo, weak=weak_photo(photo, float(usual))))
+        found.append(photo if photo.tests else replace(photo, weak=find_weaknesses(photo, float(usual))))
     return tuple(found)
 
 
-def weak_photo(photo: Photo, usual: float) -> tuple[str, ...]:
+def find_weaknesses(photo: PhotoFacts, usual: float) -> tuple[str, ...]:
     """What is weak about a photo, in words. usual: the median number of points of the set's photos."""
     said = []
     if photo.points < max(LEAST_POINTS, LEAST_SHARE * usual):
         said.append(f"held by {photo.points} points only, others by about {usual:.0f}")
     if photo.error is not None and not photo.error <= WORST_ERROR:
         said.append(f"its points are {photo.error:.1f} px off on average")
-    if photo.shared < split.LINK:
+    if photo.shared < view_split.LINK:
         said.append(f"shares at most {photo.shared} points with any other photo")
     return tuple(said)
 
 
-def over_exemplar(found: Found) -> Int[Array, "rows columns"]:
+def crop_to_exemplar(found: ReportFacts) -> Int[Array, "rows columns"]:
     """How many photos see each cell of the exemplar."""
     west, south, side = found.exemplar
     rows, columns = found.cover.counts.shape
@@ -141,7 +146,7 @@ def over_exemplar(found: Found) -> Int[Array, "rows columns"]:
     return found.cover.counts[np.ix_((y > south) & (y < south + side), (x > west) & (x < west + side))]
 
 
-def part_of(found: Found, east: int, north: int) -> str:
+def describe_part(found: ReportFacts, east: int, north: int) -> str:
     """A ninth of the exemplar in words: -1, 0 or 1 to the east and to the north, of the compass where it is known."""
     if not (east or north):
         return "middle"
@@ -150,12 +155,12 @@ def part_of(found: Found, east: int, north: int) -> str:
     return f"{ON_MAP[round(np.degrees(np.arctan2(east, north)) / 45) % 8]} part (as on the map)"
 
 
-def weak_spots(found: Found) -> list[str]:
+def list_weak_spots(found: ReportFacts) -> list[str]:
     """What is weak about the set, the worst first, in sentences that say what can be done."""
     return [*_left_out(found), *_thin(found), *_loose(found), *_unsure_lens(found), *_small(found)]
 
 
-def _left_out(found: Found) -> list[str]:
+def _left_out(found: ReportFacts) -> list[str]:
     out, total = len(found.frame.left_out), found.frame.images
     if not out:
         return []
@@ -165,9 +170,9 @@ def _left_out(found: Found) -> list[str]:
     ]
 
 
-def _thin(found: Found) -> list[str]:
+def _thin(found: ReportFacts) -> list[str]:
     """Parts of the exemplar that few photos see."""
-    counts, said = over_exemplar(found), []
+    counts, said = crop_to_exemplar(found), []
     if min(counts.shape) < 3:
         return ["The exemplar is too small on the coverage map to say how often its parts are seen."]
     for i, band in enumerate(np.array_split(counts, 3, axis=0)):
@@ -175,14 +180,14 @@ def _thin(found: Found) -> list[str]:
             typical = int(np.median(part))
             if typical <= found.need:
                 many = "1 photo" if typical == 1 else f"{typical} photos"
-                said.append(f"The {part_of(found, j - 1, i - 1)} of the exemplar is mostly seen by {many} only.")
+                said.append(f"The {describe_part(found, j - 1, i - 1)} of the exemplar is mostly seen by {many} only.")
     short = float((counts < found.need).mean())
     if short > TOO_FEW and not said:
         said.append(f"{100 * short:.0f} % of the exemplar is seen by fewer than {found.need} photos.")
     return [f"{text} More photos of it make it sharper and surer." for text in said]
 
 
-def _loose(found: Found) -> list[str]:
+def _loose(found: ReportFacts) -> list[str]:
     weak = [photo.name for photo in found.photos if photo.weak]
     if not weak:
         return []
@@ -191,36 +196,36 @@ def _loose(found: Found) -> list[str]:
     return [f"{len(weak)} {verb} weakly placed: {names}. If the field looks blurred there, try without."]
 
 
-def _unsure_lens(found: Found) -> list[str]:
+def _unsure_lens(found: ReportFacts) -> list[str]:
     said, frame = [], found.frame
-    error = mean_error(found)
+    error = mean_reprojection_error(found)
     if error is not None and error > WORST_MEAN:
         said.append(f"Points are {error:.1f} px off on average: is every photo of one camera, unzoomed, and sharp?")
     lens = frame.focal
-    if lens and lens.exif is None and lens.tilt < focal.OBLIQUE:
+    if lens and lens.exif is None and lens.tilt < focal_length.OBLIQUE:
         said.append("The focal length is unsure, and heights with it: give the scene's `focal`, or add views aslant.")
     elif lens and lens.exif and lens.free:
         ratio = lens.free / lens.exif
-        if abs(ratio - 1) > focal.HELD:
+        if abs(ratio - 1) > focal_length.HELD:
             said.append(f"The photos alone would say a focal length {ratio:.2f} times that of EXIF: are heights right?")
     return said
 
 
-def _small(found: Found) -> list[str]:
+def _small(found: ReportFacts) -> list[str]:
     side = found.exemplar[2] / found.frame.flying_height
     if side >= LEAST_SIDE:
         return []
     return [f"The exemplar is only {side:.2f} flying heights wide: tiles will repeat soon. Photograph a larger place."]
 
 
-def mean_error(found: Found) -> float | None:
+def mean_reprojection_error(found: ReportFacts) -> float | None:
     """Mean reprojection error in pixels: as registration says it, else over the model's observations."""
     if found.frame.reprojection_error is not None:
         return found.frame.reprojection_error
-    off = models.errors(found.model)
+    off = reprojection_errors(found.model)
     return float(off.mean()) if len(off) else None
 
 
-def spread(values: Float[Array, "n"] | Int[Array, "n"]) -> tuple[float, float, float]:
+def min_median_max(values: Float[Array, "n"] | Int[Array, "n"]) -> tuple[float, float, float]:
     """Least, median and greatest."""
     return tuple(float(v) for v in np.percentile(values, [0, 50, 100]))

@@ -19,9 +19,10 @@ from numpy import ndarray as Array
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos import ground_frame, split
-from dav_gswt.photos.model import Model
-from dav_gswt.photos.report.facts import Found, Photo
+from dav_gswt.photos import ground_frame
+from dav_gswt.photos.colmap_model import ColmapModel
+from dav_gswt.photos.report.facts import PhotoFacts, ReportFacts
+from dav_gswt.photos.view_split import find_aim_point
 
 LONGER = 1000.0  # of a plan's sides, in its own units
 DOTS = 600  # pixels of the longer side of the points' picture
@@ -36,7 +37,7 @@ STEPS = np.array([1, 2, 2.5, 5, 10])  # a scale bar's round lengths
 
 
 @dataclass(frozen=True)
-class Small:
+class Thumbnail:
     """A photo in small. uri: with what is masked in pink. masked: the share that is."""
 
     image: Float32[Array, "h w 3"]
@@ -45,7 +46,7 @@ class Small:
 
 
 @dataclass(frozen=True)
-class Sheet:
+class MapSheet:
     """A piece of the world on paper, north up. per_unit: units of the drawing to one of the world."""
 
     west: float
@@ -59,7 +60,7 @@ class Sheet:
         return (np.asarray(places, float)[:, :2] - [self.west, self.north]) * [self.per_unit, -self.per_unit]
 
 
-def sheet(found: Found) -> Sheet:
+def make_sheet(found: ReportFacts) -> MapSheet:
     """Room for the ground that photos see, the exemplar and all cameras."""
     west, south, side = found.exemplar
     extent = found.frame.extent
@@ -70,15 +71,15 @@ def sheet(found: Found) -> Sheet:
     low, high = low - margin, high + margin
     scale = LONGER / float((high - low).max())
     width, height = scale * (high - low)
-    return Sheet(float(low[0]), float(high[1]), float(width), float(height), scale)
+    return MapSheet(float(low[0]), float(high[1]), float(width), float(height), scale)
 
 
-def plan(found: Found, smalls: list[Small]) -> str:
+def draw_plan(found: ReportFacts, smalls: list[Thumbnail]) -> str:
     """Cameras over the points, each with its footprint, as SVG."""
-    on = sheet(found)
+    on = make_sheet(found)
     shots = zip(found.photos, found.model.cameras, strict=True)
     drawn = [_shot(i, photo, camera, found, on) for i, (photo, camera) in enumerate(shots)]
-    ground_picture = dots(found.model, colours(found.model, smalls), on)
+    ground_picture = draw_points(found.model, average_colours(found.model, smalls), on)
     layers = [
         _picture(ground_picture, 0.0, 0.0, on.width, on.height),
         _exemplar(found, on),
@@ -88,14 +89,14 @@ def plan(found: Found, smalls: list[Small]) -> str:
     return _svg("Plan: cameras over the ground, seen from above", on, layers)
 
 
-def coverage(found: Found) -> str:
+def draw_coverage(found: ReportFacts) -> str:
     """How many photos see each place, as SVG."""
-    on, cover = sheet(found), found.cover
+    on, cover = make_sheet(found), found.cover
     rows, columns = cover.counts.shape
     (x, y), *_ = on.at(np.array([[cover.west, cover.south + rows * cover.cell]]))
     size = columns * cover.cell * on.per_unit, rows * cover.cell * on.per_unit
     painted = np.zeros((rows, columns, 4), np.uint8)
-    for low, high, colour in bins(found):
+    for low, high, colour in bin_coverage(found):
         mask = (cover.counts >= low) & (cover.counts <= high)
         painted[mask] = [*(int(colour[k : k + 2], 16) for k in (1, 3, 5)), 255]
     layers = [
@@ -106,7 +107,7 @@ def coverage(found: Found) -> str:
     return _svg("Coverage: how many photos see each place of the ground", on, layers)
 
 
-def bins(found: Found) -> list[tuple[int, int, str]]:
+def bin_coverage(found: ReportFacts) -> list[tuple[int, int, str]]:
     """Numbers of photos that share a colour: first, last, colour. Those below what is needed stand out."""
     most = max(int(found.cover.counts.max()), found.need)
     few = [(n, n, FEW[0] if n == 1 and found.need > 2 else FEW[1]) for n in range(1, found.need)]
@@ -117,7 +118,7 @@ def bins(found: Found) -> list[tuple[int, int, str]]:
     return few + enough
 
 
-def footprint(camera: Camera, reach: float, along: int = 8) -> Float[Array, "n 2"]:
+def camera_footprint(camera: Camera, reach: float, along: int = 8) -> Float[Array, "n 2"]:
     """The outline on z = 0 of what a camera sees, no farther than `reach` from it; `along`: corners a side.
 
     Rays that meet the plane beyond, or never, end above the point at that distance.
@@ -132,7 +133,7 @@ def footprint(camera: Camera, reach: float, along: int = 8) -> Float[Array, "n 2
     return centre[:2] + np.minimum(far, reach)[:, None] * rays[:, :2]
 
 
-def colours(model: Model, smalls: list[Small]) -> Float32[Array, "n 3"]:
+def average_colours(model: ColmapModel, smalls: list[Thumbnail]) -> Float32[Array, "n 3"]:
     """The points' mean colours over the photos that see them: the model's own may be grey."""
     total = np.zeros((len(model.points), 3))
     for i, (camera, small) in enumerate(zip(model.cameras, smalls, strict=True)):
@@ -145,7 +146,7 @@ def colours(model: Model, smalls: list[Small]) -> Float32[Array, "n 3"]:
     return (total / np.maximum(seen, 1)[:, None]).astype(np.float32)
 
 
-def dots(model: Model, colour: Float32[Array, "n 3"], on: Sheet) -> UInt8[Array, "h w 4"]:
+def draw_points(model: ColmapModel, colour: Float32[Array, "n 3"], on: MapSheet) -> UInt8[Array, "h w 4"]:
     """The sparse points, the higher over the lower."""
     scale = DOTS / LONGER
     width, height = (max(1, round(scale * side)) for side in (on.width, on.height))
@@ -161,7 +162,7 @@ def dots(model: Model, colour: Float32[Array, "n 3"], on: Sheet) -> UInt8[Array,
     return picture[wide // 2 :, wide // 2 :][:height, :width]
 
 
-def shrunk(path: Path, longer: int) -> Small:
+def make_thumbnail(path: Path, longer: int) -> Thumbnail:
     """A picture at most `longer` pixels wide or high."""
     image, cover = image_files.read_photo_and_alpha(path)
     share = min(1.0, longer / max(image.shape[:2]))
@@ -171,13 +172,13 @@ def shrunk(path: Path, longer: int) -> Small:
         image_files.shrink_image(cover[..., None], width, height),
     )
     shown = counts * small + (1 - counts) * (0.5 * small + 0.5 * MASKED)
-    return Small(small, _uri(shown, "jpeg"), float(1 - cover.mean()))
+    return Thumbnail(small, _uri(shown, "jpeg"), float(1 - cover.mean()))
 
 
-def all_shrunk(folder: Path, names: list[str]) -> list[Small]:
+def make_thumbnails(folder: Path, names: list[str]) -> list[Thumbnail]:
     """Photos in small, smaller ones of many."""
     longer = THUMB if len(names) < MANY else SMALLER
-    return [shrunk(folder / name, longer) for name in progress(names, "shrink photos")]
+    return [make_thumbnail(folder / name, longer) for name in progress(names, "shrink photos")]
 
 
 def _uri(picture: Array, kind: str) -> str:
@@ -189,7 +190,7 @@ def _uri(picture: Array, kind: str) -> str:
     return f"data:image/{kind};base64,{base64.b64encode(file.getvalue()).decode('ascii')}"
 
 
-def _svg(label: str, on: Sheet, layers: list[str]) -> str:
+def _svg(label: str, on: MapSheet, layers: list[str]) -> str:
     inside = "\n".join(layers)
     return (
         f'<svg viewBox="0 0 {on.width:.1f} {on.height:.1f}" role="group" aria-label="{escape(label)}">\n'
@@ -204,7 +205,7 @@ def _picture(
     return f'<image class="{kind}" {place} preserveAspectRatio="none" href="{_uri(pixels, "png")}"/>'
 
 
-def _exemplar(found: Found, on: Sheet) -> str:
+def _exemplar(found: ReportFacts, on: MapSheet) -> str:
     west, south, side = found.exemplar
     ((x, y),) = on.at(np.array([[west, south + side]]))
     length = side * on.per_unit
@@ -213,10 +214,10 @@ def _exemplar(found: Found, on: Sheet) -> str:
     return f'<rect class="halo" {box}/><rect class="exemplar" {box}><title>{escape(said)}</title></rect>'
 
 
-def _shot(index: int, photo: Photo, camera: Camera, found: Found, on: Sheet) -> str:
+def _shot(index: int, photo: PhotoFacts, camera: Camera, found: ReportFacts, on: MapSheet) -> str:
     """A camera: its footprint, an arrow to where it looks, and a dot that leads to its row."""
     unit = found.frame.flying_height
-    outline = " ".join(f"{x:.1f},{y:.1f}" for x, y in on.at(footprint(camera, ground_frame.REACH * unit)))
+    outline = " ".join(f"{x:.1f},{y:.1f}" for x, y in on.at(camera_footprint(camera, ground_frame.REACH * unit)))
     ((x, y),) = on.at(camera.centre[None])
     kind = "shot weak" if photo.weak else "shot test" if photo.tests else "shot"
     said = f"{photo.name}: {found.length(photo.height)} high, {photo.tilt:.0f} degrees off straight down"
@@ -228,12 +229,12 @@ def _shot(index: int, photo: Photo, camera: Camera, found: Found, on: Sheet) -> 
     )
 
 
-def _arrow(photo: Photo, camera: Camera, unit: float, on: Sheet) -> str:
+def _arrow(photo: PhotoFacts, camera: Camera, unit: float, on: MapSheet) -> str:
     """From the camera towards where the middle of its picture lies, at most half a flying height long."""
     start, ahead = camera.centre[:2], camera.forward[:2]
     if photo.tilt < DOWN:
         return ""
-    aim = split.aim(camera) - start if camera.forward[2] <= -0.1 else ahead / np.linalg.norm(ahead) * unit
+    aim = find_aim_point(camera) - start if camera.forward[2] <= -0.1 else ahead / np.linalg.norm(ahead) * unit
     aim *= min(1.0, 0.5 * unit / max(float(np.linalg.norm(aim)), 1e-12))
     (x, y), (u, v) = on.at(np.stack([start, start + aim]))
     length = max(float(np.hypot(u - x, v - y)), 24.0)
@@ -245,7 +246,7 @@ def _arrow(photo: Photo, camera: Camera, unit: float, on: Sheet) -> str:
     )
 
 
-def _furniture(found: Found, on: Sheet) -> str:
+def _furniture(found: ReportFacts, on: MapSheet) -> str:
     """A scale bar, and where north is if that is known."""
     wanted = 0.2 * on.width / on.per_unit
     tens = 10 ** np.floor(np.log10(wanted))

@@ -11,43 +11,51 @@ from string import Template
 import numpy as np
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import whole
-from dav_gswt.photos import split
-from dav_gswt.photos.report import facts as report_facts
+from dav_gswt.files import atomic_file
+from dav_gswt.photos import view_split
 from dav_gswt.photos.report import figures
-from dav_gswt.photos.report.facts import Found, Photo
-from dav_gswt.photos.report.figures import Small
+from dav_gswt.photos.report.facts import (
+    PhotoFacts,
+    ReportFacts,
+    collect_facts,
+    crop_to_exemplar,
+    list_weak_spots,
+    mean_reprojection_error,
+    min_median_max,
+)
+from dav_gswt.photos.report.figures import Thumbnail, bin_coverage, draw_coverage, draw_plan, make_thumbnails
+from dav_gswt.photos.view_split import ground_bounds, measure_visible_share
 
 SIGN = '<span class="sign" aria-hidden="true">⚠</span>'
 Fact = tuple[str, str, str]  # its name, its value, what it means
 
 
-def write(folder: Path | str, template: Path | str, scene: str, out: Path | str) -> None:
+def write_report(folder: Path | str, template: Path | str, scene: str, out: Path | str) -> None:
     """Write the report on a photos/ folder (images/, sparse/, ground.json) to `out`.
 
     Raises: InputError: the folder is not readable, or the template asks for what is not there.
     """
-    found = report_facts.read(folder, scene)
-    smalls = figures.all_shrunk(Path(folder) / "images", [photo.name for photo in found.photos])
+    found = collect_facts(folder, scene)
+    smalls = make_thumbnails(Path(folder) / "images", [photo.name for photo in found.photos])
     page = Template(Path(template).read_text(encoding="utf-8"))
     try:
         text = page.substitute(parts(found, smalls))
     except (KeyError, ValueError) as error:
         raise InputError(f"{template}: not a template of this report ({error})") from error
-    with whole(out) as part:
+    with atomic_file(out) as part:
         part.write_text(text, encoding="utf-8")
 
 
-def parts(found: Found, smalls: list[Small]) -> dict[str, str]:
+def parts(found: ReportFacts, smalls: list[Thumbnail]) -> dict[str, str]:
     """What the template's names stand for, as HTML."""
     photos = sorted(enumerate(zip(found.photos, smalls, strict=True)), key=lambda photo: photo[1][0].tests)
     return {
         "scene": escape(found.scene),
         "summary": escape(summary(found)),
         "verdict": verdict(found),
-        "plan": figures.plan(found, smalls),
+        "plan": draw_plan(found, smalls),
         "plan_notes": plan_notes(found),
-        "coverage": figures.coverage(found),
+        "coverage": draw_coverage(found),
         "bar": bar(found),
         "need": str(found.need),
         "facts": "\n".join(_fact(*fact) for fact in [*registration(found), *camera_facts(found), *masks(smalls)]),
@@ -55,11 +63,11 @@ def parts(found: Found, smalls: list[Small]) -> dict[str, str]:
         "strip": "\n".join(_thumb(i, photo, small, found) for i, (photo, small) in photos),
         "rows": "\n".join(_row(i, photo, small.masked, found) for i, (photo, small) in photos),
         "height_unit": "m" if found.frame.unit == "metre" else "flying heights",
-        "link": str(split.LINK),
+        "link": str(view_split.LINK),
     }
 
 
-def summary(found: Found) -> str:
+def summary(found: ReportFacts) -> str:
     """The page's first sentences."""
     frame, side = found.frame, found.length(found.exemplar[2])
     if frame.kind == "synthetic":
@@ -70,9 +78,9 @@ def summary(found: Found) -> str:
     return f"{first} Tiles are made of a square of ground {side} wide: the exemplar, framed on both maps."
 
 
-def verdict(found: Found) -> str:
+def verdict(found: ReportFacts) -> str:
     """The weak spots as a list, or that there are none."""
-    spots = report_facts.weak_spots(found)
+    spots = list_weak_spots(found)
     if not spots:
         good = "Nothing is weak: no photo, and no part of the exemplar."
         return f'<p class="fine"><span aria-hidden="true">✓</span> {good}</p>'
@@ -80,7 +88,7 @@ def verdict(found: Found) -> str:
     return f'<ul class="spots">\n{items}\n</ul>'
 
 
-def plan_notes(found: Found) -> str:
+def plan_notes(found: ReportFacts) -> str:
     """What the plan's signs mean, as far as it has them."""
     notes = ["Each dot is a camera. Point at it for its name and what it sees (thin outline); select it for its row."]
     if any(photo.tilt >= figures.DOWN for photo in found.photos):
@@ -95,24 +103,26 @@ def plan_notes(found: Found) -> str:
     return escape(" ".join(notes))
 
 
-def bar(found: Found) -> str:
+def bar(found: ReportFacts) -> str:
     """The coverage map's colours, each with its numbers of photos."""
 
     def item(low: int, high: int, colour: str) -> str:
         few = ' class="few"' if high < found.need else ""
         return f'<li{few} style="--colour: {colour}">{low if low == high else f"{low}–{high}"}</li>'
 
-    return "\n".join(item(*found_bin) for found_bin in figures.bins(found))
+    return "\n".join(item(*found_bin) for found_bin in bin_coverage(found))
 
 
-def registration(found: Found) -> list[Fact]:
+def registration(found: ReportFacts) -> list[Fact]:
     """How well the photos fit together."""
-    frame, error = found.frame, report_facts.mean_error(found)
-    counts = report_facts.over_exemplar(found)
-    low, usual, high = report_facts.spread(counts.ravel()) if counts.size else (0, 0, 0)
+    frame, error = found.frame, mean_reprojection_error(found)
+    counts = crop_to_exemplar(found)
+    low, usual, high = min_median_max(counts.ravel()) if counts.size else (0, 0, 0)
     pairs = zip(found.photos, found.model.cameras, strict=True)
-    sights = [split.sight(camera, split.bounds(frame, whole=False)) for photo, camera in pairs if not photo.tests]
-    sees = sum(sight >= split.LEAST_SIGHT for sight in sights)
+    sights = [
+        measure_visible_share(camera, ground_bounds(frame, whole=False)) for photo, camera in pairs if not photo.tests
+    ]
+    sees = sum(sight >= view_split.LEAST_SIGHT for sight in sights)
     rest = "all of them" if sees == len(sights) else "the others show too little of it to take part"
     if frame.kind == "synthetic":
         first = ("Photos", f"{len(found.placed)} and {len(found.photos) - len(found.placed)} tests", "rendered")
@@ -132,7 +142,7 @@ def registration(found: Found) -> list[Fact]:
     ]
 
 
-def focal_length(found: Found) -> tuple[str, str]:
+def focal_length(found: ReportFacts) -> tuple[str, str]:
     """The focal length over EXIF's, and what was decided about it."""
     frame, lens = found.frame, found.frame.focal
     if frame.kind == "synthetic":
@@ -145,11 +155,11 @@ def focal_length(found: Found) -> tuple[str, str]:
     return value, f"{lens.decision}{free if 'alone' not in lens.decision else ''}"
 
 
-def camera_facts(found: Found) -> list[Fact]:
+def camera_facts(found: ReportFacts) -> list[Fact]:
     """Where the cameras are, and where the place is."""
     frame, cameras = found.frame, found.photos
-    low, usual, high = report_facts.spread(np.array([c.height for c in cameras]))
-    least, middle, most = report_facts.spread(np.array([c.tilt for c in cameras]))
+    low, usual, high = min_median_max(np.array([c.height for c in cameras]))
+    least, middle, most = min_median_max(np.array([c.tilt for c in cameras]))
     metric = frame.unit == "metre"
     flying = found.length(frame.flying_height) if metric else "the unit of length: metres are not known"
     facts = [
@@ -173,7 +183,7 @@ def camera_facts(found: Found) -> list[Fact]:
     return facts
 
 
-def masks(smalls: list[Small]) -> list[Fact]:
+def masks(smalls: list[Thumbnail]) -> list[Fact]:
     """How many photos are masked, and how much of them."""
     shares = [small.masked for small in smalls if small.masked > 0]
     if not shares:
@@ -182,7 +192,7 @@ def masks(smalls: list[Small]) -> list[Fact]:
     return [("Masks", many, f"{100 * np.mean(shares):.1f} % does not count there (pink below)")]
 
 
-def left_out(found: Found) -> str:
+def left_out(found: ReportFacts) -> str:
     """The photos that found no place, and why, as a section; nothing where all did."""
     if not (rows := found.frame.left_out):
         return ""
@@ -200,7 +210,7 @@ def _fact(name: str, value: str, meaning: str) -> str:
     )
 
 
-def _thumb(index: int, photo: Photo, small: Small, found: Found) -> str:
+def _thumb(index: int, photo: PhotoFacts, small: Thumbnail, found: ReportFacts) -> str:
     height, width = small.image.shape[:2]
     alt = f"Photo {photo.name}, {found.length(photo.height)} above the ground"
     sign = f"{SIGN} " if photo.weak else ""
@@ -210,7 +220,7 @@ def _thumb(index: int, photo: Photo, small: Small, found: Found) -> str:
     )
 
 
-def _row(index: int, photo: Photo, masked: float, found: Found) -> str:
+def _row(index: int, photo: PhotoFacts, masked: float, found: ReportFacts) -> str:
     unit = "" if found.frame.unit == "flying height" else " m"
     if photo.partner:
         share = 100 * photo.shared / max(photo.points, 1)

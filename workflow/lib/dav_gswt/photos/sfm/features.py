@@ -11,48 +11,48 @@ from pathlib import Path
 import pycolmap
 
 from dav_gswt.logs import progress
-from dav_gswt.photos.sfm import pairs
+from dav_gswt.photos.sfm.pairs import select_pairs
 
 _log = logging.getLogger(__name__)
 
 LOOK = 4.0  # seconds between two looks at how far a long step is
 
 
-def find(count: int, folder: Path, database: Path, size: int, features: int, threads: int) -> None:
+def extract_features(count: int, folder: Path, database: Path, size: int, features: int, threads: int) -> None:
     """Find SIFT features in every photo of the database. features: most of them in a photo."""
     choice = pycolmap.FeatureExtractionOptions(num_threads=threads, use_gpu=False, max_image_size=size)
     choice.sift.max_num_features = features
-    watched(
+    run_with_progress(
         lambda token: pycolmap.extract_features(
             database, folder, extraction_options=choice, device=pycolmap.Device.cpu, cancellation_token=token
         ),
-        lambda: rows(database, "keypoints"),
+        lambda: count_rows(database, "keypoints"),
         count,
         "find features",
     )
 
 
-def match(count: int, database: Path, neighbours: int, threads: int, seed: int) -> None:
+def match_photos(count: int, database: Path, neighbours: int, threads: int, seed: int) -> None:
     """Match photos that look alike and keep what one rigid scene explains. neighbours: see `pairs.chosen`; 0: all."""
     with closing(pycolmap.Database.open(database)) as store:
         names = {image.image_id: image.name for image in store.read_all_images()}
         found = [store.read_descriptors(i).data for i in range(1, count + 1)] if neighbours else [None] * count
     if neighbours:
-        some = pairs.chosen(found, neighbours, seed)
+        some = select_pairs(found, neighbours, seed)
     else:
         some = [(i, j) for i in range(count) for j in range(i + 1, count)]
     if len(some) < count * (count - 1) // 2:
         _log.info("match %d of %d pairs of photos: those that look alike", len(some), count * (count - 1) // 2)
-    match_pairs([(names[i + 1], names[j + 1]) for i, j in some], database, threads, seed)
+    match_image_pairs([(names[i + 1], names[j + 1]) for i, j in some], database, threads, seed)
 
 
-def match_pairs(some: list[tuple[str, str]], database: Path, threads: int, seed: int) -> None:
+def match_image_pairs(some: list[tuple[str, str]], database: Path, threads: int, seed: int) -> None:
     """Match the named pairs of the database's images."""
     listed = database.with_name("pairs.txt")
     listed.write_text("".join(f"{one} {two}\n" for one, two in some), encoding="utf-8")
     verification = pycolmap.TwoViewGeometryOptions()
     verification.ransac.random_seed = seed
-    watched(
+    run_with_progress(
         lambda token: pycolmap.match_image_pairs(
             database,
             pycolmap.FeatureMatchingOptions(num_threads=threads, use_gpu=False),
@@ -61,13 +61,13 @@ def match_pairs(some: list[tuple[str, str]], database: Path, threads: int, seed:
             pycolmap.Device.cpu,
             token,
         ),
-        lambda: rows(database, "two_view_geometries"),
+        lambda: count_rows(database, "two_view_geometries"),
         len(some),
         "match pairs of photos",
     )
 
 
-def watched(work: Callable, done: Callable[[], int], total: int, what: str):
+def run_with_progress(work: Callable, done: Callable[[], int], total: int, what: str):
     """Do a long piece of work in a thread and report meanwhile how much is done; Ctrl-C stops it."""
     token = pycolmap.CancellationToken()
     with ThreadPoolExecutor(1) as pool, progress(None, what, total=total) as bar:
@@ -82,7 +82,7 @@ def watched(work: Callable, done: Callable[[], int], total: int, what: str):
     return job.result()
 
 
-def rows(database: Path, table: str) -> int:
+def count_rows(database: Path, table: str) -> int:
     """Rows of a table that another thread is filling; 0 while it is locked.
 
     Asked by another process: two copies of SQLite in one process, Python's and pycolmap's, drop each other's locks

@@ -15,7 +15,8 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.photos import exif, model
+from dav_gswt.photos.colmap_model import bundle_adjust_with_priors
+from dav_gswt.photos.exif import read_gps_position
 
 _log = logging.getLogger(__name__)
 
@@ -27,7 +28,7 @@ ROUNDS = 50  # of reweighting
 
 
 @dataclass(frozen=True)
-class Positions:
+class GpsPositions:
     """Where photos were taken. about: the place of a frame of metres east, north and up; its own north is 0.
 
     at: in that frame, by photo; NaN where a photo does not say.
@@ -37,9 +38,9 @@ class Positions:
     at: Float[Array, "n 3"]
 
 
-def of_photos(paths: list[Path]) -> Positions | None:
+def read_gps_positions(paths: list[Path]) -> GpsPositions | None:
     """The positions of a set's photos; None, with the reason in the log, where they cannot place it."""
-    found = np.array([exif.position(path) or (np.nan,) * 3 for path in paths], float)
+    found = np.array([read_gps_position(path) or (np.nan,) * 3 for path in paths], float)
     known = np.isfinite(found).all(1)
     if not known.any():
         return None
@@ -53,10 +54,10 @@ def of_photos(paths: list[Path]) -> Positions | None:
     if spread < LEAST_SPREAD * ACROSS:
         _log.warning("the photos' GPS positions lie within %.0f m, which is within their error: none is used", spread)
         return None
-    return Positions(about, at)
+    return GpsPositions(about, at)
 
 
-def enter(best: pycolmap.Reconstruction, at: dict[str, Float[Array, "3"]]) -> bool:
+def align_to_gps(best: pycolmap.Reconstruction, at: dict[str, Float[Array, "3"]]) -> bool:
     """Bring a reconstruction into the frame of the positions, in place, and adjust it with them as priors.
 
     at: the positions by the images' names. Returns whether they agree with the photos; if not, nothing is changed.
@@ -66,17 +67,17 @@ def enter(best: pycolmap.Reconstruction, at: dict[str, Float[Array, "3"]]) -> bo
         return False
     centres = np.stack([best.images[i].projection_center() for i in numbers])
     wanted = np.stack([at[best.images[i].name] for i in numbers])
-    scale, turn, shift, off = similarity(centres, wanted)
+    scale, turn, shift, off = fit_similarity(centres, wanted)
     if off > WORST * ACROSS:
         _log.warning("the photos' GPS positions are %.0f m off where the photos themselves place them: unused", off)
         return False
     best.transform(pycolmap.Sim3d(scale, pycolmap.Rotation3d(turn), shift))
-    model.adjust_with_priors(best, [_prior(best.images[i], at[best.images[i].name]) for i in numbers])
+    bundle_adjust_with_priors(best, [_prior(best.images[i], at[best.images[i].name]) for i in numbers])
     _log.info("GPS: the photos lie in metres, %.1f m from their positions (median)", off)
     return True
 
 
-def similarity(
+def fit_similarity(
     a: Float[Array, "n 3"], b: Float[Array, "n 3"]
 ) -> tuple[float, Float[Array, "3 3"], Float[Array, "3"], float]:
     """Scale s, rotation R and shift t of b = s R a + t, and the median distance that is left.

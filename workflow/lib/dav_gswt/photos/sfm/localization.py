@@ -17,9 +17,10 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos import lenses
-from dav_gswt.photos import model as models
-from dav_gswt.photos.model import Model
-from dav_gswt.photos.sfm import features, pairs
+from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
+from dav_gswt.photos.lenses import pinhole_parameters, read_lenses, undistort_scene_photo
+from dav_gswt.photos.sfm.features import extract_features, match_image_pairs
+from dav_gswt.photos.sfm.pairs import compare_descriptions, describe_photos
 
 _log = logging.getLogger(__name__)
 
@@ -31,19 +32,19 @@ LEAST_SHARE = 0.25  # of its matched points that must agree on it
 WORST = 6.0  # pixels, of a point that agrees
 
 
-def located(photos: Path, paths: list[Path], seed: int = 0) -> list[Camera | None]:
+def localize_photos(photos: Path, paths: list[Path], seed: int = 0) -> list[Camera | None]:
     """The cameras of photos in the world of a photos/ folder; None for one that finds no place.
 
     The photos must be taken with the scene's own camera: each is undistorted as its pictures were.
     """
     if not paths:
         return []
-    known = models.read(photos / "sparse")
+    known = read_colmap_model(photos / "sparse")
     with tempfile.TemporaryDirectory(prefix="locate-") as scratch:
         return _located(known, photos, paths, Path(scratch), seed)
 
 
-def _located(known: Model, photos: Path, paths: list[Path], scratch: Path, seed: int) -> list[Camera | None]:
+def _located(known: ColmapModel, photos: Path, paths: list[Path], scratch: Path, seed: int) -> list[Camera | None]:
     pinhole = _main(known, photos)
     new = [_developed(path, photos, pinhole, scratch / f"new_{i:04d}.png") for i, path in enumerate(paths)]
     for name in progress(known.names, "read pictures"):
@@ -53,25 +54,25 @@ def _located(known: Model, photos: Path, paths: list[Path], scratch: Path, seed:
     size = max(pinhole.width, pinhole.height)
     with closing(pycolmap.Database.open(database)) as store:
         _enter(names, [*known.cameras, *[pinhole] * (len(names) - len(known.names))], store)
-    features.find(len(names), scratch, database, size, FEATURES, 1)
+    extract_features(len(names), scratch, database, size, FEATURES, 1)
     _match(names, len(known.names), database, seed)
     with closing(pycolmap.Database.open(database)) as store:
         seen = _seen(known, store)
         return [_placed(names.index(name), seen, known, pinhole, store, seed) if name else None for name in new]
 
 
-def _main(known: Model, photos: Path) -> Camera:
+def _main(known: ColmapModel, photos: Path) -> Camera:
     """A camera with the lens of most pictures."""
-    kinds = lenses.read(photos)
+    kinds = read_lenses(photos)
     if not kinds:
         return known.cameras[0]
-    return next(c for c in known.cameras if np.allclose(lenses.pinhole(c), kinds[0].pinhole, atol=lenses.SAME))
+    return next(c for c in known.cameras if np.allclose(pinhole_parameters(c), kinds[0].pinhole, atol=lenses.SAME))
 
 
 def _developed(path: Path, photos: Path, pinhole: Camera, out: Path) -> str | None:
     """Write the photo as a picture of the scene's; None, with the reason in the log, where it is not of its camera."""
     try:
-        image_files.write_png(out, lenses.developed(image_files.read_photo(path), photos, pinhole))
+        image_files.write_png(out, undistort_scene_photo(image_files.read_photo(path), photos, pinhole))
     except (InputError, ValueError) as error:
         _log.warning("%s: %s", path.name, error)
         return None
@@ -98,14 +99,14 @@ def _match(names: list[str], old: int, database: Path, seed: int) -> None:
     """Match every new photo with the pictures that it looks like most."""
     with closing(pycolmap.Database.open(database)) as store:
         found = [store.read_descriptors(i + 1).data for i in range(len(names))]
-    alike = pairs.similarity(pairs.described(found, seed))
+    alike = compare_descriptions(describe_photos(found, seed))
     some = [
         (j, int(i)) for j in range(old, len(names)) for i in np.argsort(-alike[j, :old], kind="stable")[:NEIGHBOURS]
     ]
-    features.match_pairs([(names[i], names[j]) for j, i in some], database, 1, seed)
+    match_image_pairs([(names[i], names[j]) for j, i in some], database, 1, seed)
 
 
-def _seen(known: Model, store: pycolmap.Database) -> list[dict[int, int]]:
+def _seen(known: ColmapModel, store: pycolmap.Database) -> list[dict[int, int]]:
     """Per picture of the scene: which of its features shows which point."""
     out = []
     for i in range(len(known.names)):
@@ -124,7 +125,7 @@ def _keypoints(store: pycolmap.Database, index: int) -> Float[Array, "n 2"]:
 
 
 def _placed(
-    index: int, seen: list[dict[int, int]], known: Model, pinhole: Camera, store: pycolmap.Database, seed: int
+    index: int, seen: list[dict[int, int]], known: ColmapModel, pinhole: Camera, store: pycolmap.Database, seed: int
 ) -> Camera | None:
     """The camera whose view of the matched points fits best, if enough of them agree."""
     own, at = _keypoints(store, index), {}

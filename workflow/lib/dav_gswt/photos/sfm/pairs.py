@@ -19,12 +19,12 @@ NEXT = 2  # photos before and after a photo by name: flights are named in their 
 ALL = 20  # photos up to which every pair is matched
 
 
-def chosen(descriptors: list[UInt8[Array, "_ 128"]], neighbours: int, seed: int) -> list[tuple[int, int]]:
+def select_pairs(descriptors: list[UInt8[Array, "_ 128"]], neighbours: int, seed: int) -> list[tuple[int, int]]:
     """Pairs i < j of photos to match. neighbours: of each photo; every pair is taken where there are few photos."""
     count = len(descriptors)
     if count <= ALL or neighbours >= count - 1:
         return [(i, j) for i in range(count) for j in range(i + 1, count)]
-    alike = similarity(described(descriptors, seed))
+    alike = compare_descriptions(describe_photos(descriptors, seed))
     pairs = {(i, i + step) for step in range(1, NEXT + 1) for i in range(count - step)}
     for i in range(count):
         order = np.argsort(-alike[i], kind="stable")
@@ -34,7 +34,7 @@ def chosen(descriptors: list[UInt8[Array, "_ 128"]], neighbours: int, seed: int)
     return sorted(pairs | {(min(i, j), max(i, j)) for i, j in zip(tree.row.tolist(), tree.col.tolist(), strict=True)})
 
 
-def described(descriptors: list[UInt8[Array, "_ 128"]], seed: int) -> Float32[Array, "photos d"]:
+def describe_photos(descriptors: list[UInt8[Array, "_ 128"]], seed: int) -> Float32[Array, "photos d"]:
     """A unit vector for each photo; zero for one without features."""
     rng = np.random.default_rng(seed)
     some = [_rooted(_evenly(d, EACH)) for d in descriptors]
@@ -46,7 +46,7 @@ def described(descriptors: list[UInt8[Array, "_ 128"]], seed: int) -> Float32[Ar
     return np.stack([_aggregated(photo, words) for photo in some])
 
 
-def similarity(described: Float32[Array, "photos d"]) -> Float[Array, "photos photos"]:
+def compare_descriptions(described: Float32[Array, "photos d"]) -> Float[Array, "photos photos"]:
     """Cosines, -1 to 1."""
     return np.clip(described.astype(float) @ described.T.astype(float), -1, 1)
 

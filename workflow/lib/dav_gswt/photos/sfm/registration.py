@@ -21,10 +21,13 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.scene_frame import FocalLength
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos import exif, lenses, model
-from dav_gswt.photos.model import Model
-from dav_gswt.photos.sfm import features, focal, gps
-from dav_gswt.photos.sfm.gps import Positions
+from dav_gswt.photos import exif
+from dav_gswt.photos.colmap_model import ColmapModel, bundle_adjust, measure_parallax, model_from_reconstruction
+from dav_gswt.photos.exif import read_focal_length
+from dav_gswt.photos.lenses import undistort_photo
+from dav_gswt.photos.sfm.features import extract_features, match_photos, run_with_progress
+from dav_gswt.photos.sfm.focal_length import require_parallax, settle_focal_length
+from dav_gswt.photos.sfm.gps import GpsPositions, align_to_gps, read_gps_positions
 
 _log = logging.getLogger(__name__)
 
@@ -37,7 +40,7 @@ PRESETS = {
 
 
 @dataclass(frozen=True)
-class Options:
+class SfmOptions:
     """How structure from motion is run.
 
     size: longer side at which features are looked for, pixels. features: most of them in a photo. neighbours: photos
@@ -58,16 +61,16 @@ class Options:
     seed: int = 0
 
 
-def options_of(scene: dict, threads: int) -> Options:
+def choose_sfm_options(scene: dict, threads: int) -> SfmOptions:
     """The options that a scene's entry of the config asks for."""
     given = {"size": 1024} | PRESETS[scene.get("sfm", "quick")]
     given |= {key: scene[key] for key in ("mapper", "cameras", "focal") if key in scene}
     given["size"] = min(given["size"], max(1024, scene["size"]))
-    return Options(**given, side=scene["size"], threads=threads)
+    return SfmOptions(**given, side=scene["size"], threads=threads)
 
 
 @dataclass(frozen=True)
-class Registered:
+class Registration:
     """Photos that found their place. model: of the undistorted pictures, in an arbitrary world frame; in metres east,
     north and up of `positions` where the photos have any.
 
@@ -76,13 +79,13 @@ class Registered:
     reprojection error at the size at which features were looked for, pixels.
     """
 
-    model: Model
+    model: ColmapModel
     sources: tuple[Path, ...]
     lenses: tuple[pycolmap.Camera, ...]
     left_out: tuple[tuple[str, str], ...]
     focal: FocalLength | None
     error: float
-    positions: Positions | None = None
+    positions: GpsPositions | None = None
 
     @property
     def focal_ratio(self) -> float | None:
@@ -99,7 +102,7 @@ class _Photo:
     focal: float | None  # EXIF's, at that size
 
 
-def register(folder: Path | str, options: Options) -> Registered:
+def register_photos(folder: Path | str, options: SfmOptions) -> Registration:
     """Register the photos that lie in a folder.
 
     One radial distortion term a camera. Where EXIF has a focal length it is held, unless the photos fix it (see
@@ -112,14 +115,14 @@ def register(folder: Path | str, options: Options) -> Registered:
         names = " and ".join(p.name for p in paths)
         raise InputError(f"{folder}: only {names}; at least {LEAST_PHOTOS} overlapping photos are needed, better 20")
     photos = [_described(p, key, options) for p, key in zip(paths, _keys(paths), strict=True)]
-    positions = gps.of_photos(paths)
+    positions = read_gps_positions(paths)
     with tempfile.TemporaryDirectory(prefix="sfm-") as scratch:
         database = Path(scratch) / "database.db"
         _shrink(photos, Path(scratch))
         with closing(pycolmap.Database.open(database)) as store:
             held = _enter(photos, store, options)
-        features.find(len(photos), Path(scratch), database, options.size, options.features, options.threads)
-        features.match(len(photos), database, options.neighbours, options.threads, options.seed)
+        extract_features(len(photos), Path(scratch), database, options.size, options.features, options.threads)
+        match_photos(len(photos), database, options.neighbours, options.threads, options.seed)
         found = _map(len(photos), held, database, Path(scratch), options)
         best = max(found.values(), key=lambda r: (r.num_reg_images(), r.num_points3D()), default=None)
         left_out = _left_out(photos, best, database)
@@ -131,23 +134,23 @@ def register(folder: Path | str, options: Options) -> Registered:
         )
     for name, reason in left_out:
         _log.warning("%s is left out: %s", name, reason)
-    settled = focal.decided(best, held, np.random.default_rng(options.seed))
+    settled = settle_focal_length(best, held, np.random.default_rng(options.seed))
     _log.info("focal length: %s", settled.decision)
-    if positions and not gps.enter(best, {p.key: at for p, at in zip(photos, positions.at, strict=True)}):
+    if positions and not align_to_gps(best, {p.key: at for p, at in zip(photos, positions.at, strict=True)}):
         positions = None
     made = _undistortable(photos, best, left_out, settled, options, positions)
-    focal.refuse_one_spot(model.parallax(made.model))
+    require_parallax(measure_parallax(made.model))
     return made
 
 
-def undistorted(registered: Registered, index: int) -> Float32[Array, "h w 3"]:
+def undistort_image(registered: Registration, index: int) -> Float32[Array, "h w 3"]:
     """The picture of the model's image `index`: the photo as a pinhole camera would have taken it.
 
     The photo is shrunk by area means to the picture's resolution, then sampled (`lenses.undistorted`).
     """
     lens, camera = registered.lenses[index], registered.model.cameras[index]
     photo = image_files.shrink_image(image_files.read_photo(registered.sources[index]), lens.width, lens.height)
-    return lenses.undistorted(photo, lens, camera)
+    return undistort_photo(photo, lens, camera)
 
 
 def _keys(paths: list[Path]) -> list[str]:
@@ -161,15 +164,15 @@ def _fit(width: int, height: int, longest: int) -> tuple[int, int]:
     return max(1, round(width * share)), max(1, round(height * share))
 
 
-def _described(path: Path, key: str, options: Options) -> _Photo:
+def _described(path: Path, key: str, options: SfmOptions) -> _Photo:
     full = image_files.read_size(path)
     width, height = _fit(*full, options.size)
     given = options.focal and options.focal / exif.FILM_DIAGONAL * float(np.hypot(*full))
-    pixels = given or exif.focal_length(path)
+    pixels = given or read_focal_length(path)
     return _Photo(path, key, width, height, pixels and pixels * width / full[0])
 
 
-def _enter(photos: list[_Photo], store: pycolmap.Database, options: Options) -> dict[int, float]:
+def _enter(photos: list[_Photo], store: pycolmap.Database, options: SfmOptions) -> dict[int, float]:
     """Enter cameras and images, numbered in the photos' order; returns EXIF's focal length of those that have one."""
     cameras, held = {}, {}
     for i, photo in enumerate(photos):
@@ -202,7 +205,7 @@ def _shrink(photos: list[_Photo], folder: Path) -> None:
 
 
 def _map(
-    count: int, held: dict[int, float], database: Path, scratch: Path, options: Options
+    count: int, held: dict[int, float], database: Path, scratch: Path, options: SfmOptions
 ) -> dict[int, pycolmap.Reconstruction]:
     """Mapping; where only some cameras have a known focal length, those stay as they are until the end."""
     with closing(pycolmap.Database.open(database)) as store:
@@ -217,7 +220,7 @@ def _map(
     if mixed:
         choice.constant_cameras = set(held)
     placed = []
-    found = features.watched(
+    found = run_with_progress(
         lambda token: pycolmap.incremental_mapping(
             database,
             scratch,
@@ -232,11 +235,13 @@ def _map(
     )
     if mixed:
         for reconstruction in found.values():
-            model.adjust(reconstruction, refine_focal_length=False)
+            bundle_adjust(reconstruction, refine_focal_length=False)
     return found
 
 
-def _map_globally(known: bool, database: Path, scratch: Path, options: Options) -> dict[int, pycolmap.Reconstruction]:
+def _map_globally(
+    known: bool, database: Path, scratch: Path, options: SfmOptions
+) -> dict[int, pycolmap.Reconstruction]:
     """All photos at once. known: EXIF has focal lengths."""
     choice = pycolmap.GlobalPipelineOptions(num_threads=1, random_seed=options.seed)
     choice.mapper.num_threads = 1
@@ -274,9 +279,9 @@ def _undistortable(
     best: pycolmap.Reconstruction,
     left_out: tuple,
     settled: FocalLength,
-    options: Options,
-    positions: Positions | None,
-) -> Registered:
+    options: SfmOptions,
+    positions: GpsPositions | None,
+) -> Registration:
     """Bring cameras to the size of the pictures, and give each its pinhole."""
     by_key = {photo.key: photo for photo in photos}
     found, pinholes = {}, {}
@@ -288,9 +293,9 @@ def _undistortable(
             lens = pycolmap.Camera(image.camera.todict())
             lens.rescale(*_fit(*image_files.read_size(by_key[image.name].path), options.side))
             found[number], pinholes[number] = lens, pycolmap.undistort_camera(limits, lens)
-    sparse = model.of(best, pinholes=pinholes)
+    sparse = model_from_reconstruction(best, pinholes=pinholes)
     numbers = {best.images[i].name: best.images[i].camera_id for i in best.reg_image_ids()}
-    return Registered(
+    return Registration(
         sparse,
         tuple(by_key[name].path for name in sparse.names),
         tuple(found[numbers[name]] for name in sparse.names),

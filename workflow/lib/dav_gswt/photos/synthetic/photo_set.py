@@ -12,8 +12,7 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos import model
-from dav_gswt.photos.model import Model
+from dav_gswt.photos.colmap_model import ColmapModel, model_from_reconstruction, write_colmap_model
 from dav_gswt.photos.synthetic import renderer, truth
 from dav_gswt.photos.synthetic import scene as synthetic
 
@@ -41,7 +40,7 @@ def render_set(entry: dict, folder: Path) -> None:
         image_files.write_png(folder / "images" / name, synthetic.render(scene, camera))
         truth.write(folder / "truth" / Path(name).with_suffix(".exr"), scene, camera)
     found = triangulated(folder / "images", shots, entry["seed"])
-    model.write(with_cameras(found, tests), folder / "sparse")
+    write_colmap_model(with_cameras(found, tests), folder / "sparse")
     named = [name for name, _ in tests]
     groups = {group: tuple(named[i] for i in part) for group, part in synthetic.test_groups(entry).items()}
     frame = replace(
@@ -61,14 +60,14 @@ def _named(kind: str, views: list[Camera]) -> list[tuple[str, Camera]]:
     return [(f"{kind}_{i:0{digits}d}.png", camera) for i, camera in enumerate(views)]
 
 
-def triangulated(folder: Path, shots: list[tuple[str, Camera]], seed: int) -> Model:
+def triangulated(folder: Path, shots: list[tuple[str, Camera]], seed: int) -> ColmapModel:
     """Points where matched SIFT features of pictures with known cameras cross; cameras stay as they are.
 
     Up to ALL pictures every pair is matched, else those of `overlapping`.
     """
     names, cameras = (list(column) for column in zip(*shots, strict=True))
     none = np.zeros(0, int)
-    known = Model(
+    known = ColmapModel(
         tuple(names), tuple(cameras), np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2))
     )
     extraction = pycolmap.FeatureExtractionOptions(num_threads=1, use_gpu=False)
@@ -99,12 +98,12 @@ def triangulated(folder: Path, shots: list[tuple[str, Camera]], seed: int) -> Mo
             listed.write_text("".join(f"{names[i]} {names[j]}\n" for i, j in some), encoding="utf-8")
             choice = pycolmap.ImportedPairingOptions(match_list_path=listed)
             pycolmap.match_image_pairs(database, matching, choice, verification, pycolmap.Device.cpu)
-        model.write(known, sparse)
+        write_colmap_model(known, sparse)
         options = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=seed)
         stored = pycolmap.triangulate_points(
             pycolmap.Reconstruction(str(sparse)), database, folder, sparse, options=options
         )
-        return model.of(stored)
+        return model_from_reconstruction(stored)
 
 
 def overlapping(cameras: list[Camera], side: float = synthetic.EXEMPLAR) -> list[tuple[int, int]]:
@@ -129,7 +128,7 @@ def overlapping(cameras: list[Camera], side: float = synthetic.EXEMPLAR) -> list
     return sorted(pairs)
 
 
-def with_cameras(found: Model, more: list[tuple[str, Camera]]) -> Model:
+def with_cameras(found: ColmapModel, more: list[tuple[str, Camera]]) -> ColmapModel:
     """The model with further images that observe nothing, ordered by name as a model's images are."""
     named = sorted([*zip(found.names, found.cameras, strict=True), *more], key=lambda pair: pair[0])
     names = tuple(name for name, _ in named)

@@ -13,8 +13,7 @@ from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
-from dav_gswt.geometry import cameras
-from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.cameras import Camera, camera_from_json, camera_to_json
 from dav_gswt.images import image_files
 from dav_gswt.photos.synthetic import scene as synthetic
 
@@ -54,7 +53,7 @@ def _seen(scene: synthetic.Scene, camera: Camera) -> tuple[Float32[Array, "h w"]
 def write(path: Path | str, scene: synthetic.Scene, camera: Camera) -> None:
     """Write what the camera sees."""
     depth, label = seen(scene, camera)
-    header = {"labels": json.dumps(LABELS), "camera": json.dumps(cameras.to_json(camera))}
+    header = {"labels": json.dumps(LABELS), "camera": json.dumps(camera_to_json(camera))}
     image_files.write_exr(path, {"Z": depth, "label": label}, header)
 
 
@@ -62,6 +61,6 @@ def read(path: Path | str) -> tuple[Float32[Array, "h w"], Float32[Array, "h w"]
     """Depth, label and camera of a file that `write` wrote. Raises: InputError: not readable, or of another kind."""
     channels, header = image_files.read_exr(path)
     try:
-        return channels["Z"], channels["label"], cameras.from_json(json.loads(header["camera"]))
+        return channels["Z"], channels["label"], camera_from_json(json.loads(header["camera"]))
     except (KeyError, ValueError) as error:
         raise InputError(f"{path}: no depth, labels and camera of a synthetic picture ({error})") from error

@@ -14,7 +14,7 @@ from jaxtyping import Float, UInt8
 from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
 
-from dav_gswt.files import whole
+from dav_gswt.files import atomic_file
 from dav_gswt.logs import progress
 from dav_gswt.prior import dropout
 from dav_gswt.prior.networks import LATENT, TIMES, Network, make_schedule
@@ -172,7 +172,7 @@ def _save_checkpoint(
     for i, state in adam.state_dict()["state"].items():
         values |= {f"adam.{i}.{name}": v for name, v in state.items()}
     values["losses"] = torch.tensor(losses)
-    with whole(path) as temporary:
+    with atomic_file(path) as temporary:
         save_file({name: v.contiguous() for name, v in values.items()}, str(temporary))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction.fitting.photo_colours import median_colours, sampled
 
 GAIN = 1.6  # a photo brighter or darker than the set by more than this is left at the bound
@@ -43,7 +43,7 @@ def gain_offset(x: Float[Array, "n 3"], y: Float[Array, "n 3"]) -> tuple[Float32
     return a, b
 
 
-def levelled(views: list[View], points: Float[Array, "n 3"]) -> list[View]:
+def levelled(views: list[TrainingView], points: Float[Array, "n 3"]) -> list[TrainingView]:
     """The photos with their exposure brought to that of the set.
 
     Each photo is fitted to the median colour that the set gives the ground points it sees, three times over; the
@@ -60,7 +60,7 @@ def levelled(views: list[View], points: Float[Array, "n 3"]) -> list[View]:
     return views
 
 
-def matched(view: View, points: Float[Array, "n 3"], colours: Float[Array, "n 3"]) -> View:
+def matched(view: TrainingView, points: Float[Array, "n 3"], colours: Float[Array, "n 3"]) -> TrainingView:
     """A photo whose gain and offset bring it to known colours of points."""
     seen, _ = sampled(points, view)
     a, b = gain_offset(seen, colours)
@@ -80,7 +80,7 @@ class Levels:
     def __init__(self, views: int):
         self.gains, self.offsets = np.ones((views, 3), np.float32), np.zeros((views, 3), np.float32)
 
-    def look(self, index: int, picture: Float32[Array, "h w 3"], view: View) -> None:
+    def look(self, index: int, picture: Float32[Array, "h w 3"], view: TrainingView) -> None:
         """Learn of a photo's level from the picture of its place."""
         a, b = towards(picture, view, (self.gains[index], self.offsets[index]))
         self.gains[index] += LEARNT * (a - self.gains[index])
@@ -93,7 +93,7 @@ class Levels:
 
 
 def towards(
-    picture: Float32[Array, "h w 3"], view: View, before: tuple[Float32[Array, "3"], Float32[Array, "3"]]
+    picture: Float32[Array, "h w 3"], view: TrainingView, before: tuple[Float32[Array, "3"], Float32[Array, "3"]]
 ) -> tuple[Float32[Array, "3"], Float32[Array, "3"]]:
     """Gain a and offset b that bring a picture to its photo, least squares over the pixels that count and agree.
 

@@ -4,12 +4,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 
 CHUNK = 50_000  # points at a time: what stays in the cache of a small machine
 
 
-def sampled(points: Float[Array, "n 3"], view: View) -> tuple[Float32[Array, "n 3"], Bool[Array, "n"]]:
+def sampled(points: Float[Array, "n 3"], view: TrainingView) -> tuple[Float32[Array, "n 3"], Bool[Array, "n"]]:
     """The photo's colour at each point's pixel, and which points are inside the picture and count there."""
     pixel, depth = view.camera.project(points)
     x, y = pixel[:, 0], pixel[:, 1]
@@ -21,12 +21,14 @@ def sampled(points: Float[Array, "n 3"], view: View) -> tuple[Float32[Array, "n 
     return colours, inside
 
 
-def samples(points: Float[Array, "n 3"], views: list[View]) -> Float32[Array, "v n 3"]:
+def samples(points: Float[Array, "n 3"], views: list[TrainingView]) -> Float32[Array, "v n 3"]:
     """Every photo's colours of the points; NaN where it does not see them."""
     return np.stack([sampled(points, view)[0] for view in views])
 
 
-def median_colours(points: Float[Array, "n 3"], views: list[View]) -> tuple[Float32[Array, "n 3"], Bool[Array, "n"]]:
+def median_colours(
+    points: Float[Array, "n 3"], views: list[TrainingView]
+) -> tuple[Float32[Array, "n 3"], Bool[Array, "n"]]:
     """Median over the photos that see each point, and which points any photo sees (the others are NaN)."""
     colours = np.full((len(points), 3), np.nan, np.float32)
     for start in range(0, len(points), CHUNK):

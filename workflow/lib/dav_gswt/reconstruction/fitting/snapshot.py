@@ -14,7 +14,7 @@ import numpy as np
 from numpy import ndarray as Array
 
 import dav_gswt.reconstruction.fitting
-from dav_gswt.files import UNREADABLE, whole
+from dav_gswt.files import UNREADABLE, atomic_file
 
 _log = logging.getLogger(__name__)
 
@@ -49,7 +49,7 @@ class Keeper:
     def save(self, arrays: dict[str, Array], rest: dict) -> None:
         """Keep this moment; a snapshot that cannot be written costs the fit nothing."""
         try:
-            with whole(self.path) as part, part.open("wb") as file:
+            with atomic_file(self.path) as part, part.open("wb") as file:
                 np.savez(file, rest=np.frombuffer(json.dumps(rest).encode(), np.uint8), **arrays)
         except OSError as error:
             _log.warning("no snapshot of the fit: %s", error)

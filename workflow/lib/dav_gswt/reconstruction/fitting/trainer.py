@@ -18,8 +18,7 @@ from dav_gswt import raster
 from dav_gswt.field import SH0, GaussianField
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos import training_views as photos
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView, make_training_view
 from dav_gswt.reconstruction.fitting import densification, exposure, held_out, sh_degree, snapshot, state
 from dav_gswt.reconstruction.fitting import pose_refinement as poses
 from dav_gswt.reconstruction.fitting.constraints import Rules
@@ -69,8 +68,8 @@ class Run:
 class Task:
     """All that does not change."""
 
-    views: list[View]
-    halves: list[View]
+    views: list[TrainingView]
+    halves: list[TrainingView]
     held: list[Array] | None
     plan: Plan
     schedule: Schedule
@@ -80,7 +79,7 @@ class Task:
 
 def fit(
     field: GaussianField,
-    views: list[View],
+    views: list[TrainingView],
     plan: Plan,
     rules: Rules,
     rng: np.random.Generator,
@@ -113,7 +112,7 @@ def fit(
     return _ended(run, task, what)
 
 
-def _begun(field: GaussianField, views: list[View], plan: Plan, rng: np.random.Generator) -> Run:
+def _begun(field: GaussianField, views: list[TrainingView], plan: Plan, rng: np.random.Generator) -> Run:
     begun = state.of(field)
     if begun.sh_degree > plan.most_degree:
         begun.bend_to(plan.most_degree)
@@ -121,15 +120,15 @@ def _begun(field: GaussianField, views: list[View], plan: Plan, rng: np.random.G
     return Run(begun, Report(), rng, exposure.Levels(n), poses.Poses(n), Residual(), [])
 
 
-def _task(start: int, views: list[View], plan: Plan, rules: Rules, rng: np.random.Generator) -> Task:
+def _task(start: int, views: list[TrainingView], plan: Plan, rules: Rules, rng: np.random.Generator) -> Task:
     held = [held_out.mask(*v.image.shape[:2], rng) for v in views] if plan.degree == AUTO else None
     halves = [_half(v) for v in views] if plan.half_share else []
     return Task(views, halves, held, plan, Schedule(plan, start), rules, raster.Rasterizer())
 
 
-def _half(view: View) -> View:
+def _half(view: TrainingView) -> TrainingView:
     """A view at half its size."""
-    half = photos.of(view.name, view.camera, view.image, max(view.camera.width, view.camera.height) // 2)
+    half = make_training_view(view.name, view.camera, view.image, max(view.camera.width, view.camera.height) // 2)
     width, height = half.camera.width, half.camera.height
     weight = image_files.shrink_image(view.weight[..., None], width, height)[..., 0]
     rows, columns = ((np.arange(n) + 0.5) * of // n for n, of in zip((height, width), view.weight.shape, strict=True))
@@ -184,7 +183,7 @@ def _descend(run: Run, task: Task, index: int) -> None:
         run.poses.descend(index, gradients.camera, task.plan.pose_rate * task.schedule.rate(run.step), camera)
 
 
-def _behind(view: View, colour: Float32[Array, "3"]) -> Float32[Array, "h w 3"]:
+def _behind(view: TrainingView, colour: Float32[Array, "3"]) -> Float32[Array, "h w 3"]:
     """A colour, and the sky where the photo shows it."""
     if view.behind is None:
         return np.broadcast_to(colour, view.image.shape)
@@ -195,7 +194,7 @@ def _over(seen, behind: Float32[Array, "h w 3"]) -> Float32[Array, "h w 3"]:
     return seen.colour + (1 - seen.alpha)[..., None] * behind
 
 
-def _exposed(run: Run, index: int, seen, behind: Float32[Array, "h w 3"], view: View):
+def _exposed(run: Run, index: int, seen, behind: Float32[Array, "h w 3"], view: TrainingView):
     """The picture over its background, brought to the photo's exposure, and the gain."""
     image = _over(seen, behind)
     run.levels.look(index, image, view)
@@ -269,7 +268,7 @@ def _ended(run: Run, task: Task, what: str) -> Fitted:
     return Fitted(field, run.report)
 
 
-def _key(field: GaussianField, views: list[View], plan: Plan, rng: np.random.Generator) -> str:
+def _key(field: GaussianField, views: list[TrainingView], plan: Plan, rng: np.random.Generator) -> str:
     arrays = [a for v in views for a in (v.image, v.weight, v.behind, v.camera.rotation, v.camera.translation)]
     numbers = [(v.camera.fx, v.camera.fy, v.camera.cx, v.camera.cy) for v in views]
     return snapshot.key(*vars(field).values(), *arrays, numbers, plan, rng.bit_generator.state)

@@ -8,9 +8,9 @@ from jaxtyping import Float32, Float64
 from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
-from dav_gswt.geometry.poses import Pose, of_camera, place
+from dav_gswt.geometry.poses import Pose, pose_of_camera, pose_offset
 from dav_gswt.geometry.scene_frame import SceneFrame
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.study.calibration import controls, measures, truth
 from dav_gswt.views import prior_sampling
@@ -30,14 +30,14 @@ class CalibrationTarget:
     field: GaussianField
     grid: Ground
     frame: SceneFrame
-    taken: list[View]
+    taken: list[TrainingView]
     size: int
 
 
 def calibrate_scores(
     judged: CalibrationTarget,
     some: Candidates,
-    views: list[View],
+    views: list[TrainingView],
     scored: tuple[Scores, PoseMaps],
     lam: float,
     seed: int,
@@ -52,7 +52,7 @@ def calibrate_scores(
     row = {name: i for i, name in enumerate(scored[0].names)}
     terms, shown = _select_terms(*scored, [row[pose.name] for pose, _ in some], lam)
     terms |= geometric_baselines(
-        [pose for pose, _ in some], [of_camera("", v.camera, judged.frame) for v in judged.taken]
+        [pose for pose, _ in some], [pose_of_camera("", v.camera, judged.frame) for v in judged.taken]
     )
     if prior is not None and some:
         given = judged.field, judged.grid, some, judged.taken, judged.frame
@@ -72,7 +72,7 @@ def calibrate_scores(
 
 def choose_candidates(
     judged: CalibrationTarget, pool: Candidates, scored: Scores, given: dict, count: int
-) -> tuple[Candidates, list[View]]:
+) -> tuple[Candidates, list[TrainingView]]:
     """The candidates to compare, spread over those that were scored, and what they truly show.
 
     given: folders, `images` of photos and, where a scene can be rendered, `truth` (see `truth.write_truth`).
@@ -87,7 +87,7 @@ def choose_candidates(
 
 def geometric_baselines(some: list[Pose], taken: list[Pose]) -> dict[str, Float64[Array, "n"]]:
     """What any score has to beat: `low`, degrees under the zenith, and `far`, how far the nearest photo is."""
-    at, photos = (np.array([place(pose) for pose in poses]).reshape(-1, 3) for poses in (some, taken))
+    at, photos = (np.array([pose_offset(pose) for pose in poses]).reshape(-1, 3) for poses in (some, taken))
     apart = np.linalg.norm(at[:, None] - photos, axis=-1).min(1, initial=np.inf)
     return {"low": np.array([90.0 - pose.elevation for pose in some]), "far": apart}
 

@@ -10,7 +10,7 @@ from numpy import ndarray as Array
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files, metrics
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import render
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.views.scoring import ground_mask
@@ -27,7 +27,7 @@ Judgement = dict[str, float | None]
 
 
 def measure_errors(
-    field: GaussianField, grid: Ground, views: list[View], size: int, corrected: bool = False
+    field: GaussianField, grid: Ground, views: list[TrainingView], size: int, corrected: bool = False
 ) -> tuple[Float64[Array, "n"], list[Float32[Array, "_ _"]]]:
     """RMSE between what the field shows and the true views, over the pixels that look at the modelled exemplar.
 

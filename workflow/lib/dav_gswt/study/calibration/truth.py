@@ -8,12 +8,12 @@ from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
-from dav_gswt.geometry import poses
 from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.poses import select_farthest_poses
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos.synthetic import scene as synthetic
-from dav_gswt.photos.training_views import WHOLE, View
+from dav_gswt.photos.training_views import WHOLE, TrainingView
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.scoring import WIDTH, scoring_camera
 
@@ -22,7 +22,7 @@ from dav_gswt.views.scoring import WIDTH, scoring_camera
 FINE = 4
 
 
-def render_truth(scene: dict, pool: Candidates, images_folder: Path | str) -> Iterator[View]:
+def render_truth(scene: dict, pool: Candidates, images_folder: Path | str) -> Iterator[TrainingView]:
     """The photo of each candidate in turn, WIDTH pixels across, named by its pose; weight 0 where it is masked.
 
     scene: its entry in the config. Of agent `render` it is the photo that would be taken, drawn at most FINE times as
@@ -40,13 +40,13 @@ def render_truth(scene: dict, pool: Candidates, images_folder: Path | str) -> It
         raise InputError(f"agent {scene['agent']}: what candidates truly show is known of `render` and `replay` alone")
 
 
-def write_truth(folder: Path | str, views: Iterator[View]) -> None:
+def write_truth(folder: Path | str, views: Iterator[TrainingView]) -> None:
     """Keep what candidates show, as PNGs named by their poses."""
     for view in views:
         image_files.write_png(Path(folder) / f"{view.name}.png", view.image)
 
 
-def read_truth(pool: Candidates, folder: Path | str) -> tuple[Candidates, list[View]]:
+def read_truth(pool: Candidates, folder: Path | str) -> tuple[Candidates, list[TrainingView]]:
     """The candidates whose pictures `write_truth` kept, and these. Raises: InputError: a picture of another size."""
     some = [(pose, camera) for pose, camera in pool if (Path(folder) / f"{pose.name}.png").is_file()]
     found = []
@@ -57,13 +57,13 @@ def read_truth(pool: Candidates, folder: Path | str) -> tuple[Candidates, list[V
             raise InputError(
                 f"{path}: {image.shape[1]} x {image.shape[0]} pixels, not those of its pose; make it again"
             )
-        found.append(View(pose.name, camera, image, np.ones(image.shape[:2], np.float32)))
+        found.append(TrainingView(pose.name, camera, image, np.ones(image.shape[:2], np.float32)))
     return some, found
 
 
 def spread_candidates(pool: Candidates, count: int) -> Candidates:
     """`count` candidates, or all, evenly spread: each the farthest from those before, the first one first."""
-    return [pool[i] for i in poses.spread([pose for pose, _ in pool], count)]
+    return [pool[i] for i in select_farthest_poses([pose for pose, _ in pool], count)]
 
 
 def _render_camera(camera: Camera) -> Camera:
@@ -74,7 +74,7 @@ def _render_camera(camera: Camera) -> Camera:
 
 def _shrink_view(
     name: str, camera: Camera, image: Float32[Array, "h w 3"], cover: Float32[Array, "h w"] | None = None
-) -> View:
+) -> TrainingView:
     camera = scoring_camera(camera)
     size = camera.width, camera.height
     weight = (
@@ -82,4 +82,4 @@ def _shrink_view(
         if cover is None
         else image_files.shrink_image(cover[..., None], *size)[..., 0] > WHOLE
     )
-    return View(name, camera, image_files.shrink_image(image, *size), weight.astype(np.float32))
+    return TrainingView(name, camera, image_files.shrink_image(image, *size), weight.astype(np.float32))

@@ -2,14 +2,14 @@
 
 from pathlib import Path
 
-from dav_gswt.files import whole
+from dav_gswt.files import atomic_file
 from dav_gswt.study.comparison.tables import EVERY
 from dav_gswt.study.markdown import format_table
 
 
 def write_comparison(path: Path | str, compared: list[dict], baseline: str) -> None:
     """Write the table of `format_comparison`."""
-    with whole(path) as part:
+    with atomic_file(path) as part:
         part.write_text(format_comparison(compared, baseline), encoding="utf-8")
 
 

@@ -5,7 +5,7 @@ import shutil
 from pathlib import Path
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import whole_folder, write_json
+from dav_gswt.files import atomic_folder, write_json
 from dav_gswt.study.forced_choice import trials
 from dav_gswt.study.forced_choice.store import Drawn
 
@@ -24,7 +24,7 @@ def write(page: Path | str, key: Path | str, parts: Path, drawn: list[Drawn], se
     if not any(not pair.check for pair in drawn):
         raise InputError("perceptual_study: there is no pair to show; ask for `pairs` and `crops`")
     made = trials.key_of(drawn, seed)
-    with whole_folder(page) as part:
+    with atomic_folder(page) as part:
         for path in sorted(parts.iterdir()):
             shutil.copyfile(path, part / path.name)
         (part / PICTURES).mkdir()

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import read_json, whole_folder, write_json
+from dav_gswt.files import atomic_folder, read_json, write_json
 from dav_gswt.images import image_files
 from dav_gswt.study.forced_choice.pairs import CHECK, Item
 
@@ -29,7 +29,7 @@ class Drawn:
 
 def write(folder: Path | str, items: list[Item], origin: dict) -> None:
     """Write a scene's pairs; the folder appears whole or not at all. origin: its provenance."""
-    with whole_folder(folder) as part:
+    with atomic_folder(folder) as part:
         told = []
         for number, item in enumerate(items):
             for letter, half in zip("ab", item.halves, strict=True):

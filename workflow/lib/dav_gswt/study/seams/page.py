@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dav_gswt.files import whole
+from dav_gswt.files import atomic_file
 from dav_gswt.study.markdown import format_table
 from dav_gswt.study.seams.repetition import LAGS
 from dav_gswt.study.seams.summary import EVERY, MEASURES
@@ -29,7 +29,7 @@ surely lies above the floor.
 
 def write(path: Path | str, told: str) -> None:
     """The page's text as a file."""
-    with whole(path) as part:
+    with atomic_file(path) as part:
         part.write_text(told, encoding="utf-8")
 
 

@@ -15,7 +15,7 @@ from plyfile import PlyData
 from dav_gswt.bundle import chunks
 from dav_gswt.bundle.encoding import Encoding
 from dav_gswt.cli.log_filter import Narrator
-from dav_gswt.files import read_json, whole_folder, write_json
+from dav_gswt.files import atomic_folder, read_json, write_json
 from dav_gswt.images.lpips_weights import PATH as LPIPS
 from dav_gswt.study.stability.extremes import Extreme
 
@@ -30,7 +30,7 @@ def run_extreme(extreme: Extreme, root: Path, out: Path | str, cores: int, lpips
     A run that fails is an outcome like any other. lpips: its weights; without them LPIPS is left out.
     Returns the content of outcome.json.
     """
-    with TemporaryDirectory(prefix="stability-") as place, whole_folder(out) as part:
+    with TemporaryDirectory(prefix="stability-") as place, atomic_folder(out) as part:
         folder = Path(place)
         if extreme.prepare:
             extreme.prepare(folder)

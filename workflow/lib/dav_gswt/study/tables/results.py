@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt.files import whole
+from dav_gswt.files import atomic_file
 from dav_gswt.study.markdown import format_table
 from dav_gswt.study.statistics import two_sided_p
 from dav_gswt.study.tables import paper
@@ -42,7 +42,7 @@ TESTED = {"PSNR (dB)": ("psnr", 2), "Seam-LPIPS": ("seam_lpips", 4)}
 
 def write(path: Path | str, tables: dict[str, list[dict]], figures: dict[str, str]) -> None:
     """The page of `text`, as a file."""
-    with whole(path) as part:
+    with atomic_file(path) as part:
         part.write_text(text(tables, figures), encoding="utf-8")
 
 

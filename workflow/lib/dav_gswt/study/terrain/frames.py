@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt import provenance
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.logs import progress
+from dav_gswt.provenance import describe_machine
 from dav_gswt.study import csv_tables, figures
 from dav_gswt.study.tables import spread
 from dav_gswt.study.terrain import browser
@@ -130,7 +130,7 @@ def _row(asked: Asked, budget: int, times: dict[str, list[float]], counts: list[
 
 
 def _about(renderer: str, gl: str) -> dict:
-    return {"renderer": renderer, "gl": gl} | provenance.machine() | {"load": os.getloadavg()[0]}
+    return {"renderer": renderer, "gl": gl} | describe_machine() | {"load": os.getloadavg()[0]}
 
 
 def gathered(cells: list[dict], library: list[str], page: list[str]) -> list[dict]:

@@ -1,7 +1,7 @@
 """The page docs/research/results/auto.md: what `auto` chose, what fixed settings cost instead, and what was lost."""
 
-from dav_gswt import provenance
 from dav_gswt.files import read_json
+from dav_gswt.provenance import describe_machine
 from dav_gswt.study.markdown import format_table
 from dav_gswt.study.tradeoff.page import number
 from dav_gswt.study.tradeoff.tables import mean_square, measured, total
@@ -62,7 +62,7 @@ def _row(mine: dict, base: dict) -> dict:
     for key in ("photos", "gaussians", "levels", "bundle_mb", "peak_mb"):
         found |= {key: mine[key], f"fixed_{key}": base[key]}
     found |= {"target": met(found["saved"], **lost)}
-    return found | {"version": mine["version"], "renderer": mine["renderer"]} | provenance.machine()
+    return found | {"version": mine["version"], "renderer": mine["renderer"]} | describe_machine()
 
 
 def met(saved: float | None, loss_db: float | None, loss_lpips: float | None) -> int | None:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dav_gswt.files import whole
+from dav_gswt.files import atomic_file
 from dav_gswt.study.markdown import format_table
 from dav_gswt.study.tradeoff.settings import PRESET
 from dav_gswt.study.tradeoff.tables import UNITS
@@ -19,7 +19,7 @@ WHAT = {
 
 def write(path: Path | str, text: str) -> None:
     """A page, whole or not at all."""
-    with whole(path) as part:
+    with atomic_file(path) as part:
         part.write_text(text, encoding="utf-8")
 
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt import provenance
 from dav_gswt.images import image_files
 from dav_gswt.images.metrics import mse_to_psnr
+from dav_gswt.provenance import describe_machine
 from dav_gswt.study import csv_tables
 from dav_gswt.study.sweeps import tables as sweeps
 from dav_gswt.study.sweeps.grid import CELL
@@ -37,7 +37,7 @@ def rows(cells: list[dict]) -> list[dict]:
             best[cell["knob"]] = cell | told
         about = {key: cell[key] for key in ("knob", "setting", "measure")}
         about |= {key: int(cell[key]) for key in ("most", "base")}
-        found.append(about | told | _lost(cell | told, best[cell["knob"]]) | provenance.machine())
+        found.append(about | told | _lost(cell | told, best[cell["knob"]]) | describe_machine())
     return found
 
 

@@ -15,7 +15,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import metrics
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import render
 from dav_gswt.reconstruction.build import modelled
 from dav_gswt.reconstruction.ground import Ground
@@ -86,7 +86,7 @@ def choose_test_views(first: dict, key: str, named: str = "round 0") -> dict[str
     return {rows[i]["view"]: why for i, why in whys.items()}
 
 
-def build_strips(rounds: list[Round], tests: list[View], key: str) -> list[Strip]:
+def build_strips(rounds: list[Round], tests: list[TrainingView], key: str) -> list[Strip]:
     """Return the chosen test views after each round; the first round is round 0. key: see `psnr_key`.
 
     Raises: InputError: a round's metrics lack the view.
@@ -100,7 +100,7 @@ def build_strips(rounds: list[Round], tests: list[View], key: str) -> list[Strip
     return found
 
 
-def render_view(one: Round, view: View, key: str) -> Look:
+def render_view(one: Round, view: TrainingView, key: str) -> Look:
     """The view after a round, its colours corrected where its PSNR is that of corrected ones."""
     row = next((row for row in one.metrics["test_views"] if row["view"] == view.name), None)
     if row is None:

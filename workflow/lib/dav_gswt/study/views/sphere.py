@@ -14,7 +14,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.geometry.poses import Pose, of_camera
+from dav_gswt.geometry.poses import Pose, pose_of_camera
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.study import figures
 from dav_gswt.views.policies import uncertainty
@@ -75,7 +75,7 @@ def read_round(number: int, scores: Scores, asked: dict, taken: list[Camera], fr
 
     Raises: InputError: a pose was chosen that is not among the candidates.
     """
-    photos = [of_camera("", camera, frame) for camera in taken]
+    photos = [pose_of_camera("", camera, frame) for camera in taken]
     index = {name: i for i, name in enumerate(scores.names)}
     names = [pose["name"] for pose in asked["poses"]]
     if strange := [name for name in names if name not in index]:

@@ -12,7 +12,8 @@ from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.scene_frame import FocalLength
-from dav_gswt.photos import ground_frame, model
+from dav_gswt.photos.colmap_model import bundle_adjust
+from dav_gswt.photos.ground_frame import fit_plane
 
 OBLIQUE = 20.0  # degrees off the vertical from which a view helps to fix the focal length
 LEAST_OBLIQUE = 3  # such views, and
@@ -22,7 +23,7 @@ LENSES = 0.35, 6.0  # focal length in longer sides of the picture: a fisheye's t
 LEAST_ANGLE = 2.0  # degrees, median over the points of the widest angle under which photos see them
 
 
-def decided(best: pycolmap.Reconstruction, held: dict[int, float], rng: np.random.Generator) -> FocalLength:
+def settle_focal_length(best: pycolmap.Reconstruction, held: dict[int, float], rng: np.random.Generator) -> FocalLength:
     """Settle the focal length of a reconstruction, in place. held: EXIF's by camera, kept so far.
 
     Raises: InputError: a solution that no lens gives, or photos from one spot.
@@ -59,7 +60,7 @@ def decided(best: pycolmap.Reconstruction, held: dict[int, float], rng: np.rando
     )
 
 
-def refuse_one_spot(spread: Float[Array, "n"]) -> None:
+def require_parallax(spread: Float[Array, "n"]) -> None:
     """spread: 1 - cos of the angle under which each point is seen. Raises: InputError: photos without parallax."""
     if len(spread) and np.degrees(np.arccos(1 - np.clip(np.median(spread), 0, 2))) < LEAST_ANGLE:
         raise InputError(
@@ -71,7 +72,7 @@ def refuse_one_spot(spread: Float[Array, "n"]) -> None:
 def _tilts(best: pycolmap.Reconstruction, rng: np.random.Generator) -> Float[Array, "n"]:
     """Degrees between each view and the normal of the points' plane."""
     points = np.array([p.xyz for p in best.points3D.values()])
-    normal, _, _ = ground_frame.plane(points, rng)
+    normal, _, _ = fit_plane(points, rng)
     forward = np.stack([best.images[i].cam_from_world().rotation.matrix()[2] for i in best.reg_image_ids()])
     return np.degrees(np.arccos(np.clip(np.abs(forward @ normal), 0, 1)))
 
@@ -79,7 +80,7 @@ def _tilts(best: pycolmap.Reconstruction, rng: np.random.Generator) -> Float[Arr
 def _adjusted(best: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
     """A copy whose focal lengths are free."""
     copy = pycolmap.Reconstruction(best)
-    model.adjust(copy, refine_focal_length=True)
+    bundle_adjust(copy, refine_focal_length=True)
     return copy
 
 

@@ -16,7 +16,8 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.photos.importers import lens_models
-from dav_gswt.photos.importers.imported_model import Given, Shot
+from dav_gswt.photos.importers.imported_model import ImportedImage, ImportedModel
+from dav_gswt.photos.importers.lens_models import fit_camera_to_photo
 
 _log = logging.getLogger(__name__)
 
@@ -24,7 +25,7 @@ MOST_FILES = 200_000  # looked through for photos
 
 
 @dataclass(frozen=True)
-class Placed:
+class MatchedPhoto:
     """A photo and its place. lens: upright, at the photo's size. index: of the shot in the model.
 
     turns: quarter turns clockwise from the picture that the model speaks of to the upright one; rotation and
@@ -40,7 +41,7 @@ class Placed:
     translation: Float[Array, "3"]
 
 
-class Folder:
+class PhotoFolder:
     """The photos below a folder, by their path relative to it, by file name and by stem."""
 
     def __init__(self, folder: Path):
@@ -79,7 +80,9 @@ class Folder:
         return None if found is None else _stored(self.photos[found])[:2]
 
 
-def placed(given: Given, folder: Folder, source: Path) -> tuple[list[Placed], tuple[tuple[str, str], ...]]:
+def match_photos_to_images(
+    given: ImportedModel, folder: PhotoFolder, source: Path
+) -> tuple[list[MatchedPhoto], tuple[tuple[str, str], ...]]:
     """The photos that have a camera, by their pictures' names; and the others, and images without photo, with reasons.
 
     Photos without a camera are told where another photo of the same folder has one.
@@ -134,11 +137,11 @@ def _keys(names: list[str]) -> dict[str, str]:
     return keys
 
 
-def _place(shot: Shot, index: int, path: Path, key: str, source: Path) -> Placed:
+def _place(shot: ImportedImage, index: int, path: Path, key: str, source: Path) -> MatchedPhoto:
     width, height, orientation = _stored(path)
-    lens, turns = lens_models.fitted(shot.lens, (width, height), orientation, f"{source}: {shot.name}")
+    lens, turns = fit_camera_to_photo(shot.lens, (width, height), orientation, f"{source}: {shot.name}")
     turn = np.linalg.matrix_power(lens_models.QUARTER, turns)
-    return Placed(path, key, index, lens, turns, turn @ shot.rotation, turn @ shot.translation)
+    return MatchedPhoto(path, key, index, lens, turns, turn @ shot.rotation, turn @ shot.translation)
 
 
 def _stored(path: Path) -> tuple[int, int, int]:

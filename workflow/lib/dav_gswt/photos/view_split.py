@@ -9,7 +9,7 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import SceneFrame
-from dav_gswt.photos.model import Model, shared_points
+from dav_gswt.photos.colmap_model import ColmapModel, count_shared_points
 
 _log = logging.getLogger(__name__)
 
@@ -23,8 +23,8 @@ LINK = 30  # points that a start view shares with one chosen before: enough to f
 Bounds = tuple[float, float, float, float]  # west, south, east, north
 
 
-def split(
-    model: Model, frame: SceneFrame, start: int, rng: np.random.Generator, whole: bool = False
+def split_views(
+    model: ColmapModel, frame: SceneFrame, start: int, rng: np.random.Generator, whole: bool = False
 ) -> dict[str, list[str]]:
     """Names of the start views, the pool and the test views.
 
@@ -36,21 +36,21 @@ def split(
     Raises: InputError: ground.json names a test view that is no image, or no view is left to start from.
     """
     given = _given_test(model, frame)
-    ground = bounds(frame, whole)
-    sees = [i for i, camera in enumerate(model.cameras) if sight(camera, ground) >= LEAST_SIGHT]
+    ground = ground_bounds(frame, whole)
+    sees = [i for i, camera in enumerate(model.cameras) if measure_visible_share(camera, ground) >= LEAST_SIGHT]
     among = sees if len(sees) >= start + LEAST_TEST else list(range(len(model.names)))
-    test = given if given is not None else test_views(model, ground, among)
+    test = given if given is not None else choose_test_views(model, ground, among)
     others = [i for i in among if i not in test]
     if not others:
         raise InputError("every image is a test view; leave some to start from")
     if len(among) < len(model.names):
         _log.info("%d of %d images see enough of the ground in question to take part", len(among), len(model.names))
-    first = start_views(model, others, start, rng)
+    first = choose_start_views(model, others, start, rng)
     pool = [i for i in others if i not in first]
     return {key: [model.names[i] for i in part] for key, part in (("start", first), ("pool", pool), ("test", test))}
 
 
-def test_views(model: Model, ground: Bounds, among: list[int]) -> list[int]:
+def choose_test_views(model: ColmapModel, ground: Bounds, among: list[int]) -> list[int]:
     """About one image in ten, at least two, spread and over the ground; none of fewer than LEAST_WITH_TEST.
 
     Only images that look at the inner half of the ground (by area) are considered, if there are enough: at the border
@@ -61,7 +61,7 @@ def test_views(model: Model, ground: Bounds, among: list[int]) -> list[int]:
         return []
     count = max(LEAST_TEST, round(TEST_SHARE * len(among)))
     low, high = np.reshape(ground, (2, 2))
-    aims = np.stack([aim(camera) for camera in model.cameras])
+    aims = np.stack([find_aim_point(camera) for camera in model.cameras])
     off = (np.abs(aims - (low + high) / 2) / (high - low)).max(1)
     inner = [i for i in among if off[i] <= 0.5 * 0.5**0.5]
     if len(inner) < 2 * count:
@@ -72,13 +72,13 @@ def test_views(model: Model, ground: Bounds, among: list[int]) -> list[int]:
     return sorted(chosen)
 
 
-def start_views(model: Model, among: list[int], count: int, rng: np.random.Generator) -> list[int]:
+def choose_start_views(model: ColmapModel, among: list[int], count: int, rng: np.random.Generator) -> list[int]:
     """A connected, spread set of images: a random first, then again and again the one farthest from those chosen.
 
     Considered are images that share at least LINK points with one chosen; where there is none, those that share most.
     Distances are between the positions of the cameras.
     """
-    shared = shared_points(model)
+    shared = count_shared_points(model)
     centres = np.stack([camera.centre for camera in model.cameras])
     linked = [i for i in among if (shared[i, [j for j in among if j != i]] >= LINK).any()]
     chosen = [int(rng.choice(linked or among))]
@@ -93,7 +93,7 @@ def start_views(model: Model, among: list[int], count: int, rng: np.random.Gener
     return chosen
 
 
-def bounds(frame: SceneFrame, whole: bool) -> Bounds:
+def ground_bounds(frame: SceneFrame, whole: bool) -> Bounds:
     """The exemplar, or all ground that the photos see."""
     if whole:
         extent = frame.extent
@@ -102,7 +102,7 @@ def bounds(frame: SceneFrame, whole: bool) -> Bounds:
     return square.west, square.south, square.east, square.north
 
 
-def sight(camera: Camera, ground: Bounds, grid: int = 16) -> float:
+def measure_visible_share(camera: Camera, ground: Bounds, grid: int = 16) -> float:
     """The share of the ground between these bounds that a camera sees."""
     (west, south, east, north), at = ground, (np.arange(grid) + 0.5) / grid
     x, y = np.meshgrid(west + at * (east - west), south + at * (north - south))
@@ -111,7 +111,7 @@ def sight(camera: Camera, ground: Bounds, grid: int = 16) -> float:
     return float((inside & (depth > 0)).mean())
 
 
-def aim(camera: Camera) -> Float[Array, "2"]:
+def find_aim_point(camera: Camera) -> Float[Array, "2"]:
     """Where the middle of a picture looks on the plane z = 0; under the camera where it looks to the sky."""
     forward, centre = camera.forward, camera.centre
     if forward[2] > -0.1:
@@ -124,7 +124,7 @@ def _farthest(places: Float[Array, "n d"], among: list[int], chosen: list[int]) 
     return int(among[int(apart.argmax())])
 
 
-def _given_test(model: Model, frame: SceneFrame) -> list[int] | None:
+def _given_test(model: ColmapModel, frame: SceneFrame) -> list[int] | None:
     if frame.test is None:
         return None
     if unknown := [name for name in frame.test if name not in model.names]:

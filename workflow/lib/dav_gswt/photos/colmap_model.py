@@ -20,7 +20,7 @@ LEAST_ANGLE = 1.5  # degrees between two rays, below which their crossing says n
 
 
 @dataclass(frozen=True)
-class Model:
+class ColmapModel:
     """n points seen m times by named pinhole cameras.
 
     colours: sRGB in [0, 1]. Observation k says that image image_of[k] sees point point_of[k] at pixels[k]; observations
@@ -42,14 +42,14 @@ class Model:
         return self.cameras[self.names.index(name)]
 
 
-def adjust(stored: pycolmap.Reconstruction, refine_focal_length: bool) -> None:
+def bundle_adjust(stored: pycolmap.Reconstruction, refine_focal_length: bool) -> None:
     """Bundle adjustment in one thread, in place; the world's frame is held by two cameras."""
     options, config = _adjustment(stored, refine_focal_length, lenses=True)
     config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
     pycolmap.create_default_bundle_adjuster(options, config, stored).solve()
 
 
-def adjust_with_priors(stored: pycolmap.Reconstruction, priors: list[pycolmap.PosePrior]) -> None:
+def bundle_adjust_with_priors(stored: pycolmap.Reconstruction, priors: list[pycolmap.PosePrior]) -> None:
     """Bundle adjustment with positions of cameras, their outliers held back, in one thread, in place; lenses stay."""
     options, config = _adjustment(stored, refine_focal_length=False, lenses=False)
     robust = pycolmap.PosePriorBundleAdjustmentOptions()
@@ -69,7 +69,9 @@ def _adjustment(stored: pycolmap.Reconstruction, refine_focal_length: bool, lens
     return options, config
 
 
-def similar(model: Model, scale: float, rotation: Float[Array, "3 3"], shift: Float[Array, "3"]) -> Model:
+def transform_model(
+    model: ColmapModel, scale: float, rotation: Float[Array, "3 3"], shift: Float[Array, "3"]
+) -> ColmapModel:
     """The model in another world frame: p becomes scale * rotation @ p + shift; the pictures stay as they are."""
 
     def moved(camera: Camera) -> Camera:
@@ -79,7 +81,7 @@ def similar(model: Model, scale: float, rotation: Float[Array, "3 3"], shift: Fl
     return replace(model, cameras=tuple(map(moved, model.cameras)), points=scale * model.points @ rotation.T + shift)
 
 
-def errors(model: Model) -> Float[Array, "m"]:
+def reprojection_errors(model: ColmapModel) -> Float[Array, "m"]:
     """Distance in pixels of every observation from its point's projection; infinite behind the camera."""
     distance = np.full(len(model.pixels), np.inf)
     for i, camera in enumerate(model.cameras):
@@ -89,26 +91,26 @@ def errors(model: Model) -> Float[Array, "m"]:
     return distance
 
 
-def shared_points(model: Model) -> Int[Array, "images images"]:
+def count_shared_points(model: ColmapModel) -> Int[Array, "images images"]:
     """How many points each pair of images sees in common; on the diagonal, how many each sees."""
     sees = np.zeros((len(model.names), len(model.points)), np.float32)  # sums of ones: exact below 2^24
     sees[model.image_of, model.point_of] = 1
     return np.rint(sees @ sees.T).astype(int)
 
 
-def points_seen_by(
-    model: Model, names: Sequence[str], photos: Path | str | None = None, at_least: int = 2
+def triangulate_points(
+    model: ColmapModel, names: Sequence[str], photos: Path | str | None = None, at_least: int = 2
 ) -> tuple[Float[Array, "n 3"], Float32[Array, "n 3"]]:
     """Points and their colours as structure from motion would know them from the named images alone.
 
     The points are those of `triangulated`. Colours are means over the named images in the folder `photos`; without it
     they are mid-grey, since the model's own colours come from images that may not be captured yet.
     """
-    part = triangulated(model, names, at_least)
+    part = triangulate_model(model, names, at_least)
     return part.points, part.colours if photos is None else _colours(part, Path(photos))
 
 
-def triangulated(model: Model, names: Sequence[str], at_least: int = 2) -> Model:
+def triangulate_model(model: ColmapModel, names: Sequence[str], at_least: int = 2) -> ColmapModel:
     """The model of the named images alone, its points found anew from what these see; colours are mid-grey.
 
     A point is the one nearest to its rays in the sense of least squares, sum_i |(I - d_i d_i^T)(p - c_i)|^2 over ray
@@ -127,16 +129,16 @@ def triangulated(model: Model, names: Sequence[str], at_least: int = 2) -> Model
     points, spread = _crossings(part)
     part = replace(part, points=points)
     good = spread >= 1 - np.cos(np.radians(LEAST_ANGLE))
-    np.logical_and.at(good, part.point_of, errors(part) <= WORST_ERROR)
+    np.logical_and.at(good, part.point_of, reprojection_errors(part) <= WORST_ERROR)
     return _with_points(part, good)
 
 
-def parallax(model: Model) -> Float[Array, "n"]:
+def measure_parallax(model: ColmapModel) -> Float[Array, "n"]:
     """1 - cos of the angle under which each point is seen: see `_crossings`."""
     return _crossings(model)[1]
 
 
-def _crossings(model: Model) -> tuple[Float[Array, "n 3"], Float[Array, "n"]]:
+def _crossings(model: ColmapModel) -> tuple[Float[Array, "n 3"], Float[Array, "n"]]:
     """The points nearest to their rays, and how well the rays fix them.
 
     The second is the least eigenvalue of sum_i (I - d_i d_i^T): for two rays at angle a it is 1 - cos a, 0 where all
@@ -168,7 +170,7 @@ def _directions(camera: Camera, pixels: Float[Array, "k 2"]) -> Float[Array, "k 
     return rays @ camera.rotation
 
 
-def _with_images(model: Model, kept: list[int]) -> Model:
+def _with_images(model: ColmapModel, kept: list[int]) -> ColmapModel:
     """The model of some of its images; all points stay."""
     number = np.full(len(model.names), -1)
     number[kept] = np.arange(len(kept))
@@ -183,7 +185,7 @@ def _with_images(model: Model, kept: list[int]) -> Model:
     )
 
 
-def _with_points(model: Model, kept: Bool[Array, "n"]) -> Model:
+def _with_points(model: ColmapModel, kept: Bool[Array, "n"]) -> ColmapModel:
     """The model of some of its points; all images stay."""
     own = kept[model.point_of]
     return replace(
@@ -196,7 +198,7 @@ def _with_points(model: Model, kept: Bool[Array, "n"]) -> Model:
     )
 
 
-def _colours(model: Model, photos: Path) -> Float32[Array, "n 3"]:
+def _colours(model: ColmapModel, photos: Path) -> Float32[Array, "n 3"]:
     """Every point's mean colour over the pixels that see it."""
     total = np.zeros((len(model.points), 3))
     for i, name in enumerate(model.names):
@@ -208,7 +210,7 @@ def _colours(model: Model, photos: Path) -> Float32[Array, "n 3"]:
     return (total / np.maximum(count, 1)[:, None]).astype(np.float32)
 
 
-def read(folder: Path | str) -> Model:
+def read_colmap_model(folder: Path | str) -> ColmapModel:
     """Read a COLMAP model of pinhole cameras, its images by name. Raises: InputError: missing, damaged, no pinhole."""
     try:
         stored = pycolmap.Reconstruction(str(folder))
@@ -217,14 +219,14 @@ def read(folder: Path | str) -> Model:
     for camera in stored.cameras.values():
         if camera.model_name not in ("PINHOLE", "SIMPLE_PINHOLE"):
             raise InputError(f"{folder}: its cameras are {camera.model_name}; undistort the images to PINHOLE first")
-    return of(stored)
+    return model_from_reconstruction(stored)
 
 
-def of(
+def model_from_reconstruction(
     stored: pycolmap.Reconstruction,
     names: Mapping[str, str] | None = None,
     pinholes: Mapping[int, pycolmap.Camera] | None = None,
-) -> Model:
+) -> ColmapModel:
     """Arrays of a reconstruction, its images ordered by name.
 
     names: what images are called from here on. pinholes: by the number of a camera the undistorted one that takes its
@@ -248,7 +250,7 @@ def of(
     point_of, image_of = np.concatenate(numbers or [np.zeros(0, int)]), np.concatenate(owners or [np.zeros(0, int)])
     order = np.lexsort((image_of, point_of))
     points = [stored.points3D[i] for i in ids]
-    return Model(
+    return ColmapModel(
         tuple(label for label, _ in found),
         tuple(cameras),
         np.array([p.xyz for p in points]).reshape(-1, 3),
@@ -273,7 +275,7 @@ def _camera(camera: pycolmap.Camera, pose: pycolmap.Rigid3d) -> Camera:
     )
 
 
-def write(model: Model, folder: Path | str) -> None:
+def write_colmap_model(model: ColmapModel, folder: Path | str) -> None:
     """Write a COLMAP model (binary) into an existing folder; images are numbered from 1 in the model's order."""
     stored = pycolmap.Reconstruction()
     numbers: dict[tuple, int] = {}
