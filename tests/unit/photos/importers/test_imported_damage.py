@@ -15,6 +15,8 @@ from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.photos import importers
 from dav_gswt.photos.importers import import_model
+from dav_gswt.photos.importers.colmap import import_colmap
+from dav_gswt.photos.importers.photo_matching import PhotoFolder
 
 
 @pytest.fixture(scope="module")
@@ -267,7 +269,7 @@ def test_whatever_bytes_change_there_is_a_model_or_one_message(photos, tmp_path,
     content[place : place + len(new)] = new[: len(content) - place]
     folder = write_binary(tmp_path / "m", binary | {file: bytes(content)})
     try:
-        found = importers.colmap.read(folder, photos)
+        found = import_colmap(folder, photos)
     except InputError as error:
         assert ".bin: " in str(error)
     else:
@@ -282,7 +284,7 @@ def test_whatever_text_changes_there_is_a_model_or_one_message(photos, tmp_path,
     path = tmp_path / "some.json"
     path.write_text(text[:place] + new + text[place + len(new) :], encoding="utf-8", errors="replace")
     try:
-        found = importers._given(path, importers.pictures.Folder(photos))
+        found = importers._given(path, PhotoFolder(photos))
     except InputError as error:
         assert "some.json" in str(error)
     else:

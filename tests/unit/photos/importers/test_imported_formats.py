@@ -6,8 +6,9 @@ import pytest
 import test_imported_models as made
 from plyfile import PlyData, PlyElement
 
-from dav_gswt.photos import importers
 from dav_gswt.photos.importers import import_model
+from dav_gswt.photos.importers.colmap import import_colmap
+from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
 from dav_gswt.photos.importers.photo_matching import PhotoFolder
 
 
@@ -41,7 +42,7 @@ def test_frames_may_have_intrinsics_of_their_own_and_a_field_of_view_instead(pho
     values = made.transforms()
     angle = 2 * np.arctan(0.5 * made.WIDTH / 310.0)
     values["frames"][3] |= {"camera_angle_x": angle, "fl_y": 311.0, "cx": 150.0, "k1": 0.0, "camera_model": "OPENCV"}
-    given = importers.nerfstudio.read(tmp_path / "t.json", values, photos, PhotoFolder(photos).stored_size)
+    given = import_nerfstudio(tmp_path / "t.json", values, photos, PhotoFolder(photos).stored_size)
     assert given.shots[3].lens.params == pytest.approx(
         np.array([310, 311, 150, *made.NUMBERS[3:4], 0, *made.NUMBERS[5:]])
     )
@@ -55,7 +56,7 @@ def test_a_file_without_sizes_takes_those_of_the_photos(photos, tmp_path):
     }
     for frame in values["frames"]:
         frame["file_path"] = "./train/" + frame["file_path"].removesuffix(".png")  # Blender's scenes name no suffix
-    given = importers.nerfstudio.read(tmp_path / "t.json", values, photos, PhotoFolder(photos).stored_size)
+    given = import_nerfstudio(tmp_path / "t.json", values, photos, PhotoFolder(photos).stored_size)
     assert given.shots[0].lens.model_name == "PINHOLE"
     assert given.shots[0].lens.params == pytest.approx(np.array([300, 300, made.WIDTH / 2, made.HEIGHT / 2]))
     assert given.shots[4].translation == pytest.approx(made.SCENE.translations[4])
@@ -68,7 +69,7 @@ def test_an_applied_scale_is_undone_too(photos, tmp_path):
         matrix[:3, 3] *= 2.5
         frame["transform_matrix"] = matrix.tolist()
     values["applied_scale"] = 2.5
-    given = importers.nerfstudio.read(tmp_path / "t.json", values, photos, PhotoFolder(photos).stored_size)
+    given = import_nerfstudio(tmp_path / "t.json", values, photos, PhotoFolder(photos).stored_size)
     assert np.array([s.translation for s in given.shots]) == pytest.approx(made.SCENE.translations)
 
 
@@ -82,7 +83,7 @@ def test_points_beside_transforms_are_brought_into_the_cameras_world(photos, tmp
     rows["red"], rows["green"], rows["blue"] = 51, 102, 204
     PlyData([PlyElement.describe(rows, "vertex")], text=text).write(str(tmp_path / "sparse_pc.ply"))
     values = made.transforms() | {"ply_file_path": "sparse_pc.ply"}
-    given = importers.nerfstudio.read(tmp_path / "t.json", values, photos, PhotoFolder(photos).stored_size)
+    given = import_nerfstudio(tmp_path / "t.json", values, photos, PhotoFolder(photos).stored_size)
     assert given.points == pytest.approx(made.SCENE.points, abs=1e-5)
     assert given.colours[0] == pytest.approx([0.2, 0.4, 0.8], abs=1e-6)
 
@@ -114,7 +115,7 @@ def test_a_rig_of_cameras_is_read_by_its_images(photos, tmp_path):
         stored.register_frame(i + 1)
     (tmp_path / "b").mkdir()
     stored.write_binary(str(tmp_path / "b"))
-    given = importers.colmap.read(tmp_path / "b", photos)
+    given = import_colmap(tmp_path / "b", photos)
     by_name = {s.name: s for s in given.shots}
     for i in range(4):
         t = made.SCENE.translations[2 * i]
