@@ -6,7 +6,7 @@ from pathlib import Path
 import jinja2
 import pandas as pd
 
-from dav_gswt.files import whole
+from dav_gswt.files import atomic_file
 
 
 def format_table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
@@ -27,7 +27,7 @@ def render_template(template: Path | str, values: dict) -> str:
 
 def write_page(path: Path | str, text: str) -> None:
     """Write a page, whole or not at all."""
-    with whole(path) as part:
+    with atomic_file(path) as part:
         part.write_text(text, encoding="utf-8")
 
 
