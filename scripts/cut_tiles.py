@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from dav_gswt import provenance
 from dav_gswt.images import lpips_weights
 from dav_gswt.lod import store as levels
 from dav_gswt.logs import logging_to
+from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction import top_view
 from dav_gswt.tiles import build, semantics, store
 from dav_gswt.tiles.layout import Exemplar
@@ -23,4 +23,4 @@ with logging_to(snakemake.log[0]):
     tiles = build.cut_tiles(fields, exemplar, above.known_colour(), above.uncertainty, options, rng)
     inputs = {f"level{number}": Path(given.levels, f"level{number}.ply") for number in range(len(fields))}
     inputs |= {name: given[name] for name in ("lpips", "sam2") if given.get(name)}
-    store.write_tiles(tiles, snakemake.output.tiles, snakemake.output.seams, provenance.of(inputs, dict(seam)))
+    store.write_tiles(tiles, snakemake.output.tiles, snakemake.output.seams, record_provenance(inputs, dict(seam)))

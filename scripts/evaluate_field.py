@@ -1,20 +1,20 @@
 """Rules evaluate_coarse and evaluate_round: what the test photos say about a field."""
 
-from dav_gswt import provenance
 from dav_gswt.field import read_field
 from dav_gswt.files import read_json, write_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import lpips_weights
 from dav_gswt.logs import logging_to
-from dav_gswt.photos import training_views
 from dav_gswt.photos.capture_record import read_capture_record
+from dav_gswt.photos.training_views import read_training_views
+from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction import build, evaluation, ground
 from dav_gswt.views import stopping
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     split, captures = read_json(given.views), list(given.get("captures", []))
-    tests = training_views.taken(given.images, given.model, split["test"], [], params.quality["size"])
+    tests = read_training_views(given.images, given.model, split["test"], [], params.quality["size"])
     photos = len(split["start"]) + sum(len(read_capture_record(folder)) for folder in captures)
     fitted, grid = read_field(given.field), ground.read(given.ground)
     perceptual = lpips_weights.read(given.lpips) if given.get("lpips") else None
@@ -24,4 +24,4 @@ with logging_to(snakemake.log[0]):
     result |= {"fit": read_json(given.fit)}
     result |= stopping.decision_record(read_json(given.poses)) if given.get("poses") else {}
     inputs = {"field": given.field, "ground": given.ground, "views": given.views}
-    write_json(snakemake.output.metrics, result | {"provenance": provenance.of(inputs, dict(params.quality))})
+    write_json(snakemake.output.metrics, result | {"provenance": record_provenance(inputs, dict(params.quality))})

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from dav_gswt import provenance
 from dav_gswt.files import write_json
 from dav_gswt.images import lpips_weights
 from dav_gswt.lod import store as levels
 from dav_gswt.logs import logging_to
+from dav_gswt.provenance import record_provenance
 from dav_gswt.study import csv_tables
 from dav_gswt.study.seams import density, exemplar, measure
 from dav_gswt.study.seams import ground as terrain
@@ -26,5 +26,5 @@ with logging_to(snakemake.log[0]):
     inputs = {"seams": given.seams, "level0": Path(given.levels, "level0.ply")} | (
         {"lpips": given.lpips} if alexnet else {}
     )
-    found = {"dense": density.of_tiles(tiles, patches), "provenance": provenance.of(inputs, dict(params.seam))}
+    found = {"dense": density.of_tiles(tiles, patches), "provenance": record_provenance(inputs, dict(params.seam))}
     write_json(snakemake.output.facts, found)

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from dav_gswt import provenance
 from dav_gswt.lod import store as levels
 from dav_gswt.logs import logging_to
+from dav_gswt.provenance import record_provenance
 from dav_gswt.study.refine import build, repair
 from dav_gswt.tiles import store
 from dav_gswt.tiles.layout import Exemplar
@@ -21,4 +21,4 @@ with logging_to(snakemake.log[0]):
     mended = build.refined(tiles, uncut, build.Options.of(params.refine), by, model.size)
     inputs = {name: given[name] for name in ("seams", "weights")} | {"level0": Path(given.levels, "level0.ply")}
     about = {"refine": dict(params.refine), "prior": dict(params.prior), "seed": params.seed}
-    store.write_tiles(mended, out.tiles, out.seams, provenance.of(inputs, about))
+    store.write_tiles(mended, out.tiles, out.seams, record_provenance(inputs, about))

@@ -17,10 +17,10 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
-from dav_gswt.photos import training_views
 from dav_gswt.photos.capture_record import read_capture_record, write_capture_record
 from dav_gswt.photos.sfm import localization
 from dav_gswt.photos.synthetic import scene as synthetic
+from dav_gswt.photos.training_views import read_captured_views
 
 WHEN = "2026-05-04T10:00:00"
 
@@ -171,7 +171,7 @@ def test_where_no_pose_was_chosen_nobody_is_asked_for_anything(agent, tmp_path, 
     agents.capture_views(site, {}, [], [], tmp_path / "capture")
     assert [path.name for path in (tmp_path / "capture").iterdir()] == ["capture.json"]
     assert json.loads((tmp_path / "capture/capture.json").read_text()) == {"agent": agent, "shots": []}
-    assert training_views.captured(tmp_path / "capture", 8) == [] and not (tmp_path / "captures").exists()
+    assert read_captured_views(tmp_path / "capture", 8) == [] and not (tmp_path / "captures").exists()
 
 
 def test_what_was_taken_before_a_failure_stays(site, tmp_path, monkeypatch):

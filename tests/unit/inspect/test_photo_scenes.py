@@ -40,9 +40,9 @@ def test_names_that_lead_out_of_the_folder_are_refused(tree, tmp_path):
     write_json(tmp_path / "capture.json", {"shots": [shot]})
     with pytest.raises(InputError, match="not as the workflow writes it"):
         result_files.read_shots(tmp_path / "capture.json")
-    from dav_gswt.geometry import cameras
+    from dav_gswt.geometry.cameras import camera_to_json
 
-    shot["got"] = cameras.to_json(result_tree.camera(result_tree.poses()[0]))
+    shot["got"] = camera_to_json(result_tree.camera(result_tree.poses()[0]))
     write_json(tree.start / "capture.json", {"shots": [shot]})
     try:
         with pytest.raises(InputError, match="is no file's name"):

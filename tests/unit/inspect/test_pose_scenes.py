@@ -8,7 +8,7 @@ from fixtures import result_tree
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json, write_json
-from dav_gswt.geometry.poses import place
+from dav_gswt.geometry.poses import pose_offset
 from dav_gswt.inspect import pose_scenes, scene
 from dav_gswt.inspect.options import ViewOptions
 from dav_gswt.inspect.scene import ColourBar
@@ -23,7 +23,7 @@ def centres(layer):
 
 
 def at(numbers):
-    return np.array([result_tree.MIDDLE + place(POSES[i]) for i in numbers])
+    return np.array([result_tree.MIDDLE + pose_offset(POSES[i]) for i in numbers])
 
 
 def test_scores_and_poses_find_each_other_and_show_the_same(tree):

@@ -12,8 +12,8 @@ from dav_gswt.capture import drone, handheld, render, replay, serial_rig
 from dav_gswt.capture.interface import CaptureAgent, CaptureRequest, RequestedPose, photo_name, view_distance
 from dav_gswt.capture.site import Site
 from dav_gswt.images import image_files
-from dav_gswt.photos import lenses
 from dav_gswt.photos.capture_record import CapturedPhoto, write_capture_record
+from dav_gswt.photos.lenses import undistort_scene_photo
 from dav_gswt.views import candidates
 
 
@@ -64,7 +64,7 @@ def _undistort_stored(request: CaptureRequest, requested: RequestedPose) -> list
     photos = []
     for i, stored in enumerate(site.store.photos_of(camera)[: site.burst]):
         name = photo_name(pose, i, site.burst)
-        picture = lenses.developed(image_files.read_photo(stored.photo), site.photos, stored.camera)
+        picture = undistort_scene_photo(image_files.read_photo(stored.photo), site.photos, stored.camera)
         image_files.write_png(request.folder / name, picture)
         distance = view_distance(camera, stored.camera, site.unit)
         photos.append(CapturedPhoto(name, pose, camera, stored.camera, distance, stored.taken))

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from dav_gswt.capture.interface import RequestedPose, view_distance
 from dav_gswt.capture.site import Site
-from dav_gswt.files import digest
+from dav_gswt.files import digest_files
 from dav_gswt.images import image_files
-from dav_gswt.photos import exif
-from dav_gswt.photos.sfm import localization
+from dav_gswt.photos.exif import read_capture_time
+from dav_gswt.photos.sfm.localization import localize_photos
 
 _log = logging.getLogger(__name__)
 
@@ -32,8 +32,8 @@ def import_dropped_photos(site: Site, requested: list[RequestedPose], agent: str
     known = {record["sha256"] for record in site.store.records()}
     folder = make_drop_folder(site)
     here = image_files.list_photos(folder) if any(not p.name.startswith(".") for p in folder.iterdir()) else []
-    paths = [p for p in here if digest(p) not in known]  # cameras use names again
-    found = [(p, camera) for p, camera in zip(paths, localization.located(site.photos, paths), strict=True) if camera]
+    paths = [p for p in here if digest_files(p) not in known]  # cameras use names again
+    found = [(p, camera) for p, camera in zip(paths, localize_photos(site.photos, paths), strict=True) if camera]
     for path in sorted(set(paths) - {p for p, _ in found}):
         _log.warning("%s: it could not be localised; it must overlap photos of the scene", path.name)
     need = {pose.name: site.missing_photos(camera) for pose, camera in requested}
@@ -54,4 +54,4 @@ def import_dropped_photos(site: Site, requested: list[RequestedPose], agent: str
 
 
 def _read_time(path: Path) -> str:
-    return exif.taken(path) or datetime.fromtimestamp(path.stat().st_mtime, UTC).isoformat(timespec="seconds")
+    return read_capture_time(path) or datetime.fromtimestamp(path.stat().st_mtime, UTC).isoformat(timespec="seconds")

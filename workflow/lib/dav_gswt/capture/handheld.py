@@ -9,7 +9,7 @@ from dav_gswt.capture.interface import RequestedPose
 from dav_gswt.capture.site import Site
 from dav_gswt.errors import InputError
 from dav_gswt.field import read_field
-from dav_gswt.files import whole_folder
+from dav_gswt.files import atomic_folder
 
 
 def take_photos(site: Site, requested: list[RequestedPose], field: Path | str | None = None) -> None:
@@ -41,6 +41,6 @@ def write_shot_list(site: Site, missing: list[RequestedPose], field: Path | str 
         site.name, site.frame, directions.make_ruler(site.frame), drop_folder.make_drop_folder(site), length
     )
     folder = site.store.folder / "shot-list"
-    with whole_folder(folder) as part:
+    with atomic_folder(folder) as part:
         shot_list_page.write_page(part, shot_list, stations, read_field(field) if field else None)
     return folder / "index.html"

@@ -24,7 +24,7 @@ from dav_gswt.geometry.poses import middle
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos import lenses
+from dav_gswt.photos.lenses import undistort_scene_photo
 
 _log = logging.getLogger(__name__)
 
@@ -245,6 +245,6 @@ def _take_photo(rig: SerialRig, name: str, target: Axes) -> tuple[Path, Axes, st
 def _check_photo(photo: Path, site: Site, camera: Camera) -> None:
     """Raises: InputError: the photo is not of the scene's lens. Checked now rather than after all other photos."""
     try:
-        lenses.developed(image_files.read_photo(photo), site.photos, camera)
+        undistort_scene_photo(image_files.read_photo(photo), site.photos, camera)
     except (InputError, ValueError) as error:
         raise InputError(f"{photo}: {error}") from error

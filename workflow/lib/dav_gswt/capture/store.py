@@ -15,9 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import digest, read_json, write_json
-from dav_gswt.geometry import cameras
-from dav_gswt.geometry.cameras import Camera
+from dav_gswt.files import digest_files, read_json, write_json
+from dav_gswt.geometry.cameras import Camera, camera_from_json, camera_to_json
 from dav_gswt.geometry.poses import Pose
 
 PLACES = 6  # decimals of a camera's numbers in its key: finer than any device repeats a pose
@@ -53,7 +52,11 @@ class PhotoStore:
             name = f"photo{photo.suffix.lower()}"
             shutil.copyfile(photo, made / name)
             record = {"agent": agent, "pose": asdict(pose), "taken": taken, "source": photo.name, "photo": name}
-            record |= {"asked": cameras.to_json(pinhole), "got": cameras.to_json(camera), "sha256": digest(made / name)}
+            record |= {
+                "asked": camera_to_json(pinhole),
+                "got": camera_to_json(camera),
+                "sha256": digest_files(made / name),
+            }
             write_json(made / "shot.json", record)
             place = home / f"{len(list(home.glob('[0-9]*'))):03d}"
             made.rename(place)
@@ -86,6 +89,6 @@ def pose_key(camera: Camera) -> str:
 def _read_photo(place: Path) -> StoredPhoto:
     record = read_json(place / "shot.json")
     photo = place / record["photo"]
-    if not photo.is_file() or digest(photo) != record["sha256"]:
+    if not photo.is_file() or digest_files(photo) != record["sha256"]:
         raise InputError(f"{photo}: is not the photo that was stored; put it back, or remove {place} to take it again")
-    return StoredPhoto(photo, cameras.from_json(record["got"]), record["taken"])
+    return StoredPhoto(photo, camera_from_json(record["got"]), record["taken"])

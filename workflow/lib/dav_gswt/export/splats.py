@@ -16,7 +16,7 @@ from dav_gswt.bundle import gswt
 from dav_gswt.bundle.fidelity import arrange_torus
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, concatenate_fields, write_field
-from dav_gswt.files import whole_folder
+from dav_gswt.files import atomic_folder
 from dav_gswt.logs import progress
 from dav_gswt.tiles.layout import EDGES
 
@@ -37,7 +37,7 @@ def assemble_patch(fields: list[GaussianField], side: float) -> GaussianField:
 def write_plys(archive: Path | str, side: float, out: Path | str) -> None:
     """Write level{l}.ply of every level of a gswt.zip to a folder. Raises: InputError: see `gswt.read`."""
     fields = gswt.read_gswt(archive, side)
-    with whole_folder(out) as folder:
+    with atomic_folder(out) as folder:
         for level, tiles in enumerate(progress(fields, "write patches")):
             write_field(assemble_patch(tiles, side), folder / f"level{level}.ply")
 
@@ -48,7 +48,7 @@ def convert_plys(plys: Path | str, kind: str, out: Path | str) -> None:
     By PACKAGE, which npx fetches the first time. Raises: InputError: no Node.js, or what the program complains of.
     """
     names = sorted(Path(plys).glob("level*.ply"), key=lambda path: int(path.stem.removeprefix("level")))
-    with whole_folder(out) as folder:
+    with atomic_folder(out) as folder:
         if kind == "sog":
             tagged = [word for level, name in enumerate(names) for word in (str(name), "-l", str(level))]
             _run_converter([*tagged, str(folder / "lod-meta.json"), "-g", "cpu"], kind)

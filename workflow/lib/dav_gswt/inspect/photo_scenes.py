@@ -58,10 +58,10 @@ def _check_shots(path: Path) -> list[tuple[str, Camera]]:
 
 def arrange_photos(folder: Path, split: Path | None, title: str, captured: list[tuple[Camera, Path]]) -> Scene:
     """A photos/ folder. split: views.json. captured: further cameras, and their photos."""
-    from dav_gswt.photos import model  # here, not above: it loads pycolmap
+    from dav_gswt.photos.colmap_model import read_colmap_model  # here, not above: it loads pycolmap
 
     frame = read_scene_frame(folder / "ground.json")
-    found = model.read(folder / "sparse")
+    found = read_colmap_model(folder / "sparse")
     roles = _read_roles(split)
     reach = DEPTH * frame.flying_height
     layers, used = outline_ground(frame), {}

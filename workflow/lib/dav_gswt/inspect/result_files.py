@@ -6,8 +6,7 @@ from pathlib import Path
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
-from dav_gswt.geometry import cameras
-from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.cameras import Camera, camera_from_json
 
 ROUND = re.compile(r"iter(0|[1-9]\d{0,5})")
 ACTIVE = re.compile(r"active_[a-z0-9-]+_([a-z0-9_-]+)_pdrop([0-9.]+)_lam([0-9.]+)_k\d.*")
@@ -35,7 +34,7 @@ def read_shots(path: Path) -> list[tuple[str, Camera]]:
     """The cameras of a capture.json, by name."""
     told = read_json(path)
     with blaming(path):
-        return [(str(shot["name"]), cameras.from_json(shot["got"])) for shot in told["shots"]]
+        return [(str(shot["name"]), camera_from_json(shot["got"])) for shot in told["shots"]]
 
 
 def parse_round(path: Path) -> int | None:

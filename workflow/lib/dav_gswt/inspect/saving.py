@@ -11,7 +11,7 @@ import zipfile
 from pathlib import Path
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import whole
+from dav_gswt.files import atomic_file
 from dav_gswt.inspect.scene import ColourBar, ColourKey, Scene, to_bytes
 
 WINDOWS = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")  # what VTK can draw in where there is no display
@@ -69,7 +69,7 @@ def save_scene(scene: Scene, path: Path, size: tuple[int, int]) -> None:
     """Write a .png or a .html file; it appears whole or not at all."""
     from dav_gswt.inspect import plotting  # here, not above: it loads VTK
 
-    with whole(path) as part:
+    with atomic_file(path) as part:
         if path.suffix == ".png":
             drawn = plotting.make_plotter(scene, size, off_screen=True)
             drawn.screenshot(str(part))

@@ -18,7 +18,7 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
 from dav_gswt.lod.levels import AUTO, MAX_LEVELS, Levels
 from dav_gswt.lod.merge import crop_to_blocks, halve_resolution
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import Gradients, to_raster_arrays
 from dav_gswt.reconstruction.build import modelled
 from dav_gswt.reconstruction.fitting import trainer
@@ -102,7 +102,7 @@ def fit_coarser_level(
     return level, coarse
 
 
-def render_neighbour_views(field: GaussianField, coarse: Ground) -> list[View]:
+def render_neighbour_views(field: GaussianField, coarse: Ground) -> list[TrainingView]:
     """Pictures of a field, PIXELS pixels a coarse disc, drawn at twice that and averaged so that they do not alias.
 
     Drawn once, splats finer than a pixel are wider than they are: level 1 of flowers of a seed for development is then
@@ -115,7 +115,7 @@ def render_neighbour_views(field: GaussianField, coarse: Ground) -> list[View]:
         # what shines through is not the field's colour: divide it out
         colour = seen.colour / np.maximum(seen.alpha, 0.5)[..., None]
         image = image_files.shrink_image(np.clip(colour, 0, 1).astype(np.float32), camera.width, camera.height)
-        views.append(View(f"neighbour_{number}", camera, image, np.ones(image.shape[:2], np.float32)))
+        views.append(TrainingView(f"neighbour_{number}", camera, image, np.ones(image.shape[:2], np.float32)))
     return views
 
 

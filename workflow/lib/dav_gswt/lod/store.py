@@ -4,14 +4,14 @@ from pathlib import Path
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import mean_scale, read_field, write_field
-from dav_gswt.files import read_json, whole_folder, write_json
+from dav_gswt.files import atomic_folder, read_json, write_json
 from dav_gswt.lod.levels import Levels
 from dav_gswt.reconstruction import ground
 
 
 def write_levels(levels: Levels, folder: Path | str, provenance: dict) -> None:
     """Write the levels; the folder appears whole or not at all."""
-    with whole_folder(folder) as part:
+    with atomic_folder(folder) as part:
         for number, (fitted, grid) in enumerate(zip(levels.fields, levels.grids, strict=True)):
             write_field(fitted, part / f"level{number}.ply")
             ground.write(grid, part / f"level{number}.exr")

@@ -5,8 +5,7 @@ from pathlib import Path
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import read_json, write_json
-from dav_gswt.geometry import cameras
-from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.cameras import Camera, camera_from_json, camera_to_json
 from dav_gswt.geometry.poses import Pose
 
 
@@ -31,8 +30,8 @@ def write_capture_record(folder: Path, agent: str, photos: list[CapturedPhoto]) 
     rows = [
         {
             "name": photo.name,
-            "asked": asdict(photo.pose) | {"camera": cameras.to_json(photo.requested)},
-            "got": cameras.to_json(photo.camera),
+            "asked": asdict(photo.pose) | {"camera": camera_to_json(photo.requested)},
+            "got": camera_to_json(photo.camera),
             "asked_to_got": photo.distance,
             "taken": photo.taken,
         }
@@ -52,6 +51,6 @@ def read_capture_record(folder: Path | str) -> list[CapturedPhoto]:
 
 def _parse_photo(row: dict) -> CapturedPhoto:
     pose = dict(row["asked"])
-    requested = cameras.from_json(pose.pop("camera"))
-    camera = cameras.from_json(row["got"])
+    requested = camera_from_json(pose.pop("camera"))
+    camera = camera_from_json(row["got"])
     return CapturedPhoto(row["name"], Pose(**pose), requested, camera, row["asked_to_got"], row["taken"])

@@ -7,12 +7,11 @@ from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
-from dav_gswt.geometry import poses
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.geometry.poses import Pose
+from dav_gswt.geometry.poses import Pose, pose_of_camera, pose_offset
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import image_files
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.prior.interface import Condition
 from dav_gswt.raster import Rasterizer, to_raster_arrays
 
@@ -37,10 +36,10 @@ class ReferencePhotos:
     photos: Float32[Array, "n s s 3"]
 
 
-def prepare_photos(views: list[View], frame: SceneFrame, size: int) -> ReferencePhotos:
+def prepare_photos(views: list[TrainingView], frame: SceneFrame, size: int) -> ReferencePhotos:
     """Crop and resize captured photos of any size for a prior of `size` pixels."""
     small = [_resize(crop_image(view.image), size) for view in views]
-    return ReferencePhotos([poses.of_camera(view.name, view.camera, frame) for view in views], np.stack(small))
+    return ReferencePhotos([pose_of_camera(view.name, view.camera, frame) for view in views], np.stack(small))
 
 
 def _resize(square: Float32[Array, "s s 3"], size: int) -> Float32[Array, "{size} {size} 3"]:
@@ -84,7 +83,7 @@ def _downsample(image: Float32[Array, "h w *c"]) -> Float32[Array, "h2 w2 *c"]:
 
 def find_nearest(pose: Pose, references: list[Pose]) -> int:
     """The index of the reference pose nearest to a pose."""
-    return int(np.argmin([np.linalg.norm(poses.place(r) - poses.place(pose)) for r in references]))
+    return int(np.argmin([np.linalg.norm(pose_offset(r) - pose_offset(pose)) for r in references]))
 
 
 def relative_pose(photo: Pose, pose: Pose, flying_height: float) -> Float32[Array, "4"]:

@@ -8,7 +8,7 @@ from safetensors.torch import save_file
 from torch import nn
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import whole
+from dav_gswt.files import atomic_file
 
 TERRAIN_WEIGHTS = Path(__file__).with_name("terrain.safetensors")  # they come with the library
 MOST_BYTES = 256 * 2**20
@@ -20,7 +20,7 @@ def save_weights(
 ) -> None:
     """Write a network's weights, by default in half precision. facts: metadata for the header."""
     values = {_stored_name(name): v.detach().to("cpu", dtype).contiguous() for name, v in network.state_dict().items()}
-    with whole(path) as part:
+    with atomic_file(path) as part:
         save_file(values, str(part), metadata=facts)
 
 

@@ -8,10 +8,10 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.geometry.poses import Pose, middle, of_camera
+from dav_gswt.geometry.poses import Pose, middle, pose_of_camera
 from dav_gswt.geometry.scene_frame import SceneFrame
-from dav_gswt.photos import model
 from dav_gswt.photos.capture_record import read_capture_record
+from dav_gswt.photos.colmap_model import read_colmap_model
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.photos.synthetic import scene as synthetic
 
@@ -25,10 +25,10 @@ def list_remaining(scene: dict, frame: SceneFrame, model_folder: Path | str, spl
     if scene["agent"] == "render":
         pool = list_hemisphere(scene, frame)
     else:
-        known = model.read(model_folder)
+        known = read_colmap_model(model_folder)
         at = dict(zip(known.names, known.cameras, strict=True))
         if scene["agent"] == "replay":
-            pool = [(of_camera(name, at[name], frame), at[name]) for name in split["pool"]]
+            pool = [(pose_of_camera(name, at[name], frame), at[name]) for name in split["pool"]]
         else:
             pool = list_orbit(scene, frame, at[split["start"][0]])
     used = {name for folder in captures for name in _used_names(folder)}
@@ -38,7 +38,7 @@ def list_remaining(scene: dict, frame: SceneFrame, model_folder: Path | str, spl
 def list_hemisphere(scene: dict, frame: SceneFrame) -> Candidates:
     """Poses spread evenly over the hemisphere from which a synthetic scene can be photographed."""
     found = synthetic.candidates(scene, middle(frame))
-    return [(of_camera(f"pose_{i:04d}", camera, frame), camera) for i, camera in enumerate(found)]
+    return [(pose_of_camera(f"pose_{i:04d}", camera, frame), camera) for i, camera in enumerate(found)]
 
 
 def list_orbit(scene: dict, frame: SceneFrame, like: Camera) -> Candidates:
@@ -49,12 +49,12 @@ def list_orbit(scene: dict, frame: SceneFrame, like: Camera) -> Candidates:
     )
     found = [camera_layouts.orbit(*place, middle(frame), like.width, like.height, 60.0) for place in places]
     lens = {name: getattr(like, name) for name in ("fx", "fy", "cx", "cy")}
-    return [(of_camera(f"pose_{i:04d}", camera, frame), replace(camera, **lens)) for i, camera in enumerate(found)]
+    return [(pose_of_camera(f"pose_{i:04d}", camera, frame), replace(camera, **lens)) for i, camera in enumerate(found)]
 
 
 def read_captured_cameras(model_folder: Path | str, split: dict, captures: list) -> list[Camera]:
     """The cameras of the photos taken so far."""
-    known = model.read(model_folder)
+    known = read_colmap_model(model_folder)
     at = dict(zip(known.names, known.cameras, strict=True))
     start = [at[name] for name in split["start"]]
     return start + [photo.camera for folder in captures for photo in read_capture_record(folder)]

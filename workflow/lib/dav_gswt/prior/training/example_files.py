@@ -10,7 +10,7 @@ from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import UNREADABLE, whole
+from dav_gswt.files import UNREADABLE, atomic_file
 from dav_gswt.prior.interface import Condition
 
 SIZE = 64  # pixels per side of an example
@@ -58,7 +58,7 @@ def write_examples(path: Path | str, examples: Examples) -> None:
     """Write examples. Raises: ValueError: see `Condition.check`."""
     if len(examples):
         examples.condition.check()
-    with whole(path) as part, part.open("wb") as file:
+    with atomic_file(path) as part, part.open("wb") as file:
         arrays = {name: _compress(name, a) for name, a in _to_arrays(examples).items()}
         np.savez_compressed(file, **arrays)  # pyright: ignore[reportArgumentType]: no array is named allow_pickle
 

@@ -7,14 +7,13 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
-from dav_gswt.geometry import poses
 from dav_gswt.geometry.cameras import Camera, look_at
-from dav_gswt.geometry.poses import Pose
+from dav_gswt.geometry.poses import Pose, pose_of_camera
 from dav_gswt.geometry.scene_frame import Extent
 from dav_gswt.images import image_files
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.photos.synthetic.camera_layouts import Place
-from dav_gswt.photos.training_views import View
+from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.prior.conditions import RenderedView, find_nearest, relative_pose, render_view
 from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.training.example_files import SIZE, Examples, concatenate, empty_examples
@@ -41,7 +40,7 @@ def make_examples(seed: int, count: int) -> Examples:
     photos = take_photos(world, rng)
     field = fit_field(world, photos, rng)
     small = [image_files.shrink_image(v.image, SIZE, SIZE) for v in photos]
-    references = [poses.of_camera(v.name, v.camera, world.frame) for v in photos]
+    references = [pose_of_camera(v.name, v.camera, world.frame) for v in photos]
     examples = []
     for _ in range(TRIES * count):
         if len(examples) == count:
@@ -51,7 +50,7 @@ def make_examples(seed: int, count: int) -> Examples:
             continue
         truth = render_view(world.field, camera, FLYING_HEIGHT)
         if truth.alpha.mean() >= LEAST_COVER:
-            pose = poses.of_camera("", camera, world.frame)
+            pose = pose_of_camera("", camera, world.frame)
             at = find_nearest(pose, references)
             render = render_view(field, camera, FLYING_HEIGHT)
             relative = relative_pose(references[at], pose, FLYING_HEIGHT)
@@ -88,7 +87,7 @@ def draw_rig(rng: np.random.Generator) -> list[tuple[Place, Float[Array, "3"]]]:
     return [(place, np.append(rng.uniform(-spread, spread, 2), 0)) for place in places]
 
 
-def take_photos(world: World, rng: np.random.Generator) -> list[View]:
+def take_photos(world: World, rng: np.random.Generator) -> list[TrainingView]:
     """The start photos: noisy, each with an exposure of its own."""
     size, noise, exposure = int(rng.choice(PHOTO_SIZES)), rng.uniform(0.003, 0.02), rng.uniform(0, 0.05)
     photos = []
@@ -98,12 +97,12 @@ def take_photos(world: World, rng: np.random.Generator) -> list[View]:
         image = truth.colour + (1 - truth.alpha)[..., None] * world.sky.render(camera)
         image = image * np.exp(exposure * rng.normal()) + noise * rng.normal(size=image.shape)
         image = np.clip(image, 0, 1).astype(np.float32)
-        photos.append(View(f"photo_{i}", camera, image, np.ones(image.shape[:2], np.float32)))
+        photos.append(TrainingView(f"photo_{i}", camera, image, np.ones(image.shape[:2], np.float32)))
     return photos
 
 
 def simulate_points(
-    world: World, photos: list[View], rng: np.random.Generator
+    world: World, photos: list[TrainingView], rng: np.random.Generator
 ) -> tuple[Float[Array, "n 3"], Float[Array, "n 3"]]:
     """Points as of structure from motion, and their colours: surface points seen by two photos or more, with errors."""
     least, most = np.log(POINTS)
@@ -124,7 +123,7 @@ def simulate_points(
     return points[matched], colours[matched]
 
 
-def fit_field(world: World, photos: list[View], rng: np.random.Generator) -> GaussianField:
+def fit_field(world: World, photos: list[TrainingView], rng: np.random.Generator) -> GaussianField:
     """The coarse fit of the reconstruction, small and short; in some worlds of more or less ground than usual."""
     steps = int(rng.integers(*STEPS, endpoint=True))
     quality = build.Quality(photos[0].camera.width, 1.25, MOST_GAUSSIANS, steps, 0, 0)

@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
-from dav_gswt.files import whole
+from dav_gswt.files import atomic_file
 from dav_gswt.prior import weights
 from dav_gswt.prior.networks import Network
 from dav_gswt.prior.terrain import average_opacity, pack_photo, pack_render, pack_truth
@@ -85,7 +85,7 @@ def write_losses(path: Path | str, losses: Losses) -> None:
         pd.DataFrame({"trained": name, "step": range(1, len(values) + 1), "loss": values})
         for name, values in (("coder", losses.autoencoder), ("denoiser", losses.denoiser))
     ]
-    with whole(path) as part:
+    with atomic_file(path) as part:
         pd.concat(tables).to_csv(part, index=False, float_format="%.5g", lineterminator="\n")
 
 
