@@ -28,6 +28,11 @@ def test_every_path_that_a_page_names_exists(page):
 
 
 @pytest.mark.parametrize("page", PAGES)
+def test_every_module_that_a_page_names_exists(page):
+    assert {name for name in doc_pages.named_modules(page) if not doc_pages.is_in_library(name)} == set()
+
+
+@pytest.mark.parametrize("page", PAGES)
 def test_no_page_cites_what_a_reader_cannot_have(page):
     cited = re.findall(r"(?<![\w/])(?:\.\./)+shared/\S*", page.read_text(encoding="utf-8"))
     assert cited == []
