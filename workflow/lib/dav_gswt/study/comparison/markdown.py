@@ -1,4 +1,4 @@
-"""A comparison as a table to read, for the README."""
+"""A comparison as a table to read, for docs/research/results/view-selection.md."""
 
 from pathlib import Path
 
@@ -14,11 +14,11 @@ def write_comparison(path: Path | str, compared: list[dict], baseline: str) -> N
 
 
 def format_comparison(compared: list[dict], baseline: str) -> str:
-    """Rows of nAUC less the baseline's in dB: a row a policy, best first, with a column for all scenes and one a scene
-    and k; in brackets the 95 % interval, where there is more than one start.
+    """Rows of nAUC less the baseline's in dB: a row a policy, best over all scenes first, with a column a scene and k;
+    in brackets the 95 % interval, where there is more than one start.
     """
-    columns = [(EVERY, ""), *sorted({(row["scene"], row["k"]) for row in compared} - {(EVERY, "")})]
-    named = ["all" if scene == EVERY else f"{scene.removesuffix('_pool')}, {k} a round" for scene, k in columns]
+    columns = sorted({(row["scene"], row["k"]) for row in compared} - {(EVERY, "")})
+    named = [f"{scene.removesuffix('_pool')}, {k} a round" for scene, k in columns]
     found = {(row["policy"], row["scene"], row["k"]): row for row in compared}
     best = sorted((row for row in compared if row["scene"] == EVERY), key=lambda row: -row["mean"])
     lines = []
