@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from record import tell
 
-from dav_gswt.reconstruction.build import Quality
+from dav_gswt.reconstruction.build import FitSettings
 from dav_gswt.study import fit_profile
 
-COPR = Quality(size=256, spacing=1.5, cap=350_000, steps=1000, steps_per_photo=40, level_steps=80)
-HIGH = Quality(size=384, spacing=1.25, cap=150_000, steps=400, steps_per_photo=30, level_steps=60)
+COPR = FitSettings(size=256, spacing=1.5, max_gaussians=350_000, steps=1000, steps_per_photo=40, level_steps=80)
+HIGH = FitSettings(size=384, spacing=1.25, max_gaussians=150_000, steps=400, steps_per_photo=30, level_steps=60)
 SCENES = ("desert_high", "meadow_high")
 
 

@@ -1,17 +1,21 @@
-"""Bundle: what a viewer loads. tau enters here: tiles in more doubt than tau keep more pre-sorted orders.
+"""Bundle: what a viewer loads. Here tau enters: tiles of higher uncertainty keep more pre-sorted orders.
 
-In: the tiles. Out: davgswt.json (the only contract with the viewer), its chunks, and gswt.zip for the public renderer.
-exports/ply, exports/spz and exports/sog, only where asked for: a patch of terrain at each level for other viewers.
-Beside the tiles, whatever tau is: orders.csv, what more directions are worth; lod.csv, how coarse each level is, from
-where it is used and how well it stands in for the finest there. `snakemake lod_table orders_table` gathers those of
-the scenes that the config's `lod` names.
+In: the tiles. Out: davgswt.json (the contract with the viewer, docs/formats.md), its chunks, and gswt.zip for the public
+renderer.
 """
+
+
+def photos_of_field(wildcards):
+    """All photos that a round's field was made of, or the finished field that came instead."""
+    if config["scenes"][wildcards.scene]["kind"] == "field":
+        return {"photos": "<results>/<photos>/field.ply"}
+    return {"photos": ["<results>/<photos>/images", *captures_until(wildcards)]}
 
 
 rule bundle_tiles:
     """Pack the tiles with their pre-sorted orders."""
     input:
-        unpack(photos_behind),
+        unpack(photos_of_field),
         seams="<results>/<tiles>/seams.json",
         tiles="<results>/<tiles>/tiles",
         levels="<results>/<levels>",
@@ -26,8 +30,8 @@ rule bundle_tiles:
         "<benchmarks>/<bundle>/bundle_tiles.tsv"
     threads: 2
     resources:
-        mem_mb=growing(2500),
-        runtime=growing("10m"),
+        mem_mb=per_attempt(2500),
+        runtime=per_attempt("10m"),
     params:
         tau=real("tau"),
         seed=integer("seed"),

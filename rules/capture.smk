@@ -1,4 +1,8 @@
-"""TODO."""
+"""Capture: the scene's agent takes the photos of the chosen poses.
+
+In: poses.json. Out: capture/, the photos with their cameras. `render` and `replay` take them at once; `serial` drives a
+camera rig, `plan` writes a drone mission, `handheld` a shot list: these run on this machine and never take a photo twice.
+"""
 
 
 rule capture_views:
@@ -21,8 +25,8 @@ rule capture_views:
         t=POSITIVE,
     threads: 2
     resources:
-        mem_mb=growing(2500),
-        runtime=growing("30m"),
+        mem_mb=per_attempt(2500),
+        runtime=per_attempt("30m"),
     params:
         scene=entry("scenes", "scene"),
         source=code_of("capture_views"),
@@ -32,7 +36,7 @@ rule capture_views:
 
 use rule capture_views as request_views with:
     input:
-        field=lambda wildcards: before_round(wildcards)["field"],
+        field=lambda wildcards: round_before(wildcards)["field"],
         poses="<results>/<round>/poses.json",
         views="<results>/<start>/views.json",
         captures=captures_before,

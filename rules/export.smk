@@ -1,4 +1,7 @@
-"""TODO."""
+"""Export: a patch of terrain at each level, for other viewers. Not part of `all`: files are asked for by their paths.
+
+In: the bundle. Out: exports/ply, exports/spz, exports/sog.
+"""
 
 
 rule export_plys:
@@ -13,8 +16,8 @@ rule export_plys:
     benchmark:
         "<benchmarks>/<bundle>/export_plys.tsv"
     resources:
-        mem_mb=growing(2500),
-        runtime=growing("10m"),
+        mem_mb=per_attempt(2500),
+        runtime=per_attempt("10m"),
     params:
         schema=BUNDLE_SCHEMA,
         source=code_of("export_plys"),
@@ -33,8 +36,8 @@ rule convert_plys:
     benchmark:
         "<benchmarks>/<bundle>/convert_plys_{kind}.tsv"
     resources:
-        mem_mb=growing(2500),
-        runtime=growing("20m"),
+        mem_mb=per_attempt(2500),
+        runtime=per_attempt("20m"),
     params:
         source=code_of("convert_plys"),
     script:

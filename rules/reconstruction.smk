@@ -1,8 +1,14 @@
-"""Coarse field: a ground layer through the start views' points and the things on it, fitted to the start views.
+"""Reconstruction: a ground layer and the objects on it, fitted to the photos; refitted in each round of view selection.
 
-In: photos, their model, views.json. Out: field.ply (standard 3DGS), ground.exr (height, seen or not), fit.json
-(what the fit chose and why), metrics.json.
+In: photos, their model, views.json; of round t the photos captured so far. Out: field.ply (standard 3DGS), ground.exr
+(height, seen or not), fit.json (what the fit chose and why), metrics.json (the test photos, which nothing else sees).
+Round t starts from round t - 1, so T is only which round is asked for.
 """
+
+
+def fits_before(wildcards):
+    """The reports of the updates of rounds 1 to t - 1."""
+    return {"fits": [f"{round_folder(t)}/fit.json" for t in range(1, int(wildcards.t))]}
 
 
 rule fit_coarse:
@@ -22,10 +28,10 @@ rule fit_coarse:
         "<benchmarks>/<coarse>/fit_coarse.tsv"
     threads: 2
     resources:
-        mem_mb=growing(2000),
-        runtime=growing("60m"),
+        mem_mb=per_attempt(2000),
+        runtime=per_attempt("60m"),
     params:
-        quality=entry("presets", "preset"),
+        preset=entry("presets", "preset"),
         seed=integer("seed"),
         whole=lambda wildcards: config["scenes"][wildcards.scene].get("whole", False),
         keep=SNAPSHOTS,
@@ -37,7 +43,7 @@ rule fit_coarse:
 rule evaluate_coarse:
     """Compare the coarse field with the test photos, which nothing else sees."""
     input:
-        unpack(lpips_if_fetched),
+        unpack(lpips_weights),
         field="<results>/<coarse>/field.ply",
         ground="<results>/<coarse>/ground.exr",
         fit="<results>/<coarse>/fit.json",
@@ -53,10 +59,10 @@ rule evaluate_coarse:
         "<benchmarks>/<coarse>/evaluate_coarse.tsv"
     threads: 2
     resources:
-        mem_mb=growing(1500),
-        runtime=growing("10m"),
+        mem_mb=per_attempt(1500),
+        runtime=per_attempt("10m"),
     params:
-        quality=entry("presets", "preset"),
+        preset=entry("presets", "preset"),
         t=0,
         source=code_of("evaluate_field"),
     script:
@@ -66,7 +72,7 @@ rule evaluate_coarse:
 rule update_field:
     """Refit the field with the photos of this round; without any it goes on as it is."""
     input:
-        unpack(before_round),
+        unpack(round_before),
         unpack(fits_before),
         captures=captures_until,
         views="<results>/<start>/views.json",
@@ -86,10 +92,10 @@ rule update_field:
         t=POSITIVE,
     threads: 2
     resources:
-        mem_mb=growing(2000),
-        runtime=growing("60m"),
+        mem_mb=per_attempt(2000),
+        runtime=per_attempt("60m"),
     params:
-        quality=entry("presets", "preset"),
+        preset=entry("presets", "preset"),
         seed=integer("seed"),
         t=integer("t"),
         keep=SNAPSHOTS,
@@ -100,7 +106,7 @@ rule update_field:
 
 use rule evaluate_coarse as evaluate_round with:
     input:
-        unpack(lpips_if_fetched),
+        unpack(lpips_weights),
         field="<results>/<round>/field.ply",
         ground="<results>/<round>/ground.exr",
         fit="<results>/<round>/fit.json",
@@ -119,7 +125,7 @@ use rule evaluate_coarse as evaluate_round with:
     wildcard_constraints:
         t=POSITIVE,
     params:
-        quality=entry("presets", "preset"),
+        preset=entry("presets", "preset"),
         t=integer("t"),
         source=code_of("evaluate_field"),
 
@@ -154,15 +160,15 @@ rule prepare_external_field:
         field="<results>/<photos>/field.ply",
         frame="<results>/<photos>/ground.json",
     output:
-        field="<results>/<fit>/active_given_none_pdrop0_lam0_k0/iter0/field.ply",
-        ground="<results>/<fit>/active_given_none_pdrop0_lam0_k0/iter0/ground.exr",
+        field="<results>/<external>/field.ply",
+        ground="<results>/<external>/ground.exr",
     log:
-        "<logs>/<fit>/active_given_none_pdrop0_lam0_k0/iter0/prepare_external_field.log",
+        "<logs>/<external>/prepare_external_field.log",
     benchmark:
-        "<benchmarks>/<fit>/active_given_none_pdrop0_lam0_k0/iter0/prepare_external_field.tsv"
+        "<benchmarks>/<external>/prepare_external_field.tsv"
     threads: 2
     params:
-        quality=entry("presets", "preset"),
+        preset=entry("presets", "preset"),
         source=code_of("prepare_external_field"),
     script:
         "../scripts/prepare_external_field.py"

@@ -1,9 +1,13 @@
-"""Terrain: the tiles laid without end, as a page to walk in, as stills and, where the config asks, as a flight.
+"""Terrain: the tiles placed without end, as a page to walk in, as stills and, where the config asks, as a flight.
 
-In: the bundle. Out: page/ (open it with `make view`), walker.png, oblique.png, above.png, these three small in stills.jpg,
-flight/; beside the bundle, where asked for, presort.csv: what the page's shortcuts do to a picture. `snakemake
-presort_table` gathers those of the config's `lod`.
+In: the bundle. Out: page/ (`make view` serves it), walker.png, oblique.png, above.png, the three small in stills.jpg, flight/.
 """
+
+
+def height_map(wildcards):
+    """The image that the terrain's surface is read from, where the config names one."""
+    file = config["heights"].get("file")
+    return {"map": existing(file, "heights.file")} if file else {}
 
 
 rule make_page:
@@ -44,8 +48,8 @@ rule render_terrain:
         "<benchmarks>/<terrain>/render_terrain.tsv"
     threads: 2
     resources:
-        mem_mb=growing(4000),
-        runtime=growing("20m"),
+        mem_mb=per_attempt(4000),
+        runtime=per_attempt("20m"),
     params:
         size=lookup(dpath="stills", within=config),
         heights=lookup(dpath="heights", within=config),
@@ -90,8 +94,8 @@ rule render_flight:
         "<benchmarks>/<terrain>/render_flight.tsv"
     threads: 2
     resources:
-        mem_mb=growing(4000),
-        runtime=growing("4h"),
+        mem_mb=per_attempt(4000),
+        runtime=per_attempt("4h"),
     params:
         size=lookup(dpath="stills", within=config),
         heights=lookup(dpath="heights", within=config),

@@ -1,15 +1,26 @@
-"""Wang tiles: a centre, two strips per direction and one corner, joined along cuts that nobody should find.
+"""Wang tiles: a centre, two strips per direction and one corner, joined along cuts.
 
-In: the levels. Out: labels.npz, lod{l}_tile_{TT}.ply and seams.json. The cut is made on the finest level; coarser
-levels follow it. Where the config asks for it (`refine`), a prior repairs what lies beside the cuts: the same files again,
-in tiles_{seam}-refined.
+In: the levels. Out: tiles/ (labels.npz, lod{l}_tile_{TT}.ply) and seams.json. The cut is made on the finest level; coarser levels
+follow it.
 """
+
+
+def tiling_inputs(name):
+    """What tells the kinds of ground apart, beside colours: LPIPS's features, a segmenter's checkpoint."""
+    tiling = config["tilings"][name]
+    if tiling["energy"] == "colour":
+        return {}
+    if "sam2" not in tiling:
+        return lpips_weights()
+    where = f"tilings.{name}.sam2"
+    folder = existing(tiling["sam2"], where)
+    return lpips_weights() | {"sam2": existing(f"{folder}/model.safetensors", where)}
 
 
 rule cut_tiles:
     """Cut sixteen tiles from the exemplar."""
     input:
-        unpack(describing),
+        unpack(lambda wildcards: tiling_inputs(wildcards.tiling)),
         levels="<results>/<levels>",
     output:
         seams="<results>/<tiles>/seams.json",
@@ -19,13 +30,13 @@ rule cut_tiles:
     benchmark:
         "<benchmarks>/<tiles>/cut_tiles.tsv"
     wildcard_constraints:
-        seam=CUT,
+        tiling=PLAIN_TILING,
     threads: 2
     resources:
-        mem_mb=growing(2000),
-        runtime=growing("20m"),
+        mem_mb=per_attempt(2000),
+        runtime=per_attempt("20m"),
     params:
-        seam=cutting,
+        tiling=entry("tilings", "tiling"),
         seed=integer("seed"),
         source=code_of("cut_tiles"),
     script:

@@ -1,16 +1,44 @@
-"""Active views: score the candidate poses, choose k, capture them, refit, and again.
+"""View selection: score the candidate poses and choose the next k.
 
-In: the coarse field. Out, per round t: poses.json and poses.exr, capture/, field.ply, ground.exr, and of that new field
-scores.csv and scores.json, maps.npz, uncertainty.exr and metrics.json. Round t starts from round t - 1, so T rounds are
-a prefix of T + 1, and T is only which round is asked for. A round after the stop asks for no pose and hands the field on
-as it is. Scoring keeps its terms apart: the policy, lam and k enter when poses are chosen.
+In: the field of round t - 1 and its scores. Out: scores.csv and scores.json, maps.npz, uncertainty.exr of a field; of round t
+poses.json and poses.exr. Scores keep their terms apart: the policy, lam and k enter when poses are chosen, so sweeps over
+them share the first scoring. A round after a stop asks for no pose and hands the field on as it is.
 """
+
+
+def prior_weights(wildcards):
+    """What scoring reads beside the field: the weights of the prior and of LPIPS."""
+    if wildcards.prior == "none":
+        return {}
+    prior, where = config["priors"][wildcards.prior], f"priors.{wildcards.prior}"
+    files = lpips_weights(wildcards) if prior["lpips"] else {}
+    if prior["model"] == "terrain":
+        return files | {"weights": terrain_weights(wildcards.prior)}
+    return files | {"folder": existing(prior["folder"], f"{where}.folder", "; see docs/research/results/prior.md")}
+
+
+def earlier_decisions(wildcards):
+    """What rounds 1 to t - 1 reported of their photos, and whether the last of them still asked for any."""
+    t = int(wildcards.t)
+    return fits_before(wildcards) | ({"last": f"{round_folder(t - 1)}/poses.json"} if t > 1 else {})
+
+
+def true_images(wildcards):
+    """What candidates truly show, for the policies that know it."""
+    if wildcards.policy not in ORACLES:
+        return {}
+    agent = config["scenes"][wildcards.scene].get("agent")
+    if agent not in ("render", "replay"):
+        raise WorkflowError(
+            f"policy {wildcards.policy}: what {wildcards.scene} truly shows is not known; it needs agent: render or replay"
+        )
+    return {"truth": "<results>/<photos>/candidates"} if agent == "render" else {"images": "<results>/<photos>/images"}
 
 
 rule score_coarse:
     """Score every candidate pose by what the coarse field does not know there, and freeze the scales of the terms."""
     input:
-        unpack(prior_of),
+        unpack(prior_weights),
         field="<results>/<coarse>/field.ply",
         ground="<results>/<coarse>/ground.exr",
         views="<results>/<start>/views.json",
@@ -29,7 +57,7 @@ rule score_coarse:
     threads: 2
     resources:
         mem_mb=lambda wildcards, attempt: (1000 if wildcards.prior == "none" else 3000) * attempt,
-        runtime=growing("60m"),
+        runtime=per_attempt("60m"),
     params:
         scene=entry("scenes", "scene"),
         prior=lambda wildcards: config["priors"].get(wildcards.prior),
@@ -42,7 +70,7 @@ rule score_coarse:
 
 use rule score_coarse as score_round with:
     input:
-        unpack(prior_of),
+        unpack(prior_weights),
         field="<results>/<round>/field.ply",
         ground="<results>/<round>/ground.exr",
         frozen="<results>/<scored>/scores.json",
@@ -67,9 +95,9 @@ use rule score_coarse as score_round with:
 rule select_poses:
     """Choose the k poses that the policy expects most of, or none after a stop, and show what is not known there."""
     input:
-        unpack(before_round),
-        unpack(decided_before),
-        unpack(truth_for_oracle),
+        unpack(round_before),
+        unpack(earlier_decisions),
+        unpack(true_images),
         captures=captures_before,
         views="<results>/<start>/views.json",
         model="<results>/<photos>/sparse",
@@ -94,7 +122,7 @@ rule select_poses:
         policy=lambda wildcards: wildcards.policy,
         lam=real("lam"),
         k=integer("k"),
-        stop=lambda wildcards: read_stop(wildcards.stop),
+        stop=lambda wildcards: paths.decode_stop(wildcards.stop),
         seed=integer("seed"),
         t=integer("t"),
         source=code_of("select_poses"),

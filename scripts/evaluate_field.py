@@ -14,7 +14,7 @@ from dav_gswt.views import stopping
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     split, captures = read_json(given.views), list(given.get("captures", []))
-    tests = read_training_views(given.images, given.model, split["test"], [], params.quality["size"])
+    tests = read_training_views(given.images, given.model, split["test"], [], params.preset["size"])
     photos = len(split["start"]) + sum(len(read_capture_record(folder)) for folder in captures)
     fitted, grid = read_field(given.field), ground.read(given.ground)
     perceptual = lpips_weights.read(given.lpips) if given.get("lpips") else None
@@ -24,4 +24,4 @@ with logging_to(snakemake.log[0]):
     result |= {"fit": read_json(given.fit)}
     result |= stopping.decision_record(read_json(given.poses)) if given.get("poses") else {}
     inputs = {"field": given.field, "ground": given.ground, "views": given.views}
-    write_json(snakemake.output.metrics, result | {"provenance": record_provenance(inputs, dict(params.quality))})
+    write_json(snakemake.output.metrics, result | {"provenance": record_provenance(inputs, dict(params.preset))})

@@ -10,7 +10,7 @@ from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction import build, ground
 
 with logging_to(snakemake.log[0]):
-    given, quality = snakemake.input, snakemake.params.quality
+    given, quality = snakemake.input, snakemake.params.preset
     names, grid = read_json(given.views)["test"], ground.read(given.ground)
     tests = build.modelled(read_training_views(given.images, given.model, names, [], quality["size"]), grid)
     perceptual = lpips_weights.read(given.lpips) if given.get("lpips") else None

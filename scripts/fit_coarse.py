@@ -12,7 +12,7 @@ from dav_gswt.reconstruction import build, ground
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    quality, margin = build.Quality(**params.quality), ground.WHOLE if params.whole else ground.MARGIN
+    quality, margin = build.FitSettings(**params.preset), ground.WHOLE if params.whole else ground.MARGIN
     names = read_json(given.views)["start"]
     photos = read_training_views(given.images, given.model, names, [], quality.size)
     points, colours = triangulate_points(read_colmap_model(given.model), names, given.images)

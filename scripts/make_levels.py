@@ -12,7 +12,7 @@ with logging_to(snakemake.log[0]):
     finest, grid = read_field(given.field), ground.read(given.ground)
     if given.get("maps"):  # a prior was asked: what it doubts is what the tiles go by
         finest = pose_maps.apply_uncertainty(finest, pose_maps.read_pose_maps(given.maps)[1])
-    steps = params.quality["level_steps"]
+    steps = params.preset["level_steps"]
     levels = build.build_levels(*merge.crop_to_blocks(finest, grid, 1), params.levels, steps, params.seed, params.keep)
     inputs = {"field": given.field, "ground": given.ground}
     asked = {"levels": params.levels, "level_steps": steps, "seed": params.seed}

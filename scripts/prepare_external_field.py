@@ -6,7 +6,7 @@ from dav_gswt.logs import logging_to
 from dav_gswt.reconstruction import build, external_field, ground
 
 with logging_to(snakemake.log[0]):
-    quality = build.Quality(**snakemake.params.quality)
+    quality = build.FitSettings(**snakemake.params.preset)
     entered, grid = external_field.enter(
         read_field(snakemake.input.field), read_scene_frame(snakemake.input.frame), quality
     )

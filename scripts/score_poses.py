@@ -18,7 +18,9 @@ with logging_to(snakemake.log[0]):
     pool = candidates.list_remaining(scene, frame, given.model, split, captures)
     if scene["agent"] != "replay":  # whose frames were all taken, wherever they stand
         pool = serial_rig.filter_reachable(scene, frame, pool) if scene["agent"] == "serial" else pool
-        pool = feasibility.filter_feasible(pool, grid, scene.get("reach"), feasibility.CLEARANCE * frame.flying_height)
+        pool = feasibility.filter_feasible(
+            pool, grid, scene.get("feasibility"), feasibility.CLEARANCE * frame.flying_height
+        )
     taken = read_training_views(given.images, given.model, split["start"], captures, scoring.PHOTO)
     prior = prior_sampling.open_scoring_prior(params.prior, params.p_drop, params.seed, given.get("lpips"))
     first = frozen_scales.read_frozen_scales(given.frozen) if given.get("frozen") else None

@@ -11,7 +11,7 @@ from dav_gswt.reconstruction import build, ground, regression_guard
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    quality, captures = build.Quality(**params.quality), list(given.captures)
+    quality, captures = build.FitSettings(**params.preset), list(given.captures)
     names, aside = read_json(given.views)["start"], regression_guard.set_aside(map(read_json, given.fits))
     before = read_training_views(given.images, given.model, names, captures[:-1], quality.size)
     new = read_captured_views(captures[-1], quality.size)

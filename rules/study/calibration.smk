@@ -1,10 +1,22 @@
-"""Figures of docs/: how soon a fit shows photos it has not seen, what its field looks like from elsewhere, and whether
-scores of poses say where a field is wrong.
+"""Calibration: do scores of candidate poses say where a field is wrong?
 
-In: the photos of a scene; calibration.json of scenes and rounds. Out: tables in docs/research/data with their provenance, plots.
-Not part of `all`: `snakemake docs/research/figures/fit_time.png docs/research/figures/calibration.png` makes them. Seconds differ from
-machine to machine.
+In: a field, its scores, and what some candidates truly show. Out: calibration.json and calibration.csv of a round;
+docs/research/data/calibration.csv and figures/calibration.png of all that the config's `study.calibration` names.
 """
+
+def true_candidates(wildcards):
+    """What candidates truly show, where it is rendered; a replayed scene has its photos."""
+    if config["scenes"][wildcards.scene].get("agent") != "render":
+        return {}
+    return {"truth": "<results>/<photos>/candidates"}
+
+
+def regressor_weights(wildcards):
+    """Networks without diffusion, to compare the project's own prior with."""
+    entry = config["priors"].get(wildcards.prior, {})
+    count = STUDY["calibration"]["regressors"] if entry.get("model") == "terrain" else 0
+    files = expand("<results>/prior/regressor{member}.safetensors", member=range(count))
+    return {"regressors": files} if files else {}
 
 
 rule render_candidates:
@@ -21,11 +33,11 @@ rule render_candidates:
         scene=scenes_by("render"),
     threads: 2
     resources:
-        mem_mb=growing(2500),
-        runtime=growing("60m"),
+        mem_mb=per_attempt(2500),
+        runtime=per_attempt("60m"),
     params:
         scene=entry("scenes", "scene"),
-        poses=lookup(dpath="calibration/poses", within=config),
+        poses=lambda wildcards: STUDY["calibration"]["poses"],
         source=code_of("study/render_candidates"),
     script:
         "../../scripts/study/render_candidates.py"
@@ -34,9 +46,9 @@ rule render_candidates:
 rule calibrate_coarse:
     """Compare the scores of some candidates with the true error of the field there."""
     input:
-        unpack(prior_of),
-        unpack(regressors_of),
-        unpack(truth_of),
+        unpack(prior_weights),
+        unpack(regressor_weights),
+        unpack(true_candidates),
         field="<results>/<coarse>/field.ply",
         ground="<results>/<coarse>/ground.exr",
         scores="<results>/<scored>/scores.csv",
@@ -54,8 +66,8 @@ rule calibrate_coarse:
         "<benchmarks>/<scored>/calibrate_coarse.tsv"
     threads: 2
     resources:
-        mem_mb=growing(3000),
-        runtime=growing("60m"),
+        mem_mb=per_attempt(3000),
+        runtime=per_attempt("60m"),
     params:
         scene=entry("scenes", "scene"),
         size=lambda wildcards: config["presets"][wildcards.preset]["size"],
@@ -63,7 +75,7 @@ rule calibrate_coarse:
         p_drop=real("p_drop"),
         lam=lookup(dpath="lam", within=config),
         seed=integer("seed"),
-        poses=lookup(dpath="calibration/poses", within=config),
+        poses=lambda wildcards: STUDY["calibration"]["poses"],
         source=code_of("study/calibrate_scores"),
     script:
         "../../scripts/study/calibrate_scores.py"
@@ -71,9 +83,9 @@ rule calibrate_coarse:
 
 use rule calibrate_coarse as calibrate_round with:
     input:
-        unpack(prior_of),
-        unpack(regressors_of),
-        unpack(truth_of),
+        unpack(prior_weights),
+        unpack(regressor_weights),
+        unpack(true_candidates),
         field="<results>/<round>/field.ply",
         ground="<results>/<round>/ground.exr",
         scores="<results>/<round>/scores.csv",

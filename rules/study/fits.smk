@@ -1,10 +1,9 @@
-"""Figures of docs/: how soon a fit shows photos it has not seen, what its field looks like from elsewhere, and whether
-scores of poses say where a field is wrong.
+"""Fit profiles: PSNR of the test photos over the seconds of a fit, and what its field looks like from elsewhere.
 
-In: the photos of a scene; calibration.json of scenes and rounds. Out: tables in docs/research/data with their provenance, plots.
-Not part of `all`: `snakemake docs/research/figures/fit_time.png docs/research/figures/calibration.png` makes them. Seconds differ from
-machine to machine.
+In: the photos of a scene of the config's `study.fit_profiles`. Out: docs/research/data/fit_{scene}.csv and figures.
 """
+
+CURVES = ["copr_dunes", "desert_high"]  # one real set, one synthetic
 
 
 rule profile_fit:
@@ -24,10 +23,10 @@ rule profile_fit:
         "<benchmarks>/figures/profile_fit_{scene}.tsv"
     threads: 2
     resources:
-        mem_mb=growing(3000),
-        runtime=growing("30m"),
+        mem_mb=per_attempt(3000),
+        runtime=per_attempt("30m"),
     params:
-        trial=lambda wildcards: lookup(dpath=f"trials/{wildcards.scene}", within=config),
+        profile=lambda wildcards: STUDY["fit_profiles"][wildcards.scene],
         source=code_of("study/profile_fit"),
     script:
         "../../scripts/study/profile_fit.py"

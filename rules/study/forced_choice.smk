@@ -1,31 +1,32 @@
-"""The perceptual study: which of two crops has the less visible seam? A kit for people, and what follows from answers.
+"""Forced choice: people choose which of two crops has the less visible seam. docs/research/results/forced-choice.md.
 
-In: the levels and, of each seam that is compared, the tiles; the files that people saved, in the folder `answers` of the
-config's `perceptual_study`. Out, per scene: perceptual/{scene}/pairs, the crops; for all: perceptual/kit/page, a page that works
-offline and does not say which crop is which, perceptual/kit/key.json, which does; results/tables/perceptual.csv,
-results/figures/perceptual.png and perceptual/participants.json, who was counted.
-Not part of `all`: `snakemake perceptual_kit` and `snakemake perceptual_results`; docs/research/results/forced-choice.md says how to run it.
+In: levels and tiles of each tiling that is compared; the answers that people saved. Out, per scene:
+forced_choice/{scene}/pairs; forced_choice/kit/page, a page that works offline and does not say which crop is which, and
+kit/key.json, which does; results/tables/forced_choice.csv and its figure. `snakemake perceptual_kit`, `perceptual_results`.
 """
+
+PAGE_PARTS = files_in(BASE / "workflow/forced_choice")
+ANSWERS_SCHEMA = str(BASE / "workflow/schemas/answers.schema.json")
 
 
 rule render_pairs:
     """A scene's crops, two of a place: cut in two ways, or cut and whole; and attention checks."""
     input:
-        unpack(perceptual_inputs),
+        unpack(pair_inputs),
     output:
         pairs=directory("<results>/perceptual/{scene}/pairs"),
     log:
-        "<logs>/perceptual/{scene}/render_pairs.log",
+        "<logs>/forced_choice/{scene}/render_pairs.log",
     benchmark:
-        "<benchmarks>/perceptual/{scene}/render_pairs.tsv"
+        "<benchmarks>/forced_choice/{scene}/render_pairs.tsv"
     threads: 2
     resources:
-        mem_mb=growing(6000),
-        runtime=growing("30m"),
+        mem_mb=per_attempt(6000),
+        runtime=per_attempt("30m"),
     params:
-        seams=lambda wildcards: perceptual_seams(),
+        tilings=lambda wildcards: compared_tilings(),
         study=lambda wildcards: {
-            key: config["perceptual_study"][key] for key in ("pairs", "crops", "checks", "size", "seed")
+            key: STUDY["forced_choice"][key] for key in ("pairs", "crops", "checks", "size", "seed")
         },
         salt=lambda wildcards: config["seeds"][0],
         tau=lambda wildcards: float(config["tau"]),
@@ -37,18 +38,18 @@ rule render_pairs:
 rule make_kit:
     """All pairs as a page with trial lists, and the key to it."""
     input:
-        pairs=lambda wildcards: expand(rules.render_pairs.output.pairs, scene=config["perceptual_study"]["scenes"]),
-        parts=TRIALS,
+        pairs=lambda wildcards: expand(rules.render_pairs.output.pairs, scene=STUDY["forced_choice"]["scenes"]),
+        parts=PAGE_PARTS,
     output:
         page=directory("<results>/perceptual/kit/page"),
         key="<results>/perceptual/kit/key.json",
     log:
-        "<logs>/perceptual/make_kit.log",
+        "<logs>/forced_choice/make_kit.log",
     benchmark:
-        "<benchmarks>/perceptual/make_kit.tsv"
+        "<benchmarks>/forced_choice/make_kit.tsv"
     params:
-        scenes=lambda wildcards: config["perceptual_study"]["scenes"],
-        seed=lambda wildcards: config["perceptual_study"]["seed"],
+        scenes=lambda wildcards: STUDY["forced_choice"]["scenes"],
+        seed=lambda wildcards: STUDY["forced_choice"]["seed"],
         source=code_of("study/make_kit"),
     script:
         "../../scripts/study/make_kit.py"
@@ -57,22 +58,22 @@ rule make_kit:
 rule evaluate_answers:
     """How often people chose which, clustered by participant; and the model observer, in rows of its own."""
     input:
-        unpack(answers_given),
+        unpack(saved_answers),
         key=rules.make_kit.output.key,
         schema=ANSWERS_SCHEMA,
     output:
-        table="results/tables/perceptual.csv",
+        table="results/tables/forced_choice.csv",
         plot=report(
-            "results/figures/perceptual.png",
-            caption="../../workflow/report/perceptual.rst",
+            "results/figures/forced_choice.png",
+            caption="../../workflow/report/forced_choice.rst",
             category="Figures",
             labels={"figure": "which seams are harder to see"},
         ),
-        facts="results/perceptual/participants.json",
+        facts="results/forced_choice/participants.json",
     log:
-        "<logs>/perceptual/evaluate_answers.log",
+        "<logs>/forced_choice/evaluate_answers.log",
     benchmark:
-        "<benchmarks>/perceptual/evaluate_answers.tsv"
+        "<benchmarks>/forced_choice/evaluate_answers.tsv"
     params:
         source=code_of("study/evaluate_answers"),
     script:

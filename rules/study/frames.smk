@@ -1,11 +1,9 @@
-"""Frames: how long one takes on a walk at a fixed height over hills, for several budgets of Gaussians in view.
+"""Frame times on a walk at a fixed height over hills, for several budgets of Gaussians in view: `snakemake frame_times`.
 
-In: the bundles that the config's `frames` names, viewer. Out, beside each bundle: frames/library.csv (drawn by the library
-on the processor), frames/page.csv (by the page in a headless Chromium), frames/steadiness.csv (what changes from a frame to
-the next of a slow walk, in pre-sorted orders and sorted exactly); of all together results/tables/frames.csv, also in
-docs/research/data, results/figures/frames.png, and results/tables/viewer.csv, which the study's tables show. Not part of `all`:
-`snakemake frame_times`; needs Chromium and requirements-test.lock. Milliseconds hold for the machine and its load, which
-every row names.
+In: the bundles of the config's `study.frames`, the viewer. Out, beside each bundle: frames/library.csv (rendered by the library on
+the CPU), frames/page.csv (by the page in a headless Chromium), frames/flicker.csv (what changes from a frame to the next of a
+slow walk); results/tables/frames.csv, viewer.csv and a figure. Needs Chromium and requirements-test.lock. Milliseconds hold
+for the machine and its load, which every row names.
 """
 
 
@@ -22,10 +20,10 @@ rule time_library:
         "<benchmarks>/<bundle>/time_library.tsv"
     threads: 2
     resources:
-        mem_mb=growing(4000),
-        runtime=growing("1h"),
+        mem_mb=per_attempt(4000),
+        runtime=per_attempt("1h"),
     params:
-        asked=walked_over,
+        asked=walk_settings,
         schema=BUNDLE_SCHEMA,
         source=code_of("study/time_library"),
     script:
@@ -46,10 +44,10 @@ rule time_page:
         "<benchmarks>/<bundle>/time_page.tsv"
     threads: 2
     resources:
-        mem_mb=growing(3000),
-        runtime=growing("2h"),
+        mem_mb=per_attempt(3000),
+        runtime=per_attempt("2h"),
     params:
-        asked=walked_over,
+        asked=walk_settings,
         source=code_of("study/time_page"),
     script:
         "../../scripts/study/time_page.py"
@@ -61,23 +59,23 @@ rule measure_flicker:
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
     output:
-        table="<results>/<bundle>/frames/steadiness.csv",
+        table="<results>/<bundle>/frames/flicker.csv",
     log:
         "<logs>/<bundle>/measure_flicker.log",
     benchmark:
         "<benchmarks>/<bundle>/measure_flicker.tsv"
     threads: 2
     resources:
-        mem_mb=growing(4000),
-        runtime=growing("1h"),
+        mem_mb=per_attempt(4000),
+        runtime=per_attempt("1h"),
     params:
-        heights=lambda wildcards: config["frames"]["heights"],
+        heights=lambda wildcards: STUDY["frames"]["heights"],
         walk=lambda wildcards: {
-            "count": config["frames"]["pairs"],
-            "length": config["frames"]["flight"]["length"],
-            "width": config["frames"]["width"],
-            "height": config["frames"]["height"],
-            "budget": max(config["frames"]["budgets"]),
+            "count": STUDY["frames"]["pairs"],
+            "length": STUDY["frames"]["flight"]["length"],
+            "width": STUDY["frames"]["width"],
+            "height": STUDY["frames"]["height"],
+            "budget": max(STUDY["frames"]["budgets"]),
         },
         schema=BUNDLE_SCHEMA,
         source=code_of("study/measure_flicker"),

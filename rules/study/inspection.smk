@@ -1,16 +1,27 @@
 """Pictures of docs/inspect.md: what `dav-gswt inspect` shows of a round of the config's scene.
 
-In: photos, scores, poses, field, levels, tiles and maps of the scene's last round. Out: docs/research/figures/inspect_{shown}.png.
-Not part of `all`: `snakemake --cores 2 --config policy=w2-lpips-diverse rounds=1 -- inspection` makes them. Needs the extra
-`inspect`.
+In: artifacts of the scene's last round. Out: docs/research/figures/inspect_{shown}.png. Needs the extra `inspect`.
+`snakemake --cores 2 --config policy=w2-lpips-diverse rounds=1 -- inspection`
 """
+
+INSPECTED = {  # by the name of the picture: what is opened, and how
+    "field": (rules.update_field.output.field, {}),
+    "uncertainty": (rules.score_round.output.maps, {}),
+    "levels": (rules.make_levels.output.levels, {"colour": "level"}),
+    "poses": (rules.select_poses.output.poses, {}),
+    "photos": (rules.split_views.output.views, {}),
+    "tiles": (rules.cut_tiles.output.seams, {}),
+    "patches": (rules.cut_tiles.output.seams, {"colour": "patch"}),
+    "maps": (rules.score_round.output.shown, {"channel": "w2_sq"}),
+    "ground": (rules.score_round.output.shown, {"part": "above"}),
+}
 
 
 rule inspect_artifact:
     """Draw an artefact as `dav-gswt inspect --save` does."""
     input:
         lambda wildcards: expand(
-            INSPECTED[wildcards.shown][0], **(values_of(config["scene"]) | {"seed": config["seeds"][0]})
+            INSPECTED[wildcards.shown][0], **(branch(config["scene"]) | {"seed": config["seeds"][0]})
         ),
     output:
         picture="docs/research/figures/inspect_{shown}.png",
@@ -21,8 +32,8 @@ rule inspect_artifact:
     wildcard_constraints:
         shown="|".join(INSPECTED),
     resources:
-        mem_mb=growing(3000),
-        runtime=growing("10m"),
+        mem_mb=per_attempt(3000),
+        runtime=per_attempt("10m"),
     params:
         asked=lambda wildcards: INSPECTED[wildcards.shown][1],
         source=code_of("study/inspect_artifact"),

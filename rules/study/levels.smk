@@ -1,4 +1,7 @@
-"""TODO."""
+"""Levels and pre-sorted orders against the finest level and exact sorting: `snakemake lod_table orders_table`.
+
+In: tiles. Out: lod.csv and orders.csv beside them; of the scenes of the config's `study.lod` results/tables/lod.csv, orders.csv.
+"""
 
 
 rule measure_levels:
@@ -14,8 +17,8 @@ rule measure_levels:
         "<benchmarks>/<tiles>/measure_levels.tsv"
     threads: 2
     resources:
-        mem_mb=growing(4000),
-        runtime=growing("20m"),
+        mem_mb=per_attempt(4000),
+        runtime=per_attempt("20m"),
     params:
         source=code_of("study/measure_levels"),
     script:
@@ -57,8 +60,8 @@ rule measure_orders:
         "<benchmarks>/<tiles>/measure_orders.tsv"
     threads: 2
     resources:
-        mem_mb=growing(2000),
-        runtime=growing("20m"),
+        mem_mb=per_attempt(2000),
+        runtime=per_attempt("20m"),
     params:
         source=code_of("study/measure_orders"),
     script:

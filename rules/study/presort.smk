@@ -1,4 +1,7 @@
-"""TODO."""
+"""What the page's shortcuts do to a picture: pre-sorted orders, levels and rounding. `snakemake presort_table`.
+
+In: bundles and tiles. Out: presort.csv beside each bundle; results/tables/presort.csv and its figure.
+"""
 
 
 rule measure_presort:
@@ -16,8 +19,8 @@ rule measure_presort:
         "<benchmarks>/<bundle>/measure_presort.tsv"
     threads: 2
     resources:
-        mem_mb=growing(4000),
-        runtime=growing("20m"),
+        mem_mb=per_attempt(4000),
+        runtime=per_attempt("20m"),
     params:
         schema=BUNDLE_SCHEMA,
         source=code_of("study/measure_presort"),

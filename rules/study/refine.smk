@@ -1,10 +1,17 @@
-"""TODO."""
+"""Refinement of cuts: pictures of the cuts are repaired by a prior, and the Gaussians beside them refitted within bounds.
+
+In: tiles and levels. Out: tiles_{tiling}-refined/, the same files again. It was not shown to help (docs/research/lab-notes.md).
+"""
+
+def refining_prior(wildcards):
+    """The weights of the prior that repairs cuts."""
+    return {"weights": terrain_weights(STUDY["refine"]["prior"])}
 
 
 rule refine_tiles:
     """Repair pictures of the cuts by a prior, and refit the Gaussians beside them, within bounds."""
     input:
-        unpack(refiner_of),
+        unpack(refining_prior),
         seams="<results>/<tiles>/seams.json",
         tiles="<results>/<tiles>/tiles",
         levels="<results>/<levels>",
@@ -16,14 +23,14 @@ rule refine_tiles:
     benchmark:
         "<benchmarks>/<tiles>-refined/refine_tiles.tsv"
     wildcard_constraints:
-        seam=CUT,
+        tiling=PLAIN_TILING,
     threads: 2
     resources:
-        mem_mb=growing(3000),
-        runtime=growing("30m"),
+        mem_mb=per_attempt(3000),
+        runtime=per_attempt("30m"),
     params:
-        refine=refining,
-        prior=lambda wildcards: config["priors"][refining(wildcards)["prior"]],
+        refine=STUDY["refine"],
+        prior=lambda wildcards: config["priors"][STUDY["refine"]["prior"]],
         seed=integer("seed"),
         source=code_of("study/refine_tiles"),
     script:

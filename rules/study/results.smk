@@ -1,9 +1,7 @@
-"""The study: all tables and figures of the paper from our own runs, and docs/research/results/results.md, which shows them.
+"""The study: all tables and figures of the paper from our own runs, and the page that shows them.
 
-In: what the config's `study` names. Out: results/tables/{timing,lod,sensitivity,ablation}.csv, results/sweeps/*.png,
-results/figures/, figures beside what they show; docs/research/results/results.md with docs/research/figures/study_*; the pages of `stability`
-and `tradeoff`. Not part of `all`: `snakemake study` makes it, with `--max-threads 1` a core to each cell;
-`snakemake study --report page.html` a page of it.
+In: what the config's `study.tables` names. Out: docs/research/results/results.md with its figures; the pages of `stability` and
+`tradeoff`. `snakemake study` makes it, `snakemake study --report page.html` one page of all.
 """
 
 
@@ -11,11 +9,11 @@ rule write_results:
     """The study's tables and figures as a page of docs/."""
     input:
         **{name: f"results/tables/{name}.csv" for name in TABLES},
-        figures=lambda wildcards: list(study_figures().values()),
+        figures=lambda wildcards: list(figure_files().values()),
     output:
         page="docs/research/results/results.md",
         lod="docs/research/data/lod.csv",
-        figures=[f"docs/research/figures/study_{name}{kept_as(name)}" for name in study_figures()],
+        figures=[f"docs/research/figures/study_{name}{kept_suffix(name)}" for name in figure_files()],
     log:
         "<logs>/study/write_results.log",
     benchmark:
@@ -30,4 +28,12 @@ rule write_results:
 rule study:
     """All tables and figures of the paper, from our own runs."""
     input:
-        *STUDY,
+        expand("results/tables/{name}.csv", name=TABLES),
+        lambda wildcards: expand("results/sweeps/{name}.png", name=sweeps_of(STUDY["tables"])),
+        lambda wildcards: list(figure_files().values()) + terrain_sheets(),
+        lambda wildcards: [rules.write_results.output.page, rules.write_stability.output.page],
+        lambda wildcards: [rules.write_tradeoff.output.page, rules.gather_auto.output.page],
+
+
+localrules:
+    study,

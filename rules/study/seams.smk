@@ -1,18 +1,16 @@
-"""Seams measured: does anybody find the borders and the cuts? And does the terrain repeat?
+"""Seams: can anybody find the borders and the cuts, and does the terrain repeat? `snakemake seams`.
 
-In: the levels and the tiles. Out, per cell (a scene, a seed, a variant of `seams`; restarted by itself): crops.csv,
-facts.json (with the share of cuts through strong gradients), repetition.csv, repetition.png; of each scene's own seam
-20 x 20 tiles from above and walking, flat and hilly; seam_cuts.png, where colour and semantics cut. Gathered:
-results/tables/seams.csv (every crop), seam_summary.csv, seam_ablation.csv and repetition.csv; the last three also in
-docs/research/data, where runs add up; docs/research/figures/seam_ablation.png, seam_sheet.jpg and the page docs/research/results/seams.md.
-Not part of `all`: `snakemake seams` makes them, for the scenes of the config's `seam_study`.
+In: levels and tiles. Out, per experiment (a scene, a seed, a tiling): crops.csv, facts.json, repetition.csv; of each scene's
+own tiling 20 x 20 tiles from above and walking, flat and hilly. Gathered: results/tables/seams.csv (every crop),
+seam_summary.csv, seam_ablation.csv and repetition.csv, the last three also in docs/research/data; the page
+docs/research/results/seams.md.
 """
 
 
 rule measure_seams:
     """Crops on borders and cuts, beside the same of uncut patches and of tiles cut straight."""
     input:
-        unpack(lambda wildcards: describing(wildcards) | lpips_if_fetched(wildcards)),
+        unpack(lambda wildcards: tiling_inputs(plain_tiling(wildcards)) | lpips_weights()),
         levels="<results>/<levels>",
         seams="<results>/<tiles>/seams.json",
         tiles="<results>/<tiles>/tiles",
@@ -26,10 +24,10 @@ rule measure_seams:
     priority: -1  # after all jobs of two threads: between them one core would stand idle
     threads: 1  # crops are small: two cells beside each other take half the time
     resources:
-        mem_mb=growing(4000),
-        runtime=growing("20m"),
+        mem_mb=per_attempt(4000),
+        runtime=per_attempt("20m"),
     params:
-        seam=cutting,
+        tiling=lambda wildcards: config["tilings"][plain_tiling(wildcards)],
         seed=integer("seed"),
         tau=real("tau"),
         source=code_of("study/measure_seams"),
@@ -52,10 +50,10 @@ rule measure_repetition:
         "<benchmarks>/<seams>/measure_repetition.tsv"
     threads: 2
     resources:
-        mem_mb=growing(4000),
-        runtime=growing("10m"),
+        mem_mb=per_attempt(4000),
+        runtime=per_attempt("10m"),
     params:
-        seam=cutting,
+        tiling=lambda wildcards: config["tilings"][plain_tiling(wildcards)],
         seed=integer("seed"),
         source=code_of("study/measure_repetition"),
     script:
@@ -82,8 +80,8 @@ rule render_grid:
     priority: -1
     threads: 1  # most of it places Gaussians, one cell after another
     resources:
-        mem_mb=growing(6000),
-        runtime=growing("20m"),
+        mem_mb=per_attempt(6000),
+        runtime=per_attempt("20m"),
     params:
         size=lookup(dpath="stills", within=config),
         source=code_of("study/render_grid"),
@@ -95,7 +93,7 @@ rule gather_seams:
     """Every crop of every cell in one table; what follows from them, added to what earlier runs found."""
     input:
         measured=lambda wildcards: [
-            cell[name] for cell in seam_cells() for name in ("table", "facts", "repeats") if name in cell
+            cell[name] for cell in seam_experiments() for name in ("table", "facts", "repeats") if name in cell
         ],
     output:
         crops="results/tables/seams.csv",
@@ -109,8 +107,8 @@ rule gather_seams:
     benchmark:
         "<benchmarks>/seams/gather_seams.tsv"
     params:
-        cells=lambda wildcards: seam_cells(),
-        study=lambda wildcards: config["seam_study"],
+        cells=lambda wildcards: seam_experiments(),
+        study=lambda wildcards: STUDY["seams"],
         source=code_of("study/gather_seams"),
     script:
         "../../scripts/study/gather_seams.py"
@@ -131,7 +129,7 @@ rule write_seams:
         "<benchmarks>/seams/write_seams.tsv"
     params:
         pictures=lambda wildcards: seam_pictures(),
-        own=lambda wildcards: {scene: config["scenes"][scene]["seam"] for scene in config["seam_study"]["scenes"]},
+        own=lambda wildcards: {scene: config["scenes"][scene]["tiling"] for scene in STUDY["seams"]["scenes"]},
         source=code_of("study/write_seams"),
     script:
         "../../scripts/study/write_seams.py"
@@ -166,8 +164,8 @@ rule seams:
         lambda wildcards: list(rules.write_seams.output),
         lambda wildcards: [
             path
-            for scene in config["seam_study"]["scenes"]
-            for path in expand(list(rules.plot_cuts.output), **seam_values(scene))
+            for scene in STUDY["seams"]["scenes"]
+            for path in expand(list(rules.plot_cuts.output), **seam_branch(scene))
         ],
 
 

@@ -1,11 +1,11 @@
 """Numerical stability at the extremes: every formula in float32 against float64, and the workflow at the ends of its range.
 
-In: the library; the config of the tests, with each extreme laid over it. Out: results/tables/stability.csv, a row a
-formula; results/stability/{extreme}/, what came of a run, each restarted by itself; results/tables/stability_runs.csv,
-a row a run; both tables also in docs/research/data with stability.json, which says what they were made with;
-docs/research/figures/stability.png and the page docs/research/results/stability.md.
-Not part of `all`: `snakemake stability` makes them. LPIPS takes part in the runs where its weights were fetched.
+In: the library; the config of the tests, with each extreme laid over it. Out: results/tables/stability.csv, a row a formula;
+results/stability/{extreme}/; results/tables/stability_runs.csv, a row a run; both also in docs/research/data; the page
+docs/research/results/stability.md. `snakemake stability`.
 """
+
+from dav_gswt.study.stability.extremes import EXTREMES
 
 
 rule measure_formulas:
@@ -19,8 +19,8 @@ rule measure_formulas:
     benchmark:
         "<benchmarks>/stability/measure_formulas.tsv"
     resources:
-        mem_mb=growing(2000),
-        runtime=growing("10m"),
+        mem_mb=per_attempt(2000),
+        runtime=per_attempt("10m"),
     params:
         source=code_of("study/measure_formulas"),
     script:
@@ -30,8 +30,7 @@ rule measure_formulas:
 rule run_extreme:
     """Run the whole workflow at one extreme, in a folder of its own; that it fails is an outcome like any other."""
     input:
-        unpack(lpips_if_fetched),
-        configs=[str(Path(workflow.basedir, name)) for name in ("config/config.yaml", "config/test/config.yaml")],
+        configs=[str(Path(BASE, name)) for name in ("config/config.yaml", "config/test/config.yaml")],
     output:
         folder=directory("results/stability/{extreme}"),
     log:
@@ -42,10 +41,11 @@ rule run_extreme:
         extreme="|".join(map(re.escape, EXTREMES)),
     threads: 2
     resources:
-        mem_mb=growing(8000),
-        runtime=growing("60m"),
+        mem_mb=per_attempt(8000),
+        runtime=per_attempt("60m"),
     params:
         root=lambda wildcards: workflow.basedir,
+        lpips=lambda wildcards: config["lpips"],
         source=code_of("study/run_extreme"),
     script:
         "../../scripts/study/run_extreme.py"
@@ -74,7 +74,7 @@ rule write_stability:
         formulas=rules.measure_formulas.output.kept,
         facts=rules.measure_formulas.output.facts,
         runs=rules.gather_extremes.output.kept,
-        template=str(Path(workflow.basedir, "workflow/report/stability.md")),
+        template=str(Path(BASE, "workflow/report/stability.md")),
     output:
         page="docs/research/results/stability.md",
         plot="docs/research/figures/stability.png",

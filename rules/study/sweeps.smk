@@ -1,15 +1,14 @@
-"""Sweeps: the rows of the config's `sweeps`, each one table (a row a cell) and its figure.
+"""Sweeps: what one setting changes; one table and one figure for each row of the config's `study.sweeps`.
 
-In: what its cells left, each a scene, a seed and a combination of settings; a cell is restarted by itself, and what cells
-have in common is made once. Out: results/sweeps/{sweep}.csv and {sweep}.png; docs/research/data/sweep_{sweep}.csv, where runs add up.
-Not part of `all`: a sweep is asked for by its path, several by `snakemake study`.
+In: what its experiments left, each a scene, a seed and a combination of settings; what experiments have in common is made once.
+Out: results/sweeps/{sweep}.csv and {sweep}.png; docs/research/data/sweep_{sweep}.csv, where runs add up.
 """
 
 
 rule gather_sweep:
     """Collect what every cell of a sweep measured and what it cost."""
     input:
-        measured=lambda wildcards: [path for cell in sweep_cells(wildcards.sweep) for path in cell["files"].values()],
+        measured=lambda wildcards: [path for cell in sweep_experiments(wildcards.sweep) for path in cell["files"].values()],
     output:
         table=report(
             "results/sweeps/{sweep}.csv",
@@ -23,7 +22,7 @@ rule gather_sweep:
     benchmark:
         "<benchmarks>/sweeps/gather_{sweep}.tsv"
     params:
-        cells=lambda wildcards: sweep_cells(wildcards.sweep),
+        cells=lambda wildcards: sweep_experiments(wildcards.sweep),
         source=code_of("study/gather_sweep"),
     script:
         "../../scripts/study/gather_sweep.py"
@@ -45,7 +44,7 @@ rule plot_sweep:
     benchmark:
         "<benchmarks>/sweeps/plot_{sweep}.tsv"
     params:
-        axes=lambda wildcards: list(config["sweeps"][wildcards.sweep]["vary"]),
+        axes=lambda wildcards: list(STUDY["sweeps"][wildcards.sweep]["vary"]),
         source=code_of("study/plot_sweep"),
     script:
         "../../scripts/study/plot_sweep.py"

@@ -1,16 +1,15 @@
 """The paper's tables with their own columns from our runs, the paper's values beside them as columns `paper_`; figures.
 
-In: sweeps that the config's `study` names; where a browser measured it, results/tables/viewer.csv: a row a bundle (scene,
-seed, quality, seam, tau) with milliseconds a frame. Out: results/tables/timing.csv, sensitivity.csv, ablation.csv, also in
-docs/research/data; results/figures/estimators_{scene}.png; doubt.png beside a bundle.
+In: sweeps that the config's `study.tables` names. Out: results/tables/timing.csv, sensitivity.csv, ablation.csv, also in
+docs/research/data; results/figures/estimators_{scene}.png; uncertainty.png beside a bundle.
 """
 
 
 rule tabulate_timing:
     """What each stage took in our runs, and what a frame of the viewer takes."""
     input:
-        unpack(viewer_if_measured),
-        sweep=lambda wildcards: f"results/sweeps/{config['study']['timing']}.csv",
+        unpack(viewer_times),
+        sweep=lambda wildcards: "results/sweeps/{timing}.csv".format(**STUDY["tables"]),
     output:
         table=report(
             "results/tables/timing.csv",
@@ -24,7 +23,7 @@ rule tabulate_timing:
     benchmark:
         "<benchmarks>/tables/timing.tsv"
     params:
-        value=lambda wildcards: default_of(config["study"]["timing"]),
+        value=lambda wildcards: default_of(STUDY["tables"]["timing"]),
         families=lambda wildcards: {n: s["family"] for n, s in config["scenes"].items() if "family" in s},
         source=code_of("study/tabulate_timing"),
     script:
@@ -34,7 +33,7 @@ rule tabulate_timing:
 rule tabulate_sensitivity:
     """What one setting changes, the others as they are."""
     input:
-        unpack(viewer_if_measured),
+        unpack(viewer_times),
         sweeps=swept("sensitivity"),
     output:
         table=report(
@@ -49,8 +48,8 @@ rule tabulate_sensitivity:
     benchmark:
         "<benchmarks>/tables/sensitivity.tsv"
     params:
-        settings=lambda wildcards: [setting_of(name) for name in config["study"]["sensitivity"]],
-        defaults=lambda wildcards: {setting_of(name): default_of(name) for name in config["study"]["sensitivity"]},
+        settings=lambda wildcards: [setting_of(name) for name in STUDY["tables"]["sensitivity"]],
+        defaults=lambda wildcards: {setting_of(name): default_of(name) for name in STUDY["tables"]["sensitivity"]},
         source=code_of("study/tabulate_sensitivity"),
     script:
         "../../scripts/study/tabulate_sensitivity.py"
@@ -59,7 +58,7 @@ rule tabulate_sensitivity:
 rule tabulate_ablation:
     """Estimators, policies and ways to cut, each less the baseline of its sweep."""
     input:
-        unpack(viewer_if_measured),
+        unpack(viewer_times),
         sweeps=swept("ablation"),
     output:
         table=report(
@@ -74,7 +73,7 @@ rule tabulate_ablation:
     benchmark:
         "<benchmarks>/tables/ablation.tsv"
     params:
-        baselines=lambda wildcards: {name: config["sweeps"][name]["baseline"] for name in config["study"]["ablation"]},
+        baselines=lambda wildcards: {name: STUDY["sweeps"][name]["baseline"] for name in STUDY["tables"]["ablation"]},
         source=code_of("study/tabulate_ablation"),
     script:
         "../../scripts/study/tabulate_ablation.py"
@@ -102,11 +101,11 @@ rule plot_estimators:
     benchmark:
         "<benchmarks>/figures/estimators_{scene}.tsv"
     resources:
-        mem_mb=growing(1500),
-        runtime=growing("10m"),
+        mem_mb=per_attempt(1500),
+        runtime=per_attempt("10m"),
     params:
-        named=lambda wildcards: config["study"]["figures"]["estimators"],
-        rounds=lambda wildcards: config["study"]["figures"]["rounds"],
+        named=lambda wildcards: STUDY["tables"]["figures"]["estimators"],
+        rounds=lambda wildcards: STUDY["tables"]["figures"]["rounds"],
         size=lambda wildcards: config["presets"][config["scenes"][wildcards.scene]["preset"]]["size"],
         source=code_of("study/plot_estimators"),
     script:
@@ -119,8 +118,8 @@ rule plot_tile_uncertainty:
         manifest="<results>/<bundle>/davgswt.json",
     output:
         plot=report(
-            "<results>/<bundle>/doubt.png",
-            caption="../../workflow/report/doubt.rst",
+            "<results>/<bundle>/uncertainty.png",
+            caption="../../workflow/report/uncertainty.rst",
             category="Figures",
             labels={"figure": "uncertainty of tiles", "scene": "{scene}"},
         ),

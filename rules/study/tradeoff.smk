@@ -1,29 +1,48 @@
-"""Speed against accuracy: every setting of the config's `tradeoff` as a cell, and what `auto` chose.
+"""Speed against accuracy: each setting of the config's `study.tradeoff` turned by itself, and what `auto` chose.
 
-In: what each cell left, and its jobs' benchmarks; a cell is restarted by itself, and what cells have in common is made
-once. Out: results/tradeoff/{tradeoff,pareto,auto}.csv, {pareto,knobs}.png; docs/research/data/tradeoff.csv and auto.csv, where runs
-add up; docs/research/results/tradeoff.md and docs/research/results/auto.md. Not part of `all`: `snakemake tradeoff` makes it, or `study`. Seconds differ from machine
-to machine: one that is otherwise idle is to run all of it.
+In: what each experiment left, and its jobs' benchmarks. Out: results/tradeoff/{tradeoff,pareto,auto}.csv, {pareto,knobs}.png;
+docs/research/data/tradeoff.csv and auto.csv, where runs add up; docs/research/results/tradeoff.md and auto.md. Seconds differ from
+machine to machine: one that is otherwise idle is to run all of it. `snakemake tradeoff`.
 """
 
 
-use rule evaluate_round as evaluate_at with:
+rule evaluate_at:
+    """Compare a round's field with the test photos at another size than it was fitted at."""
+    input:
+        unpack(lpips_weights),
+        field="<results>/<round>/field.ply",
+        ground="<results>/<round>/ground.exr",
+        fit="<results>/<round>/fit.json",
+        poses="<results>/<round>/poses.json",
+        captures=captures_until,
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
     output:
         metrics="<results>/<round>/metrics_{size}.json",
     log:
         "<logs>/<round>/evaluate_at_{size}.log",
     benchmark:
         "<benchmarks>/<round>/evaluate_at_{size}.tsv"
+    wildcard_constraints:
+        t=POSITIVE,
+    threads: 2
+    resources:
+        mem_mb=per_attempt(1500),
+        runtime=per_attempt("10m"),
     params:
-        quality=lambda wildcards: config["presets"][wildcards.preset] | {"size": int(wildcards.size)},
+        preset=lambda wildcards: config["presets"][wildcards.preset] | {"size": int(wildcards.size)},
         t=integer("t"),
         source=code_of("evaluate_field"),
+    script:
+        "../../scripts/evaluate_field.py"
 
 
 rule gather_tradeoff:
     """What every setting costs, what it is worth, and which of them nothing else beats."""
     input:
-        measured=lambda wildcards: files_of(tradeoff_cells()),
+        measured=lambda wildcards: files_of(tradeoff_experiments()),
     output:
         table="results/tradeoff/tradeoff.csv",
         pareto="results/tradeoff/pareto.csv",
@@ -33,7 +52,7 @@ rule gather_tradeoff:
     benchmark:
         "<benchmarks>/tradeoff/gather_tradeoff.tsv"
     params:
-        cells=lambda wildcards: tradeoff_cells(),
+        cells=lambda wildcards: tradeoff_experiments(),
         source=code_of("study/gather_tradeoff"),
     script:
         "../../scripts/study/gather_tradeoff.py"
@@ -79,7 +98,7 @@ rule write_tradeoff:
 rule gather_auto:
     """What `auto` chose for each scene, what fixed settings cost instead, and what was lost."""
     input:
-        measured=lambda wildcards: files_of(auto_cells()),
+        measured=lambda wildcards: files_of(auto_experiments()),
     output:
         table="results/tradeoff/auto.csv",
         kept=update("docs/research/data/auto.csv"),
@@ -89,7 +108,7 @@ rule gather_auto:
     benchmark:
         "<benchmarks>/tradeoff/gather_auto.tsv"
     params:
-        cells=lambda wildcards: auto_cells(),
+        cells=lambda wildcards: auto_experiments(),
         source=code_of("study/gather_auto"),
     script:
         "../../scripts/study/gather_auto.py"

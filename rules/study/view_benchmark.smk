@@ -1,17 +1,16 @@
-"""What policies are worth: the same scenes, photos to start from and pools for each, compared photo by photo.
+"""View benchmark: policies compared photo by photo, from the same photos to start from, pools and test views.
 
-In: what the cells of the config's `benchmark` left, each a scene, a seed, a policy and k; a cell is restarted by itself.
-Out: docs/research/data/{table}_curves.csv, where runs add up, a row a round of a cell; {table}_benchmark.csv, a row a cell, also
-under results/tables; {table}_comparison.csv and .md, every policy less the baseline; {table}_worth.csv, what rounds
-gained against what was expected of them; docs/research/figures/{table}_budget.png, PSNR against photos.
-Not part of `all`: `snakemake view_benchmark` makes them.
+In: the experiments of the config's `study.view_benchmark`, each a scene, a seed, a policy and k. Out:
+docs/research/data/{table}_curves.csv, a row for each round of an experiment; {table}_benchmark.csv, a row for each experiment;
+{table}_comparison.csv and .md, every policy less the baseline; {table}_worth.csv, what rounds gained against what was
+expected of them; figures/{table}_budget.png, PSNR against photos. `snakemake view_benchmark` makes them.
 """
 
 
 rule gather_curves:
     """Collect what every round of every cell measured, and what it cost, beside what earlier runs found."""
     input:
-        measured=lambda wildcards: [path for cell in compared_cells() for path in (*cell["metrics"], *cell["facts"])],
+        measured=lambda wildcards: [path for cell in benchmark_experiments() for path in (*cell["metrics"], *cell["facts"])],
     output:
         curves=update("docs/research/data/{table}_curves.csv"),
     log:
@@ -21,7 +20,7 @@ rule gather_curves:
     wildcard_constraints:
         table="view|development",
     params:
-        cells=lambda wildcards: compared_cells(),
+        cells=lambda wildcards: benchmark_experiments(),
         source=code_of("study/gather_curves"),
     script:
         "../../scripts/study/gather_curves.py"
@@ -45,7 +44,7 @@ rule compare_policies:
     wildcard_constraints:
         table="view|development",
     params:
-        baseline=lambda wildcards: config["benchmark"]["baseline"],
+        baseline=lambda wildcards: STUDY["view_benchmark"]["baseline"],
         source=code_of("study/compare_policies"),
     script:
         "../../scripts/study/compare_policies.py"
@@ -54,7 +53,7 @@ rule compare_policies:
 rule view_benchmark:
     """Compare the policies of the config's `benchmark`."""
     input:
-        lambda wildcards: expand(list(rules.compare_policies.output), table=config["benchmark"]["table"]),
+        lambda wildcards: expand(list(rules.compare_policies.output), table=STUDY["view_benchmark"]["table"]),
 
 
 localrules:

@@ -9,7 +9,7 @@ with logging_to(snakemake.log[0]):
     rows = [row for cell in cells for row in tables.rows(cell)]
     csv_tables.write_table(out.crops, rows)
     often = study.get("compared_draws", 1)
-    compared = [row for row in rows if row["variant"] in study["seams"] and row["draw"] < often]
+    compared = [row for row in rows if row["variant"] in study["tilings"] and row["replicate"] < often]
     found = {
         out.summary: summary.summary(rows),
         out.ablation: summary.ablation(compared, study["baseline"]),

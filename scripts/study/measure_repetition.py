@@ -10,7 +10,7 @@ with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
     known = exemplar.Known.of(levels.read_levels(given.levels))
     tiles = store.read_tiles(given.tiles, given.seams)
-    source = known.flattened(tiles, params.seam)
+    source = known.flattened(tiles, params.tiling)
     fields = [shelf.field for shelf in source.levels]
     found = repetition.repeats(tiles, fields, source.exemplar.cells * tiles.spacing, params.seed)
     csv_tables.write_table(out.table, repetition.rows(found))

@@ -17,14 +17,14 @@ with logging_to(snakemake.log[0]):
     known = exemplar.Known.of(levels.read_levels(given.levels))
     alexnet = lpips_weights.read(given.lpips) if given.get("lpips") else None
     tiles = store.read_tiles(given.tiles, given.seams)
-    rng = build.make_generator(params.seed, params.seam)
+    rng = build.make_generator(params.seed, params.tiling)
     source = semantics.SemanticSource(alexnet, given.get("sam2"))
-    both = tiles, known.cut_straight(params.seam, source, rng)
-    patches = known.flattened(tiles, params.seam)
+    both = tiles, known.cut_straight(params.tiling, source, rng)
+    patches = known.flattened(tiles, params.tiling)
     laid = [terrain.laid(each, patches, params.seed, params.tau) for each in both]
     csv_tables.write_table(snakemake.output.crops, measure.measured(*laid, alexnet, params.seed))
     inputs = {"seams": given.seams, "level0": Path(given.levels, "level0.ply")} | (
         {"lpips": given.lpips} if alexnet else {}
     )
-    found = {"dense": density.of_tiles(tiles, patches), "provenance": record_provenance(inputs, dict(params.seam))}
+    found = {"dense": density.of_tiles(tiles, patches), "provenance": record_provenance(inputs, dict(params.tiling))}
     write_json(snakemake.output.facts, found)

@@ -10,9 +10,9 @@ from dav_gswt.reconstruction import build
 from dav_gswt.study import csv_tables, fit_profile
 
 with logging_to(snakemake.log[0]):
-    out, settings = snakemake.output, dict(snakemake.params.trial)
+    out, settings = snakemake.output, dict(snakemake.params.profile)
     margin = settings.pop("margin")
-    quality = build.Quality(**settings)
+    quality = build.FitSettings(**settings)
     photos = fit_profile.opened(Path(snakemake.input.frame).parent, quality.size, margin)
     found = fit_profile.run(photos, quality)
     csv_tables.write_table(out.curve, found.curve)

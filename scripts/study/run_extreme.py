@@ -8,5 +8,5 @@ from dav_gswt.study.stability.extremes import EXTREMES
 
 with logging_to(snakemake.log[0]):
     extreme = EXTREMES[snakemake.wildcards.extreme]
-    root, lpips = Path(snakemake.params.root), snakemake.input.get("lpips")
+    root, lpips = Path(snakemake.params.root), snakemake.params.lpips
     running.run_extreme(extreme, root, snakemake.output.folder, snakemake.threads, lpips)

@@ -65,7 +65,7 @@ def finished(snakemake, tiny, tmp_path_factory) -> Made:
     folder = tmp_path_factory.mktemp("finished")
     shutil.copy(tiny.round / "field.ply", folder / "finished.ply")
     done = snakemake(folder, "--cores", "2", "--config", "scene=finished", configs=(USUAL, TINY))
-    return Made(folder, "finished", "seed0/draft", "active_given_none_pdrop0_lam0_k0/iter0", done.stdout)
+    return Made(folder, "finished", "seed0/draft", "active_external_none_pdrop0_lam0_k0/iter0", done.stdout)
 
 
 @pytest.fixture(scope="session")
@@ -81,10 +81,10 @@ scenes:
     size: 512
     start: 8
     agent: replay
-    quality: reduced
-    seam: semantic
-qualities:
-  reduced: {{size: 256, spacing: 1.5, cap: 40000, steps: 80, steps_per_photo: 5, level_steps: 10}}
+    preset: reduced
+    tiling: semantic
+presets:
+  reduced: {{size: 256, spacing: 1.5, max_gaussians: 40000, steps: 80, steps_per_photo: 5, level_steps: 10}}
 """)
     done = snakemake(folder, "--cores", "2", configs=(USUAL, TINY, folder / "beach.yaml"))
     return Made(folder, "beach", "seed0/reduced", "active_farthest_none_pdrop0_lam0_k2/iter1", done.stdout)

@@ -13,7 +13,7 @@ ROUND = "results/desert/seed0/draft/active_{policy}_none_pdrop0_lam0_k{k}/iter{t
 BUNDLE = ROUND + "/tiles_semantic/bundle_tau{tau}/davgswt.json"
 DEFAULT = dict(policy="farthest", k=4, t=2, tau=0.6)
 FARTHEST = ROUND.format(policy="farthest", k=4, t=1)
-GIVEN = "results/finished/seed0/draft/active_given_none_pdrop0_lam0_k0/iter0"
+GIVEN = "results/finished/seed0/draft/active_external_none_pdrop0_lam0_k0/iter0"
 LAM = ROUND.format(policy="farthest", k=4, t=1).replace("lam0", "lam0.1")
 
 
@@ -57,13 +57,13 @@ def test_a_prior_is_asked_once_for_every_lam(planned, tmp_path, axis, values, sc
     targets = [ASKED.format(**({"lam": "0.1", "p_drop": "0.15"} | {axis: value})) for value in values]
     plan = planned(tmp_path, *targets)
     assert plan["score_coarse"] == scorings and plan["fit_coarse"] == 1
-    assert plan["select_poses"] == plan["update_field"] == 2 * len(values) and plan["fetch_lpips"] == 1
+    assert plan["select_poses"] == plan["update_field"] == 2 * len(values) and plan["convert_lpips_weights"] == 1
 
 
 def test_scores_are_judged_by_truth_that_is_drawn_once_a_scene(planned, tmp_path):
     (tmp_path / "few.yaml").write_text("calibration: {scenes: [desert, planet], rounds: 2, regressors: 1}")
     plan = planned(tmp_path, "docs/research/figures/calibration.png", configs=(USUAL, tmp_path / "few.yaml"))
-    assert plan["show_candidates"] == plan["calibrate_coarse"] == 2 and plan["calibrate_round"] == 4
+    assert plan["render_candidates"] == plan["calibrate_coarse"] == 2 and plan["calibrate_round"] == 4
     assert plan["train_regressor"] == plan["plot_calibration"] == 1
 
 
@@ -89,7 +89,9 @@ def test_every_policy_has_a_path(planned, tmp_path):
         way = "{}_{prior}_pdrop{p_drop}_lam{lam}".format(policy, **spelled)
         plan = planned(tmp_path, f"results/desert/seed0/draft/active_{way}_k4/iter1/field.ply")
         assert plan["update_field"] == plan["select_poses"] == 1, policy
-        assert plan["show_candidates"] == (policy in ORACLES) and plan["fetch_lpips"] == (policy in PRIOR_POLICIES)
+        assert plan["render_candidates"] == (policy in ORACLES) and plan["convert_lpips_weights"] == (
+            policy in PRIOR_POLICIES
+        )
         default = planned(tmp_path, "--config", f"policy={policy}", configs=(USUAL, TINY))
         assert default["make_page"] == 1 and default["select_poses"] == 1, policy
 
@@ -98,11 +100,11 @@ STOP = "results/desert/seed0/draft/active_farthest_none_pdrop0_lam0_k4{}/iter3/m
 
 
 def test_every_stop_has_a_branch_of_its_own_and_all_share_the_coarse_field(planned, tmp_path):
-    stops = ["", "_upto20", "_worth0.05", "_upto20_worth0.05"]
+    stops = ["", "_upto20", "_gain0.05", "_upto20_gain0.05"]
     plan = planned(tmp_path, *map(STOP.format, stops))
     assert plan["fit_coarse"] == plan["score_coarse"] == 1
     assert plan["select_poses"] == plan["capture_views"] == plan["update_field"] == 3 * len(stops)
-    (tmp_path / "stop.yaml").write_text("stop: {worth: 0.050, photos: 20}")
+    (tmp_path / "stop.yaml").write_text("stop: {marginal_gain: 0.050, photos: 20}")
     default = planned(tmp_path, configs=(USUAL, TINY, tmp_path / "stop.yaml"))
     assert default["select_poses"] == default["make_page"] == 1
 
@@ -124,12 +126,12 @@ def test_what_compares_fetches_lpips_first_and_a_terrain_does_without(snakemake,
         said = snakemake(tmp_path, target, "--dry-run", configs=(USUAL, TINY, tmp_path / "few.yaml")).stdout
         jobs = [job for job in said.split("\n\n") if "rule cut_tiles:" in job]
         assert jobs and all(("lpips_alexnet.safetensors" in job) == fetched for job in jobs)
-        assert ("rule fetch_lpips:" in said) == fetched
+        assert ("rule convert_lpips_weights:" in said) == fetched
 
 
 def test_tiles_go_by_the_doubt_of_the_prior_that_was_asked(planned, tmp_path):
     plan = planned(tmp_path, "--config", "policy=w2-lpips", configs=(USUAL, TINY))
-    assert plan["score_coarse"] == plan["score_round"] == plan["make_levels"] == 1 and not plan["fetch_lpips"]
+    assert plan["score_coarse"] == plan["score_round"] == plan["make_levels"] == 1 and not plan["convert_lpips_weights"]
     tiles = "results/desert/seed0/draft/active_{}_k4/iter0/tiles_semantic/seams.json"
     for way, scored in (("w2-lpips_terrain_pdrop0.15_lam0", 1), ("random_none_pdrop0_lam0", 0)):
         assert planned(tmp_path, tiles.format(way))["score_coarse"] == scored
@@ -140,7 +142,7 @@ def test_refined_tiles_share_the_cut_and_go_on_as_the_others_do(planned, tmp_pat
     plan = planned(tmp_path, cut.format("tiles_semantic-refined"), cut.format("tiles_semantic"))
     assert plan["cut_tiles"] == plan["refine_tiles"] == 1 and plan["bundle_tiles"] == 2
     assert planned(tmp_path, cut.format("tiles_semantic"))["refine_tiles"] == 0
-    scene = planned(tmp_path, "--config", "scenes={desert: {seam: semantic-refined}}")
+    scene = planned(tmp_path, "--config", "scenes={desert: {tiling: semantic-refined}}")
     assert scene["refine_tiles"] == scene["cut_tiles"] == scene["make_page"] == 1
 
 
@@ -195,19 +197,19 @@ def test_cuts_read_what_is_at_hand_to_tell_things_apart(snakemake, tmp_path):
         pytest.param("results/desert/seed0/draft/coarse/scores_none_pdrop0.1/scores.csv", id="dropout of no prior"),
         pytest.param(BUNDLE.format(**(DEFAULT | {"tau": "0.60"})), id="tau with a trailing zero"),
         pytest.param(BUNDLE.format(**(DEFAULT | {"k": "04"})), id="k with a leading zero"),
-        pytest.param(STOP.format("_worth0.05_upto20"), id="the price before the number of photos"),
-        pytest.param(STOP.format("_worth0"), id="a price of nothing"),
+        pytest.param(STOP.format("_gain0.05_upto20"), id="the price before the number of photos"),
+        pytest.param(STOP.format("_gain0"), id="a price of nothing"),
         pytest.param(STOP.format("_upto020"), id="a number of photos with a leading zero"),
-        pytest.param(STOP.format("_worth0.050"), id="a price with a trailing zero"),
+        pytest.param(STOP.format("_gain0.050"), id="a price with a trailing zero"),
         pytest.param(
-            "results/desert/seed0/draft/active_given_none_pdrop0_lam0_k0_upto9/iter0/levels",
+            "results/desert/seed0/draft/active_external_none_pdrop0_lam0_k0_upto9/iter0/levels",
             id="a stop of a finished field",
         ),
         pytest.param("results/Desert/seed0/views.json", id="a scene in capitals"),
         pytest.param(f"{LAM}/field.ply", id="lam for a policy without a prior"),
-        pytest.param(f"{FARTHEST}/completed_none/levels", id="completed by no prior"),
-        pytest.param(f"{FARTHEST}/completed_/levels", id="completed by nobody"),
-        pytest.param(GIVEN + "/completed_terrain/field.ply", id="a finished field, completed"),
+        pytest.param(f"{FARTHEST}/inpainted_none/levels", id="completed by no prior"),
+        pytest.param(f"{FARTHEST}/inpainted_/levels", id="completed by nobody"),
+        pytest.param(GIVEN + "/inpainted_terrain/field.ply", id="a finished field, completed"),
         pytest.param("results/moon/photos/ground.json", id="a scene that is not in the config"),
     ],
 )
@@ -219,26 +221,28 @@ def test_a_second_spelling_of_a_path_has_no_rule(snakemake, tmp_path, path):
 @pytest.mark.parametrize("policy", ["farthest", "w2-lpips"])
 def test_a_completed_field_lies_between_the_round_and_its_levels(planned, tmp_path, policy):
     without, made = (
-        planned(tmp_path, "--config", f"policy={policy}", f"complete={on}", configs=(USUAL, TINY))
+        planned(tmp_path, "--config", f"policy={policy}", f"inpaint={on}", configs=(USUAL, TINY))
         for on in (False, True)
     )
-    assert not without["complete_field"] and not without["evaluate_completed"]
-    assert made == without + Counter(complete_field=1, evaluate_completed=1)
+    assert not without["inpaint_field"] and not without["evaluate_inpainted"]
+    assert made == without + Counter(inpaint_field=1, evaluate_inpainted=1)
 
 
 def test_a_round_can_be_tiled_as_it_is_and_completed(planned, tmp_path):
     tiles = ROUND.format(policy="farthest", k=4, t=1) + "{}/tiles_semantic/seams.json"
-    plan = planned(tmp_path, tiles.format(""), tiles.format("/completed_terrain"))
-    assert plan["make_levels"] == plan["cut_tiles"] == 2 and plan["complete_field"] == plan["update_field"] == 1
+    plan = planned(tmp_path, tiles.format(""), tiles.format("/inpainted_terrain"))
+    assert plan["make_levels"] == plan["cut_tiles"] == 2 and plan["inpaint_field"] == plan["update_field"] == 1
 
 
 def test_no_round_and_a_finished_field_go_from_field_to_terrain(planned, tmp_path):
     without = planned(tmp_path, "--config", "rounds=0")
-    assert without["begin_active"] == without["make_page"] == 1 and not without["select_poses"]
+    assert without["copy_coarse_field"] == without["make_page"] == 1 and not without["select_poses"]
     (tmp_path / "finished.ply").touch()
     given = planned(tmp_path, "--config", "scene=finished", configs=(USUAL, TINY))
-    assert given["import_field"] == given["enter_field"] == given["make_page"] == given["render_terrain"] == 1
-    assert not given["fit_coarse"] and not given["begin_active"]
+    assert (
+        given["import_field"] == given["prepare_external_field"] == given["make_page"] == given["render_terrain"] == 1
+    )
+    assert not given["fit_coarse"] and not given["copy_coarse_field"]
 
 
 @pytest.mark.parametrize(
@@ -252,7 +256,7 @@ def test_no_round_and_a_finished_field_go_from_field_to_terrain(planned, tmp_pat
         ("priors: {terrain: {samples: 1}}", "config: priors.terrain.samples: 1 is less than the minimum of 2"),
         ("stop: {photos: 2}", "config: stop.photos: 2 is less than the minimum of 3"),
         ("rounds: -1", "config: rounds: -1 is less than the minimum of 0"),
-        ("scenes: {desert: {quality: best}}", "config: scenes.desert.quality: there is no 'best'; qualities has"),
+        ("scenes: {desert: {preset: best}}", "config: scenes.desert.preset: there is no 'best'; qualities has"),
     ],
 )
 def test_a_config_that_is_wrong_stops_before_the_first_job(snakemake, run, checkout, tmp_path, wrong, said):
@@ -327,4 +331,4 @@ def test_seams_are_measured_by_cells_that_share_the_levels(planned, tmp_path):
         plan = planned(tmp_path, "seams", configs=(USUAL, TINY, tmp_path / "few.yaml"))
         assert plan["measure_seams"] == plan["cut_tiles"] == cells
         assert plan["measure_repetition"] == len({"colour", "semantic", own})
-        assert plan["make_levels"] == plan["draw_grid"] == plan["show_cuts"] == plan["gather_seams"] == 1
+        assert plan["make_levels"] == plan["render_grid"] == plan["plot_cuts"] == plan["gather_seams"] == 1

@@ -113,7 +113,7 @@ def test_who_asks_people_or_devices_stays_here_and_asks_once(checkout, tmp_path)
     """On a cluster, too. All that the rule reads is empty, so it fails; the profile would have it tried twice more."""
     photos, capture = "results/mine/photos", ROUND.format(stop="", t=1).replace("desert", "mine") + "/capture"
     folder = checkout(tmp_path / "clone")
-    scene = "kind: photos, folder: mine, size: 64, start: 3, agent: handheld, quality: draft, seam: semantic"
+    scene = "kind: photos, folder: mine, size: 64, start: 3, agent: handheld, preset: draft, seam: semantic"
     (folder / "mine.yaml").write_text(f"scenes: {{mine: {{{scene}}}}}")
     for place in ("mine", f"{photos}/images", f"{photos}/sparse"):
         (folder / place).mkdir(parents=True)
@@ -125,5 +125,5 @@ def test_who_asks_people_or_devices_stays_here_and_asks_once(checkout, tmp_path)
     command = [sys.executable, "-m", "snakemake", "--profile", f"{PROFILES}/slurm"]
     command += ["--configfile", USUAL, TINY, "mine.yaml", "--", capture]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 1 and "localrule ask_for_views" in done.stderr, done.stderr
-    assert done.stderr.count("Error in rule ask_for_views") == 1 and "Trying to restart" not in done.stderr
+    assert done.returncode == 1 and "localrule request_views" in done.stderr, done.stderr
+    assert done.stderr.count("Error in rule request_views") == 1 and "Trying to restart" not in done.stderr

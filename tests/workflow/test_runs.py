@@ -27,9 +27,9 @@ RULES = {
     "active": ["select_poses", "capture_views", "update_field", "score_round", "evaluate_round"],
     "levels": ["make_levels"],
     "tiles": ["cut_tiles", "bundle_tiles"],
-    "terrain": ["make_page", "render_terrain", "show_stills"],
+    "terrain": ["make_page", "render_terrain", "make_contact_sheet"],
 }
-AFTER_TAU = {"bundle_tiles", "make_page", "render_terrain", "show_stills", "all"}
+AFTER_TAU = {"bundle_tiles", "make_page", "render_terrain", "make_contact_sheet", "all"}
 BEFORE_K = {*RULES["photos"], *RULES["coarse"]}
 
 
@@ -235,10 +235,10 @@ def test_another_round_goes_on_from_the_last_one(tiny, planned):
 @pytest.mark.parametrize(
     "change, made",
     [
-        pytest.param("stills: {width: 320, height: 180}", {"render_terrain", "show_stills"}, id="another size"),
+        pytest.param("stills: {width: 320, height: 180}", {"render_terrain", "make_contact_sheet"}, id="another size"),
         pytest.param(
             "heights: {kind: hills, height: 2, wavelength: 20}",
-            {"render_terrain", "show_stills", "make_page"},
+            {"render_terrain", "make_contact_sheet", "make_page"},
             id="another surface",
         ),
     ],
@@ -252,7 +252,7 @@ def test_another_look_makes_only_what_shows_it(tiny, planned, tmp_path, change, 
 def test_a_field_is_completed_beside_its_round_and_levels_go_on_from_it(tiny, snakemake, tmp_path):
     folder = tmp_path / "completed"
     shutil.copytree(tiny.folder, folder)
-    made = tiny.round.relative_to(tiny.folder) / "completed_terrain"
+    made = tiny.round.relative_to(tiny.folder) / "inpainted_terrain"
     snakemake(folder, "--cores", "2", made / "metrics.json", made / "levels", configs=CONFIGS)
     facts, found = read_json(folder / made / "completion.json"), read_json(folder / made / "metrics.json")
     before, after = (read_field(path / "field.ply") for path in (tiny.round, folder / made))

@@ -8,7 +8,7 @@ from dav_gswt.study.stability.extremes import EXTREMES
 def test_every_extreme_is_a_job_of_its_own(planned, tmp_path):
     plan = planned(tmp_path, "stability")
     assert plan["run_extreme"] == len(EXTREMES)
-    assert plan["measure_formulas"] == plan["gather_extremes"] == plan["show_stability"] == 1
+    assert plan["measure_formulas"] == plan["gather_extremes"] == plan["write_stability"] == 1
 
 
 def test_a_run_that_cannot_be_done_leaves_its_message(snakemake, tmp_path):

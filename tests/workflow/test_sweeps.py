@@ -28,7 +28,7 @@ def few(folder, vary, fixed="{policy: w2, rounds: 1}", measure="{views: [0]}"):
 @pytest.mark.parametrize(
     "vary, jobs",
     [
-        pytest.param("{lam: [0, 1]}", dict(score_coarse=1, select_poses=2, fetch_lpips=0), id="lam shares the scores"),
+        pytest.param("{lam: [0, 1]}", dict(score_coarse=1, select_poses=2), id="lam shares the scores"),
         pytest.param("{p_drop: [0.05, 0.3]}", dict(score_coarse=2, update_field=2), id="p_drop does not"),
         pytest.param("{k: [2, 3, 4]}", dict(score_coarse=1, select_poses=3, update_field=3), id="k shares the scores"),
         pytest.param("{rounds: [0, 1, 2]}", dict(evaluate_coarse=1, update_field=2, score_round=1), id="T is a prefix"),
@@ -76,13 +76,13 @@ def test_the_page_of_results_plans(planned, root, tmp_path, size):
     assert plan["fit_coarse"] == scenes * seeds and plan["render_photos"] + plan["register_photos"] == scenes
     assert plan["gather_sweep"] == 7  # those that its tables are made from
     assert all(plan[f"tabulate_{table}"] == 1 for table in ("timing", "sensitivity", "ablation"))
-    assert plan["plot_sphere"] == plan["plot_evolution"] == plan["plot_estimators"] == plan["show_cuts"] == 2
+    assert plan["plot_sphere"] == plan["plot_evolution"] == plan["plot_estimators"] == plan["plot_cuts"] == 2
     assert plan["write_results"] == plan["gather_lod"] == 1
 
 
 def test_the_study_makes_every_page_and_each_photo_set_once(planned, root, tmp_path):
     plan = plan_of(planned, root, tmp_path, "study", "config/config.yaml")
-    pages = ("write_results", "show_stability", "write_tradeoff", "gather_auto")
+    pages = ("write_results", "write_stability", "write_tradeoff", "gather_auto")
     assert all(plan[page] == 1 for page in (*pages, "study"))
     assert plan["gather_sweep"] == plan["plot_sweep"] == 9
     asked = yaml.safe_load((root / "config/config.yaml").read_text())

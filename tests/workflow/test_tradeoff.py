@@ -10,18 +10,18 @@ from dav_gswt.images import image_files
 SMALL = """
 tradeoff:
   scene: desert
-  base: {quality: draft, seam: semantic, prior: terrain}
+  base: {preset: draft, seam: semantic, prior: terrain}
   presets: [draft]
   only: [%s]
   knobs:
-    cap: {values: [20000, 10000]}
+    max_gaussians: {values: [20000, 10000]}
     candidates: {values: [24, 6]}
     level_steps: {values: [10, 5]}
 auto:
   scenes: [desert]
-  base: {quality: draft, rounds: 1, prior: terrain}
-qualities:
-  auto: {size: 128, spacing: 1.5, cap: auto, steps: 60, steps_per_photo: 10, degree: 0, level_steps: 10}
+  base: {preset: draft, rounds: 1, prior: terrain}
+presets:
+  auto: {size: 128, spacing: 1.5, max_gaussians: auto, steps: 60, steps_per_photo: 10, degree: 0, level_steps: 10}
 """
 
 

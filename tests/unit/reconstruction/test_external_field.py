@@ -4,9 +4,9 @@ from fixtures.frames import scene_frame
 
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.reconstruction import external_field
-from dav_gswt.reconstruction.build import Quality
+from dav_gswt.reconstruction.build import FitSettings
 
-QUALITY = Quality(size=64, spacing=1.0, cap=20_000, steps=1, steps_per_photo=1, level_steps=1)
+QUALITY = FitSettings(size=64, spacing=1.0, max_gaussians=20_000, steps=1, steps_per_photo=1, level_steps=1)
 FRAME = scene_frame(
     kind="field", unit="metre", flying_height=5.0, exemplar=(0.0, 0.0, 4.0), extent=(0.0, 0.0, 4.0, 4.0)
 )

@@ -13,7 +13,7 @@ from dav_gswt.reconstruction import build, ground, regression_guard
 from dav_gswt.reconstruction.fitting.plan import AUTO, STEPS_PER_NEW_PHOTO, Report
 from dav_gswt.reconstruction.fitting.trainer import Fitted
 
-QUALITY = build.Quality(size=48, spacing=1.0, cap=2000, steps=40, steps_per_photo=12, level_steps=5)
+QUALITY = build.FitSettings(size=48, spacing=1.0, max_gaussians=2000, steps=40, steps_per_photo=12, level_steps=5)
 GRAIN = 0.03  # as coarse as what a real field does not know of its photos
 SYNTHETIC = replace(made.FRAME, kind="synthetic")
 
@@ -211,6 +211,6 @@ def test_an_update_takes_so_many_steps_for_each_new_photo_and_keeps_the_degree_t
 
 
 def test_an_update_without_a_number_has_as_many_gaussians_a_photo_as_the_field_before():
-    plan = build._plan(replace(QUALITY, cap=AUTO), made.field(), 8, 4)
+    plan = build._plan(replace(QUALITY, max_gaussians=AUTO), made.field(), 8, 4)
     assert (plan.cap, plan.most) == (AUTO, int(1.5 * len(made.field())))
-    assert build._plan(replace(QUALITY, cap=AUTO), made.field(), 0, 2).most == 2 * len(made.field())
+    assert build._plan(replace(QUALITY, max_gaussians=AUTO), made.field(), 0, 2).most == 2 * len(made.field())

@@ -12,7 +12,7 @@ from dav_gswt.reconstruction import build
 from dav_gswt.reconstruction.objects import blobs
 from dav_gswt.study import fit_profile
 
-QUALITY = build.Quality(size=48, spacing=1.0, cap=5000, steps=12, steps_per_photo=10, level_steps=5)
+QUALITY = build.FitSettings(size=48, spacing=1.0, max_gaussians=5000, steps=12, steps_per_photo=10, level_steps=5)
 
 
 def photo_set(tests):

@@ -98,7 +98,9 @@ def test_samples_may_start_from_noises_of_their_own():
         def sample(self, condition, m, p_drop, steps, seed, common=True):
             return super().sample(condition, m, 0.0 if common else 0.3, steps, seed)
 
-    common, own = (scored(PriorConfig(Noisy(), 2, 4, 0.0, noises=n)).scores.terms["w2_sq"] for n in (False, True))
+    common, own = (
+        scored(PriorConfig(Noisy(), 2, 4, 0.0, independent_noise=n)).scores.terms["w2_sq"] for n in (False, True)
+    )
     assert not common.any() and (own > 0).all()
 
 

@@ -66,7 +66,7 @@ def test_the_last_round_takes_fewer_and_then_no_more():
 
 def test_a_stop_stays_with_its_reason():
     last = {"stopped": "after 16 photos: enough", "expected": None}
-    found = decide({"worth": 0.01}, 4, 1, known(16, behind(3.0), last=last))
+    found = decide({"marginal_gain": 0.01}, 4, 1, known(16, behind(3.0), last=last))
     assert found.poses == 0 and found.stopped == "after 16 photos: enough"
 
 
@@ -79,19 +79,19 @@ def test_a_price_above_what_the_next_photos_are_worth_stops(dearer, stops, caplo
     """A gap of 10 dB at 8 photos is 80 / n; two after 12 close 80 (1 / 12 - 1 / 14) = 0.952 dB: a share is won."""
     each, total = SHARE * 80 * (1 / 12 - 1 / 14) / 2, f"{SHARE * 0.952:.2f}"
     with caplog.at_level(logging.INFO):
-        found = decide({"worth": dearer * each}, 2, 1, known(12, behind(10.0)))
+        found = decide({"marginal_gain": dearer * each}, 2, 1, known(12, behind(10.0)))
     assert found.expected.each == pytest.approx(each) and (found.stopped is not None) == stops
     assert f"the next 2 photos are worth about {total} dB (" in caplog.text
     told = json.loads(json.dumps(found.to_json(), allow_nan=False))
     assert told["expected"]["gain_per_photo"] == pytest.approx(each) and told["expected"]["photos"] == 2
     if stops:
         assert told["stopped"].startswith(f"after 12 photos: the next 2 photos are worth about {total} dB")
-        assert told["stopped"].endswith(f"less than {dearer * each:g} (stop.worth)") and found.poses == 0
+        assert told["stopped"].endswith(f"less than {dearer * each:g} (stop.marginal_gain)") and found.poses == 0
 
 
 def test_before_three_new_photos_nothing_stops_and_that_is_said(caplog):
     with caplog.at_level(logging.INFO):
-        found = decide({"worth": 100}, 2, 1, known(10, [fit(20.0, 30.0)]))
+        found = decide({"marginal_gain": 100}, 2, 1, known(10, [fit(20.0, 30.0)]))
     assert found.stopped is None and found.poses == 2 and found.expected is None
     assert "cannot be said yet" in caplog.text
 
@@ -103,7 +103,7 @@ def test_what_comes_counts_bursts_the_budget_and_the_pool():
 
 
 def test_a_budget_that_is_spent_is_told_with_what_more_would_be_worth():
-    found = decide({"photos": 12, "worth": 0.001}, 4, 1, known(12, behind(1.0)))
+    found = decide({"photos": 12, "marginal_gain": 0.001}, 4, 1, known(12, behind(1.0)))
     assert "stop.photos" in found.stopped and found.expected.photos == 4
 
 

@@ -1,33 +1,204 @@
-"""How paths spell numbers and when rounds stop: one spelling for each, so that what is alike meets in one place."""
+"""The result tree: the one place that encodes settings into paths and decodes them again.
+
+A setting stands in the path at the stage where it first matters, so two runs that agree on the first stages share their
+files. Read by the workflow before the first job, so it imports nothing heavy.
+"""
 
 import re
+from collections.abc import Mapping
 from decimal import Decimal
+from pathlib import Path
 
-STOPS = {"photos": "_upto", "worth": "_worth"}  # keys of the config's `stop`, and what stands before their value
+from dav_gswt.views.policy_names import PRIOR_POLICIES, ZERO_SETTINGS
+
+RESULTS = "results"
+# Directories beside the scenes' own; no scene may have such a name.
+RESERVED = ("logs", "benchmarks", "snapshots", "weights", "prior", "sweeps", "tables", "figures", "tradeoff")
+RESERVED = (*RESERVED, "stability", "forced_choice")
+SNAPSHOTS = f"{RESULTS}/snapshots"  # of running fits: outside the outputs, so that a killed fit can go on
+LPIPS_WEIGHTS = f"{RESULTS}/weights/lpips_alexnet.safetensors"
+
+# One directory level a stage, which names only the settings that the stage adds. <name> stands for another entry.
+TREE = {
+    "logs": "results/logs",
+    "benchmarks": "results/benchmarks",
+    "photos": "{scene}/photos",
+    "start": "{scene}/seed{seed}",
+    "fit": "{scene}/seed{seed}/{preset}",
+    "coarse": "<fit>/coarse",
+    "scored": "<coarse>/scores_{prior}_pdrop{p_drop}",
+    "active": "<fit>/active_{policy}_{prior}_pdrop{p_drop}_lam{lam}_k{k}{stop}",
+    "external": "<fit>/active_external_none_pdrop0_lam0_k0/iter0",
+    "round": "<active>/iter{t}",
+    "levels": "<round>{inpainted}/levels",
+    "tiles": "<round>{inpainted}/tiles_{tiling}",
+    "bundle": "<tiles>/bundle_tau{tau}",
+    "terrain": "<bundle>/terrain",
+    "seams": "<bundle>/seams",
+}
+CONTENTS = {  # what a reader finds at each stage
+    "photos": "undistorted photos, their COLMAP model, ground.json, report.html",
+    "start": "views.json: photos to start from, the pool, test photos",
+    "coarse": "field.ply, ground.exr, metrics.json of the first fit",
+    "scored": "scores.csv, uncertainty.exr: scores of candidate poses",
+    "round": "poses.json, capture/, field.ply, scores.csv, metrics.json of round t",
+    "levels": "level{l}.ply: levels of detail",
+    "tiles": "seams.json and tiles/lod{l}_tile_{T}.ply",
+    "bundle": "davgswt.json, chunks/, gswt.zip, exports/",
+    "terrain": "page/, walker.png, oblique.png, above.png",
+}
+
+NAME = rf"(?!(?:{'|'.join(RESERVED)})(?:/|$))[a-z][a-z0-9_-]*"
+NATURAL = r"0|[1-9]\d*"
+POSITIVE = r"[1-9]\d*"
+FRACTION = r"0|1|0\.\d*[1-9]"
+SHARE = r"0|0\.\d*[1-9]"
+NUMBER = r"0|[1-9]\d*|(?:0|[1-9]\d*)\.\d*[1-9]"
+STOP = rf"(?:_upto(?:{POSITIVE}))?(?:_gain(?!0/)(?:{NUMBER}))?"  # or nothing
+INPAINTED = r"(?:/inpainted_[a-z][a-z0-9_-]*)?"  # or nothing
+WILDCARDS = {
+    "scene": NAME,
+    "seed": NATURAL,
+    "preset": NAME,
+    "policy": r"[a-z0-9-]+",
+    "prior": r"[a-z][a-z0-9_-]*?",
+    "p_drop": SHARE,
+    "lam": NUMBER,
+    "k": NATURAL,
+    "stop": STOP,
+    "t": NATURAL,
+    "inpainted": INPAINTED,
+    "tiling": NAME,
+    "tau": FRACTION,
+}
+_STOPS = {"photos": "_upto", "marginal_gain": "_gain"}  # keys of the config's `stop`, and their marks in a path
+_EXTERNAL = {
+    "policy": "external",
+    "prior": "none",
+    "p_drop": "0",
+    "lam": "0",
+    "k": 0,
+    "stop": "",
+    "t": 0,
+    "inpainted": "",
+}
 
 
-def spell(value: int | float | str) -> str:
-    """The one spelling of a number that the constraints accept: 0.1, never 0.10."""
+def encode_number(value: int | float | str) -> str:
+    """The one spelling of a number in paths: 0.1, never 0.10."""
     text = f"{Decimal(str(value)).normalize():f}"
     return "0" if text == "-0" else text
 
 
-def spell_stop(stop: dict) -> str:
-    """When rounds stop, as it stands at the end of a branch's name; empty where they do not: _upto20_worth0.05."""
-    return "".join(f"{mark}{spell(stop[key])}" for key, mark in STOPS.items() if key in stop)
+def encode_stop(stop: Mapping) -> str:
+    """When rounds end, as the end of a branch's name; empty where they do not: _upto20_gain0.05."""
+    return "".join(f"{mark}{encode_number(stop[key])}" for key, mark in _STOPS.items() if stop.get(key) is not None)
 
 
-def spell_completed(complete: bool, prior: str) -> str:
-    """The directory level of a completed field, as it follows its round's; empty where none is asked for."""
-    return f"/completed_{prior}" if complete else ""
-
-
-def read_stop(spelled: str) -> dict:
-    """The config's `stop` that a branch's name spells. Raises: ValueError: it is none."""
-    pattern = "".join(rf"(?:{mark}(?P<{key}>[\d.]+))?" for key, mark in STOPS.items())
-    found = re.fullmatch(pattern, spelled)
-    values = {key: text for key, text in found.groupdict().items() if text} if found else {}
-    stop = {key: int(text) if key == "photos" else float(text) for key, text in values.items()}
-    if not found or spell_stop(stop) != spelled:
-        raise ValueError(f"{spelled!r} does not say when rounds stop; one way to is '_upto20_worth0.05'")
+def decode_stop(text: str) -> dict[str, int | float]:
+    """The config's `stop` from the end of a branch's name. Raises: ValueError: it is not one."""
+    pattern = "".join(rf"(?:{mark}(?P<{key}>[\d.]+))?" for key, mark in _STOPS.items())
+    match = re.fullmatch(pattern, text)
+    values = {key: value for key, value in match.groupdict().items() if value} if match else {}
+    stop = {key: int(value) if key == "photos" else float(value) for key, value in values.items()}
+    if not match or encode_stop(stop) != text:
+        raise ValueError(f"{text!r} does not say when rounds end; an example is '_upto20_gain0.05'")
     return stop
+
+
+def encode_inpainted(inpaint: bool, prior: str) -> str:
+    """The directory level of an inpainted field below its round; empty without inpainting."""
+    return f"/inpainted_{prior}" if inpaint else ""
+
+
+def encode_branch(config: Mapping, scene: str, policy: str | None = None, changes: Mapping | None = None) -> dict:
+    """The wildcards of what is made of a scene, by the config or by settings that replace some of the config's.
+
+    A setting that a policy does not read has one spelling: prior `none`, `p_drop` and `lam` 0.
+    """
+    settings = {**config, **(changes or {})}
+    entry = config["scenes"][scene]
+    fit = {"scene": scene, "seed": config["seeds"], "preset": settings.get("preset", entry["preset"])}
+    tiles = {
+        "inpainter": config["prior"],
+        "tiling": settings.get("tiling", entry["tiling"]),
+        "tau": encode_number(settings["tau"]),
+    }
+    if entry["kind"] == "field":
+        return fit | _EXTERNAL | tiles
+    policy = policy or settings["policy"]
+    unread = ZERO_SETTINGS.get(policy, ()) if policy in PRIOR_POLICIES else ("p_drop", "lam")
+    numbers = {key: "0" if key in unread else encode_number(settings[key]) for key in ("p_drop", "lam")}
+    return (
+        fit
+        | {"policy": policy, "prior": settings["prior"] if policy in PRIOR_POLICIES else "none"}
+        | numbers
+        | {"k": settings["k"], "stop": encode_stop(config["stop"]), "t": settings["rounds"]}
+        | {"inpainted": encode_inpainted(config["inpaint"], config["prior"])}
+        | tiles
+    )
+
+
+def stage_template(stage: str) -> str:
+    """The path of a stage below results/ with its wildcards: {scene}/seed{seed}/..."""
+    template = TREE[stage]
+    while found := re.search(r"<(\w+)>", template):
+        template = template.replace(found[0], TREE[found[1]])
+    return template
+
+
+def stage_folder(stage: str, wildcards: Mapping) -> Path:
+    """The folder of a stage. `wildcards`: as `encode_branch` gives them, of one seed."""
+    return Path(RESULTS, stage_template(stage).format(**wildcards))
+
+
+def decode_path(path: Path | str) -> dict[str, str]:
+    """The wildcards that a path in the result tree spells; {} where it spells none.
+
+    The longest stage that leads to the path is decoded. The path may lie anywhere; `results` need not be part of it.
+    """
+    text = Path(path).as_posix()
+    for stage in reversed(TREE):
+        if "{" in stage_template(stage) and (match := _stage_pattern(stage).search(text)):
+            return match.groupdict()
+    return {}
+
+
+def _stage_pattern(stage: str) -> re.Pattern:
+    parts, seen = [], set()
+    for literal, wildcard in re.findall(r"([^{]*)(?:\{(\w+)\})?", stage_template(stage)):
+        parts.append(re.escape(literal))
+        if wildcard:
+            parts.append(f"(?P={wildcard})" if wildcard in seen else f"(?P<{wildcard}>{WILDCARDS[wildcard]})")
+            seen.add(wildcard)
+    return re.compile(rf"(?:^|/){''.join(parts)}(?=/|$)")
+
+
+def policy_pattern(policy: str) -> str:
+    """A constraint: the policy, followed by a spelling that it has of prior, p_drop and lam."""
+    if policy not in PRIOR_POLICIES:
+        return f"{policy}(?=_none_pdrop0_lam0_)"
+    zeros = ZERO_SETTINGS.get(policy, ())
+    p_drop, lam = ("0" if key in zeros else "[^_]+" for key in ("p_drop", "lam"))
+    return f"{policy}(?!_none_)(?=_[a-z0-9_-]+_pdrop{p_drop}_lam{lam}_)"
+
+
+def describe_tree() -> str:
+    """The tree as text, for results/README.md."""
+    shown = [(f"{RESULTS}/{stage_template(stage)}/", contents) for stage, contents in CONTENTS.items()]
+    return "\n".join(f"{path}\n    {contents}" for path, contents in shown)
+
+
+# Old top-level keys of the config that the study has now: `study.` and the new name.
+STUDY_TABLES = {
+    "lod": "lod",
+    "frames": "frames",
+    "calibration": "calibration",
+    "benchmark": "view_benchmark",
+    "trials": "fit_profiles",
+    "seam_study": "seams",
+    "perceptual_study": "forced_choice",
+    "sweeps": "sweeps",
+    "tradeoff": "tradeoff",
+    "auto": "auto",
+}

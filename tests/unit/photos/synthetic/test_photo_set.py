@@ -8,7 +8,7 @@ from dav_gswt.images import image_files
 from dav_gswt.photos.synthetic import camera_layouts, desert, photo_set
 from dav_gswt.photos.synthetic import scene as synthetic
 
-ENTRY = {"family": "desert", "seed": 0, "photos": 100, "test": 0, "size": 64, "candidates": 0, "rig": "paper"}
+ENTRY = {"family": "desert", "seed": 0, "photos": 100, "test": 0, "size": 64, "candidates": 0, "layout": "paper"}
 
 
 def angle(one, other):

@@ -13,7 +13,7 @@ from dav_gswt.photos.synthetic import scene as synthetic
 mi = pytest.importorskip("mitsuba")
 BARE = {"stones": 0, "pebbles": 0, "shrubs": 0, "tufts": 0}
 ENTRY = {"family": "desert", "seed": 0, "photos": 8, "test": 6, "size": 64, "candidates": 20}
-HIGH = ENTRY | {"rig": "cap", "lowest": 60, "photos": 24, "test": 12, "oblique": 8}
+HIGH = ENTRY | {"layout": "cap", "min_elevation": 60, "photos": 24, "test": 12, "oblique": 8}
 
 
 @pytest.fixture(autouse=True)
@@ -192,7 +192,7 @@ def test_views_at_45_degrees_are_a_group_of_their_own():
 
 
 def test_a_paper_rig_is_tested_on_the_hemisphere():
-    entry = ENTRY | {"rig": "paper", "photos": 100}
+    entry = ENTRY | {"layout": "paper", "photos": 100}
     assert (np.abs(elevations(synthetic.start_views(entry)) - 45) < 1e-9).sum() == 36
     assert elevations(synthetic.start_views(entry)).min() > 30
     assert synthetic.test_groups(entry) == {"hemisphere": list(range(6))}
@@ -215,7 +215,7 @@ def test_walkers_are_a_group_of_their_own_and_look_over_the_exemplar_to_the_hori
 
 @pytest.mark.parametrize("rig", ["cap", "paper"])
 def test_no_view_is_another(rig):
-    entry = HIGH | {"rig": rig, "candidates": 24, "walkers": 6}
+    entry = HIGH | {"layout": rig, "candidates": 24, "walkers": 6}
     cameras = synthetic.start_views(entry) + synthetic.test_views(entry) + synthetic.candidates(entry)
     at = np.array([c.centre for c in cameras])
     assert np.linalg.norm(at[:, None] - at, axis=-1)[~np.eye(len(at), dtype=bool)].min() > 0.1

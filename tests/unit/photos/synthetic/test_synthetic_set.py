@@ -30,12 +30,12 @@ def dark(monkeypatch):
     [
         pytest.param({}, {"hemisphere": ["test_00.png", "test_01.png"]}, id="ring"),
         pytest.param(
-            {"rig": "cap", "lowest": 60, "oblique": 3},
+            {"layout": "cap", "min_elevation": 60, "oblique": 3},
             {"high": ["test_00.png", "test_01.png"], "oblique": ["test_02.png", "test_03.png", "test_04.png"]},
             id="cap",
         ),
         pytest.param(
-            {"rig": "paper", "walkers": 2},
+            {"layout": "paper", "walkers": 2},
             {"hemisphere": ["test_00.png", "test_01.png"], "walker": ["test_02.png", "test_03.png"]},
             id="paper",
         ),

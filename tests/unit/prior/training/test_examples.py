@@ -12,7 +12,7 @@ from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.training import example_files, examples
-from dav_gswt.reconstruction.build import Quality
+from dav_gswt.reconstruction.build import FitSettings
 
 SEED, COUNT = 4, 3
 
@@ -198,7 +198,7 @@ def test_a_fit_stays_under_its_cap(monkeypatch):
     """The cap is what bounds the seconds of a fit."""
     seen = []
 
-    def fit(frame, photos, points, colours, quality: Quality, rng, margin):
+    def fit(frame, photos, points, colours, quality: FitSettings, rng, margin):
         seen.append((quality, len(points), len(photos), frame.extent.east))
         raise InterruptedError
 

@@ -10,7 +10,7 @@ from dav_gswt.study.seams import replicates, summary, tables
 from dav_gswt.tiles import build
 
 SEAMS = {"semantic": {"tile": 0.5, "strip": 0.06, "candidates": 9, "variants": 1}, "small": {"tile": 0.3}}
-SCENES = {"desert": {"seam": "semantic-refined"}, "beach": {"seam": "small"}, "moon": {"seam": "semantic"}}
+SCENES = {"desert": {"tiling": "semantic-refined"}, "beach": {"tiling": "small"}, "moon": {"tiling": "semantic"}}
 
 
 def config(**study):
@@ -67,7 +67,7 @@ def test_crops_of_another_draw_are_other_places_of_the_same_seam(tmp_path):
         ]
         csv_tables.write_table(tmp_path / f"{draw}.csv", crops)
         write_json(tmp_path / "facts.json", {"provenance": {"version": "1", "inputs": {"seams": "abc"}}})
-        cell = {"scene": "desert", "seed": 0, "quality": "draft", "variant": "semantic", "draw": draw}
+        cell = {"scene": "desert", "seed": 0, "preset": "draft", "variant": "semantic", "draw": draw}
         rows += tables.rows(cell | {"table": tmp_path / f"{draw}.csv", "facts": tmp_path / "facts.json"})
     (every,) = [row for row in summary.summary(rows) if row["view"] == summary.EVERY]
     assert (every["sets"], every["borders"], every["border_clusters"]) == (2, 6, 6)

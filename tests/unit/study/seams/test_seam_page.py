@@ -16,7 +16,7 @@ def told(scene, variant, view="every", share="0.25"):
     row = {
         "scene": scene,
         "seed": 0,
-        "quality": "draft",
+        "preset": "draft",
         "variant": variant,
         "view": view,
         "ground": view,

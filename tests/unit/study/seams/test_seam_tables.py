@@ -8,7 +8,7 @@ from dav_gswt.study.seams import repetition, summary
 ABOUT = {
     "scene": "desert",
     "seed": 0,
-    "quality": "draft",
+    "preset": "draft",
     "variant": "colour",
     "version": "1",
     "weights": "",

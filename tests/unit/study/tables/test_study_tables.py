@@ -10,7 +10,7 @@ from dav_gswt.study.sweeps import tables as sweeps
 from dav_gswt.study.tables import ablation, results, sensitivity, spread, timing
 from dav_gswt.study.terrain import tile_uncertainty
 
-ROW = dict.fromkeys(sweeps.columns(1)) | {"quality": "draft", "seam": "semantic", "tau": "0.6"}
+ROW = dict.fromkeys(sweeps.columns(1)) | {"preset": "draft", "tiling": "semantic", "tau": "0.6"}
 TWO = [("desert", 0, 30.0), ("desert", 1, 32.0), ("dunes", 0, 20.0), ("dunes", 1, 21.0)]
 
 
@@ -31,7 +31,7 @@ def test_means_count_scenes_alike_and_deviations_are_over_seeds():
 
 
 def test_the_viewer_is_beside_the_bundle_that_it_measured(tmp_path):
-    measured = {"scene": "desert", "seed": 0, "quality": "draft", "seam": "semantic", "tau": 0.6, "render_ms": 5.0}
+    measured = {"scene": "desert", "seed": 0, "preset": "draft", "tiling": "semantic", "tau": 0.6, "render_ms": 5.0}
     csv_tables.write_table(tmp_path / "viewer.csv", [measured])
     viewer = spread.read_viewer(tmp_path / "viewer.csv")
     mine, other = spread.with_viewer([cell("0.6"), cell("0.6") | {"tau": "0.3"}], viewer)

@@ -13,7 +13,7 @@ from dav_gswt.study.terrain import frames
 ASKED = frames.Asked(
     {"kind": "hills", "height": 1, "wavelength": 10}, {"frames": 3, "length": 1, "height": 1}, 48, 32, [900, 300]
 )
-CELL = {"scene": "desert", "seed": 0, "quality": "draft", "seam": "semantic", "tau": "0.6"}
+CELL = {"scene": "desert", "seed": 0, "preset": "draft", "tiling": "semantic", "tau": "0.6"}
 
 
 def row_of(renderer: str, budget: int, **times) -> dict:

@@ -1,61 +1,62 @@
 """Settings as named entries: one spelling, in range, nothing twice, and what makes no sense is named."""
 
 from copy import deepcopy
-from pathlib import Path
 
 import pytest
-import yaml
+from fixtures.configs import check_flat, flat_config
 
-from dav_gswt.config import check
 from dav_gswt.errors import InputError
 from dav_gswt.study.tradeoff import settings
-
-ROOT = Path(__file__).parents[4]
-SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
 
 
 @pytest.fixture
 def config():
-    return yaml.safe_load((ROOT / "config/config.yaml").read_text())
+    return flat_config()
 
 
 @pytest.mark.parametrize(
     "value, spelled",
     [
-        (70000, "reference-cap-70000"),
-        (70000.0, "reference-cap-70000"),
-        (7e4, "reference-cap-70000"),
-        (1.25, "reference-cap-1_25"),
-        (1.250, "reference-cap-1_25"),
-        (0.5, "reference-cap-0_5"),
-        ("auto", "reference-cap-auto"),
+        (70000, "reference-max_gaussians-70000"),
+        (70000.0, "reference-max_gaussians-70000"),
+        (7e4, "reference-max_gaussians-70000"),
+        (1.25, "reference-max_gaussians-1_25"),
+        (1.250, "reference-max_gaussians-1_25"),
+        (0.5, "reference-max_gaussians-0_5"),
+        ("auto", "reference-max_gaussians-auto"),
     ],
 )
 def test_a_setting_has_one_name(value, spelled):
-    assert settings.name("reference", "cap", value) == spelled
+    assert settings.name("reference", "max_gaussians", value) == spelled
 
 
 def test_every_setting_is_an_entry_that_differs_in_one_key(config):
     made = settings.entries(config)
-    new = set(made["qualities"]) - set(config["qualities"])
-    assert {"draft-size-192", "draft-spacing-1_75", "draft-cap-auto", "reference-size-384", "auto-size-384"} < new
+    new = set(made["presets"]) - set(config["presets"])
+    assert {
+        "draft-size-192",
+        "draft-spacing-1_75",
+        "draft-max_gaussians-auto",
+        "reference-size-384",
+        "auto-size-384",
+    } < new
     for entry in new:
-        below = made["qualities"][entry.split("-")[0]]
-        differing = {key for key, value in made["qualities"][entry].items() if value != below.get(key)}
+        below = made["presets"][entry.split("-")[0]]
+        differing = {key for key, value in made["presets"][entry].items() if value != below.get(key)}
         assert len(differing) == 1 and f"-{differing.pop()}-" in entry
     assert made["priors"]["terrain-steps-16"]["steps"] == 16
-    assert made["seams"]["semantic-variants-1"]["candidates"] == config["seams"]["semantic"]["candidates"]
+    assert made["tilings"]["semantic-variants-1"]["candidates"] == config["tilings"]["semantic"]["candidates"]
     for table, own in (
-        ("qualities", "draft-size-384"),
+        ("presets", "draft-size-384"),
         ("priors", "terrain-steps-8"),
-        ("seams", "semantic-variants-2"),
+        ("tilings", "semantic-variants-2"),
     ):
         assert own not in made[table]  # the base's own values
 
 
 def test_the_entries_are_valid_and_making_them_again_changes_nothing(config):
     made = settings.entries(config)
-    check(made, SCHEMA)
+    check_flat(made)
     assert settings.entries(made) == made
     assert all(len(made[table]) > len(config[table]) for table in settings.CALLED)
 
@@ -70,7 +71,7 @@ def test_what_auto_compares_is_fitted_to_photos_of_one_size(config):
     assert settings.sized(config, "draft") == "draft"  # its own size
     del config["auto"]["size"]
     assert settings.sized(config, "reference") == "reference"
-    assert "reference-size-384" not in settings.entries(config)["qualities"]
+    assert "reference-size-384" not in settings.entries(config)["presets"]
 
 
 def test_each_knob_has_a_most_accurate_and_a_base_and_no_setting_comes_twice(config):
@@ -82,7 +83,7 @@ def test_each_knob_has_a_most_accurate_and_a_base_and_no_setting_comes_twice(con
         assert [s.most for s in mine] == [True] + [False] * (len(mine) - 1)
         assert sum(s.base for s in mine) == 1
         assert len({s.shown for s in mine}) == len(mine)
-    assert [(s.shown, s.chosen["quality"], s.base) for s in found if s.knob == "steps"] == [
+    assert [(s.shown, s.chosen["preset"], s.base) for s in found if s.knob == "steps"] == [
         ("1000", "draft-steps-1000", False),
         ("400", "draft", True),
         ("200", "draft-steps-200", False),
@@ -100,7 +101,7 @@ def test_the_base_of_a_knob_that_does_not_name_it_is_its_last(config):
 
 
 def test_all_are_tested_on_photos_of_the_largest_size(config):
-    assert settings.tested_size(settings.entries(config)) == config["qualities"]["reference"]["size"]
+    assert settings.tested_size(settings.entries(config)) == config["presets"]["reference"]["size"]
     config["tradeoff"]["presets"] = ["draft"]
     config["tradeoff"]["knobs"]["size"]["values"] = [500, 100]
     assert settings.tested_size(settings.entries(config)) == 500
@@ -108,7 +109,7 @@ def test_all_are_tested_on_photos_of_the_largest_size(config):
 
 def test_only_the_knobs_that_are_asked_for_are_turned(config):
     config["tradeoff"]["only"] = ["tau"]
-    check(config, SCHEMA)
+    check_flat(config)
     assert {s.knob for s in settings.settings(config)} == {settings.PRESET, "tau"}
 
 
@@ -128,26 +129,26 @@ def changed(config, path, value):
         pytest.param("tradeoff.scene", "moon", "tradeoff: moon is no scene", id="no such scene"),
         pytest.param("auto.scenes", ["moon"], "auto: moon is no scene", id="no such scene of auto"),
         pytest.param("tradeoff.knob", {}, "tradeoff: there is no key 'knob'; is 'knobs' meant", id="a typo"),
-        pytest.param("tradeoff.base.quality", "best", "tradeoff.base: there is no quality 'best'", id="no such base"),
-        pytest.param("tradeoff.base.rounds", 0, "tradeoff.base.rounds: 0 is less", id="no round"),
-        pytest.param("tradeoff.presets", ["best"], "tradeoff.presets: there is no quality 'best'", id="no such preset"),
+        pytest.param("tradeoff.base.preset", "best", "tradeoff.base: there is no preset 'best'", id="no such base"),
+        pytest.param("tradeoff.base.rounds", 0, "tradeoff.base.rounds: .*greater", id="no round"),
+        pytest.param("tradeoff.presets", ["best"], "tradeoff.presets: there is no preset 'best'", id="no such preset"),
         pytest.param("tradeoff.only", ["caps"], "tradeoff.only: there is no knob 'caps'", id="no such knob"),
-        pytest.param("auto.auto.quality", "best", "auto.auto: there is no quality 'best'", id="no such auto"),
-        pytest.param("tradeoff.knobs.cap.values", [5], "draft-cap-5.*: 5 is less", id="out of range"),
-        pytest.param("tradeoff.knobs.degree.values", [9], "draft-degree-9", id="a degree too many"),
-        pytest.param("tradeoff.knobs.cap.key", "cup", "there is no key 'cup'", id="a key that entries have not"),
-        pytest.param("tradeoff.knobs.tau.values", [1.5], "1.5 is greater", id="tau above 1"),
+        pytest.param("auto.auto.preset", "best", "auto.auto: there is no preset 'best'", id="no such auto"),
+        pytest.param("tradeoff.knobs.max_gaussians.values", [5], "draft-max_gaussians-5.*greater", id="out of range"),
+        pytest.param("tradeoff.knobs.sh_degree.values", [9], "draft-sh_degree-9", id="a degree too many"),
+        pytest.param("tradeoff.knobs.max_gaussians.key", "cup", "no key 'cup'", id="no such key"),
+        pytest.param("tradeoff.knobs.tau.values", [1.5], "values are from 0 to 1", id="tau above 1"),
         pytest.param("tradeoff.knobs.samples.base", {}, "samples: makes no difference to the policy", id="no prior"),
-        pytest.param("qualities.draft-cap-70000", {}, "qualities.draft-cap-70000", id="an empty entry"),
+        pytest.param("presets.draft-max_gaussians-70000", {}, "presets.draft-max_gaussians-70000", id="an empty entry"),
     ],
 )
 def test_what_makes_no_sense_is_named(config, path, value, said):
-    check(config, SCHEMA)
+    check_flat(config)
     with pytest.raises(InputError, match=f"config: .*{said}"):
-        check(changed(config, path, value), SCHEMA)
+        check_flat(changed(config, path, value))
 
 
 def test_an_entry_of_ones_own_must_not_have_the_name_of_a_setting(config):
-    mine = config["qualities"]["standard"]
-    with pytest.raises(InputError, match="qualities.draft-cap-70000: `tradeoff` or `auto` makes an entry of this name"):
-        check(changed(config, "qualities.draft-cap-70000", mine), SCHEMA)
+    mine = config["presets"]["standard"]
+    with pytest.raises(InputError, match="presets.draft-max_gaussians-70000: .* makes an entry of this name"):
+        check_flat(changed(config, "presets.draft-max_gaussians-70000", mine))

@@ -29,7 +29,7 @@ def take_photos(site: Site, requested: list[RequestedPose]) -> None:
         )
     exemplar = site.frame.exemplar
     home = np.array([exemplar.west + exemplar.side / 2, exemplar.south])
-    rules = qgc_plan.FlightRules(**{key: float(value) for key, value in site.scene.get("flight", {}).items()})
+    rules = qgc_plan.FlightRules(**{key: float(value) for key, value in site.scene.get("drone", {}).items()})
     _check_level(site, place, missing, home, rules)
     flown = qgc_plan.plan_flight([(pose.name, camera) for pose, camera in missing], place, home, rules, site.burst)
     path = site.store.folder / "mission.plan"

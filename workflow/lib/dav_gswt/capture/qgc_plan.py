@@ -33,10 +33,10 @@ SAME = 0.01  # metres: nearer positions count as equal
 class FlightRules:
     """Safety limits of a flight, in metres above the plane of the ground and metres per second.
 
-    No photo is taken below least_altitude; below clearance the vehicle only moves vertically.
+    No photo is taken below min_altitude; below clearance the vehicle only moves vertically.
     """
 
-    least_altitude: float = 2.0
+    min_altitude: float = 2.0
     clearance: float = 5.0
     speed: float = 3.0
 
@@ -70,15 +70,15 @@ def plan_flight(
 ) -> SurveyFlight:
     """Plan a flight from a point on the ground (`home`, world units) past all views and back.
 
-    Raises: InputError: views below rules.least_altitude, by name.
+    Raises: InputError: views below rules.min_altitude, by name.
     """
     scale = place.metres_per_unit
     at = scale * np.array([camera.centre for _, camera in views])
-    low = [name for (name, _), z in zip(views, at[:, 2], strict=True) if z < rules.least_altitude]
+    low = [name for (name, _), z in zip(views, at[:, 2], strict=True) if z < rules.min_altitude]
     if low:
         raise InputError(
-            f"{', '.join(low)}: lower than {rules.least_altitude:g} m above the ground, where no photo is taken from "
-            "the air (flight.least_altitude of the scene's entry); take a rig or agent: handheld for poses this low"
+            f"{', '.join(low)}: lower than {rules.min_altitude:g} m above the ground, where no photo is taken from "
+            "the air (flight.min_altitude of the scene's entry); take a rig or agent: handheld for poses this low"
         )
     start = scale * np.array([*home, 0.0]) + [0.0, 0.0, rules.clearance]
     ordered = route.order_stops(at, start, start)

@@ -195,7 +195,7 @@ def plan_from_options(options: argparse.Namespace) -> tuple[list[qgc_plan.Survey
         heights = options.heights or [full, LOWER * full]
         views = plan_exhaustive(side, heights, lens, tuple(options.elevations), options.overlap)
     place = Georeference(options.latitude, options.longitude, options.altitude, options.north, 1.0)
-    rules = qgc_plan.FlightRules(options.least_altitude, options.clearance, options.speed)
+    rules = qgc_plan.FlightRules(options.min_altitude, options.clearance, options.speed)
     return split_flights(views, place, np.array([0.0, -side / 2]), rules, options.minutes), views
 
 
@@ -224,7 +224,7 @@ def make_parser() -> argparse.ArgumentParser:
     what.add_argument("--aspect", type=_number_type(1, 3), default=Lens.aspect, help="longer over shorter side")
     safe = parser.add_argument_group("safety")
     safe.add_argument(
-        "--least-altitude", type=_number_type(0, 100), default=qgc_plan.FlightRules.least_altitude, help="metres"
+        "--least-altitude", type=_number_type(0, 100), default=qgc_plan.FlightRules.min_altitude, help="metres"
     )
     safe.add_argument("--clearance", type=_number_type(1, 100), default=qgc_plan.FlightRules.clearance, help="metres")
     safe.add_argument(

@@ -10,20 +10,20 @@ from pathlib import Path
 
 import psutil
 
-from dav_gswt import config
 from dav_gswt.cli.log_filter import Narrator
+from dav_gswt.config.load import add_scene_files, check_config, read_config
 from dav_gswt.errors import InputError
-from dav_gswt.paths import spell, spell_completed, spell_stop
+from dav_gswt.paths import encode_branch, stage_folder
 from dav_gswt.raster import backends
 
-CONFIG = Path("config/config.yaml")
+CONFIG, STUDY = Path("config/config.yaml"), Path("config/study.yaml")
+SCENES = Path("config/scenes")
 SMALLER = Path("config/without_compiler.yaml")
-SCHEMA = Path("workflow/schemas/config.schema.yaml")
 
 
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m dav_gswt.cli.run", description=__doc__)
-    parser.add_argument("--scene", help="an entry of scenes in config/config.yaml (default: its scene)")
+    parser.add_argument("--scene", help="a scene of config/scenes or config/config.yaml (default: its `scene`)")
     parser.add_argument("--cores", type=int, default=2)
     parser.add_argument("--configfile", nargs="+", type=Path, default=[], help="laid over config/config.yaml in turn")
     parser.add_argument("--view", action="store_true", help="serve the scene's page on this machine")
@@ -31,8 +31,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         overlays = smaller(options.view) + options.configfile
-        given = config.read([CONFIG, *overlays], {"scene": options.scene} if options.scene else {})
-        config.check(given, SCHEMA)
+        given = load_config(overlays, {"scene": options.scene} if options.scene else {})
         if options.view:
             return view(given, options.port)
         return run(given, options.cores, overlays)
@@ -41,6 +40,11 @@ def main(arguments: list[str] | None = None) -> int:
         return 1
     except KeyboardInterrupt:
         return 130
+
+
+def load_config(overlays: list[Path], changes: dict | None = None) -> dict:
+    """The config of this folder with all defaults, as the workflow reads it."""
+    return check_config(add_scene_files(read_config([CONFIG, STUDY, *overlays], changes), SCENES))
 
 
 def smaller(quietly: bool) -> list[Path]:
@@ -131,24 +135,18 @@ def running() -> list[int]:
 
 
 def pages(given: dict) -> list[Path]:
-    """The pages of the config's scene, newest first; those made at its parameters, if there are any."""
-    scene = given["scenes"][given["scene"]]
-    stop = spell_stop(given["stop"])
-    views = ("given", "0", 0) if scene["kind"] == "field" else (given["policy"], f"{given['k']}{stop}", given["rounds"])
-    completed = "" if scene["kind"] == "field" else spell_completed(given["complete"], given["prior"])
-    branch = "seed{}/{}/active_{}_*_k{}/iter{}{}/tiles_{}/bundle_tau{}".format(
-        given["seeds"][0], scene["quality"], *views, completed, scene["seam"], spell(given["tau"])
-    )
-    folder = Path("results", given["scene"])
-    found = list(folder.glob(f"{branch}/terrain/page/index.html")) or folder.rglob("terrain/page/index.html")
-    return sorted((p.parent for p in found), key=lambda p: p.stat().st_mtime, reverse=True)
+    """The pages of the config's scene, newest first; those made by its settings, if there are any."""
+    scene = given["scene"]
+    exact = stage_folder("terrain", encode_branch(given, scene) | {"seed": given["seeds"][0]}) / "page/index.html"
+    found = [exact] if exact.is_file() else list(Path("results", scene).rglob("terrain/page/index.html"))
+    return sorted((path.parent for path in found), key=lambda path: path.stat().st_mtime, reverse=True)
 
 
 def tell(given: dict, done: str, overlays: list[Path]) -> None:
     """What was made, where it is, and what to type next."""
     page = pages(given)[0]
     terrain, bundle, tiles = page.parent, page.parents[1], page.parents[2]
-    usual = given["scene"] == config.read([CONFIG])["scene"] and not set(overlays) - {SMALLER}
+    usual = given["scene"] == read_config([CONFIG])["scene"] and not set(overlays) - {SMALLER}
     print(
         f"""
 {done}.
@@ -161,7 +159,7 @@ Next:
   make view{"" if usual else f" SCENE={given['scene']}"}
            walk over the terrain in a browser
   make run SCENE=name
-           another scene of config/config.yaml; config/README.md says how to add your own photos""",
+           another scene of config/scenes; docs/photos.md says how to add your own photos""",
         flush=True,
     )
 

@@ -1,7 +1,7 @@
-"""The published weights of LPIPS v0.1 on AlexNet: fetched from a package's source archive once, kept as safetensors.
+"""The published weights of LPIPS v0.1 on AlexNet: from the installed package's pickle, kept as safetensors.
 
-The archive has them as a pickle, which could run anything: its digest is checked first, and then it is read by an
-unpickler that knows nothing but plain arrays.
+A pickle could run anything: its digest is checked first, and then it is read by an unpickler that knows nothing but
+plain arrays.
 """
 
 import io
@@ -9,7 +9,6 @@ import logging
 import pickle
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from jaxtyping import Float32
@@ -19,11 +18,9 @@ from safetensors.numpy import load_file, save
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_file
-from dav_gswt.images.lpips_package import MEMBER, MEMBER_SHA256, PACKAGE, downloaded, member, require_digest
+from dav_gswt.images.lpips_package import MEMBER, PACKAGE, read_member, require_digest
 
 _log = logging.getLogger(__name__)
-
-PATH = Path("results/weights/lpips_alexnet.safetensors")  # where the rule fetch_lpips puts them
 
 # outputs, inputs, rows, columns of each convolution
 KERNELS = (64, 3, 11, 11), (192, 64, 5, 5), (384, 192, 3, 3), (256, 384, 3, 3), (256, 256, 3, 3)
@@ -45,21 +42,13 @@ class Weights:
         return {f"{kind}{i}": a for kind, arrays in kinds for i, a in enumerate(arrays)}
 
 
-def found(path: Path | str = PATH) -> Path | None:
-    """The file with the weights, or None where it was not fetched: LPIPS is then left out, never made up."""
-    path = Path(path)
-    return path if path.is_file() else None
+def convert_weights(source: Path | str, path: Path | str) -> None:
+    """Write the weights as safetensors. source: the package's pickle, or weights that `write` wrote.
 
-
-def fetch(path: Path | str = PATH) -> None:
-    """Fetch the weights and write them as safetensors.
-
-    Raises: InputError: they cannot be had (no network), or are not the published ones.
+    Raises: InputError: not the published weights.
     """
-    with TemporaryDirectory() as folder:
-        content = member(downloaded(Path(folder)))
-    require_digest(content, MEMBER_SHA256, MEMBER)
-    write(path, of_pickle(content))
+    weights = read(source) if Path(source).suffix == ".safetensors" else of_pickle(read_member(source))
+    write(path, weights)
     _log.info("LPIPS's weights (BSD, Zhang et al. 2018) are at %s", path)
 
 

@@ -38,16 +38,16 @@ HALF_SHARE = 0.3  # of the steps at half the resolution, where no ground gives a
 
 
 @dataclass(frozen=True)
-class Quality:
-    """A named set of settings that trade speed for accuracy (config: qualities)."""
+class FitSettings:
+    """What a fit may spend: an entry of the config's `presets`."""
 
     size: int  # longer side of the photos, pixels
     spacing: float  # of the discs, in sizes of a photo's pixel on the ground
-    cap: Count  # most Gaussians
+    max_gaussians: Count
     steps: Count  # of the coarse fit
     steps_per_photo: Count  # of an update, for every new photo
     level_steps: int  # of the fit of a coarser level
-    degree: Count = 0  # of the spherical harmonics
+    sh_degree: Count = 0
     pose_rate: float = 0.0  # radians a step that cameras may turn
     levels: Count | None = None  # of detail, where not as many as elsewhere
 
@@ -66,7 +66,7 @@ def fit(
     views: list[TrainingView],
     points: Float[Array, "n 3"],
     colours: Float[Array, "n 3"],
-    quality: Quality,
+    quality: FitSettings,
     rng: np.random.Generator,
     keep: Path | str | None = None,
     margin: float = ground.MARGIN,
@@ -97,7 +97,7 @@ def fit(
     )
     _log.info("things: %d Gaussians over %.1f %% of the ground", len(stand), 100 * scene.relief.stands.mean())
     rules = _rules(grid, scene.relief, stand, frame)
-    plan = Plan(_steps(quality, views), quality.cap, quality.degree, pose_rate=quality.pose_rate)
+    plan = Plan(_steps(quality, views), quality.max_gaussians, quality.sh_degree, pose_rate=quality.pose_rate)
     masked = sky.behind(scene.views, modelled(scene.views, grid))
     fitted = trainer.fit(start, masked, plan, rules, rng, "fit coarse field", keep, watch)
     return _made(fitted, grid, masked)
@@ -109,7 +109,7 @@ def refine(
     frame: SceneFrame,
     before: list[TrainingView],
     new: list[TrainingView],
-    quality: Quality,
+    quality: FitSettings,
     rng: np.random.Generator,
     keep: Path | None = None,
 ) -> Made:
@@ -150,7 +150,7 @@ def _begun(
     grid: Ground,
     frame: SceneFrame,
     views: list[TrainingView],
-    quality: Quality,
+    quality: FitSettings,
     rng: np.random.Generator,
 ) -> _Begun:
     """The field with what photos show and it lacks; its first Gaussians are the grid's, as before."""
@@ -172,18 +172,18 @@ def _begun(
     return _Begun(replace(field, sh=sh), grid, masked, _rules(grid, scene.relief, there, frame))
 
 
-def _steps(quality: Quality, views: list[TrainingView]) -> int:
+def _steps(quality: FitSettings, views: list[TrainingView]) -> int:
     """How many a first fit takes."""
     return STEPS_PER_PHOTO * len(views) if quality.steps == AUTO else quality.steps
 
 
-def _plan(quality: Quality, field: GaussianField, before: int, new: int) -> Plan:
+def _plan(quality: FitSettings, field: GaussianField, before: int, new: int) -> Plan:
     """What an update may spend: so many steps for each new photo; where "auto", as many Gaussians a photo as the field
     has that was fitted to those before, and the degree of it."""
     each = STEPS_PER_NEW_PHOTO if quality.steps_per_photo == AUTO else quality.steps_per_photo
     most = min(MOST_GAUSSIANS, len(field) * (before + new) // max(1, before))
-    degree = field.degree if quality.degree == AUTO else quality.degree
-    return Plan(each * new, quality.cap, degree, pose_rate=quality.pose_rate, most=most)
+    degree = field.degree if quality.sh_degree == AUTO else quality.sh_degree
+    return Plan(each * new, quality.max_gaussians, degree, pose_rate=quality.pose_rate, most=most)
 
 
 @dataclass(frozen=True)
@@ -224,9 +224,9 @@ def _rules(grid: Ground, relief: Relief, stand: GaussianField, frame: SceneFrame
 def _without_ground(grid, views, points, colours, quality, rng, keep, watch) -> Made:
     apart = cKDTree(points).query(points, k=min(4, len(points)))[0][:, 1:].mean(1)
     start = objects.blobs(points, colours, np.clip(0.5 * apart, 1e-6, None), logit=0.0)
-    if quality.cap != AUTO:
-        start = start[: quality.cap]
-    plan = Plan(_steps(quality, views), quality.cap, quality.degree, HALF_SHARE, quality.pose_rate)
+    if quality.max_gaussians != AUTO:
+        start = start[: quality.max_gaussians]
+    plan = Plan(_steps(quality, views), quality.max_gaussians, quality.sh_degree, HALF_SHARE, quality.pose_rate)
     rules = Anywhere(float(np.median(apart)), _extent(points))
     return _made(trainer.fit(start, views, plan, rules, rng, "fit free field", keep, watch), grid, views)
 
@@ -261,13 +261,13 @@ def _unknown(stand: GaussianField, there: GaussianField, near: float) -> Gaussia
     return stand[cKDTree(there.means).query(stand.means)[0] > near]
 
 
-def most_discs(quality: Quality) -> int:
+def most_discs(quality: FitSettings) -> int:
     """How many discs the cap leaves the ground."""
     return int(GROUND_SHARE * _most(quality) / (1 + 1 / underlay.STRIDE**2))
 
 
-def _most(quality: Quality) -> int:
-    return MOST_GAUSSIANS if quality.cap == AUTO else quality.cap
+def _most(quality: FitSettings) -> int:
+    return MOST_GAUSSIANS if quality.max_gaussians == AUTO else quality.max_gaussians
 
 
 def _some(part: GaussianField, room: int, rng: np.random.Generator) -> GaussianField:

@@ -8,7 +8,7 @@ import numpy as np
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.reconstruction import ground
-from dav_gswt.reconstruction.build import BLOCK, Quality, most_discs
+from dav_gswt.reconstruction.build import BLOCK, FitSettings, most_discs
 from dav_gswt.reconstruction.discs import WIDTH
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.top_view import from_above
@@ -18,7 +18,7 @@ _log = logging.getLogger(__name__)
 OPAQUE = 0.5  # alpha from which a cell's height is taken from the field
 
 
-def enter(field: GaussianField, frame: SceneFrame, quality: Quality) -> tuple[GaussianField, Ground]:
+def enter(field: GaussianField, frame: SceneFrame, quality: FitSettings) -> tuple[GaussianField, Ground]:
     """The field as it is, cut to its exemplar, and the grid of the surface that it shows from above.
 
     The spacing follows from the field's own Gaussians: a disc of the grid is as wide as their median.

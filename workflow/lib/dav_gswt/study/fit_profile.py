@@ -22,7 +22,7 @@ from dav_gswt.images import metrics
 from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
 from dav_gswt.photos.training_views import TrainingView, mask_outside_ground, read_training_view
 from dav_gswt.reconstruction import build
-from dav_gswt.reconstruction.build import Made, Quality
+from dav_gswt.reconstruction.build import FitSettings, Made
 from dav_gswt.reconstruction.ground import WHOLE, Ground
 
 FIRST_TEST, EACH = 5, 10
@@ -77,7 +77,7 @@ def _over_exemplar(views: list[TrainingView], square: Square) -> list[TrainingVi
     return [v for v in seen if v.weight.any()]
 
 
-def run(photos: PhotoSet, quality: Quality, seed: int = 0, every: int = 25) -> Trial:
+def run(photos: PhotoSet, quality: FitSettings, seed: int = 0, every: int = 25) -> Trial:
     """Fit the training photos, looking at the first group of test views every so many steps."""
     watched, measuring = next(iter(photos.tests.values())), 0.0
     start = time.perf_counter()

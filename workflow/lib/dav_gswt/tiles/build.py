@@ -67,7 +67,7 @@ class TilingOptions:
 
 def make_generator(seed: int, tiling: Mapping[str, Any]) -> np.random.Generator:
     """The generator of a tile set, from the workflow's seed and, where it is not 0, the tiling's replicate number."""
-    return np.random.default_rng([seed, tiling["draw"]] if tiling.get("draw") else [seed])
+    return np.random.default_rng([seed, tiling["replicate"]] if tiling.get("replicate") else [seed])
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ def list_orbit(scene: dict, frame: SceneFrame, like: Camera) -> Candidates:
     """Poses spread evenly over the hemisphere at the flying height, for devices and people. like: a camera whose lens
     they have. `lowest`: the least elevation, degrees."""
     places = camera_layouts.hemisphere(
-        scene.get("candidates", AROUND), scene.get("lowest", LOWEST), frame.flying_height
+        scene.get("candidates", AROUND), scene.get("min_elevation", LOWEST), frame.flying_height
     )
     found = [camera_layouts.orbit(*place, middle(frame), like.width, like.height, 60.0) for place in places]
     lens = {name: getattr(like, name) for name in ("fx", "fy", "cx", "cy")}

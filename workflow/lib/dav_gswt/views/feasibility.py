@@ -73,7 +73,7 @@ def find_infeasible(
 ) -> dict[str, str]:
     """Why a pose is none, in words, by its name: what stands before the colon is the kind of reason.
 
-    limits: lowest_height and highest_height above the ground, farthest from the exemplar's middle, in world units; each
+    limits: min_height and max_height above the ground, max_distance from the exemplar's middle, in world units; each
     may be missing. clearance: least distance from the ground, in world units; if None, CLEARANCE times the median
     distance of the candidates from the middle, which is the flying height where they lie on its hemisphere.
     A pose is hidden where fewer than SHARE of the lattice's points in its picture are in sight, and where it has none.
@@ -153,7 +153,7 @@ def _find_outside_limits(site: _Site, centres: Float[Array, "n 3"], limits: dict
     away = np.linalg.norm(centres - site.middle, axis=1)
     low, high, far = (
         limits.get(name, default)
-        for name, default in (("lowest_height", -np.inf), ("highest_height", np.inf), ("farthest", np.inf))
+        for name, default in (("min_height", -np.inf), ("max_height", np.inf), ("max_distance", np.inf))
     )
     reasons = {int(i): f"too low: {above[i]:.3g} above the ground, {low:g} is the least" for i in _indices(above < low)}
     reasons |= {i: f"too high: {above[i]:.3g} above the ground, {high:g} is the most" for i in _indices(above > high)}

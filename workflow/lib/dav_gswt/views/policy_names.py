@@ -5,7 +5,7 @@ The functions are in `policies.py`. This module imports no numerics, so that the
 
 from dataclasses import dataclass
 
-EXTERNAL = "given"  # stands in paths in place of a policy: a finished field, refined by no photo
+EXTERNAL = "external"  # stands in paths in place of a policy: a finished field, refined by no photo
 
 
 @dataclass(frozen=True)

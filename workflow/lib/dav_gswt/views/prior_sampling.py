@@ -27,7 +27,7 @@ FEW = 2 * (staging.TOP + staging.BATCH)  # poses of which so many would be imagi
 class PriorConfig:
     """A prior and how it is asked. samples of each pose; steps of denoising; p_drop: of its attention; weights: of
     LPIPS, None where they are not had; staged: cheaply first, in full where it matters; posterior: a sample is a
-    distribution, as wide as the coder says, instead of a point; noises: each sample starts from its own."""
+    distribution, as wide as the coder says, instead of a point; independent_noise: each sample starts from its own."""
 
     model: Prior
     samples: int
@@ -37,7 +37,7 @@ class PriorConfig:
     weights: Weights | None = None
     staged: bool = True
     posterior: bool = False
-    noises: bool = False
+    independent_noise: bool = False
 
 
 def open_scoring_prior(
@@ -52,7 +52,9 @@ def open_scoring_prior(
     if lpips_file is None:
         _log.warning("LPIPS is switched off: scores have no such term")
     weights = None if lpips_file is None else read(lpips_file)
-    how = {name: entry[name] for name in ("samples", "steps", "staged", "posterior", "noises") if name in entry}
+    how = {
+        name: entry[name] for name in ("samples", "steps", "staged", "posterior", "independent_noise") if name in entry
+    }
     return PriorConfig(load_prior(entry), p_drop=p_drop, seed=seed, weights=weights, **how)
 
 
@@ -105,7 +107,7 @@ def _sample_batch(
     prior: PriorConfig, condition: Condition, names: list[str], steps: int, counts: Float32[Array, "k s s"]
 ) -> PriorTerms:
     asked = condition, prior.samples, prior.p_drop, steps, prior.seed
-    latents = prior.model.sample(*asked, common=not prior.noises)
+    latents = prior.model.sample(*asked, common=not prior.independent_noise)
     wide = prior.model.estimate_variances(latents) if prior.posterior else None
     _, maps = w2_sq(latents, wide, names)
     pictures = prior.model.decode(latents).rgba[..., :3]
@@ -114,7 +116,7 @@ def _sample_batch(
         from dav_gswt.images import lpips  # not above: torch takes seconds to load, and most scoring does without
 
         between = lpips.pairwise_mean((2 * pictures - 1) * counts[:, None, :, :, None], prior.weights)
-        if prior.p_drop == 0 and not prior.noises:
+        if prior.p_drop == 0 and not prior.independent_noise:
             one, render = ((2 * p - 1) * counts[..., None] for p in (pictures[:, 0], condition.colour))
             single = lpips.distance(one, render, prior.weights)
     apart = ((latents.mean(1) - prior.model.encode_render(condition)) ** 2).sum(1)

@@ -58,7 +58,7 @@ def decide(stop: dict, k: int, burst: int, known: StoppingState) -> Decision:
     )
     if found is not None:
         _log.info("%s", describe_gain(found))
-    elif "worth" in stop:
+    elif "marginal_gain" in stop:
         _log.info("what the next photos are worth cannot be said yet: that takes three new photos")
     stopped = known.last["stopped"] if known.last else None
     stopped = stopped or _budget_reason(stop, burst, known, poses) or _gain_reason(stop, known.taken, found)
@@ -88,6 +88,6 @@ def _budget_reason(stop: dict, burst: int, known: StoppingState, poses: int) -> 
 
 
 def _gain_reason(stop: dict, taken: int, found: ExpectedGain | None) -> str | None:
-    if "worth" not in stop or found is None or found.each >= stop["worth"]:
+    if "marginal_gain" not in stop or found is None or found.each >= stop["marginal_gain"]:
         return None
-    return f"after {taken} photos: {describe_gain(found)}, less than {stop['worth']:g} (stop.worth)"
+    return f"after {taken} photos: {describe_gain(found)}, less than {stop['marginal_gain']:g} (stop.marginal_gain)"

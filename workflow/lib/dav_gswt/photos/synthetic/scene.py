@@ -75,12 +75,12 @@ def of_config(entry: dict) -> Scene:
 
 
 def start_views(entry: dict, middle=(0.0, 0.0, 0.0)) -> list[Camera]:
-    """The cameras that the scene starts from, as the entry's `rig` says.
+    """The cameras that the scene starts from, as the entry's `layout` says.
 
     ring: one straight above, the others around it. cap: spread evenly by area above the entry's lowest elevation.
     paper: some on a circle, the others as in a cap.
     """
-    rig = entry.get("rig", "ring")
+    rig = entry.get("layout", "ring")
     if rig == "cap":
         places = camera_layouts.hemisphere(entry["photos"], _lowest(entry), RADIUS, turn=35.0)
     elif rig == "paper":
@@ -130,11 +130,11 @@ def walkers(entry: dict, middle=(0.0, 0.0, 0.0)) -> dict[str, Camera]:
 
 
 def _lowest(entry: dict) -> float:
-    return float(entry.get("lowest", LOWEST_ELEVATION))
+    return float(entry.get("min_elevation", LOWEST_ELEVATION))
 
 
 def _test_cameras(entry: dict, middle=(0.0, 0.0, 0.0)) -> dict[str, list[Camera]]:
-    all_over = "high" if entry.get("rig") == "cap" else "hemisphere"
+    all_over = "high" if entry.get("layout") == "cap" else "hemisphere"
     size, count = entry["size"], entry.get("walkers", 0)
     groups = {all_over: _cameras(camera_layouts.test_views(entry["test"], _lowest(entry), RADIUS), middle, size)}
     if entry.get("oblique"):

@@ -126,7 +126,7 @@ def simulate_points(
 def fit_field(world: World, photos: list[TrainingView], rng: np.random.Generator) -> GaussianField:
     """The coarse fit of the reconstruction, small and short; in some worlds of more or less ground than usual."""
     steps = int(rng.integers(*STEPS, endpoint=True))
-    quality = build.Quality(photos[0].camera.width, 1.25, MOST_GAUSSIANS, steps, 0, 0)
+    quality = build.FitSettings(photos[0].camera.width, 1.25, MOST_GAUSSIANS, steps, 0, 0)
     frame = world.frame
     if rng.uniform() < OTHER_EXTENT:
         share = rng.uniform(*EXTENTS) / 1.25

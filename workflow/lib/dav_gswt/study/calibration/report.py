@@ -7,7 +7,7 @@ import numpy as np
 
 from dav_gswt.study import figures
 
-CELL = ("scene", "seed", "quality", "policy", "prior", "p_drop", "round")
+CELL = ("scene", "seed", "preset", "policy", "prior", "p_drop", "round")
 MEASURES = ("spearman", "ause", "ause_chance", "coverage", "width", "pixel_spearman", "pixel_ause", "pixel_ause_chance")
 WIDE, ROW, AROUND = 10.5, 0.42, 1.4  # inches: the figure, a score's row in a panel, and what is around a panel's rows
 LANES = 0.6  # of a row, over which scenes are spread

@@ -11,7 +11,7 @@ from dav_gswt.files import read_json
 from dav_gswt.study import csv_tables
 from dav_gswt.views import marginal_gain
 
-CELL = ("scene", "seed", "quality", "policy", "prior", "p_drop", "lam", "k")
+CELL = ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k")
 MEASURES = ("psnr", "ssim", "lpips", "worst_psnr", "walker_psnr")
 ASIDE = ("oblique", "walker")  # groups of test views away from where photos may be taken
 EXPECTED = ("closes", "expected", "expected_low", "expected_high")  # of a round, before it: see `worth`

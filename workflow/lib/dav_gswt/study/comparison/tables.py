@@ -11,7 +11,7 @@ from dav_gswt.study.statistics import adjust_holm, bootstrap_paired
 
 EVERYTHING = "all"  # the policy that takes the whole pool: what there is to reach, and no curve
 EVERY = "every"  # scene, in the rows over all of them
-UNIT = ("scene", "quality", "seed", "k")
+UNIT = ("scene", "preset", "seed", "k")
 
 
 def summarise_cells(curves: list[dict]) -> list[dict]:

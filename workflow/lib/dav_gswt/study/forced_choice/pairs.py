@@ -13,10 +13,10 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
-from dav_gswt.config import FLOOR
 from dav_gswt.errors import InputError
 from dav_gswt.images.lpips_weights import Weights
 from dav_gswt.logs import progress
+from dav_gswt.study.config import FLOOR
 from dav_gswt.study.seams import crops, measure, places
 from dav_gswt.study.seams.crops import Crop, Shown, View
 from dav_gswt.study.seams.ground import Laid

@@ -17,7 +17,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import metrics
-from dav_gswt.images.lpips_weights import PATH, Weights
+from dav_gswt.images.lpips_weights import Weights
 from dav_gswt.logs import progress
 from dav_gswt.study.seams import crops, perceptual_distance, places
 from dav_gswt.study.seams.crops import Crop, Shown, View
@@ -60,7 +60,7 @@ def measured(laid: Laid, straight: Laid, weights: Weights | None, seed: int) -> 
     Raises: InputError: fewer than half of the crops of a place can be taken.
     """
     if weights is None:
-        _log.warning("crops are compared without LPIPS: its weights were not fetched (snakemake %s)", PATH)
+        _log.warning("crops are compared without LPIPS (config: lpips: none)")
     rows = []
     views = [(ground, view) for ground in GROUNDS for view in crops.VIEWS]
     for ground, view in progress(views, "measure seams"):

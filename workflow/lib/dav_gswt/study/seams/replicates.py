@@ -1,38 +1,50 @@
-"""Tile sets of one field that are drawn anew: there are four strips in a set, and intervals over so few are wide.
+"""Replicates: tile sets of one field, each cut from newly drawn places, since intervals over one set are wide.
 
-Each is an entry of `seams` of its own: the first draw of `semantic` is `semantic` itself, the second semantic-draw-1.
-Read by the workflow before the first job, so it loads no numerics.
+Each is an entry of `tilings` of its own: the first replicate of `semantic` is `semantic` itself, the second
+semantic-replicate-1. Read by the workflow before the first job, so it loads no numerics.
 """
 
 from itertools import product
 
-from dav_gswt.config import REFINED
 from dav_gswt.errors import InputError
 
-
-def name(seam: str, draw: int) -> str:
-    """What an entry of `seams` is called in a draw; draw 0 is the entry itself."""
-    own = seam.removesuffix(REFINED)
-    return f"{own}-draw-{draw}{seam[len(own) :]}" if draw else seam
+SUFFIXES = ("-refined", "-expansion")  # of tilings that the study makes of an entry of `tilings`
 
 
-def asked(seam: str, own: str, study: dict) -> list[str]:
-    """All draws of an entry that the config's `seam_study` asks for of a scene whose own entry is `own`."""
-    times = [study.get("draws", 1)] * (seam == own) + [study.get("compared_draws", 1)] * (seam in study["seams"])
-    return [name(seam, draw) for draw in range(max(times, default=0))]
+def split_tiling(tiling: str) -> tuple[str, str]:
+    """The entry of `tilings` that a tiling is made of, and the suffix that says how."""
+    suffix = next((each for each in SUFFIXES if tiling.endswith(each)), "")
+    return tiling.removesuffix(suffix), suffix
 
 
-def entries(config: dict) -> dict:
-    """The config with the entries of `seams` that its `seam_study` draws: every scene's own, and those it compares.
+def name_replicate(tiling: str, number: int) -> str:
+    """The name of a replicate; replicate 0 is the tiling itself."""
+    plain, suffix = split_tiling(tiling)
+    return f"{plain}-replicate-{number}{suffix}" if number else tiling
 
+
+def list_replicates(tiling: str, own: str, study: dict) -> list[str]:
+    """All replicates of a tiling that `study.seams` asks for of a scene whose own tiling is `own`."""
+    counts = [study["replicates"]] * (tiling == own) + [study["compared_replicates"]] * (tiling in study["tilings"])
+    return [name_replicate(tiling, number) for number in range(max(counts, default=0))]
+
+
+def add_replicates(config: dict) -> dict:
+    """The config with the tilings that `study.seams` replicates: every scene's own, and those it compares.
+
+    config: with the study's tables beside the product's.
     Raises: InputError: the config has another entry of such a name.
     """
-    study, made = config.get("seam_study", {"scenes": [], "seams": []}), dict(config["seams"])
-    owned = dict.fromkeys(config["scenes"][scene]["seam"] for scene in study["scenes"])
-    for own, seam in product(owned, [*owned, *study["seams"]]):
-        for draw, entry in enumerate(asked(seam, own, study)):
-            plain, entry = seam.removesuffix(REFINED), entry.removesuffix(REFINED)
-            found = config["seams"][plain] | ({"draw": draw} if draw else {})
-            if made.setdefault(entry, found) != found:
-                raise InputError(f"config: seams.{entry}: `seam_study` makes an entry of this name; give yours another")
-    return config | {"seams": made}
+    if "seams" not in config:
+        return config
+    study, tilings = config["seams"], dict(config["tilings"])
+    owned = dict.fromkeys(config["scenes"][scene]["tiling"] for scene in study["scenes"])
+    for own, tiling in product(owned, [*owned, *study["tilings"]]):
+        for number, replicate in enumerate(list_replicates(tiling, own, study)):
+            plain, name = split_tiling(tiling)[0], split_tiling(replicate)[0]
+            entry = config["tilings"][plain] | ({"replicate": number} if number else {})
+            if tilings.setdefault(name, entry) != entry:
+                raise InputError(
+                    f"config: tilings.{name}: `study.seams` makes an entry of this name; give yours another"
+                )
+    return config | {"tilings": tilings}

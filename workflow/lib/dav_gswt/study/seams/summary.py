@@ -11,7 +11,7 @@ from numpy import ndarray as Array
 from dav_gswt.study import statistics
 
 EVERY = "every"
-CELL = ("scene", "seed", "quality", "variant")
+CELL = ("scene", "seed", "preset", "variant")
 PLACES = ("border", "cut", "ceiling")
 MEASURES = ("seam_lpips", "psnr", "jump")
 
@@ -27,7 +27,7 @@ def summary(rows: list[dict]) -> list[dict]:
     for cell, mine in _grouped(rows, CELL).items():
         views = _grouped(mine, ("view", "ground")) | {(EVERY, EVERY): mine}
         for (view, ground), some in sorted(views.items()):
-            about = {"sets": len({row.get("draw", 0) for row in mine})}
+            about = {"sets": len({row.get("replicate", 0) for row in mine})}
             about |= {key: mine[0][key] for key in ("version", "weights", "tiles")}
             found.append(dict(zip(CELL, cell, strict=True)) | {"view": view, "ground": ground} | _told(some) | about)
     return found

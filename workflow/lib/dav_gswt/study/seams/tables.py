@@ -25,7 +25,7 @@ def rows(cell: dict) -> list[dict]:
         "weights": made["inputs"].get("lpips", "")[:12],
         "tiles": made["inputs"]["seams"][:12],
     }
-    about, draw = {key: cell[key] for key in (*CELL, "draw")}, cell["draw"]
+    about, draw = {key: cell[key] for key in (*CELL, "replicate")}, cell["replicate"]
     return [
         about | row | {key: f"{draw}:{row[key]}" if draw else row[key] for key in ("crop", "cluster")} | origin
         for row in read(cell["table"])

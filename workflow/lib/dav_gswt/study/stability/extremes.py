@@ -81,9 +81,10 @@ def override_views(**keys) -> dict:
 
 FIELD_SCENE = {"scene": "finished"}
 FOLDER_SCENE = {"kind": "photos", "folder": "photos", "size": 128, "start": 3, "agent": "replay"}
-FOLDER_SCENE |= {"quality": "draft", "seam": "semantic"}
-MILLION = {"size": 128, "spacing": 1.5, "cap": 2_000_000, "steps": 60, "steps_per_photo": 10, "level_steps": 4}
-MILLION_SCENE = {"scenes": {"finished": {"quality": "million"}}, "qualities": {"million": MILLION}}
+FOLDER_SCENE |= {"preset": "draft", "tiling": "semantic"}
+MILLION = {"size": 128, "spacing": 1.5, "max_gaussians": 2_000_000, "steps": 60, "steps_per_photo": 10}
+MILLION |= {"level_steps": 4}
+MILLION_SCENE = {"scenes": {"finished": {"preset": "million"}}, "presets": {"million": MILLION}}
 
 ALL = (
     Extreme(

@@ -16,7 +16,6 @@ from dav_gswt.bundle import chunks
 from dav_gswt.bundle.encoding import Encoding
 from dav_gswt.cli.log_filter import Narrator
 from dav_gswt.files import atomic_folder, read_json, write_json
-from dav_gswt.images.lpips_weights import PATH as LPIPS
 from dav_gswt.study.stability.extremes import Extreme
 
 DEFAULT_CONFIG, TEST_CONFIG = "config/config.yaml", "config/test/config.yaml"
@@ -24,21 +23,18 @@ NUMERIC_FILES = ("*.ply", "*.csv", "*.json", "lod*.bin")  # files whose numbers 
 TRACEBACK = "Traceback (most recent call last)"
 
 
-def run_extreme(extreme: Extreme, root: Path, out: Path | str, cores: int, lpips: Path | str | None = None) -> dict:
+def run_extreme(extreme: Extreme, root: Path, out: Path | str, cores: int, lpips: str = "installed") -> dict:
     """Run the workflow of a repository at an extreme; outcome.json, its output and its stills go to the folder `out`.
 
-    A run that fails is an outcome like any other. lpips: its weights; without them LPIPS is left out.
+    A run that fails is an outcome like any other. lpips: as in the config.
     Returns the content of outcome.json.
     """
     with TemporaryDirectory(prefix="stability-") as place, atomic_folder(out) as part:
         folder = Path(place)
         if extreme.prepare:
             extreme.prepare(folder)
-        if lpips:
-            (folder / LPIPS).parent.mkdir(parents=True)
-            shutil.copy(lpips, folder / LPIPS)
-        prior = {"priors": {"terrain": {"lpips": bool(lpips)}}}
-        (folder / "extreme.yaml").write_text(yaml.safe_dump(prior | extreme.overrides), encoding="utf-8")
+        with_lpips = {"lpips": lpips, "priors": {"terrain": {"lpips": lpips != "none"}}}
+        (folder / "extreme.yaml").write_text(yaml.safe_dump(with_lpips | extreme.overrides), encoding="utf-8")
         files = [str(root / DEFAULT_CONFIG), str(root / TEST_CONFIG), "extreme.yaml"]
         command = [sys.executable, "-m", "snakemake", "--snakefile", str(root / "Snakefile"), "--directory", place]
         command += ["--cores", str(cores), "--scheduler", "greedy", "--configfile", *files]

@@ -6,9 +6,10 @@ Read by the workflow before the first job, so it loads no numerics.
 from itertools import product
 
 from dav_gswt.errors import InputError
+from dav_gswt.study.seams.replicates import split_tiling
 from dav_gswt.views.policy_names import GEOMETRIC, ZERO_SETTINGS
 
-CELL = ("scene", "seed", "quality", "policy", "prior", "p_drop", "lam", "k", "rounds", "seam", "tau")  # its wildcards
+CELL = ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k", "rounds", "tiling", "tau")  # its wildcards
 ASKING = ("prior", "p_drop", "lam")  # what only a prior that is asked depends on
 EVERYTHING = "all"  # the policy that takes the whole pool in one round
 
@@ -16,7 +17,7 @@ EVERYTHING = "all"  # the policy that takes the whole pool in one round
 def combinations(vary: dict[str, list], fixed: dict) -> list[dict]:
     """The settings of every combination, in the order they stand in: `fixed`, and a value of each of `vary` over it.
 
-    A policy with settings of its own, {policy: residual, prior: noises, p_drop: 0}, brings these with it. `shown` holds
+    A policy with settings of its own, {policy: residual, prior: independent, p_drop: 0}, brings these. `shown` holds
     for each of `vary` the value as tables name it. The policy that takes everything has one round, whatever is asked.
     """
     found = []
@@ -57,9 +58,9 @@ def check(config: dict) -> None:
     """
     for entry in ("lod", "frames"):
         if "fixed" in config.get(entry, {}):
-            _check_names(f"config: {entry}", {"vary": {}} | config[entry], config)
+            _check_names(f"config: study.{entry}", {"vary": {}} | config[entry], config)
     for name, asked in config.get("sweeps", {}).items():
-        where = f"config: sweeps.{name}"
+        where = f"config: study.sweeps.{name}"
         if both := [key for key in asked["vary"] if key in asked.get("fixed", {})]:
             raise InputError(f"{where}.fixed.{both[0]}: is varied already; leave it out there")
         _check_names(where, asked, config)
@@ -69,11 +70,11 @@ def check(config: dict) -> None:
 
 
 def _check_names(where: str, asked: dict, config: dict) -> None:
-    tables = {"prior": "priors", "seam": "seams", "quality": "qualities"}
+    tables = {"prior": "priors", "tiling": "tilings", "preset": "presets"}
     for key, table in tables.items():
         fixed = [asked["fixed"][key]] if key in asked.get("fixed", {}) else []
         for value in [*fixed, *asked["vary"].get(key, [])]:
-            if value not in config[table]:
+            if split_tiling(value)[0] not in config[table]:
                 known = ", ".join(config[table]) or "nothing"
                 raise InputError(f"{where}: there is no {key} {value!r}; {table} has {known}")
     for policy in asked["vary"].get("policy", []):

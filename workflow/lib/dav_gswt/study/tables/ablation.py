@@ -51,10 +51,10 @@ def _variant(sweep: str, variant: str, cells: list[dict], baseline: str) -> dict
 
 
 def _compared(key: str, mine: list[dict], base: list[dict], same: bool) -> dict:
-    at = {(row["scene"], row["quality"], row["seed"]): row[key] for row in base if row[key] is not None}
+    at = {(row["scene"], row["preset"], row["seed"]): row[key] for row in base if row[key] is not None}
     pairs: dict[str, list[float]] = {}
     for row in mine:
-        unit = (row["scene"], row["quality"], row["seed"])
+        unit = (row["scene"], row["preset"], row["seed"])
         if unit in at and row[key] is not None:
             pairs.setdefault(row["scene"], []).append(row[key] - at[unit])
     if same or not pairs:

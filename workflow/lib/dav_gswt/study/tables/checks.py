@@ -12,18 +12,20 @@ def sweeps_of(study: dict) -> list[str]:
 
 def check(config: dict) -> None:
     """Raises: InputError: a sweep, a baseline or a scene of `study` that is not there, and what is."""
-    if "study" not in config:
+    if "tables" not in config:
         return
-    study, sweeps = config["study"], config.get("sweeps", {})
+    study, sweeps = config["tables"], config.get("sweeps", {})
     for name in sweeps_of(study):
         if name not in sweeps:
-            raise InputError(f"config: study: there is no sweep {name!r}; sweeps has {', '.join(sweeps) or 'nothing'}")
+            raise InputError(
+                f"config: study.tables: there is no sweep {name!r}; sweeps has {', '.join(sweeps) or 'nothing'}"
+            )
     for name in study["ablation"]:
         values = [str(named(value)) for value in next(iter(sweeps[name]["vary"].values()))]
         if sweeps[name].get("baseline") not in values:
             raise InputError(
-                f"config: sweeps.{name}.baseline: must be one of {', '.join(values)}; study.ablation compares them"
+                f"config: study.sweeps.{name}.baseline: must be one of {', '.join(values)}, for study.tables.ablation"
             )
     for name in study["figures"]["scenes"]:
         if config["scenes"].get(name, {"kind": "field"})["kind"] == "field":
-            raise InputError(f"config: study.figures.scenes: {name} is no scene with photos")
+            raise InputError(f"config: study.tables.figures.scenes: {name} is no scene with photos")

@@ -1,6 +1,6 @@
 """The paper's table of sensitivity: one setting varied, the others as they are."""
 
-from dav_gswt.paths import spell
+from dav_gswt.paths import encode_number
 from dav_gswt.study.tables import paper, spread
 
 MEANS = ("psnr", "lpips", "seam_lpips", "score_s", "orders", "bundle_mb", "stills_s", "render_ms")
@@ -31,7 +31,7 @@ def rows(sweeps: dict[str, list[dict]], defaults: dict[str, str]) -> list[dict]:
 def _place(setting: str, values: list[str], place: int) -> int | None:
     """Which of the paper's rows of a setting stands beside the value at a place of all values."""
     printed = {where: text for where, text in paper.read().items() if (where[0], where[2]) == ("sensitivity", "value")}
-    known = [spell(text) for where, text in printed.items() if where[1].startswith(f"{setting}.")]
+    known = [encode_number(text) for where, text in printed.items() if where[1].startswith(f"{setting}.")]
     if set(values) & set(known):
         return known.index(values[place]) if values[place] in known else None
     return place if len(values) == len(known) else None

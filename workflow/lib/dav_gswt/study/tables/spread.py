@@ -11,7 +11,7 @@ VIEWER = (
     *("render_ms", "render_ms_sd", "sort_ms", "sort_ms_sd", "sort_share"),
     *("update_ms", "update_ms_sd", "update_share"),
 )
-CELL = ("scene", "seed", "quality", "seam", "tau")  # of what the viewer measured
+CELL = ("scene", "seed", "preset", "tiling", "tau")  # of what the viewer measured
 
 
 def mean(rows: list[dict], key: str) -> float | None:

@@ -19,7 +19,7 @@ def rows(cells: list[dict], families: dict[str, str]) -> list[dict]:
     for scene in dict.fromkeys(row["scene"] for row in cells):
         mine = [row for row in cells if row["scene"] == scene]
         splats, recon, presort = (spread.both(mine, key) for key in ("splats", "recon_s", "bundle_s"))
-        row = {"scene": scene, "quality": mine[0]["quality"], "seeds": len(mine), "photos": spread.mean(mine, "photos")}
+        row = {"scene": scene, "preset": mine[0]["preset"], "seeds": len(mine), "photos": spread.mean(mine, "photos")}
         row |= {"splats_m": _over(splats["splats"], MEGA), "recon_min": _over(recon["recon_s"], MINUTE)}
         row |= {"recon_min_sd": _over(recon["recon_s_sd"], MINUTE)} | spread.both(mine, "levels_s")
         row |= spread.both(mine, "cut_s") | {"presort_s": presort["bundle_s"], "presort_s_sd": presort["bundle_s_sd"]}

@@ -55,7 +55,7 @@ def _row(mine: dict, base: dict) -> dict:
         "loss_lpips": _less(mine["lpips"], base["lpips"]),
     }
     found = {key: mine[key] for key in ("scene", "seed", "part")} | {"chosen": chosen(mine)}
-    found |= {"quality": mine["quality"], "fixed_quality": base["quality"]}
+    found |= {"preset": mine["preset"], "fixed_quality": base["preset"]}
     saved = None if None in (seconds, fixed) else 1 - seconds / fixed
     found |= {"seconds": seconds, "fixed_seconds": fixed, "saved": saved}
     found |= lost | {"difference": 255 * mean_square(mine["stills"], base["stills"]) ** 0.5}

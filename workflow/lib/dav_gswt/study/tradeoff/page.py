@@ -30,8 +30,8 @@ def text(rows: list[dict], pareto: list[dict]) -> str:
         "# Speed against accuracy",
         "Made by `snakemake tradeoff` from `docs/research/data/tradeoff.csv`; do not edit. "
         f"Scene `{first['scene']}`, seed {first['seed']:.0f}, on {first['cores']:.0f} cores of {first['processor']}. "
-        f"Each knob is turned by itself from the base, which has the quality `{base['quality']}`, the seam "
-        f"`{base['seam']}` and tau {base['tau']:g}; its own settings are bold. Losses are counted from each knob's "
+        f"Each knob is turned by itself from the base, which has the quality `{base['preset']}`, the seam "
+        f"`{base['tiling']}` and tau {base['tau']:g}; its own settings are bold. Losses are counted from each knob's "
         "first setting, taken for the most accurate. Seconds are those of whole jobs from the start views to the "
         "bundle, without the taking of photos; what settings share counts for each. One scene and one seed: "
         "differences of a few hundredths of a decibel are within what another seed changes.",
@@ -93,7 +93,7 @@ def number(value: float | None, digits: int) -> str:
 
 def _presets(pareto: list[dict]) -> tuple[list[str], list[list[str]]]:
     form = {"seconds": 0, "psnr": 2, "ssim": 3, "lpips": 3, "peak_mb": 0, "bundle_mb": 1}
-    head = ["quality", "seconds", "PSNR (dB)", "SSIM", "LPIPS", "memory (MB)", "bundle (MB)"]
+    head = ["preset", "seconds", "PSNR (dB)", "SSIM", "LPIPS", "memory (MB)", "bundle (MB)"]
     head += ["on the front", "on that of LPIPS"]
     said = {1: "yes", 0: "no", None: ""}
     found = []

@@ -1,7 +1,7 @@
 """Which settings the config's `tradeoff` compares, and the named entries that it makes of them.
 
-A knob turns one key of an entry of `qualities`, `seams` or `priors`; the workflow knows entries by their names only, so
-each setting becomes an entry of its own: the cap 70000 of the quality draft is draft-cap-70000.
+A knob turns one key of an entry of `presets`, `tilings` or `priors`; the workflow knows entries by their names only, so
+each setting becomes an entry of its own: the max_gaussians 70000 of the preset draft is draft-max_gaussians-70000.
 Read by the workflow before the first job, so it loads no numerics.
 """
 
@@ -9,12 +9,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from dav_gswt.errors import InputError
-from dav_gswt.paths import spell
+from dav_gswt.paths import encode_number
 from dav_gswt.views.policy_names import PRIOR_POLICIES
 
-CALLED = {"qualities": "quality", "seams": "seam", "priors": "prior"}  # how what is chosen calls an entry of a table
-LEFT_OUT = {"degree": 0, "levels": "auto"}  # what a key means where an entry has none
-PRESET = "preset"  # the knob of the named qualities
+CALLED = {"presets": "preset", "tilings": "tiling", "priors": "prior"}  # how what is chosen calls an entry of a table
+LEFT_OUT = {"levels": "auto"}  # what a key means where an entry has none
+PRESET = "preset"  # the knob of the named presets
 
 
 @dataclass(frozen=True)
@@ -49,13 +49,13 @@ def settings(config: dict) -> list[Setting]:
 
 def tested_size(config: dict) -> int:
     """The size of the photos that all settings are tested on: the largest that one is fitted to. config: `entries`'."""
-    return max(config["qualities"][setting.chosen["quality"]]["size"] for setting in settings(config))
+    return max(config["presets"][setting.chosen["preset"]]["size"] for setting in settings(config))
 
 
 def sized(config: dict, quality: str) -> str:
     """The entry that is this quality at the size of the config's `auto`."""
-    size = config["auto"].get("size", config["qualities"][quality]["size"])
-    return quality if config["qualities"][quality]["size"] == size else name(quality, "size", size)
+    size = config["auto"].get("size", config["presets"][quality]["size"])
+    return quality if config["presets"][quality]["size"] == size else name(quality, "size", size)
 
 
 def entries(config: dict) -> dict:
@@ -88,7 +88,7 @@ def check(config: dict) -> None:
             _check_names(f"{section}.{part}", asked.get(part, {}), config)
     asked = config.get("tradeoff", {"knobs": {}, "presets": []})
     for quality in asked["presets"]:
-        _check_names("tradeoff.presets", {"quality": quality}, config)
+        _check_names("tradeoff.presets", {"preset": quality}, config)
     for knob in asked.get("only", []):
         if knob not in asked["knobs"]:
             raise InputError(f"config: tradeoff.only: there is no knob {knob!r}; knobs has {', '.join(asked['knobs'])}")
@@ -110,7 +110,7 @@ def _check_names(where: str, chosen: dict, config: dict) -> None:
 
 
 def _knobs(asked: dict) -> Iterator[tuple[str, dict]]:
-    yield PRESET, {"key": "quality", "values": asked["presets"], "measure": "views"}
+    yield PRESET, {"key": "preset", "values": asked["presets"], "measure": "views"}
     for knob in asked.get("only", asked["knobs"]):
         yield knob, asked["knobs"][knob]
 
@@ -149,15 +149,15 @@ def _made(config: dict) -> Iterator[tuple[str, str, str, str, int | float | str]
                 yield table, name(base[called], key, value), base[called], key, value
     for quality in _of_auto(config):
         if (made := sized(config, quality)) != quality:
-            yield "qualities", made, quality, "size", config["auto"]["size"]
+            yield "presets", made, quality, "size", config["auto"]["size"]
 
 
 def _of_auto(config: dict) -> list[str]:
     """The qualities that `auto` compares; one that does not exist is `check`'s to tell."""
     asked = config.get("auto")
-    named = [asked[part]["quality"] for part in ("base", "auto")] if asked else []
-    return [quality for quality in named if quality in config["qualities"]]
+    named = [asked[part]["preset"] for part in ("base", "auto")] if asked else []
+    return [quality for quality in named if quality in config["presets"]]
 
 
 def _spelled(value: int | float | str) -> str:
-    return value if isinstance(value, str) else spell(value)
+    return value if isinstance(value, str) else encode_number(value)

@@ -12,11 +12,11 @@ from dav_gswt.study.sweeps import tables as sweeps
 from dav_gswt.study.sweeps.grid import CELL
 from dav_gswt.study.tradeoff.front import front, rivals
 
-KEY = ("scene", "seed", "knob", "setting", "quality", "seam", "prior", "tau", "processor", "cores")  # tells rows apart
+KEY = ("scene", "seed", "knob", "setting", "preset", "tiling", "prior", "tau", "processor", "cores")  # tells rows apart
 TILE_JOBS = ("levels_s", "cut_s", "bundle_s")
 LEVELS_OF_GREY = 255
 UNITS = {"views": "dB", "stills": "grey levels", "seams": "LPIPS"}  # of a loss
-TEXTS = ("scene", "knob", "setting", "measure", "quality", "policy", "prior", "seam", "psnr_is", "version", "renderer")
+TEXTS = ("scene", "knob", "setting", "measure", "preset", "policy", "prior", "tiling", "psnr_is", "version", "renderer")
 TEXTS += ("fixed_quality", "field", "tiles", "processor", "part", "chosen", "rival_knob", "rival_setting")
 
 

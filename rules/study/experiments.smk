@@ -1,0 +1,338 @@
+"""Experiments: what the study's tables and figures are made from, each with its settings and its files."""
+
+from itertools import product
+
+from dav_gswt.paths import encode_number, encode_stop
+from dav_gswt.study.seams import replicates
+from dav_gswt.study.sweeps import grid
+from dav_gswt.study.tables.checks import sweeps_of
+from dav_gswt.study.tradeoff import settings
+
+TABLES = ("timing", "lod", "sensitivity", "ablation")
+FRAMES = "results/tables/viewer.csv"
+FLAT = config | STUDY  # the study's tables beside the product's
+
+
+def viewer_times(wildcards):
+    """What a browser measured of bundles, where the config's `study.tables.viewer` asks for it."""
+    return {"viewer": FRAMES} if STUDY["tables"]["viewer"] else {}
+
+
+def plain_tiling(wildcards):
+    """The entry of `tilings` that a tiling is made of."""
+    return replicates.split_tiling(wildcards.tiling)[0]
+
+
+def measured_of_tiles(made, entry="lod"):
+    """The tables of levels, orders or frames that are gathered: the path of each one's, and what tells it from the others."""
+    found = {}
+    asked = STUDY[entry]
+    told = ("scene", "seed", "preset", "tiling") + (("tau",) if "tau" in made.output.table else ())
+    for scene in asked["scenes"]:
+        chosen = experiment_branch(scene, asked["fixed"]) if "fixed" in asked else branch(scene)
+        for seed in asked.get("seeds", config["seeds"]):
+            values = chosen | {"seed": seed}
+            (path,) = expand(made.output.table, **values)
+            found[path] = {key: values[key] for key in told}
+    return found
+
+
+def calibrations():
+    """The cells that are compared: the path of each one's calibration.json, and what tells it from the others."""
+    asked, found = STUDY["calibration"], {}
+    for scene in asked["scenes"]:
+        values = branch(scene, asked["policy"])
+        for seed in config["seeds"]:
+            for t in range(asked["rounds"] + 1):
+                made = rules.calibrate_round if t else rules.calibrate_coarse
+                (path,) = expand(made.output.found, **(values | {"seed": seed, "t": t}))
+                cell = {key: values[key] for key in ("scene", "preset", "policy", "prior", "p_drop")}
+                found[path] = cell | {"seed": seed, "round": t}
+    return found
+
+
+def benchmark_experiments():
+    """The cells of the config's `benchmark`: what tells each from the others, and the files that tell of its rounds."""
+    asked, cells = STUDY["view_benchmark"], []
+    for group in asked["sets"]:
+        for scene, policy, seed, k in product(
+            group["scenes"], group.get("policies", asked["policies"]), asked["seeds"], group["k"]
+        ):
+            policy = {"policy": policy} if isinstance(policy, str) else policy
+            if policy["policy"] != "all" or k == group["k"][0]:  # all of the pool is one round, whatever k is
+                cells.append(benchmark_experiment(scene, policy, seed, k, group["photos"]))
+    return cells
+
+
+def benchmark_experiment(scene, asked, seed, k, photos):
+    """One of them: rounds of k from the scene's start until there are so many photos."""
+    entry, policy = config["scenes"][scene], asked["policy"]
+    rounds = 1 if policy == "all" else (photos - entry["start"]) // k
+    own = {
+        key: asked[key] if key == "prior" else encode_number(asked[key]) for key in ("prior", "p_drop", "lam") if key in asked
+    }
+    values = branch(scene, policy) | own | {"seed": seed, "k": k, "stop": ""}
+    before, after = range(1, rounds), range(1, rounds + 1)
+
+    def of(first, later, ts):
+        return expand(first, **values) + expand(later, **(values | {"t": ts}))
+
+    jobs = [of(rules.score_coarse.benchmark, rules.score_round.benchmark, before)]
+    jobs += [of([], job.benchmark, after) for job in (rules.select_poses, rules.capture_views, rules.update_field)]
+    prior = config["priors"].get(values["prior"], {"samples": 0})
+    return {key: values[key] for key in ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k")} | {
+        "corrected": entry["kind"] == "photos",
+        "samples": prior["samples"],
+        "metrics": of(rules.evaluate_coarse.output.metrics, rules.evaluate_round.output.metrics, after),
+        "facts": of(rules.score_coarse.output.facts, rules.score_round.output.facts, before),
+        "times": [list(of_round) for of_round in zip(*jobs, strict=True)],
+    }
+
+
+def seam_branch(scene, variant=None):
+    """The wildcards of a scene's tiles as they are measured: cut as its own entry says, or as another one."""
+    values = branch(scene)
+    return values | ({"tiling": variant} if variant else {})
+
+
+def seam_experiments():
+    """What tells each cell from the others, and its files; a scene's own seam is always among its variants, each drawn
+    as often as is asked for."""
+    asked, cells = STUDY["seams"], []
+    for scene in asked["scenes"]:
+        own = config["scenes"][scene]["tiling"]
+        variants = [
+            (variant, name, number)
+            for variant in dict.fromkeys([*asked["tilings"], own])
+            for number, name in enumerate(replicates.list_replicates(variant, own, asked))
+        ]
+        for (variant, entry, number), seed in product(variants, config["seeds"]):
+            values = seam_branch(scene, entry) | {"seed": seed}
+            files = {"table": rules.measure_seams.output.crops, "facts": rules.measure_seams.output.facts}
+            files |= {} if number else {"repeats": rules.measure_repetition.output.table}
+            (cell,) = [{name: expand(path, **values)[0] for name, path in files.items()}]
+            about = {key: values[key] for key in ("scene", "seed", "preset")}
+            cells.append(about | {"variant": variant, "replicate": number} | cell)
+    return cells
+
+
+def seam_pictures():
+    """What rule draw_grid draws of each scene, in the order of its shots."""
+    drawn = list(rules.render_grid.output.pictures)
+    return {scene: expand(drawn, **seam_branch(scene)) for scene in STUDY["seams"]["scenes"]}
+
+
+def compared_tilings():
+    """The entries of `seams` that are compared, by name: of other sizes, tiles have no place in common."""
+    names = dict.fromkeys(name for pair in STUDY["forced_choice"]["pairs"] for name in pair)
+    found = {name: config["tilings"][replicates.split_tiling(name)[0]] for name in names if name != FLOOR}
+    if len({tuple(entry[key] for key in ("tile", "strip", "variants")) for entry in found.values()}) > 1:
+        raise WorkflowError(
+            "config: study.forced_choice.pairs: tilings of other `tile`, `strip` or `variants` have no place in common; "
+            f"name such that are only cut in other ways ({', '.join(found)} are not)"
+        )
+    return found
+
+
+def pair_inputs(wildcards):
+    """A scene's levels, its tiles of each seam, LPIPS's weights where they are."""
+    values = seam_branch(wildcards.scene) | {"seed": config["seeds"][0]}
+    made, names = rules.cut_tiles.output, list(compared_tilings())
+    found = {"levels": expand(rules.make_levels.output.levels, **values)[0]}
+    found |= {"seams": expand(made.seams, **(values | {"tiling": names}))}
+    found |= {"tiles": expand(made.tiles, **(values | {"tiling": names}))}
+    return found | lpips_weights(wildcards)
+
+
+def saved_answers(wildcards):
+    """The files of answers, where there are any yet."""
+    folder = Path(STUDY["forced_choice"]["answers"])
+    found = sorted(str(p) for p in folder.glob("*.json") if p.is_file() and not p.name.startswith("."))
+    return {"answers": found} if found else {}
+
+
+def sweep_experiments(name):
+    """The cells of a row of the config's `sweeps`: what tells each from the others, what it varied, and its files."""
+    asked, cells = STUDY["sweeps"][name], {}
+    for chosen in grid.combinations(asked["vary"], asked.get("fixed", {})):
+        for scene, seed in product(asked["scenes"], grid.seeds_of(asked["measure"])):
+            values = experiment_branch(scene, chosen) | {"seed": seed}
+            measured = [key for key, seeds in asked["measure"].items() if seed in seeds]
+            cell = sweep_experiment(values, measured) | {"sweep": name, "varied": chosen["shown"]}
+            cells.setdefault(tuple(cell[key] for key in grid.CELL), cell)
+    return list(cells.values())
+
+
+def experiment_branch(scene, chosen):
+    """The wildcards of a cell of settings of its own, which stops nowhere before its last round and paints nothing."""
+    entry, over = config["scenes"][scene], {key: value for key, value in chosen.items() if key != "shown"}
+    asked = config | over
+    rounds = grid.rounds_of(over, asked["policy"], grid.start_of(entry), asked["k"], asked["rounds"])
+    return branch(scene, changes=over | {"rounds": rounds}) | {"stop": "", "inpainted": ""}
+
+
+def sweep_experiment(values, measured):
+    """One of them. measured: keys of `measure` that hold for it."""
+    rounds, scene = values["t"], config["scenes"][values["scene"]]
+
+    def of(found, ts=None):
+        return expand(found, **(values if ts is None else values | {"t": list(ts)}))
+
+    tested = rules.evaluate_round if rounds else rules.evaluate_coarse
+    files = {
+        "views": {"metrics": tested.output.metrics},
+        "tiles": {"manifest": rules.bundle_tiles.output.manifest},
+        "seams": {"crops": rules.measure_seams.output.crops, "facts": rules.measure_seams.output.facts},
+        "stills": {"still": rules.render_terrain.output.stills[0]},
+    }
+    rounds_before, after = range(1, rounds), range(1, rounds + 1)
+    times = {"coarse": of(rules.fit_coarse.benchmark)}
+    times["score"] = (of(rules.score_coarse.benchmark) if rounds else []) + of(
+        rules.score_round.benchmark, rounds_before
+    )
+    for key, job in (("select", rules.select_poses), ("capture", rules.capture_views), ("update", rules.update_field)):
+        times[key] = of(job.benchmark, after)
+    if {"tiles", "seams", "stills"} & set(measured):
+        times |= {"levels": of(rules.make_levels.benchmark), "cut": of(rules.cut_tiles.benchmark)}
+    times |= {"bundle": of(rules.bundle_tiles.benchmark)} if {"tiles", "stills"} & set(measured) else {}
+    times |= {"stills": of(rules.render_terrain.benchmark)} if "stills" in measured else {}
+    prior = config["priors"].get(values["prior"], {"samples": 0, "steps": 0})
+    told = {key: values[key] for key in grid.CELL if key != "rounds"} | {"rounds": rounds}
+    return told | {
+        "corrected": scene["kind"] == "photos",
+        "samples": prior["samples"],
+        "steps": prior["steps"],
+        "files": {key: of(path)[0] for part in measured for key, path in files[part].items()},
+        "times": times,
+    }
+
+
+def tradeoff_experiments():
+    """A cell for every setting of every knob, each knob's most accurate first."""
+    asked, size = STUDY["tradeoff"], settings.tested_size(FLAT)
+    return [
+        {"knob": s.knob, "setting": s.shown, "most": s.most, "base": s.base, "measure": s.measure}
+        | tradeoff_experiment(asked["scene"], asked["seed"], s.chosen, size, s.measure)
+        for s in settings.settings(FLAT)
+    ]
+
+
+def auto_experiments():
+    """Of each scene of `auto`: the base, then with each of what is chosen by itself alone, then with all of them."""
+    asked = STUDY["auto"]
+    chosen, base = asked["auto"], asked["base"]["preset"]
+    size = config["presets"][settings.sized(FLAT, base)]["size"]
+    parts = {
+        "base": {"preset": settings.sized(FLAT, base)},
+        "fit": {"preset": settings.sized(FLAT, chosen["preset"])},
+        "rounds": {"stop": {"marginal_gain": chosen["marginal_gain"]}},
+        "orders": {"tau": chosen["tau"]},
+    }
+    parts["all"] = {key: value for part in parts.values() for key, value in part.items()}
+    return [
+        {"part": part} | tradeoff_experiment(scene, asked["seed"], asked["base"] | parts["base"] | own, size, "stills")
+        for scene in asked["scenes"]
+        for part, own in parts.items()
+    ]
+
+
+def tradeoff_experiment(scene, seed, chosen, size, measure):
+    """One of them. size: of the photos that all are tested on, whatever they were fitted to."""
+    stop = chosen.get("stop", {})
+    others = {key: value for key, value in chosen.items() if key != "stop"}
+    values = experiment_branch(scene, others) | {"seed": seed, "stop": encode_stop(stop)}
+    cell = sweep_experiment(values, ["views", "tiles", measure])
+    (metrics,) = expand(rules.evaluate_at.output.metrics, size=size, **values)
+    rounds = expand(rules.update_field.output.fit, **(values | {"t": range(1, values["t"] + 1)}))
+    return cell | {
+        "sweep": "tradeoff",
+        "varied": {},
+        "files": cell["files"] | {"metrics": metrics},
+        "fits": expand(rules.fit_coarse.output.fit, **values) + rounds,
+        "stills": expand(rules.render_terrain.output.stills, **values) if measure == "stills" else [],
+    }
+
+
+def files_of(cells):
+    """Everything that cells are read from, but for benchmarks."""
+    return [path for cell in cells for path in [*cell["files"].values(), *cell["fits"], *cell["stills"]]]
+
+
+def walk_settings(wildcards):
+    """A params function: what of the config's `frames` a walk is measured by, whichever the scene."""
+    return {key: STUDY["frames"][key] for key in ("heights", "flight", "width", "height", "budgets")}
+
+
+def swept(table):
+    """An input function: the sweeps that one of the study's tables is made from."""
+    return lambda wildcards: [f"results/sweeps/{name}.csv" for name in STUDY["tables"][table]]
+
+
+def setting_of(sweep):
+    """What a sweep varies."""
+    return next(iter(STUDY["sweeps"][sweep]["vary"]))
+
+
+def default_of(sweep):
+    """The value that a setting has where it is not varied, as tables spell it."""
+    return str(config.get(setting_of(sweep), ""))
+
+
+def estimator_branch(scene, policy):
+    """The wildcards of what the study's figures show of a scene after a policy chose."""
+    asked = STUDY["tables"]["figures"]
+    return experiment_branch(scene, {"policy": policy, "rounds": asked["rounds"]}) | {"seed": asked["seed"]}
+
+
+def of_estimators(output):
+    """An input function: a file of each estimator that the study's figure shows."""
+    return lambda wildcards: [
+        expand(output, **estimator_branch(wildcards.scene, policy))[0]
+        for policy in STUDY["tables"]["figures"]["estimators"]
+    ]
+
+
+def figure_files():
+    """The paper's figures: the path of each, by its name in docs/figures; they are of scenes, seed and policy of `study`."""
+    asked, found = STUDY["tables"]["figures"], {}
+    for scene in asked["scenes"]:
+        values = estimator_branch(scene, asked["policy"])
+        shown = {
+            "sphere": rules.plot_sphere.output.plot,
+            "evolution": rules.plot_evolution.output.plot,
+            "estimators": rules.plot_estimators.output.plot,
+            "cuts": rules.plot_cuts.output.plot,
+            "uncertainty": rules.plot_tile_uncertainty.output.plot,
+        }
+        found |= {f"{name}_{scene}": expand(path, **values)[0] for name, path in shown.items()}
+    return found | {"budget": "results/sweeps/budget.png"}
+
+
+def terrain_sheets():
+    """The stills of the terrain of each scene that the study's figures show."""
+    asked = STUDY["tables"]["figures"]
+    return [
+        path
+        for scene in asked["scenes"]
+        for path in expand(rules.make_contact_sheet.output.sheet, **estimator_branch(scene, asked["policy"]))
+    ]
+
+
+def kept_suffix(name):
+    """The ending of a figure of the study in docs/figures: those of photos are a fifth as large as JPEGs."""
+    return ".jpg" if name.startswith(("evolution", "estimators", "cuts")) else ".png"
+
+
+def captions():
+    """What the figures of the study show, in their order."""
+    about = {
+        "sphere": "candidates by what scores said of them, and what was chosen",
+        "evolution": "two test views after the first rounds",
+        "estimators": "test views after as many photos, chosen by each estimator",
+        "cuts": "cuts by colours and by what the ground is",
+        "uncertainty": "uncertainty of tiles, and a walk over them",
+    }
+    return [
+        f"{name.partition('_')[2]}: {about[name.partition('_')[0]]}" if "_" in name else "quality against photos"
+        for name in figure_files()
+    ]

@@ -1,7 +1,0 @@
-"""Rule fetch_lpips: LPIPS's published weights, as safetensors."""
-
-from dav_gswt.images import lpips_weights
-from dav_gswt.logs import logging_to
-
-with logging_to(snakemake.log[0]):
-    lpips_weights.fetch(snakemake.output.weights)

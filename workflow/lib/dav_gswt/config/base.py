@@ -1,0 +1,36 @@
+"""What all config models share: closed, frozen models and the types of their values."""
+
+import re
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
+
+from dav_gswt.paths import NAME, RESERVED
+
+
+class ConfigModel(BaseModel):
+    """A table of the config: unknown keys are errors, values do not change, numbers are never made from text."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+def _require_name(name: str) -> str:
+    if not re.fullmatch(NAME, name):
+        raise ValueError(
+            f"{name!r} is no name: small letters, digits, - and _, from a letter, and none of {', '.join(RESERVED)}"
+        )
+    return name
+
+
+Name = Annotated[str, AfterValidator(_require_name)]
+Text = Annotated[str, StringConstraints(min_length=1)]
+Seed = Annotated[int, Field(ge=0, le=2**32 - 1)]
+Degrees = Annotated[float, Field(ge=-360, le=360)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Auto = Literal["auto"]
+
+
+def key(description: str, default: Any = ..., *, unit: str = "", renamed: str = "", **bounds) -> Any:
+    """A key of a table: meaning, default, unit and bounds; `renamed`: its name in old config files."""
+    extra = {name: value for name, value in (("unit", unit), ("renamed", renamed)) if value}
+    return Field(default, description=description, json_schema_extra=extra or None, **bounds)

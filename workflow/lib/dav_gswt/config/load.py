@@ -1,0 +1,123 @@
+"""Read config files, check them, and fill in the defaults; errors name the key and what it may be."""
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+from dav_gswt.config.model import Config
+from dav_gswt.config.tables import matching_table, renamed_keys
+from dav_gswt.errors import InputError
+from dav_gswt.paths import STUDY_TABLES
+
+Model = TypeVar("Model", bound=BaseModel)
+
+REFERENCE = "docs/reference/config.md lists every key"
+
+
+def read_config(files: list[Path], changes: Mapping | None = None) -> dict:
+    """A config as Snakemake reads it: each file's keys replace those of the files before; `changes` come last.
+
+    Raises: InputError: a file is missing or not YAML (with the line), or holds no keys.
+    """
+    config: dict = {}
+    for file in files:
+        config = merge_tables(config, _read_yaml(Path(file)))
+    return merge_tables(config, dict(changes or {}))
+
+
+def merge_tables(below: dict, above: dict) -> dict:
+    """`below` with the keys of `above`; where both have a table, key by key."""
+    both = {
+        key: merge_tables(below[key], value) if isinstance(value, dict) and isinstance(below.get(key), dict) else value
+        for key, value in above.items()
+    }
+    return below | both
+
+
+def add_scene_files(config: dict, folder: Path) -> dict:
+    """The config with the scenes of config/scenes/*.yaml; keys of `scenes` replace those of a file."""
+    files = {path.stem: _read_yaml(path) for path in sorted(folder.glob("*.yaml"))}
+    return config | {"scenes": merge_tables(files, config.get("scenes") or {})}
+
+
+def check_config(config: Mapping) -> dict:
+    """The config with all defaults, as plain values. Keys without a value (None) are left out.
+
+    Raises: InputError: the first key that is unknown, renamed or out of range, and what it may be.
+    """
+    for old, new in STUDY_TABLES.items():
+        if old in config:
+            raise InputError(f"config: {old}: is called `study.{new}` now; move it there ({REFERENCE})")
+    return check_model(Config, config).model_dump(mode="json", exclude_none=True)
+
+
+def check_model(model: type[Model], values: Mapping, where: str = "") -> Model:
+    """Validate values by a model. where: what stands before the keys in messages. Raises: InputError."""
+    try:
+        return model.model_validate(dict(values))
+    except ValidationError as error:
+        raise InputError(_describe_error(model, dict(values), error, where)) from None
+
+
+def _read_yaml(file: Path) -> dict:
+    try:
+        values = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{file}: not readable ({error.strerror})") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise InputError(f"{file}: not YAML ({' '.join(str(error).split())})") from error
+    if not isinstance(values, dict):
+        raise InputError(f"{file}: holds no keys; config/config.yaml is an example")
+    return values
+
+
+def _describe_error(model: type[BaseModel], values: dict, error: ValidationError, where: str) -> str:
+    """One line: the key that is wrong, how, and what it may be."""
+    errors = error.errors(include_url=False)
+    first = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
+    location = first["loc"]
+    if first["type"] == "value_error":
+        message = str(first["ctx"]["error"])
+    elif first["type"] == "extra_forbidden":
+        message = _describe_unknown_key(model, location)
+    elif first["type"] == "missing":
+        message = "is missing"
+    else:
+        # of a value that may be of several kinds there is an error for each kind
+        own = _keys_of(values, location)
+        message = " or ".join(
+            dict.fromkeys(_lower_first(e["msg"]) for e in errors if _keys_of(values, e["loc"]) == own)
+        )
+    keys = ".".join([where] * bool(where) + [str(key) for key in _keys_of(values, location)])
+    if first["type"] in ("missing", "extra_forbidden") and not keys.endswith(str(location[-1])):
+        keys = f"{keys}.{location[-1]}".lstrip(".")
+    if first["type"] == "extra_forbidden":
+        keys = keys.rpartition(".")[0]
+    return f"config: {keys + ': ' if keys else ''}{message} ({REFERENCE})"
+
+
+def _keys_of(values: Any, location: tuple) -> list:
+    """The part of an error's location that are keys of the config: pydantic adds names of kinds of values."""
+    keys = []
+    for part in location:
+        if isinstance(values, dict) and part in values or isinstance(values, list) and isinstance(part, int):
+            keys.append(part)
+            values = values[part]
+    return keys
+
+
+def _describe_unknown_key(model: type[BaseModel], location: tuple) -> str:
+    unknown, table = str(location[-1]), matching_table(model, location[:-1])
+    if unknown in (renamed := renamed_keys(table)):
+        return f"{unknown!r} is called {renamed[unknown]!r} now"
+    known = list(table.model_fields)
+    near = get_close_matches(unknown, known, 1)
+    return f"there is no key {unknown!r}" + (f"; is {near[0]!r} meant?" if near else f", only {', '.join(known)}")
+
+
+def _lower_first(text: str) -> str:
+    return text[:1].lower() + text[1:]

@@ -1,0 +1,97 @@
+"""The whole config of the product."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from dav_gswt.config.base import Auto, ConfigModel, Name, Seed, Share, Text, key
+from dav_gswt.config.scenes import FieldScene, Scene
+from dav_gswt.config.settings import (
+    Flat,
+    Flight,
+    Heights,
+    Preset,
+    PriorSettings,
+    Stills,
+    Stop,
+    TerrainPriorSettings,
+    Tiling,
+)
+from dav_gswt.paths import STUDY_TABLES
+from dav_gswt.views.policy_names import POLICY_NAMES
+
+Policy = Literal[POLICY_NAMES]  # pyright: ignore[reportInvalidTypeForm] - a tuple of names, known at run time
+Lpips = Literal["installed", "none"] | Text
+
+
+class Config(ConfigModel):
+    """The experiment: what is made, from what, and how well."""
+
+    scene: Name = key(
+        "the scene that `snakemake` and `make run` make: an entry of `scenes`, or a file of config/scenes"
+    )
+    seeds: list[Seed] = key("each is a run of its own: start views, noise of the fit", [0], min_length=1)
+    policy: Policy = key("how the next views are chosen: docs/reference/policies.md", "farthest")
+    prior: Name = key("the entry of `priors` that policies sample", "terrain")
+    p_drop: float = key("share of its attention that a prior drops in each sample", 0.15, ge=0, lt=1)
+    lam: float = key("weight of LPIPS beside W2 in a pose's score (the paper's lambda)", 0.1, ge=0, le=1e6)
+    rounds: int = key("rounds of view selection (the paper's T)", 2, ge=0, le=100)
+    k: int = key("views chosen in a round; where fewer are left, all", 4, ge=1, le=1000)
+    stop: Stop = key("when rounds end before the last one", Stop())
+    inpaint: bool = key("`true`: ground that no photo saw is painted by `prior`, and marked", False, renamed="complete")
+    levels: Annotated[int, Field(ge=1, le=8)] | Auto = key(
+        "levels of detail; `auto`: as many as are ever drawn, at most six", "auto"
+    )
+    tau: Share = key(
+        "tiles whose mean uncertainty reaches it keep twice the pre-sorted orders; 0: all tiles, 1: none", 0.6
+    )
+    lpips: Lpips = key(
+        "the weights of LPIPS: `installed`, those that come with the set-up; a path of `alexnet.ckpt` or a converted "
+        "`.safetensors`; `none`: cuts know colours and superpixels only, scores and metrics lack LPIPS",
+        "installed",
+    )
+    heights: Heights = key("the surface that the tiles are laid over", Flat(kind="flat"))
+    stills: Stills = key("size of the stills", Stills())
+    flight: Flight = key("a walk that is rendered frame by frame", Flight())
+    scenes: dict[Name, Scene] = key("what there is to make a terrain of", {})
+    priors: dict[Name, PriorSettings] = key("diffusion priors", {})
+    presets: dict[Name, Preset] = key("speed against accuracy", renamed="qualities", min_length=1)
+    tilings: dict[Name, Tiling] = key("how tiles are cut", renamed="seams", min_length=1)
+    study: dict[str, Any] = key("what the study compares: docs/reference/study.md", {})
+
+    @model_validator(mode="after")
+    def _require_known_names(self) -> "Config":
+        _require("scene", self.scene, self.scenes, "scenes")
+        _require("prior", self.prior, self.priors, "priors")
+        for name, scene in self.scenes.items():
+            _require(f"scenes.{name}.preset", scene.preset, self.presets, "presets")
+            _require(f"scenes.{name}.tiling", scene.tiling, self.tilings, "tilings")
+        if "none" in self.priors:
+            raise ValueError("priors.none: is the name of no prior; give yours another")
+        return self
+
+    @model_validator(mode="after")
+    def _require_inpainter(self) -> "Config":
+        """Ground can be inpainted where there are photos, by a prior that knows depth."""
+        if not self.inpaint:
+            return self
+        if isinstance(self.scenes[self.scene], FieldScene):
+            raise ValueError(
+                f"inpaint: {self.scene} is a finished field: without photos nothing says what they did not see; "
+                "set inpaint: false"
+            )
+        if not isinstance(self.priors[self.prior], TerrainPriorSettings):
+            able = [name for name, prior in self.priors.items() if isinstance(prior, TerrainPriorSettings)]
+            raise ValueError(
+                f"inpaint: the prior {self.prior} knows no depth; set prior to one of model terrain "
+                f"({', '.join(able) or 'none is'} in priors), or inpaint: false"
+            )
+        return self
+
+
+def _require(where: str, name: str, table: dict, called: str) -> None:
+    if name not in table:
+        raise ValueError(f"{where}: there is no {name!r}; {called} has {', '.join(table) or 'nothing'}")
+
+
+MOVED_TO_STUDY = STUDY_TABLES  # old top-level keys: new place

@@ -1,0 +1,153 @@
+"""Scenes: what there is to make a terrain of, and how further photos of it are taken."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from dav_gswt.config.base import ConfigModel, Degrees, Name, Seed, Text, key
+
+Range = Annotated[tuple[float, float], Field(description="lowest and highest", strict=False)]
+
+
+class Axes(ConfigModel):
+    """Ranges of a rig's axes."""
+
+    pan: Range | None = key("rotation about the vertical", None, unit="degrees")
+    tilt: Range | None = key("rotation about the horizontal", None, unit="degrees")
+    radius: Range | None = key("distance from the exemplar's centre", None, unit="mm")
+
+
+class SerialRig(ConfigModel):
+    """A motorised camera rig on a serial port (docs/rig-protocol.md), for `agent: serial`."""
+
+    port: Text = key("the serial port: `/dev/ttyUSB0`, or a URL that pyserial knows (`socket://rig:4000`)")
+    baud: int = key("speed of the port", 115200, unit="bit/s", ge=300, le=4_000_000)
+    inbox: Text = key("the folder into which the tethered camera's software saves photos")
+    millimetres: float = key("in one unit of the scene's world (`ground.json`)", unit="mm", ge=0.001, le=1e6)
+    pan_zero: Degrees = key("pan at the world's azimuth 0 (its +x)", 0, unit="degrees")
+    tilt_zero: Degrees = key("tilt at elevation 0 (the horizon)", 0, unit="degrees")
+    limits: Axes = key("`pan`, `tilt` and `radius`: lowest and highest that the rig may be sent to")
+    no_go: list[Axes] = key(
+        "boxes that it neither enters nor crosses; an axis left out is barred in full", [], max_length=20
+    )
+    settle: float = key("pause before a photo", 1, unit="s", ge=0, le=60)
+    timeout: float = key("longest wait for an answer", 2, unit="s", ge=0.01, le=60)
+    retries: int = key("how often a question is repeated", 3, ge=0, le=100)
+    move_timeout: float = key("longest time of one move, or of homing", 120, unit="s", ge=0.1, le=3600)
+    photo_timeout: float = key("longest time until a photo is complete in `inbox`", 30, unit="s", ge=0.1, le=3600)
+    dry_run: bool = key("`true`: print each move, move nothing, take nothing", True)
+
+    @field_validator("limits")
+    @classmethod
+    def _require_all_limits(cls, limits: Axes) -> Axes:
+        if missing := [axis for axis in ("pan", "tilt", "radius") if getattr(limits, axis) is None]:
+            raise ValueError(f"{missing[0]} is missing")
+        return limits
+
+
+class Drone(ConfigModel):
+    """How a drone flies, for `agent: plan`."""
+
+    min_altitude: float = key(
+        "no photo is taken below", 2, unit="m above ground", renamed="least_altitude", ge=0, le=100
+    )
+    clearance: float = key("below it the drone only climbs and sinks", 5, unit="m above ground", ge=1, le=100)
+    speed: float = key("between photos", 3, unit="m/s", ge=0.1, le=20)
+
+
+class Feasibility(ConfigModel):
+    """Bounds of candidate poses. Poses inside the ground or hidden behind it are never asked for."""
+
+    min_height: float | None = key("above the ground", None, unit="world units", renamed="lowest_height", ge=0)
+    max_height: float | None = key("above the ground", None, unit="world units", renamed="highest_height", gt=0)
+    max_distance: float | None = key("from the exemplar's middle", None, unit="world units", renamed="farthest", gt=0)
+
+
+class _Scene(ConfigModel):
+    preset: Name = key("an entry of `presets`", renamed="quality")
+    tiling: Name = key("an entry of `tilings`", renamed="seam")
+
+
+class _PhotographedScene(_Scene):
+    candidates: int = key("poses on the hemisphere that may be asked for", 250, ge=0, le=10_000)
+    min_elevation: float = key(
+        "lowest elevation of candidates and of test views", 30, unit="degrees", renamed="lowest", ge=5, le=85
+    )
+    burst: int = key("photos of each pose; every one counts", 1, ge=1, le=10)
+    feasibility: Feasibility | None = key("bounds of candidate poses", None, renamed="reach")
+
+
+class SyntheticScene(_PhotographedScene):
+    """A scene that is rendered, with exact poses."""
+
+    kind: Literal["synthetic"]
+    family: Literal["desert", "meadow", "flowers", "grass", "planet"] = key("which generator")
+    seed: Seed = key("which scene of the family")
+    photos: int = key("photos that are rendered beforehand", ge=3, le=200)
+    start: int | None = key("photos to start from, with `agent: replay`; all if left out", None, ge=2, le=200)
+    test: int = key("views that only test", ge=0, le=200)
+    layout: Literal["ring", "cap", "paper"] = key(
+        "how photos are placed: `ring`, one from above and the others around it at 65 degrees; `cap`, evenly over the "
+        "hemisphere above `min_elevation`; `paper`, 36 on a circle at 45 degrees and the others as `cap`",
+        "ring",
+        renamed="rig",
+    )
+    oblique: int = key("further test views around the exemplar at 45 degrees", 0, ge=0, le=200)
+    walkers: int = key("further test views at eye level, 0.8, 1.6 and 3.2 m above the ground in turn", 0, ge=0, le=200)
+    size: int = key("width and height of the photos", unit="pixels", ge=64, le=4096)
+    agent: Literal["render", "replay"] = key(
+        "`render`: photos are rendered at the chosen poses; `replay`: chosen from those rendered beforehand"
+    )
+
+
+class PhotoScene(_PhotographedScene):
+    """A folder of photos."""
+
+    kind: Literal["photos"]
+    folder: Text = key("a folder of photos and nothing else, relative to the working directory or to the repository")
+    model: Text | None = key(
+        "known cameras: a COLMAP folder, `transforms.json` (nerfstudio) or `reconstruction.json` (OpenSfM)",
+        None,
+    )
+    size: int = key("longer side of the undistorted photos; never enlarged", unit="pixels", ge=64, le=16_384)
+    start: int = key(
+        "photos to start from; one in ten of the others only tests, the rest may be asked for", ge=2, le=1000
+    )
+    whole: bool = key(
+        "`true`: all ground in the photos is fitted and scored, not only the exemplar and a margin", False
+    )
+    sfm: Literal["quick", "careful"] = key(
+        "`quick`: 4096 features a photo, 12 partners; `careful`: 8192 and 40", "quick"
+    )
+    mapper: Literal["incremental", "global"] = key("`global`: all photos at once, faster for hundreds", "incremental")
+    cameras: Literal["auto", "one", "each"] = key(
+        "`auto`: one camera for all photos of equal size and EXIF focal length; `one`: for all of equal size", "auto"
+    )
+    focal: float | None = key("where EXIF has none or is wrong", None, unit="mm (35 mm equivalent)", ge=4, le=2000)
+    masks: Text | None = key("a folder of masks named as the photos: black pixels are not ground", None)
+    agent: Literal["replay", "serial", "plan", "handheld"] = key(
+        "who takes further photos: `replay` takes the nearest unused photo of the folder; `serial` is a camera rig, "
+        "`plan` a drone, `handheld` a person"
+    )
+    candidates: int = key("poses on the hemisphere that a device may be asked for", 250, ge=1, le=10_000)
+    rig: SerialRig | None = key("the camera rig of `agent: serial`", None)
+    drone: Drone = key("how a drone flies, for `agent: plan`", Drone(), renamed="flight")
+
+    @model_validator(mode="after")
+    def _require_rig(self) -> "PhotoScene":
+        if self.agent == "serial" and self.rig is None:
+            raise ValueError("agent serial needs `rig`: docs/capture.md")
+        return self
+
+
+class FieldScene(_Scene):
+    """A finished 3D Gaussian splatting file instead of photos."""
+
+    kind: Literal["field"]
+    field: Annotated[str, Field(pattern=r"\.ply$")] = key("a finished 3D Gaussian splatting `.ply`")
+    up: tuple[float, float, float] = key(
+        "a direction that points roughly up in the file", (0.0, -1.0, 0.0), strict=False
+    )
+
+
+Scene = Annotated[SyntheticScene | PhotoScene | FieldScene, Field(discriminator="kind")]

@@ -1,0 +1,144 @@
+"""Named settings (presets, priors, tilings), and the smaller tables of the config."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from dav_gswt.config.base import Auto, ConfigModel, Seed, Share, Text, key
+
+
+class Stop(ConfigModel):
+    """When rounds end before the last one; whichever comes first. Empty: never."""
+
+    photos: int | None = key("most photos in all", None, ge=3, le=100_000)
+    marginal_gain: float | None = key(
+        "least expected gain of a further photo", None, unit="dB a photo", renamed="worth", ge=0.0001, le=100
+    )
+
+
+class Flat(ConfigModel):
+    """A plain."""
+
+    kind: Literal["flat"]
+
+
+class Hills(ConfigModel):
+    """Hills by noise."""
+
+    kind: Literal["hills"]
+    height: float = key("nothing is higher above the plain or deeper below it", unit="tile sides", ge=0, le=100)
+    wavelength: float = key("from one large hill to the next, about", unit="tile sides", ge=1, le=100_000)
+    octaves: int = key("of hills on hills, each half as wide and 0.4 times as high", 4, ge=1, le=8)
+    seed: Seed = key("which hills", 0)
+
+
+class HeightMap(ConfigModel):
+    """A height map from an image."""
+
+    kind: Literal["image"]
+    file: Text = key("grey image of 16 bits (PNG, TIFF) or of floats (EXR), at most 67 million pixels")
+    width: float = key(
+        "of the whole image; its middle lies at the world's origin", unit="world units", ge=0.001, le=1e7
+    )
+    height: float = key("height of white; black is 0, floats are multiplied by it", unit="world units", ge=-1e6, le=1e6)
+    beyond: Literal["mirror", "clamp"] = key("what comes after the image's edge", "mirror")
+
+
+Heights = Annotated[Flat | Hills | HeightMap, Field(discriminator="kind")]
+
+
+class Stills(ConfigModel):
+    """Size of the stills, and of the frames of a flight."""
+
+    width: int = key("of a still", 1920, unit="pixels", ge=16, le=8192)
+    height: int = key("of a still", 1080, unit="pixels", ge=16, le=8192)
+
+
+class Flight(ConfigModel):
+    """A walk straight on, rendered frame by frame. Empty: none."""
+
+    frames: int | None = key("number of frames", None, ge=2, le=100_000)
+    length: float | None = key("of the walk", None, unit="tile sides", gt=0, le=100_000)
+    height: float | None = key("of the eye above the surface", None, unit="eye floors", ge=0.5, le=100)
+
+    @model_validator(mode="after")
+    def _require_all_or_none(self) -> "Flight":
+        missing = [name for name in ("frames", "length", "height") if getattr(self, name) is None]
+        if 0 < len(missing) < 3:
+            raise ValueError(f"{missing[0]} is missing; a flight needs frames, length and height")
+        return self
+
+
+class Preset(ConfigModel):
+    """How much a fit may spend. `auto` asks the scene; fit.json says what was chosen and why."""
+
+    size: int = key("longer side of the photos that the fit sees", unit="pixels", ge=32, le=4096)
+    spacing: float = key("of the ground's discs, in sizes of a photo's pixel on the ground", ge=0.5, le=16)
+    max_gaussians: Annotated[int, Field(ge=1000, le=8_000_000)] | Auto = key(
+        "most Gaussians in the field", renamed="cap"
+    )
+    steps: Annotated[int, Field(ge=1, le=100_000)] | Auto = key("optimiser steps of the coarse fit")
+    steps_per_photo: Annotated[int, Field(ge=1, le=100_000)] | Auto = key(
+        "optimiser steps for each new photo of a round"
+    )
+    sh_degree: Annotated[int, Field(ge=0, le=3)] | Auto = key(
+        "of the spherical harmonics of colour", 0, renamed="degree"
+    )
+    pose_rate: float = key(
+        "first learning rate of the cameras' rotations; 0: they are held", 0, unit="radians", ge=0, le=0.01
+    )
+    level_steps: int = key("optimiser steps for a coarser level", ge=1, le=100_000)
+    levels: Annotated[int, Field(ge=1, le=8)] | Auto | None = key("instead of the config's `levels`", None)
+
+
+class _Prior(ConfigModel):
+    samples: int = key("drawn for each pose", ge=2, le=100)
+    steps: int = key("denoising steps of a sample", ge=1, le=1000)
+    staged: bool = key("`true`: all poses with 2 steps, then in full those that may be among the best", True)
+    posterior: bool = key("`true`: a sample is a distribution, as wide as the encoder says; `false`: a point", False)
+    independent_noise: bool = key(
+        "`true`: each sample starts from its own noise; `false`: from one noise, as in the paper",
+        False,
+        renamed="noises",
+    )
+    lpips: bool = key("`false`: without the term LPIPS", True)
+
+
+class TerrainPriorSettings(_Prior):
+    """The project's own latent diffusion model of terrain."""
+
+    model: Literal["terrain"]
+    weights: Text | None = key("other weights of the same network", None)
+
+
+class Zero123Settings(_Prior):
+    """Zero-1-to-3 from a folder of published weights."""
+
+    model: Literal["zero123"]
+    folder: Text = key("its weights: docs/research/results/prior.md")
+    guidance: float = key("strength of classifier-free guidance", 3, ge=1, le=100)
+
+
+PriorSettings = Annotated[TerrainPriorSettings | Zero123Settings, Field(discriminator="model")]
+
+
+class Tiling(ConfigModel):
+    """How tiles are cut from the exemplar."""
+
+    tile: Annotated[float, Field(ge=0.1, le=0.9)] | Auto = key("side of a tile, as a share of the exemplar's", "auto")
+    strip: Annotated[float, Field(ge=0.05, le=0.19)] | Auto = key(
+        "half-width of the strips along the edges, as a share of a tile's side", "auto"
+    )
+    candidates: int = key("places tried for each patch", 600, ge=1, le=100_000)
+    variants: int = key("centres for each of the sixteen edge combinations", 2, ge=1, le=16)
+    energy: Literal["none", "colour", "semantic", "semantic-nogamma"] = key(
+        "cost of a cut: `none`, straight lines; `colour`, of colours; `semantic`, and of the kind of ground, "
+        "the surer a patch the more its colours count (the paper's gamma); `semantic-nogamma`, both alike everywhere",
+        "semantic",
+    )
+    slope: float = key("how fast the weight of colour falls with uncertainty", 2, gt=0, le=100)
+    replicate: int = key("another number, another draw of places", 0, renamed="draw", ge=0, le=1000)
+    sam2: Text | None = key("a folder with a checkpoint of SAM 2, whose masks separate objects", None)
+
+
+__all__ = ["Flight", "Heights", "Preset", "PriorSettings", "Share", "Stills", "Stop", "Tiling"]
