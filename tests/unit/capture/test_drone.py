@@ -148,7 +148,7 @@ def test_a_scene_without_gps_is_refused(site, asked):
 
 
 def test_poses_that_are_too_low_are_refused_by_name(site, asked):
-    low = Site("moor", {"flight": {"min_altitude": 3.6}}, FRAME, site.photos, site.store)
+    low = Site("moor", {"drone": {"min_altitude": 3.6}}, FRAME, site.photos, site.store)
     with pytest.raises(InputError, match=r"pose_4, pose_5: lower than 3.6 m"):
         drone.take_photos(low, asked)
 

@@ -129,7 +129,7 @@ def test_more_photos_than_anyone_flies_are_refused():
 def test_what_cannot_be_flown_is_said(tmp_path, capsys):
     assert survey.main(["start", str(tmp_path / "a.plan"), *WHERE, "--heights", "5"]) == 1
     assert "fly at" in capsys.readouterr().err
-    assert survey.main(["start", str(tmp_path / "a.plan"), *WHERE, "--least-altitude", "30"]) == 1
+    assert survey.main(["start", str(tmp_path / "a.plan"), *WHERE, "--min-altitude", "30"]) == 1
     assert "lower than 30 m" in capsys.readouterr().err
     with pytest.raises(SystemExit):
         survey.main(["start", str(tmp_path / "a.plan"), *WHERE, "--latitude", "147"])

@@ -78,7 +78,7 @@ def plan_flight(
     if low:
         raise InputError(
             f"{', '.join(low)}: lower than {rules.min_altitude:g} m above the ground, where no photo is taken from "
-            "the air (flight.min_altitude of the scene's entry); take a rig or agent: handheld for poses this low"
+            "the air (drone.min_altitude of the scene's entry); take a rig or agent: handheld for poses this low"
         )
     start = scale * np.array([*home, 0.0]) + [0.0, 0.0, rules.clearance]
     ordered = route.order_stops(at, start, start)

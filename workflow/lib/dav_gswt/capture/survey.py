@@ -224,7 +224,7 @@ def make_parser() -> argparse.ArgumentParser:
     what.add_argument("--aspect", type=_number_type(1, 3), default=Lens.aspect, help="longer over shorter side")
     safe = parser.add_argument_group("safety")
     safe.add_argument(
-        "--least-altitude", type=_number_type(0, 100), default=qgc_plan.FlightRules.min_altitude, help="metres"
+        "--min-altitude", type=_number_type(0, 100), default=qgc_plan.FlightRules.min_altitude, help="metres"
     )
     safe.add_argument("--clearance", type=_number_type(1, 100), default=qgc_plan.FlightRules.clearance, help="metres")
     safe.add_argument(
