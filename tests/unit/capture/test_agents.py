@@ -191,7 +191,7 @@ def drop(site, places, monkeypatch):
     for i, name in enumerate(places):
         os.utime(picture(folder / name, 0.1 * i), (0, 0))
     at_places = {name: value if value is None else at(value) for name, value in places.items()}
-    monkeypatch.setattr(localization, "located", lambda photos, paths: [at_places[p.name] for p in paths])
+    monkeypatch.setattr(localization, "localize_photos", lambda photos, paths: [at_places[p.name] for p in paths])
 
 
 def test_dropped_photos_go_to_the_poses_that_they_were_taken_for(site, monkeypatch, caplog):
