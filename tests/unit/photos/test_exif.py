@@ -77,7 +77,27 @@ def test_a_damaged_block_is_passed_over(tmp_path, cut):
     path = with_block(tmp_path / "a.jpg", {0x920A: (5, "II", (254, 100)), 0xA20E: (5, "II", (10000, 1))})
     whole = path.read_bytes()
     path.write_bytes(whole[:cut] + b"\xff" * (130 - cut) + whole[130:])
-    assert exif._jpeg_tags(path) == {} or all(np.isfinite(v) for v in exif._jpeg_tags(path).values())
+    assert all(np.isfinite(value) for value in exif._read_jpeg_tags(path).values())
+
+
+def test_a_number_that_is_none_is_passed_over(tmp_path):
+    nan = (12, "d", (float("nan"),))
+    entries = {0x920A: (5, "II", (254, 100)), 0xA20E: (5, "II", (10000, 1)), 0xA210: nan}
+    assert read_focal_length(with_block(tmp_path / "a.jpg", entries)) == pytest.approx(1000)
+
+
+def test_a_directory_that_leads_to_itself_is_passed_over(tmp_path):
+    entries = {0x8769: (4, "I", (26,)), 0x920A: (5, "II", (254, 100)), 0xA20E: (5, "II", (10000, 1))}
+    assert read_focal_length(with_block(tmp_path / "a.jpg", entries)) in (None, pytest.approx(1000))
+
+
+def test_a_count_beyond_the_file_is_passed_over(tmp_path):
+    path = with_block(tmp_path / "a.jpg", {0x920A: (5, "II", (254, 100)), 0xA20E: (5, "II", (10000, 1))})
+    at = path.read_bytes().index(struct.pack("<HHI", 0xA20E, 5, 1))
+    content = bytearray(path.read_bytes())
+    content[at + 4 : at + 8] = b"\xff" * 4
+    path.write_bytes(content)
+    assert read_focal_length(path) is None
 
 
 @pytest.mark.parametrize("name, pixels", [("brighton_beach", 592), ("copr_dunes", 1377), ("caliterra_earthworks", 743)])

@@ -5,15 +5,13 @@ Altitudes above sea level are taken for heights above the ellipsoid: that moves 
 """
 
 from dataclasses import astuple, dataclass, field
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
-
-EQUATOR = 6378137.0  # metres: WGS84's semi-major axis
-FLATTENING = 1 / 298.257223563
-ECCENTRICITY2 = FLATTENING * (2 - FLATTENING)  # squared
-ROUNDS = 6  # of Bowring's iteration for the latitude; three leave less than a micrometre near the ground
+from pyproj import Transformer
+from pyproj.enums import TransformDirection
 
 
 @dataclass(frozen=True)
@@ -50,44 +48,23 @@ class Georeference:
     def to_earth(self, points: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
         """Latitude, longitude and altitude of points of the world."""
         metres = self.metres_per_unit * np.asarray(points, float)
-        local = np.concatenate([metres[:, :2] @ self.turn.T, metres[:, 2:]], axis=1)
-        at = np.array([[self.latitude, self.longitude, self.altitude]])
-        return _geodetic(_geocentric(at) + local @ _axes(self.latitude, self.longitude))
+        east, north = (metres[:, :2] @ self.turn.T).T
+        longitude, latitude, altitude = self._to_local.transform(
+            east, north, metres[:, 2], direction=TransformDirection.INVERSE
+        )
+        return np.stack([latitude, longitude, altitude], axis=1)
 
     def to_world(self, places: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
         """World coordinates of latitudes, longitudes and altitudes."""
-        at = np.array([[self.latitude, self.longitude, self.altitude]])
-        offset = _geocentric(np.asarray(places, float)) - _geocentric(at)
-        local = offset @ _axes(self.latitude, self.longitude).T
+        latitude, longitude, altitude = np.asarray(places, float).T
+        local = np.stack(self._to_local.transform(longitude, latitude, altitude), axis=1)
         return np.concatenate([local[:, :2] @ self.turn, local[:, 2:]], axis=1) / self.metres_per_unit
 
-
-def _axes(latitude: float, longitude: float) -> Float[Array, "3 3"]:
-    """East, north and up, as rows, in geocentric coordinates."""
-    f, a = np.radians(latitude), np.radians(longitude)
-    east = [-np.sin(a), np.cos(a), 0.0]
-    north = [-np.sin(f) * np.cos(a), -np.sin(f) * np.sin(a), np.cos(f)]
-    return np.array([east, north, [np.cos(f) * np.cos(a), np.cos(f) * np.sin(a), np.sin(f)]])
-
-
-def _geocentric(places: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
-    """Metres from the earth's centre; N is the radius of curvature in the prime vertical."""
-    f, a = np.radians(places[:, 0]), np.radians(places[:, 1])
-    n = EQUATOR / np.sqrt(1 - ECCENTRICITY2 * np.sin(f) ** 2)
-    out = (n + places[:, 2]) * np.cos(f)
-    return np.stack([out * np.cos(a), out * np.sin(a), (n * (1 - ECCENTRICITY2) + places[:, 2]) * np.sin(f)], axis=1)
-
-
-def _geodetic(points: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
-    """The inverse of `_geocentric`. Source: Bowring, Transformation from spatial to geographical coordinates (1976)."""
-    out = np.hypot(points[:, 0], points[:, 1])
-    polar = EQUATOR * (1 - FLATTENING)
-    beta = np.arctan2(points[:, 2], (1 - FLATTENING) * out)
-    for _ in range(ROUNDS):
-        rise = points[:, 2] + ECCENTRICITY2 / (1 - ECCENTRICITY2) * polar * np.sin(beta) ** 3
-        latitude = np.arctan2(rise, out - ECCENTRICITY2 * EQUATOR * np.cos(beta) ** 3)
-        beta = np.arctan2((1 - FLATTENING) * np.sin(latitude), np.cos(latitude))
-    s = np.sin(latitude)
-    height = out * np.cos(latitude) + points[:, 2] * s - EQUATOR * np.sqrt(1 - ECCENTRICITY2 * s**2)
-    longitude = np.arctan2(points[:, 1], points[:, 0])
-    return np.stack([np.degrees(latitude), np.degrees(longitude), height], axis=1)
+    @cached_property
+    def _to_local(self) -> Transformer:
+        """Longitude and latitude in degrees and altitude to metres east, north and up of the origin."""
+        return Transformer.from_pipeline(
+            "+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad +step +proj=cart +ellps=WGS84 "
+            f"+step +proj=topocentric +ellps=WGS84 +lat_0={self.latitude!r} +lon_0={self.longitude!r} "
+            f"+h_0={self.altitude!r}"
+        )

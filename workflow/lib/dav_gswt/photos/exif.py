@@ -1,18 +1,20 @@
 """What a photo's EXIF claims: focal length in pixels of the picture as it is, position, and time."""
 
-import struct
+import math
 from datetime import datetime
+from io import BytesIO
 from pathlib import Path
 
+import exifread
 import OpenImageIO as oiio
+from exifread.core.ifd_tag import IfdTag
+from exifread.utils import Ratio
 
 from dav_gswt.images import image_files
 
 FILM_DIAGONAL = 43.2666  # of a 36 x 24 mm frame, which "35 mm equivalent" compares diagonals with
 WIDEST = 1.55  # photos wider than a 3:2 sensor are cut from a 4:3 one, whose diagonal the equivalent refers to
 UNITS = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}  # FocalPlaneResolutionUnit in millimetres
-_FORMATS = {3: "H", 4: "I", 5: "II", 9: "i", 10: "ii", 11: "f", 12: "d"}  # TIFF's types of numbers
-_EXIF_IFD, _FOCAL, _PLANE_X, _PLANE_UNIT, _FILM, _WIDTH = 0x8769, 0x920A, 0xA20E, 0xA210, 0xA405, 0xA002
 
 
 def read_focal_length(path: Path | str) -> float | None:
@@ -23,13 +25,13 @@ def read_focal_length(path: Path | str) -> float | None:
     Where the tagged width differs from the real one, the pitch is scaled with it: the photo was resized, the tag not.
     """
     width, height = sorted(image_files.read_size(path), reverse=True)
-    tags = _jpeg_tags(Path(path))
+    tags = _read_jpeg_tags(Path(path))
     spec = oiio.ImageInput.open(str(path)).spec()
-    focal = tags.get(_FOCAL) or _number(spec.getattribute("Exif:FocalLength"))
-    film = tags.get(_FILM) or _number(spec.getattribute("Exif:FocalLengthIn35mmFilm"))
-    pitch, unit = tags.get(_PLANE_X), UNITS.get(int(tags.get(_PLANE_UNIT, 2)))
+    focal = tags.get("EXIF FocalLength") or _number(spec.getattribute("Exif:FocalLength"))
+    film = tags.get("EXIF FocalLengthIn35mmFilm") or _number(spec.getattribute("Exif:FocalLengthIn35mmFilm"))
+    pitch, unit = tags.get("EXIF FocalPlaneXResolution"), UNITS.get(int(tags.get("EXIF FocalPlaneResolutionUnit", 2)))
     if focal > 0 and pitch and unit:
-        pixels = focal / unit * pitch * width / max(tags.get(_WIDTH, width), 1)
+        pixels = focal / unit * pitch * width / max(tags.get("EXIF ExifImageWidth", width), 1)
     elif film > 0:
         pixels = (
             film
@@ -73,32 +75,27 @@ def _number(value) -> float:
     return float(value) if isinstance(value, int | float) and value == value else 0.0
 
 
-def _jpeg_tags(path: Path) -> dict[int, float]:
-    """Numbers of the EXIF block by tag. OpenImageIO drops the pixel pitch where it is not stored as a rational."""
+def _read_jpeg_tags(path: Path) -> dict[str, float]:
+    """Finite numbers of a JPEG's EXIF block by tag. OpenImageIO drops the pixel pitch where it is no rational.
+
+    Only the start of the file is read, which holds the block.
+    """
     with path.open("rb") as file:
         head = file.read(1 << 17)
-    start = head.find(b"Exif\0\0")
-    if head[:2] != b"\xff\xd8" or start < 0:
+    if head[:2] != b"\xff\xd8" or b"Exif\0\0" not in head:
         return {}
-    block = head[start + 6 :]
-    order = "<" if block[:2] == b"II" else ">"
     try:
-        first = _directory(block, order, struct.unpack_from(order + "I", block, 4)[0])
-        return _directory(block, order, int(first[_EXIF_IFD]))
-    except (struct.error, KeyError):
+        tags = exifread.process_file(BytesIO(head), details=False, extract_thumbnail=False)
+    except Exception:  # whatever a damaged block leads the parser to
         return {}
+    numbers = {name: _first_number(tag.values) for name, tag in tags.items() if isinstance(tag, IfdTag)}
+    return {name: value for name, value in numbers.items() if value is not None and math.isfinite(value)}
 
 
-def _directory(block: bytes, order: str, offset: int) -> dict[int, float]:
-    """One TIFF directory: the first value of every entry that is a number."""
-    values = {}
-    for k in range(struct.unpack_from(order + "H", block, offset)[0]):
-        at = offset + 2 + 12 * k
-        tag, kind, _ = struct.unpack_from(order + "HHI", block, at)
-        if kind not in _FORMATS:
-            continue
-        form = order + _FORMATS[kind]
-        place = at + 8 if struct.calcsize(form) <= 4 else struct.unpack_from(order + "I", block, at + 8)[0]
-        number = struct.unpack_from(form, block, place)
-        values[tag] = number[0] / (number[1] or 1) if len(number) == 2 else float(number[0])
-    return values
+def _first_number(values) -> float | None:
+    value = values[0] if isinstance(values, list) and values else None
+    if isinstance(value, tuple):  # as the parser gives floats
+        value = value[0] if value else None
+    if isinstance(value, Ratio):
+        return value.num / (value.den or 1)
+    return float(value) if isinstance(value, int | float) else None
