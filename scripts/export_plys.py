@@ -8,4 +8,4 @@ from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):
     told = manifest.read_manifest(Path(snakemake.input.manifest).parent, snakemake.params.schema)
-    splats.write_plys(snakemake.input.archive, told["tile_side"], snakemake.output.plys)
+    splats.write_plys(snakemake.input.archive, told.tile_side, snakemake.output.plys)

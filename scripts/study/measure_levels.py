@@ -1,10 +1,11 @@
 """Rule measure_levels: how well coarser levels stand in for the finest."""
 
-from dav_gswt.bundle import build, fidelity
+from dav_gswt.bundle import build
 from dav_gswt.logs import logging_to
 from dav_gswt.study import csv_tables
+from dav_gswt.study.terrain.level_fidelity import measure_levels
 from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
     tiles, used = store.read_tiles(snakemake.input.tiles, snakemake.input.seams), build.BundleOptions
-    csv_tables.write_table(snakemake.output.table, fidelity.measure_levels(tiles, used.level_pixels, used.band))
+    csv_tables.write_table(snakemake.output.table, measure_levels(tiles, used.level_pixels, used.band))

@@ -1,10 +1,11 @@
 """Rule measure_orders: what pre-sorted orders of neighbouring directions do to pictures of tiles."""
 
-from dav_gswt.bundle import build, direction_search
+from dav_gswt.bundle import build
 from dav_gswt.logs import logging_to
 from dav_gswt.study import csv_tables
+from dav_gswt.study.terrain.order_fidelity import measure_orders
 from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
     tiles = store.read_tiles(snakemake.input.tiles, snakemake.input.seams)
-    csv_tables.write_table(snakemake.output.table, direction_search.measure_orders(tiles, build.BundleOptions.decibels))
+    csv_tables.write_table(snakemake.output.table, measure_orders(tiles, build.BundleOptions.decibels))

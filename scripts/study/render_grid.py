@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.files import read_json
 from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to, progress
@@ -9,7 +10,7 @@ from dav_gswt.study.seams import pictures
 from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
-    given, bundle = snakemake.input, read_json(snakemake.input.manifest)
+    given, bundle = snakemake.input, Manifest.from_dict(read_json(snakemake.input.manifest))
     tiles = store.read_tiles(given.tiles, given.seams)
     for path in progress(snakemake.output.pictures, "draw grids"):
         shot, surface = Path(path).stem.split("_")

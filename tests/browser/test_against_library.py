@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from fixtures.bundles import SKY, Ground
 
+from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.geometry import cameras
 from dav_gswt.study.terrain.browser import served
@@ -42,7 +43,7 @@ def hilly(request, page_of):
 
 
 def terrain_of(folder, surface) -> tuple[EndlessTerrain, dict]:
-    bundle = Bundle(folder, json.loads((folder / "davgswt.json").read_text()))
+    bundle = Bundle(folder, Manifest.from_dict(json.loads((folder / "davgswt.json").read_text())))
     return replace(endless.terrain_from_bundle(bundle, {"kind": "flat"}), heights=surface), bundle.manifest
 
 
@@ -51,7 +52,7 @@ def test_the_page_draws_what_the_library_draws(visit, hilly, place):
     address, (terrain, manifest) = hilly
     seen = visit(160, 100).open(f"{address}?still")
     drawn = seen.at(**place)
-    expected = np.rint(255 * stills.render_view(terrain, camera_at(terrain, place), SKY, manifest["ground_colour"]))
+    expected = np.rint(255 * stills.render_view(terrain, camera_at(terrain, place), SKY, manifest.ground_colour))
     difference = np.abs(drawn - expected)
     assert difference.mean() < MEAN and difference.max() <= MOST
     assert expected.std() > 8, "there is something to see"

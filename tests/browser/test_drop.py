@@ -13,6 +13,7 @@ from fixtures.bundles import Ground
 
 from dav_gswt.bundle import gswt
 from dav_gswt.bundle.encoding import Encoding
+from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.study.terrain.browser import served
@@ -65,7 +66,7 @@ def test_a_dropped_bundle_takes_the_place_of_the_pages_own(visit, plain, page_of
 
 def test_a_gswt_zip_of_the_public_renderer_is_shown(visit, plain, other, tmp_path):
     manifest = json.loads((other / "davgswt.json").read_text())
-    gswt.write_gswt(Bundle(other, manifest).fields(), OTHER.side, tmp_path / "gswt.zip")
+    gswt.write_gswt(Bundle(other, Manifest.from_dict(manifest)).fields(), OTHER.side, tmp_path / "gswt.zip")
     seen = visit(160, 100).open(f"{plain}?still")
     drop(seen, "gswt.zip", (tmp_path / "gswt.zip").read_bytes())
     seen.until("davgswt.state.opened === 2")
@@ -97,7 +98,7 @@ def test_the_page_rounds_a_set_as_the_library_does(visit, plain):
         }""",
         lists,
     )
-    for key, values in encoding.to_dict().items():
+    for key, values in vars(encoding).items():
         np.testing.assert_allclose(told[key], values, rtol=1e-12, err_msg=key)
     for field, own in zip(fields, found, strict=True):
         assert bytes(own) == encoding.encode(field).tobytes()

@@ -8,6 +8,7 @@ from fixtures import bundles
 from scipy.spatial.transform import Rotation
 
 from dav_gswt.bundle import store
+from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry import cameras
 from dav_gswt.study.terrain.browser import served
@@ -26,7 +27,9 @@ def one(ground, tile, level):
 @pytest.fixture(scope="module")
 def seen_as(lonely_folder):
     """The Gaussian as it was rounded."""
-    return store.Bundle(lonely_folder, json.loads((lonely_folder / "davgswt.json").read_text())).chunk(0, 0)[0]
+    return store.Bundle(
+        lonely_folder, Manifest.from_dict(json.loads((lonely_folder / "davgswt.json").read_text()))
+    ).chunk(0, 0)[0]
 
 
 @pytest.fixture(scope="module")

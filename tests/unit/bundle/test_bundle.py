@@ -1,6 +1,5 @@
 """Bundles: values by hand, round trips, refusals, and the public renderer's rules."""
 
-import copy
 import hashlib
 import json
 import shutil
@@ -49,13 +48,11 @@ def bundle(tiles, tmp_path_factory):
 def test_a_level_ends_where_the_next_one_has_its_size_in_pixels():
     # f = 960 / tan 30 degrees = 1662.77 px: 0.3 units cover 2 px at 249.4 units
     table = level_distances.compute_levels([0.1, 0.3], pixels=2.0, band=0.1)
-    assert table[0]["distance"] == pytest.approx(249.415, abs=1e-3)
-    assert table[0]["band"] == pytest.approx(24.9415, abs=1e-4)
-    assert table[1]["distance"] is None
+    assert table[0].distance == pytest.approx(249.415, abs=1e-3)
+    assert table[0].band == pytest.approx(24.9415, abs=1e-4)
+    assert table[1].distance is None
     # a scene in other units is the same scene
-    assert level_distances.compute_levels([1.0, 3.0], 2.0, 0.1)[0]["distance"] == pytest.approx(
-        10 * table[0]["distance"]
-    )
+    assert level_distances.compute_levels([1.0, 3.0], 2.0, 0.1)[0].distance == pytest.approx(10 * table[0].distance)
     with pytest.raises(InputError, match="level 1"):
         level_distances.compute_levels([0.1, 0.1], 1.0, 0.1)
 
@@ -75,23 +72,23 @@ def test_eye_floor_shows_the_nearest_disc_at_the_size_asked_for():
 def test_a_bundle_reads_back_as_the_tiles_it_was_made_of(bundle, tiles):
     folder, written = bundle
     read = store.read_bundle(folder, SCHEMA)
-    assert read.manifest == json.loads(json.dumps(written))
-    error, along = written["error"], np.array(written["directions"])
-    for number, tile in enumerate(read.manifest["tiles"]):
-        for entry in tile["chunks"]:
-            source = tiles.fields[entry["level"]][number]
-            field, order = read.chunk(number, entry["level"])
+    assert read.manifest == written
+    error, along = written.error, np.array(written.directions)
+    for number, tile in enumerate(read.manifest.tiles):
+        for entry in tile.chunks:
+            source = tiles.fields[entry.level][number]
+            field, order = read.chunk(number, entry.level)
             # what the manifest states; a float32's last digits on top
             away = np.linalg.norm(field.means.astype(float) - source.means, axis=1).max()
-            assert 0 < away <= error["position"] * (1 + 1e-6)
-            assert np.abs(field.base_colours - source.base_colours).max() <= error["colour"] + 1e-6
-            assert field.means[:, 2].min() >= tile["z"][0] and field.means[:, 2].max() <= tile["z"][1]
-            for direction, row in zip(entry["orders"], order, strict=True):
+            assert 0 < away <= error.position * (1 + 1e-6)
+            assert np.abs(field.base_colours - source.base_colours).max() <= error.colour + 1e-6
+            assert field.means[:, 2].min() >= tile.z[0] and field.means[:, 2].max() <= tile.z[1]
+            for direction, row in zip(entry.orders, order, strict=True):
                 depth = source.means[row].astype(float) @ along[direction]
                 # depths are sorted in 65535 steps of what the tile spans, at most its diagonal
                 assert (np.diff(depth) <= 2 * SIDE / 65535).all()
-    deep = [len(tile["chunks"][0]["orders"]) for tile in written["tiles"] if tile["uncertainty"] >= 0.5]
-    plain = [len(tile["chunks"][0]["orders"]) for tile in written["tiles"] if tile["uncertainty"] < 0.5]
+    deep = [len(tile.chunks[0].orders) for tile in written.tiles if tile.uncertainty >= 0.5]
+    plain = [len(tile.chunks[0].orders) for tile in written.tiles if tile.uncertainty < 0.5]
     assert set(deep) == {len(along)} and set(plain) == {(len(along) + 1) // 2}
 
 
@@ -109,14 +106,14 @@ def test_the_terrain_of_a_bundle_is_that_of_its_tiles_but_for_the_rounding(bundl
 
 
 def test_the_errors_stated_are_those_of_16_bytes(bundle):
-    error = bundle[1]["error"]
+    error = bundle[1].error
     # half a step of 2 / 65535 along x and y, of 0.2 / 65535 along z
-    assert error["position"] <= np.hypot(np.hypot(1, 1), 0.1) / 65535 * 1.001
-    assert error["position_pixels"] == pytest.approx(error["position"] / (0.1 / 12))
+    assert error.position <= np.hypot(np.hypot(1, 1), 0.1) / 65535 * 1.001
+    assert error.position_pixels == pytest.approx(error.position / (0.1 / 12))
     # sizes span a factor of 6: half a step of ln 6 / 255
-    assert error["scale_percent"] <= 100 * np.expm1(np.log(6) / 510) * 1.001 and error["clipped"] == 0
-    assert error["angle_degrees"] <= 0.37 and error["opacity"] <= 0.5 / 255 + 1e-9
-    assert min(error["walker_db"], error["oblique_db"]) > 40
+    assert error.scale_percent <= 100 * np.expm1(np.log(6) / 510) * 1.001 and error.clipped == 0
+    assert error.angle_degrees <= 0.37 and error.opacity <= 0.5 / 255 + 1e-9
+    assert min(error.walker_db, error.oblique_db) > 40
 
 
 @pytest.mark.parametrize("threads", [1, 3])
@@ -340,7 +337,7 @@ def test_a_manifest_as_large_as_no_manifest_is_not_read(copy_of, monkeypatch):
     ],
 )
 def test_a_manifest_that_contradicts_itself_or_its_schema_is_refused(bundle, key, change):
-    value = copy.deepcopy(bundle[1])
+    value = bundle[1].to_dict()
     change(value)
     with pytest.raises(InputError, match=f"(?i){key}"):
         manifest.check_manifest(value, SCHEMA)

@@ -10,6 +10,7 @@ import pytest
 from fixtures.bundles import Ground, write_bundle
 
 from dav_gswt.bundle import chunks
+from dav_gswt.bundle.chunks import ChunkEntry
 from dav_gswt.bundle.encoding import Encoding
 
 SMALL = Ground(discs=4, levels=2, variants=2)
@@ -40,7 +41,7 @@ def test_a_chunk_is_read_as_the_page_says(bundle):
     folder, manifest = bundle
     entry = manifest["tiles"][5]["chunks"][0]
     data, count = (folder / entry["file"]).read_bytes(), entry["count"]
-    field, orders = chunks.read(folder, entry, Encoding.of_json(manifest["encoding"]))
+    field, orders = chunks.read_chunk(folder, ChunkEntry(**entry), Encoding(**manifest["encoding"]))
     assert len(data) == entry["bytes"] == count * (16 + 2 * len(entry["orders"]))
     for n in range(count):
         centre, deviations, quat, colour, opacity = record(data[16 * n : 16 * n + 16], manifest["encoding"])
@@ -57,7 +58,7 @@ def test_a_chunk_is_read_as_the_page_says(bundle):
 def test_orders_run_from_back_to_front(bundle):
     folder, manifest = bundle
     entry = manifest["tiles"][0]["chunks"][0]
-    field, orders = chunks.read(folder, entry, Encoding.of_json(manifest["encoding"]))
+    field, orders = chunks.read_chunk(folder, ChunkEntry(**entry), Encoding(**manifest["encoding"]))
     for k, order in zip(entry["orders"], orders, strict=True):
         depth = (field.means @ np.array(manifest["directions"][k]))[order]
         assert (np.diff(depth) < 1e-3 * np.ptp(depth) + 1e-6).all()

@@ -95,12 +95,14 @@ def test_a_number_that_is_not_finite_is_found_in_a_chunk(tmp_path):
     given, path = make_ground_field(3, 1.0), tmp_path / "chunks/lod0_tile_00.bin"
     path.parent.mkdir()
     code = Encoding.fit([given], 1.0, 0.01)
-    entry = chunks.write_chunk(code.encode(given), np.arange(len(given))[None], path)
-    tiles = [{"chunks": [entry | {"file": "chunks/lod0_tile_00.bin", "orders": [0]}]}]
-    write_json(tmp_path / "davgswt.json", {"tiles": tiles, "encoding": code.to_dict()})
+    kept = chunks.ChunkOrders(0, [0])
+    rows, order = code.encode(given), np.arange(len(given))[None]
+    entry = chunks.write_chunk(rows, order, tmp_path, "chunks/lod0_tile_00.bin", kept)
+    tiles = [{"chunks": [vars(entry)]}]
+    write_json(tmp_path / "davgswt.json", {"tiles": tiles, "encoding": vars(code)})
     assert running.is_finite(path)
     beyond = replace(code, log_scale=[1000.0, 1.0])  # the exponential of it is no number
-    write_json(tmp_path / "davgswt.json", {"tiles": tiles, "encoding": beyond.to_dict()})
+    write_json(tmp_path / "davgswt.json", {"tiles": tiles, "encoding": vars(beyond)})
     assert not running.is_finite(path)
 
 

@@ -60,8 +60,8 @@ def test_one_level_costs_nothing(tmp_path):
 def test_orders_of_another_direction_cost_more(tmp_path):
     tiles = tile_set(1)
     good = bundled(tiles, tmp_path / "bundle")
-    away = [[0.0, 0.0, -1.0]] * len(good.manifest["directions"])
-    bad = replace(good, manifest=good.manifest | {"directions": away})  # from above only
+    away = [[0.0, 0.0, -1.0]] * len(good.manifest.directions)
+    bad = replace(good, manifest=replace(good.manifest, directions=away))  # from above only
     found = [of(shortcuts.rows(tiles, bundle), "presorting")["walker"] for bundle in (good, bad)]
     assert found[0] is None or found[0] > found[1]
 

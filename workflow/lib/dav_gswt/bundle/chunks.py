@@ -1,6 +1,16 @@
-"""Chunks: one tile at one level as the viewer's bytes, a record of 16 a splat, followed by its orders."""
+"""Chunks: one tile at one level, as the bytes that a viewer loads.
+
+A chunk of n splats and d orders is, without padding and little-endian,
+
+    offset 0        n records of 16 bytes (`encoding.RECORD`)
+    offset 16 n     d orders of n indices each: uint16 where n < 65536, else uint32
+
+An order lists the records from back to front for one viewing direction; the manifest's `orders` says, in the same
+sequence, which of its `directions` these are.
+"""
 
 import hashlib
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,36 +23,59 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 
 
+@dataclass(frozen=True)
+class ChunkOrders:
+    """Which directions a tile at one level keeps orders for: indices into the manifest's `directions`."""
+
+    level: int
+    orders: list[int]
+
+
+@dataclass(frozen=True)
+class ChunkEntry(ChunkOrders):
+    """A chunk in the manifest: its path relative to the manifest, size and digest of the file, number of splats."""
+
+    file: str
+    bytes: int
+    sha256: str
+    count: int
+
+
 def chunk_size(count: int, orders: int) -> int:
-    """Bytes of a chunk: two a splat and order, four from 65536 splats on."""
+    """Bytes of a chunk."""
     return count * (RECORD.itemsize + orders * index_type(count).itemsize)
 
 
-def write_chunk(rows: Array, order: Integer[Array, "d n"], path: Path) -> dict:
-    """Write records and orders; returns what the manifest says of the file's bytes."""
+def write_chunk(
+    rows: Array, order: Integer[Array, "d n"], folder: Path | str, file: str, kept: ChunkOrders
+) -> ChunkEntry:
+    """Write records and orders to `file` in a bundle's folder; returns the chunk's entry in the manifest."""
     data = rows.tobytes() + order.astype(index_type(len(rows))).tobytes()
-    path.write_bytes(data)
-    return {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest(), "count": len(rows)}
+    (Path(folder) / file).write_bytes(data)
+    digest = hashlib.sha256(data).hexdigest()
+    return ChunkEntry(kept.level, kept.orders, file, len(data), digest, len(rows))
 
 
-def read_chunk(folder: Path | str, entry: dict, encoding: Encoding) -> tuple[GaussianField, Integer[Array, "d n"]]:
-    """Splats (as they were rounded, nothing known of ground or doubt) and orders of one manifest entry.
+def read_chunk(
+    folder: Path | str, entry: ChunkEntry, encoding: Encoding
+) -> tuple[GaussianField, Integer[Array, "d n"]]:
+    """Read the splats of a chunk, as they were rounded, and its orders. Ground and uncertainty are not stored.
 
-    Raises: InputError: the file lies outside of the folder, is missing, has another size (looked at before anything
+    Raises: InputError: the file lies outside of the folder, is missing, has another size (checked before anything
     is read) or digest than the manifest says, or an order does not hold every splat once.
     """
     folder = Path(folder)
-    path, count, kept = folder / entry["file"], entry["count"], len(entry["orders"])
+    path, count, kept = folder / entry.file, entry.count, len(entry.orders)
     if not path.resolve().is_relative_to(folder.resolve()):
         raise InputError(f"{path}: lies outside of the bundle; make the bundle again")
     try:
         size = path.stat().st_size
-        if size != entry["bytes"] or size != chunk_size(count, kept):
-            raise InputError(f"{path}: {size} bytes where the manifest says {entry['bytes']}; make the bundle again")
+        if size != entry.bytes or size != chunk_size(count, kept):
+            raise InputError(f"{path}: {size} bytes where the manifest says {entry.bytes}; make the bundle again")
         data = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: not readable ({error.strerror}); make the bundle again") from None
-    if len(data) != size or hashlib.sha256(data).hexdigest() != entry["sha256"]:
+    if len(data) != size or hashlib.sha256(data).hexdigest() != entry.sha256:
         raise InputError(f"{path}: its digest is not the manifest's; make the bundle again")
     rows = np.frombuffer(data, RECORD, count)
     order = np.frombuffer(data, index_type(count), offset=count * RECORD.itemsize).reshape(kept, count)

@@ -1,29 +1,32 @@
-"""How many orders a tile set needs: directions are added until drawing in a neighbour's order is not seen."""
+"""How many pre-sorted orders a tile set needs: directions are added until a neighbour's order looks right."""
 
 import logging
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float, Float32
+from numpy import ndarray as Array
 
 from dav_gswt.bundle import order_directions
-from dav_gswt.bundle.chunks import chunk_size
 from dav_gswt.bundle.order_directions import TileView
 from dav_gswt.bundle.orders import DirectionRings
 from dav_gswt.field import GaussianField
-from dav_gswt.logs import progress
-from dav_gswt.tiles.build import TileSet
 
 _log = logging.getLogger(__name__)
 
-MAX_ORDERS = 33  # orders of a tile that is not deep: with its record, 82 bytes a Gaussian
-MIN_AZIMUTHS = 4  # azimuths
-AZIMUTHS = (4, 8, 16, 32, 64)  # of the table
+MAX_ORDERS = 33  # of a tile that keeps every second azimuth: with its record, 82 bytes a Gaussian
+MIN_AZIMUTHS = 4
 
 
 @dataclass(frozen=True)
 class DirectionSearchResult:
-    """Directions, and the PSNR of the finest level drawn in the order of the nearest one that a tile keeps which is not
-    deep, by elevation (`sights.ELEVATIONS`), where that is worst: half-way between two azimuths. None: no difference.
+    """Directions, and what they are good for.
+
+    Attributes:
+        rings: the directions.
+        decibels: by elevation (`order_directions.ELEVATIONS`), the PSNR of the finest level drawn in the order of the
+            nearest direction that a tile with every second azimuth keeps, half-way between two of these azimuths, where
+            it is worst. None: no difference.
     """
 
     rings: DirectionRings
@@ -33,13 +36,14 @@ class DirectionSearchResult:
 def search_directions(
     fields: list[GaussianField], side: float, wanted: float, most: int = MAX_ORDERS
 ) -> DirectionSearchResult:
-    """The fewest directions with which no sight is below `wanted` decibels, or as many as `most` allow.
+    """The fewest directions with which every view reaches `wanted` decibels, or as many as `most` allow.
 
-    Begins with a ring of FEWEST azimuths 20 degrees down, as walkers look at the ground around. Where the worst sight
-    is below, it is looked at along the kept azimuths alone: if the elevation is to blame for most of the error, a ring
-    is added at that elevation, else every ring has twice the azimuths. Views from above 45 degrees are not looked at:
-    steep sights are of the tiles about the eye, which are sorted exactly.
-    Args: fields: of the finest level; coarser ones begin where one of their discs covers a pixel.
+    Starts with a ring of MIN_AZIMUTHS azimuths 20 degrees below the horizon. While the worst view is below `wanted`, it
+    is compared with views along the kept azimuths: if the elevation causes most of the error, a ring at that elevation
+    is added, otherwise every ring gets twice the azimuths. Views steeper than 45 degrees are left out: they are of the
+    tiles about the eye, which are sorted exactly.
+
+    Args: fields: the tiles of the finest level; a coarser level is used only where its discs cover a pixel.
     """
     elevations, kept = (20.0,), MIN_AZIMUTHS
     while True:
@@ -49,81 +53,48 @@ def search_directions(
         worst = min(found.decibels, key=lambda view: _as_number(found.decibels[view]))
         if _as_number(found.decibels[worst]) >= wanted:
             return found
-        down, above = (
-            order_directions.ELEVATIONS[worst],
-            3.0 + _as_number(found.decibels[worst]),
-        )  # 3 dB: half of the error
-        taller = tuple(sorted({*elevations, down}))
-        missing = (
-            taller != elevations
-            and _as_number(measure_between_azimuths(fields, side, elevations, kept, down, halfway=False)) < above
+        elevation = order_directions.ELEVATIONS[worst]
+        half = 3.0 + _as_number(found.decibels[worst])  # of the error is 3 dB
+        more = tuple(sorted({*elevations, elevation}))
+        along_azimuths = DirectionRings(elevations, kept)
+        missing = more != elevations and (
+            _as_number(measure_psnr(fields, side, along_azimuths, elevation, halfway=False)) < half
         )
-        more = (taller, kept) if missing else (elevations, 2 * kept)
-        if len(more[0]) * more[1] + 1 > most:
-            _log.warning(
-                "orders: %.1f dB with %d directions, and no room for more", _as_number(found.decibels[worst]), most
-            )
+        elevations_next, kept_next = (more, kept) if missing else (elevations, 2 * kept)
+        if len(elevations_next) * kept_next + 1 > most:
+            decibels = _as_number(found.decibels[worst])
+            _log.warning("orders: %.1f dB with %d directions, and no room for more", decibels, most)
             return found
-        elevations, kept = more
+        elevations, kept = elevations_next, kept_next
 
 
 def measure_elevations(
     fields: list[GaussianField], side: float, elevations: tuple[float, ...], kept: int
 ) -> dict[str, float | None]:
-    """The PSNR half-way between azimuths, at the elevations looked at."""
-    return {
-        view: measure_between_azimuths(fields, side, elevations, kept, down)
-        for view, down in order_directions.ELEVATIONS.items()
-    }
+    """`measure_psnr` at each of `order_directions.ELEVATIONS`, for rings of `kept` azimuths at `elevations`."""
+    rings = DirectionRings(elevations, kept)
+    return {view: measure_psnr(fields, side, rings, down) for view, down in order_directions.ELEVATIONS.items()}
 
 
-def measure_orders(tiles: TileSet, wanted: float) -> list[dict]:
-    """One row a tile and number of azimuths, at the elevations that the set needs: what more orders are worth.
-
-    `doubtful`: of the half of the tiles that are most in doubt. `orders`, `bytes` a Gaussian with its record.
-    `{view}_db`: PSNR half-way between azimuths against the exact order; None: no difference.
-    """
-    elevations = search_directions(tiles.fields[0], tiles.side, wanted).rings.elevations
-    doubt, found = np.argsort(np.argsort(-tiles.uncertainty, kind="stable")), []
-    for tile, field in enumerate(progress(tiles.fields[0], "measure orders")):
-        for azimuths in AZIMUTHS:
-            count = len(elevations) * azimuths + 1
-            told = {
-                "tile": tile,
-                "uncertainty": float(tiles.uncertainty[tile]),
-                "doubtful": int(doubt[tile] < len(doubt) // 2),
-                "azimuths": azimuths,
-                "orders": count,
-                "bytes": chunk_size(len(field), count) / len(field),
-            }
-            errors = measure_elevations([field], tiles.side, elevations, azimuths)
-            found.append(told | {f"{view}_db": value for view, value in errors.items()})
-    return found
-
-
-def measure_between_azimuths(
-    fields: list[GaussianField],
-    side: float,
-    elevations: tuple[float, ...],
-    kept: int,
-    down: float,
-    halfway: bool = True,
+def measure_psnr(
+    fields: list[GaussianField], side: float, rings: DirectionRings, elevation: float, halfway: bool = True
 ) -> float | None:
-    """PSNR over sights at one elevation, drawn in the order of the nearest direction against their own.
+    """PSNR of views at one elevation, drawn in the order of the nearest direction, against their own order.
 
-    halfway: between two azimuths, else along the kept ones: then only the elevation errs.
+    Args: halfway: views lie half-way between two azimuths, where an order is worst; otherwise along an azimuth.
     """
-    along = DirectionRings(elevations, kept).directions()
-    pairs = []
-    for sight in order_directions.spread_views(len(fields), down, kept):
-        seen = sight if halfway else TileView(sight.tile, sight.azimuth - 180 / kept, down)
+    along, pairs = rings.directions(), []
+    for view in order_directions.spread_views(len(fields), elevation, rings.azimuths):
+        seen = view if halfway else TileView(view.tile, view.azimuth - 180 / rings.azimuths, elevation)
         pairs.append(render_in_two_orders(fields[seen.tile], side, seen, along))
     return order_directions.compute_psnr(pairs)
 
 
-def render_in_two_orders(field: GaussianField, side: float, sight: TileView, along) -> tuple:
-    """A sight in the order of the nearest of some directions, and in its own."""
-    direction, pixel = sight.direction, order_directions.pixel_size(side)
+def render_in_two_orders(
+    field: GaussianField, side: float, view: TileView, along: Float[Array, "d 3"]
+) -> tuple[Float32[Array, "h w 3"], Float32[Array, "h w 3"]]:
+    """A view drawn in the order of the nearest of some directions, and in its own."""
+    direction, pixel = view.direction, order_directions.pixel_size(side)
     best = along[int(np.argmax(along @ direction))]
     exact = order_directions.render_in_order(field, side, direction, pixel)
     same = np.array_equal(best, direction)

@@ -1,10 +1,17 @@
-"""Gaussians in 16 bytes, one texel of four 32-bit words, and by how much that errs.
+"""Gaussians as records of 16 bytes (one texel of four 32-bit words of a viewer), and the errors of that rounding.
 
-Places lie on one grid for all tiles of a bundle, of which a tile's side is a whole number of steps: two Gaussians that
-meet across a border are moved alike, wherever their tiles lie. Colours are the same from all sides, as tiles' are.
+A record is little-endian:
+
+    offset 0    3 x uint16    position: steps of the bundle's grid along x, y, z
+    offset 6    3 x uint8     scale: steps of the logarithm of each axis's standard deviation
+    offset 9    3 x uint8     rotation: x, y, z of the unit quaternion (w, x, y, z), w >= 0, about 127
+    offset 12   4 x uint8     red, green, blue (sRGB) and opacity, 0 to 255
+
+All tiles of a bundle share one grid, and a tile's side is a whole number of its steps: Gaussians that meet across a
+border move alike. Colour does not depend on the direction.
 """
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from jaxtyping import Float, Float64, Int
@@ -17,40 +24,48 @@ from dav_gswt.field import GaussianField, rgb_to_sh
 
 RECORD = np.dtype([("position", "<u2", 3), ("scale", "u1", 3), ("turn", "u1", 3), ("rgba", "u1", 4)])
 assert RECORD.itemsize == 16
-POSITION_STEPS = 65535  # steps of the grid along an axis
-MIN_STEPS_PER_TILE = 1024  # of them a tile's side is wide
-SCALE_STEPS = 255  # steps of a logarithm of a standard deviation
-MAX_COMPONENT = np.sin(np.pi / 8)  # of the smallest of the 24 turns, the largest component beside w
-ROTATION_STEPS = 127  # steps of it either way
-MIN_PIXELS = 1 / 64  # pixels: a thinner axis is as good as none, as every splat is widened by half a pixel
-MAX_TILE_SIDES = (
-    4.0  # tile sides: a longer axis is cut to that, as tiles farther away are not drawn for what reaches out of them
-)
-HALF_STEP = 0.5 / 255  # of opacity: bytes 0 and 255 stand for all up to half a step inside 0 and 1
+POSITION_STEPS = 65535  # of the grid along an axis
+MIN_STEPS_PER_TILE = 1024  # of the grid along a tile's side
+SCALE_STEPS = 255  # of a logarithm of a standard deviation
+MAX_COMPONENT = np.sin(np.pi / 8)  # largest |x|, |y|, |z| of the smallest of an ellipsoid's 24 rotations
+ROTATION_STEPS = 127  # of a component, either way
+MIN_PIXELS = 1 / 64  # a thinner axis does not show: the rasterizer widens every splat by half a pixel
+MAX_TILE_SIDES = 4.0  # longer axes are cut: a tile farther away than that is not drawn for what reaches out of it
+HALF_STEP = 0.5 / 255  # of opacity: bytes 0 and 255 decode to half a step inside 0 and 1
 
 
 @dataclass(frozen=True)
 class Encoding:
-    """position = origin + step * three 16-bit numbers; ln(deviation) = log_scale[0] + log_scale[1] * a byte;
-    turn = (w, x, y, z) with (x, y, z) = STEEPEST (byte - 127) / 127 and w = sqrt(1 - x^2 - y^2 - z^2).
+    """How the records of all chunks of a bundle are read.
+
+        position  = origin + step * (three uint16)
+        deviation = exp(log_scale[0] + log_scale[1] * byte), one an axis
+        rotation  = (w, x, y, z), each of x, y, z = sin(pi / 8) * (byte - 127) / 127, w = sqrt(1 - x^2 - y^2 - z^2)
+        colour    = byte / 255, opacity = byte / 255
+
+    Attributes:
+        origin, step: of the grid, along x, y, z.
+        log_scale: smallest natural logarithm of a standard deviation, and its step.
+        sh_degree: of the colours; always 0.
     """
 
     origin: list[float]
     step: list[float]
     log_scale: list[float]
+    sh_degree: int = 0
 
     @classmethod
     def fit(cls, parts: list[GaussianField], side: float, pixel: float) -> "Encoding":
-        """The finest grid that holds all these Gaussians; pixel: the width of one on the nearest ground in sight.
+        """The finest grid that holds all these Gaussians.
 
-        Raises: InputError: they spread over so many tile sides that a side has less than LEAST steps.
+        Args: side: of a tile. pixel: width of a pixel on the nearest visible ground.
+        Raises: InputError: the Gaussians spread so far that a tile's side has fewer than MIN_STEPS_PER_TILE steps.
         """
         places = [f.means.astype(float) for f in parts if len(f)]
         low, high = np.min([p.min(0) for p in places], 0), np.max([p.max(0) for p in places], 0)
         west, east = min(0.0, float(low[:2].min())), max(side, float(high[:2].max()))
-        many = np.floor(
-            (POSITION_STEPS - (west < 0)) * side / (east - west)
-        )  # one more where the rim is rounded outwards
+        # one step less where the western rim is rounded outwards
+        many = np.floor((POSITION_STEPS - (west < 0)) * side / (east - west))
         if many < MIN_STEPS_PER_TILE:
             raise InputError(f"tiles: a splat lies {(east - west) / side:.0f} tile sides from another; cut them again")
         step = float(side / many)
@@ -59,11 +74,11 @@ class Encoding:
         sizes = np.concatenate([f.log_scales.ravel() for f in parts]).astype(float)
         sizes = np.clip(sizes, np.log(MIN_PIXELS * pixel), np.log(MAX_TILE_SIDES * side))
         least = float(sizes.min())
-        ladder = [least, float(sizes.max() - least) / SCALE_STEPS]
-        return cls([west, west, float(low[2])], [step, step, rise], ladder)
+        log_scale = [least, float(sizes.max() - least) / SCALE_STEPS]
+        return cls([west, west, float(low[2])], [step, step, rise], log_scale)
 
     def encode(self, field: GaussianField) -> Array:
-        """The records of a field; what lies outside of the grid goes to its rim."""
+        """The records of a field. Values outside of the ranges are clipped."""
         rows = np.empty(len(field), RECORD)
         step = np.array(self.step)
         place = (field.means.astype(float) - self.origin) / np.where(step > 0, step, 1)
@@ -80,7 +95,7 @@ class Encoding:
         return rows
 
     def decode(self, rows: Array) -> GaussianField:
-        """The Gaussians of records, as the page sees them; nothing is known of ground or doubt."""
+        """The Gaussians of records. Ground and uncertainty are not stored: no ground, 0."""
         turn = (rows["turn"].astype(float) - ROTATION_STEPS) * (MAX_COMPONENT / ROTATION_STEPS)
         whole = np.sqrt(np.maximum(1 - (turn**2).sum(1, keepdims=True), 0))
         opacity = np.clip(rows["rgba"][:, 3] / 255, HALF_STEP, 1 - HALF_STEP)
@@ -94,21 +109,14 @@ class Encoding:
             np.zeros(len(rows), bool),
         )
 
-    def to_dict(self) -> dict:
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, told: dict) -> "Encoding":
-        """Of what a manifest says of it."""
-        return cls(**{own.name: told[own.name] for own in fields(cls)})
-
 
 def find_smallest_rotations(quats: Float[Array, "n 4"]) -> tuple[Float64[Array, "n 4"], Int[Array, "n 3"]]:
-    """Unit quaternions, w > 0, of the same ellipsoids whose axes are named so that they are turned least, and of each
-    new axis which old one it is.
+    """The smallest rotation of each ellipsoid, as a unit quaternion with w >= 0, and how its axes are permuted.
 
-    An ellipsoid has 24 turns, as a cube has; of q g over the cube's rotations g the one with the largest w leaves x, y
-    and z within sin(pi / 8): were x larger, a quarter turn about x would make w larger, (w + |x|) / sqrt(2).
+    An ellipsoid looks the same under 24 rotations q g, g in the rotations of the cube. The one with the largest w keeps
+    |x|, |y| and |z| within sin(pi / 8): were |x| larger, a quarter turn about x would raise w to (w + |x|) / sqrt(2).
+
+    Returns: quaternions, and for each new axis the index of the old one.
     Raises: ValueError: a quaternion of length 0.
     """
     cube = Rotation.create_group("O")
@@ -132,10 +140,14 @@ def _multiply_quaternions(p: Float[Array, "n 4"], q: Float[Array, "n 4"]) -> Flo
 
 @dataclass(frozen=True)
 class EncodingErrors:
-    """The largest difference between Gaussians and what is read back: position in world units and in pixels of the
-    nearest ground in sight, deviations in percent, the turn in degrees, channels of colour and opacity from 0 to 1.
+    """Largest differences between Gaussians and their records.
 
-    clipped: how many axes were shorter or longer than the ladder of sizes; they are no part of scale_percent.
+    Attributes:
+        position, position_pixels: in world units, and in pixels of the nearest visible ground.
+        scale_percent: of a standard deviation.
+        angle_degrees: between rotations.
+        colour, opacity: in [0, 1].
+        clipped: number of axes outside of the encoding's range of sizes; they do not count for scale_percent.
     """
 
     position: float = 0.0
@@ -148,7 +160,7 @@ class EncodingErrors:
 
     @classmethod
     def measure(cls, encoding: Encoding, field: GaussianField, rows: Array, pixel: float) -> "EncodingErrors":
-        """Those of a field's records."""
+        """The errors of a field's records."""
         back, (turn, axes) = encoding.decode(rows), find_smallest_rotations(field.quats)
         away = float(np.linalg.norm(back.means.astype(float) - field.means, axis=1).max(initial=0.0))
         sizes = np.take_along_axis(field.log_scales.astype(float), axes, 1)
@@ -167,7 +179,7 @@ class EncodingErrors:
             clipped=int((~inside).sum()),
         )
 
-    def joined(self, more: "EncodingErrors") -> "EncodingErrors":
-        """The worse of each; axes that were clipped are counted."""
+    def combine(self, more: "EncodingErrors") -> "EncodingErrors":
+        """The larger of each error, and all clipped axes."""
         worst = {name: max(value, getattr(more, name)) for name, value in asdict(self).items()}
         return EncodingErrors(**worst | {"clipped": self.clipped + more.clipped})

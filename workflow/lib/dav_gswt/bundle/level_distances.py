@@ -5,6 +5,7 @@ The reference picture is 1920 pixels and 60 degrees wide, its focal length f = 9
 
 import numpy as np
 
+from dav_gswt.bundle.manifest import LevelEntry
 from dav_gswt.errors import InputError
 
 WIDTH, FOV = 1920, 60.0
@@ -12,7 +13,7 @@ FOCAL = 0.5 * WIDTH / np.tan(np.radians(FOV / 2))  # pixels
 ASPECT = 9 / 16
 
 
-def compute_levels(scales: list[float], pixels: float, band: float) -> list[dict]:
+def compute_levels(scales: list[float], pixels: float, band: float) -> list[LevelEntry]:
     """The manifest's levels from their mean scales, finest first.
 
     Level l gives way to l + 1 at the distance D_l = scale_{l+1} f / pixels, where the coarser one's mean standard
@@ -27,10 +28,9 @@ def compute_levels(scales: list[float], pixels: float, band: float) -> list[dict
             )
     reach = [float(scale * FOCAL / pixels) for scale in scales[1:]]
     table = [
-        {"level": level, "mean_scale": scale, "distance": far, "band": band * far}
-        for level, (scale, far) in enumerate(zip(scales, reach, strict=False))
+        LevelEntry(level, scale, far, band * far) for level, (scale, far) in enumerate(zip(scales, reach, strict=False))
     ]
-    return [*table, {"level": len(scales) - 1, "mean_scale": scales[-1], "distance": None, "band": 0.0}]
+    return [*table, LevelEntry(len(scales) - 1, scales[-1], None, 0.0)]
 
 
 def compute_eye_floor(spacing: float, pixels: float, pitch: float = 30.0) -> float:

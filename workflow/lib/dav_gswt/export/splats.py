@@ -13,12 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from dav_gswt.bundle import gswt
-from dav_gswt.bundle.fidelity import arrange_torus
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, concatenate_fields, write_field
 from dav_gswt.files import atomic_folder
 from dav_gswt.logs import progress
-from dav_gswt.tiles.layout import EDGES
+from dav_gswt.tiles.layout import EDGES, arrange_torus
 
 PACKAGE = "@playcanvas/splat-transform@2.7.1"
 TILES_PER_ROW = 4  # tiles

@@ -7,7 +7,6 @@ from jaxtyping import Float, Integer
 from numpy import ndarray as Array
 
 from dav_gswt.bundle import store as bundles
-from dav_gswt.bundle.fidelity import arrange_torus
 from dav_gswt.errors import InputError
 from dav_gswt.export.splats import TILES_PER_ROW
 from dav_gswt.field import GaussianField
@@ -25,7 +24,7 @@ from dav_gswt.inspect.options import ViewOptions
 from dav_gswt.inspect.scene import ColourBar, ColourKey, Label, Layer, Scene, move_layer
 from dav_gswt.tiles import store
 from dav_gswt.tiles.build import TileSet
-from dav_gswt.tiles.layout import EDGES, LABELS
+from dav_gswt.tiles.layout import EDGES, LABELS, arrange_torus
 
 GAP, LETTER = 0.2, 0.1  # tile sides
 CUT_WIDTH, MIN_CUT_WIDTH, CUT_LIFT = (
@@ -53,7 +52,7 @@ def build_bundle(path: Path, asked: ViewOptions) -> Scene:
         raise InputError(f"{path}: bundles are read by {SCHEMA}, which is not there; install from a checkout")
     found = bundles.read_bundle(path, SCHEMA)
     with result_files.blaming(path / "davgswt.json"):
-        side = float(found.manifest["tile_side"])
+        side = found.manifest.tile_side
     return arrange_tiles(str(path), found.fields(), side, None, asked)
 
 

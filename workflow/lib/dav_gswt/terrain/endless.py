@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
+from dav_gswt.bundle.manifest import TileSetInfo
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.field import GaussianField
 from dav_gswt.raster.interface import RIM
@@ -54,32 +55,32 @@ class EndlessTerrain:
 def terrain_from_bundle(bundle: Bundle, surface: dict[str, Any]) -> EndlessTerrain:
     """The Gaussians of a bundle, as they were quantized, on the surface that the config's `heights` describes.
 
-    Raises: InputError: see `bundle.chunks.read`, `heights.surface_from_config`.
+    Raises: InputError: see `bundle.chunks.read_chunk`, `heights.surface_from_config`.
     """
     return terrain_from_fields(bundle.fields(), bundle.manifest, surface)
 
 
 def terrain_from_fields(
-    tiles: list[list[GaussianField]], manifest: dict[str, Any], surface: dict[str, Any]
+    tiles: list[list[GaussianField]], manifest: TileSetInfo, surface: dict[str, Any]
 ) -> EndlessTerrain:
     """tiles[level][tile] with the distances of a manifest, on the surface that the config's `heights` describes.
 
     Raises: InputError: as `heights.surface_from_config`.
     """
-    levels, entries, side = manifest["levels"], manifest["tiles"], manifest["tile_side"]
+    levels, entries, side = manifest.levels, manifest.tiles, manifest.tile_side
     largest = max(float(np.exp(f.log_scales.max(initial=-np.inf))) for row in tiles for f in row)
     beyond = (RIM - 3) * largest  # the manifest's heights reach three deviations beyond the centres
     return EndlessTerrain(
         tiles={(level, tile): f for level, row in enumerate(tiles) for tile, f in enumerate(row)},
         side=side,
-        switches=[np.inf if level["distance"] is None else level["distance"] for level in levels],
-        bands=[level["band"] for level in levels],
-        directions=np.array(manifest["directions"], float),
-        tile_orders=[entry["chunks"][0]["orders"] for entry in entries],
-        z=(min(entry["z"][0] for entry in entries) - beyond, max(entry["z"][1] for entry in entries) + beyond),
+        switches=[np.inf if level.distance is None else level.distance for level in levels],
+        bands=[level.band for level in levels],
+        directions=np.array(manifest.directions, float),
+        tile_orders=[entry.chunks[0].orders for entry in entries],
+        z=(min(entry.z[0] for entry in entries) - beyond, max(entry.z[1] for entry in entries) + beyond),
         overhang=RIM * largest,
         variants=len(tiles[0]) // 16,
-        salt=manifest["salt"],
-        near=NEAR * manifest["eye_floor"],
+        salt=manifest.salt,
+        near=NEAR * manifest.eye_floor,
         heights=surface_from_config(surface, side),
     )

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
+from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.terrain import splats
@@ -60,11 +61,11 @@ def shot_camera(shot: Shot, terrain: EndlessTerrain, floor: float, width: int, h
 
 
 def render_shot(
-    terrain: EndlessTerrain, shot: Shot, manifest: dict[str, Any], width: int, height: int
+    terrain: EndlessTerrain, shot: Shot, manifest: Manifest, width: int, height: int
 ) -> Float32[Array, "h w 3"]:
     """Render a shot with the eye floor, sky and ground colour of the bundle's manifest."""
-    camera = shot_camera(shot, terrain, manifest["eye_floor"], width, height)
-    return render_view(terrain, camera, manifest["sky"], manifest["ground_colour"])
+    camera = shot_camera(shot, terrain, manifest.eye_floor, width, height)
+    return render_view(terrain, camera, vars(manifest.sky), manifest.ground_colour)
 
 
 def render_view(

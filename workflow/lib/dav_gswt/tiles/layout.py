@@ -30,6 +30,7 @@ MAX_BLOCK, MIN_PLACES = 4, 32  # a block is at most so many cells, or a tile's s
 SMALLEST_DRAWN = 4  # cells of the coarsest level that a tile is wide at least then: a coarser one is never drawn
 SMALLEST_LEVEL = 2  # and in any case: the least that has a slope
 EDGES = 16  # tiles of one centre variant: two colours on each of four sides
+TORUS = (0, 0, 1, 1)  # edge colours along a torus of sixteen tiles: every pair of neighbours occurs once
 
 
 @dataclass(frozen=True)
@@ -125,6 +126,16 @@ def _choose_side(exemplar: int, levels: int, share: float) -> int:
 def edge_colours(tile: int) -> tuple[int, int, int, int]:
     """Edge colours (W, N, E, S) of a tile number 16 c + 8 W + 4 N + 2 E + S."""
     return tile >> 3 & 1, tile >> 2 & 1, tile >> 1 & 1, tile & 1
+
+
+def arrange_torus(variant: int) -> Int[Array, "6 6"]:
+    """Tile numbers of a variant's sixteen tiles, four by four so that neighbours' edges match, with a ring of the same
+    around them. Row 0 is in the south.
+    """
+    lines = np.array(TORUS)[np.arange(-1, 6) % len(TORUS)]
+    west, south = np.meshgrid(lines[:-1], lines[:-1])
+    east, north = np.meshgrid(lines[1:], lines[1:])
+    return EDGES * variant + 8 * west + 4 * north + 2 * east + south
 
 
 def label_shifts(layout: Layout, places: PatchPlaces, tile: int) -> Int[Array, "9 2"]:

@@ -80,7 +80,7 @@ def _equal_splat_cases() -> list[Case]:
 
 
 def _switch_distance(scale: float) -> float:
-    return level_distances.compute_levels([0.5 * scale, scale], 1.0, 0.1)[0]["distance"]
+    return level_distances.compute_levels([0.5 * scale, scale], 1.0, 0.1)[0].distance
 
 
 def _shape_cases() -> list[Case]:

@@ -13,6 +13,7 @@ import yaml
 from plyfile import PlyData
 
 from dav_gswt.bundle import chunks
+from dav_gswt.bundle.chunks import ChunkEntry
 from dav_gswt.bundle.encoding import Encoding
 from dav_gswt.cli.log_filter import Narrator
 from dav_gswt.files import atomic_folder, read_json, write_json
@@ -102,7 +103,7 @@ def _is_chunk_finite(path: Path) -> bool:
     manifest = read_json(path.parents[1] / "davgswt.json")
     entries = [chunk for tile in manifest["tiles"] for chunk in tile["chunks"]]
     entry = next(entry for entry in entries if entry["file"] == f"chunks/{path.name}")
-    field, _ = chunks.read_chunk(path.parents[1], entry, Encoding.from_dict(manifest["encoding"]))
+    field, _ = chunks.read_chunk(path.parents[1], ChunkEntry(**entry), Encoding(**manifest["encoding"]))
     with np.errstate(over="ignore"):
         deviations = np.exp(field.log_scales)
     return all(np.isfinite(part).all() for part in (field.means, deviations, field.quats, field.opacity_logits))

@@ -44,8 +44,9 @@ def round_trip(side: float = 1.0) -> GaussianField:
     field = make_splats(side)
     code = encoding.Encoding.fit([field], side, side / PIXELS)
     with TemporaryDirectory() as folder:
-        entry = chunks.write_chunk(code.encode(field), np.empty((0, COUNT), np.uint16), Path(folder, "chunk.bin"))
-        return chunks.read_chunk(folder, entry | {"file": "chunk.bin", "orders": []}, code)[0]
+        rows, none = code.encode(field), np.empty((0, COUNT), np.uint16)
+        entry = chunks.write_chunk(rows, none, folder, "chunk.bin", chunks.ChunkOrders(0, []))
+        return chunks.read_chunk(folder, entry, code)[0]
 
 
 def _all_splats(along: Array | None = None, at: str = "all splats") -> list[Case]:

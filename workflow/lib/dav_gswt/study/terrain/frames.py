@@ -75,10 +75,10 @@ def of_library(bundle: Bundle, asked: Asked) -> list[dict]:
         meters = []
         for shot in asked.shots():
             meters.append(FrameTiming())
-            camera = stills.shot_camera(shot, terrain, told["eye_floor"], asked.width, asked.height)
+            camera = stills.shot_camera(shot, terrain, told.eye_floor, asked.width, asked.height)
             with meters[-1].measure("update"):
                 coarser = visibility.coarsen_to_budget(terrain, camera, budget)
-            stills.render_view(coarser, camera, told["sky"], told["ground_colour"], timing=meters[-1])
+            stills.render_view(coarser, camera, vars(told.sky), told.ground_colour, timing=meters[-1])
         times = {part: [meter.milliseconds[part] for meter in meters] for part in PARTS}
         rows.append(
             _row(asked, budget, times, [meter.gaussians for meter in meters], len(meters)) | _about(LIBRARY, "")

@@ -50,8 +50,8 @@ def _pairs(tiles: TileSet, bundle: Bundle, shot: Shot) -> list[tuple[Picture, Pi
     cut = replace(endless.terrain_from_fields(tiles.fields, told, flat), reach=REACH)
 
     def drawn(terrain: EndlessTerrain, exact: bool) -> Picture:
-        camera = stills.shot_camera(shot, terrain, told["eye_floor"], WIDTH, HEIGHT)
-        return stills.render_view(terrain, camera, told["sky"], told["ground_colour"], exact)
+        camera = stills.shot_camera(shot, terrain, told.eye_floor, WIDTH, HEIGHT)
+        return stills.render_view(terrain, camera, vars(told.sky), told.ground_colour, exact)
 
     page, sorted_, levels, reference = (
         drawn(rounded, False),

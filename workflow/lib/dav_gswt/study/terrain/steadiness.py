@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
+from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.logs import progress
 from dav_gswt.terrain import stills
@@ -43,12 +44,12 @@ def _to_border(at: Float[Array, "2"], ahead: Float[Array, "2"]) -> float:
 
 
 def rows(
-    terrain: EndlessTerrain, manifest: dict, count: int, length: float, width: int, height: int, budget: int
+    terrain: EndlessTerrain, manifest: Manifest, count: int, length: float, width: int, height: int, budget: int
 ) -> list[dict]:
     """A row a pair of frames: the largest and the mean difference of a pixel, in 8-bit steps, in pre-sorted orders
     (`largest`, `mean`) and sorted exactly (`exact_largest`, `exact_mean`); border: between its frames the eye enters
     another cell. budget: at most so many Gaussians are in view, in both frames at one coarseness."""
-    floor, found = manifest["eye_floor"], []
+    floor, found = manifest.eye_floor, []
     for k, shots in enumerate(progress(pairs(count, length, STEP * floor / terrain.side), "measure steadiness")):
         cameras = [stills.shot_camera(shot, terrain, floor, width, height) for shot in shots]
         row = {"pair": k, "east": shots[0].at[0], "north": shots[0].at[1], "border": k % 2}
@@ -57,8 +58,8 @@ def rows(
     return found
 
 
-def _changes(terrain: EndlessTerrain, manifest: dict, cameras: list[Camera], exact: bool) -> dict:
-    told = manifest["sky"], manifest["ground_colour"]
+def _changes(terrain: EndlessTerrain, manifest: Manifest, cameras: list[Camera], exact: bool) -> dict:
+    told = vars(manifest.sky), manifest.ground_colour
     before, after = (stills.render_view(terrain, camera, *told, exact=exact) for camera in cameras)
     change, name = 255 * np.abs(after - before), "exact_" if exact else ""
     return {f"{name}largest": float(change.max()), f"{name}mean": float(change.mean())}

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dav_gswt.bundle import fidelity
 from dav_gswt.reconstruction import discs
 from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.study.terrain import level_fidelity
 from dav_gswt.tiles.build import TileSet
 
 CELLS, SPACING = 16, 0.25
@@ -28,17 +28,17 @@ def tile_set(fields):
 
 
 def test_the_torus_holds_every_tile_once_and_colours_meet():
-    torus = fidelity.arrange_torus(0)
+    torus = level_fidelity.arrange_torus(0)
     assert sorted(torus[1:-1, 1:-1].ravel()) == list(range(16))
     np.testing.assert_array_equal(torus[:, :-1] >> 1 & 1, torus[:, 1:] >> 3 & 1)  # E and W
     np.testing.assert_array_equal(torus[:-1] >> 2 & 1, torus[1:] & 1)  # N and S
-    np.testing.assert_array_equal(fidelity.arrange_torus(2), torus + 32)
+    np.testing.assert_array_equal(level_fidelity.arrange_torus(2), torus + 32)
 
 
 def test_a_level_that_is_too_bright_is_wrong_by_that_much():
     fine = [plain(CELLS, 0.5) for _ in range(16)]
     coarse = [plain(CELLS // 2, 0.6) for _ in range(16)]
-    rows = fidelity.measure_levels(tile_set([fine, coarse]), 1.0, 0.1)
+    rows = level_fidelity.measure_levels(tile_set([fine, coarse]), 1.0, 0.1)
     assert [(r["level"], r["tile"]) for r in rows] == [(level, tile) for level in (0, 1) for tile in range(16)]
     for row in rows[:16]:
         assert row["oblique_db"] is row["walker_change"] is None and row["distance"] == 0
@@ -56,19 +56,19 @@ def test_errors_are_those_of_the_tile_and_of_what_is_near_its_cut():
     x = coarse[5].means[:, 0]
     dark = coarse[5].sh - np.float32(0.5) * (np.abs(x - SIDE / 2) < 0.2 * SIDE)[:, None, None]
     coarse[5] = replace(coarse[5], sh=dark)
-    told = fidelity.measure_errors(tile_set([fine, coarse]), 1, 200.0)
+    told = level_fidelity.measure_errors(tile_set([fine, coarse]), 1, 200.0)
     worst = min((t for t in told if told[t]["db"] is not None), key=lambda t: told[t]["db"])
     assert worst[0] == 5 and told[5, "oblique"]["cut_db"] < told[5, "oblique"]["db"] - 1
 
 
 def test_a_level_that_equals_the_finest_changes_nothing():
     fine = [plain(CELLS, 0.1 + t / 20) for t in range(16)]
-    told = fidelity.measure_errors(tile_set([fine, fine]), 1, 200.0)
+    told = level_fidelity.measure_errors(tile_set([fine, fine]), 1, 200.0)
     assert len(told) == 32 and all(t["change"] == 0 and t["db"] is None for t in told.values())
 
 
 def test_each_variant_is_measured_by_itself():
     fine = [plain(CELLS, 0.5) for _ in range(32)]
     other = [replace(f, sh=f.sh + np.float32(0.1 * (t >= 16))) for t, f in enumerate(fine)]
-    told = fidelity.measure_errors(tile_set([fine, other]), 1, 200.0)
+    told = level_fidelity.measure_errors(tile_set([fine, other]), 1, 200.0)
     assert told[3, "oblique"]["change"] == 0 and told[19, "oblique"]["change"] > 5

@@ -22,9 +22,8 @@ from dav_gswt.images.metrics import mse_to_psnr
 from dav_gswt.logs import progress
 from dav_gswt.raster import Rasterizer, to_raster_arrays
 from dav_gswt.tiles.build import TileSet
-from dav_gswt.tiles.layout import EDGES
+from dav_gswt.tiles.layout import EDGES, TORUS, arrange_torus
 
-LINES = (0, 0, 1, 1)  # colours of the torus's lines: each pair of neighbours comes once, so every tile does
 ELEVATIONS = {"oblique": np.radians(45.0), "walker": np.arcsin(0.1)}  # a walker's eye is at a tenth of the distance
 AZIMUTH = np.radians(25.0)  # of the eye: along no row of cells
 ROOM = 1.2  # width of the picture over that of the sixteen tiles
@@ -41,7 +40,7 @@ def measure_levels(tiles: TileSet, pixels: float, band: float) -> list[dict]:
     table = level_distances.compute_levels([mean_scale(level) for level in tiles.fields], pixels, band)
     found = []
     for level, fields in enumerate(progress(tiles.fields, "measure levels")):
-        distance = table[level - 1]["distance"] if level else 0.0
+        distance = (table[level - 1].distance or 0.0) if level else 0.0
         errors = measure_errors(tiles, level, distance) if level else {}
         for tile, field in enumerate(fields):
             row = {"tile": tile, "level": level, "mean_scale": mean_scale([field]), "count": len(field)}
@@ -70,14 +69,6 @@ def measure_errors(tiles: TileSet, level: int, distance: float) -> dict[tuple[in
     return found
 
 
-def arrange_torus(variant: int) -> Int[Array, "6 6"]:
-    """Tile numbers of the torus's sixteen cells, row 0 in the south, and a ring of the same around them."""
-    lines = np.array(LINES)[np.arange(-1, 6) % len(LINES)]
-    west, south = np.meshgrid(lines[:-1], lines[:-1])
-    east, north = np.meshgrid(lines[1:], lines[1:])
-    return EDGES * variant + 8 * west + 4 * north + 2 * east + south
-
-
 def join_tiles(fields: list[GaussianField], torus: Int[Array, "6 6"], side: float) -> GaussianField:
     """Tiles side by side; the south-western corner of the sixteen is the origin."""
     parts = []
@@ -99,7 +90,7 @@ def _camera(side: float, distance: float, elevation: float, height: float) -> Ca
     """From so far away onto the middle of the sixteen tiles, at the reference picture's focal length."""
     middle = np.array([2 * side, 2 * side, height])
     flat = np.cos(elevation) * np.array([np.cos(AZIMUTH), np.sin(AZIMUTH)])
-    width = max(8, int(np.ceil(ROOM * 2**0.5 * len(LINES) * side * level_distances.FOCAL / distance)))
+    width = max(8, int(np.ceil(ROOM * 2**0.5 * len(TORUS) * side * level_distances.FOCAL / distance)))
     lower = max(4, int(np.ceil(width * np.sin(elevation))))
     fov = 2 * np.degrees(np.arctan(0.5 * width / level_distances.FOCAL))
     return cameras.pinhole(middle + distance * np.array([*flat, np.sin(elevation)]), middle, width, lower, fov)
@@ -114,7 +105,7 @@ def _find_tiles(
     with np.errstate(divide="ignore", invalid="ignore"):
         t = (height - origin[..., 2]) / step[..., 2]
         x, y = (origin[..., i] + t * step[..., i] for i in (0, 1))
-        inside = (t > 0) & (np.minimum(x, y) >= 0) & (np.maximum(x, y) < len(LINES) * tiles.side)
+        inside = (t > 0) & (np.minimum(x, y) >= 0) & (np.maximum(x, y) < len(TORUS) * tiles.side)
     x, y = np.where(inside, x, 0.0) / tiles.side, np.where(inside, y, 0.0) / tiles.side
     tile = torus[y.astype(int) + 1, x.astype(int) + 1]
     size, n = (1, 2 * near + 1, 2 * near + 1), tiles.labels.shape[1]
