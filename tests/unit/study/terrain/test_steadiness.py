@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from fixtures.terrains import MAGENTA, SIDE, SKY, stony_terrain
+from fixtures.terrains import MAGENTA, SIDE, manifest_of, stony_terrain
 
 from dav_gswt.study.terrain import steadiness
 from dav_gswt.terrain import draw_order
 
 BUDGET = 10**6
-TOLD = {"eye_floor": 1.0, "sky": SKY, "ground_colour": MAGENTA}
+MANIFEST = manifest_of(eye_floor=1.0, ground_colour=MAGENTA)
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def test_every_second_pair_of_frames_lies_across_a_border():
 
 
 def test_a_slow_walk_in_pre_sorted_orders_jumps_no_more_than_twice_as_far(stony):
-    found = steadiness.rows(stony, TOLD, 6, 2.0, 96, 54, BUDGET)
+    found = steadiness.rows(stony, MANIFEST, 6, 2.0, 96, 54, BUDGET)
     assert all(row["exact_largest"] > 0 for row in found)
     assert steadiness.worst(found) < steadiness.MOST
 
@@ -33,9 +33,9 @@ def test_a_jump_is_found(stony, monkeypatch):
     """Orders that turn about from one frame to the next."""
     turns = iter(range(10**6))
     monkeypatch.setattr(draw_order, "nearest_order", lambda directions, kept, *_: next(turns) * 5 % len(kept))
-    assert steadiness.worst(steadiness.rows(stony, TOLD, 2, 1.0, 96, 54, BUDGET)) > steadiness.MOST
+    assert steadiness.worst(steadiness.rows(stony, MANIFEST, 2, 1.0, 96, 54, BUDGET)) > steadiness.MOST
 
 
 def test_the_way_is_counted_in_tiles(stony):
-    (first, *_) = steadiness.rows(stony, TOLD, 2, 1.0, 16, 9, BUDGET)
+    (first, *_) = steadiness.rows(stony, MANIFEST, 2, 1.0, 16, 9, BUDGET)
     assert (first["east"], first["north"]) == (0.5, 0.5) and stony.side == SIDE
