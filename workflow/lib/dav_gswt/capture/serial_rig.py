@@ -34,7 +34,7 @@ POLL = 0.05  # seconds between queries of the position
 
 @dataclass(frozen=True)
 class RigSettings:
-    """The `rig` entry of a scene; config/README.md describes its keys."""
+    """The `rig` entry of a scene; docs/reference/config.md describes its keys."""
 
     port: str
     inbox: Path
@@ -66,7 +66,7 @@ def take_photos(site: Site, requested: list[RequestedPose]) -> None:
     camera, or a dry run.
     """
     if "rig" not in site.scene:
-        raise InputError(f"config: scenes.{site.name}.rig: the agent serial needs it (config/README.md has its keys)")
+        raise InputError(f"config: scenes.{site.name}.rig: the agent serial needs it (see docs/reference/config.md)")
     settings = RigSettings.from_config(site.scene["rig"])
     inbox.list_photos(settings.inbox)  # raises if the folder does not exist
     mount = settings.build_mount(site.frame)

@@ -19,7 +19,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
 
 EXTRA = "transformers==5.23.0"
-HELP = "config/README.md says what it must hold"
+HELP = "docs/reference/config.md says what it must hold"
 TYPES = "sam2", "sam2_video"  # the published folders are of the second: the same network, and one for videos
 MEAN, SPREAD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)  # of its pictures
 POINTS = 32  # a side of the grid

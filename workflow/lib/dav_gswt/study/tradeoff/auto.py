@@ -83,7 +83,7 @@ def text(rows: list[dict]) -> str:
         "# Only what the scene requires",
         "Made by `snakemake docs/research/results/auto.md` from `docs/research/data/auto.csv`; "
         "do not edit. What `auto` chose instead of fixed "
-        f"settings (quality `{first['fixed_quality']}`, all rounds, all pre-sorted orders; see config/README.md), "
+        f"settings (quality `{first['fixed_quality']}`, all rounds, all pre-sorted orders), "
         f"seed {first['seed']:.0f}, on {first['cores']:.0f} cores of {first['processor']}: seconds of whole "
         "jobs from the start views to the bundle, without the taking of photos. Wanted is at least a third less time "
         f"for at most {MOST_DB:g} dB and {MOST_LPIPS:g} LPIPS. How many candidates are scored is not chosen by itself.",
