@@ -18,7 +18,6 @@ from dav_gswt.geometry import cameras
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
 from dav_gswt.photos.capture_record import read_capture_record, write_capture_record
-from dav_gswt.photos.sfm import localization
 from dav_gswt.photos.synthetic import scene as synthetic
 from dav_gswt.photos.training_views import read_captured_views
 
@@ -191,7 +190,7 @@ def drop(site, places, monkeypatch):
     for i, name in enumerate(places):
         os.utime(picture(folder / name, 0.1 * i), (0, 0))
     at_places = {name: value if value is None else at(value) for name, value in places.items()}
-    monkeypatch.setattr(localization, "localize_photos", lambda photos, paths: [at_places[p.name] for p in paths])
+    monkeypatch.setattr(drop_folder, "localize_photos", lambda photos, paths: [at_places[p.name] for p in paths])
 
 
 def test_dropped_photos_go_to_the_poses_that_they_were_taken_for(site, monkeypatch, caplog):
