@@ -25,13 +25,14 @@ LONGEST, OFTEN = 120, 0.05  # seconds to wait for the page, between looks
 SELDOM = 20  # looks for a reply, for one at the memory
 REST = 30  # seconds: a browser collects garbage when it likes, on a quiet machine late
 SHOW = """(async () => {
-  if (!window.davgswt) return null;
-  await davgswt.ready;
+  if (document.readyState !== "complete" || location.protocol === "about:") return null;
+  const { ready, viewer } = await import("./main.js");
+  await ready;
   for (const yaw of [60, 150, 240, 330]) {
-    davgswt.set({ yaw });
-    await davgswt.settle();
+    viewer.setPlace({ yaw });
+    await viewer.settle();
   }
-  return davgswt.state.count;
+  return viewer.state().count;
 })()"""
 
 

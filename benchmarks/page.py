@@ -18,27 +18,28 @@ GROUND = bundles.Ground(discs=100, levels=3, speckle=20)  # 16 tiles x (100^2 + 
 VISITS = 5
 TARGETS = {"terrain_update_ms": 4.0}
 LOAD = """async () => {
-  while (!window.davgswt) await new Promise(done => setTimeout(done, 5));
-  await davgswt.ready;
+  const { ready } = await import("./main.js");
+  await ready;
   return performance.now();
 }"""
 UPDATE = """async hills => {
   // what the worker does for each view, timed here: a walk on a fixed path, 97 x 97 cells about the eye
-  const { createUpdate } = await import("./update.js");
-  const { createHeights } = await import("./heights.js");
-  const { cameraOf, createWalker } = await import("./walk.js");
+  const { createFrameBuilder } = await import("./worker/frame_builder.js");
+  const { createHeights } = await import("./terrain/heights.js");
+  const { cameraAt } = await import("./terrain/camera.js");
+  const { createWalker } = await import("./ui/walker.js");
   const manifest = await (await fetch("davgswt.json")).json();
   const side = manifest.tile_side;
   const surface = { kind: "hills", height: 3 * side, wavelength: 20 * side, octaves: 4, salt: 1 };
-  const heights = createHeights(hills ? surface : undefined), update = createUpdate(manifest, heights);
+  const heights = createHeights(hills ? surface : undefined), builder = createFrameBuilder(manifest, heights);
   for (const { tile, chunks } of manifest.tiles) for (const { level, count, file } of chunks) {
-    update.add({ tile, level, count, buffer: await (await fetch(file)).arrayBuffer() });
+    builder.add({ tile, level, count, buffer: await (await fetch(file)).arrayBuffer() });
   }
   const times = { update: [], sort: [], both: [] };
   let seen;
   for (let k = 0; k < 160; k++) {
     const place = { eye: 1, pitch: -8, yaw: 30 * Math.sin(k / 20), x: 0.05 * k * side, y: 0.02 * k * side };
-    seen = update.update(cameraOf(createWalker(manifest, place), 1920, 1080, heights), 1e6, false);
+    seen = builder.build(cameraAt(createWalker(manifest, place), 1920, 1080, heights), 1e6, false);
     if (k < 40) continue;
     const { update: chosen, sort } = seen.milliseconds;
     for (const [name, t] of [["update", chosen], ["sort", sort], ["both", chosen + sort]]) times[name].push(t);
@@ -46,12 +47,13 @@ UPDATE = """async hills => {
   return { times, tiles: seen.cells.length, count: seen.count, near: seen.near.length };
 }"""
 DRAW = """async () => {
-  await davgswt.settle();
+  const { viewer } = await import("./main.js");
+  await viewer.settle();
   const gl = document.getElementById("picture").getContext("webgl2"), pixel = new Uint8Array(4);
   const start = performance.now();
-  davgswt.frame();
+  viewer.drawFrame();
   gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
-  return [performance.now() - start, davgswt.state.count];
+  return [performance.now() - start, viewer.state().count];
 }"""
 
 

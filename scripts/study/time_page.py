@@ -6,9 +6,10 @@ from dav_gswt.files import read_json
 from dav_gswt.logs import logging_to
 from dav_gswt.study import csv_tables
 from dav_gswt.study.terrain import frames
+from dav_gswt.terrain import page
 
 with logging_to(snakemake.log[0]):
     given = snakemake.input
-    bundle, viewer = Path(given.manifest).parent, Path(given.viewer[0]).parent
+    bundle, viewer = Path(given.manifest).parent, page.find_viewer(given.viewer)
     rows = frames.of_page(bundle, viewer, read_json(given.manifest), frames.Asked(**snakemake.params.asked))
     csv_tables.write_table(snakemake.output.table, rows)

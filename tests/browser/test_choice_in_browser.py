@@ -10,9 +10,9 @@ def test_integers_are_those_shared_with_the_library(visit, plain):
     page = visit().open(f"{plain}?still").page
     computed = page.evaluate(
         """async cells => {
-          const { hashed, tileAt } = await import("./choice.js");
+          const { hashCell, tileAt } = await import("./terrain/choice.js");
           return cells.map(({ i, j, salt, variants }) => ({ i, j, salt, variants,
-            hashes: [0, 1, 2].map(axis => hashed(i, j, axis, salt)), tile: tileAt(i, j, salt, variants) }));
+            hashes: [0, 1, 2].map(axis => hashCell(i, j, axis, salt)), tile: tileAt(i, j, salt, variants) }));
         }""",
         GOLDEN,
     )

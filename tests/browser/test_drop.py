@@ -84,12 +84,12 @@ def test_the_page_rounds_a_set_as_the_library_does(visit, plain):
     page = visit(160, 100).open(f"{plain}?still").page
     told, found = page.evaluate(
         """async sets => {
-          const { encodingOf, writeRecords } = await import("./rounding.js");
+          const { fitEncoding, writeRecords } = await import("./data/quantize.js");
           const made = sets.map(([paint, ...rest]) => {
             const [centres, logScales, turns] = rest.map(list => new Float32Array(list));
             return { count: paint.length / 4, paint: new Uint8Array(paint), centres, logScales, turns };
           });
-          const encoding = encodingOf(made, 4, 0.01);
+          const encoding = fitEncoding(made, 4, 0.01);
           return [encoding, made.map(one => {
             const out = new ArrayBuffer(16 * one.count);
             writeRecords(out, one, encoding);
@@ -127,7 +127,7 @@ def test_a_folder_is_found_wherever_its_manifest_lies(visit, plain):
     seen = visit(160, 100).open(f"{plain}?still")
     found = seen.page.evaluate(
         """async () => {
-          const { sourceOf } = await import("./drop.js");
+          const { sourceOf } = await import("./ui/drop.js");
           const bytes = (n) => async () => new ArrayBuffer(n);
           const files = new Map([["a/b/davgswt.json", bytes(1)], ["a/b/chunks/x.bin", bytes(5)], ["c.txt", bytes(9)]]);
           const source = await sourceOf(files);
@@ -192,9 +192,9 @@ def test_a_dropped_fly_path_is_played(visit, plain):
     place = dict(eye=2.0, yaw=20.0, pitch=-30.0)
     path = [dict(seconds=0.0, x=0.0, y=0.0, **place), dict(seconds=0.3, x=8.0, y=4.0, **place)]
     drop(seen, "flight.json", json.dumps({"format": "davgswt-flight", "path": path}).encode())
-    seen.until("davgswt.flight.path.length === 2")
-    seen.page.evaluate("davgswt.flight.play()")
-    seen.until("davgswt.state.x === 8 && davgswt.state.y === 4 && davgswt.flight.mode === 'rest'")
+    seen.until("davgswt.flyPath.path.length === 2")
+    seen.page.evaluate("davgswt.flyPath.play()")
+    seen.until("davgswt.state.x === 8 && davgswt.state.y === 4 && davgswt.flyPath.mode === 'rest'")
 
 
 def test_a_broken_fly_path_is_refused(visit, plain):

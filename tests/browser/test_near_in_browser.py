@@ -13,14 +13,15 @@ SIDE, COUNT, NEAR = 4.0, 3000, 0.05
 DEVIATIONS = np.geomspace(0.005, 0.5, 16)
 SURFACES = {"flat": {"kind": "flat"}, "hills": {"kind": "hills", "height": 1.0, "wavelength": 3.0}}
 LOOK = """async ({ surface, side, near, deviations, centres, sizes, cameras }) => {
-  const { createNear } = await import("./near.js"), { createHeights } = await import("./heights.js");
+  const { createNearSorter } = await import("./worker/near_sort.js");
+  const { createHeights } = await import("./terrain/heights.js");
   const { height = 0, wavelength = 1 } = surface; // in tile sides
   const heights = createHeights({ ...surface, height: height * side, wavelength: wavelength * side });
   const count = sizes.length, cell = { di: 0, dj: 0, tile: 0, lo: 0, hi: 0, whole: true, count };
   const entries = Uint32Array.from({ length: count }, (_, k) => k);
   const chunk = { centres: new Float32Array(centres), sizes: new Uint8Array(sizes), entries, count };
-  const nearOrder = createNear({ get: () => chunk }, { side, near, deviations, heights });
-  return cameras.map(camera => Array.from(nearOrder([cell], camera, {}), entry => entry & 0x0fffffff));
+  const sortNear = createNearSorter({ get: () => chunk }, { side, near, deviations, heights });
+  return cameras.map(camera => Array.from(sortNear([cell], camera, {}), entry => entry & 0x0fffffff));
 }"""
 
 

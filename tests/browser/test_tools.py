@@ -67,12 +67,12 @@ def test_a_walk_is_recorded_played_and_saved(visit, plain):
     seen.page.keyboard.down("w")
     seen.until("davgswt.state.x > 3.3")
     seen.page.keyboard.up("w")
-    seen.until("davgswt.flight.path.length > 2")
+    seen.until("davgswt.flyPath.path.length > 2")
     seen.page.keyboard.press("r")
-    end = seen.page.evaluate("davgswt.flight.path.at(-1)")
+    end = seen.page.evaluate("davgswt.flyPath.path.at(-1)")
     seen.at(x=-50.0)
     seen.page.keyboard.press("p")
-    seen.until("davgswt.flight.mode === 'rest'")
+    seen.until("davgswt.flyPath.mode === 'rest'")
     assert seen.state["x"] == pytest.approx(end["x"]) and seen.state["yaw"] == pytest.approx(20.0)
     with seen.page.expect_download() as download:
         seen.page.locator("#save").dispatch_event("click")
@@ -84,7 +84,7 @@ def test_between_recorded_places_the_way_is_straight_and_turns_are_short(visit, 
     page = visit(160, 100).open(f"{plain}?still").page
     places = page.evaluate(
         """async () => {
-          const { placeAt } = await import("./flight.js");
+          const { placeAt } = await import("./ui/fly_path.js");
           const path = [{ seconds: 0, x: 0, y: 2, eye: 1, yaw: 350, pitch: 0 },
                         { seconds: 2, x: 4, y: 0, eye: 3, yaw: 10, pitch: -8 }];
           return [-1, 1, 9].map(seconds => placeAt(path, seconds));

@@ -135,16 +135,17 @@ def test_the_budget_takes_fewer_splats_and_still_draws_near_tiles_back_to_front(
     seen = visit(160, 100).open(f"{plain}?still")
     result = seen.page.evaluate(
         """async () => {
-          const { createTerrain } = await import("./terrain.js");
-          const { visible } = await import("./budget.js");
-          const { createHeights } = await import("./heights.js");
-          const { cameraOf, createWalker } = await import("./walk.js");
+          const { createTerrainTables } = await import("./worker/terrain_tables.js");
+          const { selectCells } = await import("./terrain/budget.js");
+          const { createHeights } = await import("./terrain/heights.js");
+          const { cameraAt } = await import("./terrain/camera.js");
+          const { createWalker } = await import("./ui/walker.js");
           const manifest = await (await fetch("davgswt.json")).json();
-          const terrain = createTerrain(manifest, createHeights());
+          const terrain = createTerrainTables(manifest, createHeights());
           for (const tile of terrain.tiles) tile.arrived = (1 << manifest.levels.length) - 1;
-          const camera = cameraOf(createWalker(manifest, { eye: 1, pitch: -10 }), 1280, 720);
+          const camera = cameraAt(createWalker(manifest, { eye: 1, pitch: -10 }), 1280, 720);
           return [1e9, 20000, 5000, 300].map(budget => {
-            const { cells, count, reach } = visible(terrain, camera, budget);
+            const { cells, count, reach } = selectCells(terrain, camera, budget);
             return { budget, count, reach, cells: cells.map(({ di, dj }) => [di, dj]),
               steps: cells.map(({ di, dj }) => Math.abs(di) + Math.abs(dj)) };
           });

@@ -108,7 +108,7 @@ function save() {
   const { participant, list, screen, answers } = session;
   const told = { format: "davgswt-2afc", version: 1, study: STUDY.study, participant, list, consent: true, screen, answers };
   const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([JSON.stringify(told, null, 1) + "\n"], { type: "application/json" }));
+  link.href = URL.createObjectURL(new Blob([`${JSON.stringify(told, null, 1)}\n`], { type: "application/json" }));
   link.download = `2afc_${participant}.json`;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 60000);

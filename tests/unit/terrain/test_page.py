@@ -101,6 +101,20 @@ def test_another_version_is_refused(tmp_path, viewer, bundle):
         write_page(bundle, viewer, tmp_path / "page")
 
 
+def test_the_viewer_is_the_folder_of_index_html(tmp_path):
+    files = ["data/a.js", "index.html", "main.js"]
+    assert page.find_viewer([str(tmp_path / name) for name in files]) == tmp_path
+    with pytest.raises(InputError, match=r"no index\.html"):
+        page.find_viewer(["data/a.js"])
+
+
+def test_modules_in_folders_are_copied_as_they_lie(tmp_path, viewer, bundle):
+    (viewer / "draw").mkdir()
+    (viewer / "draw" / "sky.js").write_text("export {}")
+    write_page(bundle, viewer, tmp_path / "page")
+    assert (tmp_path / "page" / "draw" / "sky.js").read_text() == "export {}"
+
+
 def test_a_viewer_without_its_page_is_refused(tmp_path, viewer, bundle):
     (viewer / "index.html").unlink()
     with pytest.raises(InputError, match="no viewer here"):

@@ -3,6 +3,7 @@
 import hashlib
 import os
 import shutil
+from collections.abc import Iterable
 from pathlib import Path, PurePosixPath
 
 from dav_gswt.bundle.manifest import FORMAT, VERSION
@@ -39,6 +40,14 @@ def write_page(
         if pixels:
             (part / SURFACE).write_bytes(pixels)
         write_json(part / MANIFEST, read_json(bundle / MANIFEST) | {"heights": heights})
+
+
+def find_viewer(paths: Iterable[Path | str]) -> Path:
+    """The folder of the viewer, given its files. Raises: InputError: there is no index.html among them."""
+    for path in map(Path, paths):
+        if path.name == "index.html":
+            return path.parent
+    raise InputError("the viewer's files hold no index.html")
 
 
 def describe_surface(surface: HeightField) -> tuple[dict, bytes]:

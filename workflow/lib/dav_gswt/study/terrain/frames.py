@@ -27,17 +27,18 @@ LIBRARY, PAGE = "library", "page"
 LEAST = 0.1  # milliseconds: what is less is not drawn
 BEFORE = 4  # frames at the walk's start that are not counted: orders are made, shaders compiled
 VISIT = """async ({ places, before, budget }) => {
+  const { viewer } = await import("./main.js");
   const gl = document.getElementById("picture").getContext("webgl2"), pixel = new Uint8Array(4);
   const render = [], counts = [], times = { update: [], sort: [] };
   let last = null, ran = 0;
   for (let k = -before; k < places.length; k++) {
-    davgswt.set(places[Math.max(k, 0)]);
-    davgswt.ask(budget);
+    viewer.setPlace(places[Math.max(k, 0)]);
+    if (viewer.scene.client.idle) viewer.askWorker(budget, false);
     await new Promise((done) => requestAnimationFrame(done));
     const start = performance.now();
-    davgswt.frame();
+    viewer.drawFrame();
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
-    const answer = davgswt.answer;
+    const answer = viewer.scene.frame;
     if (k >= 0) {
       render.push(performance.now() - start);
       counts.push(answer.count);
@@ -101,7 +102,7 @@ def of_page(bundle_dir: Path | str, viewer_dir: Path | str, manifest: dict, aske
         with browser.served(Path(folder) / "page") as address:
             tab = chromium.new_page(viewport={"width": asked.width, "height": asked.height})
             tab.goto(f"{address}?still={min(asked.budgets)}#{first}")
-            tab.evaluate("davgswt.ready.then(() => 0)")
+            tab.evaluate("import('./main.js').then(({ ready }) => ready)")
             for budget in progress(asked.budgets, "measure frames of the page"):
                 found = tab.evaluate(VISIT, {"places": places, "before": BEFORE, "budget": budget})
                 times = {part: found[part] for part in PARTS}

@@ -1,0 +1,25 @@
+// What tests see of a page: window.davgswt. Served beside the page by fixtures/page_visit.py; no user's page loads it.
+
+import { OVERLAYS } from "./draw/overlays.js";
+import { ready, viewer } from "./main.js";
+
+Object.assign(window, {
+  davgswt: {
+    ready,
+    get state() {
+      return viewer.state();
+    },
+    get stats() {
+      return viewer.stats.summary();
+    },
+    get flyPath() {
+      return viewer.flyPath;
+    },
+    /** @param {Partial<import("./terrain/camera.js").Place>} place */
+    set: (place) => viewer.setPlace(place),
+    /** @param {string} name */
+    overlay: (name) => viewer.showOverlay(OVERLAYS.indexOf(name)),
+    /** @param {number} [budget] */
+    settle: (budget) => viewer.settle(budget),
+  },
+});

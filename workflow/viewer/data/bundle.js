@@ -1,0 +1,125 @@
+// Reading a bundle: davgswt.json, its height map and its chunks, coarse levels first, each checked before it is used.
+
+import { PageError, REMAKE } from "./errors.js";
+import { CACHE_BYTES } from "./layout.js";
+import { findFault, NAME } from "./manifest.js";
+
+/**
+ * @typedef {import("./manifest.js").Manifest} Manifest
+ * @typedef {import("./manifest.js").ChunkEntry} ChunkEntry
+ * @typedef {import("./source.js").Source} Source
+ *
+ * A chunk to read, and a chunk that was read.
+ * @typedef {{ tile: number, entry: ChunkEntry }} QueueItem
+ * @typedef {{ tile: number, level: number, count: number, buffer: ArrayBuffer }} Chunk
+ *
+ * Bytes and chunks so far, of all.
+ * @typedef {{ bytes: number, total: number, chunks: number, of: number }} Progress
+ */
+
+const PARALLEL = 6; // requests at a time
+
+/**
+ * Read and check the manifest. Throws a PageError.
+ *
+ * @param {Source} source
+ * @returns {Promise<Manifest>}
+ */
+export async function readManifest(source) {
+  const text = new TextDecoder().decode(await source.read(NAME, null));
+  let manifest;
+  try {
+    manifest = JSON.parse(text);
+  } catch (error) {
+    throw new PageError(`${NAME} is not readable as JSON (${/** @type {Error} */ (error).message}). ${REMAKE}`);
+  }
+  const fault = findFault(manifest);
+  if (fault) throw new PageError(`${NAME}: ${fault}`);
+  return manifest;
+}
+
+/**
+ * The pixels of the height map, or null where there is none. Throws a PageError.
+ *
+ * @param {Manifest} manifest
+ * @param {Source} source
+ */
+export async function readHeightMap({ heights }, source) {
+  if (heights?.kind !== "image") return null;
+  const buffer = await source.read(heights.file, heights.bytes);
+  await checkDigest(buffer, heights);
+  const pixels = new Float32Array(buffer);
+  if (!pixels.every(Number.isFinite)) throw new PageError(`${heights.file}: a height is not finite. ${REMAKE}`);
+  return pixels;
+}
+
+/**
+ * The chunks to read first, the coarsest level first: all, or as many as the cache holds.
+ *
+ * @param {Manifest} manifest
+ * @returns {QueueItem[]}
+ */
+export function initialChunks(manifest) {
+  const queue = manifest.tiles.flatMap((tile) => tile.chunks.map((entry) => ({ tile: tile.tile, entry })));
+  queue.sort((a, b) => b.entry.level - a.entry.level || a.tile - b.tile);
+  let sum = 0;
+  return queue.filter(({ entry }) => {
+    sum += entry.bytes;
+    return sum <= CACHE_BYTES;
+  });
+}
+
+/**
+ * Read chunks and hand each to `take` as it arrives. The first failure stops all other requests and is thrown.
+ *
+ * @param {QueueItem[]} queue
+ * @param {Source} source
+ * @param {{ take: (chunk: Chunk) => void, onProgress?: (progress: Progress) => void, signal?: AbortSignal }} options
+ */
+export async function readChunks(queue, source, { take, onProgress = () => {}, signal }) {
+  const total = queue.reduce((sum, { entry }) => sum + entry.bytes, 0);
+  const progress = { bytes: 0, total, chunks: 0, of: queue.length };
+  const stop = new AbortController();
+  signal?.addEventListener("abort", () => stop.abort(signal.reason), { once: true });
+  let next = 0;
+  /** @param {number} bytes */
+  const onBytes = (bytes) => {
+    progress.bytes += bytes;
+    onProgress(progress);
+  };
+  const readNext = async () => {
+    while (next < queue.length) {
+      const { tile, entry } = queue[next++];
+      const buffer = await source.read(entry.file, entry.bytes, { signal: stop.signal, onBytes });
+      await checkDigest(buffer, entry);
+      stop.signal.throwIfAborted();
+      take({ tile, level: entry.level, count: entry.count, buffer });
+      progress.chunks += 1;
+      onProgress(progress);
+    }
+  };
+  /** @type {unknown} */
+  let first = null;
+  const guarded = () => readNext().catch((error) => {
+    first ??= error;
+    stop.abort();
+  });
+  await Promise.all(Array.from({ length: PARALLEL }, guarded));
+  if (first) throw first;
+}
+
+/**
+ * Compare with the manifest's SHA-256 where the browser offers it (https, or this machine's own address).
+ *
+ * @param {ArrayBuffer} buffer
+ * @param {{ file: string, sha256?: string }} entry
+ */
+async function checkDigest(buffer, { file, sha256 }) {
+  if (!globalThis.crypto?.subtle || typeof sha256 !== "string") return;
+  const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", buffer));
+  const text = Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join("");
+  if (text !== sha256.toLowerCase()) {
+    throw new PageError(
+      `${file} is damaged (its SHA-256 is not the manifest's). Reload the page. If that does not help: ${REMAKE}`);
+  }
+}

@@ -1,0 +1,151 @@
+// A gswt.zip: tiles as PLY files for the public GSWT renderer, converted to a bundle. It holds no orders, distances or
+// surface; these are computed as dav_gswt/bundle/level_distances.py and orders.py do, with a fixed number of directions.
+
+import { createDepthSorter } from "../terrain/depth_sort.js";
+import { PageError } from "./errors.js";
+import { MAX_LEVELS } from "./layout.js";
+import { NAME } from "./manifest.js";
+import { parsePly } from "./ply.js";
+import { fitEncoding, writeRecords } from "./quantize.js";
+import { chunkBytes, indexType, RECORD, VERSION } from "./records.js";
+import { fileSource } from "./source.js";
+
+/**
+ * @typedef {import("./quantize.js").Gaussians & { tile: number, level: number }} GaussianSet
+ * @typedef {import("./manifest.js").Manifest} Manifest
+ * @typedef {{ scale: number, count: number, colour: number[] }} LevelSum
+ */
+
+const SIDE = 4; // of its tiles
+const FOCAL = 960 / Math.tan(Math.PI / 6); // of the picture that level distances are made for
+const BAND = 0.1, FLOOR_PIXELS = 12;
+const AZIMUTHS = 16, DOWN = (20 * Math.PI) / 180;
+const FILE = /(?:^|\/)(?!\._)[^/]*lod(\d{1,3})_tile_(\d{1,4})[^/]*\.ply$/;
+const SKY = { zenith: [0.36, 0.55, 0.8], horizon: [0.78, 0.84, 0.88] };
+
+/** @param {import("./source.js").Files} files */
+export const isGswt = (files) => [...files.keys()].some((name) => FILE.test(name));
+
+/**
+ * A bundle's source made of the PLY files. Throws a PageError: one of them is missing or broken.
+ *
+ * @param {import("./source.js").Files} files
+ */
+export async function gswtSource(files) {
+  /** @type {import("./source.js").Files} */
+  const chunks = new Map();
+  const { sets, levels, tiles } = await readSets(files);
+  const manifest = makeManifest(sets, levels, tiles);
+  for (const set of sets) chunks.set(chunkName(set), async () => makeChunk(set, manifest));
+  chunks.set(NAME, async () => new TextEncoder().encode(JSON.stringify(manifest)).buffer);
+  return fileSource(chunks);
+}
+
+/** @param {import("./source.js").Files} files */
+async function readSets(files) {
+  const byKey = new Map();
+  let levels = 0, tiles = 0;
+  for (const [name, open] of files) {
+    const match = FILE.exec(name);
+    if (!match) continue;
+    const level = Number(match[1]), tile = Number(match[2]);
+    byKey.set(`${level}/${tile}`, { name, open });
+    [levels, tiles] = [Math.max(levels, level + 1), Math.max(tiles, tile + 1)];
+  }
+  if (tiles % 16) throw new PageError(`The set has ${tiles} tiles, a multiple of 16 is needed. Make it again.`);
+  if (levels > MAX_LEVELS) {
+    throw new PageError(`The set has ${levels} levels, this page shows ${MAX_LEVELS}. Leave the coarsest ones out.`);
+  }
+  /** @type {GaussianSet[]} */
+  const sets = [];
+  for (let tile = 0; tile < tiles; tile++) {
+    for (let level = 0; level < levels; level++) {
+      const file = byKey.get(`${level}/${tile}`);
+      if (!file) throw new PageError(`Tile ${tile} of level ${level} is missing in the set. Make it again.`);
+      sets.push({ tile, level, ...parsePly(await file.open(), file.name) });
+    }
+  }
+  return { sets, levels, tiles };
+}
+
+/** @param {{ tile: number, level: number }} set */
+const chunkName = ({ tile, level }) => `lod${level}_tile_${tile}.bin`;
+
+/**
+ * The manifest of a set. Throws a PageError: it spreads too far.
+ *
+ * @param {GaussianSet[]} sets
+ * @param {number} levels
+ * @param {number} tiles
+ * @returns {Manifest}
+ */
+function makeManifest(sets, levels, tiles) {
+  const directions = orderDirections(), orders = directions.map((_, k) => k);
+  const sums = Array.from({ length: levels }, () => ({ scale: 0, count: 0, colour: [0, 0, 0] }));
+  /** @type {import("./manifest.js").TileEntry[]} */
+  const entries = Array.from({ length: tiles }, (_, tile) => (
+    { tile, uncertainty: 0, z: [Infinity, -Infinity], chunks: [] }));
+  for (const set of sets) {
+    const { tile, level, count } = set, { z, chunks } = entries[tile];
+    addToSums(set, sums[level], z);
+    chunks.push({ level, file: chunkName(set), bytes: chunkBytes(count, orders.length), count, orders });
+  }
+  const scales = sums.map(({ scale, count }) => scale / Math.max(1, count)), last = sums[levels - 1];
+  const spacing = SIDE / Math.sqrt(sums[0].count / tiles), v = Math.atan((9 / 16) * Math.tan(Math.PI / 6));
+  const encoding = fitEncoding(sets, SIDE, spacing / FLOOR_PIXELS);
+  if (!encoding) throw new PageError("A splat lies dozens of tile sides from the others. Make the set again.");
+  return {
+    format: "davgswt", version: VERSION, unit: "unit", tile_side: SIDE, salt: 0, sky: SKY, encoding, directions,
+    tiles: entries,
+    eye_floor: (((spacing * FOCAL) / FLOOR_PIXELS) * Math.sin(Math.PI / 6 + v)) / Math.cos(v),
+    ground_colour: last.colour.map((sum) => Math.min(Math.max(sum / Math.max(1, last.count), 0), 1)),
+    levels: scales.map((scale, level) => {
+      const distance = level < levels - 1 ? scales[level + 1] * FOCAL : null;
+      return { level, mean_scale: scale, distance, band: distance ? BAND * distance : 0 };
+    }),
+  };
+}
+
+/**
+ * Add Gaussians to the sums of a level and widen the heights of a tile.
+ *
+ * @param {GaussianSet} set
+ * @param {LevelSum} sum
+ * @param {number[]} z
+ */
+function addToSums({ count, centres, logScales, paint }, sum, z) {
+  for (let k = 0; k < count; k++) {
+    const scales = [0, 1, 2].map((n) => Math.exp(logScales[3 * k + n])), reach = 3 * Math.max(...scales);
+    z[0] = Math.min(z[0], centres[3 * k + 2] - reach);
+    z[1] = Math.max(z[1], centres[3 * k + 2] + reach);
+    sum.scale += (scales[0] + scales[1] + scales[2]) / 3;
+    for (let n = 0; n < 3; n++) sum.colour[n] += paint[4 * k + n] / 255;
+  }
+  sum.count += count;
+}
+
+/** A ring of directions 20 degrees below the horizon, and straight down. */
+function orderDirections() {
+  const around = Array.from({ length: AZIMUTHS }, (_, k) => (2 * Math.PI * k) / AZIMUTHS);
+  const ring = around.map((a) => [Math.cos(a) * Math.cos(DOWN), Math.sin(a) * Math.cos(DOWN), -Math.sin(DOWN)]);
+  return [...ring, [0, 0, -1]];
+}
+
+const sort = createDepthSorter();
+
+/**
+ * The bytes of a chunk.
+ *
+ * @param {GaussianSet} set
+ * @param {Manifest} manifest
+ */
+function makeChunk(set, { encoding, directions }) {
+  const { count, centres } = set, chunk = new ArrayBuffer(chunkBytes(count, directions.length));
+  writeRecords(chunk, set, encoding);
+  const orders = new (indexType(count))(chunk, count * RECORD), depths = new Float32Array(count);
+  directions.forEach(([x, y, z], d) => {
+    for (let k = 0; k < count; k++) depths[k] = centres[3 * k] * x + centres[3 * k + 1] * y + centres[3 * k + 2] * z;
+    orders.set(sort(depths, count), d * count);
+  });
+  return chunk;
+}

@@ -1,0 +1,220 @@
+// Shaders of the splats: decode a record, place it on the surface, project it (EWA), weight it by its level.
+
+import { LEVEL_SHIFT, MAX_LEVELS, NO_SLOT, PAGE, PAGES_A_ROW, ROW, SLOT_SHIFT } from "../data/layout.js";
+import { MAX_TURN, TURN_STEPS } from "../data/records.js";
+import { MAX_OCTAVES } from "../terrain/heights.js";
+
+/** A record as a Gaussian; the other end of data/records.js. */
+const DECODE = `
+uniform vec3 origin, stride; // centre = origin + stride * 16 bits
+uniform vec2 logScale;       // ln(deviation) = x + y * 8 bits
+struct Gaussian { vec3 centre, deviation; vec4 paint, turn; }; // turn: the quaternion w x y z, of length 1
+Gaussian decodeRecord(uvec4 t) {
+  vec3 place = vec3(t.x & 65535u, t.x >> 16, t.y & 65535u);
+  vec3 size = vec3(t.y >> 16 & 255u, t.y >> 24, t.z & 255u);
+  vec3 turn = (vec3(t.z >> 8 & 255u, t.z >> 16 & 255u, t.z >> 24) - 127.0) * ${MAX_TURN / TURN_STEPS};
+  vec4 paint = vec4(t.w & 255u, t.w >> 8 & 255u, t.w >> 16 & 255u, t.w >> 24) / 255.0;
+  float whole = sqrt(max(1.0 - dot(turn, turn), 0.0));
+  return Gaussian(origin + stride * place, exp(logScale.x + logScale.y * size), paint, vec4(whole, turn));
+}`;
+
+/** Sky and far ground behind the tiles; the last tiles are blended into it. */
+export const BACKDROP = `
+uniform vec3 zenith, horizon, ground;
+uniform float low; // sine of the angle below the horizon at which tiles end
+vec3 backdrop(float rise) {
+  vec3 above = mix(horizon, zenith, sqrt(clamp(rise, 0.0, 1.0)));
+  vec3 below = mix(ground, horizon, exp(clamp(rise, -1.0, 0.0) / (0.3 * low)));
+  return rise > 0.0 ? above : below;
+}`;
+
+const FLAT = `vec3 surface(vec2 at) { return vec3(0.0); }`;
+
+const HILLS = `
+uniform ivec2 cellUnder[${MAX_OCTAVES}]; // the noise's cell under the eye, octave by octave, and the place in it
+uniform vec2 placeUnder[${MAX_OCTAVES}];
+uniform float amplitude[${MAX_OCTAVES}], scale[${MAX_OCTAVES}];
+uniform int octaves;
+uniform uint salt;
+uint hashCell(ivec2 cell, uint axis) {
+  uint h = uint(cell.x) * 0x8da6b343u ^ uint(cell.y) * 0xd8163841u ^ axis * 0xcb1ab31fu ^ salt;
+  h = (h ^ h >> 16) * 0x85ebca6bu;
+  h = (h ^ h >> 13) * 0xc2b2ae35u;
+  return h ^ h >> 16;
+}
+vec3 surface(vec2 at) { // height and slope at a place seen from the eye
+  vec3 sum = vec3(0.0);
+  for (int k = 0; k < octaves; k++) {
+    vec2 p = placeUnder[k] + at * scale[k], cell = floor(p), t = p - cell;
+    vec2 fade = t * t * t * (t * (6.0 * t - 15.0) + 10.0), turn = 30.0 * t * t * (t * (t - 2.0) + 1.0);
+    vec3 noise = vec3(0.0);
+    for (int c = 0; c < 4; c++) {
+      ivec2 corner = ivec2(c & 1, c >> 1);
+      uint bits = hashCell(cellUnder[k] + ivec2(cell) + corner, uint(3 + k));
+      vec2 gradient = vec2(float(bits & 0xffffu), float(bits >> 16)) / 32767.5 - 1.0;
+      float plane = dot(gradient, t - vec2(corner));
+      bool east = corner.x == 1, north = corner.y == 1;
+      vec2 share = vec2(east ? fade.x : 1.0 - fade.x, north ? fade.y : 1.0 - fade.y);
+      float weight = share.x * share.y;
+      noise += vec3(weight * plane, weight * gradient.x + (east ? turn.x : -turn.x) * share.y * plane,
+        weight * gradient.y + share.x * (north ? turn.y : -turn.y) * plane);
+    }
+    sum += amplitude[k] * noise * vec3(1.0, scale[k], scale[k]);
+  }
+  return sum;
+}`;
+
+const IMAGE = `
+uniform highp sampler2D relief;
+uniform ivec2 cellUnder[1];
+uniform vec2 placeUnder[1];
+uniform float scale[1];
+uniform bool mirrored;
+int inside(int k, int n) {
+  if (!mirrored) return clamp(k, 0, n - 1);
+  k = ((k % (2 * n)) + 2 * n) % (2 * n);
+  return k < n ? k : 2 * n - 1 - k;
+}
+vec3 surface(vec2 at) { // a quadratic B-spline of the pixels; rows go south
+  vec2 p = placeUnder[0] + at * vec2(scale[0], -scale[0]), pixel = floor(p), t = p - pixel - 0.5;
+  ivec2 middle = cellUnder[0] + ivec2(pixel), size = textureSize(relief, 0);
+  vec2 weight[3] = vec2[3](0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t));
+  vec2 turn[3] = vec2[3](t - 0.5, -2.0 * t, t + 0.5);
+  vec3 sum = vec3(0.0);
+  for (int b = 0; b < 3; b++) for (int a = 0; a < 3; a++) {
+    ivec2 texel = ivec2(inside(middle.x + a - 1, size.x), inside(middle.y + b - 1, size.y));
+    float value = texelFetch(relief, texel, 0).r;
+    vec2 slope = scale[0] * vec2(turn[a].x * weight[b].y, -weight[a].x * turn[b].y);
+    sum += value * vec3(weight[a].x * weight[b].y, slope);
+  }
+  return sum;
+}`;
+
+/** Weights of levels by distance, as dav_gswt/terrain/weights.py; tests/golden/weights.json holds both to it. */
+export const LEVEL_WEIGHTS = `
+uniform float switches[${MAX_LEVELS}], bands[${MAX_LEVELS}];
+uniform int levels;
+float finerShare(float d, float switchAt, float band) {
+  return band > 0.0 ? clamp(0.5 - (d - switchAt) / (2.0 * band), 0.0, 1.0) : d < switchAt ? 1.0 : d > switchAt ? 0.0 : 0.5;
+}
+float levelWeight(int level, float d) {
+  float left = 1.0;
+  for (int l = 0; l < levels - 1; l++) {
+    float share = finerShare(d, switches[l], bands[l]);
+    if (l == level) return left * share;
+    left *= 1.0 - share;
+  }
+  return left;
+}`;
+
+/** Opacity of a Gaussian that is drawn with a weight: two equal ones of weights w and 1 - w hide as much as one. */
+export const CROSSFADE = `
+float crossfadeOpacity(float alpha, float weight) {
+  return weight < 1.0 ? 1.0 - pow(1.0 - min(alpha, 0.999999), weight) : alpha;
+}`;
+
+const SURFACES = { flat: FLAT, hills: HILLS, image: IMAGE };
+
+/** @param {import("../terrain/heights.js").HeightField["kind"]} kind */
+export const vertexShader = (kind) => `#version 300 es
+precision highp float;
+precision highp int;
+precision highp usampler2D;
+layout(location = 0) in uvec3 block;
+uniform usampler2D records, entries;
+uniform highp sampler2D hues;   // of overlays, see overlays.js
+uniform vec3 right, up, ahead;  // camera axes in the world
+uniform vec3 corner;            // south-west corner of the middle cell, on the ground, seen from the eye
+uniform vec2 halfSize;          // half the picture, in pixels
+uniform float side, focal, near, end;
+uniform int overlay;
+uniform uint marks[9];          // of the 3 x 3 block of cells about the eye
+flat out vec4 colour;
+flat out float weight;          // of the Gaussian's level
+out vec2 at;                    // in standard deviations from the centre
+${DECODE}
+${BACKDROP}
+${SURFACES[kind]}
+mat3 rotation(vec4 q) { // of length 1
+  float w = q.x, x = q.y, y = q.z, z = q.w;
+  return mat3(
+    1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y),
+    2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x),
+    2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y));
+}
+${LEVEL_WEIGHTS}
+void main() {
+  gl_Position = vec4(2.0, 2.0, 2.0, 1.0); // culled, unless it is set below
+  at = vec2(0.0);
+  colour = vec4(0.0);
+  weight = 1.0;
+  uint lane = uint(gl_InstanceID) & ${PAGE - 1}u;
+  if (lane > (block.y >> 16u & ${PAGE - 1}u)) return;
+  ivec2 texel = ivec2(int(block.x % ${PAGES_A_ROW}u) * ${PAGE} + int(lane), int(block.x / ${PAGES_A_ROW}u));
+  uint entry = texelFetch(entries, texel, 0).x, slot = entry >> ${SLOT_SHIFT}u, mark = block.z;
+  int level = int(entry >> ${LEVEL_SHIFT}u & 7u);
+  vec2 cell = vec2(int(block.y & 255u) - 128, int(block.y >> 8u & 255u) - 128);
+  if (slot != ${NO_SLOT}u) {
+    cell = vec2(int(slot % 3u) - 1, int(slot / 3u) - 1);
+    mark = marks[slot];
+  }
+  uint place = entry & ${(1 << LEVEL_SHIFT) - 1}u;
+  Gaussian one = decodeRecord(texelFetch(records, ivec2(int(place & ${ROW - 1}u), int(place / ${ROW}u)), 0));
+  vec3 seen = one.centre + vec3(cell * side, 0.0) + corner;
+  vec3 rise = surface(seen.xy);
+  seen.z += rise.x;
+  vec3 p = vec3(dot(right, seen), dot(up, seen), dot(ahead, seen));
+  if (!(p.z > near)) return;
+  float distance = length(seen), opacity = one.paint.a;
+  if ((mark >> 24u & 1u) == 0u) weight = levelWeight(level, distance);
+  if (weight <= 0.0) return;
+
+  // EWA: covariance A A^T in the picture, with a dilation of 0.3 square pixels. The projection is linearised at a point
+  // within 1.3 times the picture, or splats at its edges would become needles.
+  mat3 axes = rotation(one.turn);
+  for (int k = 0; k < 3; k++) {
+    axes[k] *= one.deviation[k];
+    axes[k].z += dot(rise.yz, axes[k].xy); // the surface shears shapes along its slope
+  }
+  mat3 shape = transpose(mat3(right, up, ahead)) * axes;
+  vec2 slope = clamp(p.xy / p.z, -1.3 * halfSize / focal, 1.3 * halfSize / focal);
+  vec3 depth = vec3(shape[0].z, shape[1].z, shape[2].z);
+  vec3 across = (vec3(shape[0].x, shape[1].x, shape[2].x) - slope.x * depth) * (focal / p.z);
+  vec3 along = (vec3(shape[0].y, shape[1].y, shape[2].y) - slope.y * depth) * (focal / p.z);
+  // Where the extent in depth is large against the depth, the linearised splat would cover the picture up to the
+  // horizon as haze, so it fades out.
+  opacity *= smoothstep(1.8, 3.2, p.z / max(length(depth), 1e-9));
+  if (opacity * 255.0 <= 1.0) return;
+  float a = dot(across, across) + 0.3, b = dot(across, along), c = dot(along, along) + 0.3;
+
+  float mean = 0.5 * (a + c), lean = 0.5 * (a - c), spread = length(vec2(lean, b));
+  vec2 major = lean > 0.0 ? vec2(lean + spread, b) : vec2(b, spread - lean);
+  major = spread < 1e-6 * mean ? vec2(1.0, 0.0) : normalize(major);
+  vec2 lengths = sqrt(vec2(mean + spread, max((a * c - b * b) / (mean + spread), 0.3)));
+  float reach = sqrt(2.0 * log(255.0 * opacity)); // beyond it the Gaussian is fainter than 1/255
+  at = (vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0) * reach;
+  vec2 pixel = focal * p.xy / p.z + at.x * lengths.x * major + at.y * lengths.y * vec2(-major.y, major.x);
+  float going = 1.0 - clamp(2.0 - 2.0 * distance / end, 0.0, 1.0); // smoothstep from half the reach to its end
+  vec3 paint = mix(one.paint.rgb, backdrop(seen.z / distance), going * going * (3.0 - 2.0 * going));
+  if (overlay > 0) {
+    uint numbers[4] = uint[4](mark & 255u, uint(level) * 32u, mark >> 8u & 255u, mark >> 16u & 255u);
+    uint number = numbers[overlay - 1];
+    paint = mix(vec3(dot(paint, vec3(0.3, 0.6, 0.1))), texelFetch(hues, ivec2(int(number), 0), 0).rgb, 0.7);
+  }
+  colour = vec4(paint, opacity);
+  gl_Position = vec4(pixel / halfSize, 0.0, 1.0);
+}`;
+
+export const FRAGMENT = `#version 300 es
+precision highp float;
+flat in vec4 colour;
+flat in float weight;
+in vec2 at;
+out vec4 painted;
+${CROSSFADE}
+void main() {
+  float alpha = colour.a * exp(-0.5 * dot(at, at));
+  alpha = min(0.99, crossfadeOpacity(alpha, weight));
+  if (alpha < 1.0 / 255.0) discard;
+  painted = vec4(colour.rgb * alpha, alpha);
+}`;

@@ -1,0 +1,61 @@
+// The backdrop: sky, with a sun where the manifest has one, and a far ground of the terrain's mean colour. The same
+// colours as dav_gswt/terrain/backdrop.py.
+
+import { createProgram, setAxes } from "./gl.js";
+import { BACKDROP } from "./shaders.js";
+
+/** @typedef {import("../terrain/camera.js").Camera} Camera */
+
+const VERTEX = `#version 300 es
+out vec2 at;
+void main() {
+  at = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0;
+  gl_Position = vec4(at, 0.0, 1.0);
+}`;
+
+const FRAGMENT = `#version 300 es
+precision highp float;
+in vec2 at;
+out vec4 colour;
+uniform vec3 right, up, ahead, sun, sunColour; // sun: its direction; of length 0: none
+uniform vec2 halfTangent; // tangents of half the field of view
+${BACKDROP}
+void main() {
+  vec3 ray = normalize(ahead + at.x * halfTangent.x * right + at.y * halfTangent.y * up);
+  vec3 seen = backdrop(ray.z);
+  float close = dot(ray, sun);
+  float disc = ray.z > 0.0 ? smoothstep(0.99988, 0.99996, close) + 0.25 * pow(max(close, 0.0), 350.0) : 0.0;
+  colour = vec4(mix(seen, sunColour, clamp(disc, 0.0, 1.0)), 1.0);
+}`;
+
+/**
+ * @param {import("./gl.js").GL} gl
+ * @param {import("../data/manifest.js").Manifest} manifest
+ */
+export function createSky(gl, { sky, ground_colour: ground }) {
+  const { use, uniforms } = createProgram(gl, VERTEX, FRAGMENT), empty = gl.createVertexArray();
+  const long = sky.sun ? Math.hypot(...sky.sun.direction) : 1;
+  return {
+    /**
+     * Fill the picture; low: sine of the angle below the horizon at which tiles end.
+     *
+     * @param {Camera} camera
+     * @param {{ low: number }} options
+     */
+    draw(camera, { low }) {
+      use();
+      gl.bindVertexArray(empty);
+      gl.disable(gl.BLEND);
+      setAxes(gl, uniforms, camera);
+      gl.uniform3fv(uniforms.zenith, sky.zenith);
+      gl.uniform3fv(uniforms.horizon, sky.horizon);
+      gl.uniform3fv(uniforms.ground, ground);
+      gl.uniform3fv(uniforms.sun, sky.sun ? sky.sun.direction.map((v) => v / long) : [0, 0, 0]);
+      gl.uniform3fv(uniforms.sunColour, sky.sun?.colour ?? [1, 1, 1]);
+      gl.uniform2f(uniforms.halfTangent, camera.width / 2 / camera.focal, camera.height / 2 / camera.focal);
+      gl.uniform1f(uniforms.low, low);
+      gl.drawArrays(gl.TRIANGLES, 0, 3);
+      gl.bindVertexArray(null);
+    },
+  };
+}

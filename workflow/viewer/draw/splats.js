@@ -1,0 +1,262 @@
+// Splats on the GPU: all records in one texture, pages of orders in another, and two instanced draws a picture, one for
+// far tiles and one for the 3 x 3 block about the eye. A block of instances is a page of entries in one cell.
+
+import { PageError } from "../data/errors.js";
+import { BLOCK, MAX_LEVELS, NEAR, orderPages, PAGE, PAGES_A_ROW, recordRows, ROW } from "../data/layout.js";
+import { MAX_OCTAVES } from "../terrain/heights.js";
+import { createProgram, createTexture, setAxes } from "./gl.js";
+import { overlayColours } from "./overlays.js";
+import { FRAGMENT, vertexShader } from "./shaders.js";
+
+/**
+ * @typedef {import("./gl.js").GL} GL
+ * @typedef {import("../data/manifest.js").Manifest} Manifest
+ * @typedef {import("../terrain/heights.js").HeightField} HeightField
+ * @typedef {import("../worker/frame_builder.js").FrameAnswer} FrameAnswer
+ * @typedef {Record<string, WebGLUniformLocation | null>} Uniforms
+ *
+ * end: distance at which the last tiles are blended into the backdrop; low: sine of the angle below the horizon there.
+ * @typedef {{ end: number, low: number, overlay: number }} DrawOptions
+ * @typedef {ReturnType<typeof createSplats>} Splats
+ */
+
+const FULL = "The terrain does not fit into this machine's graphics memory. Close other pages, make one with larger "
+  + "tiles or fewer variants, or open it on a larger machine.";
+const WIDTH = PAGE * PAGES_A_ROW; // of the order textures
+const RECORDS = 0, ENTRIES = 1, RELIEF = 2, HUES = 3; // texture units
+
+/**
+ * @param {GL} gl
+ * @param {Manifest} manifest
+ * @param {HeightField} heights
+ */
+export function createSplats(gl, manifest, heights) {
+  const { use, uniforms } = createProgram(gl, vertexShader(heights.kind), FRAGMENT);
+  const tallest = Math.max(recordRows(manifest), orderPages(manifest) / PAGES_A_ROW);
+  if (tallest > gl.getParameter(gl.MAX_TEXTURE_SIZE)) throw new PageError(FULL);
+  const records = createTexture(gl, gl.RGBA32UI, ROW, recordRows(manifest));
+  const entries = createTexture(gl, gl.R32UI, WIDTH, orderPages(manifest) / PAGES_A_ROW);
+  const far = createBlocks(gl), close = createBlocks(gl);
+  let nearEntries = createTexture(gl, gl.R32UI, WIDTH, 1), nearRows = 1;
+  /** @type {FrameAnswer | null} */
+  let frame = null;
+  const relief = heights.kind === "image" ? createRelief(gl, heights) : null;
+  const hues = createTexture(gl, gl.RGBA8, 256, 1);
+  let shownOverlay = -1;
+  if (gl.getError() === gl.OUT_OF_MEMORY) throw new PageError(FULL);
+
+  /** @param {number} unit @param {WebGLTexture} texture */
+  function bind(unit, texture) {
+    gl.activeTexture(gl.TEXTURE0 + unit);
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+  }
+
+  return {
+    /**
+     * Copy a chunk's records to their rows.
+     *
+     * @param {{ rows: Uint32Array, records: Uint32Array }} chunk
+     */
+    addRecords({ rows, records: words }) {
+      bind(RECORDS, records);
+      const wordsARow = 4 * ROW;
+      for (let k = 0; k < rows.length; k++) {
+        const texels = Math.min(ROW, (words.length - k * wordsARow) / 4);
+        const from = k * wordsARow;
+        gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, rows[k], texels, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words, from);
+      }
+    },
+
+    /**
+     * Copy the worker's answer for a view: new pages of orders, the blocks, and the order of the near block.
+     *
+     * @param {FrameAnswer} answer
+     */
+    setFrame(answer) {
+      bind(ENTRIES, entries);
+      uploadPages(gl, answer.uploads);
+      far.fill(answer.blocks);
+      const pages = Math.ceil(answer.near.length / PAGE), rows = Math.ceil(pages / PAGES_A_ROW);
+      if (rows > nearRows) {
+        gl.deleteTexture(nearEntries);
+        nearRows = 2 * rows;
+        nearEntries = createTexture(gl, gl.R32UI, WIDTH, nearRows);
+      }
+      if (rows) {
+        const data = new Uint32Array(rows * WIDTH);
+        data.set(answer.near);
+        bind(ENTRIES, nearEntries);
+        gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, WIDTH, rows, gl.RED_INTEGER, gl.UNSIGNED_INT, data);
+      }
+      close.fill(nearBlocks(pages, answer.near.length));
+      frame = answer;
+    },
+
+    /**
+     * Draw the last frame over the backdrop, as the camera sees it now.
+     *
+     * @param {import("../terrain/camera.js").Camera} camera
+     * @param {DrawOptions} options
+     */
+    draw(camera, { end, low, overlay }) {
+      if (!frame) return;
+      use();
+      setConstants(gl, uniforms, manifest);
+      setSurface(gl, uniforms, heights, camera);
+      setView(gl, uniforms, camera, frame, manifest.tile_side);
+      gl.uniform1f(uniforms.end, end);
+      gl.uniform1f(uniforms.low, low);
+      gl.uniform1i(uniforms.overlay, overlay);
+      gl.enable(gl.BLEND);
+      gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+      bind(HUES, hues);
+      if (shownOverlay !== overlay) {
+        shownOverlay = overlay;
+        const colours = overlayColours(overlay, manifest);
+        gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 256, 1, gl.RGBA, gl.UNSIGNED_BYTE, colours);
+      }
+      bind(RECORDS, records);
+      if (relief) bind(RELIEF, relief);
+      bind(ENTRIES, entries);
+      far.draw();
+      bind(ENTRIES, nearEntries);
+      close.draw();
+      gl.activeTexture(gl.TEXTURE0);
+      gl.bindVertexArray(null);
+    },
+
+    /** Free the textures. */
+    end() {
+      for (const texture of [records, entries, nearEntries, hues, relief]) gl.deleteTexture(texture);
+    },
+  };
+}
+
+/** @param {GL} gl @param {Uniforms} uniforms @param {Manifest} manifest */
+function setConstants(gl, uniforms, manifest) {
+  const { origin, step, log_scale: logScale } = manifest.encoding;
+  gl.uniform3fv(uniforms.origin, origin);
+  gl.uniform3fv(uniforms.stride, step);
+  gl.uniform2fv(uniforms.logScale, logScale);
+  gl.uniform1i(uniforms.records, RECORDS);
+  gl.uniform1i(uniforms.entries, ENTRIES);
+  gl.uniform1i(uniforms.hues, HUES);
+  gl.uniform1i(uniforms.levels, manifest.levels.length);
+  gl.uniform1f(uniforms.side, manifest.tile_side);
+  gl.uniform1f(uniforms.near, NEAR * manifest.eye_floor);
+  gl.uniform3fv(uniforms.zenith, manifest.sky.zenith);
+  gl.uniform3fv(uniforms.horizon, manifest.sky.horizon);
+  gl.uniform3fv(uniforms.ground, manifest.ground_colour);
+}
+
+/**
+ * @param {GL} gl
+ * @param {Uniforms} uniforms
+ * @param {HeightField} heights
+ * @param {import("../terrain/camera.js").Camera} camera
+ */
+function setSurface(gl, uniforms, heights, { eye: [x, y] }) {
+  if (heights.kind === "flat") return;
+  if (heights.kind === "hills") {
+    gl.uniform1i(uniforms.octaves, heights.amplitudes.length);
+    gl.uniform1ui(uniforms.salt, heights.salt);
+    gl.uniform1fv(uniforms["amplitude[0]"], padded(heights.amplitudes, MAX_OCTAVES));
+    gl.uniform1fv(uniforms["scale[0]"], padded(heights.scales, MAX_OCTAVES));
+  } else {
+    gl.uniform1i(uniforms.relief, RELIEF);
+    gl.uniform1i(uniforms.mirrored, Number(heights.mirrored));
+    gl.uniform1fv(uniforms["scale[0]"], [heights.perUnit]);
+  }
+  const { cells, places } = heights.under(x, y);
+  gl.uniform2iv(uniforms["cellUnder[0]"], cells);
+  gl.uniform2fv(uniforms["placeUnder[0]"], places);
+}
+
+/**
+ * @param {GL} gl
+ * @param {Uniforms} uniforms
+ * @param {import("../terrain/camera.js").Camera} camera
+ * @param {FrameAnswer} frame
+ * @param {number} side
+ */
+function setView(gl, uniforms, camera, { i0, j0, switches, bands, marks }, side) {
+  const [x, y, z] = camera.eye;
+  setAxes(gl, uniforms, camera);
+  gl.uniform3f(uniforms.corner, i0 * side - x, j0 * side - y, -z);
+  gl.uniform2f(uniforms.halfSize, camera.width / 2, camera.height / 2);
+  gl.uniform1f(uniforms.focal, camera.focal);
+  gl.uniform1fv(uniforms["switches[0]"], padded(switches.slice(0, -1), MAX_LEVELS));
+  gl.uniform1fv(uniforms["bands[0]"], padded(bands, MAX_LEVELS));
+  gl.uniform1uiv(uniforms["marks[0]"], marks);
+}
+
+/** @param {number[]} list @param {number} length */
+const padded = (list, length) => Float32Array.from({ length }, (_, k) => list[k] ?? 0);
+
+/** @param {GL} gl @param {import("../terrain/heights.js").HeightMap} heights */
+function createRelief(gl, { pixels, columns, rows }) {
+  const texture = createTexture(gl, gl.R32F, columns, rows);
+  gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, columns, rows, gl.RED, gl.FLOAT, pixels);
+  return texture;
+}
+
+/**
+ * Consecutive pages of a texture row are uploaded together.
+ *
+ * @param {GL} gl
+ * @param {FrameAnswer["uploads"]} uploads
+ */
+function uploadPages(gl, { numbers, data }) {
+  for (let k = 0; k < numbers.length;) {
+    const first = numbers[k], place = first % PAGES_A_ROW;
+    let n = 1;
+    while (k + n < numbers.length && numbers[k + n] === first + n && place + n < PAGES_A_ROW) n += 1;
+    const [column, row] = [place * PAGE, Math.floor(first / PAGES_A_ROW)];
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, column, row, n * PAGE, 1, gl.RED_INTEGER, gl.UNSIGNED_INT, data, k * PAGE);
+    k += n;
+  }
+}
+
+/**
+ * Blocks of an instanced draw; each serves PAGE instances.
+ *
+ * @param {GL} gl
+ */
+function createBlocks(gl) {
+  const array = gl.createVertexArray(), buffer = gl.createBuffer();
+  let count = 0;
+  gl.bindVertexArray(array);
+  gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+  gl.enableVertexAttribArray(0);
+  gl.vertexAttribIPointer(0, 3, gl.UNSIGNED_INT, 4 * BLOCK, 0);
+  gl.vertexAttribDivisor(0, PAGE);
+  gl.bindVertexArray(null);
+  return {
+    /** @param {Uint32Array} words */
+    fill(words) {
+      count = words.length / BLOCK;
+      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+      gl.bufferData(gl.ARRAY_BUFFER, words, gl.DYNAMIC_DRAW);
+    },
+    draw() {
+      if (!count) return;
+      gl.bindVertexArray(array);
+      gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, count * PAGE);
+    },
+  };
+}
+
+/**
+ * Blocks of pages 0, 1, ... of the near block's order; its entries name their cells themselves.
+ *
+ * @param {number} pages
+ * @param {number} count
+ */
+function nearBlocks(pages, count) {
+  const words = new Uint32Array(BLOCK * pages);
+  for (let k = 0; k < pages; k++) {
+    words[BLOCK * k] = k;
+    words[BLOCK * k + 1] = (Math.min(PAGE, count - k * PAGE) - 1) << 16;
+  }
+  return words;
+}

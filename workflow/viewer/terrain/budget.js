@@ -1,0 +1,148 @@
+// Level of detail within a budget of Gaussians: the levels of each cell in view, and the distance to the last cells.
+//
+// Over the budget all level distances are multiplied by one factor, so every place is drawn coarser by as much, and the
+// last cells come nearer by less. A level whose distance falls below the eye's height above the ground is replaced by
+// the next coarser one everywhere, so ground covers the picture under any budget.
+
+import { REACH } from "./cells.js";
+import { cellsInFrustum } from "./frustum.js";
+
+/**
+ * @typedef {import("./frustum.js").Cell} Cell
+ * @typedef {import("./camera.js").Camera} Camera
+ * @typedef {import("../worker/terrain_tables.js").TerrainTables} TerrainTables
+ *
+ * Level distances and reach under a factor.
+ * @typedef {{ shrink: number, switches: number[], bands: number[], reach: number }} Distances
+ *
+ * What to draw: cells back to front, their number of Gaussians, and missing chunks (16 tile + level).
+ * @typedef {Distances & { cells: Cell[], count: number, missing: Set<number> }} Selection
+ */
+
+const REACH_EXPONENT = 1 / 5; // the reach shrinks by the factor to this power: docs/research/lab-notes.md
+const BISECTIONS = 12; // of the search for the factor
+const NEVER = -1; // switch distance of a level that is not used
+
+/**
+ * The cells and levels to draw from a camera, with at most `budget` Gaussians where the coarsest levels allow it.
+ *
+ * @param {TerrainTables} terrain
+ * @param {Camera} camera
+ * @param {number} budget
+ * @returns {Selection}
+ */
+export function selectCells(terrain, camera, budget) {
+  const cells = cellsInFrustum(terrain, camera, REACH * terrain.side), above = eyeHeight(terrain, camera);
+  /** @param {Distances} distances */
+  const cost = (distances) =>
+    cells.reduce((sum, cell) => (chooseLevels(terrain, cell, distances) ? sum + cell.count : sum), 0);
+  let distances = distancesAt(terrain, above, 1);
+  if (cost(distances) > budget) {
+    let low = Math.log(leastShrink(terrain, above)), high = 0;
+    for (let k = 0; k < BISECTIONS; k++) {
+      const middle = (low + high) / 2;
+      if (cost(distancesAt(terrain, above, Math.exp(middle))) <= budget) low = middle;
+      else high = middle;
+    }
+    distances = distancesAt(terrain, above, Math.exp(low));
+  }
+  const kept = cells.filter((cell) => chooseLevels(terrain, cell, distances));
+  return { ...distances, ...nearestCells(kept, budget, distances.reach), missing: missingChunks(kept) };
+}
+
+/**
+ * @param {TerrainTables} terrain
+ * @param {number} above height of the eye over the ground
+ * @param {number} shrink
+ * @returns {Distances}
+ */
+function distancesAt({ switches, bands, side }, above, shrink) {
+  const used = switches.map((distance, l) => shrink === 1 || shrink * (distance + bands[l]) >= above);
+  return {
+    shrink,
+    switches: switches.map((distance, l) => (used[l] ? shrink * distance : NEVER)),
+    bands: bands.map((band, l) => (used[l] ? shrink * band : 0)),
+    reach: REACH * side * shrink ** REACH_EXPONENT,
+  };
+}
+
+/**
+ * The factor under which only the coarsest level is drawn.
+ *
+ * @param {TerrainTables} terrain
+ * @param {number} above
+ */
+function leastShrink({ switches, bands }, above) {
+  const farthest = switches.slice(0, -1).map((distance, l) => distance + bands[l]);
+  return Math.min(1, (0.99 * above) / Math.max(above, ...farthest));
+}
+
+/**
+ * Height of the eye over the ground; at least the near plane's distance.
+ *
+ * @param {TerrainTables} terrain
+ * @param {Camera} camera
+ */
+function eyeHeight({ heights, near }, { eye: [x, y, z] }) {
+  return Math.max(near, z - heights.at(x, y)[0]);
+}
+
+/**
+ * Set a cell's levels lo to hi and their count; where one of them has not arrived, one that has stands in for all, the
+ * next coarser first. Returns: is there anything to draw?
+ *
+ * @param {TerrainTables} terrain
+ * @param {Cell} cell
+ * @param {Distances} distances
+ */
+function chooseLevels({ tiles, levels }, cell, { switches, bands, reach }) {
+  if (cell.nearest >= reach) return false;
+  const { counts, arrived } = tiles[cell.tile];
+  let lo = 0, hi = 0;
+  while (lo < levels - 1 && cell.nearest > switches[lo] + bands[lo]) lo += 1;
+  for (hi = lo; hi < levels - 1 && cell.farthest >= switches[hi] - bands[hi];) hi += 1;
+  const wanted = (2 << hi) - (1 << lo);
+  cell.missing = wanted & ~arrived;
+  cell.whole = cell.missing !== 0;
+  if (cell.whole) {
+    let level = lo;
+    while (level < levels && !((arrived >> level) & 1)) level += 1;
+    if (level === levels) for (level = lo - 1; level >= 0 && !((arrived >> level) & 1);) level -= 1;
+    if (level < 0) return false;
+    lo = hi = level;
+  }
+  cell.lo = lo;
+  cell.hi = hi;
+  cell.count = 0;
+  for (let level = lo; level <= hi; level++) cell.count += counts[level];
+  return true;
+}
+
+/** @param {Cell[]} cells */
+function missingChunks(cells) {
+  /** @type {Set<number>} */
+  const chunks = new Set();
+  for (const { tile, missing } of cells) {
+    for (let level = 0; missing >> level; level++) if ((missing >> level) & 1) chunks.add(16 * tile + level);
+  }
+  return chunks;
+}
+
+/**
+ * Where even the coarsest levels exceed the budget: the cells nearest to the eye, at least one, and their reach.
+ *
+ * @param {Cell[]} cells
+ * @param {number} budget
+ * @param {number} reach
+ */
+function nearestCells(cells, budget, reach) {
+  let count = cells.reduce((sum, cell) => sum + cell.count, 0);
+  if (count <= budget || !cells.length) return { cells, count, reach };
+  const nearestFirst = [...cells].sort((a, b) => a.nearest - b.nearest);
+  let kept = 0;
+  for (count = 0; kept < cells.length && (!kept || count + nearestFirst[kept].count <= budget); kept++) {
+    count += nearestFirst[kept].count;
+  }
+  const chosen = new Set(nearestFirst.slice(0, kept));
+  return { cells: cells.filter((cell) => chosen.has(cell)), count, reach: nearestFirst[kept]?.nearest ?? reach };
+}

@@ -1,0 +1,31 @@
+// The camera of an eye on the terrain.
+
+/**
+ * Angles in degrees: yaw from east, counter-clockwise; pitch above the horizon. eye: height above the surface.
+ * @typedef {{ x: number, y: number, eye: number, yaw: number, pitch: number }} Place
+ *
+ * Position and axes in the world; size and focal length in pixels.
+ * @typedef {{ eye: number[], right: number[], up: number[], ahead: number[], width: number, height: number,
+ *   focal: number }} Camera
+ */
+
+export const FIELD_OF_VIEW = 60; // of the picture's longer side, degrees
+
+/**
+ * The camera of an eye at a place, for a picture of this size.
+ *
+ * @param {Place} place
+ * @param {number} width
+ * @param {number} height
+ * @param {import("./heights.js").HeightField} [heights]
+ * @returns {Camera}
+ */
+export function cameraAt(place, width, height, heights) {
+  const yaw = (place.yaw * Math.PI) / 180, pitch = (place.pitch * Math.PI) / 180;
+  const [c, s, p, q] = [Math.cos(yaw), Math.sin(yaw), Math.cos(pitch), Math.sin(pitch)];
+  return {
+    eye: [place.x, place.y, place.eye + (heights ? heights.at(place.x, place.y)[0] : 0)],
+    right: [s, -c, 0], up: [-q * c, -q * s, p], ahead: [p * c, p * s, q],
+    width, height, focal: Math.max(width, height) / 2 / Math.tan((FIELD_OF_VIEW * Math.PI) / 360),
+  };
+}

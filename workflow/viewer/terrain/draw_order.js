@@ -1,0 +1,54 @@
+// Draw order of cells and tiles: back to front, with little or no sorting.
+// The same as dav_gswt/terrain/draw_order.py; tests/golden/draw_order.json holds both to it.
+
+/**
+ * Call `visit(di, dj)` for the cells of a window of `most` cells to every side of the eye's, back to front.
+ *
+ * A ray from the eye crosses cell edges only away from it, in i and in j: a cell with more steps |di| + |dj| never
+ * hides one with fewer, and cells of equal steps never hide each other. Equal steps are visited by j, then by i.
+ *
+ * @param {number} most
+ * @param {(di: number, dj: number) => void} visit
+ */
+export function visitBackToFront(most, visit) {
+  for (let steps = 2 * most; steps >= 0; steps--) {
+    const tall = Math.min(steps, most);
+    for (let dj = -tall; dj <= tall; dj++) {
+      const wide = steps - Math.abs(dj);
+      if (wide > most) continue;
+      visit(-wide, dj);
+      if (wide) visit(wide, dj);
+    }
+  }
+}
+
+/**
+ * Is a cell in the 3 x 3 block about the eye's cell, which is drawn last and sorted by depth?
+ *
+ * @param {number} di
+ * @param {number} dj
+ */
+export const inNearBlock = (di, dj) => Math.abs(di) <= 1 && Math.abs(dj) <= 1;
+
+/**
+ * Position in `orders` of the pre-sorted order whose direction is nearest to the viewing direction on a surface with
+ * slopes (east, north): the angle to (x + east z, y + north z, z) counts. Ties: the first.
+ *
+ * @param {number[][]} directions
+ * @param {number[]} orders indices into directions, those that the tile keeps
+ * @param {number[]} to from the eye to the tile's centre
+ * @param {number} east
+ * @param {number} north
+ */
+export function nearestOrder(directions, orders, to, east, north) {
+  const x = to[0] + east * to[2], y = to[1] + north * to[2], z = to[2];
+  let best = 0, most = -Infinity;
+  for (let k = 0; k < orders.length; k++) {
+    const d = directions[orders[k]], along = d[0] * x + d[1] * y + d[2] * z;
+    if (along > most) {
+      best = k;
+      most = along;
+    }
+  }
+  return best;
+}

@@ -1,0 +1,61 @@
+// The place in the page's address: `#x,y,eye,yaw,pitch`.
+
+import { moveTo, PLACE_KEYS } from "./walker.js";
+
+/**
+ * @typedef {import("../terrain/camera.js").Place} Place
+ * @typedef {import("./walker.js").Walker} Walker
+ */
+
+const EVERY = 500; // milliseconds between updates of the address
+
+/**
+ * The address's part for a walker's place, to a thousandth of the eye floor and of a degree.
+ *
+ * @param {Walker} walker
+ */
+export function formatPlace(walker) {
+  const digits = Math.min(12, Math.max(0, Math.ceil(3 - Math.log10(walker.floor))));
+  const lengths = [walker.x, walker.y, walker.eye].map((v) => v.toFixed(digits));
+  return `#${[...lengths, walker.yaw.toFixed(3), walker.pitch.toFixed(3)].join(",")}`;
+}
+
+/**
+ * The place of an address; parts that are missing or no numbers are left out.
+ *
+ * @param {string} hash
+ * @returns {Partial<Place>}
+ */
+export function parsePlace(hash) {
+  const values = decodeURIComponent(hash.replace(/^#/, "")).split(",").map((v) => (v.trim() === "" ? NaN : Number(v)));
+  /** @type {Partial<Place>} */
+  const place = {};
+  PLACE_KEYS.forEach((key, k) => {
+    if (Number.isFinite(values[k])) place[key] = values[k];
+  });
+  return place;
+}
+
+/**
+ * Keep the address at the walker's place, and follow an address that a person enters.
+ *
+ * @param {Walker} walker
+ * @param {() => void} onChange
+ */
+export function syncAddress(walker, onChange) {
+  let last = location.hash;
+  const write = () => {
+    const hash = formatPlace(walker);
+    if (hash === last) return;
+    last = hash;
+    history.replaceState(null, "", hash);
+  };
+  setInterval(write, EVERY);
+  addEventListener("pagehide", write);
+  addEventListener("hashchange", () => {
+    if (location.hash === last) return;
+    last = location.hash;
+    moveTo(walker, parsePlace(last));
+    onChange();
+  });
+}

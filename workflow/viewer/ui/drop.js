@@ -1,0 +1,105 @@
+// Files dropped onto the page: a bundle's folder, its zip, a gswt.zip for the public renderer, or a fly path.
+
+import { PageError } from "../data/errors.js";
+import { gswtSource, isGswt } from "../data/gswt.js";
+import { NAME } from "../data/manifest.js";
+import { fileSource } from "../data/source.js";
+import { openZip } from "../data/zip.js";
+
+/**
+ * @typedef {import("../data/source.js").Source} Source
+ * @typedef {import("../data/source.js").Files} Files
+ * @typedef {{ openSource: (source: Source) => Promise<void>, loadPath: (json: unknown) => void,
+ *   onError: (error: unknown) => void }} DropHandlers
+ */
+
+/** @param {DropHandlers} handlers */
+export function listenToDrops(handlers) {
+  /** @param {boolean} on */
+  const markDropping = (on) => document.documentElement.classList.toggle("dropping", on);
+  addEventListener("dragover", (event) => {
+    event.preventDefault();
+    markDropping(true);
+  });
+  addEventListener("dragleave", () => markDropping(false));
+  addEventListener("drop", (event) => {
+    event.preventDefault();
+    markDropping(false);
+    // entries must be asked for before anything is awaited: the browser forgets them
+    const entries = [...event.dataTransfer?.items ?? []].flatMap((item) => item.webkitGetAsEntry?.() ?? []);
+    const files = [...event.dataTransfer?.files ?? []];
+    handleDrop(entries, files, handlers).catch(handlers.onError);
+  });
+}
+
+/**
+ * @param {FileSystemEntry[]} entries
+ * @param {File[]} loose
+ * @param {DropHandlers} handlers
+ */
+async function handleDrop(entries, loose, { openSource, loadPath }) {
+  const files = entries.length ? await listFiles(entries) : new Map(loose.map((file) => [file.name, file]));
+  const only = files.size === 1 ? [...files.values()][0] : null;
+  if (only && /\.json$/i.test(only.name) && only.name !== NAME) return loadPath(await parseJson(only));
+  if (only && /\.zip$/i.test(only.name)) return openSource(await sourceOf(await openZip(only)));
+  /** @type {Files} */
+  const readers = new Map([...files].map(([name, file]) => [name, () => file.arrayBuffer()]));
+  return openSource(await sourceOf(readers));
+}
+
+/**
+ * A bundle, wherever its manifest lies among the files, or a set of tiles for the public renderer.
+ *
+ * @param {Files} files
+ * @returns {Promise<Source>}
+ */
+export async function sourceOf(files) {
+  const manifest = [...files.keys()].filter((name) => name === NAME || name.endsWith(`/${NAME}`))
+    .sort((a, b) => a.length - b.length)[0];
+  if (manifest !== undefined) {
+    const above = manifest.slice(0, -NAME.length);
+    const inside = [...files].filter(([name]) => name.startsWith(above));
+    return fileSource(new Map(inside.map(([name, open]) => [name.slice(above.length), open])));
+  }
+  if (isGswt(files)) return gswtSource(files);
+  throw new PageError(
+    `There is no terrain in what was dropped: neither ${NAME} nor lod0_tile_00.ply. `
+    + "Drop a bundle's folder or its gswt.zip.");
+}
+
+/** @param {File} file */
+async function parseJson(file) {
+  try {
+    return JSON.parse(await file.text());
+  } catch (error) {
+    const { message } = /** @type {Error} */ (error);
+    throw new PageError(`${file.name} is not readable as JSON (${message}). Drop a fly path that this page saved.`);
+  }
+}
+
+/**
+ * All files of dropped entries, folders included, by their paths.
+ *
+ * @param {FileSystemEntry[]} entries
+ */
+async function listFiles(entries) {
+  /** @type {Map<string, File>} */
+  const files = new Map();
+  /** @param {FileSystemEntry} entry */
+  const walk = async (entry) => {
+    if (entry.isFile) {
+      const { file } = /** @type {FileSystemFileEntry} */ (entry);
+      files.set(entry.fullPath.replace(/^\//, ""), await new Promise((done, fail) => file.call(entry, done, fail)));
+      return;
+    }
+    const reader = /** @type {FileSystemDirectoryEntry} */ (entry).createReader();
+    for (;;) { // a reader gives some entries at a time
+      /** @type {FileSystemEntry[]} */
+      const some = await new Promise((done, fail) => reader.readEntries(done, fail));
+      if (!some.length) break;
+      for (const one of some) await walk(one);
+    }
+  };
+  for (const entry of entries) await walk(entry);
+  return files;
+}

@@ -1,0 +1,292 @@
+// The viewer: an open bundle, the walker in it, and what the worker and the GPU make of both.
+
+import { initialChunks, readChunks, readHeightMap, readManifest } from "../data/bundle.js";
+import { PageError } from "../data/errors.js";
+import { chunkKey } from "../data/layout.js";
+import { BUDGET, createFramePacing } from "../draw/frame_pacing.js";
+import { createFrameStats } from "../draw/frame_stats.js";
+import { OVERLAYS } from "../draw/overlays.js";
+import { createRenderer } from "../draw/renderer.js";
+import { cameraAt } from "../terrain/camera.js";
+import { REACH, tileUnder } from "../terrain/cells.js";
+import { createHeights } from "../terrain/heights.js";
+import { createWorkerClient } from "../worker/worker_client.js";
+import { parsePlace } from "./address.js";
+import { createFlyPath } from "./fly_path.js";
+import { createWalker, moveTo } from "./walker.js";
+
+/**
+ * @typedef {import("../data/source.js").Source} Source
+ * @typedef {import("./walker.js").Walker} Walker
+ *
+ * An open bundle. renderer: null while the graphics context is lost; frame: the worker's last; coarse: chunks of the
+ * coarsest level that have arrived; pending: keys of chunks that are being read again.
+ * @typedef {{ manifest: import("../data/manifest.js").Manifest, source: Source, walker: Walker,
+ *   heights: import("../terrain/heights.js").HeightField, client: import("../worker/worker_client.js").WorkerClient,
+ *   renderer: import("../draw/renderer.js").Renderer | null,
+ *   frame: import("../worker/frame_builder.js").FrameAnswer | null, coarse: number, pending: Set<number> }} Scene
+ *
+ * still: draw only when asked, for tests and screenshots; firstBudget: of the first picture then; onFirstScene: called
+ * when the first bundle's manifest is read.
+ * @typedef {{ still: boolean, firstBudget: number, onFirstScene: (walker: Walker) => void }} Options
+ */
+
+const MAX_PIXEL_RATIO = 1.5; // device pixels a CSS pixel: splats are soft, pixels cost
+const RETRY = 50; // milliseconds until a lost graphics context is asked for again
+const MIN_LOW = 1e-4; // sine of the angle below the horizon at which tiles end, at least
+
+export class Viewer {
+  /** @type {Scene | null} */
+  scene = null;
+  loaded = false;
+  opened = 0; // bundles that were loaded
+  /** @type {string | null} */
+  error = null;
+  overlay = 0;
+  dirty = true; // the picture must be drawn again
+  stale = true; // the worker must be asked again
+  pacing = createFramePacing();
+  stats = createFrameStats();
+  flyPath = createFlyPath();
+  #fresh = false; // the worker has answered since the last picture
+  #stop = new AbortController(); // of the bundle that is being loaded
+  #restored = Promise.resolve(); // pending while the graphics context is lost
+
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {import("../draw/gl.js").GL} gl
+   * @param {import("./hud.js").Hud} hud
+   * @param {Options} options
+   */
+  constructor(canvas, gl, hud, options) {
+    this.canvas = canvas;
+    this.gl = gl;
+    this.hud = hud;
+    this.options = options;
+    this.#watchContext();
+  }
+
+  /**
+   * Open a bundle: the page's own, or one that was dropped. The picture stays until the manifest is read.
+   *
+   * @param {Source} source
+   */
+  async open(source) {
+    const manifest = await readManifest(source), pixels = await readHeightMap(manifest, source);
+    const before = this.scene;
+    this.#stop.abort();
+    before?.client.end();
+    before?.renderer?.end();
+    const stop = new AbortController();
+    this.#stop = stop;
+    const walker = createWalker(manifest, before ? {} : parsePlace(location.hash));
+    const heights = createHeights(manifest.heights, pixels);
+    const client = createWorkerClient(manifest, pixels, {
+      onRecords: (records) => this.#addRecords(records),
+      onFrame: (frame) => this.#setFrame(frame),
+      onError: (error) => this.fail(error),
+    });
+    this.loaded = false;
+    this.error = null;
+    this.scene = {
+      manifest, source, heights, client, walker: Object.assign(before?.walker ?? walker, walker),
+      renderer: createRenderer(this.gl, manifest, heights), frame: null, coarse: 0, pending: new Set(),
+    };
+    if (!before) this.options.onFirstScene(this.scene.walker);
+    this.hud.showTools();
+    this.drawFrame(); // sky and far ground at once
+    try {
+      await readChunks(initialChunks(manifest), source, {
+        take: (chunk) => client.add(chunk), onProgress: (progress) => this.hud.showProgress(progress),
+        signal: stop.signal,
+      });
+    } catch (error) {
+      if (stop.signal.aborted) return; // another bundle was opened meanwhile
+      throw error;
+    }
+    this.loaded = true;
+    await this.settle(this.options.still ? this.options.firstBudget : this.pacing.budget);
+    this.opened += 1;
+    this.hud.showLoaded(this.options.still);
+  }
+
+  /** @param {Scene} scene */
+  #camera({ walker, heights }) {
+    const ratio = Math.min(devicePixelRatio, MAX_PIXEL_RATIO);
+    /** @param {number} size */
+    const pixels = (size) => Math.max(1, Math.round(size * ratio));
+    return cameraAt(walker, pixels(this.canvas.clientWidth), pixels(this.canvas.clientHeight), heights);
+  }
+
+  /**
+   * Ask the worker for a frame of the walker's place.
+   *
+   * @param {number} budget
+   * @param {boolean} patient wait for every batch of it
+   */
+  askWorker(budget, patient) {
+    if (!this.scene) return;
+    this.stale = false;
+    this.scene.client.ask(this.#camera(this.scene), budget, patient);
+  }
+
+  /** Draw the picture now, of the worker's last frame. */
+  drawFrame() {
+    const { scene, canvas } = this;
+    if (!scene?.renderer) return;
+    const start = performance.now(), { manifest, heights, frame, renderer } = scene, camera = this.#camera(scene);
+    const { width, height } = camera, farthest = REACH * manifest.tile_side;
+    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+    this.gl.viewport(0, 0, width, height);
+    const low = Math.max(MIN_LOW, (camera.eye[2] - heights.low) / farthest);
+    renderer.draw(camera, { end: frame?.reach ?? farthest, low, overlay: this.overlay });
+    this.dirty = false;
+    this.stats.addTime("render", performance.now() - start);
+    this.stats.addFrame(this.#fresh);
+    this.#fresh = false;
+    this.hud.showNumbers({
+      now: start, state: () => describeScene(scene), stats: this.stats.summary(), fps: this.pacing.fps,
+      unit: manifest.unit, force: this.options.still,
+    });
+  }
+
+  /**
+   * Draw the picture of this place exactly, however long the worker takes: for pictures that are kept or compared.
+   *
+   * @param {number} [budget]
+   * @returns {Promise<void>}
+   */
+  async settle(budget = BUDGET.most) {
+    await this.#restored;
+    const renderer = this.scene?.renderer;
+    this.askWorker(budget, true);
+    await this.scene?.client.answered();
+    this.drawFrame();
+    // the context may be lost without an event yet, or be back and empty
+    if (this.gl.isContextLost() || renderer !== this.scene?.renderer) {
+      await new Promise((done) => setTimeout(done, RETRY));
+      return this.settle(budget);
+    }
+  }
+
+  /** A picture is due: at the next turn of the frame loop, or now if there is none. */
+  redraw() {
+    this.dirty = this.stale = true;
+    if (this.options.still) this.settle().catch((error) => this.fail(error));
+  }
+
+  /** @param {Partial<import("../terrain/camera.js").Place>} place */
+  setPlace(place) {
+    if (this.scene) moveTo(this.scene.walker, place);
+    this.dirty = this.stale = true;
+  }
+
+  /** @param {number} overlay */
+  showOverlay(overlay) {
+    this.overlay = overlay;
+    this.redraw();
+  }
+
+  /** The picture on the screen as a PNG file. @returns {Promise<Blob>} */
+  async takePicture() {
+    await this.settle();
+    return new Promise((done, refuse) =>
+      this.canvas.toBlob((blob) => (blob ? done(blob) : refuse(new Error("the picture cannot be saved")))));
+  }
+
+  /** What is on the screen, in plain values. */
+  state() {
+    const { loaded, opened, error, overlay, pacing: { budget } } = this;
+    const view = this.scene ? describeScene(this.scene) : { drawn: [], count: 0, bytes: 0 };
+    return { ...view, overlay: OVERLAYS[overlay], budget, loaded, opened, error };
+  }
+
+  /** Tell the person what went wrong. @param {unknown} error */
+  fail(error) {
+    this.error = explainError(error);
+    this.hud.showError(this.error);
+    console.error(error);
+  }
+
+  /** @param {import("../worker/worker.js").Records} records */
+  #addRecords(records) {
+    const { scene } = this;
+    if (!scene) return;
+    scene.renderer?.splats.addRecords(records);
+    if (records.level === scene.manifest.levels.length - 1) scene.coarse += 1;
+    this.dirty = this.stale = true;
+  }
+
+  /** @param {import("../worker/frame_builder.js").FrameAnswer} frame */
+  #setFrame(frame) {
+    const { scene } = this;
+    if (!scene) return;
+    scene.renderer?.splats.setFrame(frame);
+    this.stats.addTime("update", frame.milliseconds.update);
+    this.stats.addTime("sort", frame.milliseconds.sort);
+    scene.frame = frame;
+    this.dirty = this.#fresh = true;
+    if (frame.incomplete) this.stale = true;
+    if (this.loaded) this.#readMissing(scene, frame.missing);
+  }
+
+  /**
+   * Read chunks that were evicted from the cache, in a set larger than it.
+   *
+   * @param {Scene} scene
+   * @param {number[]} missing
+   */
+  #readMissing({ manifest, source, client, pending }, missing) {
+    const keys = missing.filter((key) => !pending.has(key));
+    if (!keys.length) return;
+    for (const key of keys) pending.add(key);
+    const queue = manifest.tiles.flatMap(({ tile, chunks }) => chunks.map((entry) => ({ tile, entry })))
+      .filter(({ tile, entry }) => keys.includes(chunkKey(tile, entry.level)));
+    readChunks(queue, source, { take: (chunk) => client.add(chunk) })
+      .catch((error) => this.fail(error))
+      .finally(() => {
+        for (const key of keys) pending.delete(key);
+      });
+  }
+
+  #watchContext() {
+    let restored = () => {};
+    this.canvas.addEventListener("webglcontextlost", (event) => {
+      event.preventDefault();
+      if (this.scene) this.scene.renderer = null;
+      this.#restored = new Promise((done) => (restored = done));
+      this.hud.showError("The graphics driver took the picture away; it comes back as soon as the driver does.");
+    });
+    this.canvas.addEventListener("webglcontextrestored", () => {
+      const { scene } = this;
+      if (scene) {
+        scene.renderer = createRenderer(this.gl, scene.manifest, scene.heights);
+        scene.client.restore();
+      }
+      restored();
+      this.hud.hideError();
+      this.redraw();
+    });
+  }
+}
+
+/** Place and picture of a scene, in plain values. @param {Scene} scene */
+function describeScene({ manifest, walker, frame }) {
+  const { x, y, eye, yaw, pitch } = walker, drawn = [];
+  for (let k = 0; frame && k < frame.drawn.length; k += 6) {
+    const [di, dj, tile, level, last, order] = frame.drawn.subarray(k, k + 6);
+    drawn.push({ i: frame.i0 + di, j: frame.j0 + dj, tile, level, last, order });
+  }
+  const { count = 0, reach, shrink, bytes = 0 } = frame ?? {};
+  return { x, y, eye, yaw, pitch, under: tileUnder(manifest, x, y), drawn, count, reach, shrink, bytes };
+}
+
+/** One sentence for the person at the screen. @param {unknown} error */
+export function explainError(error) {
+  if (error instanceof PageError) return error.message;
+  const { name = "", message = String(error) } = /** @type {Partial<Error>} */ (error ?? {});
+  if (error instanceof RangeError || name === "RangeError" || name === "NotReadableError") {
+    return "The terrain does not fit into this browser's memory. Close other pages, or open it on a larger machine.";
+  }
+  return `Something unexpected went wrong: ${message}. Reload the page; if it stays, please report it.`;
+}

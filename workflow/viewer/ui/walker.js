@@ -1,0 +1,71 @@
+// The walker: where the eye is, and how held keys move it. Angles in degrees.
+
+const SPEED = 1.2; // eye heights a second
+const RUN = 4; // with Shift
+const TURN = 70; // degrees a second with the arrow keys
+const RISE = 1.2; // powers of e a second with Q and E
+const CEILING = 16; // highest eye, in tile sides
+
+/**
+ * @typedef {import("../terrain/camera.js").Place} Place
+ * @typedef {"forward" | "back" | "left" | "right" | "turnLeft" | "turnRight" | "lower" | "higher" | "run"} Action
+ *
+ * A place, the bounds of the eye's height above the surface, and the actions of held keys.
+ * @typedef {Place & { floor: number, ceiling: number, held: Set<Action> }} Walker
+ */
+
+/** @type {(keyof Place)[]} */
+export const PLACE_KEYS = ["x", "y", "eye", "yaw", "pitch"];
+
+/**
+ * @param {{ tile_side: number, eye_floor: number }} manifest
+ * @param {Partial<Place>} [place]
+ * @returns {Walker}
+ */
+export function createWalker({ tile_side: side, eye_floor: floor }, place = {}) {
+  const walker = {
+    x: side / 2, y: side / 2, eye: floor, yaw: 60, pitch: -12,
+    floor, ceiling: Math.max(CEILING * side, 4 * floor), held: new Set(),
+  };
+  moveTo(walker, place);
+  return walker;
+}
+
+/**
+ * Change any parts of the place, within bounds; what is not a finite number stays as it was.
+ *
+ * @param {Walker} walker
+ * @param {Partial<Place>} place
+ */
+export function moveTo(walker, place) {
+  for (const key of PLACE_KEYS) {
+    const value = place[key];
+    if (value !== undefined && Number.isFinite(value)) walker[key] = value;
+  }
+  walker.eye = Math.min(Math.max(walker.eye, walker.floor), walker.ceiling);
+  walker.pitch = Math.min(Math.max(walker.pitch, -90), 90);
+  walker.yaw = ((walker.yaw % 360) + 360) % 360;
+}
+
+/**
+ * Move by the held keys for some seconds. Returns: did anything change?
+ *
+ * @param {Walker} walker
+ * @param {number} seconds
+ */
+export function stepWalker(walker, seconds) {
+  /** @param {Action} action */
+  const on = (action) => Number(walker.held.has(action));
+  const forward = on("forward") - on("back"), right = on("right") - on("left");
+  const turn = on("turnLeft") - on("turnRight"), rise = on("higher") - on("lower");
+  if (!forward && !right && !turn && !rise) return false;
+  const yaw = (walker.yaw * Math.PI) / 180;
+  const stride = (SPEED * walker.eye * seconds * (on("run") ? RUN : 1)) / Math.max(1, Math.hypot(forward, right));
+  moveTo(walker, {
+    x: walker.x + stride * (forward * Math.cos(yaw) + right * Math.sin(yaw)),
+    y: walker.y + stride * (forward * Math.sin(yaw) - right * Math.cos(yaw)),
+    yaw: walker.yaw + turn * TURN * seconds,
+    eye: walker.eye * Math.exp(rise * RISE * seconds),
+  });
+  return true;
+}
