@@ -119,6 +119,7 @@ rule write_seams:
     input:
         tables=list(rules.gather_seams.output.kept),
         ablation=rules.gather_seams.output.plot,
+        template=str(Path(workflow.basedir, "workflow/report/seams.md")),
         drawn=lambda wildcards: [path for paths in seam_pictures().values() for path in paths],
     output:
         page="docs/research/results/seams.md",

@@ -1,4 +1,4 @@
-"""Rule gather_seams: all cells in one table, what follows from it, and a figure."""
+"""Rule gather_seams: crops of all experiments in one table, its summaries, and a figure."""
 
 from dav_gswt.logs import logging_to
 from dav_gswt.study import csv_tables
@@ -6,14 +6,14 @@ from dav_gswt.study.seams import plots, summary, tables
 
 with logging_to(snakemake.log[0]):
     out, cells, study = snakemake.output, snakemake.params.cells, snakemake.params.study
-    rows = [row for cell in cells for row in tables.rows(cell)]
+    rows = [row for cell in cells for row in tables.tabulate_crops(cell)]
     csv_tables.write_table(out.crops, rows)
     often = study.get("compared_draws", 1)
     compared = [row for row in rows if row["variant"] in study["tilings"] and row["replicate"] < often]
     found = {
-        out.summary: summary.summary(rows),
-        out.ablation: summary.ablation(compared, study["baseline"]),
-        out.repetition: [row for cell in cells if "repeats" in cell for row in tables.repeats(cell)],
+        out.summary: summary.summarise_crops(rows),
+        out.ablation: summary.compare_variants(compared, study["baseline"]),
+        out.repetition: [row for cell in cells if "repeats" in cell for row in tables.tabulate_repetition(cell)],
     }
     for (path, new), kept, key in zip(found.items(), out.kept, tables.KEYS, strict=True):
         csv_tables.write_table(path, new)

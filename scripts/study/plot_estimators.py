@@ -15,7 +15,7 @@ with logging_to(snakemake.log[0]):
     for name, *paths in zip(params.named, given.fields, given.grounds, given.metrics, given.crops, strict=True):
         fitted, surface, measured, crops = paths
         read = read_field(fitted), ground.read(surface), read_json(measured)
-        found.append(evolution.Round(params.rounds, *read, title=name, note=estimators.note(crops)))
+        found.append(evolution.Round(params.rounds, *read, title=name, note=estimators.format_seam_note(crops)))
     names = list(evolution.choose_test_views(found[0].metrics, key))
     tests = read_training_views(given.images, given.model, names, [], params.size)
     evolution.write_figure(snakemake.output.plot, evolution.build_strips(found, tests, key), found, key)

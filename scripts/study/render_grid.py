@@ -14,4 +14,6 @@ with logging_to(snakemake.log[0]):
     tiles = store.read_tiles(given.tiles, given.seams)
     for path in progress(snakemake.output.pictures, "draw grids"):
         shot, surface = Path(path).stem.split("_")
-        image_files.write_png(path, pictures.drawn(tiles, bundle, shot, surface, snakemake.params.size))
+        image_files.write_png(
+            path, pictures.render_terrain_picture(tiles, bundle, shot, surface, snakemake.params.size)
+        )

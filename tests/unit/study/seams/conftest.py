@@ -1,10 +1,10 @@
-"""The made-up exemplar, its tiles cut by colour and straight, laid; made once."""
+"""A synthetic exemplar, its tiles cut by colour and straight, placed as terrain; made once."""
 
 import numpy as np
 import pytest
 from fixtures import tile_sets
 
-from dav_gswt.study.seams import ground
+from dav_gswt.study.seams import placed_tiles
 
 
 @pytest.fixture(scope="session")
@@ -20,17 +20,17 @@ def tiles(made_up):
 @pytest.fixture(scope="session")
 def source(made_up, tiles):
     width = 0.2 * tiles.seams["layout"]["side"]
-    return ground.source_of(made_up.levels, made_up.exemplar, made_up.colour, width)
+    return placed_tiles.detrend_exemplar(made_up.levels, made_up.exemplar, made_up.colour, width)
 
 
 @pytest.fixture(scope="session")
 def laid(tiles, source):
-    return ground.laid(tiles, source, 3, 0.6)
+    return placed_tiles.place_tiles(tiles, source, 3, 0.6)
 
 
 @pytest.fixture(scope="session")
 def straight(made_up, source):
-    return ground.laid(tile_sets.tiles_of(made_up, "none", corrected=False), source, 3, 0.6)
+    return placed_tiles.place_tiles(tile_sets.tiles_of(made_up, "none", corrected=False), source, 3, 0.6)
 
 
 @pytest.fixture()

@@ -20,7 +20,7 @@ def sets(laid, straight):
 
 @pytest.fixture(scope="module")
 def items(sets):
-    return pairs.drawn(sets, ASKED, None)
+    return pairs.sample_pairs(sets, ASKED, None)
 
 
 def named(items, second):
@@ -67,23 +67,23 @@ def test_a_check_has_a_half_that_is_much_darker(items):
 
 
 def test_the_same_seed_draws_the_same_pairs(sets, items):
-    again = pairs.drawn(sets, ASKED | {"crops": 1, "checks": 0}, None)
+    again = pairs.sample_pairs(sets, ASKED | {"crops": 1, "checks": 0}, None)
     assert [item.cluster for item in again] == [named(items, "none")[0].cluster, named(items, "floor")[0].cluster]
     np.testing.assert_array_equal(again[0].halves[1].picture, named(items, "none")[0].halves[1].picture)
 
 
 def test_the_model_observer_judges_what_has_a_seam(sets, monkeypatch):
-    monkeypatch.setattr(measure, "BANK", 40)
-    found = pairs.drawn(sets, ASKED | {"crops": 1, "checks": 1}, lpips_arrays.random())
+    monkeypatch.setattr(measure, "BANK_SIZE", 40)
+    found = pairs.sample_pairs(sets, ASKED | {"crops": 1, "checks": 1}, lpips_arrays.random())
     over = {item.halves[1].name: item.over for item in found}
     assert over["check"] == (None, None) and over["floor"][1] == 0.0
     assert all(np.isfinite(value) and value != 0 for value in (*over["none"], over["floor"][0]))
 
 
 def test_more_than_the_exemplar_holds_cannot_be_shown(sets, monkeypatch):
-    monkeypatch.setattr(pairs, "TRIED", 20)
+    monkeypatch.setattr(pairs, "MAX_PLACES", 20)
     with pytest.raises(InputError, match="only 0 of 1 crops of colour and floor .* smaller `size`"):
-        pairs.drawn(sets, ASKED | {"pairs": [["colour", "floor"]], "crops": 1, "size": 1200}, None)
+        pairs.sample_pairs(sets, ASKED | {"pairs": [["colour", "floor"]], "crops": 1, "size": 1200}, None)
 
 
 def test_what_is_written_is_read_again(items, tmp_path):

@@ -1,5 +1,7 @@
 """The page of seams: every number from a table, a row for what was measured and none for what was not."""
 
+from pathlib import Path
+
 from fixtures.markdown import collapse_spaces
 
 from dav_gswt.study.seams import page, summary
@@ -8,8 +10,9 @@ OWN = {"desert": "semantic", "copr_dunes": "auto"}
 NAMES = ("border", "cut", "ceiling")
 
 
-def page_text(*tables):
-    return collapse_spaces(page.text(*tables))
+def page_text(summary, ablation, repetition, own, pictures):
+    template = Path(__file__).parents[4] / "workflow/report/seams.md"
+    return collapse_spaces(page.format_seam_page(template, (summary, ablation, repetition), own, pictures))
 
 
 def told(scene, variant, view="every", share="0.25"):
@@ -66,7 +69,7 @@ def test_a_way_that_cannot_be_told_is_left_empty():
 def test_ways_to_cut_stand_first_over_all_scenes():
     rows = [less("none", "desert", "psnr", "-0.5"), less("none", summary.EVERY, "psnr", "-0.25")]
     text = page_text([], [*rows, less("none", "desert", "jump", "")], [], OWN, {})
-    assert "## Ways to cut, less `colour`" in text
+    assert "## Other ways to cut, minus `colour`" in text
     overall, desert = line_of(text, "| `none` | all"), line_of(text, "| `none` | desert")
     assert "-0.25 (-1.00, +1.00)" in overall and "-0.50" in desert and desert.endswith("| |")
     assert text.index(overall) < text.index(desert)

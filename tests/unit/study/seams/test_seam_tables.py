@@ -32,26 +32,26 @@ def table(cut=0.01, ceiling=0.05, noise=0.001, variant="colour"):
 
 
 def test_differences_and_shares_are_those_put_in():
-    every = next(row for row in summary.summary(table()) if row["view"] == summary.EVERY)
+    every = next(row for row in summary.summarise_crops(table()) if row["view"] == summary.EVERY)
     assert every["border"] == pytest.approx(0, abs=5e-4) and every["border_low"] < 0 < every["border_high"]
     assert every["share"] == pytest.approx(0.2, abs=0.02) and every["share_low"] < 0.2 < every["share_high"]
     assert (every["borders"], every["border_clusters"]) == (40, 20)
 
 
 def test_where_the_ceiling_is_not_told_from_the_floor_there_is_no_share():
-    every = summary.summary(table(ceiling=-0.01, noise=0.02))[0]
+    every = summary.summarise_crops(table(ceiling=-0.01, noise=0.02))[0]
     assert every["ceiling_low"] < 0 and every["share"] is None
 
 
 def test_without_lpips_there_is_none_in_the_summary():
     rows = [row | {"seam_lpips": None} for row in table()]
-    every = summary.summary(rows)[0]
+    every = summary.summarise_crops(rows)[0]
     assert every["border"] is None and every["share"] is None and every["cut_psnr"] == pytest.approx(30)
 
 
 def test_a_variant_is_compared_with_the_baseline_in_the_same_clusters():
     rows = table() + table(cut=0.03, variant="none")
-    found = summary.ablation(rows, "colour")
+    found = summary.compare_variants(rows, "colour")
     row = next(r for r in found if r["measure"] == "seam_lpips")
     assert row["variant"] == "none" and row["difference"] == pytest.approx(0.02, abs=1e-3)
     assert row["difference_low"] > 0.018
@@ -59,19 +59,19 @@ def test_a_variant_is_compared_with_the_baseline_in_the_same_clusters():
 
 def test_autocorrelation_is_that_of_the_slow_sum():
     picture = np.random.default_rng(0).random((6, 5, 3))
-    found = repetition.autocorrelation(picture)
+    found = repetition.autocorrelate(picture)
     f = picture - picture.mean((0, 1))
     for dy, dx in ((0, 0), (1, 2), (3, 0)):
         slow = (f[: 6 - dy, : 5 - dx] * f[dy:, dx:]).sum(-1).mean() / (f**2).sum(-1).mean()
         assert found[6 + dy, 5 + dx] == pytest.approx(slow) == pytest.approx(found[6 - dy, 5 - dx])
-    assert not repetition.autocorrelation(np.full((4, 4, 3), 0.5)).any()
+    assert not repetition.autocorrelate(np.full((4, 4, 3), 0.5)).any()
 
 
 def test_a_picture_that_repeats_stands_out_at_its_period_and_noise_does_not():
     rng = np.random.default_rng(1)
     tile = rng.random((32, 32, 3))
     for picture, repeats in ((np.tile(tile, (6, 6, 1)), True), (rng.random((192, 192, 3)), False)):
-        r = repetition.autocorrelation(picture)
-        found = repetition.rows(repetition.Repeats(r, r, 32))
+        r = repetition.autocorrelate(picture)
+        found = repetition.tabulate_repetition(repetition.Autocorrelations(r, r, 32))
         assert all((row["terrain"] > 2 * row["around"]) == repeats for row in found)
         assert found[0]["terrain"] == pytest.approx(1 if repeats else 0, abs=0.05)

@@ -17,5 +17,5 @@ def crops(path, value, floor):
 
 
 def test_seams_are_told_over_their_floor_and_not_without_lpips(tmp_path):
-    assert estimators.note(crops(tmp_path / "a.csv", 0.3, 0.1)) == "\nSeam-LPIPS +0.200"
-    assert estimators.note(crops(tmp_path / "b.csv", None, None)) == ""
+    assert estimators.format_seam_note(crops(tmp_path / "a.csv", 0.3, 0.1)) == "\nSeam-LPIPS +0.200"
+    assert estimators.format_seam_note(crops(tmp_path / "b.csv", None, None)) == ""

@@ -1,8 +1,8 @@
-"""Pairs of crops of one scene: the same place cut in two ways, or cut and whole, and some that nobody can mistake.
+"""Pairs of crops of one scene: a place cut in two ways, or with and without a cut, and attention checks.
 
-The crops are those of the seam study (`seams.measure`): on level and hilly ground, near, walking and from above, a cut
-in the middle, drawn as the terrain is. People see more around it; what the model observer judges is the middle.
-Cuts alone are shown: across a border between tiles the same patch goes on.
+The crops are those of the seam study (`seams.measure`): on level and hilly ground, near, at walker height and from
+above, with a cut in the middle. Participants see a larger crop; the model observer judges its middle. Only cuts are
+compared: across a border between tiles the patch does not change.
 """
 
 from collections.abc import Iterator
@@ -18,32 +18,30 @@ from dav_gswt.images.lpips_weights import Weights
 from dav_gswt.logs import progress
 from dav_gswt.study.config import FLOOR
 from dav_gswt.study.seams import crops, measure, places
-from dav_gswt.study.seams.crops import Crop, Shown, View
-from dav_gswt.study.seams.ground import Laid
+from dav_gswt.study.seams.crops import Crop, RenderedCrop, View
 from dav_gswt.study.seams.measure import GROUNDS
+from dav_gswt.study.seams.placed_tiles import PlacedTiles
 from dav_gswt.study.seams.places import Place
 from dav_gswt.terrain import heights
 from dav_gswt.terrain.endless import EndlessTerrain
 
-PLAIN, CHECK = "plain", "check"  # of an attention check: the right answer and the wrong one
-TRIED = 300  # places of a comparison in a look, before there are too few
-DARK = 0.6  # brightness of the half of a check that is not to be overlooked
+PLAIN, CHECK = "plain", "check"  # names in an attention check: the right answer and the wrong one
+MAX_PLACES = 300  # places of a comparison that are tried in a setup
+DARKENING = 0.6  # brightness of the replaced half of an attention check
 
 
 @dataclass(frozen=True)
 class Half:
-    """One of the two. shown: what the model observer judges; None for what has no seam."""
+    """One crop of a pair. shown: what the model observer judges; None without a seam."""
 
     name: str
     picture: Float32[Array, "h w 3"]
-    shown: Shown | None = None
+    shown: RenderedCrop | None = None
 
 
 @dataclass(frozen=True)
 class Item:
-    """Two crops of a place, and what is seen there. over: of both, Seam-LPIPS over its floor; 0 for what has no seam,
-    None where it was not measured.
-    """
+    """Two crops of a place. over: Seam-LPIPS of both over its floor; 0 without a seam, None if it was not measured."""
 
     halves: tuple[Half, Half]
     view: str
@@ -53,148 +51,154 @@ class Item:
 
 
 @dataclass(frozen=True)
-class Look:
-    """How crops are looked at: from where, over which ground, how many pixels wide; the tile sets laid over it."""
+class Setup:
+    """How crops are rendered: view, ground, width in pixels, and the tile sets on that ground."""
 
     view: View
     ground: str
     size: int
-    laid: dict[str, tuple[Laid, EndlessTerrain]]
+    placed: dict[str, tuple[PlacedTiles, EndlessTerrain]]
 
 
 @dataclass(frozen=True)
 class Spot:
-    """A place that can be shown: what is judged, what people see, the patches that meet in the former."""
+    """A place to render: the crop that is judged, the crop that people see, and the patches of the former."""
 
     small: Crop
     large: Crop
     met: list[int]
 
 
-def drawn(sets: dict[str, Laid], asked: dict, weights: Weights | None) -> list[Item]:
-    """All pairs of a scene. sets: its tile sets by their seams, of one layout. asked: the config's `perceptual_study`.
+def sample_pairs(sets: dict[str, PlacedTiles], asked: dict, weights: Weights | None) -> list[Item]:
+    """All pairs of a scene. sets: its tile sets by tiling, of one layout. asked: the config's `perceptual_study`.
 
-    The crops of each pair are dealt to the six looks (ground and view) in turn; no part of a tile is shown twice as
-    long as there are others.
-    Raises: InputError: too few places can be shown.
+    The pairs of each comparison are distributed over the six setups (ground and view) in turn; no part of a tile is
+    shown twice while others are left.
+    Raises: InputError: too few places can be rendered.
     """
-    looks, used, found = list(product(GROUNDS, crops.VIEWS)), set(), []
+    setups, used, found = list(product(GROUNDS, crops.VIEWS)), set(), []
     side = next(iter(sets.values())).terrain.side
-    for number, (ground, view) in enumerate(progress(looks, "draw pairs")):
+    for number, (ground, view) in enumerate(progress(setups, "draw pairs")):
         surface = heights.surface_from_config(GROUNDS[ground], side)
-        laid = {name: (each, replace(each.terrain, heights=surface)) for name, each in sets.items()}
-        look = Look(view, ground, asked["size"], laid)
+        placed = {name: (each, replace(each.terrain, heights=surface)) for name, each in sets.items()}
+        look = Setup(view, ground, asked["size"], placed)
         rng = np.random.default_rng([asked["seed"], number])
         some = []
         for a, b in asked["pairs"]:
-            some += _enough(_compared(look, a, b, used, rng), _dealt(asked["crops"], number), f"{a} and {b}")
-        some += _enough(_checks(look, used, rng), _dealt(asked["checks"], number), "attention checks")
-        found += _judged(look, some, weights, rng) if weights else some
+            some += _take_enough(
+                _sample_comparison(look, a, b, used, rng), _count_for_setup(asked["crops"], number), f"{a} and {b}"
+            )
+        some += _take_enough(
+            _sample_checks(look, used, rng), _count_for_setup(asked["checks"], number), "attention checks"
+        )
+        found += _measure_excess(look, some, weights, rng) if weights else some
     return found
 
 
-def _dealt(count: int, look: int) -> int:
-    """How many of the crops a look has: it and those six further on."""
+def _count_for_setup(count: int, look: int) -> int:
+    """How many of the crops a setup gets: every sixth."""
     return len(range(look, count, len(GROUNDS) * len(crops.VIEWS)))
 
 
-def _enough(found: Iterator[Item], asked: int, what: str) -> list[Item]:
+def _take_enough(found: Iterator[Item], asked: int, what: str) -> list[Item]:
     some = list(islice(found, asked))
     if len(some) < asked:
         raise InputError(
-            f"perceptual_study: only {len(some)} of {asked} crops of {what} could be taken in one view: patches end "
-            "within what a crop shows; ask for a smaller `size` in the config's perceptual_study, or a finer quality"
+            f"perceptual_study: only {len(some)} of {asked} crops of {what} could be rendered in one view: patches end "
+            "inside a crop; choose a smaller `size` in the config's perceptual_study, or a finer preset"
         )
     return some
 
 
-def _fresh(laid: Laid, used: set[str], rng: np.random.Generator) -> list[Place]:
-    """Some places on cuts: first those of clusters that were not shown."""
-    return sorted(places.cuts(laid, rng), key=lambda place: place.cluster in used)[:TRIED]
+def _order_places(placed: PlacedTiles, used: set[str], rng: np.random.Generator) -> list[Place]:
+    """Places on cuts, those of unused clusters first."""
+    return sorted(places.sample_cuts(placed, rng), key=lambda place: place.cluster in used)[:MAX_PLACES]
 
 
-def _compared(look: Look, a: str, b: str, used: set[str], rng: np.random.Generator) -> Iterator[Item]:
-    """Crops of the cuts of `a`, each beside the nearest cut of `b` in the same tile, or the same ground whole."""
-    for place in _fresh(look.laid[a][0], used, rng):
-        if not (spot := _spot(look, a, place)):
+def _sample_comparison(look: Setup, a: str, b: str, used: set[str], rng: np.random.Generator) -> Iterator[Item]:
+    """Crops of the cuts of `a`, each with the nearest cut of `b` in the same tile, or the same ground without a cut."""
+    for place in _order_places(look.placed[a][0], used, rng):
+        if not (spot := _find_spot(look, a, place)):
             continue
-        twin = None if b == FLOOR else places.beside(look.laid[b][0], place)
-        other = _covering(look.laid[a][0], spot) if b == FLOOR else twin and _spot(look, b, twin)
-        if other is None or not (first := _cut(look, a, spot)):
+        twin = None if b == FLOOR else places.find_nearest_cut(look.placed[b][0], place)
+        other = _find_covering_patch(look.placed[a][0], spot) if b == FLOOR else twin and _find_spot(look, b, twin)
+        if other is None or not (first := _render_cut(look, a, spot)):
             continue
-        if second := _whole(look, a, spot, other) if b == FLOOR else _cut(look, b, other):
+        if second := _render_whole(look, a, spot, other) if b == FLOOR else _render_cut(look, b, other):
             used.add(place.cluster)
             yield Item((first, second), look.view.name, look.ground, place.cluster)
 
 
-def _spot(look: Look, name: str, place: Place) -> Spot | None:
-    """Where a cut can be looked at, before anything is drawn; None where it cannot be judged."""
-    laid, terrain = look.laid[name]
-    small = crops.crop(laid, terrain, look.view, place.at)
-    met = crops.meeting(laid, small) if small else None
-    large = crops.crop(laid, terrain, look.view, place.at, look.size) if met and len(met) > 1 else None
+def _find_spot(look: Setup, name: str, place: Place) -> Spot | None:
+    """The crops of a cut before rendering; None where it cannot be judged."""
+    placed, terrain = look.placed[name]
+    small = crops.make_crop(placed, terrain, look.view, place.at)
+    met = crops.find_patches(placed, small) if small else None
+    large = crops.make_crop(placed, terrain, look.view, place.at, look.size) if met and len(met) > 1 else None
     return Spot(small, large, met) if large else None
 
 
-def _covering(laid: Laid, spot: Spot) -> int | None:
-    """The first of the patches that can be laid whole over all that the crop shows."""
-    return next((patch for patch in spot.met if crops.inside(laid, spot.large, laid.origins[patch])), None)
+def _find_covering_patch(placed: PlacedTiles, spot: Spot) -> int | None:
+    """The first of the patches that covers the whole crop."""
+    return next((patch for patch in spot.met if crops.covers_crop(placed, spot.large, placed.origins[patch])), None)
 
 
-def _cut(look: Look, name: str, spot: Spot) -> Half | None:
-    """A crop with a cut in its middle; None where things that stand hide it."""
-    laid, terrain = look.laid[name]
-    shown = crops.shown(laid, terrain, spot.small, spot.met)
-    return Half(name, crops.picture(laid, terrain, spot.large), shown) if shown.any else None
+def _render_cut(look: Setup, name: str, spot: Spot) -> Half | None:
+    """A crop with a cut in its middle; None where things hide it."""
+    placed, terrain = look.placed[name]
+    shown = crops.render_patches(placed, terrain, spot.small, spot.met)
+    return Half(name, crops.render_crop(placed, terrain, spot.large), shown) if shown.shows_patch else None
 
 
-def _whole(look: Look, name: str, spot: Spot, patch: int) -> Half:
-    """The crop with that patch laid whole."""
-    laid, terrain = look.laid[name]
-    changed = crops.change(laid, spot.small, patch)
-    return Half(FLOOR, crops.whole(laid, terrain, spot.large, laid.origins[patch], changed))
+def _render_whole(look: Setup, name: str, spot: Spot, patch: int) -> Half:
+    """The crop with that patch alone."""
+    placed, terrain = look.placed[name]
+    changed = crops.mean_correction(placed, spot.small, patch)
+    return Half(FLOOR, crops.render_patch(placed, terrain, spot.large, placed.origins[patch], changed))
 
 
-def _checks(look: Look, used: set[str], rng: np.random.Generator) -> Iterator[Item]:
+def _sample_checks(look: Setup, used: set[str], rng: np.random.Generator) -> Iterator[Item]:
     """A crop, and half of it beside half of another place, which is darker: a straight edge that nobody overlooks."""
-    name, (laid, terrain) = next(iter(look.laid.items()))
+    name, (placed, terrain) = next(iter(look.placed.items()))
     before = None
-    for place in _fresh(laid, used, rng):
-        if not (large := crops.crop(laid, terrain, look.view, place.at, look.size)):
+    for place in _order_places(placed, used, rng):
+        if not (large := crops.make_crop(placed, terrain, look.view, place.at, look.size)):
             continue
-        picture = crops.picture(laid, terrain, large)
+        picture = crops.render_crop(placed, terrain, large)
         if before is not None:
             used.add(place.cluster)
-            halves = Half(PLAIN, picture), Half(CHECK, _spoilt(picture, before, upright=bool(rng.integers(2))))
+            halves = Half(PLAIN, picture), Half(CHECK, _replace_half(picture, before, upright=bool(rng.integers(2))))
             yield Item(halves, look.view.name, look.ground, place.cluster)
         before = picture
 
 
-def _spoilt(picture: Float32[Array, "h w 3"], other: Float32[Array, "h w 3"], upright: bool) -> Float32[Array, "h w 3"]:
+def _replace_half(
+    picture: Float32[Array, "h w 3"], other: Float32[Array, "h w 3"], upright: bool
+) -> Float32[Array, "h w 3"]:
     out = picture.copy()
     half = (slice(None), slice(out.shape[1] // 2, None)) if upright else (slice(out.shape[0] // 2, None),)
-    out[half] = np.float32(DARK) * other[half]
+    out[half] = np.float32(DARKENING) * other[half]
     return out
 
 
-def _judged(look: Look, items: list[Item], weights: Weights, rng: np.random.Generator) -> list[Item]:
-    """The items with how much farther the middle of each crop is from the exemplar than its patches are.
+def _measure_excess(look: Setup, items: list[Item], weights: Weights, rng: np.random.Generator) -> list[Item]:
+    """The pairs with Seam-LPIPS of the middle of each crop over its floor.
 
-    One bank of the exemplar's crops serves all tile sets, so that both of a pair are compared with the same.
+    All tile sets share one bank of crops of the exemplar.
     """
     at = [(i, k) for i, item in enumerate(items) for k in (0, 1) if item.halves[k].shown]
-    taken = [measure.Taken("cut", i, items[i].cluster, items[i].halves[k].shown) for i, k in at]
+    taken = [measure.SampledCrop("cut", i, items[i].cluster, items[i].halves[k].shown) for i, k in at]
     if not taken:
         return items
     seen = [each.shown.crop for each in taken]
-    bank = measure.exemplar_bank(*next(iter(look.laid.values())), seen, weights, rng)
-    values = measure.likeness_of(taken, bank, weights)
+    bank = measure.sample_exemplar_bank(*next(iter(look.placed.values())), seen, weights, rng)
+    values = measure.compute_seam_lpips(taken, bank, weights)
     over = {place: own - floor for place, (own, floor) in zip(at, values, strict=True)}
     return [
-        replace(item, over=tuple(over.get((i, k), _seamless(item.halves[k].name)) for k in (0, 1)))
+        replace(item, over=tuple(over.get((i, k), _excess_without_seam(item.halves[k].name)) for k in (0, 1)))
         for i, item in enumerate(items)
     ]
 
 
-def _seamless(name: str) -> float | None:
+def _excess_without_seam(name: str) -> float | None:
     return 0.0 if name == FLOOR else None

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 from numpy import ndarray as Array
 
-from dav_gswt.study.seams.ground import Source
+from dav_gswt.study.seams.placed_tiles import DetrendedExemplar
 from dav_gswt.tiles import energy, layout
 from dav_gswt.tiles.build import TileSet
 
@@ -13,24 +13,24 @@ STRONG = (
 )
 
 
-def of_tiles(tiles: TileSet, source: Source) -> float:
+def seam_density(tiles: TileSet, source: DetrendedExemplar) -> float:
     """Share of all cuts' edges between cells where either patch's gradient is among the exemplar's strongest quarter,
     counted by patch. Source: DAV-GSWT speaks of "seam density around object boundaries" without a formula.
     """
     colour = source.ground[..., :3]
     steep = np.linalg.norm(energy.compute_gradients(np.nan_to_num(colour, nan=float(np.nanmean(colour)))), axis=-1)
     strong = steep > np.quantile(steep, STRONG)
-    found = [_along(strong, tiles.labels[t], tiles.shifts[t]) for t in range(len(tiles.labels))]
-    edges = np.concatenate(found)
+    parts = [_edge_steepness(strong, tiles.labels[t], tiles.shifts[t]) for t in range(len(tiles.labels))]
+    edges = np.concatenate(parts)
     return float(edges.mean()) if len(edges) else 0.0
 
 
-def _along(strong: Bool[Array, "m m"], labels: UInt8[Array, "n n"], shift: Array) -> Float[Array, "edges"]:
+def _edge_steepness(strong: Bool[Array, "m m"], labels: UInt8[Array, "n n"], shift: Array) -> Float[Array, "edges"]:
     """For each end of each edge that is cut, whether what is shown there is steep."""
-    rows, columns = layout.source_cells(labels, shift)
-    here, out = strong[rows, columns].astype(float), []
+    rows, columns = layout.sources(labels, shift)
+    here, values = strong[rows, columns].astype(float), []
     for axis in (0, 1):
         labels, here = (np.swapaxes(v, 0, axis) for v in (labels, here))
         cut = labels[1:] != labels[:-1]
-        out += [here[:-1][cut], here[1:][cut]]
-    return np.concatenate(out)
+        values += [here[:-1][cut], here[1:][cut]]
+    return np.concatenate(values)

@@ -1,4 +1,4 @@
-"""Large pictures to be looked at: does a grid show, a repeat, a border?"""
+"""Large pictures of the terrain, to look for grids, repetition and borders."""
 
 from dataclasses import replace
 
@@ -6,7 +6,6 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
-from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.study.seams.measure import GROUNDS
 from dav_gswt.terrain import endless, stills
 from dav_gswt.tiles.build import TileSet
@@ -15,15 +14,17 @@ TILES = 20  # a side of the picture from above
 SQUARE = 1600  # pixels of its side
 
 
-def drawn(tiles: TileSet, manifest: Manifest, shot: str, surface: str, size: dict) -> Float32[Array, "h w 3"]:
-    """A `grid` of TILES x TILES from above, or what a `walker` sees, on `flat` or `hilly` ground.
+def render_terrain_picture(
+    tiles: TileSet, manifest: dict, shot: str, surface: str, size: dict
+) -> Float32[Array, "h w 3"]:
+    """A `grid` of TILES x TILES tiles from above, or the view of a `walker`, on `flat` or `hilly` ground.
 
-    size: of the walker's picture. From above the eye is so high that a picture 60 degrees wide shows that many tiles.
+    size: of the walker's picture. From above, the eye is so high that a field of view of 60 degrees holds TILES tiles.
     """
     terrain = endless.terrain_from_fields(tiles.fields, manifest, GROUNDS[surface])
     if shot == "walker":
         return stills.render_shot(terrain, stills.SHOTS[0], manifest, **size)
-    high = 0.5 * TILES * tiles.side / np.tan(np.radians(30.0)) / manifest.eye_floor
+    high = 0.5 * TILES * tiles.side / np.tan(np.radians(30.0)) / manifest["eye_floor"]
     above = stills.Shot("grid", (0.5, 0.5), float(high), 90.0, 90.0)
-    far = replace(terrain, reach=2 * TILES + 8)  # all of it is nearer than what goes over into the far ground
+    far = replace(terrain, reach=2 * TILES + 8)  # all tiles are nearer than the far ground
     return stills.render_shot(far, above, manifest, SQUARE, SQUARE)

@@ -1,4 +1,4 @@
-"""Figures of seams: how the variants compare, where cuts run, what repeats."""
+"""Figures of seams: comparison of variants, cuts in tiles, autocorrelations."""
 
 from pathlib import Path
 
@@ -9,16 +9,16 @@ from numpy import ndarray as Array
 from dav_gswt.geometry import cameras
 from dav_gswt.raster import render
 from dav_gswt.study import figures
-from dav_gswt.study.seams.repetition import Repeats
+from dav_gswt.study.seams.repetition import Autocorrelations
 from dav_gswt.study.seams.summary import EVERY, MEASURES
 from dav_gswt.tiles.build import TileSet
 
-SHOWN = 4  # tiles of the figure of cuts
+TILES_SHOWN = 4  # tiles of the figure of cuts
 NAMES = {"seam_lpips": "Seam-LPIPS of cuts over their floor", "psnr": "PSNR of cuts (dB)", "jump": "jump across cuts"}
 
 
 def write_ablation(path: Path | str, rows: list[dict], baseline: str) -> None:
-    """A panel a measure: every variant less the baseline with its 95 % interval, over all scenes, and a dot a scene."""
+    """A panel for each measure: every variant minus the baseline with its 95 % interval; dots are scenes."""
     variants = sorted({row["variant"] for row in rows})
     figure = figures.blank(11.0, 1.4 + 0.5 * max(len(variants), 1))
     for axes, measure in zip(figure.subplots(1, len(MEASURES)), MEASURES, strict=True):
@@ -40,27 +40,27 @@ def write_ablation(path: Path | str, rows: list[dict], baseline: str) -> None:
 
 
 def write_cuts(path: Path | str, variants: dict[str, TileSet]) -> None:
-    """Some tiles from above, a row a variant, with the cuts drawn in."""
-    figure = figures.blank(3.0 * SHOWN, 3.2 * len(variants))
-    grid = figure.subplots(len(variants), SHOWN, squeeze=False)
+    """Some tiles from above with their cuts, a row for each variant."""
+    figure = figures.blank(3.0 * TILES_SHOWN, 3.2 * len(variants))
+    grid = figure.subplots(len(variants), TILES_SHOWN, squeeze=False)
     for line, (name, tiles) in zip(grid, variants.items(), strict=True):
-        for axes, number in zip(line, np.linspace(0, 15, SHOWN).astype(int).tolist(), strict=True):
-            axes.imshow(tile_from_above(tiles, number), extent=(0, tiles.side, 0, tiles.side))
-            _outline(axes, tiles.labels[number], tiles.spacing)
+        for axes, number in zip(line, np.linspace(0, 15, TILES_SHOWN).astype(int).tolist(), strict=True):
+            axes.imshow(render_tile(tiles, number), extent=(0, tiles.side, 0, tiles.side))
+            _draw_cuts(axes, tiles.labels[number], tiles.spacing)
             axes.set_title(f"{name}, tile {number}", fontsize=9, loc="left")
             axes.axis("off")
     figures.save(figure, path)
 
 
-def tile_from_above(tiles: TileSet, number: int) -> Float[Array, "h w 3"]:
-    """Two pixels a finest cell."""
+def render_tile(tiles: TileSet, number: int) -> Float[Array, "h w 3"]:
+    """A tile from above, two pixels a finest cell."""
     field, pixels = tiles.fields[0][number], 2 * len(tiles.labels[number])
     top = float(field.means[:, 2].max()) + 10 * tiles.spacing
     return np.clip(render(field, cameras.top_down(0.0, 0.0, pixels, pixels, 0.5 * tiles.spacing, top)).colour, 0, 1)
 
 
-def _outline(axes, labels: Array, spacing: float) -> None:
-    """Lines between cells of two labels."""
+def _draw_cuts(axes, labels: Array, spacing: float) -> None:
+    """Draw lines between cells of different labels."""
     from matplotlib.collections import LineCollection
 
     y, x = np.nonzero(labels[:, 1:] != labels[:, :-1])
@@ -71,15 +71,15 @@ def _outline(axes, labels: Array, spacing: float) -> None:
     axes.add_collection(LineCollection(lines, colors="#d55e00", linewidths=1.0))
 
 
-def write_repeats(path: Path | str, found: Repeats) -> None:
-    """Both autocorrelations, lags in tiles; the tile's period is where the dotted lines cross."""
+def write_autocorrelations(path: Path | str, measured: Autocorrelations) -> None:
+    """Both autocorrelations over lags in tiles; dotted lines mark the tile's period."""
     figure = figures.blank(9.0, 4.4)
     for axes, (name, r) in zip(
-        figure.subplots(1, 2), (("terrain", found.terrain), ("exemplar", found.exemplar)), strict=True
+        figure.subplots(1, 2), (("terrain", measured.terrain), ("exemplar", measured.exemplar)), strict=True
     ):
-        reach = 2.5 if name == "terrain" else 0.45 * len(found.exemplar) / found.pixels
-        half = [n / 2 / found.pixels for n in r.shape]
-        seen = axes.imshow(
+        reach = 2.5 if name == "terrain" else 0.45 * len(measured.exemplar) / measured.pixels
+        half = [n / 2 / measured.pixels for n in r.shape]
+        image = axes.imshow(
             r, extent=(-half[1], half[1], -half[0], half[0]), vmin=-0.2, vmax=0.2, cmap="RdBu_r", interpolation="none"
         )
         axes.set_xlim(-reach, reach)
@@ -89,5 +89,5 @@ def write_repeats(path: Path | str, found: Repeats) -> None:
             axes.axhline(lag, color="0.4", linewidth=0.6, linestyle=":")
         axes.set_title(f"autocorrelation of the {name}", fontsize=10, loc="left")
         axes.set_xlabel("tiles east", fontsize=9)
-    figure.colorbar(seen, ax=figure.axes, shrink=0.8)
+    figure.colorbar(image, ax=figure.axes, shrink=0.8)
     figures.save(figure, path)

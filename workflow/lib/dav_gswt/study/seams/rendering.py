@@ -1,7 +1,7 @@
-"""Crops of the terrain as `terrain.still.draw` draws it, and of the exemplar in its place, from what reaches into them.
+"""Render crops of the terrain, or of the exemplar in its place, as stills are rendered, from visible Gaussians alone.
 
-Cells stand back to front, each in its pre-sorted order, those about the eye are sorted together. A patch that is laid
-whole is drawn in the order of the cell that the crop's middle lies in: what orders do to a picture is in both.
+Cells are blended back to front, each in its pre-sorted order; those around the eye are sorted together. A patch alone
+has the order of the cell under the crop's middle, so pre-sorting affects both pictures alike.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,20 +13,22 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import SH0, GaussianField
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.study.seams.spatial_index import Seen, Shelf
+from dav_gswt.study.seams.spatial_index import Footprint, SpatialIndex
 from dav_gswt.terrain import placement, splats, visibility
 from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.endless import EndlessTerrain
 
 SKY = {"zenith": [0.0, 0.0, 0.0], "horizon": [0.0, 0.0, 0.0]}  # crops see none
 
-Look = Callable[[GaussianField, Float[Array, "3"]], Float32[Array, "n 3"]]  # colours of Gaussians counted from the eye
+Recolouring = Callable[
+    [GaussianField, Float[Array, "3"]], Float32[Array, "n 3"]
+]  # colours of Gaussians counted from the eye
 
 
 @dataclass(frozen=True)
 class Piece:
-    """Gaussians by level that lie together in a cell of the terrain: from where they count, in which order they stand,
-    whether about the eye.
+    """The Gaussians of a cell of the terrain, by level. corner: their origin; direction: of their pre-sorted order;
+    close: whether the cell is around the eye.
     """
 
     parts: dict[int, GaussianField]
@@ -36,54 +38,60 @@ class Piece:
     cell: tuple[int, int]
 
 
-def of_terrain(terrain: EndlessTerrain, camera: Camera, seen: Seen, tiles: dict[tuple[int, int], Shelf]) -> list[Piece]:
-    """What of the terrain may show, cell by cell from back to front. tiles: by (level, tile number)."""
-    eye, side, found = camera.centre, terrain.side, []
+def collect_pieces(
+    terrain: EndlessTerrain, camera: Camera, footprint: Footprint, tiles: dict[tuple[int, int], SpatialIndex]
+) -> list[Piece]:
+    """What may be visible of the terrain, cell by cell from back to front. tiles: by (level, tile number)."""
+    eye, side, pieces = camera.centre, terrain.side, []
     cells = visibility.visible_cells(terrain, camera)
     active = visibility.active_levels(terrain, cells)
     for k in range(len(cells)):
         i, j, tile = int(cells.i[k]), int(cells.j[k]), int(cells.tile[k])
         corner = np.array([i * side, j * side, 0.0])
-        parts = {int(level): tiles[level, tile].near(seen, corner) for level in np.flatnonzero(active[:, k])}
+        parts = {int(level): tiles[int(level), tile].query(footprint, corner) for level in np.flatnonzero(active[:, k])}
         if any(len(part) for part in parts.values()):
             direction = placement.cell_direction(terrain, i, j, tile, eye)
-            found.append(Piece(parts, corner, direction, bool(cells.close[k]), (i, j)))
-    return found
+            pieces.append(Piece(parts, corner, direction, bool(cells.close[k]), (i, j)))
+    return pieces
 
 
-def of_patch(
-    levels: list[Shelf], corner: Float[Array, "3"], like: Piece, change: Float[Array, "4"], seen: Seen
+def make_patch_piece(
+    levels: list[SpatialIndex],
+    corner: Float[Array, "3"],
+    template: Piece,
+    correction: Float[Array, "4"],
+    footprint: Footprint,
 ) -> Piece:
-    """The exemplar with its corner there, where it may show; colours and heights changed throughout."""
+    """The visible part of the exemplar with its corner there, the correction added to all colours and heights."""
     parts = {}
-    for level in like.parts:
-        part = levels[min(level, len(levels) - 1)].near(seen, corner)  # coarser ones are the tiles' own
+    for level in template.parts:
+        part = levels[min(level, len(levels) - 1)].query(footprint, corner)  # coarser ones are the tiles' own
         sh = part.sh.copy()
-        sh[:, 0] += (change[:3] / SH0).astype(np.float32)
+        sh[:, 0] += (correction[:3] / SH0).astype(np.float32)
         parts[level] = replace(part, sh=sh)
-    return replace(like, parts=parts, corner=corner + [0, 0, change[3]])
+    return replace(template, parts=parts, corner=corner + [0, 0, correction[3]])
 
 
-def drawn(
-    terrain: EndlessTerrain, pieces: list[Piece], camera: Camera, ground, looks: Sequence[Look] = ()
+def render_pieces(
+    terrain: EndlessTerrain, pieces: list[Piece], camera: Camera, ground, recolourings: Sequence[Recolouring] = ()
 ) -> list[Float32[Array, "h w 3"]]:
-    """The picture of pieces that stand back to front, and the same in other colours, over black, for each look.
+    """The picture of pieces, given back to front, and the same over black in the colours of each recolouring.
 
-    ground: colour of what lies behind.
+    ground: colour of the far ground.
     """
     eye, here = camera.centre, replace(camera, translation=np.zeros(3))
     behind = Backdrop.for_eye(terrain, eye, SKY, ground)
-    found = []  # of each piece: its splats, their colours by every look, whether it is about the eye
+    parts = []  # of each piece: its splats, their colours by every recolouring, whether it is close
     for piece in pieces:
         field, slope = placement.place_gaussians(terrain, piece.parts, piece.corner, piece.direction, eye)
-        part, which = splats.project_indexed(behind.blend_far(field), slope, here, terrain.near)
-        found.append((part, [look(field, eye)[which] for look in looks], piece.close))
-    found.sort(key=lambda each: each[2])  # those about the eye come last
-    stand = splats.concatenate_splats([splats.EMPTY, *(part for part, _, _ in found)])
-    first = sum(len(part) for part, _, close in found if not close)
-    order = np.concatenate([np.arange(first), first + splats.depth_order(stand[first:])])
-    stand = stand[order]
-    seen = splats.blend(stand, here)
-    picture = np.clip(seen.colour + (1 - seen.alpha)[..., None] * behind.colours_along(here.rays()[1]), 0, 1)
-    painted = (np.concatenate([own[k] for _, own, _ in found])[order] for k in range(len(looks)))
-    return [picture, *(splats.blend(replace(stand, colours=own), here).colour for own in painted)]
+        part, indices = splats.project_indexed(behind.blend_far(field), slope, here, terrain.near)
+        parts.append((part, [recolour(field, eye)[indices] for recolour in recolourings], piece.close))
+    parts.sort(key=lambda each: each[2])  # close pieces come last
+    ordered = splats.concatenate_splats([splats.EMPTY, *(part for part, _, _ in parts)])
+    first = sum(len(part) for part, _, close in parts if not close)
+    order = np.concatenate([np.arange(first), first + splats.depth_order(ordered[first:])])
+    ordered = ordered[order]
+    footprint = splats.blend(ordered, here)
+    picture = np.clip(footprint.colour + (1 - footprint.alpha)[..., None] * behind.colours_along(here.rays()[1]), 0, 1)
+    recoloured = (np.concatenate([own[k] for _, own, _ in parts])[order] for k in range(len(recolourings)))
+    return [picture, *(splats.blend(replace(ordered, colours=own), here).colour for own in recoloured)]

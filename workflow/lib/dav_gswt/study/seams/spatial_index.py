@@ -1,4 +1,4 @@
-"""Gaussians on shelves, from west to east: of the many of a tile, or of the exemplar, a crop shows few."""
+"""Spatial index of the Gaussians of a tile or of the exemplar: a crop shows few of them."""
 
 from dataclasses import dataclass
 
@@ -10,38 +10,42 @@ from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster.interface import RIM
 
-SLOPES = 1.5  # how much more ground than where it is level a thing may hide behind it
+MAX_SLOPE = 1.5  # ground that a thing may hide behind it, over what it hides on level ground
 
 Box = Float[Array, "2 2"]  # south-western and north-eastern corner, in world units
 
 
 @dataclass(frozen=True)
-class Seen:
-    """The ground that a crop looks at, and how far a ray that hits level ground comes from per unit of height."""
+class Footprint:
+    """The ground under a crop, and the horizontal way of a viewing ray per unit of height."""
 
     box: Box
     per_height: Float[Array, "2"]
 
     @classmethod
-    def of(cls, camera: Camera, box: Box) -> "Seen":
+    def from_camera(cls, camera: Camera, box: Box) -> "Footprint":
         ahead = camera.forward
         return cls(box, ahead[:2] / abs(ahead[2]))
 
-    def hidden(self, axis: int, low: Float[Array, "n"], high: Float[Array, "n"]) -> tuple[Float[Array, "n"], ...]:
-        """From where to where along an axis, counted from their places, things between two heights may hide the ground.
+    def occlusion_range(
+        self, axis: int, low: Float[Array, "n"], high: Float[Array, "n"]
+    ) -> tuple[Float[Array, "n"], ...]:
+        """Interval along an axis, relative to their places, in which things between two heights may hide the ground.
 
-        One at a height z hides it up to SLOPES times z per_height behind itself: on a slope up it is less, on a slope
-        down more. A patch that is laid higher or lower as a whole takes its ground along.
+        A thing at height z hides it up to MAX_SLOPE z per_height behind itself: less on a slope up, more on a slope
+        down. A patch that is placed higher or lower as a whole takes its ground along.
         """
-        far = SLOPES * self.per_height[axis]
-        first, last = (far * low, far * high) if far > 0 else (far * high, far * low)
+        offset = MAX_SLOPE * self.per_height[axis]
+        first, last = (offset * low, offset * high) if offset > 0 else (offset * high, offset * low)
         return np.minimum(first, 0), np.maximum(last, 0)
 
 
 @dataclass(frozen=True)
-class Shelf:
-    """A field, its Gaussians' numbers from west to east, and of each in that order: its place, how far it reaches from
-    there at most, its lowest and highest point. most: the farthest reach, the lowest and the highest point of all.
+class SpatialIndex:
+    """A field with its Gaussians sorted from west to east.
+
+    order: their numbers in the field. Of each in that order: its place, its largest radius (`reach`), its lowest and
+    highest point. max_extent: the largest radius, the lowest and the highest point of all.
     """
 
     field: GaussianField
@@ -50,30 +54,38 @@ class Shelf:
     reach: Float[Array, "n"]
     low: Float[Array, "n"]
     high: Float[Array, "n"]
-    most: tuple[float, float, float]
+    max_extent: tuple[float, float, float]
 
     @classmethod
-    def of(cls, field: GaussianField) -> "Shelf":
+    def from_field(cls, field: GaussianField) -> "SpatialIndex":
         order = np.argsort(field.means[:, 0], kind="stable")
         means = field.means[order].astype(float)
         reach = RIM * np.exp(field.log_scales.max(1, initial=-np.inf)[order].astype(float))
         low, high = means[:, 2] - reach, means[:, 2] + reach
-        most = reach.max(initial=0), low.min(initial=np.inf), high.max(initial=-np.inf)
-        return cls(field, order, np.ascontiguousarray(means[:, :2].T), reach, low, high, tuple(float(v) for v in most))
+        max_extent = reach.max(initial=0), low.min(initial=np.inf), high.max(initial=-np.inf)
+        return cls(
+            field,
+            order,
+            np.ascontiguousarray(means[:, :2].T),
+            reach,
+            low,
+            high,
+            (float(max_extent[0]), float(max_extent[1]), float(max_extent[2])),
+        )
 
-    def near(self, seen: Seen, corner: Float[Array, "3"]) -> GaussianField:
-        """Those that may show over the ground that is seen, counted from a corner; in the field's own order."""
-        box = seen.box - corner[:2]
-        some, shown = self._between(seen, *box[:, 0]), True
+    def query(self, footprint: Footprint, corner: Float[Array, "3"]) -> GaussianField:
+        """Gaussians that may be visible over a footprint, with the field's origin at `corner`, in the field's order."""
+        box = footprint.box - corner[:2]
+        columns, visible = self._query_columns(footprint, *box[:, 0]), True
         for axis in (0, 1):
-            low, high = seen.hidden(axis, self.low[some], self.high[some])
-            places, reach = self.places[axis, some], self.reach[some]
-            shown &= (places + reach + high > box[0, axis]) & (places - reach + low < box[1, axis])
-        return self.field[np.sort(self.order[some][shown])]
+            low, high = footprint.occlusion_range(axis, self.low[columns], self.high[columns])
+            places, reach = self.places[axis, columns], self.reach[columns]
+            visible &= (places + reach + high > box[0, axis]) & (places - reach + low < box[1, axis])
+        return self.field[np.sort(self.order[columns][visible])]
 
-    def _between(self, seen: Seen, west: float, east: float) -> slice:
-        """Where on the shelf those stand that may show between west and east: by `most`."""
-        widest, lowest, highest = self.most
-        (low,), (high,) = seen.hidden(0, np.array([lowest]), np.array([highest]))
+    def _query_columns(self, footprint: Footprint, west: float, east: float) -> slice:
+        """The slice of the order that may be visible between west and east, by `max_extent`."""
+        widest, lowest, highest = self.max_extent
+        (low,), (high,) = footprint.occlusion_range(0, np.array([lowest]), np.array([highest]))
         first, last = west - high - widest, east - low + widest
         return slice(np.searchsorted(self.places[0], first), np.searchsorted(self.places[0], last, side="right"))

@@ -1,7 +1,7 @@
-"""From crops to what can be said of a tile set: differences with 95 % intervals, by a bootstrap over clusters.
+"""Summaries of crops: differences with 95 % intervals from a bootstrap over clusters.
 
-Crops that show the same place of the same strip, or of the same tile, are one cluster: there are four strips, however
-often they are laid, and the bootstrap draws clusters, never crops. All views of a place belong to its cluster.
+Crops of the same place of the same strip, or of the same tile, are one cluster: a set has four strips, however often
+they occur in the terrain. All views of a place belong to its cluster.
 """
 
 import numpy as np
@@ -16,36 +16,36 @@ PLACES = ("border", "cut", "ceiling")
 MEASURES = ("seam_lpips", "psnr", "jump")
 
 
-def summary(rows: list[dict]) -> list[dict]:
-    """A row for each cell, view and ground, and one over all of both.
+def summarise_crops(rows: list[dict]) -> list[dict]:
+    """A row for each experiment, view and ground, and one over all views and grounds.
 
-    sets: tile sets that were drawn. border, cut, ceiling: Seam-LPIPS of these less their floors. share: of the way from
-    floor to ceiling that cuts go, cut / ceiling; empty where the interval of `ceiling` reaches 0, as then nothing can
-    be told.
+    sets: number of tile sets. border, cut, ceiling: Seam-LPIPS minus its floor. share: cut / ceiling, the way of cuts
+    from floor to ceiling; None where the interval of `ceiling` reaches 0.
     """
-    found = []
-    for cell, mine in _grouped(rows, CELL).items():
-        views = _grouped(mine, ("view", "ground")) | {(EVERY, EVERY): mine}
+    table = []
+    for cell, mine in _group_rows(rows, CELL).items():
+        views = _group_rows(mine, ("view", "ground")) | {(EVERY, EVERY): mine}
         for (view, ground), some in sorted(views.items()):
             about = {"sets": len({row.get("replicate", 0) for row in mine})}
             about |= {key: mine[0][key] for key in ("version", "weights", "tiles")}
-            found.append(dict(zip(CELL, cell, strict=True)) | {"view": view, "ground": ground} | _told(some) | about)
-    return found
+            table.append(
+                dict(zip(CELL, cell, strict=True)) | {"view": view, "ground": ground} | _summarise(some) | about
+            )
+    return table
 
 
-def _told(rows: list[dict]) -> dict:
+def _summarise(rows: list[dict]) -> dict:
     at = {(row["place"], row["view"], row["ground"], row["crop"]): row for row in rows}
-    sums = {place: of_crops(at, place) for place in PLACES}
+    sums = {place: subtract_floors(at, place) for place in PLACES}
     out = {}
     for place in ("border", "cut"):
         out |= {f"{place}s": len([r for r in rows if r["place"] == place]), f"{place}_clusters": len(sums[place])}
-    draws = {
-        place: values[:, 0] for place, values in zip(PLACES, statistics.bootstrap_clusters(*sums.values()), strict=True)
-    }
+    all_replicates = zip(PLACES, statistics.bootstrap_clusters(*sums.values()), strict=True)
+    replicates = {place: values[:, 0] for place, values in all_replicates}
     for place in PLACES:
-        out |= _named(place, draws[place])
-    sure = out["ceiling_low"] is not None and out["ceiling_low"] > 0
-    out |= _named("share", draws["cut"] / draws["ceiling"] if sure else None)
+        out |= _describe_interval(place, replicates[place])
+    ceiling_known = out["ceiling_low"] is not None and out["ceiling_low"] > 0
+    out |= _describe_interval("share", replicates["cut"] / replicates["ceiling"] if ceiling_known else None)
     for measure in MEASURES:
         for place in (*PLACES, "floor"):
             known = [r[measure] for r in rows if r["place"] == place and r[measure] is not None]
@@ -53,8 +53,8 @@ def _told(rows: list[dict]) -> dict:
     return out
 
 
-def of_crops(at: dict[tuple, dict], place: str) -> statistics.ClusterSums:
-    """By cluster: Seam-LPIPS of crops less that of their floors."""
+def subtract_floors(at: dict[tuple, dict], place: str) -> statistics.ClusterSums:
+    """By cluster: Seam-LPIPS of crops minus that of their floors."""
     pairs = []
     for (name, *where), row in at.items():
         if name == place:
@@ -63,47 +63,49 @@ def of_crops(at: dict[tuple, dict], place: str) -> statistics.ClusterSums:
     return statistics.sum_by_cluster(pairs)
 
 
-def _named(name: str, values: Float[Array, "draws"] | None) -> dict:
-    found = (None, None, None) if values is None or np.isnan(values[0]) else statistics.percentile_interval(values)
-    return dict(zip((name, f"{name}_low", f"{name}_high"), found, strict=True))
+def _describe_interval(name: str, values: Float[Array, "replicates"] | None) -> dict:
+    table = (None, None, None) if values is None or np.isnan(values[0]) else statistics.percentile_interval(values)
+    return dict(zip((name, f"{name}_low", f"{name}_high"), table, strict=True))
 
 
-def ablation(rows: list[dict], baseline: str) -> list[dict]:
-    """Every variant less the baseline: cuts' Seam-LPIPS over the floor, their PSNR and jump, over all views.
+def compare_variants(rows: list[dict], baseline: str) -> list[dict]:
+    """Every variant minus the baseline: Seam-LPIPS of cuts over the floor, their PSNR and jump, over all views.
 
-    Of each scene and seed, and over all: the mean of these, whose interval tells of other places, not other scenes.
-    Clusters of both variants that have one name (a part of the same tile) are drawn together.
+    For each scene and seed, and their mean over all, whose interval is over places, not over scenes. Clusters with one
+    name (a part of the same tile) are resampled together in both variants.
     """
-    cells = _grouped(rows, ("scene", "seed", "variant"))
-    found = []
+    cells = _group_rows(rows, ("scene", "seed", "variant"))
+    table = []
     for variant in sorted({name for *_, name in cells if name != baseline}):
         for measure in MEASURES:
-            all_draws = []
+            differences = []
             for scene, seed, _ in sorted(key for key in cells if key[2] == variant):
                 pair = [cells.get((scene, seed, name)) for name in (variant, baseline)]
-                if not all(pair) or not all(sums := [_of_variant(some, measure) for some in pair]):
+                if not all(pair) or not all(sums := [_sum_variant(some, measure) for some in pair]):
                     continue
                 first, second = statistics.bootstrap_clusters(*sums)
-                all_draws.append(first[:, 0] - second[:, 0])
-                found.append(_less(variant, baseline, measure, scene, seed, all_draws[-1]))
-            if len(all_draws) > 1:
-                found.append(_less(variant, baseline, measure, EVERY, EVERY, np.mean(all_draws, 0)))
-    return found
+                differences.append(first[:, 0] - second[:, 0])
+                table.append(_tabulate_difference(variant, baseline, measure, scene, seed, differences[-1]))
+            if len(differences) > 1:
+                table.append(_tabulate_difference(variant, baseline, measure, EVERY, EVERY, np.mean(differences, 0)))
+    return table
 
 
-def _of_variant(rows: list[dict], measure: str) -> statistics.ClusterSums:
+def _sum_variant(rows: list[dict], measure: str) -> statistics.ClusterSums:
     if measure == "seam_lpips":
         at = {(row["place"], row["view"], row["ground"], row["crop"]): row for row in rows}
-        return of_crops(at, "cut")
+        return subtract_floors(at, "cut")
     return statistics.sum_by_cluster((row["cluster"], [row[measure]]) for row in rows if row["place"] == "cut")
 
 
-def _less(variant: str, baseline: str, measure: str, scene, seed, draws: Float[Array, "draws"]) -> dict:
+def _tabulate_difference(
+    variant: str, baseline: str, measure: str, scene, seed, replicates: Float[Array, "replicates"]
+) -> dict:
     about = {"variant": variant, "baseline": baseline, "measure": measure, "scene": scene, "seed": seed}
-    return about | _named("difference", draws)
+    return about | _describe_interval("difference", replicates)
 
 
-def _grouped(rows: list[dict], keys: tuple[str, ...]) -> dict[tuple, list[dict]]:
+def _group_rows(rows: list[dict], keys: tuple[str, ...]) -> dict[tuple, list[dict]]:
     out: dict[tuple, list[dict]] = {}
     for row in rows:
         out.setdefault(tuple(row[key] for key in keys), []).append(row)

@@ -1,4 +1,4 @@
-"""Tables of seams: what each cell measured as one table, and summaries that add up from run to run."""
+"""Tables of seams: crops of all experiments as one table, and the keys of tables that grow from run to run."""
 
 from pathlib import Path
 
@@ -10,14 +10,14 @@ KEYS = (
     (*CELL, "view", "ground"),
     ("variant", "baseline", "measure", "scene", "seed"),
     (*CELL, "east", "north"),
-)  # what tells rows of seam_summary, seam_ablation and repetition apart
+)  # keys of the tables seam_summary, seam_ablation and repetition
 NUMBERS = ("seam_lpips", "psnr", "jump")
 
 
-def rows(cell: dict) -> list[dict]:
-    """The crops of a cell. cell: what CELL names, the draw, and its files `table` and `facts`.
+def tabulate_crops(cell: dict) -> list[dict]:
+    """The crops of an experiment. cell: the values of CELL, the replicate (`draw`), and its files `table` and `facts`.
 
-    Places and crops of another draw of the tiles are other ones: its number is part of their names.
+    Crops and clusters of different replicates of the tiles differ: the replicate is part of their names.
     """
     made = read_json(cell["facts"])["provenance"]
     origin = {
@@ -28,16 +28,16 @@ def rows(cell: dict) -> list[dict]:
     about, draw = {key: cell[key] for key in (*CELL, "replicate")}, cell["replicate"]
     return [
         about | row | {key: f"{draw}:{row[key]}" if draw else row[key] for key in ("crop", "cluster")} | origin
-        for row in read(cell["table"])
+        for row in read_seam_table(cell["table"])
     ]
 
 
-def read(path: Path | str) -> list[dict]:
+def read_seam_table(path: Path | str) -> list[dict]:
     """Read a table of seams, measures as numbers; no rows where there is no file yet."""
     rows = csv_tables.read_table(path, numbers=NUMBERS, missing_ok=True)
     return [row | {key: int(row[key]) for key in ("seed", "crop") if row.get(key, "").isdigit()} for row in rows]
 
 
-def repeats(cell: dict) -> list[dict]:
-    """The rows of a cell's autocorrelation."""
-    return [{key: cell[key] for key in CELL} | row for row in read(cell["repeats"])]
+def tabulate_repetition(cell: dict) -> list[dict]:
+    """The rows of an experiment's autocorrelation."""
+    return [{key: cell[key] for key in CELL} | row for row in read_seam_table(cell["repeats"])]

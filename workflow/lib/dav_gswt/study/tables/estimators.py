@@ -1,4 +1,4 @@
-"""What stands under the figure of estimators: the Seam-LPIPS of the tiles that come of each."""
+"""The note under each picture of the figure of estimators: Seam-LPIPS of the tiles."""
 
 from pathlib import Path
 
@@ -6,11 +6,11 @@ from dav_gswt.study import statistics
 from dav_gswt.study.seams import summary, tables
 
 
-def note(crops: Path | str) -> str:
-    """Seam-LPIPS of the cuts less their floor, over all views; nothing where LPIPS had no weights. crops: crops.csv."""
-    rows = tables.read(crops)
+def format_seam_note(crops: Path | str) -> str:
+    """Seam-LPIPS of the cuts over their floor, over all views; empty without LPIPS. crops: path of crops.csv."""
+    rows = tables.read_seam_table(crops)
     at = {(row["place"], row["view"], row["ground"], row["crop"]): row for row in rows}
-    sums = summary.of_crops(at, "cut")
+    sums = summary.subtract_floors(at, "cut")
     if not sums:
         return ""
     value, _, _ = statistics.percentile_interval(statistics.bootstrap_clusters(sums)[0][:, 0])
