@@ -8,8 +8,8 @@ from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
-    maps = exemplar.ExemplarMaps.from_levels(levels.read(given.levels))
-    tiles = store.read(given.tiles, given.seams)
+    maps = exemplar.ExemplarMaps.from_levels(levels.read_levels(given.levels))
+    tiles = store.read_tiles(given.tiles, given.seams)
     source = maps.detrend(tiles, params.seam)
     fields = [level.field for level in source.levels]
     measured = repetition.measure_repetition(tiles, fields, source.exemplar.cells * tiles.spacing, params.seed)

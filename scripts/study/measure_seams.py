@@ -8,23 +8,22 @@ from dav_gswt.lod import store as levels
 from dav_gswt.logs import logging_to
 from dav_gswt.provenance import record_provenance
 from dav_gswt.study import csv_tables
-from dav_gswt.study.seams import density, exemplar, measure
-from dav_gswt.study.seams import ground as terrain
+from dav_gswt.study.seams import density, exemplar, measure, placed_tiles
 from dav_gswt.tiles import build, semantics, store
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    maps = exemplar.ExemplarMaps.from_levels(levels.read(given.levels))
+    maps = exemplar.ExemplarMaps.from_levels(levels.read_levels(given.levels))
     alexnet = lpips_weights.read(given.lpips) if given.get("lpips") else None
-    tiles = store.read(given.tiles, given.seams)
-    rng = np.random.default_rng(build.seeds(params.seed, params.seam))
-    source = semantics.Source(alexnet, given.get("sam2"))
+    tiles = store.read_tiles(given.tiles, given.seams)
+    rng = build.make_generator(params.seed, params.seam)
+    source = semantics.SemanticSource(alexnet, given.get("sam2"))
     sets = tiles, maps.cut_straight(params.seam, source, rng)
     patches = maps.detrend(tiles, params.seam)
-    placed = [terrain.place_tiles(cut, patches, params.seed, params.tau) for cut in sets]
+    placed = [placed_tiles.place_tiles(cut, patches, params.seed, params.tau) for cut in sets]
     csv_tables.write_table(snakemake.output.crops, measure.measure_crops(*placed, alexnet, params.seed))
     inputs = {"seams": given.seams, "level0": Path(given.levels, "level0.ply")} | (
         {"lpips": given.lpips} if alexnet else {}
     )
-    found = {"dense": density.seam_density(tiles, patches), "provenance": provenance.of(inputs, dict(params.seam))}
+    found = {"dense": density.seam_density(tiles, patches), "provenance": record_provenance(inputs, dict(params.seam))}
     write_json(snakemake.output.facts, found)

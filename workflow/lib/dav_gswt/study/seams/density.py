@@ -27,7 +27,7 @@ def seam_density(tiles: TileSet, source: DetrendedExemplar) -> float:
 
 def _edge_steepness(strong: Bool[Array, "m m"], labels: UInt8[Array, "n n"], shift: Array) -> Float[Array, "edges"]:
     """For each end of each edge that is cut, whether what is shown there is steep."""
-    rows, columns = layout.sources(labels, shift)
+    rows, columns = layout.source_cells(labels, shift)
     here, values = strong[rows, columns].astype(float), []
     for axis in (0, 1):
         labels, here = (np.swapaxes(v, 0, axis) for v in (labels, here))

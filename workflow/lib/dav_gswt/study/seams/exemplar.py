@@ -41,17 +41,22 @@ class ExemplarMaps:
             top.uncertainty,
         )
 
-    def cut_straight(self, seam: dict, source: semantics.Source, rng: np.random.Generator) -> build.TileSet:
+    def cut_straight(self, seam: dict, source: semantics.SemanticSource, rng: np.random.Generator) -> build.TileSet:
         """Tiles of the same sizes with straight seams at unsearched places: the ceiling of every measure.
 
         Patches lie at the first of UNSEARCHED places, and steps of brightness and height stay: with the search and the
         corrections straight seams would be hardly worse than cut ones.
         """
-        options = build.Options.of(dict(seam) | {"energy": "none", "candidates": UNSEARCHED}, source, self.level_count)
+        options = build.TilingOptions.from_config(
+            dict(seam) | {"energy": "none", "candidates": UNSEARCHED}, source, self.level_count
+        )
         options = replace(options, tries=1, corrected=False)
         return build.cut_tiles(self.levels, self.exemplar, self.colour, self.uncertainty, options, rng)
 
     def detrend(self, tiles: build.TileSet, seam: dict) -> DetrendedExemplar:
         """The exemplar without the trend that was removed for a tile set."""
-        width = build.Options.of(dict(seam), semantics.Source()).trend * tiles.seams["layout"]["side"]
+        width = (
+            build.TilingOptions.from_config(dict(seam), semantics.SemanticSource()).trend
+            * tiles.seams["layout"]["side"]
+        )
         return detrend_exemplar(self.levels, self.exemplar, self.colour, width)

@@ -12,8 +12,7 @@ from jaxtyping import Float, Int
 from numpy import ndarray as Array
 
 from dav_gswt.bundle import direction_search
-from dav_gswt.bundle.build import Options as BundleOptions
-from dav_gswt.bundle.build import laying
+from dav_gswt.bundle.build import BundleOptions, describe_tiles
 from dav_gswt.field import GaussianField
 from dav_gswt.study.seams.spatial_index import SpatialIndex
 from dav_gswt.terrain import endless
@@ -90,9 +89,9 @@ def detrend_exemplar(
     levels: list[GaussianField], exemplar: Exemplar, colour: Float[Array, "m m 3"], width: float
 ) -> DetrendedExemplar:
     """The exemplar as `build.cut_tiles` uses it. colour: NaN for holes. width: of the low-pass, in cells."""
-    _, height = build.ground_maps(levels[0], exemplar)
-    trend = trends.trend_of(colour, height, exemplar, width)
-    flat = [trends.detrended(field, trend) for field in levels]
+    _, height = build.compute_ground_maps(levels[0], exemplar)
+    trend = trends.fit_trend(colour, height, exemplar, width)
+    flat = [trends.remove_trend(field, trend) for field in levels]
     corner = np.float32([exemplar.west, exemplar.south, 0])
     home = replace(exemplar, west=0.0, south=0.0)
     flat = [replace(field, means=field.means - corner) for field in flat]
@@ -104,10 +103,10 @@ def place_tiles(tiles: build.TileSet, source: DetrendedExemplar, salt: int, tau:
     patches of the exemplar that they are compared with are not either.
     """
     options = BundleOptions(tau=tau, salt=salt)
-    rings = direction_search.climbed(tiles.fields[0], tiles.side, options.decibels).rings
-    layout_json = laying(tiles, options, rings)
+    rings = direction_search.search_directions(tiles.fields[0], tiles.side, options.decibels).rings
+    layout_json = describe_tiles(tiles, options, rings)
     terrain = replace(endless.terrain_from_fields(tiles.fields, layout_json, {"kind": "flat"}), reach=REACH)
-    plan = Layout.of(tiles.seams["layout"])
+    plan = Layout.from_dict(tiles.seams["layout"])
     first = -(WINDOW // 2)
     numbers = tiles_in(first, first, (WINDOW, WINDOW), salt, tiles.variants)
     n = plan.side
@@ -140,9 +139,9 @@ def _corner_cells(cells: Int[Array, "w w"]) -> Int[Array, "4 v v"]:
 def _measure_correction(tiles: build.TileSet, source: DetrendedExemplar, number: int) -> Float[Array, "n n 4"]:
     labels, shift = tiles.labels[number], tiles.shifts[number]
     own = _mean_cells(tiles.fields[0][number], Exemplar(0.0, 0.0, tiles.spacing, len(labels)))
-    return own - source.ground[layout.sources(labels, shift)]
+    return own - source.ground[layout.source_cells(labels, shift)]
 
 
 def _mean_cells(field: GaussianField, cells: Exemplar) -> Float[Array, "m m 4"]:
-    colour, height = build.ground_maps(field, cells)
+    colour, height = build.compute_ground_maps(field, cells)
     return np.concatenate([colour, height[..., None]], -1)

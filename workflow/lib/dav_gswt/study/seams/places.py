@@ -29,7 +29,7 @@ def sample_borders(placed: PlacedTiles, rng: np.random.Generator) -> list[Place]
             for along in range(0, size):
                 if a <= along % n < n - a:
                     x, y = (edge, along) if upright else (along, edge)
-                    west, _, _, south = layout.colours(int(placed.tile[y, x]) % layout.EDGES)
+                    west, _, _, south = layout.edge_colours(int(placed.tile[y, x]) % layout.EDGES)
                     name = f"v{west}" if upright else f"h{south}"
                     places.append(Place((x + placed.first, y + placed.first), f"{name}:{along % n // BIN}"))
     return _shuffle(places, rng)
