@@ -10,7 +10,7 @@ with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
     maps = exemplar.ExemplarMaps.from_levels(levels.read_levels(given.levels))
     tiles = store.read_tiles(given.tiles, given.seams)
-    source = maps.detrend(tiles, params.seam)
+    source = maps.detrend(tiles, params.tiling)
     fields = [level.field for level in source.levels]
     measured = repetition.measure_repetition(tiles, fields, source.exemplar.cells * tiles.spacing, params.seed)
     csv_tables.write_table(out.table, repetition.tabulate_repetition(measured))

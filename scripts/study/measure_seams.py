@@ -16,14 +16,17 @@ with logging_to(snakemake.log[0]):
     maps = exemplar.ExemplarMaps.from_levels(levels.read_levels(given.levels))
     alexnet = lpips_weights.read(given.lpips) if given.get("lpips") else None
     tiles = store.read_tiles(given.tiles, given.seams)
-    rng = build.make_generator(params.seed, params.seam)
+    rng = build.make_generator(params.seed, params.tiling)
     source = semantics.SemanticSource(alexnet, given.get("sam2"))
-    sets = tiles, maps.cut_straight(params.seam, source, rng)
-    patches = maps.detrend(tiles, params.seam)
+    sets = tiles, maps.cut_straight(params.tiling, source, rng)
+    patches = maps.detrend(tiles, params.tiling)
     placed = [placed_tiles.place_tiles(cut, patches, params.seed, params.tau) for cut in sets]
     csv_tables.write_table(snakemake.output.crops, measure.measure_crops(*placed, alexnet, params.seed))
     inputs = {"seams": given.seams, "level0": Path(given.levels, "level0.ply")} | (
         {"lpips": given.lpips} if alexnet else {}
     )
-    found = {"dense": density.seam_density(tiles, patches), "provenance": record_provenance(inputs, dict(params.seam))}
+    found = {
+        "dense": density.seam_density(tiles, patches),
+        "provenance": record_provenance(inputs, dict(params.tiling)),
+    }
     write_json(snakemake.output.facts, found)

@@ -12,9 +12,9 @@ with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     maps = exemplar.ExemplarMaps.from_levels(levels.read_levels(given.levels))
     sets = {}
-    for name, *files in zip(params.seams, given.tiles, given.seams, strict=True):
+    for name, *files in zip(params.tilings, given.tiles, given.seams, strict=True):
         cut = tiles.read_tiles(*files)
-        sets[name] = placed_tiles.place_tiles(cut, maps.detrend(cut, params.seams[name]), params.salt, params.tau)
+        sets[name] = placed_tiles.place_tiles(cut, maps.detrend(cut, params.tilings[name]), params.salt, params.tau)
     alexnet = lpips_weights.read(given.lpips) if given.get("lpips") else None
     inputs = {"seams": list(given.seams)} | ({"lpips": given.lpips} if alexnet else {})
     asked = dict(params.study)

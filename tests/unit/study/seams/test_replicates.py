@@ -67,10 +67,10 @@ def test_crops_of_another_draw_are_other_places_of_the_same_seam(tmp_path):
         ]
         csv_tables.write_table(tmp_path / f"{draw}.csv", crops)
         write_json(tmp_path / "facts.json", {"provenance": {"version": "1", "inputs": {"seams": "abc"}}})
-        cell = {"scene": "desert", "seed": 0, "quality": "draft", "variant": "semantic", "draw": draw}
+        cell = {"scene": "desert", "seed": 0, "preset": "draft", "variant": "semantic", "draw": draw}
         rows += tables.tabulate_crops(cell | {"table": tmp_path / f"{draw}.csv", "facts": tmp_path / "facts.json"})
-    (every,) = [row for row in summary.summarise_crops(rows) if row["view"] == summary.EVERY]
+    (every,) = [row for row in summary.summary(rows) if row["view"] == summary.EVERY]
     assert (every["sets"], every["borders"], every["border_clusters"]) == (2, 6, 6)
     assert every["border"] == pytest.approx(0.01) and every["cut"] == pytest.approx(0.02)
-    (once,) = [row for row in summary.summarise_crops(rows[: len(rows) // 2]) if row["view"] == summary.EVERY]
+    (once,) = [row for row in summary.summary(rows[: len(rows) // 2]) if row["view"] == summary.EVERY]
     assert (once["sets"], once["border_clusters"]) == (1, 3)
