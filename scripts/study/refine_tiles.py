@@ -18,7 +18,7 @@ with logging_to(snakemake.log[0]):
     uncut = build.Uncut(made.fields[0], Exemplar(west, south, grid.spacing, grid.cells))
     model = prior_sampling.load_prior(params.prior)
     by = repair.ByPrior.of(model, params.refine, params.seed)
-    mended = build.refined(tiles, uncut, build.TilingOptions.from_config(params.refine), by, model.size)
+    mended = build.refined(tiles, uncut, build.Options.of(params.refine), by, model.size)
     inputs = {name: given[name] for name in ("seams", "weights")} | {"level0": Path(given.levels, "level0.ply")}
     about = {"refine": dict(params.refine), "prior": dict(params.prior), "seed": params.seed}
     store.write_tiles(mended, out.tiles, out.seams, record_provenance(inputs, about))

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
+from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.study.seams.measure import GROUNDS
 from dav_gswt.terrain import endless, stills
 from dav_gswt.tiles.build import TileSet
@@ -15,7 +16,7 @@ SQUARE = 1600  # pixels of its side
 
 
 def render_terrain_picture(
-    tiles: TileSet, manifest: dict, shot: str, surface: str, size: dict
+    tiles: TileSet, manifest: Manifest, shot: str, surface: str, size: dict
 ) -> Float32[Array, "h w 3"]:
     """A `grid` of TILES x TILES tiles from above, or the view of a `walker`, on `flat` or `hilly` ground.
 
@@ -24,7 +25,7 @@ def render_terrain_picture(
     terrain = endless.terrain_from_fields(tiles.fields, manifest, GROUNDS[surface])
     if shot == "walker":
         return stills.render_shot(terrain, stills.SHOTS[0], manifest, **size)
-    high = 0.5 * TILES * tiles.side / np.tan(np.radians(30.0)) / manifest["eye_floor"]
+    high = 0.5 * TILES * tiles.side / np.tan(np.radians(30.0)) / manifest.eye_floor
     above = stills.Shot("grid", (0.5, 0.5), float(high), 90.0, 90.0)
     far = replace(terrain, reach=2 * TILES + 8)  # all tiles are nearer than the far ground
     return stills.render_shot(far, above, manifest, SQUARE, SQUARE)

@@ -104,8 +104,8 @@ def place_tiles(tiles: build.TileSet, source: DetrendedExemplar, salt: int, tau:
     """
     options = BundleOptions(tau=tau, salt=salt)
     rings = direction_search.search_directions(tiles.fields[0], tiles.side, options.decibels).rings
-    layout_json = describe_tiles(tiles, options, rings)
-    terrain = replace(endless.terrain_from_fields(tiles.fields, layout_json, {"kind": "flat"}), reach=REACH)
+    manifest = describe_tiles(tiles, options, rings)
+    terrain = replace(endless.terrain_from_fields(tiles.fields, manifest, {"kind": "flat"}), reach=REACH)
     plan = Layout.from_dict(tiles.seams["layout"])
     first = -(WINDOW // 2)
     numbers = tiles_in(first, first, (WINDOW, WINDOW), salt, tiles.variants)
@@ -120,8 +120,8 @@ def place_tiles(tiles: build.TileSet, source: DetrendedExemplar, salt: int, tau:
         plan,
         terrain,
         {key: SpatialIndex.from_field(field) for key, field in terrain.tiles.items()},
-        layout_json["eye_floor"],
-        layout_json["ground_colour"],
+        manifest.eye_floor,
+        manifest.ground_colour,
         first * n,
         patch.reshape(label.shape),
         tile,
