@@ -3,7 +3,7 @@
 from dav_gswt.images import lpips_weights
 from dav_gswt.logs import logging_to
 from dav_gswt.prior.terrain import TerrainPrior
-from dav_gswt.prior.training import examples
+from dav_gswt.prior.training import example_files
 from dav_gswt.study import csv_tables
 from dav_gswt.study.prior import plots, trial
 from dav_gswt.study.prior.regressor import Regressor
@@ -12,7 +12,7 @@ with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
     setting = trial.Setting(**params.setting)
     prior, regressors = TerrainPrior.open(given.weights), [Regressor.open(path) for path in given.regressors]
-    made = examples.concatenate([examples.read_examples(part) for part in given.examples])
+    made = example_files.concatenate([example_files.read_examples(part) for part in given.examples])
     perceptual = lpips_weights.read(*given.lpips) if given.lpips else None  # a list of none or one
     rows = trial.tried(trial.evenly(made, params.views), prior, regressors, setting, perceptual)
     csv_tables.write_table(out.table, rows)

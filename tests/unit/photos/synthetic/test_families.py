@@ -1,12 +1,25 @@
 """Flowers, tall grass and the planet: what they refuse, that they repeat, where things stand, and how they look."""
 
 import zlib
+from functools import partial
 
 import numpy as np
 import pytest
 
 from dav_gswt.errors import InputError
-from dav_gswt.photos.synthetic import blooms, camera_layouts, flowers, grass, grasses, planet, rocks, scattering, scene
+from dav_gswt.photos.synthetic import (
+    camera_layouts,
+    flower_plants,
+    flowers,
+    grass,
+    grass_plants,
+    land,
+    planet,
+    rocks,
+    scattering,
+    scene,
+)
+from dav_gswt.photos.synthetic.flower_plants import DISCS
 
 pytest.importorskip("mitsuba")
 FAMILIES = {"flowers": flowers, "grass": grass, "planet": planet}
@@ -30,12 +43,12 @@ def small(monkeypatch):
         monkeypatch.setattr(grass, ring, end)
     monkeypatch.setattr(planet, "SORTS", tuple((*span, 8.0, 3, min(fine, 2)) for *span, _, _, fine in planet.SORTS))
     yield
-    scene._world.cache_clear()
+    scene._load_scene.cache_clear()
 
 
 def grown(name, seed=0, **given):
     family = FAMILIES[name]
-    return family.grow(family.options(**given), seed, 6.0)
+    return family.make_land(land.make_options(name, family.Options, given), seed, 6.0)
 
 
 def digest(made):
@@ -63,20 +76,21 @@ def height_at(made, x, y):
 @every_family
 def test_every_option_has_bounds_that_hold_its_default(name):
     family = FAMILIES[name]
-    assert set(family.BOUNDS) == set(family.Options.__dataclass_fields__)
-    for option, (low, high) in family.BOUNDS.items():
+    assert set(land.option_bounds(family.Options)) == set(family.Options.__dataclass_fields__)
+    for option, (low, high) in land.option_bounds(family.Options).items():
         assert low <= getattr(family.Options(), option) <= high
-        family.options(**{option: low}), family.options(**{option: high})
+        for value in (low, high):
+            land.make_options(name, family.Options, {option: value})
 
 
 @every_family
 def test_what_a_family_cannot_be_is_said_by_name(name):
-    for option, (low, high) in FAMILIES[name].BOUNDS.items():
+    for option, (low, high) in land.option_bounds(FAMILIES[name].Options).items():
         for value in (low - 1, high + 1, float("nan"), "many", True):
             with pytest.raises(InputError, match=f"{name}: {option} is .*{low} to {high}"):
-                scene.make(name, 0, **{option: value})
+                scene.make_scene(name, 0, **{option: value})
     with pytest.raises(InputError, match=f"{name}.*'undulations'.*undulation"):
-        scene.make(name, 0, undulations=0.1)
+        scene.make_scene(name, 0, undulations=0.1)
 
 
 @every_family
@@ -109,7 +123,7 @@ def test_everything_is_finite_and_no_reflectance_leaves_0_to_1(name):
 @every_family
 def test_extreme_options_still_grow(name):
     family = FAMILIES[name]
-    counts = {k: low for k, (low, _) in family.BOUNDS.items()}
+    counts = {k: low for k, (low, _) in land.option_bounds(family.Options).items()}
     assert np.isfinite(grown(name, 0, **counts).ground.vertices).all()
 
 
@@ -138,9 +152,9 @@ def test_no_rock_floats_and_many_are_half_buried():
 
 @pytest.mark.parametrize("name, highest", [("flowers", 1.0), ("grass", 1.2)])
 def test_what_grows_hides_the_ground_from_the_side(name, highest):
-    camera = camera_layouts.walker(0.8, 210.0, 3.8, (0, 0, 0), 48, 27, 60.0)
+    camera = camera_layouts.eye_level_camera(0.8, 210.0, 3.8, (0, 0, 0), 48, 27, 60.0)
     origin, way = camera.rays()
-    depth = scene.render_depth(scene.make(name, 0), camera)
+    depth = scene.render_depth(scene.make_scene(name, 0), camera)
     seen = (origin + way * depth[..., None])[np.isfinite(depth) & (depth < 5)]
     above = seen[:, 2] - height_at(grown(name), seen[:, 0], seen[:, 1])
     assert (above > 0.1).mean() > 0.3 and above.max() < highest
@@ -148,7 +162,7 @@ def test_what_grows_hides_the_ground_from_the_side(name, highest):
 
 def test_the_families_look_plausible_and_unlike_each_other():
     camera = camera_layouts.orbit(60, 20, 7.0, (0, 0, 0), 40, 40, 40.0)
-    shots = {name: scene.render(scene.make(name, 0), camera, 4) for name in scene.FAMILIES}
+    shots = {name: scene.render(scene.make_scene(name, 0), camera, 4) for name in scene.FAMILIES}
     mean = {name: shot.mean(axis=(0, 1)) for name, shot in shots.items()}
     for name, shot in shots.items():
         assert 0.15 < mean[name].mean() < 0.75 and shot.std() > 0.04, name
@@ -162,11 +176,11 @@ def test_the_families_look_plausible_and_unlike_each_other():
 
 
 PLANTS = [
-    *(pytest.param(lambda rng, kind=kind: blooms.bush(rng, kind), id=f"{kind.flower.petals}") for kind in blooms.DISCS),
-    pytest.param(lambda rng: blooms.spire(rng, blooms.LARKSPUR), id="spire"),
-    pytest.param(blooms.umbel, id="umbel"),
-    *(pytest.param(ear, id=ear.__name__) for ear in (*grasses.EARS, grasses.dock)),
-    pytest.param(lambda rng: grasses.tussock(rng, grasses.TINTS[0]), id="tussock"),
+    *(pytest.param(partial(flower_plants.make_bush, kind=kind), id=f"{kind.flower.petals}") for kind in DISCS),
+    pytest.param(lambda rng: flower_plants.make_spire(rng, flower_plants.LARKSPUR), id="spire"),
+    pytest.param(flower_plants.make_umbel, id="umbel"),
+    *(pytest.param(ear, id=ear.__name__) for ear in (*grass_plants.EARS, grass_plants.make_dock)),
+    pytest.param(lambda rng: grass_plants.make_tussock(rng, grass_plants.TINTS[0]), id="tussock"),
 ]
 
 
@@ -181,15 +195,18 @@ def test_a_plant_stands_on_its_root_about_1_high_in_faces_of_one_colour(grow):
 
 
 def test_a_stand_leans_with_the_wind_and_flat_grass_lies():
-    rng, tint = np.random.default_rng(0), grasses.TINTS[1]
-    stand, flat = grasses.stand(rng, 200, 0.9, 0.01, tint), grasses.flat(rng, 200, 0.9, 0.01, tint)
+    rng, tint = np.random.default_rng(0), grass_plants.TINTS[1]
+    stand, flat = (
+        grass_plants.make_stand(rng, 200, 0.9, 0.01, tint),
+        grass_plants.make_flat_grass(rng, 200, 0.9, 0.01, tint),
+    )
     assert stand.vertices[:, 0].mean() > 0.05 and abs(stand.vertices[:, 1].mean()) < 0.05
     assert stand.vertices[:, 2].max() > 0.8 and flat.vertices[:, 2].max() < 0.35
 
 
 def test_a_rock_is_closed_and_about_1_across():
     for seed in range(5):
-        rock = rocks.rock(np.random.default_rng(seed), 2, planet.ROCKS)
+        rock = rocks.make_rock(np.random.default_rng(seed), 2, planet.ROCKS)
         a, b, c = (rock.vertices[rock.faces[:, i]].astype(float) for i in range(3))
         spans = np.ptp(rock.vertices, axis=0)
         assert 0 < (np.cross(a, b) * c).sum() / 6 < np.prod(spans)  # its volume, if closed and outside out
@@ -201,7 +218,7 @@ def test_a_rock_is_closed_and_about_1_across():
 def test_a_fresh_crater_has_its_depth_its_rim_and_an_end():
     one, round_ = np.array([[0.5, -0.2, 2.0, 1.0]]), np.zeros((1, 6))
     r = np.array([0.0, 0.5, 1.0, 1.2, 2.0, 3.5, 4.0])
-    z = rocks.cratered(0.5 + r, np.full(r.shape, -0.2), one, round_)
+    z = rocks.crater_relief(0.5 + r, np.full(r.shape, -0.2), one, round_)
     assert z[0] == pytest.approx(-2.0 * rocks.DEPTH, rel=1e-6)
     assert z[2:4].max() == pytest.approx(2.0 * rocks.RIM, rel=0.5) and z[2] > z[1]
     assert z[3] > z[4] > 0 and z[5] == z[6] == 0
@@ -209,18 +226,18 @@ def test_a_fresh_crater_has_its_depth_its_rim_and_an_end():
 
 def test_craters_and_rocks_keep_to_their_sizes():
     rng = np.random.default_rng(0)
-    found = rocks.craters(rng, 4000, 20.0, 0.25, 2.5)
+    found = rocks.draw_craters(rng, 4000, 20.0, 0.25, 2.5)
     assert found[:, 2].min() >= 0.25 and found[:, 2].max() <= 2.5
     # as many above d as d^-2: a quarter of them above twice the least, but for those beyond the greatest (1 %)
     assert (found[:, 2] > 0.5).mean() == pytest.approx(0.2424, abs=0.025)
-    sizes = rocks.sizes(rng, 4000, 0.1, 0.3, 2.2)
+    sizes = rocks.draw_sizes(rng, 4000, 0.1, 0.3, 2.2)
     assert sizes.min() >= 0.1 and sizes.max() <= 0.3 and np.median(sizes) < 0.17
 
 
 def test_patches_hold_their_share_and_mats_leave_no_gap():
     rng = np.random.default_rng(1)
-    assert scattering.patches(rng, 0.3, 3.0).mean() == pytest.approx(0.3, abs=0.06)
-    everywhere = scattering.laid(rng, lambda x, y: np.ones_like(x), 0.0, 4.0, 0.5)
+    assert scattering.make_patches(rng, 0.3, 3.0).mean() == pytest.approx(0.3, abs=0.06)
+    everywhere = scattering.lay_mats(rng, lambda x, y: np.ones_like(x), (0.0, 4.0), 0.5)
     at = rng.uniform(-2, 2, (500, 2))
     nearest = np.hypot(*(at[:, None] - everywhere[None, :, :2]).transpose(2, 0, 1)).min(axis=1)
     assert nearest.max() < 0.5
@@ -228,6 +245,6 @@ def test_patches_hold_their_share_and_mats_leave_no_gap():
 
 def test_a_swathe_is_about_1_across_and_as_high_as_its_plants():
     rng = np.random.default_rng(0)
-    plants = [blooms.bush(rng, blooms.POPPY) for _ in range(2)]
-    made = blooms.swathe(rng, plants, 20, (0.3, 0.4))
+    plants = [flower_plants.make_bush(rng, flower_plants.POPPY) for _ in range(2)]
+    made = flower_plants.make_swathe(rng, plants, 20, (0.3, 0.4))
     assert 0.25 < made.vertices[:, 2].max() < 0.55 and np.hypot(*made.vertices[:, :2].T).max() < 1.0

@@ -19,7 +19,7 @@ def angle(one, other):
 
 def test_of_many_views_each_is_matched_with_some_that_see_the_same_ground_alike():
     cameras = synthetic.start_views(ENTRY)
-    pairs = photo_set.overlapping(cameras)
+    pairs = photo_set.find_overlapping_pairs(cameras)
     assert all(0 <= i < j < 100 for i, j in pairs) and len(set(pairs)) == len(pairs)
     assert 100 * photo_set.NEIGHBOURS / 2 <= len(pairs) <= 100 * photo_set.NEIGHBOURS  # of 4950
     assert max(angle(cameras[i], cameras[j]) for i, j in pairs) <= 60
@@ -37,23 +37,23 @@ def test_views_of_other_ground_or_from_opposite_sides_are_no_pair():
     here = [camera_layouts.orbit(60, azimuth, 7.0, (0, 0, 0), 64, 64, 55.0) for azimuth in (0, 20)]
     opposite = camera_layouts.orbit(20, 190, 7.0, (0, 0, 0), 64, 64, 55.0)
     away = camera_layouts.orbit(60, 0, 7.0, (30.0, 0, 0), 64, 64, 55.0)
-    assert photo_set.overlapping([*here, opposite, away]) == [(0, 1)]
+    assert photo_set.find_overlapping_pairs([*here, opposite, away]) == [(0, 1)]
     assert look_at(away.centre, (30.0, 0, 0))[0] == pytest.approx(away.rotation)
 
 
 def test_few_and_many_views_yield_points_on_the_ground(tmp_path, monkeypatch):
     pytest.importorskip("mitsuba")
     monkeypatch.setattr(desert, "TEXELS", 1024)
-    scene = synthetic.make("desert", 0)
-    cameras = synthetic.start_views(ENTRY | {"photos": 7, "size": 256, "rig": "ring"})
+    scene = synthetic.make_scene("desert", 0)
+    cameras = synthetic.start_views(ENTRY | {"photos": 7, "size": 256, "layout": "ring"})
     shots = [(f"view_{i:02d}.png", camera) for i, camera in enumerate(cameras)]
     for name, camera in shots:
         image_files.write_png(tmp_path / name, synthetic.render(scene, camera, 9))
-    synthetic._world.cache_clear()
-    every = photo_set.triangulated(tmp_path, shots, 0)
-    monkeypatch.setattr(photo_set, "ALL", 4)
+    synthetic._load_scene.cache_clear()
+    every = photo_set.triangulate_points(tmp_path, shots, 0)
+    monkeypatch.setattr(photo_set, "EXHAUSTIVE", 4)
     monkeypatch.setattr(photo_set, "NEIGHBOURS", 3)
-    some = photo_set.triangulated(tmp_path, shots, 0)
+    some = photo_set.triangulate_points(tmp_path, shots, 0)
     for found in (every, some):
         assert found.names == tuple(name for name, _ in shots)
         assert len(found.points) > 100

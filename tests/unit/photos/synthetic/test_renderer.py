@@ -18,16 +18,16 @@ NEW, OLD = Variant("llvm_ad_rgb", "/somewhere/libLLVM.so.19.1", 19), Variant("ll
 @pytest.fixture
 def asked(monkeypatch):
     """Ask for a variant anew, with libraries of which only some work."""
-    renderer.chosen.cache_clear()
+    renderer.choose_variant.cache_clear()
 
     def ask(word, working=(), there=(NEW, OLD)):
         monkeypatch.setenv(renderer.VARIABLE, word)
-        monkeypatch.setattr(renderer, "candidates", lambda: list(there))
-        monkeypatch.setattr(renderer, "works", lambda library: library in {v.library for v in working})
-        return renderer.chosen()
+        monkeypatch.setattr(renderer, "find_libraries", lambda: list(there))
+        monkeypatch.setattr(renderer, "check_library", lambda library: library in {v.library for v in working})
+        return renderer.choose_variant()
 
     yield ask
-    renderer.chosen.cache_clear()
+    renderer.choose_variant.cache_clear()
 
 
 @pytest.mark.parametrize(
@@ -54,11 +54,11 @@ def test_what_cannot_be_had_is_said(asked, word, said):
 def test_the_choice_is_logged_once_and_kept(asked, caplog):
     with caplog.at_level(logging.INFO, "dav_gswt.photos.synthetic.renderer"):
         asked("auto", (NEW,))
-        renderer.chosen()
+        renderer.choose_variant()
     assert [r.message for r in caplog.records] == [
         "synthetic scenes are rendered by mitsuba's llvm_ad_rgb with LLVM 19"
     ]
-    assert renderer.described() | {"mitsuba": ""} == {"mitsuba": "", "variant": "llvm_ad_rgb", "llvm": 19}
+    assert renderer.describe_renderer() | {"mitsuba": ""} == {"mitsuba": "", "variant": "llvm_ad_rgb", "llvm": 19}
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,7 @@ def test_the_choice_is_logged_once_and_kept(asked, caplog):
     ],
 )
 def test_a_library_tells_its_version_by_its_name(name, number):
-    assert renderer.version(name) == number
+    assert renderer.parse_version(name) == number
 
 
 @pytest.mark.parametrize(
@@ -88,27 +88,28 @@ def test_a_library_tells_its_version_by_its_name(name, number):
     ],
 )
 def test_a_library_that_spoils_its_trial_does_not_work(trial):
-    assert not renderer.works("/libLLVM.so.99", trial, patience=2.0)
+    assert not renderer.check_library("/libLLVM.so.99", trial, timeout=2.0)
 
 
 def test_a_library_that_passes_its_trial_works_and_is_named_to_it():
     trial = f"import os; assert os.environ['{renderer.LIBRARY}'] == '/libLLVM.so.99'; print('mean 0.501')"
-    assert renderer.works("/libLLVM.so.99", trial)
+    assert renderer.check_library("/libLLVM.so.99", trial)
 
 
 def test_the_same_world_is_seen_in_a_compiled_variant(tmp_path):
     """In processes of their own, since a process keeps its variant."""
     pytest.importorskip("mitsuba")
-    if not any(renderer.works(v.library) for v in renderer.candidates()):
+    if not any(renderer.check_library(v.library) for v in renderer.find_libraries()):
         pytest.skip("no LLVM library that works on this machine: apt-get install libllvm19")
     script = """
 import sys
 import numpy as np
-from dav_gswt.photos import desert, rigs, synthetic, truth
+from dav_gswt.photos.synthetic import camera_layouts, desert, truth
+from dav_gswt.photos.synthetic import scene as synthetic
 desert.TEXELS = 256
-scene = synthetic.make("desert", 0, tufts=60, stones=40)
-camera = rigs.orbit(70, 0, 7.0, (0, 0, 0), 48, 48, 55.0)
-depth, label = truth.seen(scene, camera)
+scene = synthetic.make_scene("desert", 0, tufts=60, stones=40)
+camera = camera_layouts.orbit(70, 0, 7.0, (0, 0, 0), 48, 48, 55.0)
+depth, label = truth.render_truth(scene, camera)
 np.savez(sys.argv[1], depth=depth, label=label, picture=synthetic.render(scene, camera, 100))
 """
     seen = {}

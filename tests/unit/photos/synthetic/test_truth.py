@@ -37,7 +37,7 @@ def box(size, colour, at=(0.0, 0.0, 0.0)):
 def simple(monkeypatch):
     """Flat ground at z = 0; a stone, a cube of 1 at x = -1; a plant, a cube of 0.8 at x = 1. All in plain colours."""
 
-    def grow(options, seed, exemplar):
+    def make_land(options, seed, exemplar):
         edge = 40.0
         corners = np.array([[-edge, -edge, 0], [edge, -edge, 0], [edge, edge, 0], [-edge, edge, 0]], np.float32)
         ground = Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]]), np.tile(np.float32(RED), (4, 1)), False)
@@ -46,18 +46,18 @@ def simple(monkeypatch):
         places = np.array([[0, 1.0, 0.0, 0.0, 0.8, 0.0, 0.0, 0.0]])
         return Land(ground, albedo, 4.0, box(1.0, GREEN, (-1.0, 0.0, 0.0)), [box(1.0, BLUE)], places, light)
 
-    family = SimpleNamespace(grow=grow, options=desert.options)
+    family = SimpleNamespace(make_land=make_land, Options=desert.Options)
     monkeypatch.setitem(synthetic.FAMILIES, "simple", family)
-    synthetic._world.cache_clear(), synthetic._alone.cache_clear()
-    yield synthetic.make("simple", 0)
-    synthetic._world.cache_clear(), synthetic._alone.cache_clear()
+    synthetic._load_scene.cache_clear(), synthetic._load_isolated.cache_clear()
+    yield synthetic.make_scene("simple", 0)
+    synthetic._load_scene.cache_clear(), synthetic._load_isolated.cache_clear()
 
 
 @pytest.fixture
 def sand(monkeypatch):
     monkeypatch.setattr(desert, "TEXELS", 256)
-    yield synthetic.make("desert", 0, tufts=60, stones=40)
-    synthetic._world.cache_clear(), synthetic._alone.cache_clear()
+    yield synthetic.make_scene("desert", 0, tufts=60, stones=40)
+    synthetic._load_scene.cache_clear(), synthetic._load_isolated.cache_clear()
 
 
 def expected(camera):
@@ -78,7 +78,7 @@ def expected(camera):
 
 def test_depth_and_label_are_what_a_ray_through_the_pixel_s_centre_meets(simple):
     for camera in (BESIDE, replace(BESIDE, cx=30.0, cy=41.0)):
-        depth, label = truth.seen(simple, camera)
+        depth, label = truth.render_truth(simple, camera)
         by_hand, kinds = expected(camera)
         assert set(np.unique(kinds)) == {0, 1, 2, 3}
         assert (label == kinds).mean() > 0.999  # a ray along an edge may meet either side of it
@@ -89,7 +89,7 @@ def test_depth_and_label_are_what_a_ray_through_the_pixel_s_centre_meets(simple)
 
 
 def test_labels_are_where_the_picture_has_the_things_colours(simple):
-    _, label = truth.seen(simple, BESIDE)
+    _, label = truth.render_truth(simple, BESIDE)
     picture = synthetic.render(simple, BESIDE, 16)
     inner = np.ones(label.shape, bool)  # away from edges, where a pixel has several colours
     for axis in (0, 1):
@@ -104,7 +104,7 @@ def test_labels_are_where_the_picture_has_the_things_colours(simple):
 
 def test_depth_is_that_of_the_picture_s_own_pass(sand):
     camera = camera_layouts.orbit(70, 0, 7.0, (0, 0, 0), 64, 64, 55.0)
-    depth, label = truth.seen(sand, camera)
+    depth, label = truth.render_truth(sand, camera)
     assert (depth == synthetic.render_depth(sand, camera)).mean() > 0.999  # but where a ray slipped through
     assert {truth.GROUND, truth.STONE, truth.PLANT} <= set(np.unique(label))
 
@@ -113,28 +113,28 @@ def test_no_ray_slips_through_the_ground(sand):
     cameras = [camera_layouts.orbit(65, azimuth, 7.0, (0, 0, 0), 128, 128, 45.0) for azimuth in range(0, 360, 30)]
     slipped = sum(np.isinf(synthetic.render_depth(sand, camera)).sum() for camera in cameras)
     assert slipped < 20  # of 200000
-    assert not any(np.isinf(truth.seen(sand, camera)[0]).any() for camera in cameras)
+    assert not any(np.isinf(truth.render_truth(sand, camera)[0]).any() for camera in cameras)
 
 
 def test_strewn_rocks_are_stones_where_the_family_has_no_plants(simple, monkeypatch):
     monkeypatch.setattr(truth, "ROCKY", ("simple",))
-    _, label = truth.seen(simple, BESIDE)
+    _, label = truth.render_truth(simple, BESIDE)
     assert set(np.unique(label)) == {truth.SKY, truth.GROUND, truth.STONE}
 
 
 def test_a_scene_of_bare_ground_is_ground_and_sky(monkeypatch):
     monkeypatch.setattr(desert, "TEXELS", 256)
-    scene = synthetic.make("desert", 0, stones=0, pebbles=0, shrubs=0, tufts=0)
-    walker = camera_layouts.walker(1.6, 0.0, 4.6, (0, 0, 0), 40, 30, 60.0)
-    depth, label = truth.seen(scene, walker)
+    scene = synthetic.make_scene("desert", 0, stones=0, pebbles=0, shrubs=0, tufts=0)
+    walker = camera_layouts.eye_level_camera(1.6, 0.0, 4.6, (0, 0, 0), 40, 30, 60.0)
+    depth, label = truth.render_truth(scene, walker)
     assert set(np.unique(label)) == {truth.SKY, truth.GROUND}
     assert (label[:5] == truth.SKY).all() and (label[-5:] == truth.GROUND).all()
 
 
 def test_a_file_keeps_depth_label_camera_and_what_labels_mean(simple, tmp_path):
-    truth.write(tmp_path / "view_00.exr", simple, BESIDE)
-    depth, label, camera = truth.read(tmp_path / "view_00.exr")
-    want = truth.seen(simple, BESIDE)
+    truth.write_truth(tmp_path / "view_00.exr", simple, BESIDE)
+    depth, label, camera = truth.read_truth(tmp_path / "view_00.exr")
+    want = truth.render_truth(simple, BESIDE)
     assert (depth == want[0]).all() and (label == want[1]).all()
     assert (camera.rotation == BESIDE.rotation).all() and camera.fx == BESIDE.fx and camera.width == 90
     channels, header = image_files.read_exr(tmp_path / "view_00.exr")
@@ -145,14 +145,14 @@ def test_a_file_keeps_depth_label_camera_and_what_labels_mean(simple, tmp_path):
 def test_a_file_of_another_kind_is_refused(tmp_path):
     image_files.write_exr(tmp_path / "other.exr", {"Z": np.zeros((2, 2))})
     with pytest.raises(InputError, match="no depth, labels and camera"):
-        truth.read(tmp_path / "other.exr")
+        truth.read_truth(tmp_path / "other.exr")
 
 
 @pytest.mark.parametrize("kind", ["standing", "turned", "leaning"])
 def test_merged_plants_stand_where_instances_do(kind):
     """The two ways to place a plant, for the variants that need one mesh of all."""
-    renderer.use()
-    from dav_gswt.photos.synthetic import world
+    renderer.load_mitsuba()
+    from dav_gswt.photos.synthetic import mitsuba_scene
 
     stand = {
         "standing": [1.0, 2.0, 0.5, 0.7, 0.0, 0.0, 0.0],
@@ -160,8 +160,8 @@ def test_merged_plants_stand_where_instances_do(kind):
         "leaning": [1.0, 2.0, 0.5, 0.7, 1.1, 0.2, -0.3],
     }[kind]
     plant = box(1.0, BLUE, (0.3, 0.1, 0.0))
-    matrix = np.array(world._standing(*stand).matrix)
+    matrix = np.array(mitsuba_scene.instance_transform(*stand).matrix)
     by_matrix = plant.vertices @ matrix[:3, :3].T + matrix[:3, 3]
-    both = world.placed(plant, np.array([stand, stand]))
+    both = mitsuba_scene.transform_copies(plant, np.array([stand, stand]))
     assert both[: len(by_matrix)] == pytest.approx(by_matrix, abs=1e-6)
     assert (both[len(by_matrix) :] == both[: len(by_matrix)]).all()

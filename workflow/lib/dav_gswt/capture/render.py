@@ -9,7 +9,7 @@ from dav_gswt.photos.synthetic import scene as synthetic
 
 def capture_rendered(request: CaptureRequest) -> list[CapturedPhoto]:
     """Render `burst` photos of each pose; photos of a burst differ in their noise."""
-    world, burst = synthetic.of_config(request.site.scene), request.site.burst
+    world, burst = synthetic.scene_from_config(request.site.scene), request.site.burst
     photos = []
     for pose, camera in progress(request.poses, "render photos"):
         for i in range(burst):

@@ -1,4 +1,4 @@
-"""Where a synthetic scene is photographed from: poses (elevation, azimuth, radius) about a target, and sets of them.
+"""Camera layouts: places (elevation, azimuth, radius) about a target, and sets of them.
 
 Elevation is measured from the ground up (90: straight above), azimuth from +x towards +y; both in degrees.
 """
@@ -8,10 +8,10 @@ import numpy as np
 from dav_gswt.geometry.cameras import Camera, look_at, pinhole
 
 Place = tuple[float, float, float]  # elevation, azimuth, radius
-NEARER = 0.9  # radius of a test view, as a share of the others'
-GOLDEN = np.pi * (3.0 - 5.0**0.5)  # radians: the turn between neighbours of a Fibonacci lattice
-CIRCLE = 36  # views of the rig `paper` that stand on a circle: of 100, and of any number from twice as many on
-STRIDE = 12.0  # degrees below the horizon that a walker looks
+NEARER = 0.9  # radius of a test view, relative to other views
+GOLDEN = np.pi * (3.0 - 5.0**0.5)  # radians between neighbours of a Fibonacci lattice
+CIRCLE = 36  # views on the circle of the rig `paper`, of 100 or of any number from 72
+EYE_LEVEL_PITCH = 12.0  # degrees below the horizon
 
 
 def orbit(elevation, azimuth, radius, target, width: int, height: int, fov) -> Camera:
@@ -65,26 +65,23 @@ def paper(n: int, elevation: float, lowest_elevation: float, radius: float) -> l
     return ring(circle, elevation, radius) + hemisphere(n - circle, lowest_elevation, radius, turn=35.0)
 
 
-def test_views(n: int, lowest_elevation: float, radius: float) -> list[Place]:
-    """n places that only test: uniform by area like `hemisphere`, turned away from its lattice and nearer by a tenth.
+def held_out(n: int, lowest_elevation: float, radius: float) -> list[Place]:
+    """n places of test views: uniform by area like `hemisphere`, but rotated and nearer by a tenth.
 
-    The other radius keeps them distinct from every start view and candidate, whatever their number.
+    The other radius keeps them distinct from every start view and candidate.
     """
     return hemisphere(n, lowest_elevation, NEARER * radius, turn=70.0)
 
 
-test_views.__test__ = False  # not a test, whatever its name makes pytest think
+def eye_level_camera(height: float, azimuth: float, away: float, target, width: int, rows: int, fov: float) -> Camera:
+    """A camera at eye level: `height` above the target, `away` from it, looking past it to the horizon.
 
-
-def walker(height: float, azimuth: float, away: float, target, width: int, rows: int, fov: float) -> Camera:
-    """The camera at a walker's eye: `height` above the target, `away` from it, looking past it to the horizon.
-
-    azimuth: where the walker stands, from the target. fov: of the picture's width, degrees.
+    azimuth: of the camera from the target. fov: of the picture's width, degrees.
     Raises: ValueError: a height that is not positive.
     """
     if not height > 0:
-        raise ValueError(f"a walker's eye is above the ground, not at {height}")
-    a, down = np.radians(azimuth), np.radians(STRIDE)
+        raise ValueError(f"an eye-level camera is above the ground, not at {height}")
+    a, down = np.radians(azimuth), np.radians(EYE_LEVEL_PITCH)
     out = np.array([np.cos(a), np.sin(a), 0.0])
     eye = np.asarray(target, float) + away * out + [0.0, 0.0, height]
     return pinhole(eye, eye - np.cos(down) * out - [0.0, 0.0, np.sin(down)], width, rows, fov)

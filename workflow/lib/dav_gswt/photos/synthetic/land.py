@@ -1,21 +1,23 @@
-"""What the families of synthetic ground share: a piece of land as it is rendered, and how things are strewn on it.
+"""What the families of synthetic ground share: the land that is rendered, options, relief, and scattered stones.
 
 Metres, z up; the mean ground over the exemplar square about the origin is at z = 0.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
-from dav_gswt.photos.synthetic import meshes
+from dav_gswt.photos.synthetic import meshes, noise
 from dav_gswt.photos.synthetic.meshes import Mesh
 
-STREWN = 16.0  # metres: side of the square about the origin that has stones
-Height = Callable[[Array, Array], Array]  # ground height at x, y
+STONE_SQUARE = 16.0  # metres: side of the square about the origin that has stones
+Height = Callable[[Array, Array], Array]  # a value at x, y, such as the height of the ground
+Wave = tuple[float, float, float, float]  # of far hills: wave numbers along x and y, phase, weight
 
 
 @dataclass(frozen=True)
@@ -23,20 +25,20 @@ class Light:
     """Sun and sky, in units of the exposure: irradiance across the beam and radiance; angles in degrees."""
 
     elevation: float  # of the sun
-    azimuth: float  # from +x towards +y, where the sun stands
+    azimuth: float  # of the sun, from +x towards +y
     sun: Float[Array, "3"]
     zenith: Float[Array, "3"]
     horizon: Float[Array, "3"]
-    below: Float[Array, "3"]  # what comes from under the horizon: light that far ground throws back
+    below: Float[Array, "3"]  # below the horizon: light reflected by far ground
 
 
 @dataclass(frozen=True)
 class Land:
     """A piece of land ready to be rendered.
 
-    ground: coloured by `albedo`, which repeats after `period` metres. plants: kinds, each about 1 high. places: a row
-    for every plant: which kind, x, y, z, size in metres, yaw in radians, and the ground's slope along x and along y
-    that it follows (0 0: it stands upright).
+    ground: coloured by `albedo`, which repeats after `period` metres. plants: kinds, each about 1 high. places: one row
+    per plant: its kind, x, y, z, size in metres, yaw in radians, and the ground's slope along x and along y that it
+    follows (0 0: it is upright).
     """
 
     ground: Mesh
@@ -48,11 +50,30 @@ class Land:
     light: Light
 
 
-def options(family: str, kind: type, bounds: dict[str, tuple[float, float]], given: dict):
-    """Options of a family (`kind`, a dataclass of numbers) with some values given.
+@dataclass(frozen=True)
+class FamilyOptions:
+    """Base of the options of a family: numbers, each with bounds (see `option`)."""
+
+
+Options = TypeVar("Options", bound=FamilyOptions)
+
+
+def option(default: float, least: float, most: float) -> Any:
+    """A field of FamilyOptions."""
+    return field(default=default, metadata={"bounds": (least, most)})
+
+
+def option_bounds(options: type[FamilyOptions]) -> dict[str, tuple[float, float]]:
+    """The least and the greatest value of every option."""
+    return {f.name: f.metadata["bounds"] for f in fields(options)}
+
+
+def make_options(family: str, kind: type[Options], given: dict[str, Any]) -> Options:
+    """The options of a family with some values given.
 
     Raises: InputError: an unknown name or a value out of bounds, by name.
     """
+    bounds = option_bounds(kind)
     for name, value in given.items():
         if name not in bounds:
             raise InputError(f"{family}: there is no option {name!r}; it has {', '.join(bounds)}")
@@ -62,15 +83,27 @@ def options(family: str, kind: type, bounds: dict[str, tuple[float, float]], giv
     return kind(**{f.name: float(given.get(f.name, f.default)) for f in fields(kind)})
 
 
-def levelled(height: Height, exemplar: float) -> Height:
-    """The same ground, moved so that its mean over the exemplar is 0."""
+def fade_raster(raster: Float[Array, "n n"], period: float, x: Array, y: Array, start: float, end: float) -> Array:
+    """A repeating raster that fades to 0 from `start` to `end` metres from the origin."""
+    return noise.sample_raster(raster, period, x, y) * (1 - smoothstep(start, end, np.hypot(x, y)))
+
+
+def sum_hills(x: Array, y: Array, rise: tuple[float, float], amplitudes: tuple[float, float], waves: Sequence[Wave]):
+    """Far hills: sine waves times the product of `amplitudes`, rising between two distances from the origin."""
+    one, other = amplitudes
+    far = smoothstep(*rise, np.hypot(x, y)) * one * other
+    return far * sum(weight * np.sin(kx * x + ky * y + phase) for kx, ky, phase, weight in waves)
+
+
+def level_ground(height: Height, exemplar: float) -> Height:
+    """The ground moved in height so that its mean over the exemplar is 0."""
     grid = np.linspace(-exemplar / 2, exemplar / 2, 256)
     level = height(*np.meshgrid(grid, grid)).mean()
     return lambda x, y: height(x, y) - level
 
 
-def surface(height: Height) -> Mesh:
-    """A grid that is fine about the origin and grows coarser towards the horizon. A texture colours it."""
+def make_ground_mesh(height: Height) -> Mesh:
+    """The mesh of the ground: a grid that is fine about the origin and grows coarser towards the horizon."""
     fine, reach, growth = 0.022, 7.0, 1.06
     steps = fine * growth ** np.arange(1, 125)
     outer = reach + np.cumsum(steps)
@@ -83,31 +116,35 @@ def surface(height: Height) -> Mesh:
     return Mesh(vertices, faces, None, smooth=True)
 
 
-def stones(
+def scatter_stones(
     rng: np.random.Generator, large: float, small: float, height: Height, colours: meshes.Colours
 ) -> Mesh | None:
-    """Stones of 3 to 25 cm and pebbles, so many on 100 square metres, as one mesh, sunk a little into the ground."""
-    big = scattered(rng, large, STREWN, 0.03, 0.25, 1.75)
-    little = scattered(rng, small, STREWN, 0.010, 0.032, 2.5)
-    shapes = [meshes.stone(rng, 3, colours) for _ in range(14)], [meshes.stone(rng, 1, colours) for _ in range(24)]
+    """Stones of 3 to 25 cm and pebbles as one mesh, sunk a little into the ground.
+
+    large, small: how many of either per 100 square metres.
+    """
+    big = scatter_disjoint(rng, large, STONE_SQUARE, 0.03, 0.25, 1.75)
+    little = scatter_disjoint(rng, small, STONE_SQUARE, 0.010, 0.032, 2.5)
+    stones = [meshes.make_stone(rng, 3, colours) for _ in range(14)]
+    pebbles = [meshes.make_stone(rng, 1, colours) for _ in range(24)]
     found = []
-    for places, kinds in ((big, shapes[0]), (little, shapes[1])):
+    for places, kinds in ((big, stones), (little, pebbles)):
         if not len(places):
             continue
         z = height(places[:, 0], places[:, 1]) + 0.10 * places[:, 2]
         for (x, y, size), up in zip(places, z, strict=True):
             shape = kinds[rng.integers(len(kinds))]
-            found.append(meshes.placed(shape, (x, y, up), size, rng.uniform(0, 2 * np.pi)))
-    return meshes.merged(found) if found else None
+            found.append(meshes.transform_mesh(shape, (x, y, up), size, rng.uniform(0, 2 * np.pi)))
+    return meshes.merge_meshes(found) if found else None
 
 
-def scattered(
+def scatter_disjoint(
     rng: np.random.Generator, density: float, side: float, least: float, most: float, steep: float
 ) -> Float[Array, "n 3"]:
-    """x, y and size of things on a square of `side` about the origin, in loose groups; small ones are more frequent.
+    """x, y and size of objects on a square of `side` about the origin, in loose groups and without overlap.
 
-    density: on 100 square metres. Sizes lie between least and most with a density that falls as size^-steep. Bigger
-    things keep clear of each other by the sum of their sizes.
+    density: per 100 square metres. Sizes lie between least and most; their density falls as size^-steep. An object for
+    which 12 tries find no free place is left out.
     """
     count = round(density * side * side / 100)
     u = rng.uniform(size=count)
@@ -128,18 +165,17 @@ def scattered(
     return taken
 
 
-def sown(rng: np.random.Generator, density: Height, most: float, reach: float) -> Float[Array, "n 2"]:
-    """Places x, y at random within `reach` of the origin, `density(x, y)` on a square metre; it never exceeds `most`.
+def scatter_points(rng: np.random.Generator, density: Height, most: float, reach: float) -> Float[Array, "n 2"]:
+    """Random places x, y within `reach` of the origin, `density(x, y)` per square metre.
 
-    So many as the densest ground would have are thrown on the whole square, and each stays with the share of `most`
-    that its ground has: a Poisson process but for its number.
+    Candidates of the density `most`, which `density` never exceeds, are thinned: a Poisson process but for its number.
     """
-    thrown = rng.uniform(-reach, reach, (round(most * (2 * reach) ** 2), 2))
-    stays = rng.uniform(0, most, len(thrown)) < density(*thrown.T)
-    return thrown[stays & (np.hypot(*thrown.T) < reach)]
+    candidates = rng.uniform(-reach, reach, (round(most * (2 * reach) ** 2), 2))
+    kept = rng.uniform(0, most, len(candidates)) < density(*candidates.T)
+    return candidates[kept & (np.hypot(*candidates.T) < reach)]
 
 
-def smoothstep(low: float, high: float, x):
+def smoothstep(low: float, high: float, x: Array) -> Array:
     """0 below low, 1 above high, smooth between."""
     t = np.clip((x - low) / (high - low), 0, 1)
     return t * t * (3 - 2 * t)

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 
-def band(
+def make_noise(
     rng: np.random.Generator, n: int, period: float, longest: float, shortest: float, slope: float
 ) -> Float[Array, "n n"]:
     """Isotropic noise of mean 0 and standard deviation 1 with wavelengths between `shortest` and `longest`.
@@ -34,7 +34,14 @@ def band(
     return noise / spread
 
 
-def ripples(
+def texel_centres(n: int, period: float) -> tuple[Float[Array, "n n"], Float[Array, "n n"]]:
+    """x and y of the centres of a raster's texels."""
+    centres = (np.arange(n) + 0.5) * period / n
+    x, y = np.meshgrid(centres, centres)
+    return x, y
+
+
+def make_ripples(
     rng: np.random.Generator, n: int, period: float, length: float, wind: float
 ) -> tuple[Float[Array, "n n"], Float[Array, "n n"]]:
     """Wind ripples: their phase in radians and the strength, 0 to 1, with which they stand out.
@@ -71,7 +78,7 @@ def _wave_numbers(n: int, period: float, half: bool = False) -> tuple[Array, Arr
     return kx, ky, np.hypot(kx, ky)
 
 
-def sample(
+def sample_raster(
     raster: Float[Array, "n n"], period: float, x: Float[Array, "..."], y: Float[Array, "..."]
 ) -> Float[Array, "..."]:
     """A repeating raster's value at places, bilinear. Texel (r, c) is at x = (c + .5) period/n, y likewise."""

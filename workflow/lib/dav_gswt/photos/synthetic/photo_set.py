@@ -1,4 +1,4 @@
-"""A synthetic scene as photos: start and test views rendered, and points triangulated from their exact poses."""
+"""The photo set of a synthetic scene: start and test views, and points triangulated with their exact poses."""
 
 import logging
 import tempfile
@@ -19,10 +19,10 @@ from dav_gswt.photos.synthetic import scene as synthetic
 _log = logging.getLogger(__name__)
 
 FEATURES = 4096
-ALL = 40  # views up to which every pair is matched
-NEIGHBOURS = 20  # of each view among more
-WIDEST = 60.0  # degrees between two views of the same ground, beyond which features no longer look alike
-LEAST_SHARED = 0.1  # of the exemplar that both views of a pair must see
+EXHAUSTIVE = 40  # views up to which every pair is matched
+NEIGHBOURS = 20  # matched with each view if there are more views
+WIDEST = 60.0  # degrees between two views that are matched
+LEAST_OVERLAP = 0.1  # share of the exemplar that both views of a pair must see
 
 
 def render_set(entry: dict, folder: Path) -> None:
@@ -31,16 +31,16 @@ def render_set(entry: dict, folder: Path) -> None:
     entry: a synthetic scene of the config. Points come from the start views alone; test views are in the model, but
     observe nothing. ground.json names them by group, and says what rendered.
     """
-    scene = synthetic.of_config(entry)
+    scene = synthetic.scene_from_config(entry)
     start, test = synthetic.start_views(entry), synthetic.test_views(entry)
-    shots, tests = _named("view", start), _named("test", test)
+    shots, tests = _name_views("view", start), _name_views("test", test)
     for part in ("images", "truth", "sparse"):
         (folder / part).mkdir(parents=True, exist_ok=True)
     for name, camera in progress(shots + tests, "render photos"):
         image_files.write_png(folder / "images" / name, synthetic.render(scene, camera))
-        truth.write(folder / "truth" / Path(name).with_suffix(".exr"), scene, camera)
-    found = triangulated(folder / "images", shots, entry["seed"])
-    write_colmap_model(with_cameras(found, tests), folder / "sparse")
+        truth.write_truth(folder / "truth" / Path(name).with_suffix(".exr"), scene, camera)
+    points = triangulate_points(folder / "images", shots, entry["seed"])
+    write_colmap_model(add_cameras(points, tests), folder / "sparse")
     named = [name for name, _ in tests]
     groups = {group: tuple(named[i] for i in part) for group, part in synthetic.test_groups(entry).items()}
     frame = replace(
@@ -49,21 +49,21 @@ def render_set(entry: dict, folder: Path) -> None:
         test_groups=groups,
         images=len(shots),
         registered=len(shots),
-        renderer=renderer.described(),
+        renderer=renderer.describe_renderer(),
     )
     write_scene_frame(folder / "ground.json", frame)
 
 
-def _named(kind: str, views: list[Camera]) -> list[tuple[str, Camera]]:
+def _name_views(kind: str, views: list[Camera]) -> list[tuple[str, Camera]]:
     """The views with names that sort by number."""
     digits = max(2, len(str(len(views) - 1)))
     return [(f"{kind}_{i:0{digits}d}.png", camera) for i, camera in enumerate(views)]
 
 
-def triangulated(folder: Path, shots: list[tuple[str, Camera]], seed: int) -> ColmapModel:
-    """Points where matched SIFT features of pictures with known cameras cross; cameras stay as they are.
+def triangulate_points(folder: Path, shots: list[tuple[str, Camera]], seed: int) -> ColmapModel:
+    """Triangulate points of matched SIFT features of pictures with known cameras, which are not changed.
 
-    Up to ALL pictures every pair is matched, else those of `overlapping`.
+    Up to EXHAUSTIVE pictures every pair is matched, else those of `find_overlapping_pairs`.
     """
     names, cameras = (list(column) for column in zip(*shots, strict=True))
     none = np.zeros(0, int)
@@ -89,10 +89,10 @@ def triangulated(folder: Path, shots: list[tuple[str, Camera]], seed: int) -> Co
             extraction_options=extraction,
             device=pycolmap.Device.cpu,
         )
-        if len(names) <= ALL:
+        if len(names) <= EXHAUSTIVE:
             pycolmap.match_exhaustive(database, matching, verification_options=verification, device=pycolmap.Device.cpu)
         else:
-            some, every = overlapping(cameras), len(names) * (len(names) - 1) // 2
+            some, every = find_overlapping_pairs(cameras), len(names) * (len(names) - 1) // 2
             _log.info("match %d of %d pairs of views: those that see the same ground alike", len(some), every)
             listed = Path(scratch) / "pairs.txt"
             listed.write_text("".join(f"{names[i]} {names[j]}\n" for i, j in some), encoding="utf-8")
@@ -106,11 +106,11 @@ def triangulated(folder: Path, shots: list[tuple[str, Camera]], seed: int) -> Co
         return model_from_reconstruction(stored)
 
 
-def overlapping(cameras: list[Camera], side: float = synthetic.EXEMPLAR) -> list[tuple[int, int]]:
-    """Pairs i < j of views to match: each with the NEIGHBOURS that see most of the same ground under like angles.
+def find_overlapping_pairs(cameras: list[Camera], side: float = synthetic.EXEMPLAR) -> list[tuple[int, int]]:
+    """Pairs i < j of views to match: each with its NEIGHBOURS by overlap.
 
-    Neighbours share LEAST_SHARED of the exemplar, a square of a side about the origin, and look at it under angles that
-    differ by at most WIDEST, taken from its middle. They are ranked by the share times the angle's cosine.
+    Both see LEAST_OVERLAP of the exemplar, a square about the origin, or more, and the angle between them at its centre
+    is at most WIDEST. Neighbours are ranked by the shared ground times the cosine of that angle.
     """
     at = (np.arange(16) + 0.5) / 16 * side - side / 2
     x, y = np.meshgrid(at, at)
@@ -121,15 +121,15 @@ def overlapping(cameras: list[Camera], side: float = synthetic.EXEMPLAR) -> list
         sees[i] = (depth > 0) & (pixels > 0).all(1) & (pixels < [camera.width, camera.height]).all(1)
     towards = np.stack([camera.centre / np.linalg.norm(camera.centre) for camera in cameras])
     shared, cosine = sees @ sees.T / len(ground), towards @ towards.T
-    worth = np.where((shared >= LEAST_SHARED) & (cosine >= np.cos(np.radians(WIDEST))), shared * cosine, 0.0)
-    np.fill_diagonal(worth, 0.0)
-    best = np.argsort(-worth, axis=1, kind="stable")[:, :NEIGHBOURS]
-    pairs = {(min(i, int(j)), max(i, int(j))) for i, row in enumerate(best) for j in row if worth[i, j] > 0}
+    score = np.where((shared >= LEAST_OVERLAP) & (cosine >= np.cos(np.radians(WIDEST))), shared * cosine, 0.0)
+    np.fill_diagonal(score, 0.0)
+    best = np.argsort(-score, axis=1, kind="stable")[:, :NEIGHBOURS]
+    pairs = {(min(i, int(j)), max(i, int(j))) for i, row in enumerate(best) for j in row if score[i, j] > 0}
     return sorted(pairs)
 
 
-def with_cameras(found: ColmapModel, more: list[tuple[str, Camera]]) -> ColmapModel:
-    """The model with further images that observe nothing, ordered by name as a model's images are."""
+def add_cameras(found: ColmapModel, more: list[tuple[str, Camera]]) -> ColmapModel:
+    """The model with further images without observations; images are ordered by name."""
     named = sorted([*zip(found.names, found.cameras, strict=True), *more], key=lambda pair: pair[0])
     names = tuple(name for name, _ in named)
     moved = np.array([names.index(name) for name in found.names])

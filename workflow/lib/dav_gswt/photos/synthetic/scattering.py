@@ -1,78 +1,110 @@
-"""Where things grow on synthetic ground: patches, mats laid edge to edge, and things strewn one by one.
+"""Where plants grow on synthetic ground: patches, mats side by side, and single plants.
 
-What grows where is told by rasters over a square of side PERIOD that repeats, 0 (nowhere) to 1 (everywhere). Things are
-rows of x, y, size in metres and whether they follow the ground's slope (1) or stand upright (0), until `standing` sets
-them on the ground.
+Rasters over a repeating square of side PERIOD say what grows where, 0 (nowhere) to 1 (everywhere). Until `place_plants`
+puts them on the ground, plants are rows of x, y, size in metres, and whether they follow the slope of the ground (1) or
+stand upright (0).
 """
+
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.photos.synthetic import noise
-from dav_gswt.photos.synthetic.land import Height, smoothstep, sown
+from dav_gswt.photos.synthetic.land import Height, scatter_points, smoothstep
+from dav_gswt.photos.synthetic.meshes import Mesh
 
-PERIOD = 16.0  # metres after which what grows where repeats
-CELLS = 512  # a side of such a raster: 3.1 cm a cell
+PERIOD = 16.0  # metres
+CELLS = 512  # per side of a raster: 3.1 cm a cell
 
 
-def patches(rng: np.random.Generator, share: float, longest: float, shortest: float = 0.35) -> Float[Array, "n n"]:
+@dataclass(frozen=True)
+class PlantGroup:
+    """Plants that share a choice of kinds. rows: see the module. yaw: radians; None: at random."""
+
+    kinds: list[Mesh]
+    rows: Float[Array, "n 4"]
+    yaw: Float[Array, "n"] | None = None
+
+
+def make_patches(rng: np.random.Generator, share: float, longest: float, shortest: float = 0.35) -> Float[Array, "n n"]:
     """1 in patches that hold about `share` of the ground, 0 elsewhere, smooth between.
 
-    longest, shortest: wavelengths in metres of the patches and of their outlines' bays.
+    longest, shortest: wavelengths in metres of the patches and of their outlines.
     """
-    raster = noise.band(rng, CELLS, PERIOD, longest, shortest, 1.1)
-    return smoothstep(*np.quantile(raster, [max(0.0, 1 - 1.6 * share), min(1.0, 1 - 0.4 * share)]), raster)
+    raster = noise.make_noise(rng, CELLS, PERIOD, longest, shortest, 1.1)
+    low, high = np.quantile(raster, [max(0.0, 1 - 1.6 * share), min(1.0, 1 - 0.4 * share)])
+    return smoothstep(low, high, raster)
 
 
-def at(raster: Float[Array, "n n"]) -> Height:
+def interpolate(raster: Float[Array, "n n"]) -> Height:
     """A raster as a function of places."""
-    return lambda x, y: noise.sample(raster, PERIOD, x, y)
+    return lambda x, y: noise.sample_raster(raster, PERIOD, x, y)
 
 
-def thinning(density: Height, start: float, end: float) -> Height:
-    """Less and less of it from `start` to `end` metres from the origin, where there is none."""
+def fade_out(density: Height, start: float, end: float) -> Height:
+    """A density that falls to 0 from `start` to `end` metres from the origin."""
     return lambda x, y: density(x, y) * (1 - smoothstep(start, end, np.hypot(x, y)))
 
 
-def laid(
-    rng: np.random.Generator, density: Height, inner: float, outer: float, size: float, overlap: float = 0.26
+def lay_mats(
+    rng: np.random.Generator,
+    density: Height,
+    ring: tuple[float, float],
+    size: float,
+    overlap: float = 0.26,
+    jitter: float = 0.3,
 ) -> Float[Array, "n 4"]:
-    """Mats of `size` on a jittered grid in a ring about the origin, left out as `density` falls from 1.
+    """Mats of `size` on a jittered grid in a ring about the origin; a mat is kept with probability `density`.
 
-    overlap: share of a mat's size that its neighbour covers. They follow the slope.
+    overlap: share of a mat that its neighbour covers. jitter: in grid spacings. Mats follow the slope.
     """
+    inner, outer = ring
     spacing = (1 - overlap) * size
     axis = np.arange(-outer, outer, spacing)
-    x, y = (v.ravel() + rng.uniform(-0.3, 0.3, v.size) * spacing for v in np.meshgrid(axis, axis))
+    x, y = (v.ravel() + rng.uniform(-jitter, jitter, v.size) * spacing for v in np.meshgrid(axis, axis))
     r = np.hypot(x, y)
-    stays = (rng.uniform(size=x.size) < density(x, y)) & (r >= inner) & (r < outer)
-    x, y = x[stays], y[stays]
+    kept = (rng.uniform(size=x.size) < density(x, y)) & (r >= inner) & (r < outer)
+    x, y = x[kept], y[kept]
     return np.column_stack([x, y, size * rng.uniform(0.85, 1.2, x.size), np.ones(x.size)])
 
 
-def strewn(
-    rng: np.random.Generator, where: Float[Array, "c c"], count: float, sizes: tuple[float, float], ends: float
+def scatter_plants(
+    rng: np.random.Generator,
+    where: Float[Array, "c c"],
+    count: float,
+    sizes: tuple[float, float],
+    fade: tuple[float, float],
+    lies: float = 0.0,
 ) -> Float[Array, "n 4"]:
-    """Upright things in proportion to the raster `where`, on average `count` on 100 square metres near the origin.
+    """Single plants in proportion to the raster `where`, on average `count` per 100 square metres near the origin.
 
-    ends: metres from the origin where the last stand; they thin out from 0.7 of that.
+    fade: distances in metres from the origin between which they thin out. lies: 1: they follow the slope.
     """
     share = where * (count / 100 / max(where.mean(), 1e-9))
-    places = sown(rng, thinning(at(share), 0.7 * ends, ends), share.max(), ends)
-    return np.column_stack([places, rng.uniform(*sizes, len(places)), np.zeros(len(places))])
+    places = scatter_points(rng, fade_out(interpolate(share), *fade), share.max(), fade[1])
+    return np.column_stack([places, rng.uniform(*sizes, len(places)), np.full(len(places), lies)])
 
 
-def standing(
-    rng: np.random.Generator, which, found: Float[Array, "n 4"], height: Height, yaw: Float[Array, "n"] | None = None
-) -> Float[Array, "n 8"]:
-    """Rows of Land.places for things found at x, y: on the ground, turned by `yaw` radians or at random.
+def place_plants(
+    rng: np.random.Generator, groups: Iterable[PlantGroup], height: Height
+) -> tuple[list[Mesh], Float[Array, "n 8"]]:
+    """All kinds of plants, and the rows of Land.places. Each plant is of a random kind of its group."""
+    plants, places = [], []
+    for group in groups:
+        which = len(plants) + rng.integers(0, len(group.kinds), len(group.rows))
+        plants += group.kinds
+        places.append(_place_group(rng, which, group, height))
+    return plants, np.concatenate(places)
 
-    Whatever follows the slope follows that over half its size.
-    """
-    x, y, size, lies = found.T
+
+def _place_group(rng: np.random.Generator, which: Array, group: PlantGroup, height: Height) -> Float[Array, "n 8"]:
+    """A plant that follows the slope follows that over half its size."""
+    x, y, size, lies = group.rows.T
     reach = 0.5 * size + 0.01
     along_x = lies * (height(x + reach, y) - height(x - reach, y)) / (2 * reach)
     along_y = lies * (height(x, y + reach) - height(x, y - reach)) / (2 * reach)
-    turn = rng.uniform(0, 2 * np.pi, len(x)) if yaw is None else yaw
+    turn = rng.uniform(0, 2 * np.pi, len(x)) if group.yaw is None else group.yaw
     return np.column_stack([which, x, y, height(x, y), size, turn, along_x, along_y])

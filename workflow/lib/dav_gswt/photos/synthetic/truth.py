@@ -1,7 +1,7 @@
-"""What a picture of a synthetic scene shows, exactly: depth and kind of thing at the centre of every pixel.
+"""Ground truth of synthetic pictures: depth and label at the centre of every pixel.
 
-A file of it is an EXR of the channels Z (camera depth, infinite where the sky is seen) and label; its header holds what
-the labels mean and the camera, as JSON.
+It is stored as an EXR with the channels Z (camera depth, infinite in the sky) and label; the header holds the names of
+the labels and the camera as JSON.
 """
 
 import json
@@ -19,46 +19,46 @@ from dav_gswt.photos.synthetic import scene as synthetic
 
 SKY, GROUND, STONE, PLANT = range(4)
 LABELS = {"sky": SKY, "ground": GROUND, "stone": STONE, "plant": PLANT}
-ROCKY = ("planet",)  # families whose strewn things are stones; of the others they are plants
-SAME = 1e-6  # share of a depth by which two may differ that are of the same surface: float32 and the order of a search
-NUDGE = 1e-3  # pixels
+ROCKY = ("planet",)  # families whose instances are stones; those of others are plants
+TOLERANCE = 1e-6  # relative difference of two depths of the same surface
+NUDGE = 1e-3  # pixels by which rays that missed the ground are moved
 
 
-def seen(scene: synthetic.Scene, camera: Camera) -> tuple[Float32[Array, "h w"], Float32[Array, "h w"]]:
+def render_truth(scene: synthetic.Scene, camera: Camera) -> tuple[Float32[Array, "h w"], Float32[Array, "h w"]]:
     """Depth and label of every pixel.
 
-    What is as far as the ground alone would be is ground, or stone by the same token; what is nearer than both was
-    strewn on it. About one ray in a hundred thousand slips through between two triangles of the ground: pixels of sky
-    are looked at again NUDGE beside their centres.
+    A pixel as far as the ground alone, or the stones alone, is of these; a nearer one is of an instance. About one ray
+    in a hundred thousand passes between two triangles of the ground, so pixels of sky are rendered again NUDGE beside
+    their centres.
     """
-    depth, label = _seen(scene, camera)
+    depth, label = _render_labels(scene, camera)
     sky = label == SKY
     if sky.any():
         nudged = replace(camera, cx=camera.cx + NUDGE, cy=camera.cy + 0.7 * NUDGE)
-        for values, again in zip((depth, label), _seen(scene, nudged), strict=True):
+        for values, again in zip((depth, label), _render_labels(scene, nudged), strict=True):
             values[sky] = again[sky]
     return depth, label
 
 
-def _seen(scene: synthetic.Scene, camera: Camera) -> tuple[Float32[Array, "h w"], Float32[Array, "h w"]]:
-    depth, alone = synthetic.render_depth(scene, camera), synthetic.render_alone(scene, camera)
-    nothing = np.full_like(depth, np.inf)
-    ground, stones = (alone.get(name, nothing) for name in ("ground", "stones"))
-    strewn = STONE if scene.family in ROCKY else PLANT
+def _render_labels(scene: synthetic.Scene, camera: Camera) -> tuple[Float32[Array, "h w"], Float32[Array, "h w"]]:
+    depth, isolated = synthetic.render_depth(scene, camera), synthetic.render_isolated_depths(scene, camera)
+    sky = np.full_like(depth, np.inf)
+    ground, stones = (isolated.get(name, sky) for name in ("ground", "stones"))
+    instance = STONE if scene.family in ROCKY else PLANT
     label = np.where(stones < ground, STONE, GROUND)
-    label = np.where(depth < np.minimum(ground, stones) * (1 - SAME), strewn, label)
+    label = np.where(depth < np.minimum(ground, stones) * (1 - TOLERANCE), instance, label)
     return depth, np.where(np.isinf(depth), SKY, label).astype(np.float32)
 
 
-def write(path: Path | str, scene: synthetic.Scene, camera: Camera) -> None:
-    """Write what the camera sees."""
-    depth, label = seen(scene, camera)
+def write_truth(path: Path | str, scene: synthetic.Scene, camera: Camera) -> None:
+    """Render and write the ground truth of a camera."""
+    depth, label = render_truth(scene, camera)
     header = {"labels": json.dumps(LABELS), "camera": json.dumps(camera_to_json(camera))}
     image_files.write_exr(path, {"Z": depth, "label": label}, header)
 
 
-def read(path: Path | str) -> tuple[Float32[Array, "h w"], Float32[Array, "h w"], Camera]:
-    """Depth, label and camera of a file that `write` wrote. Raises: InputError: not readable, or of another kind."""
+def read_truth(path: Path | str) -> tuple[Float32[Array, "h w"], Float32[Array, "h w"], Camera]:
+    """Depth, label and camera of a file of `write_truth`. Raises: InputError: unreadable, or another kind of file."""
     channels, header = image_files.read_exr(path)
     try:
         return channels["Z"], channels["label"], camera_from_json(json.loads(header["camera"]))

@@ -95,10 +95,10 @@ def draw_colour(rng: np.random.Generator, names: tuple[str, ...] | None = None) 
 def make_noise(rng: np.random.Generator, longest: float, shortest: float, slope: float, stretch: float = 1.0) -> Map:
     """Noise of standard deviation 1 with wavelengths between the limits, rotated at random, stretched along an axis."""
     period = REPEATS * longest
-    raster = noise.band(rng, TEXELS, period, longest, max(shortest, 2.5 * period / TEXELS), slope)
+    raster = noise.make_noise(rng, TEXELS, period, longest, max(shortest, 2.5 * period / TEXELS), slope)
     turn, (du, dv) = rng.uniform(0, np.pi), rng.uniform(0, period, 2)
     c, s = np.cos(turn), np.sin(turn)
-    return lambda x, y: noise.sample(raster, period, (c * x + s * y) / stretch + du, c * y - s * x + dv)
+    return lambda x, y: noise.sample_raster(raster, period, (c * x + s * y) / stretch + du, c * y - s * x + dv)
 
 
 def draw_relief(rng: np.random.Generator) -> Relief:

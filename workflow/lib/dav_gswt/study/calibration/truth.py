@@ -30,7 +30,7 @@ def render_truth(scene: dict, pool: Candidates, images_folder: Path | str) -> It
     Raises: InputError: another agent, or a photo that is not there.
     """
     if scene["agent"] == "render":
-        world = synthetic.of_config(scene)
+        world = synthetic.scene_from_config(scene)
         for pose, camera in progress(pool, "draw what candidates show"):
             yield _shrink_view(pose.name, camera, synthetic.render(world, _render_camera(camera)))
     elif scene["agent"] == "replay":

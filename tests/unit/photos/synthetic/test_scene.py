@@ -7,7 +7,7 @@ import pytest
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import pinhole, top_down
-from dav_gswt.photos.synthetic import camera_layouts, desert
+from dav_gswt.photos.synthetic import camera_layouts, desert, land
 from dav_gswt.photos.synthetic import scene as synthetic
 
 mi = pytest.importorskip("mitsuba")
@@ -21,7 +21,7 @@ def coarse_sand(monkeypatch):
     """Sand of few texels: quick to make, and otherwise the same."""
     monkeypatch.setattr(desert, "TEXELS", 256)
     yield
-    synthetic._world.cache_clear(), synthetic._alone.cache_clear()
+    synthetic._load_scene.cache_clear(), synthetic._load_isolated.cache_clear()
 
 
 def off_centre(width=96, height=64):
@@ -43,21 +43,22 @@ def off_centre(width=96, height=64):
 )
 def test_what_a_scene_cannot_be_is_said_by_name(family, seed, given, said):
     with pytest.raises(InputError, match=said):
-        synthetic.make(family, seed, **given)
+        synthetic.make_scene(family, seed, **given)
 
 
 def test_every_option_has_bounds_that_hold_its_default():
-    assert set(desert.BOUNDS) == set(desert.Options.__dataclass_fields__)
-    for name, (low, high) in desert.BOUNDS.items():
+    assert set(land.option_bounds(desert.Options)) == set(desert.Options.__dataclass_fields__)
+    for name, (low, high) in land.option_bounds(desert.Options).items():
         assert low <= getattr(desert.Options(), name) <= high
-        desert.options(**{name: low}), desert.options(**{name: high})
+        for value in (low, high):
+            land.make_options("desert", desert.Options, {name: value})
 
 
 def test_points_of_light_appear_where_the_camera_projects_them():
     camera = off_centre()
     points = np.array([[0.0, 0.0, 0.0], [1.2, 0.4, 0.3], [-0.6, -0.9, 0.8], [0.3, 0.6, -0.4], [-0.9, 0.9, 0.1]])
     expected, depth = camera.project(points)
-    sensor = mi.load_dict(synthetic.sensor(camera, {"type": "multijitter", "sample_count": 256}))
+    sensor = mi.load_dict(synthetic.make_sensor(camera, {"type": "multijitter", "sample_count": 256}))
     rows, columns = np.mgrid[: camera.height, : camera.width] + 0.5
     for point, pixel, z in zip(points, expected, depth, strict=True):
         assert 5 < pixel[0] < camera.width - 5 and 5 < pixel[1] < camera.height - 5
@@ -71,12 +72,12 @@ def test_points_of_light_appear_where_the_camera_projects_them():
 
 
 def test_depth_leads_back_to_the_ground():
-    scene = synthetic.make("desert", 0, **BARE)
+    scene = synthetic.make_scene("desert", 0, **BARE)
     camera = off_centre()
     origin, step = camera.rays()
     depth = synthetic.render_depth(scene, camera)
     seen = origin + step * depth[..., None]
-    ground = desert.grow(scene.options, 0, scene.exemplar).ground
+    ground = desert.make_land(scene.options, 0, scene.exemplar).ground
     near = np.abs(ground.vertices[:, :2]).max(axis=1) < 4
     grid = ground.vertices[near].reshape(np.sqrt(near.sum()).astype(int), -1, 3)
     axis = grid[0, :, 0]
@@ -89,12 +90,12 @@ def test_depth_leads_back_to_the_ground():
 
 
 def test_the_sky_is_infinitely_far():
-    scene = synthetic.make("desert", 0, **BARE)
+    scene = synthetic.make_scene("desert", 0, **BARE)
     assert np.isinf(synthetic.render_depth(scene, pinhole((0, 0, 2), (0, 5, 12), 8, 8, 30.0))).all()
 
 
 def test_the_mean_ground_of_the_exemplar_is_at_0():
-    scene = synthetic.make("desert", 4, undulation=0.4, **BARE)
+    scene = synthetic.make_scene("desert", 4, undulation=0.4, **BARE)
     side, above = scene.exemplar, pinhole((0, 0, 1000.0), (0, 0, 0), 120, 120, np.degrees(2 * np.arctan(3.0 / 1000.0)))
     height = 1000.0 - synthetic.render_depth(scene, above)
     assert side == 6.0
@@ -105,13 +106,13 @@ def test_the_mean_ground_of_the_exemplar_is_at_0():
 def test_a_picture_repeats_to_the_byte_whatever_the_number_of_threads():
     import drjit
 
-    scene, camera = synthetic.make("desert", 0, shrubs=20, stones=40), off_centre(50, 38)
+    scene, camera = synthetic.make_scene("desert", 0, shrubs=20, stones=40), off_centre(50, 38)
     before = drjit.thread_count()
     try:
         drjit.set_thread_count(1)
         one = synthetic.render(scene, camera, 4)
         drjit.set_thread_count(3)
-        synthetic._world.cache_clear()
+        synthetic._load_scene.cache_clear()
         three = synthetic.render(scene, camera, 4)
     finally:
         drjit.set_thread_count(before)
@@ -121,7 +122,7 @@ def test_a_picture_repeats_to_the_byte_whatever_the_number_of_threads():
 
 
 def test_photos_taken_again_differ_in_their_noise_alone():
-    scene, camera = synthetic.make("desert", 0, **BARE), off_centre(50, 38)
+    scene, camera = synthetic.make_scene("desert", 0, **BARE), off_centre(50, 38)
     first, same, second = (synthetic.render(scene, camera, 4, again) for again in (0, 0, 1))
     assert first.tobytes() == same.tobytes() != second.tobytes()
     assert np.abs(first - second).mean() < 0.05
@@ -130,12 +131,12 @@ def test_photos_taken_again_differ_in_their_noise_alone():
 
 def test_another_seed_is_another_desert():
     camera = camera_layouts.orbit(90, 0, 7.0, (0, 0, 0), 24, 24, 55.0)
-    one, other = (synthetic.render_depth(synthetic.make("desert", seed), camera) for seed in (0, 1))
+    one, other = (synthetic.render_depth(synthetic.make_scene("desert", seed), camera) for seed in (0, 1))
     assert np.abs(one - other).mean() > 0.02
 
 
 def test_a_camera_that_mitsuba_cannot_hold_is_refused():
-    scene = synthetic.make("desert", 0, **BARE)
+    scene = synthetic.make_scene("desert", 0, **BARE)
     with pytest.raises(ValueError, match="pinhole"):
         synthetic.render(scene, top_down(-1.0, -1.0, 8, 8, 0.25, 5.0))
     with pytest.raises(ValueError, match="square"):
@@ -151,7 +152,7 @@ def test_the_config_entry_tells_how_many_pictures_of_which_size():
 
 
 def test_the_start_views_see_the_whole_exemplar_from_at_least_three_sides():
-    half = synthetic.make("desert", 0).exemplar / 2
+    half = synthetic.make_scene("desert", 0).exemplar / 2
     ground = np.array([[x, y, 0.0] for x in np.linspace(-half, half, 13) for y in np.linspace(-half, half, 13)])
     seen = np.zeros(len(ground), int)
     for camera in synthetic.start_views(ENTRY):
@@ -221,18 +222,8 @@ def test_no_view_is_another(rig):
     assert np.linalg.norm(at[:, None] - at, axis=-1)[~np.eye(len(at), dtype=bool)].min() > 0.1
 
 
-def test_walkers_look_over_the_exemplar_at_their_eyes_heights():
-    found = synthetic.walkers(HIGH, (10.0, 0.0, 0.0))
-    assert list(found) == ["walker_0.8", "walker_1.6", "walker_3.2"]
-    for name, camera in found.items():
-        assert camera.centre[2] == pytest.approx(float(name.split("_")[1]))
-        assert (camera.width, camera.height) == (64, 36)
-        [pixel], _ = camera.project(np.array([[10.0, 0.0, 0.0]]))
-        assert pixel[0] == pytest.approx(32) and 0 < pixel[1] < 36
-
-
 @pytest.mark.parametrize(
     "light, code", [(0.0, 0.0), (1.0, 1.0), (7.0, 1.0), (-1.0, 0.0), (0.5, 0.7353570), (0.002, 0.02584)]
 )
 def test_light_is_encoded_as_srgb(light, code):
-    assert synthetic.encode(np.array([light]))[0] == pytest.approx(code, abs=1e-6)
+    assert synthetic.encode_srgb(np.array([light]))[0] == pytest.approx(code, abs=1e-6)

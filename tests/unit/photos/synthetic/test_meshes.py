@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from dav_gswt.photos.synthetic import meshes
 
@@ -12,25 +13,16 @@ def volume(vertices, faces):
     return (np.cross(a, b) * c).sum() / 6
 
 
-def test_an_icosphere_is_a_closed_unit_sphere():
-    vertices, faces = meshes.icosphere(3)
-    assert len(faces) == 20 * 4**3
-    assert len(vertices) - 3 * len(faces) // 2 + len(faces) == 2  # Euler
-    assert np.linalg.norm(vertices, axis=1) == pytest.approx(np.ones(len(vertices)))
-    # flat faces of edge h lie about h^2/8 inside: 3 % of 4 pi/3 at h = 0.14 and less
-    assert volume(vertices, faces) == pytest.approx(4 * np.pi / 3, rel=0.02)
-
-
 def test_a_stone_is_closed_outside_out_and_about_1_across():
     for seed in range(10):
-        stone = meshes.stone(np.random.default_rng(seed), 3)
+        stone = meshes.make_stone(np.random.default_rng(seed), 3)
         spans = np.ptp(stone.vertices, axis=0)
         assert 0.6 < spans[0] <= 1.07 and spans[2] < spans[0]
         assert 0 < volume(stone.vertices, stone.faces) < np.prod(spans)
         assert stone.colours.min() > 0 and stone.colours.max() < 1
 
 
-@pytest.mark.parametrize("grow", [meshes.shrub, meshes.tuft])
+@pytest.mark.parametrize("grow", [meshes.make_shrub, meshes.make_tuft])
 def test_a_plant_stands_on_its_root_about_1_high_in_reflectances(grow):
     for seed in range(4):
         plant = grow(np.random.default_rng(seed))
@@ -41,19 +33,20 @@ def test_a_plant_stands_on_its_root_about_1_high_in_reflectances(grow):
         assert plant.faces.min() == 0 and plant.faces.max() == len(plant.vertices) - 1
 
 
-@pytest.mark.parametrize("grow", [meshes.shrub, meshes.tuft])
+@pytest.mark.parametrize("grow", [meshes.make_shrub, meshes.make_tuft])
 def test_every_face_of_a_plant_has_one_colour(grow):
     plant = grow(np.random.default_rng(1))
     assert np.ptp(plant.colours[plant.faces], axis=1).max() == 0
 
 
-def test_a_thing_is_scaled_turned_and_moved():
+def test_a_mesh_is_scaled_turned_and_moved():
     one = meshes.Mesh(np.array([[1, 0, 0]], np.float32), np.zeros((0, 3), int), np.ones((1, 3), np.float32))
-    assert meshes.placed(one, (1, 2, 3), 2.0, np.pi / 2).vertices[0] == pytest.approx([1, 4, 3])
+    assert meshes.transform_mesh(one, (1, 2, 3), 2.0, np.pi / 2).vertices[0] == pytest.approx([1, 4, 3])
 
 
 def test_merged_meshes_keep_their_faces():
-    sphere, faces = meshes.icosphere(0)
+    icosphere = trimesh.creation.icosphere(subdivisions=0)
+    sphere, faces = np.array(icosphere.vertices), np.array(icosphere.faces)
     one = meshes.Mesh(sphere.astype(np.float32), faces, np.ones((12, 3), np.float32))
-    two = meshes.merged([one, meshes.placed(one, (5, 0, 0), 1.0, 0.0)])
+    two = meshes.merge_meshes([one, meshes.transform_mesh(one, (5, 0, 0), 1.0, 0.0)])
     assert volume(two.vertices, two.faces) == pytest.approx(2 * volume(sphere, faces), rel=1e-5)  # float32 positions

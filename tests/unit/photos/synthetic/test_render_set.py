@@ -21,8 +21,8 @@ def dark(monkeypatch):
         return ColmapModel(names, cameras, np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2)))
 
     monkeypatch.setattr(synthetic, "render", lambda scene, camera: np.zeros((64, 64, 3), np.float32))
-    monkeypatch.setattr(truth, "write", lambda path, scene, camera: path.write_text(str(camera.centre.tolist())))
-    monkeypatch.setattr(photo_set, "triangulated", nothing)
+    monkeypatch.setattr(truth, "write_truth", lambda path, scene, camera: path.write_text(str(camera.centre.tolist())))
+    monkeypatch.setattr(photo_set, "triangulate_points", nothing)
 
 
 @pytest.mark.parametrize(
@@ -62,5 +62,5 @@ def test_every_picture_has_its_truth_and_the_record_says_what_rendered(tmp_path)
 
 
 def test_names_of_more_than_a_hundred_views_sort_by_number():
-    names = [name for name, _ in photo_set._named("view", synthetic.start_views(ENTRY | {"photos": 120}))]
+    names = [name for name, _ in photo_set._name_views("view", synthetic.start_views(ENTRY | {"photos": 120}))]
     assert names == sorted(names) and names[0] == "view_000.png" and names[-1] == "view_119.png"

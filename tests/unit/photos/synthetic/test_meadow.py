@@ -5,7 +5,7 @@ import pytest
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import pinhole
-from dav_gswt.photos.synthetic import camera_layouts, meadow
+from dav_gswt.photos.synthetic import camera_layouts, land, meadow
 from dav_gswt.photos.synthetic import scene as synthetic
 
 pytest.importorskip("mitsuba")
@@ -19,11 +19,11 @@ def small(monkeypatch):
     monkeypatch.setattr(meadow, "NEAR", 3.0)
     monkeypatch.setattr(meadow, "FAR", 8.0)
     yield
-    synthetic._world.cache_clear()
+    synthetic._load_scene.cache_clear()
 
 
 def grown(seed=0, **given):
-    return meadow.grow(meadow.options(**given), seed, 6.0)
+    return meadow.make_land(land.make_options("meadow", meadow.Options, given), seed, 6.0)
 
 
 @pytest.mark.parametrize(
@@ -37,14 +37,15 @@ def grown(seed=0, **given):
 )
 def test_what_a_meadow_cannot_be_is_said_by_name(given, said):
     with pytest.raises(InputError, match=said):
-        synthetic.make("meadow", 0, **given)
+        synthetic.make_scene("meadow", 0, **given)
 
 
 def test_every_option_of_a_meadow_has_bounds_that_hold_its_default():
-    assert set(meadow.BOUNDS) == set(meadow.Options.__dataclass_fields__)
-    for name, (low, high) in meadow.BOUNDS.items():
+    assert set(land.option_bounds(meadow.Options)) == set(meadow.Options.__dataclass_fields__)
+    for name, (low, high) in land.option_bounds(meadow.Options).items():
         assert low <= getattr(meadow.Options(), name) <= high
-        meadow.options(**{name: low}), meadow.options(**{name: high})
+        for value in (low, high):
+            land.make_options("meadow", meadow.Options, {name: value})
 
 
 def test_a_meadow_follows_its_seed():
@@ -117,7 +118,7 @@ def test_a_bare_meadow_is_all_soil():
 def test_a_meadow_is_greener_where_grass_covers_it():
     camera = camera_layouts.orbit(90, 0, 7.0, (0, 0, 0), 32, 32, 40.0)
     grass, soil = (
-        synthetic.render(synthetic.make("meadow", 0, bare=bare, flowers=0), camera, 4).mean(axis=(0, 1))
+        synthetic.render(synthetic.make_scene("meadow", 0, bare=bare, flowers=0), camera, 4).mean(axis=(0, 1))
         for bare in (0, 1)
     )
     assert grass[1] > grass[0] and grass[1] - grass[0] > soil[1] - soil[0] + 0.05
@@ -126,13 +127,13 @@ def test_a_meadow_is_greener_where_grass_covers_it():
 def test_a_picture_of_a_meadow_repeats_to_the_byte_whatever_the_number_of_threads():
     import drjit
 
-    scene, camera = synthetic.make("meadow", 0), pinhole((3.0, -4.0, 1.6), (0.3, 0.2, 0.0), 50, 38, 50.0)
+    scene, camera = synthetic.make_scene("meadow", 0), pinhole((3.0, -4.0, 1.6), (0.3, 0.2, 0.0), 50, 38, 50.0)
     before = drjit.thread_count()
     try:
         drjit.set_thread_count(1)
         one = synthetic.render(scene, camera, 4)
         drjit.set_thread_count(3)
-        synthetic._world.cache_clear()
+        synthetic._load_scene.cache_clear()
         three = synthetic.render(scene, camera, 4)
     finally:
         drjit.set_thread_count(before)
@@ -142,8 +143,8 @@ def test_a_picture_of_a_meadow_repeats_to_the_byte_whatever_the_number_of_thread
 
 
 def test_depth_of_a_meadow_ends_on_the_ground_or_on_what_grows_on_it():
-    scene, camera = synthetic.make("meadow", 0), pinhole((0.5, -4.0, 3.0), (0, 0, 0), 60, 40, 40.0)
-    bare = synthetic.make("meadow", 0, tufts=0, seed_heads=0, clover=0, flowers=0, stones=0, pebbles=0)
+    scene, camera = synthetic.make_scene("meadow", 0), pinhole((0.5, -4.0, 3.0), (0, 0, 0), 60, 40, 40.0)
+    bare = synthetic.make_scene("meadow", 0, tufts=0, seed_heads=0, clover=0, flowers=0, stones=0, pebbles=0)
     origin, way = camera.rays()
     with_plants, without = (synthetic.render_depth(s, camera) for s in (scene, bare))
     height = (origin + way * with_plants[..., None])[..., 2]

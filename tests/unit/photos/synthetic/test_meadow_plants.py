@@ -3,22 +3,22 @@
 import numpy as np
 import pytest
 
-from dav_gswt.photos.synthetic import herbage
+from dav_gswt.photos.synthetic import meadow_plants
 
 
 def mat(rng):
-    return herbage.mat(rng, 200, 0.12, 0.2)
+    return meadow_plants.make_mat(rng, 200, 0.12, 0.2)
 
 
 def flowers(kind):
-    return lambda rng: herbage.flower(rng, kind)
+    return lambda rng: meadow_plants.make_flower(rng, kind)
 
 
 PLANTS = [
-    pytest.param(herbage.tuft, id="tuft"),
-    pytest.param(herbage.in_seed, id="grass in seed"),
-    pytest.param(herbage.clover, id="clover"),
-    *(pytest.param(flowers(kind), id=f"{kind.petals} petals") for kind in herbage.FLOWERS),
+    pytest.param(meadow_plants.make_tuft, id="tuft"),
+    pytest.param(meadow_plants.make_seed_grass, id="grass in seed"),
+    pytest.param(meadow_plants.make_clover, id="clover"),
+    *(pytest.param(flowers(kind), id=f"{kind.petals} petals") for kind in meadow_plants.FLOWERS),
 ]
 
 
@@ -48,13 +48,15 @@ def test_a_mat_is_about_1_across_and_as_high_as_its_blades():
 
 
 def test_dry_grass_is_redder_than_green():
-    green, dry = (herbage.mat(np.random.default_rng(0), 200, 0.1, share).colours.mean(axis=0) for share in (0.0, 1.0))
+    green, dry = (
+        meadow_plants.make_mat(np.random.default_rng(0), 200, 0.1, share).colours.mean(axis=0) for share in (0.0, 1.0)
+    )
     assert dry[0] > dry[1] and green[1] > green[0]
 
 
 def test_a_flower_has_the_colours_of_its_kind():
-    for kind in herbage.FLOWERS:
-        colours = herbage.flower(np.random.default_rng(2), kind).colours
+    for kind in meadow_plants.FLOWERS:
+        colours = meadow_plants.make_flower(np.random.default_rng(2), kind).colours
         # a petal's shade is 0.85 to 1.08 times the kind's, and 0.88 of that in its inner part
         share = (colours / np.array(kind.colour)).round(3)
         petals = (np.ptp(share, axis=1) < 0.02) & (share[:, 0] > 0.74) & (share[:, 0] < 1.09)

@@ -14,13 +14,13 @@ def spectrum(field, period):
 
 
 def test_band_noise_has_mean_0_and_deviation_1():
-    field = noise.band(np.random.default_rng(0), 128, 4.0, 1.0, 0.2, 1.0)
+    field = noise.make_noise(np.random.default_rng(0), 128, 4.0, 1.0, 0.2, 1.0)
     assert field.mean() == pytest.approx(0, abs=1e-9)
     assert field.std() == pytest.approx(1, abs=1e-9)
 
 
 def test_band_noise_keeps_to_its_band():
-    k, energy = spectrum(noise.band(np.random.default_rng(1), 256, 8.0, 1.0, 0.25, 0.0), 8.0)
+    k, energy = spectrum(noise.make_noise(np.random.default_rng(1), 256, 8.0, 1.0, 0.25, 0.0), 8.0)
     # an octave outside either limit the amplitude is exp(-4): 3e-4 of the energy a wave
     outside = energy[(k > 0) & ((k < 0.5) | (k > 8.0))].sum()
     assert outside < 1e-3 * energy.sum()
@@ -28,19 +28,19 @@ def test_band_noise_keeps_to_its_band():
 
 
 def test_band_noise_follows_the_seed():
-    one, same, other = (noise.band(np.random.default_rng(s), 32, 1.0, 0.5, 0.1, 1.0) for s in (5, 5, 6))
+    one, same, other = (noise.make_noise(np.random.default_rng(s), 32, 1.0, 0.5, 0.1, 1.0) for s in (5, 5, 6))
     assert (one == same).all() and (one != other).any()
 
 
 def test_a_raster_without_any_wave_is_refused():
     with pytest.raises(ValueError, match="no wavelength"):
-        noise.band(np.random.default_rng(0), 1, 1.0, 1.0, 0.1, 1.0)
+        noise.make_noise(np.random.default_rng(0), 1, 1.0, 1.0, 0.1, 1.0)
 
 
 @pytest.mark.parametrize("wind", [0.0, 0.5, 2.0])
 def test_ripples_have_their_length_along_the_wind_and_grow_in_phase_with_it(wind):
     n, period, length = 256, 8.0, 0.4
-    phase, strength = noise.ripples(np.random.default_rng(2), n, period, length, wind)
+    phase, strength = noise.make_ripples(np.random.default_rng(2), n, period, length, wind)
     step = np.angle(np.exp(1j * np.diff(phase, axis=1)[:-1])), np.angle(np.exp(1j * np.diff(phase, axis=0)[:, :-1]))
     where = strength[:-1, :-1] > 0.5  # away from forks, where a phase has no slope
     slope = np.array([s[where].mean() for s in step]) * n / period
@@ -63,4 +63,4 @@ def test_a_raster_is_sampled_at_texel_centres_between_them_and_across_its_edge()
     raster = np.array([[0.0, 1.0], [2.0, 3.0]])  # texels of side 1, centres at .5 and 1.5
     x = np.array([0.5, 1.5, 0.5, 1.0, 2.0, -1.5, 2.5])
     y = np.array([0.5, 0.5, 1.5, 1.0, 0.5, 0.5, 4.5])
-    assert noise.sample(raster, 2.0, x, y) == pytest.approx(np.array([0, 1, 2, 1.5, 0.5, 0, 0]))
+    assert noise.sample_raster(raster, 2.0, x, y) == pytest.approx(np.array([0, 1, 2, 1.5, 0.5, 0, 0]))

@@ -84,7 +84,7 @@ def test_test_views_are_distinct_from_each_other_and_from_every_other_view():
     def centres(places):
         return np.array([camera(*place).centre for place in places])
 
-    tests = centres(camera_layouts.test_views(6, 30.0, 7.0))
+    tests = centres(camera_layouts.held_out(6, 30.0, 7.0))
     others = centres(camera_layouts.start_ring(8, 65.0, 7.0) + camera_layouts.hemisphere(250, 30.0, 7.0))
     assert np.linalg.norm(tests[:, None] - others, axis=-1).min() >= 0.7 - 1e-9  # a tenth of the radius
     assert np.linalg.norm(tests[:, None] - tests, axis=-1)[~np.eye(6, dtype=bool)].min() > 1.0
@@ -107,11 +107,11 @@ def test_a_paper_rig_has_36_in_100_views_on_a_circle_and_the_others_uniform_abov
 
 
 def test_a_walker_stands_away_from_the_target_and_looks_past_it_to_the_horizon():
-    camera = camera_layouts.walker(1.6, 90.0, 4.0, (1.0, 2.0, 0.5), 160, 90, 60.0)
+    camera = camera_layouts.eye_level_camera(1.6, 90.0, 4.0, (1.0, 2.0, 0.5), 160, 90, 60.0)
     assert camera.centre == pytest.approx(np.array([1.0, 6.0, 2.1]))
     horizon = camera.centre + np.array([[0.0, -1.0, 0.0]])
     [pixel], _ = camera.project(horizon)
     # 12 degrees above the middle: a focal length of 80 / tan 30 pixels times tan 12
     assert pixel == pytest.approx([80, 45 - 80 * 3**0.5 * np.tan(np.radians(12))])
     with pytest.raises(ValueError, match="above the ground"):
-        camera_layouts.walker(0.0, 0.0, 4.0, (0.0, 0.0, 0.0), 160, 90, 60.0)
+        camera_layouts.eye_level_camera(0.0, 0.0, 4.0, (0.0, 0.0, 0.0), 160, 90, 60.0)
