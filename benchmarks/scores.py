@@ -9,7 +9,6 @@ import time
 import numpy as np
 from record import tell
 
-from dav_gswt.geometry import poses
 from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.images import lpips, lpips_weights
 from dav_gswt.photos.synthetic import camera_layouts
@@ -78,7 +77,7 @@ def pools() -> dict[str, float]:
     def scored(count: int, staged: bool):
         places = camera_layouts.hemisphere(count, 30.0, FLYING_HEIGHT)
         cameras = [
-            camera_layouts.orbit(*place, poses.middle(made.frame), 96, 96, examples.FIELD_OF_VIEW) for place in places
+            camera_layouts.orbit(*place, made.frame.exemplar.centre, 96, 96, examples.FIELD_OF_VIEW) for place in places
         ]
         pool = [(pose_of_camera(f"pose_{i:04d}", c, made.frame), c) for i, c in enumerate(cameras)]
         start = time.perf_counter()

@@ -8,6 +8,7 @@ from dav_gswt.capture.store import PhotoStore
 from dav_gswt.files import read_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
+from dav_gswt.photos.view_split import read_view_split
 
 with logging_to(snakemake.log[0]):
     given, name = snakemake.input, snakemake.wildcards.scene
@@ -16,4 +17,4 @@ with logging_to(snakemake.log[0]):
     site = Site(name, snakemake.params.scene, read_scene_frame(given.frame), photos, store, given.get("field"))
     before = list(given.captures)
     chosen = read_json(given.poses)["poses"]
-    capture_views(site, read_json(given.views), before, chosen, Path(snakemake.output.capture))
+    capture_views(site, read_view_split(given.views), before, chosen, Path(snakemake.output.capture))

@@ -7,15 +7,16 @@ from dav_gswt.images import lpips_weights
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.capture_record import read_capture_record
 from dav_gswt.photos.training_views import read_training_views
+from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction import build, evaluation, ground
 from dav_gswt.views import stopping
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    split, captures = read_json(given.views), list(given.get("captures", []))
-    tests = read_training_views(given.images, given.model, split["test"], [], params.preset["size"])
-    photos = len(split["start"]) + sum(len(read_capture_record(folder)) for folder in captures)
+    split, captures = read_view_split(given.views), list(given.get("captures", []))
+    tests = read_training_views(given.images, given.model, split.test, [], params.preset["size"])
+    photos = len(split.start) + sum(len(read_capture_record(folder)) for folder in captures)
     fitted, grid = read_field(given.field), ground.read(given.ground)
     perceptual = lpips_weights.read(given.lpips) if given.get("lpips") else None
     groups = read_scene_frame(given.frame).test_groups

@@ -1,17 +1,18 @@
 """Rule evaluate_completed: what the test photos say about a field before and after it was completed."""
 
 from dav_gswt.field import read_field
-from dav_gswt.files import read_json, write_json
+from dav_gswt.files import write_json
 from dav_gswt.images import lpips_weights
 from dav_gswt.inpainting import evaluation
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.training_views import read_training_views
+from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction import build, ground
 
 with logging_to(snakemake.log[0]):
     given, quality = snakemake.input, snakemake.params.preset
-    names, grid = read_json(given.views)["test"], ground.read(given.ground)
+    names, grid = read_view_split(given.views).test, ground.read(given.ground)
     tests = build.modelled(read_training_views(given.images, given.model, names, [], quality["size"]), grid)
     perceptual = lpips_weights.read(given.lpips) if given.get("lpips") else None
     result = evaluation.judged(read_field(given.before), read_field(given.after), tests, perceptual)

@@ -3,17 +3,18 @@
 import numpy as np
 
 from dav_gswt.field import write_field
-from dav_gswt.files import read_json, write_json
+from dav_gswt.files import write_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.colmap_model import read_colmap_model, triangulate_points
 from dav_gswt.photos.training_views import read_training_views
+from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.reconstruction import build, ground
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     quality, margin = build.FitSettings(**params.preset), ground.WHOLE if params.whole else ground.MARGIN
-    names = read_json(given.views)["start"]
+    names = read_view_split(given.views).start
     photos = read_training_views(given.images, given.model, names, [], quality.size)
     points, colours = triangulate_points(read_colmap_model(given.model), names, given.images)
     rng = np.random.default_rng(params.seed)

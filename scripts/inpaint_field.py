@@ -1,18 +1,19 @@
 """Rule complete_field: what no photo saw, painted by a prior."""
 
 from dav_gswt.field import read_field, write_field
-from dav_gswt.files import copy_file, read_json, write_json
+from dav_gswt.files import copy_file, write_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.inpainting import build
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.training_views import read_training_views
+from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction import ground
 from dav_gswt.views import prior_sampling, scoring
 
 with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
-    fitted, grid, names = read_field(given.field), ground.read(given.ground), read_json(given.views)["start"]
+    fitted, grid, names = read_field(given.field), ground.read(given.ground), read_view_split(given.views).start
     taken = read_training_views(given.images, given.model, names, list(given.captures), scoring.PHOTO)
     asked = prior_sampling.open_inpainting_prior(params.prior, params.seed)
     made = build.complete(fitted, grid, read_scene_frame(given.frame), taken, asked)

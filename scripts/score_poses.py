@@ -2,18 +2,18 @@
 
 from dav_gswt.capture import serial_rig
 from dav_gswt.field import read_field
-from dav_gswt.files import read_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.training_views import read_training_views
+from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.reconstruction import ground
 from dav_gswt.views import candidates, feasibility, frozen_scales, pose_maps, prior_sampling, scores, scoring
 
 with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
     captures = list(given.get("captures", []))
-    scene, frame, split = params.scene, read_scene_frame(given.frame), read_json(given.views)
+    scene, frame, split = params.scene, read_scene_frame(given.frame), read_view_split(given.views)
     fitted, grid = read_field(given.field), ground.read(given.ground)
     pool = candidates.list_remaining(scene, frame, given.model, split, captures)
     if scene["agent"] != "replay":  # whose frames were all taken, wherever they stand
@@ -21,7 +21,7 @@ with logging_to(snakemake.log[0]):
         pool = feasibility.filter_feasible(
             pool, grid, scene.get("feasibility"), feasibility.CLEARANCE * frame.flying_height
         )
-    taken = read_training_views(given.images, given.model, split["start"], captures, scoring.PHOTO)
+    taken = read_training_views(given.images, given.model, split.start, captures, scoring.PHOTO)
     prior = prior_sampling.open_scoring_prior(params.prior, params.p_drop, params.seed, given.get("lpips"))
     first = frozen_scales.read_frozen_scales(given.frozen) if given.get("frozen") else None
     found = scoring.score_poses(fitted, grid, pool, taken, frame, prior, first)

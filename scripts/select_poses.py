@@ -2,19 +2,20 @@
 
 import numpy as np
 
-from dav_gswt.files import read_json, write_json
+from dav_gswt.files import write_json
 from dav_gswt.geometry.poses import poses_to_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to
+from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.views import candidates, policy_inputs, pose_maps, scores, selection, stopping
 from dav_gswt.views.policies import SelectionInput
 
 with logging_to(snakemake.log[0]):
     given, params, policy = snakemake.input, snakemake.params, snakemake.params.policy
-    frame, split, scored = read_scene_frame(given.frame), read_json(given.views), scores.read_scores(given.scores)
+    frame, split, scored = read_scene_frame(given.frame), read_view_split(given.views), scores.read_scores(given.scores)
     taken = candidates.read_captured_cameras(given.model, split, given.captures)
-    known = stopping.read_state(given, len(split["start"]), len(taken), len(scored))
+    known = stopping.read_state(given, len(split.start), len(taken), len(scored))
     k, chosen = selection.poses_per_round(policy, params.k, len(scored)), []
     decided = stopping.decide(params.stop, k, params.scene.get("burst", 1), known)
     if not decided.stopped:

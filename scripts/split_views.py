@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from dav_gswt.files import write_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.colmap_model import read_colmap_model
-from dav_gswt.photos.view_split import split_views
+from dav_gswt.photos.splitting import split_views
+from dav_gswt.photos.view_split import write_view_split
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     start, whole = params.scene.get("start") or params.scene["photos"], params.scene.get("whole", False)
     rng = np.random.default_rng(params.seed)
-    found = split_views(read_colmap_model(given.model), read_scene_frame(given.frame), start, rng, whole)
-    write_json(snakemake.output.views, found)
+    split = split_views(read_colmap_model(given.model), read_scene_frame(given.frame), start, rng, whole)
+    write_view_split(snakemake.output.views, split)

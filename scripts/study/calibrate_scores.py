@@ -1,10 +1,11 @@
 """Rules calibrate_coarse and calibrate_round: do scores say where the field is wrong?"""
 
 from dav_gswt.field import read_field
-from dav_gswt.files import read_json, write_json
+from dav_gswt.files import write_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.training_views import read_training_views
+from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction import ground
 from dav_gswt.study import csv_tables
@@ -14,8 +15,8 @@ from dav_gswt.views import candidates, pose_maps, prior_sampling, scores, scorin
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     captures = list(given.get("captures", []))
-    frame, split = read_scene_frame(given.frame), read_json(given.views)
-    taken = read_training_views(given.images, given.model, split["start"], captures, scoring.PHOTO)
+    frame, split = read_scene_frame(given.frame), read_view_split(given.views)
+    taken = read_training_views(given.images, given.model, split.start, captures, scoring.PHOTO)
     fitted = read_field(given.field), ground.read(given.ground)
     judged = judging.CalibrationTarget(params.scene, *fitted, frame, taken, params.size)
     pool = candidates.list_remaining(params.scene, frame, given.model, split, captures)

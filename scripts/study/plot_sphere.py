@@ -3,12 +3,13 @@
 from dav_gswt.files import read_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
+from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.study.views import sphere
 from dav_gswt.views import candidates, scores
 
 with logging_to(snakemake.log[0]):
     given, lam = snakemake.input, snakemake.params.lam
-    frame, split = read_scene_frame(given.frame), read_json(given.views)
+    frame, split = read_scene_frame(given.frame), read_view_split(given.views)
     captures, rounds = list(given.captures), []
     for t, (scored, asked) in enumerate(zip(given.scores, given.poses, strict=True), 1):
         taken = candidates.read_captured_cameras(given.model, split, captures[: t - 1])

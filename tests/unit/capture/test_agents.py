@@ -20,6 +20,7 @@ from dav_gswt.images import image_files
 from dav_gswt.photos.capture_record import read_capture_record, write_capture_record
 from dav_gswt.photos.synthetic import scene as synthetic
 from dav_gswt.photos.training_views import read_captured_views
+from dav_gswt.photos.view_split import ViewSplit
 
 WHEN = "2026-05-04T10:00:00"
 
@@ -167,7 +168,7 @@ def test_where_no_pose_was_chosen_nobody_is_asked_for_anything(agent, tmp_path, 
     monkeypatch.setattr(agents.candidates, "list_remaining", lambda *_: requested(0.0))
     scene = {"agent": agent, "kind": "photos"}
     site = Site("dune", scene, scene_frame(flying_height=5.0), tmp_path / "photos", PhotoStore(tmp_path / "captures"))
-    agents.capture_views(site, {}, [], [], tmp_path / "capture")
+    agents.capture_views(site, ViewSplit((), (), ()), [], [], tmp_path / "capture")
     assert [path.name for path in (tmp_path / "capture").iterdir()] == ["capture.json"]
     assert json.loads((tmp_path / "capture/capture.json").read_text()) == {"agent": agent, "shots": []}
     assert read_captured_views(tmp_path / "capture", 8) == [] and not (tmp_path / "captures").exists()

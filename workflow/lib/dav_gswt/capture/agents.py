@@ -14,6 +14,7 @@ from dav_gswt.capture.site import Site
 from dav_gswt.images import image_files
 from dav_gswt.photos.capture_record import CapturedPhoto, write_capture_record
 from dav_gswt.photos.lenses import undistort_scene_photo
+from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.views import candidates
 
 
@@ -44,7 +45,7 @@ AGENTS: dict[str, CaptureAgent] = {
 }
 
 
-def capture_views(site: Site, split: dict, before: list, chosen: list[dict], folder: Path) -> None:
+def capture_views(site: Site, split: ViewSplit, before: list, chosen: list[dict], folder: Path) -> None:
     """Fill `folder` with the photos of the chosen poses and with capture.json.
 
     split: views.json. before: the capture folders of earlier rounds. chosen: poses of poses.json. The agent is not

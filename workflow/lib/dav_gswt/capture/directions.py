@@ -8,7 +8,6 @@ from numpy import ndarray as Array
 
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.geometry.poses import middle
 from dav_gswt.geometry.scene_frame import SceneFrame
 
 COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
@@ -72,7 +71,7 @@ def heading(camera: Camera) -> Float[Array, "3"]:
 
 def describe_facing(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
     """Say which way to face."""
-    ahead, inwards = heading(camera)[:2], (middle(frame) - camera.centre)[:2]
+    ahead, inwards = heading(camera)[:2], (frame.exemplar.centre - camera.centre)[:2]
     towards = by.format_direction(ahead)
     if abs(tilt(camera)) >= STEEP:
         return f"turn the top of the picture to {towards}"
@@ -85,7 +84,7 @@ def describe_facing(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
 
 def describe_position(camera: Camera, frame: SceneFrame, by: Ruler) -> str:
     """Say where to stand."""
-    out = (camera.centre - middle(frame))[:2]
+    out = (camera.centre - frame.exemplar.centre)[:2]
     away = float(np.linalg.norm(out))
     if away < HERE * by.unit:
         return "Stand in the middle"

@@ -20,7 +20,6 @@ from dav_gswt.capture.rig_limits import Axes, AxisRanges, RigLimits
 from dav_gswt.capture.site import Site
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.geometry.poses import middle
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
@@ -56,7 +55,7 @@ class RigSettings:
         return TypeAdapter(RigSettings).validate_python(entry)
 
     def build_mount(self, frame: SceneFrame) -> Mount:
-        return Mount(middle(frame), self.millimetres, self.pan_zero, self.tilt_zero)
+        return Mount(frame.exemplar.centre, self.millimetres, self.pan_zero, self.tilt_zero)
 
 
 def take_photos(site: Site, requested: list[RequestedPose]) -> None:

@@ -13,7 +13,6 @@ from dav_gswt.capture import directions, shot_list_map
 from dav_gswt.capture.directions import Ruler
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.geometry.poses import middle
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import image_files
 from dav_gswt.raster import render
@@ -115,7 +114,7 @@ def _explain_unit(by: Ruler) -> str:
 def _format_card(i: int, station: Station, before: Camera | None, shot_list: ShotList, pictured: bool) -> str:
     camera, by = station.camera, shot_list.ruler
     said = directions.describe_pose(camera, shot_list.frame, by)
-    out = camera.centre - middle(shot_list.frame)
+    out = camera.centre - shot_list.frame.exemplar.centre
     facts = {
         "Height above the ground": by.format_length(float(out[2])),
         "Distance to the middle": by.format_length(float(np.linalg.norm(out[:2]))),

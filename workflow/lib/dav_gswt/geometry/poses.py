@@ -20,14 +20,9 @@ class Pose:
     radius: float
 
 
-def middle(frame: SceneFrame) -> Float[Array, "3"]:
-    """The exemplar's centre on the plane z = 0."""
-    return frame.exemplar.centre
-
-
 def pose_of_camera(name: str, camera: Camera, frame: SceneFrame) -> Pose:
     """Where a camera stands, as a pose about the exemplar's centre."""
-    x, y, z = camera.centre - middle(frame)
+    x, y, z = camera.centre - frame.exemplar.centre
     radius = float(np.sqrt(x * x + y * y + z * z))
     elevation = float(np.degrees(np.arcsin(np.clip(z / max(radius, 1e-12), -1, 1))))
     return Pose(name, elevation, float(np.degrees(np.arctan2(y, x)) % 360), radius)

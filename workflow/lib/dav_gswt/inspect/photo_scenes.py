@@ -1,5 +1,6 @@
 """The photos of a scene: where they were taken from, what structure from motion found, where tiles come from."""
 
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -7,13 +8,13 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import read_json
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.inspect import result_files
 from dav_gswt.inspect.options import ViewOptions
 from dav_gswt.inspect.scene import ColourKey, Layer, Scene, hang_picture, make_outline, to_bytes
+from dav_gswt.photos.view_split import read_view_split
 
 DEPTH = 0.12  # flying heights from a camera to its picture
 MAX_SIDE = 160  # pixels of a photo's longer side
@@ -84,9 +85,7 @@ def arrange_photos(folder: Path, split: Path | None, title: str, captured: list[
 def _read_roles(split: Path | None) -> dict[str, str]:
     if split is None:
         return {}
-    told = read_json(split)
-    with result_files.blaming(split):
-        return {str(name): role for role in ("start", "pool", "test") for name in told[role]}
+    return {name: role for role, names in asdict(read_view_split(split)).items() for name in names}
 
 
 def outline_ground(frame: SceneFrame) -> list[Layer]:

@@ -9,7 +9,6 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.field import read_field
 from dav_gswt.files import read_json
-from dav_gswt.geometry import poses as places
 from dav_gswt.geometry.poses import pose_offset
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.inspect import result_files
@@ -17,6 +16,7 @@ from dav_gswt.inspect.field_scenes import compute_colours, make_solids, thin_fie
 from dav_gswt.inspect.options import ViewOptions
 from dav_gswt.inspect.photo_scenes import compute_bounds, make_frustum, outline_ground
 from dav_gswt.inspect.scene import BLACK, ColourKey, Label, Layer, Scene, make_balls, make_bar, map_colours
+from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.study.views.sphere import HIGHEST, candidate_values
 from dav_gswt.views import scores as tables
 from dav_gswt.views.scores import Scores
@@ -50,7 +50,7 @@ def arrange_poses(path: Path, poses: Path | None, asked: ViewOptions, rounds: in
     label, values = choose_values(table, asked.colour, result_files.parse_lam(poses or path))
     label, _, unit = label.partition(", ")
     bar = make_bar(label, values, most=HIGHEST)
-    middle = places.middle(frame)
+    middle = frame.exemplar.centre
     at = middle + np.array([pose_offset(pose) for pose in table.poses])
     radius = float(np.median(np.linalg.norm(at - middle, axis=1)))
     chosen = _read_chosen(table, poses)
@@ -129,6 +129,6 @@ def _taken_cameras(path: Path, photos: Path) -> list:
     captures = [path.parents[1] / f"iter{t}" / "capture" for t in range(1, parse_round_before(path) + 1)]
     if up is None or not all((folder / "capture.json").is_file() for folder in captures):
         return []
-    split = read_json(up / "views.json")
+    split = read_view_split(up / "views.json")
     with result_files.blaming(up / "views.json"):
         return candidates.read_captured_cameras(photos / "sparse", split, captures)

@@ -8,19 +8,22 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.geometry.poses import Pose, middle, pose_of_camera
+from dav_gswt.geometry.poses import Pose, pose_of_camera
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.capture_record import read_capture_record
 from dav_gswt.photos.colmap_model import read_colmap_model
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.photos.synthetic import scene as synthetic
+from dav_gswt.photos.view_split import ViewSplit
 
 Candidates = list[tuple[Pose, Camera]]
 
 AROUND, LOWEST = 250, 30.0  # poses that devices and people may be asked for, and their least elevation in degrees
 
 
-def list_remaining(scene: dict, frame: SceneFrame, model_folder: Path | str, split: dict, captures: list) -> Candidates:
+def list_remaining(
+    scene: dict, frame: SceneFrame, model_folder: Path | str, split: ViewSplit, captures: list
+) -> Candidates:
     """Every pose that can still be captured: the scene's candidates less those that captures have used."""
     if scene["agent"] == "render":
         pool = list_hemisphere(scene, frame)
@@ -28,16 +31,16 @@ def list_remaining(scene: dict, frame: SceneFrame, model_folder: Path | str, spl
         known = read_colmap_model(model_folder)
         at = dict(zip(known.names, known.cameras, strict=True))
         if scene["agent"] == "replay":
-            pool = [(pose_of_camera(name, at[name], frame), at[name]) for name in split["pool"]]
+            pool = [(pose_of_camera(name, at[name], frame), at[name]) for name in split.pool]
         else:
-            pool = list_orbit(scene, frame, at[split["start"][0]])
+            pool = list_orbit(scene, frame, at[split.start[0]])
     used = {name for folder in captures for name in _used_names(folder)}
     return [(pose, camera) for pose, camera in pool if pose.name not in used]
 
 
 def list_hemisphere(scene: dict, frame: SceneFrame) -> Candidates:
     """Poses spread evenly over the hemisphere from which a synthetic scene can be photographed."""
-    found = synthetic.candidates(scene, middle(frame))
+    found = synthetic.candidates(scene, frame.exemplar.centre)
     return [(pose_of_camera(f"pose_{i:04d}", camera, frame), camera) for i, camera in enumerate(found)]
 
 
@@ -47,22 +50,22 @@ def list_orbit(scene: dict, frame: SceneFrame, like: Camera) -> Candidates:
     places = camera_layouts.hemisphere(
         scene.get("candidates", AROUND), scene.get("min_elevation", LOWEST), frame.flying_height
     )
-    found = [camera_layouts.orbit(*place, middle(frame), like.width, like.height, 60.0) for place in places]
+    found = [camera_layouts.orbit(*place, frame.exemplar.centre, like.width, like.height, 60.0) for place in places]
     lens = {name: getattr(like, name) for name in ("fx", "fy", "cx", "cy")}
     return [(pose_of_camera(f"pose_{i:04d}", camera, frame), replace(camera, **lens)) for i, camera in enumerate(found)]
 
 
-def read_captured_cameras(model_folder: Path | str, split: dict, captures: list) -> list[Camera]:
+def read_captured_cameras(model_folder: Path | str, split: ViewSplit, captures: list) -> list[Camera]:
     """The cameras of the photos taken so far."""
     known = read_colmap_model(model_folder)
     at = dict(zip(known.names, known.cameras, strict=True))
-    start = [at[name] for name in split["start"]]
+    start = [at[name] for name in split.start]
     return start + [photo.camera for folder in captures for photo in read_capture_record(folder)]
 
 
 def camera_positions(taken: list[Camera], frame: SceneFrame) -> Float[Array, "m 3"]:
     """Where cameras stand, relative to the exemplar's centre."""
-    return np.array([camera.centre - middle(frame) for camera in taken]).reshape(-1, 3)
+    return np.array([camera.centre - frame.exemplar.centre for camera in taken]).reshape(-1, 3)
 
 
 def select_by_name(pool: Candidates, chosen: list[dict]) -> Candidates:

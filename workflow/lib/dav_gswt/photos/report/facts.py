@@ -9,7 +9,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
-from dav_gswt.photos import view_split
+from dav_gswt.photos import splitting
 from dav_gswt.photos.colmap_model import (
     ColmapModel,
     count_shared_points,
@@ -117,7 +117,7 @@ def assess_photos(model: ColmapModel, tests: set[str]) -> tuple[PhotoFacts, ...]
             float(np.degrees(np.arccos(np.clip(-camera.forward[2], -1, 1)))),
             model.names[int(shared[i].argmax())] if most else None,
             most,
-            int((shared[i] >= view_split.LINK).sum()),
+            int((shared[i] >= splitting.LINK).sum()),
             name in tests,
             (),
         )
@@ -132,7 +132,7 @@ def find_weaknesses(photo: PhotoFacts, usual: float) -> tuple[str, ...]:
         said.append(f"held by {photo.points} points only, others by about {usual:.0f}")
     if photo.error is not None and not photo.error <= WORST_ERROR:
         said.append(f"its points are {photo.error:.1f} px off on average")
-    if photo.shared < view_split.LINK:
+    if photo.shared < splitting.LINK:
         said.append(f"shares at most {photo.shared} points with any other photo")
     return tuple(said)
 

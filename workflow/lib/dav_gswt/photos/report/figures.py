@@ -22,7 +22,7 @@ from dav_gswt.logs import progress
 from dav_gswt.photos import ground_frame
 from dav_gswt.photos.colmap_model import ColmapModel
 from dav_gswt.photos.report.facts import PhotoFacts, ReportFacts
-from dav_gswt.photos.view_split import find_aim_point
+from dav_gswt.photos.splitting import find_aim_point
 
 LONGER = 1000.0  # of a plan's sides, in its own units
 DOTS = 600  # pixels of the longer side of the points' picture

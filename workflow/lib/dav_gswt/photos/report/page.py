@@ -12,7 +12,7 @@ import numpy as np
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_file
-from dav_gswt.photos import view_split
+from dav_gswt.photos import splitting
 from dav_gswt.photos.report import figures
 from dav_gswt.photos.report.facts import (
     PhotoFacts,
@@ -24,7 +24,7 @@ from dav_gswt.photos.report.facts import (
     min_median_max,
 )
 from dav_gswt.photos.report.figures import Thumbnail, bin_coverage, draw_coverage, draw_plan, make_thumbnails
-from dav_gswt.photos.view_split import ground_bounds, measure_visible_share
+from dav_gswt.photos.splitting import ground_bounds, measure_visible_share
 
 SIGN = '<span class="sign" aria-hidden="true">⚠</span>'
 Fact = tuple[str, str, str]  # its name, its value, what it means
@@ -63,7 +63,7 @@ def parts(found: ReportFacts, smalls: list[Thumbnail]) -> dict[str, str]:
         "strip": "\n".join(_thumb(i, photo, small, found) for i, (photo, small) in photos),
         "rows": "\n".join(_row(i, photo, small.masked, found) for i, (photo, small) in photos),
         "height_unit": "m" if found.frame.unit == "metre" else "flying heights",
-        "link": str(view_split.LINK),
+        "link": str(splitting.LINK),
     }
 
 
@@ -122,7 +122,7 @@ def registration(found: ReportFacts) -> list[Fact]:
     sights = [
         measure_visible_share(camera, ground_bounds(frame, whole=False)) for photo, camera in pairs if not photo.tests
     ]
-    sees = sum(sight >= view_split.LEAST_SIGHT for sight in sights)
+    sees = sum(sight >= splitting.LEAST_SIGHT for sight in sights)
     rest = "all of them" if sees == len(sights) else "the others show too little of it to take part"
     if frame.kind == "synthetic":
         first = ("Photos", f"{len(found.placed)} and {len(found.photos) - len(found.placed)} tests", "rendered")

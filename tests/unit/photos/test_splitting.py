@@ -1,6 +1,6 @@
 """Start views, pool and test views."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
@@ -8,8 +8,8 @@ from fixtures import photos as made_up
 from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
-from dav_gswt.photos import view_split
-from dav_gswt.photos.view_split import find_aim_point, ground_bounds, measure_visible_share, split_views
+from dav_gswt.photos import splitting
+from dav_gswt.photos.splitting import find_aim_point, ground_bounds, measure_visible_share, split_views
 
 FRAME = scene_frame(exemplar=(-0.6, -0.6, 1.2))
 
@@ -34,7 +34,7 @@ def split(model, seed=0, start=8, frame=FRAME):
 def test_every_photo_has_one_part(flown, photos):
     model = first(flown, photos)
     parts = split(model)
-    together = parts["start"] + parts["pool"] + parts["test"]
+    together = parts.start + parts.pool + parts.test
     assert sorted(together) == sorted(model.names)
 
 
@@ -44,18 +44,18 @@ def test_every_photo_has_one_part(flown, photos):
 )
 def test_how_many_photos_each_part_gets(flown, photos, start, pool, test):
     parts = split(first(flown, photos))
-    assert (len(parts["start"]), len(parts["pool"]), len(parts["test"])) == (start, pool, test)
+    assert (len(parts.start), len(parts.pool), len(parts.test)) == (start, pool, test)
 
 
 def test_test_views_are_the_same_for_every_seed_and_start_views_are_not(flown):
     parts = [split(flown, seed) for seed in range(5)]
-    assert all(p["test"] == parts[0]["test"] for p in parts)
-    assert len({tuple(p["start"]) for p in parts}) > 1
+    assert all(p.test == parts[0].test for p in parts)
+    assert len({tuple(p.start) for p in parts}) > 1
     assert split(flown, 3) == split(flown, 3)
 
 
 def test_test_views_look_at_the_inner_exemplar_and_stay_apart(flown):
-    chosen = [flown.camera(name) for name in split(flown)["test"]]
+    chosen = [flown.camera(name) for name in split(flown).test]
     aims = np.array([find_aim_point(camera) for camera in chosen])
     assert np.abs(aims).max() <= 0.6 * 0.5**0.5
     apart = np.linalg.norm(aims[:, None] - aims[None], axis=2)[~np.eye(len(aims), dtype=bool)]
@@ -66,9 +66,9 @@ def test_start_views_are_connected_by_points(flown):
     """Whatever the seed, each start view shares enough points with one chosen before it."""
     sees = [set(flown.point_of[flown.image_of == i]) for i in range(30)]
     for seed in range(8):
-        start = [flown.names.index(name) for name in split(flown, seed)["start"]]
+        start = [flown.names.index(name) for name in split(flown, seed).start]
         for k in range(1, len(start)):
-            assert max(len(sees[start[k]] & sees[j]) for j in start[:k]) >= view_split.LINK
+            assert max(len(sees[start[k]] & sees[j]) for j in start[:k]) >= splitting.LINK
 
 
 def test_start_views_are_more_spread_than_random_ones(flown):
@@ -78,7 +78,7 @@ def test_start_views_are_more_spread_than_random_ones(flown):
         return apart.min()
 
     rng = np.random.default_rng(0)
-    ours = np.mean([spread(split(flown, seed)["start"]) for seed in range(10)])
+    ours = np.mean([spread(split(flown, seed).start) for seed in range(10)])
     random = np.mean([spread(rng.choice(flown.names, 8, replace=False)) for _ in range(50)])
     assert ours > 1.2 * random
 
@@ -86,17 +86,17 @@ def test_start_views_are_more_spread_than_random_ones(flown):
 def test_photos_that_share_no_points_still_all_start():
     cameras = [made_up.camera((3.0 * i, 0, 1)) for i in range(4)]
     points = np.concatenate([made_up.plain(50, 0.3, np.random.default_rng(i)) + [3.0 * i, 0, 0] for i in range(4)])
-    assert len(split(made_up.model(cameras, points))["start"]) == 4
+    assert len(split(made_up.model(cameras, points)).start) == 4
 
 
 def test_photos_of_other_ground_take_no_part(flown):
     """An exemplar in one corner: photos of the opposite corner do not see it."""
     frame = scene_frame(exemplar=(-0.9, -0.9, 0.6))
     parts = split(flown, start=4, frame=frame)
-    named = [name for part in parts.values() for name in part]
+    named = [name for part in astuple(parts) for name in part]
     assert 6 <= len(named) < 30
     assert all(
-        measure_visible_share(flown.camera(name), ground_bounds(frame, whole=False)) >= view_split.LEAST_SIGHT
+        measure_visible_share(flown.camera(name), ground_bounds(frame, whole=False)) >= splitting.LEAST_SIGHT
         for name in named
     )
 
@@ -111,8 +111,8 @@ def test_sight_is_the_share_of_the_square_by_hand():
 
 def test_the_test_views_that_ground_json_names_are_taken(flown):
     parts = split(flown, frame=replace(FRAME, test=("003.png", "017.png")))
-    assert parts["test"] == ["003.png", "017.png"]
-    assert not set(parts["test"]) & set(parts["start"] + parts["pool"])
+    assert parts.test == ("003.png", "017.png")
+    assert not set(parts.test) & set(parts.start + parts.pool)
 
 
 def test_a_named_test_view_that_is_no_image_is_refused(flown):
@@ -126,6 +126,6 @@ def test_photos_of_all_ground_take_part_where_all_of_it_is_in_question(flown):
     """The same corner, but every photo sees some of the whole; tests are spread over the whole, too."""
     frame = scene_frame(exemplar=(-0.9, -0.9, 0.6), extent=(-1.2, -1.2, 1.2, 1.2))
     parts = split_views(flown, frame, 4, np.random.default_rng(0), whole=True)
-    assert sum(len(part) for part in parts.values()) == 30
-    aims = np.array([find_aim_point(flown.camera(name)) for name in parts["test"]])
+    assert sum(len(part) for part in astuple(parts)) == 30
+    aims = np.array([find_aim_point(flown.camera(name)) for name in parts.test])
     assert np.ptp(aims[:, 0]) > 0.6
