@@ -1,4 +1,4 @@
-"""Rule gather_answers: what people chose, and what the model observer does."""
+"""Rule evaluate_answers: choices of participants and of the model observer."""
 
 from dav_gswt.files import write_json
 from dav_gswt.logs import logging_to

@@ -1,4 +1,4 @@
-"""Rule gather_auto: what `auto` chose, as a table and as a page."""
+"""Rule gather_auto: the choices of `auto`, as a table and as a page."""
 
 from dav_gswt.logs import logging_to
 from dav_gswt.study import csv_tables

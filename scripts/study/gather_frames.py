@@ -1,4 +1,4 @@
-"""Rule gather_frames: how long frames take, of all scenes that were asked for."""
+"""Rule gather_frames: frame times of all scenes."""
 
 from dav_gswt.logs import logging_to
 from dav_gswt.study import csv_tables
@@ -6,7 +6,7 @@ from dav_gswt.study.terrain import frames
 
 with logging_to(snakemake.log[0]):
     given, made = snakemake.input, snakemake.output
-    rows = frames.gathered(snakemake.params.cells, given.library, given.page)
+    rows = frames.gather_frames(snakemake.params.cells, given.library, given.page)
     for path in (made.table, made.kept):
         csv_tables.write_table(path, rows)
-    csv_tables.write_table(made.viewer, frames.of_viewer(rows))
+    csv_tables.write_table(made.viewer, frames.select_viewer_rows(rows))

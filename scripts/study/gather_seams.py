@@ -8,8 +8,9 @@ with logging_to(snakemake.log[0]):
     out, cells, study = snakemake.output, snakemake.params.cells, snakemake.params.study
     rows = [row for cell in cells for row in tables.tabulate_crops(cell)]
     csv_tables.write_table(out.crops, rows)
-    often = study.get("compared_draws", 1)
-    compared = [row for row in rows if row["variant"] in study["tilings"] and row["replicate"] < often]
+    compared = [
+        row for row in rows if row["variant"] in study["tilings"] and row["replicate"] < study["compared_replicates"]
+    ]
     found = {
         out.summary: summary.summarise_crops(rows),
         out.ablation: summary.compare_variants(compared, study["baseline"]),

@@ -1,4 +1,4 @@
-"""Rule gather_sweep: the cells of a sweep as one table, added to what earlier runs measured."""
+"""Rule gather_sweep: the experiments of a sweep as one table, added to that of earlier runs."""
 
 from dav_gswt.logs import logging_to
 from dav_gswt.study import csv_tables

@@ -1,4 +1,4 @@
-"""Rule gather_tradeoff: the cells of the trade-off as one table, and the front of those that test views tell apart."""
+"""Rule gather_tradeoff: all settings as one table, and the Pareto front of those measured by test views."""
 
 from dav_gswt.logs import logging_to
 from dav_gswt.study import csv_tables

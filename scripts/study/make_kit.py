@@ -1,4 +1,4 @@
-"""Rule make_kit: all scenes' pairs as a page to be answered, and the key to it."""
+"""Rule make_kit: the pairs of all scenes as an offline page, and its key."""
 
 from pathlib import Path
 

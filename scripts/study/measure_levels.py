@@ -1,4 +1,4 @@
-"""Rule measure_levels: how well coarser levels stand in for the finest."""
+"""Rule measure_levels: errors of coarser levels against the finest."""
 
 from dav_gswt.bundle import build
 from dav_gswt.logs import logging_to

@@ -1,4 +1,4 @@
-"""Rule measure_orders: what pre-sorted orders of neighbouring directions do to pictures of tiles."""
+"""Rule measure_orders: errors of pre-sorted orders of neighbouring directions in pictures of tiles."""
 
 from dav_gswt.bundle import build
 from dav_gswt.logs import logging_to

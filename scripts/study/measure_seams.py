@@ -1,4 +1,4 @@
-"""Rule measure_seams: crops on borders and cuts, their floors and ceilings."""
+"""Rule measure_seams: Seam-LPIPS of crops on borders and cuts, with floors and ceilings."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Rule show_cuts: where the seams of the same tiles run, by colour alone and by what the ground is."""
+"""Rule plot_cuts: cuts of the same tiles by colour alone and by semantics."""
 
 from dav_gswt.logs import logging_to
 from dav_gswt.study.seams import plots

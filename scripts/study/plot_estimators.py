@@ -1,4 +1,4 @@
-"""Rule plot_estimators: the same test views after as many photos, chosen in different ways."""
+"""Rule plot_estimators: test views of fields whose photos different estimators chose."""
 
 from dav_gswt.field import read_field
 from dav_gswt.files import read_json

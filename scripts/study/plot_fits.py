@@ -1,4 +1,4 @@
-"""Rule plot_fits: how soon fits show photos they have not seen."""
+"""Rule plot_fits: PSNR of test photos over seconds of fitting."""
 
 from pathlib import Path
 

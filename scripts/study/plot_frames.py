@@ -7,4 +7,4 @@ from dav_gswt.study.terrain import frames
 with logging_to(snakemake.log[0]):
     rows = csv_tables.read_table(snakemake.input.table)
     for path in (snakemake.output.plot, snakemake.output.kept):
-        frames.write_plot(path, rows)
+        frames.write_frame_plot(path, rows)

@@ -1,4 +1,4 @@
-"""Rule plot_sweep: what a sweep measured, over what it varied."""
+"""Rule plot_sweep: measures of a sweep over the setting that it varies."""
 
 from dav_gswt.logs import logging_to
 from dav_gswt.study.sweeps import plots, tables

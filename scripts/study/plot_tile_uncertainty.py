@@ -1,4 +1,4 @@
-"""Rule plot_doubt: the tiles of the terrain by their uncertainty, and a walk over them."""
+"""Rule plot_tile_uncertainty: the tiles of the terrain by their uncertainty, and a walk over them."""
 
 from dav_gswt.files import read_json
 from dav_gswt.logs import logging_to

@@ -1,4 +1,4 @@
-"""Rule plot_tradeoff: what settings are worth, over their time."""
+"""Rule plot_tradeoff: quality of settings over their time."""
 
 from dav_gswt.logs import logging_to
 from dav_gswt.study import figures

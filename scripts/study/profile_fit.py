@@ -1,4 +1,4 @@
-"""Rule watch_fit: a fit, watched second by second, and stills of its field that nobody photographed."""
+"""Rule profile_fit: quality of a fit over time, and stills of its field away from the photos."""
 
 from pathlib import Path
 

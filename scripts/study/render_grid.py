@@ -1,4 +1,4 @@
-"""Rule draw_grid: twenty by twenty tiles, to be looked at."""
+"""Rule render_grid: pictures of twenty by twenty tiles."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Rule tabulate_ablation: estimators, policies and ways to cut, each less the baseline of its sweep."""
+"""Rule tabulate_ablation: estimators, policies and tilings, each minus the baseline of its sweep."""
 
 from dav_gswt.logs import logging_to
 from dav_gswt.study import csv_tables

@@ -1,4 +1,4 @@
-"""Rule tabulate_sensitivity: what one setting changes, the others as they are."""
+"""Rule tabulate_sensitivity: one setting varied, the others fixed."""
 
 from dav_gswt.logs import logging_to
 from dav_gswt.study import csv_tables

@@ -1,4 +1,4 @@
-"""Rule tabulate_timing: what each stage took, and a frame of the viewer."""
+"""Rule tabulate_timing: time of each stage, and of a frame of the viewer."""
 
 from dav_gswt.logs import logging_to
 from dav_gswt.study import csv_tables

@@ -1,4 +1,4 @@
-"""Rule time_library: how long the library takes for a frame."""
+"""Rule time_library: milliseconds of a frame by the library."""
 
 from pathlib import Path
 
@@ -9,4 +9,6 @@ from dav_gswt.study.terrain import frames
 
 with logging_to(snakemake.log[0]):
     bundle = store.read_bundle(Path(snakemake.input.manifest).parent, snakemake.params.schema)
-    csv_tables.write_table(snakemake.output.table, frames.of_library(bundle, frames.Asked(**snakemake.params.asked)))
+    csv_tables.write_table(
+        snakemake.output.table, frames.time_library(bundle, frames.FrameSettings(**snakemake.params.asked))
+    )

@@ -1,4 +1,4 @@
-"""Rule time_page: how long the page takes for a frame."""
+"""Rule time_page: milliseconds of a frame by the page."""
 
 from pathlib import Path
 
@@ -11,5 +11,5 @@ from dav_gswt.terrain import page
 with logging_to(snakemake.log[0]):
     given = snakemake.input
     bundle, viewer = Path(given.manifest).parent, page.find_viewer(given.viewer)
-    rows = frames.of_page(bundle, viewer, read_json(given.manifest), frames.Asked(**snakemake.params.asked))
+    rows = frames.time_page(bundle, viewer, read_json(given.manifest), frames.FrameSettings(**snakemake.params.asked))
     csv_tables.write_table(snakemake.output.table, rows)

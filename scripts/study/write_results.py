@@ -1,4 +1,4 @@
-"""Rule write_results: the study's tables and figures as a page to read."""
+"""Rule write_results: the page of the study's tables and figures."""
 
 from pathlib import Path
 

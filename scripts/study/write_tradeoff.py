@@ -1,4 +1,4 @@
-"""Rule write_tradeoff: what settings are worth, as a page to read."""
+"""Rule write_tradeoff: the page of speed against accuracy."""
 
 from dav_gswt.files import copy_file
 from dav_gswt.logs import logging_to

@@ -10,8 +10,8 @@ from dav_gswt.study.seams import measure
 from dav_gswt.study.sweeps import plots, tables
 
 CELL = dict(
-    sweep="tau", scene="desert", seed=0, quality="draft", policy="farthest", prior="none", p_drop="0", lam="0", k=4,
-    rounds=2, seam="semantic", tau="0.6", samples=0, steps=0, corrected=False, varied={"tau": 0.6},
+    sweep="tau", scene="desert", seed=0, preset="draft", policy="farthest", prior="none", p_drop="0", lam="0", k=4,
+    rounds=2, tiling="semantic", tau="0.6", samples=0, steps=0, corrected=False, varied={"tau": 0.6},
 )  # fmt: skip
 ORIGIN = {"version": "1", "renderer": {"backend": "cpu", "isa": "x"}, "inputs": {"field": "f" * 64, "seams": "t" * 64}}
 

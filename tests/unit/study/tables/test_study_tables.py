@@ -114,8 +114,8 @@ def test_the_page_holds_the_tables_numbers_and_the_papers_slips(tmp_path):
 def test_cells_of_the_terrain_are_as_uncertain_as_their_tiles(tmp_path):
     tiles = [{"uncertainty": n / 16, "chunks": [{"orders": [0, 1, 2] if n > 7 else [0, 2]}]} for n in range(16)]
     manifest = {"tiles": tiles, "salt": 0, "directions": [0, 1, 2]}
-    shown, deep = tile_uncertainty.cells_of(manifest, -3, -2, (5, 6))
+    shown, deep = tile_uncertainty.read_cells(manifest, -3, -2, (5, 6))
     assert shown.shape == (5, 6) and (deep == (shown > 7 / 16)).all() and deep.any() and not deep.all()
-    assert np.abs(tile_uncertainty.walk(50, 16.0)[[0, -1], 0] - [0.5, 16.5]).max() == 0
+    assert np.abs(tile_uncertainty.make_walk(50, 16.0)[[0, -1], 0] - [0.5, 16.5]).max() == 0
     tile_uncertainty.write_figure(tmp_path / "doubt.png", manifest, 0.5, 6.0)
     assert image_files.read_size(tmp_path / "doubt.png")[0] > 900

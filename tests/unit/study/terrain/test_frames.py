@@ -10,7 +10,7 @@ from dav_gswt.study import csv_tables
 from dav_gswt.study.tables import spread
 from dav_gswt.study.terrain import frames
 
-ASKED = frames.Asked(
+ASKED = frames.FrameSettings(
     {"kind": "hills", "height": 1, "wavelength": 10}, {"frames": 3, "length": 1, "height": 1}, 48, 32, [900, 300]
 )
 CELL = {"scene": "desert", "seed": 0, "preset": "draft", "tiling": "semantic", "tau": "0.6"}
@@ -35,14 +35,14 @@ def test_the_pages_first_budget_is_what_the_studys_tables_join(tmp_path: Path):
     for renderer in (frames.LIBRARY, frames.PAGE):
         csv_tables.write_table(tmp_path / f"{renderer}.csv", [row_of(renderer, budget) for budget in ASKED.budgets])
     paths = [[str(tmp_path / f"{renderer}.csv")] for renderer in (frames.LIBRARY, frames.PAGE)]
-    rows = frames.gathered([CELL], *paths)
+    rows = frames.gather_frames([CELL], *paths)
     assert [(row["renderer"], row["budget"]) for row in rows] == [
         (name, str(budget)) for name in (frames.LIBRARY, frames.PAGE) for budget in ASKED.budgets
     ]
-    csv_tables.write_table(tmp_path / "viewer.csv", frames.of_viewer(rows))
+    csv_tables.write_table(tmp_path / "viewer.csv", frames.select_viewer_rows(rows))
     (joined,) = spread.with_viewer([CELL], spread.read_viewer(tmp_path / "viewer.csv"))
     assert (joined["render_ms"], joined["sort_ms"]) == (4, 1.5) and joined["update_share"] == 0.66667  # five digits
     with (tmp_path / "viewer.csv").open(newline="") as file:
         assert next(csv.reader(file)) == [*spread.CELL, *spread.VIEWER]
-    frames.write_plot(tmp_path / "plot.png", rows)
+    frames.write_frame_plot(tmp_path / "plot.png", rows)
     assert (tmp_path / "plot.png").stat().st_size > 5000

@@ -32,14 +32,14 @@ def cell(folder, setting, psnr, faster=1.0, grey=0.5, measure="views", most=Fals
     wildcards = dict(
         scene="desert",
         seed=0,
-        quality="q" if most else f"{knob}-{setting}",
+        preset="q" if most else f"{knob}-{setting}",
         policy="farthest",
         prior="none",
         p_drop="0",
         lam="0",
         k=4,
     )
-    wildcards |= dict(rounds=1, seam="semantic", tau="0", sweep="tradeoff", samples=0, steps=0, corrected=False)
+    wildcards |= dict(rounds=1, tiling="semantic", tau="0", sweep="tradeoff", samples=0, steps=0, corrected=False)
     files = {"metrics": str(place / "metrics.json"), "manifest": str(place / "davgswt.json")}
     about = {"knob": knob, "setting": setting, "measure": measure, "varied": {}, "times": times}
     about |= {"most": most, "base": most}

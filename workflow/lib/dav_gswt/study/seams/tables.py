@@ -15,7 +15,7 @@ NUMBERS = ("seam_lpips", "psnr", "jump")
 
 
 def tabulate_crops(cell: dict) -> list[dict]:
-    """The crops of an experiment. cell: the values of CELL, the replicate (`draw`), and its files `table` and `facts`.
+    """The crops of an experiment. cell: the values of CELL, `replicate`, and its files `table` and `facts`.
 
     Crops and clusters of different replicates of the tiles differ: the replicate is part of their names.
     """
@@ -25,9 +25,9 @@ def tabulate_crops(cell: dict) -> list[dict]:
         "weights": made["inputs"].get("lpips", "")[:12],
         "tiles": made["inputs"]["seams"][:12],
     }
-    about, draw = {key: cell[key] for key in (*CELL, "replicate")}, cell["replicate"]
+    about, number = {key: cell[key] for key in (*CELL, "replicate")}, cell["replicate"]
     return [
-        about | row | {key: f"{draw}:{row[key]}" if draw else row[key] for key in ("crop", "cluster")} | origin
+        about | row | {key: f"{number}:{row[key]}" if number else row[key] for key in ("crop", "cluster")} | origin
         for row in read_seam_table(cell["table"])
     ]
 

@@ -100,7 +100,7 @@ def _tiles(path: str) -> dict:
 
 
 def _seams(cell: dict) -> dict:
-    rows = crops.tabulate_crops(cell | {"table": cell["crops"], "variant": cell["tiling"], "draw": 0})
+    rows = crops.tabulate_crops(cell | {"table": cell["crops"], "variant": cell["tiling"], "replicate": 0})
     told = next(r for r in summary.summarise_crops(rows) if r["view"] == r["ground"] == summary.EVERY)
     named = {"seam_lpips": "cut", "seam_lpips_low": "cut_low", "seam_lpips_high": "cut_high"}
     found = {key: told[name] for key, name in (named | {"seam_psnr": "cut_psnr", "seam_jump": "cut_jump"}).items()}

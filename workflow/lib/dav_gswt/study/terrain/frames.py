@@ -1,4 +1,4 @@
-"""How long a frame takes on a walk at a fixed height over hills: drawn by the library, and by the page in a browser.
+"""Milliseconds of a frame on a walk at a fixed height over hills, rendered by the library and by the page.
 
 Both go the same way, frame by frame, at several budgets of Gaussians, and fill the same columns; milliseconds hold for
 the machine that the row names, and for what else it did meanwhile (`load`).
@@ -24,8 +24,8 @@ from dav_gswt.terrain.timing import FrameTiming
 
 PARTS = ("render", "sort", "update")
 LIBRARY, PAGE = "library", "page"
-LEAST = 0.1  # milliseconds: what is less is not drawn
-BEFORE = 4  # frames at the walk's start that are not counted: orders are made, shaders compiled
+MIN_MS = 0.1  # lower end of the axis
+WARM_UP = 4  # uncounted frames at the start, in which orders are made and shaders compiled
 VISIT = """async ({ places, before, budget }) => {
   const { viewer } = await import("./main.js");
   const gl = document.getElementById("picture").getContext("webgl2"), pixel = new Uint8Array(4);
@@ -53,8 +53,8 @@ VISIT = """async ({ places, before, budget }) => {
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What is measured: config's `frames`."""
+class FrameSettings:
+    """The config's `frames`: surface, walk, size of a frame, budgets of Gaussians."""
 
     heights: dict
     flight: dict
@@ -66,60 +66,66 @@ class Asked:
         return stills.walk_shots(**self.flight)
 
 
-def of_library(bundle: Bundle, asked: Asked) -> list[dict]:
-    """A row a budget, of the library's own pictures: every frame is updated, sorted and rendered.
+def time_library(bundle: Bundle, settings: FrameSettings) -> list[dict]:
+    """A row for each budget, of the library: every frame is updated, sorted and rendered.
 
     update holds the orders, too, which the library makes again for every frame; the page reads them from the bundle.
     """
-    terrain, told, rows = endless.terrain_from_bundle(bundle, asked.heights), bundle.manifest, []
-    for budget in progress(asked.budgets, "measure frames of the library"):
+    terrain, told, rows = endless.terrain_from_bundle(bundle, settings.heights), bundle.manifest, []
+    for budget in progress(settings.budgets, "measure frames of the library"):
         meters = []
-        for shot in asked.shots():
+        for shot in settings.shots():
             meters.append(FrameTiming())
-            camera = stills.shot_camera(shot, terrain, told.eye_floor, asked.width, asked.height)
+            camera = stills.shot_camera(shot, terrain, told.eye_floor, settings.width, settings.height)
             with meters[-1].measure("update"):
                 coarser = visibility.coarsen_to_budget(terrain, camera, budget)
             stills.render_view(coarser, camera, vars(told.sky), told.ground_colour, timing=meters[-1])
         times = {part: [meter.milliseconds[part] for meter in meters] for part in PARTS}
         rows.append(
-            _row(asked, budget, times, [meter.gaussians for meter in meters], len(meters)) | _about(LIBRARY, "")
+            _tabulate_times(settings, budget, times, [meter.gaussians for meter in meters], len(meters))
+            | _describe_renderer(LIBRARY, "")
         )
     return rows
 
 
-def of_page(bundle_dir: Path | str, viewer_dir: Path | str, manifest: dict, asked: Asked) -> list[dict]:
-    """A row a budget, of the page in a headless Chromium with software rendering.
+def time_page(bundle_dir: Path | str, viewer_dir: Path | str, manifest: dict, settings: FrameSettings) -> list[dict]:
+    """A row for each budget, of the page in a headless Chromium with software rendering.
 
     render: until the first pixel can be read; sort and update: in the worker, meanwhile. Their shares are of frames
     that something new had come for from the worker.
     Raises: InputError: see `browser.chromium`, `page.write_page`.
     """
-    surface, rows = heights.surface_from_config(asked.heights, manifest["tile_side"]), []
-    places = [_place(shot, manifest) for shot in asked.shots()]
+    surface, rows = heights.surface_from_config(settings.heights, manifest["tile_side"]), []
+    places = [_shot_to_place(shot, manifest) for shot in settings.shots()]
     first = ",".join(f"{places[0][key]:.6g}" for key in ("x", "y", "eye", "yaw", "pitch"))
     with tempfile.TemporaryDirectory() as folder, browser.chromium() as chromium:
         write_page(bundle_dir, viewer_dir, Path(folder) / "page", surface)
         with browser.served(Path(folder) / "page") as address:
-            tab = chromium.new_page(viewport={"width": asked.width, "height": asked.height})
-            tab.goto(f"{address}?still={min(asked.budgets)}#{first}")
+            tab = chromium.new_page(viewport={"width": settings.width, "height": settings.height})
+            tab.goto(f"{address}?still={min(settings.budgets)}#{first}")
             tab.evaluate("import('./main.js').then(({ ready }) => ready)")
-            for budget in progress(asked.budgets, "measure frames of the page"):
-                found = tab.evaluate(VISIT, {"places": places, "before": BEFORE, "budget": budget})
+            for budget in progress(settings.budgets, "measure frames of the page"):
+                found = tab.evaluate(VISIT, {"places": places, "before": WARM_UP, "budget": budget})
                 times = {part: found[part] for part in PARTS}
-                rows.append(_row(asked, budget, times, found["counts"], found["ran"]) | _about(PAGE, found["gl"]))
+                rows.append(
+                    _tabulate_times(settings, budget, times, found["counts"], found["ran"])
+                    | _describe_renderer(PAGE, found["gl"])
+                )
     return rows
 
 
-def _place(shot: Shot, manifest: dict) -> dict:
-    """A shot as the page's places are."""
+def _shot_to_place(shot: Shot, manifest: dict) -> dict:
+    """A shot as a place of the page."""
     x, y = (v * manifest["tile_side"] for v in shot.at)
     return {"x": x, "y": y, "eye": shot.height * manifest["eye_floor"], "yaw": shot.yaw, "pitch": -shot.pitch}
 
 
-def _row(asked: Asked, budget: int, times: dict[str, list[float]], counts: list[int], ran: int) -> dict:
-    """Means and standard deviations (ddof 1); of what the worker never did None."""
+def _tabulate_times(
+    settings: FrameSettings, budget: int, times: dict[str, list[float]], counts: list[int], ran: int
+) -> dict:
+    """Means and standard deviations (ddof 1); None for what the worker never did."""
     frames = len(counts)
-    row = {"width": asked.width, "height": asked.height, "frames": frames, "budget": budget}
+    row = {"width": settings.width, "height": settings.height, "frames": frames, "budget": budget}
     row |= {"splats": float(np.mean(counts))}
     for part in PARTS:
         values = times[part]
@@ -130,20 +136,20 @@ def _row(asked: Asked, budget: int, times: dict[str, list[float]], counts: list[
     return row
 
 
-def _about(renderer: str, gl: str) -> dict:
+def _describe_renderer(renderer: str, gl: str) -> dict:
     return {"renderer": renderer, "gl": gl} | describe_machine() | {"load": os.getloadavg()[0]}
 
 
-def gathered(cells: list[dict], library: list[str], page: list[str]) -> list[dict]:
-    """All rows with what tells each bundle from the others in front; paths of tables, one a cell."""
+def gather_frames(cells: list[dict], library: list[str], page: list[str]) -> list[dict]:
+    """All rows, with the columns of each experiment first. library, page: a table for each experiment."""
     found = []
     for cell, *paths in zip(cells, library, page, strict=True):
         found += [cell | row for path in paths for row in csv_tables.read_table(path)]
     return found
 
 
-def of_viewer(rows: list[dict]) -> list[dict]:
-    """The page's row of each bundle at the first budget, in the columns that the study's tables join."""
+def select_viewer_rows(rows: list[dict]) -> list[dict]:
+    """The page's row of each bundle at the first budget, with the columns that the study's tables join."""
     first: dict[tuple, dict] = {}
     for row in rows:
         if row["renderer"] == PAGE:
@@ -151,8 +157,8 @@ def of_viewer(rows: list[dict]) -> list[dict]:
     return [{key: row[key] for key in (*spread.CELL, *spread.VIEWER)} for row in first.values()]
 
 
-def write_plot(path: Path | str, rows: list[dict]) -> None:
-    """Milliseconds of a frame's parts over Gaussians in view: a panel a renderer, a line a scene; rows have text."""
+def write_frame_plot(path: Path | str, rows: list[dict]) -> None:
+    """Milliseconds of a frame's parts over Gaussians in view, a panel for each renderer; rows hold text."""
     from matplotlib.ticker import LogLocator  # here, not above: see `figures.blank`
 
     figure = figures.blank(10.0, 4.4)
@@ -169,11 +175,11 @@ def write_plot(path: Path | str, rows: list[dict]) -> None:
                 )
         axes.set_xscale("log")
         axes.set_yscale("log")
-        axes.set_ylim(bottom=LEAST)
+        axes.set_ylim(bottom=MIN_MS)
         axes.xaxis.set_major_formatter(lambda value, _: f"{value / 1000:g} k")
         axes.xaxis.set_minor_formatter("")
         axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        axes.set_title(_titled(renderer, mine), fontsize=9, loc="left")
+        axes.set_title(_format_title(renderer, mine), fontsize=9, loc="left")
         axes.set_xlabel("Gaussians in view")
         axes.grid(alpha=0.3)
     panels[0].set_ylabel("milliseconds a frame (mean, sd)")
@@ -182,7 +188,7 @@ def write_plot(path: Path | str, rows: list[dict]) -> None:
     figures.save(figure, path)
 
 
-def _titled(renderer: str, rows: list[dict]) -> str:
+def _format_title(renderer: str, rows: list[dict]) -> str:
     if not rows:
         return f"{renderer}: not measured"
     row = rows[0]

@@ -1,4 +1,4 @@
-"""The paper's figure of the tile cache: how uncertain the tile in each cell is, which keep all orders, and a walk.
+"""The paper's figure of the tile cache: uncertainty of the tile in each cell, tiles with all orders, and a walk.
 
 Source: DAV-GSWT, figure on the tile-level uncertainty cache.
 """
@@ -12,18 +12,18 @@ from numpy import ndarray as Array
 from dav_gswt.study import figures
 from dav_gswt.terrain import choice
 
-AROUND = 4  # cells shown beyond the walk, on all sides
-TURN = 3.0  # tiles between bends of the walk
-SWAY = 1.2  # tiles, to either side of the straight line
+MARGIN = 4  # cells shown beyond the walk, on all sides
+BEND = 3.0  # tiles between bends of the walk
+AMPLITUDE = 1.2  # tiles, to either side of the straight line
 
 
-def walk(steps: int, length: float) -> Float[Array, "steps 2"]:
+def make_walk(steps: int, length: float) -> Float[Array, "steps 2"]:
     """Places of a walk in tiles: on a straight line from the origin, swaying, so that it meets more tiles."""
     along = np.linspace(0, length, steps)
-    return np.stack([along, SWAY * np.sin(np.pi * along / TURN)], 1) + 0.5
+    return np.stack([along, AMPLITUDE * np.sin(np.pi * along / BEND)], 1) + 0.5
 
 
-def cells_of(manifest: dict, west: int, south: int, shape: tuple[int, int]) -> tuple[Array, Array]:
+def read_cells(manifest: dict, west: int, south: int, shape: tuple[int, int]) -> tuple[Array, Array]:
     """Uncertainty of the tile in each cell of a window, rows from the south, and whether it keeps all orders."""
     tiles = manifest["tiles"]
     laid = choice.tiles_in(west, south, shape, manifest["salt"], len(tiles) // 16)
@@ -35,10 +35,10 @@ def cells_of(manifest: dict, west: int, south: int, shape: tuple[int, int]) -> t
 def write_figure(path: Path | str, manifest: dict, tau: float, length: float) -> None:
     """The terrain from above, a square a tile, warm where it is uncertain; dots: tiles that keep all orders; a line:
     the walk, `length` tiles long."""
-    way = walk(200, length)
-    (west, south), (east, north) = np.floor(way.min(0)).astype(int) - AROUND, np.floor(way.max(0)).astype(int) + AROUND
+    way = make_walk(200, length)
+    (west, south), (east, north) = np.floor(way.min(0)).astype(int) - MARGIN, np.floor(way.max(0)).astype(int) + MARGIN
     shape = int(north - south + 1), int(east - west + 1)
-    doubt, deep = cells_of(manifest, int(west), int(south), shape)
+    doubt, deep = read_cells(manifest, int(west), int(south), shape)
     figure = figures.blank(9.0, 7.2 * shape[0] / shape[1] + 0.9)
     axes = figure.subplots()
     extent = (west, east + 1, south, north + 1)

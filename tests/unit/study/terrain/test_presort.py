@@ -8,7 +8,7 @@ import pytest
 from fixtures.splats import rough_ground
 
 from dav_gswt.bundle import build, store
-from dav_gswt.study.terrain import shortcuts
+from dav_gswt.study.terrain import presort
 from dav_gswt.tiles.build import TileSet
 
 SCHEMA = Path(__file__).parents[4] / "workflow/schemas/davgswt.schema.json"
@@ -40,20 +40,20 @@ def of(rows, shortcut):
 def test_every_shortcut_has_a_price_of_its_own(tmp_path):
     tiles = tile_set(2)
     # coarse discs begin where one is twelve pixels wide: within what is laid
-    rows = shortcuts.rows(tiles, bundled(tiles, tmp_path / "bundle", level_pixels=12.0))
+    rows = presort.measure_approximations(tiles, bundled(tiles, tmp_path / "bundle", level_pixels=12.0))
     assert [(r["view"], r["shortcut"]) for r in rows] == [
-        (v.name, s) for v in shortcuts.VIEWS for s in shortcuts.SHORTCUTS
+        (v.name, s) for v in presort.VIEWS for s in presort.APPROXIMATIONS
     ]
     assert all(20 < r["psnr"] < 100 for r in rows if r["psnr"] is not None)
     assert min(of(rows, "rounding").values()) > 45
     assert of(rows, "levels")["walker"] < of(rows, "rounding")["walker"], "coarse discs are seen, rounding is not"
     for view, found in of(rows, "all").items():
-        assert found < 3 + min(v for s in shortcuts.SHORTCUTS[:3] if (v := of(rows, s)[view]) is not None)
+        assert found < 3 + min(v for s in presort.APPROXIMATIONS[:3] if (v := of(rows, s)[view]) is not None)
 
 
 def test_one_level_costs_nothing(tmp_path):
     tiles = tile_set(1)
-    rows = shortcuts.rows(tiles, bundled(tiles, tmp_path / "bundle"))
+    rows = presort.measure_approximations(tiles, bundled(tiles, tmp_path / "bundle"))
     assert set(of(rows, "levels").values()) == {None}
 
 
@@ -62,11 +62,11 @@ def test_orders_of_another_direction_cost_more(tmp_path):
     good = bundled(tiles, tmp_path / "bundle")
     away = [[0.0, 0.0, -1.0]] * len(good.manifest.directions)
     bad = replace(good, manifest=replace(good.manifest, directions=away))  # from above only
-    found = [of(shortcuts.rows(tiles, bundle), "presorting")["walker"] for bundle in (good, bad)]
+    found = [of(presort.measure_approximations(tiles, bundle), "presorting")["walker"] for bundle in (good, bad)]
     assert found[0] is None or found[0] > found[1]
 
 
 def test_the_figure_takes_what_the_table_has(tmp_path):
     row = {"scene": "desert", "view": "near", "shortcut": "levels", "psnr": "41.5"}
-    shortcuts.write_plot(tmp_path / "a.png", [row, row | {"shortcut": "rounding", "psnr": ""}])
+    presort.write_presort_plot(tmp_path / "a.png", [row, row | {"shortcut": "rounding", "psnr": ""}])
     assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"

@@ -1,4 +1,4 @@
-"""Does the picture jump while one walks? Changes from frame to frame, in pre-sorted orders and sorted exactly.
+"""Flicker of the terrain on a walk: changes from frame to frame, in pre-sorted orders and sorted exactly.
 
 Moving changes a picture by itself: what pre-sorting adds is seen against the same two frames with all Gaussians sorted
 exactly. Where the eye enters another cell other tiles are sorted exactly, and orders change most: half of the pairs of
@@ -20,51 +20,58 @@ from dav_gswt.terrain.stills import Shot
 from dav_gswt.terrain.visibility import coarsen_to_budget
 
 STEP = 0.02  # eye floors from a frame to the next: the page's walking pace, 1.2 eye heights a second, at 60 frames
-MOST = 2.0  # times the exactly sorted walk's largest change
+MAX_RATIO = 2.0  # of the largest change, over that of the exactly sorted walk
 
 
-def pairs(count: int, length: float, step: float) -> list[tuple[Shot, Shot]]:
-    """Pairs of consecutive frames of a flight `length` tiles long, `step` tiles apart; every second one is moved to
-    where the way next enters another cell, half a step before it and half a step after it."""
+def make_frame_pairs(count: int, length: float, step: float) -> list[tuple[Shot, Shot]]:
+    """Pairs of consecutive frames of a walk `length` tiles long, `step` tiles apart.
+
+    Every second pair is moved to where the walk next enters another cell: half a step before and half a step after.
+    """
     way = stills.walk_shots(count, length, 1.0)
-    found = []
+    rows = []
     for k, shot in enumerate(way):
         yaw = np.radians(shot.yaw)
         ahead = np.array([np.cos(yaw), np.sin(yaw)])
         at = np.array(shot.at)
         if k % 2:
-            at = at + ahead * (_to_border(at, ahead) - 0.5 * step)
-        found.append(tuple(replace(shot, at=tuple(p.tolist())) for p in (at, at + step * ahead)))
-    return found
+            at = at + ahead * (_distance_to_border(at, ahead) - 0.5 * step)
+        rows.append(tuple(replace(shot, at=tuple(p.tolist())) for p in (at, at + step * ahead)))
+    return rows
 
 
-def _to_border(at: Float[Array, "2"], ahead: Float[Array, "2"]) -> float:
-    """Tiles to go until x or y is the next whole number; ahead: with no negative component."""
+def _distance_to_border(at: Float[Array, "2"], ahead: Float[Array, "2"]) -> float:
+    """Tiles until x or y is the next whole number; ahead: without negative components."""
     return float(min((np.floor(p) + 1 - p) / a for p, a in zip(at, ahead, strict=True) if a > 0))
 
 
-def rows(
+def measure_flicker(
     terrain: EndlessTerrain, manifest: Manifest, count: int, length: float, width: int, height: int, budget: int
 ) -> list[dict]:
-    """A row a pair of frames: the largest and the mean difference of a pixel, in 8-bit steps, in pre-sorted orders
+    """A row for each pair of frames: the largest and the mean difference of a pixel, in 8-bit steps, in pre-sorted orders
     (`largest`, `mean`) and sorted exactly (`exact_largest`, `exact_mean`); border: between its frames the eye enters
     another cell. budget: at most so many Gaussians are in view, in both frames at one coarseness."""
-    floor, found = manifest.eye_floor, []
-    for k, shots in enumerate(progress(pairs(count, length, STEP * floor / terrain.side), "measure steadiness")):
+    floor, rows = manifest.eye_floor, []
+    pairs = make_frame_pairs(count, length, STEP * floor / terrain.side)
+    for k, shots in enumerate(progress(pairs, "measure flicker")):
         cameras = [stills.shot_camera(shot, terrain, floor, width, height) for shot in shots]
         row = {"pair": k, "east": shots[0].at[0], "north": shots[0].at[1], "border": k % 2}
         coarser = coarsen_to_budget(terrain, cameras[0], budget)
-        found.append(row | _changes(coarser, manifest, cameras, False) | _changes(coarser, manifest, cameras, True))
-    return found
+        rows.append(
+            row
+            | _measure_changes(coarser, manifest, cameras, False)
+            | _measure_changes(coarser, manifest, cameras, True)
+        )
+    return rows
 
 
-def _changes(terrain: EndlessTerrain, manifest: Manifest, cameras: list[Camera], exact: bool) -> dict:
-    told = vars(manifest.sky), manifest.ground_colour
-    before, after = (stills.render_view(terrain, camera, *told, exact=exact) for camera in cameras)
+def _measure_changes(terrain: EndlessTerrain, manifest: Manifest, cameras: list[Camera], exact: bool) -> dict:
+    background = vars(manifest.sky), manifest.ground_colour
+    before, after = (stills.render_view(terrain, camera, *background, exact=exact) for camera in cameras)
     change, name = 255 * np.abs(after - before), "exact_" if exact else ""
     return {f"{name}largest": float(change.max()), f"{name}mean": float(change.mean())}
 
 
-def worst(found: list[dict]) -> float:
-    """The largest change of the whole walk, over that of the exactly sorted walk: steady below MOST."""
-    return max(row["largest"] for row in found) / max(row["exact_largest"] for row in found)
+def compare_largest_changes(rows: list[dict]) -> float:
+    """The largest change of the walk over that of the exactly sorted walk; acceptable below MAX_RATIO."""
+    return max(row["largest"] for row in rows) / max(row["exact_largest"] for row in rows)
