@@ -48,7 +48,7 @@ def _distance_to_border(at: Float[Array, "2"], ahead: Float[Array, "2"]) -> floa
 def measure_flicker(
     terrain: EndlessTerrain, manifest: Manifest, count: int, length: float, width: int, height: int, budget: int
 ) -> list[dict]:
-    """A row for each pair of frames: the largest and the mean difference of a pixel, in 8-bit steps, in pre-sorted orders
+    """A row for each pair of frames: largest and mean difference of a pixel, in 8-bit steps, in pre-sorted orders
     (`largest`, `mean`) and sorted exactly (`exact_largest`, `exact_mean`); border: between its frames the eye enters
     another cell. budget: at most so many Gaussians are in view, in both frames at one coarseness."""
     floor, rows = manifest.eye_floor, []
