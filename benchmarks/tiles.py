@@ -38,8 +38,8 @@ def made_up() -> tuple[GaussianField, Ground]:
     colour = np.clip(0.45 + 0.25 * soft[..., None] + 0.05 * rng.normal(size=(CELLS, CELLS, 3)), 0, 1)
     heights = 0.4 * gaussian_filter(rng.normal(size=(CELLS, CELLS)), 12, mode="wrap")
     grid = Ground(0.0, 0.0, SPACING, 0, 0, CELLS, heights, np.ones((CELLS, CELLS), bool))
-    layer = discs.ground_discs(grid, colour.reshape(-1, 3))
-    layer = concatenate_fields([layer, underlay.beneath(grid, layer)])
+    layer = discs.make_ground_discs(grid, colour.reshape(-1, 3))
+    layer = concatenate_fields([layer, underlay.make_underlay(grid, layer)])
     n = ALL - len(layer)
     place = np.concatenate([rng.uniform(0, CELLS * SPACING, (n, 2)), np.zeros((n, 1))], 1)
     place[:, 2] = grid.height_at(place) + SPACING * rng.uniform(1, 6, n)
@@ -60,11 +60,11 @@ def measured() -> dict[str, float]:
     start = time.perf_counter()
     made = levels.build_levels(field, grid, LEVELS, STEPS, 0)
     fitted = time.perf_counter()
-    above = top_view.over_exemplar(made.fields[0], grid)
+    above = top_view.render_exemplar(made.fields[0], grid)
     west, south, _ = grid.exemplar
     exemplar = Exemplar(west, south, grid.spacing, grid.cells)
     options, rng = tiles.TilingOptions(levels=made.wanted), np.random.default_rng(0)
-    found = tiles.cut_tiles(made.fields, exemplar, above.known_colour(), above.uncertainty, options, rng)
+    found = tiles.cut_tiles(made.fields, exemplar, above.colour_or_nan(), above.uncertainty, options, rng)
     cut = time.perf_counter()
     assert [len(found.fields), len(found.labels)] == [LEVELS, 16]
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6

@@ -14,7 +14,7 @@ with logging_to(snakemake.log[0]):
     given, tiling = snakemake.input, snakemake.params.tiling
     made = levels.read_levels(given.levels)
     fields, grid = made.fields, made.grids[0]
-    above = top_view.over_exemplar(fields[0], grid)
+    above = top_view.render_exemplar(fields[0], grid)
     west, south, _ = grid.exemplar
     alexnet = lpips_weights.read(given.lpips) if given.get("lpips") else None
     options = build.TilingOptions.from_config(
@@ -22,7 +22,7 @@ with logging_to(snakemake.log[0]):
     )
     exemplar = Exemplar(west, south, grid.spacing, grid.cells)
     rng = build.make_generator(snakemake.params.seed, tiling)
-    tiles = build.cut_tiles(fields, exemplar, above.known_colour(), above.uncertainty, options, rng)
+    tiles = build.cut_tiles(fields, exemplar, above.colour_or_nan(), above.uncertainty, options, rng)
     inputs = {f"level{number}": Path(given.levels, f"level{number}.ply") for number in range(len(fields))}
     inputs |= {name: given[name] for name in ("lpips", "sam2") if given.get(name)}
     store.write_tiles(tiles, snakemake.output.tiles, snakemake.output.seams, record_provenance(inputs, dict(tiling)))

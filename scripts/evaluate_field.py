@@ -9,7 +9,8 @@ from dav_gswt.photos.capture_record import read_capture_record
 from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.provenance import record_provenance
-from dav_gswt.reconstruction import build, evaluation, ground
+from dav_gswt.reconstruction import evaluation, ground
+from dav_gswt.reconstruction.observation import mask_to_ground
 from dav_gswt.views import stopping
 
 with logging_to(snakemake.log[0]):
@@ -17,10 +18,10 @@ with logging_to(snakemake.log[0]):
     split, captures = read_view_split(given.views), list(given.get("captures", []))
     tests = read_training_views(given.images, given.model, split.test, [], params.preset["size"])
     photos = len(split.start) + sum(len(read_capture_record(folder)) for folder in captures)
-    fitted, grid = read_field(given.field), ground.read(given.ground)
+    fitted, grid = read_field(given.field), ground.read_ground(given.ground)
     perceptual = lpips_weights.read(given.lpips) if given.get("lpips") else None
     groups = read_scene_frame(given.frame).test_groups
-    result = evaluation.evaluate(fitted, build.modelled(tests, grid), groups, perceptual)
+    result = evaluation.evaluate_field(fitted, mask_to_ground(tests, grid), groups, perceptual)
     result |= {"round": params.t, "photos": photos, "gaussians": len(fitted)}
     result |= {"fit": read_json(given.fit)}
     result |= stopping.decision_record(read_json(given.poses)) if given.get("poses") else {}

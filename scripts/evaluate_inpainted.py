@@ -8,12 +8,13 @@ from dav_gswt.logs import logging_to
 from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.provenance import record_provenance
-from dav_gswt.reconstruction import build, ground
+from dav_gswt.reconstruction import ground
+from dav_gswt.reconstruction.observation import mask_to_ground
 
 with logging_to(snakemake.log[0]):
     given, quality = snakemake.input, snakemake.params.preset
-    names, grid = read_view_split(given.views).test, ground.read(given.ground)
-    tests = build.modelled(read_training_views(given.images, given.model, names, [], quality["size"]), grid)
+    names, grid = read_view_split(given.views).test, ground.read_ground(given.ground)
+    tests = mask_to_ground(read_training_views(given.images, given.model, names, [], quality["size"]), grid)
     perceptual = lpips_weights.read(given.lpips) if given.get("lpips") else None
     result = evaluation.judged(read_field(given.before), read_field(given.after), tests, perceptual)
     inputs = {name: given[name] for name in ("before", "after", "ground", "views")}

@@ -9,7 +9,7 @@ from dav_gswt.views import pose_maps
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    finest, grid = read_field(given.field), ground.read(given.ground)
+    finest, grid = read_field(given.field), ground.read_ground(given.ground)
     if given.get("maps"):  # a prior was asked: what it doubts is what the tiles go by
         finest = pose_maps.apply_uncertainty(finest, pose_maps.read_pose_maps(given.maps)[1])
     steps = params.preset["level_steps"]

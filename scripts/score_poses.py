@@ -14,7 +14,7 @@ with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
     captures = list(given.get("captures", []))
     scene, frame, split = params.scene, read_scene_frame(given.frame), read_view_split(given.views)
-    fitted, grid = read_field(given.field), ground.read(given.ground)
+    fitted, grid = read_field(given.field), ground.read_ground(given.ground)
     pool = candidates.list_remaining(scene, frame, given.model, split, captures)
     if scene["agent"] != "replay":  # whose frames were all taken, wherever they stand
         pool = serial_rig.filter_reachable(scene, frame, pool) if scene["agent"] == "serial" else pool

@@ -8,17 +8,19 @@ from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.training_views import read_captured_views, read_training_views
 from dav_gswt.photos.view_split import read_view_split
-from dav_gswt.reconstruction import build, ground, regression_guard
+from dav_gswt.reconstruction import ground, regression_guard
+from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.refinement import refine_field
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    quality, captures = build.FitSettings(**params.preset), list(given.captures)
-    names, aside = read_view_split(given.views).start, regression_guard.set_aside(map(read_json, given.fits))
+    quality, captures = FitSettings(**params.preset), list(given.captures)
+    names, aside = read_view_split(given.views).start, regression_guard.list_rejected_photos(map(read_json, given.fits))
     before = read_training_views(given.images, given.model, names, captures[:-1], quality.size)
     new = read_captured_views(captures[-1], quality.size)
     rng = np.random.default_rng([params.seed, params.t])
-    last = read_field(given.field), ground.read(given.ground), read_scene_frame(given.frame)
-    made = build.refine(*last, [v for v in before if v.name not in aside], new, quality, rng, params.keep)
-    write_field(made.field, snakemake.output.field)
-    ground.write(made.grid, snakemake.output.ground)
-    write_json(snakemake.output.fit, made.report)
+    last = read_field(given.field), ground.read_ground(given.ground), read_scene_frame(given.frame)
+    updated = refine_field(*last, [v for v in before if v.name not in aside], new, quality, rng, params.keep)
+    write_field(updated.field, snakemake.output.field)
+    ground.write_ground(updated.grid, snakemake.output.ground)
+    write_json(snakemake.output.fit, updated.report.to_dict())

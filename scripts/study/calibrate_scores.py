@@ -17,7 +17,7 @@ with logging_to(snakemake.log[0]):
     captures = list(given.get("captures", []))
     frame, split = read_scene_frame(given.frame), read_view_split(given.views)
     taken = read_training_views(given.images, given.model, split.start, captures, scoring.PHOTO)
-    fitted = read_field(given.field), ground.read(given.ground)
+    fitted = read_field(given.field), ground.read_ground(given.ground)
     judged = judging.CalibrationTarget(params.scene, *fitted, frame, taken, params.size)
     pool = candidates.list_remaining(params.scene, frame, given.model, split, captures)
     prior = prior_sampling.open_scoring_prior(params.prior, params.p_drop, params.seed, given.get("lpips"))

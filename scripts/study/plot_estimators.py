@@ -14,7 +14,7 @@ with logging_to(snakemake.log[0]):
     key, found = evolution.psnr_key(read_scene_frame(given.frame)), []
     for name, *paths in zip(params.named, given.fields, given.grounds, given.metrics, given.crops, strict=True):
         fitted, surface, measured, crops = paths
-        read = read_field(fitted), ground.read(surface), read_json(measured)
+        read = read_field(fitted), ground.read_ground(surface), read_json(measured)
         found.append(evolution.Round(params.rounds, *read, title=name, note=estimators.format_seam_note(crops)))
     names = list(evolution.choose_test_views(found[0].metrics, key))
     tests = read_training_views(given.images, given.model, names, [], params.size)

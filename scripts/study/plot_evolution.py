@@ -13,7 +13,7 @@ with logging_to(snakemake.log[0]):
     key, rounds = evolution.psnr_key(read_scene_frame(given.frame)), []
     for t, *paths in zip(params.rounds, given.fields, given.grounds, given.metrics, strict=True):
         fitted, surface, measured = paths
-        rounds.append(evolution.Round(t, read_field(fitted), ground.read(surface), read_json(measured)))
+        rounds.append(evolution.Round(t, read_field(fitted), ground.read_ground(surface), read_json(measured)))
     names = list(evolution.choose_test_views(rounds[0].metrics, key))
     tests = read_training_views(given.images, given.model, names, [], params.size)
     evolution.write_figure(snakemake.output.plot, evolution.build_strips(rounds, tests, key), rounds, key)

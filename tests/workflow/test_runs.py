@@ -57,7 +57,7 @@ def test_fields_lie_on_their_grids(tiny):
     levels = [(tiny.round / f"levels/level{level}.ply", tiny.round / f"levels/level{level}.exr") for level in (0, 1)]
     pairs = [(stage / "field.ply", stage / "ground.exr") for stage in (tiny.coarse, tiny.round)]
     for path, grid_path in pairs + levels:
-        fitted, grid = read_field(path), ground.read(grid_path)
+        fitted, grid = read_field(path), ground.read_ground(grid_path)
         cells = grid.shape[0] * grid.shape[1]
         assert fitted.ground[:cells].all() and not fitted.ground[cells:].any()
         assert (

@@ -11,7 +11,9 @@ from dav_gswt.raster import backends
 def without_core(monkeypatch):
     real = backends.explain_unavailable
     monkeypatch.delenv(backends.VARIABLE, raising=False)
-    monkeypatch.setattr(backends, "lacking", lambda name: real(name) if name == "torch" else "it was not built")
+    monkeypatch.setattr(
+        backends, "explain_unavailable", lambda name: real(name) if name == "torch" else "it was not built"
+    )
 
 
 def test_where_the_core_is_missing_a_smaller_size_is_said_and_laid_over(without_core, capsys):

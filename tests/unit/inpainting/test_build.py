@@ -115,7 +115,7 @@ def test_unseen_ground_takes_the_priors_colour_and_all_else_keeps_its_bytes():
 def test_the_underlay_shows_what_was_painted_above_it():
     field, grid = half_seen()
     made = completed(field, grid).field
-    rows = underlay.rows(made, grid)
+    rows = underlay.find_rows(made, grid)
     under = made[rows].base_colours.reshape(16, 16, 3)
     assert np.median(off_paint(under[3:-3, 13:-2])) < 0.1
     assert np.array_equal(made.imagined[rows].reshape(16, 16), np.tile(np.arange(16) >= FIRST // 2, (16, 1)))

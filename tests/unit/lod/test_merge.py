@@ -13,11 +13,11 @@ FRAME = scene_frame(exemplar=(0.0, 0.0, 3.2), extent=(-1.0, -1.0, 4.2, 4.2))
 
 @pytest.fixture
 def scene():
-    grid = ground.lay(FRAME, np.zeros((0, 3)), spacing=0.1, cap=10**6, block=8, margin=0.2)
+    grid = ground.fit_ground(FRAME, np.zeros((0, 3)), spacing=0.1, max_cells=10**6, block=8, margin=0.2)
     x, y, _ = grid.centres.T
     grid = replace(grid, heights=(0.1 * x).reshape(grid.shape), seen=np.ones(grid.shape, bool))
     colours = np.stack([x / 10, y / 10, 0 * x + 0.5], 1)
-    return concatenate_fields([discs.ground_discs(grid, colours), things(3)]), grid
+    return concatenate_fields([discs.make_ground_discs(grid, colours), things(3)]), grid
 
 
 def things(n, seed=0):

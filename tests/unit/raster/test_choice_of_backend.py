@@ -195,7 +195,7 @@ def test_how_torch_groups_its_squares_does_not_matter(monkeypatch):
     torch = backends.load_backend("torch")
     pictures, gradients = [], []
     for together in (1, 1 << 14, 1 << 26):
-        monkeypatch.setattr(torch, "TOGETHER", together)
+        monkeypatch.setattr(torch, "BATCH", together)
         drawing = torch.Rasterizer()
         seen = drawing.forward(**gaussians(300), camera=CAMERAS["pinhole"])
         pictures.append(seen.colour)

@@ -8,11 +8,15 @@ from dav_gswt.field import rgb_to_sh
 from dav_gswt.geometry import cameras
 from dav_gswt.photos.training_views import TrainingView, mask_outside_ground
 from dav_gswt.raster import render
-from dav_gswt.reconstruction import build, top_view, underlay
-from dav_gswt.reconstruction.evaluation import evaluate
+from dav_gswt.reconstruction import top_view, underlay
+from dav_gswt.reconstruction.coarse import fit_coarse_field
+from dav_gswt.reconstruction.evaluation import evaluate_field
+from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.observation import mask_to_ground
 from dav_gswt.reconstruction.opacity_uncertainty import estimate_uncertainty
+from dav_gswt.reconstruction.refinement import refine_field
 
-QUALITY = build.FitSettings(size=48, spacing=1.0, max_gaussians=5000, steps=40, steps_per_photo=10, level_steps=5)
+QUALITY = FitSettings(size=48, spacing=1.0, max_gaussians=5000, steps=40, steps_per_photo=10, level_steps=5)
 
 
 def test_ground_that_no_photo_sees_is_uncertain_and_the_rest_is_not():
@@ -28,7 +32,7 @@ def test_ground_that_no_photo_sees_is_uncertain_and_the_rest_is_not():
 
 def test_a_map_from_above_has_the_south_in_its_first_row():
     grid = made.grid()
-    found = top_view.from_above(made.field(grid), grid)
+    found = top_view.render_top_view(made.field(grid), grid)
     true = made.look(*grid.centres[:, :2].T).reshape(*grid.shape, 3)
     inner = np.s_[3:-3, 3:-3]
     # coplanar discs are blended by their index, which moves the picture by a part of a cell
@@ -39,7 +43,7 @@ def test_a_map_from_above_has_the_south_in_its_first_row():
 
 def test_a_refinement_without_photos_hands_the_field_on():
     field, grid = made.field(), made.grid()
-    same = build.refine(field, grid, made.FRAME, made.photos(), [], QUALITY, np.random.default_rng(0))
+    same = refine_field(field, grid, made.FRAME, made.photos(), [], QUALITY, np.random.default_rng(0))
     assert same.field is field and same.grid is grid
 
 
@@ -52,7 +56,7 @@ def test_a_refinement_colours_ground_that_only_the_new_photo_sees():
     sh[: seen.size][~seen.ravel()] = 0  # mid-grey, as if filled
     frame = replace(made.FRAME, kind="synthetic")
     photos = made.photos(2)
-    after = build.refine(replace(field, sh=sh), grid, frame, photos[:1], photos[1:], QUALITY, np.random.default_rng(0))
+    after = refine_field(replace(field, sh=sh), grid, frame, photos[:1], photos[1:], QUALITY, np.random.default_rng(0))
     assert after.grid.seen.sum() > seen.sum()
     fresh = np.flatnonzero((after.grid.seen & ~seen).ravel())
     true = made.look(*grid.centres[fresh, :2].T)
@@ -62,25 +66,27 @@ def test_a_refinement_colours_ground_that_only_the_new_photo_sees():
 def test_a_coarse_field_from_photos_alone():
     photos = made.photos(4)
     none = np.zeros((0, 3)), np.zeros((0, 3), np.float32)
-    found = build.fit(made.FRAME, photos, *none, QUALITY, np.random.default_rng(0))
+    found = fit_coarse_field(made.FRAME, photos, *none, QUALITY, np.random.default_rng(0))
     assert np.isfinite(found.field.means).all()
     assert found.grid.cells % 32 == 0
-    assert found.report["steps"] == QUALITY.steps
-    assert evaluate(found.field, build.modelled(photos[:1], found.grid))["psnr"] == pytest.approx(30, abs=12)
+    assert found.report.steps == QUALITY.steps
+    assert evaluate_field(found.field, mask_to_ground(photos[:1], found.grid))["psnr"] == pytest.approx(30, abs=12)
 
 
 def test_a_field_has_its_underlay_after_its_discs_and_no_thing_is_lost_with_it():
     grid, field = made.grid(), made.field()
-    assert underlay.rows(field, grid) == slice(grid.heights.size, grid.heights.size + underlay.count(grid))
-    alone = underlay.without(field, grid)
+    assert underlay.find_rows(field, grid) == slice(
+        grid.heights.size, grid.heights.size + underlay.count_gaussians(grid)
+    )
+    alone = underlay.remove_underlay(field, grid)
     assert alone.ground.all() and len(alone) == grid.heights.size
-    assert underlay.rows(alone, grid).stop == grid.heights.size
+    assert underlay.find_rows(alone, grid).stop == grid.heights.size
 
 
 def test_a_finished_field_with_fewer_gaussians_than_cells_has_no_underlay_to_lose():
     grid, field = made.grid(), made.field()
     few = replace(field, ground=np.zeros(len(field), bool))[: grid.heights.size // 2]
-    assert underlay.without(few, grid) is few
+    assert underlay.remove_underlay(few, grid) is few
 
 
 def test_no_sky_shines_through_the_ground_between_shrunken_discs():
@@ -97,7 +103,7 @@ def test_no_sky_shines_through_the_ground_between_shrunken_discs():
         2.8,
     )
     counts = inside.weight > 0
-    assert render(underlay.without(grains, grid), camera).alpha[counts].min() < 0.5  # there were holes
+    assert render(underlay.remove_underlay(grains, grid), camera).alpha[counts].min() < 0.5  # there were holes
     assert render(grains, camera).alpha[counts].min() > 0.95
 
 
@@ -106,9 +112,9 @@ def test_a_scene_without_a_ground_is_fitted_as_free_gaussians():
     rng = np.random.default_rng(0)
     points = rng.uniform(0.4, 2.8, (400, 3))
     colours = rng.uniform(0.2, 0.8, (400, 3)).astype(np.float32)
-    from dav_gswt.reconstruction.objects import blobs
+    from dav_gswt.reconstruction.objects import make_blobs
 
-    truth = blobs(points, colours, np.full(400, 0.06))
+    truth = make_blobs(points, colours, np.full(400, 0.06))
     photos = []
     for i in range(6):
         camera = cameras.pinhole([1.6 + 5 * np.cos(i), 1.6 + 5 * np.sin(i), 3.0], [1.6, 1.6, 1.6], 48, 48, 40.0)
@@ -117,7 +123,9 @@ def test_a_scene_without_a_ground_is_fitted_as_free_gaussians():
         photos.append(TrainingView(f"photo_{i}", camera, image, (seen.alpha > 0.5).astype(np.float32)))
     frame = replace(made.FRAME, kind="synthetic", flying_height=3.0)
     quality = replace(QUALITY, max_gaussians=2000, steps=150)
-    found = build.fit(frame, photos, points, np.full((400, 3), 0.5, np.float32), quality, np.random.default_rng(0))
+    found = fit_coarse_field(
+        frame, photos, points, np.full((400, 3), 0.5, np.float32), quality, np.random.default_rng(0)
+    )
     assert not found.field.ground.any()
     grey = replace(truth, sh=rgb_to_sh(np.full((400, 3), 0.5)))
-    assert evaluate(found.field, photos)["psnr"] > evaluate(grey, photos)["psnr"] + 1
+    assert evaluate_field(found.field, photos)["psnr"] > evaluate_field(grey, photos)["psnr"] + 1

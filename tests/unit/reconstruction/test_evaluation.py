@@ -12,7 +12,7 @@ from dav_gswt.reconstruction import evaluation
 
 
 def test_a_field_that_is_right_has_no_psnr_and_full_marks():
-    found = evaluation.evaluate(patch.field(), patch.photos(), weights=lpips_arrays.random())
+    found = evaluation.evaluate_field(patch.field(), patch.photos(), weights=lpips_arrays.random())
     assert found["psnr"] is None  # equal pictures
     assert found["ssim"] == pytest.approx(1) and found["lpips"] == 0
     assert [row["view"] for row in found["test_views"]] == ["photo_0", "photo_1", "photo_2"]
@@ -29,7 +29,7 @@ def off(amount, views=None):
 def test_means_groups_and_the_worst_tenth():
     tests = off([0.02, 0.02, 0.1])
     groups = {"high": ["photo_0", "photo_1"], "low": ["photo_2"], "none": ["elsewhere"]}
-    found = evaluation.evaluate(patch.field(), tests, groups, lpips_arrays.random())
+    found = evaluation.evaluate_field(patch.field(), tests, groups, lpips_arrays.random())
     rows = found["test_views"]
     for key in evaluation.MEASURES:
         values = [row[key] for row in rows]
@@ -41,7 +41,7 @@ def test_means_groups_and_the_worst_tenth():
 
 def test_exposure_is_forgiven_where_it_is_said():
     dim = [replace(v, image=0.8 * v.image) for v in off([0.01], patch.photos(1))]
-    found = evaluation.evaluate(patch.field(), dim)
+    found = evaluation.evaluate_field(patch.field(), dim)
     assert found["psnr_colour_corrected"] > found["psnr"] + 5
 
 
@@ -52,12 +52,12 @@ def test_pixels_that_do_not_count_change_nothing():
     spoilt = view.image.copy()
     spoilt[:, 33:] = 1
     one, two = (
-        evaluation.evaluate(patch.field(), [replace(view, image=image, weight=weight)])
+        evaluation.evaluate_field(patch.field(), [replace(view, image=image, weight=weight)])
         for image in (view.image, spoilt)
     )
     assert one["psnr"] == pytest.approx(two["psnr"]) and one["psnr_colour_corrected"] == two["psnr_colour_corrected"]
     blind = replace(view, weight=np.zeros_like(weight))
-    assert evaluation.evaluate(patch.field(), [blind])["psnr"] is None
+    assert evaluation.evaluate_field(patch.field(), [blind])["psnr"] is None
 
 
 def test_lpips_counts_by_the_area_that_counts():
@@ -69,7 +69,7 @@ def test_lpips_counts_by_the_area_that_counts():
     half[:, :48] = 1
     weights = lpips_arrays.random()
     alone, beside = (
-        evaluation.evaluate(patch.field(), [replace(view, image=wrong, weight=w)], weights=weights)["lpips"]
+        evaluation.evaluate_field(patch.field(), [replace(view, image=wrong, weight=w)], weights=weights)["lpips"]
         for w in (half, view.weight)
     )
     assert alone == pytest.approx(2 * beside, rel=1e-3)
@@ -77,10 +77,10 @@ def test_lpips_counts_by_the_area_that_counts():
 
 def test_without_weights_lpips_is_null_and_that_is_said(caplog):
     with caplog.at_level(logging.INFO):
-        found = evaluation.evaluate(patch.field(), off([0.02]))
+        found = evaluation.evaluate_field(patch.field(), off([0.02]))
     assert found["lpips"] is found["worst_decile"]["lpips"] is None and "LPIPS has no weights" in caplog.text
 
 
 def test_no_test_view_is_null():
-    found = evaluation.evaluate(patch.field(), [])
+    found = evaluation.evaluate_field(patch.field(), [])
     assert found["psnr"] is found["worst_decile"]["ssim"] is None and found["test_views"] == []

@@ -4,7 +4,7 @@ from fixtures.frames import scene_frame
 
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.reconstruction import external_field
-from dav_gswt.reconstruction.build import FitSettings
+from dav_gswt.reconstruction.fit_settings import FitSettings
 
 QUALITY = FitSettings(size=64, spacing=1.0, max_gaussians=20_000, steps=1, steps_per_photo=1, level_steps=1)
 FRAME = scene_frame(
@@ -25,7 +25,7 @@ def test_the_surface_under_a_finished_field_is_found_and_what_lies_beyond_is_cut
         np.zeros(n, np.float32),
         np.ones(n, bool),  # as if it came from a ground layer of ours
     )
-    inside, grid = external_field.enter(field, FRAME, QUALITY)
+    inside, grid = external_field.prepare_external_field(field, FRAME, QUALITY)
     assert 0 < len(inside) < n and not inside.ground.any()
     assert inside.means[:, :2].min() >= 0 and inside.means[:, :2].max() <= 4
     x = grid.centres[:, 0].reshape(grid.shape)

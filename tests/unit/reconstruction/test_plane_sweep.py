@@ -45,7 +45,7 @@ def photos():
 
 @pytest.fixture(scope="module")
 def found(photos) -> plane_sweep.Relief:
-    return plane_sweep.sweep(made.grid(0.05), photos, flying_height=4.0, pixel=0.04)
+    return plane_sweep.sweep_heights(made.grid(0.05), photos, flying_height=4.0, pixel=0.04)
 
 
 def inner(grid: Ground, low: float, high: float):
@@ -74,7 +74,7 @@ def flicker(eye, seed):
 def test_sand_that_looks_like_sand_is_no_tower_over_what_no_two_photos_show_alike():
     eyes = [(0, 0), (0.9, 0), (-0.9, 0), (0, 0.9), (0, -0.9), (0.6, 0.6), (-0.6, 0.6)]
     views = [flicker([1.6 + x, 1.6 + y, 4.0], i) for i, (x, y) in enumerate(eyes)]
-    found = plane_sweep.sweep(made.grid(0.05), views, flying_height=4.0, pixel=0.04)
+    found = plane_sweep.sweep_heights(made.grid(0.05), views, flying_height=4.0, pixel=0.04)
     assert found.above.max() < 0.25  # of 1.2 that are tried
 
 
@@ -83,14 +83,14 @@ def test_nothing_is_a_column():
     above[2:10, 2:10] = 0.2  # a bush, 8 cells of .1 wide, ...
     above[5, 5] = above[5, 6] = 1.5  # ... and over it what is not even .2 wide
     above[12:18, 12:18] = 1.5  # a tree
-    found = plane_sweep.stout(above > 0, above, 0.1)
+    found = plane_sweep.reject_columns(above > 0, above, 0.1)
     assert found[12:18, 12:18].all() and found[2:10, 2:10].sum() == 62 and found.sum() == 98
-    assert not plane_sweep.stout(np.zeros((4, 4), bool), np.zeros((4, 4)), 0.1).any()
+    assert not plane_sweep.reject_columns(np.zeros((4, 4), bool), np.zeros((4, 4)), 0.1).any()
 
 
 def test_a_wider_grid_goes_on_as_high_as_its_border():
     grid = replace(made.grid(0.1), heights=np.random.default_rng(0).random(made.grid(0.1).shape))
-    wide = plane_sweep.padded(grid, 3)
+    wide = plane_sweep.pad_grid(grid, 3)
     assert wide.shape == tuple(n + 6 for n in grid.shape) and not wide.seen[:3].any()
     np.testing.assert_allclose(wide.exemplar, grid.exemplar, atol=1e-12)
     at = np.array([[0.7, 1.3], [2.05, 0.4], [-0.2, 1.0]])
@@ -104,18 +104,18 @@ def test_the_ground_around_stays_ground(found):
 
 
 def test_ground_that_fewer_than_two_photos_see_is_not_known(photos):
-    alone = plane_sweep.sweep(made.grid(0.1), photos[:1], flying_height=4.0, pixel=0.08)
+    alone = plane_sweep.sweep_heights(made.grid(0.1), photos[:1], flying_height=4.0, pixel=0.08)
     assert not alone.known.any() and not alone.stands.any()
     assert (alone.above == 0).all()
 
 
 def test_the_shell_closes_what_stands_down_to_the_ground(found, photos):
-    shell = objects.shell(found, photos)
+    shell = objects.make_shell(found, photos)
     heights = shell.means[:, 2]
     assert not shell.ground.any()
     assert heights.max() == pytest.approx(TALL, abs=2 * found.step)
     assert heights.min() < 0.2 * TALL  # walls reach down
-    ceiling = objects.ceiling(made.grid(0.05), found, shell)
+    ceiling = objects.compute_ceiling(made.grid(0.05), found, shell)
     grid = made.grid(0.05)
     assert ceiling[inner(grid, 0.3, 0.7)].max() < 0.3 * TALL  # free space over bare ground
     assert ceiling[inner(grid, 1.4, 1.8)].min() > TALL
@@ -124,7 +124,7 @@ def test_the_shell_closes_what_stands_down_to_the_ground(found, photos):
 def test_costs_without_steps_are_each_cells_own():
     rng = np.random.default_rng(0)
     costs = rng.uniform(0, 1, (5, 4, 6)).astype(np.float32)
-    free = plane_sweep.aggregated(costs, 0.0, 0.0)
+    free = plane_sweep.aggregate_costs(costs, 0.0, 0.0)
     np.testing.assert_array_equal(free.argmin(0), costs.argmin(0))  # changes cost nothing
 
 
@@ -134,7 +134,7 @@ def test_a_cell_that_says_nothing_takes_the_height_of_its_neighbours():
     costs[:, 3, 3] = 0.3
     costs[1, 3, 3] = 0.29  # a little better elsewhere
     assert costs.argmin(0)[3, 3] == 1
-    assert (plane_sweep.aggregated(costs, 0.01, 0.06).argmin(0) == 3).all()
+    assert (plane_sweep.aggregate_costs(costs, 0.01, 0.06).argmin(0) == 3).all()
 
 
 def test_points_in_the_air_become_things_only_together_and_where_the_sweep_saw_nothing():
@@ -142,7 +142,7 @@ def test_points_in_the_air_become_things_only_together_and_where_the_sweep_saw_n
     flat = plane_sweep.Relief(grid, np.zeros(grid.shape), np.zeros(grid.shape, bool), np.ones(grid.shape, bool), 0.1)
     crowd = np.array([[1.0, 1.0, 0.5], [1.1, 1.0, 0.5], [1.0, 1.1, 0.5], [1.1, 1.1, 0.55]])
     points = np.concatenate([crowd, [[2.5, 2.5, 0.5], [1.0, 1.05, 3.0], [1.0, 1.0, 0.05]]])
-    field = objects.lone_points(grid, flat, points, np.full((7, 3), 0.5), band=1.0)
+    field = objects.make_isolated_points(grid, flat, points, np.full((7, 3), 0.5), band=1.0)
     np.testing.assert_allclose(field.means, crowd, atol=1e-6)
     taken = replace(flat, stands=inner(grid, 0.8, 1.3))
-    assert not len(objects.lone_points(grid, taken, points, np.full((7, 3), 0.5), band=1.0))
+    assert not len(objects.make_isolated_points(grid, taken, points, np.full((7, 3), 0.5), band=1.0))

@@ -8,11 +8,12 @@ from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry import cameras
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import render
-from dav_gswt.reconstruction import build, sky
+from dav_gswt.reconstruction import sky
 from dav_gswt.reconstruction.fitting import trainer
-from dav_gswt.reconstruction.fitting.plan import Plan
-from dav_gswt.reconstruction.ground_constraints import OnGround
-from dav_gswt.reconstruction.objects import blobs
+from dav_gswt.reconstruction.fitting.plan import FitPlan
+from dav_gswt.reconstruction.ground_constraints import GroundConstraints
+from dav_gswt.reconstruction.objects import make_blobs
+from dav_gswt.reconstruction.observation import mask_to_ground
 
 THING = np.array([[1.6, 1.6, 0.35]])
 
@@ -27,7 +28,7 @@ def low(count=4, size=64, thing=True):
     """Photos of the made-up ground from low down, under the made-up sky, with a dark thing that stands against it."""
     field = made.field()
     if thing:
-        field = concatenate_fields([field, blobs(THING, np.full((1, 3), 0.05), np.full(1, 0.08), logit=5.0)])
+        field = concatenate_fields([field, make_blobs(THING, np.full((1, 3), 0.05), np.full(1, 0.08), logit=5.0)])
     found = []
     for i in range(count):
         angle = 2 * np.pi * i / count + 0.3
@@ -42,7 +43,7 @@ def low(count=4, size=64, thing=True):
 
 
 def over(photos):
-    return build.modelled(photos, made.grid())
+    return mask_to_ground(photos, made.grid())
 
 
 def test_the_sky_is_found_whatever_stands_before_it():
@@ -52,7 +53,7 @@ def test_the_sky_is_found_whatever_stands_before_it():
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     colours = heavens(directions)
     colours[::4] = 0.1  # a quarter is something else
-    coefficients, deviation = sky.fitted(directions, colours)
+    coefficients, deviation = sky.fit_sky(directions, colours)
     basis = sky.harmonics.basis(directions, sky.DEGREE)
     np.testing.assert_allclose(basis @ coefficients, heavens(directions), atol=0.03)
     assert deviation < 0.01
@@ -60,7 +61,7 @@ def test_the_sky_is_found_whatever_stands_before_it():
 
 def test_sky_counts_and_what_stands_against_it_says_nothing():
     photos = low()
-    found = sky.behind(photos, over(photos))
+    found = sky.add_sky(photos, over(photos))
     for view, photo, ground in zip(found, photos, over(photos), strict=True):
         _, step = photo.camera.rays()
         rising = step[..., 2] > 0
@@ -74,19 +75,19 @@ def test_sky_counts_and_what_stands_against_it_says_nothing():
 
 def test_photos_from_above_and_broken_skies_have_none():
     above = over(made.photos())
-    assert all(v.behind is None for v in sky.behind(made.photos(), above))
+    assert all(v.behind is None for v in sky.add_sky(made.photos(), above))
     rng = np.random.default_rng(1)
     broken = [replace(v, image=rng.uniform(0, 1, v.image.shape).astype(np.float32)) for v in low()]
-    assert all(v.behind is None for v in sky.behind(broken, over(broken)))
+    assert all(v.behind is None for v in sky.add_sky(broken, over(broken)))
 
 
 @pytest.mark.parametrize("known", [True, False])
 def test_what_the_photos_show_to_be_sky_is_not_modelled(known):
     photos = low(thing=False)
-    masked = sky.behind(photos, over(photos)) if known else over(photos)
-    start = concatenate_fields([made.field(), blobs(THING, np.full((1, 3), 0.05), np.full(1, 0.08), logit=1.0)])
+    masked = sky.add_sky(photos, over(photos)) if known else over(photos)
+    start = concatenate_fields([made.field(), make_blobs(THING, np.full((1, 3), 0.05), np.full(1, 0.08), logit=1.0)])
     grid = made.grid()
-    rules = OnGround(grid, np.full(grid.shape, 0.8))
-    fitted = trainer.fit(start, masked, Plan(100, 1), rules, np.random.default_rng(0)).field
+    constraints = GroundConstraints(grid, np.full(grid.shape, 0.8))
+    fitted = trainer.fit_field(start, masked, FitPlan(100, 1), constraints, np.random.default_rng(0)).field
     gone = len(fitted) < len(start) or fitted.opacity_logits[-1] < -1
     assert gone == known

@@ -32,7 +32,7 @@ def eastings(grid):
 def one(places, *photos, grid=None, values=None, least=1):
     grid = grid or ground()
     values = eastings(grid) if values is None else values
-    return visibility.behind(grid, values, np.asarray(places, np.float32), list(photos), least)
+    return visibility.median_behind(grid, values, np.asarray(places, np.float32), list(photos), least)
 
 
 def test_behind_a_place_is_where_the_ray_through_it_meets_the_ground():

@@ -8,11 +8,12 @@ from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry.scene_frame import write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
-from dav_gswt.reconstruction import build
-from dav_gswt.reconstruction.objects import blobs
+from dav_gswt.reconstruction.coarse import Reconstruction, fit_coarse_field
+from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.objects import make_blobs
 from dav_gswt.study import fit_profile
 
-QUALITY = build.FitSettings(size=48, spacing=1.0, max_gaussians=5000, steps=12, steps_per_photo=10, level_steps=5)
+QUALITY = FitSettings(size=48, spacing=1.0, max_gaussians=5000, steps=12, steps_per_photo=10, level_steps=5)
 
 
 def photo_set(tests):
@@ -47,7 +48,7 @@ def test_a_trial_tells_seconds_steps_and_quality_and_gives_the_field_that_a_fit_
     assert [row["step"] for row in found.curve] == [5, 10, 12]
     assert all(row["seconds"] > 0 and row["psnr"] > 10 for row in found.curve)
     none = np.zeros((0, 3)), np.zeros((0, 3), np.float32)
-    alone = build.fit(photos.frame, photos.train, *none, QUALITY, np.random.default_rng(0))
+    alone = fit_coarse_field(photos.frame, photos.train, *none, QUALITY, np.random.default_rng(0))
     np.testing.assert_array_equal(found.made.field.means, alone.field.means)
     assert set(fit_profile.away(photos, found.made)) == {"test"}
 
@@ -60,15 +61,15 @@ def test_when_a_quality_was_first_reached():
 
 def test_haze_is_counted_and_what_stands_low_is_not():
     photos = photo_set(made.photos(1))
-    low = blobs(np.array([[1.6, 1.6, 0.3]]), np.full((1, 3), 0.5), np.full(1, 0.3))
-    high = blobs(np.array([[1.6, 1.6, 2.0]]), np.full((1, 3), 0.5), np.full(1, 0.3))
+    low = make_blobs(np.array([[1.6, 1.6, 0.3]]), np.full((1, 3), 0.5), np.full(1, 0.3))
+    high = make_blobs(np.array([[1.6, 1.6, 2.0]]), np.full((1, 3), 0.5), np.full(1, 0.3))
     assert fit_profile.free_space_opacity(concatenate_fields([made.field(), low]), made.grid(), photos) == 0
     assert fit_profile.free_space_opacity(concatenate_fields([made.field(), high]), made.grid(), photos) > 0.01
 
 
 def test_stills_are_pictures_of_the_exemplar():
     grid = made.grid()
-    seen = fit_profile.stills(build.Made(made.field(), grid, {}), made.FRAME, 96, 64)
+    seen = fit_profile.stills(Reconstruction(made.field(), grid, {}), made.FRAME, 96, 64)
     assert seen["oblique"].shape == (64, 96, 3)
     true = made.look(np.array([1.6]), np.array([1.6]))[0]
     assert seen["oblique"][32, 48] == pytest.approx(true, abs=0.15)  # a pixel is 0.13 of the stripes' slope

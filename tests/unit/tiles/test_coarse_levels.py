@@ -22,10 +22,10 @@ def tile():
     rng = np.random.default_rng(3)
     x, y = np.meshgrid((np.arange(CELLS) + 0.5) * SPACING, (np.arange(CELLS) + 0.5) * SPACING)
     grid = Ground(0.0, 0.0, SPACING, 0, 0, CELLS, 0.2 * x - 0.1 * y, np.ones((CELLS, CELLS), bool))
-    layer = discs.ground_discs(grid, rng.uniform(0.2, 0.8, (CELLS**2, 3)))
+    layer = discs.make_ground_discs(grid, rng.uniform(0.2, 0.8, (CELLS**2, 3)))
     layer = replace(layer, uncertainty=rng.random(CELLS**2).astype(np.float32))
     things = splats(rng.random((200, 3)) * CELLS * SPACING, rng.random((200, 3)), [0.02, 0.02, 0.05], False)
-    whole = concatenate_fields([layer, underlay.beneath(grid, layer), things])
+    whole = concatenate_fields([layer, underlay.make_underlay(grid, layer), things])
     return whole[rng.permutation(len(whole))]
 
 

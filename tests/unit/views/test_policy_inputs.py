@@ -28,7 +28,7 @@ def files(tmp_path):
     """A field that is darker than its photos, and more so in the last of them."""
     true = patch.field()
     write_field(replace(true, sh=true.sh - np.float32(0.1)), tmp_path / "field.ply")
-    ground.write(patch.grid(), tmp_path / "ground.exr")
+    ground.write_ground(patch.grid(), tmp_path / "ground.exr")
     write_scene_frame(tmp_path / "ground.json", replace(patch.FRAME, kind="synthetic"))
     views = []
     for i, (pose, camera) in enumerate(pool()):
@@ -56,7 +56,7 @@ def test_of_a_rendered_scene_only_what_was_drawn_is_known(files):
     assert np.isnan(found).tolist() == [False, False, True] and found[0] > 2 * found[1]
 
 
-def test_other_policies_look_at_nothing_and_no_truth_is_an_error(files, tmp_path):
+def test_other_policies_look_at_nothing_and_no_truth_is_refused(files, tmp_path):
     assert errors({}, "replay", "farthest") is None
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="shows no candidate that is left"):

@@ -12,7 +12,7 @@ from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.training import example_files, examples
-from dav_gswt.reconstruction.build import FitSettings
+from dav_gswt.reconstruction.fit_settings import FitSettings
 
 SEED, COUNT = 4, 3
 
@@ -202,9 +202,9 @@ def test_a_fit_stays_under_its_cap(monkeypatch):
         seen.append((quality, len(points), len(photos), frame.extent.east))
         raise InterruptedError
 
-    monkeypatch.setattr(examples.build, "fit", fit)
+    monkeypatch.setattr(examples, "fit_coarse_field", fit)
     with pytest.raises(InterruptedError):
         examples.make_examples(7, 1)
     quality, points, photos, east = seen[0]
-    assert quality.cap <= 50_000 and quality.steps <= 90 and quality.size in examples.PHOTO_SIZES
+    assert quality.max_gaussians <= 50_000 and quality.steps <= 90 and quality.size in examples.PHOTO_SIZES
     assert 3 <= photos <= 12 and 50 < points < 2000 and 3 < east < 6

@@ -4,19 +4,19 @@ import pytest
 from dav_gswt.geometry import cameras
 from dav_gswt.raster import render
 from dav_gswt.reconstruction.fitting import densification, state
-from dav_gswt.reconstruction.objects import blobs
+from dav_gswt.reconstruction.objects import make_blobs
 
 
 def some(n=20, opacity=0.8, size=0.2):
     rng = np.random.default_rng(0)
     logit = float(np.log(opacity / (1 - opacity)))
-    return state.of(blobs(rng.uniform(-1, 1, (n, 3)), rng.uniform(0, 1, (n, 3)), np.full(n, size), logit))
+    return state.from_field(make_blobs(rng.uniform(-1, 1, (n, 3)), rng.uniform(0, 1, (n, 3)), np.full(n, size), logit))
 
 
 @pytest.mark.parametrize("parts", [1, 2, 3, 8])
 def test_copies_together_look_as_the_one_before(parts):
     """Over a line through the middle: the integral of 1 - (1 - o' g)^N is that of o g (Kheradmand et al., Eq. 9)."""
-    each, size = densification.split(np.array([0.7]), np.array([parts]))
+    each, size = densification.split_opacity(np.array([0.7]), np.array([parts]))
     t = np.linspace(-12, 12, 20001)
     one = np.trapezoid(0.7 * np.exp(-(t**2) / 2), t)
     many = np.trapezoid(1 - (1 - each[0] * np.exp(-((t / size[0]) ** 2) / 2)) ** parts, t)
@@ -34,7 +34,7 @@ def test_the_dead_go_where_the_errors_are_and_the_cap_holds():
     assert moved == 8 and len(now) == 23  # five dead, three new
     away = np.linalg.norm(now.values["means"] - place, axis=1)
     assert (away[[*range(5), 20, 21, 22]] < 1.0).all()
-    assert densification.opacities(now.values["opacity_logits"]).min() > 0.05
+    assert densification.to_opacity(now.values["opacity_logits"]).min() > 0.05
 
 
 def test_without_errors_nothing_grows():
@@ -58,9 +58,9 @@ def test_the_ground_is_never_moved_and_what_grows_on_it_is_small_and_flat_beside
 def test_a_split_hardly_changes_the_picture():
     now = some(3)
     camera = cameras.pinhole([0.0, 0.0, 6.0], [0, 0, 0], 64, 64, 40.0)
-    before = render(state.field_of(now, 0), camera).colour
+    before = render(state.to_field(now, 0), camera).colour
     densification.grow(now, 0, np.zeros(3, bool), np.ones(3, np.float32), 6, np.random.default_rng(0))
-    after = render(state.field_of(now, 0), camera).colour
+    after = render(state.to_field(now, 0), camera).colour
     assert np.abs(after - before).mean() < 0.03  # copies are set apart by half their size
     assert np.abs(after.sum() / before.sum() - 1) < 0.3
 
@@ -69,7 +69,7 @@ def test_only_the_nearly_transparent_are_shaken():
     now = some()
     now.values["opacity_logits"][:10] = -9
     before = now.values["means"].copy()
-    densification.shake(now, 0, 0.5, np.random.default_rng(0))
+    densification.perturb(now, 0, 0.5, np.random.default_rng(0))
     moved = np.linalg.norm(now.values["means"] - before, axis=1)
     assert moved[:10].min() > 0 and moved[10:].max() == 0
     assert moved.max() < 5 * 0.5 * 0.2
@@ -78,5 +78,5 @@ def test_only_the_nearly_transparent_are_shaken():
 def test_steps_along_a_gaussians_axes_turn_with_it():
     now = some(1)
     now.values["quats"][0] = [np.sqrt(0.5), 0, 0, np.sqrt(0.5)]  # x to y
-    step = densification.along(now.values, np.array([0]), np.array([[1.0, 0, 0]]))
+    step = densification.rotate_steps(now.values, np.array([0]), np.array([[1.0, 0, 0]]))
     np.testing.assert_allclose(step, [[0, 0.2, 0]], atol=1e-6)

@@ -15,7 +15,7 @@ FRAME = scene_frame(exemplar=(0.0, 0.0, 4.0), extent=(0.0, 0.0, 4.0, 4.0))
 
 @pytest.fixture
 def grid():
-    return ground.lay(FRAME, np.zeros((0, 3)), spacing=0.1, cap=10**6, block=8, margin=0.0)
+    return ground.fit_ground(FRAME, np.zeros((0, 3)), spacing=0.1, max_cells=10**6, block=8, margin=0.0)
 
 
 def photo(colour, name="photo", eye=(2.0, 2, 6)):
@@ -42,7 +42,7 @@ def test_exposures_are_levelled_without_drift(grid):
     texture = rng.uniform(0.2, 0.7, (40, 40, 3)).astype(np.float32)
     gains = [0.8, 1.0, 1.0, 1.25]
     photos = [replace(photo([0, 0, 0], str(g)), image=(texture * g).astype(np.float32)) for g in gains]
-    levelled = exposure.levelled(photos, grid.centres)
+    levelled = exposure.equalize_exposure(photos, grid.centres)
     for view in levelled:
         np.testing.assert_allclose(view.image.mean((0, 1)), texture.mean((0, 1)), rtol=0.02)
 
@@ -53,7 +53,7 @@ def test_a_pictures_exposure_is_found_beside_what_moves():
     image = (1.1 * picture - 0.03).astype(np.float32)
     image[:6] = 1.0  # something else
     none = np.ones(3, np.float32), np.zeros(3, np.float32)
-    a, b = exposure.towards(picture, replace(photo([0, 0, 0]), image=image), none)
+    a, b = exposure.update_gain_and_offset(picture, replace(photo([0, 0, 0]), image=image), none)
     # the prior's share: 1e-3 against the variance of the picture, 0.03
     np.testing.assert_allclose(a, 1.1, atol=0.01)
     np.testing.assert_allclose(b, -0.03, atol=0.01)
@@ -62,23 +62,23 @@ def test_a_pictures_exposure_is_found_beside_what_moves():
 def test_pixels_without_weight_and_flat_pictures_give_no_gain():
     none = np.ones(3, np.float32), np.zeros(3, np.float32)
     picture = np.full((40, 40, 3), 0.4, np.float32)
-    a, b = exposure.towards(picture, photo([0.5, 0.5, 0.5]), none)
+    a, b = exposure.update_gain_and_offset(picture, photo([0.5, 0.5, 0.5]), none)
     np.testing.assert_allclose(a, 1, atol=1e-6)
     np.testing.assert_allclose(b, 0.1, atol=1e-6)
     blind = replace(photo([0.5, 0.5, 0.5]), weight=np.zeros((40, 40), np.float32))
-    assert exposure.towards(picture, blind, none) is none
+    assert exposure.update_gain_and_offset(picture, blind, none) is none
 
 
 def test_the_level_of_the_typical_photo_is_taken_out():
     rng = np.random.default_rng(2)
     picture = rng.uniform(0.2, 0.8, (40, 40, 3)).astype(np.float32)
-    levels = exposure.Levels(3)
-    np.testing.assert_array_equal(levels.of(2), (np.ones(3), np.zeros(3)))
+    tracker = exposure.ExposureTracker(3)
+    np.testing.assert_array_equal(tracker.gain_and_offset(2), (np.ones(3), np.zeros(3)))
     for _ in range(20):
         for index, gain in enumerate([0.9, 1.0, 1.1]):  # of a field that is too dark
             image = (gain * (picture / 0.95 + 0.02)).astype(np.float32)
-            levels.look(index, picture, replace(photo([0, 0, 0]), image=image))
-    used = np.array([levels.of(i) for i in range(3)])
+            tracker.update(index, picture, replace(photo([0, 0, 0]), image=image))
+    used = np.array([tracker.gain_and_offset(i) for i in range(3)])
     np.testing.assert_allclose(used[1], np.repeat([[1.0], [0.0]], 3, 1), atol=0.01)
     np.testing.assert_allclose(used[:, 0], np.repeat([[0.9], [1.0], [1.1]], 3, 1), atol=0.02)
 
@@ -92,14 +92,14 @@ def test_colours_do_not_swing_however_many_photos_there_are(count):
     """
     rng = np.random.default_rng(3)
     texture = rng.uniform(0.2, 0.8, (40, 40, 3)).astype(np.float32)
-    levels, bright, momentum, away = exposure.Levels(count), 0.0, 0.0, []
+    tracker, bright, momentum, away = exposure.ExposureTracker(count), 0.0, 0.0, []
     for step in range(1200):
         if step % count == 0:
             turn = rng.permutation(count)
         picture, taken = texture + np.float32(bright), texture * np.float32(rng.normal(1, 0.02))
         index = int(turn[step % count])
-        levels.look(index, picture, replace(photo([0, 0, 0]), image=taken))
-        a, b = levels.of(index)
+        tracker.update(index, picture, replace(photo([0, 0, 0]), image=taken))
+        a, b = tracker.gain_and_offset(index)
         momentum = 0.9 * momentum + 0.1 * float((picture * a + b - taken).mean())
         bright -= 0.004 * np.clip(momentum / 1e-3, -1, 1)
         away.append(abs(bright))

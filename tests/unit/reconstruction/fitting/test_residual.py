@@ -13,24 +13,24 @@ def noted(shares):
         drawn.forward(**to_raster_arrays(made.field()), camera=view.camera)
         weight = np.zeros_like(view.weight)
         weight[:, : round(share * weight.shape[1])] = 1
-        residual.note(drawn, np.full_like(view.image, 0.1), weight)
+        residual.add(drawn, np.full_like(view.image, 0.1), weight)
     return residual
 
 
 def test_errors_of_all_photos_add_up_and_count_once_for_each_gaussian():
     once, twice = noted([1.0]), noted([1.0, 1.0])
-    assert once.of_a_photo == pytest.approx(once.errors.sum(), rel=1e-5)
+    assert once.error_per_photo == pytest.approx(once.errors.sum(), rel=1e-5)
     assert twice.errors.sum() > 1.8 * once.errors.sum()
-    assert twice.of_a_photo == pytest.approx(once.of_a_photo, rel=0.1)
+    assert twice.error_per_photo == pytest.approx(once.error_per_photo, rel=0.1)
     assert twice.photos.max() == 2
 
 
 def test_pixels_that_do_not_count_say_nothing():
-    assert noted([0.0]).of_a_photo == 0
+    assert noted([0.0]).error_per_photo == 0
     half, whole = noted([0.5]), noted([1.0])
     assert 0 < half.errors.sum() < whole.errors.sum()
     assert (half.photos <= whole.photos).all()
 
 
 def test_nothing_noted_is_no_error():
-    assert Residual().of_a_photo == 0 and len(Residual().errors) == 0
+    assert Residual().error_per_photo == 0 and len(Residual().errors) == 0

@@ -16,7 +16,7 @@ SIDE = CELLS * SPACING
 
 def plain(cells, grey):
     grid = Ground(0.0, 0.0, SIDE / cells, 0, 0, cells, np.zeros((cells, cells)), np.ones((cells, cells), bool))
-    return discs.ground_discs(grid, np.full((cells**2, 3), grey))
+    return discs.make_ground_discs(grid, np.full((cells**2, 3), grey))
 
 
 def tile_set(fields):

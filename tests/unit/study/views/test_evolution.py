@@ -10,7 +10,7 @@ from fixtures.frames import scene_frame
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files, metrics
 from dav_gswt.reconstruction import evaluation
-from dav_gswt.reconstruction.build import modelled
+from dav_gswt.reconstruction.observation import mask_to_ground
 from dav_gswt.study.views import evolution
 
 KEYS = ("psnr", "psnr_colour_corrected")
@@ -33,8 +33,8 @@ def spoilt():
 def round_of(number, wrong):
     """A round whose field is off by a share of its colour."""
     made = patch.field()
-    made, views = replace(made, sh=made.sh * np.float32(1 + wrong)), modelled(spoilt(), patch.grid())
-    return evolution.Round(number, made, patch.grid(), evaluation.evaluate(made, views) | {"photos": 3 + number})
+    made, views = replace(made, sh=made.sh * np.float32(1 + wrong)), mask_to_ground(spoilt(), patch.grid())
+    return evolution.Round(number, made, patch.grid(), evaluation.evaluate_field(made, views) | {"photos": 3 + number})
 
 
 def cell():
@@ -81,7 +81,7 @@ def test_without_a_test_view_there_is_nothing_to_show():
 def test_errors_are_those_that_the_metrics_were_measured_by(key):
     one, view = round_of(1, 0.2), spoilt()[1]
     found = evolution.render_view(one, view, key)
-    counts = modelled([view], patch.grid())[0].weight > 0
+    counts = mask_to_ground([view], patch.grid())[0].weight > 0
     assert 0.1 < counts.mean() < 0.99
     np.testing.assert_array_equal(np.isfinite(found.error), counts)
     np.testing.assert_allclose(found.error[counts], np.abs(found.picture - view.image).mean(-1)[counts], atol=1e-6)

@@ -124,10 +124,10 @@ def _read_off(picture: Float32[Array, "s s 3"], pixels: Float[Array, "n 2"]) -> 
 
 def _above_underlay(field: GaussianField, grid: Ground, marked: Bool[Array, "n"]) -> GaussianField:
     """The field with the colours of the marked discs on what of its underlay is marked."""
-    rows, n = underlay.rows(field, grid), grid.heights.size
+    rows, n = underlay.find_rows(field, grid), grid.heights.size
     if rows.stop == rows.start:
         return field
-    colours = underlay.places(grid, field.means[:n, 2], field.base_colours[:n])[2]
+    colours = underlay.place_underlay(grid, field.means[:n, 2], field.base_colours[:n])[2]
     under, sh = np.flatnonzero(marked[rows]), field.sh.copy()
     sh[rows.start + under, :1] = rgb_to_sh(colours[under])
     return replace(field, sh=sh)

@@ -20,14 +20,14 @@ def judged(
     ground alone, of the field before and after; how many pixels that is.
 
     The pixels are the same for both: those that look at the discs that were painted. tests: weighted, see
-    `build.modelled`. Returns: null in `imagined` where no test photo looks at any.
+    `observation.mask_to_ground`. Returns: null in `imagined` where no test photo looks at any.
     """
     painted = after.imagined[: len(before)]
     views = {"all": tests, "imagined": [_over(view, before, painted) for view in tests]}
     out = {
         part: {
-            "before": evaluation.evaluate(before, seen, weights=weights),
-            "after": evaluation.evaluate(after, seen, weights=weights),
+            "before": evaluation.evaluate_field(before, seen, weights=weights),
+            "after": evaluation.evaluate_field(after, seen, weights=weights),
             "pixels": int(sum((view.weight > 0).sum() for view in seen)),
         }
         for part, seen in views.items()

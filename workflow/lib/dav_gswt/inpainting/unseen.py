@@ -31,7 +31,7 @@ def gaussians(field: GaussianField, grid: Ground, there: Bool[Array, "rows colum
     """The discs of some cells, and of the underlay what lies under such cells alone."""
     marked = np.zeros(len(field), bool)
     marked[: there.size] = there.ravel()
-    rows, s = underlay.rows(field, grid), underlay.STRIDE
+    rows, s = underlay.find_rows(field, grid), underlay.STRIDE
     if rows.stop > rows.start:
         even = np.pad(there, [(0, -size % s) for size in there.shape], constant_values=True)
         blocks = even.reshape(even.shape[0] // s, s, even.shape[1] // s, s).all((1, 3))

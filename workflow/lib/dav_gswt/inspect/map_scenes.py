@@ -31,7 +31,7 @@ def build_map(path: Path, asked: ViewOptions) -> Scene:
     """An EXR file: a ground's as its surface, and so the part `above` where it is asked for; all else as pictures."""
     parts = image_files.read_exr_parts(path)
     if len(parts) == 1 and "ground_west" in (only := next(iter(parts.values())))[1]:
-        return _build_surface(path, ground.read(path), only[0], asked)
+        return _build_surface(path, ground.read_ground(path), only[0], asked)
     if asked.part == ABOVE and ABOVE in parts:
         return _build_surface(path, _find_grid(path), parts[ABOVE][0], asked)
     return arrange_pictures(path, _select_channels(parts, asked, path), asked)
@@ -113,7 +113,7 @@ def _find_grid(path: Path) -> Ground:
     """The ground of the field that the maps are of."""
     for folder in (path.parent, path.parent.parent):
         if (folder / "ground.exr").is_file():
-            return ground.read(folder / "ground.exr")
+            return ground.read_ground(folder / "ground.exr")
     raise InputError(f"{path}: there is no ground.exr beside it to lay its part {ABOVE} over")
 
 

@@ -20,11 +20,11 @@ from dav_gswt.lod.levels import AUTO, MAX_LEVELS, Levels
 from dav_gswt.lod.merge import crop_to_blocks, halve_resolution
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import Gradients, to_raster_arrays
-from dav_gswt.reconstruction.build import modelled
 from dav_gswt.reconstruction.fitting import trainer
-from dav_gswt.reconstruction.fitting.plan import Plan
+from dav_gswt.reconstruction.fitting.plan import FitPlan
 from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.reconstruction.ground_constraints import OnGround
+from dav_gswt.reconstruction.ground_constraints import GroundConstraints
+from dav_gswt.reconstruction.observation import mask_to_ground
 
 _log = logging.getLogger(__name__)
 
@@ -38,11 +38,11 @@ PIXELS_PER_DISC = (
 )
 
 
-class FixedHeights(OnGround):
+class FixedHeights(GroundConstraints):
     """A ground with things on it whose discs keep their heights."""
 
-    def guide(self, gradients: Gradients) -> None:
-        super().guide(gradients)
+    def adjust_gradients(self, gradients: Gradients) -> None:
+        super().adjust_gradients(gradients)
         gradients.means[: self.discs, 2] = 0
 
 
@@ -90,13 +90,13 @@ def fit_coarser_level(
 ) -> tuple[GaussianField, Ground]:
     """The next level: half the resolution, about a quarter of the Gaussians, fitted for `steps` steps."""
     start, coarse = halve_resolution(*crop_to_blocks(field, grid, 2))
-    views = modelled(render_neighbour_views(field, coarse), coarse)
+    views = mask_to_ground(render_neighbour_views(field, coarse), coarse)
     stand = start[~start.ground]
     top = CLEARANCE * coarse.spacing
     if len(stand):
         top += float((stand.means[:, 2] - coarse.height_at(stand.means)).max())
-    rules, plan = FixedHeights(coarse, np.full(coarse.shape, top)), Plan(steps, len(start))
-    level = trainer.fit(start, views, plan, rules, rng, f"fit level of {len(start)} Gaussians", keep).field
+    constraints, plan = FixedHeights(coarse, np.full(coarse.shape, top)), FitPlan(steps, len(start))
+    level = trainer.fit_field(start, views, plan, constraints, rng, f"fit level of {len(start)} Gaussians", keep).field
     scales = mean_scale([field]), mean_scale([level])
     _log.info("mean scale %.4g to %.4g, %d to %d Gaussians", *scales, len(field), len(level))
     return level, coarse

@@ -10,14 +10,14 @@ from scipy.spatial.transform import Rotation
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.reconstruction import discs, underlay
 from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.reconstruction.top_view import from_above
+from dav_gswt.reconstruction.top_view import render_top_view
 
 
 def crop_to_blocks(field: GaussianField, grid: Ground, block: int) -> tuple[GaussianField, Ground]:
     """Field and grid cut down to whole blocks of cells that start at the exemplar's corner."""
-    under = underlay.rows(field, grid)
+    under = underlay.find_rows(field, grid)
     had = under.stop > under.start
-    field = underlay.without(field, grid)
+    field = underlay.remove_underlay(field, grid)
     rows, columns = grid.shape
     below, left = grid.first_row % block, grid.first_column % block
     ny, nx = (rows - below) // block * block, (columns - left) // block * block
@@ -36,7 +36,7 @@ def crop_to_blocks(field: GaussianField, grid: Ground, block: int) -> tuple[Gaus
     stand = stand[small.contains(field.means[stand])]
     discs_alone, standing = field[np.asarray(keep, int)], field[stand]
     return concatenate_fields(
-        [discs_alone, underlay.beneath(small, discs_alone), standing] if had else [discs_alone, standing]
+        [discs_alone, underlay.make_underlay(small, discs_alone), standing] if had else [discs_alone, standing]
     ), small
 
 
@@ -57,15 +57,17 @@ def halve_resolution(field: GaussianField, grid: Ground) -> tuple[GaussianField,
     n = grid.heights.size
     if field.ground.any():
         colours = field.base_colours[:n].reshape(*grid.shape, 3)
-        doubt, things = field.uncertainty[:n].reshape(grid.shape), underlay.without(field, grid)[n:]
+        doubt, things = field.uncertainty[:n].reshape(grid.shape), underlay.remove_underlay(field, grid)[n:]
     else:  # a finished field: its ground is what it shows from above, its things stand higher than the discs reach
-        maps = from_above(field, grid)
+        maps = render_top_view(field, grid)
         colours, doubt = maps.colour, maps.uncertainty
         above = field.means[:, 2] - grid.height_at(field.means)
-        things = field[above > discs.STANDS * coarse.spacing]
-    base = discs.ground_discs(coarse, _mean4(colours.astype(float)).reshape(-1, 3))
+        things = field[above > discs.OBJECT_HEIGHT * coarse.spacing]
+    base = discs.make_ground_discs(coarse, _mean4(colours.astype(float)).reshape(-1, 3))
     base = replace(base, uncertainty=_mean4(doubt.astype(float)).ravel().astype(np.float32))
-    return concatenate_fields([base, underlay.beneath(coarse, base), merge_by_voxel(things, coarse.spacing)]), coarse
+    return concatenate_fields(
+        [base, underlay.make_underlay(coarse, base), merge_by_voxel(things, coarse.spacing)]
+    ), coarse
 
 
 def merge_by_voxel(field: GaussianField, voxel: float) -> GaussianField:

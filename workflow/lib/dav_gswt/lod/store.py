@@ -14,7 +14,7 @@ def write_levels(levels: Levels, folder: Path | str, provenance: dict) -> None:
     with atomic_folder(folder) as part:
         for number, (fitted, grid) in enumerate(zip(levels.fields, levels.grids, strict=True)):
             write_field(fitted, part / f"level{number}.ply")
-            ground.write(grid, part / f"level{number}.exr")
+            ground.write_ground(grid, part / f"level{number}.exr")
         table = [
             {"level": number, "spacing": grid.spacing, "gaussians": len(f), "mean_scale": mean_scale([f])}
             for number, (f, grid) in enumerate(zip(levels.fields, levels.grids, strict=True))
@@ -36,5 +36,5 @@ def read_levels(folder: Path | str) -> Levels:
     if [len(f) for f in fields] != counts:
         raise InputError(f"{folder}: the levels are not those that levels.json tells of; make them again")
     return Levels(
-        fields, [ground.read(folder / f"level{number}.exr") for number in range(len(counts))], wanted, stopped
+        fields, [ground.read_ground(folder / f"level{number}.exr") for number in range(len(counts))], wanted, stopped
     )

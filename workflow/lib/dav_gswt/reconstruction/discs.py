@@ -1,4 +1,4 @@
-"""Discs of the ground layer as Gaussians."""
+"""The ground layer: one flat Gaussian (disc) a cell."""
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32
@@ -11,11 +11,11 @@ from dav_gswt.reconstruction.ground import Ground
 WIDTH = 0.72  # standard deviation of a disc in spacings: neighbours overlap, the ground is opaque
 THICKNESS = 0.1  # of a disc, in spacings
 OPAQUE = 4.0  # opacity logit of a disc before the first step
-STANDS = 1.5  # what is this many spacings above the surface is a thing, not a disc
+OBJECT_HEIGHT = 1.5  # spacings above the surface, from which a Gaussian belongs to an object
 
 
-def quaternions(east: Float[Array, "n"], north: Float[Array, "n"]) -> Float32[Array, "n 4"]:
-    """The shortest rotation (w x y z) that takes +z to the normal of a surface with these slopes."""
+def slopes_to_quaternions(east: Float[Array, "n"], north: Float[Array, "n"]) -> Float32[Array, "n 4"]:
+    """The shortest rotation (w x y z) from +z to the normal of a surface with these slopes."""
     normal = np.stack([-east, -north, np.ones_like(east)], 1)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     # half-way quaternion: (1 + z.n, z x n)
@@ -23,8 +23,8 @@ def quaternions(east: Float[Array, "n"], north: Float[Array, "n"]) -> Float32[Ar
     return (q / np.linalg.norm(q, axis=1, keepdims=True)).astype(np.float32)
 
 
-def ground_discs(grid: Ground, colours: Float[Array, "n 3"]) -> GaussianField:
-    """One disc a cell, tangent to the surface and stretched by its slope, so that none opens a hole downhill."""
+def make_ground_discs(grid: Ground, colours: Float[Array, "n 3"]) -> GaussianField:
+    """One disc a cell, tangent to the surface and stretched by its slope, so that slopes have no holes."""
     n = grid.heights.size
     east, north = (s.ravel() for s in grid.slopes())
     stretch = np.sqrt(1 + east**2 + north**2)
@@ -33,7 +33,7 @@ def ground_discs(grid: Ground, colours: Float[Array, "n 3"]) -> GaussianField:
     return GaussianField(
         grid.centres.astype(np.float32),
         np.log(scales).astype(np.float32),
-        quaternions(east, north),
+        slopes_to_quaternions(east, north),
         np.full(n, OPAQUE, np.float32),
         rgb_to_sh(colours),
         np.where(grid.seen.ravel(), 0, 1).astype(np.float32),
@@ -41,8 +41,8 @@ def ground_discs(grid: Ground, colours: Float[Array, "n 3"]) -> GaussianField:
     )
 
 
-def filled(colours: Float[Array, "n 3"], known: Bool[Array, "rows columns"]) -> Float32[Array, "n 3"]:
-    """Colours of unknown cells from the nearest known ones, blurred so that no streak shows; grey if none is known."""
+def fill_unknown(colours: Float[Array, "n 3"], known: Bool[Array, "rows columns"]) -> Float32[Array, "n 3"]:
+    """Colours with unknown cells filled from the nearest known ones and blurred; grey if none is known."""
     image = np.where(known[..., None], colours.reshape(*known.shape, 3), 0)
     if not known.any():
         return np.full((known.size, 3), 0.5, np.float32)

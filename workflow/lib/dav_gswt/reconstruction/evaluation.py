@@ -1,4 +1,4 @@
-"""How well a field shows what the test photos show. Test photos are seen by nothing but this."""
+"""Evaluation of a field on the test photos, which no other step uses."""
 
 import logging
 from collections.abc import Mapping, Sequence
@@ -17,10 +17,10 @@ from dav_gswt.raster import render
 _log = logging.getLogger(__name__)
 
 MEASURES = ("psnr", "psnr_colour_corrected", "ssim", "lpips")
-WORST = 0.1  # of the views, at least one: how bad it is where it is bad
+WORST = 0.1  # of the views, at least one
 
 
-def evaluate(
+def evaluate_field(
     field: GaussianField,
     tests: list[TrainingView],
     groups: Mapping[str, Sequence[str]] | None = None,
@@ -28,23 +28,23 @@ def evaluate(
 ) -> dict:
     """Mean PSNR (raw, colour-corrected), SSIM and LPIPS over the test views, over the pixels that look at the ground.
 
-    groups: names of views that are looked at by themselves, too (from low, from aside). weights: of LPIPS; without them
-    it is null, and said. `worst_decile`: the mean of the worst tenth.
-    Returns: null where there is no test view, or where pictures are equal and PSNR has no value.
+    groups: names of views that are also averaged by themselves (low, oblique). weights: of LPIPS; without them it is
+    null, with a log message. `worst_decile`: the mean of the worst tenth.
+    A value is null without test views, and PSNR is where pictures are equal.
     """
     if weights is None:
         _log.info("LPIPS has no weights here: it is left out of the metrics (docs/prior.md)")
-    rows = [_row(field, view, weights) for view in tests if view.weight.any()]
+    rows = [_evaluate_view(field, view, weights) for view in tests if view.weight.any()]
     named = {row["view"]: row for row in rows}
     parts = {group: [named[name] for name in names if name in named] for group, names in (groups or {}).items()}
-    return _summed(rows) | {"groups": {group: _summed(part) for group, part in parts.items()}, "test_views": rows}
+    return _summarize(rows) | {"groups": {group: _summarize(part) for group, part in parts.items()}, "test_views": rows}
 
 
-def _summed(rows: list[dict]) -> dict:
-    return _means(rows) | {"worst_decile": _worst(rows)}
+def _summarize(rows: list[dict]) -> dict:
+    return _average(rows) | {"worst_decile": _average_worst(rows)}
 
 
-def _row(field: GaussianField, view: TrainingView, weights: Weights | None) -> dict:
+def _evaluate_view(field: GaussianField, view: TrainingView, weights: Weights | None) -> dict:
     seen = np.clip(render(field, view.camera).colour, 0, 1)
     level = np.clip(metrics.correct_colours(seen, view.image, view.weight), 0, 1).astype(np.float32)
     return {
@@ -57,20 +57,20 @@ def _row(field: GaussianField, view: TrainingView, weights: Weights | None) -> d
 
 
 def _lpips(seen: Float32[Array, "h w 3"], view: TrainingView, weights: Weights) -> float:
-    """LPIPS of the picture, the photo's own pixels standing where none counts; over the area that does."""
-    from dav_gswt.images import lpips  # here, not above: torch takes seconds to load
+    """LPIPS of the picture, with the photo's pixels where none counts, over the share of pixels that count."""
+    from dav_gswt.images import lpips  # deferred: torch takes seconds to load
 
     counts = (view.weight > 0)[..., None]
     pair = (2 * np.where(counts, seen, view.image) - 1)[None], (2 * view.image - 1)[None]
     return float(lpips.distance(*(p.astype(np.float32) for p in pair), weights)[0] / counts.mean())
 
 
-def _means(rows: list[dict]) -> dict[str, float | None]:
+def _average(rows: list[dict]) -> dict[str, float | None]:
     columns = {key: [row[key] for row in rows] for key in MEASURES}
     return {key: None if not c or None in c else float(np.mean(c)) for key, c in columns.items()}
 
 
-def _worst(rows: list[dict]) -> dict[str, float | None]:
+def _average_worst(rows: list[dict]) -> dict[str, float | None]:
     """Means over the worst tenth by each measure."""
     out = {}
     for key in MEASURES:

@@ -1,4 +1,4 @@
-"""The ground as a height field on a regular grid: one cell a disc.
+"""The ground: a height field on a regular grid with one disc a cell.
 
 Rows run from south to north and columns from west to east, in memory; on disk (EXR) the first row is the northern one,
 as in any image of a map. The exemplar is a square block of whole cells, so that tiles cut from it stay on the grid.
@@ -93,10 +93,12 @@ class Ground:
         return (x >= inset) & (y >= inset) & (x <= columns * self.spacing - inset) & (y <= rows * self.spacing - inset)
 
 
-def lay(frame: SceneFrame, points: Float[Array, "n 3"], spacing: float, cap: int, block: int, margin: float) -> Ground:
-    """Lay the grid over the exemplar and a margin around it, and draw the surface through the points.
+def fit_ground(
+    frame: SceneFrame, points: Float[Array, "n 3"], spacing: float, max_cells: int, block: int, margin: float
+) -> Ground:
+    """Place the grid over the exemplar and a margin around it, and fit the surface to the points.
 
-    spacing: of the discs, in world units; widened where more than `cap` cells would be needed.
+    spacing: of the discs, in world units; widened where more than `max_cells` cells would be needed.
     block: the exemplar's side becomes a multiple of it, in cells. margin: ground kept around the exemplar, as a share
     of its side, as far as a photo sees any.
     Raises: InputError: the exemplar is too small for one block.
@@ -111,7 +113,7 @@ def lay(frame: SceneFrame, points: Float[Array, "n 3"], spacing: float, cap: int
         min(extent.north, south + side + reach),
     )
     area = (around[2] - around[0]) * (around[3] - around[1])
-    spacing = max(spacing, float(np.sqrt(area / cap)))
+    spacing = max(spacing, float(np.sqrt(area / max_cells)))
     cells = int(side / spacing) // block * block
     if cells < block:
         raise InputError(
@@ -134,10 +136,10 @@ def lay(frame: SceneFrame, points: Float[Array, "n 3"], spacing: float, cap: int
         np.zeros(shape),
         np.zeros(shape, bool),
     )
-    return replace(grid, heights=surface(grid, points))
+    return replace(grid, heights=fit_surface(grid, points))
 
 
-def surface(grid: Ground, points: Float[Array, "n 3"]) -> Float[Array, "rows columns"]:
+def fit_surface(grid: Ground, points: Float[Array, "n 3"]) -> Float[Array, "rows columns"]:
     """A smooth surface through points over the grid: least bending, robust against points that stand out.
 
     Minimises sum_p w_p (h(x_p) - z_p)^2 + STIFFNESS |second differences of h|^2 on NODES knots with bilinear
@@ -167,7 +169,7 @@ def surface(grid: Ground, points: Float[Array, "n 3"]) -> Float[Array, "rows col
     return map_coordinates(knots.reshape(ny, nx), np.meshgrid(row, column, indexing="ij"), order=1, mode="nearest")
 
 
-def smoothed(values: Float[Array, "rows columns"], cells: float) -> Float[Array, "rows columns"]:
+def smooth(values: Float[Array, "rows columns"], cells: float) -> Float[Array, "rows columns"]:
     """Gaussian blur over the grid; borders repeat."""
     return gaussian_filter(values, cells, mode="nearest")
 
@@ -194,7 +196,7 @@ def _second(n: int):
     return diags([np.ones(n - 2), -2 * np.ones(n - 2), np.ones(n - 2)], [0, 1, 2], shape=(n - 2, n))
 
 
-def write(grid: Ground, path: Path | str) -> None:
+def write_ground(grid: Ground, path: Path | str) -> None:
     """Write heights and the seen cells as the channels Z and seen of an EXR, the grid's place in its header."""
     header = {
         "west": grid.west,
@@ -211,10 +213,10 @@ def write(grid: Ground, path: Path | str) -> None:
     )
 
 
-def read(path: Path | str) -> Ground:
-    """Read what `write` wrote; heights come back as stored, in float32.
+def read_ground(path: Path | str) -> Ground:
+    """Read a ground; heights have the stored precision, float32.
 
-    Raises: InputError: not readable, or another program's.
+    Raises: InputError: not readable, or not a ground.
     """
     channels, header = image_files.read_exr(path)
     try:

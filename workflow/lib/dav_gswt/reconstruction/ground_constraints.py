@@ -1,8 +1,8 @@
-"""The rules of a ground with things on it, for the fit.
+"""Constraints of a fit over a ground with objects on it.
 
-Discs keep to their cell, to the surface's tangent plane and to near-full opacity; their heights move nearly together
-(the gradient is blurred a little over the grid). The underlay follows them: no sky shines through. Things stay under
-the ceiling: what is above it the photos see through.
+Discs stay in their cell, tangent to the surface and nearly opaque; their heights move together (the gradient is
+slightly blurred over the grid). The underlay follows them, so that no sky shines through. Objects stay below a ceiling,
+above which the photos see through.
 """
 
 from dataclasses import replace
@@ -13,61 +13,61 @@ from numpy import ndarray as Array
 
 from dav_gswt.raster import Gradients
 from dav_gswt.reconstruction import underlay
-from dav_gswt.reconstruction.discs import THICKNESS, quaternions
-from dav_gswt.reconstruction.fitting.constraints import LOGITS, bounded
-from dav_gswt.reconstruction.ground import Ground, smoothed
+from dav_gswt.reconstruction.discs import THICKNESS, slopes_to_quaternions
+from dav_gswt.reconstruction.fitting.constraints import LOGITS, clip_sizes
+from dav_gswt.reconstruction.ground import Ground, smooth
 
-TOGETHER = 0.5  # cells over which heights move together
-HOME = 0.49  # spacings that a disc may leave its cell's centre
+SMOOTHING = 0.5  # cells: blur of the gradients of heights
+MAX_OFFSET = 0.49  # spacings between a disc and its cell's centre
 DISC_SIZES = 0.5, 1.5  # spacings
-THING_SIZES = 0.1, 1.5  # spacings: from the finest detail the photos resolve to what a disc covers
+OBJECT_SIZES = 0.1, 1.5  # spacings: from the finest detail the photos resolve to a disc
 DISC_LOGITS = 2.5, 6.0
 
 
-class OnGround:
-    """Rules for a field whose first Gaussians are the discs of `grid`, row by row, and then their underlay.
+class GroundConstraints:
+    """Constraints of a field whose first Gaussians are the discs of `grid`, row by row, and then their underlay.
 
-    ceiling: how high above the surface anything may be, by cell.
+    ceiling: the largest height of objects above the surface, by cell.
     """
 
     def __init__(self, grid: Ground, ceiling: Float[Array, "rows columns"]):
-        self.discs, self.reach = grid.heights.size, grid.spacing
-        self.fixed = self.discs + underlay.count(grid)
+        self.discs, self.detail = grid.heights.size, grid.spacing
+        self.fixed = self.discs + underlay.count_gaussians(grid)
         self.grid, self.ceiling = grid, replace(grid, heights=ceiling)
-        self.home = grid.centres[:, :2].astype(np.float32)
+        self.centres = grid.centres[:, :2].astype(np.float32)
 
-    def guide(self, gradients: Gradients) -> None:
-        """Heights move together; discs turn with the surface (see `keep`)."""
+    def adjust_gradients(self, gradients: Gradients) -> None:
+        """Heights move together; discs turn with the surface (see `project_parameters`)."""
         up = gradients.means[: self.discs, 2].reshape(self.grid.shape)
-        gradients.means[: self.discs, 2] = smoothed(up, TOGETHER).ravel()
+        gradients.means[: self.discs, 2] = smooth(up, SMOOTHING).ravel()
         gradients.quats[: self.discs] = 0
         for part in vars(gradients).values():
             if part is not None and len(part) > self.discs:
                 part[self.discs : self.fixed] = 0
 
-    def keep(self, values: dict[str, Array]) -> None:
-        """Project onto what a ground with things on it may be."""
+    def project_parameters(self, values: dict[str, Array]) -> None:
+        """Discs onto their cells, tangents and sizes; the underlay below them; objects onto their sizes."""
         n, s = self.discs, self.grid.spacing
         means, scales, logits = values["means"], values["log_scales"], values["opacity_logits"]
-        np.clip(means[:n, :2], self.home - HOME * s, self.home + HOME * s, out=means[:n, :2])
-        values["quats"][:n] = quaternions(*(g.ravel() for g in self.surface(values).slopes()))
+        np.clip(means[:n, :2], self.centres - MAX_OFFSET * s, self.centres + MAX_OFFSET * s, out=means[:n, :2])
+        values["quats"][:n] = slopes_to_quaternions(*(g.ravel() for g in self.surface(values).slopes()))
         np.clip(scales[:n, :2], *np.log(np.multiply(DISC_SIZES, s)), out=scales[:n, :2])
         scales[:n, 2] = np.log(THICKNESS * s)
         np.clip(logits[:n], *DISC_LOGITS, out=logits[:n])
-        underlay.follow(self.grid, values)
-        bounded(scales[self.fixed :], *np.multiply(THING_SIZES, s))
+        underlay.update_underlay(self.grid, values)
+        clip_sizes(scales[self.fixed :], *np.multiply(OBJECT_SIZES, s))
         np.clip(logits[self.fixed :], *LOGITS, out=logits[self.fixed :])
 
-    def lost(self, values: dict[str, Array]) -> Bool[Array, "n"]:
-        """Things under the ground, above the ceiling, or off the grid."""
-        things = values["means"][self.fixed :]
-        above = things[:, 2] - self.surface(values).height_at(things)
+    def find_misplaced(self, values: dict[str, Array]) -> Bool[Array, "n"]:
+        """Objects under the ground, above the ceiling, or off the grid."""
+        standing = values["means"][self.fixed :]
+        above = standing[:, 2] - self.surface(values).height_at(standing)
         out = np.zeros(len(values["means"]), bool)
-        out[self.fixed :] = (above < -self.grid.spacing) | (above > self.ceiling.height_at(things))
-        out[self.fixed :] |= ~self.grid.contains(things)
+        out[self.fixed :] = (above < -self.grid.spacing) | (above > self.ceiling.height_at(standing))
+        out[self.fixed :] |= ~self.grid.contains(standing)
         return out
 
     def surface(self, values: dict[str, Array]) -> Ground:
-        """The grid with the heights that its discs have now."""
+        """The grid with the current heights of its discs."""
         heights = values["means"][: self.discs, 2].reshape(self.grid.shape)
         return replace(self.grid, heights=heights.astype(float))

@@ -1,4 +1,4 @@
-"""What stands on the ground, as Gaussians: the shell that the sweep saw, down to the ground at its rims."""
+"""Objects on the ground as Gaussians: the shell that the sweep saw, down to the ground at its rims."""
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -13,64 +13,66 @@ from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.plane_sweep import Relief
 
 SIZE = 0.6  # standard deviation of a shell's Gaussian, in cells of the sweep
-APART = 1.2  # cells between the Gaussians of a wall, from above to below
+WALL_SPACING = 1.2  # cells between the Gaussians of a wall, vertically
 OPAQUE = 2.0  # opacity logit of a shell before the first step
-CLEARANCE = 2.0  # cells of the sweep that a thing may grow beyond what the sweep saw
-ALONE = 4.0  # spacings to its neighbours from which a point in the air is taken for a wrong match
-LONE = 1.5  # spacings above the surface from which a point is that of a thing
+CLEARANCE = 2.0  # cells of the sweep that an object may extend beyond what the sweep saw
+MAX_ISOLATION = 4.0  # spacings to its neighbours, beyond which a point in the air is a wrong match
+MIN_HEIGHT = 1.5  # spacings above the surface, beyond which a point belongs to an object
 
 
-def shell(relief: Relief, views: list[TrainingView]) -> GaussianField:
-    """Round Gaussians over the cells where something stands, and below each down to its lowest neighbour."""
+def make_shell(relief: Relief, views: list[TrainingView]) -> GaussianField:
+    """Round Gaussians at the top of cells with an object, and below down to the lowest neighbouring cell."""
     grid, cell = relief.grid, relief.grid.spacing
     tops = np.where(relief.stands, relief.above, 0)
     lowest = minimum_filter(tops, footprint=[[0, 1, 0], [1, 1, 1], [0, 1, 0]])
     rows = np.flatnonzero(relief.stands)
     places = grid.centres[rows]
     top, drop = tops.ravel()[rows], (tops - lowest).ravel()[rows]
-    layers = np.maximum(1, np.ceil(drop / (APART * cell)).astype(int))
+    layers = np.maximum(1, np.ceil(drop / (WALL_SPACING * cell)).astype(int))
     which = np.repeat(np.arange(len(rows)), layers)
     down = np.arange(len(which)) - np.repeat(np.cumsum(layers) - layers, layers)
     points = places[which]
-    points[:, 2] += top[which] - down * APART * cell
+    points[:, 2] += top[which] - down * WALL_SPACING * cell
     colours, known = median_colours(points, views)
-    return blobs(points[known], colours[known], np.full(int(known.sum()), SIZE * cell))
+    return make_blobs(points[known], colours[known], np.full(int(known.sum()), SIZE * cell))
 
 
-def lone_points(
+def make_isolated_points(
     grid: Ground, relief: Relief, points: Float[Array, "n 3"], colours: Float[Array, "n 3"], band: float
 ) -> GaussianField:
-    """Gaussians at matched points that stand together above the surface, up to `band`, where the sweep saw nothing."""
+    """Gaussians at groups of matched points above the surface, up to `band`, where the sweep saw nothing."""
     inside = grid.contains(points)
     points, colours = points[inside], colours[inside]
     above = points[:, 2] - grid.height_at(points)
     known = relief.grid.contains(points)
     taken = np.zeros(len(points), bool)
     taken[known] = _at(relief.grid, maximum_filter(relief.stands, 3), points[known])
-    stand = (above > LONE * grid.spacing) & (above < band) & ~taken
+    stand = (above > MIN_HEIGHT * grid.spacing) & (above < band) & ~taken
     points, colours = points[stand], colours[stand]
     apart = cKDTree(points).query(points, k=4)[0][:, 1:].mean(1) if len(points) > 3 else np.full(len(points), np.inf)
-    together = apart < ALONE * grid.spacing
+    together = apart < MAX_ISOLATION * grid.spacing
     size = np.clip(0.5 * apart[together], 0.5 * grid.spacing, 1.5 * grid.spacing)
-    return blobs(points[together], colours[together], size, logit=0.0)
+    return make_blobs(points[together], colours[together], size, logit=0.0)
 
 
-def ceiling(grid: Ground, relief: Relief, things: GaussianField) -> Float[Array, "rows columns"]:
-    """How high above the surface anything may be, by cell of the ground: all above it the photos see through.
+def compute_ceiling(grid: Ground, relief: Relief, standing: GaussianField) -> Float[Array, "rows columns"]:
+    """Largest height of objects above the surface, by cell of the ground; the photos see through all above.
 
-    The highest that the sweep or a matched point stands within CLEARANCE cells, and CLEARANCE cells more.
+    It is the largest height of the sweep and of Gaussians within CLEARANCE cells, and CLEARANCE cells more.
     """
     tops = np.where(relief.stands, relief.above, 0)
-    if len(things):
-        row, column = _cell(relief.grid, things.means)
-        above = things.means[:, 2] - relief.grid.height_at(things.means)
+    if len(standing):
+        row, column = _cell(relief.grid, standing.means)
+        above = standing.means[:, 2] - relief.grid.height_at(standing.means)
         np.maximum.at(tops, (row, column), above)
     reach = 2 * int(CLEARANCE) + 1
     return relief.onto(grid, maximum_filter(tops, reach)) + CLEARANCE * relief.grid.spacing
 
 
-def blobs(points: Float[Array, "n 3"], colours: Float[Array, "n 3"], sizes: Float[Array, "n"], logit: float = OPAQUE):
-    """Round Gaussians as a field of things."""
+def make_blobs(
+    points: Float[Array, "n 3"], colours: Float[Array, "n 3"], sizes: Float[Array, "n"], logit: float = OPAQUE
+):
+    """Round Gaussians at points."""
     n = len(points)
     quats = np.zeros((n, 4), np.float32)
     quats[:, 0] = 1

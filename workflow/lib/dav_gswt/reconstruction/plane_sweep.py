@@ -1,11 +1,10 @@
-"""How high does what the photos see stand? A plane sweep over the ground grid, made smooth by dynamic programming.
+"""Plane sweep: the heights of objects above the ground's surface, by photo consistency.
 
-For every cell and every height above the surface the photos that see the place are compared: where it is truly there
-they agree. This finds trees, shrubs and stones from photos taken straight from above, and the finer relief that the
-sparse points of structure from motion miss. Sand is like sand, so photos also agree where nothing is; but what stood
-there would hide ground that they agree on as well, which tells it apart (`sight`). Costs are summed along rows and
-columns as semi-global matching does (Hirschmueller 2008), so that sand without texture takes the height of its
-neighbours.
+For every cell and height above the surface the photos that see the point are compared: they agree where a surface is.
+This finds trees, shrubs and stones even in photos straight from above, and relief that the sparse points of structure
+from motion miss. Photos also agree by chance on uniform ground; but an object there would hide ground that they agree
+on as well, which rules it out (`visibility`). Costs are summed along rows and columns as in semi-global matching
+(Hirschmueller 2008), so that ground without texture takes the height of its neighbours.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -20,26 +19,26 @@ from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import visibility
 from dav_gswt.reconstruction.ground import Ground
 
-MOST_CELLS = 60_000  # of the sweep's own grid: what it costs hardly depends on the photos' size
+MAX_CELLS = 60_000  # of the sweep's own grid
 LOW, HIGH = -0.02, 0.3  # heights tried, in flying heights over the surface
 WINDOW = 2.0  # cells: standard deviation of the window over which photos are compared
-ONE_STEP, MORE_STEPS = 0.01, 0.06  # what a change of height by one step, by more, costs from cell to cell
-AIR = 0.01  # what standing in the air costs: without a reason nothing does
-BETTER = 0.8  # of the surface's cost: what stands must agree at least so much better
-UNKNOWN = 0.3  # cost where fewer than two photos look
+ONE_STEP, MORE_STEPS = 0.01, 0.06  # cost of a change of height by one step, by more, between cells
+AIR_COST = 0.01  # of any height above the surface
+MAX_COST = 0.8  # of an object, in costs of the surface
+UNKNOWN_COST = 0.3  # where fewer than two photos look
 SUPPORT = 0.7  # of the photos that see the surface must see a height above it
-WITNESSES = 3  # photos without which nothing stands: two agree anywhere along a stripe
-SLANT = 2.0  # of a look, its run over its fall: so far beyond the grid (half of it at most) the ground is compared too
-SLENDER = 4.0  # a thing is at most so much higher than wide: more is a mistaken match
+MIN_PHOTOS = 3  # that must agree on an object: two agree anywhere along a stripe
+SLANT = 2.0  # run over fall of a ray: how far beyond the grid (half of it at most) the ground is compared too
+MAX_SLENDERNESS = 4.0  # height over width of an object: more is a wrong match
 THREADS = 4  # at most; changes no result
-STANDS = 2.0  # steps above the surface from which a height is that of a thing
+OBJECT_STEPS = 2.0  # steps above the surface, beyond which a height belongs to an object
 
 
 @dataclass(frozen=True)
 class Relief:
-    """What the sweep found, on the cells of a grid that is coarser than the ground's.
+    """The result of the sweep, on a grid coarser than the ground's.
 
-    above: height over the surface. stands: a thing is there. known: at least two photos look there.
+    above: height over the surface. stands: whether an object is there. known: whether at least two photos look there.
     """
 
     grid: Ground
@@ -55,42 +54,42 @@ class Relief:
         return map_coordinates(values.astype(float), [row, column], order=1, mode="nearest").reshape(grid.shape)
 
 
-def sweep(grid: Ground, views: list[TrainingView], flying_height: float, pixel: float) -> Relief:
+def sweep_heights(grid: Ground, views: list[TrainingView], flying_height: float, pixel: float) -> Relief:
     """Sweep heights LOW to HIGH over the grid's surface, in steps of `pixel`, a pixel's size on the ground."""
-    stride = max(1, int(np.ceil(np.sqrt(grid.heights.size / MOST_CELLS))))
-    coarse = thinned(grid, stride)
+    stride = max(1, int(np.ceil(np.sqrt(grid.heights.size / MAX_CELLS))))
+    coarse = coarsen_grid(grid, stride)
     step = max(pixel, coarse.spacing / 2)
     heights = step * np.arange(np.floor(LOW * flying_height / step), np.ceil(HIGH * flying_height / step) + 1)
-    costs, photos = disagreement(coarse, views, heights)
+    costs, photos = measure_disagreement(coarse, views, heights)
     known = photos >= 2
     surface = int(np.abs(heights).argmin())
-    see_through(costs, coarse, views, heights, costs[surface].copy(), STANDS * step)
-    in_air = (np.abs(heights) > STANDS * step)[:, None, None] * np.float32(AIR)
-    summed = aggregated(costs + in_air, ONE_STEP, MORE_STEPS)
+    reject_seen_through(costs, coarse, views, heights, costs[surface].copy(), OBJECT_STEPS * step)
+    in_air = (np.abs(heights) > OBJECT_STEPS * step)[:, None, None] * np.float32(AIR_COST)
+    summed = aggregate_costs(costs + in_air, ONE_STEP, MORE_STEPS)
     best = summed.argmin(0)
     cost = np.take_along_axis(costs, best[None], 0)[0]
-    sure = (photos >= WITNESSES) & (cost <= BETTER * costs[surface])
-    above = np.where(known, _between(summed, best, heights), 0)
-    stands = stout(sure & (above > STANDS * step), above, coarse.spacing)
-    near = np.abs(above) <= STANDS * step
+    sure = (photos >= MIN_PHOTOS) & (cost <= MAX_COST * costs[surface])
+    above = np.where(known, _refine_heights(summed, best, heights), 0)
+    stands = reject_columns(sure & (above > OBJECT_STEPS * step), above, coarse.spacing)
+    near = np.abs(above) <= OBJECT_STEPS * step
     return Relief(coarse, np.where(stands | near, above, 0), stands, known, step)
 
 
-def stout(
+def reject_columns(
     stands: Bool[Array, "rows columns"], above: Float[Array, "rows columns"], cell: float
 ) -> Bool[Array, "rows columns"]:
-    """Those of the cells that are not a column in the air: no higher than SLENDER times the patch is wide that stands
-    at least half as high (within a factor of two). above: positive where something stands."""
+    """The cells without columns in the air: a cell is at most MAX_SLENDERNESS times as high as the patch is wide whose
+    cells are at least as high, within a factor of two. above: positive where an object stands."""
     found, low = stands.copy(), above[stands].min(initial=np.inf)
     while (band := stands & (above >= low)).any():
         patch, count = label(band, np.ones((3, 3)))
         wide = cell * np.sqrt(np.bincount(patch.ravel(), minlength=count + 1))
-        found &= ~(band & (above < 2 * low) & (above > SLENDER * wide[patch]))
+        found &= ~(band & (above < 2 * low) & (above > MAX_SLENDERNESS * wide[patch]))
         low *= 2
     return found
 
 
-def thinned(grid: Ground, stride: int) -> Ground:
+def coarsen_grid(grid: Ground, stride: int) -> Ground:
     """A grid over (nearly) the same ground whose cells are `stride` times as wide."""
     rows, columns = (max(1, n // stride) for n in grid.shape)
     part = grid.heights[: rows * stride, : columns * stride]
@@ -98,7 +97,7 @@ def thinned(grid: Ground, stride: int) -> Ground:
     return replace(grid, spacing=stride * grid.spacing, heights=heights, seen=np.zeros(heights.shape, bool))
 
 
-def padded(grid: Ground, cells: int) -> Ground:
+def pad_grid(grid: Ground, cells: int) -> Ground:
     """The grid with so many more cells on every side, as high as its border."""
     off, seen = cells * grid.spacing, np.pad(grid.seen, cells)
     heights = np.pad(grid.heights, cells, mode="edge")
@@ -114,35 +113,35 @@ def padded(grid: Ground, cells: int) -> Ground:
     )
 
 
-def disagreement(
+def measure_disagreement(
     grid: Ground, views: list[TrainingView], heights: Float[Array, "h"]
 ) -> tuple[Float32[Array, "h rows columns"], Float32[Array, "rows columns"]]:
-    """Standard deviation of the photos' colours at each height over each cell, averaged over a window of cells.
+    """Standard deviation of the photos' colours at each height over each cell, averaged over a window of cells, and the
+    number of photos that see each cell's surface.
 
-    Also: how many photos see each cell's surface. A height that far fewer photos see than the surface under it costs
-    UNKNOWN: two photos that share little agree somewhere.
+    A height that far fewer photos see than the surface below it costs UNKNOWN_COST: few photos agree by chance.
     """
     places = grid.centres.astype(np.float32)
     starts = [
         (places @ v.camera.rotation.T.astype(np.float32) + v.camera.translation.astype(np.float32)) for v in views
     ]
 
-    number = _spread(views, starts, np.float32(0))[1]
+    number = _colour_deviation(views, starts, np.float32(0))[1]
     least = np.maximum(2, SUPPORT * number)
 
     def at(height: float) -> Array:
-        spread, count = _spread(views, starts, np.float32(height))
+        spread, count = _colour_deviation(views, starts, np.float32(height))
         spread, seen = (a.reshape(grid.shape) for a in (spread, count >= least))
         weight = gaussian_filter(seen.astype(np.float32), WINDOW, mode="nearest")
         mean = gaussian_filter(np.where(seen, spread, 0), WINDOW, mode="nearest") / np.maximum(weight, 1e-6)
-        return np.where(seen, mean, np.float32(UNKNOWN))
+        return np.where(seen, mean, np.float32(UNKNOWN_COST))
 
     with ThreadPoolExecutor(THREADS) as pool:  # NumPy works beside itself; each height is on its own
         costs = list(pool.map(at, heights))
     return np.stack(costs).astype(np.float32, copy=False), number.reshape(grid.shape)
 
 
-def see_through(
+def reject_seen_through(
     costs: Float32[Array, "h rows columns"],
     grid: Ground,
     views: list[TrainingView],
@@ -150,31 +149,33 @@ def see_through(
     surface: Float32[Array, "rows columns"],
     lowest: float,
 ) -> None:
-    """UNKNOWN becomes the cost of heights over `lowest` where a thing would hide ground that the photos agree on nearly
-    as well as on the thing: most that see the place see through it. So it does where too few see ground behind to tell.
-    surface: cost of the ground."""
-    around = padded(grid, min(int(np.ceil(SLANT * heights.max() / grid.spacing)), min(grid.shape) // 2))
-    (ground,), photos = disagreement(around, views, np.zeros(1))
+    """Set the cost of heights above `lowest` to UNKNOWN_COST where the photos see through: an object there would hide
+    ground that they agree on nearly as well as on the object, or too few photos see ground behind it.
+
+    surface: cost of the ground. Changes costs in place.
+    """
+    around = pad_grid(grid, min(int(np.ceil(SLANT * heights.max() / grid.spacing)), min(grid.shape) // 2))
+    (ground,), photos = measure_disagreement(around, views, np.zeros(1))
     ground = np.where(photos >= 2, ground, np.float32(np.nan))
     places = grid.centres.astype(np.float32)
 
     def at(height: float, cost: Float32[Array, "rows columns"]) -> None:
-        rows = np.flatnonzero(cost <= BETTER * surface)  # elsewhere nothing would stand anyway
-        behind = visibility.behind(around, ground, places[rows] + np.float32([0, 0, height]), views, WITNESSES)
-        cost.ravel()[rows[~(cost.ravel()[rows] <= BETTER * behind)]] = UNKNOWN
+        rows = np.flatnonzero(cost <= MAX_COST * surface)  # elsewhere nothing would stand anyway
+        behind = visibility.median_behind(around, ground, places[rows] + np.float32([0, 0, height]), views, MIN_PHOTOS)
+        cost.ravel()[rows[~(cost.ravel()[rows] <= MAX_COST * behind)]] = UNKNOWN_COST
 
     over = np.flatnonzero(heights > lowest)
     with ThreadPoolExecutor(THREADS) as pool:
         list(pool.map(at, heights[over].tolist(), costs[over[0] :] if len(over) else []))
 
 
-def _spread(
+def _colour_deviation(
     views: list[TrainingView], starts: list[Array], height: np.float32
 ) -> tuple[Float32[Array, "n"], Float32[Array, "n"]]:
     n = len(starts[0])
     total, squares, count = np.zeros((n, 3), np.float32), np.zeros(n, np.float32), np.zeros(n, np.float32)
     for view, start in zip(views, starts, strict=True):
-        rows, colours = _bilinear(view, start + height * view.camera.rotation[:, 2].astype(np.float32))
+        rows, colours = _sample_bilinear(view, start + height * view.camera.rotation[:, 2].astype(np.float32))
         total[rows] += colours
         squares[rows] += np.einsum("nc,nc->n", colours, colours)
         count[rows] += 1
@@ -183,10 +184,10 @@ def _spread(
     return np.sqrt(np.maximum(variance, 0)), count
 
 
-def _bilinear(view: TrainingView, q: Float32[Array, "n 3"]) -> tuple[Array, Float32[Array, "m 3"]]:
+def _sample_bilinear(view: TrainingView, q: Float32[Array, "n 3"]) -> tuple[Array, Float32[Array, "m 3"]]:
     """Rows of the points (in the camera's frame) that the photo sees, and its colours there."""
     camera = view.camera
-    rows, x, y = visibility.seen(view, q)
+    rows, x, y = visibility.project_visible(view, q)
     column, row = x.astype(np.int32), y.astype(np.int32)
     right, down = ((at - cell).astype(np.float32)[:, None] for at, cell in ((x, column), (y, row)))
     flat, at = view.image.reshape(-1, 3), row * camera.width + column
@@ -195,7 +196,9 @@ def _bilinear(view: TrainingView, q: Float32[Array, "n 3"]) -> tuple[Array, Floa
     return rows, top * (1 - down) + bottom * down
 
 
-def aggregated(costs: Float32[Array, "h rows columns"], one: float, more: float) -> Float32[Array, "h rows columns"]:
+def aggregate_costs(
+    costs: Float32[Array, "h rows columns"], one: float, more: float
+) -> Float32[Array, "h rows columns"]:
     """Sum over four directions of the least cost of a path of heights that ends in a cell.
 
     L(p, h) = C(p, h) + min(L(q, h), L(q, h +- 1) + one, min over g of L(q, g) + more) - min over g of L(q, g), q: the
@@ -219,7 +222,9 @@ def aggregated(costs: Float32[Array, "h rows columns"], one: float, more: float)
     return total
 
 
-def _between(costs: Float32[Array, "h rows columns"], best: Array, heights: Array) -> Float[Array, "rows columns"]:
+def _refine_heights(
+    costs: Float32[Array, "h rows columns"], best: Array, heights: Array
+) -> Float[Array, "rows columns"]:
     """The height of the parabola's minimum through the best cost and its two neighbours."""
     middle = np.clip(best, 1, len(heights) - 2)
     low, at, high = (np.take_along_axis(costs, (middle + k)[None], 0)[0].astype(float) for k in (-1, 0, 1))

@@ -1,8 +1,8 @@
-"""An update is bounded: it never shows the earlier photos worse than before it by more than `bound`.
+"""Regression guard: an update may not show the earlier photos worse than before it by more than a bound.
 
-A photo whose pose is wrong, or of another place, contradicts those before it, and a fit settles between them. Compared
-is how well the field shows each photo, its exposure fitted, over the pixels that count in the fit; what is lost above
-CLEAR nobody sees, and it does not count: a field fitted to a photo's noise shows it at 44 dB and must give that up.
+A photo of a wrong pose or of another place contradicts the earlier ones, and a fit settles between them. The guard
+compares how well the field shows each photo: PSNR after the exposure is fitted, over the pixels that count in the fit.
+Losses above VISIBLE_PSNR cannot be seen and do not count: a field that shows a photo's noise may give that up.
 """
 
 import logging
@@ -17,134 +17,129 @@ from dav_gswt.field import GaussianField
 from dav_gswt.images import metrics
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import to_raster_arrays
-from dav_gswt.reconstruction.fitting.plan import Plan
-from dav_gswt.reconstruction.fitting.trainer import Fitted
+from dav_gswt.reconstruction.fitting.plan import EarlierViews, FitPlan, NewViews, UpdateReport
+from dav_gswt.reconstruction.fitting.trainer import FitResult
 
 _log = logging.getLogger(__name__)
 
-# dB that the earlier photos may lose on average. A field fitted to 8 photos shows those better than one fitted to 12 or
-# 67: ordinary updates from 8 to 12 (desert and meadow, for development) lost 2.6 (one of them above CLEAR) and 1.9.
-# With more photos (caliterra_earthworks, before haze was pruned) it was 1.9 to 20, 2.2 to 32, 2.5 to 67: a little more
-# is allowed for each doubling. The same updates with the four poses exchanged lost 8.0 (one above CLEAR) and 3.3; with
-# one wrong pose of the four 3.3 (one above CLEAR) and 2.0: harm is bounded, and where it is less a wrong photo passes.
-BOUND, DOUBLED = 2.5, 0.5
-AGAIN = 2  # times that a fit goes on for as many steps as at first
-CLEAR = 40.0  # dB: pixels differ by 2.6 of 255 grey levels
-SAME = 100.0  # dB that stand for equal pictures
+# dB that the earlier photos may lose on average, and how much more for each doubling of the photos
+ALLOWED_LOSS, LOSS_PER_DOUBLING = 2.5, 0.5
+RETRIES = 2  # more fits of as many steps
+VISIBLE_PSNR = 40.0  # dB: pixels differ by 2.6 of 255 grey levels
+EQUAL_PSNR = 100.0  # dB that stand for equal pictures
 
 
 @dataclass(frozen=True)
-class Update:
-    """field: what the fit made, or the one from before where that is handed on. taken: the fit's."""
+class GuardedUpdate:
+    """field: of the last fit if it was accepted, else the one from before."""
 
     field: GaussianField
-    taken: bool
-    report: dict
+    accepted: bool
+    report: UpdateReport
 
 
-def update(
+def fit_with_guard(
     field: GaussianField,
     start: GaussianField,
     earlier: list[TrainingView],
     new: list[TrainingView],
-    plan: Plan,
-    fit: Callable[[GaussianField, Plan], Fitted],
-) -> Update:
-    """Fit; while the earlier photos have lost more than `bound` fit on, AGAIN times at most; then the field before.
+    plan: FitPlan,
+    fit: Callable[[GaussianField, FitPlan], FitResult],
+) -> GuardedUpdate:
+    """Fit, and go on fitting, RETRIES times at most, while the earlier photos have lost too much.
 
-    field: from before the new photos. start: what the fit starts from. fit: to all views. Where no earlier photo has a
-    pixel that counts there is nothing to lose.
+    field: from before the new photos; it is kept if the loss stays above the bound. start: what the fit starts from.
+    fit: to all views. Where no earlier photo has a pixel that counts, nothing can be lost.
     """
-    before, fitted = shown(field, earlier), fit(start, plan)
-    most = bound(len(earlier), len(new))
-    fits, reached = [vars(fitted.report)], [shown(fitted.field, earlier)]
-    while lost(before, reached[-1]) > most and len(fits) <= AGAIN:
-        _log.info("the earlier photos lost %.2f dB: fitting on", lost(before, reached[-1]))
-        fitted = fit(fitted.field, replace(plan, steps=fits[0]["steps"]))
-        fits.append(vars(fitted.report))
-        reached.append(shown(fitted.field, earlier))
-    taken = lost(before, reached[-1]) <= most
-    if not taken:
+    before, fitted = measure_psnr(field, earlier), fit(start, plan)
+    most = allowed_loss(len(earlier), len(new))
+    fits, reached = [fitted.report], [measure_psnr(fitted.field, earlier)]
+    while mean_loss(before, reached[-1]) > most and len(fits) <= RETRIES:
+        _log.info("the earlier photos lost %.2f dB: fitting on", mean_loss(before, reached[-1]))
+        fitted = fit(fitted.field, replace(plan, steps=fits[0].steps))
+        fits.append(fitted.report)
+        reached.append(measure_psnr(fitted.field, earlier))
+    loss = mean_loss(before, reached[-1])
+    accepted = loss <= most
+    if not accepted:
         _log.warning(
             "the new photos contradict the earlier ones: with %s the field shows those %.2f dB worse (bound: %.2g dB). "
             "The field from before is handed on, and no later fit sees these photos; is a pose wrong, or a photo of "
             "another place?",
             ", ".join(view.name for view in new),
-            lost(before, reached[-1]),
+            loss,
             most,
         )
-    kept = fitted.field if taken else field
-    done = f"the field of fit {len(fits)}" if taken else f"the field from before, after {len(fits)} fits"
-    report = _joined(fits) | {"gaussians": len(kept)}
-    report["earlier_views"] = {
-        "photos": len(earlier),
-        "psnr_before": _mean(before),
-        "psnr_after": _mean(reached[-1] if taken else before),
-        "psnr_of_fits": [_mean(each) for each in reached],
-        "lost": lost(before, reached[-1]) if taken else 0.0,
-        "bound": most,
-        "handed_on": done,
-    }
-    return Update(kept, taken, report | {"new_views": _of_new(new, field, kept, taken)})
+    kept = fitted.field if accepted else field
+    done = f"the field of fit {len(fits)}" if accepted else f"the field from before, after {len(fits)} fits"
+    report = UpdateReport(
+        steps=sum(each.steps for each in fits),
+        gaussians=len(kept),
+        degree=fits[-1].degree,
+        choices=[choice for each in fits for choice in each.choices],
+        held_out=fits[-1].held_out,
+        earlier_views=EarlierViews(
+            photos=len(earlier),
+            psnr_before=_mean(before),
+            psnr_after=_mean(reached[-1] if accepted else before),
+            psnr_of_fits=[_mean(each) for each in reached],
+            lost=loss if accepted else 0.0,
+            bound=most,
+            handed_on=done,
+        ),
+        new_views=_report_new_views(new, field, kept, accepted),
+    )
+    return GuardedUpdate(kept, accepted, report)
 
 
-def bound(earlier: int, new: int) -> float:
-    """dB that so many earlier photos may lose to so many new ones: BOUND, and DOUBLED for each doubling."""
-    return BOUND + (DOUBLED * log2((earlier + new) / earlier) if earlier else 0.0)
+def allowed_loss(earlier: int, new: int) -> float:
+    """dB that so many earlier photos may lose to so many new ones."""
+    return ALLOWED_LOSS + (LOSS_PER_DOUBLING * log2((earlier + new) / earlier) if earlier else 0.0)
 
 
-def lost(before: list[float | None], after: list[float | None]) -> float:
-    """dB by which photos are shown worse, on average, counted below CLEAR alone; 0 where no photo is known."""
-    known = [(b, a) for b, a in zip(before, after, strict=True) if b is not None]
-    return float(np.mean([min(b, CLEAR) - min(a, CLEAR) for b, a in known])) if known else 0.0
+def mean_loss(before: list[float | None], after: list[float | None]) -> float:
+    """Mean loss of PSNR in dB, counted below VISIBLE_PSNR only; 0 where no value is known."""
+    known = [(b, a) for b, a in zip(before, after, strict=True) if b is not None and a is not None]
+    return float(np.mean([min(b, VISIBLE_PSNR) - min(a, VISIBLE_PSNR) for b, a in known])) if known else 0.0
 
 
-def unchanged(field: GaussianField) -> dict:
+def report_unchanged(field: GaussianField) -> UpdateReport:
     """The report of a round without new photos."""
-    none = {"steps": 0, "gaussians": len(field), "choices": [], "held_out": [], "earlier_views": None}
-    return none | {"new_views": {"photos": 0, "taken": True, "psnr_before": None, "psnr_after": None, "views": []}}
+    return UpdateReport(gaussians=len(field), degree=None, new_views=NewViews(0, True, None, None, []))
 
 
-def set_aside(reports: Iterable[dict]) -> set[str]:
-    """Names of the photos that contradicted those before them, by the reports of their rounds."""
-    refused = [report["new_views"]["views"] for report in reports if not report["new_views"]["taken"]]
-    return {row["view"] for rows in refused for row in rows}
+def list_rejected_photos(reports: Iterable[dict]) -> set[str]:
+    """Names of the photos that contradicted earlier ones, by their rounds' fit.json."""
+    rejected = [report["new_views"]["views"] for report in reports if not report["new_views"]["taken"]]
+    return {row["view"] for rows in rejected for row in rows}
 
 
-def shown(field: GaussianField, views: list[TrainingView]) -> list[float | None]:
-    """How well a field shows each photo: PSNR in dB, the picture's gain and offset per channel fitted to the photo,
-    over the pixels that count; None where none does."""
-    drawn = raster.Rasterizer()
-    return [_psnr(drawn, field, view) if view.weight.any() else None for view in views]
+def measure_psnr(field: GaussianField, views: list[TrainingView]) -> list[float | None]:
+    """PSNR of each photo in dB over the pixels that count, after a gain and offset per channel; None without any."""
+    rasterizer = raster.Rasterizer()
+    return [_psnr(rasterizer, field, view) if view.weight.any() else None for view in views]
 
 
-def _psnr(drawn: raster.Rasterizer, field: GaussianField, view: TrainingView) -> float:
-    seen = drawn.forward(**to_raster_arrays(field), camera=view.camera)
+def _psnr(rasterizer: raster.Rasterizer, field: GaussianField, view: TrainingView) -> float:
+    seen = rasterizer.forward(**to_raster_arrays(field), camera=view.camera)
     picture = seen.colour
     if view.behind is not None:
         picture = picture + (1 - seen.alpha)[..., None] * np.nan_to_num(view.behind)
     level = np.clip(metrics.correct_colours(np.clip(picture, 0, 1), view.image, view.weight), 0, 1)
     found = metrics.psnr(level.astype(np.float32), view.image, view.weight)
-    return SAME if found is None else min(SAME, float(found))
+    return EQUAL_PSNR if found is None else min(EQUAL_PSNR, float(found))
 
 
-def _of_new(new: list[TrainingView], field: GaussianField, kept: GaussianField, taken: bool) -> dict:
-    """A new photo is an honest test of the field from before it: nothing was fitted to it yet."""
-    before = shown(field, new)
-    after = shown(kept, new) if taken else before
+def _report_new_views(new: list[TrainingView], field: GaussianField, kept: GaussianField, accepted: bool) -> NewViews:
+    """PSNR of the new photos before (an honest test: no fit has seen them) and after the update."""
+    before = measure_psnr(field, new)
+    after = measure_psnr(kept, new) if accepted else before
     rows = [
         {"view": view.name, "psnr_before": b, "psnr_after": a} for view, b, a in zip(new, before, after, strict=True)
     ]
-    means = {"psnr_before": _mean(before), "psnr_after": _mean(after)}
-    return {"photos": len(new), "taken": taken} | means | {"views": rows}
+    return NewViews(len(new), accepted, _mean(before), _mean(after), rows)
 
 
 def _mean(values: list[float | None]) -> float | None:
     known = [value for value in values if value is not None]
     return float(np.mean(known)) if known else None
-
-
-def _joined(fits: list[dict]) -> dict:
-    """Reports of fits that went on from one another, as one."""
-    choices = [choice for fit in fits for choice in fit["choices"]]
-    return fits[-1] | {"steps": sum(fit["steps"] for fit in fits), "choices": choices}

@@ -1,9 +1,9 @@
-"""The sky: what lies behind where rays miss the ground, so that low photos carve things out against it.
+"""The sky: the background of rays that miss the ground, against which low photos carve objects out.
 
-Colours by direction as spherical harmonics of degree 3, one sky for all photos, fitted so that what stands before it
-has no say (least absolute deviations). A pixel above the horizon that has the sky's colour sees through everything: it
-counts, with the sky behind the field. One that has not may show a thing or a far hill that is not modelled: it says
-nothing.
+Its colours by direction are spherical harmonics of degree 3, one sky for all photos, fitted by least absolute
+deviations, so that objects before it have no influence. A pixel above the horizon with the sky's colour sees through
+everything: it counts, with the sky behind the field. Other pixels may show an object or a far hill that is not
+modelled: they do not count.
 """
 
 import logging
@@ -20,41 +20,41 @@ from dav_gswt.raster import harmonics
 _log = logging.getLogger(__name__)
 
 DEGREE = 3
-LEAST = 2000  # pixels above the horizon, of all photos, to know a sky by
-ENOUGH = 50_000  # of them, evenly over the photos, are looked at
+MIN_PIXELS = 2000  # above the horizon, of all photos, to fit a sky
+MAX_PIXELS = 50_000  # of them that are used, evenly over the photos
 ROUNDS = 12  # of reweighting
-RIDGE = 1e-3  # keeps directions that no photo shows near the others' colours
-TRIM, SLACK = 3.0, 0.02  # a pixel is sky within so many median deviations and so much more
-SPLIT = 0.08  # median deviation from which there is no one sky: broken clouds, trees all around
-EDGE = 2  # pixels around what stands against the sky that are neither
+RIDGE = 1e-3  # regularises directions that no photo shows
+TRIM, SLACK = 3.0, 0.02  # a pixel is sky within TRIM median deviations plus SLACK
+MAX_DEVIATION = 0.08  # median deviation, above which there is no single sky: broken clouds, trees all around
+EDGE = 2  # pixels around objects against the sky that are ignored
 
 
-def behind(views: list[TrainingView], modelled: list[TrainingView]) -> list[TrainingView]:
-    """The modelled views with the sky behind them, where they see it.
+def add_sky(views: list[TrainingView], modelled: list[TrainingView]) -> list[TrainingView]:
+    """The modelled views with the sky as background, where they see it.
 
-    views: the photos, counting wherever a photo may be trusted. modelled: the same, counting only over the ground.
-    Without enough sky, or with one that no smooth function shows, they come back as they are.
+    views: the photos, counting wherever they are valid. modelled: the same, counting only over the ground.
+    Without enough sky, or without a smooth one, the modelled views are returned.
     """
-    rising = [_rising(view) for view in views]
+    rising = [_rays_above_horizon(view) for view in views]
     total = sum(int(mask.sum()) for _, mask in rising)
-    if total < LEAST:
+    if total < MIN_PIXELS:
         return modelled
-    stride = max(1, total // ENOUGH)
+    stride = max(1, total // MAX_PIXELS)
     directions = np.concatenate([d[mask] for d, mask in rising])[::stride]
     colours = np.concatenate([view.image[mask] for view, (_, mask) in zip(views, rising, strict=True)])[::stride]
-    coefficients, deviation = fitted(directions, colours)
-    if deviation > SPLIT:
+    coefficients, deviation = fit_sky(directions, colours)
+    if deviation > MAX_DEVIATION:
         _log.info("sky: none that is smooth (its pixels differ by %.2f), it counts for nothing", deviation)
         return modelled
     bound = TRIM * 1.4826 * deviation + SLACK
-    found = [_with(m, v, *r, coefficients, bound) for m, v, r in zip(modelled, views, rising, strict=True)]
+    found = [_mask_sky(m, v, *r, coefficients, bound) for m, v, r in zip(modelled, views, rising, strict=True)]
     seen = sum(int((~np.isnan(v.behind[..., 0])).sum()) for v in found)
     _log.info("sky: %.0f %% of what lies above the horizon", 100 * seen / total)
     return found
 
 
-def fitted(directions: Float[Array, "n 3"], colours: Float32[Array, "n 3"]) -> tuple[Float[Array, "16 3"], float]:
-    """Coefficients of the sky that leaves the least absolute deviation, and the median deviation that it leaves."""
+def fit_sky(directions: Float[Array, "n 3"], colours: Float32[Array, "n 3"]) -> tuple[Float[Array, "16 3"], float]:
+    """Coefficients of the sky with the least absolute deviation, and the median deviation."""
     basis = harmonics.basis(directions, DEGREE)
     weight = np.ones(len(basis))
     ridge = RIDGE * len(basis) * np.diag([0.0] + [1.0] * (basis.shape[1] - 1))
@@ -66,14 +66,16 @@ def fitted(directions: Float[Array, "n 3"], colours: Float32[Array, "n 3"]) -> t
     return coefficients, float(np.median(residual))
 
 
-def _rising(view: TrainingView) -> tuple[Float[Array, "h w 3"], Bool[Array, "h w"]]:
-    """Unit directions of a view's rays, and which of them rise above the horizon and count."""
+def _rays_above_horizon(view: TrainingView) -> tuple[Float[Array, "h w 3"], Bool[Array, "h w"]]:
+    """Unit directions of a view's rays, and which of them are above the horizon and count."""
     _, step = view.camera.rays()
     direction = step / np.linalg.norm(step, axis=-1, keepdims=True)
     return direction, (direction[..., 2] > 0) & (view.weight > 0)
 
 
-def _with(modelled: TrainingView, view: TrainingView, directions, rising, coefficients, bound: float) -> TrainingView:
+def _mask_sky(
+    modelled: TrainingView, view: TrainingView, directions, rising, coefficients, bound: float
+) -> TrainingView:
     sky = np.full(view.image.shape, np.nan, np.float32)
     sky[rising] = np.clip(harmonics.basis(directions[rising], DEGREE) @ coefficients, 0, 1)
     with np.errstate(invalid="ignore"):

@@ -1,7 +1,7 @@
-"""Lines of sight: which places a photo sees, and the ground behind them.
+"""Visibility: which points a photo sees, and the ground behind them.
 
-A photo that sees the ground sees through all that is between: nothing stands there. Kutulakos and Seitz (2000) carve
-space by photos alone; here the ground's height is known, and one look behind a place is enough.
+Where a photo sees the ground, nothing stands between. Kutulakos and Seitz (2000) carve space by photos alone; here the
+ground's height is known, and one ray through a point is enough.
 """
 
 import numpy as np
@@ -11,34 +11,38 @@ from numpy import ndarray as Array
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction.ground import Ground
 
-LOOKS = 3  # at the height of the ground where a ray meets it, each from where the last one was
+ITERATIONS = 3  # of the intersection of a ray with the ground
 
 
-def behind(
+def median_behind(
     grid: Ground,
     values: Float32[Array, "rows columns"],
     places: Float32[Array, "n 3"],
     views: list[TrainingView],
     least: int,
 ) -> Float32[Array, "n"]:
-    """Of each place the median of the ground's values behind it, over the photos that see it; nan where fewer than
-    `least` of them see ground with a value. values: nan where there is none."""
+    """Per point, the median of the ground's values behind it over the photos that see it.
+
+    values: NaN where unknown. The result is NaN where fewer than `least` photos see ground with a value.
+    """
     found = np.full((len(views), len(places)), np.nan, np.float32)
     for row, view in zip(found, views, strict=True):
         rotation, translation = (np.asarray(a, np.float32) for a in (view.camera.rotation, view.camera.translation))
-        sees = seen(view, places @ rotation.T + translation)[0]
-        cells, hit = _met(grid, -rotation.T @ translation, places[sees])
+        sees = project_visible(view, places @ rotation.T + translation)[0]
+        cells, hit = _intersect_ground(grid, -rotation.T @ translation, places[sees])
         row[sees[hit]] = values.ravel()[cells[hit]]
-    found.sort(0)  # what is not a number comes last
+    found.sort(0)  # NaN is sorted last
     number = np.isfinite(found).sum(0)
     middle = np.stack([np.maximum(number - 1, 0) // 2, np.minimum(number // 2, len(views) - 1)])
     median = np.take_along_axis(found, middle, 0).mean(0)
     return np.where(number >= least, median, np.float32(np.nan))
 
 
-def seen(view: TrainingView, q: Float32[Array, "n 3"]) -> tuple[Array, Float32[Array, "m"], Float32[Array, "m"]]:
-    """Rows of the points (in the camera's frame) where the photo counts, and their places in it, pixels from the centre
-    of the first; each has a pixel to its right and below."""
+def project_visible(
+    view: TrainingView, q: Float32[Array, "n 3"]
+) -> tuple[Array, Float32[Array, "m"], Float32[Array, "m"]]:
+    """Rows of the points (in the camera's frame) where the photo counts, and their columns and rows in pixels, from the
+    first pixel's centre; each has a neighbour to the right and below."""
     camera = view.camera
     per_z = 1 / np.where(q[:, 2] > 1e-6, q[:, 2], np.inf)
     x, y = (np.float32(f) * q[:, k] * per_z + np.float32(c - 0.5) for k, f, c in _lens(camera))
@@ -49,14 +53,14 @@ def seen(view: TrainingView, q: Float32[Array, "n 3"]) -> tuple[Array, Float32[A
     return rows[counts], x[counts], y[counts]
 
 
-def _met(grid: Ground, eye: Float32[Array, "3"], places: Float32[Array, "n 3"]) -> tuple[Array, Array]:
-    """Cells of the ground that rays from an eye meet beyond places in the air, and which rays meet any."""
+def _intersect_ground(grid: Ground, eye: Float32[Array, "3"], places: Float32[Array, "n 3"]) -> tuple[Array, Array]:
+    """Cells of the ground that rays from an eye through points meet, and which rays meet any."""
     rows, columns = grid.shape
     down = places - eye
     falls = down[:, 2] < 0
     fall = np.where(falls, down[:, 2], -1)
     z = grid.height_at(places)
-    for _ in range(LOOKS):
+    for _ in range(ITERATIONS):
         at = eye + ((z - eye[2]) / fall)[:, None] * down
         row, column = np.floor((at[:, 1] - grid.south) / grid.spacing), np.floor((at[:, 0] - grid.west) / grid.spacing)
         inside = falls & (row >= 0) & (row < rows) & (column >= 0) & (column < columns)

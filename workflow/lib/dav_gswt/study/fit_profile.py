@@ -21,8 +21,8 @@ from dav_gswt.geometry.scene_frame import SceneFrame, Square, read_scene_frame
 from dav_gswt.images import metrics
 from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
 from dav_gswt.photos.training_views import TrainingView, mask_outside_ground, read_training_view
-from dav_gswt.reconstruction import build
-from dav_gswt.reconstruction.build import FitSettings, Made
+from dav_gswt.reconstruction.coarse import Reconstruction, fit_coarse_field
+from dav_gswt.reconstruction.fit_settings import FitSettings
 from dav_gswt.reconstruction.ground import WHOLE, Ground
 
 FIRST_TEST, EACH = 5, 10
@@ -47,14 +47,14 @@ class PhotoSet:
 class Trial:
     """What came out. curve: rows of seconds, step, psnr, psnr_colour_corrected and Gaussians."""
 
-    made: Made
+    made: Reconstruction
     curve: list[dict]
 
 
 def opened(folder: Path | str, size: int, margin: float = WHOLE) -> PhotoSet:
     """Read a photos/ folder at a size, its test views apart.
 
-    margin: see `build.fit`. Of the test views all pixels count where all ground that photos see is modelled (WHOLE);
+    margin: see `fit_coarse_field`. All pixels of test views count where all ground that photos see is modelled (WHOLE);
     else those that look at the exemplar: at the border of what is modelled relief hides and shows what is not.
     """
     folder = Path(folder)
@@ -95,10 +95,12 @@ def run(photos: PhotoSet, quality: FitSettings, seed: int = 0, every: int = 25) 
 
     rng = np.random.default_rng(seed)
     points, colours = photos.model.points, photos.model.colours
-    made = build.fit(photos.frame, photos.train, points, colours, quality, rng, margin=photos.margin, watch=watch)
+    made = fit_coarse_field(
+        photos.frame, photos.train, points, colours, quality, rng, margin=photos.margin, callback=watch
+    )
     seconds = time.perf_counter() - start - measuring
     last = quality_of(lambda v: raster.render(made.field, v.camera).colour, watched)
-    curve.append({"seconds": seconds, "step": made.report["steps"], "gaussians": len(made.field)} | last)
+    curve.append({"seconds": seconds, "step": made.report.steps, "gaussians": len(made.field)} | last)
     return Trial(made, curve)
 
 
@@ -130,13 +132,15 @@ def free_space_opacity(field: GaussianField, grid: Ground, photos: PhotoSet) -> 
     return float(np.mean([raster.render(high, v.camera).alpha.mean() if len(high) else 0.0 for v in views]))
 
 
-def away(photos: PhotoSet, made: Made) -> dict[str, float]:
+def away(photos: PhotoSet, made: Reconstruction) -> dict[str, float]:
     """Mean PSNR of each group of test views, raw."""
     seen = {g: quality_of(lambda v: raster.render(made.field, v.camera).colour, v) for g, v in photos.tests.items()}
     return {group: quality["psnr"] for group, quality in seen.items()}
 
 
-def stills(made: Made, frame: SceneFrame, width: int = 768, height: int = 512) -> dict[str, Float32[Array, "h w 3"]]:
+def stills(
+    made: Reconstruction, frame: SceneFrame, width: int = 768, height: int = 512
+) -> dict[str, Float32[Array, "h w 3"]]:
     """What nobody photographed: from 45 degrees at the flying height, and from as low as the photos' detail allows.
 
     Low: a disc in the middle of the picture is some eight pixels wide, so all detail that there is shows, and no more.
@@ -165,5 +169,5 @@ def facts(found: Trial, photos: PhotoSet) -> dict:
         "seconds_to": {str(d): seconds_to(found.curve, d) for d in (30.0, 33.0, 34.0)},
         "free_space_opacity": free_space_opacity(made.field, made.grid, photos),
         "away_psnr": away(photos, made),
-        "choices": made.report["choices"],
+        "choices": made.report.choices,
     }

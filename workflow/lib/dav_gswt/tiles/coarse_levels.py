@@ -32,7 +32,7 @@ def merge_cells(tile: GaussianField, cells: int, spacing: float) -> GaussianFiel
     under = find_underlay(tile, spacing)
     known, (*colour, height, doubt, logit, size) = _average_discs(tile[tile.ground], cells // 2, 2 * spacing)
     grid = Ground(0.0, 0.0, 2 * spacing, 0, 0, cells // 2, height, known)
-    layer = discs.ground_discs(grid, np.stack(colour, -1).reshape(-1, 3))
+    layer = discs.make_ground_discs(grid, np.stack(colour, -1).reshape(-1, 3))
     scales = layer.log_scales.copy()
     scales[:, :2] = (size + np.log(2)).reshape(-1, 1).clip(*np.log(np.multiply(DISC_SIZES, grid.spacing)))
     layer = replace(
@@ -42,7 +42,7 @@ def merge_cells(tile: GaussianField, cells: int, spacing: float) -> GaussianFiel
         uncertainty=doubt.ravel().astype(np.float32),
     )
     parts = [layer[known.ravel()], merge_by_voxel(tile[~tile.ground & ~under], 2 * spacing)]
-    return concatenate_fields([parts[0], underlay.beneath(grid, layer), parts[1]] if under.any() else parts)
+    return concatenate_fields([parts[0], underlay.make_underlay(grid, layer), parts[1]] if under.any() else parts)
 
 
 def find_underlay(tile: GaussianField, spacing: float) -> Bool[Array, "n"]:

@@ -49,7 +49,9 @@ def measure_true_errors(
     else:
         some, views = truth.read_truth(pool, files["truth"])
     corrected = read_scene_frame(files["frame"]).kind == "photos"  # which change their exposure
-    found, _ = measures.measure_errors(read_field(files["field"]), ground.read(files["ground"]), views, size, corrected)
+    found, _ = measures.measure_errors(
+        read_field(files["field"]), ground.read_ground(files["ground"]), views, size, corrected
+    )
     known = {pose.name: error for (pose, _), error in zip(some, found, strict=True)}
     if not known:
         raise InputError(f"{files['truth']}: shows no candidate that is left; make it again with more of them")

@@ -17,7 +17,7 @@ from dav_gswt.prior.interface import Condition
 from dav_gswt.raster import Rasterizer
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.opacity_uncertainty import render_uncertainty
-from dav_gswt.reconstruction.top_view import from_above
+from dav_gswt.reconstruction.top_view import render_top_view
 from dav_gswt.views import collision, fisher, prior_sampling
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.frozen_scales import FrozenScales
@@ -50,7 +50,7 @@ class ScoringResult:
 
 def exr_parts(found: ScoringResult, field: GaussianField, grid: Ground) -> dict[str, Part]:
     """The maps to show, as parts of an EXR: the ground from above, and candidates spread over the hemisphere."""
-    above = from_above(replace(field, uncertainty=found.gaussians), grid).uncertainty[::-1]
+    above = render_top_view(replace(field, uncertainty=found.gaussians), grid).uncertainty[::-1]
     some = [found.scores.names[i] for i in select_farthest_poses(found.scores.poses, OTHERS)]
     shown = found.maps.parts(found.scores, some)
     return {"above": ({"uncertainty": above}, {"camera": "straight above"})} | shown

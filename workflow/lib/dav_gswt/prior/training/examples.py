@@ -19,8 +19,9 @@ from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.training.example_files import SIZE, Examples, concatenate, empty_examples
 from dav_gswt.prior.training.worlds import FLYING_HEIGHT, World, make_world
 from dav_gswt.raster import Rasterizer, to_raster_arrays
-from dav_gswt.reconstruction import build
-from dav_gswt.reconstruction.fitting.photo_colours import sampled
+from dav_gswt.reconstruction.coarse import fit_coarse_field
+from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fitting.photo_colours import sample_colours
 
 FIELD_OF_VIEW = 55.0  # degrees, as of synthetic scenes
 LEAST_COVER = 0.2  # share of the true picture that must not be sky
@@ -119,21 +120,21 @@ def simulate_points(
         points.append(origins[rows, columns] + depth[:, None] * steps[rows, columns] + error)
         colours.append(view.image[rows, columns])
     points, colours = np.concatenate(points), np.concatenate(colours).astype(float)
-    matched = np.sum([sampled(points, view)[1].astype(int) for view in photos], axis=0) >= 2
+    matched = np.sum([sample_colours(points, view)[1].astype(int) for view in photos], axis=0) >= 2
     return points[matched], colours[matched]
 
 
 def fit_field(world: World, photos: list[TrainingView], rng: np.random.Generator) -> GaussianField:
     """The coarse fit of the reconstruction, small and short; in some worlds of more or less ground than usual."""
     steps = int(rng.integers(*STEPS, endpoint=True))
-    quality = build.FitSettings(photos[0].camera.width, 1.25, MOST_GAUSSIANS, steps, 0, 0)
+    quality = FitSettings(photos[0].camera.width, 1.25, MOST_GAUSSIANS, steps, 0, 0)
     frame = world.frame
     if rng.uniform() < OTHER_EXTENT:
         share = rng.uniform(*EXTENTS) / 1.25
         extent = Extent(*(share * at for at in astuple(frame.extent)))
         frame = replace(frame, extent=extent)
     points, colours = simulate_points(world, photos, rng)
-    return build.fit(frame, photos, points, colours, quality, rng, margin=0.5 * (EXTENTS[1] - 1)).field
+    return fit_coarse_field(frame, photos, points, colours, quality, rng, margin=0.5 * (EXTENTS[1] - 1)).field
 
 
 def draw_camera(rng: np.random.Generator, photos: list[Pose]) -> Camera:

@@ -17,7 +17,7 @@ from dav_gswt.prior.training import worlds_ground as ground
 from dav_gswt.prior.training import worlds_light as light
 from dav_gswt.prior.training import worlds_objects as objects
 from dav_gswt.prior.training.worlds_objects import Cloud
-from dav_gswt.reconstruction.discs import quaternions
+from dav_gswt.reconstruction.discs import slopes_to_quaternions
 
 FLYING_HEIGHT = 7.0  # metres, as of synthetic scenes
 THICKNESS = 0.1  # of a disc, in its spacings
@@ -86,7 +86,7 @@ def _make_ground(discs: ground.Discs, radiance: Float[Array, "n 3"]) -> Gaussian
     stretch = np.stack([np.sqrt(1 + discs.east**2), np.sqrt(1 + discs.north**2)], 1)
     scales = np.column_stack([ground.WIDTH * discs.sizes * stretch, THICKNESS * discs.sizes.min(1)])
     opacity = np.full(len(radiance), OPACITY)
-    return _make_field(discs.means, scales, quaternions(discs.east, discs.north), opacity, radiance, True)
+    return _make_field(discs.means, scales, slopes_to_quaternions(discs.east, discs.north), opacity, radiance, True)
 
 
 def _make_objects(cloud: Cloud, radiance: Float[Array, "n 3"]) -> GaussianField:

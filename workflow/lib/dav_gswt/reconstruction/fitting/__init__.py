@@ -1,4 +1,4 @@
-"""Fitting: from Gaussians that are about right to Gaussians that look like the photos; knows nothing of terrains.
+"""Fitting of a Gaussian field to photos, without knowledge of grounds.
 
-`trainer.fit` is the loop; `rules` of the caller say where Gaussians may be and what they may look like.
+`trainer.fit_field` is the training loop; the caller's `constraints` say where Gaussians may be and how they may look.
 """

@@ -1,4 +1,4 @@
-"""Where Gaussians may be and what they may look like: the caller's knowledge of the scene, asked at every step."""
+"""Constraints of a fit: where Gaussians may be and what they may look like, applied at every step."""
 
 from typing import Protocol, runtime_checkable
 
@@ -8,55 +8,57 @@ from numpy import ndarray as Array
 
 from dav_gswt.raster import Gradients
 
-NEEDLE = np.log(3.0)  # the longest axis against the middle one: flat things are welcome, needles are not
-FLAT = np.log(10.0)  # the longest axis against the shortest
+NEEDLE = np.log(3.0)  # the longest axis over the middle one: flat Gaussians are allowed, needles are not
+FLAT = np.log(10.0)  # the longest axis over the shortest
 LOGITS = (-8.0, 6.0)
 
 
 @runtime_checkable
-class Rules(Protocol):
-    """A scene's rules. The first `fixed` Gaussians are never removed, moved away or made to jump; the first `discs` of
-    them are the ground's."""
+class Constraints(Protocol):
+    """The first `fixed` Gaussians are never pruned, relocated or perturbed; the first `discs` are the ground's."""
 
     fixed: int
     discs: int
-    reach: float  # unit of length: what a detail of this scene measures
+    detail: float  # typical size of a detail, in world units
 
-    def guide(self, gradients: Gradients) -> None:
-        """Change gradients, in place, before the optimiser sees them."""
+    def adjust_gradients(self, gradients: Gradients) -> None:
+        """Change gradients in place before the optimiser's step."""
+        ...
 
-    def keep(self, values: dict[str, Array]) -> None:
-        """Bring parameters back, in place, into what they may be."""
+    def project_parameters(self, values: dict[str, Array]) -> None:
+        """Project parameters onto what is allowed, in place."""
+        ...
 
-    def lost(self, values: dict[str, Array]) -> Bool[Array, "n"]:
-        """Which Gaussians are where none can be: they go, and others take their places."""
+    def find_misplaced(self, values: dict[str, Array]) -> Bool[Array, "n"]:
+        """Which Gaussians are where none can be: they are relocated."""
+        ...
 
 
-class Anywhere:
-    """Rules of a scene of which nothing is known (ordinary 3D Gaussian splatting): sizes are bounded, places are not.
+class FreeConstraints:
+    """Constraints without knowledge of the scene, as in ordinary 3D Gaussian splatting: only sizes are bounded.
 
-    reach: the typical distance between neighbours. extent: the scene's size.
+    detail: typical distance between neighbours. extent: the scene's size.
     """
 
-    def __init__(self, reach: float, extent: float):
-        self.fixed, self.discs, self.reach, self.extent = 0, 0, reach, extent
+    def __init__(self, detail: float, extent: float):
+        self.fixed, self.discs, self.detail, self.extent = 0, 0, detail, extent
 
-    def guide(self, gradients: Gradients) -> None:
-        """Nothing to add."""
+    def adjust_gradients(self, gradients: Gradients) -> None:
+        """Changes nothing."""
 
-    def keep(self, values: dict[str, Array]) -> None:
-        """Neither needles nor Gaussians as large as the scene."""
-        bounded(values["log_scales"], 0.02 * self.reach, 0.1 * self.extent)
+    def project_parameters(self, values: dict[str, Array]) -> None:
+        """Allows neither needles nor Gaussians as large as the scene."""
+        clip_sizes(values["log_scales"], 0.02 * self.detail, 0.1 * self.extent)
         np.clip(values["opacity_logits"], *LOGITS, out=values["opacity_logits"])
 
-    def lost(self, values: dict[str, Array]) -> Bool[Array, "n"]:
-        """None."""
+    def find_misplaced(self, values: dict[str, Array]) -> Bool[Array, "n"]:
+        """Finds none."""
         return np.zeros(len(values["means"]), bool)
 
 
-def bounded(log_scales: Array, least: float, most: float) -> None:
-    """Clip sizes, in place, and make needles thicker: no axis under the longest by more than FLAT, and the middle one
-    by no more than NEEDLE."""
+def clip_sizes(log_scales: Array, least: float, most: float) -> None:
+    """Clip sizes in place and thicken needles: no axis is shorter than the longest by more than the factor of FLAT, the
+    middle one by no more than that of NEEDLE."""
     np.clip(log_scales, np.log(least), np.log(most), out=log_scales)
     if not len(log_scales):
         return

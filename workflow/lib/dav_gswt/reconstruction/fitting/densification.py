@@ -1,8 +1,8 @@
-"""Growth: Gaussians that show nothing go where the residual is, and new ones follow them, under a cap.
+"""Densification: transparent Gaussians are relocated to where the residual is, and new ones added, up to a number.
 
-After 3DGS as Markov chain Monte Carlo (Kheradmand et al. 2024): a source is split into copies that together look as it
-did, and nearly transparent Gaussians are shaken so that they find something to do. Sources are drawn by the squared
-error that the photos carry back onto them, not by opacity: more detail where it lacks, none where all is said.
+After 3DGS as Markov chain Monte Carlo (Kheradmand et al. 2024): a source is split into copies that together look like
+it, and nearly transparent Gaussians are perturbed. Sources are sampled by the squared error that the photos project
+back onto them, not by opacity: detail is added only where it lacks.
 """
 
 from math import comb
@@ -13,56 +13,61 @@ from numpy import ndarray as Array
 
 from dav_gswt.reconstruction.fitting.state import NAMES, State
 
-DEAD = 0.005  # opacity below which a Gaussian shows nothing
-MOST_COPIES = 8  # of one source at a time
-CHILD = np.log(0.5)  # a detail on the ground starts at half its disc's size
-SHAKE = 0.3  # standard deviations that a transparent Gaussian is shaken a step, at the start
-LOOSE = DEAD + np.log(99) / 100  # opacity from which none is shaken: its share of the strength would be under .01
+DEAD = 0.005  # opacity below which a Gaussian is relocated
+MAX_COPIES = 8  # of one source in one event
+DETAIL_SIZE = np.log(0.5)  # of a detail on the ground, over its disc's size
+PERTURBATION = 0.3  # standard deviations a step, of a transparent Gaussian at the start
+MAX_PERTURBED = DEAD + np.log(99) / 100  # opacity above which the perturbation's share would be under .01
 
 
-def opacities(logits: Float[Array, "n"]) -> Float[Array, "n"]:
+def to_opacity(logits: Float[Array, "n"]) -> Float[Array, "n"]:
     """The peak opacity."""
     return 1 / (1 + np.exp(-np.asarray(logits, float)))
 
 
 def grow(
-    state: State, fixed: int, lost: Bool[Array, "n"], errors: Float[Array, "n"], cap: int, rng: np.random.Generator
+    state: State,
+    fixed: int,
+    misplaced: Bool[Array, "n"],
+    errors: Float[Array, "n"],
+    max_gaussians: int,
+    rng: np.random.Generator,
 ) -> int:
-    """Move the dead and the lost among the free Gaussians to where the errors are, and add others up to `cap`.
+    """Relocate transparent and misplaced free Gaussians to where the errors are, and add others up to `max_gaussians`.
 
-    errors: squared error carried back onto each Gaussian. Returns how many were moved or added; 0 without any error.
+    errors: squared error projected back onto each Gaussian. Returns the number relocated or added; 0 without error.
     """
-    dead = (opacities(state.values["opacity_logits"]) < DEAD) | lost
+    dead = (to_opacity(state.values["opacity_logits"]) < DEAD) | misplaced
     dead[:fixed] = False
     weight = np.where(dead, 0, errors).astype(float)
     places = np.flatnonzero(dead)
-    count = len(places) + max(0, cap - len(state))
+    count = len(places) + max(0, max_gaussians - len(state))
     if not count or not weight.sum() > 0:
         return 0
     drawn = rng.choice(len(weight), count, p=weight / weight.sum())
     sources, copies = np.unique(drawn, return_counts=True)
-    copies = np.minimum(copies, MOST_COPIES)
-    born = _born(state, sources, copies, fixed, rng)
-    count = len(born["means"])
+    copies = np.minimum(copies, MAX_COPIES)
+    copied = _make_copies(state, sources, copies, fixed, rng)
+    count = len(copied["means"])
     places = places[:count]
-    state.put(places, {k: v[: len(places)] for k, v in born.items()})
-    state.append({k: v[len(places) :] for k, v in born.items()})
+    state.overwrite(places, {k: v[: len(places)] for k, v in copied.items()})
+    state.append({k: v[len(places) :] for k, v in copied.items()})
     return count
 
 
-def shake(state: State, fixed: int, strength: float, rng: np.random.Generator) -> None:
-    """Move nearly transparent free Gaussians at random within themselves; opaque ones stay."""
+def perturb(state: State, fixed: int, strength: float, rng: np.random.Generator) -> None:
+    """Move nearly transparent free Gaussians by random steps within their size; opaque ones stay."""
     values = state.values
-    rows = fixed + np.flatnonzero(values["opacity_logits"][fixed:] < np.log(LOOSE / (1 - LOOSE)))
+    rows = fixed + np.flatnonzero(values["opacity_logits"][fixed:] < np.log(MAX_PERTURBED / (1 - MAX_PERTURBED)))
     if not len(rows):
         return
-    loose = 1 / (1 + np.exp(100 * (opacities(values["opacity_logits"][rows]) - DEAD)))
+    loose = 1 / (1 + np.exp(100 * (to_opacity(values["opacity_logits"][rows]) - DEAD)))
     noise = rng.standard_normal((len(rows), 3), np.float32) * (strength * loose[:, None]).astype(np.float32)
-    values["means"][rows] += along(values, rows, noise)
+    values["means"][rows] += rotate_steps(values, rows, noise)
 
 
-def along(values: dict[str, Array], rows: Int[Array, "m"], steps: Float[Array, "m 3"]) -> Float32[Array, "m 3"]:
-    """Steps given in standard deviations along a Gaussian's own axes, in the world."""
+def rotate_steps(values: dict[str, Array], rows: Int[Array, "m"], steps: Float[Array, "m 3"]) -> Float32[Array, "m 3"]:
+    """World vectors of steps given in standard deviations along each Gaussian's axes."""
     quats = values["quats"][rows]
     w, x, y, z = (quats / np.sqrt(np.einsum("mi,mi->m", quats, quats))[:, None]).T
     a, b, c = (steps * np.exp(values["log_scales"][rows])).T
@@ -71,8 +76,8 @@ def along(values: dict[str, Array], rows: Int[Array, "m"], steps: Float[Array, "
     return np.stack(moved, 1).astype(np.float32)
 
 
-def split(opacity: Float[Array, "n"], parts: Int[Array, "n"]) -> tuple[Float[Array, "n"], Float[Array, "n"]]:
-    """Opacity of each of `parts` equal copies, and the factor of their size, that together look like the one before.
+def split_opacity(opacity: Float[Array, "n"], parts: Int[Array, "n"]) -> tuple[Float[Array, "n"], Float[Array, "n"]]:
+    """Opacity of each of `parts` equal copies, and the factor of their size, that together look like the source.
 
     (1 - o')^parts = 1 - o keeps the peak; the factor keeps the integral along a line through it (Kheradmand et al.,
     Eq. 9). parts = 1 changes nothing.
@@ -86,22 +91,24 @@ def split(opacity: Float[Array, "n"], parts: Int[Array, "n"]) -> tuple[Float[Arr
     return each, np.where(parts > 1, opacity / np.maximum(total, 1e-12), 1)
 
 
-def _born(state: State, sources: Array, copies: Array, fixed: int, rng: np.random.Generator) -> dict[str, Array]:
-    """The new rows; free sources become one of the copies."""
+def _make_copies(state: State, sources: Array, copies: Array, fixed: int, rng: np.random.Generator) -> dict[str, Array]:
+    """The new rows; a free source becomes one of its copies."""
     values = state.values
     free = sources >= fixed
     rows, parts = sources[free], copies[free] + 1
-    each, size = split(opacities(values["opacity_logits"][rows]), parts)
+    each, size = split_opacity(to_opacity(values["opacity_logits"][rows]), parts)
     values["opacity_logits"][rows] = np.log(each / (1 - each))
     values["log_scales"][rows] += np.log(size)[:, None].astype(np.float32)
     for part in (state.first, state.second):
         for name in NAMES:
             part[name][rows] = 0
     repeated = np.repeat(sources, copies)
-    born = {name: values[name][repeated].copy() for name in NAMES}
-    child = repeated < fixed
-    born["log_scales"][child, :2] += np.float32(CHILD)
-    born["opacity_logits"][child] = 0
+    copied = {name: values[name][repeated].copy() for name in NAMES}
+    of_ground = repeated < fixed
+    copied["log_scales"][of_ground, :2] += np.float32(DETAIL_SIZE)
+    copied["opacity_logits"][of_ground] = 0
     spread = rng.uniform(-0.7, 0.7, (len(repeated), 3)) * [1, 1, 0]
-    born["means"] += along(values, repeated, np.where(child[:, None], spread, rng.normal(0, 0.5, (len(repeated), 3))))
-    return born
+    copied["means"] += rotate_steps(
+        values, repeated, np.where(of_ground[:, None], spread, rng.normal(0, 0.5, (len(repeated), 3)))
+    )
+    return copied

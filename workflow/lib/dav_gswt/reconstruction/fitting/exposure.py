@@ -1,7 +1,7 @@
-"""Exposure of photos: gain and offset per photo and channel, anchored so that the set as a whole does not drift.
+"""Exposure of photos: gain and offset per photo and channel, anchored so that the set does not drift.
 
-Twice: once before the fit, from what the photos say of the same points, and then at every step, from the picture that
-the field gives now. A test photo gets none.
+Fitted before the fit, between the photos' colours of the same points, and at every step, to the field's picture. Test
+photos get none.
 """
 
 from dataclasses import replace
@@ -11,19 +11,21 @@ from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.photos.training_views import TrainingView
-from dav_gswt.reconstruction.fitting.photo_colours import median_colours, sampled
+from dav_gswt.reconstruction.fitting.photo_colours import median_colours, sample_colours
 
-GAIN = 1.6  # a photo brighter or darker than the set by more than this is left at the bound
-STEP_GAIN = 1.25  # the same for what is left to correct during the fit
-LEARNT = np.float32(0.25)  # share of what a turn says of a photo's level
-PRIOR = 1e-3  # variance of made-up pixels with gain 1: a picture without contrast says nothing of its gain
-TRIM = 3.0  # pixels further off than this many medians of the difference say nothing of the exposure
+MAX_GAIN = 1.6  # of a photo against the set
+MAX_STEP_GAIN = 1.25  # during the fit
+LEARNING_RATE = np.float32(0.25)  # share of a step's estimate
+PRIOR = 1e-3  # variance of pseudo-pixels of gain 1: a picture without contrast keeps its gain
+TRIM = 3.0  # medians of the difference, beyond which a pixel is ignored
 ROUNDS = 3
-ENOUGH = 8000  # pixels, evenly over the picture, to know its exposure by
+MAX_PIXELS = 8000  # evenly over the picture
 
 
-def gain_offset(x: Float[Array, "n 3"], y: Float[Array, "n 3"]) -> tuple[Float32[Array, "3"], Float32[Array, "3"]]:
-    """Per channel the robust least-squares a, b of y = a x + b; a within 1 / GAIN .. GAIN.
+def fit_gain_and_offset(
+    x: Float[Array, "n 3"], y: Float[Array, "n 3"]
+) -> tuple[Float32[Array, "3"], Float32[Array, "3"]]:
+    """Per channel the robust least-squares a, b of y = a x + b; a within 1 / MAX_GAIN .. MAX_GAIN.
 
     Pairs far off the first fit (three median deviations: moving things, blur) are left out of the second.
     """
@@ -35,7 +37,7 @@ def gain_offset(x: Float[Array, "n 3"], y: Float[Array, "n 3"]) -> tuple[Float32
             if len(u) < 10:
                 break
             spread = u.var() + 1e-6
-            a[c] = np.clip(((u - u.mean()) * (v - v.mean())).mean() / spread, 1 / GAIN, GAIN)
+            a[c] = np.clip(((u - u.mean()) * (v - v.mean())).mean() / spread, 1 / MAX_GAIN, MAX_GAIN)
             b[c] = v.mean() - a[c] * u.mean()
             residual = np.abs(a[c] * x[:, c] + b[c] - y[:, c])
             with np.errstate(invalid="ignore"):
@@ -43,65 +45,64 @@ def gain_offset(x: Float[Array, "n 3"], y: Float[Array, "n 3"]) -> tuple[Float32
     return a, b
 
 
-def levelled(views: list[TrainingView], points: Float[Array, "n 3"]) -> list[TrainingView]:
-    """The photos with their exposure brought to that of the set.
+def equalize_exposure(views: list[TrainingView], points: Float[Array, "n 3"]) -> list[TrainingView]:
+    """The photos at the exposure of the set.
 
-    Each photo is fitted to the median colour that the set gives the ground points it sees, three times over; the
-    anchor is the first median, so gains multiply to about 1 and the colours stay those of the typical photo.
+    Each photo is fitted to the set's median colours of the ground points that it sees, in ROUNDS rounds. The anchor is
+    the first median, so that gains multiply to about 1 and colours stay those of the typical photo.
     """
     anchor = None
     for _ in range(ROUNDS):
         median, _ = median_colours(points, views)
         if anchor is not None:  # without this the common gain random-walks from round to round
-            back = gain_offset(median, anchor)
+            back = fit_gain_and_offset(median, anchor)
             median = median * back[0] + back[1]
         anchor = median if anchor is None else anchor
-        views = [matched(view, points, median) for view in views]
+        views = [match_exposure(view, points, median) for view in views]
     return views
 
 
-def matched(view: TrainingView, points: Float[Array, "n 3"], colours: Float[Array, "n 3"]) -> TrainingView:
-    """A photo whose gain and offset bring it to known colours of points."""
-    seen, _ = sampled(points, view)
-    a, b = gain_offset(seen, colours)
+def match_exposure(view: TrainingView, points: Float[Array, "n 3"], colours: Float[Array, "n 3"]) -> TrainingView:
+    """A photo with the gain and offset that fit it to known colours of points."""
+    seen, _ = sample_colours(points, view)
+    a, b = fit_gain_and_offset(seen, colours)
     return replace(view, image=(view.image * a + b).astype(np.float32))
 
 
-class Levels:
-    """Gain and offset of each photo against the pictures that the field gave at its turns.
+class ExposureTracker:
+    """Gain and offset of each photo against the field's pictures, estimated step by step.
 
-    What is used of them is anchored: the median over the photos is taken out, so that the field shows what the typical
-    photo shows. Without this a picture that is not yet sharp, whose gain least squares finds below 1, would make the
-    field's contrast and brightness grow at every step. A turn changes a photo's level by a share (LEARNT) only: the
-    median is as old as the other photos' last turns, and would it follow the field at once, the two would chase each
-    other, the wider the more photos there are.
+    They are used relative to their median over the photos, so that the field shows what the typical photo shows;
+    otherwise a blurred picture, whose gain least squares finds below 1, would make the field's contrast grow at every
+    step. A step moves a photo's values by the share LEARNING_RATE only: with all of it the field and the median, which
+    is as old as the other photos' last steps, would oscillate.
     """
 
     def __init__(self, views: int):
         self.gains, self.offsets = np.ones((views, 3), np.float32), np.zeros((views, 3), np.float32)
 
-    def look(self, index: int, picture: Float32[Array, "h w 3"], view: TrainingView) -> None:
-        """Learn of a photo's level from the picture of its place."""
-        a, b = towards(picture, view, (self.gains[index], self.offsets[index]))
-        self.gains[index] += LEARNT * (a - self.gains[index])
-        self.offsets[index] += LEARNT * (b - self.offsets[index])
+    def update(self, index: int, picture: Float32[Array, "h w 3"], view: TrainingView) -> None:
+        """Update a photo's values from the field's picture at its pose."""
+        a, b = update_gain_and_offset(picture, view, (self.gains[index], self.offsets[index]))
+        self.gains[index] += LEARNING_RATE * (a - self.gains[index])
+        self.offsets[index] += LEARNING_RATE * (b - self.offsets[index])
 
-    def of(self, index: int) -> tuple[Float32[Array, "3"], Float32[Array, "3"]]:
-        """Gain a and offset b that bring the picture x to the photo: a x + b; 1 and 0 where nothing is learnt yet."""
+    def gain_and_offset(self, index: int) -> tuple[Float32[Array, "3"], Float32[Array, "3"]]:
+        """Gain a and offset b that bring the picture x to the photo: a x + b; 1 and 0 before the first step."""
         a = self.gains[index] / np.median(self.gains, 0)
         return a, self.offsets[index] - a * np.median(self.offsets, 0)
 
 
-def towards(
+def update_gain_and_offset(
     picture: Float32[Array, "h w 3"], view: TrainingView, before: tuple[Float32[Array, "3"], Float32[Array, "3"]]
 ) -> tuple[Float32[Array, "3"], Float32[Array, "3"]]:
     """Gain a and offset b that bring a picture to its photo, least squares over the pixels that count and agree.
 
-    before: this photo's a and b of its last turn; pixels that differ by more than TRIM medians under them (things that
-    move, things that the field does not know yet) have no vote. a is held within 1 / STEP_GAIN .. STEP_GAIN by a prior
-    and a bound; no pixel that counts: unchanged.
+    before: the photo's a and b at its last step; pixels that differ by more than TRIM medians under them (moving
+    objects, objects that the field lacks) are ignored. a is held within 1 / MAX_STEP_GAIN .. MAX_STEP_GAIN by a prior
+    and by clipping. If no pixel counts they stay unchanged.
     """
-    stride = max(1, int(np.sqrt(view.weight.size / ENOUGH)))
+    stride = max(1, int(np.sqrt(view.weight.size / MAX_PIXELS)))
     some = np.s_[::stride, ::stride]
     picture, image, weight = picture[some], view.image[some], view.weight[some]
     counts = weight > 0
@@ -113,5 +114,5 @@ def towards(
     u, v, total = picture[agrees].astype(float), image[agrees].astype(float), float(w.sum()) + 1e-9
     x, y = (w * u).sum(0) / total, (w * v).sum(0) / total
     xx, xy = (w * u * u).sum(0) / total - x * x, (w * u * v).sum(0) / total - x * y
-    a = np.clip((xy + PRIOR) / (np.maximum(xx, 0) + PRIOR), 1 / STEP_GAIN, STEP_GAIN)
+    a = np.clip((xy + PRIOR) / (np.maximum(xx, 0) + PRIOR), 1 / MAX_STEP_GAIN, MAX_STEP_GAIN)
     return a.astype(np.float32), (y - a * x).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Colours that photos give to points of the world."""
+"""Colours of world points in the photos."""
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32
@@ -6,10 +6,10 @@ from numpy import ndarray as Array
 
 from dav_gswt.photos.training_views import TrainingView
 
-CHUNK = 50_000  # points at a time: what stays in the cache of a small machine
+CHUNK = 50_000  # points at a time, so that they stay in the cache
 
 
-def sampled(points: Float[Array, "n 3"], view: TrainingView) -> tuple[Float32[Array, "n 3"], Bool[Array, "n"]]:
+def sample_colours(points: Float[Array, "n 3"], view: TrainingView) -> tuple[Float32[Array, "n 3"], Bool[Array, "n"]]:
     """The photo's colour at each point's pixel, and which points are inside the picture and count there."""
     pixel, depth = view.camera.project(points)
     x, y = pixel[:, 0], pixel[:, 1]
@@ -21,24 +21,24 @@ def sampled(points: Float[Array, "n 3"], view: TrainingView) -> tuple[Float32[Ar
     return colours, inside
 
 
-def samples(points: Float[Array, "n 3"], views: list[TrainingView]) -> Float32[Array, "v n 3"]:
+def sample_all_views(points: Float[Array, "n 3"], views: list[TrainingView]) -> Float32[Array, "v n 3"]:
     """Every photo's colours of the points; NaN where it does not see them."""
-    return np.stack([sampled(points, view)[0] for view in views])
+    return np.stack([sample_colours(points, view)[0] for view in views])
 
 
 def median_colours(
     points: Float[Array, "n 3"], views: list[TrainingView]
 ) -> tuple[Float32[Array, "n 3"], Bool[Array, "n"]]:
-    """Median over the photos that see each point, and which points any photo sees (the others are NaN)."""
+    """Median colour of each point over the photos that see it (NaN without any), and which points a photo sees."""
     colours = np.full((len(points), 3), np.nan, np.float32)
     for start in range(0, len(points), CHUNK):
         part = np.s_[start : start + CHUNK]
-        colours[part] = middle(samples(points[part], views))
+        colours[part] = nan_median(sample_all_views(points[part], views))
     return colours, np.isfinite(colours[:, 0])
 
 
-def middle(values: Float32[Array, "v n c"]) -> Float32[Array, "n c"]:
-    """Median over the first axis of what is not NaN; NaN where all is."""
+def nan_median(values: Float32[Array, "v n c"]) -> Float32[Array, "n c"]:
+    """Median over the first axis, ignoring NaN; NaN where all values are."""
     ordered = np.sort(values, axis=0)  # NaN goes last: the median is at half of the number that are not
     count = np.isfinite(ordered[..., 0]).sum(0)
     pick, last = np.arange(values.shape[1]), np.maximum(count - 1, 0)

@@ -1,4 +1,6 @@
-"""Small corrections of the cameras, learned with the field: q' = exp([w]x) q + tau for each photo."""
+"""Corrections of the cameras, optimised with the field: q' = exp([w]x) q + tau for each photo."""
+
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
@@ -10,18 +12,15 @@ from dav_gswt.geometry.cameras import Camera
 BETAS = 0.9, 0.999
 
 
-class Poses:
-    """The corrections (w, tau), Adam's moments, and how often each was moved.
-
-    The set as a whole stays where it is: the mean correction is taken out after every step, or the field would drift.
-    """
+class PoseCorrections:
+    """The corrections (w, tau), Adam's moments, and the number of steps of each photo."""
 
     def __init__(self, views: int):
         self.twists, self.first, self.second = (np.zeros((views, 6)) for _ in range(3))
         self.turns = np.zeros(views, int)
 
-    def moved(self, index: int, camera: Camera) -> Camera:
-        """The camera with its correction; the very same while there is none."""
+    def correct(self, index: int, camera: Camera) -> Camera:
+        """The camera with its correction; the same object while that is 0."""
         if not self.twists[index].any():
             return camera
         turn = Rotation.from_rotvec(self.twists[index, :3]).as_matrix()
@@ -36,13 +35,11 @@ class Poses:
         m, v = self.first[index] / (1 - BETAS[0] ** t), self.second[index] / (1 - BETAS[1] ** t)
         unit = np.repeat([1.0, max(abs(float(camera.centre[2])), 1e-6)], 3)
         step = rate * unit * m / (np.sqrt(v) + 1e-15)
-        # the correction so far was applied before: compose, then keep it as one twist
+        # compose with the correction so far, as one twist
         turn = Rotation.from_rotvec(-step[:3])
         self.twists[index, 3:] = turn.apply(self.twists[index, 3:]) - step[3:]
         self.twists[index, :3] = (turn * Rotation.from_rotvec(self.twists[index, :3])).as_rotvec()
 
 
 def _with_pose(camera: Camera, rotation: Float[Array, "3 3"], translation: Float[Array, "3"]) -> Camera:
-    from dataclasses import replace
-
     return replace(camera, rotation=rotation, translation=translation)

@@ -1,4 +1,4 @@
-"""What the photos of the last steps show wrong of each Gaussian, to know where more are needed."""
+"""The residual of the last photos projected back onto the Gaussians, to know where more are needed."""
 
 import numpy as np
 from jaxtyping import Float32
@@ -8,24 +8,24 @@ from dav_gswt.raster import Rasterizer
 
 
 class Residual:
-    """Squared error carried back onto the Gaussians by their blend weights, and how many photos had a part in it.
+    """Squared error projected back onto the Gaussians by blend weights, and the number of photos that contributed.
 
-    Empty arrays: nothing was noted yet.
+    The arrays are empty before the first photo.
     """
 
     def __init__(self):
         self.errors, self.photos = np.zeros(0, np.float32), np.zeros(0, np.int32)
 
-    def note(self, drawn: Rasterizer, apart: Float32[Array, "h w 3"], weight: Float32[Array, "h w"]) -> None:
-        """Take the picture that `drawn` has drawn last. apart: it less the photo; weight: pixels that count."""
-        squared = np.ascontiguousarray(((apart**2).mean(-1) * weight)[..., None], np.float32)
-        found = drawn.contributions(squared).mapped[:, 0]
+    def add(self, rasterizer: Rasterizer, difference: Float32[Array, "h w 3"], weight: Float32[Array, "h w"]) -> None:
+        """Add the last picture of the rasterizer. difference: picture less photo. weight: pixels that count."""
+        squared = np.ascontiguousarray(((difference**2).mean(-1) * weight)[..., None], np.float32)
+        found = rasterizer.contributions(squared).mapped[:, 0]
         if not len(self.errors):
             self.errors, self.photos = np.zeros_like(found), np.zeros(len(found), np.int32)
         self.errors += found
         self.photos += found > 0
 
     @property
-    def of_a_photo(self) -> float:
-        """Squared error, summed over all Gaussians, each as one of the photos that see it shows it on average."""
+    def error_per_photo(self) -> float:
+        """Squared error summed over all Gaussians, for each its mean over the photos that see it."""
         return float((self.errors / np.maximum(self.photos, 1)).sum(dtype=float))

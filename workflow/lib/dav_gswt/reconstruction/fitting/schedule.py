@@ -1,60 +1,54 @@
-"""When rates fall, when Gaussians grow and how many they may be, when those that show nothing go."""
+"""The schedule of a fit: learning rates, growth of the number of Gaussians, pruning."""
 
 from dataclasses import dataclass
 
-from dav_gswt.reconstruction.fitting.plan import AUTO, Plan
+from dav_gswt.reconstruction.fitting.plan import AUTO, FitPlan
 
-SETTLED = 0.1  # of the rates at the start are left at the end
-EVENTS = 10  # growth events of a fit
-GROWN = 0.7  # of the steps: growth ends there
-PRUNED = 0.8  # of the steps: then goes what shows nothing, and what stays makes up for it in those left
-# Of the Gaussians there are, so many at most come at the first event of a growth without a number, a tenth of it at the
-# last: what comes late is fitted little. Meadow (development, 8 photos, 600 steps): 22.28 dB, LPIPS .316 with 492k
-# Gaussians of a quarter at every event, 22.46 and .297 with 419k so.
-GROWTH = 0.4
-VISIBLE = 0.011  # error of one pixel that is worth a Gaussian where their number is to be found, of colours 0 to 1
+FINAL_RATE = 0.1  # of the rates at the start
+EVENTS = 10  # of growth
+GROWTH_END = 0.7  # of the steps
+PRUNE_AT = 0.8  # of the steps; the rest makes up for what is pruned
+GROWTH = 0.4  # of the Gaussians, at most added at the first event with "auto", a tenth of it at the last
+VISIBLE = 0.011  # error of a pixel, of colours 0 to 1, that justifies a Gaussian with "auto"
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """Of a fit; known before its first step.
+    """start: Gaussians that the fit begins with. With `max_gaussians` of them none is moved, added or pruned, as in the
+    fit of a level."""
 
-    start: Gaussians it begins with: with as many as the cap none jumps, is added or goes, as in the fit of a level.
-    """
-
-    plan: Plan
+    plan: FitPlan
     start: int
 
     def rate(self, step: int) -> float:
-        """Factor of all rates: 1, falling to SETTLED."""
-        return SETTLED ** (step / max(1, self.plan.steps))
+        """Factor of all learning rates: 1, falling to FINAL_RATE."""
+        return FINAL_RATE ** (step / max(1, self.plan.steps))
 
     def to_growth(self, step: int) -> int | None:
-        """Steps from this one to the next growth, 0: it is due now; None: none comes any more."""
+        """Steps to the next growth event; 0: it is due now; None: there is none left."""
         due = max(1, -(-step // self._every)) * self._every
-        return due - step if self._grows and due <= GROWN * self.plan.steps else None
+        return due - step if self._grows and due <= GROWTH_END * self.plan.steps else None
 
     def prunes(self, step: int) -> bool:
-        """What shows nothing goes at this step."""
-        return self._grows and step == int(PRUNED * self.plan.steps)
+        """Whether Gaussians are pruned at this step."""
+        return self._grows and step == int(PRUNE_AT * self.plan.steps)
 
-    def cap(self, step: int, now: int, error: float) -> int:
-        """How many Gaussians there may be after growing at this step.
+    def max_gaussians(self, step: int, now: int, error: float) -> int:
+        """Number of Gaussians allowed after the growth event at this step.
 
-        error: squared error that a photo shows, summed over the Gaussians: where no number is given one Gaussian is
-        worth VISIBLE**2 of it.
+        error: squared error of a photo, summed over the Gaussians; with "auto" each VISIBLE**2 of it justifies one.
         """
-        events = int(self.plan.steps * GROWN) // self._every
+        events = int(self.plan.steps * GROWTH_END) // self._every
         left = max(1, events - step // self._every + 1)
-        if self.plan.cap == AUTO:
+        if self.plan.max_gaussians == AUTO:
             soon = int(now * (1 + GROWTH * left / max(1, events)))
-            return max(now, min(self.plan.most, soon, int(error / VISIBLE**2)))
-        return now + max(0, int(self.plan.cap) - now) // left
+            return max(now, min(self.plan.limit, soon, int(error / VISIBLE**2)))
+        return now + max(0, int(self.plan.max_gaussians) - now) // left
 
     @property
     def _grows(self) -> bool:
-        return self.plan.cap == AUTO or self.plan.cap > self.start
+        return self.plan.max_gaussians == AUTO or self.plan.max_gaussians > self.start
 
     @property
     def _every(self) -> int:
-        return max(1, int(self.plan.steps * GROWN) // EVENTS)
+        return max(1, int(self.plan.steps * GROWTH_END) // EVENTS)

@@ -1,4 +1,4 @@
-"""Do colours have to change with direction? The least degree of spherical harmonics that held-out pixels ask for."""
+"""The degree of the spherical harmonics: the lowest that held-out pixels need."""
 
 from collections.abc import Callable
 
@@ -6,34 +6,34 @@ import numpy as np
 
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import harmonics
-from dav_gswt.reconstruction.fitting.held_out import GAIN
-from dav_gswt.reconstruction.fitting.plan import Report
+from dav_gswt.reconstruction.fitting.held_out import MIN_GAIN
+from dav_gswt.reconstruction.fitting.plan import FitReport
 from dav_gswt.reconstruction.fitting.state import State
 
 
-def least(now: State, cameras: list[Camera], score: Callable[[State], float], report: Report) -> State:
-    """The state with the least degree that loses less than GAIN.
+def choose_degree(now: State, cameras: list[Camera], score: Callable[[State], float], report: FitReport) -> State:
+    """The state of the lowest degree that loses less than MIN_GAIN.
 
     cameras: of the photos. score: PSNR of held-out pixels, dB.
     """
-    tried = {degree: reduced(now, degree, cameras) for degree in range(now.sh_degree)} | {now.sh_degree: now}
+    tried = {degree: reduce_degree(now, degree, cameras) for degree in range(now.sh_degree)} | {now.sh_degree: now}
     scores = {degree: score(state) for degree, state in tried.items()}
     report.held_out += [{"degree": degree, "psnr": round(value, 3)} for degree, value in scores.items()]
-    chosen = min(degree for degree, value in scores.items() if value > max(scores.values()) - GAIN)
-    worth = scores[now.sh_degree] - scores[0]
-    report.chose("degree", chosen, f"degree {now.sh_degree} is worth {worth:+.3f} dB on held-out pixels")
+    chosen = min(degree for degree, value in scores.items() if value > max(scores.values()) - MIN_GAIN)
+    gain = scores[now.sh_degree] - scores[0]
+    report.note_choice("degree", chosen, f"degree {now.sh_degree} is worth {gain:+.3f} dB on held-out pixels")
     return tried[chosen]
 
 
-def reduced(full: State, degree: int, cameras: list[Camera]) -> State:
-    """A state of a lower degree. What is left out goes into the constant: its mean over the photos' directions."""
+def reduce_degree(full: State, degree: int, cameras: list[Camera]) -> State:
+    """A state of a lower degree; the constant takes the mean of the dropped terms over the photos' directions."""
     k = (degree + 1) ** 2
     colours, mean = full.values["colours"], 0.0
     for camera in cameras:
         seen = harmonics.directions(full.values["means"].astype(float), camera)
         mean = mean + harmonics.basis(seen, full.sh_degree) / len(cameras)
     out = full.copy()
-    out.bend_to(degree)
+    out.resize_sh(degree)
     gone = np.einsum("nk,nkc->nc", mean[:, k:], colours[:, k:])
     out.values["colours"][:, 0] += (gone / mean[:, :1]).astype(np.float32)
     return out

@@ -1,7 +1,7 @@
-"""Snapshots of a fit: killed at any moment it goes on from the last one, and ends with the same bytes.
+"""Snapshots of a fit: a killed fit continues from the last one and ends with the same bytes.
 
-A snapshot lies outside the outputs, under the digest of all that the result depends on, and goes when the fit ends.
-Arrays in an .npz without pickle, all else as JSON in it.
+A snapshot lies outside the outputs, is named by a digest of all that the result depends on, and is deleted when the fit
+ends. Arrays are in an .npz without pickle, the rest is JSON in it.
 """
 
 import hashlib
@@ -18,11 +18,11 @@ from dav_gswt.files import UNREADABLE, atomic_file
 
 _log = logging.getLogger(__name__)
 
-EVERY = 20.0  # seconds between two snapshots: when one is taken changes no result
+EVERY = 20.0  # seconds between snapshots; results do not depend on them
 
 
-def key(*parts) -> str:
-    """Digest of arrays, of whatever has a plain text, and of this package's code."""
+def digest_inputs(*parts) -> str:
+    """Digest of arrays, of the repr of other values, and of this package's code."""
     state = hashlib.sha256()
     for path in sorted(Path(dav_gswt.reconstruction.fitting.__file__).parent.glob("*.py")):
         state.update(path.read_bytes())
@@ -35,19 +35,20 @@ def key(*parts) -> str:
     return state.hexdigest()[:32]
 
 
-class Keeper:
-    """Where one fit's snapshot lies. folder: None keeps none."""
+class SnapshotStore:
+    """The file of one fit's snapshot. folder: None stores none."""
 
     def __init__(self, folder: Path | str | None, name: str):
         self.path = Path(folder) / f"{name}.npz" if folder else None
         self._last = time.monotonic()
 
     def due(self) -> bool:
-        """It is time for another snapshot."""
+        """Whether it is time for another snapshot."""
         return self.path is not None and time.monotonic() - self._last >= EVERY
 
     def save(self, arrays: dict[str, Array], rest: dict) -> None:
-        """Keep this moment; a snapshot that cannot be written costs the fit nothing."""
+        """Store a snapshot; one that cannot be written is only a warning."""
+        assert self.path is not None
         try:
             with atomic_file(self.path) as part, part.open("wb") as file:
                 np.savez(file, rest=np.frombuffer(json.dumps(rest).encode(), np.uint8), **arrays)
@@ -56,7 +57,7 @@ class Keeper:
         self._last = time.monotonic()
 
     def load(self) -> tuple[dict[str, Array], dict] | None:
-        """The last moment kept, if there is one that can be read."""
+        """The stored snapshot, if there is a readable one."""
         if self.path is None or not self.path.exists():
             return None
         try:
@@ -68,6 +69,6 @@ class Keeper:
             return None
 
     def clear(self) -> None:
-        """The fit has ended."""
+        """Delete the snapshot: the fit has ended."""
         if self.path is not None:
             self.path.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""What the fit moves: parameters by the names the rasterizer gives them, and Adam's two moments of each."""
+"""The state of a fit: the parameters, by the rasterizer's names, and Adam's two moments of each."""
 
 from dataclasses import dataclass
 
@@ -28,10 +28,10 @@ class State:
         return int(np.sqrt(self.values["colours"].shape[1])) - 1
 
     def copy(self) -> "State":
-        """A state that does not change with this one."""
+        """A deep copy."""
         return State(*({k: v.copy() for k, v in part.items()} for part in vars(self).values()))
 
-    def take(self, rows: Array) -> None:
+    def select(self, rows: Array) -> None:
         """Keep these rows (mask or indices), in that order."""
         for part in vars(self).values():
             for name in NAMES:
@@ -44,14 +44,14 @@ class State:
             for part in (self.first, self.second):
                 part[name] = np.concatenate([part[name], np.zeros_like(values[name])])
 
-    def put(self, rows: Array, values: dict[str, Array]) -> None:
+    def overwrite(self, rows: Array, values: dict[str, Array]) -> None:
         """Overwrite rows; their moments start again at zero."""
         for name in NAMES:
             self.values[name][rows] = values[name]
             self.first[name][rows] = self.second[name][rows] = 0
 
-    def bend_to(self, degree: int) -> None:
-        """Carry spherical harmonics of this degree: coefficients beyond it go, new ones are zero."""
+    def resize_sh(self, degree: int) -> None:
+        """Change the degree of the spherical harmonics: higher coefficients are dropped, new ones are zero."""
         k = (degree + 1) ** 2
         for part in vars(self).values():
             old = part["colours"]
@@ -60,15 +60,15 @@ class State:
             part["colours"][:, :kept] = old[:, :kept]
 
 
-def of(field: GaussianField) -> State:
-    """A field at the start of its training."""
+def from_field(field: GaussianField) -> State:
+    """The state of a field before the first step."""
     arrays = (field.means, field.log_scales, field.quats, field.opacity_logits, field.sh)
     values = {name: np.array(a, np.float32, order="C") for name, a in zip(NAMES, arrays, strict=True)}
     return State(values, *({k: np.zeros_like(v) for k, v in values.items()} for _ in range(2)))
 
 
-def field_of(state: State, ground: int, keep: Bool[Array, "n"] | None = None) -> GaussianField:
-    """The field in training, its first `ground` Gaussians marked as discs of the ground; nothing in it is uncertain."""
+def to_field(state: State, ground: int, keep: Bool[Array, "n"] | None = None) -> GaussianField:
+    """The field of a state: its first `ground` Gaussians are discs of the ground; its uncertainty is 0."""
     n = len(state)
     values = state.values
     field = GaussianField(

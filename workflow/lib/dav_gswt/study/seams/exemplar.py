@@ -31,13 +31,13 @@ class ExemplarMaps:
     @classmethod
     def from_levels(cls, levels: Levels) -> "ExemplarMaps":
         grid = levels.grids[0]
-        top = top_view.over_exemplar(levels.fields[0], grid)
+        top = top_view.render_exemplar(levels.fields[0], grid)
         west, south, _ = grid.exemplar
         return cls(
             levels.fields,
             levels.wanted,
             Exemplar(west, south, grid.spacing, grid.cells),
-            top.known_colour().astype(float),
+            top.colour_or_nan().astype(float),
             top.uncertainty,
         )
 

@@ -17,8 +17,8 @@ from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import metrics
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import render
-from dav_gswt.reconstruction.build import modelled
 from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.reconstruction.observation import mask_to_ground
 from dav_gswt.study import figures
 
 WIDE = 9.0  # inches of the figure
@@ -105,7 +105,7 @@ def render_view(one: Round, view: TrainingView, key: str) -> Look:
     row = next((row for row in one.metrics["test_views"] if row["view"] == view.name), None)
     if row is None:
         raise InputError(f"metrics.json of round {one.number}: lacks the test view {view.name}; make it again")
-    (view,) = modelled([view], one.grid)
+    (view,) = mask_to_ground([view], one.grid)
     picture = np.clip(render(one.field, view.camera).colour, 0, 1)
     if key == "psnr_colour_corrected":
         picture = np.clip(metrics.correct_colours(picture, view.image, view.weight), 0, 1).astype(np.float32)

@@ -1,0 +1,128 @@
+"""The coarse field: from the start views and the points of structure from motion to the first Gaussian field."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray as Array
+from scipy.spatial import cKDTree
+
+from dav_gswt.field import GaussianField, concatenate_fields
+from dav_gswt.geometry.scene_frame import SceneFrame
+from dav_gswt.photos.training_views import TrainingView
+from dav_gswt.reconstruction import discs, ground, objects, underlay
+from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fitting import trainer
+from dav_gswt.reconstruction.fitting.constraints import FreeConstraints
+from dav_gswt.reconstruction.fitting.plan import AUTO, FitReport
+from dav_gswt.reconstruction.fitting.state import State
+from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.reconstruction.observation import (
+    extent_of,
+    ground_colours,
+    make_constraints,
+    mask_for_fit,
+    observe,
+    pixel_size,
+    thin_at_random,
+)
+from dav_gswt.reconstruction.opacity_uncertainty import estimate_uncertainty
+
+_log = logging.getLogger(__name__)
+
+BAND = 0.1  # flying heights within which points belong to a ground with objects on it
+BLOCK = 32  # the exemplar's side is a multiple of it, in cells: six levels halve it five times
+NEIGHBOURS = 12  # of a point on the map
+MIN_EXPLAINED = 0.6  # share of the points that a height field must explain, or the scene has no ground
+HALF_SHARE = 0.3  # of the steps at half the resolution, for a scene without a ground
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """A field, the grid of its ground, and the report of the fit."""
+
+    field: GaussianField
+    grid: Ground
+    report: FitReport
+
+
+def fit_coarse_field(
+    frame: SceneFrame,
+    views: list[TrainingView],
+    points: Float[Array, "n 3"],
+    colours: Float[Array, "n 3"],
+    settings: FitSettings,
+    rng: np.random.Generator,
+    snapshots: Path | str | None = None,
+    margin: float = ground.MARGIN,
+    callback: Callable[[int, State], None] | None = None,
+) -> Reconstruction:
+    """Fit a field of the ground and the objects on it to the start views.
+
+    points, colours: of structure from motion, from these views alone. margin: ground modelled around the exemplar, as
+    a share of its side. snapshots, callback: see `trainer.fit_field`.
+    A scene that no height field explains is fitted as free Gaussians.
+    """
+    spacing = settings.spacing * pixel_size(frame, views)
+    grid = ground.fit_ground(frame, points, spacing, settings.max_discs, BLOCK, margin)
+    explained = _explained_share(grid, points, frame)
+    if explained < MIN_EXPLAINED:
+        _log.warning("a height field explains only %.0f %% of the points: free Gaussians instead", 100 * explained)
+        plan = settings.plan_coarse_fit(len(views), HALF_SHARE)
+        start, constraints = _start_from_points(points, colours, settings)
+        fit = trainer.fit_field(start, views, plan, constraints, rng, "fit free field", snapshots, callback)
+        return Reconstruction(*finish_field(fit.field, grid, views), fit.report)
+    scene = observe(frame, grid, views)
+    shell = objects.make_shell(scene.relief, scene.views)
+    isolated = objects.make_isolated_points(grid, scene.relief, points, colours, BAND * frame.flying_height)
+    room = settings.gaussian_limit - grid.heights.size - underlay.count_gaussians(grid)
+    standing = thin_at_random(concatenate_fields([isolated, shell]), room, rng)
+    colour, known = ground_colours(grid, scene.views, standing)
+    grid = replace(grid, seen=known)
+    layer = discs.make_ground_discs(grid, discs.fill_unknown(colour, known))
+    start = concatenate_fields([layer, underlay.make_underlay(grid, layer), standing])
+    _log.info(
+        "ground: %d x %d discs of %.4g %s, %.0f %% seen", *grid.shape, grid.spacing, frame.unit, 100 * known.mean()
+    )
+    _log.info("objects: %d Gaussians over %.1f %% of the ground", len(standing), 100 * scene.relief.stands.mean())
+    constraints = make_constraints(grid, scene.relief, standing, frame)
+    plan = settings.plan_coarse_fit(len(views))
+    masked = mask_for_fit(scene.views, grid)
+    fit = trainer.fit_field(start, masked, plan, constraints, rng, "fit coarse field", snapshots, callback)
+    return Reconstruction(*finish_field(fit.field, grid, masked), fit.report)
+
+
+def finish_field(fitted: GaussianField, grid: Ground, views: list[TrainingView]) -> tuple[GaussianField, Ground]:
+    """The fitted field with its uncertainty, and the grid with the heights of its discs."""
+    field = underlay.copy_uncertainty(estimate_uncertainty(fitted, views), grid)
+    if not field.ground.any():
+        return field, grid
+    heights = field.means[: grid.heights.size, 2].reshape(grid.shape).astype(float)
+    return field, replace(grid, heights=heights)
+
+
+def _start_from_points(
+    points: Float[Array, "n 3"], colours: Float[Array, "n 3"], settings: FitSettings
+) -> tuple[GaussianField, FreeConstraints]:
+    """Gaussians as large as the points are apart, for a scene without a ground."""
+    apart = cKDTree(points).query(points, k=min(4, len(points)))[0][:, 1:].mean(1)
+    start = objects.make_blobs(points, colours, np.clip(0.5 * apart, 1e-6, None), logit=0.0)
+    if settings.max_gaussians != AUTO:
+        start = start[: settings.gaussian_limit]
+    return start, FreeConstraints(float(np.median(apart)), extent_of(points))
+
+
+def _explained_share(grid: Ground, points: Float[Array, "n 3"], frame: SceneFrame) -> float:
+    """Share of the points over the grid that lie near the median height of their neighbours; 1 with too few to tell.
+
+    The fitted surface cannot tell: between few points it bends to all of them.
+    """
+    inside = points[grid.contains(points)]
+    if len(inside) <= NEIGHBOURS:
+        return 1.0
+    near = cKDTree(inside[:, :2]).query(inside[:, :2], k=NEIGHBOURS + 1)[1][:, 1:]
+    apart = np.abs(inside[:, 2] - np.median(inside[near, 2], axis=1))
+    return float((apart < BAND * frame.flying_height).mean())
