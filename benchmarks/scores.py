@@ -86,7 +86,7 @@ def pools() -> dict[str, float]:
         everywhere = np.ones((count, model.size, model.size), np.float32)
         terms, _ = prior_sampling.sample_terms(ask, told, [pose.name for pose, _ in pool], everywhere)
         return time.perf_counter() - start, uncertainty.combine_terms(
-            terms.w2_sq, terms.lpips, 0.1, uncertainty.Scales.frozen(terms.named())
+            terms.w2_sq, terms.lpips, 0.1, uncertainty.Scales.from_terms(terms.by_name())
         )
 
     draft, _ = scored(250, staged=True)

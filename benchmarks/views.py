@@ -38,7 +38,7 @@ def selection() -> dict[str, float]:
     found = [Pose(f"pose_{i:04d}", *p) for i, p in enumerate(places)]
     rng = np.random.default_rng(0)
     terms = {name: rng.uniform(0, 1, CANDIDATES) for name in TERMS}
-    scores = Scores(found, terms, Scales.frozen(terms), np.full(CANDIDATES, 8))
+    scores = Scores(found, terms, Scales.from_terms(terms), np.full(CANDIDATES, 8))
     captured = np.array([pose_offset(pose) for pose in found[:PHOTOS]])
     out = {}
     for name, policy in POLICIES.items():

@@ -11,7 +11,7 @@ from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction import evaluation, ground
 from dav_gswt.reconstruction.observation import mask_to_ground
-from dav_gswt.views import stopping
+from dav_gswt.views.selection import read_pose_selection
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
@@ -24,6 +24,8 @@ with logging_to(snakemake.log[0]):
     result = evaluation.evaluate_field(fitted, mask_to_ground(tests, grid), groups, perceptual)
     result |= {"round": params.t, "photos": photos, "gaussians": len(fitted)}
     result |= {"fit": read_json(given.fit)}
-    result |= stopping.decision_record(read_json(given.poses)) if given.get("poses") else {}
+    if given.get("poses"):
+        chosen = read_pose_selection(given.poses)
+        result |= {"stopped": chosen.stopped, "expected": chosen.expected}
     inputs = {"field": given.field, "ground": given.ground, "views": given.views}
     write_json(snakemake.output.metrics, result | {"provenance": record_provenance(inputs, dict(params.preset))})

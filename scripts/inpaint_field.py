@@ -14,7 +14,7 @@ from dav_gswt.views import prior_sampling, scoring
 with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
     fitted, grid, names = read_field(given.field), ground.read_ground(given.ground), read_view_split(given.views).start
-    taken = read_training_views(given.images, given.model, names, list(given.captures), scoring.PHOTO)
+    taken = read_training_views(given.images, given.model, names, list(given.captures), scoring.PHOTO_WIDTH)
     asked = prior_sampling.open_inpainting_prior(params.prior, params.seed)
     made = build.complete(fitted, grid, read_scene_frame(given.frame), taken, asked)
     if made.field is fitted:

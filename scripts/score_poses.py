@@ -21,7 +21,7 @@ with logging_to(snakemake.log[0]):
         pool = feasibility.filter_feasible(
             pool, grid, scene.get("feasibility"), feasibility.CLEARANCE * frame.flying_height
         )
-    taken = read_training_views(given.images, given.model, split.start, captures, scoring.PHOTO)
+    taken = read_training_views(given.images, given.model, split.start, captures, scoring.PHOTO_WIDTH)
     prior = prior_sampling.open_scoring_prior(params.prior, params.p_drop, params.seed, given.get("lpips"))
     first = frozen_scales.read_frozen_scales(given.frozen) if given.get("frozen") else None
     found = scoring.score_poses(fitted, grid, pool, taken, frame, prior, first)
@@ -31,4 +31,4 @@ with logging_to(snakemake.log[0]):
     inputs = {name: given[name] for name in ("field", "ground", "views", "weights", "lpips") if given.get(name)}
     about = {"prior": params.prior, "p_drop": params.p_drop, "seed": params.seed}
     about["variance"] = "posterior" if prior and prior.posterior else "point"
-    frozen_scales.write_frozen_scales(out.facts, found.frozen, found.facts(), inputs, about)
+    frozen_scales.write_frozen_scales(out.facts, found.frozen, found.describe(), inputs, about)

@@ -2,8 +2,6 @@
 
 import numpy as np
 
-from dav_gswt.files import write_json
-from dav_gswt.geometry.poses import poses_to_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.logs import logging_to
@@ -15,16 +13,17 @@ with logging_to(snakemake.log[0]):
     given, params, policy = snakemake.input, snakemake.params, snakemake.params.policy
     frame, split, scored = read_scene_frame(given.frame), read_view_split(given.views), scores.read_scores(given.scores)
     taken = candidates.read_captured_cameras(given.model, split, given.captures)
-    known = stopping.read_state(given, len(split.start), len(taken), len(scored))
+    state = stopping.read_state(given, len(split.start), len(taken), len(scored))
     k, chosen = selection.poses_per_round(policy, params.k, len(scored)), []
-    decided = stopping.decide(params.stop, k, params.scene.get("burst", 1), known)
+    decided = stopping.decide_poses(params.stop, k, params.scene.get("burst", 1), state)
     if not decided.stopped:
         pool = candidates.list_remaining(params.scene, frame, given.model, split, given.captures)
         places, rng = candidates.camera_positions(taken, frame), np.random.default_rng([params.seed, params.t])
         information = policy_inputs.build_information_gain(policy, scored, pool, taken, given.field)
         errors = policy_inputs.measure_true_errors(policy, scored, pool, given, params.scene, params.size)
         inputs = SelectionInput(places, decided.poses, rng, params.lam, information, errors)
-        chosen = selection.select(policy, scored, inputs)
-    write_json(snakemake.output.poses, poses_to_json(chosen, policy, params.k) | decided.to_json())
-    shown = pose_maps.read_pose_maps(given.maps)[0].parts(scored, [pose.name for pose in chosen])
-    image_files.write_exr_parts(snakemake.output.shown, shown or pose_maps.NOTHING)
+        chosen = selection.select_poses(policy, scored, inputs)
+    result = selection.PoseSelection(policy, params.k, chosen, decided.stopped, decided.expected_gain())
+    selection.write_pose_selection(snakemake.output.poses, result)
+    shown = pose_maps.read_pose_maps(given.maps)[0].exr_parts(scored, [pose.name for pose in chosen])
+    image_files.write_exr_parts(snakemake.output.shown, shown or pose_maps.EMPTY_PARTS)

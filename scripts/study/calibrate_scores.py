@@ -16,7 +16,7 @@ with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     captures = list(given.get("captures", []))
     frame, split = read_scene_frame(given.frame), read_view_split(given.views)
-    taken = read_training_views(given.images, given.model, split.start, captures, scoring.PHOTO)
+    taken = read_training_views(given.images, given.model, split.start, captures, scoring.PHOTO_WIDTH)
     fitted = read_field(given.field), ground.read_ground(given.ground)
     judged = judging.CalibrationTarget(params.scene, *fitted, frame, taken, params.size)
     pool = candidates.list_remaining(params.scene, frame, given.model, split, captures)

@@ -1,18 +1,18 @@
 """Rule plot_sphere: what was each candidate worth to each round, and which did it choose?"""
 
-from dav_gswt.files import read_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.study.views import sphere
 from dav_gswt.views import candidates, scores
+from dav_gswt.views.selection import read_pose_selection
 
 with logging_to(snakemake.log[0]):
     given, lam = snakemake.input, snakemake.params.lam
     frame, split = read_scene_frame(given.frame), read_view_split(given.views)
     captures, rounds = list(given.captures), []
-    for t, (scored, asked) in enumerate(zip(given.scores, given.poses, strict=True), 1):
+    for t, (scored, poses) in enumerate(zip(given.scores, given.poses, strict=True), 1):
         taken = candidates.read_captured_cameras(given.model, split, captures[: t - 1])
         table = scores.read_scores(scored)
-        rounds.append(sphere.read_round(t, table, read_json(asked), taken, frame, lam))
+        rounds.append(sphere.build_round(t, table, read_pose_selection(poses).poses, taken, frame, lam))
     sphere.write_figure(snakemake.output.plot, rounds, sphere.candidate_values(table, lam)[0])

@@ -3,11 +3,11 @@
 from dav_gswt.files import atomic_folder
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
-from dav_gswt.study.calibration import truth
-from dav_gswt.views import candidates
+from dav_gswt.views import candidates, oracle
 
 with logging_to(snakemake.log[0]):
     scene = snakemake.params.scene
     pool = candidates.list_hemisphere(scene, read_scene_frame(snakemake.input.frame))
     with atomic_folder(snakemake.output.truth) as folder:
-        truth.write_truth(folder, truth.render_truth(scene, truth.spread_candidates(pool, snakemake.params.poses), ""))
+        some = oracle.spread_candidates(pool, snakemake.params.poses)
+        oracle.write_truth(folder, oracle.render_truth(scene, some, ""))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dav_gswt.views import marginal_gain
-from dav_gswt.views.marginal_gain import OFF, SHARE, FitHistory, RoundGaps, predict_gain
+from dav_gswt.views.marginal_gain import SHARE, SPREAD, FitHistory, RoundGaps, predict_gain
 
 
 def by_law(c, sizes, each, noise=0.0, seed=0):
@@ -25,7 +25,7 @@ def test_the_law_is_found_whatever_the_rounds_and_goes_on_falling(sizes):
 
 def test_where_photos_agree_the_interval_is_that_of_the_share():
     found = predict_gain(FitHistory(by_law(40.0, (8, 12), 4), 16, 4))
-    wide = np.exp(3.182446 * OFF * np.sqrt(1.25))  # Student's t of 3 degrees of freedom, from a table
+    wide = np.exp(3.182446 * SPREAD * np.sqrt(1.25))  # Student's t of 3 degrees of freedom, from a table
     assert (found.low, found.high) == pytest.approx((found.gain / wide, found.gain * wide), rel=1e-5)
 
 
@@ -38,7 +38,7 @@ def test_the_interval_holds_another_scene_as_often_as_it_says(monkeypatch):
     for seed in range(400):
         scenes = rng.normal(np.log(0.5), 0.4, 5)
         monkeypatch.setattr(marginal_gain, "SHARE", float(np.exp(scenes[:4].mean())))
-        monkeypatch.setattr(marginal_gain, "OFF", float(scenes[:4].std(ddof=1)))
+        monkeypatch.setattr(marginal_gain, "SPREAD", float(scenes[:4].std(ddof=1)))
         found = predict_gain(FitHistory(by_law(40.0, (8, 12), 4, noise=1.0, seed=seed), 16, 4))
         gained = 40.0 * (1 / 16 - 1 / 20) * np.exp(scenes[4])
         missed += not found.low <= gained <= found.high

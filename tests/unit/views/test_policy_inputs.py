@@ -13,8 +13,7 @@ from dav_gswt.images import image_files
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import render
 from dav_gswt.reconstruction import ground
-from dav_gswt.study.calibration import truth
-from dav_gswt.views import policy_inputs
+from dav_gswt.views import oracle, policy_inputs
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.uncertainty.weighting import Scales
 
@@ -35,7 +34,7 @@ def files(tmp_path):
         picture = np.clip(render(true, camera).colour + np.float32(0.2 * (i == 2)), 0, 1)
         image_files.write_png(tmp_path / pose.name, picture)
         views.append(TrainingView(pose.name, camera, picture, np.ones((96, 96), np.float32)))
-    truth.write_truth(tmp_path / "truth", iter(views[1:]))
+    oracle.write_truth(tmp_path / "truth", iter(views[1:]))
     given = {"field": tmp_path / "field.ply", "ground": tmp_path / "ground.exr", "frame": tmp_path / "ground.json"}
     return given | {"images": tmp_path, "truth": tmp_path / "truth"}
 

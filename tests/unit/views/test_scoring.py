@@ -64,7 +64,7 @@ def test_without_a_prior_there_are_geometric_terms_alone():
 
 def test_a_prior_adds_what_its_samples_disagree_about():
     still, doubting = (scored(PriorConfig(Doubting(), 2, 4, p)) for p in (0.0, 0.2))
-    assert not still.scores.terms["w2_sq"].any() and still.scores.scales.of["w2_sq"] == 0
+    assert not still.scores.terms["w2_sq"].any() and still.scores.scales.by_term["w2_sq"] == 0
     # two samples at +-d in four channels: 2 var(ddof=1) summed is 4 (2 d)^2, and d is .2 of a blue of about .4
     np.testing.assert_allclose(doubting.scores.terms["w2_sq"][0], 4 * (2 * 0.2 * 0.4) ** 2, rtol=0.2)
     assert doubting.maps.w2_sq.shape == (3, 32, 32) and (doubting.scores.steps == 4).all()
@@ -181,7 +181,7 @@ def test_a_prior_sees_the_middle_square_and_the_nearest_photo():
 
 @pytest.mark.parametrize(
     ("eye", "said"),
-    [([1.6, 1.6, -0.5], "p0: under the ground"), ([1.6, 1.6, 2.0], "p0: inside of what stands there")],
+    [([1.6, 1.6, -0.5], "p0: below the ground"), ([1.6, 1.6, 2.0], "p0: inside an object")],
     ids=["under", "inside"],
 )
 def test_a_pose_that_no_photo_comes_from_is_named(eye, said):
@@ -215,7 +215,7 @@ def test_maps_come_back_and_are_shown_with_their_pose(tmp_path):
 def test_a_wide_pictures_map_knows_its_middle_square_alone():
     found = pose_maps.PoseMaps(["p0"], np.zeros((1, 64, 96), np.float32), np.ones((1, 16, 16), np.float32))
     table = scores.Scores([pool()[0][0]], {"w2_sq": np.ones(1)}, Scales({"w2_sq": 1.0}), np.ones(1, int))
-    shown = found.part(table, "p0")[0]["w2_sq"]
+    shown = found.exr_part(table, "p0")[0]["w2_sq"]
     assert (shown[:, 16:80] == 1).all() and np.isnan(shown[:, :16]).all() and np.isnan(shown[:, 80:]).all()
 
 

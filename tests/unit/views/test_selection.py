@@ -39,7 +39,7 @@ class Sharing:
 
 def chosen(policy, pool, k, captured=((1.0, 0, 0),), seed=0, lam=0.0, information=None, errors=None):
     inputs = SelectionInput(np.array(captured).reshape(-1, 3), k, np.random.default_rng(seed), lam, information, errors)
-    return [pose.name for pose in selection.select(policy, pool, inputs)]
+    return [pose.name for pose in selection.select_poses(policy, pool, inputs)]
 
 
 def test_farthest_takes_the_opposite_side_then_the_gaps():
@@ -172,6 +172,19 @@ def test_a_pool_that_is_too_small_is_taken_whole_and_said_so(policy, caplog):
 def test_spread_poses_are_far_apart_and_the_first_comes_first():
     assert select_farthest_poses(scored(0, 5, 180, 90).poses, 3) == [0, 2, 3]
     assert select_farthest_poses(scored(0, 0).poses, 5) == [0, 1]
+
+
+def test_a_selection_of_poses_comes_back(tmp_path):
+    chosen = selection.PoseSelection("farthest", 4, scored(0, 90).poses, None, {"gain": 0.1})
+    selection.write_pose_selection(tmp_path / "poses.json", chosen)
+    assert selection.read_pose_selection(tmp_path / "poses.json") == chosen
+
+
+@pytest.mark.parametrize("content", ["[]", "{}", '{"policy": "all", "k": 1, "poses": 3}', '{"poses": [{}]}'])
+def test_something_else_is_no_selection_of_poses(tmp_path, content):
+    (tmp_path / "poses.json").write_text(content)
+    with pytest.raises(InputError, match=r"poses\.json: not a selection"):
+        selection.read_pose_selection(tmp_path / "poses.json")
 
 
 def test_scores_come_back_to_the_bit(tmp_path):

@@ -15,9 +15,9 @@ from dav_gswt.prior import weights
 from dav_gswt.prior.networks import Network
 from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt.raster import render
-from dav_gswt.study.calibration import controls, judging, truth
+from dav_gswt.study.calibration import controls, judging
 from dav_gswt.study.prior.regressor import Regressor
-from dav_gswt.views import prior_sampling, scoring
+from dav_gswt.views import oracle, prior_sampling, scoring
 from dav_gswt.views.prior_sampling import PriorConfig
 
 AGENT = {"agent": "replay"}
@@ -93,7 +93,7 @@ def test_truth_that_was_drawn_once_is_what_is_compared(replayed, tmp_path):
     found = scoring.score_poses(judged.field, judged.grid, pool(), judged.taken, judged.frame)
     some, views = judging.choose_candidates(judged, pool(), found.scores, {"images": folder}, 5)
     (tmp_path / "truth").mkdir()
-    truth.write_truth(tmp_path / "truth", iter(views))
+    oracle.write_truth(tmp_path / "truth", iter(views))
     again = judging.choose_candidates(
         judged, pool(), found.scores, {"images": "", "truth": str(tmp_path / "truth")}, 12
     )
@@ -102,7 +102,7 @@ def test_truth_that_was_drawn_once_is_what_is_compared(replayed, tmp_path):
     assert all(np.abs(view.image - by_name[view.name]).max() < 0.003 for view in again[1])
     image_files.write_png(tmp_path / "truth" / f"{some[0][0].name}.png", np.zeros((5, 5, 3), np.float32))
     with pytest.raises(InputError, match="5 x 5 pixels, not those of its pose"):
-        truth.read_truth(pool(), tmp_path / "truth")
+        oracle.read_truth(pool(), tmp_path / "truth")
 
 
 def test_controls_are_what_they_say(files):

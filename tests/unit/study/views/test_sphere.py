@@ -23,8 +23,8 @@ def scored(count=60, high=1.0, **terms):
     return Scores(poses, terms, Scales({name: 0.5 for name in terms}), np.zeros(count, int))
 
 
-def asked(*numbers):
-    return {"poses": [{"name": f"p{i}"} for i in numbers]}
+def chosen_poses(*numbers):
+    return [Pose(f"p{i}", 45.0, 0.0, 5.0) for i in numbers]
 
 
 def photo(*eye):
@@ -33,7 +33,7 @@ def photo(*eye):
 
 def round_of(number=1, chosen=(5, 40, 2), photos=((0.0, 0.0, 5.0), (0.0, -3.0, 3.0)), high=1.0, count=60):
     taken = [photo(*eye) for eye in photos]
-    return sphere.read_round(number, scored(count, high), asked(*chosen), taken, FRAME, 0.0)
+    return sphere.build_round(number, scored(count, high), chosen_poses(*chosen), taken, FRAME, 0.0)
 
 
 def test_poses_lie_where_they_are_seen_from_above():
@@ -58,7 +58,7 @@ def test_candidates_are_coloured_by_doubt_where_a_prior_was_asked_else_by_opacit
     np.testing.assert_allclose(values, 2 * (w2 + 0.1 * lpips))
     assert "LPIPS" not in sphere.candidate_values(scored(w2_sq=w2), 0.1)[0]
     agreed = scored(w2_sq=np.zeros(60))
-    agreed.scales.of["w2_sq"] = 0.0
+    agreed.scales.by_term["w2_sq"] = 0.0
     assert "opaque" in sphere.candidate_values(agreed, 0.0)[0]
 
 
@@ -118,7 +118,7 @@ def test_many_chosen_are_not_numbered_and_none_is_said():
 
 
 def test_candidates_all_alike_or_none_at_all_are_drawn(tmp_path):
-    alike = [round_of(high=0.0), sphere.read_round(2, scored(0), asked(), [photo(0.0, 0.0, 5.0)], FRAME, 0.0)]
+    alike = [round_of(high=0.0), sphere.build_round(2, scored(0), chosen_poses(), [photo(0.0, 0.0, 5.0)], FRAME, 0.0)]
     sphere.write_figure(tmp_path / "a.png", alike, "doubt")
     assert image_files.read_photo(tmp_path / "a.png").std() > 0.05
 

@@ -75,7 +75,7 @@ def test_intervals_hold_their_level_on_held_out_samples_whatever_u_is_worth(info
         u = rng.uniform(0, 1, 240)
         error = np.abs(rng.normal(0, 0.05 + u)) if informative else rng.exponential(1, 240)
         intervals = un.calibrate_intervals(u[:199], error[:199], rng, 0.9)
-        low, high = intervals.at(u[199:])
+        low, high = intervals.bounds(u[199:])
         covered.append(((low <= error[199:]) & (error[199:] <= high)).mean())
         widths.append(np.corrcoef(u[199:], high)[0, 1] if informative else 0)
         assert (low >= 0).all() and (high >= low).all()
@@ -86,9 +86,9 @@ def test_intervals_hold_their_level_on_held_out_samples_whatever_u_is_worth(info
 
 def test_intervals_of_errors_that_are_all_0_and_of_few_samples():
     rng = np.random.default_rng(0)
-    low, high = un.calibrate_intervals(np.arange(60.0), np.zeros(60), rng).at(np.array([3.0, 1e9]))
+    low, high = un.calibrate_intervals(np.arange(60.0), np.zeros(60), rng).bounds(np.array([3.0, 1e9]))
     assert (low == 0).all() and (high == 0).all()
-    low, high = un.calibrate_intervals(np.arange(6.0), np.ones(6), rng).at(np.array([3.0]))
+    low, high = un.calibrate_intervals(np.arange(6.0), np.ones(6), rng).bounds(np.array([3.0]))
     assert low[0] == 0 and high[0] == np.inf
     with pytest.raises(ValueError, match="at least 2 samples"):
         un.calibrate_intervals(np.zeros(1), np.zeros(1), rng)

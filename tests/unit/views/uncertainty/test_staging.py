@@ -111,7 +111,7 @@ def condition(n):
     return Condition(blank, blank[..., 0], blank[..., 0], blank, relative)
 
 
-def test_imagining_in_stages_costs_less_and_says_how_much(caplog):
+def test_sampling_in_stages_costs_less_and_says_how_much(caplog):
     n, names = 200, [f"p{i}" for i in range(200)]
     with caplog.at_level(logging.INFO):
         whole, staged = Counting(), Counting()
@@ -121,7 +121,7 @@ def test_imagining_in_stages_costs_less_and_says_how_much(caplog):
         some, spent = prior_sampling.sample_terms(PriorConfig(staged, 4, 8, 0.1), condition(n), names, ALL[:n])
     assert whole.evaluations == n * 4 * 8 and (steps == 8).all()
     assert staged.evaluations == n * 4 * 2 + (spent == 8).sum() * 4 * 8 < 0.6 * whole.evaluations
-    assert "of 200 poses were imagined in full" in caplog.text
+    assert "of 200 poses were sampled in full" in caplog.text
     assert best(full.w2_sq) == best(some.w2_sq)
 
 

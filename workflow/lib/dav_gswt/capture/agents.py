@@ -11,6 +11,7 @@ from pathlib import Path
 from dav_gswt.capture import drone, handheld, render, replay, serial_rig
 from dav_gswt.capture.interface import CaptureAgent, CaptureRequest, RequestedPose, photo_name, view_distance
 from dav_gswt.capture.site import Site
+from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
 from dav_gswt.photos.capture_record import CapturedPhoto, write_capture_record
 from dav_gswt.photos.lenses import undistort_scene_photo
@@ -45,10 +46,10 @@ AGENTS: dict[str, CaptureAgent] = {
 }
 
 
-def capture_views(site: Site, split: ViewSplit, before: list, chosen: list[dict], folder: Path) -> None:
+def capture_views(site: Site, split: ViewSplit, before: list, chosen: list[Pose], folder: Path) -> None:
     """Fill `folder` with the photos of the chosen poses and with capture.json.
 
-    split: views.json. before: the capture folders of earlier rounds. chosen: poses of poses.json. The agent is not
+    split: views.json. before: the capture folders of earlier rounds. chosen: the poses to photograph. The agent is not
     called if no pose was chosen.
     """
     pool = candidates.list_remaining(site.scene, site.frame, site.photos / "sparse", split, before)

@@ -1,6 +1,6 @@
 """Candidate poses: places on a hemisphere over the exemplar, as (elevation, azimuth, radius) and a camera each."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -48,8 +48,3 @@ def select_farthest_poses(candidates: list[Pose], count: int, taken: Float[Array
         nearest = np.minimum(nearest, np.linalg.norm(places - places[chosen[-1]], axis=1))
         nearest[chosen[-1]] = -np.inf
     return chosen
-
-
-def poses_to_json(chosen: list[Pose], policy: str, k: int) -> dict:
-    """The content of poses.json: what was asked, and the poses in the order they were chosen."""
-    return {"policy": policy, "k": k, "poses": [asdict(pose) for pose in chosen]}

@@ -1,1 +1,1 @@
-"""Active views: score the candidate poses, choose some, capture them, refit, and again."""
+"""View selection: scores candidate poses (`scoring`) and chooses the next ones (`policies`, `selection`)."""

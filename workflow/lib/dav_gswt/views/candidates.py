@@ -1,4 +1,4 @@
-"""The pool: where a photo could still be taken: on a hemisphere if a scene can be rendered, else at its frames."""
+"""Candidate poses: on a hemisphere for scenes that can be photographed, at the photos of a replayed scene."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -18,13 +18,16 @@ from dav_gswt.photos.view_split import ViewSplit
 
 Candidates = list[tuple[Pose, Camera]]
 
-AROUND, LOWEST = 250, 30.0  # poses that devices and people may be asked for, and their least elevation in degrees
+ORBIT_POSES, LOWEST = 250, 30.0  # candidates for devices and people, and their least elevation in degrees
 
 
 def list_remaining(
     scene: dict, frame: SceneFrame, model_folder: Path | str, split: ViewSplit, captures: list
 ) -> Candidates:
-    """Every pose that can still be captured: the scene's candidates less those that captures have used."""
+    """List the candidates of a scene that earlier captures have not used.
+
+    split: views.json. captures: folders of earlier rounds.
+    """
     if scene["agent"] == "render":
         pool = list_hemisphere(scene, frame)
     else:
@@ -39,16 +42,19 @@ def list_remaining(
 
 
 def list_hemisphere(scene: dict, frame: SceneFrame) -> Candidates:
-    """Poses spread evenly over the hemisphere from which a synthetic scene can be photographed."""
+    """List poses spread evenly over the hemisphere of a synthetic scene."""
     found = synthetic.candidates(scene, frame.exemplar.centre)
     return [(pose_of_camera(f"pose_{i:04d}", camera, frame), camera) for i, camera in enumerate(found)]
 
 
 def list_orbit(scene: dict, frame: SceneFrame, like: Camera) -> Candidates:
-    """Poses spread evenly over the hemisphere at the flying height, for devices and people. like: a camera whose lens
-    they have. `lowest`: the least elevation, degrees."""
+    """List poses spread evenly over the hemisphere at the flying height, for devices and people.
+
+    scene: its keys `candidates` (number) and `min_elevation` (least elevation, degrees) are used. like: a camera of
+    their lens.
+    """
     places = camera_layouts.hemisphere(
-        scene.get("candidates", AROUND), scene.get("min_elevation", LOWEST), frame.flying_height
+        scene.get("candidates", ORBIT_POSES), scene.get("min_elevation", LOWEST), frame.flying_height
     )
     found = [camera_layouts.orbit(*place, frame.exemplar.centre, like.width, like.height, 60.0) for place in places]
     lens = {name: getattr(like, name) for name in ("fx", "fy", "cx", "cy")}
@@ -56,7 +62,7 @@ def list_orbit(scene: dict, frame: SceneFrame, like: Camera) -> Candidates:
 
 
 def read_captured_cameras(model_folder: Path | str, split: ViewSplit, captures: list) -> list[Camera]:
-    """The cameras of the photos taken so far."""
+    """Read the cameras of all photos so far."""
     known = read_colmap_model(model_folder)
     at = dict(zip(known.names, known.cameras, strict=True))
     start = [at[name] for name in split.start]
@@ -64,14 +70,14 @@ def read_captured_cameras(model_folder: Path | str, split: ViewSplit, captures: 
 
 
 def camera_positions(taken: list[Camera], frame: SceneFrame) -> Float[Array, "m 3"]:
-    """Where cameras stand, relative to the exemplar's centre."""
+    """Positions of cameras relative to the exemplar's centre."""
     return np.array([camera.centre - frame.exemplar.centre for camera in taken]).reshape(-1, 3)
 
 
-def select_by_name(pool: Candidates, chosen: list[dict]) -> Candidates:
-    """The candidates that poses.json names."""
+def select_by_name(pool: Candidates, chosen: list[Pose]) -> Candidates:
+    """Return the candidates of chosen poses, by their names."""
     by_name = {pose.name: (pose, camera) for pose, camera in pool}
-    return [by_name[pose["name"]] for pose in chosen]
+    return [by_name[pose.name] for pose in chosen]
 
 
 def _used_names(folder: Path | str) -> list[str]:

@@ -1,4 +1,4 @@
-"""A camera stands in the open: under the ground, or inside of what stands on it, no photo is taken and none scored."""
+"""Collision test of camera positions with the ground and with solid Gaussians."""
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -12,34 +12,35 @@ from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.uncertainty.finite import format_names
 
-SOLID = 0.5  # opacity from which a Gaussian is something that one can be inside of
+SOLID = 0.5  # opacity from which a Gaussian counts as solid
 
 
 def require_free_positions(pool: Candidates, field: GaussianField, grid: Ground) -> None:
-    """Raises: InputError: candidates under the ground, or within one deviation of a solid Gaussian, by their names."""
+    """Raises: InputError: candidates below the ground, or within one standard deviation of a solid Gaussian, by
+    name."""
     if not pool:
         return
     centres = np.stack([camera.centre for _, camera in pool])
     checks = {
-        "under the ground": find_below_ground(centres, grid),
-        "inside of what stands there": find_inside_objects(centres, field),
+        "below the ground": find_below_ground(centres, grid),
+        "inside an object": find_inside_objects(centres, field),
     }
     for what, bad in checks.items():
         if bad.any():
             names = format_names(bad, [pose.name for pose, _ in pool])
             raise InputError(
-                f"pose {names}: {what}; no photo comes from there. Set `reach` or `lowest` of the scene, or look "
-                f"whether its ground is right"
+                f"pose {names}: {what}; no photo can be taken there. Set `reach` or `lowest` of the scene, or check "
+                f"its ground"
             )
 
 
 def find_below_ground(centres: Float[Array, "n 3"], grid: Ground) -> Bool[Array, "n"]:
-    """Which places are at or below the surface; none beyond the grid, where there is no surface."""
+    """Which positions are at or below the surface; none outside the grid."""
     return grid.contains(centres) & (centres[:, 2] <= grid.height_at(centres))
 
 
 def find_inside_objects(centres: Float[Array, "n 3"], field: GaussianField) -> Bool[Array, "n"]:
-    """Which places are within one standard deviation of a solid Gaussian's centre."""
+    """Which positions are within one standard deviation of a solid Gaussian's centre."""
     solid = expit(field.opacity_logits) >= SOLID
     means, scales = field.means[solid].astype(float), np.exp(field.log_scales[solid].astype(float))
     found = np.zeros(len(centres), bool)

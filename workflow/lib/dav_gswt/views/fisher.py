@@ -1,8 +1,7 @@
-"""Fisher information that a photo would give about a field: how much better its Gaussians' colours would be known.
+"""Fisher information that a photo gives about the colours of a field's Gaussians.
 
 A pixel's colour is the sum of w_i c_i, so its derivative by the colour c_i is the blend weight w_i, and the diagonal of
-the information of a whole picture is H_i = sum over pixels of w_i^2, alike in each channel: exact, and squared before
-it is summed (the square of a sum would let pixels cancel).
+the information of a picture is H_i = sum over pixels of w_i^2, equal in all channels.
 """
 
 import numpy as np
@@ -14,11 +13,11 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import Rasterizer, to_raster_arrays
 from dav_gswt.raster.interface import Contributions
 
-PRIOR = 1.0  # information on each Gaussian before any photo: one pixel that it fills
+PRIOR = 1.0  # information on each Gaussian before any photo: one pixel that it covers fully
 
 
 def accumulate_information(field: GaussianField, cameras: list[Camera], raster: Rasterizer) -> Float64[Array, "n"]:
-    """Information on each Gaussian in photos that were taken, and a little before them."""
+    """Sum the information of captured photos on each Gaussian, plus PRIOR."""
     total = np.full(len(field), PRIOR)
     for camera in cameras:
         raster.forward(**to_raster_arrays(field), camera=camera)
@@ -27,27 +26,27 @@ def accumulate_information(field: GaussianField, cameras: list[Camera], raster: 
 
 
 def information_gain(seen: Contributions, already: Float64[Array, "n"]) -> float:
-    """Sum over Gaussians of a photo's information over what there is: the trace of H (H_known)^-1, both diagonal.
+    """Information gain of a photo: the trace of H (H_known)^-1, both diagonal.
 
-    Source: Jiang et al., FisherRF, ECCV 2024, of colours alone.
+    Source: Jiang et al., FisherRF, ECCV 2024, for colours only.
     """
     return float((seen.squared / already).sum())
 
 
 class FisherInformation:
-    """The information on a field that photos give, growing as candidates are chosen (`policies.InformationGain`)."""
+    """Information gain of candidates, updated with every choice; implements `policies.InformationGain`."""
 
     def __init__(self, field: GaussianField, taken: list[Camera], candidates: list[Camera]):
-        """taken, candidates: cameras at the size at which poses are scored."""
+        """taken, candidates: cameras at the scoring size."""
         self.field, self.candidates, self.raster = field, candidates, Rasterizer()
         self.known = accumulate_information(field, taken, self.raster)
 
     def gain(self, i: int) -> float:
-        """Of a photo from candidate i, given all that was taken."""
+        """Return the gain of a photo from candidate i over all photos so far."""
         return information_gain(self._seen(i), self.known)
 
     def take(self, i: int) -> None:
-        """Candidate i is chosen."""
+        """Add the photo from candidate i."""
         self.known = self.known + self._seen(i).squared
 
     def _seen(self, i: int) -> Contributions:

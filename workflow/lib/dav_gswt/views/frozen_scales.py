@@ -1,4 +1,4 @@
-"""What the first round settles for all others of its scene, and what scores.json says of a scoring."""
+"""scores.json: scales that the first round fixes for all later rounds of a scene, and a summary of the scoring."""
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,15 +11,15 @@ from dav_gswt.views.uncertainty.weighting import Quantiles, Scales
 
 @dataclass(frozen=True)
 class FrozenScales:
-    """scales: of terms. pixels: of w2_sq's maps, those that count as 0 and as 1 when the maps are carried onto
-    Gaussians; None without a prior."""
+    """scales: of the terms. pixels: values of w2_sq maps that become 0 and 1 in uncertainties of Gaussians; None
+    without a prior."""
 
     scales: Scales
     pixels: Quantiles | None
 
 
 def read_frozen_scales(path: Path | str) -> FrozenScales:
-    """Raises: InputError: not the scores.json of a first round."""
+    """Read scores.json. Raises: InputError: not that of a first round."""
     found = read_json(path)
     try:
         pixels = found["pixels"] and Quantiles(float(found["pixels"]["low"]), float(found["pixels"]["high"]))
@@ -29,8 +29,8 @@ def read_frozen_scales(path: Path | str) -> FrozenScales:
 
 
 def write_frozen_scales(
-    path: Path | str, frozen: FrozenScales, facts: dict, inputs: dict[str, Path | str], parameters: dict
+    path: Path | str, frozen: FrozenScales, facts: dict, inputs: dict[str, Path | str | list], parameters: dict
 ) -> None:
-    """facts: what more is to be said of a scoring."""
-    scales, pixels = frozen.scales.of, frozen.pixels and asdict(frozen.pixels)
+    """Write scores.json. facts: summary of the scoring, see `ScoringResult.describe`."""
+    scales, pixels = frozen.scales.by_term, frozen.pixels and asdict(frozen.pixels)
     write_json(path, facts | {"scales": scales, "pixels": pixels, "provenance": record_provenance(inputs, parameters)})

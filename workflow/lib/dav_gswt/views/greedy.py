@@ -1,13 +1,13 @@
-"""Greedy choice where a gain only falls as others are chosen: looked at again only as far as it must be."""
+"""Lazy greedy maximisation of submodular functions."""
 
 import heapq
 from collections.abc import Callable, Iterable
 
 
 def lazy_greedy(gains: Iterable[float], look: Callable[[int], float], take: Callable[[int], None], k: int) -> list[int]:
-    """The k items that plain greedy chooses: one whose gain is still the largest after another look is the largest.
+    """Choose the same k items as plain greedy, with fewer evaluations: gains only fall as items are chosen.
 
-    gains: of each item before anything is chosen. look: its gain now. take: it is chosen. Ties by index.
+    gains: of each item before any choice. look: returns an item's current gain. take: records a choice. Ties by index.
     Source: Minoux, Accelerated greedy algorithms for maximizing submodular set functions, 1978.
     """
     queue = [(-gain, i) for i, gain in enumerate(gains)]

@@ -1,8 +1,7 @@
-"""What the next photos are worth: expected from what the captured photos themselves told, no test photo is asked.
+"""Expected gain of the next photos, from captured photos only; no test photo is used.
 
-A field shows the photos that it was fitted to better than any other: by a gap that is the wider, the fewer they are.
-Each new photo, before it is fitted to, tells how wide. New photos narrow it, and views that nobody took gain about half
-of what it loses.
+A field shows the photos that it was fitted to better than others. This gap shrinks with their number, and each new
+photo measures it before the field is fitted to it. Test views gain about half of what the gap loses.
 """
 
 from dataclasses import dataclass
@@ -11,18 +10,16 @@ import numpy as np
 from scipy.special import ndtri, stdtrit  # scipy.stats has them too, but loads for longer than most jobs take
 
 LEVEL = 0.95  # of the interval
-LEAST = 3  # new photos, without which nothing can be said
-# Of the gap that closes, what test views gained, and the standard deviation of its logarithm from cell to cell: over 27
-# rounds on development scenes (desert, grass, flowers, caliterra_earthworks; draft, `farthest`, four photos a round).
-# How they do on others: docs/research/data/view_worth.csv.
-SHARE, OFF = 0.5, 0.4
-SCENES = 4  # that these two are from: few, so another scene may be farther off than a normal law says
+LEAST = 3  # new photos needed for an estimate
+SHARE = 0.5  # of the closed gap that test views gain, measured on development scenes
+SPREAD = 0.4  # standard deviation of the logarithm of SHARE between cells
+SCENES = 4  # behind both constants; the interval uses Student's t for so few
 
 
 @dataclass(frozen=True)
 class RoundGaps:
-    """fitted: photos that the field was fitted to before this round. gaps: dB by which it shows each photo of the round
-    worse than those, on average."""
+    """fitted: photos before this round. gaps: dB by which each photo of the round is shown worse than those on
+    average."""
 
     fitted: int
     gaps: list[float]
@@ -30,7 +27,7 @@ class RoundGaps:
 
 @dataclass(frozen=True)
 class FitHistory:
-    """fitted: photos that the field is fitted to now. coming: how many the next round would take."""
+    """fitted: photos so far. coming: photos of the next round."""
 
     rounds: list[RoundGaps]
     fitted: int
@@ -39,8 +36,8 @@ class FitHistory:
 
 @dataclass(frozen=True)
 class ExpectedGain:
-    """What the next `photos` photos are expected to gain in all, in dB, and the ends of the 95 % interval. closes: how
-    much of the gap they close, in dB: `gain` is a share of it."""
+    """Expected gain of the next `photos` photos together in dB, and the ends of its 95 % interval. closes: dB of the
+    gap that they close; `gain` is a share of it."""
 
     photos: int
     gain: float
@@ -55,13 +52,12 @@ class ExpectedGain:
 
 
 def predict_gain(history: FitHistory) -> ExpectedGain | None:
-    """The gain that a field fitted to n photos has to expect of k more.
+    """Predict the gain of a field fitted to n photos from k more.
 
-    Model: the gap is c / n, c its mean over all new photos so far; k photos close c (1 / n - 1 / (n + k)) of it, and
-    other views gain SHARE of that. The interval is of the logarithm: normal of c, from photo to photo, and of SHARE
-    Student's t for one scene more than SCENES, t_(SCENES - 1) OFF sqrt(1 + 1 / SCENES). Where new photos are shown no
-    worse than old ones the gain is 0, and may be what c's own interval allows.
-    Returns: None where nothing can be said: fewer than LEAST new photos so far, or none to come.
+    Model: the gap is c / n, with c estimated from all new photos so far; k photos close c (1 / n - 1 / (n + k)) of it,
+    and test views gain SHARE of that. The interval is of the logarithm: normal for c, Student's t for SHARE on one more
+    scene, t_(SCENES - 1) SPREAD sqrt(1 + 1 / SCENES). If c <= 0 the gain is 0, and its upper end follows from c alone.
+    Returns: None with fewer than LEAST new photos so far, or none to come.
     """
     found = np.array([r.fitted * gap for r in history.rounds for gap in r.gaps])
     if len(found) < LEAST or history.coming < 1:
@@ -71,15 +67,15 @@ def predict_gain(history: FitHistory) -> ExpectedGain | None:
     c, error = float(found.mean()), float(found.std(ddof=1) / np.sqrt(len(found)))
     if not c > 0:
         return ExpectedGain(k, 0.0, 0.0, SHARE * part * max(0.0, c + reach * error), 0.0)
-    scene = float(stdtrit(SCENES - 1, (1 + LEVEL) / 2)) * OFF * np.sqrt(1 + 1 / SCENES)
+    scene = float(stdtrit(SCENES - 1, (1 + LEVEL) / 2)) * SPREAD * np.sqrt(1 + 1 / SCENES)
     gain, wide = SHARE * part * c, float(np.exp(np.hypot(scene, reach * error / c)))
     return ExpectedGain(k, gain, gain / wide, gain * wide, part * c)
 
 
 def build_history(reports: list[dict], start: int, coming: int) -> FitHistory:
-    """What the reports of the rounds so far (fit.json) tell. start: photos before the first round.
+    """Collect the gaps from the reports of the rounds so far (fit.json). start: photos before the first round.
 
-    Photos that were set aside because they contradict the others tell nothing: the field was never fitted to them.
+    Rejected photos are left out: the field was never fitted to them.
     """
     rounds, fitted = [], start
     for report in reports:

@@ -1,4 +1,4 @@
-"""What single policies need beside the scores: opened for those that ask for it, and for no others."""
+"""Inputs of single policies beside the scores, computed only for the policies that need them."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from dav_gswt.field import read_field
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.reconstruction import ground
-from dav_gswt.views import fisher
+from dav_gswt.views import fisher, oracle
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.policies import InformationGain
 from dav_gswt.views.policy_names import NEEDS_FIELD, ORACLES
@@ -22,7 +22,10 @@ from dav_gswt.views.scoring import scoring_camera
 def build_information_gain(
     policy: str, scores: Scores, pool: Candidates, taken: list[Camera], file: Path | str
 ) -> InformationGain | None:
-    """For `fisher`: the information that photos give about a field's file, candidates in the order of the scores."""
+    """Build the information gain for policies with `needs_field`; None for others.
+
+    taken: cameras of the photos so far. file: the field. Candidates are in the order of the scores.
+    """
     if policy not in NEEDS_FIELD:
         return None
     at = {pose.name: camera for pose, camera in pool}
@@ -34,22 +37,20 @@ def build_information_gain(
 def measure_true_errors(
     policy: str, scores: Scores, pool: Candidates, files: dict[str, Path | str], scene: dict, size: int
 ) -> Float64[Array, "n"] | None:
-    """For oracles: the true error at each candidate, NaN where its truth was not drawn.
+    """Measure the true error at each candidate for policies with `needs_truth`; None for others.
 
-    files: `field`, `ground`, `frame`, and `truth`, the folder of what candidates truly show; `images`, the photos of a
-    scene that is replayed. size: see `measures.measure_errors`.
-    Raises: InputError: no candidate's truth is known.
+    files: `field`, `ground`, `frame`, `truth` (folder of true pictures of candidates), and for a replayed scene
+    `images`. size: see `oracle.measure_errors`.
+    Returns: NaN where the true picture is unknown. Raises: InputError: it is unknown at every candidate.
     """
     if policy not in ORACLES:
         return None
-    from dav_gswt.study.calibration import measures, truth
-
     if scene["agent"] == "replay":
-        some, views = pool, list(truth.render_truth(scene, pool, files["images"]))
+        some, views = pool, list(oracle.render_truth(scene, pool, files["images"]))
     else:
-        some, views = truth.read_truth(pool, files["truth"])
-    corrected = read_scene_frame(files["frame"]).kind == "photos"  # which change their exposure
-    found, _ = measures.measure_errors(
+        some, views = oracle.read_truth(pool, files["truth"])
+    corrected = read_scene_frame(files["frame"]).kind == "photos"  # photos differ in exposure
+    found, _ = oracle.measure_errors(
         read_field(files["field"]), ground.read_ground(files["ground"]), views, size, corrected
     )
     known = {pose.name: error for (pose, _), error in zip(some, found, strict=True)}

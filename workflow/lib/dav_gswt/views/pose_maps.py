@@ -1,4 +1,4 @@
-"""Maps of candidate poses: kept for all of them in one file, shown for some as parts of an EXR."""
+"""Maps of candidate poses: all in one .npz file, some as parts of an EXR for display."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,25 +13,25 @@ from dav_gswt.files import UNREADABLE, atomic_file
 from dav_gswt.images.image_files import enlarge_map
 from dav_gswt.views.scores import Scores
 
-Part = tuple[dict[str, Array], dict[str, str]]  # of an EXR: channels, and what the header says
-NOTHING: dict[str, Part] = {"none": ({"opacity": np.zeros((1, 1), np.float32)}, {"camera": "no pose was left"})}
+Part = tuple[dict[str, Array], dict[str, str]]  # of an EXR: channels and header
+EMPTY_PARTS: dict[str, Part] = {"none": ({"opacity": np.zeros((1, 1), np.float32)}, {"camera": "no pose was left"})}
 
 
 @dataclass(frozen=True)
 class PoseMaps:
-    """Of n candidates. opacity: what is not known to be opaque, of the whole picture (NaN below a lower one).
-    w2_sq: how much the prior's samples disagree, of the picture's middle square; None without a prior."""
+    """Maps of n candidates. opacity: 1 - opacity of the whole picture, NaN below a picture of less height. w2_sq:
+    disagreement of the prior's samples in the picture's middle square; None without a prior."""
 
     names: list[str]
     opacity: Float32[Array, "n h w"]
     w2_sq: Float32[Array, "n hz wz"] | None
 
-    def parts(self, scores: Scores, names: list[str]) -> dict[str, Part]:
-        """Some candidates' maps, as parts of an EXR."""
-        return {name: self.part(scores, name) for name in names}
+    def exr_parts(self, scores: Scores, names: list[str]) -> dict[str, Part]:
+        """Maps of some candidates, as parts of an EXR."""
+        return {name: self.exr_part(scores, name) for name in names}
 
-    def part(self, scores: Scores, name: str) -> Part:
-        """A candidate's maps on the pixels of its picture; header: pose and terms."""
+    def exr_part(self, scores: Scores, name: str) -> Part:
+        """Maps of a candidate on the pixels of its picture; header: pose and terms."""
         i, row = self.names.index(name), scores.names.index(name)
         opacity = self.opacity[i]
         opacity = opacity[: int((~np.isnan(opacity[:, 0])).sum())]
@@ -43,7 +43,7 @@ class PoseMaps:
 
 
 def _place_square(square: Float32[Array, "s s"], shape: tuple[int, int]) -> Float32[Array, "h w"]:
-    """A map of the middle square, on a whole picture's pixels; NaN beside it."""
+    """Place a map of the middle square in a whole picture; NaN beside it."""
     h, w = shape
     side = min(h, w)
     top, left = (h - side) // 2, (w - side) // 2
@@ -53,15 +53,15 @@ def _place_square(square: Float32[Array, "s s"], shape: tuple[int, int]) -> Floa
 
 
 def apply_uncertainty(field: GaussianField, gaussians: Float32[Array, "g"]) -> GaussianField:
-    """The field with the uncertainty that maps gave its first Gaussians. What was imagined since stays as it is, in
-    full doubt: the maps are of the field before."""
-    doubt = field.uncertainty.copy()
-    doubt[: len(gaussians)] = np.where(field.imagined[: len(gaussians)], doubt[: len(gaussians)], gaussians)
-    return replace(field, uncertainty=doubt)
+    """Replace the uncertainty of a field's first Gaussians. Inpainted ones keep theirs: the maps are older than
+    they."""
+    uncertainty, n = field.uncertainty.copy(), len(gaussians)
+    uncertainty[:n] = np.where(field.imagined[:n], uncertainty[:n], gaussians)
+    return replace(field, uncertainty=uncertainty)
 
 
 def write_pose_maps(path: Path | str, maps: PoseMaps, gaussians: Float32[Array, "g"]) -> None:
-    """All maps in half precision (w2_sq in single), and the uncertainty that they give each Gaussian of the field."""
+    """Write maps in half precision (w2_sq in single) and the uncertainty of each Gaussian of the field."""
     values = {"names": np.array(maps.names, str), "opacity": maps.opacity.astype(np.float16), "gaussians": gaussians}
     if maps.w2_sq is not None:
         values["w2_sq"] = maps.w2_sq
@@ -70,7 +70,7 @@ def write_pose_maps(path: Path | str, maps: PoseMaps, gaussians: Float32[Array, 
 
 
 def read_pose_maps(path: Path | str) -> tuple[PoseMaps, Float32[Array, "g"]]:
-    """Maps and Gaussians' uncertainty. Raises: InputError: not what `write_pose_maps` wrote."""
+    """Read maps and Gaussians' uncertainty. Raises: InputError: not such a file."""
     try:
         with np.load(path, allow_pickle=False) as stored:
             w2_sq = stored.get("w2_sq")

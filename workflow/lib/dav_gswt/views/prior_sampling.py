@@ -1,4 +1,4 @@
-"""The terms of a pose's uncertainty that a prior gives: how much its samples disagree, in latents and in pictures."""
+"""Uncertainty terms from samples of a prior: their disagreement in latents and in pictures."""
 
 import logging
 from dataclasses import dataclass
@@ -18,16 +18,19 @@ from dav_gswt.views.uncertainty.texture import image_gradient
 
 _log = logging.getLogger(__name__)
 
-AT_ONCE = 16  # poses that are imagined at a time
-CHEAP = 2  # steps of denoising in the first of two stages
-FEW = 2 * (staging.TOP + staging.BATCH)  # poses of which so many would be imagined in full that one stage costs less
+BATCH = 16  # poses sampled at a time
+CHEAP = 2  # denoising steps of the first of two stages
+FEW = 2 * (staging.TOP + staging.BATCH)  # up to so many poses a single stage costs less
 
 
 @dataclass(frozen=True)
 class PriorConfig:
-    """A prior and how it is asked. samples of each pose; steps of denoising; p_drop: of its attention; weights: of
-    LPIPS, None where they are not had; staged: cheaply first, in full where it matters; posterior: a sample is a
-    distribution, as wide as the coder says, instead of a point; independent_noise: each sample starts from its own."""
+    """A prior and its sampling settings.
+
+    samples: per pose. steps: of denoising. p_drop: attention dropout. weights: of LPIPS; None leaves its terms out.
+    staged: score all poses with few steps first, then the best in full. posterior: a sample is a distribution with the
+    variance of the coder, instead of a point. independent_noise: independent initial noise for each sample.
+    """
 
     model: Prior
     samples: int
@@ -43,9 +46,10 @@ class PriorConfig:
 def open_scoring_prior(
     entry: dict | None, p_drop: float, seed: int, lpips_file: Path | str | None
 ) -> PriorConfig | None:
-    """A config's entry of `priors`; None for none. Without LPIPS's weights its term is absent, and that is said.
+    """Open an entry of `priors` of the config for scoring; None for None.
 
-    Raises: InputError: the prior's weights, or LPIPS's, are missing or not what they should be.
+    lpips_file: weights of LPIPS; None leaves its terms out, with a warning.
+    Raises: InputError: weights of the prior or of LPIPS are missing or invalid.
     """
     if entry is None:
         return None
@@ -59,12 +63,12 @@ def open_scoring_prior(
 
 
 def open_inpainting_prior(entry: dict, seed: int) -> PriorConfig:
-    """A config's entry of `priors`, to be asked for pictures, without dropout."""
+    """Open an entry of `priors` for inpainting, without dropout."""
     return PriorConfig(load_prior(entry), entry["samples"], entry["steps"], 0.0, seed)
 
 
 def load_prior(entry: dict) -> Prior:
-    """The prior of a config's entry. Raises: InputError: its weights are missing or not to be trusted."""
+    """Load the model of an entry of `priors`. Raises: InputError: its weights are missing or invalid."""
     if entry["model"] == "terrain":
         from dav_gswt.prior.terrain import TerrainPrior  # not above: diffusers takes seconds to load
         from dav_gswt.prior.weights import TERRAIN_WEIGHTS
@@ -78,28 +82,28 @@ def load_prior(entry: dict) -> Prior:
 def sample_terms(
     prior: PriorConfig, condition: Condition, names: list[str], counts: Float32[Array, "n s s"]
 ) -> tuple[PriorTerms, Int[Array, "n"]]:
-    """The terms of every pose, and the steps of denoising that they rest on.
+    """Compute the terms of every pose, and the denoising steps used for each.
 
-    counts: 1 for the pixels that matter, those that look at the modelled ground: w2_sq is the mean over these (0 where
-    there is none), and LPIPS sees no others; the maps and the gradient are of the whole picture.
+    counts: 1 for pixels that look at the modelled ground. w2_sq is the mean over these (0 if there are none), and LPIPS
+    sees only these; maps and gradient are of the whole picture.
     Raises: ValueError: fewer than 2 samples, p_drop outside [0, 1), something not finite, naming the poses.
     """
     n = len(condition)
 
     def of(rows: Int[Array, "k"], steps: int, what: str) -> PriorTerms:
-        parts = [rows[i : i + AT_ONCE] for i in range(0, len(rows), AT_ONCE)]
+        parts = [rows[i : i + BATCH] for i in range(0, len(rows), BATCH)]
         made = (
             _sample_batch(prior, condition[r], [names[i] for i in r], steps, counts[r]) for r in progress(parts, what)
         )
         return _concatenate(list(made))
 
     if not prior.staged or n <= FEW or prior.steps <= CHEAP:
-        return of(np.arange(n), prior.steps, "imagine poses"), np.full(n, prior.steps)
+        return of(np.arange(n), prior.steps, "sample poses"), np.full(n, prior.steps)
     found, full = staging.score_in_stages(
-        n, lambda rows: of(rows, CHEAP, "imagine poses"), lambda rows: of(rows, prior.steps, "imagine best poses")
+        n, lambda rows: of(rows, CHEAP, "sample poses"), lambda rows: of(rows, prior.steps, "sample best poses")
     )
     share = (n * CHEAP + int(full.sum()) * prior.steps) / (n * prior.steps)
-    _log.info("%d of %d poses were imagined in full: %.0f %% of the cost of all", full.sum(), n, 100 * share)
+    _log.info("%d of %d poses were sampled in full: %.0f %% of the cost of all", full.sum(), n, 100 * share)
     return found, np.where(full, prior.steps, CHEAP)
 
 
@@ -131,7 +135,7 @@ def _sample_batch(
 
 
 def weighted_mean(maps: Float32[Array, "n h w"], counts: Float32[Array, "n s s"]) -> Float64[Array, "n"]:
-    """Mean of each map over the pixels that count, those of a cell together; 0 where none does."""
+    """Mean of each map weighted by the share of counted pixels in a cell; 0 if there are none."""
     n, h, w = maps.shape
     cells = counts.reshape(n, h, counts.shape[1] // h, w, counts.shape[2] // w).mean((2, 4), dtype=np.float64)
     return (maps * cells).sum((1, 2)) / np.maximum(cells.sum((1, 2)), 1e-9)

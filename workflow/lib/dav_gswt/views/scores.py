@@ -1,6 +1,6 @@
-"""Scores of candidate poses, term by term: raw, in columns of scores.csv; they are weighed when poses are chosen.
+"""Scores of candidate poses, one raw value per term, stored in scores.csv; policies combine the terms.
 
-A term that could not be had (no prior, no LPIPS weights) is absent, and its column is empty.
+The column of a term that is not available (no prior, no LPIPS weights) is empty.
 """
 
 import csv
@@ -22,8 +22,8 @@ FIELDS = ("pose", "elevation", "azimuth", "radius", *TERMS, "steps", *(f"{term}_
 
 @dataclass(frozen=True)
 class Scores:
-    """One row a candidate. terms: those of TERMS that are known. scales: what each is to be divided by, frozen at the
-    first round. steps: of denoising that a row's prior terms rest on; 0 without a prior."""
+    """Scores of n candidates. terms: the available ones of TERMS. scales: divisor of each term, fixed in the first
+    round. steps: denoising steps behind the prior terms of a candidate; 0 without a prior."""
 
     poses: list[Pose]
     terms: dict[str, Float64[Array, "n"]]
@@ -38,18 +38,18 @@ class Scores:
         return [pose.name for pose in self.poses]
 
     def term(self, name: str) -> Float64[Array, "n"]:
-        """Raises: InputError: the term is absent."""
+        """Return a term. Raises: InputError: it is not available."""
         if name not in self.terms:
             raise InputError(f"{name}: the poses were scored without it; it needs {_requirement(name)} (docs/prior.md)")
         return self.terms[name]
 
 
 def _requirement(name: str) -> str:
-    return "a prior asked without dropout (p_drop 0), and LPIPS" if name == "single" else "a prior"
+    return "a prior without dropout (p_drop 0), and LPIPS" if name == "single" else "a prior"
 
 
 def write_scores(path: Path | str, scores: Scores) -> None:
-    """One row a candidate; numbers as they are, so that reading gives the same bits."""
+    """Write scores.csv, one row per candidate; numbers are written exactly."""
     with atomic_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, FIELDS)
         table.writeheader()
@@ -57,7 +57,7 @@ def write_scores(path: Path | str, scores: Scores) -> None:
             row = {"pose": pose.name, "steps": int(scores.steps[i])}
             row |= {k: repr(getattr(pose, k)) for k in ("elevation", "azimuth", "radius")}
             row |= {name: repr(float(values[i])) for name, values in scores.terms.items()}
-            row |= {f"{name}_scale": repr(scores.scales.of[name]) for name in scores.terms}
+            row |= {f"{name}_scale": repr(scores.scales.by_term[name]) for name in scores.terms}
             table.writerow(row)
 
 

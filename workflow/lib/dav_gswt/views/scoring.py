@@ -1,4 +1,4 @@
-"""Scores of candidate poses: how much of what a camera would see there is not known yet."""
+"""Scoring of candidate poses: how uncertain the field is in what a camera would see there."""
 
 from dataclasses import dataclass, replace
 
@@ -27,37 +27,37 @@ from dav_gswt.views.scores import Scores
 from dav_gswt.views.uncertainty.backprojection import backproject_maps
 from dav_gswt.views.uncertainty.weighting import Quantiles, Scales, normalise
 
-WIDTH = 96  # pixels of a picture that is only scored
-PHOTO = 384  # pixels across of a photo that priors are shown, before it is cut to its middle square and made smaller
-OTHERS = 16  # candidates whose maps are shown
+WIDTH = 96  # pixels across a picture for scoring
+PHOTO_WIDTH = 384  # pixels across a captured photo that conditions a prior, before cropping and shrinking
+SHOWN = 16  # candidates whose maps are shown
 
 
 @dataclass(frozen=True)
 class ScoringResult:
-    """All that scoring finds. gaussians: uncertainty of each of the field's Gaussians, in [0, 1]."""
+    """Result of a scoring. gaussians: uncertainty of each Gaussian of the field, in [0, 1]."""
 
     scores: Scores
     maps: PoseMaps
     frozen: FrozenScales
     gaussians: Float32[Array, "gaussians"]
 
-    def facts(self) -> dict:
-        """What scores.json says beside the scales: how many poses rest on how many steps, and which terms there are."""
+    def describe(self) -> dict:
+        """Summary for scores.json: number of candidates, available terms, and poses by denoising steps."""
         steps, count = np.unique(self.scores.steps, return_counts=True)
-        told = {str(s): int(n) for s, n in zip(steps, count, strict=True)}
-        return {"candidates": len(self.scores), "terms": list(self.scores.terms), "poses_by_steps": told}
+        by_steps = {str(s): int(n) for s, n in zip(steps, count, strict=True)}
+        return {"candidates": len(self.scores), "terms": list(self.scores.terms), "poses_by_steps": by_steps}
 
 
 def exr_parts(found: ScoringResult, field: GaussianField, grid: Ground) -> dict[str, Part]:
-    """The maps to show, as parts of an EXR: the ground from above, and candidates spread over the hemisphere."""
+    """Maps for display as parts of an EXR: the ground from above, and candidates spread over the hemisphere."""
     above = render_top_view(replace(field, uncertainty=found.gaussians), grid).uncertainty[::-1]
-    some = [found.scores.names[i] for i in select_farthest_poses(found.scores.poses, OTHERS)]
-    shown = found.maps.parts(found.scores, some)
+    some = [found.scores.names[i] for i in select_farthest_poses(found.scores.poses, SHOWN)]
+    shown = found.maps.exr_parts(found.scores, some)
     return {"above": ({"uncertainty": above}, {"camera": "straight above"})} | shown
 
 
 def scoring_camera(camera: Camera) -> Camera:
-    """A candidate's camera at the size at which poses are scored."""
+    """A candidate's camera at the scoring size."""
     return camera.resized(WIDTH, max(1, round(WIDTH * camera.height / camera.width)))
 
 
@@ -70,10 +70,10 @@ def score_poses(
     prior: PriorConfig | None = None,
     frozen: FrozenScales | None = None,
 ) -> ScoringResult:
-    """Every candidate's terms (opacity and Fisher gain; with a prior also how much its samples disagree) and its maps.
+    """Score every candidate: opacity and Fisher gain, with a prior also its terms, and maps.
 
-    taken: the photos so far. prior: None: geometry alone. frozen: of the first round; None: this is the first.
-    Raises: InputError: a candidate under the ground or inside of what stands on it, by name.
+    taken: the photos so far. prior: None for geometric terms only. frozen: of the first round; None in the first round.
+    Raises: InputError: a candidate below the ground or inside an object, by name.
     """
     collision.require_free_positions(pool, field, grid)
     terms, opacity = _score_geometry(field, grid, pool, [scoring_camera(view.camera) for view in taken])
@@ -81,7 +81,7 @@ def score_poses(
     if prior is not None and pool:
         condition, counts = build_conditions(field, grid, pool, taken, frame, prior.model.size)
         found, steps = prior_sampling.sample_terms(prior, condition, [pose.name for pose, _ in pool], counts)
-        terms |= {name: values.astype(np.float64) for name, values in found.named().items()}
+        terms |= {name: values.astype(np.float64) for name, values in found.by_name().items()}
         w2_sq = found.maps
     poses, names = [pose for pose, _ in pool], [pose.name for pose, _ in pool]
     frozen = frozen or _freeze_scales(terms, w2_sq, names)
@@ -92,7 +92,7 @@ def score_poses(
 def build_conditions(
     field: GaussianField, grid: Ground, pool: Candidates, taken: list[TrainingView], frame: SceneFrame, size: int
 ) -> tuple[Condition, Float32[Array, "n s s"]]:
-    """What a prior is told of candidates, and which of its pixels look at the modelled ground (1)."""
+    """Build the conditions of a prior at the candidates, and masks of pixels that look at the modelled ground (1)."""
     known = conditions.prepare_photos(taken, frame, size)
     squares = [conditions.crop_camera(camera).resized(size, size) for _, camera in pool]
     counts = np.stack([ground_mask(grid, camera) for camera in squares])
@@ -102,7 +102,8 @@ def build_conditions(
 def _score_geometry(
     field: GaussianField, grid: Ground, pool: Candidates, taken: list[Camera]
 ) -> tuple[dict[str, Float64[Array, "n"]], Float32[Array, "n h w"]]:
-    """opacity: mean of the opacity map over the pixels that look at the modelled ground; 0 where none does."""
+    """Geometric terms and opacity maps. opacity: mean of the map over pixels on the modelled ground; 0 if there are
+    none."""
     raster = Rasterizer()
     already = fisher.accumulate_information(field, taken, raster)
     terms, maps = {"opacity": np.zeros(len(pool)), "fisher": np.zeros(len(pool))}, []
@@ -119,7 +120,7 @@ def _score_geometry(
 
 
 def ground_mask(grid: Ground, camera: Camera) -> Float32[Array, "h w"]:
-    """1 for the pixels of a camera that look at the modelled ground."""
+    """Mask (1) of the pixels that look at the modelled ground."""
     shape = camera.height, camera.width
     blank = TrainingView("", camera, np.zeros((*shape, 3), np.float32), np.ones(shape, np.float32))
     return mask_outside_ground(blank, *grid.judged).weight
@@ -128,14 +129,14 @@ def ground_mask(grid: Ground, camera: Camera) -> Float32[Array, "h w"]:
 def _freeze_scales(
     terms: dict[str, Float64[Array, "n"]], w2_sq: Float32[Array, "n h w"] | None, names: list[str]
 ) -> FrozenScales:
-    pixels = None if w2_sq is None or not w2_sq.size else Quantiles.frozen(w2_sq.ravel())
-    return FrozenScales(Scales.frozen(terms, names), pixels)
+    pixels = None if w2_sq is None or not w2_sq.size else Quantiles.from_values(w2_sq.ravel())
+    return FrozenScales(Scales.from_terms(terms, names), pixels)
 
 
 def _gaussian_uncertainty(
     field: GaussianField, pool: Candidates, w2_sq: Float32[Array, "n h w"] | None, frozen: FrozenScales
 ) -> Float32[Array, "gaussians"]:
-    """What the prior's maps say of each Gaussian; of those that no candidate sees, and without a prior, geometry."""
+    """Uncertainty of each Gaussian from the prior's maps; geometric where no candidate sees it, or without a prior."""
     if w2_sq is None or frozen.pixels is None:
         return field.uncertainty
     cameras = [conditions.crop_camera(camera) for _, camera in pool]

@@ -1,8 +1,11 @@
-"""Selection of the poses of a round, by a policy."""
+"""Selection of the poses of a round by a policy, and poses.json, its record."""
 
 import logging
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 
+from dav_gswt.errors import InputError
+from dav_gswt.files import read_json, write_json
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.views.policies import POLICIES, SelectionInput
 from dav_gswt.views.scores import Scores
@@ -10,12 +13,27 @@ from dav_gswt.views.scores import Scores
 _log = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True)
+class PoseSelection:
+    """The poses that a round requests, in the order of choice.
+
+    k: poses of a full round. stopped: reason why no pose is requested, else None. expected: predicted gain as a JSON
+    value, see `stopping.Decision.expected_gain`.
+    """
+
+    policy: str
+    k: int
+    poses: list[Pose]
+    stopped: str | None = None
+    expected: dict | None = None
+
+
 def poses_per_round(policy: str, k: int, candidates: int) -> int:
     """Return k, or the number of candidates for the policy `all`, which takes them in one round."""
     return candidates if policy == "all" else k
 
 
-def select(policy: str, scores: Scores, inputs: SelectionInput) -> list[Pose]:
+def select_poses(policy: str, scores: Scores, inputs: SelectionInput) -> list[Pose]:
     """Return the poses that a policy chooses, at most k. If k exceeds the pool, all are taken, with a warning."""
     if not len(scores):
         _log.warning("no candidate pose is left: no photo is taken, the field stays as it is")
@@ -24,3 +42,17 @@ def select(policy: str, scores: Scores, inputs: SelectionInput) -> list[Pose]:
         _log.warning("asked for %d poses; only %d candidates are left: all are taken", inputs.k, len(scores))
         inputs = replace(inputs, k=len(scores))
     return [scores.poses[i] for i in POLICIES[policy](scores, inputs)[: inputs.k]]
+
+
+def write_pose_selection(path: Path | str, selection: PoseSelection) -> None:
+    """Write poses.json."""
+    write_json(path, asdict(selection))
+
+
+def read_pose_selection(path: Path | str) -> PoseSelection:
+    """Read poses.json. Raises: InputError: not such a file."""
+    values = read_json(path)
+    try:
+        return PoseSelection(**values | {"poses": [Pose(**pose) for pose in values["poses"]]})
+    except (KeyError, TypeError) as error:
+        raise InputError(f"{path}: not a selection of poses ({error}); make it again") from error

@@ -12,8 +12,8 @@ from dav_gswt.geometry.poses import Pose, pose_of_camera, pose_offset
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.study.calibration import controls, measures, truth
-from dav_gswt.views import prior_sampling
+from dav_gswt.study.calibration import controls, measures
+from dav_gswt.views import oracle, prior_sampling
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.pose_maps import PoseMaps
 from dav_gswt.views.prior_sampling import PriorConfig
@@ -62,7 +62,7 @@ def calibrate_scores(
         # `residual` takes the place of the scores' term: that of samples from other noises, whatever was asked for them
         terms |= {name: prior_sampling.weighted_mean(m, counts) for name, m in others.items()}
     corrected = judged.frame.kind == "photos"  # which change their exposure
-    error, error_maps = measures.measure_errors(judged.field, judged.grid, views, judged.size, corrected)
+    error, error_maps = oracle.measure_errors(judged.field, judged.grid, views, judged.size, corrected)
     table = [
         {"pose": pose.name, "error": error[i]} | {name: values[i] for name, values in terms.items()}
         for i, (pose, _) in enumerate(some)
@@ -75,14 +75,14 @@ def choose_candidates(
 ) -> tuple[Candidates, list[TrainingView]]:
     """The candidates to compare, spread over those that were scored, and what they truly show.
 
-    given: folders, `images` of photos and, where a scene can be rendered, `truth` (see `truth.write_truth`).
+    given: folders, `images` of photos and, where a scene can be rendered, `truth` (see `oracle.write_truth`).
     """
     names = set(scored.names)
     known = [(pose, camera) for pose, camera in pool if pose.name in names]
     if given.get("truth"):
-        return truth.read_truth(known, given["truth"])
-    some = truth.spread_candidates(known, count)
-    return some, list(truth.render_truth(judged.scene, some, given["images"]))
+        return oracle.read_truth(known, given["truth"])
+    some = oracle.spread_candidates(known, count)
+    return some, list(oracle.render_truth(judged.scene, some, given["images"]))
 
 
 def geometric_baselines(some: list[Pose], taken: list[Pose]) -> dict[str, Float64[Array, "n"]]:

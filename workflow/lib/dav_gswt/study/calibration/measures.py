@@ -1,65 +1,20 @@
-"""Does a score of a candidate pose say where the field is truly wrong? Of whole pictures, and of their pixels.
-
-Scores are compared with the error of what the field shows there; `truth` says what it should have shown.
-"""
+"""Agreement of scores with the true error of the field, over whole pictures and over their pixels."""
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64
 from numpy import ndarray as Array
 
-from dav_gswt.field import GaussianField
-from dav_gswt.geometry.cameras import Camera
-from dav_gswt.images import image_files, metrics
-from dav_gswt.photos.training_views import TrainingView
-from dav_gswt.raster import render
-from dav_gswt.reconstruction.ground import Ground
-from dav_gswt.views.scoring import ground_mask
+from dav_gswt.images import image_files
 from dav_gswt.views.uncertainty import ause, calibrate_intervals, spearman
 
 LEVEL = 0.9  # of the intervals
-LEAST = 8  # poses, below which nothing is said
-SPLITS = 200  # random halves of the poses: of 36 poses, 20 halves leave the coverage uncertain by 0.02
-KNOWN = 0.5  # of a cell's pixels whose error must be known
-PIXELS = 200_000  # of all poses together that are compared, at most
+LEAST = 8  # poses needed for a result
+SPLITS = 200  # random halves of the poses over which coverage is averaged
+KNOWN = 0.5  # share of a cell's pixels whose error must be known
+PIXELS = 200_000  # compared at most, over all poses
 
 Maps = list[Float[Array, "_ _"]] | Float[Array, "n _ _"]
 Judgement = dict[str, float | None]
-
-
-def measure_errors(
-    field: GaussianField, grid: Ground, views: list[TrainingView], size: int, corrected: bool = False
-) -> tuple[Float64[Array, "n"], list[Float32[Array, "_ _"]]]:
-    """RMSE between what the field shows and the true views, over the pixels that look at the modelled exemplar.
-
-    Args:   size: longer side of the photos that the field was fitted to, pixels. The field is drawn that large, then
-            shrunk: drawn small, its splats are blurred to a pixel's width and it is 0.04 off even where it is right.
-            corrected: gain and offset of each channel are fitted to the view first (photos change their exposure).
-    Returns: of each view the error (NaN where no pixel counts), and its map: root mean square over the channels, NaN
-            where a pixel does not count.
-    """
-    error, maps = np.full(len(views), np.nan), []
-    for i, view in enumerate(views):
-        weight = view.weight * ground_mask(grid, view.camera)
-        counts = weight > 0
-        squares = np.full(counts.shape, np.nan)
-        if counts.any():
-            picture = _render_at_size(field, view.camera, size)
-            if corrected:
-                picture = np.clip(metrics.correct_colours(picture, view.image, weight), 0, 1)
-            apart = picture[counts].astype(np.float64) - view.image[counts]
-            squares[counts] = (apart**2).mean(-1)
-            error[i] = np.sqrt(squares[counts].mean())
-        maps.append(np.sqrt(squares).astype(np.float32))
-    return error, maps
-
-
-def _render_at_size(field: GaussianField, camera: Camera, size: int) -> Float32[Array, "h w 3"]:
-    """What the field shows, drawn `size` pixels long, then shrunk to the camera's own."""
-    width, height = camera.width, camera.height
-    share = max(1.0, size / max(width, height))
-    large = camera.resized(round(width * share), round(height * share))
-    seen = np.clip(render(field, large).colour, 0, 1).astype(np.float32)
-    return image_files.shrink_image(seen, width, height)
 
 
 def evaluate_scores(
@@ -91,7 +46,7 @@ def _intervals(
         rng = np.random.default_rng([seed, split])
         order = rng.permutation(len(error))
         one, other = order[: len(error) // 2], order[len(error) // 2 :]
-        low, high = calibrate_intervals(score[one], error[one], rng, level).at(score[other])
+        low, high = calibrate_intervals(score[one], error[one], rng, level).bounds(score[other])
         inside.append(((low <= error[other]) & (error[other] <= high)).mean())
         width.append((high - low).mean())
     if not np.isfinite(width).all():

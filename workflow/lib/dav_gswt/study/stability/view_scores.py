@@ -91,7 +91,7 @@ def _term_cases() -> list[Case]:
 
 
 def _combine(w2: Array, lpips: Array, lam: float) -> Array:
-    return un.combine_terms(w2, lpips, lam, Scales.frozen({"w2_sq": w2, "lpips": lpips}))
+    return un.combine_terms(w2, lpips, lam, Scales.from_terms({"w2_sq": w2, "lpips": lpips}))
 
 
 def _combine_reference(w2: Array, lpips: Array, lam: float) -> Array:

@@ -60,30 +60,34 @@ def project_poses(poses: list[Pose]) -> Float64[Array, "n 2"]:
 
 
 def candidate_values(scores: Scores, lam: float) -> tuple[str, Float64[Array, "n"]]:
-    """What candidates are coloured by, in words and in numbers: the doubt u, or opacity if no prior was asked (or one
-    without dropout, whose samples all agree)."""
-    if scores.scales.of.get("w2_sq", 0.0) > 0:
+    """Label and values by which candidates are coloured: the uncertainty u, or opacity without a prior or without
+    dropout, where all samples agree."""
+    if scores.scales.by_term.get("w2_sq", 0.0) > 0:
         lpips = f" + {lam:g} LPIPS" if lam and "lpips" in scores.terms else ""
         return f"uncertainty u = W2{lpips}, in units of the scale frozen at round 1", uncertainty(scores, lam)
-    scale, values = scores.scales.of["opacity"], scores.term("opacity")
+    scale, values = scores.scales.by_term["opacity"], scores.term("opacity")
     values = values / scale if scale > 0 else np.zeros(len(scores))
     return "not known to be opaque, in units of the scale frozen at round 1", values
 
 
-def read_round(number: int, scores: Scores, asked: dict, taken: list[Camera], frame: SceneFrame, lam: float) -> Round:
-    """scores: of the candidates before the round. asked: the round's poses.json. taken: cameras of all photos before.
+def build_round(
+    number: int, scores: Scores, chosen: list[Pose], taken: list[Camera], frame: SceneFrame, lam: float
+) -> Round:
+    """Build the figure's data of a round.
+
+    scores: of the candidates before the round. chosen: poses of the round. taken: cameras of all photos before.
 
     Raises: InputError: a pose was chosen that is not among the candidates.
     """
     photos = [pose_of_camera("", camera, frame) for camera in taken]
     index = {name: i for i, name in enumerate(scores.names)}
-    names = [pose["name"] for pose in asked["poses"]]
+    names = [pose.name for pose in chosen]
     if strange := [name for name in names if name not in index]:
         raise InputError(f"poses.json of round {number}: {strange[0]} is not among the scored poses; make it again")
     lowest = min((pose.elevation for pose in scores.poses + photos), default=0.0)
-    chosen = [index[name] for name in names]
+    rows = [index[name] for name in names]
     return Round(
-        number, candidate_values(scores, lam)[1], project_poses(scores.poses), project_poses(photos), chosen, lowest
+        number, candidate_values(scores, lam)[1], project_poses(scores.poses), project_poses(photos), rows, lowest
     )
 
 

@@ -1,4 +1,4 @@
-"""Uncertainty from pictures onto what they show: each Gaussian gets the mean of the pixels that it is seen in."""
+"""Back-projection of uncertainty maps onto Gaussians: each gets the weighted mean of the pixels that show it."""
 
 import numpy as np
 from jaxtyping import Float32
@@ -9,18 +9,17 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images.image_files import enlarge_map
 from dav_gswt.raster import Rasterizer, to_raster_arrays
 
-SIDE = 64  # pixels of the pictures whose blend weights are taken
-SEEN = 0.05  # pixels of blend weight, over all pictures, from which a Gaussian counts as seen
+SIDE = 64  # pixels of the pictures from which blend weights are computed
+SEEN = 0.05  # total blend weight, in pixels, from which a Gaussian counts as seen
 
 
 def backproject_maps(
     field: GaussianField, cameras: list[Camera], maps: Float32[Array, "n h w"]
 ) -> Float32[Array, "gaussians"]:
-    """Mean over cameras and pixels of u, weighted by blend weight: sum of w_i(p) u(p) / sum of w_i(p); NaN where a
-    Gaussian is not seen.
+    """Mean of u over cameras and pixels, weighted by blend weight: sum of w_i(p) u(p) / sum of w_i(p).
 
-    cameras: of square pictures, which the maps cover in whatever resolution. Drawn like a colour, what is carried gives
-    the uncertainty of any other view.
+    cameras: of square pictures, which the maps cover at any resolution. Rendered like a colour, the result gives the
+    uncertainty of any other view. Returns: NaN for Gaussians that are not seen.
     """
     raster = Rasterizer()
     total = np.zeros((2, len(field)))

@@ -1,7 +1,4 @@
-"""Does the score know where the errors are? Rank correlation, sparsification, and intervals that hold what they say.
-
-Nothing here assumes that uncertainty grows with error: that is what is measured.
-"""
+"""Agreement of scores with errors: rank correlation, sparsification error, and split-conformal intervals."""
 
 from dataclasses import dataclass
 from fractions import Fraction
@@ -13,15 +10,15 @@ from numpy import ndarray as Array
 
 from dav_gswt.views.uncertainty.finite import require_finite
 
-LEAST = 0.1  # of the mean expected error: what an interval's unit of width is at least
+LEAST = 0.1  # least unit of an interval's width, in mean expected errors
 
 
 def spearman(u: Float[Array, "n"], error: Float[Array, "n"]) -> float | None:
-    """Rank correlation of a score with the true error, ties by their mean rank; None where one of them is constant.
+    """Rank correlation of a score with the true error, ties by their mean rank; None if one of them is constant.
 
     Raises: ValueError: a value that is not finite.
     """
-    from scipy.stats import spearmanr  # here, not above: slow to load, and scores do without
+    from scipy.stats import spearmanr  # slow to load
 
     u, error = _check_finite(u, error)
     if len(u) < 2 or np.ptp(u) == 0 or np.ptp(error) == 0:
@@ -30,12 +27,11 @@ def spearman(u: Float[Array, "n"], error: Float[Array, "n"]) -> float | None:
 
 
 def ause(u: Float[Array, "n"], error: Float[Array, "n"]) -> float:
-    """Area under the sparsification error: 0 for a score that orders as the true error does; smaller is better.
+    """Area under the sparsification error: 0 if the score orders samples as the true error does; smaller is better.
 
-    Leave out the most uncertain share f of the samples: the mean error of the rest, over that of all, is the curve
-    s(f). Leave out by true error instead: the oracle's curve. AUSE is the integral over f from 0 to (n - 1) / n of
-    their difference, by the trapezoidal rule. Samples of equal score are left out in no particular order: each counts
-    with the mean error of its equals. Errors that are all 0: 0.
+    s(f) is the mean error without the most uncertain share f of the samples, over that of all; the oracle's curve
+    leaves out by true error. AUSE is the integral over f from 0 to (n - 1) / n of their difference, by the trapezoidal
+    rule. Samples of equal score count with their mean error. 0 if all errors are 0.
     Raises: ValueError: no sample, a value that is not finite, an error below 0.
     Source: Ilg et al., Uncertainty estimates and multi-hypotheses networks for optical flow, ECCV 2018.
     """
@@ -49,7 +45,7 @@ def ause(u: Float[Array, "n"], error: Float[Array, "n"]) -> float:
 
 
 def _sparsification_curve(by: Float64[Array, "n"], error: Float64[Array, "n"]) -> Float64[Array, "n"]:
-    """Mean error of what is left, over that of all, when 0, 1, ... n - 1 samples of the largest `by` are left out."""
+    """Relative mean error of the rest when 0, 1, ... n - 1 samples of the largest `by` are left out."""
     _, group = np.unique(by, return_inverse=True)
     alike = np.bincount(group, error) / np.bincount(group)
     rising = alike[np.sort(group)]
@@ -61,32 +57,32 @@ def _sparsification_curve(by: Float64[Array, "n"], error: Float64[Array, "n"]) -
 class Intervals:
     """Split-conformal intervals of |error| against u. expected: |error| at the knots u, rising, linear between them.
 
-    reach: half the interval's width over `unit`; infinite where there were too few samples for the level.
+    half_width: of the interval, in `unit`s; infinite if there were too few samples for the level.
     """
 
     u: Float64[Array, "k"]
     expected: Float64[Array, "k"]
-    reach: float
+    half_width: float
     level: float
 
-    def at(self, u: Float[Array, "n"]) -> tuple[Float64[Array, "n"], Float64[Array, "n"]]:
-        """The ends, not below 0, between which |error| is with probability of at least the level.
+    def bounds(self, u: Float[Array, "n"]) -> tuple[Float64[Array, "n"], Float64[Array, "n"]]:
+        """Ends of the intervals, not below 0, that contain |error| with at least the probability `level`.
 
-        On average over samples that are exchangeable with those of the calibration, whatever the quality of u.
+        This holds on average over samples exchangeable with those of the calibration, for any u.
         """
         middle = np.interp(u, self.u, self.expected)
-        wide = self.reach * self.unit(middle)
+        wide = self.half_width * self.unit(middle)
         return np.maximum(middle - wide, 0), middle + wide
 
     def unit(self, middle: Float64[Array, "n"]) -> Float64[Array, "n"]:
-        """What a deviation is measured in: the expected error, but never as little as none; 1 if none is expected."""
+        """Unit of deviations: the expected error, bounded from below; 1 if no error is expected."""
         return np.maximum(middle, LEAST * float(self.expected.mean()) or 1.0)
 
 
 def calibrate_intervals(
     u: Float[Array, "n"], error: Float[Array, "n"], rng: np.random.Generator, level: float = 0.9
 ) -> Intervals:
-    """Intervals from held-out samples: one random half says what |error| is expected at u, the other how far it strays.
+    """Calibrate intervals on held-out samples: one random half fits the expected |error| at u, the other its spread.
 
     Raises: ValueError: fewer than 2 samples, a level outside (0, 1), a value that is not finite.
     """
@@ -102,20 +98,21 @@ def calibrate_intervals(
     expected = isotonic_regression(np.bincount(group, error[fit]) / count, weights=count).x
     rough = Intervals(knots, expected, 0.0, level)
     middle = np.interp(u[rest], knots, expected)
-    strays = np.abs(error[rest] - middle) / rough.unit(middle)
-    return Intervals(knots, expected, conformal_quantile(strays, level), level)
+    deviations = np.abs(error[rest] - middle) / rough.unit(middle)
+    return Intervals(knots, expected, conformal_quantile(deviations, level), level)
 
 
-def conformal_quantile(strays: Float[Array, "n"], level: float) -> float:
-    """The ceil((n + 1) level)-th smallest of n: one more, exchangeable with them, is at most that with probability of
-    at least `level` (exactly that rank over n + 1 without ties). Infinite where the rank exceeds n.
+def conformal_quantile(deviations: Float[Array, "n"], level: float) -> float:
+    """The ceil((n + 1) level)-th smallest of n deviations; infinite if that rank exceeds n.
+
+    One more exchangeable deviation is at most this with at least the probability `level`.
 
     Raises: ValueError: a level outside (0, 1).
     """
     if not 0 < level < 1:
         raise ValueError(f"the level of an interval lies between 0 and 1, not at {level}")
-    rank = ceil((len(strays) + 1) * Fraction(repr(float(level))))  # as written: 0.9 is nine tenths
-    return float(np.sort(strays)[rank - 1]) if rank <= len(strays) else np.inf
+    rank = ceil((len(deviations) + 1) * Fraction(repr(float(level))))  # as written: 0.9 is nine tenths
+    return float(np.sort(deviations)[rank - 1]) if rank <= len(deviations) else np.inf
 
 
 def _check_finite(u: Float[Array, "n"], error: Float[Array, "n"]) -> tuple[Float64[Array, "n"], Float64[Array, "n"]]:

@@ -1,4 +1,4 @@
-"""How much the samples that a prior draws for a pose disagree: the squared 2-Wasserstein distance of their latents."""
+"""Disagreement of a prior's samples at a pose: squared 2-Wasserstein distance of their latents."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -9,7 +9,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.views.uncertainty.finite import reject_poses, require_finite
 
-CHUNK = 1 << 18  # numbers worked on at a time: what a second-level cache holds
+CHUNK = 1 << 18  # values per chunk: fits a second-level cache
 
 
 def w2_sq(
@@ -36,7 +36,7 @@ def w2_sq(
     step = max(1, CHUNK // max(1, m * c * h * w))
     for start in range(0, n, step):
         rows = slice(start, start + step)
-        with np.errstate(over="ignore", invalid="ignore"):  # what that gives is refused below
+        with np.errstate(over="ignore", invalid="ignore"):  # rejected below
             found = _twice_the_variance(means[rows])
             if variances is not None:
                 reject_poses(np.any(variances[rows] < 0, axis=(1, 2, 3, 4)), "variance below 0", names and names[rows])

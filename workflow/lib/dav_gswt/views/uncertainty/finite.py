@@ -1,4 +1,4 @@
-"""A score that is not a number has no place in a ranking: it is refused, and the poses it is of are named."""
+"""Checks of scores, with errors that name the poses."""
 
 from collections.abc import Sequence
 
@@ -6,17 +6,17 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
-NAMED = 5  # poses in a message; of more the number is said
+NAMED = 5  # poses named in a message
 
 
 def reject_poses(bad: Bool[Array, "n"], what: str, names: Sequence[str] | None = None) -> None:
-    """Raises: ValueError: any is bad; says what they are, and of which poses: by name, or by index without names."""
+    """Raises: ValueError: any pose is bad; the message names the poses, or their indices without names."""
     if bad.any():
         raise ValueError(f"{what} of pose {format_names(bad, names)}")
 
 
 def format_names(bad: Bool[Array, "n"], names: Sequence[str] | None = None) -> str:
-    """The first few that are bad, by name, or by index without names, and how many more."""
+    """Format the first bad poses by name, or by index without names, and the number of others."""
     found = [names[i] if names is not None else str(i) for i in np.flatnonzero(bad).tolist()]
     more = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""
     return ", ".join(found[:NAMED]) + more

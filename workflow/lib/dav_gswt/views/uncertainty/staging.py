@@ -1,4 +1,4 @@
-"""Scoring in two stages: every pose cheaply, then in full those that may be among the best, until the rest cannot."""
+"""Two-stage scoring: all poses cheaply, then in full those that may be among the best."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -10,16 +10,16 @@ from numpy import ndarray as Array
 from dav_gswt.views.uncertainty.weighting import robust_scale
 
 TOP = 20  # poses whose order matters: as many as a round may take
-BATCH = 16  # poses scored in full before looking again
-REACH = 0.95  # quantile of full over cheap, of the poses scored both ways: more is not expected of the others
-RANKING = ("w2_sq", "lpips", "single", "residual")  # terms by which policies rank; and their sum
+BATCH = 16  # poses scored in full at a time
+RATIO = 0.95  # quantile of full over cheap values that bounds the full values of other poses
+RANKING = ("w2_sq", "lpips", "single", "residual")  # terms by which policies rank; so does their sum
 
 
 @dataclass(frozen=True)
 class PriorTerms:
-    """Of n poses. lpips: None without its weights. single: LPIPS between the one sample that there is without dropout
-    and the render itself; None with dropout. maps: of w2_sq, in cells of the latents. residual: squared distance of the
-    samples' mean from the latents of the render itself."""
+    """Terms of n poses. lpips: None without its weights. single: LPIPS between the only sample without dropout and the
+    render; None with dropout. maps: of w2_sq, in cells of the latents. residual: squared distance of the samples' mean
+    from the latents of the render."""
 
     w2_sq: Float64[Array, "n"]
     lpips: Float64[Array, "n"] | None
@@ -28,8 +28,8 @@ class PriorTerms:
     single: Float64[Array, "n"] | None = None
     residual: Float64[Array, "n"] | None = None
 
-    def named(self) -> dict[str, Float64[Array, "n"]]:
-        """The terms that there are, by name."""
+    def by_name(self) -> dict[str, Float64[Array, "n"]]:
+        """The available terms by name."""
         found = {"w2_sq": self.w2_sq, "lpips": self.lpips, "gradient": self.gradient}
         found |= {"single": self.single, "residual": self.residual}
         return {name: values for name, values in found.items() if values is not None}
@@ -41,11 +41,11 @@ def score_in_stages(
     full: Callable[[Int[Array, "k"]], PriorTerms],
     top: int = TOP,
 ) -> tuple[PriorTerms, Bool[Array, "n"]]:
-    """Terms of all n poses, and which of them were scored in full.
+    """Score n poses in two stages. Returns the terms, and which poses were scored in full.
 
-    Poses go on to full scoring in the order of their best cheap rank, by any term and by the terms' sum, until for
-    each of these the `top` best full values are above all that the remaining poses can be expected to reach: their
-    cheap value times nearly the largest ratio seen. Those keep their cheap values, times the usual ratio.
+    Poses are scored in full in the order of their best cheap rank, by any term and by the terms' sum, until for each of
+    these the `top` best full values exceed the bound of all remaining poses: their cheap value times the RATIO quantile
+    of full over cheap. The remaining poses keep their cheap values times the median ratio.
     """
     found, done = cheap(np.arange(n)), np.zeros(n, bool)
     first = found
@@ -60,8 +60,8 @@ def score_in_stages(
 
 
 def _rankings(terms: PriorTerms, scales: dict[str, float]) -> dict[str, Float64[Array, "n"]]:
-    """What poses may be ranked by."""
-    named = {name: values for name, values in terms.named().items() if name in RANKING}
+    """Values by which poses may be ranked."""
+    named = {name: values for name, values in terms.by_name().items() if name in RANKING}
     total = np.zeros(len(terms.w2_sq))
     for name, values in named.items():
         total += values / (scales[name] or 1)
@@ -69,7 +69,7 @@ def _rankings(terms: PriorTerms, scales: dict[str, float]) -> dict[str, Float64[
 
 
 def _scales(terms: PriorTerms) -> dict[str, float]:
-    return {name: robust_scale(values) for name, values in terms.named().items()}
+    return {name: robust_scale(values) for name, values in terms.by_name().items()}
 
 
 def _best_rank(terms: PriorTerms) -> Int[Array, "n"]:
@@ -78,13 +78,13 @@ def _best_rank(terms: PriorTerms) -> Int[Array, "n"]:
 
 
 def _may_enter_top(found: PriorTerms, first: PriorTerms, done: Bool[Array, "n"], top: int) -> bool:
-    """Whether a pose that was scored cheaply alone may belong to the best `top` by any ranking."""
+    """Whether a pose scored only cheaply may belong to the best `top` by any ranking."""
     scales = _scales(first)
     now, before = _rankings(found, scales), _rankings(first, scales)
     for name, full in now.items():
         ratio = _ratios(full[done], before[name][done])
         bar = np.sort(full[done])[-top]
-        if (before[name][~done] * np.quantile(ratio, REACH) > bar).any():
+        if (before[name][~done] * np.quantile(ratio, RATIO) > bar).any():
             return True
     return False
 
@@ -104,11 +104,11 @@ def _insert_rows(into: PriorTerms, rows: Int[Array, "k"], values: PriorTerms) ->
 
 
 def _rescale_cheap(found: PriorTerms, first: PriorTerms, done: Bool[Array, "n"]) -> PriorTerms:
-    """Cheap values brought to the full ones' level: few steps disagree by another amount than many."""
+    """Scale cheap values by the median ratio of full over cheap."""
     if done.all() or not done.any():
         return found
     parts = {}
-    for name, cheap in first.named().items():
+    for name, cheap in first.by_name().items():
         usual = float(np.median(_ratios(getattr(found, name)[done], cheap[done])))
         parts[name] = np.where(done, getattr(found, name), usual * cheap)
         if name == "w2_sq":

@@ -1,6 +1,6 @@
-"""How much texture the picture has that a prior expects at a pose: the gradient term of the paper's u_img, an ablation.
+"""Texture of the picture that a prior expects at a pose: the gradient term of the paper's u_img, an ablation.
 
-It measures what is seen, not what is doubted: sharp certain grass scores high.
+It measures texture, not uncertainty: sharp, certain grass scores high.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from numpy import ndarray as Array
 from dav_gswt.views.uncertainty.finite import require_finite
 
 LUMINANCE = 0.2126, 0.7152, 0.0722  # of Rec. 709's red, green and blue
-CHUNK = 1 << 20  # numbers worked on at a time
+CHUNK = 1 << 20  # values per chunk
 
 
 def image_gradient(
@@ -32,7 +32,7 @@ def image_gradient(
     step = max(1, CHUNK // (m * h * w * 3))
     for start in range(0, n, step):
         rows = slice(start, start + step)
-        with np.errstate(invalid="ignore"):  # refused below
+        with np.errstate(invalid="ignore"):  # rejected below
             slope = gradient_map(pictures[rows].mean(1, dtype=np.float64) @ np.array(LUMINANCE))
         found[rows] = (slope**2 if squared else slope).mean((1, 2))
     require_finite(found, "the decoded pictures", names)
@@ -40,8 +40,7 @@ def image_gradient(
 
 
 def gradient_map(values: Float64[Array, "n h w"]) -> Float64[Array, "n h w"]:
-    """Norm of the gradient by the Sobel operator over 8, reflected at the border: a ramp's slope within, and 0 across
-    the border, where the reflected ramp comes back."""
+    """Norm of the gradient by the Sobel operator over 8, with reflection at the border."""
     padded = np.pad(values, ((0, 0), (1, 1), (1, 1)), mode="reflect")
     return np.hypot(_along(padded, 2), _along(padded, 1))
 

@@ -1,20 +1,17 @@
-"""Terms of other units put together: each over a scale frozen at the first round, then brought to [0, 1].
+"""Combination of uncertainty terms: each is divided by a scale fixed in the first round, the sum is mapped to [0, 1].
 
-Raw terms are what is stored; lam enters when views are chosen, so its sweep shares the scoring.
+Only raw terms are stored; lam enters when poses are selected, so that a sweep over lam shares the scoring.
 """
 
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Float32, Float64
 from numpy import ndarray as Array
 from scipy.special import expit
 
-from dav_gswt.errors import InputError
-from dav_gswt.files import read_json, write_json
 from dav_gswt.views.uncertainty.finite import reject_poses, require_finite
 
 _log = logging.getLogger(__name__)
@@ -22,81 +19,52 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Scales:
-    """What each term is divided by: a scene's, frozen at t = 1. 0: the term was 0 everywhere, and weighs nothing."""
+    """Divisor of each term of a scene, fixed in the first round. 0: the term was 0 everywhere, and has no weight."""
 
-    of: dict[str, float]
+    by_term: dict[str, float]
 
     def __post_init__(self):
-        if bad := [name for name, scale in self.of.items() if not 0 <= scale < np.inf]:
+        if bad := [name for name, scale in self.by_term.items() if not 0 <= scale < np.inf]:
             raise ValueError(f"the scale of {', '.join(bad)} is not a number of at least 0")
 
     @staticmethod
-    def frozen(terms: Mapping[str, Float[Array, "n"]], names: Sequence[str] | None = None) -> "Scales":
-        """The robust scales of the terms of all candidates. A term that is 0 everywhere is said.
+    def from_terms(terms: Mapping[str, Float[Array, "n"]], names: Sequence[str] | None = None) -> "Scales":
+        """Compute robust scales of the terms of all candidates. A term that is 0 everywhere is logged.
 
         Raises: ValueError: a value that is not finite, naming the poses.
         """
         for name, values in terms.items():
             require_finite(values, name, names)
         scales = Scales({name: robust_scale(values) for name, values in terms.items()})
-        for name in (n for n, scale in scales.of.items() if scale == 0):
-            _log.warning("%s is 0 at every candidate: the term weighs nothing", name)
+        for name in (n for n, scale in scales.by_term.items() if scale == 0):
+            _log.warning("%s is 0 at every candidate: the term has no weight", name)
         return scales
-
-    def write(self, path: Path | str) -> None:
-        """As JSON, to the same bits."""
-        write_json(path, self.of)
-
-    @staticmethod
-    def read(path: Path | str) -> "Scales":
-        """Raises: InputError: not what `write` wrote."""
-        return Scales(_read_numbers(path, lambda scale: scale >= 0))
 
 
 @dataclass(frozen=True)
 class Quantiles:
-    """The uncertainties that become 0 and 1: a scene's, frozen at t = 1."""
+    """Uncertainties that are mapped to 0 and 1, fixed in the first round."""
 
     low: float
     high: float
 
+    def __post_init__(self):
+        if not self.low <= self.high:
+            raise ValueError(f"the low quantile {self.low} is not below the high one {self.high}")
+
     @staticmethod
-    def frozen(u: Float[Array, "n"], low: float = 0.05, high: float = 0.95) -> "Quantiles":
-        """Quantiles of all candidates' uncertainties. Raises: ValueError: none is there, or one is not finite."""
+    def from_values(u: Float[Array, "n"], low: float = 0.05, high: float = 0.95) -> "Quantiles":
+        """Quantiles of all candidates' uncertainties. Raises: ValueError: no value, or one that is not finite."""
         if not len(u):
-            raise ValueError("no candidate pose is there to take quantiles of")
+            raise ValueError("quantiles need at least one value")
         require_finite(u, "the uncertainty")
         return Quantiles(*(float(q) for q in np.quantile(u.astype(np.float64), [low, high])))
 
-    def write(self, path: Path | str) -> None:
-        """As JSON, to the same bits."""
-        write_json(path, asdict(self))
-
-    @staticmethod
-    def read(path: Path | str) -> "Quantiles":
-        """Raises: InputError: not what `write` wrote."""
-        found = _read_numbers(path)
-        if set(found) != {"low", "high"} or found["low"] > found["high"]:
-            raise InputError(f"{path}: needs the numbers low <= high, and nothing else")
-        return Quantiles(**found)
-
-
-def _read_numbers(path: Path | str, good=lambda number: True) -> dict[str, float]:
-    """JSON of finite numbers by name. Raises: InputError: anything else."""
-    found = read_json(path)
-    if not isinstance(found, dict):
-        raise InputError(f"{path}: is not a table of numbers")
-    for name, number in found.items():
-        usable = isinstance(number, int | float) and not isinstance(number, bool) and np.isfinite(number)
-        if not usable or not good(number):
-            raise InputError(f"{path}: {name} is not a number that can be used ({number})")
-    return {name: float(number) for name, number in found.items()}
-
 
 def robust_scale(values: Float[Array, "n"]) -> float:
-    """Median absolute value of those that are not 0, or 0 if all are: as large as a usual value, whatever outliers do.
+    """Median absolute value of the values that are not 0; 0 if all are.
 
-    Zeros are left out since a term can be exactly 0 at most poses (all samples agree) and still tell the others apart.
+    Zeros are excluded since a term can be exactly 0 at most poses, where all samples agree.
     """
     size = np.abs(values.astype(np.float64))
     return float(np.median(size[size > 0])) if (size > 0).any() else 0.0
@@ -111,8 +79,8 @@ def combine_terms(
 ) -> Float64[Array, "n"]:
     """u = W2 + lam LPIPS, each over its frozen scale (`w2_sq`, `lpips`). lpips: None where its weights are missing.
 
-    lam = 0 ranks by W2, a large one by LPIPS; a latent space in other units ranks alike. Without LPIPS the term is
-    left out, and said so if lam asks for it.
+    lam = 0 ranks by W2, a large lam by LPIPS; the units of the latent space do not matter. Without LPIPS its term is
+    left out, with a warning if lam > 0.
     Raises: ValueError: lam below 0 or not finite; a term without scale; a value that is not finite, naming the poses.
     Source: DAV-GSWT, Eq. (uncert_latent).
     """
@@ -145,22 +113,23 @@ def _weighted_sum(name: str, first, lpips, lam: float, scales: Scales, names) ->
 
 
 def _divide_by_scale(name: str, values: Float[Array, "n"], scales: Scales, names) -> Float64[Array, "n"]:
-    if name not in scales.of:
+    if name not in scales.by_term:
         raise ValueError(f"{name} has no frozen scale")
     require_finite(values, name, names)
-    scale = scales.of[name]
+    scale = scales.by_term[name]
     return values.astype(np.float64) / scale if scale > 0 else np.zeros(len(values))
 
 
 def normalise(
     u: Float[Array, "..."], quantiles: Quantiles, names: Sequence[str] | None = None
 ) -> Float32[Array, "..."]:
-    """u brought to [0, 1], 0 at the low quantile and below, 1 at the high one and above; of poses or of maps.
+    """Map u linearly to [0, 1], 0 at the low quantile and below, 1 at the high one and above.
 
-    Where both quantiles are equal (a scene that is doubted alike everywhere) what lies above them is 1, the rest 0.
+    If both quantiles are equal, values above them become 1, the others 0.
     Raises: ValueError: a value that is not finite, naming the poses (the first axis).
     """
-    reject_poses(~np.isfinite(u).reshape(u.shape[0] if u.ndim else 1, -1).all(1), "not finite: the uncertainty", names)
+    finite = np.isfinite(u).reshape(u.shape[0] if u.ndim else 1, -1)
+    reject_poses(~np.all(finite, axis=1), "not finite: the uncertainty", names)
     wide = u.astype(np.float64)
     span = quantiles.high - quantiles.low
     share = (wide - quantiles.low) / span if span > 0 else wide > quantiles.high

@@ -1,0 +1,125 @@
+"""True pictures of candidate poses and the true error of a field there, for oracle policies and for calibration.
+
+They exist for synthetic scenes and for photo sets, where pictures of candidates are available without a capture.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float32, Float64
+from numpy import ndarray as Array
+
+from dav_gswt.errors import InputError
+from dav_gswt.field import GaussianField
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.images import image_files, metrics
+from dav_gswt.logs import progress
+from dav_gswt.photos.synthetic import scene as synthetic
+from dav_gswt.photos.training_views import WHOLE, TrainingView
+from dav_gswt.raster import render
+from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.views.candidates import Candidates
+from dav_gswt.views.scoring import WIDTH, ground_mask, scoring_camera
+
+FINE = 4  # supersampling: photos are clipped and encoded before they are shrunk, so rendering at WIDTH is too bright
+
+
+def render_truth(scene: dict, pool: Candidates, images_folder: Path | str) -> Iterator[TrainingView]:
+    """Yield the photo of each candidate, WIDTH pixels across, named by its pose; weight 0 where it is masked.
+
+    scene: its entry in the config. Agent `render`: the photo is rendered, at most FINE times as wide, then shrunk.
+    Agent `replay`: the photo is read from `images_folder`.
+    Raises: InputError: another agent, or a missing photo.
+    """
+    if scene["agent"] == "render":
+        world = synthetic.scene_from_config(scene)
+        for pose, camera in progress(pool, "render candidates"):
+            yield _shrink_view(pose.name, camera, synthetic.render(world, _render_camera(camera)))
+    elif scene["agent"] == "replay":
+        for pose, camera in pool:
+            yield _shrink_view(pose.name, camera, *image_files.read_photo_and_alpha(Path(images_folder) / pose.name))
+    else:
+        agent = scene["agent"]
+        raise InputError(f"agent {agent}: true pictures of candidates exist for the agents render and replay only")
+
+
+def write_truth(folder: Path | str, views: Iterator[TrainingView]) -> None:
+    """Write pictures of candidates as PNGs named by their poses."""
+    for view in views:
+        image_files.write_png(Path(folder) / f"{view.name}.png", view.image)
+
+
+def read_truth(pool: Candidates, folder: Path | str) -> tuple[Candidates, list[TrainingView]]:
+    """Read the candidates whose pictures exist, and the pictures. Raises: InputError: a picture of another size."""
+    some = [(pose, camera) for pose, camera in pool if (Path(folder) / f"{pose.name}.png").is_file()]
+    found = []
+    for pose, camera in some:
+        image = image_files.read_photo(path := Path(folder) / f"{pose.name}.png")
+        camera = scoring_camera(camera)
+        if image.shape != (camera.height, camera.width, 3):
+            raise InputError(
+                f"{path}: {image.shape[1]} x {image.shape[0]} pixels, not those of its pose; make it again"
+            )
+        found.append(TrainingView(pose.name, camera, image, np.ones(image.shape[:2], np.float32)))
+    return some, found
+
+
+def spread_candidates(pool: Candidates, count: int) -> Candidates:
+    """Choose `count` candidates, or all, by farthest point sampling from the first one."""
+    return [pool[i] for i in select_farthest_poses([pose for pose, _ in pool], count)]
+
+
+def _render_camera(camera: Camera) -> Camera:
+    """The candidate's camera, with its width clipped to [WIDTH, FINE WIDTH]."""
+    across = min(max(camera.width, WIDTH), FINE * WIDTH)
+    return camera.resized(across, max(1, round(across * camera.height / camera.width)))
+
+
+def _shrink_view(
+    name: str, camera: Camera, image: Float32[Array, "h w 3"], cover: Float32[Array, "h w"] | None = None
+) -> TrainingView:
+    camera = scoring_camera(camera)
+    size = camera.width, camera.height
+    weight = (
+        np.ones(size[::-1], bool)
+        if cover is None
+        else image_files.shrink_image(cover[..., None], *size)[..., 0] > WHOLE
+    )
+    return TrainingView(name, camera, image_files.shrink_image(image, *size), weight.astype(np.float32))
+
+
+def measure_errors(
+    field: GaussianField, grid: Ground, views: list[TrainingView], size: int, corrected: bool = False
+) -> tuple[Float64[Array, "n"], list[Float32[Array, "_ _"]]]:
+    """Measure the RMSE between renders and true views, over the pixels that look at the modelled exemplar.
+
+    Args:   size: longer side of the photos that the field was fitted to, pixels. The field is rendered at that size,
+            then shrunk; at a smaller size splats are blurred to a pixel's width.
+            corrected: fit gain and offset of each channel to the view first (photos differ in exposure).
+    Returns: of each view the error (NaN where no pixel counts), and its map: root mean square over the channels, NaN
+            where a pixel does not count.
+    """
+    error, maps = np.full(len(views), np.nan), []
+    for i, view in enumerate(views):
+        weight = view.weight * ground_mask(grid, view.camera)
+        counts = weight > 0
+        squares = np.full(counts.shape, np.nan)
+        if counts.any():
+            picture = _render_at_size(field, view.camera, size)
+            if corrected:
+                picture = np.clip(metrics.correct_colours(picture, view.image, weight), 0, 1)
+            apart = picture[counts].astype(np.float64) - view.image[counts]
+            squares[counts] = (apart**2).mean(-1)
+            error[i] = np.sqrt(squares[counts].mean())
+        maps.append(np.sqrt(squares).astype(np.float32))
+    return error, maps
+
+
+def _render_at_size(field: GaussianField, camera: Camera, size: int) -> Float32[Array, "h w 3"]:
+    """Render the field `size` pixels long, then shrink it to the camera's size."""
+    width, height = camera.width, camera.height
+    share = max(1.0, size / max(width, height))
+    large = camera.resized(round(width * share), round(height * share))
+    seen = np.clip(render(field, large).colour, 0, 1).astype(np.float32)
+    return image_files.shrink_image(seen, width, height)
