@@ -102,17 +102,17 @@ def test_the_world_may_have_any_unit(scale):
         == verdicts()["behind the ridge"]
         == "hidden: 27 of 81 points of the exemplar are in sight"
     )
-    low = {"lowest_height": 2.1 * scale}
-    assert kinds(verdicts(scale=scale, limits=low)) == kinds(verdicts(limits={"lowest_height": 2.1}))
+    low = {"min_height": 2.1 * scale}
+    assert kinds(verdicts(scale=scale, limits=low)) == kinds(verdicts(limits={"min_height": 2.1}))
 
 
 @pytest.mark.parametrize(
     "limits, out",
     [
-        ({"lowest_height": 2.2}, {"aside": "too low", "over the ridge": "too low"}),
-        ({"highest_height": 2.2}, {"above": "too high"}),
-        ({"farthest": 3.0}, {"over the ridge": "too far"}),
-        ({"lowest_height": 0.1, "highest_height": 9, "farthest": 9}, {}),
+        ({"min_height": 2.2}, {"aside": "too low", "over the ridge": "too low"}),
+        ({"max_height": 2.2}, {"above": "too high"}),
+        ({"max_distance": 3.0}, {"over the ridge": "too far"}),
+        ({"min_height": 0.1, "max_height": 9, "max_distance": 9}, {}),
     ],
 )
 def test_limits_bar_what_is_beyond_them(limits, out):

@@ -12,7 +12,7 @@ NONE = dict.fromkeys(report.MEASURES)
 
 
 def cell(scene="dunes", number=0):
-    return dict(scene=scene, seed=0, quality="draft", policy="farthest", prior="none", p_drop="0", round=number)
+    return dict(scene=scene, seed=0, preset="draft", policy="farthest", prior="none", p_drop="0", round=number)
 
 
 def judged(rank, pixels=None):
@@ -49,7 +49,7 @@ def test_the_table_has_a_row_for_each_score_of_each_cell(tmp_path):
     csv_tables.write_table(tmp_path / "a.csv", made)
     with (tmp_path / "a.csv").open(newline="") as file:
         back = list(csv.DictReader(file))
-    wanted = "scene seed quality policy prior p_drop round score poses spearman ause coverage width pixel_spearman"
+    wanted = "scene seed preset policy prior p_drop round score poses spearman ause coverage width pixel_spearman"
     assert set(wanted.split()) | {"pixel_ause"} <= set(back[0])
     assert back[3]["spearman"] == "0.8" and back[3]["poses"] == "40" and back[5]["spearman"] == ""
     with pytest.raises(ValueError):

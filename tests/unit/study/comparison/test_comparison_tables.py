@@ -9,7 +9,7 @@ from dav_gswt.study import csv_tables
 from dav_gswt.study.comparison import curves, plots, tables
 from dav_gswt.views import marginal_gain
 
-CELL = dict(scene="flowers", seed=0, quality="draft", policy="farthest", prior="none", p_drop="0", lam="0", k=4)
+CELL = dict(scene="flowers", seed=0, preset="draft", policy="farthest", prior="none", p_drop="0", lam="0", k=4)
 
 
 def rounds(psnr, photos=(8, 12, 16), **cell):

@@ -13,6 +13,7 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.poses import select_farthest_poses
 from dav_gswt.images import image_files, metrics
 from dav_gswt.logs import progress
 from dav_gswt.photos.synthetic import scene as synthetic
