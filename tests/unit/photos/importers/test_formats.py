@@ -3,7 +3,7 @@
 import numpy as np
 import pycolmap
 import pytest
-import test_imported_models as made
+from fixtures import imported_models as made
 from plyfile import PlyData, PlyElement
 
 from dav_gswt.photos.importers import import_model

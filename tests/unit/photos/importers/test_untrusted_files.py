@@ -7,7 +7,7 @@ import struct
 import numpy as np
 import pycolmap
 import pytest
-import test_imported_models as made
+from fixtures import imported_models as made
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 

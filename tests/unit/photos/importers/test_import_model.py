@@ -1,7 +1,6 @@
 """Camera models of other programs: one made-up scene in three formats, the same cameras, pictures and points."""
 
-import json
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +8,22 @@ import OpenImageIO as oiio
 import pycolmap
 import pytest
 from fixtures import photos as made_up
-from scipy.ndimage import map_coordinates
-from scipy.spatial.transform import Rotation
+from fixtures.imported_models import (
+    HEIGHT,
+    NUMBERS,
+    OPTIONS,
+    SCENE,
+    WIDTH,
+    WORLD,
+    alike,
+    lens,
+    photograph,
+    reconstruction,
+    shoot,
+    transforms,
+    write_colmap,
+    write_json,
+)
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
@@ -19,146 +32,7 @@ from dav_gswt.photos.importers import import_model, points
 from dav_gswt.photos.importers.photo_matching import MatchedPhoto, PhotoFolder
 from dav_gswt.photos.importers.points import find_near_pairs
 from dav_gswt.photos.photo_set import prepare_photos
-from dav_gswt.photos.sfm.registration import SfmOptions, undistort_image
-
-HALF = 1.0  # of the made-up ground
-WIDTH, HEIGHT = 320, 240
-# fx, fy, cx, cy, k1, k2, p1, p2
-NUMBERS = (300.0, 302.0, 163.2, 117.4, -0.08, 0.02, 0.001, -0.0007)
-OPTIONS = SfmOptions(size=320, features=1024, side=320)
-MOVE = np.array([[1.0, 0, 0, 0.3], [0, 0, 1, -0.2], [0, -1, 0, 0.5]])  # what nerfstudio does to a world, and a shift
-WORLD = Rotation.from_rotvec([0.3, -0.2, 0.4]).as_matrix()  # so that no axis of the scene is an axis of the file
-
-
-@dataclass(frozen=True)
-class Scene:
-    names: tuple[str, ...]
-    rotations: np.ndarray
-    translations: np.ndarray
-    points: np.ndarray
-
-
-def made_scene() -> Scene:
-    """Eight cameras in two lines at two heights, and points of the ground."""
-    flown = made_up.flight(2, 4, step=0.2, tilt=0.2)
-    cameras = [
-        made_up.camera(c.centre * [1, 1, 1 + 0.2 * (i % 2)], [0.6 * c.centre[0], 0.6 * c.centre[1] + 1e-3, 0])
-        for i, c in enumerate(flown)
-    ]
-    rotations = np.array([c.rotation @ WORLD.T for c in cameras])
-    ground = made_up.plain(60, 0.4, np.random.default_rng(7))
-    return Scene(
-        tuple(f"{i:03d}.png" for i in range(8)),
-        rotations,
-        np.array([c.translation for c in cameras]),
-        ground @ WORLD.T,
-    )
-
-
-SCENE = made_scene()
-
-
-def lens(scale: float = 1.0) -> pycolmap.Camera:
-    camera = pycolmap.Camera(model="OPENCV", width=WIDTH, height=HEIGHT, params=NUMBERS)
-    if scale != 1:
-        camera.rescale(scale)
-    return camera
-
-
-def photograph(camera: pycolmap.Camera, rotation, translation, ground: np.ndarray) -> np.ndarray:
-    """What a distorted camera sees of a picture laid on the plane z = 0 before the world was turned."""
-    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    rays = np.c_[camera.cam_from_img(np.stack([x, y], -1).reshape(-1, 2)), np.ones(x.size)]
-    turn = rotation @ WORLD
-    origin, step = -turn.T @ translation, rays @ turn
-    at = (origin - origin[2] / step[:, 2:] * step)[:, :2]
-    size = len(ground)
-    where = np.array([(HALF - at[:, 1]), (at[:, 0] + HALF)]) / (2 * HALF) * size - 0.5
-    planes = [map_coordinates(ground[..., c], where, order=1, mode="nearest") for c in range(3)]
-    return np.stack(planes, -1).reshape(camera.height, camera.width, 3).astype(np.float32)
-
-
-def shoot(folder, scale: float = 1.0, names=SCENE.names) -> None:
-    """Photos of the scene."""
-    ground, camera = made_up.texture(np.random.default_rng(4)), lens(scale)
-    folder.mkdir(parents=True, exist_ok=True)
-    for i, name in enumerate(names):
-        (folder / name).parent.mkdir(exist_ok=True, parents=True)
-        image_files.write_png(folder / name, photograph(camera, SCENE.rotations[i], SCENE.translations[i], ground))
-
-
-def alike(picture: np.ndarray, wanted: np.ndarray) -> bool:
-    """Whether two pictures differ much less than one does from itself a pixel aside (one was sampled twice)."""
-    shifts = [np.abs(np.roll(wanted, 1, axis) - wanted)[4:-4, 4:-4].mean() for axis in (0, 1)]
-    return np.abs(picture - wanted)[4:-4, 4:-4].mean() < 0.35 * min(shifts)
-
-
-def quaternion(rotation) -> np.ndarray:
-    return np.roll(Rotation.from_matrix(rotation).as_quat(), 1)
-
-
-def observations(camera: pycolmap.Camera) -> list[np.ndarray]:
-    """Of every image the pixels at which it sees the scene's points."""
-    return [
-        np.asarray(camera.img_from_cam(SCENE.points @ r.T + t))
-        for r, t in zip(SCENE.rotations, SCENE.translations, strict=True)
-    ]
-
-
-def write_colmap(folder, names=SCENE.names, sees: bool = False) -> None:
-    """A text model; sees: with points and observations, else without points."""
-    folder.mkdir(parents=True)
-    camera = lens()
-    (folder / "cameras.txt").write_text(
-        f"# Camera list\n3 OPENCV {WIDTH} {HEIGHT} {' '.join(map(repr, NUMBERS))}\n", encoding="utf-8"
-    )
-    lines = ["# Image list"]
-    for i, (name, at) in enumerate(zip(names, observations(camera), strict=True)):
-        pose = [*quaternion(SCENE.rotations[i]), *SCENE.translations[i]]
-        lines.append(f"{10 * i + 5} {' '.join(repr(float(v)) for v in pose)} 3 {name}")
-        seen = [f"{x!r} {y!r} {100 + 3 * k}" for k, (x, y) in enumerate(at.tolist())]
-        lines.append(" ".join(["1.5 2.5 -1", *seen]) if sees else "")
-    (folder / "images.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    if sees:
-        rows = [f"{100 + 3 * k} {x!r} {y!r} {z!r} 51 102 204 0.1" for k, (x, y, z) in enumerate(SCENE.points.tolist())]
-        (folder / "points3D.txt").write_text("\n".join(reversed(rows)) + "\n", encoding="utf-8")
-
-
-def transforms(names=SCENE.names, move=MOVE) -> dict:
-    """What nerfstudio would write."""
-    fx, fy, cx, cy, k1, k2, p1, p2 = NUMBERS
-    frames = []
-    for i, name in enumerate(names):
-        pose = np.eye(4)
-        pose[:3, :3] = SCENE.rotations[i].T * [1, -1, -1]
-        pose[:3, 3] = -SCENE.rotations[i].T @ SCENE.translations[i]
-        frames.append({"file_path": f"./{name}", "transform_matrix": (np.r_[move, [[0, 0, 0, 1]]] @ pose).tolist()})
-    out = {"camera_model": "OPENCV", "fl_x": fx, "fl_y": fy, "cx": cx, "cy": cy, "w": WIDTH, "h": HEIGHT}
-    return out | {"k1": k1, "k2": k2, "p1": p1, "p2": p2, "applied_transform": move.tolist(), "frames": frames}
-
-
-def reconstruction(names=SCENE.names) -> list:
-    """What OpenSfM would write."""
-    fx, fy, cx, cy, k1, k2, p1, p2 = NUMBERS
-    side = max(WIDTH, HEIGHT)
-    camera = {"projection_type": "brown", "width": WIDTH, "height": HEIGHT, "focal_x": fx / side, "focal_y": fy / side}
-    camera |= {"c_x": (cx - WIDTH / 2) / side, "c_y": (cy - HEIGHT / 2) / side}
-    camera |= {"k1": k1, "k2": k2, "k3": 0.0, "p1": p1, "p2": p2}
-    shots = {
-        name: {
-            "rotation": Rotation.from_matrix(SCENE.rotations[i]).as_rotvec().tolist(),
-            "translation": SCENE.translations[i].tolist(),
-            "camera": "v2 brown",
-        }
-        for i, name in enumerate(names)
-    }
-    places = {str(k): {"coordinates": p, "color": [51, 102, 204]} for k, p in enumerate(SCENE.points.tolist())}
-    return [{"cameras": {"v2 brown": camera}, "shots": shots, "points": places}]
-
-
-def write_json(path, values):
-    path.write_text(json.dumps(values), encoding="utf-8")
-    return path
+from dav_gswt.photos.sfm.registration import undistort_image
 
 
 @pytest.fixture(scope="module")
