@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 from fixtures.splats import rough_ground
+from fixtures.tile_sets import report_of
 from record import tell
 
 from dav_gswt.bundle import build, direction_search, order_directions, orders, store
@@ -28,7 +29,7 @@ def tile_set(cells: int, levels: int) -> TileSet:
     """Sixteen tiles, each level with half the cells a side; half of the tiles are in doubt."""
     fields = [[rough_ground(tile, cells >> level, SIDE) for tile in range(16)] for level in range(levels)]
     labels, doubt = np.zeros((16, cells, cells), np.uint8), np.arange(16) / 15
-    return TileSet(SIDE, SIDE / cells, fields, labels, np.zeros((16, 9, 2), int), doubt, {})
+    return TileSet(SIDE, SIDE / cells, fields, labels, np.zeros((16, 9, 2), int), doubt, report_of())
 
 
 def presorting(tiles: TileSet, threads: int) -> tuple[float, float, int]:

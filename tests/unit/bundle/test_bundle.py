@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fixtures.tile_sets import report_of
 
 from dav_gswt.bundle import build, gswt, level_distances, manifest, store
 from dav_gswt.errors import InputError
@@ -36,7 +37,7 @@ def made_up(n, sigma, seed):
 def tiles():
     fields = [[made_up(60 >> level, 0.02 * 2**level, 100 * level + t) for t in range(16)] for level in range(2)]
     doubt = np.linspace(0, 1, 16)
-    return TileSet(SIDE, 0.1, fields, np.zeros((16, 20, 20), np.uint8), np.zeros((16, 9, 2), int), doubt, {})
+    return TileSet(SIDE, 0.1, fields, np.zeros((16, 20, 20), np.uint8), np.zeros((16, 9, 2), int), doubt, report_of())
 
 
 @pytest.fixture(scope="module")

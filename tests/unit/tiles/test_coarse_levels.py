@@ -90,7 +90,7 @@ def five(made_up):
 
 
 def test_tiles_go_on_where_the_exemplar_ends(five, tiles):
-    assert five.seams["layout"]["levels"] == 5 and five.seams["layout"]["laid"] == 3
+    assert five.report.layout.levels == 5 and five.report.layout.composed_levels == 3
     assert five.side == tiles.side
     scales = [[float(np.exp(f.log_scales).mean()) for f in level] for level in five.fields]
     assert (np.diff(scales, axis=0) > 0).all()

@@ -145,7 +145,7 @@ def test_a_set_that_was_written_reads_back_and_repeats_its_bytes(tiles, tmp_path
     np.testing.assert_array_equal(back.labels, tiles.labels)
     np.testing.assert_array_equal(back.shifts, tiles.shifts)
     np.testing.assert_array_equal(back.fields[1][3].means, tiles.fields[1][3].means)
-    assert back.side == tiles.side and back.seams == tiles.seams
+    assert back.side == tiles.side and back.report == tiles.report
     for path in sorted((tmp_path / "a").rglob("*.*")):
         assert path.read_bytes() == (tmp_path / "b" / path.relative_to(tmp_path / "a")).read_bytes(), path.name
 

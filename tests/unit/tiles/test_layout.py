@@ -107,29 +107,3 @@ def test_a_frame_holds_strips_at_its_sides_and_the_corner_patch_in_its_corners()
     assert labels[b, 0] == SW and labels[b, 1] == W and (labels[b + 1 : n - b, :b] == W).all()
     assert (labels[b : n - b, n - b :] == E).all()
     assert (labels[b : n - b, b : n - b] == layout.CENTRE).all()
-
-
-def test_every_cell_may_show_some_patch_but_for_the_rim_and_only_where_it_reaches():
-    reach = layout.allowed_cells(PLAN)
-    n, k = PLAN.side, PLAN.block
-    inner = np.zeros((n, n), bool)
-    inner[k : n - k, k : n - k] = True
-    np.testing.assert_array_equal(reach[layout.CENTRE], inner)
-    assert not reach[:, ~inner].any()
-    y, x = np.nonzero(reach[W])
-    assert set(x) == {1} and set(y) == set(range(2, 8))  # a strip is 2 wide; the rim is 1
-    np.testing.assert_array_equal(reach[S], reach[W].T)
-    np.testing.assert_array_equal(reach[E], reach[W][:, ::-1])
-    np.testing.assert_array_equal(reach[N], reach[S][::-1])
-    np.testing.assert_array_equal(np.argwhere(reach[SW]), [[1, 1], [1, 2], [2, 1], [2, 2]])  # a corner is 3
-    np.testing.assert_array_equal(reach[NE], reach[SW][::-1, ::-1])
-    np.testing.assert_array_equal(reach[SE], reach[SW][:, ::-1])
-    np.testing.assert_array_equal(reach[NW], reach[SW][::-1])
-
-
-def test_what_reaches_a_cell_lies_in_the_exemplar():
-    shift = layout.label_shifts(PLAN, PLACES, 5)
-    for label, cells in enumerate(layout.allowed_cells(PLAN)):
-        y, x = np.nonzero(cells)
-        assert ((shift[label] + np.stack([x, y], 1)) >= 0).all()
-        assert ((shift[label] + np.stack([x, y], 1)) < PLAN.exemplar).all()

@@ -108,7 +108,7 @@ def test_colour_alone_is_gamma_1_whatever_is_doubted():
     assert colour.gamma(0.9) == 1 and colour.terms(1.0) == [(1.0, colour.colours)]
 
 
-@pytest.mark.parametrize("kind", ["semantic", "none", "expansion"])
+@pytest.mark.parametrize("kind", ["semantic", "none"])
 def test_the_surer_a_patch_the_more_its_colours_count(kind):
     e = made_up(1, kind)
     assert e.gamma(0.5) == 0.5 and e.gamma(0.0) == pytest.approx(0.7310585786)  # 1 / (1 + exp(-1))
@@ -144,17 +144,6 @@ def test_weights_in_single_precision_agree_with_double(share):
     ):
         # colours up to 1 rounded to 2^-24, differences of them from 0.05 on, scales a sum over 144 cells
         np.testing.assert_allclose(a, b, rtol=2e-5)
-
-
-@pytest.mark.parametrize("axis", [0, 1])
-def test_single_edges_cost_what_they_cost_in_a_grid(axis):
-    e, pair = made_up(5), (where(0, 0), where(7, 4))
-    grid = energy.compute_edge_costs(e.terms(0.6), *pair)[axis]
-    tails = tuple(np.indices(grid.shape).reshape(2, -1))
-    heads = tails[0] + axis, tails[1] + 1 - axis
-    ends = [tuple((rows[cells], columns[cells]) for rows, columns in pair) for cells in (tails, heads)]
-    found = energy.compute_costs_along(e.terms(0.6), *ends, np.full(grid.size, axis))
-    np.testing.assert_allclose(found.reshape(grid.shape), grid, rtol=1e-12)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.731, 1.0])

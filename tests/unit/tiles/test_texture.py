@@ -57,5 +57,5 @@ def test_tiles_by_their_texture_are_those_of_its_sizes(made_up):
 
     own, given = cut(options), cut(replace(options, share=share, strip=strip))
     np.testing.assert_array_equal(own.labels, given.labels)
-    assert own.side == given.side and own.seams == given.seams
+    assert own.side == given.side and own.report == given.report
     assert cut(replace(options, share=0.6)).side != given.side

@@ -26,21 +26,20 @@ def every(made_up):
 
 def test_every_way_says_what_it_used(every):
     for kind, found in every.items():
-        told = found.seams["energy"]
+        told = found.report.energy.to_dict()
         assert told["kind"] == kind and told["eps"] == energy.EPS
         assert ("semantics" in told["scales"]) == ("semantics" in told) == (kind != "colour")
-        assert len(found.seams["tile_energy"]) == len(found.seams["tile_gamma"]) == 16
+        assert len(found.report.tile_energy) == len(found.report.tile_gamma) == 16
         assert told["standing"] == energy.OCCLUDER_WEIGHT
-        assert ("expansion" in found.seams) == (kind == "expansion")
         gamma = {"colour": 1.0, "semantic-nogamma": 0.5}.get(kind, 0.7310585786)  # of no doubt: 1 / (1 + exp(-1))
-        assert found.seams["tile_gamma"] + found.seams["strip_gamma"] == pytest.approx([gamma] * 20)
+        assert found.report.tile_gamma + found.report.strip_gamma == pytest.approx([gamma] * 20)
 
 
 def test_a_straight_seam_costs_more_than_the_cheapest_one_between_the_same_patches(every):
     # the first strips were chosen before anything was cut
     for k in (0, 2):
-        assert every["none"].seams["strip_energy"][k] > every["semantic"].seams["strip_energy"][k]
-    assert every["none"].seams["places"]["vertical"] == every["semantic"].seams["places"]["vertical"]
+        assert every["none"].report.strip_energy[k] > every["semantic"].report.strip_energy[k]
+    assert every["none"].report.places.vertical == every["semantic"].report.places.vertical
 
 
 def test_without_a_cut_seams_are_straight_and_in_the_middle_of_the_overlap(every):
@@ -52,31 +51,11 @@ def test_without_a_cut_seams_are_straight_and_in_the_middle_of_the_overlap(every
         np.testing.assert_array_equal(labels == CENTRE, inner)
 
 
-def test_expansion_starts_at_the_exact_cuts_and_never_costs_more(every):
-    exact, moved = every["semantic"], every["expansion"]
-    assert exact.seams["places"] == moved.seams["places"]
-    assert exact.seams["tile_energy"] == moved.seams["tile_energy"]
-    for told in moved.seams["expansion"]:
-        assert told["after"] <= told["before"] and 0 <= told["triangles_broken"] <= told["triangles_tested"]
-        assert (told["moves"] > 0) == (told["after"] < told["before"])
-    assert any(told["moves"] for told in moved.seams["expansion"])
-    block = 4
-    np.testing.assert_array_equal(exact.labels[:, :block], moved.labels[:, :block])
-    np.testing.assert_array_equal(exact.labels[:, :, -block:], moved.labels[:, :, -block:])
-
-
-def test_after_an_expansion_every_patch_lies_within_its_reach(every):
-    reach = layout.allowed_cells(layout.plan_layout(96, 3, 0.5, 0.17))
-    for labels in every["expansion"].labels:
-        for label in range(9):
-            assert not (labels[4:-4, 4:-4] == label)[~reach[label][4:-4, 4:-4]].any()
-
-
 def test_what_is_doubted_is_cut_by_semantics_more_than_by_colour(made_up):
-    doubted = cut(made_up, "semantic", doubt=np.full((96, 96), 0.75)).seams
-    assert doubted["tile_gamma"] == pytest.approx([1 / (1 + np.exp(0.5))] * 16)
-    steep = cut(made_up, "semantic", doubt=np.full((96, 96), 0.75), options=replace(FEW, slope=8.0)).seams
-    assert steep["tile_gamma"] == pytest.approx([1 / (1 + np.exp(2))] * 16)
+    doubted = cut(made_up, "semantic", doubt=np.full((96, 96), 0.75)).report
+    assert doubted.tile_gamma == pytest.approx([1 / (1 + np.exp(0.5))] * 16)
+    steep = cut(made_up, "semantic", doubt=np.full((96, 96), 0.75), options=replace(FEW, slope=8.0)).report
+    assert steep.tile_gamma == pytest.approx([1 / (1 + np.exp(2))] * 16)
 
 
 @pytest.mark.parametrize("kind", energy.KINDS)
@@ -84,7 +63,7 @@ def test_patches_that_are_all_the_same_cost_nothing(made_up, kind):
     bare = [level[level.ground] for level in made_up.levels]
     found = cut(made_up, kind, colour=np.full((96, 96, 3), 0.5), levels=bare)
     # colours without their trend differ by rounding
-    assert found.seams["tile_energy"] + found.seams["strip_energy"] == pytest.approx([0] * 20, abs=1e-9)
+    assert found.report.tile_energy + found.report.strip_energy == pytest.approx([0] * 20, abs=1e-9)
     assert np.isfinite(found.fields[0][0].means).all()
 
 
@@ -135,10 +114,10 @@ def test_a_finest_level_from_elsewhere_is_refused(made_up):
 
 
 def test_options_are_those_of_the_configs_entry():
-    seam = {"tile": 0.4, "strip": 0.1, "candidates": 7, "variants": 3, "energy": "expansion", "slope": 4.0, "sam2": "a"}
+    seam = {"tile": 0.4, "strip": 0.1, "candidates": 7, "variants": 3, "energy": "colour", "slope": 4.0, "sam2": "a"}
     found = build.TilingOptions.from_config(seam, FEW.source)
     assert (found.share, found.strip, found.candidates, found.variants) == (0.4, 0.1, 7, 3)
-    assert (found.kind, found.slope) == ("expansion", 4.0)
+    assert (found.kind, found.slope) == ("colour", 4.0)
     older = build.TilingOptions.from_config(
         {key: seam[key] for key in ("tile", "strip", "candidates", "variants")}, FEW.source
     )

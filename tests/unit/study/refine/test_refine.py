@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from fixtures.tile_sets import report_of
 
 from dav_gswt.field import SH0, GaussianField, concatenate_fields
 from dav_gswt.prior.interface import Condition, DecodedViews
@@ -48,9 +49,8 @@ def brightness(step, n=N):
 def tile_set(step=STEP):
     finest, coarse = (ground(n, SIDE / n, brightness(step, n)) for n in (N, N // 2))
     shifts = np.zeros((EDGES, 9, 2), int)
-    seams = {"layout": {"strip": 8}}
     levels = [[finest] * EDGES, [coarse] * EDGES]
-    return TileSet(SIDE, SPACING, levels, np.stack([labels()] * EDGES), shifts, np.zeros(EDGES), seams)
+    return TileSet(SIDE, SPACING, levels, np.stack([labels()] * EDGES), shifts, np.zeros(EDGES), report_of(N, 8))
 
 
 UNCUT = Uncut(ground(48, SPACING, np.full((48, 48, 3), 0.4), -3.0, -3.0), Exemplar(-3.0, -3.0, SPACING, 48))
@@ -82,7 +82,7 @@ def test_where_nothing_is_repaired_every_level_keeps_its_bytes():
     found, before = refined(nothing), tile_set()
     for one, two in zip(found.fields, before.fields, strict=True):
         assert all(same(a, b) for a, b in zip(one, two, strict=True))
-    assert all(told["changed"] == 0 for told in found.seams["refined"]["tiles"])
+    assert all(told["changed"] == 0 for told in found.report.more["refined"]["tiles"])
 
 
 def step_at_the_cut(field, n):
@@ -96,7 +96,7 @@ def test_a_step_of_brightness_becomes_smaller_in_every_level(mended):
     for level, n in ((0, N), (1, N // 2)):
         before, after = (step_at_the_cut(tiles.fields[level][5], n) for tiles in (tile_set(), mended))
         assert after < 0.7 * before, level
-    told = mended.seams["refined"]["tiles"][5]
+    told = mended.report.more["refined"]["tiles"][5]
     assert told["apart"][1] < 0.8 * told["apart"][0] and told["changed"] > 0
 
 
@@ -136,8 +136,8 @@ def test_labels_and_what_was_cut_are_kept(mended):
     before = tile_set()
     np.testing.assert_array_equal(mended.labels, before.labels)
     assert (mended.side, mended.spacing) == (before.side, before.spacing)
-    assert mended.seams["layout"] == before.seams["layout"]
-    assert mended.seams["refined"]["options"]["reach"] == FEW.reach
+    assert mended.report.layout == before.report.layout
+    assert mended.report.more["refined"]["options"]["reach"] == FEW.reach
 
 
 def test_a_tile_without_a_cut_is_left_alone():

@@ -19,7 +19,7 @@ def tiles(made_up):
 
 @pytest.fixture(scope="session")
 def source(made_up, tiles):
-    width = 0.2 * tiles.seams["layout"]["side"]
+    width = 0.2 * tiles.report.layout.side
     return placed_tiles.detrend_exemplar(made_up.levels, made_up.exemplar, made_up.colour, width)
 
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures.tile_sets import report_of
 
 from dav_gswt.reconstruction import discs
 from dav_gswt.reconstruction.ground import Ground
@@ -24,7 +25,7 @@ def tile_set(fields):
     count = len(fields[0])
     labels = np.zeros((count, CELLS, CELLS), np.uint8)
     labels[:, :, CELLS // 2 :] = 1
-    return TileSet(SIDE, SPACING, fields, labels, np.zeros((count, 9, 2), int), np.zeros(count), {})
+    return TileSet(SIDE, SPACING, fields, labels, np.zeros((count, 9, 2), int), np.zeros(count), report_of())
 
 
 def test_the_torus_holds_every_tile_once_and_colours_meet():

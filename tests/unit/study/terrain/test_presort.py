@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fixtures.splats import rough_ground
+from fixtures.tile_sets import report_of
 
 from dav_gswt.bundle import build, store
 from dav_gswt.study.terrain import presort
@@ -18,7 +19,7 @@ SIDE = 4.0
 def tile_set(levels) -> TileSet:
     fields = [[rough_ground(tile, 32 >> level, SIDE) for tile in range(16)] for level in range(levels)]
     return TileSet(
-        SIDE, SIDE / 32, fields, np.zeros((16, 32, 32), np.uint8), np.zeros((16, 9, 2), int), np.zeros(16), {}
+        SIDE, SIDE / 32, fields, np.zeros((16, 32, 32), np.uint8), np.zeros((16, 9, 2), int), np.zeros(16), report_of()
     )
 
 

@@ -1,4 +1,4 @@
-"""The tile set of a field: trends out, places searched, strips and centres cut, every level composed."""
+"""The tile set of a field: trends are removed, patches searched and cut, and every level is composed of them."""
 
 import logging
 from collections.abc import Mapping
@@ -12,8 +12,9 @@ from scipy.ndimage import distance_transform_edt
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import SH0, GaussianField
-from dav_gswt.lod.levels import AUTO
+from dav_gswt.lod.levels import AUTO, Levels
 from dav_gswt.logs import progress
+from dav_gswt.reconstruction import top_view
 from dav_gswt.tiles import (
     coarse_levels,
     compose,
@@ -28,19 +29,30 @@ from dav_gswt.tiles import (
     trends,
 )
 from dav_gswt.tiles.layout import EDGES, Exemplar, Layout
+from dav_gswt.tiles.report import EnergyReport, PlacesReport, TileReport
 
 _log = logging.getLogger(__name__)
 
-WARN_UNCERTAINTY = 0.5  # mean uncertainty of a tile that is said
+WARN_UNCERTAINTY = 0.5  # mean of a tile, above which a warning is logged
 
 
 @dataclass(frozen=True)
 class TilingOptions:
-    """share: tile side over the exemplar's. strip: half-width of the strips over the tile's side, below 1/5. Either may
-    be layout.AUTO: by the scale of the exemplar's texture. variants: centres per edge colouring. trend: width of the
-    low-pass in tile sides. candidates: places that a search compares; tries: of them, how many are cut before the best
-    is taken. kind: one of energy.KINDS; slope: of gamma; source: what the semantics are made of. levels: of the tiles,
-    a number or layout.AUTO; None: as many as are given. corrected: steps across seams are spread out (`membrane`).
+    """How a tile set is cut.
+
+    Attributes:
+        share: tile side over the exemplar's side, or AUTO: by the scale of the exemplar's texture.
+        strip: half-width of the strips over the tile's side, below 1/5, or AUTO.
+        variants: centres per edge colouring.
+        trend: width of the low-pass that is removed, in tile sides.
+        candidates: places that a search compares.
+        tries: the best of them that are cut before one is taken.
+        kind: one of `energy.KINDS`.
+        slope: of the weight of colour as a function of uncertainty.
+        source: what the semantics are made of.
+        levels: of the tiles, a number or AUTO; None: as many as are given.
+        corrected: steps across seams are spread out (`poisson_blending`).
+        relabel: see `search.SearchProblem`.
     """
 
     share: float | str = 0.5
@@ -54,6 +66,7 @@ class TilingOptions:
     source: semantics.SemanticSource = semantics.SemanticSource()
     levels: int | str | None = None
     corrected: bool = True
+    relabel: search.Relabel | None = None
 
     @classmethod
     def from_config(
@@ -74,9 +87,13 @@ def make_generator(seed: int, tiling: Mapping[str, Any]) -> np.random.Generator:
 class TileSet:
     """16 C tiles at every level, in world units from each tile's south-western corner.
 
-    fields[level][tile]. labels: [tile, y, x], row 0 in the south. shifts: what to add to a cell (x, y) of a tile to
-    get the exemplar's cell, per label. uncertainty: mean over each tile's cells. seams: what was chosen and what it
-    cost, as JSON.
+    Attributes:
+        side: width of a tile; spacing: width of a finest cell.
+        fields: fields[level][tile].
+        labels: [tile, y, x], row 0 in the south: which patch each finest cell shows (`layout.LABELS`).
+        shifts: per tile and label, what to add to a cell (x, y) of the tile for the exemplar's cell.
+        uncertainty: mean over each tile's cells.
+        report: what was chosen and what it cost.
     """
 
     side: float
@@ -85,11 +102,19 @@ class TileSet:
     labels: UInt8[Array, "tiles n n"]
     shifts: Int[Array, "tiles 9 2"]
     uncertainty: Float[Array, "tiles"]
-    seams: dict
+    report: TileReport
 
     @property
     def variants(self) -> int:
         return len(self.labels) // EDGES
+
+
+def cut_levels(levels: Levels, options: TilingOptions, rng: np.random.Generator) -> TileSet:
+    """Cut the tile set of a field's levels, as they look from straight above. Raises: InputError: see `cut_tiles`."""
+    grid = levels.grids[0]
+    above = top_view.render_exemplar(levels.fields[0], grid)
+    maps = above.colour_or_nan(), above.uncertainty
+    return cut_tiles(levels.fields, Exemplar.from_grid(grid), *maps, options, rng)
 
 
 def cut_tiles(
@@ -100,14 +125,14 @@ def cut_tiles(
     options: TilingOptions,
     rng: np.random.Generator,
 ) -> TileSet:
-    """Make the tile set of a field.
+    """Cut the tile set of a field.
 
     Args:
-        levels: finest first; level l's ground has cells of 2^l spacings from the exemplar's corner. Those whose cells
-            are wider than a block are left aside: such levels are merged from each tile's own cells.
-        colour, uncertainty: seen from straight above, one value a finest cell, **row 0 in the south** (turn a top-down
-            camera's picture upside down). Uncertainty in [0, 1]; NaN where nothing is known: a hole takes the colour of
-            the nearest cell, and is shown only where nothing better serves.
+        levels: finest first; level l's ground has cells of 2^l spacings from the exemplar's corner. Levels whose cells
+            are wider than a block are not used: such levels are merged from each tile's own cells.
+        colour, uncertainty: seen from straight above, one value a finest cell, **row 0 in the south**. Uncertainty in
+            [0, 1]; NaN where nothing is known: a hole takes the colour of the nearest cell, and is shown only where no
+            other place serves.
     Raises: InputError: the exemplar is too small for a tile, a level has no Gaussian in it, or nothing is known of any
         cell.
     """
@@ -125,62 +150,84 @@ def cut_tiles(
         _check_level(compose.bin_gaussians(trends.remove_trend(field, trend), exemplar, 2**number), number)
         for number, field in enumerate(levels[: plan.composed_levels])
     ]
-    stands = energy.make_occluder_layer(occluders.compute_cover(levels[0], exemplar, height))
+    hidden = energy.make_occluder_layer(occluders.compute_cover(levels[0], exemplar, height))
     colour = np.clip(known - trend.colour, 0, 1).astype(float)
     height = np.nan_to_num(height - trend.height, nan=float(np.nanmean(height)))
-    meant = None if options.kind == "colour" else semantics.make_semantic_layer(colour, options.source)
-    priced = energy.SeamEnergy(options.kind, options.slope, energy.make_colour_layer(colour), meant, stands)
+    semantic = None if options.kind == "colour" else semantics.make_semantic_layer(colour, options.source)
+    priced = energy.SeamEnergy(options.kind, options.slope, energy.make_colour_layer(colour), semantic, hidden)
     guide = patches.make_guidance(colour, height, doubt, plan)
-    sketch = search.SearchProblem(plan, guide, priced, options.candidates, options.tries)
-    found = search.search_patches(sketch, options.variants, rng)
-    labels = found.labels
-    shifts = np.stack([layout.label_shifts(plan, found.places, tile) for tile in range(len(labels))])
+    problem = search.SearchProblem(plan, guide, priced, options.candidates, options.tries, options.relabel)
+    found = search.search_patches(problem, options.variants, rng)
+    shifts = np.stack([layout.label_shifts(plan, found.places, tile) for tile in range(len(found.tiles))])
     corrections = _solve_corrections(plan, found, shifts, poisson_blending.make_soft_maps(colour, height))
     corrections *= options.corrected
+    fields, raised = _compose_tiles(binned, plan, found.labels, shifts, corrections)
+    report = TileReport(
+        places=PlacesReport.from_places(found.places),
+        strip_energy=[strip.seam.energy for strip in found.strips],
+        strip_gamma=[strip.gamma for strip in found.strips],
+        tile_energy=[tile.centre.seam.energy for tile in found.tiles],
+        tile_gamma=[tile.centre.gamma for tile in found.tiles],
+        layout=plan,
+        texture=scale * exemplar.spacing,
+        raised=raised.tolist(),
+        energy=_describe_energy(priced, semantic),
+        trend={"colour": float(np.ptp(trend.colour)), "height": float(np.ptp(trend.height))},
+        correction=np.abs(corrections).max((0, 1, 2)).tolist(),
+    )
+    means = [doubt[layout.source_cells(*pair)].mean() for pair in zip(found.labels, shifts, strict=True)]
+    if max(means) > WARN_UNCERTAINTY:
+        _log.warning(
+            "the tiles show uncertain ground (mean uncertainty %.2f to %.2f): a smaller `tile` in the config's tilings "
+            "would show surer ground, or more photos",
+            min(means),
+            max(means),
+        )
+    return TileSet(
+        plan.side * exemplar.spacing, exemplar.spacing, fields, found.labels, shifts, np.array(means), report
+    )
+
+
+def _compose_tiles(
+    binned: list[compose.BinnedLevel], plan: Layout, labels: Array, shifts: Array, corrections: Array
+) -> tuple[list[list[GaussianField]], Float[Array, "tiles"]]:
+    """fields[level][tile] of all levels, and by how much each tile was raised."""
+    spacing = binned[0].exemplar.spacing
     tiles = [
         [_compose_level(level, labels[tile], shifts[tile], corrections[tile]) for level in binned]
         for tile in progress(range(len(labels)), "compose tiles")
     ]
-    side = plan.side * exemplar.spacing
-    tiles, raised = compose.equalise_heights(tiles, side)
-    tiles = [_append_merged_levels(tile, plan, exemplar.spacing) for tile in tiles]
-    seams = found.describe() | {
-        "layout": {
-            key: int(getattr(plan, "composed_levels" if key == "laid" else key))
-            for key in ("exemplar", "levels", "laid", "side", "strip", "corner", "block")
-        },
-        "texture": scale * exemplar.spacing,
-        "raised": raised.tolist(),
-        "energy": priced.describe(),
-        "trend": {"colour": float(np.ptp(trend.colour)), "height": float(np.ptp(trend.height))},
-        "correction": np.abs(corrections).max((0, 1, 2)).tolist(),
-    }
-    shown = [doubt[layout.source_cells(labels[t], shifts[t])].mean() for t in range(len(labels))]
-    if max(shown) > WARN_UNCERTAINTY:
-        _log.warning(
-            "the tiles show ground in doubt (mean uncertainty %.2f to %.2f): a smaller `tile` in the config's seams "
-            "would show surer ground, or more photos",
-            min(shown),
-            max(shown),
-        )
-    fields = [list(level) for level in zip(*tiles, strict=True)]
-    return TileSet(side, exemplar.spacing, fields, labels, shifts, np.array(shown), seams)
+    tiles, raised = compose.equalise_heights(tiles, plan.side * spacing)
+    tiles = [_append_merged_levels(tile, plan, spacing) for tile in tiles]
+    return [list(level) for level in zip(*tiles, strict=True)], raised
+
+
+def _describe_energy(priced: energy.SeamEnergy, semantic: semantics.SemanticLayer | None) -> EnergyReport:
+    scales = {"colour": priced.colours.unit} | ({"semantics": semantic.unit} if semantic is not None else {})
+    hidden = energy.OCCLUDER_WEIGHT if priced.occluders is not None else None
+    if semantic is None:
+        return EnergyReport(priced.kind, scales, energy.EPS, hidden)
+    constant = priced.kind == "semantic-nogamma"
+    gamma, slope = (0.5, None) if constant else (None, priced.slope)
+    return EnergyReport(priced.kind, scales, energy.EPS, hidden, gamma, slope, semantic.said)
 
 
 def _choose_sizes(options: TilingOptions, scale: float, exemplar: Exemplar) -> tuple[float, float]:
-    """What the options ask for as `share` and `strip`, by the texture's scale in cells where that is left to it."""
+    """Share and strip as numbers; where they are AUTO, by the texture's scale in cells."""
     by_texture = texture.choose_sizes(scale / exemplar.cells)
-    asked = options.share, options.strip
-    share, strip = (own if given == AUTO else given for given, own in zip(asked, by_texture, strict=True))
-    if AUTO in asked:
+    share, strip = (
+        own if isinstance(asked, str) else asked
+        for asked, own in zip((options.share, options.strip), by_texture, strict=True)
+    )
+    if AUTO in (options.share, options.strip):
         _log.info("texture of scale %.3g: tiles of %.2f of the exemplar", scale * exemplar.spacing, share)
     return share, strip
 
 
 def _fill_holes(colour: Array, uncertainty: Array) -> tuple[Float[Array, "m m 3"], Float[Array, "m m"]]:
-    """Colours where all are known, and uncertainties in [0, 1]; a hole has the nearest cell's colour and is in doubt.
+    """Colours without holes, and uncertainties in [0, 1]; a hole takes the nearest cell's colour and is uncertain.
 
-    Raises: InputError: there is nothing but holes, or nothing but ground in doubt.
+    Raises: InputError: there is nothing but holes or uncertain ground.
     """
     known = np.isfinite(colour).all(-1)
     doubt = np.where(known, np.clip(np.nan_to_num(uncertainty, nan=1.0), 0, 1), 1.0).astype(float)
@@ -199,7 +246,7 @@ def _fill_holes(colour: Array, uncertainty: Array) -> tuple[Float[Array, "m m 3"
 def _solve_corrections(
     plan: Layout, found: search.SearchResult, shifts: Array, ground: poisson_blending.SoftMaps
 ) -> Float[Array, "t n n 4"]:
-    """What every tile's cells are changed by so that no step is left along its seams; the strips' part first."""
+    """Correction of every tile's cells, so that no step is left along its seams; strips are solved first."""
     strips = []
     for upright, masks, places in (
         (True, found.vertical, found.places.vertical),
@@ -221,7 +268,7 @@ def _solve_corrections(
 
 
 def _compose_level(level: compose.BinnedLevel, labels: Array, shift: Array, correction: Array) -> GaussianField:
-    """One tile at one level, corrected; a coarser level follows the finest one's labels by majority."""
+    """One tile at one level, corrected. A coarser level takes the majority of the finest labels."""
     majority = compose.coarsen_labels(labels, level.cell)
     splats = compose.compose_tile(level, majority, shift)
     change = poisson_blending.coarsen_correction(correction, labels, majority)
@@ -229,7 +276,7 @@ def _compose_level(level: compose.BinnedLevel, labels: Array, shift: Array, corr
 
 
 def _append_merged_levels(tile: list[GaussianField], plan: Layout, spacing: float) -> list[GaussianField]:
-    """A tile's levels with those that are coarser than a block."""
+    """A tile's levels, with those whose cells are wider than a block merged from its own cells."""
     for number in range(len(tile), plan.levels):
         cell = 2 ** (number - 1)
         tile = [*tile, coarse_levels.merge_cells(tile[-1], plan.side // cell, cell * spacing)]

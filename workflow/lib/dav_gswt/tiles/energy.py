@@ -18,12 +18,12 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.views.uncertainty import gamma
 
-KINDS = ("none", "colour", "semantic", "semantic-nogamma", "expansion")
+KINDS = ("none", "colour", "semantic", "semantic-nogamma")
 OCCLUDER_WEIGHT = 2.0  # D of a thing that hides the ground, beside bare ground; in units of two random colours
 EPS = 1.0  # of the mean gradient: with less, a cut through a bush (steep everywhere) is as cheap as one through sand
 ROUNDING = 1e-9  # of colours, which are about 1
@@ -126,16 +126,6 @@ class SeamEnergy:
         stand = [(OCCLUDER_WEIGHT, self.occluders)] if self.occluders is not None else []
         return [(weight, layer) for weight, layer in both if weight > 0] + stand
 
-    def describe(self) -> dict:
-        """What seams were priced by, as JSON."""
-        used = {"colour": self.colours} | ({"semantics": self.semantics} if self.semantics is not None else {})
-        out = {"kind": self.kind, "scales": {name: vars(layer.unit) for name, layer in used.items()}, "eps": EPS}
-        out |= {"standing": OCCLUDER_WEIGHT} if self.occluders is not None else {}
-        if self.semantics is None:
-            return out
-        gamma = {"gamma": 0.5} if self.kind == "semantic-nogamma" else {"slope": self.slope}
-        return out | gamma | {"semantics": self.semantics.said}
-
 
 def compute_edge_costs(
     terms: Sequence[tuple[float, CostLayer]], first: Cells, second: Cells
@@ -150,25 +140,10 @@ def compute_edge_costs(
         g = (layer.slope[first] + layer.slope[second]) * share
         right.append((d[:, :-1] + d[:, 1:], g[:, :-1, 0] + g[:, 1:, 0], layer.unit))
         upper.append((d[:-1] + d[1:], g[:-1, :, 1] + g[1:, :, 1], layer.unit))
-    return _divide_terms(right), _divide_terms(upper)
+    return divide_terms(right), divide_terms(upper)
 
 
-def compute_costs_along(
-    terms: Sequence[tuple[float, CostLayer]],
-    tails: tuple[Cells, Cells],
-    heads: tuple[Cells, Cells],
-    axis: Int[Array, "edges"],
-) -> Float[Array, "edges"]:
-    """W of single edges: what the first and the second patch show at each one's tail and head; axis 0 is along x."""
-    parts = []
-    for share, layer in terms:
-        d = (layer.distances(*tails) + layer.distances(*heads)) * share
-        (a, b), (e, f) = ([layer.slope[(*cells, axis)] for cells in end] for end in (tails, heads))
-        parts.append((d, ((a + b) + (e + f)) * share, layer.unit))
-    return _divide_terms(parts)
-
-
-def _divide_terms(parts: list[tuple[Array, Array, LayerScales]]) -> Array:
+def divide_terms(parts: list[tuple[Array, Array, LayerScales]]) -> Array:
     """Eq. (graphcut_main) from each layer's weighed D and G."""
     difference = sum(d / unit.difference for d, _, unit in parts)
     return difference / (sum(g / unit.gradient for _, g, unit in parts) + EPS)

@@ -20,6 +20,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.lod.levels import AUTO, MAX_LEVELS
+from dav_gswt.reconstruction.ground import Ground
 
 _log = logging.getLogger(__name__)
 
@@ -42,6 +43,12 @@ class Exemplar:
     spacing: float
     cells: int
 
+    @classmethod
+    def from_grid(cls, grid: Ground) -> "Exemplar":
+        """The exemplar of a ground grid."""
+        west, south, _ = grid.exemplar
+        return cls(west, south, grid.spacing, grid.cells)
+
 
 @dataclass(frozen=True)
 class Layout:
@@ -60,9 +67,14 @@ class Layout:
     block: int = 1
 
     @classmethod
-    def from_dict(cls, told: dict) -> "Layout":
-        """Of what seams.json says of it."""
-        return cls(**{own.name: told[own.name] for own in fields(cls)})
+    def from_dict(cls, value: dict[str, int]) -> "Layout":
+        """The layout of its JSON object in seams.json."""
+        return cls(**{own.name: value[own.name] for own in fields(cls)})
+
+    def to_dict(self) -> dict[str, int]:
+        """The JSON object; `laid` is `composed_levels`."""
+        keys = ("exemplar", "levels", "laid", "side", "strip", "corner", "block")
+        return {key: int(getattr(self, "composed_levels" if key == "laid" else key)) for key in keys}
 
     @property
     def composed_levels(self) -> int:
@@ -194,25 +206,6 @@ def frame_labels(
     labels[ends, :b] = np.where(vertical[west][ends, b:], np.where(rows, NW, SW), W)
     labels[ends, n - b :] = np.where(vertical[east][ends, :b], np.where(rows, NE, SE), E)
     return labels
-
-
-def allowed_cells(layout: Layout) -> Bool[Array, "9 n n"]:
-    """Where each label's patch may come to lie in a tile: the centre anywhere, a strip along its side but for the
-    corners, a corner patch in its corner. The outermost `block` cells are the frame's: their neighbours are in other
-    tiles.
-    """
-    n, b, a = layout.side, layout.strip, layout.corner
-    low, high = np.arange(n) < a, np.arange(n) >= n - a
-    side = (np.arange(n) >= b) & (np.arange(n) < n - b)
-    inner = (np.arange(n) >= layout.block) & (np.arange(n) < n - layout.block)
-    out = np.zeros((len(LABELS), n, n), bool)
-    out[CENTRE] = True
-    for label, ys, xs in ((W, side, slice(b)), (E, side, slice(n - b, n))):
-        out[label, ys, xs] = True
-        out[(S, N)[label - W]] = out[label].T
-    for label, ys, xs in ((SW, low, low), (SE, low, high), (NW, high, low), (NE, high, high)):
-        out[label] = ys[:, None] & xs
-    return out & inner[:, None] & inner
 
 
 def source_cells(

@@ -22,6 +22,9 @@ NEAR_SHARE = 0.25  # of a patch's shorter side: nearer places show nearly the sa
 SAMPLES = 3000  # cells of a seam zone that are compared
 
 
+UsedPatch = tuple[Array, tuple[int, int]]  # a place (x, y) and a size (width, height)
+
+
 @dataclass(frozen=True)
 class GuidanceMaps:
     """What a search looks at, per finest cell of the exemplar: features to match, and uncertainty in [0, 1]."""
@@ -155,7 +158,7 @@ def rank_places(
     places: Int[Array, "n 2"],
     cost: Float[Array, "n"],
     size: tuple[int, int],
-    used: list[tuple[Array, tuple[int, int]]],
+    used: list[UsedPatch],
     taken: Int[Array, "k 2"],
 ) -> Int[Array, "n 2"]:
     """Candidate places from best to worst.
@@ -177,7 +180,7 @@ def rank_pairs(
     cost: Float[Array, "n"],
     together: Float[Array, "n n"],
     size: tuple[int, int],
-    used: list[tuple[Array, tuple[int, int]]],
+    used: list[UsedPatch],
 ) -> Int[Array, "p 2 2"]:
     """Pairs of different candidate places from best to worst; a place twice where there is but one.
 

@@ -1,10 +1,11 @@
 """A tile set on disk: lod{l}_tile_{TT}.ply and labels.npz in one folder, seams.json beside it.
 
-seams.json is written last and names the counts: whoever finds it finds the whole set.
+seams.json is written last and holds the counts: where it exists, the set is whole.
 """
 
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from dav_gswt.field import read_field, write_field
 from dav_gswt.files import UNREADABLE, atomic_folder, read_json, write_json
 from dav_gswt.logs import progress
 from dav_gswt.tiles.build import TileSet
+from dav_gswt.tiles.report import TileReport
 
 STAMP = (1980, 1, 1, 0, 0, 0)  # NumPy's own npz carries no better time either
 
@@ -21,7 +23,7 @@ def tile_file_name(level: int, tile: int) -> str:
     return f"lod{level}_tile_{tile:02d}.ply"
 
 
-def write_tiles(tiles: TileSet, folder: Path | str, seams: Path | str, provenance: dict) -> None:
+def write_tiles(tiles: TileSet, folder: Path | str, seams: Path | str, provenance: dict[str, Any]) -> None:
     """Write the set; `folder` and `seams` appear whole or not at all, the folder first."""
     folder, seams = Path(folder), Path(seams)
     seams.unlink(missing_ok=True)
@@ -38,27 +40,27 @@ def write_tiles(tiles: TileSet, folder: Path | str, seams: Path | str, provenanc
         "uncertainty": tiles.uncertainty.tolist(),
         "counts": [[len(f) for f in fields] for fields in tiles.fields],
     }
-    write_json(seams, table | {"seams": tiles.seams, "provenance": provenance})
+    write_json(seams, table | {"seams": tiles.report.to_dict(), "provenance": provenance})
 
 
 def read_tiles(folder: Path | str, seams: Path | str) -> TileSet:
-    """Read what `write` wrote. Raises: InputError: a file is missing or not what seams.json says."""
+    """Read what `write_tiles` wrote. Raises: InputError: a file is missing or not what seams.json says."""
     folder, table = Path(folder), read_json(seams)
     try:
         levels, count = table["levels"], table["tiles"]
-        values = table["side"], table["spacing"], np.array(table["uncertainty"]), table["seams"], table["counts"]
+        side, spacing, counts = table["side"], table["spacing"], table["counts"]
+        uncertainty, report = np.array(table["uncertainty"]), TileReport.from_dict(table["seams"])
     except (KeyError, TypeError) as error:
         raise InputError(f"{seams}: {error} is missing; cut the tiles again") from None
-    side, spacing, uncertainty, chosen, counts = values
     fields = [[read_field(folder / tile_file_name(level, tile)) for tile in range(count)] for level in range(levels)]
     if [[len(f) for f in level] for level in fields] != counts:
-        raise InputError(f"{folder}: the tiles are not those that {seams} tells of; cut them again")
+        raise InputError(f"{folder}: the tiles are not those of {seams}; cut them again")
     try:
         with np.load(folder / "labels.npz", allow_pickle=False) as arrays:
             labels, shifts = arrays["labels"], arrays["shifts"]
     except UNREADABLE as error:
         raise InputError(f"{folder / 'labels.npz'}: not readable ({error}); cut the tiles again") from error
-    return TileSet(side, spacing, fields, labels, shifts, uncertainty, chosen)
+    return TileSet(side, spacing, fields, labels, shifts, uncertainty, report)
 
 
 def _write_npz(path: Path, **arrays) -> None:

@@ -72,7 +72,8 @@ def refined(tiles: TileSet, uncut: Uncut, options: Options, repair: Repair, size
     for level in range(1, len(tiles.fields)):
         levels.append([_follows(tiles, level, number, finest[number]) for number in range(len(finest))])
     _log.info("%d of %d Gaussians changed", sum(f["changed"] for f in told), sum(map(len, finest)))
-    return replace(tiles, fields=levels, seams=tiles.seams | {"refined": {"options": vars(options), "tiles": told}})
+    more = tiles.report.more | {"refined": {"options": vars(options), "tiles": told}}
+    return replace(tiles, fields=levels, report=replace(tiles.report, more=more))
 
 
 def _tile(
@@ -80,7 +81,7 @@ def _tile(
 ) -> tuple[GaussianField, dict]:
     """One tile's finest level, and what was done to it."""
     cell, labels, field = tiles.spacing, tiles.labels[number], tiles.fields[0][number]
-    share = limits.shares(labels, options.reach, float(tiles.seams["layout"]["strip"]))
+    share = limits.shares(labels, options.reach, float(tiles.report.layout.strip))
     bounds = limits.bounds(field, share, tiles.side, options.colour, options.opacity, options.position * cell)
     around = viewpoints.assembly(tiles.fields[0], number, tiles.side)
     points, width = viewpoints.points(labels, options.width // 2), options.width * cell

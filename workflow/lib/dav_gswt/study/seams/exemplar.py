@@ -55,8 +55,5 @@ class ExemplarMaps:
 
     def detrend(self, tiles: build.TileSet, seam: dict) -> DetrendedExemplar:
         """The exemplar without the trend that was removed for a tile set."""
-        width = (
-            build.TilingOptions.from_config(dict(seam), semantics.SemanticSource()).trend
-            * tiles.seams["layout"]["side"]
-        )
+        width = build.TilingOptions.from_config(dict(seam), semantics.SemanticSource()).trend * tiles.report.layout.side
         return detrend_exemplar(self.levels, self.exemplar, self.colour, width)

@@ -106,7 +106,7 @@ def place_tiles(tiles: build.TileSet, source: DetrendedExemplar, salt: int, tau:
     rings = direction_search.search_directions(tiles.fields[0], tiles.side, options.decibels).rings
     manifest = describe_tiles(tiles, options, rings)
     terrain = replace(endless.terrain_from_fields(tiles.fields, manifest, {"kind": "flat"}), reach=REACH)
-    plan = Layout.from_dict(tiles.seams["layout"])
+    plan = tiles.report.layout
     first = -(WINDOW // 2)
     numbers = tiles_in(first, first, (WINDOW, WINDOW), salt, tiles.variants)
     n = plan.side

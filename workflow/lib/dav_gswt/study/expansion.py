@@ -1,22 +1,57 @@
-"""Alpha-expansion over all the patches of a tile at once, as the paper has it: an alternative to exact binary cuts.
+"""Alpha-expansion over all patches of a tile at once, as the paper has it: an alternative to exact binary cuts.
 
-A move lets every cell either keep its patch or take one patch, alpha, at the least cost, found as a cut. W is no metric
-(a seam from one patch to another can cost more than two seams over a third), and where it breaks the triangle no cut
-can tell a move's true cost: the two seams are taken for dearer, as dear as the one together. Such edges are counted. A
-move then costs at least what it truly does, and to keep all as it is costs exactly that: the energy never rises.
+A move lets every cell keep its patch or take one patch, alpha, at the least cost, found as a cut. W is no metric: a
+seam between two patches can cost more than two seams across a third. Where it breaks the triangle inequality no cut
+can represent a move's true cost, so the two seams are priced as high as the one; such edges are counted. A move then
+costs at least what it truly does, and keeping all costs exactly that: the energy never rises.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import maxflow
 import numpy as np
-from jaxtyping import Bool, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 from numpy import ndarray as Array
 
-from dav_gswt.tiles import energy
+from dav_gswt.lod.levels import Levels
+from dav_gswt.tiles.build import TileSet, TilingOptions, cut_levels
+from dav_gswt.tiles.energy import Cells, CostLayer, divide_terms
+from dav_gswt.tiles.layout import CENTRE, LABELS, NE, NW, SE, SW, E, Layout, N, S, W
+from dav_gswt.tiles.search import PlacedPatch, Relabel, SearchProblem
 
-QUANTA = 2.0**26  # of a seam between places at random on flat ground: costs are whole numbers, as those of cuts
+QUANTA = 2.0**26  # of a seam between random places on flat ground: costs are whole numbers, as those of cuts
 CYCLES = 8  # over all patches, at most
+
+
+def cut_by_expansion(levels: Levels, options: TilingOptions, rng: np.random.Generator) -> TileSet:
+    """`tiles.build.cut_levels` with semantic cuts, after which all patches of every tile are expanded."""
+    records: list[dict[str, Any]] = []
+    options = replace(options, kind="semantic", relabel=make_relabel(records))
+    return add_records(cut_levels(levels, options, rng), records)
+
+
+def make_relabel(records: list[dict[str, Any]]) -> Relabel:
+    """The relabelling of `TilingOptions` that expands all patches of a tile; what it did is appended to `records`."""
+
+    def relabel(
+        problem: SearchProblem, centre: PlacedPatch, labels: UInt8[Array, "n n"], shift: Int[Array, "9 2"]
+    ) -> UInt8[Array, "n n"]:
+        # where a patch may not lie, any cell will do
+        shown = [problem.source_cells(np.full(labels.shape, label), shift) for label in range(len(LABELS))]
+        rows, columns = (np.stack([cells[axis] for cells in shown]) for axis in (0, 1))
+        patches = Patches(rows, columns, allowed_cells(problem.plan))
+        found = expand_labels(labels, patches, problem.energy.terms(centre.gamma))
+        records.append(found.describe())
+        return found.labels
+
+    return relabel
+
+
+def add_records(tiles: TileSet, records: list[dict[str, Any]]) -> TileSet:
+    """The tile set with the records under `expansion` in its report."""
+    priced = replace(tiles.report.energy, kind="expansion")
+    return replace(tiles, report=replace(tiles.report, energy=priced, more={"expansion": records}))
 
 
 @dataclass(frozen=True)
@@ -62,10 +97,12 @@ class _Edges:
         return _Edges(self.tails[pick], self.heads[pick], self.axis[pick])
 
 
-def expand_labels(labels: UInt8[Array, "h w"], patches: Patches, terms: list) -> ExpansionResult:
+def expand_labels(
+    labels: UInt8[Array, "h w"], patches: Patches, terms: list[tuple[float, CostLayer]]
+) -> ExpansionResult:
     """Expand every patch in turn until none lowers the energy; of one patch alone nothing changes.
 
-    terms: see energy.Energy.terms. Cells where no other patch is allowed keep theirs.
+    terms: see `SeamEnergy.terms`. Cells where no other patch is allowed keep theirs.
     """
     n, edges, found = len(patches.rows), _edges(labels.shape), labels.ravel().astype(np.int64)
     price = _Price(terms, patches.rows.reshape(n, -1), patches.columns.reshape(n, -1))
@@ -88,7 +125,7 @@ def expand_labels(labels: UInt8[Array, "h w"], patches: Patches, terms: list) ->
 class _Price:
     """W in whole quanta. rows, columns: see Patches, flattened."""
 
-    terms: list
+    terms: list[tuple[float, CostLayer]]
     rows: Int[Array, "labels n"]
     columns: Int[Array, "labels n"]
 
@@ -99,7 +136,7 @@ class _Price:
         pair = at_tail[seams], at_head[seams]
         ends = (edges.tails[seams], edges.heads[seams])
         shown = [tuple((self.rows[label, end], self.columns[label, end]) for label in pair) for end in ends]
-        out[seams] = np.rint(energy.compute_costs_along(self.terms, *shown, edges.axis[seams]) * QUANTA)
+        out[seams] = np.rint(compute_costs_along(self.terms, *shown, edges.axis[seams]) * QUANTA)
         return out
 
 
@@ -149,3 +186,37 @@ def _edges(shape: tuple[int, int]) -> _Edges:
     right, upper = (cell[:, :-1], cell[:, 1:]), (cell[:-1], cell[1:])
     tails, heads = (np.concatenate([right[i].ravel(), upper[i].ravel()]) for i in (0, 1))
     return _Edges(tails, heads, np.repeat([0, 1], [right[0].size, upper[0].size]))
+
+
+def allowed_cells(layout: Layout) -> Bool[Array, "9 n n"]:
+    """Where each label's patch may come to lie in a tile: the centre anywhere, a strip along its side but for the
+    corners, a corner patch in its corner. The outermost `block` cells are the frame's: their neighbours are in other
+    tiles.
+    """
+    n, b, a = layout.side, layout.strip, layout.corner
+    low, high = np.arange(n) < a, np.arange(n) >= n - a
+    side = (np.arange(n) >= b) & (np.arange(n) < n - b)
+    inner = (np.arange(n) >= layout.block) & (np.arange(n) < n - layout.block)
+    out = np.zeros((len(LABELS), n, n), bool)
+    out[CENTRE] = True
+    for label, ys, xs in ((W, side, slice(b)), (E, side, slice(n - b, n))):
+        out[label, ys, xs] = True
+        out[(S, N)[label - W]] = out[label].T
+    for label, ys, xs in ((SW, low, low), (SE, low, high), (NW, high, low), (NE, high, high)):
+        out[label] = ys[:, None] & xs
+    return out & inner[:, None] & inner
+
+
+def compute_costs_along(
+    terms: list[tuple[float, CostLayer]],
+    tails: tuple[Cells, Cells],
+    heads: tuple[Cells, Cells],
+    axis: Int[Array, "edges"],
+) -> Float[Array, "edges"]:
+    """W of single edges: what the first and the second patch show at each one's tail and head; axis 0 is along x."""
+    parts = []
+    for share, layer in terms:
+        d = (layer.distances(*tails) + layer.distances(*heads)) * share
+        (a, b), (e, f) = ([layer.slope[(*cells, axis)] for cells in end] for end in (tails, heads))
+        parts.append((d, ((a + b) + (e + f)) * share, layer.unit))
+    return divide_terms(parts)
