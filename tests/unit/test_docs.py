@@ -7,7 +7,10 @@ import subprocess
 import sys
 
 import pytest
+import yaml
 from fixtures import doc_pages
+
+from dav_gswt.config import load
 
 PAGES = [pytest.param(page, id=str(page.relative_to(doc_pages.ROOT))) for page in doc_pages.pages()]
 MADE_BY_THE_SITE = {"reference/api.md"}
@@ -54,6 +57,21 @@ def test_targets_are_read_without_options_and_placeholders(tmp_path):
         "```sh\n.venv/bin/snakemake --profile workflow/profiles/slurm study   # all of it\n```\n"
     )
     assert doc_pages.named_targets(tmp_path / "a.md") == {"make": {"run"}, "snakemake": {"seams", "study"}}
+
+
+EXAMPLES = [
+    pytest.param(block, id=f"{page.relative_to(doc_pages.ROOT)}:{number}")
+    for page in doc_pages.pages()
+    for number, block in enumerate(re.findall(r"```yaml\n(.*?)```", page.read_text(encoding="utf-8"), re.S))
+]
+
+
+@pytest.mark.parametrize("block", EXAMPLES)
+def test_every_config_that_a_page_shows_is_valid(block, root, tmp_path):
+    (tmp_path / "example.yaml").write_text(block)
+    given = load.read_config([root / "config/config.yaml", tmp_path / "example.yaml"])
+    scenes = load.check_config(load.add_scene_files(given, root / "config/scenes"))["scenes"]
+    assert set(yaml.safe_load(block)["scenes"]) <= set(scenes)
 
 
 def test_every_page_of_the_site_is_in_its_navigation(root):
