@@ -54,9 +54,7 @@ def walker(tiles: TileSet) -> float | None:
         terrain = endless.terrain_from_bundle(bundle, {"kind": "flat"})
     value = bundle.manifest
     camera = stills.shot_camera(stills.SHOTS[0], terrain, value.eye_floor, 960, 540)
-    pictures = [
-        stills.render_view(terrain, camera, vars(value.sky), value.ground_colour, exact) for exact in (False, True)
-    ]
+    pictures = [stills.render_view(terrain, camera, value.sky, value.ground_colour, exact) for exact in (False, True)]
     return order_directions.compute_psnr([tuple(pictures)])
 
 

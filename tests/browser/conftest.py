@@ -1,4 +1,4 @@
-"""Made-up bundles as served pages, and visits to them."""
+"""Synthetic bundles as served pages, and visits to them, shared where a test changes nothing but the place."""
 
 from pathlib import Path
 
@@ -28,6 +28,34 @@ def plain(page_of):
     """The address of a page with 5120 Gaussians, one plain colour a tile."""
     with served(page_of(bundles.Ground())) as address:
         yield address
+
+
+@pytest.fixture(scope="session")
+def modules(chromium, plain):
+    """A tab beside the viewer's modules that shows no page: for tests that import one and call it."""
+    with chromium.new_context() as context:
+        tab = context.new_page()
+        tab.route("**/blank.html", lambda route: route.fulfill(body="<!doctype html>", content_type="text/html"))
+        tab.goto(f"{plain}blank.html")
+        yield tab
+
+
+@pytest.fixture(scope="session")
+def still(chromium):
+    """Visits to `?still` pages that tests share: one for each address and size of the canvas."""
+    visits, contexts = {}, []
+
+    def start(address: str, width: int = 320, height: int = 200) -> Visit:
+        key = address, width, height
+        if key not in visits:
+            contexts.append(chromium.new_context(viewport={"width": width, "height": height}))
+            visits[key] = Visit(contexts[-1].new_page()).open(f"{address}?still")
+        visits[key].page.evaluate("davgswt.overlay('picture')")
+        return visits[key]
+
+    yield start
+    for context in contexts:
+        context.close()
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from fixtures.bundles import SKY, Ground
 
-from dav_gswt.bundle.manifest import Manifest
+from dav_gswt.bundle.manifest import Manifest, Sky
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.geometry import cameras
 from dav_gswt.study.terrain.browser import served
@@ -48,11 +48,11 @@ def terrain_of(folder, surface) -> tuple[EndlessTerrain, dict]:
 
 
 @pytest.mark.parametrize("place", [pytest.param(place, id=name) for name, place in PLACES.items()])
-def test_the_page_draws_what_the_library_draws(visit, hilly, place):
+def test_the_page_draws_what_the_library_draws(still, hilly, place):
     address, (terrain, manifest) = hilly
-    seen = visit(160, 100).open(f"{address}?still")
+    seen = still(address, 160, 100)
     drawn = seen.at(**place)
-    expected = np.rint(255 * stills.render_view(terrain, camera_at(terrain, place), SKY, manifest.ground_colour))
+    expected = np.rint(255 * stills.render_view(terrain, camera_at(terrain, place), Sky(**SKY), manifest.ground_colour))
     difference = np.abs(drawn - expected)
     assert difference.mean() < MEAN and difference.max() <= MOST
     assert expected.std() > 8, "there is something to see"

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from fixtures import bundles
 from fixtures.bundles import Ground
+from fixtures.page_visit import Visit
 
 from dav_gswt.bundle import gswt
 from dav_gswt.bundle.encoding import Encoding
@@ -37,6 +38,13 @@ def other(tmp_path_factory):
     folder = tmp_path_factory.mktemp("other") / "bundle"
     bundles.write_bundle(folder, OTHER)
     return folder
+
+
+@pytest.fixture(scope="module")
+def target(chromium, plain):
+    """A visit that one broken zip after the other is dropped onto."""
+    with chromium.new_context(viewport={"width": 320, "height": 200}) as context:
+        yield Visit(context.new_page()).open(f"{plain}?still")
 
 
 def zipped(files: dict[str, bytes], method=zipfile.ZIP_DEFLATED) -> bytes:
@@ -76,13 +84,12 @@ def test_a_gswt_zip_of_the_public_renderer_is_shown(visit, plain, other, tmp_pat
     assert picture.std() > 5
 
 
-def test_the_page_rounds_a_set_as_the_library_does(visit, plain):
+def test_the_page_rounds_a_set_as_the_library_does(modules):
     rng = np.random.default_rng(4)
     fields = [rounded_before(rng, n) for n in (40, 300)]
     encoding = Encoding.fit(fields, 4.0, 0.01)
     lists = [[bytes_of(f), *(v.ravel().tolist() for v in (f.means, f.log_scales, f.quats))] for f in fields]
-    page = visit(160, 100).open(f"{plain}?still").page
-    told, found = page.evaluate(
+    told, found = modules.evaluate(
         """async sets => {
           const { fitEncoding, writeRecords } = await import("./data/quantize.js");
           const made = sets.map(([paint, ...rest]) => {
@@ -123,9 +130,8 @@ def bytes_of(field: GaussianField) -> list[int]:
     return np.rint(255 * np.concatenate([field.base_colours, opacity[:, None]], 1)).astype(int).ravel().tolist()
 
 
-def test_a_folder_is_found_wherever_its_manifest_lies(visit, plain):
-    seen = visit(160, 100).open(f"{plain}?still")
-    found = seen.page.evaluate(
+def test_a_folder_is_found_wherever_its_manifest_lies(modules):
+    found = modules.evaluate(
         """async () => {
           const { sourceOf } = await import("./ui/drop.js");
           const bytes = (n) => async () => new ArrayBuffer(n);
@@ -177,8 +183,8 @@ def flipped(folder) -> bytes:
         pytest.param(flipped, "is damaged", id="flipped"),
     ],
 )
-def test_what_is_wrong_with_a_dropped_zip_is_said(visit, plain, other, spoil, message):
-    seen = visit(320, 200).open(f"{plain}?still")
+def test_what_is_wrong_with_a_dropped_zip_is_said(target, other, spoil, message):
+    seen = target
     drop(seen, "bundle.zip", spoil(other))
     alert = seen.page.get_by_role("alert")
     alert.wait_for(state="visible")

@@ -31,39 +31,39 @@ PACE = """async ([frames, cost]) => {
 }"""
 
 
-def budgets(visit, plain, frames, cost):
-    return visit(160, 100).open(f"{plain}?still").page.evaluate(PACE, [frames, cost])
+def budgets(modules, frames, cost):
+    return modules.evaluate(PACE, [frames, cost])
 
 
-def test_a_fast_machine_gets_all_there_is(visit, plain):
-    assert budgets(visit, plain, 600, 0)[-1] == 6_000_000
+def test_a_fast_machine_gets_all_there_is(modules):
+    assert budgets(modules, 600, 0)[-1] == 6_000_000
 
 
-def test_a_slow_machine_gets_the_least_and_no_less(visit, plain):
-    assert min(budgets(visit, plain, 30, 0.01)) == budgets(visit, plain, 30, 0.01)[-1] == 20_000
+def test_a_slow_machine_gets_the_least_and_no_less(modules):
+    assert min(budgets(modules, 30, 0.01)) == budgets(modules, 30, 0.01)[-1] == 20_000
 
 
-def test_a_machine_in_between_comes_to_rest_below_what_it_can_do(visit, plain):
+def test_a_machine_in_between_comes_to_rest_below_what_it_can_do(modules):
     # 20 ms at 500,000 splats: after 600 frames the budget is one that frames of 24 ms allow, and stays
-    settled = budgets(visit, plain, 900, 20 / 500_000)[600:]
+    settled = budgets(modules, 900, 20 / 500_000)[600:]
     assert min(settled) > 300_000 and max(settled) < 1.21 * min(settled) and max(settled) <= 600_000
 
 
-def test_few_frames_say_nothing(visit, plain):
-    assert set(budgets(visit, plain, 2, 1)) == {100_000}
+def test_few_frames_say_nothing(modules):
+    assert set(budgets(modules, 2, 1)) == {100_000}
 
 
-def pictures_at_rest(visit, plain, cost, all_):
-    return visit(160, 100).open(f"{plain}?still").page.evaluate(REST, [cost, all_])
+def pictures_at_rest(modules, cost, all_):
+    return modules.evaluate(REST, [cost, all_])
 
 
-def test_at_rest_the_picture_gets_all_there_is_after_a_while(visit, plain):
-    found = pictures_at_rest(visit, plain, 1e-5, 1_000_000)
+def test_at_rest_the_picture_gets_all_there_is_after_a_while(modules):
+    found = pictures_at_rest(modules, 1e-5, 1_000_000)
     assert [budget for _, budget in found] == [80_000, 320_000, 1_280_000]
     assert found[0][0] >= 500
 
 
-def test_at_rest_a_slow_machine_is_not_kept_busy_for_long(visit, plain):
+def test_at_rest_a_slow_machine_is_not_kept_busy_for_long(modules):
     # 400 ms for 20,000: four times as many would take longer than somebody who walks on may wait
-    assert pictures_at_rest(visit, plain, 400 / 20_000, 1_000_000) == []
-    assert [budget for _, budget in pictures_at_rest(visit, plain, 100 / 20_000, 1_000_000)] == [80_000]
+    assert pictures_at_rest(modules, 400 / 20_000, 1_000_000) == []
+    assert [budget for _, budget in pictures_at_rest(modules, 100 / 20_000, 1_000_000)] == [80_000]

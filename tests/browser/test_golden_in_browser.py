@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 FOLDER = Path(__file__).parents[1] / "golden"
 
@@ -54,18 +53,13 @@ WEIGHTS = """async ({ levels, opacities }) => {
 }"""
 
 
-@pytest.fixture
-def page(visit, plain):
-    return visit(160, 100).open(f"{plain}?still").page
-
-
 def golden(name):
     return json.loads((FOLDER / f"{name}.json").read_text())
 
 
-def test_surfaces_have_the_heights_slopes_and_bounds_shared_with_the_library(page):
+def test_surfaces_have_the_heights_slopes_and_bounds_shared_with_the_library(modules):
     surfaces = golden("heights")["surfaces"]
-    computed = page.evaluate(
+    computed = modules.evaluate(
         """async surfaces => {
           const { createHeights } = await import("./terrain/heights.js");
           return surfaces.map(s => {
@@ -83,10 +77,10 @@ def test_surfaces_have_the_heights_slopes_and_bounds_shared_with_the_library(pag
         np.testing.assert_allclose(found["points"], expected, rtol=1e-12, atol=1e-12)
 
 
-def test_levels_have_the_weights_shared_with_the_library(page):
+def test_levels_have_the_weights_shared_with_the_library(modules):
     values = golden("weights")
     sharp = [entry for entry in values["levels"] if not entry["smooth"]]  # the page has no smooth fades
-    levels, opacities = page.evaluate(WEIGHTS, {"levels": sharp, "opacities": values["opacities"]})
+    levels, opacities = modules.evaluate(WEIGHTS, {"levels": sharp, "opacities": values["opacities"]})
     for entry, found in zip(sharp, levels, strict=True):
         # float32: a distance's last digit over the width of the band
         slack = [6e-8 * entry["distance"] / band for band in entry["bands"][:-1] if band]
@@ -95,9 +89,9 @@ def test_levels_have_the_weights_shared_with_the_library(page):
     np.testing.assert_allclose(opacities, [o["drawn"] for o in values["opacities"]], atol=2e-4)
 
 
-def test_cells_and_orders_stand_as_they_do_in_the_library(page):
+def test_cells_and_orders_stand_as_they_do_in_the_library(modules):
     values = golden("draw_order")
-    cells, orders = page.evaluate(
+    cells, orders = modules.evaluate(
         """async ({ cells, along, orders }) => {
           const { inNearBlock, nearestOrder, visitBackToFront } = await import("./terrain/draw_order.js");
           const listed = cells.map(({ eye: [i0, j0], west, south, columns, rows }) => {
@@ -118,11 +112,11 @@ def test_cells_and_orders_stand_as_they_do_in_the_library(page):
     assert orders == [entry["position"] for entry in values["orders"]]
 
 
-def test_sorting_is_exact_and_stable(page):
+def test_sorting_is_exact_and_stable(modules):
     depths = np.random.default_rng(3).normal(size=5000).astype(np.float32)
     depths[::7] = depths[3]
     depths[5], depths[6] = 0.0, 1e30
-    found = page.evaluate(
+    found = modules.evaluate(
         """async depths => {
           const { createDepthSorter } = await import("./terrain/depth_sort.js");
           return [...createDepthSorter()(new Float32Array(depths), depths.length)];

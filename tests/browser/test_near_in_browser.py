@@ -60,7 +60,7 @@ def looks(surface, rng) -> list[tuple[np.ndarray, cameras.Camera]]:
 
 
 @pytest.mark.parametrize("entry", SURFACES.values(), ids=SURFACES)
-def test_whatever_may_show_is_sorted(visit, plain, field, rng, entry):
+def test_whatever_may_show_is_sorted(modules, field, rng, entry):
     surface = surface_from_config(entry, SIDE)
     views = looks(surface, rng)
     given = {
@@ -72,7 +72,7 @@ def test_whatever_may_show_is_sorted(visit, plain, field, rng, entry):
         "sizes": np.abs(field.log_scales.max(1)[:, None] - np.log(DEVIATIONS)).argmin(1).tolist(),
         "cameras": [_of_page(eye, camera) for eye, camera in views],
     }
-    sorted_ = visit(160, 100).open(f"{plain}?still").page.evaluate(LOOK, given)
+    sorted_ = modules.evaluate(LOOK, given)
     shown = kept = 0
     for (eye, camera), found in zip(views, sorted_, strict=True):
         placed, slope = displace_means(field, surface, np.zeros(3), eye)

@@ -32,8 +32,8 @@ def through(picture) -> np.ndarray:
     return np.clip((picture[..., 2] - 60) / 195, 0, 1)
 
 
-def test_each_tile_shows_its_colour_where_the_hash_puts_it(visit, plain):
-    seen = visit().open(f"{plain}?still")
+def test_each_tile_shows_its_colour_where_the_hash_puts_it(still, plain):
+    seen = still(plain)
     for i, j in [(0, 0), (1, 0), (0, 1), (-1, -1), (-3, 2), (250, -1000)]:
         picture = seen.at(x=(i + 0.5) * SIDE, y=(j + 0.5) * SIDE, eye=1.0, yaw=90, pitch=-90)
         # one tile fills the picture (1.15 of 4 units wide). Gaps between its discs let at most 2 of 255 of the far
@@ -41,8 +41,8 @@ def test_each_tile_shows_its_colour_where_the_hash_puts_it(visit, plain):
         assert np.abs(picture - colour_of(tile_at(i, j, SALT, 1))).max() <= 6
 
 
-def test_east_is_right_and_north_is_up_when_one_faces_north(visit, plain):
-    picture = visit().open(f"{plain}?still").at(x=0.0, y=0.0, eye=3.0, yaw=90, pitch=-90)
+def test_east_is_right_and_north_is_up_when_one_faces_north(still, plain):
+    picture = still(plain).at(x=0.0, y=0.0, eye=3.0, yaw=90, pitch=-90)
     height, width, _ = picture.shape
     for i, row in ((-1, "left"), (0, "right")):
         for j in (-1, 0):
@@ -52,8 +52,8 @@ def test_east_is_right_and_north_is_up_when_one_faces_north(visit, plain):
             assert np.abs(picture[y, x] - expected).max() <= 6, (row, j)
 
 
-def test_sky_is_above_the_horizon_and_ground_below_it(visit, plain):
-    picture = visit().open(f"{plain}?still").at(x=2.0, y=2.0, eye=1.0, yaw=60, pitch=0) / 255
+def test_sky_is_above_the_horizon_and_ground_below_it(still, plain):
+    picture = still(plain).at(x=2.0, y=2.0, eye=1.0, yaw=60, pitch=0) / 255
     middle = len(picture) // 2
     horizon, zenith = np.array(bundles.SKY["horizon"]), np.array(bundles.SKY["zenith"])
     focal = 160 / np.tan(np.radians(30))
@@ -74,15 +74,15 @@ def test_sky_is_above_the_horizon_and_ground_below_it(visit, plain):
         pytest.param(dict(x=51234.5, y=-70000.25, eye=2.0, pitch=-30, yaw=200), id="kilometres out"),
     ],
 )
-def test_the_ground_has_no_holes(visit, behind_magenta, place):
-    picture = visit().open(f"{behind_magenta}?still").at(**place)
+def test_the_ground_has_no_holes(still, behind_magenta, place):
+    picture = still(behind_magenta).at(**place)
     # discs of opacity 250/255 whose deviation is 0.7 of their spacing overlap so much that less than 3 % is let through
     assert through(picture).max() < 0.03
 
 
 @pytest.mark.parametrize("budget", [2_500, 1_500, 1_000])
-def test_a_small_budget_draws_coarser_ground_and_no_holes(visit, behind_magenta, budget):
-    seen = visit().open(f"{behind_magenta}?still")
+def test_a_small_budget_draws_coarser_ground_and_no_holes(still, behind_magenta, budget):
+    seen = still(behind_magenta)
     seen.page.evaluate("place => davgswt.set(place)", dict(x=2.0, y=2.0, eye=1.0, yaw=60, pitch=-25))
     picture = seen.picture(budget)
     state = seen.state
@@ -113,17 +113,17 @@ def test_two_visits_see_the_same_bits(visit, plain):
     assert pictures[0].std() > 10
 
 
-def test_a_link_brings_another_person_to_the_same_place(visit, plain):
-    first = visit().open(f"{plain}?still")
+def test_a_link_brings_another_person_to_the_same_place(visit, still, plain):
+    first = still(plain)
     expected = first.at(**OBLIQUE)
     other = visit().open(f"{plain}?still#3,5,2,20,-30")
     assert {k: other.state[k] for k in OBLIQUE} == OBLIQUE
     assert (other.picture() == expected).all()
 
 
-def test_two_to_the_32_cells_out_the_same_tiles_give_the_same_bits(visit, plain):
+def test_two_to_the_32_cells_out_the_same_tiles_give_the_same_bits(still, plain):
     # The hash repeats after 2^32 cells, and 2^32 cells of side 4 are a distance that doubles hold exactly.
-    seen = visit().open(f"{plain}?still")
+    seen = still(plain)
     near = seen.at(**OBLIQUE)
     far = seen.at(**OBLIQUE | {"x": OBLIQUE["x"] + 2**32 * SIDE, "y": OBLIQUE["y"] - 2**32 * SIDE})
     assert (near == far).all()
@@ -141,16 +141,16 @@ def test_a_step_kilometres_out_moves_the_picture_as_much_as_a_step_at_home(visit
     assert (changes[0] == changes[1]).all()
 
 
-def test_coarser_levels_are_drawn_farther_away(visit, plain):
-    seen = visit().open(f"{plain}?still")
+def test_coarser_levels_are_drawn_farther_away(still, plain):
+    seen = still(plain)
     seen.at(x=2.0, y=2.0, eye=1.0, yaw=0, pitch=-10)
     levels = {(cell["i"], cell["j"]): cell["level"] for cell in seen.state["drawn"]}
     # level 0 is used nearer than 2 sides (8 units): cell (1, 0) begins 2 units away, cell (3, 0) 10
     assert levels[1, 0] == 0 and levels[3, 0] == 1
 
 
-def test_each_tile_keeps_the_order_of_its_own_direction(visit, plain):
-    seen = visit().open(f"{plain}?still")
+def test_each_tile_keeps_the_order_of_its_own_direction(still, plain):
+    seen = still(plain)
     seen.at(x=2.0, y=2.0, eye=0.5, yaw=0, pitch=0)
     orders = {(cell["i"], cell["j"]): cell["order"] for cell in seen.state["drawn"]}
     assert orders[5, 0] == 0, "eastwards along +x"

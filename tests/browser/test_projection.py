@@ -73,8 +73,8 @@ def expected(camera: cameras.Camera, field: GaussianField) -> np.ndarray:
         pytest.param(dict(x=4.0, y=1.6, eye=0.8, yaw=205.0, pitch=-38.0), id="low, from the north-east"),
     ],
 )
-def test_a_gaussian_looks_as_the_formula_says(visit, lonely, seen_as, place):
-    seen = visit().open(f"{lonely}?still").at(**place)
+def test_a_gaussian_looks_as_the_formula_says(still, lonely, seen_as, place):
+    seen = still(lonely).at(**place)
     yaw, pitch = np.radians(place["yaw"]), np.radians(place["pitch"])
     eye = np.array([place["x"], place["y"], place["eye"]])
     ahead = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])

@@ -12,8 +12,8 @@ OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
 
 
 @pytest.fixture(scope="module")
-def doubtful(page_of):
-    """A page whose tiles 0 to 7 are sure and whose others are not."""
+def uncertain(page_of):
+    """A page whose tiles 0 to 7 have uncertainty 0 and whose others have 1."""
     folder = page_of(Ground())
     manifest = json.loads((folder / "davgswt.json").read_text())
     for tile in manifest["tiles"]:
@@ -24,8 +24,8 @@ def doubtful(page_of):
 
 
 @pytest.mark.parametrize("overlay", ["tile", "level", "order", "uncertainty"])
-def test_an_overlay_paints_the_tiles_and_goes_again(visit, doubtful, overlay):
-    seen = visit(160, 100).open(f"{doubtful}?still")
+def test_an_overlay_paints_the_tiles_and_goes_again(still, uncertain, overlay):
+    seen = still(uncertain, 160, 100)
     plain = seen.at(**OBLIQUE)
     seen.page.select_option("#overlay", overlay)
     painted = seen.picture()
@@ -35,8 +35,8 @@ def test_an_overlay_paints_the_tiles_and_goes_again(visit, doubtful, overlay):
     assert (seen.picture() == plain).all()
 
 
-def test_doubtful_tiles_are_warm_and_sure_ones_cool(visit, doubtful):
-    seen = visit(160, 100).open(f"{doubtful}?still")
+def test_uncertain_tiles_are_warm_and_sure_ones_cool(still, uncertain):
+    seen = still(uncertain, 160, 100)
     seen.page.evaluate("davgswt.overlay('uncertainty')")
     found = set()
     for i in range(6):
@@ -48,8 +48,8 @@ def test_doubtful_tiles_are_warm_and_sure_ones_cool(visit, doubtful):
     assert found == {True, False}
 
 
-def test_far_tiles_show_their_level_and_order(visit, plain):
-    seen = visit(160, 100).open(f"{plain}?still")
+def test_far_tiles_show_their_level_and_order(still, plain):
+    seen = still(plain, 160, 100)
     seen.at(x=2.0, y=2.0, eye=6.0, yaw=0, pitch=-25)
     counts = {}
     for overlay in ("level", "order"):
@@ -80,9 +80,8 @@ def test_a_walk_is_recorded_played_and_saved(visit, plain):
     assert saved["path"][0]["x"] == pytest.approx(3.0) and saved["path"][-1] == end
 
 
-def test_between_recorded_places_the_way_is_straight_and_turns_are_short(visit, plain):
-    page = visit(160, 100).open(f"{plain}?still").page
-    places = page.evaluate(
+def test_between_recorded_places_the_way_is_straight_and_turns_are_short(modules):
+    places = modules.evaluate(
         """async () => {
           const { placeAt } = await import("./ui/fly_path.js");
           const path = [{ seconds: 0, x: 0, y: 2, eye: 1, yaw: 350, pitch: 0 },

@@ -2,10 +2,18 @@
 
 import pytest
 from fixtures.bundles import Ground
+from fixtures.page_visit import Visit
 
 from dav_gswt.study.terrain.browser import served
 
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
+
+
+@pytest.fixture(scope="module")
+def moving(chromium, plain):
+    """A visit to a page that draws by itself."""
+    with chromium.new_context(viewport={"width": 160, "height": 100}) as context:
+        yield Visit(context.new_page()).open(plain)
 
 
 def test_a_walk_changes_the_place_and_coming_back_shows_the_same_picture(visit, plain):
@@ -34,12 +42,11 @@ def test_a_walk_changes_the_place_and_coming_back_shows_the_same_picture(visit, 
         ("q", "s.eye < 1.9"),
     ],
 )
-def test_each_key_does_what_the_help_says(visit, plain, key, condition):
-    seen = visit(160, 100).open(plain)
-    seen.at(**OBLIQUE)
-    seen.page.keyboard.down(key)
-    seen.until(f"(s => {condition})(davgswt.state)")
-    seen.page.keyboard.up(key)
+def test_each_key_does_what_the_help_says(moving, key, condition):
+    moving.at(**OBLIQUE)
+    moving.page.keyboard.down(key)
+    moving.until(f"(s => {condition})(davgswt.state)")
+    moving.page.keyboard.up(key)
 
 
 def test_the_eye_stays_above_its_floor(visit, plain):
@@ -131,9 +138,8 @@ def test_a_picture_waits_for_a_context_that_is_lost_meanwhile(visit, plain, over
     assert (seen.picture() == before).all()
 
 
-def test_the_budget_takes_fewer_splats_and_still_draws_near_tiles_back_to_front(visit, plain):
-    seen = visit(160, 100).open(f"{plain}?still")
-    result = seen.page.evaluate(
+def test_the_budget_takes_fewer_splats_and_still_draws_near_tiles_back_to_front(modules):
+    result = modules.evaluate(
         """async () => {
           const { createTerrainTables } = await import("./worker/terrain_tables.js");
           const { selectCells } = await import("./terrain/budget.js");

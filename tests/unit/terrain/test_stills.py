@@ -8,6 +8,7 @@ from fixtures.terrains import MAGENTA, SKY, terrain_of, walking
 from jaxtyping import Float
 from numpy import ndarray as Array
 
+from dav_gswt.bundle.manifest import Sky
 from dav_gswt.geometry import cameras
 from dav_gswt.terrain import draw_order, placement, stills, visibility
 from dav_gswt.terrain.choice import tile_at
@@ -27,7 +28,7 @@ def test_a_level_that_equals_its_neighbour_lets_nothing_more_through(stony):
     twice = {(level, t): stony.tiles[0, t] for level in (0, 1) for t in range(16)}
     faded = terrain_of(twice, [12.0, np.inf], [8.0, 0.0])
     camera = walking(stony, 40.0)
-    black = {"zenith": [0.0] * 3, "horizon": [0.0] * 3}
+    black = Sky([0.0] * 3, [0.0] * 3)
     alone, both = (stills.render_view(t, camera, black, [0.0] * 3) for t in (stony, faded))
     through = [stills.render_view(t, camera, SKY, MAGENTA) - p for t, p in ((stony, alone), (faded, both))]
     assert through[1].max() < through[0].max() + 0.01
@@ -77,7 +78,7 @@ def test_hills_have_no_cracks(hilly, pitch, height):
     """Before magenta: where a ray meets the ground nothing shines through, neither at tile borders nor where levels
     change."""
     camera = walking(hilly, pitch, height, at=(3.4, -2.3))
-    picture = stills.render_view(hilly, camera, {"zenith": MAGENTA, "horizon": MAGENTA}, MAGENTA)
+    picture = stills.render_view(hilly, camera, Sky(MAGENTA, MAGENTA), MAGENTA)
     origin, step = (a.reshape(-1, 3) for a in camera.rays())
     t = np.linspace(0.5, 20, 400)  # nearer than where tiles go over into what is behind them
     at = origin[:, None] + t[:, None] * step[:, None]
@@ -150,8 +151,8 @@ def test_a_camera_without_an_eye_is_refused(terrain):
 
 def test_a_picture_is_the_same_measured_or_not_and_coarser_within_a_budget(terrain):
     camera, whole, least = walking(terrain), FrameTiming(), FrameTiming()
-    plain, told = (stills.render_view(terrain, camera, SKY, MAGENTA, timing=meter) for meter in (None, whole))
-    assert (plain == told).all() and set(whole.milliseconds) == {"update", "sort", "render"}
+    plain, timed = (stills.render_view(terrain, camera, SKY, MAGENTA, timing=timing) for timing in (None, whole))
+    assert (plain == timed).all() and set(whole.milliseconds) == {"update", "sort", "render"}
     budget = 3 * whole.gaussians // 4  # the coarsest level alone has half
     stills.render_view(visibility.coarsen_to_budget(terrain, camera, budget), camera, SKY, MAGENTA, timing=least)
     assert whole.gaussians // 2 < least.gaussians <= budget

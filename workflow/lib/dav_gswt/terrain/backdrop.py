@@ -1,12 +1,13 @@
 """Backdrop of the terrain: sky, far ground, and the transition of the last tiles into it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
+from dav_gswt.bundle.manifest import Sky
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.weights import finer_share
@@ -28,9 +29,11 @@ class Backdrop:
     low: float
 
     @staticmethod
-    def for_eye(terrain: EndlessTerrain, eye: Float[Array, "3"], sky: dict[str, Any], ground_colour) -> "Backdrop":
+    def for_eye(
+        terrain: EndlessTerrain, eye: Float[Array, "3"], sky: Sky, ground_colour: Sequence[float] | Array
+    ) -> "Backdrop":
         end = terrain.reach * terrain.side
-        zenith, horizon, ground = (np.asarray(c, np.float32) for c in (sky["zenith"], sky["horizon"], ground_colour))
+        zenith, horizon, ground = (np.asarray(c, np.float32) for c in (sky.zenith, sky.horizon, ground_colour))
         return Backdrop(zenith, horizon, ground, end, (eye[2] - terrain.heights.low) / end)
 
     def colours_along(self, directions: Float[Array, "*shape 3"]) -> Float32[Array, "*shape 3"]:

@@ -1,13 +1,13 @@
 """Stills of the endless terrain: rendered tile by tile as the viewer does, over a sky and a far ground."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
-from dav_gswt.bundle.manifest import Manifest
+from dav_gswt.bundle.manifest import Manifest, Sky
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.terrain import splats
@@ -65,14 +65,14 @@ def render_shot(
 ) -> Float32[Array, "h w 3"]:
     """Render a shot with the eye floor, sky and ground colour of the bundle's manifest."""
     camera = shot_camera(shot, terrain, manifest.eye_floor, width, height)
-    return render_view(terrain, camera, vars(manifest.sky), manifest.ground_colour)
+    return render_view(terrain, camera, manifest.sky, manifest.ground_colour)
 
 
 def render_view(
     terrain: EndlessTerrain,
     camera: Camera,
-    sky: dict[str, Any],
-    ground_colour,
+    sky: Sky,
+    ground_colour: Sequence[float] | Array,
     exact: bool = False,
     timing: FrameTiming | None = None,
 ) -> Float32[Array, "h w 3"]:

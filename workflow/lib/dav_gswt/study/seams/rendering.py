@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
+from dav_gswt.bundle.manifest import Sky
 from dav_gswt.field import SH0, GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.study.seams.spatial_index import Footprint, SpatialIndex
@@ -18,7 +19,7 @@ from dav_gswt.terrain import placement, splats, visibility
 from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.endless import EndlessTerrain
 
-SKY = {"zenith": [0.0, 0.0, 0.0], "horizon": [0.0, 0.0, 0.0]}  # crops see none
+SKY = Sky([0.0, 0.0, 0.0], [0.0, 0.0, 0.0])  # crops see none
 
 Recolouring = Callable[
     [GaussianField, Float[Array, "3"]], Float32[Array, "n 3"]

@@ -66,7 +66,7 @@ def measure_flicker(
 
 
 def _measure_changes(terrain: EndlessTerrain, manifest: Manifest, cameras: list[Camera], exact: bool) -> dict:
-    background = vars(manifest.sky), manifest.ground_colour
+    background = manifest.sky, manifest.ground_colour
     before, after = (stills.render_view(terrain, camera, *background, exact=exact) for camera in cameras)
     change, name = 255 * np.abs(after - before), "exact_" if exact else ""
     return {f"{name}largest": float(change.max()), f"{name}mean": float(change.mean())}

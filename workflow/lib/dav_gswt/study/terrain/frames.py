@@ -79,7 +79,7 @@ def time_library(bundle: Bundle, settings: FrameSettings) -> list[dict]:
             camera = stills.shot_camera(shot, terrain, told.eye_floor, settings.width, settings.height)
             with meters[-1].measure("update"):
                 coarser = visibility.coarsen_to_budget(terrain, camera, budget)
-            stills.render_view(coarser, camera, vars(told.sky), told.ground_colour, timing=meters[-1])
+            stills.render_view(coarser, camera, told.sky, told.ground_colour, timing=meters[-1])
         times = {part: [meter.milliseconds[part] for meter in meters] for part in PARTS}
         rows.append(
             _tabulate_times(settings, budget, times, [meter.gaussians for meter in meters], len(meters))

@@ -52,7 +52,7 @@ def _render_pairs(tiles: TileSet, bundle: Bundle, shot: Shot) -> list[tuple[Pict
 
     def render(terrain: EndlessTerrain, exact: bool) -> Picture:
         camera = stills.shot_camera(shot, terrain, manifest.eye_floor, WIDTH, HEIGHT)
-        return stills.render_view(terrain, camera, vars(manifest.sky), manifest.ground_colour, exact)
+        return stills.render_view(terrain, camera, manifest.sky, manifest.ground_colour, exact)
 
     page, sorted_, levels, reference = (
         render(rounded, False),
