@@ -9,9 +9,9 @@ from dav_gswt.study.forced_choice import answers, plots, results
 with logging_to(snakemake.log[0]):
     given, out = snakemake.input, snakemake.output
     key, files = answers.read_key(given.key), list(given.get("answers", []))
-    people = answers.gathered(files, key, given.schema)
-    rows = results.table(key, people.participants)
+    people = answers.read_answers(files, key, given.schema)
+    rows = results.tabulate_choices(key, people.participants)
     csv_tables.write_table(out.table, rows)
-    plots.write(out.plot, rows)
+    plots.write_choice_plot(out.plot, rows)
     origin = record_provenance({"key": given.key, "answers": files}, {"study": key["study"]})
     write_json(out.facts, people.facts | {"provenance": origin})

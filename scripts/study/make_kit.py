@@ -7,6 +7,6 @@ from dav_gswt.study.forced_choice import kit, store, trials
 
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    drawn = [pair for item in zip(given.pairs, params.scenes, strict=True) for pair in store.read(*item)]
+    drawn = [pair for item in zip(given.pairs, params.scenes, strict=True) for pair in store.read_pairs(*item)]
     parts = Path(given.parts[0]).parent
-    kit.write(snakemake.output.page, snakemake.output.key, parts, drawn, params.seed, trials.SECONDS)
+    kit.write_kit(snakemake.output.page, snakemake.output.key, parts, drawn, params.seed, trials.SECONDS)

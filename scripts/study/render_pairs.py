@@ -18,4 +18,6 @@ with logging_to(snakemake.log[0]):
     alexnet = lpips_weights.read(given.lpips) if given.get("lpips") else None
     inputs = {"seams": list(given.seams)} | ({"lpips": given.lpips} if alexnet else {})
     asked = dict(params.study)
-    store.write(snakemake.output.pairs, pairs.sample_pairs(sets, asked, alexnet), record_provenance(inputs, asked))
+    store.write_pairs(
+        snakemake.output.pairs, pairs.sample_pairs(sets, asked, alexnet), record_provenance(inputs, asked)
+    )

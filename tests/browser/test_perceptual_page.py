@@ -115,9 +115,9 @@ def test_all_trials_answered_are_saved_and_analysed(person, kit, tmp_path, as_fi
     assert path.name == f"2afc_{told['participant']}.json" and told["list"] == 5
     assert told["screen"]["width"] == 1280 and told["screen"]["picture"] == 512
     assert all(one["seen"] == 1 and 0 < one["ms"] < 60000 for one in told["answers"])
-    people = answers.gathered([str(path)], key, answer_files.SCHEMA)
+    people = answers.read_answers([str(path)], key, answer_files.SCHEMA)
     assert people.facts == {"files": 1, "copies": 0, "incomplete": 0, "attention": 0, "participants": 1}
-    rows = results.table(key, people.participants)
+    rows = results.tabulate_choices(key, people.participants)
     shares = {
         row["second"]: row["share"] for row in rows if row["observer"] == "participants" and row["scene"] == "every"
     }

@@ -13,7 +13,7 @@ from dav_gswt.study.forced_choice import answers, plots, results, trials
 
 @pytest.fixture(scope="module")
 def key():
-    return trials.key_of(answer_files.drawn(), seed=0)
+    return trials.make_key(answer_files.drawn(), seed=0)
 
 
 def attentive(item):
@@ -30,7 +30,7 @@ def gather(tmp_path, key):
         for number, one in enumerate(given):
             files.append(tmp_path / f"{number}.json")
             files[-1].write_text(one if isinstance(one, str) else json.dumps(one))
-        return answers.gathered([str(file) for file in files], key, answer_files.SCHEMA)
+        return answers.read_answers([str(file) for file in files], key, answer_files.SCHEMA)
 
     return call
 
@@ -47,12 +47,12 @@ def test_who_stopped_early_or_failed_the_checks_is_left_out_and_counted(gather, 
 
 
 def test_a_fifth_of_the_checks_may_be_wrong():
-    key = trials.key_of(answer_files.drawn(crops=1, checks=5, scenes=("desert",)), seed=0)
+    key = trials.make_key(answer_files.drawn(crops=1, checks=5, scenes=("desert",)), seed=0)
     checks = [name for name, item in key["items"].items() if item["check"]]
     for wrong, kept in ((1, True), (2, False)):
         missed = [key["items"][name]["pictures"] for name in checks[:wrong]]
         given = answer_files.answers(key, 0, lambda item, missed=missed: item["pictures"] not in missed)
-        assert (answers._left_out(given, key) is None) is kept
+        assert (answers._exclusion_reason(given, key) is None) is kept
 
 
 def test_two_files_of_one_participant_count_once_and_the_longer_counts(gather, key):
@@ -94,7 +94,7 @@ def first_answer(key, **change):
         pytest.param(lambda key: first_answer(key, choice="both"), "answers.0.choice", id="both"),
         pytest.param(lambda key: first_answer(key, ms=-1), "answers.0.ms", id="before it was shown"),
         pytest.param(lambda key: first_answer(key, item="0" * 12), "other trials", id="a pair that is not there"),
-        pytest.param(lambda key: " " * (answers.MOST_BYTES + 1), "bytes; answers have at most", id="too large"),
+        pytest.param(lambda key: " " * (answers.MAX_BYTES + 1), "bytes; answers have at most", id="too large"),
     ],
 )
 def test_a_file_that_is_not_what_the_page_saves_is_named_in_one_message(gather, key, broken, said):
@@ -118,7 +118,7 @@ def test_scripted_answers_give_the_shares_that_they_were_scripted_with(gather, k
     rules = [lambda item: True, lambda item: True, lambda item: item["check"]]
     rules += [lambda item: item["check"] or item["scene"] == "desert"]
     people = gather(*(answer_files.answers(key, n, rule) for n, rule in enumerate(rules)))
-    table = results.table(key, people.participants)
+    table = results.tabulate_choices(key, people.participants)
     (every,) = rows_of(table, first="semantic", second="colour", scene="every", observer=results.PEOPLE)
     assert (every["participants"], every["answers"]) == (4, 32)
     assert every["share"] == pytest.approx((1 + 1 + 0 + 0.5) / 4) and every["median_ms"] == 1200
@@ -130,7 +130,7 @@ def test_scripted_answers_give_the_shares_that_they_were_scripted_with(gather, k
 def test_without_answers_there_is_the_model_observer_alone_and_it_is_no_participant(gather, key):
     people = gather()
     assert people.facts["participants"] == 0
-    table = results.table(key, people.participants)
+    table = results.tabulate_choices(key, people.participants)
     assert {row["observer"] for row in table} == {"model observer (LPIPS)"}
     assert all(row["participants"] == 0 and row["p"] is None for row in table)
     (colour,) = rows_of(table, second="colour", scene="every")
@@ -140,7 +140,9 @@ def test_without_answers_there_is_the_model_observer_alone_and_it_is_no_particip
 
 
 def test_people_and_model_are_never_in_one_row(gather, key):
-    table = results.table(key, gather(*(answer_files.answers(key, n, attentive) for n in (0, 1))).participants)
+    table = results.tabulate_choices(
+        key, gather(*(answer_files.answers(key, n, attentive) for n in (0, 1))).participants
+    )
     for row in table:
         assert row["participants"] == (2 if row["observer"] == results.PEOPLE else 0)
     assert len(table) == 2 * 2 * 3  # observers, comparisons, every scene and each
@@ -148,25 +150,25 @@ def test_people_and_model_are_never_in_one_row(gather, key):
 
 def test_a_tie_of_the_model_observer_counts_as_half(key):
     items = {name: item | {"over": [0.1, 0.1]} for name, item in key["items"].items() if not item["check"]}
-    assert results._model(items)["share"] == 0.5
+    assert results._tabulate_model(items)["share"] == 0.5
 
 
 def test_the_paper_s_preference_stands_beside_the_comparison_that_it_made(key):
     items = {n: item | {"b": "semantic-nogamma"} for n, item in key["items"].items() if item["b"] == "colour"}
-    every, *scenes = results.table(key | {"items": items}, [])
+    every, *scenes = results.tabulate_choices(key | {"items": items}, [])
     assert every["paper_preference"] == "84.3" and all(row["paper_preference"] is None for row in scenes)
 
 
 def test_with_neither_answers_nor_lpips_the_message_says_what_to_do(key):
     items = {name: item | {"over": [None, None]} for name, item in key["items"].items()}
     with pytest.raises(InputError, match="neither answers .* fetches it"):
-        results.table(key | {"items": items}, [])
+        results.tabulate_choices(key | {"items": items}, [])
 
 
 def test_the_figure_is_drawn_with_and_without_people(gather, key, tmp_path):
     for number, count in enumerate((0, 1, 3)):
         people = gather(*(answer_files.answers(key, n, attentive) for n in range(count)))
-        plots.write(path := tmp_path / f"{number}.png", results.table(key, people.participants))
+        plots.write_choice_plot(path := tmp_path / f"{number}.png", results.tabulate_choices(key, people.participants))
         assert image_files.read_size(path)[0] > 500
 
 

@@ -19,7 +19,7 @@ def drawn():
 
 @pytest.fixture(scope="module")
 def key(drawn):
-    return trials.key_of(drawn, seed=7)
+    return trials.make_key(drawn, seed=7)
 
 
 def on_the_left(key, number):
@@ -39,7 +39,7 @@ def test_every_list_has_every_pair_once_and_half_of_each_comparison_either_way_r
 
 
 def test_of_an_odd_number_one_side_has_one_more_and_not_always_the_same(drawn):
-    odd = trials.key_of(answer_files.drawn(crops=3, checks=0, scenes=("desert",)), seed=0)
+    odd = trials.make_key(answer_files.drawn(crops=3, checks=0, scenes=("desert",)), seed=0)
     lefts = {on_the_left(odd, number)["semantic", "colour"] for number in range(trials.LISTS)}
     assert lefts == {1, 2}
 
@@ -60,8 +60,8 @@ def test_checks_are_spread_over_the_list(key):
 
 
 def test_the_same_seed_makes_the_same_kit_and_another_another(drawn, key):
-    assert trials.key_of(drawn, seed=7) == key
-    other = trials.key_of(drawn, seed=8)
+    assert trials.make_key(drawn, seed=7) == key
+    other = trials.make_key(drawn, seed=8)
     assert (
         other["study"] != key["study"]
         and other["lists"] != key["lists"]
@@ -97,7 +97,7 @@ def test_the_name_of_a_picture_says_nothing_of_which_of_the_two_it_is(key):
 
 def test_the_same_picture_in_two_pairs_has_two_names():
     pair = answer_files.drawn(crops=1, checks=0, scenes=("desert",))[0]
-    key = trials.key_of([pair, pair], seed=0)
+    key = trials.make_key([pair, pair], seed=0)
     assert len({name for item in key["items"].values() for name in item["pictures"]}) == 4
 
 

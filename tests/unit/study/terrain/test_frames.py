@@ -19,7 +19,7 @@ CELL = {"scene": "desert", "seed": 0, "preset": "draft", "tiling": "semantic", "
 def row_of(renderer: str, budget: int, **times) -> dict:
     parts = {"render": [3.0, 5.0, 4.0], "sort": [1.0, 2.0], "update": [2.0, 2.0]} | times
     made = frames._tabulate_times(ASKED, budget, parts, [budget - 1, budget, budget + 1], ran=2)
-    return made | frames._about(renderer, "SwiftShader" if renderer == frames.PAGE else "")
+    return made | frames._describe_renderer(renderer, "SwiftShader" if renderer == frames.PAGE else "")
 
 
 def test_a_row_holds_means_deviations_and_shares_worked_by_hand():

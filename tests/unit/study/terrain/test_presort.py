@@ -25,8 +25,8 @@ def tile_set(levels) -> TileSet:
 
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
-    monkeypatch.setattr(shortcuts, "WIDTH", 64)
-    monkeypatch.setattr(shortcuts, "HEIGHT", 36)
+    monkeypatch.setattr(presort, "WIDTH", 64)
+    monkeypatch.setattr(presort, "HEIGHT", 36)
 
 
 def bundled(tiles, folder, **more):

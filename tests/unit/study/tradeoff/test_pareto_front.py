@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dav_gswt.study.tradeoff.front import front, rivals
+from dav_gswt.study.tradeoff.front import find_pareto_front, find_rivals
 
 few = st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=1, max_size=12)  # ties are common
 
@@ -36,18 +36,18 @@ def by_pairs(points):
     ],
 )
 def test_points_that_nothing_beats(points, on):
-    assert front(*split(points)).tolist() == [bool(x) for x in on]
+    assert find_pareto_front(*split(points)).tolist() == [bool(x) for x in on]
 
 
 @given(few)
 def test_the_front_is_that_of_all_pairs(points):
-    assert front(*split(points)).tolist() == by_pairs(points)
+    assert find_pareto_front(*split(points)).tolist() == by_pairs(points)
 
 
 @given(few)
 def test_a_rival_is_affordable_and_the_best_there_is(points):
     cost, worth = split(points)
-    for i, rival in enumerate(rivals(cost, worth)):
+    for i, rival in enumerate(find_rivals(cost, worth)):
         assert cost[rival] <= cost[i]
         assert worth[rival] == max(w for c, w in points if c <= cost[i])
         assert rival == i or worth[rival] > worth[i]
@@ -55,5 +55,5 @@ def test_a_rival_is_affordable_and_the_best_there_is(points):
 
 def test_what_is_not_a_number_is_refused():
     with pytest.raises(ValueError, match="not a number"):
-        front(np.array([1.0, np.nan]), np.array([1.0, 2.0]))
-    assert front(np.zeros(0), np.zeros(0)).size == 0
+        find_pareto_front(np.array([1.0, np.nan]), np.array([1.0, 2.0]))
+    assert find_pareto_front(np.zeros(0), np.zeros(0)).size == 0

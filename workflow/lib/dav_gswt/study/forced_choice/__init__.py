@@ -1,1 +1,1 @@
-"""Which of two crops has the less visible seam? A study for people, as a kit, and what follows from answers."""
+"""Forced-choice study: participants choose the crop with the less visible seam; kit, answers and results."""

@@ -1,4 +1,4 @@
-"""What people chose: files that came back from the page, none of them trusted, and whose answers count."""
+"""Answers of participants: untrusted files from the page, checked, and which of them count."""
 
 import json
 import logging
@@ -12,9 +12,9 @@ from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
 from dav_gswt.study.forced_choice.trials import FORMAT, VERSION, Trial
 
-MOST_BYTES = 1 << 22  # of a file of answers; one of 10000 answers has less
-MOST_FILES = 10000
-MOST_WRONG = 0.2  # share of the attention checks
+MAX_BYTES = 1 << 22  # of a file of answers; one of 10000 answers has less
+MAX_FILES = 10000
+MAX_WRONG = 0.2  # share of the attention checks
 INCOMPLETE, INATTENTIVE = "incomplete", "attention"
 
 _log = logging.getLogger(__name__)
@@ -22,7 +22,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Participant:
-    """One person's answers. Of each pair: whether the first of the two was chosen, and after how many ms."""
+    """Answers of one participant. By pair: whether the first of the two was chosen, and the response time in ms."""
 
     name: str
     chosen: dict[str, bool]
@@ -30,8 +30,8 @@ class Participant:
 
 
 @dataclass(frozen=True)
-class Gathered:
-    """Those whose answers count, and how many files and people there were, and were left out for what."""
+class AnswerSet:
+    """The participants that count; facts: numbers of files and participants, and of those left out by reason."""
 
     participants: list[Participant]
     facts: dict
@@ -45,70 +45,72 @@ def read_key(path: Path | str) -> dict:
     return key
 
 
-def gathered(files: list[str], key: dict, schema: Path | str) -> Gathered:
-    """All participants of whom there is a complete list, and who did not fail the attention checks.
+def read_answers(files: list[str], key: dict, schema: Path | str) -> AnswerSet:
+    """All participants with a complete list who passed the attention checks.
 
     Two files of one participant are copies, or one is from earlier on: the longer counts. One who has more than
     MOST_WRONG of the checks wrong is left out whatever else was chosen; where there is no check nobody is.
-    Raises: InputError: as `read`; too many files; two files of one participant that contradict each other.
+    Raises: InputError: as `read_answer_file`; too many files; two files of one participant that contradict each other.
     """
-    if len(files) > MOST_FILES:
-        raise InputError(f"{Path(files[0]).parent}: {len(files)} files of answers; at most {MOST_FILES} are read")
+    if len(files) > MAX_FILES:
+        raise InputError(f"{Path(files[0]).parent}: {len(files)} files of answers; at most {MAX_FILES} are read")
     validator = Draft202012Validator(read_json(schema))
-    told: dict[str, tuple[str, dict]] = {}
+    by_name: dict[str, tuple[str, dict]] = {}
     for file in sorted(files):
-        given = read(file, key, validator)
-        name = given["participant"]
-        before = told.get(name, (file, given))
-        if not _same_start(before[1], given):
+        answer_file = read_answer_file(file, key, validator)
+        name = answer_file["participant"]
+        before = by_name.get(name, (file, answer_file))
+        if not _same_start(before[1], answer_file):
             raise InputError(f"{file}: contradicts {before[0]}, of the same participant; remove the one that is wrong")
-        told[name] = max(before, (file, given), key=lambda each: len(each[1]["answers"]))
-    facts = {"files": len(files), "copies": len(files) - len(told), INCOMPLETE: 0, INATTENTIVE: 0}
+        by_name[name] = max(before, (file, answer_file), key=lambda each: len(each[1]["answers"]))
+    facts = {"files": len(files), "copies": len(files) - len(by_name), INCOMPLETE: 0, INATTENTIVE: 0}
     kept = []
-    for name, (_, given) in sorted(told.items()):
-        if why := _left_out(given, key):
+    for name, (_, answer_file) in sorted(by_name.items()):
+        if why := _exclusion_reason(answer_file, key):
             facts[why] += 1
         else:
-            kept.append(_participant(name, given, key))
+            kept.append(_make_participant(name, answer_file, key))
     facts |= {"participants": len(kept)}
     _log.info("%(files)d files of answers, %(copies)d of them copies", facts)
     _log.info("left out: %(incomplete)d incomplete, %(attention)d for their attention checks", facts)
     _log.info("participants %(participants)d", facts)
-    return Gathered(kept, facts)
+    return AnswerSet(kept, facts)
 
 
-def read(file: Path | str, key: dict, validator: Draft202012Validator) -> dict:
+def read_answer_file(file: Path | str, key: dict, validator: Draft202012Validator) -> dict:
     """One file of answers, checked against the schema and the key's trial lists.
 
     Raises: InputError: too large, no JSON, not as the schema says, of another kit, or not of its list's trials.
     """
-    given = _json(Path(file))
-    if error := best_match(validator.iter_errors(given)):
+    answer_file = _read_json(Path(file))
+    if error := best_match(validator.iter_errors(answer_file)):
         where = ".".join(str(part) for part in error.absolute_path)
-        said = error.message if len(error.message) < 200 else f"is not what {error.validator} asks for"
-        raise InputError(f"{file}: {where + ': ' if where else ''}{said}; remove it, or save it from the page again")
-    if given["study"] != key["study"]:
-        raise InputError(f"{file}: answers to the kit {given['study']}, not {key['study']}; move it out of this folder")
+        message = error.message if len(error.message) < 200 else f"is not what {error.validator} asks for"
+        raise InputError(f"{file}: {where + ': ' if where else ''}{message}; remove it, or save it from the page again")
+    if answer_file["study"] != key["study"]:
+        raise InputError(
+            f"{file}: answers to the kit {answer_file['study']}, not {key['study']}; move it out of this folder"
+        )
     lists = key["lists"]
-    trials: list[Trial] = lists[given["list"]] if given["list"] < len(lists) else []
-    asked = [[one["item"], one["left"], one["right"]] for one in given["answers"]]
+    trials: list[Trial] = lists[answer_file["list"]] if answer_file["list"] < len(lists) else []
+    asked = [[one["item"], one["left"], one["right"]] for one in answer_file["answers"]]
     if asked != trials[: len(asked)]:
-        raise InputError(f"{file}: answers other trials than those of list {given['list']}; remove it")
-    return given
+        raise InputError(f"{file}: answers other trials than those of list {answer_file['list']}; remove it")
+    return answer_file
 
 
-def _json(path: Path):
+def _read_json(path: Path):
     try:
         size = path.stat().st_size
-        if size > MOST_BYTES:
-            raise InputError(f"{path}: {size} bytes; answers have at most {MOST_BYTES}; remove it")
-        return json.loads(path.read_text(encoding="utf-8"), parse_constant=_refused)
+        if size > MAX_BYTES:
+            raise InputError(f"{path}: {size} bytes; answers have at most {MAX_BYTES}; remove it")
+        return json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
     except (OSError, ValueError, RecursionError) as error:
         why = "nested too deep" if isinstance(error, RecursionError) else error
         raise InputError(f"{path}: not readable as JSON ({why}); remove it, or save it from the page again") from error
 
 
-def _refused(name: str):
+def _refuse_constant(name: str):
     raise ValueError(f"{name} is no number of JSON")
 
 
@@ -118,18 +120,20 @@ def _same_start(one: dict, other: dict) -> bool:
     return one["list"] == other["list"] and one["answers"][:count] == other["answers"][:count]
 
 
-def _left_out(given: dict, key: dict) -> str | None:
-    if len(given["answers"]) < len(key["lists"][given["list"]]):
+def _exclusion_reason(answer_file: dict, key: dict) -> str | None:
+    if len(answer_file["answers"]) < len(key["lists"][answer_file["list"]]):
         return INCOMPLETE
-    chosen = _chosen(given, key)
+    chosen = _choices(answer_file, key)
     right = [first for name, first in chosen.items() if key["items"][name]["check"]]
-    return INATTENTIVE if right and right.count(False) > MOST_WRONG * len(right) else None
+    return INATTENTIVE if right and right.count(False) > MAX_WRONG * len(right) else None
 
 
-def _chosen(given: dict, key: dict) -> dict[str, bool]:
-    answers = {one["item"]: one[one["choice"]] for one in given["answers"]}
+def _choices(answer_file: dict, key: dict) -> dict[str, bool]:
+    answers = {one["item"]: one[one["choice"]] for one in answer_file["answers"]}
     return {name: picture == key["items"][name]["pictures"][0] for name, picture in answers.items()}
 
 
-def _participant(name: str, given: dict, key: dict) -> Participant:
-    return Participant(name, _chosen(given, key), {one["item"]: float(one["ms"]) for one in given["answers"]})
+def _make_participant(name: str, answer_file: dict, key: dict) -> Participant:
+    return Participant(
+        name, _choices(answer_file, key), {one["item"]: float(one["ms"]) for one in answer_file["answers"]}
+    )

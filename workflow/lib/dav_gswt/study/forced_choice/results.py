@@ -1,8 +1,7 @@
-"""What follows from answers: a row a comparison, over all scenes and of each, of people and of the model observer.
+"""Results of the forced-choice study: a row for each comparison and scene, for participants and the model observer.
 
-The model observer is no person and stands in rows of its own: of two crops it chooses the one whose middle has the
-lower Seam-LPIPS over its floor (`seams.measure`: how much farther it is from the exemplar than its patches, laid
-whole). A place that is laid whole has no seam, and 0 there. Ties count as half.
+The model observer has rows of its own: of two crops it chooses the one whose middle has the lower Seam-LPIPS over its
+floor (`seams.measure`). A crop without a seam has 0. Ties count as half.
 """
 
 import numpy as np
@@ -17,7 +16,7 @@ PEOPLE, MODEL = "participants", "model observer (LPIPS)"
 MEASURES = ("low", "high", "p", "df", "worth", "binomial_low", "binomial_high", "binomial_p", "median_ms")
 
 
-def table(key: dict, participants: list[Participant]) -> list[dict]:
+def tabulate_choices(key: dict, participants: list[Participant]) -> list[dict]:
     """Rows: first, second, scene, observer, participants, answers, share (of answers that chose the first), and of
     people MEASURES; `paper_preference`, in percent, where the paper has the comparison. Empty where nothing is known.
 
@@ -30,7 +29,9 @@ def table(key: dict, participants: list[Participant]) -> list[dict]:
             some = {name: item for name, item in mine.items() if scene in (EVERY, item["scene"])}
             about = {"first": first, "second": second, "scene": scene}
             printed = paper.beside("perceptual", f"{first} {second}" if scene == EVERY else "", ("preference",))
-            rows += [about | row | printed for row in (_people(some, participants), _model(some)) if row]
+            rows += [
+                about | row | printed for row in (_tabulate_people(some, participants), _tabulate_model(some)) if row
+            ]
     if not rows:
         raise InputError(
             "perceptual_study: there are neither answers (`answers` names their folder) nor LPIPS for the model "
@@ -39,7 +40,7 @@ def table(key: dict, participants: list[Participant]) -> list[dict]:
     return rows
 
 
-def _people(items: dict[str, dict], participants: list[Participant]) -> dict | None:
+def _tabulate_people(items: dict[str, dict], participants: list[Participant]) -> dict | None:
     if not participants:
         return None
     chosen = np.array([sum(each.chosen[name] for name in items) for each in participants], float)
@@ -53,8 +54,8 @@ def _people(items: dict[str, dict], participants: list[Participant]) -> dict | N
     )
 
 
-def _model(items: dict[str, dict]) -> dict | None:
-    """None where LPIPS was not measured."""
+def _tabulate_model(items: dict[str, dict]) -> dict | None:
+    """The row of the model observer; None where LPIPS was not measured."""
     known = [item["over"] for item in items.values() if None not in item["over"]]
     if not known:
         return None

@@ -9,7 +9,7 @@ from collections import defaultdict
 
 import numpy as np
 
-from dav_gswt.study.forced_choice.store import Drawn
+from dav_gswt.study.forced_choice.store import StoredPair
 
 LISTS = 16  # list 2 n + 1 is list 2 n with left and right exchanged, in another order
 FORMAT, VERSION = "davgswt-2afc-key", 1
@@ -18,24 +18,24 @@ SECONDS = 5.0  # for which a pair is shown, as in the paper
 Trial = list[str]  # the pair's name, and those of the pictures on the left and on the right
 
 
-def named(drawn: list[Drawn], seed: int) -> dict[str, bytes]:
+def name_pictures(pairs: list[StoredPair], seed: int) -> dict[str, bytes]:
     """All pictures by their names; the same picture in two pairs has two."""
-    pictures = (zip(_names(pair, seed, k), pair.pictures, strict=True) for k, pair in enumerate(drawn))
+    pictures = (zip(_picture_names(pair, seed, k), pair.pictures, strict=True) for k, pair in enumerate(pairs))
     return {name: data for both in pictures for name, data in both}
 
 
-def _names(pair: Drawn, seed: int, number: int) -> list[str]:
+def _picture_names(pair: StoredPair, seed: int, number: int) -> list[str]:
     return [_digest(seed, number, side, data)[:16] for side, data in enumerate(pair.pictures)]
 
 
-def key_of(drawn: list[Drawn], seed: int) -> dict:
+def make_key(pairs: list[StoredPair], seed: int) -> dict:
     """The key: of each pair, by its name, what it is and its pictures' names, a's first; and the trial lists.
 
     `study` is a digest of all of it, so that answers to one kit are not taken for answers to another.
     """
     items = {}
-    for k, pair in enumerate(drawn):
-        names = {"pictures": _names(pair, seed, k)}
+    for k, pair in enumerate(pairs):
+        names = {"pictures": _picture_names(pair, seed, k)}
         items[_digest(seed, k, *pair.pictures)[:12]] = pair.about | {"check": pair.check} | names
     items = dict(sorted(items.items()))
     lists = [trials for number in range(LISTS // 2) for trials in mirrored(items, seed, number)]

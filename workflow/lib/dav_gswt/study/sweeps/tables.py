@@ -1,4 +1,4 @@
-"""One table of a sweep: a row a cell, its wildcards, what it measured, what it cost, and where it comes from."""
+"""The table of a sweep: a row for each experiment with its settings, measures, costs and provenance."""
 
 import csv
 from pathlib import Path
@@ -24,7 +24,7 @@ MEGA = 1e6
 
 
 def row(cell: dict) -> dict:
-    """The row of a cell; what was not measured is None.
+    """The row of an experiment; what was not measured is None.
 
     psnr_is: `colour-corrected` of photos, whose exposure changes, else `raw`. uncertainty: mean over the tiles; deep:
     share of them that keep all orders; orders: kept of all tiles and levels; bundle_mb: of the chunks a page loads.
@@ -49,7 +49,7 @@ def columns(axes: int) -> tuple[str, ...]:
 
 
 def read(path: Path | str) -> list[dict]:
-    """A table as it was written, NUMBERS as floats, None where one is empty; no rows where there is no file yet."""
+    """Read a sweep's table, NUMBERS as floats, None where empty; no rows where there is no file yet."""
     return csv_tables.read_table(path, numbers=NUMBERS, missing_ok=True)
 
 
@@ -67,7 +67,7 @@ def times(jobs: dict[str, list[str]]) -> dict:
 
 
 def _benchmark(path: str) -> tuple[float, float | None] | None:
-    """Seconds and megabytes of a job; a job that was over at once has no memory told."""
+    """Seconds and megabytes of a job; memory is None for a job that was over at once."""
     if not Path(path).is_file():
         return None
     with Path(path).open(newline="", encoding="utf-8") as text:

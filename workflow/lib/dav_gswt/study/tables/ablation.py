@@ -1,4 +1,4 @@
-"""The paper's table of ablation: estimators, policies and ways to cut, each less the baseline of its sweep."""
+"""The paper's table of ablation: estimators, policies and tilings, each minus the baseline of its sweep."""
 
 from dataclasses import asdict
 
@@ -35,7 +35,7 @@ def rows(sweeps: dict[str, list[dict]], baselines: dict[str, str]) -> list[dict]
 
 
 def _last(cells: list[dict]) -> list[dict]:
-    """Of each variant the cells with the last value of the second setting."""
+    """The experiments of each variant with the last value of the second setting."""
     at = {row["varied_0"]: row.get("varied_1") for row in cells}
     return [row for row in cells if row.get("varied_1") == at[row["varied_0"]]]
 

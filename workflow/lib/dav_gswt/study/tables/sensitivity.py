@@ -1,4 +1,4 @@
-"""The paper's table of sensitivity: one setting varied, the others as they are."""
+"""The paper's table of sensitivity: one setting varied, the others fixed."""
 
 from dav_gswt.paths import encode_number
 from dav_gswt.study.tables import paper, spread
@@ -8,7 +8,7 @@ PRINTED = ("value", "psnr", "seam_lpips", "score_s")
 
 
 def rows(sweeps: dict[str, list[dict]], defaults: dict[str, str]) -> list[dict]:
-    """A row a setting and value: means over scenes and seeds, standard deviations over seeds; the paper's beside it.
+    """A row for each setting and value: means over scenes and seeds, deviations over seeds, and the paper's values.
 
     score_s: seconds to score all candidates once, the paper's uncertainty time; stills_s: to draw three stills;
     render_ms: of the viewer, empty where it measured nothing. paper_: the row of the paper with the same value, or,

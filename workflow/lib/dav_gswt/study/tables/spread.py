@@ -1,4 +1,4 @@
-"""Means of a sweep's rows, over scenes and seeds, and the viewer's measurements of the same cells."""
+"""Means and deviations of a sweep's rows over scenes and seeds, joined with the viewer's measurements."""
 
 from pathlib import Path
 
@@ -11,11 +11,11 @@ VIEWER = (
     *("render_ms", "render_ms_sd", "sort_ms", "sort_ms_sd", "sort_share"),
     *("update_ms", "update_ms_sd", "update_share"),
 )
-CELL = ("scene", "seed", "preset", "tiling", "tau")  # of what the viewer measured
+CELL = ("scene", "seed", "preset", "tiling", "tau")  # key of the viewer's measurements
 
 
 def mean(rows: list[dict], key: str) -> float | None:
-    """The mean over scenes of the means over their seeds: no scene counts more for having more seeds."""
+    """Mean over scenes of the means over their seeds: scenes with more seeds do not count more."""
     by_scene: dict[str, list[float]] = {}
     for row in rows:
         if row.get(key) is not None:

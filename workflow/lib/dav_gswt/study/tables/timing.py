@@ -1,4 +1,4 @@
-"""The paper's table of timing: what each stage took, and what a frame of the viewer takes."""
+"""The paper's table of timing: time of each stage, and of a frame of the viewer."""
 
 from dav_gswt.study.tables import paper, spread
 
@@ -8,7 +8,7 @@ PRINTED = ("splats_m", "recon_min", "cut_s", "presort_s", *FRAMES)
 
 
 def rows(cells: list[dict], families: dict[str, str]) -> list[dict]:
-    """A row a scene, means over its seeds.
+    """A row for each scene, means over its seeds.
 
     splats_m: Gaussians of all tiles and levels; recon_min: from photos with their cameras to the last round's field
     (taking photos not counted); cut_s: tiles; presort_s: the bundle with its orders. The viewer's columns are empty

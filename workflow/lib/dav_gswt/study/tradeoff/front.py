@@ -1,17 +1,17 @@
-"""The front of Pareto: what nothing else is both as cheap as and better than."""
+"""Pareto front: points that no other point matches in cost and beats in worth."""
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
 
 
-def front(cost: Float[Array, " n"], worth: Float[Array, " n"]) -> Bool[Array, " n"]:
-    """Points that no other dominates: none costs no more and is worth no less, one of the two strictly.
+def find_pareto_front(cost: Float[Array, " n"], worth: Float[Array, " n"]) -> Bool[Array, " n"]:
+    """Points that no other point dominates (costs no more and is worth no less, one of the two strictly).
 
     Equal points are on the front together. One pass by rising cost, for O(n log n).
     Raises: ValueError: a value that is not a number.
     """
-    _finite(cost, worth)
+    _check_finite(cost, worth)
     on, best = np.zeros(len(cost), bool), -np.inf
     for price in np.unique(cost):
         at = cost == price
@@ -21,12 +21,12 @@ def front(cost: Float[Array, " n"], worth: Float[Array, " n"]) -> Bool[Array, " 
     return on
 
 
-def rivals(cost: Float[Array, " n"], worth: Float[Array, " n"]) -> Int[Array, " n"]:
+def find_rivals(cost: Float[Array, " n"], worth: Float[Array, " n"]) -> Int[Array, " n"]:
     """For each point the one worth most among those that cost no more; itself where none is worth more.
 
     How far it lies behind the front is worth[rival] - worth, from 0. Raises: ValueError: as `front`.
     """
-    _finite(cost, worth)
+    _check_finite(cost, worth)
     found = np.arange(len(cost))
     for i in found:
         affordable = np.where(cost <= cost[i], worth, -np.inf)
@@ -35,6 +35,6 @@ def rivals(cost: Float[Array, " n"], worth: Float[Array, " n"]) -> Int[Array, " 
     return found
 
 
-def _finite(*values: Float[Array, " n"]) -> None:
+def _check_finite(*values: Float[Array, " n"]) -> None:
     if not all(np.isfinite(value).all() for value in values):
         raise ValueError("a point's cost or worth is not a number")

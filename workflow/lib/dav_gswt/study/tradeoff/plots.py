@@ -1,4 +1,4 @@
-"""Figures of the trade-off: all settings with their front, and a panel a knob."""
+"""Figures of the trade-off: all settings with their Pareto front, and a panel for each knob."""
 
 from dav_gswt.study import figures
 from dav_gswt.study.comparison.plots import COLOURS
@@ -57,7 +57,7 @@ def _named(axes, points: list[tuple[float, float, str]], size: int) -> None:
 
 
 def knobs(rows: list[dict]):
-    """What a knob's settings are worth over their seconds; the base is filled."""
+    """Quality of each knob's settings over their seconds; the base is filled."""
     names = list(dict.fromkeys(row["knob"] for row in rows))
     columns, lines = min(COLUMNS, len(names)), -(-len(names) // COLUMNS)
     figure = figures.blank(WIDE * columns, TALL * lines)

@@ -1,4 +1,4 @@
-"""The table of the trade-off: a row a setting, what it cost, is worth, and lost to the most accurate of its knob."""
+"""The table of the trade-off: a row for each setting with its cost, quality, and loss to the most accurate setting."""
 
 from pathlib import Path
 
@@ -10,18 +10,18 @@ from dav_gswt.provenance import describe_machine
 from dav_gswt.study import csv_tables
 from dav_gswt.study.sweeps import tables as sweeps
 from dav_gswt.study.sweeps.grid import CELL
-from dav_gswt.study.tradeoff.front import front, rivals
+from dav_gswt.study.tradeoff.front import find_pareto_front, find_rivals
 
 KEY = ("scene", "seed", "knob", "setting", "preset", "tiling", "prior", "tau", "processor", "cores")  # tells rows apart
 TILE_JOBS = ("levels_s", "cut_s", "bundle_s")
 LEVELS_OF_GREY = 255
-UNITS = {"views": "dB", "stills": "grey levels", "seams": "LPIPS"}  # of a loss
+UNITS = {"views": "dB", "stills": "grey levels", "seams": "LPIPS"}  # of losses
 TEXTS = ("scene", "knob", "setting", "measure", "preset", "policy", "prior", "tiling", "psnr_is", "version", "renderer")
 TEXTS += ("fixed_quality", "field", "tiles", "processor", "part", "chosen", "rival_knob", "rival_setting")
 
 
 def rows(cells: list[dict]) -> list[dict]:
-    """A row a cell; a knob's most accurate setting comes before the others, which are compared with it.
+    """A row for each experiment; the most accurate setting of a knob comes first, and the others are compared with it.
 
     seconds: of all jobs from the start views to the bundle, but the taking of photos; what cells share counts for each.
     own_seconds: of those that the knob can change: all of them where views tell its accuracy, else the jobs on tiles.
@@ -42,7 +42,7 @@ def rows(cells: list[dict]) -> list[dict]:
 
 
 def measured(cell: dict) -> dict:
-    """What a cell left and cost: the columns of a sweep's row, seconds and own_seconds."""
+    """Measures and cost of an experiment: the columns of a sweep's row, seconds and own_seconds."""
     told = {key: value for key, value in sweeps.row(cell).items() if key not in ("sweep", "samples", "steps")}
     tiles = total(told[key] for key in TILE_JOBS)
     seconds = total([told["recon_s"], tiles])
@@ -92,16 +92,22 @@ def pareto(table: list[dict]) -> list[dict]:
         return []
     cost, worth = (np.array([row[key] for row in known], float) for key in ("seconds", "psnr"))
     blurred = [row["lpips"] for row in known]
-    sharp = [None] * len(known) if None in blurred else front(cost, -np.array(blurred, float)).astype(int).tolist()
+    sharp = (
+        [None] * len(known)
+        if None in blurred
+        else find_pareto_front(cost, -np.array(blurred, float)).astype(int).tolist()
+    )
     shown = ("scene", "seed", "knob", "setting", "base", "seconds", "psnr", "ssim", "lpips", "peak_mb", "bundle_mb")
     return [
         {key: row[key] for key in shown}
         | {"front": int(on), "behind": float(worth[rival] - worth[i]), "sharp": sharp[i]}
         | {f"rival_{key}": known[rival][key] if rival != i else "" for key in ("knob", "setting")}
-        for i, (row, on, rival) in enumerate(zip(known, front(cost, worth), rivals(cost, worth), strict=True))
+        for i, (row, on, rival) in enumerate(
+            zip(known, find_pareto_front(cost, worth), find_rivals(cost, worth), strict=True)
+        )
     ]
 
 
 def read(path: Path | str) -> list[dict]:
-    """A table of the trade-off as it was written: numbers as floats, None where one is empty, texts as they are."""
+    """Read a table of the trade-off: numbers as floats, None where empty; TEXTS as text."""
     return csv_tables.read_table(path, texts=TEXTS)
