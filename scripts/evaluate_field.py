@@ -16,7 +16,7 @@ from dav_gswt.views.selection import read_pose_selection
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     split, captures = read_view_split(given.views), list(given.get("captures", []))
-    tests = read_training_views(given.images, given.model, split.test, [], params.preset["size"])
+    tests = read_training_views(given.images, given.model, list(split.test), [], params.preset["size"])
     photos = len(split.start) + sum(len(read_capture_record(folder)) for folder in captures)
     fitted, grid = read_field(given.field), ground.read_ground(given.ground)
     perceptual = lpips_weights.read(given.lpips) if given.get("lpips") else None

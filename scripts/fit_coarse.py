@@ -16,7 +16,7 @@ from dav_gswt.reconstruction.fit_settings import FitSettings
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     quality, margin = FitSettings(**params.preset), ground.WHOLE if params.whole else ground.MARGIN
-    names = read_view_split(given.views).start
+    names = list(read_view_split(given.views).start)
     photos = read_training_views(given.images, given.model, names, [], quality.size)
     points, colours = triangulate_points(read_colmap_model(given.model), names, given.images)
     rng = np.random.default_rng(params.seed)

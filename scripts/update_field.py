@@ -15,7 +15,10 @@ from dav_gswt.reconstruction.refinement import refine_field
 with logging_to(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
     quality, captures = FitSettings(**params.preset), list(given.captures)
-    names, aside = read_view_split(given.views).start, regression_guard.list_rejected_photos(map(read_json, given.fits))
+    names, aside = (
+        list(read_view_split(given.views).start),
+        regression_guard.list_rejected_photos(map(read_json, given.fits)),
+    )
     before = read_training_views(given.images, given.model, names, captures[:-1], quality.size)
     new = read_captured_views(captures[-1], quality.size)
     rng = np.random.default_rng([params.seed, params.t])

@@ -108,7 +108,7 @@ def _start_from_points(
     points: Float[Array, "n 3"], colours: Float[Array, "n 3"], settings: FitSettings
 ) -> tuple[GaussianField, FreeConstraints]:
     """Gaussians as large as the points are apart, for a scene without a ground."""
-    apart = cKDTree(points).query(points, k=min(4, len(points)))[0][:, 1:].mean(1)
+    apart = np.asarray(cKDTree(points).query(points, k=min(4, len(points)))[0])[:, 1:].mean(1)
     start = objects.make_blobs(points, colours, np.clip(0.5 * apart, 1e-6, None), logit=0.0)
     if settings.max_gaussians != AUTO:
         start = start[: settings.gaussian_limit]
@@ -123,6 +123,6 @@ def _explained_share(grid: Ground, points: Float[Array, "n 3"], frame: SceneFram
     inside = points[grid.contains(points)]
     if len(inside) <= NEIGHBOURS:
         return 1.0
-    near = cKDTree(inside[:, :2]).query(inside[:, :2], k=NEIGHBOURS + 1)[1][:, 1:]
+    near = np.asarray(cKDTree(inside[:, :2]).query(inside[:, :2], k=NEIGHBOURS + 1)[1])[:, 1:]
     apart = np.abs(inside[:, 2] - np.median(inside[near, 2], axis=1))
     return float((apart < BAND * frame.flying_height).mean())

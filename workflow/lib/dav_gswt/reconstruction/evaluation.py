@@ -61,8 +61,9 @@ def _lpips(seen: Float32[Array, "h w 3"], view: TrainingView, weights: Weights) 
     from dav_gswt.images import lpips  # deferred: torch takes seconds to load
 
     counts = (view.weight > 0)[..., None]
-    pair = (2 * np.where(counts, seen, view.image) - 1)[None], (2 * view.image - 1)[None]
-    return float(lpips.distance(*(p.astype(np.float32) for p in pair), weights)[0] / counts.mean())
+    picture = (2 * np.where(counts, seen, view.image) - 1)[None].astype(np.float32)
+    photo = (2 * view.image - 1)[None].astype(np.float32)
+    return float(lpips.distance(picture, photo, weights)[0] / counts.mean())
 
 
 def _average(rows: list[dict]) -> dict[str, float | None]:

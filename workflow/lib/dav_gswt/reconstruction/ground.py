@@ -5,6 +5,8 @@ as in any image of a map. The exemplar is a square block of whole cells, so that
 """
 
 from dataclasses import dataclass, replace
+from functools import reduce
+from operator import add
 from pathlib import Path
 
 import numpy as np
@@ -156,8 +158,8 @@ def fit_surface(grid: Ground, points: Float[Array, "n 3"]) -> Float[Array, "rows
     u = np.clip((points[:, 0] - grid.west) / (columns * grid.spacing) * (nx - 1), 0, nx - 1.000001)
     sample = _bilinear(v, u, ny, nx)
     bend = kron(identity(ny), _second(nx)), kron(_second(ny), identity(nx)), 2 * kron(_first(ny), _first(nx))
-    stiff = STIFFNESS * sum(b.T @ b for b in bend) + 1e-9 * identity(ny * nx)
-    z, weight = points[:, 2], np.ones(len(points))
+    stiff = STIFFNESS * reduce(add, (b.T @ b for b in bend)) + 1e-9 * identity(ny * nx)
+    z, weight, knots = points[:, 2], np.ones(len(points)), np.zeros(ny * nx)
     for _ in range(5):
         w = diags(weight)
         knots = spsolve((sample.T @ w @ sample + stiff).tocsc(), sample.T @ (weight * z))
@@ -188,12 +190,13 @@ def _bilinear(v, u, ny: int, nx: int):
     return coo_matrix((values, (np.tile(p, 4), knots)), shape=(len(v), ny * nx)).tocsr()
 
 
+# SciPy's stubs do not know lists of arrays in diags, hence the ignored rules.
 def _first(n: int):
-    return diags([-np.ones(n - 1), np.ones(n - 1)], [0, 1], shape=(n - 1, n))
+    return diags([-np.ones(n - 1), np.ones(n - 1)], [0, 1], shape=(n - 1, n))  # pyright: ignore[reportCallIssue, reportArgumentType]
 
 
 def _second(n: int):
-    return diags([np.ones(n - 2), -2 * np.ones(n - 2), np.ones(n - 2)], [0, 1, 2], shape=(n - 2, n))
+    return diags([np.ones(n - 2), -2 * np.ones(n - 2), np.ones(n - 2)], [0, 1, 2], shape=(n - 2, n))  # pyright: ignore[reportCallIssue, reportArgumentType]
 
 
 def write_ground(grid: Ground, path: Path | str) -> None:

@@ -49,7 +49,11 @@ def make_isolated_points(
     taken[known] = _at(relief.grid, maximum_filter(relief.stands, 3), points[known])
     stand = (above > MIN_HEIGHT * grid.spacing) & (above < band) & ~taken
     points, colours = points[stand], colours[stand]
-    apart = cKDTree(points).query(points, k=4)[0][:, 1:].mean(1) if len(points) > 3 else np.full(len(points), np.inf)
+    apart = (
+        np.asarray(cKDTree(points).query(points, k=4)[0])[:, 1:].mean(1)
+        if len(points) > 3
+        else np.full(len(points), np.inf)
+    )
     together = apart < MAX_ISOLATION * grid.spacing
     size = np.clip(0.5 * apart[together], 0.5 * grid.spacing, 1.5 * grid.spacing)
     return make_blobs(points[together], colours[together], size, logit=0.0)

@@ -161,7 +161,9 @@ def reject_seen_through(
 
     def at(height: float, cost: Float32[Array, "rows columns"]) -> None:
         rows = np.flatnonzero(cost <= MAX_COST * surface)  # elsewhere nothing would stand anyway
-        behind = visibility.median_behind(around, ground, places[rows] + np.float32([0, 0, height]), views, MIN_PHOTOS)
+        behind = visibility.median_behind(
+            around, ground, places[rows] + np.array([0, 0, height], np.float32), views, MIN_PHOTOS
+        )
         cost.ravel()[rows[~(cost.ravel()[rows] <= MAX_COST * behind)]] = UNKNOWN_COST
 
     over = np.flatnonzero(heights > lowest)

@@ -109,7 +109,7 @@ def _drop_near(part: GaussianField, others: GaussianField, distance: float) -> G
     """The Gaussians of a part that are farther from all others."""
     if not len(others) or not len(part):
         return part
-    return part[cKDTree(others.means).query(part.means)[0] > distance]
+    return part[np.asarray(cKDTree(others.means).query(part.means)[0]) > distance]
 
 
 def _match_degree(part: GaussianField, field: GaussianField) -> GaussianField:

@@ -48,7 +48,7 @@ def add_sky(views: list[TrainingView], modelled: list[TrainingView]) -> list[Tra
         return modelled
     bound = TRIM * 1.4826 * deviation + SLACK
     found = [_mask_sky(m, v, *r, coefficients, bound) for m, v, r in zip(modelled, views, rising, strict=True)]
-    seen = sum(int((~np.isnan(v.behind[..., 0])).sum()) for v in found)
+    seen = sum(int((~np.isnan(v.behind[..., 0])).sum()) for v in found if v.behind is not None)
     _log.info("sky: %.0f %% of what lies above the horizon", 100 * seen / total)
     return found
 
@@ -56,7 +56,8 @@ def add_sky(views: list[TrainingView], modelled: list[TrainingView]) -> list[Tra
 def fit_sky(directions: Float[Array, "n 3"], colours: Float32[Array, "n 3"]) -> tuple[Float[Array, "16 3"], float]:
     """Coefficients of the sky with the least absolute deviation, and the median deviation."""
     basis = harmonics.basis(directions, DEGREE)
-    weight = np.ones(len(basis))
+    weight, residual = np.ones(len(basis)), np.zeros(len(basis))
+    coefficients = np.zeros((basis.shape[1], 3))
     ridge = RIDGE * len(basis) * np.diag([0.0] + [1.0] * (basis.shape[1] - 1))
     for _ in range(ROUNDS):
         weighted = basis * weight[:, None]

@@ -59,7 +59,7 @@ def _intersect_ground(grid: Ground, eye: Float32[Array, "3"], places: Float32[Ar
     down = places - eye
     falls = down[:, 2] < 0
     fall = np.where(falls, down[:, 2], -1)
-    z = grid.height_at(places)
+    z, cell, inside = grid.height_at(places), np.zeros(len(places), np.int64), falls
     for _ in range(ITERATIONS):
         at = eye + ((z - eye[2]) / fall)[:, None] * down
         row, column = np.floor((at[:, 1] - grid.south) / grid.spacing), np.floor((at[:, 0] - grid.west) / grid.spacing)

@@ -1,6 +1,7 @@
 """The degree of the spherical harmonics: the lowest that held-out pixels need."""
 
 from collections.abc import Callable
+from functools import reduce
 
 import numpy as np
 
@@ -28,10 +29,9 @@ def choose_degree(now: State, cameras: list[Camera], score: Callable[[State], fl
 def reduce_degree(full: State, degree: int, cameras: list[Camera]) -> State:
     """A state of a lower degree; the constant takes the mean of the dropped terms over the photos' directions."""
     k = (degree + 1) ** 2
-    colours, mean = full.values["colours"], 0.0
-    for camera in cameras:
-        seen = harmonics.directions(full.values["means"].astype(float), camera)
-        mean = mean + harmonics.basis(seen, full.sh_degree) / len(cameras)
+    colours, means = full.values["colours"], full.values["means"].astype(float)
+    bases = (harmonics.basis(harmonics.directions(means, camera), full.sh_degree) for camera in cameras)
+    mean = reduce(np.add, (basis / len(cameras) for basis in bases))
     out = full.copy()
     out.resize_sh(degree)
     gone = np.einsum("nk,nkc->nc", mean[:, k:], colours[:, k:])

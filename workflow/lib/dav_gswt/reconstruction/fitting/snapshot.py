@@ -51,7 +51,8 @@ class SnapshotStore:
         assert self.path is not None
         try:
             with atomic_file(self.path) as part, part.open("wb") as file:
-                np.savez(file, rest=np.frombuffer(json.dumps(rest).encode(), np.uint8), **arrays)
+                text = np.frombuffer(json.dumps(rest).encode(), np.uint8)
+                np.savez(file, rest=text, **arrays)  # pyright: ignore[reportArgumentType]  no array is named allow_pickle
         except OSError as error:
             _log.warning("no snapshot of the fit: %s", error)
         self._last = time.monotonic()

@@ -135,7 +135,9 @@ def _start_training(
 def _make_task(
     start: int, views: list[TrainingView], plan: FitPlan, constraints: Constraints, rng: np.random.Generator
 ) -> TrainingTask:
-    held = [held_out.draw_mask(*v.image.shape[:2], rng) for v in views] if plan.sh_degree == AUTO else None
+    held = (
+        [held_out.draw_mask(v.image.shape[0], v.image.shape[1], rng) for v in views] if plan.sh_degree == AUTO else None
+    )
     halves = [_halve(v) for v in views] if plan.half_share else []
     return TrainingTask(views, halves, held, plan, Schedule(plan, start), constraints, raster.Rasterizer())
 
@@ -254,6 +256,7 @@ def _prune(run: TrainingState, task: TrainingTask) -> None:
 
 def _score(run: TrainingState, task: TrainingTask, now: State) -> float:
     """PSNR of the held-out pixels of all photos."""
+    assert task.held is not None
     tally = held_out.ErrorSum()
     for index, view in enumerate(task.views):
         seen = task.raster.forward(**now.values, camera=run.poses.correct(index, view.camera))
