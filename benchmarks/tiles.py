@@ -69,8 +69,8 @@ def measured() -> dict[str, float]:
     assert [len(found.fields), len(found.labels)] == [LEVELS, 16]
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
     model = prior_sampling.load_prior({"model": "terrain", "samples": 1, "steps": 20, "lpips": False})
-    by = repair.ByPrior.of(model, {"strength": STRENGTH}, 0)
-    refine.refined(found, refine.Uncut(made.fields[0], exemplar), refine.Options(), by, model.size)
+    by = repair.PriorRepair.from_config(model, {"strength": STRENGTH}, 0)
+    refine.refine_tiles(found, refine.UncutGround(made.fields[0], exemplar), refine.Options(), by, model.size)
     return {
         "tiles_200k_seconds": cut - start,
         "tiles_200k_levels_seconds": fitted - start,

@@ -11,7 +11,7 @@ def inpainter_weights(wildcards):
 
 
 rule inpaint_field:
-    """Paint the ground that no photo saw; a field without such ground goes on as it is."""
+    """Inpaint the ground that no photo saw; a field without such ground is copied."""
     input:
         unpack(inpainter_weights),
         field="<results>/<round>/field.ply",
@@ -44,7 +44,7 @@ rule inpaint_field:
 
 
 rule evaluate_inpainted:
-    """Compare the field before and after with the test photos, everywhere and where it is imagined."""
+    """Compare the field before and after with the test photos, everywhere and where it was inpainted."""
     input:
         unpack(lpips_weights),
         before="<results>/<round>/field.ply",

@@ -27,7 +27,7 @@ rule convert_lpips_weights:
 
 
 rule make_examples:
-    """Views of made-up worlds: the truth, and what fields fitted from few photos show of it."""
+    """Views of procedural worlds: the truth, and what fields fitted from few photos show of it."""
     output:
         examples="<results>/prior/examples/part{part}.npz",
     log:
@@ -48,7 +48,7 @@ rule make_examples:
 
 
 rule train_prior:
-    """Train the project's own prior on all examples; killed, it goes on from its last checkpoint."""
+    """Train the project's own prior on all examples; an interrupted training resumes at its last checkpoint."""
     input:
         examples=expand("<results>/prior/examples/part{part}.npz", part=range(PARTS)),
     output:

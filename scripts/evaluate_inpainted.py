@@ -1,4 +1,4 @@
-"""Rule evaluate_completed: what the test photos say about a field before and after it was completed."""
+"""Rule evaluate_inpainted: metrics of the test photos before and after inpainting."""
 
 from dav_gswt.field import read_field
 from dav_gswt.files import write_json
@@ -16,6 +16,6 @@ with logging_to(snakemake.log[0]):
     names, grid = read_view_split(given.views).test, ground.read_ground(given.ground)
     tests = mask_to_ground(read_training_views(given.images, given.model, names, [], quality["size"]), grid)
     perceptual = lpips_weights.read(given.lpips) if given.get("lpips") else None
-    result = evaluation.judged(read_field(given.before), read_field(given.after), tests, perceptual)
+    result = evaluation.evaluate_inpainting(read_field(given.before), read_field(given.after), tests, perceptual)
     inputs = {name: given[name] for name in ("before", "after", "ground", "views")}
     write_json(snakemake.output.metrics, result | {"provenance": record_provenance(inputs, dict(quality))})

@@ -1,4 +1,4 @@
-"""Rule complete_field: what no photo saw, painted by a prior."""
+"""Rule inpaint_field: a prior inpaints the ground that no photo saw."""
 
 from dav_gswt.field import read_field, write_field
 from dav_gswt.files import copy_file, write_json
@@ -14,14 +14,14 @@ from dav_gswt.views import prior_sampling, scoring
 with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
     fitted, grid, names = read_field(given.field), ground.read_ground(given.ground), read_view_split(given.views).start
-    taken = read_training_views(given.images, given.model, names, list(given.captures), scoring.PHOTO_WIDTH)
-    asked = prior_sampling.open_inpainting_prior(params.prior, params.seed)
-    made = build.complete(fitted, grid, read_scene_frame(given.frame), taken, asked)
-    if made.field is fitted:
+    photos = read_training_views(given.images, given.model, names, list(given.captures), scoring.PHOTO_WIDTH)
+    config = prior_sampling.open_inpainting_prior(params.prior, params.seed)
+    result = build.inpaint_field(fitted, grid, read_scene_frame(given.frame), photos, config)
+    if result.field is fitted:
         copy_file(given.field, out.field)
     else:
-        write_field(made.field, out.field)
+        write_field(result.field, out.field)
     copy_file(given.ground, out.ground)
     inputs = {name: given[name] for name in ("field", "ground", "views", "weights")}
     about = {"prior": params.prior, "seed": params.seed}
-    write_json(out.facts, made.facts(grid) | {"provenance": record_provenance(inputs, about)})
+    write_json(out.facts, result.describe(grid) | {"provenance": record_provenance(inputs, about)})

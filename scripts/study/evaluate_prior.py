@@ -1,20 +1,24 @@
-"""Rule try_prior: how good is the prior on worlds it was not trained on, and is it better than what costs less?"""
+"""Rule evaluate_prior: the accuracy of the prior on held-out worlds, compared with cheaper estimates."""
 
 from dav_gswt.images import lpips_weights
 from dav_gswt.logs import logging_to
 from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt.prior.training import example_files
 from dav_gswt.study import csv_tables
-from dav_gswt.study.prior import plots, trial
+from dav_gswt.study.prior import evaluation, plots
 from dav_gswt.study.prior.regressor import Regressor
 
 with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params
-    setting = trial.Setting(**params.setting)
+    setting = evaluation.Setting(**params.setting)
     prior, regressors = TerrainPrior.open(given.weights), [Regressor.open(path) for path in given.regressors]
     made = example_files.concatenate([example_files.read_examples(part) for part in given.examples])
     perceptual = lpips_weights.read(*given.lpips) if given.lpips else None  # a list of none or one
-    rows = trial.tried(trial.evenly(made, params.views), prior, regressors, setting, perceptual)
+    rows = evaluation.evaluate_prior(
+        evaluation.select_evenly(made, params.views), prior, regressors, setting, perceptual
+    )
     csv_tables.write_table(out.table, rows)
-    plots.losses(plots.read_losses(given.losses), out.losses)
-    plots.samples(plots.gallery(trial.evenly(made, params.shown), prior, regressors[0], setting), out.samples)
+    plots.plot_losses(plots.read_losses(given.losses), out.losses)
+    plots.plot_samples(
+        plots.make_gallery(evaluation.select_evenly(made, params.shown), prior, regressors[0], setting), out.samples
+    )

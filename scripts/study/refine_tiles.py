@@ -1,4 +1,4 @@
-"""Rule refine_tiles: what lies beside the cuts, repaired by a prior."""
+"""Rule refine_tiles: a prior refines the seams of a tile set."""
 
 from pathlib import Path
 
@@ -15,10 +15,10 @@ with logging_to(snakemake.log[0]):
     tiles, made = store.read_tiles(given.tiles, given.seams), levels.read_levels(given.levels)
     grid = made.grids[0]
     west, south, _ = grid.exemplar
-    uncut = build.Uncut(made.fields[0], Exemplar(west, south, grid.spacing, grid.cells))
+    uncut = build.UncutGround(made.fields[0], Exemplar(west, south, grid.spacing, grid.cells))
     model = prior_sampling.load_prior(params.prior)
-    by = repair.ByPrior.of(model, params.refine, params.seed)
-    mended = build.refined(tiles, uncut, build.Options.of(params.refine), by, model.size)
+    by = repair.PriorRepair.from_config(model, params.refine, params.seed)
+    mended = build.refine_tiles(tiles, uncut, build.Options.from_config(params.refine), by, model.size)
     inputs = {name: given[name] for name in ("seams", "weights")} | {"level0": Path(given.levels, "level0.ply")}
     about = {"refine": dict(params.refine), "prior": dict(params.prior), "seed": params.seed}
     store.write_tiles(mended, out.tiles, out.seams, record_provenance(inputs, about))

@@ -1,4 +1,4 @@
-"""What no photo saw, painted by a prior whose painting is known: what changes, what must not, and what is marked."""
+"""Inpainting by a prior with known samples: what changes, what must not change, and what is marked."""
 
 from dataclasses import fields as members
 from dataclasses import replace
@@ -11,7 +11,7 @@ from fixtures import ground as patch
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.poses import pose_of_camera
-from dav_gswt.inpainting import build, evaluation, occluders, paint, unseen, viewpoints
+from dav_gswt.inpainting import build, evaluation, occluders, unseen, view_inpainting, viewpoints
 from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import DecodedViews
 from dav_gswt.prior.networks import Network
@@ -23,22 +23,22 @@ from dav_gswt.views.prior_sampling import PriorConfig
 MIDDLE = [1.6, 1.6, 0.0]
 FIRST = 20  # column of the first unseen cell
 SEEN = patch.look(*np.meshgrid(0.05 + 0.1 * np.arange(FIRST), 0.05 + 0.1 * np.arange(32))).mean((0, 1))
-PAINTS = SEEN + np.float32([[0.2, -0.2, 0.1], [-0.2, 0.2, -0.1]])  # of which the mean is the colour of known ground
+BANDS = SEEN + np.float32([[0.2, -0.2, 0.1], [-0.2, 0.2, -0.1]])  # of which the mean is the colour of known ground
 BAND = 8  # pixels of a picture that have one of them
 
 
-class Painting:
-    """Paints bands of two colours where it is told not to believe the render, and elsewhere the render itself."""
+class BandPrior:
+    """Samples are bands of two colours where the render is not valid, and the render itself elsewhere."""
 
-    name, size = "painting", 32
+    name, size = "bands", 32
 
     def __init__(self, spoil=None, depth=True):
         self.spoil, self.depth = spoil, depth
 
     def sample(self, condition, m, p_drop, steps, seed, known=None, common=True):
         assert p_drop == 0 and not common
-        hidden = np.kron(~known, np.ones((1, paint.CELL, paint.CELL), bool))[..., None]
-        bands = PAINTS[np.arange(self.size) // BAND % 2][None, :, None]
+        hidden = np.kron(~known, np.ones((1, view_inpainting.CELL, view_inpainting.CELL), bool))[..., None]
+        bands = BANDS[np.arange(self.size) // BAND % 2][None, :, None]
         colour = np.where(hidden, bands, condition.colour)
         planes = [colour, condition.alpha[..., None], condition.inverse_depth[..., None]]
         return np.repeat(np.concatenate(planes, -1).transpose(0, 3, 1, 2)[:, None], m, 1).astype(np.float32)
@@ -56,8 +56,8 @@ class Painting:
         return DecodedViews(planes[..., :4], planes[..., 4] if self.depth else None)
 
 
-def asked(prior=None, samples=2):
-    return PriorConfig(prior or Painting(), samples, 2, 0.0)
+def config(prior=None, samples=2):
+    return PriorConfig(prior or BandPrior(), samples, 2, 0.0)
 
 
 def half_seen():
@@ -66,43 +66,43 @@ def half_seen():
     seen = grid.seen.copy()
     seen[:, FIRST:] = False
     field = patch.field(grid)
-    east = unseen.gaussians(field, grid, ~seen)
+    east = unseen.select_gaussians(field, grid, ~seen)
     sh = field.sh.copy()
     sh[east] = 0
     doubt = np.where(east, np.float32(1), np.float32(0.1))
     return replace(field, sh=sh, uncertainty=doubt), replace(grid, seen=seen)
 
 
-def completed(field, grid, prior=None):
-    return build.complete(field, grid, patch.FRAME, patch.photos(), asked(prior))
+def inpaint(field, grid, prior=None):
+    return build.inpaint_field(field, grid, patch.FRAME, patch.photos(), config(prior))
 
 
-def off_paint(colours):
+def distance_to_bands(colours):
     """How far colours are from the nearer of the two."""
-    return np.abs(colours[..., None, :] - PAINTS).max(-1).min(-1)
+    return np.abs(colours[..., None, :] - BANDS).max(-1).min(-1)
 
 
 def same(one: GaussianField, two: GaussianField) -> bool:
     return all(np.array_equal(getattr(one, f.name), getattr(two, f.name)) for f in members(GaussianField))
 
 
-def test_unseen_ground_takes_the_priors_colour_and_all_else_keeps_its_bytes():
+def test_unseen_ground_takes_the_colour_of_the_prior_and_all_else_keeps_its_bytes():
     field, grid = half_seen()
     before = field[:], grid.seen.copy()
-    made = completed(field, grid)
+    made = inpaint(field, grid)
     n = grid.heights.size
     marked = made.field.imagined
-    assert np.array_equal(marked[:n].reshape(grid.shape), ~grid.seen) and np.array_equal(made.painted, ~grid.seen)
+    assert np.array_equal(marked[:n].reshape(grid.shape), ~grid.seen) and np.array_equal(made.inpainted, ~grid.seen)
     assert same(made.field[~marked], field[~marked])
     inner = np.zeros(grid.shape, bool)
     inner[4:-4, FIRST + 4 : -4] = True
-    off = off_paint(made.field.base_colours[:n][inner.ravel()])
+    off = distance_to_bands(made.field.base_colours[:n][inner.ravel()])
     assert np.median(off) < 0.08  # between two bands colours mix, and far in they keep to the mean
-    assert off_paint(field.base_colours[:n][inner.ravel()]).min() > 0.1
-    assert (made.field.uncertainty[marked] == 1).all() and made.things == 0
+    assert distance_to_bands(field.base_colours[:n][inner.ravel()]).min() > 0.1
+    assert (made.field.uncertainty[marked] == 1).all() and made.objects == 0
     assert np.array_equal(made.field.means, field.means)  # no height is moved
     assert same(field, before[0]) and np.array_equal(grid.seen, before[1])  # nothing is changed in place
-    assert made.facts(grid) == {
+    assert made.describe(grid) == {
         "cells": n,
         "unseen": 32 * 12,
         "painted": 32 * 12,
@@ -112,85 +112,87 @@ def test_unseen_ground_takes_the_priors_colour_and_all_else_keeps_its_bytes():
     }
 
 
-def test_the_underlay_shows_what_was_painted_above_it():
+def test_the_underlay_takes_the_colour_of_the_discs_above_it():
     field, grid = half_seen()
-    made = completed(field, grid).field
+    made = inpaint(field, grid).field
     rows = underlay.find_rows(made, grid)
     under = made[rows].base_colours.reshape(16, 16, 3)
-    assert np.median(off_paint(under[3:-3, 13:-2])) < 0.1
+    assert np.median(distance_to_bands(under[3:-3, 13:-2])) < 0.1
     assert np.array_equal(made.imagined[rows].reshape(16, 16), np.tile(np.arange(16) >= FIRST // 2, (16, 1)))
 
 
 def test_colours_join_their_surroundings():
     """A prior that paints all a third too dark, what is known included, leaves no step at the border."""
 
-    class Dark(Painting):
+    class Dark(BandPrior):
         def sample(self, condition, m, p_drop, steps, seed, known=None, common=True):
             dark = replace(condition, colour=np.float32(0.66) * true.colour)
             return super().sample(dark, m, p_drop, steps, seed, np.ones_like(known), common)
 
     field, grid = half_seen()
     pool = seen_by([1.6, 1.6, 4.0])
-    true, condition = told(patch.field(), pool)[0], told(field, pool)[0]
-    hidden = unseen.share(field, unseen.gaussians(field, grid, ~grid.seen), pool[0][1])[None] > unseen.TOUCHES
-    made = paint.painted(asked(Dark()), condition, hidden, SEEN.astype(float))
+    true, condition = condition_views(patch.field(), pool)[0], condition_views(field, pool)[0]
+    hidden = (
+        unseen.render_share(field, unseen.select_gaussians(field, grid, ~grid.seen), pool[0][1])[None] > unseen.TOUCHED
+    )
+    made = view_inpainting.inpaint_views(config(Dark()), condition, hidden, SEEN.astype(float))
     sure = ~hidden[0] & (condition.alpha[0] > 0.9)
     near = hidden[0] & (true.alpha[0] > 0.9) & (np.roll(sure, 2, 1) | np.roll(sure, -2, 1))
     off, raw = (np.abs(picture - true.colour[0])[near].mean() for picture in (made.colour[0], 0.66 * true.colour[0]))
     assert near.sum() > 10 and off < 0.25 * raw
 
 
-def test_far_from_all_that_is_known_a_picture_keeps_to_the_grounds_mean_colour():
+def test_far_from_known_pixels_a_picture_has_the_mean_colour_of_the_ground():
     rng = np.random.default_rng(0)
     picture, ground = rng.uniform(0.4, 0.6, (64, 64, 3)).astype(np.float32), np.array([0.3, 0.5, 0.4])
     known = np.zeros((64, 64), bool)
     known[:, :8] = True
-    found = paint.levelled(picture, picture + np.float32(0.2), known, ~known, ground)
+    found = view_inpainting.match_colours(picture, picture + np.float32(0.2), known, ~known, ground)
     np.testing.assert_allclose(found[:, 48:].mean((0, 1)), ground, atol=0.01)
     np.testing.assert_allclose(found[:, :4], picture[:, :4] + 0.2, atol=0.03)
-    everywhere = paint.levelled(picture, picture + np.float32(0.2), known | True, known & False, ground)
+    everywhere = view_inpainting.match_colours(picture, picture + np.float32(0.2), known | True, known & False, ground)
     np.testing.assert_allclose(everywhere, picture + 0.2, atol=1e-6)
 
 
-def test_where_photos_missed_nothing_the_field_is_handed_on():
-    made = completed(patch.field(), patch.grid())
-    assert not made.facts(patch.grid())["changed"] and made.painted.sum() == made.unseen.sum() == 0
+def test_where_photos_saw_everything_the_field_is_returned():
+    made = inpaint(patch.field(), patch.grid())
+    assert not made.describe(patch.grid())["changed"] and made.inpainted.sum() == made.unseen.sum() == 0
     field = patch.field()
-    assert completed(field, patch.grid()).field is field
+    assert inpaint(field, patch.grid()).field is field
 
 
 def test_a_cell_is_unseen_where_neither_the_grid_nor_the_fit_knows_it():
     field, grid = half_seen()
     doubt = field.uncertainty.copy()
     doubt[: grid.heights.size].reshape(grid.shape)[:10] = 0.2  # fitted since, although something once stood before it
-    found = unseen.cells(replace(field, uncertainty=doubt), grid)
+    found = unseen.find_unseen_cells(replace(field, uncertainty=doubt), grid)
     assert not found[:10].any() and found[10:, FIRST:].all() and not found[:, :FIRST].any()
     free = replace(field, ground=np.zeros(len(field), bool))
-    assert not unseen.cells(free, grid).any() and completed(free, grid).field is free
+    assert not unseen.find_unseen_cells(free, grid).any() and inpaint(free, grid).field is free
 
 
-def test_what_a_known_thing_covers_is_not_painted():
+def test_ground_under_a_known_object_is_not_inpainted():
     field, grid = half_seen()
     lid = blob([2.7, 0.6, 0.3], [0.35, 0.35, 0.02], [0.1, 0.9, 0.1])
-    made = completed(concatenate_fields([field, lid]), grid)
+    made = inpaint(concatenate_fields([field, lid]), grid)
     covered = np.hypot(grid.centres[:, 0] - 2.7, grid.centres[:, 1] - 0.6) < 0.2
     assert covered.any() and not made.field.imagined[: grid.heights.size][covered].any()
-    assert not made.painted.ravel()[covered].any() and made.unseen.ravel()[covered].all()
+    assert not made.inpainted.ravel()[covered].any() and made.unseen.ravel()[covered].all()
     assert same(made.field[len(field) : len(field) + 1], lid)
     roof = concatenate_fields([field, blob([2.6, 1.6, 0.3], [2.0, 3.0, 0.02], [0.1, 0.9, 0.1])])
-    hidden = completed(roof, grid)
-    assert hidden.field is roof and hidden.unseen.any() and not hidden.facts(grid)["changed"]
+    hidden = inpaint(roof, grid)
+    assert hidden.field is roof and hidden.unseen.any() and not hidden.describe(grid)["changed"]
 
 
 @pytest.mark.parametrize("plane", [0, 3, 4], ids=["colour", "opacity", "depth"])
-def test_a_prior_that_paints_what_is_no_number_is_refused(plane):
+def test_a_prior_with_samples_that_are_not_finite_is_refused(plane):
     with pytest.raises(ValueError, match="view 0 is not finite"):
-        completed(*half_seen(), Painting(spoil=plane))
+        inpaint(*half_seen(), BandPrior(spoil=plane))
 
 
 def test_a_prior_without_depth_is_refused():
-    with pytest.raises(ValueError, match="painting has no depth"):
-        completed(*half_seen(), Painting(depth=False))
+    with pytest.raises(ValueError, match="bands has no depth"):
+        inpaint(*half_seen(), BandPrior(depth=False))
 
 
 @pytest.fixture(scope="module")
@@ -199,12 +201,12 @@ def terrain():
     return TerrainPrior(Network())
 
 
-def test_the_projects_own_prior_paints_the_same_bytes_on_any_number_of_threads(terrain):
-    assert isinstance(terrain, paint.Painter)
+def test_the_terrain_prior_gives_the_same_bytes_on_any_number_of_threads(terrain):
+    assert isinstance(terrain, view_inpainting.Inpainter)
     found, before = [], torch.get_num_threads()
     for threads in (1, 2, 2):
         torch.set_num_threads(threads)
-        found.append(completed(*half_seen(), terrain).field)
+        found.append(inpaint(*half_seen(), terrain).field)
     torch.set_num_threads(before)
     assert found[0].imagined.any() and same(found[0], found[1]) and same(found[1], found[2])
 
@@ -226,44 +228,46 @@ def seen_by(*eyes):
     return [(pose_of_camera(f"p{i}", c, patch.FRAME), c) for i, c in enumerate(found)]
 
 
-def told(field, pool):
-    """What is known of views, and a painting that shows the field itself."""
+def condition_views(field, pool):
+    """The condition of views, and pictures that equal the render."""
     photos = conditions.prepare_photos(patch.photos(), patch.FRAME, 32)
     c = conditions.build_condition(field, pool, photos, patch.FRAME.flying_height, 32)
-    return c, paint.Painted(c.colour, c.alpha, c.inverse_depth)
+    return c, view_inpainting.InpaintedViews(c.colour, c.alpha, c.inverse_depth)
 
 
 EYES = [1.6, 1.0, 4.2], [3.6, 1.6, 3.7], [1.6, 4.0, 3.5]
 
 
 @pytest.mark.parametrize("count, stands", [(1, False), (2, True), (3, True)])
-def test_a_thing_stands_where_two_views_agree_that_it_does(count, stands):
+def test_an_object_is_added_where_two_views_agree(count, stands):
     bare = patch.field()
     bare = replace(bare, imagined=bare.ground.copy())
     there = concatenate_fields([bare, blob([1.7, 1.5, 0.5], [0.2, 0.2, 0.2], [0.1, 0.9, 0.1])])
     pool = seen_by(*EYES[:count])
-    (condition, _), (_, made) = told(bare, pool), told(there, pool)
-    new = occluders.things(bare, patch.grid(), pool, condition, made, patch.FRAME.flying_height)
+    (condition, _), (_, made) = condition_views(bare, pool), condition_views(there, pool)
+    new = occluders.find_occluders(bare, patch.grid(), pool, condition, made, patch.FRAME.flying_height)
     assert bool(len(new)) == stands
     if stands:
         assert np.hypot(new.means[:, 0] - 1.7, new.means[:, 1] - 1.5).max() < 0.7
-        assert new.means[:, 2].min() > occluders.RISES * patch.FRAME.flying_height and new.means[:, 2].max() < 1.1
+        assert (
+            new.means[:, 2].min() > occluders.LEAST_HEIGHT * patch.FRAME.flying_height and new.means[:, 2].max() < 1.1
+        )
         assert new.base_colours.mean(0)[1] > 0.6 and new.imagined.all() and (new.uncertainty == 1).all()
 
 
-def test_no_thing_stands_where_views_contradict_each_other_or_the_ground_is_known():
+def test_no_object_is_added_where_views_contradict_each_other_or_the_ground_is_known():
     bare = patch.field()
     marked = replace(bare, imagined=bare.ground.copy())
     pool = seen_by(*EYES[:2])
-    condition, flat = told(marked, pool)
+    condition, flat = condition_views(marked, pool)
     thing = blob([1.7, 1.5, 0.5], [0.2, 0.2, 0.2], [0.1, 0.9, 0.1])
-    _, made = told(concatenate_fields([marked, thing]), pool)
+    _, made = condition_views(concatenate_fields([marked, thing]), pool)
     half = made.inverse_depth.copy()
     half[1] = flat.inverse_depth[1]
     alone = replace(made, inverse_depth=half)
     height = patch.FRAME.flying_height
-    assert len(occluders.things(marked, patch.grid(), pool, condition, alone, height)) == 0
-    assert len(occluders.things(bare, patch.grid(), pool, condition, made, height)) == 0
+    assert len(occluders.find_occluders(marked, patch.grid(), pool, condition, alone, height)) == 0
+    assert len(occluders.find_occluders(bare, patch.grid(), pool, condition, made, height)) == 0
 
 
 def test_every_unseen_cell_is_well_inside_the_picture_of_its_block():
@@ -271,37 +275,37 @@ def test_every_unseen_cell_is_well_inside_the_picture_of_its_block():
     grid = patch.grid(0.05)
     there = rng.random(grid.shape) < 0.02
     fresh = there.copy()
-    for target in viewpoints.blocks(grid, there, patch.FRAME.flying_height):
-        ((_, camera),) = viewpoints.cameras(viewpoints.ABOVE, target, patch.field(), grid, patch.FRAME, 64)
+    for target in viewpoints.find_targets(grid, there, patch.FRAME.flying_height):
+        ((_, camera),) = viewpoints.place_cameras(viewpoints.ABOVE, target, patch.field(), grid, patch.FRAME, 64)
         assert camera.forward[2] < -np.sin(np.radians(75))
         at, depth = camera.project(grid.centres)
         fresh &= ~((depth > 0) & (at > 2).all(1) & (at < 62).all(1)).reshape(grid.shape)
     assert there.any() and not fresh.any()
-    assert viewpoints.blocks(grid, np.zeros(grid.shape, bool), 6.0) == []
+    assert viewpoints.find_targets(grid, np.zeros(grid.shape, bool), 6.0) == []
 
 
-def test_no_camera_stands_inside_of_something_or_under_the_ground():
+def test_no_camera_is_inside_an_object_or_under_the_ground():
     target = np.array(MIDDLE)
-    free = viewpoints.cameras(viewpoints.ASIDE, target, patch.field(), patch.grid(), patch.FRAME, 32)
+    free = viewpoints.place_cameras(viewpoints.ASIDE, target, patch.field(), patch.grid(), patch.FRAME, 32)
     tower = blob(list(free[2][1].centre), [0.4, 0.4, 0.4], [0.5, 0.5, 0.5])
-    left = viewpoints.cameras(
+    left = viewpoints.place_cameras(
         viewpoints.ASIDE, target, concatenate_fields([patch.field(), tower]), patch.grid(), patch.FRAME, 32
     )
     assert len(free) == 4 and [pose for pose, _ in left] == [pose for i, (pose, _) in enumerate(free) if i != 2]
 
 
-def test_it_is_measured_before_and_after_everywhere_and_where_it_was_painted():
+def test_evaluation_compares_before_and_after_everywhere_and_where_it_was_inpainted():
     field, grid = half_seen()
-    east = unseen.gaussians(field, grid, ~grid.seen)
+    east = unseen.select_gaussians(field, grid, ~grid.seen)
     tests = patch.photos(2)  # of the ground as it is
     after = replace(patch.field(), imagined=east)
     after.sh[east] += 0.05
-    found = evaluation.judged(field, after, tests)
+    found = evaluation.evaluate_inpainting(field, after, tests)
     for part in ("all", "imagined"):
         assert found[part]["after"]["psnr"] > found[part]["before"]["psnr"] + 3
     assert 0 < found["imagined"]["pixels"] < found["all"]["pixels"]
     assert found["gaussians"] == {"before": len(field), "after": len(after), "imagined": int(after.imagined.sum())}
-    same_again = evaluation.judged(field, field, tests)
+    same_again = evaluation.evaluate_inpainting(field, field, tests)
     assert same_again["imagined"]["pixels"] == 0 and same_again["imagined"]["before"]["psnr"] is None
     assert same_again["all"]["before"] == same_again["all"]["after"]
 

@@ -75,7 +75,7 @@ def test_a_view_does_not_depend_on_the_others(prior):
 def test_where_nothing_is_to_be_believed_the_render_has_no_say(prior):
     one, two = condition(), replace(condition(seed=1), photo=condition().photo, relative=condition().relative)
     nothing = np.zeros((3, *LATENT[1:]), bool)
-    found = [prior.sample(c, 1, 0.0, 2, 0, nothing) for c in (one, two)]
+    found = [prior.sample(c, 1, 0.0, 2, 0, known=nothing) for c in (one, two)]
     np.testing.assert_allclose(*found, atol=1e-5)
     assert not np.allclose(prior.sample(one, 1, 0.0, 2, 0), prior.sample(two, 1, 0.0, 2, 0))
 

@@ -9,8 +9,8 @@ from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt.prior.training.example_files import Examples
 from dav_gswt.study import csv_tables
 from dav_gswt.study.prior import plots
+from dav_gswt.study.prior.evaluation import Setting
 from dav_gswt.study.prior.regressor import Regressor
-from dav_gswt.study.prior.trial import Setting
 
 
 def test_losses_come_back_by_file_and_what_was_trained(tmp_path):
@@ -24,21 +24,21 @@ def test_losses_come_back_by_file_and_what_was_trained(tmp_path):
 
 @pytest.mark.parametrize("count, wide", [(1, 1), (50, 1), (300, 3)])
 def test_smoothing_keeps_a_straight_line_where_it_is(count, wide):
-    step, mean = plots.smoothed(2.0 * np.arange(1, count + 1))
+    step, mean = plots.smooth(2.0 * np.arange(1, count + 1))
     assert len(step) == count - wide + 1
     np.testing.assert_allclose(mean, 2 * step)
 
 
 def test_colours_stand_over_grey_where_nothing_is():
     rgba = np.float32([[0.2, 0.4, 0.6, 1.0], [0, 0, 0, 0]]).reshape(2, 1, 1, 4)
-    found = plots.over_grey(rgba).reshape(2, 3)
+    found = plots.composite_over_grey(rgba).reshape(2, 3)
     np.testing.assert_allclose(found, [[0.2, 0.4, 0.6], [plots.GREY] * 3], atol=1e-6)
 
 
 def test_the_plot_of_losses_is_a_picture_and_the_same_each_time(tmp_path):
     curves = {"terrain: coder": np.exp(-np.arange(200) / 50), "regressor0: denoiser": np.full(100, 0.5)}
     for name in ("a.png", "b.png"):
-        plots.losses(curves, tmp_path / name)
+        plots.plot_losses(curves, tmp_path / name)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert image_files.read_photo(tmp_path / "a.png").std() > 0.05
 
@@ -51,15 +51,15 @@ def test_a_gallery_shows_what_was_given_what_is_true_and_what_was_guessed(tmp_pa
     drawn[5][..., 3] = drawn[5][..., 3] > 0.5
     torch.manual_seed(0)
     prior, regressor = TerrainPrior(Network()), Regressor(Network())
-    columns = plots.gallery(Examples(Condition(*drawn[:5]), *drawn[5:]), prior, regressor, Setting(m=4, steps=1))
+    columns = plots.make_gallery(Examples(Condition(*drawn[:5]), *drawn[5:]), prior, regressor, Setting(m=4, steps=1))
     assert list(columns)[:3] == ["photo given", "render given", "truth"]
     assert list(columns)[3:8] == ["sample 1", "sample 2", "sample 3", "mean of 4", "regressor"]
     assert all(values.shape == (*s, 3) for values in list(columns.values())[:8])
     assert not np.allclose(columns["sample 1"], columns["sample 2"])
-    error, doubt = columns["error of render"], columns["doubt (w2_sq)"]
+    error, uncertainty = columns["error of render"], columns["uncertainty (w2_sq)"]
     np.testing.assert_array_equal(np.isnan(error), drawn[5][..., 3] == 0)
-    assert doubt.shape == (2, *LATENT[1:]) and doubt.min() > 0
-    plots.samples(columns, tmp_path / "a.png")
+    assert uncertainty.shape == (2, *LATENT[1:]) and uncertainty.min() > 0
+    plots.plot_samples(columns, tmp_path / "a.png")
     picture = image_files.read_photo(tmp_path / "a.png")
     assert picture.shape[1] > 1.4 * SIZE * len(columns)  # no picture is shown smaller than it is
     assert picture.std() > 0.05

@@ -1,1 +1,1 @@
-"""What no photo saw is filled in from a prior, and marked: it is no capture, and nothing counts it as such."""
+"""Inpainting: a prior generates the ground that no photo saw. Its Gaussians are marked and never count as captured."""

@@ -1,4 +1,4 @@
-"""What completing a field was worth: test photos before and after, everywhere and where it was painted."""
+"""Evaluation of inpainting: test photos before and after, over all pixels and over those of inpainted ground."""
 
 from dataclasses import replace
 
@@ -13,28 +13,29 @@ from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import evaluation
 
 
-def judged(
+def evaluate_inpainting(
     before: GaussianField, after: GaussianField, tests: list[TrainingView], weights: Weights | None = None
 ) -> dict:
-    """Metrics (`evaluation.evaluate`) over `all` pixels that look at the ground, and over those that look at `imagined`
-    ground alone, of the field before and after; how many pixels that is.
+    """Metrics of the field before and after, over `all` pixels of the modelled ground and over those of `imagined`
+    (inpainted) ground alone, and the number of pixels.
 
-    The pixels are the same for both: those that look at the discs that were painted. tests: weighted, see
-    `observation.mask_to_ground`. Returns: null in `imagined` where no test photo looks at any.
+    The pixels are the same before and after: those that look at the inpainted discs. tests: weighted, see
+    `observation.mask_to_ground`.
+    Returns: the content of metrics.json; null under `imagined` if no test photo sees such ground.
     """
-    painted = after.imagined[: len(before)]
-    views = {"all": tests, "imagined": [_over(view, before, painted) for view in tests]}
-    out = {
+    inpainted = after.imagined[: len(before)]
+    views = {"all": tests, "imagined": [_mask_view(view, before, inpainted) for view in tests]}
+    metrics = {
         part: {
-            "before": evaluation.evaluate_field(before, seen, weights=weights),
-            "after": evaluation.evaluate_field(after, seen, weights=weights),
-            "pixels": int(sum((view.weight > 0).sum() for view in seen)),
+            "before": evaluation.evaluate_field(before, masked, weights=weights),
+            "after": evaluation.evaluate_field(after, masked, weights=weights),
+            "pixels": int(sum((view.weight > 0).sum() for view in masked)),
         }
-        for part, seen in views.items()
+        for part, masked in views.items()
     }
-    return out | {"gaussians": {"before": len(before), "after": len(after), "imagined": int(after.imagined.sum())}}
+    return metrics | {"gaussians": {"before": len(before), "after": len(after), "imagined": int(after.imagined.sum())}}
 
 
-def _over(view: TrainingView, field: GaussianField, painted: Bool[Array, "n"]) -> TrainingView:
-    looks = unseen.looking(field, painted, view.camera)
+def _mask_view(view: TrainingView, field: GaussianField, inpainted: Bool[Array, "n"]) -> TrainingView:
+    looks = unseen.mask_pixels(field, inpainted, view.camera)
     return replace(view, weight=np.where(looks, view.weight, np.float32(0)))

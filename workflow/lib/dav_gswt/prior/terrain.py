@@ -110,8 +110,8 @@ class TerrainPrior(LatentModel):
         p_drop: float,
         steps: int,
         seed: int,
-        known: Bool[Array, "b h w"] | None = None,
         common: bool = True,
+        known: Bool[Array, "b h w"] | None = None,
     ) -> Float32[Array, "b m c hz wz"]:
         """See `Prior`. known: see `make_denoiser`."""
         sampling = Sampling(m, p_drop, steps, seed, common=common)

@@ -1,4 +1,4 @@
-"""Plots of the prior: how its training went, and what it makes of views that it has not seen."""
+"""Plots of the prior: training losses, and samples of held-out views."""
 
 from pathlib import Path
 
@@ -9,19 +9,19 @@ from numpy import ndarray as Array
 from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt.prior.training.example_files import Examples
 from dav_gswt.study import csv_tables, figures
+from dav_gswt.study.prior.evaluation import Setting, opaque_mask
 from dav_gswt.study.prior.regressor import Regressor
-from dav_gswt.study.prior.trial import Setting, opaque
 from dav_gswt.views.uncertainty import w2_sq
 
 WIDE = 0.01  # share of the steps over which a loss is averaged
-GREY = 0.75  # what pictures stand over: where nothing is known, it shows
-SHOWN = 3  # samples of a view
+GREY = 0.75  # background of pictures
+SAMPLES = 3  # shown per view
 INCH = 1.25  # side of a picture in a plot
 HIGHEST = 0.98  # quantile of a map at which its colours end
 
 
 def read_losses(paths: list[Path | str]) -> dict[str, Float[Array, "_"]]:
-    """Losses of every step as train_prior and train_regressor wrote them, by file and what was trained."""
+    """Losses of every step, by file and trained network."""
     found: dict[str, list[float]] = {}
     for path in paths:
         name = Path(path).stem.removesuffix("_losses")
@@ -30,19 +30,19 @@ def read_losses(paths: list[Path | str]) -> dict[str, Float[Array, "_"]]:
     return {name: np.array(values) for name, values in found.items()}
 
 
-def smoothed(values: Float[Array, "n"]) -> tuple[Float[Array, "k"], Float[Array, "k"]]:
+def smooth(values: Float[Array, "n"]) -> tuple[Float[Array, "k"], Float[Array, "k"]]:
     """Means over a sliding window of WIDE of the steps, and the step in the middle of each."""
     wide = max(1, round(WIDE * len(values)))
     means = np.convolve(values, np.full(wide, 1 / wide), "valid")
     return 1 + (wide - 1) / 2 + np.arange(len(means)), means
 
 
-def losses(curves: dict[str, Float[Array, "_"]], path: Path | str) -> None:
-    """Loss against step, a line for each thing that was trained; they are of different kinds, so only falls compare."""
+def plot_losses(curves: dict[str, Float[Array, "_"]], path: Path | str) -> None:
+    """Plot the losses against the step. They are of different kinds: levels do not compare."""
     figure = figures.blank(7.2, 4.2)
     axes = figure.add_subplot()
     for name, values in curves.items():
-        axes.plot(*smoothed(values), label=name, linewidth=1.2)
+        axes.plot(*smooth(values), label=name, linewidth=1.2)
     axes.set_yscale("log")
     axes.set_xlabel("step")
     axes.set_ylabel(f"loss, mean over {100 * WIDE:.0f} % of the steps")
@@ -51,32 +51,38 @@ def losses(curves: dict[str, Float[Array, "_"]], path: Path | str) -> None:
     figures.save(figure, path)
 
 
-def gallery(made: Examples, prior: TerrainPrior, regressor: Regressor | None, setting: Setting) -> dict[str, Array]:
-    """Columns of pictures (n s s 3) and maps (n h w) by title: what was given, what is true, what was guessed.
+def make_gallery(
+    made: Examples, prior: TerrainPrior, regressor: Regressor | None, setting: Setting
+) -> dict[str, Array]:
+    """Columns of pictures (n s s 3) and maps (n h w) by title: condition, truth and samples.
 
     The error of the render is NaN where the truth is not opaque.
     """
     given, truth = made.condition, made.rgba
     asked = setting.steps, setting.seed
     noises = prior.decode(prior.sample(given, setting.m, 0.0, *asked, common=False)).rgba
-    doubt = w2_sq(prior.sample(given, setting.m, setting.p_drop, *asked))[1]
+    uncertainty = w2_sq(prior.sample(given, setting.m, setting.p_drop, *asked))[1]
     apart = np.sqrt(((given.colour - truth[..., :3]) ** 2).mean(-1))
     render = np.concatenate([given.colour, given.alpha[..., None]], -1)
-    columns = {"photo given": given.photo, "render given": over_grey(render), "truth": over_grey(truth)}
-    columns |= {f"sample {i + 1}": over_grey(noises[:, i]) for i in range(min(SHOWN, setting.m))}
-    columns[f"mean of {setting.m}"] = over_grey(noises.mean(1))
+    columns = {
+        "photo given": given.photo,
+        "render given": composite_over_grey(render),
+        "truth": composite_over_grey(truth),
+    }
+    columns |= {f"sample {i + 1}": composite_over_grey(noises[:, i]) for i in range(min(SAMPLES, setting.m))}
+    columns[f"mean of {setting.m}"] = composite_over_grey(noises.mean(1))
     if regressor is not None:
-        columns["regressor"] = over_grey(regressor.decode(regressor.predict(given)).rgba)
-    return columns | {"error of render": np.where(opaque(made), apart, np.nan), "doubt (w2_sq)": doubt}
+        columns["regressor"] = composite_over_grey(regressor.decode(regressor.predict(given)).rgba)
+    return columns | {"error of render": np.where(opaque_mask(made), apart, np.nan), "uncertainty (w2_sq)": uncertainty}
 
 
-def over_grey(rgba: Float32[Array, "n s s 4"]) -> Float32[Array, "n s s 3"]:
-    """Colours over black, as priors have them, put over GREY."""
+def composite_over_grey(rgba: Float32[Array, "n s s 4"]) -> Float32[Array, "n s s 3"]:
+    """Colours over black composited over GREY."""
     return np.clip(rgba[..., :3] + np.float32(GREY) * (1 - rgba[..., 3:]), 0, 1)
 
 
-def samples(columns: dict[str, Array], path: Path | str) -> None:
-    """A view a row, a picture or map a column, with the colours' range of a map in its title."""
+def plot_samples(columns: dict[str, Array], path: Path | str) -> None:
+    """Plot a grid: one row per view, one column per picture or map, with the colour range of a map in its title."""
     count = len(next(iter(columns.values())))
     figure = figures.blank(INCH * len(columns), INCH * count + 0.5)
     grid = figure.subplots(count, len(columns), squeeze=False)

@@ -1,1 +1,1 @@
-"""Boundary refinement: pictures of a tile set's cuts, repaired by a prior, and the Gaussians beside them refitted."""
+"""Boundary refinement of a tile set by a prior: pictures of the seams are repaired and Gaussians refitted to them."""

@@ -1,8 +1,6 @@
-"""How far a Gaussian may be changed: the most beside a cut, less and less away from it, not at all over a border.
+"""Bounds of the change of Gaussians: greatest at a seam, falling with the distance, zero at the border of a tile.
 
-What reaches a tile's border belongs to the colour of that edge, and neighbours continue one another there: it keeps
-its bits. What is changed inside keeps clear of the border too, and changes fade towards it, so that no step arises
-between what was changed and what may not be.
+A Gaussian that reaches a border continues in the neighbouring tile, so it keeps its bits. Changes fade towards it.
 """
 
 from dataclasses import dataclass
@@ -20,9 +18,9 @@ from dav_gswt.tiles.layout import CENTRE
 
 @dataclass(frozen=True)
 class Bounds:
-    """The most that each Gaussian may be changed by, either way; 0 for those that must not be.
+    """The greatest change of each Gaussian, 0 if it must not change.
 
-    share: of the full bounds. colour: of each channel, in [0, 1]. opacity: of its logit. position: along each axis, in
+    share: of the full bounds. colour: of each channel, in [0, 1]. opacity: of the logit. position: along each axis, in
     world units.
     """
 
@@ -42,11 +40,10 @@ class Bounds:
         return np.stack(columns, 1).astype(np.float32)
 
 
-def seam(labels: UInt8[Array, "n n"]) -> Bool[Array, "n n"]:
-    """The cells on either side of the cut between a tile's centre and its frame.
+def find_seam(labels: UInt8[Array, "n n"]) -> Bool[Array, "n n"]:
+    """The cells on either side of the seam between a tile's centre and its frame.
 
-    The cuts of strips against the corner patch are no part of it: they run over the border, the same in all tiles with
-    that edge colour.
+    The seams between strips and the corner patch are not included: they cross the border.
     """
     centre = labels == CENTRE
     found = np.zeros_like(centre)
@@ -57,9 +54,9 @@ def seam(labels: UInt8[Array, "n n"]) -> Bool[Array, "n n"]:
     return found
 
 
-def shares(labels: UInt8[Array, "n n"], reach: float, margin: float) -> Float[Array, "n n"]:
-    """1 at the cut, falling as cos^2 to 0 at `reach` cells; times a rise from the border over `margin` cells."""
-    cut = seam(labels)
+def compute_shares(labels: UInt8[Array, "n n"], reach: float, margin: float) -> Float[Array, "n n"]:
+    """1 at the seam, falling as cos^2 to 0 at `reach` cells, times a smooth rise over `margin` cells at the border."""
+    cut = find_seam(labels)
     if not cut.any():
         return np.zeros(labels.shape)
     away = np.minimum(distance_transform_edt(~cut) / reach, 1)
@@ -69,23 +66,23 @@ def shares(labels: UInt8[Array, "n n"], reach: float, margin: float) -> Float[Ar
     return np.cos(0.5 * np.pi * away) ** 2 * np.minimum(rise[:, None], rise)
 
 
-def clearance(field: GaussianField, side: float) -> Float[Array, "n"]:
-    """From where each Gaussian ends to its tile's nearest border, in world units; negative where it reaches over it."""
+def border_clearance(field: GaussianField, side: float) -> Float[Array, "n"]:
+    """The distance from the rim of each Gaussian to the nearest border of its tile, world units; negative beyond it."""
     ends = RIM * np.sqrt(np.diagonal(compute_covariances(field), axis1=1, axis2=2)[:, :2])
     place = field.means[:, :2].astype(float)
     return (np.minimum(place, side - place) - ends).min(1)
 
 
-def in_cells(field: GaussianField, values: Float[Array, "n n *c"], side: float) -> Float[Array, "k *c"]:
-    """Of each Gaussian, the value of the cell that its centre is in."""
+def lookup_cells(field: GaussianField, values: Float[Array, "n n *c"], side: float) -> Float[Array, "k *c"]:
+    """The value of the cell of each Gaussian's centre."""
     column, row = (np.clip((field.means[:, i] * len(values) / side).astype(int), 0, len(values) - 1) for i in (0, 1))
     return values[row, column]
 
 
-def bounds(
+def compute_bounds(
     field: GaussianField, share: Float[Array, "n n"], side: float, colour: float, opacity: float, position: float
 ) -> Bounds:
-    """Of a tile's Gaussians. position: in world units; none comes to reach a border that it did not."""
-    room = clearance(field, side)
-    own = np.where(room > 0, in_cells(field, share, side), 0.0)
+    """The bounds of a tile's Gaussians. position: in world units; no Gaussian is moved over a border."""
+    room = border_clearance(field, side)
+    own = np.where(room > 0, lookup_cells(field, share, side), 0.0)
     return Bounds(own, own * colour, own * opacity, np.minimum(own * position, 0.5 * np.maximum(room, 0)))

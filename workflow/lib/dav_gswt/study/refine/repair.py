@@ -1,28 +1,25 @@
-"""Pictures of a cut, repaired: what a prior, or something to compare it with, would add to them."""
+"""Repair pictures of a seam by a prior."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Protocol, cast, runtime_checkable
 
-import numpy as np
 from jaxtyping import Bool, Float32
 from numpy import ndarray as Array
-from scipy.ndimage import gaussian_filter
 
 from dav_gswt.prior.interface import Condition, Prior
 from dav_gswt.threads import one_thread
 
-CELL = 4  # pixels a side of a cell of the code: what a prior believes or not
-TOUCHED = 0.25  # share of the full bounds that a cell shows somewhere, from which it is not believed
-SOFT = 3.0  # pixels: how widely a feather mixes the two sides of a cut
+CELL = 4  # pixels per side of a cell of the latent
+TOUCHED = 0.25  # share of the full bounds in a cell, from which its render is not valid
 
 Repair = Callable[[Condition, Float32[Array, "b s s"]], Float32[Array, "b s s 3"]]
-"""From what is known of b pictures, and how near to a cut their pixels are (0 to 1), to what is to be added to them."""
+"""From the condition of b pictures, and the nearness of their pixels to a seam (0 to 1), to what is added to them."""
 
 
 @runtime_checkable
 class Repairer(Prior, Protocol):
-    """A prior that goes on from a picture to which a little noise was added."""
+    """A prior that can denoise a picture to which a little noise was added."""
 
     def repair(
         self,
@@ -32,15 +29,15 @@ class Repairer(Prior, Protocol):
         seed: int,
         known: Bool[Array, "b h w"] | None = None,
     ) -> Float32[Array, "b c hz wz"]:
-        """The latents of what the field shows, noised to `strength` of the schedule (0: not at all) by one noise for
-        all views, and denoised in `steps` steps without dropout. known: cells whose render is to be believed."""
+        """See `TerrainPrior.repair`."""
+        ...
 
 
 @dataclass(frozen=True)
-class ByPrior:
-    """Adds the difference that repairing makes to a coded picture: what the coder alone loses is no repair.
+class PriorRepair:
+    """Adds the difference that the repair makes to an encoded picture, without the loss of the autoencoder.
 
-    believed: whether the prior is told that the render beside the cut is to be believed, too.
+    believed: whether the render beside the seam counts as valid.
     """
 
     model: Repairer
@@ -50,10 +47,10 @@ class ByPrior:
     believed: bool = False
 
     @classmethod
-    def of(cls, model: Prior, entry: dict, seed: int) -> "ByPrior":
-        """Of what an entry of the config's `seams` says under `refine`."""
+    def from_config(cls, model: Prior, entry: dict, seed: int) -> "PriorRepair":
+        """The repair under `refine` of an entry of the config."""
         given = {key: entry[key] for key in ("steps", "believed") if key in entry}
-        return cls(model, entry["strength"], seed=seed, **given)
+        return cls(cast(Repairer, model), entry["strength"], seed=seed, **given)
 
     def __call__(self, condition: Condition, near: Float32[Array, "b s s"]) -> Float32[Array, "b s s 3"]:
         b, size = len(condition), condition.colour.shape[1]
@@ -65,9 +62,3 @@ class ByPrior:
                 self.model.decode(codes).rgba[..., :3] for codes in (made, self.model.encode_render(condition))
             )
         return after - before
-
-
-def feathered(condition: Condition, near: Float32[Array, "b s s"]) -> Float32[Array, "b s s 3"]:
-    """A plain blur beside the cut, to compare a prior with."""
-    soft = gaussian_filter(condition.colour, (0, SOFT, SOFT, 0), mode="nearest")
-    return (near[..., None] * (soft - condition.colour)).astype(np.float32)

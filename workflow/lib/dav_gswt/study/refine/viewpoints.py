@@ -1,4 +1,4 @@
-"""Where to look from: assemblies of a tile and its neighbours, and cameras around the cut of the tile in the middle."""
+"""Views of the seams of a tile among its neighbours."""
 
 from dataclasses import dataclass, replace
 
@@ -9,7 +9,7 @@ from numpy import ndarray as Array
 from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.study.refine.limits import seam
+from dav_gswt.study.refine.limits import find_seam
 from dav_gswt.tiles.layout import EDGES, edge_colours
 
 FOV = 40.0  # degrees
@@ -18,11 +18,9 @@ SPREAD = 1.1  # of a view's width: half of the square around its middle that is 
 
 
 @dataclass(frozen=True)
-class Place:
-    """A point of the cut. own: the tile's Gaussians around it; around: the neighbours' there, which stay as they are.
-
-    middle: of the ground there, from the tile's south-western corner. cameras: that look at it from all sides.
-    """
+class SeamView:
+    """A point of a seam and the cameras around it. own: the tile's Gaussians nearby. around: those of the neighbours.
+    middle: on the ground, from the tile's south-western corner."""
 
     middle: Float[Array, "3"]
     own: Int[Array, "n"]
@@ -30,9 +28,9 @@ class Place:
     cameras: list[Camera]
 
 
-def points(labels: UInt8[Array, "n n"], apart: int) -> Int[Array, "p 2"]:
-    """Cells (x, y) of the cut, so that none of it is `apart` cells from all of them along both axes."""
-    left = seam(labels)
+def find_seam_points(labels: UInt8[Array, "n n"], apart: int) -> Int[Array, "p 2"]:
+    """Cells (x, y) of the seam such that each of its cells is nearer than `apart` cells to one of them."""
+    left = find_seam(labels)
     found = []
     while left.any():
         y, x = np.argwhere(left)[0]
@@ -41,10 +39,10 @@ def points(labels: UInt8[Array, "n n"], apart: int) -> Int[Array, "p 2"]:
     return np.array(found, int).reshape(-1, 2)
 
 
-def neighbours(tile: int) -> Int[Array, "3 3"]:
-    """Tiles around a tile whose edge colours meet, [y, x] from the south-west; itself in the middle.
+def neighbouring_tiles(tile: int) -> Int[Array, "3 3"]:
+    """Tiles with matching edge colours around a tile, [y, x] from the south-west; the tile itself in the middle.
 
-    Beside it lie tiles with its western and eastern colours exchanged, above and below it those with the other two.
+    To its sides are tiles with western and eastern colours exchanged, above and below those with the other two.
     """
     west, north, east, south = edge_colours(tile)
     out = np.empty((3, 3), int)
@@ -56,42 +54,44 @@ def neighbours(tile: int) -> Int[Array, "3 3"]:
     return out
 
 
-def assembly(tiles: list[GaussianField], tile: int, side: float) -> GaussianField:
-    """The neighbours of a tile, laid around it."""
-    numbers = neighbours(tile)
-    return concatenate_fields([moved(tiles[numbers[j, i]], [(i - 1) * side, (j - 1) * side, 0.0]) for j, i in _AROUND])
+def assemble_neighbours(tiles: list[GaussianField], tile: int, side: float) -> GaussianField:
+    """The neighbours of a tile, placed around it."""
+    numbers = neighbouring_tiles(tile)
+    return concatenate_fields(
+        [translate_field(tiles[numbers[j, i]], [(i - 1) * side, (j - 1) * side, 0.0]) for j, i in _AROUND]
+    )
 
 
 _AROUND = [(j, i) for j in range(3) for i in range(3) if (j, i) != (1, 1)]
 
 
-def moved(field: GaussianField, by) -> GaussianField:
+def translate_field(field: GaussianField, by) -> GaussianField:
     return replace(field, means=(field.means + np.asarray(by, float)).astype(np.float32))
 
 
-def place(
+def view_seam(
     field: GaussianField, around: GaussianField, at: Float[Array, "2"], width: float, views: int, size: int
-) -> Place:
-    """A point of a tile's cut, and what is seen of it; width: of the ground in a picture. views: evenly around it."""
-    own = np.flatnonzero(near(field, at, SPREAD * width))
+) -> SeamView:
+    """A point of a seam and its cameras. width: of the ground in a picture. views: number of cameras around it."""
+    own = np.flatnonzero(mask_near(field, at, SPREAD * width))
     height = ground_height(field[own], at, 0.1 * width)
     middle = np.array([*at, height])
-    looks = [camera(middle, width, 360.0 * k / views + 45.0, size) for k in range(views)]
-    return Place(middle, own, around[near(around, at, SPREAD * width)], looks)
+    around_it = [make_camera(middle, width, 360.0 * k / views + 45.0, size) for k in range(views)]
+    return SeamView(middle, own, around[mask_near(around, at, SPREAD * width)], around_it)
 
 
-def near(field: GaussianField, at: Float[Array, "2"], half: float) -> Bool[Array, "n"]:
-    return (np.abs(field.means[:, :2] - at) < half).all(1)
+def mask_near(field: GaussianField, at: Float[Array, "2"], half: float) -> Bool[Array, "n"]:
+    return np.asarray((np.abs(field.means[:, :2] - at) < half).all(1))
 
 
 def ground_height(field: GaussianField, at: Float[Array, "2"], half: float) -> float:
-    """Mean height of the ground's discs around a point; of all Gaussians where none is ground; 0 of none."""
-    there = field[near(field, at, half)]
+    """Mean height of the ground's discs around a point; of all Gaussians if none is ground; 0 of none."""
+    there = field[mask_near(field, at, half)]
     there = there[there.ground] if there.ground.any() else there
     return float(there.means[:, 2].mean(dtype=float)) if len(there) else 0.0
 
 
-def camera(middle: Float[Array, "3"], width: float, azimuth: float, size: int) -> Camera:
+def make_camera(middle: Float[Array, "3"], width: float, azimuth: float, size: int) -> Camera:
     """A square picture of ground `width` wide, from an azimuth in degrees."""
     a, e = np.radians([azimuth, ELEVATION])
     away = 0.5 * width / np.tan(np.radians(0.5 * FOV))
@@ -99,11 +99,11 @@ def camera(middle: Float[Array, "3"], width: float, azimuth: float, size: int) -
     return cameras.pinhole(eye, middle, size, size, FOV)
 
 
-def shifted(camera: Camera, by: Float[Array, "3"]) -> Camera:
-    """The same camera somewhere else."""
+def shift_camera(camera: Camera, by: Float[Array, "3"]) -> Camera:
+    """The camera translated."""
     return replace(camera, translation=camera.translation - camera.rotation @ by)
 
 
 def flying_height(width: float) -> float:
-    """How high over the ground these cameras are: to a prior, crops are ground seen from its usual height."""
+    """Height of these cameras above the ground."""
     return 0.5 * width / np.tan(np.radians(0.5 * FOV)) * np.sin(np.radians(ELEVATION))

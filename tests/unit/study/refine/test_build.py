@@ -13,7 +13,7 @@ from dav_gswt.prior.interface import Condition, DecodedViews
 from dav_gswt.prior.networks import Network
 from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt.study.refine import build, limits, repair
-from dav_gswt.study.refine.build import Options, Uncut
+from dav_gswt.study.refine.build import Options, UncutGround
 from dav_gswt.tiles.build import TileSet
 from dav_gswt.tiles.layout import CENTRE, EDGES, Exemplar, W
 
@@ -53,7 +53,7 @@ def tile_set(step=STEP):
     return TileSet(SIDE, SPACING, levels, np.stack([labels()] * EDGES), shifts, np.zeros(EDGES), report_of(N, 8))
 
 
-UNCUT = Uncut(ground(48, SPACING, np.full((48, 48, 3), 0.4), -3.0, -3.0), Exemplar(-3.0, -3.0, SPACING, 48))
+UNCUT = UncutGround(ground(48, SPACING, np.full((48, 48, 3), 0.4), -3.0, -3.0), Exemplar(-3.0, -3.0, SPACING, 48))
 
 
 def nothing(condition, near):
@@ -65,13 +65,13 @@ def truth(condition, near):
     return np.where(condition.colour > 0.44, np.float32(-STEP), np.float32(0)) * np.ones(3, np.float32)
 
 
-def refined(by, options=FEW, step=STEP):
-    return build.refined(tile_set(step), UNCUT, options, by, 32)
+def refine(by, options=FEW, step=STEP):
+    return build.refine_tiles(tile_set(step), UNCUT, options, by, 32)
 
 
 @pytest.fixture(scope="module")
 def mended():
-    return refined(truth)
+    return refine(truth)
 
 
 def same(one: GaussianField, two: GaussianField) -> bool:
@@ -79,7 +79,7 @@ def same(one: GaussianField, two: GaussianField) -> bool:
 
 
 def test_where_nothing_is_repaired_every_level_keeps_its_bytes():
-    found, before = refined(nothing), tile_set()
+    found, before = refine(nothing), tile_set()
     for one, two in zip(found.fields, before.fields, strict=True):
         assert all(same(a, b) for a, b in zip(one, two, strict=True))
     assert all(told["changed"] == 0 for told in found.report.more["refined"]["tiles"])
@@ -102,8 +102,8 @@ def test_a_step_of_brightness_becomes_smaller_in_every_level(mended):
 
 def test_what_changes_stays_within_its_bounds(mended):
     before = tile_set().fields[0][5]
-    bounds = limits.bounds(
-        before, limits.shares(labels(), FEW.reach, 8.0), SIDE, FEW.colour, FEW.opacity, FEW.position * SPACING
+    bounds = limits.compute_bounds(
+        before, limits.compute_shares(labels(), FEW.reach, 8.0), SIDE, FEW.colour, FEW.opacity, FEW.position * SPACING
     )
     after = mended.fields[0][5]
     for name, most, unit in (
@@ -121,13 +121,13 @@ def test_what_changes_stays_within_its_bounds(mended):
 def test_what_reaches_a_border_keeps_its_bits_so_that_neighbours_still_continue(mended):
     for now, was in zip(mended.fields, tile_set().fields, strict=True):
         for after, before in zip(now, was, strict=True):
-            over = limits.clearance(before, SIDE) <= 0
+            over = limits.border_clearance(before, SIDE) <= 0
             assert over.any() and same(after[over], before[over])
-            np.testing.assert_array_equal(limits.clearance(after, SIDE) <= 0, over)
+            np.testing.assert_array_equal(limits.border_clearance(after, SIDE) <= 0, over)
 
 
 def test_two_rounds_stay_within_the_bounds_of_one():
-    found = refined(truth, replace(FEW, rounds=2))
+    found = refine(truth, replace(FEW, rounds=2))
     moved = np.abs(found.fields[0][5].sh.astype(float) - tile_set().fields[0][5].sh) * SH0
     assert 0 < moved.max() <= FEW.colour + 1e-6
 
@@ -142,7 +142,7 @@ def test_labels_and_what_was_cut_are_kept(mended):
 
 def test_a_tile_without_a_cut_is_left_alone():
     plain = replace(tile_set(), labels=np.full((EDGES, N, N), CENTRE, np.uint8))
-    found = build.refined(plain, UNCUT, FEW, truth, 32)
+    found = build.refine_tiles(plain, UNCUT, FEW, truth, 32)
     assert all(same(a, b) for a, b in zip(found.fields[0], plain.fields[0], strict=True))
 
 
@@ -153,12 +153,12 @@ def prior():
 
 
 def one_tile(by):
-    return build._tile(tile_set(), 0, UNCUT, replace(FEW, fit=2), by, 64)[0]
+    return build._refine_tile(tile_set(), 0, UNCUT, replace(FEW, fit=2), by, 64)[0]
 
 
 def test_a_prior_without_strength_changes_nothing_and_with_it_the_seed_decides(prior):
-    assert same(one_tile(repair.ByPrior(prior, 0.0)), tile_set().fields[0][0])
-    first, again, other = (one_tile(repair.ByPrior(prior, 0.3, 2, seed)) for seed in (1, 1, 2))
+    assert same(one_tile(repair.PriorRepair(prior, 0.0)), tile_set().fields[0][0])
+    first, again, other = (one_tile(repair.PriorRepair(prior, 0.3, 2, seed)) for seed in (1, 1, 2))
     assert same(first, again) and not same(first, other)
 
 
@@ -167,7 +167,7 @@ def test_threads_of_the_networks_change_no_byte(prior):
     try:
         for count in (1, 3):
             torch.set_num_threads(count)
-            found.append(one_tile(repair.ByPrior(prior, 0.3, 2)))
+            found.append(one_tile(repair.PriorRepair(prior, 0.3, 2)))
             assert torch.get_num_threads() == count
     finally:
         torch.set_num_threads(threads)
@@ -178,13 +178,13 @@ def test_the_terrain_prior_can_repair(prior):
     assert isinstance(prior, repair.Repairer)
 
 
-class Telling:
-    """Keeps what it was told."""
+class RecordingPrior:
+    """Records its arguments."""
 
-    name, size = "telling", 32
+    name, size = "recording", 32
 
     def repair(self, condition, strength, steps, seed, known=None):
-        self.told = (strength, steps, seed, known)
+        self.recorded = (strength, steps, seed, known)
         return self.encode_render(condition)
 
     def sample(self, condition, m, p_drop, steps, seed, common=True):
@@ -207,23 +207,15 @@ def test_the_prior_is_told_not_to_believe_the_render_beside_the_cut():
     condition = Condition(grey, one, one, grey, np.float32([[0, 0, 1, 0]]))
     near = np.zeros((1, 32, 32), np.float32)
     near[0, 9, 14] = 0.9
-    model = Telling()
-    assert not repair.ByPrior.of(model, {"prior": "x", "strength": 0.2, "steps": 3}, 7)(condition, near).any()
-    strength, steps, seed, known = model.told
+    model = RecordingPrior()
+    assert not repair.PriorRepair.from_config(model, {"prior": "x", "strength": 0.2, "steps": 3}, 7)(
+        condition, near
+    ).any()
+    strength, steps, seed, known = model.recorded
     assert (strength, steps, seed) == (0.2, 3, 7)
     np.testing.assert_array_equal(np.argwhere(~known[0]), [[2, 3]])
-    repair.ByPrior.of(model, {"strength": 0.2, "believed": True}, 7)(condition, near)
-    assert model.told[3] is None
-
-
-def test_a_feather_softens_beside_the_cut_alone():
-    picture = np.zeros((1, 32, 32, 3), np.float32)
-    picture[:, :, 16:] = 1
-    one = np.ones((1, 32, 32), np.float32)
-    near = np.zeros_like(one)
-    near[:, :16] = 1
-    added = repair.feathered(Condition(picture, one, one, picture, np.float32([[0, 0, 1, 0]])), near)
-    assert added[0, 8, 15, 0] > 0.2 and added[0, 8, 16, 0] < -0.2 and not added[0, 16:].any()
+    repair.PriorRepair.from_config(model, {"strength": 0.2, "believed": True}, 7)(condition, near)
+    assert model.recorded[3] is None
 
 
 def test_neighbours_are_what_a_tile_is_seen_among(monkeypatch):
@@ -235,8 +227,8 @@ def test_neighbours_are_what_a_tile_is_seen_among(monkeypatch):
         return np.zeros_like(condition.colour)
 
     tiles = tile_set()
-    build._tile(tiles, 0, UNCUT, FEW, look, 32)
+    build._refine_tile(tiles, 0, UNCUT, FEW, look, 32)
     bright = replace(tiles.fields[0][0], sh=tiles.fields[0][0].sh + 1)
-    monkeypatch.setattr(build.viewpoints, "assembly", lambda *_: concatenate_fields([bright]))
-    build._tile(tiles, 0, UNCUT, FEW, look, 32)
+    monkeypatch.setattr(build.viewpoints, "assemble_neighbours", lambda *_: concatenate_fields([bright]))
+    build._refine_tile(tiles, 0, UNCUT, FEW, look, 32)
     assert np.abs(seen[0] - seen[1]).max() > 0.05

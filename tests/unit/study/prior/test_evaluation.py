@@ -1,4 +1,4 @@
-"""The trial of the prior: its measures by hand-worked values, the table by networks that learned nothing."""
+"""The evaluation of the prior: its measures by hand-worked values, the table with untrained networks."""
 
 from dataclasses import replace
 
@@ -12,9 +12,9 @@ from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.networks import LATENT, SIZE, Network
 from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt.prior.training.example_files import Examples
-from dav_gswt.study.prior import trial
+from dav_gswt.study.prior import evaluation
+from dav_gswt.study.prior.evaluation import COLUMNS, Estimate, Setting
 from dav_gswt.study.prior.regressor import Regressor
-from dav_gswt.study.prior.trial import COLUMNS, Guess, Setting
 
 OFF = np.float32([0.125, 0.25, 0.375, 0.5])
 TINY = Setting(m=2, p_drop=0.15, steps=2)
@@ -60,7 +60,7 @@ def random_weights():
 
 @pytest.fixture(scope="module")
 def rows(prior, regressors, random_weights):
-    return trial.tried(made(), prior, regressors, TINY, random_weights)
+    return evaluation.evaluate_prior(made(), prior, regressors, TINY, random_weights)
 
 
 def found(rows, what):
@@ -69,8 +69,10 @@ def found(rows, what):
 
 def of_cells(cells, views):
     """The columns of one map of doubt, made in no time."""
-    truth = trial.truth_of(views)
-    return trial.summed(trial.judged(Guess("", "", 0.0, cells=np.float32(cells)), truth, None), truth)
+    truth = evaluation.compute_truth(views)
+    return evaluation.summarize_scores(
+        evaluation.score_estimate(Estimate("", "", 0.0, cells=np.float32(cells)), truth, None), truth
+    )
 
 
 def test_the_error_of_views_and_cells_is_worked_out_over_opaque_pixels():
@@ -80,7 +82,7 @@ def test_the_error_of_views_and_cells_is_worked_out_over_opaque_pixels():
     views.rgba[:, :2, 4:8, 3] = 0.98
     views.condition.colour[:] = views.rgba[..., :3] + np.float32(0.3)
     views.condition.colour[:, :4, :4] = views.rgba[:, :4, :4, :3]
-    truth = trial.truth_of(views)
+    truth = evaluation.compute_truth(views)
     np.testing.assert_allclose(truth.error, np.sqrt(8 * 0.09 / 24), rtol=1e-5)
     np.testing.assert_allclose(truth.cell_error[:, 0, :3], [[0, 0.3, 0]] * 2, atol=1e-6)
     np.testing.assert_array_equal(truth.share[:, 0, :3], [[1, 0.5, 0]] * 2)
@@ -90,12 +92,12 @@ def test_a_view_without_anything_opaque_is_refused_and_passed_over():
     views = made(4)
     views.rgba[1, ..., 3] = 0.9
     with pytest.raises(ValueError, match="view 1"):
-        trial.truth_of(views)
-    np.testing.assert_array_equal(trial.evenly(views, 2).rgba, views.rgba[[0, 3]])
-    np.testing.assert_array_equal(trial.evenly(views, 9).rgba, views.rgba[[0, 2, 3]])
+        evaluation.compute_truth(views)
+    np.testing.assert_array_equal(evaluation.select_evenly(views, 2).rgba, views.rgba[[0, 3]])
+    np.testing.assert_array_equal(evaluation.select_evenly(views, 9).rgba, views.rgba[[0, 2, 3]])
 
 
-def test_a_doubt_that_is_the_error_ranks_perfectly_and_its_opposite_does_not():
+def test_an_uncertainty_that_is_the_error_ranks_perfectly_and_its_opposite_does_not():
     error = np.arange(1, 5)[:, None, None] * np.ones((4, *LATENT[1:]))
     right, wrong = of_cells(error, made()), of_cells(-error, made())
     for by in ("", "ground_", "cell_"):
@@ -105,7 +107,7 @@ def test_a_doubt_that_is_the_error_ranks_perfectly_and_its_opposite_does_not():
     assert blind["spearman"] is None and blind["ause"] > 0.1 and blind["psnr"] is None
 
 
-def test_doubt_about_the_sky_counts_for_the_picture_but_not_for_the_ground():
+def test_uncertainty_of_the_sky_counts_for_the_picture_but_not_for_the_ground():
     views = made()
     views.rgba[:, :32, :, 3] = 0.0  # and the less of it is wrong below, the more is doubted above
     doubt = np.zeros((4, *LATENT[1:]))
@@ -132,21 +134,26 @@ def test_nearness_does_not_look_at_the_sky(random_weights):
     views = made()
     views.rgba[:, :32, :, 3] = 0.0
     picture = views.condition.colour.copy()
-    truth = trial.truth_of(views)
-    one = trial.judged(Guess("", "", 0.0, picture=picture), truth, random_weights)
+    truth = evaluation.compute_truth(views)
+    one = evaluation.score_estimate(Estimate("", "", 0.0, picture=picture), truth, random_weights)
     np.testing.assert_allclose(one["psnr"], -20 * np.log10(OFF), atol=1e-4)
     picture[:, :32] = 1 - picture[:, :32]
-    two = trial.judged(Guess("", "", 0.0, picture=picture), truth, random_weights)
+    two = evaluation.score_estimate(Estimate("", "", 0.0, picture=picture), truth, random_weights)
     np.testing.assert_array_equal(one["psnr"], two["psnr"])
     np.testing.assert_array_equal(one["lpips"], two["lpips"])
     picture[:, 32:] = 1 - picture[:, 32:]
-    assert (trial.judged(Guess("", "", 0.0, picture=picture), truth, random_weights)["lpips"] != one["lpips"]).all()
+    assert (
+        evaluation.score_estimate(Estimate("", "", 0.0, picture=picture), truth, random_weights)["lpips"]
+        != one["lpips"]
+    ).all()
 
 
 def test_a_picture_that_is_the_truth_has_no_psnr():
     views = made(2)
-    truth = trial.truth_of(views)
-    row = trial.summed(trial.judged(Guess("", "", 1.0, picture=truth.colour), truth, None), truth)
+    truth = evaluation.compute_truth(views)
+    row = evaluation.summarize_scores(
+        evaluation.score_estimate(Estimate("", "", 1.0, picture=truth.colour), truth, None), truth
+    )
     assert row["psnr"] is None and row["lpips"] is None and row["seconds"] == 0.5
 
 
@@ -211,14 +218,14 @@ def test_the_mean_of_pictures_is_nearer_than_its_pictures_are_on_average(rows):
 
 
 def test_without_lpips_weights_and_regressors_their_rows_and_columns_are_absent(prior):
-    rows = trial.tried(made(2), prior, setting=TINY)
+    rows = evaluation.evaluate_prior(made(2), prior, setting=TINY)
     assert all(row["lpips"] is None for row in rows)
     assert not {row["what"] for row in rows} & {"lpips", "regressor", "ensemble", "dropout of regressor"}
 
 
-def test_views_are_tried_a_few_at_a_time_to_the_same_end(rows, prior, regressors, random_weights, monkeypatch):
-    monkeypatch.setattr(trial, "AT_ONCE", 3)
-    for one, two in zip(rows, trial.tried(made(), prior, regressors, TINY, random_weights), strict=True):
+def test_the_batch_size_does_not_change_the_scores(rows, prior, regressors, random_weights, monkeypatch):
+    monkeypatch.setattr(evaluation, "BATCH", 3)
+    for one, two in zip(rows, evaluation.evaluate_prior(made(), prior, regressors, TINY, random_weights), strict=True):
         assert one["what"] == two["what"] and one["setting"] == two["setting"]
         for name in ("psnr", "lpips", "ause"):
             assert (one[name] is None) == (two[name] is None)
@@ -227,21 +234,21 @@ def test_views_are_tried_a_few_at_a_time_to_the_same_end(rows, prior, regressors
 
 def test_a_residual_is_0_where_the_render_is_what_is_predicted(prior):
     views = made(2)
-    code = prior.encode(trial.pack_render(views.condition)).numpy()
-    assert trial.residual(prior, views, code).max() == 0
+    code = prior.encode(evaluation.pack_render(views.condition)).numpy()
+    assert evaluation.compute_residual(prior, views, code).max() == 0
     code[1, 2, 5, 6] += 2
-    apart = trial.residual(prior, views, code)
+    apart = evaluation.compute_residual(prior, views, code)
     assert apart[1, 5, 6] == pytest.approx(4 / LATENT[0], rel=1e-5) and np.count_nonzero(apart) == 1
 
 
-def test_a_regressor_with_another_coder_is_refused_by_its_number(prior, regressors):
+def test_a_regressor_with_another_autoencoder_is_refused_by_its_number(prior, regressors):
     torch.manual_seed(10)
-    with pytest.raises(InputError, match="regressor 1 has another coder"):
-        trial.tried(made(2), prior, [regressors[0], Regressor(Network())], TINY)
+    with pytest.raises(InputError, match="regressor 1 has another autoencoder"):
+        evaluation.evaluate_prior(made(2), prior, [regressors[0], Regressor(Network())], TINY)
 
 
-def test_nothing_to_try_is_refused(prior):
+def test_an_evaluation_without_views_is_refused(prior):
     with pytest.raises(ValueError, match="no view"):
-        trial.tried(trial.chosen(made(2), []), prior)
+        evaluation.evaluate_prior(made(2)[:0], prior)
     with pytest.raises(ValueError, match="at least 2 samples"):
-        trial.tried(made(2), prior, setting=replace(TINY, m=1))
+        evaluation.evaluate_prior(made(2), prior, setting=replace(TINY, m=1))
