@@ -44,6 +44,13 @@ class SerialRig(ConfigModel):
             raise ValueError(f"{missing[0]} is missing")
         return limits
 
+    @field_validator("no_go")
+    @classmethod
+    def _require_an_axis(cls, no_go: list[Axes]) -> list[Axes]:
+        if Axes() in no_go:
+            raise ValueError("a box without any axis bars every move; give it an axis")
+        return no_go
+
 
 class Drone(ConfigModel):
     """How a drone flies, for `agent: plan`."""
