@@ -82,8 +82,8 @@ def project(
     """The splats of the Gaussians before the near plane, by depth, those of equal depth by index."""
     rotation, translation = view
     q = means @ rotation.T + translation
-    drawn = q[:, 2] > 0 if camera.orthographic else q[:, 2] >= near
-    index = torch.nonzero(drawn)[:, 0]
+    visible = q[:, 2] > 0 if camera.orthographic else q[:, 2] >= near
+    index = torch.nonzero(visible)[:, 0]
     index = index[torch.argsort(q[index, 2].detach(), stable=True)]
     q, opacity = q[index], torch.sigmoid(opacity_logits[index])
     axes = rotations(quats[index]) * log_scales[index].exp()[:, None, :]

@@ -1,1 +1,1 @@
-"""Coarse field: a ground layer laid through the start views' points, and what stands on it, fitted to the photos."""
+"""Reconstruction: from posed photos to a Gaussian field over a ground (`coarse`), and its updates (`refinement`)."""

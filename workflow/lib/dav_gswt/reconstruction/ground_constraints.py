@@ -60,11 +60,11 @@ class GroundConstraints:
 
     def find_misplaced(self, values: dict[str, Array]) -> Bool[Array, "n"]:
         """Objects under the ground, above the ceiling, or off the grid."""
-        standing = values["means"][self.fixed :]
-        above = standing[:, 2] - self.surface(values).height_at(standing)
+        occluders = values["means"][self.fixed :]
+        above = occluders[:, 2] - self.surface(values).height_at(occluders)
         out = np.zeros(len(values["means"]), bool)
-        out[self.fixed :] = (above < -self.grid.spacing) | (above > self.ceiling.height_at(standing))
-        out[self.fixed :] |= ~self.grid.contains(standing)
+        out[self.fixed :] = (above < -self.grid.spacing) | (above > self.ceiling.height_at(occluders))
+        out[self.fixed :] |= ~self.grid.contains(occluders)
         return out
 
     def surface(self, values: dict[str, Array]) -> Ground:

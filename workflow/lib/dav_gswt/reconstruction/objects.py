@@ -45,10 +45,10 @@ def make_isolated_points(
     points, colours = points[inside], colours[inside]
     above = points[:, 2] - grid.height_at(points)
     known = relief.grid.contains(points)
-    taken = np.zeros(len(points), bool)
-    taken[known] = _at(relief.grid, maximum_filter(relief.stands, 3), points[known])
-    stand = (above > MIN_HEIGHT * grid.spacing) & (above < band) & ~taken
-    points, colours = points[stand], colours[stand]
+    covered = np.zeros(len(points), bool)
+    covered[known] = _at(relief.grid, maximum_filter(relief.stands, 3), points[known])
+    raised = (above > MIN_HEIGHT * grid.spacing) & (above < band) & ~covered
+    points, colours = points[raised], colours[raised]
     apart = (
         np.asarray(cKDTree(points).query(points, k=4)[0])[:, 1:].mean(1)
         if len(points) > 3
@@ -59,15 +59,15 @@ def make_isolated_points(
     return make_blobs(points[together], colours[together], size, logit=0.0)
 
 
-def compute_ceiling(grid: Ground, relief: Relief, standing: GaussianField) -> Float[Array, "rows columns"]:
+def compute_ceiling(grid: Ground, relief: Relief, occluders: GaussianField) -> Float[Array, "rows columns"]:
     """Largest height of objects above the surface, by cell of the ground; the photos see through all above.
 
     It is the largest height of the sweep and of Gaussians within CLEARANCE cells, and CLEARANCE cells more.
     """
     tops = np.where(relief.stands, relief.above, 0)
-    if len(standing):
-        row, column = _cell(relief.grid, standing.means)
-        above = standing.means[:, 2] - relief.grid.height_at(standing.means)
+    if len(occluders):
+        row, column = _cell(relief.grid, occluders.means)
+        above = occluders.means[:, 2] - relief.grid.height_at(occluders.means)
         np.maximum.at(tops, (row, column), above)
     reach = 2 * int(CLEARANCE) + 1
     return relief.onto(grid, maximum_filter(tops, reach)) + CLEARANCE * relief.grid.spacing

@@ -47,21 +47,21 @@ def observe(frame: SceneFrame, grid: Ground, views: list[TrainingView]) -> Obser
 
 
 def ground_colours(
-    grid: Ground, views: list[TrainingView], standing: GaussianField
+    grid: Ground, views: list[TrainingView], occluders: GaussianField
 ) -> tuple[Float[Array, "n 3"], Bool[Array, "r c"]]:
     """Median colours of the ground's cells, and which cells a photo sees that no object hides."""
-    if len(standing):
+    if len(occluders):
         rasterizer = raster.Rasterizer()
-        arrays = raster.to_raster_arrays(standing)
+        arrays = raster.to_raster_arrays(occluders)
         clear = [rasterizer.forward(**arrays, camera=v.camera).alpha < 0.5 for v in views]
         views = [replace(v, weight=v.weight * c) for v, c in zip(views, clear, strict=True)]
     colour, known = median_colours(grid.centres, views)
     return colour, known.reshape(grid.shape)
 
 
-def make_constraints(grid: Ground, relief: Relief, standing: GaussianField, frame: SceneFrame) -> GroundConstraints:
+def make_constraints(grid: Ground, relief: Relief, occluders: GaussianField, frame: SceneFrame) -> GroundConstraints:
     """The constraints of a fit over this ground: how high objects may be, by cell."""
-    ceiling = np.maximum(objects.compute_ceiling(grid, relief, standing), MIN_CEILING * frame.flying_height)
+    ceiling = np.maximum(objects.compute_ceiling(grid, relief, occluders), MIN_CEILING * frame.flying_height)
     return GroundConstraints(grid, ceiling)
 
 

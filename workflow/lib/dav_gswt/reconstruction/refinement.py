@@ -85,17 +85,17 @@ def _prepare_start(
         constraints = FreeConstraints(float(np.exp(np.median(field.log_scales))), extent_of(field.means))
         return _Start(field, grid, views, constraints)
     scene = observe(frame, grid, views)
-    standing = field[grid.heights.size + underlay.count_gaussians(grid) :]
+    occluders = field[grid.heights.size + underlay.count_gaussians(grid) :]
     shell = objects.make_shell(scene.relief, scene.views)
-    added = _drop_near(shell, standing, scene.relief.grid.spacing)
+    added = _drop_near(shell, occluders, scene.relief.grid.spacing)
     added = _match_degree(thin_at_random(added, settings.gaussian_limit - len(field), rng), field)
     _log.info("objects: %d Gaussians where nothing stood", len(added))
-    field, standing = concatenate_fields([field, added]), concatenate_fields([standing, added])
-    colour, known = ground_colours(grid, scene.views, standing)
+    field, occluders = concatenate_fields([field, added]), concatenate_fields([occluders, added])
+    colour, known = ground_colours(grid, scene.views, occluders)
     field = replace(field, sh=_colour_cells(field.sh, (known & ~grid.seen).ravel(), colour))
     grid = replace(grid, seen=known)
     masked = mask_for_fit(scene.views, grid)
-    return _Start(field, grid, masked, make_constraints(grid, scene.relief, standing, frame))
+    return _Start(field, grid, masked, make_constraints(grid, scene.relief, occluders, frame))
 
 
 def _colour_cells(sh: Array, cells: Array, colour: Array) -> Array:

@@ -44,8 +44,8 @@ def grow(
     count = len(places) + max(0, max_gaussians - len(state))
     if not count or not weight.sum() > 0:
         return 0
-    drawn = rng.choice(len(weight), count, p=weight / weight.sum())
-    sources, copies = np.unique(drawn, return_counts=True)
+    sampled = rng.choice(len(weight), count, p=weight / weight.sum())
+    sources, copies = np.unique(sampled, return_counts=True)
     copies = np.minimum(copies, MAX_COPIES)
     copied = _make_copies(state, sources, copies, fixed, rng)
     count = len(copied["means"])

@@ -34,6 +34,6 @@ def reduce_degree(full: State, degree: int, cameras: list[Camera]) -> State:
     mean = reduce(np.add, (basis / len(cameras) for basis in bases))
     out = full.copy()
     out.resize_sh(degree)
-    gone = np.einsum("nk,nkc->nc", mean[:, k:], colours[:, k:])
-    out.values["colours"][:, 0] += (gone / mean[:, :1]).astype(np.float32)
+    dropped = np.einsum("nk,nkc->nc", mean[:, k:], colours[:, k:])
+    out.values["colours"][:, 0] += (dropped / mean[:, :1]).astype(np.float32)
     return out
