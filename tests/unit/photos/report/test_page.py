@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from fixtures import photos as made_up
 from fixtures.frames import scene_frame
+from jinja2 import Environment, meta
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.georeference import Georeference
@@ -257,7 +258,7 @@ def test_a_model_of_another_program_and_old_frames_are_read(page, made):
 
 def test_a_template_that_asks_for_what_is_not_there_is_refused(made, template, tmp_path):
     wrong = tmp_path / "wrong.html"
-    wrong.write_text(template.read_text() + "$nothing")
+    wrong.write_text(template.read_text() + "{{ nothing }}")
     with pytest.raises(InputError, match="wrong.html: not a template of this report .*nothing"):
         write_report(made(), wrong, SCENE, tmp_path / "report.html")
     assert not (tmp_path / "report.html").exists()
@@ -266,5 +267,5 @@ def test_a_template_that_asks_for_what_is_not_there_is_refused(made, template, t
 def test_the_template_uses_all_that_the_report_has(made, template):
     found = collect_facts(made(), SCENE)
     smalls = make_thumbnails(made() / "images", [photo.name for photo in found.photos])
-    used = set(re.findall(r"\$(\w+)", template.read_text()))
-    assert used == set(report.parts(found, smalls))
+    used = meta.find_undeclared_variables(Environment().parse(template.read_text()))
+    assert used == set(report.template_values(found, smalls))

@@ -8,6 +8,7 @@ import io
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
@@ -43,6 +44,14 @@ class Thumbnail:
     image: Float32[Array, "h w 3"]
     uri: str
     masked: float
+
+
+class CoverageBin(NamedTuple):
+    """Numbers of photos that share a colour of the coverage map."""
+
+    first: int
+    last: int
+    colour: str
 
 
 @dataclass(frozen=True)
@@ -107,14 +116,17 @@ def draw_coverage(found: ReportFacts) -> str:
     return _svg("Coverage: how many photos see each place of the ground", on, layers)
 
 
-def bin_coverage(found: ReportFacts) -> list[tuple[int, int, str]]:
-    """Numbers of photos that share a colour: first, last, colour. Those below what is needed stand out."""
+def bin_coverage(found: ReportFacts) -> list[CoverageBin]:
+    """The colours of the coverage map. Numbers of photos below what is needed stand out."""
     most = max(int(found.cover.counts.max()), found.need)
-    few = [(n, n, FEW[0] if n == 1 and found.need > 2 else FEW[1]) for n in range(1, found.need)]
+    few = [CoverageBin(n, n, FEW[0] if n == 1 and found.need > 2 else FEW[1]) for n in range(1, found.need)]
     step = -(-(most - found.need + 1) // BINS)
     starts = range(found.need, most + 1, step)
     scale = colormaps["viridis"]
-    enough = [(n, min(n + step - 1, most), to_hex(scale(0.2 + 0.8 * i / len(starts)))) for i, n in enumerate(starts)]
+    enough = [
+        CoverageBin(n, min(n + step - 1, most), to_hex(scale(0.2 + 0.8 * i / len(starts))))
+        for i, n in enumerate(starts)
+    ]
     return few + enough
 
 

@@ -4,11 +4,13 @@ The page asks nothing of the net: pictures are data URIs, plans inline SVG. The 
 the same bytes.
 """
 
-from html import escape
+from dataclasses import dataclass
 from pathlib import Path
-from string import Template
+from typing import NamedTuple
 
 import numpy as np
+from jinja2 import Environment, StrictUndefined, TemplateError
+from markupsafe import Markup
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_file
@@ -26,8 +28,29 @@ from dav_gswt.photos.report.facts import (
 from dav_gswt.photos.report.figures import Thumbnail, bin_coverage, draw_coverage, draw_plan, make_thumbnails
 from dav_gswt.photos.splitting import ground_bounds, measure_visible_share
 
-SIGN = '<span class="sign" aria-hidden="true">⚠</span>'
-Fact = tuple[str, str, str]  # its name, its value, what it means
+
+class Fact(NamedTuple):
+    """A row of the table of facts."""
+
+    name: str
+    value: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class PhotoRow:
+    """A photo as the page lists it. numbers: points, error, height and tilt, as text. weak: has a weakness."""
+
+    index: int
+    name: str
+    uri: str
+    width: int
+    height: int
+    above_ground: str
+    weak: bool
+    numbers: tuple[str, ...]
+    overlap: str
+    verdict: str
 
 
 def write_report(folder: Path | str, template: Path | str, scene: str, out: Path | str) -> None:
@@ -36,34 +59,34 @@ def write_report(folder: Path | str, template: Path | str, scene: str, out: Path
     Raises: InputError: the folder is not readable, or the template asks for what is not there.
     """
     found = collect_facts(folder, scene)
-    smalls = make_thumbnails(Path(folder) / "images", [photo.name for photo in found.photos])
-    page = Template(Path(template).read_text(encoding="utf-8"))
+    thumbnails = make_thumbnails(Path(folder) / "images", [photo.name for photo in found.photos])
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     try:
-        text = page.substitute(parts(found, smalls))
-    except (KeyError, ValueError) as error:
+        page = environment.from_string(Path(template).read_text(encoding="utf-8"))
+        text = page.render(template_values(found, thumbnails)) + "\n"
+    except TemplateError as error:
         raise InputError(f"{template}: not a template of this report ({error})") from error
     with atomic_file(out) as part:
         part.write_text(text, encoding="utf-8")
 
 
-def parts(found: ReportFacts, smalls: list[Thumbnail]) -> dict[str, str]:
-    """What the template's names stand for, as HTML."""
-    photos = sorted(enumerate(zip(found.photos, smalls, strict=True)), key=lambda photo: photo[1][0].tests)
+def template_values(found: ReportFacts, thumbnails: list[Thumbnail]) -> dict[str, object]:
+    """What the template's names stand for. Photos that only test come last."""
+    rows = [_photo_row(i, *pair, found) for i, pair in enumerate(zip(found.photos, thumbnails, strict=True))]
     return {
-        "scene": escape(found.scene),
-        "summary": escape(summary(found)),
-        "verdict": verdict(found),
-        "plan": draw_plan(found, smalls),
+        "scene": found.scene,
+        "summary": summary(found),
+        "weak_spots": list_weak_spots(found),
+        "plan": Markup(draw_plan(found, thumbnails)),
         "plan_notes": plan_notes(found),
-        "coverage": draw_coverage(found),
-        "bar": bar(found),
-        "need": str(found.need),
-        "facts": "\n".join(_fact(*fact) for fact in [*registration(found), *camera_facts(found), *masks(smalls)]),
-        "left_out": left_out(found),
-        "strip": "\n".join(_thumb(i, photo, small, found) for i, (photo, small) in photos),
-        "rows": "\n".join(_row(i, photo, small.masked, found) for i, (photo, small) in photos),
+        "coverage": Markup(draw_coverage(found)),
+        "bins": bin_coverage(found),
+        "need": found.need,
+        "facts": [*registration_facts(found), *camera_facts(found), *mask_facts(thumbnails)],
+        "left_out": found.frame.left_out,
+        "photos": sorted(rows, key=lambda row: found.photos[row.index].tests),
         "height_unit": "m" if found.frame.unit == "metre" else "flying heights",
-        "link": str(splitting.LINK),
+        "link": splitting.LINK,
     }
 
 
@@ -78,16 +101,6 @@ def summary(found: ReportFacts) -> str:
     return f"{first} Tiles are made of a square of ground {side} wide: the exemplar, framed on both maps."
 
 
-def verdict(found: ReportFacts) -> str:
-    """The weak spots as a list, or that there are none."""
-    spots = list_weak_spots(found)
-    if not spots:
-        good = "Nothing is weak: no photo, and no part of the exemplar."
-        return f'<p class="fine"><span aria-hidden="true">✓</span> {good}</p>'
-    items = "\n".join(f"<li>{SIGN} {escape(spot)}</li>" for spot in spots)
-    return f'<ul class="spots">\n{items}\n</ul>'
-
-
 def plan_notes(found: ReportFacts) -> str:
     """What the plan's signs mean, as far as it has them."""
     notes = ["Each dot is a camera. Point at it for its name and what it sees (thin outline); select it for its row."]
@@ -100,20 +113,10 @@ def plan_notes(found: ReportFacts) -> str:
     if any(photo.tests for photo in found.photos):
         notes.append("Hollow: it only tests.")
     notes.append("Behind them are the points that the photos agree on, in their colours. Dashed square: the exemplar.")
-    return escape(" ".join(notes))
+    return " ".join(notes)
 
 
-def bar(found: ReportFacts) -> str:
-    """The coverage map's colours, each with its numbers of photos."""
-
-    def item(low: int, high: int, colour: str) -> str:
-        few = ' class="few"' if high < found.need else ""
-        return f'<li{few} style="--colour: {colour}">{low if low == high else f"{low}–{high}"}</li>'
-
-    return "\n".join(item(*found_bin) for found_bin in bin_coverage(found))
-
-
-def registration(found: ReportFacts) -> list[Fact]:
+def registration_facts(found: ReportFacts) -> list[Fact]:
     """How well the photos fit together."""
     frame, error = found.frame, mean_reprojection_error(found)
     counts = crop_to_exemplar(found)
@@ -125,20 +128,20 @@ def registration(found: ReportFacts) -> list[Fact]:
     sees = sum(sight >= splitting.LEAST_SIGHT for sight in sights)
     rest = "all of them" if sees == len(sights) else "the others show too little of it to take part"
     if frame.kind == "synthetic":
-        first = ("Photos", f"{len(found.placed)} and {len(found.photos) - len(found.placed)} tests", "rendered")
+        first = Fact("Photos", f"{len(found.placed)} and {len(found.photos) - len(found.placed)} tests", "rendered")
     else:
-        first = ("Photos in the folder", f"{frame.images}", f"{frame.registered} of them found their place")
+        first = Fact("Photos in the folder", f"{frame.images}", f"{frame.registered} of them found their place")
     return [
         first,
-        ("Photos of the exemplar", f"{sees}", rest),
-        ("Photos of each place", f"{low:.0f} to {high:.0f}, mostly {usual:.0f}", "over the exemplar"),
-        ("Points", f"{len(found.model.points):,}", "places on the ground that several photos agree on"),
-        (
+        Fact("Photos of the exemplar", f"{sees}", rest),
+        Fact("Photos of each place", f"{low:.0f} to {high:.0f}, mostly {usual:.0f}", "over the exemplar"),
+        Fact("Points", f"{len(found.model.points):,}", "places on the ground that several photos agree on"),
+        Fact(
             "Reprojection error",
             "not known" if error is None else f"{error:.2f} px",
             "how far a point lies from where its photos show it: below 1 is good",
         ),
-        ("Focal length", *focal_length(found)),
+        Fact("Focal length", *focal_length(found)),
     ]
 
 
@@ -151,7 +154,9 @@ def focal_length(found: ReportFacts) -> tuple[str, str]:
     value = "EXIF has none" if ratio is None else f"{ratio:.3f} times EXIF's"
     if not lens:
         return (value, "as it was solved with") if ratio else ("as given", "from the model of another program")
-    free = f"; the photos alone say {lens.free / lens.exif:.3f} times EXIF's" if lens.free and ratio else ""
+    free = (
+        f"; the photos alone say {lens.free / lens.exif:.3f} times EXIF's" if lens.free and lens.exif and ratio else ""
+    )
     return value, f"{lens.decision}{free if 'alone' not in lens.decision else ''}"
 
 
@@ -163,82 +168,56 @@ def camera_facts(found: ReportFacts) -> list[Fact]:
     metric = frame.unit == "metre"
     flying = found.length(frame.flying_height) if metric else "the unit of length: metres are not known"
     facts = [
-        ("Exemplar", found.length(found.exemplar[2]), "side of the square of ground that tiles are made of"),
-        ("Flying height", flying, "median height of the cameras above the ground"),
-        ("Heights", found.range(low, high), f"of the cameras; median {found.length(usual)}"),
-        (
+        Fact("Exemplar", found.length(found.exemplar[2]), "side of the square of ground that tiles are made of"),
+        Fact("Flying height", flying, "median height of the cameras above the ground"),
+        Fact("Heights", found.range(low, high), f"of the cameras; median {found.length(usual)}"),
+        Fact(
             "Tilt",
             f"{least:.0f} to {most:.0f} degrees",
             f"median {middle:.0f}; 0 looks straight down, 90 to the horizon",
         ),
     ]
     if frame.relief is not None:
-        facts.append(("Relief", f"{frame.relief:.3f} flying heights", "how far points lie off the plane of the ground"))
+        facts.append(
+            Fact("Relief", f"{frame.relief:.3f} flying heights", "how far points lie off the plane of the ground")
+        )
     if found.place:
         where = f"{found.place.latitude:.6f}, {found.place.longitude:.6f}"
         turned = f"latitude and longitude of the origin; up on the maps is {found.place.north:.0f} degrees from north"
-        return [*facts, ("Place", where, turned)]
+        return [*facts, Fact("Place", where, turned)]
     if frame.kind == "photos":
-        facts.append(("Place", "not known", "the photos have no GPS positions, or none that agree with them"))
+        facts.append(Fact("Place", "not known", "the photos have no GPS positions, or none that agree with them"))
     return facts
 
 
-def masks(smalls: list[Thumbnail]) -> list[Fact]:
+def mask_facts(thumbnails: list[Thumbnail]) -> list[Fact]:
     """How many photos are masked, and how much of them."""
-    shares = [small.masked for small in smalls if small.masked > 0]
+    shares = [thumbnail.masked for thumbnail in thumbnails if thumbnail.masked > 0]
     if not shares:
         return []
     many = "1 photo" if len(shares) == 1 else f"{len(shares)} photos"
-    return [("Masks", many, f"{100 * np.mean(shares):.1f} % does not count there (pink below)")]
+    return [Fact("Masks", many, f"{100 * np.mean(shares):.1f} % does not count there (pink below)")]
 
 
-def left_out(found: ReportFacts) -> str:
-    """The photos that found no place, and why, as a section; nothing where all did."""
-    if not (rows := found.frame.left_out):
-        return ""
-    body = "\n".join(f"<tr><th scope=row>{escape(r.name)}</th><td>{escape(r.reason)}</td></tr>" for r in rows)
-    head = '<tr><th scope="col">Photo</th><th scope="col">Reason</th></tr>'
-    return (
-        f'<section id="left-out">\n<h2>Left out</h2>\n<div class="scroll"><table>\n<thead>{head}</thead>\n'
-        f"<tbody>\n{body}\n</tbody></table></div>\n</section>"
-    )
-
-
-def _fact(name: str, value: str, meaning: str) -> str:
-    return (
-        f'<tr><th scope="row">{escape(name)}</th><td>{escape(value)}</td><td class="soft">{escape(meaning)}</td></tr>'
-    )
-
-
-def _thumb(index: int, photo: PhotoFacts, small: Thumbnail, found: ReportFacts) -> str:
-    height, width = small.image.shape[:2]
-    alt = f"Photo {photo.name}, {found.length(photo.height)} above the ground"
-    sign = f"{SIGN} " if photo.weak else ""
-    return (
-        f'<li><a href="#photo-{index}"><img src="{small.uri}" width="{width}" height="{height}" alt="{escape(alt)}">'
-        f"<span>{sign}{escape(photo.name)}</span></a></li>"
-    )
-
-
-def _row(index: int, photo: PhotoFacts, masked: float, found: ReportFacts) -> str:
+def _photo_row(index: int, photo: PhotoFacts, thumbnail: Thumbnail, found: ReportFacts) -> PhotoRow:
     unit = "" if found.frame.unit == "flying height" else " m"
+    overlap = "–"
     if photo.partner:
         share = 100 * photo.shared / max(photo.points, 1)
         overlap = f"{photo.shared:,} with {photo.partner} ({share:.0f} %), {photo.linked} linked"
-    else:
-        overlap = "–"
     notes = [*photo.weak] or ["only tests" if photo.tests else "good"]
-    notes += [f"{100 * masked:.0f} % masked"] if masked > 0 else []
-    cells = [
-        f"{photo.points:,}",
-        "–" if photo.error is None else f"{photo.error:.2f}",
-        f"{photo.height:.2f}{unit}",
-        f"{photo.tilt:.0f}",
-    ]
-    numbers = "".join(f'<td class="number">{escape(cell)}</td>' for cell in cells)
-    said = f"{SIGN if photo.weak else ''} {escape('; '.join(notes))}".strip()
-    kind = ' class="weak"' if photo.weak else ""
-    return (
-        f'<tr id="photo-{index}"{kind}><th scope="row">{escape(photo.name)}</th>{numbers}'
-        f"<td>{escape(overlap)}</td><td>{said}</td></tr>"
+    notes += [f"{100 * thumbnail.masked:.0f} % masked"] if thumbnail.masked > 0 else []
+    error = "–" if photo.error is None else f"{photo.error:.2f}"
+    height, width = thumbnail.image.shape[:2]
+    return PhotoRow(
+        index=index,
+        name=photo.name,
+        uri=thumbnail.uri,
+        width=width,
+        height=height,
+        above_ground=found.length(photo.height),
+        weak=bool(photo.weak),
+        numbers=(f"{photo.points:,}", error, f"{photo.height:.2f}{unit}", f"{photo.tilt:.0f}"),
+        overlap=overlap,
+        verdict="; ".join(notes),
     )
