@@ -146,7 +146,7 @@ def test_a_page_that_is_loaded_again_goes_on_and_says_what_was_seen_twice(person
 def test_pictures_go_after_their_time_and_may_be_answered_then(person, brief):
     with person(kit=brief) as page:
         begin(page)
-        Visit(page).until("shown && shown.gone")
+        Visit(page).until("current && current.gone")
         assert not page.locator("#leftPicture").is_visible() and page.locator("#question").is_visible()
         page.keyboard.press("ArrowLeft")
         reached(page, 2)

@@ -1,159 +1,192 @@
 "use strict";
-// A session of trials: one person, one list, an answer a pair. A plain script, as pages that are opened as files may load no modules.
-// What is known is written to the browser's own storage after each step, so that a page that is loaded again goes on.
+// A session of two-alternative forced choice: one participant, one list, an answer a pair. A plain script, as pages that are
+// opened as files may load no modules. The session is stored in the browser after each step, so a reloaded page goes on.
+
+/**
+ * seen: how often a pair was shown before its answer; gone: the pictures had disappeared by then.
+ * @typedef {"left" | "right"} Side
+ * @typedef {{ item: string, left: string, right: string, choice: Side, ms: number, gone: boolean, seen: number }} Answer
+ * @typedef {{ width: number, height: number, pixel_ratio: number, picture: number }} ScreenSize
+ * @typedef {{ participant: string, list: number, screen: ScreenSize | null, seen: number, answers: Answer[] }} Session
+ */
 
 const PAUSE = 400; // milliseconds without pictures before each pair
+/** @type {Record<string, Side>} */
 const KEYS = { ArrowLeft: "left", KeyF: "left", ArrowRight: "right", KeyJ: "right" };
-const at = (id) => document.getElementById(id);
-const place = `davgswt-2afc-${STUDY.study}`;
+const STORAGE_KEY = `davgswt-2afc-${STUDY.study}`;
 
-let session = null; // {participant, list, screen, seen, answers}; `seen`: how often the next pair was shown so far
-let shown = null; // of the pair that is asked for: when it appeared, whether it went; null between pairs
+/** @type {Session | null} */
+let session = null;
+/** @type {{ since: number, gone: boolean } | null} */
+let current = null; // the pair on the screen; null between pairs
 let timer = 0;
 
-function stored() {
+/** An element of index.html. @param {string} id @returns {HTMLElement} */
+const element = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+/** @param {string} id */
+const image = (id) => /** @type {HTMLImageElement} */ (element(id));
+const consent = /** @type {HTMLInputElement} */ (element("consent"));
+const beginButton = /** @type {HTMLButtonElement} */ (element("begin"));
+
+/** @returns {Session | null} */
+function readSession() {
   try {
-    const found = JSON.parse(localStorage.getItem(place));
-    return found && STUDY.lists[found.list] && Array.isArray(found.answers) ? found : null;
+    const value = JSON.parse(localStorage.getItem(STORAGE_KEY) ?? "null");
+    return value && STUDY.lists[value.list] && Array.isArray(value.answers) ? value : null;
   } catch {
-    return null; // no storage here: a page that is loaded again begins anew
+    return null; // no storage here: a reloaded page begins anew
   }
 }
 
-function store() {
+function writeSession() {
   try {
-    if (session) localStorage.setItem(place, JSON.stringify(session));
-    else localStorage.removeItem(place);
+    if (session) localStorage.setItem(STORAGE_KEY, JSON.stringify(session));
+    else localStorage.removeItem(STORAGE_KEY);
   } catch {} // as above
 }
 
-const hex = (bytes) => [...crypto.getRandomValues(new Uint8Array(bytes))].map((b) => b.toString(16).padStart(2, "0")).join("");
-const trials = () => STUDY.lists[session.list];
+/** @param {number} bytes */
+const randomHex = (bytes) => [...crypto.getRandomValues(new Uint8Array(bytes))].map((b) => b.toString(16).padStart(2, "0")).join("");
+/** @param {Session} session */
+const trialsOf = ({ list }) => STUDY.lists[list];
 
-/** The list of ?list=n, so that lists can be dealt in turn; else any. */
-function listFor() {
+/** The list of ?list=n, so that lists can be dealt in turn; else a random one. */
+function chooseList() {
   const asked = new URLSearchParams(location.search).get("list");
-  if (/^\d{1,4}$/.test(asked ?? "") && STUDY.lists[asked]) return Number(asked);
+  if (asked !== null && /^\d{1,4}$/.test(asked) && STUDY.lists[Number(asked)]) return Number(asked);
   return crypto.getRandomValues(new Uint32Array(1))[0] % STUDY.lists.length;
 }
 
-function show(id) {
-  for (const section of ["intro", "trial", "end"]) at(section).hidden = section !== id;
+/** @param {string | null} id */
+function showSection(id) {
+  for (const section of ["intro", "trial", "end"]) element(section).hidden = section !== id;
 }
 
 function begin() {
-  session = { participant: hex(16), list: listFor(), screen: null, seen: 0, answers: [] };
-  store();
+  session = { participant: randomHex(16), list: chooseList(), screen: null, seen: 0, answers: [] };
+  writeSession();
   next();
 }
 
-const source = (name) => `pictures/${name}.png`;
+/** @param {string} name */
+const pictureFile = (name) => `pictures/${name}.png`;
 
 async function next() {
-  shown = null;
-  const number = session.answers.length, count = trials().length, mine = session;
-  at("bar").value = number / count;
-  if (number === count) return finish();
-  show("trial");
-  at("pair").className = "away";
-  at("question").textContent = "\u00a0";
-  at("number").textContent = `${number + 1} of ${count}`;
-  const [, left, right] = trials()[number];
-  const pictures = [at("leftPicture"), at("rightPicture")];
-  [pictures[0].src, pictures[1].src] = [source(left), source(right)];
+  if (!session) return;
+  current = null;
+  const mine = session, trials = trialsOf(mine), number = mine.answers.length;
+  /** @type {HTMLProgressElement} */ (element("bar")).value = number / trials.length;
+  if (number === trials.length) return finish();
+  showSection("trial");
+  element("pair").className = "away";
+  element("question").textContent = "\u00a0";
+  element("number").textContent = `${number + 1} of ${trials.length}`;
+  const [, left, right] = trials[number];
+  const pictures = [image("leftPicture"), image("rightPicture")];
+  [pictures[0].src, pictures[1].src] = [pictureFile(left), pictureFile(right)];
   try {
     await Promise.all([...pictures.map((picture) => picture.decode()), new Promise((done) => setTimeout(done, PAUSE))]);
   } catch {
     return fail("A picture is missing from the page's folder. Please tell whoever asked you to take part.");
   }
-  if (session === mine) appear();
+  if (session === mine) showPair(mine);
 }
 
-function appear() {
-  session.seen += 1;
-  session.screen = {
-    width: screen.width, height: screen.height, pixel_ratio: devicePixelRatio, picture: at("leftPicture").getBoundingClientRect().width,
+/** @param {Session} mine */
+function showPair(mine) {
+  mine.seen += 1;
+  mine.screen = {
+    width: screen.width, height: screen.height, pixel_ratio: devicePixelRatio,
+    picture: image("leftPicture").getBoundingClientRect().width,
   };
-  store();
-  at("pair").className = "";
-  at("question").textContent = "Which one has the less visible seam?";
-  const mine = session;
+  writeSession();
+  element("pair").className = "";
+  element("question").textContent = "Which one has the less visible seam?";
   requestAnimationFrame((now) => {
     if (session !== mine) return;
-    shown = { since: now, gone: false };
+    const pair = { since: now, gone: false };
+    current = pair;
     timer = setTimeout(() => {
-      at("pair").className = "away";
-      shown.gone = true;
+      element("pair").className = "away";
+      pair.gone = true;
     }, 1000 * STUDY.seconds);
   });
 }
 
+/** @param {Side} choice */
 function answer(choice) {
-  if (!shown) return;
+  if (!current || !session) return;
   clearTimeout(timer);
-  const [item, left, right] = trials()[session.answers.length];
-  const ms = Math.round(Math.max(0, performance.now() - shown.since));
-  session.answers.push({ item, left, right, choice, ms, gone: shown.gone, seen: session.seen });
+  const [item, left, right] = trialsOf(session)[session.answers.length];
+  const ms = Math.round(Math.max(0, performance.now() - current.since));
+  session.answers.push({ item, left, right, choice, ms, gone: current.gone, seen: session.seen });
   session.seen = 0;
-  store();
+  writeSession();
   next();
 }
 
 function finish() {
-  show("end");
-  at("saved").textContent = "";
+  showSection("end");
+  element("saved").textContent = "";
 }
 
 function save() {
+  if (!session) return;
   const { participant, list, screen, answers } = session;
-  const told = { format: "davgswt-2afc", version: 1, study: STUDY.study, participant, list, consent: true, screen, answers };
+  const saved = { format: "davgswt-2afc", version: 1, study: STUDY.study, participant, list, consent: true, screen, answers };
   const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([`${JSON.stringify(told, null, 1)}\n`], { type: "application/json" }));
+  link.href = URL.createObjectURL(new Blob([`${JSON.stringify(saved, null, 1)}\n`], { type: "application/json" }));
   link.download = `2afc_${participant}.json`;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 60000);
-  at("saved").textContent = `Saved as ${link.download}.`;
+  element("saved").textContent = `Saved as ${link.download}.`;
 }
 
 function forget() {
   clearTimeout(timer);
-  session = shown = null;
-  store();
+  session = current = null;
+  writeSession();
   welcome();
 }
 
 function welcome() {
-  const found = stored();
-  if (found && found.answers.length === STUDY.lists[found.list].length) {
-    session = found;
+  const before = readSession();
+  if (before && before.answers.length === trialsOf(before).length) {
+    session = before;
     return finish();
   }
   const count = STUDY.lists[0].length;
-  at("seconds").textContent = STUDY.seconds;
-  at("count").textContent = count;
-  at("minutes").textContent = Math.max(1, Math.ceil((count * (STUDY.seconds + 1)) / 60));
-  at("consent").checked = false;
-  at("begin").disabled = true;
-  at("goOn").hidden = !found;
-  at("consentLine").hidden = at("begin").hidden = Boolean(found);
-  if (found) at("done").textContent = found.answers.length;
-  show("intro");
+  element("seconds").textContent = String(STUDY.seconds);
+  element("count").textContent = String(count);
+  element("minutes").textContent = String(Math.max(1, Math.ceil((count * (STUDY.seconds + 1)) / 60)));
+  consent.checked = false;
+  beginButton.disabled = true;
+  element("goOn").hidden = !before;
+  element("consentLine").hidden = beginButton.hidden = Boolean(before);
+  if (before) element("done").textContent = String(before.answers.length);
+  showSection("intro");
 }
 
-function fail(said) {
-  show(null);
-  at("error").textContent = said;
-  at("error").hidden = false;
+/** @param {string} message */
+function fail(message) {
+  showSection(null);
+  element("error").textContent = message;
+  element("error").hidden = false;
 }
 
-at("consent").addEventListener("change", () => { at("begin").disabled = !at("consent").checked; });
-at("begin").addEventListener("click", begin);
-at("resume").addEventListener("click", () => { session = stored(); next(); });
-for (const id of ["afresh", "stop", "next"]) at(id).addEventListener("click", forget);
-at("save").addEventListener("click", save);
-for (const side of ["left", "right"]) at(side).addEventListener("click", () => answer(side));
+consent.addEventListener("change", () => {
+  beginButton.disabled = !consent.checked;
+});
+beginButton.addEventListener("click", begin);
+element("resume").addEventListener("click", () => {
+  session = readSession();
+  next();
+});
+for (const id of ["afresh", "stop", "next"]) element(id).addEventListener("click", forget);
+element("save").addEventListener("click", save);
+for (const side of /** @type {Side[]} */ (["left", "right"])) element(side).addEventListener("click", () => answer(side));
 addEventListener("keydown", (event) => {
-  if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || !KEYS[event.code] || at("trial").hidden) return;
+  if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || !KEYS[event.code] || element("trial").hidden) return;
   event.preventDefault();
   answer(KEYS[event.code]);
 });
