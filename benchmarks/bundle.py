@@ -1,6 +1,6 @@
 """How long the pre-sorting of a tile set takes, and what pre-sorted orders do to a walker's picture.
 
-A made-up set of 16 tiles at 6 levels, 1.5 million Gaussians: a rough ground of discs with stones on it. Pre-sorting is
+A synthetic set of 16 tiles at 6 levels, 1.5 million Gaussians: a rough ground of discs with stones. Pre-sorting is
 what a bundle does: the search for the directions, and every order of every tile at every level. The walker's picture
 is drawn as the page draws it, from the bundle's rounded Gaussians, against all of these sorted exactly.
 """
@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from fixtures.splats import rough_ground
 from fixtures.tile_sets import report_of
-from record import tell
+from record import report_figures
 
 from dav_gswt.bundle import build, direction_search, order_directions, orders, store
 from dav_gswt.terrain import endless, stills
@@ -66,7 +66,9 @@ def main() -> int:
     print(
         f"{count:,} Gaussians, {directions} directions: found in {searched:.2f} s, sorted in {sorting:.2f} s, 2 threads"
     )
-    tell({"presort_seconds": searched + sorting, "terrain_presort_psnr": walker(tile_set(CELLS // 2, 4))}, TARGETS)
+    report_figures(
+        {"presort_seconds": searched + sorting, "terrain_presort_psnr": walker(tile_set(CELLS // 2, 4))}, TARGETS
+    )
     return 0
 
 

@@ -1,4 +1,4 @@
-"""How much memory the page takes for a made-up set of 1.5M Gaussians, all read and drawn, beyond an empty tab's.
+"""How much memory the page takes for a synthetic set of 1.5M Gaussians, all read and drawn, beyond an empty tab's.
 
 In headless Chromium with software rendering, where what a graphics card would hold lies in memory, too: the sum over
 the tab's process and the one that draws, of pages that no other process shares. Held is what they have left when the
@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 import psutil
 from fixtures import bundles
 from pages import page_of
-from record import tell
+from record import report_figures
 
 from dav_gswt.study.terrain.browser import FLAGS, chromium_path
 
@@ -49,7 +49,7 @@ def main() -> int:
     for kind, name in KINDS.items():
         print(f"  {name}: {full[kind]:.0f} MB, empty {empty[kind]:.0f} MB")
     none = sum(empty.values())
-    tell({"page_memory_mb": sum(full.values()) - none, "page_memory_most_mb": most - none}, TARGETS)
+    report_figures({"page_memory_mb": sum(full.values()) - none, "page_memory_most_mb": most - none}, TARGETS)
     return 0
 
 

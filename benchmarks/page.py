@@ -1,4 +1,4 @@
-"""How long the page takes to load and order a made-up bundle of 200k Gaussians, and to update, sort and draw a picture.
+"""Time of the page to load and order a synthetic bundle of 200k Gaussians, and to update, sort and draw a picture.
 
 In headless Chromium with software rendering; prints a table, asserts nothing. Drawing in software is slow by nature:
 the numbers that carry over to other machines are those of loading, and of updating and sorting (the worker's part).
@@ -10,7 +10,7 @@ import sys
 
 from fixtures import bundles
 from pages import page_of
-from record import tell
+from record import report_figures
 
 from dav_gswt.study.terrain.browser import FLAGS, chromium_path
 
@@ -89,7 +89,7 @@ def measure(browser, address: str) -> None:
         where = f"{'hills' if hills else 'level'}, {found['tiles']} of 97 x 97 tiles, {found['count']:,} splats"
         for name, times in found["times"].items():
             report(f"{name} ({found['near']:,} sorted), {where}, ms", times)
-    tell({"terrain_update_ms": statistics.median(made[True]["times"]["both"])}, TARGETS)
+    report_figures({"terrain_update_ms": statistics.median(made[True]["times"]["both"])}, TARGETS)
 
 
 def report(what: str, values: list[float]) -> None:

@@ -1,4 +1,4 @@
-"""A made-up page that is served for a while. Running this module does nothing."""
+"""A synthetic page that is served for a while. Running this module does nothing."""
 
 import tempfile
 import time

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from record import tell
+from record import report_figures
 
 from dav_gswt.photos.sfm.registration import SfmOptions, register_photos
 from dav_gswt.photos.synthetic import camera_layouts
@@ -48,7 +48,7 @@ TARGETS = {"sfm_copr_seconds": 90, "synthetic_view_seconds": 2.5}  # the slowest
 
 
 def main() -> None:
-    tell(copr() | views(), TARGETS)
+    report_figures(copr() | views(), TARGETS)
 
 
 if __name__ == "__main__":

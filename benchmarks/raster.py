@@ -122,14 +122,16 @@ def scenes() -> dict[str, float]:
         forward, backward, pairs = drawing(scene, isa, THREADS)
         live = pairs / (scene.width * scene.height)
         figures[scene.name] = forward + backward
-        tell(scene.name, forward + backward, "ms", scene.limit, f"{live:.0f} live Gaussians a pixel")
+        report_figures(scene.name, forward + backward, "ms", scene.limit, f"{live:.0f} live Gaussians a pixel")
         if not LIVE[0] <= live <= LIVE[1]:
             raise ValueError(f"{scene.name}: {live:.1f} live Gaussians a pixel are not {LIVE[0]} to {LIVE[1]}")
         if scene is SHARE_OF:
             peak, part = share(pairs, forward + backward, isa, THREADS)
             figures["raster_fma_share"] = part
             rate = pairs / (forward + backward) / 1e6
-            tell("raster_fma_share", part, "", None, f"{rate:.2f} of {peak / 1e9:.0f} G/s: live pairs, FMA peak")
+            report_figures(
+                "raster_fma_share", part, "", None, f"{rate:.2f} of {peak / 1e9:.0f} G/s: live pairs, FMA peak"
+            )
     return figures
 
 
@@ -148,7 +150,7 @@ def training_step() -> dict[str, float]:
             cpu.adam(values, getattr(gradients, name), *moments[name], rate=1e-9, step=1, threads=THREADS)
 
     name, took = "train_step_256x192_30k_ms", milliseconds(step)
-    tell(name, took, "ms", 15, f"{raster.count_pairs() / (256 * 192):.0f} live Gaussians a pixel")
+    report_figures(name, took, "ms", 15, f"{raster.count_pairs() / (256 * 192):.0f} live Gaussians a pixel")
     return {name: took}
 
 
@@ -156,7 +158,7 @@ def memory() -> dict[str, float]:
     """Most memory of a process, its Gaussians and all of Python included, that draws a million and takes them back."""
     done = subprocess.run([sys.executable, __file__, "--memory"], capture_output=True, text=True, check=True)
     name, megabytes = "raster_1m_memory_mb", float(done.stdout)
-    tell(name, megabytes, "MB", 1000)
+    report_figures(name, megabytes, "MB", 1000)
     return {name: megabytes}
 
 
@@ -177,7 +179,7 @@ def peak_of_a_million() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
 
 
-def tell(name: str, value: float, unit: str, limit: float | None = None, more: str = "") -> None:
+def report_figures(name: str, value: float, unit: str, limit: float | None = None, more: str = "") -> None:
     remarks = ([] if limit is None else [f"target {limit:g}"]) + ([more] if more else [])
     print(f"{name}: {value:.4g} {unit}".rstrip() + (f" ({'; '.join(remarks)})" if remarks else ""), flush=True)
 

@@ -7,10 +7,10 @@ import resource
 import time
 
 import numpy as np
-from record import tell
+from record import read_installed_lpips, report_figures
 
 from dav_gswt.geometry.poses import pose_of_camera
-from dav_gswt.images import lpips, lpips_weights
+from dav_gswt.images import lpips
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.prior import conditions
 from dav_gswt.prior.training import examples
@@ -53,10 +53,9 @@ def w2() -> dict[str, float]:
 
 def perceptual() -> dict[str, float]:
     """Seconds a pair of pictures, and a pose of five samples (ten pairs) at the smaller size."""
-    if not (path := lpips_weights.found()):
-        print(f"lpips: skipped, its weights are not there (snakemake {lpips_weights.PATH} fetches them)")
+    given, rng, out = read_installed_lpips(), np.random.default_rng(0), {}
+    if given is None:
         return {}
-    given, rng, out = lpips_weights.read(path), np.random.default_rng(0), {}
     for side, pairs in PAIRS.items():
         a, b = rng.uniform(-1, 1, (2, pairs, side, side, 3)).astype(np.float32)
         out[f"lpips_pair_{side}_seconds"] = seconds(lambda a=a, b=b: lpips.distance(a, b, given)) / len(a)
@@ -69,8 +68,7 @@ def pools() -> dict[str, float]:
     made, rng = make_world(WORLD), np.random.default_rng(0)
     photos = examples.take_photos(made, rng)
     field = examples.fit_field(made, photos, rng)
-    path = lpips_weights.found()
-    given = lpips_weights.read(path) if path else None
+    given = read_installed_lpips()
     model = prior_sampling.load_prior({"model": "terrain"})
     known = conditions.prepare_photos(photos, made.frame, model.size)
 
@@ -103,7 +101,7 @@ def pools() -> dict[str, float]:
 
 
 def main() -> None:
-    tell(w2() | perceptual() | pools(), TARGETS)
+    report_figures(w2() | perceptual() | pools(), TARGETS)
 
 
 if __name__ == "__main__":

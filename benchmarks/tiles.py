@@ -1,6 +1,6 @@
 """How long sixteen tiles of six levels take from a field of 200 000 Gaussians, and how much memory.
 
-The field is made up: a textured ground with relief, its underlay, and grass on it. Counted: fitting the levels, and
+The field is synthetic: a textured ground with relief, its underlay, and grass on it. Counted: fitting the levels, and
 cutting, composing and merging the tiles, as the rules make_levels and cut_tiles do; files and Python's start are not.
 Refining cuts by the prior is given beside it. Every figure goes to results/bench.json.
 """
@@ -11,7 +11,7 @@ import sys
 import time
 
 import numpy as np
-from record import tell
+from record import report_figures
 from scipy.ndimage import gaussian_filter
 
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
@@ -25,13 +25,13 @@ from dav_gswt.tiles.layout import Exemplar
 from dav_gswt.views import prior_sampling
 
 CELLS, SPACING, ALL = 384, 0.05, 200_000
-STEPS = 60  # of each level's fit: quality `draft`
+STEPS = 60  # of each level's fit: preset `draft`
 LEVELS = 6
 STRENGTH = 0.2
 TARGETS = {"tiles_200k_seconds": 10, "tiles_200k_memory_mb": 2000}
 
 
-def made_up() -> tuple[GaussianField, Ground]:
+def make_field() -> tuple[GaussianField, Ground]:
     """A field of ALL Gaussians: a disc a cell, an underlay, and blades of grass for the rest."""
     rng = np.random.default_rng(0)
     soft = sum(s * gaussian_filter(rng.normal(size=(CELLS, CELLS)), s, mode="wrap") for s in (1, 3, 9))
@@ -56,7 +56,7 @@ def made_up() -> tuple[GaussianField, Ground]:
 
 
 def measured() -> dict[str, float]:
-    field, grid = made_up()
+    field, grid = make_field()
     start = time.perf_counter()
     made = levels.build_levels(field, grid, LEVELS, STEPS, 0)
     fitted = time.perf_counter()
@@ -84,7 +84,7 @@ def main() -> None:
     """In a process of its own: peak memory is the process's."""
     done = subprocess.run([sys.executable, __file__, "--here"], stdout=subprocess.PIPE, text=True, check=True)
     values = {name: float(value) for name, value in (line.split() for line in done.stdout.splitlines())}
-    tell(values, TARGETS)
+    report_figures(values, TARGETS)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from record import tell
+from record import report_figures
 
 from dav_gswt.reconstruction.fit_settings import FitSettings
 from dav_gswt.study import fit_profile
@@ -76,7 +76,7 @@ TARGETS = {
 
 
 def main() -> None:
-    tell(copr() | offpath(), TARGETS)
+    report_figures(copr() | offpath(), TARGETS)
 
 
 if __name__ == "__main__":

@@ -11,10 +11,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-from record import tell
+from record import read_installed_lpips, report_figures
 
 from dav_gswt.geometry.poses import Pose, pose_offset
-from dav_gswt.images import lpips_weights
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.views.policies import POLICIES, SelectionInput
 from dav_gswt.views.policy_names import NEEDS_FIELD, ORACLES
@@ -57,14 +56,10 @@ def selection() -> dict[str, float]:
 
 def rounds() -> dict[str, float]:
     """Wall-clock seconds of round 1, from the coarse field to the updated one."""
-    if not (lpips := lpips_weights.found()):
-        print(f"round: skipped, LPIPS's weights are not there (snakemake {lpips_weights.PATH} fetches them)")
+    if read_installed_lpips() is None:
         return {}
     out = {}
     with tempfile.TemporaryDirectory(prefix="round-") as folder:
-        there = Path(folder) / lpips_weights.PATH
-        there.parent.mkdir(parents=True)
-        there.write_bytes(Path(lpips).read_bytes())
         fit = "results/desert/seed0/draft"
         _made(folder, f"{fit}/coarse/field.ply")
         for name, (scored, cell) in CELLS.items():
@@ -81,7 +76,7 @@ def _made(folder: str, *targets: str) -> None:
 
 
 def main() -> None:
-    tell(selection() | rounds(), TARGETS)
+    report_figures(selection() | rounds(), TARGETS)
 
 
 if __name__ == "__main__":
