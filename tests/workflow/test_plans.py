@@ -1,5 +1,6 @@
 """What a sweep recomputes: the stages below the parameter it varies, and no others."""
 
+import re
 import subprocess
 import sys
 from collections import Counter
@@ -61,7 +62,7 @@ def test_a_prior_is_asked_once_for_every_lam(planned, tmp_path, axis, values, sc
 
 
 def test_scores_are_judged_by_truth_that_is_drawn_once_a_scene(planned, tmp_path):
-    (tmp_path / "few.yaml").write_text("calibration: {scenes: [desert, planet], rounds: 2, regressors: 1}")
+    (tmp_path / "few.yaml").write_text("study: {calibration: {scenes: [desert, planet], rounds: 2, regressors: 1}}")
     plan = planned(tmp_path, "docs/research/figures/calibration.png", configs=(USUAL, tmp_path / "few.yaml"))
     assert plan["render_candidates"] == plan["calibrate_coarse"] == 2 and plan["calibrate_round"] == 4
     assert plan["train_regressor"] == plan["plot_calibration"] == 1
@@ -70,8 +71,8 @@ def test_scores_are_judged_by_truth_that_is_drawn_once_a_scene(planned, tmp_path
 def test_policies_share_what_they_start_from(planned, tmp_path):
     """Two scenes of three seeds; all photos are one round, whatever k is."""
     (tmp_path / "few.yaml").write_text(
-        "benchmark: {policies: [farthest, random, all], sets: "
-        "[{scenes: [desert_pool, grass_pool], k: [4, 6], photos: 20}]}"
+        "study: {view_benchmark: {policies: [farthest, random, all], sets: "
+        "[{scenes: [desert_pool, grass_pool], k: [4, 6], photos: 20}]}}"
     )
     plan = planned(tmp_path, "view_benchmark", configs=(USUAL, tmp_path / "few.yaml"))
     assert plan["render_photos"] == 2 and plan["fit_coarse"] == plan["score_coarse"] == 6
@@ -119,68 +120,86 @@ def test_the_oracle_needs_a_scene_whose_truth_is_known(snakemake, photo_sets, tm
         assert known or "policy oracle: what copr_dunes truly shows is not known" in done.stdout
 
 
-def test_what_compares_fetches_lpips_first_and_a_terrain_does_without(snakemake, tmp_path):
-    study = "seam_study: {scenes: [desert], seams: [semantic], baseline: semantic, draws: 1}"
-    (tmp_path / "few.yaml").write_text(study)
-    for target, fetched in (("seams", True), ("all", False)):
-        said = snakemake(tmp_path, target, "--dry-run", configs=(USUAL, TINY, tmp_path / "few.yaml")).stdout
-        jobs = [job for job in said.split("\n\n") if "rule cut_tiles:" in job]
-        assert jobs and all(("lpips_alexnet.safetensors" in job) == fetched for job in jobs)
-        assert ("rule convert_lpips_weights:" in said) == fetched
+TARGETS = ("all", "seams", "study", "lod_table")
 
 
-def test_tiles_go_by_the_doubt_of_the_prior_that_was_asked(planned, tmp_path):
+def tiling_jobs(output: str) -> dict[str, str]:
+    """Of each planned cut its input and its parameters, by the folder of the tiles. output: of a dry run with -p."""
+    jobs = [job for job in output.split("\n\n") if re.search(r"^rule cut_tiles:", job, re.M)]
+    return {re.search(r"output: (\S+)/seams\.json", job)[1]: re.search(r"input: (.*)", job)[1] for job in jobs}
+
+
+def test_every_target_plans_the_same_tiles_of_a_scene(snakemake, tmp_path):
+    """What tiles are cut from follows from the config alone, whatever is asked for and whatever is on disk."""
+    study = "study: {seams: {scenes: [desert], tilings: [semantic], baseline: semantic, replicates: 1}, "
+    study += "lod: {scenes: [desert], fixed: {policy: farthest}}, tables: {figures: {scenes: [desert]}}}"
+    (tmp_path / "few.yaml").write_text(study + "\nlpips: installed\n")
+    configs = (USUAL, TINY, tmp_path / "few.yaml")
+    plans = [
+        tiling_jobs(snakemake(tmp_path, *targets, "--dry-run", configs=configs).stdout) for targets in TARGETS.values()
+    ]
+    default = plans[0]
+    assert len(default) == 1 and all(plan.items() >= default.items() for plan in plans)
+    assert all("lpips_alexnet.safetensors" in inputs for plan in plans for inputs in plan.values())
+    weights = tmp_path / "results/weights/lpips_alexnet.safetensors"
+    weights.parent.mkdir(parents=True)
+    weights.touch()
+    assert tiling_jobs(snakemake(tmp_path, "all", "--dry-run", configs=configs).stdout) == default
+
+
+@pytest.mark.parametrize("target", ["all", "seams"])
+def test_without_lpips_no_target_plans_its_weights(planned, tmp_path, target):
+    (tmp_path / "few.yaml").write_text(
+        "lpips: none\nstudy: {seams: {scenes: [desert], tilings: [semantic], baseline: semantic}}"
+    )
+    assert not planned(tmp_path, target, configs=(USUAL, TINY, tmp_path / "few.yaml"))["convert_lpips_weights"]
+
+
+def test_tiles_go_by_the_uncertainty_of_the_prior_that_was_asked(planned, tmp_path):
     plan = planned(tmp_path, "--config", "policy=w2-lpips", configs=(USUAL, TINY))
-    assert plan["score_coarse"] == plan["score_round"] == plan["make_levels"] == 1 and not plan["convert_lpips_weights"]
+    assert plan["score_coarse"] == plan["score_round"] == plan["make_levels"] == 1
     tiles = "results/desert/seed0/draft/active_{}_k4/iter0/tiles_semantic/seams.json"
     for way, scored in (("w2-lpips_terrain_pdrop0.15_lam0", 1), ("random_none_pdrop0_lam0", 0)):
         assert planned(tmp_path, tiles.format(way))["score_coarse"] == scored
 
 
-def test_refined_tiles_share_the_cut_and_go_on_as_the_others_do(planned, tmp_path):
+@pytest.mark.parametrize("suffix, rule", [("-refined", "refine_tiles"), ("-expansion", "cut_tiles_by_expansion")])
+def test_tiles_of_the_study_go_on_as_the_others_do(planned, tmp_path, suffix, rule):
     cut = ROUND.format(policy="farthest", k=4, t=1) + "/{}/bundle_tau0.6/davgswt.json"
-    plan = planned(tmp_path, cut.format("tiles_semantic-refined"), cut.format("tiles_semantic"))
-    assert plan["cut_tiles"] == plan["refine_tiles"] == 1 and plan["bundle_tiles"] == 2
-    assert planned(tmp_path, cut.format("tiles_semantic"))["refine_tiles"] == 0
-    scene = planned(tmp_path, "--config", "scenes={desert: {tiling: semantic-refined}}")
-    assert scene["refine_tiles"] == scene["cut_tiles"] == scene["make_page"] == 1
+    plan = planned(tmp_path, cut.format(f"tiles_semantic{suffix}"), cut.format("tiles_semantic"))
+    assert plan["cut_tiles"] == plan[rule] == 1
+    assert plan["bundle_tiles"] == 2
 
 
-def test_a_refinement_needs_to_be_asked_for_and_the_weights_of_its_prior(snakemake, tmp_path):
+def test_a_refinement_needs_the_weights_of_its_prior(snakemake, tmp_path):
     (tmp_path / "other.yaml").write_text(
-        "seams: {plain: {tile: 0.5, strip: 0.125, candidates: 24, variants: 1},"
-        " semantic: {refine: {prior: mine}}}\n"
+        "study: {refine: {prior: mine}}\n"
         "priors: {mine: {model: terrain, samples: 2, steps: 2, weights: mine.safetensors}}\n"
     )
-    tiles = ROUND.format(policy="farthest", k=4, t=1) + "/tiles_{}-refined/seams.json"
-
-    def said(seam):
-        target = tiles.format(seam)
-        done = snakemake(tmp_path, target, "--dry-run", configs=(USUAL, tmp_path / "other.yaml"), check=False)
-        assert done.returncode
-        return done.stdout
-
-    assert "seams.plain.refine: is missing" in said("plain")
-    assert "priors.mine.weights: there is no mine.safetensors" in said("semantic")
+    target = ROUND.format(policy="farthest", k=4, t=1) + "/tiles_semantic-refined/seams.json"
+    done = snakemake(tmp_path, target, "--dry-run", configs=(USUAL, tmp_path / "other.yaml"), check=False)
+    assert done.returncode and "priors.mine.weights: there is no mine.safetensors" in done.stdout
 
 
-def test_cuts_read_what_is_at_hand_to_tell_things_apart(snakemake, tmp_path):
-    tiles = ROUND.format(policy="farthest", k=4, t=1) + "/tiles_{}/seams.json"
-    alexnet, folder = tmp_path / "results/weights/lpips_alexnet.safetensors", tmp_path / "sam2"
-    config = tmp_path / "sam2.yaml"
-    config.write_text(f"seams: {{none: {{sam2: {folder}}}}}")
-
-    def planned(seam):
-        return snakemake(tmp_path, tiles.format(seam), "--dry-run", configs=(USUAL, config), check=False).stdout
-
-    assert alexnet.name not in planned("semantic")
-    alexnet.parent.mkdir(parents=True)
-    alexnet.touch()
-    assert alexnet.name in planned("semantic") and alexnet.name not in planned("colour")
-    assert f"seams.none.sam2: there is no {folder}/model.safetensors" in planned("none")
+def test_a_segmenter_is_an_input_of_the_cut(snakemake, tmp_path):
+    target = ROUND.format(policy="farthest", k=4, t=1) + "/tiles_none/seams.json"
+    folder, config = tmp_path / "sam2", tmp_path / "sam2.yaml"
+    config.write_text(f"tilings: {{none: {{sam2: {folder}}}}}")
     folder.mkdir()
+
+    def plan():
+        return snakemake(tmp_path, target, "--dry-run", configs=(USUAL, config), check=False).stdout
+
+    assert f"tilings.none.sam2: there is no {folder}/model.safetensors" in plan()
     (folder / "model.safetensors").touch()
-    assert f"{folder}/model.safetensors" in planned("none") and alexnet.name in planned("none")
+    assert f"{folder}/model.safetensors" in plan()
+
+
+def test_cuts_by_colour_need_no_weights(planned, tmp_path):
+    tiles = ROUND.format(policy="farthest", k=4, t=1) + "/tiles_colour/seams.json"
+    (tmp_path / "none.yaml").write_text("lpips: installed")
+    plan = planned(tmp_path, tiles)
+    assert plan["cut_tiles"] == 1 and not plan["convert_lpips_weights"]
 
 
 @pytest.mark.parametrize(
@@ -248,15 +267,19 @@ def test_no_round_and_a_finished_field_go_from_field_to_terrain(planned, tmp_pat
 @pytest.mark.parametrize(
     "wrong, said",
     [
-        ("tau: 1.5", "config: tau: 1.5 is greater than the maximum of 1"),
+        ("tau: 1.5", "config: tau: input should be less than or equal to 1"),
         ("polcy: random", "config: there is no key 'polcy'; is 'policy' meant?"),
-        ("scene: moon", "config: scene: there is no 'moon'; scenes has desert, flowers, grass, planet, meadow"),
-        ("p_drop: 1", "config: p_drop: 1 is greater than or equal to the maximum of 1"),
+        ("scene: moon", "config: scene: there is no 'moon'; scenes has brighton_beach, caliterra_earthworks"),
+        ("p_drop: 1", "config: p_drop: input should be less than 1"),
         ("prior: zero", "config: prior: there is no 'zero'; priors has terrain"),
-        ("priors: {terrain: {samples: 1}}", "config: priors.terrain.samples: 1 is less than the minimum of 2"),
-        ("stop: {photos: 2}", "config: stop.photos: 2 is less than the minimum of 3"),
-        ("rounds: -1", "config: rounds: -1 is less than the minimum of 0"),
-        ("scenes: {desert: {preset: best}}", "config: scenes.desert.preset: there is no 'best'; qualities has"),
+        (
+            "priors: {terrain: {samples: 1}}",
+            "config: priors.terrain.samples: input should be greater",
+        ),
+        ("stop: {photos: 2}", "config: stop.photos: input should be greater than or equal to 3"),
+        ("rounds: -1", "config: rounds: input should be greater than or equal to 0"),
+        ("scenes: {desert: {preset: best}}", "config: scenes.desert.preset: there is no 'best'; presets has"),
+        ("qualities: {}", "config: 'qualities' is called 'presets' now"),
     ],
 )
 def test_a_config_that_is_wrong_stops_before_the_first_job(snakemake, run, checkout, tmp_path, wrong, said):
@@ -278,7 +301,7 @@ def test_a_config_that_is_not_yaml_is_named_with_its_line(run, checkout, tmp_pat
 
 
 def test_a_missing_folder_of_photos_is_named(snakemake, run, checkout, tmp_path):
-    said = "config: scenes.copr_dunes.folder: there is no folder photos/of_nothing"
+    said = "config: scenes.copr_dunes.folder: there is no photos/of_nothing"
     (tmp_path / "missing.yaml").write_text("scenes: {copr_dunes: {folder: photos/of_nothing}}\n")
     folder = checkout(tmp_path / "clone")
     configs = (USUAL, tmp_path / "missing.yaml")
@@ -298,7 +321,7 @@ def test_a_flight_is_planned_where_the_config_asks_for_one(planned, tmp_path):
 def test_a_missing_height_map_is_named(snakemake, tmp_path):
     (tmp_path / "map.yaml").write_text("heights: {kind: image, file: no.exr, width: 10, height: 1}\n")
     done = snakemake(tmp_path, "--dry-run", configs=(USUAL, tmp_path / "map.yaml"), check=False)
-    assert done.returncode != 0 and "config: heights.file: there is no file no.exr" in done.stdout
+    assert done.returncode != 0 and "config: heights.file: there is no no.exr" in done.stdout
 
 
 def test_the_workflow_is_lint_clean_but_for_its_environment(snakemake, tmp_path):
@@ -323,11 +346,16 @@ def test_the_code_is_formatted(root, tool):
 
 def test_seams_are_measured_by_cells_that_share_the_levels(planned, tmp_path):
     """Two ways to cut besides the scene's own, which is one of them or not, and is drawn once or thrice; they too."""
-    for own, draws, twice, cells in (("colour", 1, 1, 2), ("small", 1, 1, 3), ("small", 3, 1, 5), ("small", 3, 2, 7)):
-        study = (
-            f"scenes: [desert], seams: [colour, semantic], baseline: colour, draws: {draws}, compared_draws: {twice}"
+    for own, replicates, twice, cells in (
+        ("colour", 1, 1, 2),
+        ("small", 1, 1, 3),
+        ("small", 3, 1, 5),
+        ("small", 3, 2, 7),
+    ):
+        study = f"scenes: [desert], tilings: [colour, semantic], baseline: colour, replicates: {replicates}"
+        (tmp_path / "few.yaml").write_text(
+            f"study: {{seams: {{{study}, compared_replicates: {twice}}}}}\nscenes: {{desert: {{tiling: {own}}}}}"
         )
-        (tmp_path / "few.yaml").write_text(f"seam_study: {{{study}}}\nscenes: {{desert: {{seam: {own}}}}}")
         plan = planned(tmp_path, "seams", configs=(USUAL, TINY, tmp_path / "few.yaml"))
         assert plan["measure_seams"] == plan["cut_tiles"] == cells
         assert plan["measure_repetition"] == len({"colour", "semantic", own})
