@@ -22,6 +22,7 @@ onstart:
 
 
 include: "rules/paths.smk"
+include: "rules/inputs.smk"
 include: "rules/photos.smk"
 include: "rules/reconstruction.smk"
 include: "rules/prior.smk"

@@ -5,13 +5,6 @@ renderer.
 """
 
 
-def photos_of_field(wildcards):
-    """All photos that a round's field was made of, or the finished field that came instead."""
-    if config["scenes"][wildcards.scene]["kind"] == "field":
-        return {"photos": "<results>/<photos>/field.ply"}
-    return {"photos": ["<results>/<photos>/images", *captures_until(wildcards)]}
-
-
 rule bundle_tiles:
     """Pack the tiles with their pre-sorted orders."""
     input:

@@ -5,11 +5,6 @@ ground.exr, unchanged; completion.json, how much was painted; metrics.json, the 
 """
 
 
-def inpainter_weights(wildcards):
-    """The weights of the prior that inpaints."""
-    return {"weights": terrain_weights(wildcards.inpainter)}
-
-
 rule inpaint_field:
     """Inpaint the ground that no photo saw; a field without such ground is copied."""
     input:

@@ -5,13 +5,6 @@ coarse, and levels.json, which describes them and says why there are no more.
 """
 
 
-def maps_of_prior(wildcards):
-    """The uncertainty maps of a round by its prior. Without a prior the field itself says what is known."""
-    if wildcards.prior == "none":
-        return {}
-    return {"maps": f"<results>/{'<scored>' if wildcards.t == '0' else '<round>'}/maps.npz"}
-
-
 rule make_levels:
     """As many levels as the config wants and the exemplar has room for; tiles add coarser ones of their own."""
     input:

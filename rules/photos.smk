@@ -5,18 +5,6 @@ report.html, and per seed views.json: photos to start from, photos that may be a
 """
 
 
-def source_photos(wildcards):
-    """A scene's photos and what its entry names beside them: masks, a model of another program."""
-    scene, where = config["scenes"][wildcards.scene], f"scenes.{wildcards.scene}"
-    beside = {key: existing(scene[key], f"{where}.{key}") for key in ("masks", "model") if key in scene}
-    return {"photos": files_in(existing(scene["folder"], f"{where}.folder"))} | beside
-
-
-def source_field(wildcards):
-    """A scene's finished field."""
-    return existing(config["scenes"][wildcards.scene]["field"], f"scenes.{wildcards.scene}.field")
-
-
 rule register_photos:
     """Structure from motion over a folder of photos; undistorted images and the ground frame."""
     input:

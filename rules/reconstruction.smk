@@ -6,11 +6,6 @@ Round t starts from round t - 1, so T is only which round is asked for.
 """
 
 
-def fits_before(wildcards):
-    """The reports of the updates of rounds 1 to t - 1."""
-    return {"fits": [f"{round_folder(t)}/fit.json" for t in range(1, int(wildcards.t))]}
-
-
 rule fit_coarse:
     """Fit the coarse field to the start views."""
     input:

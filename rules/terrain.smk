@@ -4,12 +4,6 @@ In: the bundle. Out: page/ (`make view` serves it), walker.png, oblique.png, abo
 """
 
 
-def height_map(wildcards):
-    """The image that the terrain's surface is read from, where the config names one."""
-    file = config["heights"].get("file")
-    return {"map": existing(file, "heights.file")} if file else {}
-
-
 rule make_page:
     """A page that needs nothing else: viewer, manifest, surface and chunks in one folder."""
     input:

@@ -5,18 +5,6 @@ follow it.
 """
 
 
-def tiling_inputs(name):
-    """What tells the kinds of ground apart, beside colours: LPIPS's features, a segmenter's checkpoint."""
-    tiling = config["tilings"][name]
-    if tiling["energy"] == "colour":
-        return {}
-    if "sam2" not in tiling:
-        return lpips_weights()
-    where = f"tilings.{name}.sam2"
-    folder = existing(tiling["sam2"], where)
-    return lpips_weights() | {"sam2": existing(f"{folder}/model.safetensors", where)}
-
-
 rule cut_tiles:
     """Cut sixteen tiles from the exemplar."""
     input:

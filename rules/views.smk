@@ -6,35 +6,6 @@ them share the first scoring. A round after a stop asks for no pose and hands th
 """
 
 
-def prior_weights(wildcards):
-    """What scoring reads beside the field: the weights of the prior and of LPIPS."""
-    if wildcards.prior == "none":
-        return {}
-    prior, where = config["priors"][wildcards.prior], f"priors.{wildcards.prior}"
-    files = lpips_weights(wildcards) if prior["lpips"] else {}
-    if prior["model"] == "terrain":
-        return files | {"weights": terrain_weights(wildcards.prior)}
-    return files | {"folder": existing(prior["folder"], f"{where}.folder", "; see docs/research/results/prior.md")}
-
-
-def earlier_decisions(wildcards):
-    """What rounds 1 to t - 1 reported of their photos, and whether the last of them still asked for any."""
-    t = int(wildcards.t)
-    return fits_before(wildcards) | ({"last": f"{round_folder(t - 1)}/poses.json"} if t > 1 else {})
-
-
-def true_images(wildcards):
-    """What candidates truly show, for the policies that know it."""
-    if wildcards.policy not in ORACLES:
-        return {}
-    agent = config["scenes"][wildcards.scene].get("agent")
-    if agent not in ("render", "replay"):
-        raise WorkflowError(
-            f"policy {wildcards.policy}: what {wildcards.scene} truly shows is not known; it needs agent: render or replay"
-        )
-    return {"truth": "<results>/<photos>/candidates"} if agent == "render" else {"images": "<results>/<photos>/images"}
-
-
 rule score_coarse:
     """Score every candidate pose by what the coarse field does not know there, and freeze the scales of the terms."""
     input:

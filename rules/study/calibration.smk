@@ -4,20 +4,6 @@ In: a field, its scores, and what some candidates truly show. Out: calibration.j
 docs/research/data/calibration.csv and figures/calibration.png of all that the config's `study.calibration` names.
 """
 
-def true_candidates(wildcards):
-    """What candidates truly show, where it is rendered; a replayed scene has its photos."""
-    if config["scenes"][wildcards.scene].get("agent") != "render":
-        return {}
-    return {"truth": "<results>/<photos>/candidates"}
-
-
-def regressor_weights(wildcards):
-    """Networks without diffusion, to compare the project's own prior with."""
-    entry = config["priors"].get(wildcards.prior, {})
-    count = STUDY["calibration"]["regressors"] if entry.get("model") == "terrain" else 0
-    files = expand("<results>/prior/regressor{member}.safetensors", member=range(count))
-    return {"regressors": files} if files else {}
-
 
 rule render_candidates:
     """Draw what some candidates truly show, as small as they are scored: for those who judge scores, never for scores."""

@@ -69,7 +69,9 @@ def benchmark_experiment(scene, asked, seed, k, photos):
     entry, policy = config["scenes"][scene], asked["policy"]
     rounds = 1 if policy == "all" else (photos - entry["start"]) // k
     own = {
-        key: asked[key] if key == "prior" else encode_number(asked[key]) for key in ("prior", "p_drop", "lam") if key in asked
+        key: asked[key] if key == "prior" else encode_number(asked[key])
+        for key in ("prior", "p_drop", "lam")
+        if key in asked
     }
     values = branch(scene, policy) | own | {"seed": seed, "k": k, "stop": ""}
     before, after = range(1, rounds), range(1, rounds + 1)
@@ -336,3 +338,43 @@ def captions():
         f"{name.partition('_')[2]}: {about[name.partition('_')[0]]}" if "_" in name else "quality against photos"
         for name in figure_files()
     ]
+
+
+def true_candidates(wildcards):
+    """What candidates truly show, where it is rendered; a replayed scene has its photos."""
+    if config["scenes"][wildcards.scene].get("agent") != "render":
+        return {}
+    return {"truth": "<results>/<photos>/candidates"}
+
+
+def regressor_weights(wildcards):
+    """Networks without diffusion, to compare the project's own prior with."""
+    entry = config["priors"].get(wildcards.prior, {})
+    count = STUDY["calibration"]["regressors"] if entry.get("model") == "terrain" else 0
+    files = expand("<results>/prior/regressor{member}.safetensors", member=range(count))
+    return {"regressors": files} if files else {}
+
+
+def refining_prior(wildcards):
+    """The weights of the prior that repairs cuts."""
+    return {"weights": terrain_weights(STUDY["refine"]["prior"])}
+
+
+def deciding_scores(wildcards):
+    """The scores that rounds 1 to t chose by: those that the round before left."""
+    return ["<results>/<scored>/scores.csv", *(f"{round_folder(t)}/scores.csv" for t in range(1, int(wildcards.t)))]
+
+
+def poses_until(wildcards):
+    """The poses that rounds 1 to t chose."""
+    return [f"{round_folder(t)}/poses.json" for t in range(1, int(wildcards.t) + 1)]
+
+
+def figure_rounds(wildcards):
+    """The rounds of the evolution figure: none, the first, and round t."""
+    return sorted({0, 1, int(wildcards.t)})
+
+
+def in_figure_rounds(file):
+    """An input function: a file as each round of the evolution figure left it."""
+    return lambda wildcards: [f"{round_folder(t)}/{file}" for t in figure_rounds(wildcards)]

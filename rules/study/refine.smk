@@ -3,10 +3,6 @@
 In: tiles and levels. Out: tiles_{tiling}-refined/, the same files again. It was not shown to help (docs/research/lab-notes.md).
 """
 
-def refining_prior(wildcards):
-    """The weights of the prior that repairs cuts."""
-    return {"weights": terrain_weights(STUDY["refine"]["prior"])}
-
 
 rule refine_tiles:
     """Repair pictures of the cuts by a prior, and refit the Gaussians beside them, within bounds."""

@@ -8,7 +8,9 @@ Out: results/sweeps/{sweep}.csv and {sweep}.png; docs/research/data/sweep_{sweep
 rule gather_sweep:
     """Collect what every cell of a sweep measured and what it cost."""
     input:
-        measured=lambda wildcards: [path for cell in sweep_experiments(wildcards.sweep) for path in cell["files"].values()],
+        measured=lambda wildcards: [
+            path for cell in sweep_experiments(wildcards.sweep) for path in cell["files"].values()
+        ],
     output:
         table=report(
             "results/sweeps/{sweep}.csv",

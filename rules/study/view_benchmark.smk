@@ -10,7 +10,9 @@ expected of them; figures/{table}_budget.png, PSNR against photos. `snakemake vi
 rule gather_curves:
     """Collect what every round of every cell measured, and what it cost, beside what earlier runs found."""
     input:
-        measured=lambda wildcards: [path for cell in benchmark_experiments() for path in (*cell["metrics"], *cell["facts"])],
+        measured=lambda wildcards: [
+            path for cell in benchmark_experiments() for path in (*cell["metrics"], *cell["facts"])
+        ],
     output:
         curves=update("docs/research/data/{table}_curves.csv"),
     log:

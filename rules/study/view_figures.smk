@@ -4,25 +4,6 @@ In: what the rounds 1 to t left. Out: sphere_{t}.png, the candidates of each rou
 paper's uncertainty sphere); evolution_{t}.png, two test views after the rounds 0, 1 and t, and where their renders are wrong.
 """
 
-def deciding_scores(wildcards):
-    """The scores that rounds 1 to t chose by: those that the round before left."""
-    return ["<results>/<scored>/scores.csv", *(f"{round_folder(t)}/scores.csv" for t in range(1, int(wildcards.t)))]
-
-
-def poses_until(wildcards):
-    """The poses that rounds 1 to t chose."""
-    return [f"{round_folder(t)}/poses.json" for t in range(1, int(wildcards.t) + 1)]
-
-
-def figure_rounds(wildcards):
-    """The rounds of the evolution figure: none, the first, and round t."""
-    return sorted({0, 1, int(wildcards.t)})
-
-
-def in_figure_rounds(file):
-    """An input function: a file as each round of the evolution figure left it."""
-    return lambda wildcards: [f"{round_folder(t)}/{file}" for t in figure_rounds(wildcards)]
-
 
 rule plot_sphere:
     """Show what each of the rounds 1 to t chose from, and what it chose."""

@@ -125,7 +125,7 @@ TARGETS = ("all", "seams", "study", "lod_table")
 
 def tiling_jobs(output: str) -> dict[str, str]:
     """Of each planned cut its input and its parameters, by the folder of the tiles. output: of a dry run with -p."""
-    jobs = [job for job in output.split("\n\n") if re.search(r"^rule cut_tiles:", job, re.M)]
+    jobs = [job for job in re.split(r"\n(?=(?:local)?rule )", output) if job.startswith("rule cut_tiles:")]
     return {re.search(r"output: (\S+)/seams\.json", job)[1]: re.search(r"input: (.*)", job)[1] for job in jobs}
 
 

@@ -1,0 +1,200 @@
+"""Functions that rules use: parameters, resources, and the inputs of each stage, in the order of the stages."""
+
+
+def integer(wildcard):
+    """A params function: the value of a wildcard, as an int."""
+    return lambda wildcards: int(wildcards[wildcard])
+
+
+def real(wildcard):
+    """A params function: the value of a wildcard, as a float."""
+    return lambda wildcards: float(wildcards[wildcard])
+
+
+def entry(table, wildcard):
+    """A params function: the config's entry of a table that a wildcard names."""
+    return lambda wildcards: config[table][wildcards[wildcard]]
+
+
+def per_attempt(need):
+    """A resources function: `need` at the first attempt, twice as much at the second; 2000, or "60m".
+
+    A job that ran out of memory or time and is tried again (`retries` of a profile) would else run out of it again.
+    """
+    amount, unit = re.fullmatch(r"(\d+)([mh]?)", str(need)).groups()
+    return lambda wildcards, attempt: f"{int(amount) * attempt}{unit}" if unit else int(amount) * attempt
+
+
+def code_of(script):
+    """A params function: a digest of the library code that a script runs."""
+    return lambda wildcards: digest_code(BASE / f"scripts/{script}.py")
+
+
+def scenes_of(*kinds):
+    """A constraint: the config's scenes of these kinds."""
+    return "|".join(name for name, scene in config["scenes"].items() if scene["kind"] in kinds) or NEVER
+
+
+def scenes_by(*agents):
+    """A constraint: the config's scenes that these agents photograph."""
+    return "|".join(name for name, scene in config["scenes"].items() if scene.get("agent") in agents) or NEVER
+
+
+def existing(path, where, hint=""):
+    """A path that the config names: as it stands, or below the repository. Raises: WorkflowError: it is not there."""
+    found = next((place for place in (Path(path), BASE / path) if place.exists()), None)
+    if found is None:
+        raise WorkflowError(f"config: {where}: there is no {path}{hint}")
+    return str(found)
+
+
+def files_in(folder):
+    """The files of a folder, as inputs: one that is added or removed is noticed."""
+    return sorted(str(path) for path in Path(folder).iterdir() if path.is_file() and not path.name.startswith("."))
+
+
+def lpips_weights(wildcards=None):
+    """LPIPS's weights as an input of what cuts, scores and measures with them; none where the config says so."""
+    return {} if config["lpips"] == "none" else {"lpips": rules.convert_lpips_weights.output.weights}
+
+
+def terrain_weights(prior):
+    """The file of weights of an entry of `priors` of model terrain."""
+    weights = config["priors"][prior].get("weights")
+    return existing(weights, f"priors.{prior}.weights") if weights else str(LIBRARY / "prior/terrain.safetensors")
+
+
+def round_folder(t):
+    """The folder that round t left; round 0 is the coarse field."""
+    return f"<results>/<active>/iter{t}" if t else "<results>/<coarse>"
+
+
+def captures_until(wildcards):
+    """The photos that rounds 1 to t took."""
+    return [f"{round_folder(t)}/capture" for t in range(1, int(wildcards.t) + 1)]
+
+
+def captures_before(wildcards):
+    """The photos that rounds 1 to t - 1 took."""
+    return captures_until(wildcards)[:-1]
+
+
+def round_before(wildcards):
+    """The field that round t starts from, and its scores."""
+    t = int(wildcards.t) - 1
+    scores = round_folder(t) if t else "<results>/<scored>"
+    return {
+        "field": f"{round_folder(t)}/field.ply",
+        "ground": f"{round_folder(t)}/ground.exr",
+        "scores": f"{scores}/scores.csv",
+        "maps": f"{scores}/maps.npz",
+    }
+
+
+def branch(scene, policy=None, changes=None):
+    """The wildcards of what is made of a scene, by the config or by settings that replace some of its own."""
+    return paths.encode_branch(config, scene, policy, changes)
+
+
+def source_photos(wildcards):
+    """A scene's photos and what its entry names beside them: masks, a model of another program."""
+    scene, where = config["scenes"][wildcards.scene], f"scenes.{wildcards.scene}"
+    beside = {key: existing(scene[key], f"{where}.{key}") for key in ("masks", "model") if key in scene}
+    return {"photos": files_in(existing(scene["folder"], f"{where}.folder"))} | beside
+
+
+def source_field(wildcards):
+    """A scene's finished field."""
+    return existing(config["scenes"][wildcards.scene]["field"], f"scenes.{wildcards.scene}.field")
+
+
+def fits_before(wildcards):
+    """The reports of the updates of rounds 1 to t - 1."""
+    return {"fits": [f"{round_folder(t)}/fit.json" for t in range(1, int(wildcards.t))]}
+
+
+def prior_weights(wildcards):
+    """What scoring reads beside the field: the weights of the prior and of LPIPS."""
+    if wildcards.prior == "none":
+        return {}
+    prior, where = config["priors"][wildcards.prior], f"priors.{wildcards.prior}"
+    files = lpips_weights(wildcards) if prior["lpips"] else {}
+    if prior["model"] == "terrain":
+        return files | {"weights": terrain_weights(wildcards.prior)}
+    return files | {"folder": existing(prior["folder"], f"{where}.folder", "; see docs/research/results/prior.md")}
+
+
+def earlier_decisions(wildcards):
+    """What rounds 1 to t - 1 reported of their photos, and whether the last of them still asked for any."""
+    t = int(wildcards.t)
+    return fits_before(wildcards) | ({"last": f"{round_folder(t - 1)}/poses.json"} if t > 1 else {})
+
+
+def true_images(wildcards):
+    """What candidates truly show, for the policies that know it."""
+    if wildcards.policy not in ORACLES:
+        return {}
+    agent = config["scenes"][wildcards.scene].get("agent")
+    if agent not in ("render", "replay"):
+        raise WorkflowError(
+            f"policy {wildcards.policy}: what {wildcards.scene} truly shows is not known; it needs agent: render or replay"
+        )
+    return {"truth": "<results>/<photos>/candidates"} if agent == "render" else {"images": "<results>/<photos>/images"}
+
+
+def inpainter_weights(wildcards):
+    """The weights of the prior that inpaints."""
+    return {"weights": terrain_weights(wildcards.inpainter)}
+
+
+def maps_of_prior(wildcards):
+    """The uncertainty maps of a round by its prior. Without a prior the field itself says what is known."""
+    if wildcards.prior == "none":
+        return {}
+    return {"maps": f"<results>/{'<scored>' if wildcards.t == '0' else '<round>'}/maps.npz"}
+
+
+def tiling_inputs(name):
+    """What tells the kinds of ground apart, beside colours: LPIPS's features, a segmenter's checkpoint."""
+    tiling = config["tilings"][name]
+    if tiling["energy"] == "colour":
+        return {}
+    if "sam2" not in tiling:
+        return lpips_weights()
+    where = f"tilings.{name}.sam2"
+    folder = existing(tiling["sam2"], where)
+    return lpips_weights() | {"sam2": existing(f"{folder}/model.safetensors", where)}
+
+
+def photos_of_field(wildcards):
+    """All photos that a round's field was made of, or the finished field that came instead."""
+    if config["scenes"][wildcards.scene]["kind"] == "field":
+        return {"photos": "<results>/<photos>/field.ply"}
+    return {"photos": ["<results>/<photos>/images", *captures_until(wildcards)]}
+
+
+def height_map(wildcards):
+    """The image that the terrain's surface is read from, where the config names one."""
+    file = config["heights"].get("file")
+    return {"map": existing(file, "heights.file")} if file else {}
+
+
+def terrain_targets(scene):
+    """A scene's terrain: page, stills, a sheet of them and, where the config asks for one, a flight."""
+    made = [rules.make_page.output.page, *rules.render_terrain.output.stills, rules.make_contact_sheet.output.sheet]
+    return expand(made + [rules.render_flight.output.frames] * bool(config["flight"]), **branch(scene))
+
+
+def photo_targets(scene):
+    """The photo report, the metrics of each round, and the scores of the last."""
+    if config["scenes"][scene]["kind"] == "field":
+        return []
+    values, rounds = branch(scene), config["rounds"]
+    scored = rules.score_round.output if rounds else rules.score_coarse.output
+    return (
+        expand(rules.report_photos.output.page, scene=scene)
+        + expand(rules.evaluate_coarse.output.metrics, **values)
+        + expand([rules.evaluate_round.output.metrics] * bool(rounds), **(values | {"t": range(1, rounds + 1)}))
+        + expand(list(scored), **values)
+        + expand([rules.evaluate_inpainted.output.metrics] * config["inpaint"], **values)
+    )
