@@ -13,7 +13,7 @@ import pytest
 from fixtures.runs import TINY, USUAL, Made
 
 COPIED = ["Snakefile", "rules", "scripts", "config", "profiles"]  # the last is a link
-COPIED += [f"workflow/{name}" for name in ("profiles", "report", "schemas", "viewer", "forced_choice")]
+COPIED += [f"workflow/{name}" for name in ("profiles", "report", "schemas", "viewer", "forced_choice", "logger")]
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,8 @@
 """What `make run` and `make view` do: run the workflow, say what was made and where, serve the page."""
 
 import argparse
+import os
+import re
 import signal
 import subprocess
 import sys
@@ -10,7 +12,6 @@ from pathlib import Path
 
 import psutil
 
-from dav_gswt.cli.log_filter import Narrator
 from dav_gswt.config.load import add_scene_files, check_config, read_config
 from dav_gswt.errors import InputError
 from dav_gswt.paths import encode_branch, stage_folder
@@ -19,6 +20,8 @@ from dav_gswt.raster import backends
 CONFIG, STUDY = Path("config/config.yaml"), Path("config/study.yaml")
 SCENES = Path("config/scenes")
 SMALLER = Path("config/without_compiler.yaml")
+LOGGER = Path("workflow/logger")  # a plugin of Snakemake, found by PYTHONPATH
+JOB = re.compile(r"\[\d+ of \d+\] \w+$")  # a line of the log at which a job begins
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -72,7 +75,7 @@ def run(given: dict, cores: int, overlays: list[Path]) -> int:
         print("The last run was cut short; going on where it stopped.")
         subprocess.run([*snakemake, "--unlock"], check=False, capture_output=True)
     start = time.monotonic()
-    code, jobs = follow([*snakemake, "--cores", str(cores), "--quiet", "host", "reason"])
+    code, jobs = follow([*snakemake, "--cores", str(cores), "--logger", "davgswt"])
     if code < 0 or code == 130:
         print("\nStopped. The same command goes on where this ended.", file=sys.stderr)
         return 130
@@ -84,19 +87,32 @@ def run(given: dict, cores: int, overlays: list[Path]) -> int:
     return 0
 
 
+def short_log(root: Path) -> dict[str, str]:
+    """The environment in which Snakemake finds the plugin `--logger davgswt` of a checkout."""
+    places = [str(root / LOGGER), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return os.environ | {"PYTHONPATH": os.pathsep.join(places)}
+
+
 def follow(command: list[str]) -> tuple[int, int]:
-    """Run Snakemake and retell its lines. Returns its exit status (130 after Ctrl-C), and the jobs it began."""
-    narrator = Narrator()
+    """Run Snakemake with the short log. Returns its exit status (130 after Ctrl-C) and the jobs that began."""
+    begun = 0
     with (
-        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace") as job,
-        ending(job) as asked,
+        subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+            env=short_log(Path.cwd()),
+        ) as job,
+        ending(job) as signals,
     ):
-        for line in job.stdout:
-            text = narrator.short(line)
-            if text is not None and not asked:  # what jobs cry on their way out helps nobody
-                print(text, flush=True)
+        for line in job.stdout or ():
+            begun += bool(JOB.match(line))
+            if not signals:  # messages of jobs that end on a signal help nobody
+                print(line, end="", flush=True)
         code = job.wait()
-    return (130 if asked and code else code), narrator.begun
+    return (130 if signals and code else code), begun
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from plyfile import PlyData
 from dav_gswt.bundle import chunks
 from dav_gswt.bundle.chunks import ChunkEntry
 from dav_gswt.bundle.encoding import Encoding
-from dav_gswt.cli.log_filter import Narrator
+from dav_gswt.cli.run import short_log
 from dav_gswt.files import atomic_folder, read_json, write_json
 from dav_gswt.study.stability.extremes import Extreme
 
@@ -38,10 +38,16 @@ def run_extreme(extreme: Extreme, root: Path, out: Path | str, cores: int, lpips
         (folder / "extreme.yaml").write_text(yaml.safe_dump(with_lpips | extreme.overrides), encoding="utf-8")
         files = [str(root / DEFAULT_CONFIG), str(root / TEST_CONFIG), "extreme.yaml"]
         command = [sys.executable, "-m", "snakemake", "--snakefile", str(root / "Snakefile"), "--directory", place]
-        command += ["--cores", str(cores), "--scheduler", "greedy", "--configfile", *files]
+        command += ["--cores", str(cores), "--scheduler", "greedy", "--logger", "davgswt", "--configfile", *files]
         start = time.monotonic()
         done = subprocess.run(
-            command, cwd=folder, check=False, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+            command,
+            cwd=folder,
+            check=False,
+            text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            env=short_log(root),
         )
         seconds = time.monotonic() - start
         (part / "output.txt").write_text(done.stdout.replace(place, ""), encoding="utf-8")
@@ -73,8 +79,7 @@ def describe_outcome(extreme: Extreme, code: int, output: str, folder: Path) -> 
 
 def extract_message(output: str) -> str:
     """The error message of a run that failed, as `make run` shows it, without lines of progress."""
-    narrator = Narrator()
-    lines = [text for line in output.splitlines() if (text := narrator.short(line)) is not None]
+    lines = output.splitlines()
     all_lines = [line.strip() for line in lines if not line.startswith("[") and "jobs to do" not in line]
     ends = [i for i, line in enumerate(lines) if line.startswith("[")]
     last = [line.strip() for line in lines[ends[-1] + 1 :]] if ends else all_lines

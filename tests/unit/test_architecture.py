@@ -1,0 +1,47 @@
+"""The structure of the code: types, one-way arrows between packages, and sizes."""
+
+import re
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+
+def test_the_library_and_the_scripts_are_typed(root):
+    """pyright in standard mode, as pyproject.toml sets it up."""
+    done = subprocess.run([sys.executable, "-m", "pyright"], cwd=root, capture_output=True, text=True, check=False)
+    if "npm" in done.stderr and not shutil.which("node"):
+        pytest.skip("pyright needs Node.js or the network once")
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-1000:]
+
+
+def test_arrows_between_packages_point_one_way(root):
+    """import-linter with the contracts of pyproject.toml."""
+    command = [sys.executable, "-c", "from importlinter.cli import lint_imports_command as run; run()"]
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-1000:]
+
+
+def test_modules_have_less_than_400_lines(root):
+    files = (root / "workflow/lib").rglob("*.py")
+    assert [file.name for file in files if len(file.read_text(encoding="utf-8").splitlines()) >= 400] == []
+
+
+def test_scripts_have_less_than_30_lines(root):
+    files = (root / "scripts").rglob("*.py")
+    assert [file.name for file in files if len(file.read_text(encoding="utf-8").splitlines()) > 30] == []
+
+
+def test_the_snakefile_has_less_than_60_lines(root):
+    assert len((root / "Snakefile").read_text(encoding="utf-8").splitlines()) < 60
+
+
+def test_the_experiment_has_less_than_80_lines(root):
+    assert len((root / "config/config.yaml").read_text(encoding="utf-8").splitlines()) < 80
+
+
+def test_each_rule_runs_the_script_of_its_own_room(root):
+    """Rules of the product run no script of the study."""
+    for file in (root / "rules").glob("*.smk"):
+        assert not re.search(r"scripts/study", file.read_text(encoding="utf-8")), file.name
