@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dav_gswt import config
 from dav_gswt.bundle import chunks
 from dav_gswt.bundle.encoding import Encoding
+from dav_gswt.config import load
 from dav_gswt.errors import InputError
 from dav_gswt.field import write_field
 from dav_gswt.files import write_json
@@ -16,14 +16,14 @@ from dav_gswt.images import image_files
 from dav_gswt.study.stability import extremes, running, tables
 from dav_gswt.study.stability.extremes import ALL, EXTREMES, make_ground_field
 
-FILES = [running.DEFAULT_CONFIG, running.TEST_CONFIG]
+FILES = [running.DEFAULT_CONFIG, "config/study.yaml", running.TEST_CONFIG]
 
 
 @pytest.mark.parametrize("extreme", ALL, ids=lambda extreme: extreme.name)
 def test_what_is_laid_over_the_config_is_what_the_config_allows_or_says(root, extreme):
-    given = config.read([root / file for file in FILES], extreme.overrides)
+    given = load.read_config([root / file for file in FILES], extreme.overrides)
     try:
-        config.check(given, root / "workflow/schemas/config.schema.yaml")
+        load.check_config(load.add_scene_files(given, root / "config/scenes"))
     except InputError as error:
         assert extreme.error_pattern and tables.has_failed_as_expected(
             extreme, outcome(exit_code=1, message=str(error))

@@ -91,7 +91,7 @@ ALL = (
         "two-photos",
         "one synthetic photo too few",
         override_desert(photos=2),
-        error_pattern=r"scenes\.desert\.photos: 2 is less than",
+        error_pattern=r"scenes\.desert\.photos: .*greater than or equal to 3",
     ),
     Extreme(
         "two-in-folder",
