@@ -70,14 +70,16 @@ def write_bundle(
         pixel = tiles.spacing / options.floor_pixels
         encoding = Encoding.fit([f for level in tiles.fields for f in level], tiles.side, pixel)
         entries, errors = _write_chunks(tiles, encoding, info, options, part)
+        known: dict[str, Any] = vars(info) | {"tiles": entries}
+        rounding: dict[str, Any] = asdict(errors) | _measure_rounding(tiles, encoding, pixel)
         made = Manifest(
-            **vars(info) | {"tiles": entries},
+            **known,
             format=manifest.FORMAT,
             version=manifest.VERSION,
             unit=options.unit,
             sky=options.sky,
             encoding=encoding,
-            error=RoundingErrors(**asdict(errors), **_measure_rounding(tiles, encoding, pixel)),
+            error=RoundingErrors(**rounding),
             orders=_describe_orders(found, options),
             provenance=provenance,
         )

@@ -35,7 +35,7 @@ class TileView:
 
 
 def spread_views(tiles: int, elevation: float, azimuths: int = 1) -> list[TileView]:
-    """VIEWS sights of different tiles, evenly around, each half-way between two of so many azimuths."""
+    """VIEWS views of different tiles, evenly around, each half-way between two of so many azimuths."""
     around = [round(azimuths * k / VIEWS) + 0.5 for k in range(VIEWS)]
     return [TileView(5 * k % tiles, 360 / azimuths * a % 360, elevation) for k, a in enumerate(around)]
 

@@ -1,7 +1,7 @@
 """Pre-sorted orders: the splats of a tile from back to front, for a few viewing directions.
 
 A viewer takes the order whose direction is nearest to its own and sorts nothing. How many directions that takes is
-measured (`ladder`). Tiles in doubt keep twice as many azimuths ("uncertainty-guided caching").
+measured (`direction_search`). Uncertain tiles keep twice as many azimuths ("uncertainty-guided caching").
 """
 
 from dataclasses import dataclass

@@ -1,5 +1,7 @@
 """A scene handed to PyVista: meshes, letters, legend and the first view."""
 
+from typing import Any
+
 import numpy as np
 import pyvista as pv
 from jaxtyping import Float
@@ -39,12 +41,12 @@ def make_mesh(layer: Layer) -> pv.PolyData:
     if not isinstance(layer.colours, tuple):
         (found.point_data if layer.cells is None else found.cell_data)["rgb"] = layer.colours
     if layer.picture is not None:
-        found.active_texture_coordinates = np.float32([[0, 1], [1, 1], [1, 0], [0, 0]])
+        found.active_texture_coordinates = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)
     return found
 
 
 def _add_layer(drawn: pv.Plotter, layer: Layer) -> None:
-    how = {"lighting": False, "show_scalar_bar": False}
+    how: dict[str, Any] = {"lighting": False, "show_scalar_bar": False}
     if layer.picture is not None:
         texture = pv.Texture(np.ascontiguousarray(layer.picture))
         drawn.add_mesh(make_mesh(layer), texture=texture, **how)

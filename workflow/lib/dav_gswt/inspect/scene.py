@@ -102,7 +102,7 @@ def move_layer(layer: Layer, by: Float[Array, "3"]) -> Layer:
 
 def make_outline(west: float, south: float, east: float, north: float, z: float, colour: tuple[int, int, int]) -> Layer:
     """A level rectangle's border."""
-    corners = np.float32([[west, south, z], [east, south, z], [east, north, z], [west, north, z]])
+    corners = np.array([[west, south, z], [east, south, z], [east, north, z], [west, north, z]], np.float32)
     return Layer("lines", corners, np.array([[0, 1], [1, 2], [2, 3], [3, 0]]), colour, 3.0)
 
 

@@ -106,7 +106,7 @@ def place_tiles(count: int, step: float) -> list[tuple[int, Float[Array, "3"]]]:
 def _tile_layers(some: GaussianField, by: str, level: int, tile: int, cut: TileSet | None) -> list[Layer]:
     if not len(some):
         return []
-    if by != "patch":
+    if by != "patch" or cut is None:
         return make_solids(some, compute_colours(some, by, level))
     return make_solids(some, shade_colours(np.array(PATCH_COLOURS)[find_patches(some, cut, tile)], some))
 
@@ -158,10 +158,13 @@ def compute_heights(some: GaussianField, cells: int, spacing: float) -> Float[Ar
 
 
 def _make_legend(by: str, numbers: list[int], cut: TileSet | None) -> list[ColourBar | ColourKey]:
+    entries: list[ColourBar | ColourKey] = []
     if by == "uncertainty":
-        bars = [ColourBar("uncertainty", 0.0, 1.0)]
+        entries.append(ColourBar("uncertainty", 0.0, 1.0))
     elif by == "level":
-        bars = [ColourKey({f"level {n}": level_colour(n) for n in numbers})]
-    else:
-        bars = [ColourKey(dict(zip(LABELS, PATCH_COLOURS, strict=True)))] * (by == "patch")
-    return bars + [ColourKey({"cut": CUT_COLOUR})] * (cut is not None and by != "patch")
+        entries.append(ColourKey({f"level {n}": level_colour(n) for n in numbers}))
+    elif by == "patch":
+        entries.append(ColourKey(dict(zip(LABELS, PATCH_COLOURS, strict=True))))
+    if cut is not None and by != "patch":
+        entries.append(ColourKey({"cut": CUT_COLOUR}))
+    return entries

@@ -1,8 +1,7 @@
-"""The levels of a field: each its finer neighbour merged, then fitted to the neighbour's pictures from above, from the
-side and as a walker sees them.
+"""Build the levels of detail of a field: each is its finer neighbour, merged and then fitted to pictures of it.
 
-What a level may change is what those pictures show of it: colours, sizes and things. Heights stay the means of the
-cells they cover: fitted from above they come out rough, and low over the ground one disc then hides the next.
+Pictures are rendered from above, from the side and at eye level. The fit changes colours, sizes and objects. Ground
+discs keep the mean height of the cells they cover: fitted heights are rough, and at eye level one disc hides the next.
 """
 
 import logging
@@ -39,7 +38,7 @@ PIXELS_PER_DISC = (
 
 
 class FixedHeights(GroundConstraints):
-    """A ground with things on it whose discs keep their heights."""
+    """Ground constraints under which the discs also keep their heights."""
 
     def adjust_gradients(self, gradients: Gradients) -> None:
         super().adjust_gradients(gradients)
@@ -47,37 +46,38 @@ class FixedHeights(GroundConstraints):
 
 
 def build_levels(
-    field: GaussianField, grid: Ground, asked: int | str, steps: int, seed: int, keep: Path | str | None = None
+    field: GaussianField, grid: Ground, wanted: int | str, steps: int, seed: int, keep: Path | str | None = None
 ) -> Levels:
-    """The field and as many coarser levels as are asked for and as its exemplar has room for.
+    """Fit as many coarser levels as are wanted and as the exemplar has room for.
 
-    Tiles make those beyond from their own cells (`tiles.coarse`), so a level is fitted only where at least ROOM of its
-    cells lie across the exemplar, but for the first, which gives every field a ground. With AUTO a level that saves
-    nothing is not made.
-    Args: steps: of each fit. keep: see `trainer.fit`.
-    Raises: InputError: so many levels were asked for, and the mean scale of one does not rise.
+    Coarser levels are merged from each tile's own cells (`tiles.coarse_levels`), so a level is fitted only if it has at
+    least MIN_CELLS cells across the exemplar. The first is always fitted: it gives every field a ground. With AUTO, a
+    level that saves too few Gaussians is dropped.
+
+    Args: wanted: number of levels, or AUTO. steps: of each fit. keep: see `trainer.fit`.
+    Raises: InputError: a number of levels is wanted, and the mean scale of one does not rise.
     """
     fields, grids = [field], [grid]
-    most, stopped = (MAX_LEVELS if asked == AUTO else asked), "no more are wanted"
+    most, stopped = (MAX_LEVELS if isinstance(wanted, str) else wanted), "no more are wanted"
     for number in range(1, most):
-        finer, laid = fields[-1], grids[-1]
-        if laid.cells % 2 or (number > 1 and laid.cells // 2 < MIN_CELLS):
-            stopped = f"level {number} would be {laid.cells / 2:g} cells wide; tiles make it from their own cells"
+        finer, finer_grid = fields[-1], grids[-1]
+        if finer_grid.cells % 2 or (number > 1 and finer_grid.cells // 2 < MIN_CELLS):
+            stopped = f"level {number} would be {finer_grid.cells / 2:g} cells wide; tiles make it from their own cells"
             break
-        level, coarse = fit_coarser_level(finer, laid, steps, np.random.default_rng([seed, number]), keep)
-        if asked == AUTO and (fault := _reason_to_drop(finer, level)):
-            asked, stopped = number, f"level {number}: {fault}"
+        level, coarse = fit_coarser_level(finer, finer_grid, steps, np.random.default_rng([seed, number]), keep)
+        if wanted == AUTO and (fault := _reason_to_drop(finer, level)):
+            wanted, stopped = number, f"level {number}: {fault}"
             break
         if not mean_scale([level]) > mean_scale([finer]):
             raise InputError(f"levels: the mean scale does not rise from level {number - 1} to {number}; ask for fewer")
         fields.append(level)
         grids.append(coarse)
     _log.info("%d levels: %s", len(fields), stopped)
-    return Levels(fields, grids, asked, stopped)
+    return Levels(fields, grids, wanted, stopped)
 
 
 def _reason_to_drop(finer: GaussianField, level: GaussianField) -> str | None:
-    """Why a level is not worth having, if it is not."""
+    """Why a level is not worth having; None if it is."""
     if not mean_scale([level]) > mean_scale([finer]):
         return "its mean scale does not rise"
     if len(level) > MAX_SHARE * len(finer):
@@ -103,10 +103,9 @@ def fit_coarser_level(
 
 
 def render_neighbour_views(field: GaussianField, coarse: Ground) -> list[TrainingView]:
-    """Pictures of a field, PIXELS pixels a coarse disc, drawn at twice that and averaged so that they do not alias.
+    """Render the pictures that a coarser level is fitted to: PIXELS_PER_DISC pixels a coarse disc.
 
-    Drawn once, splats finer than a pixel are wider than they are: level 1 of flowers of a seed for development is then
-    .03 lighter than test photos at half their size, 16.6 dB from them; so it is .01 lighter, 17.6 dB.
+    They are rendered at twice the size and averaged, so that splats finer than a pixel do not alias.
     """
     drawn, views = raster.Rasterizer(), []
     for number, camera in enumerate(_neighbour_cameras(coarse)):

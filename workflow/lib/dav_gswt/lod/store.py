@@ -1,4 +1,4 @@
-"""Levels on disk: level{l}.ply, the grid level{l}.exr of each, and levels.json, which tells of them, in one folder."""
+"""Levels on disk, in one folder: level{l}.ply, the grid level{l}.exr of each, and levels.json."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ def write_levels(levels: Levels, folder: Path | str, provenance: dict) -> None:
 
 
 def read_levels(folder: Path | str) -> Levels:
-    """Read what `write` wrote. Raises: InputError: a file is missing or not what levels.json says."""
+    """Read what `write_levels` wrote. Raises: InputError: a file is missing or not what levels.json says."""
     folder = Path(folder)
     told = read_json(folder / "levels.json")
     try:

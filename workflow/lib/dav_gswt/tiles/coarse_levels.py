@@ -1,6 +1,6 @@
 """Coarser levels of a tile from its own cells, two by two.
 
-Patches of the exemplar are laid by whole cells of the coarsest level that is composed of them. Beyond that a tile is
+Patches of the exemplar are placed by whole cells of the coarsest level that is composed of them. Beyond that a tile is
 merged as it is, cuts and corrections included: cells never reach over its border, so neighbours still meet.
 """
 

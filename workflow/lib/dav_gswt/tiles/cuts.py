@@ -83,7 +83,7 @@ def _quantize(right: Array, upper: Array) -> tuple[Array, Array, float]:
     if not (np.isfinite(largest) and min(right.min(initial=0), upper.min(initial=0)) >= 0):
         raise ValueError("seam costs must be finite and not negative")
     unit = QUANTA / largest if largest > 0 else 1.0
-    return *(np.rint(w * unit).astype(np.int64) for w in (right, upper)), unit
+    return np.rint(right * unit).astype(np.int64), np.rint(upper * unit).astype(np.int64), unit
 
 
 def _sum_costs(labels: Array, right: Array, upper: Array) -> int:

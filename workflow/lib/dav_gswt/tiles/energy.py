@@ -1,16 +1,14 @@
-"""What a seam costs: Eq. (graphcut_main) of the paper, made safe.
+"""What a seam costs: Eq. (graphcut_main) of the paper, in a form that is safe in floating point.
 
 The cost of a seam between neighbouring cells s and t is
 
     W(s, t) = (gamma D_I + (1 - gamma) D_S) / (gamma G_I + (1 - gamma) G_S + EPS):
 
-a difference is cheap where both patches have a strong gradient anyway. I is colour, S is what the ground is
-(`semantics`). D(s, t) = d(s) + d(t), d the distance between what the two patches show in a cell; G(s, t) = the four
-gradients along the edge, two of each patch; every D and G over its scale, frozen for the exemplar. gamma is high where
-the ground is sure, low where it is doubted. What stands on the ground (`standing`) has a D of its own, and no G that
-would make a cut through a shrub cheap: from above it looks like any dark ground, from the side half a shrub does not.
-W is symmetric in the patches, finite, not negative, and 0 where they are
-equal.
+a difference is cheap where both patches have a strong gradient anyway. I is colour, S the semantic layer (`semantics`).
+D(s, t) = d(s) + d(t), d the distance between what the two patches show in a cell; G(s, t) = the four gradients along
+the edge, two of each patch; every D and G is divided by its scale, frozen for the exemplar. gamma is high where the
+ground is certain. Cells hidden by occluders (`make_occluder_layer`) have a D of their own and no G: otherwise a cut
+through a shrub would be cheap. W is symmetric in the patches, finite, not negative, and 0 where they are equal.
 """
 
 from collections.abc import Sequence
@@ -24,7 +22,7 @@ from numpy import ndarray as Array
 from dav_gswt.views.uncertainty import gamma
 
 KINDS = ("none", "colour", "semantic", "semantic-nogamma")
-OCCLUDER_WEIGHT = 2.0  # D of a thing that hides the ground, beside bare ground; in units of two random colours
+OCCLUDER_WEIGHT = 2.0  # D of a hidden cell beside bare ground, in units of two random colours
 EPS = 1.0  # of the mean gradient: with less, a cut through a bush (steep everywhere) is as cheap as one through sand
 ROUNDING = 1e-9  # of colours, which are about 1
 
@@ -41,10 +39,13 @@ class LayerScales:
 
 @runtime_checkable
 class CostLayer(Protocol):
-    """A way to look at an exemplar: how far apart cells are, and how steep it is along x and along y in each."""
+    """A description of an exemplar: distances between cells, the gradient along x and y in each, and their scales."""
 
-    slope: Float[Array, "h w 2"]
-    unit: LayerScales
+    @property
+    def slope(self) -> Float[Array, "h w 2"]: ...
+
+    @property
+    def unit(self) -> LayerScales: ...
 
     def distances(self, first: Cells, second: Cells) -> Float[Array, "..."]: ...
 
@@ -54,6 +55,7 @@ class ColourLayer:
     """Colours of the exemplar's cells, and their gradients; cells are as far apart as their colours (2-norm)."""
 
     values: Float[Array, "h w c"]
+
     slope: Float[Array, "h w 2"]
     unit: LayerScales
 
@@ -66,7 +68,7 @@ def make_colour_layer(values: Float[Array, "h w c"]) -> ColourLayer:
 
 
 def make_occluder_layer(cover: Float[Array, "h w"]) -> ColourLayer | None:
-    """How much of each cell is hidden, in [0, 1], as a layer without gradient; None where nothing stands."""
+    """Share of each cell that occluders hide, in [0, 1], as a layer without gradient; None where nothing is hidden."""
     if not cover.any():
         return None
     return ColourLayer(cover[..., None], np.zeros((*cover.shape, 2)), LayerScales(1.0, 1.0))
@@ -89,16 +91,19 @@ def make_scales(spread: float, slope: Float[Array, "h w 2"]) -> LayerScales:
 
 
 def safe_unit(value: float) -> float:
-    """A unit to measure by; what is the same everywhere, but for rounding, has none: 1 then."""
+    """A unit to divide by; 1 for a value that is 0 but for rounding."""
     return value if value > ROUNDING else 1.0
 
 
 @dataclass(frozen=True)
 class SeamEnergy:
-    """How seams are cut (one of KINDS), and the layers that they are priced by; semantics are None for colour alone.
+    """How seams are cut and priced.
 
-    slope: of gamma; 2 is the paper's. occluders: how much of each cell is hidden by what stands over it;
-    None for nothing.
+    Attributes:
+        kind: one of KINDS.
+        slope: of gamma as a function of uncertainty; the paper's is 2.
+        colours, semantics: layers; semantics are None for colour alone.
+        occluders: share of each cell that is hidden; None for nothing.
     """
 
     kind: str
@@ -107,12 +112,12 @@ class SeamEnergy:
     semantics: CostLayer | None
     occluders: CostLayer | None = None
 
-    def gamma(self, doubt: float) -> float:
-        """Weight of colour in the seams of a patch whose mean uncertainty (of 0 to 1) is `doubt`.
+    def gamma(self, uncertainty: float) -> float:
+        """Weight of colour in the seams of a patch of this mean uncertainty in [0, 1].
 
-        Without semantics 1, `semantic-nogamma` 1/2. Raises: ValueError: doubt is NaN.
+        Without semantics 1, `semantic-nogamma` 1/2. Raises: ValueError: uncertainty is NaN.
         """
-        found = float(gamma(np.array([doubt], float), self.slope)[0])
+        found = float(gamma(np.array([uncertainty], float), self.slope)[0])
         if self.semantics is None:
             return 1.0
         return 0.5 if self.kind == "semantic-nogamma" else found
@@ -120,11 +125,10 @@ class SeamEnergy:
     def terms(self, share: float) -> list[tuple[float, CostLayer]]:
         """The layers with their weights, at a weight of colour of `share`; one that weighs nothing is left out.
 
-        What stands weighs the same however sure the ground is.
+        Occluders weigh the same whatever the uncertainty.
         """
-        both = (share, self.colours), (1 - share, self.semantics)
-        stand = [(OCCLUDER_WEIGHT, self.occluders)] if self.occluders is not None else []
-        return [(weight, layer) for weight, layer in both if weight > 0] + stand
+        layers = (share, self.colours), (1 - share, self.semantics), (OCCLUDER_WEIGHT, self.occluders)
+        return [(weight, layer) for weight, layer in layers if weight > 0 and layer is not None]
 
 
 def compute_edge_costs(

@@ -5,7 +5,7 @@ quarter of the corner patch in each corner. A strip is centred on an edge: its r
 the right (above), its left (lower) half in the tile to the left (below), and the common corner patch is centred on
 the corners, so the exemplar goes on across every border. All places and half-widths are multiples of a block, the
 coarsest cell that patches are laid by, so the same patches are whole cells in every level up to it. Coarser levels are
-merged from the cells of each tile (`coarse`), so a tile is a whole number of the coarsest level's cells wide.
+merged from the cells of each tile (`coarse_levels`), so a tile is a whole number of the coarsest level's cells wide.
 
 Arrays over cells are indexed [y, x], and **row 0 is the southern one**, as cell numbers grow to the north; pictures
 of maps have it at the bottom.
@@ -101,7 +101,7 @@ def plan_layout(exemplar: int, levels: int | str, share: float, strip: float, fi
     Where the exemplar holds no tile with so many levels there are fewer, and a warning says so.
     Raises: InputError: the exemplar cannot hold any tile.
     """
-    most = _count_drawn_levels(exemplar * share) if levels == AUTO else levels
+    most = _count_drawn_levels(exemplar * share) if isinstance(levels, str) else levels
     sizes = ((number, _choose_side(exemplar, number, share)) for number in range(most, 0, -1))
     number, side = next(((n, s) for n, s in sizes if s <= exemplar), (0, 0))
     if not number:

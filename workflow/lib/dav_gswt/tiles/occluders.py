@@ -1,4 +1,4 @@
-"""What stands on the ground, seen from above: which cells of an exemplar it hides.
+"""Occluders: which cells of an exemplar are hidden, seen from above, by what stands on the ground.
 
 Gaussians follow the label of the cell that their centre is in, so a cut through a shrub leaves half a shrub, and one
 under a flower's head a stalk without a head. Such cells are dear to cut (`energy.make_occluder_layer`).

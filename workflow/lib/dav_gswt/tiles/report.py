@@ -48,7 +48,8 @@ class EnergyReport:
     @classmethod
     def from_dict(cls, value: dict[str, Any]) -> "EnergyReport":
         scales = {name: LayerScales(**unit) for name, unit in value["scales"].items()}
-        return cls(**value | {"scales": scales})
+        parts: dict[str, Any] = value | {"scales": scales}
+        return cls(**parts)
 
 
 @dataclass(frozen=True)
