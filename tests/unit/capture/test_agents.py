@@ -92,7 +92,7 @@ def test_a_burst_of_a_replayed_scene_takes_several_photos_of_a_pose(site):
 
 
 def test_a_burst_of_a_rendered_scene_repeats_the_photo_with_other_noise(site, tmp_path, monkeypatch):
-    monkeypatch.setattr(synthetic, "of_config", lambda entry: None)
+    monkeypatch.setattr(synthetic, "scene_from_config", lambda entry: None)
     monkeypatch.setattr(synthetic, "render", lambda world, camera, again: np.full((8, 8, 3), again / 4, np.float32))
     photos = capture(site, "render", requested(0.0), burst=3)
     assert [photo.name for photo in photos] == ["a0_0.png", "a0_1.png", "a0_2.png"]

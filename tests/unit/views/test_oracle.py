@@ -61,7 +61,7 @@ def test_a_synthetic_scene_truly_shows_its_photo(monkeypatch):
     pool = candidates(128, 128)
     (view,) = oracle.render_truth(ENTRY, pool, "nowhere")
     photo = scene.render(scene.scene_from_config(ENTRY), pool[0][1])
-    scene._world.cache_clear()
+    scene._load_scene.cache_clear()
     np.testing.assert_array_equal(view.image, image_files.shrink_image(photo, 96, 96))
     assert view.image.std() > 0.02
 

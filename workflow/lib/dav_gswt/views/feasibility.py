@@ -1,8 +1,7 @@
-"""Poses that no photo can come from: inside the ground or too near to it, hidden behind it, out of the scene's limits.
+"""Feasibility of poses: below or too near the ground, hidden by it, or outside of the scene's limits.
 
-The ground is the height field as a mesh, the part beyond the exemplar included; rays decide what is hidden. embree
-traces them in single precision, so everything is brought to the exemplar first: its middle becomes the origin and its
-side the unit, and the answers do not depend on where the world's origin lies or on its unit.
+The ground is the whole height field as a mesh; rays decide what is hidden. embree traces in single precision, so all
+coordinates are relative to the exemplar: its middle is the origin, its side the unit.
 """
 
 import logging
@@ -23,18 +22,18 @@ from dav_gswt.views.candidates import Candidates
 
 _log = logging.getLogger(__name__)
 
-MOST = 512  # vertices of the mesh along the grid's longer side: five for each knot of the surface
-LATTICE = 9  # points on the exemplar that are looked at, along its side
-SHARE = 0.5  # of those in the picture that must be in sight: else the photo shows more of what hides the ground
-CLEARANCE = 0.05  # flying heights: what stands on the ground may reach as high
-OFF = 1e-4  # sides of the exemplar that a ray starts above the surface: beyond single precision, below any bump
+MOST = 512  # vertices of the mesh along the grid's longer side
+LATTICE = 9  # test points along a side of the exemplar
+SHARE = 0.5  # of the test points in the picture that must be visible
+CLEARANCE = 0.05  # flying heights: height of objects on the ground
+OFF = 1e-4  # sides of the exemplar: height above the surface at which a ray starts
 
 
 @dataclass(frozen=True)
-class _Site:
-    """The ground about the exemplar's middle, its side being 1. Vertices run row by row, from the south.
+class _GroundMesh:
+    """The ground in coordinates of the exemplar. Vertices run row by row, from the south.
 
-    points, normals: the lattice on the exemplar; each of its points is a vertex, so none lies under a triangle.
+    points, normals: the test points; each is a vertex, so none lies below a triangle.
     """
 
     grid: Ground
@@ -53,30 +52,30 @@ class _Site:
 def filter_feasible(
     candidates: Candidates, grid: Ground, limits: dict | None = None, clearance: float | None = None
 ) -> Candidates:
-    """The candidates that are not `find_infeasible`; how many are, and why, is logged.
+    """Keep the feasible candidates; the number of the others is logged with the reasons.
 
-    Raises: InputError: all are.
+    Raises: InputError: none is feasible.
     """
     reasons = find_infeasible(candidates, grid, limits, clearance)
     if not reasons:
         return candidates
     kinds = Counter(reason.split(":")[0] for reason in reasons.values())
-    told = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
+    summary = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
     if len(reasons) == len(candidates):
-        raise InputError(f"no photo can be taken from any of the {len(candidates)} candidate poses: {told}")
-    _log.info("%d of %d candidate poses are left out: %s", len(reasons), len(candidates), told)
+        raise InputError(f"no photo can be taken from any of the {len(candidates)} candidate poses: {summary}")
+    _log.info("%d of %d candidate poses are left out: %s", len(reasons), len(candidates), summary)
     return [(pose, camera) for pose, camera in candidates if pose.name not in reasons]
 
 
 def find_infeasible(
     candidates: Candidates, grid: Ground, limits: dict | None = None, clearance: float | None = None
 ) -> dict[str, str]:
-    """Why a pose is none, in words, by its name: what stands before the colon is the kind of reason.
+    """Find infeasible poses. Returns the reason by pose name; the text before its colon is the kind of reason.
 
     limits: min_height and max_height above the ground, max_distance from the exemplar's middle, in world units; each
     may be missing. clearance: least distance from the ground, in world units; if None, CLEARANCE times the median
     distance of the candidates from the middle, which is the flying height where they lie on its hemisphere.
-    A pose is hidden where fewer than SHARE of the lattice's points in its picture are in sight, and where it has none.
+    A pose is hidden if fewer than SHARE of the test points in its picture are visible, or if it shows none.
     """
     if not candidates:
         return {}
@@ -86,7 +85,7 @@ def find_infeasible(
     if clearance is None:
         clearance = CLEARANCE * float(np.median(np.linalg.norm(centres - site.middle, axis=1)))
     if not trimesh.ray.has_embree:
-        _log.warning("embreex is not installed: rays go over the ground step by step, more slowly")
+        _log.warning("embreex is not installed: rays are marched in steps, which is slower")
     why = (
         _find_hidden(site, cameras, centres)
         | _find_outside_limits(site, centres, limits or {})
@@ -95,7 +94,7 @@ def find_infeasible(
     return {candidates[i][0].name: why[i] for i in sorted(why)}
 
 
-def _build_mesh(grid: Ground) -> _Site:
+def _build_mesh(grid: Ground) -> _GroundMesh:
     west, south, side = grid.exemplar
     n, m, cells = grid.first_row, grid.first_column, grid.cells
     middle = np.array([west + side / 2, south + side / 2, np.median(grid.heights[n : n + cells, m : m + cells])])
@@ -111,7 +110,7 @@ def _build_mesh(grid: Ground) -> _Site:
     east, north = (slope[np.ix_(rows[i], columns[j])].ravel() for slope in grid.slopes())
     normals = np.stack([-east, -north, np.ones(len(east))], 1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return _Site(grid, middle, side, x, y, mesh, vertices[places], normals)
+    return _GroundMesh(grid, middle, side, x, y, mesh, vertices[places], normals)
 
 
 def _faces(rows: int, columns: int) -> Int[Array, "n 3"]:
@@ -121,8 +120,8 @@ def _faces(rows: int, columns: int) -> Int[Array, "n 3"]:
     return np.stack([a, b, d, a, d, c], 1).reshape(-1, 3)
 
 
-def _find_near(site: _Site, centres: Float[Array, "n 3"], clearance: float) -> dict[int, str]:
-    """Cameras below the surface or nearer to it than the clearance."""
+def _find_near(site: _GroundMesh, centres: Float[Array, "n 3"], clearance: float) -> dict[int, str]:
+    """Find cameras below the surface or nearer to it than the clearance."""
     above = centres[:, 2] - site.grid.height_at(centres)
     away = np.minimum(np.abs(above), site.side * _distance(site, site.local(centres)))
     reasons = {
@@ -132,7 +131,7 @@ def _find_near(site: _Site, centres: Float[Array, "n 3"], clearance: float) -> d
     return reasons | {i: f"buried: {-above[i]:.3g} below the ground" for i in _indices(above <= 0)}
 
 
-def _distance(site: _Site, places: Float[Array, "n 3"]) -> Float[Array, "n"]:
+def _distance(site: _GroundMesh, places: Float[Array, "n 3"]) -> Float[Array, "n"]:
     """Distance to the mesh: to the triangles of the four cells around the nearest vertex."""
     rows, columns = len(site.y), len(site.x)
     nearest = cKDTree(site.mesh.vertices).query(places)[1]
@@ -147,8 +146,8 @@ def _distance(site: _Site, places: Float[Array, "n 3"]) -> Float[Array, "n"]:
     return np.linalg.norm(found - all_places, axis=1).reshape(faces.shape).min(1)
 
 
-def _find_outside_limits(site: _Site, centres: Float[Array, "n 3"], limits: dict) -> dict[int, str]:
-    """Cameras lower, higher or farther than the limits."""
+def _find_outside_limits(site: _GroundMesh, centres: Float[Array, "n 3"], limits: dict) -> dict[int, str]:
+    """Find cameras outside of the limits."""
     above = centres[:, 2] - site.grid.height_at(centres)
     away = np.linalg.norm(centres - site.middle, axis=1)
     low, high, far = (
@@ -164,8 +163,8 @@ def _indices(mask: Bool[Array, "n"]) -> list[int]:
     return np.flatnonzero(mask).tolist()
 
 
-def _find_hidden(site: _Site, cameras: list[Camera], centres: Float[Array, "n 3"]) -> dict[int, str]:
-    """Cameras that show too little of the exemplar, or no ground in the middle of the picture."""
+def _find_hidden(site: _GroundMesh, cameras: list[Camera], centres: Float[Array, "n 3"]) -> dict[int, str]:
+    """Find cameras that show too little of the exemplar, or no ground in the middle of the picture."""
     shown, seen = _count_visible(site, cameras, centres)
     ground = np.isfinite(_cast_rays(site, site.local(centres), np.stack([camera.forward for camera in cameras])))
     reasons = {i: "past the ground: the middle of the picture shows none" for i in _indices(~ground)}
@@ -177,9 +176,9 @@ def _find_hidden(site: _Site, cameras: list[Camera], centres: Float[Array, "n 3"
 
 
 def _count_visible(
-    site: _Site, cameras: list[Camera], centres: Float[Array, "n 3"]
+    site: _GroundMesh, cameras: list[Camera], centres: Float[Array, "n 3"]
 ) -> tuple[Int[Array, "n"], Int[Array, "n"]]:
-    """Of the lattice's points, how many lie in each camera's picture, and how many of these are in its sight."""
+    """Count the test points in each camera's picture, and how many of these are visible."""
     world = site.middle + site.side * site.points
     shown = np.stack([_in_picture(camera, world) for camera in cameras])
     which, point = np.nonzero(shown)
@@ -195,8 +194,8 @@ def _in_picture(camera: Camera, points: Float[Array, "m 3"]) -> Bool[Array, "m"]
     return (depth > 0) & (at > 0).all(1) & (at[:, 0] < camera.width) & (at[:, 1] < camera.height)
 
 
-def _cast_rays(site: _Site, origins: Float[Array, "n 3"], ways: Float[Array, "n 3"]) -> Float[Array, "n"]:
-    """Distance to the ground along rays of unit direction, infinite where they miss it."""
+def _cast_rays(site: _GroundMesh, origins: Float[Array, "n 3"], ways: Float[Array, "n 3"]) -> Float[Array, "n"]:
+    """Distance to the ground along rays of unit direction; infinite for misses."""
     if not trimesh.ray.has_embree:
         return _march_rays(site, origins, ways)
     found = np.full(len(origins), np.inf)
@@ -210,10 +209,10 @@ def _cast_rays(site: _Site, origins: Float[Array, "n 3"], ways: Float[Array, "n 
     return np.nan_to_num(found, nan=0.0, posinf=np.inf)
 
 
-def _march_rays(site: _Site, origins: Float[Array, "n 3"], ways: Float[Array, "n 3"]) -> Float[Array, "n"]:
-    """As `_cast_rays`, without embree: where a ray is first below the surface, tried in steps over the grid's box.
+def _march_rays(site: _GroundMesh, origins: Float[Array, "n 3"], ways: Float[Array, "n 3"]) -> Float[Array, "n"]:
+    """As `_cast_rays`, without embree: march each ray through the grid's box until it is below the surface.
 
-    It takes as many steps as the longer side has vertices, so a ray below a crest by a cell's width is stopped.
+    There are as many steps as vertices along the longer side, so crests wider than a cell are detected.
     """
     steps = max(len(site.x), len(site.y))
     heights = site.mesh.vertices[:, 2].reshape(len(site.y), len(site.x))

@@ -18,8 +18,8 @@ from dav_gswt.views.policy_names import POLICY_NAMES
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.uncertainty.weighting import combine_image_terms, combine_terms
 
-RING = 45.0  # degrees of elevation that a ring keeps to
-TURN = 180 * (3 - 5**0.5)  # degrees between the starts of rings: the golden angle, so that none falls on another
+RING = 45.0  # elevation of a ring, degrees
+TURN = 180 * (3 - 5**0.5)  # degrees between the starts of rings: the golden angle avoids coincidences
 
 
 @runtime_checkable

@@ -1,1 +1,1 @@
-"""Do scores of poses say where a field is wrong? Scores beside the true error, of candidates whose truth can be had."""
+"""Calibration of scores: comparison with the true error at candidates whose true pictures are available."""

@@ -1,4 +1,4 @@
-"""Other estimates of what is doubted in a view, to compare the prior's disagreement with: does diffusion earn its cost?
+"""Other uncertainty estimates, as controls for the disagreement of the prior's samples.
 
 `spread`: how far samples from other noises lie apart, without dropout: what the prior itself holds for possible.
 `residual`: how far the mean of these lies from what the field shows. Of deterministic networks of the prior's shape:

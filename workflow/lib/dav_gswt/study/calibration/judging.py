@@ -1,4 +1,4 @@
-"""Scores of some candidates beside the true error there: what `measures` compares, gathered."""
+"""Collects scores of candidates and the true error there, and compares them with `measures`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from dav_gswt.views.uncertainty import combine_terms
 
 @dataclass(frozen=True)
 class CalibrationTarget:
-    """The field whose scores are judged. taken: the photos so far. size: longer side of those that it was fitted to."""
+    """The field whose scores are compared. taken: the photos so far. size: longer side of the photos of its fit."""
 
     scene: dict
     field: GaussianField
@@ -44,10 +44,10 @@ def calibrate_scores(
     prior: PriorConfig | None = None,
     regressors: Sequence = (),
 ) -> tuple[dict, list[dict]]:
-    """The content of calibration.json, and a row for each of some candidates that were scored.
+    """Compare scores with true errors. Returns the content of calibration.json, and a row per candidate.
 
-    views: what these truly show. u: W2 and LPIPS weighed by lam. low and far need no field: how low a pose stands, and
-    how far from the nearest photo. prior, regressors: for `controls`, beside the scores that there are.
+    some, views: candidates and their true pictures. scored: scores and maps. lam: weight of LPIPS in u. prior,
+    regressors: for the estimates of `controls`.
     """
     row = {name: i for i, name in enumerate(scored[0].names)}
     terms, shown = _select_terms(*scored, [row[pose.name] for pose, _ in some], lam)
@@ -61,7 +61,7 @@ def calibrate_scores(
         shown |= others
         # `residual` takes the place of the scores' term: that of samples from other noises, whatever was asked for them
         terms |= {name: prior_sampling.weighted_mean(m, counts) for name, m in others.items()}
-    corrected = judged.frame.kind == "photos"  # which change their exposure
+    corrected = judged.frame.kind == "photos"  # photos differ in exposure
     error, error_maps = oracle.measure_errors(judged.field, judged.grid, views, judged.size, corrected)
     table = [
         {"pose": pose.name, "error": error[i]} | {name: values[i] for name, values in terms.items()}
@@ -73,7 +73,7 @@ def calibrate_scores(
 def choose_candidates(
     judged: CalibrationTarget, pool: Candidates, scored: Scores, given: dict, count: int
 ) -> tuple[Candidates, list[TrainingView]]:
-    """The candidates to compare, spread over those that were scored, and what they truly show.
+    """Choose candidates, spread over the scored ones. Returns them and their true pictures.
 
     given: folders, `images` of photos and, where a scene can be rendered, `truth` (see `oracle.write_truth`).
     """
@@ -86,7 +86,7 @@ def choose_candidates(
 
 
 def geometric_baselines(some: list[Pose], taken: list[Pose]) -> dict[str, Float64[Array, "n"]]:
-    """What any score has to beat: `low`, degrees under the zenith, and `far`, how far the nearest photo is."""
+    """Baseline scores: `low`, degrees below the zenith, and `far`, distance to the nearest photo."""
     at, photos = (np.array([pose_offset(pose) for pose in poses]).reshape(-1, 3) for poses in (some, taken))
     apart = np.linalg.norm(at[:, None] - photos, axis=-1).min(1, initial=np.inf)
     return {"low": np.array([90.0 - pose.elevation for pose in some]), "far": apart}
@@ -95,7 +95,7 @@ def geometric_baselines(some: list[Pose], taken: list[Pose]) -> dict[str, Float6
 def _select_terms(
     scores: Scores, maps: PoseMaps, rows: list[int], lam: float
 ) -> tuple[dict[str, Float64[Array, "n"]], dict[str, Float32[Array, "n _ _"]]]:
-    """The terms of some rows, u among them where a prior was asked, and their maps."""
+    """Terms and maps of some rows; with a prior u is among the terms."""
     terms = {name: values[rows] for name, values in scores.terms.items()}
     shown = {"opacity": maps.opacity[rows]}
     if "w2_sq" in scores.terms:

@@ -1,1 +1,1 @@
-"""What policies are worth: curves of quality against photos, and paired comparisons with intervals."""
+"""Comparison of policies: PSNR against the number of photos, and paired differences with intervals."""

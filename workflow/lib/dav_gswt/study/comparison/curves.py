@@ -1,7 +1,7 @@
-"""Curves of the policies that were compared: a row for each round of each cell, kept from run to run.
+"""Curves of policies: a table with a row per round of each cell, accumulated over runs.
 
-A cell is a scene, a seed (which photos start), a policy with its parameters, and k. Rows of several runs add up: a
-round that was measured again replaces what it was.
+A cell is a scene, a seed (of the start photos), a policy with its parameters, and k. A round that is measured again
+replaces its row.
 """
 
 import csv
@@ -14,7 +14,7 @@ from dav_gswt.views import marginal_gain
 CELL = ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k")
 MEASURES = ("psnr", "ssim", "lpips", "worst_psnr", "walker_psnr")
 ASIDE = ("oblique", "walker")  # groups of test views away from where photos may be taken
-EXPECTED = ("closes", "expected", "expected_low", "expected_high")  # of a round, before it: see `worth`
+EXPECTED = ("closes", "expected", "expected_low", "expected_high")  # predicted before a round: `marginal_gain`
 WORK = ("score", "select", "capture", "update")  # a round's jobs whose time counts; measuring does not
 
 
@@ -27,17 +27,19 @@ def read_cell(cell: dict) -> list[dict]:
     """
     found, fits = [], []
     for t, path in enumerate(cell["metrics"]):
-        told = read_json(path)
-        row = {key: cell[key] for key in CELL} | {"round": t, "photos": told["photos"]}
-        row |= select_metrics(told, "psnr_colour_corrected" if cell["corrected"] else "psnr")
-        row |= _predict_gain(found, fits, told["photos"])
+        metrics = read_json(path)
+        row = {key: cell[key] for key in CELL} | {"round": t, "photos": metrics["photos"]}
+        row |= select_metrics(metrics, "psnr_colour_corrected" if cell["corrected"] else "psnr")
+        row |= _predict_gain(found, fits, metrics["photos"])
         if t:
-            fits.append(told["fit"])
+            fits.append(metrics["fit"])
         row |= {"seconds": _sum_seconds(cell["times"][t - 1]) if t else 0.0}
         row |= {"evaluations": _count_evaluations(cell["facts"][t - 1], cell["samples"]) if t else 0}
-        about = told["provenance"]
-        renderer = " ".join(str(value) for value in about["renderer"].values())
-        found.append(row | {"version": about["version"], "renderer": renderer, "field": about["inputs"]["field"][:12]})
+        provenance = metrics["provenance"]
+        renderer = " ".join(str(value) for value in provenance["renderer"].values())
+        found.append(
+            row | {"version": provenance["version"], "renderer": renderer, "field": provenance["inputs"]["field"][:12]}
+        )
     return found
 
 
@@ -57,11 +59,11 @@ def _key(row: dict) -> tuple:
     return tuple(row[key] for key in CELL) + (row["round"],)
 
 
-def select_metrics(told: dict, psnr: str) -> dict:
+def select_metrics(metrics: dict, psnr: str) -> dict:
     """MEASURES of a metrics.json, PSNR by its key: over the test views from where photos may be taken, if they are a
     group of their own, else over all."""
-    groups = told["groups"]
-    mine = next((groups[name] for name in groups if name not in ASIDE), told)
+    groups = metrics["groups"]
+    mine = next((groups[name] for name in groups if name not in ASIDE), metrics)
     found = {"psnr": mine[psnr], "ssim": mine["ssim"], "lpips": mine["lpips"]}
     found |= {"worst_psnr": mine["worst_decile"][psnr]}
     return found | {"walker_psnr": groups["walker"][psnr] if "walker" in groups else None}

@@ -1,7 +1,4 @@
-"""What a policy is worth: the area under its curve of PSNR against photos, and paired comparisons with intervals.
-
-The unit is (scene, seed): all policies start from the same photos and fields, and are paired there.
-"""
+"""Measures of a policy's curve of PSNR against photos."""
 
 import numpy as np
 from jaxtyping import Float
@@ -24,7 +21,7 @@ def nauc(photos: Float[Array, "t"], psnr: Float[Array, "t"]) -> float:
 
 
 def photos_to_reach(photos: Float[Array, "t"], psnr: Float[Array, "t"], best: float, way: float = WAY) -> float | None:
-    """Photos until PSNR is `way` of the way from the start to `best`, linear between rounds; None if it never is."""
+    """Photos until PSNR has risen by the share `way` from the start to `best`, linear between rounds; None if never."""
     goal = psnr[0] + way * (best - psnr[0])
     for t in range(len(photos)):
         if psnr[t] >= goal:

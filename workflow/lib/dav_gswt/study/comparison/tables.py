@@ -62,7 +62,7 @@ def compare_to_baseline(table: list[dict], baseline: str) -> list[dict]:
 
 
 def check_predictions(curves: list[dict]) -> list[dict]:
-    """What rounds gained against what was expected of them, over all scenes and of each: see `active.worth`.
+    """Compare gains of rounds with their predictions (`marginal_gain`), over all scenes and for each.
 
     share: of the gap that closes, what test views gained (geometric mean), off: standard deviation of its logarithm,
     both over rounds that gained something; covered: share of all rounds whose gain lies in the interval.

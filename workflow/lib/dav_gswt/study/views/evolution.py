@@ -1,6 +1,6 @@
-"""The paper's evolution figure: two test views after some rounds, and where each render differs from the photo.
+"""The paper's evolution figure: two test views over the rounds, with error maps.
 
-Errors are taken from the photo, not from the last field as in the paper: what the last field gets wrong shows as well.
+Errors are relative to the photo, not to the last field as in the paper.
 Source: DAV-GSWT, figure on iterative reconstruction evolution.
 """
 

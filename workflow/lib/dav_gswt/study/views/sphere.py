@@ -1,4 +1,4 @@
-"""The paper's uncertainty sphere: what the scores said of each candidate when a round chose, and what it chose.
+"""The paper's uncertainty sphere: scores of the candidates of each round, and the chosen poses.
 
 The hemisphere is seen from above, by Lambert's projection: equal areas of it are equal areas of the figure, so that
 candidates spread evenly over it lie evenly in the figure. Source: DAV-GSWT, figure on active-view uncertainty.
