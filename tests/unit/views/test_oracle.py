@@ -119,7 +119,7 @@ def test_a_field_has_no_error_against_its_own_pictures(views):
         assert 0 < np.isnan(found).sum() < found.size
 
 
-def test_an_error_is_the_root_mean_square_over_channels_and_the_pixels_that_count(views):
+def test_rmse_is_the_root_mean_square_over_channels_and_the_pixels_that_count(views):
     view = views[0]
     counts = ground_mask(GRID, view.camera) > 0
     columns = np.arange(SIDE) < 20
@@ -134,14 +134,14 @@ def test_an_error_is_the_root_mean_square_over_channels_and_the_pixels_that_coun
     assert error == pytest.approx(0, abs=1e-5) and np.isnan(found[:, columns]).all()
 
 
-def test_another_exposure_is_an_error_unless_it_is_corrected(views):
+def test_another_exposure_counts_unless_it_is_corrected(views):
     gain, offset = np.float32([0.8, 0.9, 0.7]), np.float32([0.1, 0.05, 0.0])
     other = [replace(view, image=gain * view.image + offset) for view in views]
     assert (oracle.measure_errors(FIELD, GRID, other, SIDE)[0] > 0.02).all()
     np.testing.assert_allclose(oracle.measure_errors(FIELD, GRID, other, SIDE, corrected=True)[0], 0, atol=1e-5)
 
 
-def test_a_view_of_nothing_that_is_modelled_has_no_error(views):
+def test_a_view_of_nothing_that_is_modelled_has_no_rmse(views):
     aside = replace(views[0], camera=cameras.pinhole([90, 90, 4], [90, 90.1, 0], SIDE, SIDE, 40.0))
     error, maps = oracle.measure_errors(FIELD, GRID, [aside, views[1]], SIDE)
     assert np.isnan(error[0]) and np.isnan(maps[0]).all() and np.isfinite(error[1])
