@@ -1,5 +1,6 @@
 """Views: a photo with its camera, at the size at which a quality works, and the share of it that can be modelled."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -70,7 +71,7 @@ def mask_outside_ground(view: TrainingView, west: float, south: float, east: flo
 
 
 def read_training_views(
-    images_folder: Path | str, model: Path | str, names: list[str], captures: list, size: int
+    images_folder: Path | str, model: Path | str, names: Sequence[str], captures: list, size: int
 ) -> list[TrainingView]:
     """The photos captured so far: those named in the model, then every capture folder's, in their order."""
     from dav_gswt.photos.colmap_model import read_colmap_model  # not above: it loads pycolmap
