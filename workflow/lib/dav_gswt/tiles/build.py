@@ -229,7 +229,7 @@ def _fill_holes(colour: Array, uncertainty: Array) -> tuple[Float[Array, "m m 3"
 
     Raises: InputError: there is nothing but holes or uncertain ground.
     """
-    known = np.isfinite(colour).all(-1)
+    known = np.asarray(np.isfinite(colour).all(-1))
     doubt = np.where(known, np.clip(np.nan_to_num(uncertainty, nan=1.0), 0, 1), 1.0).astype(float)
     if not (doubt < 1).any():
         raise InputError(
@@ -261,7 +261,7 @@ def _solve_corrections(
     for tile, (labels, shift) in enumerate(zip(found.labels, shifts, strict=True)):
         out.append(
             poisson_blending.solve_tile(
-                labels, shift, poisson_blending.border_values(plan, *strips, tile), plan, ground
+                labels, shift, poisson_blending.border_values(plan, strips[0], strips[1], tile), plan, ground
             )
         )
     return np.stack(out)

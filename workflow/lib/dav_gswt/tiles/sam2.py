@@ -6,6 +6,7 @@ of points asks what lies under each, sure and stable answers are kept, and of an
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -65,7 +66,7 @@ def load_model(folder: Path | str) -> nn.Module:
     return model.eval()
 
 
-def predict_masks(model: nn.Module, colour: Float[Array, "m m 3"]) -> list[Bool[Array, "m m"]]:
+def predict_masks(model: Any, colour: Float[Array, "m m 3"]) -> list[Bool[Array, "m m"]]:
     """Masks of what a picture (values in [0, 1]) shows, the surest first; there may be none."""
     cells = len(colour)
     side = int(np.ravel(model.config.prompt_encoder_config.image_size)[0])

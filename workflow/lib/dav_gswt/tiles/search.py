@@ -102,10 +102,10 @@ def search_patches(problem: SearchProblem, variants: int, rng: np.random.Generat
     upright, flat = (_search_strips(problem, corner, way, used, rng) for way in (True, False))
     sides = [np.stack([strip.place for strip in pair]) for pair in (upright, flat)]
     masks = [np.stack([~strip.seam.labels for strip in pair]) for pair in (upright, flat)]
-    places = PatchPlaces(corner, *sides, np.zeros((EDGES * variants, 2), int))
+    places = PatchPlaces(corner, sides[0], sides[1], np.zeros((EDGES * variants, 2), int))
     tiles = _search_centres(problem, places, masks, rng)
-    places = PatchPlaces(corner, *sides, np.stack([tile.centre.place for tile in tiles]))
-    return SearchResult(places, *masks, upright + flat, tiles)
+    places = PatchPlaces(corner, sides[0], sides[1], np.stack([tile.centre.place for tile in tiles]))
+    return SearchResult(places, masks[0], masks[1], upright + flat, tiles)
 
 
 def _search_strips(
@@ -162,7 +162,7 @@ def _search_centres(
     found = []
     for tile in progress(range(len(places.centres)), "cut tiles"):
         west, north, east, south = layout.edge_colours(tile)
-        around = layout.frame_labels(plan, *masks, tile)
+        around = layout.frame_labels(plan, masks[0], masks[1], tile)
         shift = layout.label_shifts(plan, places, tile)
         # inside, where the centre is forced, the frame's cells do not matter
         shown = problem.source_cells(around, shift)
