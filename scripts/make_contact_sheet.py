@@ -1,4 +1,4 @@
-"""Rule show_stills: the terrain's stills beside each other."""
+"""Rule make_contact_sheet: the terrain's stills beside each other."""
 
 from pathlib import Path
 

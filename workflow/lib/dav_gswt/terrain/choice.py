@@ -1,6 +1,6 @@
 """Tile choice: the Wang tile of every cell, by an integer hash of its edges.
 
-The viewer's `choice.js` computes the same integers; tests/golden/tile_choice.json holds both to it.
+The viewer's `terrain/choice.js` computes the same integers; tests/golden/tile_choice.json holds both to it.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """Draw order of cells and tiles: back to front, with little or no sorting.
 
-The viewer's `draw_order.js` computes the same order; tests/golden/draw_order.json holds both to it.
+The viewer's `terrain/draw_order.js` computes the same order; tests/golden/draw_order.json holds both to it.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """Height fields: height and slope of the terrain's surface at any point.
 
-The viewer's `heights.js` computes the same numbers; tests/golden/heights.json holds both to them. Only sums, products,
-quotients and floor of float64 are used, in the order written here.
+The viewer's `terrain/heights.js` computes the same numbers; tests/golden/heights.json holds both to them. Only
+sums, products, quotients and floor of float64 are used, in the order written here.
 """
 
 from dataclasses import dataclass

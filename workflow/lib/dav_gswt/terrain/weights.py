@@ -1,6 +1,6 @@
 """Level-of-detail weights by distance, and the opacity of a Gaussian that is drawn with a weight.
 
-The viewer's `weights.js` computes the same numbers; tests/golden/weights.json holds both to them.
+The viewer's shader (draw/shaders.js) computes the same weights; tests/golden/weights.json holds both to them.
 """
 
 import numpy as np
