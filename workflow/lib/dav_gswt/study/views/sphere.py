@@ -7,6 +7,7 @@ candidates spread evenly over it lie evenly in the figure. Source: DAV-GSWT, fig
 from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float64
@@ -188,7 +189,7 @@ def _to_cartesian(polar: Float64[Array, "n 2"]) -> Float64[Array, "n 2"]:
 def _legend_handles() -> list:
     from matplotlib.lines import Line2D
 
-    edge = {"linestyle": "", "markeredgecolor": "black", "markerfacecolor": "none"}
+    edge: dict[str, Any] = {"linestyle": "", "markeredgecolor": "black", "markerfacecolor": "none"}
     return [
         Line2D([], [], marker="o", markersize=7, color="0.5", linestyle="", label="candidate"),
         Line2D([], [], marker="s", markersize=8, markeredgewidth=1.6, label="photo taken", **edge),
