@@ -5,6 +5,7 @@ from dav_gswt.logs import logging_to
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.study.views import sphere
 from dav_gswt.views import candidates, scores
+from dav_gswt.views.score_colours import candidate_values
 from dav_gswt.views.selection import read_pose_selection
 
 with logging_to(snakemake.log[0]):
@@ -15,4 +16,4 @@ with logging_to(snakemake.log[0]):
         taken = candidates.read_captured_cameras(given.model, split, captures[: t - 1])
         table = scores.read_scores(scored)
         rounds.append(sphere.build_round(t, table, read_pose_selection(poses).poses, taken, frame, lam))
-    sphere.write_figure(snakemake.output.plot, rounds, sphere.candidate_values(table, lam)[0])
+    sphere.write_figure(snakemake.output.plot, rounds, candidate_values(table, lam)[0])

@@ -10,6 +10,7 @@ from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.study.views import sphere
+from dav_gswt.views import score_colours
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.uncertainty import Scales
 
@@ -48,20 +49,6 @@ def test_candidates_even_over_the_hemisphere_are_even_over_the_figure():
     np.testing.assert_allclose(sphere.project_poses(poses)[:, 1] ** 2, (np.arange(50) + 0.5) / 50)
 
 
-def test_candidates_are_coloured_by_doubt_where_a_prior_was_asked_else_by_opacity():
-    label, values = sphere.candidate_values(scored(), 0.1)
-    assert "opaque" in label
-    np.testing.assert_allclose(values, np.linspace(0, 2, 60))  # over its scale of a half
-    w2, lpips = np.linspace(1, 2, 60), np.linspace(5, 3, 60)
-    label, values = sphere.candidate_values(scored(w2_sq=w2, lpips=lpips), 0.1)
-    assert "W2 + 0.1 LPIPS" in label
-    np.testing.assert_allclose(values, 2 * (w2 + 0.1 * lpips))
-    assert "LPIPS" not in sphere.candidate_values(scored(w2_sq=w2), 0.1)[0]
-    agreed = scored(w2_sq=np.zeros(60))
-    agreed.scales.by_term["w2_sq"] = 0.0
-    assert "opaque" in sphere.candidate_values(agreed, 0.0)[0]
-
-
 def test_a_round_holds_the_photos_before_it_and_its_choice_in_order():
     one = round_of()
     assert one.chosen == [5, 40, 2] and one.candidates.shape == (60, 2)
@@ -81,7 +68,7 @@ def test_colours_are_on_one_scale_and_stars_stand_on_the_chosen_in_order():
     assert len(scales) == 1 and figure.axes[2].get_xlabel() == "doubt"
     (scale,) = scales
     every = np.concatenate([one.values for one in rounds])
-    assert (scale.vmin, scale.vmax) == (0, pytest.approx(np.quantile(every, sphere.HIGHEST)))
+    assert (scale.vmin, scale.vmax) == (0, pytest.approx(np.quantile(every, score_colours.HIGHEST)))
     for axes, one in zip(panels, rounds, strict=True):
         dots, photos, stars = axes.collections
         np.testing.assert_array_equal(dots.get_offsets(), one.candidates)

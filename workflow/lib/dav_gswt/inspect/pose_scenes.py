@@ -17,8 +17,8 @@ from dav_gswt.inspect.options import ViewOptions
 from dav_gswt.inspect.photo_scenes import compute_bounds, make_frustum, outline_ground
 from dav_gswt.inspect.scene import BLACK, ColourKey, Label, Layer, Scene, make_balls, make_bar, map_colours
 from dav_gswt.photos.view_split import read_view_split
-from dav_gswt.study.views.sphere import HIGHEST, candidate_values
 from dav_gswt.views import scores as tables
+from dav_gswt.views.score_colours import HIGHEST, candidate_values
 from dav_gswt.views.scores import Scores
 
 BALL, CHOSEN, LETTER = 0.018, 0.03, 0.07  # radii and height, in radii of the hemisphere

@@ -18,7 +18,7 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import Pose, pose_of_camera
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.study import figures
-from dav_gswt.views.policies import uncertainty
+from dav_gswt.views.score_colours import HIGHEST, candidate_values
 from dav_gswt.views.scores import Scores
 
 WIDE, TALL = 9.0, 4.5  # inches: the figure, a row of its panels
@@ -29,7 +29,6 @@ NUMBERED = 24  # poses of a round, above which stars have no numbers
 CROWDED = 4000.0  # square points that all dots cover together, where they are many
 LARGEST = 42.0  # square points: a dot, where they are few
 APART = 0.075  # from a star to its number, in radii of the disc
-HIGHEST = 0.98  # quantile of all values at which colours end
 PHOTO = {"marker": "s", "facecolors": "none", "edgecolors": "black", "linewidths": 1.6}
 STAR = {"marker": "*", "edgecolors": "black", "linewidths": 1.2}
 
@@ -58,17 +57,6 @@ def project_poses(poses: list[Pose]) -> Float64[Array, "n 2"]:
     """
     elevation, azimuth = (np.radians([getattr(p, name) for p in poses]) for name in ("elevation", "azimuth"))
     return np.stack([azimuth, np.sqrt(1 - np.sin(elevation))], -1)
-
-
-def candidate_values(scores: Scores, lam: float) -> tuple[str, Float64[Array, "n"]]:
-    """Label and values by which candidates are coloured: the uncertainty u, or opacity without a prior or without
-    dropout, where all samples agree."""
-    if scores.scales.by_term.get("w2_sq", 0.0) > 0:
-        lpips = f" + {lam:g} LPIPS" if lam and "lpips" in scores.terms else ""
-        return f"uncertainty u = W2{lpips}, in units of the scale frozen at round 1", uncertainty(scores, lam)
-    scale, values = scores.scales.by_term["opacity"], scores.term("opacity")
-    values = values / scale if scale > 0 else np.zeros(len(scores))
-    return "not known to be opaque, in units of the scale frozen at round 1", values
 
 
 def build_round(
