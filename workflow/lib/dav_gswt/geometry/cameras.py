@@ -106,5 +106,5 @@ def camera_to_json(camera: Camera) -> dict:
 
 def camera_from_json(values: dict) -> Camera:
     """The camera that `to_json` wrote."""
-    arrays = {k: np.array(values[k], float) for k in ("rotation", "translation")}
-    return Camera(**(values | arrays))
+    rotation, translation = np.array(values["rotation"], float), np.array(values["translation"], float)
+    return Camera(**(values | {"rotation": rotation, "translation": translation}))

@@ -13,8 +13,6 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
 
-pycolmap.logging.minloglevel = 2  # it reports every step of every photo on stderr; we report progress instead
-
 WORST_ERROR = 4.0  # pixels: an observation farther from its point's projection is a wrong match
 LEAST_ANGLE = 1.5  # degrees between two rays, below which their crossing says nothing about depth
 
@@ -42,6 +40,11 @@ class ColmapModel:
         return self.cameras[self.names.index(name)]
 
 
+def silence_pycolmap() -> None:
+    """Stop pycolmap from reporting every step of every photo on stderr; progress is reported instead."""
+    pycolmap.logging.minloglevel = 2
+
+
 def bundle_adjust(stored: pycolmap.Reconstruction, refine_focal_length: bool) -> None:
     """Bundle adjustment in one thread, in place; the world's frame is held by two cameras."""
     options, config = _adjustment(stored, refine_focal_length, lenses=True)
@@ -59,6 +62,7 @@ def bundle_adjust_with_priors(stored: pycolmap.Reconstruction, priors: list[pyco
 
 
 def _adjustment(stored: pycolmap.Reconstruction, refine_focal_length: bool, lenses: bool):
+    silence_pycolmap()
     options = pycolmap.BundleAdjustmentOptions(
         refine_focal_length=refine_focal_length, refine_extra_params=lenses, print_summary=False
     )
@@ -212,6 +216,7 @@ def _colours(model: ColmapModel, photos: Path) -> Float32[Array, "n 3"]:
 
 def read_colmap_model(folder: Path | str) -> ColmapModel:
     """Read a COLMAP model of pinhole cameras, its images by name. Raises: InputError: missing, damaged, no pinhole."""
+    silence_pycolmap()
     try:
         stored = pycolmap.Reconstruction(str(folder))
     except Exception as error:  # the library raises what its C++ does, bare RuntimeErrors among it
@@ -238,12 +243,13 @@ def model_from_reconstruction(
     cameras, numbers, owners, pixels = [], [], [], []
     for i, (_, key) in enumerate(found):
         image = stored.images[key]
-        target = pinholes[image.camera_id] if pinholes else image.camera
+        lens = stored.cameras[image.camera_id]
+        target = pinholes[image.camera_id] if pinholes else lens
         cameras.append(_camera(target, image.cam_from_world()))
         seen = [(p.point3D_id, *p.xy) for p in image.get_observation_points2D()]
         seen = np.array(seen, float).reshape(-1, 3)
         if pinholes:
-            seen[:, 1:] = target.img_from_cam(np.c_[image.camera.cam_from_img(seen[:, 1:]), np.ones(len(seen))])
+            seen[:, 1:] = target.img_from_cam(np.c_[lens.cam_from_img(seen[:, 1:]), np.ones(len(seen))])
         numbers.append(np.searchsorted(ids, seen[:, 0].astype(np.int64)))
         owners.append(np.full(len(seen), i))
         pixels.append(seen[:, 1:])
@@ -277,6 +283,7 @@ def _camera(camera: pycolmap.Camera, pose: pycolmap.Rigid3d) -> Camera:
 
 def write_colmap_model(model: ColmapModel, folder: Path | str) -> None:
     """Write a COLMAP model (binary) into an existing folder; images are numbered from 1 in the model's order."""
+    silence_pycolmap()
     stored = pycolmap.Reconstruction()
     numbers: dict[tuple, int] = {}
     place = np.zeros(len(model.pixels), int)  # of an observation among those of its image

@@ -10,6 +10,7 @@ import OpenImageIO as oiio
 from exifread.core.ifd_tag import IfdTag
 from exifread.utils import Ratio
 
+from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 
 FILM_DIAGONAL = 43.2666  # of a 36 x 24 mm frame, which "35 mm equivalent" compares diagonals with
@@ -26,7 +27,7 @@ def read_focal_length(path: Path | str) -> float | None:
     """
     width, height = sorted(image_files.read_size(path), reverse=True)
     tags = _read_jpeg_tags(Path(path))
-    spec = oiio.ImageInput.open(str(path)).spec()
+    spec = _open_header(path)
     focal = tags.get("EXIF FocalLength") or _number(spec.getattribute("Exif:FocalLength"))
     film = tags.get("EXIF FocalLengthIn35mmFilm") or _number(spec.getattribute("Exif:FocalLengthIn35mmFilm"))
     pitch, unit = tags.get("EXIF FocalPlaneXResolution"), UNITS.get(int(tags.get("EXIF FocalPlaneResolutionUnit", 2)))
@@ -46,7 +47,7 @@ def read_focal_length(path: Path | str) -> float | None:
 
 def read_gps_position(path: Path | str) -> tuple[float, float, float] | None:
     """Latitude and longitude in degrees and altitude in metres, or None where EXIF does not have all three."""
-    spec = oiio.ImageInput.open(str(path)).spec()
+    spec = _open_header(path)
     angles = []
     for name, negative, most in (("Latitude", "S", 90.0), ("Longitude", "W", 180.0)):
         parts = spec.getattribute(f"GPS:{name}")
@@ -64,11 +65,18 @@ def read_gps_position(path: Path | str) -> tuple[float, float, float] | None:
 
 def read_capture_time(path: Path | str) -> str | None:
     """When the photo was taken, ISO 8601 without a time zone, or None where EXIF does not say."""
-    text = oiio.ImageInput.open(str(path)).spec().getattribute("Exif:DateTimeOriginal")
+    text = _open_header(path).getattribute("Exif:DateTimeOriginal")
     try:
         return datetime.strptime(str(text), "%Y:%m:%d %H:%M:%S").isoformat()
     except ValueError:
         return None
+
+
+def _open_header(path: Path | str) -> oiio.ImageSpec:
+    file = oiio.ImageInput.open(str(path))
+    if file is None:
+        raise InputError(f"{path}: not readable as an image; remove or replace it")
+    return file.spec()
 
 
 def _number(value) -> float:

@@ -91,6 +91,6 @@ def undistort_photo(photo: Float32[Array, "h w 3"], lens: pycolmap.Camera, camer
     """A photo as a pinhole camera would have taken it: cubic splines, each channel alone. lens: of the photo's size."""
     x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     rays = np.stack([(x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, np.ones_like(x)], -1).reshape(-1, 3)
-    column, row = (lens.img_from_cam(rays) - 0.5).T.reshape(2, camera.height, camera.width)
+    column, row = (np.asarray(lens.img_from_cam(rays)) - 0.5).T.reshape(2, camera.height, camera.width)
     planes = [map_coordinates(photo[..., c], [row, column], order=3, mode="nearest") for c in range(3)]
     return np.clip(np.stack(planes, -1), 0, 1).astype(np.float32)

@@ -139,6 +139,7 @@ def _keys(names: list[str]) -> dict[str, str]:
 
 def _place(shot: ImportedImage, index: int, path: Path, key: str, source: Path) -> MatchedPhoto:
     width, height, orientation = _stored(path)
+    assert shot.lens is not None  # its photo is there, so its size is known
     lens, turns = fit_camera_to_photo(shot.lens, (width, height), orientation, f"{source}: {shot.name}")
     turn = np.linalg.matrix_power(lens_models.QUARTER, turns)
     return MatchedPhoto(path, key, index, lens, turns, turn @ shot.rotation, turn @ shot.translation)

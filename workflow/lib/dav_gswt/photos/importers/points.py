@@ -51,6 +51,7 @@ def collect_observations(given: ImportedModel, placed: Sequence[MatchedPhoto]) -
     for i, place in enumerate(placed):
         shot = given.shots[place.index]
         own = np.flatnonzero(given.image_of == place.index)
+        assert shot.lens is not None  # its photo is there, so its size is known
         rays, pixels = unproject_pixels(shot.lens, given.pixels[own]), given.pixels[own]
         known = np.isfinite(rays).all(1)
         own, rays = own[known], rays[known]
@@ -105,10 +106,10 @@ def find_near_pairs(placed: Sequence[MatchedPhoto]) -> list[tuple[int, int]]:
 def measure_visible_share(points: Float[Array, "n 3"], shots: Sequence[ImportedImage]) -> float:
     """Which share of points lies in the pictures of some shot; from a sample spread evenly over both."""
     few = points[:: max(1, len(points) // SAMPLE)]
-    known = [s for s in shots if s.lens is not None]
+    known = [(s, s.lens) for s in shots if s.lens is not None]
     inside = np.zeros(len(few), bool)
-    for shot in known[:: max(1, len(known) * 10 // SAMPLE)]:
-        inside |= find_visible_points(shot.lens, shot.rotation, shot.translation, few)
+    for shot, lens in known[:: max(1, len(known) * 10 // SAMPLE)]:
+        inside |= find_visible_points(lens, shot.rotation, shot.translation, few)
     return float(inside.mean()) if len(inside) else 0.0
 
 
@@ -121,7 +122,7 @@ def find_visible_points(
     before = at[:, 2] > np.linalg.norm(at, axis=1) * np.cos(np.radians(80))
     pixels = np.full((len(points), 2), -1.0)
     pixels[before] = lens.img_from_cam(at[before])
-    return (pixels > 0).all(1) & (pixels < [lens.width, lens.height]).all(1)
+    return np.asarray((pixels > 0).all(1) & (pixels < [lens.width, lens.height]).all(1))
 
 
 def _entered(placed: Sequence[MatchedPhoto], middle: Array, database: Path, size: int) -> pycolmap.Reconstruction:
@@ -151,10 +152,9 @@ def _shrink(placed: Sequence[MatchedPhoto], known: pycolmap.Reconstruction, fold
     """Write what features are looked for in: the photos upright, shrunk by area means."""
     for i in progress(range(len(placed)), "read photos"):
         image = known.images[i + 1]
+        camera = known.cameras[image.camera_id]
         photo = image_files.read_photo(placed[i].path)
-        image_files.write_png(
-            folder / image.name, image_files.shrink_image(photo, image.camera.width, image.camera.height)
-        )
+        image_files.write_png(folder / image.name, image_files.shrink_image(photo, camera.width, camera.height))
 
 
 def _seen(found: pycolmap.Reconstruction, photos: int, middle: Array) -> Observations:
@@ -165,11 +165,12 @@ def _seen(found: pycolmap.Reconstruction, photos: int, middle: Array) -> Observa
     seen, out, error = [], [], []
     for i in range(photos):
         image = found.images[i + 1]
+        lens = found.cameras[image.camera_id]
         own = np.array([(p.point3D_id, *p.xy) for p in image.get_observation_points2D()], float).reshape(-1, 3)
         place = np.searchsorted(ids, own[:, 0].astype(np.int64))
         pose = image.cam_from_world().matrix()
-        error.append(_errors(image.camera, points[place] @ pose[:, :3].T + pose[:, 3], own[:, 1:]))
-        out.append(unproject_pixels(image.camera, own[:, 1:]))
+        error.append(_errors(lens, points[place] @ pose[:, :3].T + pose[:, 3], own[:, 1:]))
+        out.append(unproject_pixels(lens, own[:, 1:]))
         seen.append(np.stack([place, np.full(len(own), i)], -1))
     pairs = np.concatenate(seen)
     return Observations(points + middle, colours, pairs[:, 0], pairs[:, 1], np.concatenate(out), _mean(error))

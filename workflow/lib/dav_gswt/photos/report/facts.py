@@ -228,4 +228,5 @@ def mean_reprojection_error(found: ReportFacts) -> float | None:
 
 def min_median_max(values: Float[Array, "n"] | Int[Array, "n"]) -> tuple[float, float, float]:
     """Least, median and greatest."""
-    return tuple(float(v) for v in np.percentile(values, [0, 50, 100]))
+    low, middle, high = np.percentile(values, [0, 50, 100]).tolist()
+    return low, middle, high

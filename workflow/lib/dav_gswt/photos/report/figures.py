@@ -8,7 +8,7 @@ import io
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
@@ -197,8 +197,8 @@ def _uri(picture: Array, kind: str) -> str:
     """A picture as a data URI: bytes that depend on its pixels alone."""
     file = io.BytesIO()
     pixels = picture if picture.dtype == np.uint8 else np.rint(255 * np.clip(picture, 0, 1)).astype(np.uint8)
-    more = {"metadata": {"Software": None}} if kind == "png" else {"pil_kwargs": {"quality": 80}}
-    imsave(file, np.ascontiguousarray(pixels), format=kind, **more)
+    options: dict[str, Any] = {"metadata": {"Software": None}} if kind == "png" else {"pil_kwargs": {"quality": 80}}
+    imsave(file, np.ascontiguousarray(pixels), format=kind, **options)
     return f"data:image/{kind};base64,{base64.b64encode(file.getvalue()).decode('ascii')}"
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import pycolmap
 
 from dav_gswt.logs import progress
+from dav_gswt.photos.colmap_model import silence_pycolmap
 from dav_gswt.photos.sfm.pairs import select_pairs
 
 _log = logging.getLogger(__name__)
@@ -36,7 +37,7 @@ def match_photos(count: int, database: Path, neighbours: int, threads: int, seed
     """Match photos that look alike and keep what one rigid scene explains. neighbours: see `pairs.chosen`; 0: all."""
     with closing(pycolmap.Database.open(database)) as store:
         names = {image.image_id: image.name for image in store.read_all_images()}
-        found = [store.read_descriptors(i).data for i in range(1, count + 1)] if neighbours else [None] * count
+        found = [store.read_descriptors(i).data for i in range(1, count + 1)] if neighbours else []
     if neighbours:
         some = select_pairs(found, neighbours, seed)
     else:
@@ -69,6 +70,7 @@ def match_image_pairs(some: list[tuple[str, str]], database: Path, threads: int,
 
 def run_with_progress(work: Callable, done: Callable[[], int], total: int, what: str):
     """Do a long piece of work in a thread and report meanwhile how much is done; Ctrl-C stops it."""
+    silence_pycolmap()
     token = pycolmap.CancellationToken()
     with ThreadPoolExecutor(1) as pool, progress(None, what, total=total) as bar:
         job = pool.submit(work, token)

@@ -35,7 +35,7 @@ def settle_focal_length(best: pycolmap.Reconstruction, held: dict[int, float], r
     used = [c for c in best.cameras if any(best.images[i].camera_id == c for i in best.reg_image_ids())]
     exif = [held[c] for c in used if c in held]
     free = _adjusted(best) if exif else None
-    if exif:
+    if free:
         ratio = float(np.median([free.cameras[c].focal_length / held[c] for c in used if c in held]))
         near = abs(ratio - 1) <= HELD
         if fixes:

@@ -84,7 +84,7 @@ def fit_similarity(
 
     Umeyama's closed form under Geman-McClure weights at the scale of a receiver's error: lone outliers have no say.
     """
-    weight = np.ones(len(a))
+    weight, scale, turn, shift, off = np.ones(len(a)), 1.0, np.eye(3), np.zeros(3), np.zeros(len(a))
     for _ in range(ROUNDS):
         w = weight / weight.sum()
         ma, mb = w @ a, w @ b

@@ -11,6 +11,7 @@ from collections import Counter, defaultdict
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pycolmap
@@ -63,7 +64,7 @@ class SfmOptions:
 
 def choose_sfm_options(scene: dict, threads: int) -> SfmOptions:
     """The options that a scene's entry of the config asks for."""
-    given = {"size": 1024} | PRESETS[scene.get("sfm", "quick")]
+    given: dict[str, Any] = {"size": 1024} | PRESETS[scene.get("sfm", "quick")]
     given |= {key: scene[key] for key in ("mapper", "cameras", "focal") if key in scene}
     given["size"] = min(given["size"], max(1024, scene["size"]))
     return SfmOptions(**given, side=scene["size"], threads=threads)
@@ -127,7 +128,7 @@ def register_photos(folder: Path | str, options: SfmOptions) -> Registration:
         best = max(found.values(), key=lambda r: (r.num_reg_images(), r.num_points3D()), default=None)
         left_out = _left_out(photos, best, database)
     placed = len(photos) - len(left_out)
-    if placed < LEAST_PHOTOS:
+    if best is None or placed < LEAST_PHOTOS:
         raise InputError(
             f"{folder}: {placed} of {len(photos)} photos could be placed relative to each other; they must overlap by "
             "more than half and show texture: take more from closer positions, or remove what shows something else"
@@ -290,7 +291,7 @@ def _undistortable(
         image = best.images[i]
         number = image.camera_id
         if number not in found:
-            lens = pycolmap.Camera(image.camera.todict())
+            lens = pycolmap.Camera(best.cameras[number].todict())
             lens.rescale(*_fit(*image_files.read_size(by_key[image.name].path), options.side))
             found[number], pinholes[number] = lens, pycolmap.undistort_camera(limits, lens)
     sparse = model_from_reconstruction(best, pinholes=pinholes)

@@ -12,7 +12,7 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos.colmap_model import ColmapModel, model_from_reconstruction, write_colmap_model
+from dav_gswt.photos.colmap_model import ColmapModel, model_from_reconstruction, silence_pycolmap, write_colmap_model
 from dav_gswt.photos.synthetic import renderer, truth
 from dav_gswt.photos.synthetic import scene as synthetic
 
@@ -65,6 +65,7 @@ def triangulate_points(folder: Path, shots: list[tuple[str, Camera]], seed: int)
 
     Up to EXHAUSTIVE pictures every pair is matched, else those of `find_overlapping_pairs`.
     """
+    silence_pycolmap()
     names, cameras = (list(column) for column in zip(*shots, strict=True))
     none = np.zeros(0, int)
     known = ColmapModel(
