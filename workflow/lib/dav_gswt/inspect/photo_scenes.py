@@ -72,7 +72,7 @@ def arrange_photos(folder: Path, split: Path | None, title: str, captured: list[
         layers += make_frustum(camera, reach, ROLES[role], folder / "images" / name)
     for camera, file in captured:
         used |= CAPTURE_ROLE
-        layers += make_frustum(camera, reach, *CAPTURE_ROLE.values(), file)
+        layers += make_frustum(camera, reach, next(iter(CAPTURE_ROLE.values())), file)
     if len(found.points):
         layers.append(Layer("points", found.points.astype(np.float32), colours=to_bytes(found.colours), width=3.0))
     eyes = np.array([c.centre for c in [*found.cameras, *(camera for camera, _ in captured)]]).reshape(-1, 3)

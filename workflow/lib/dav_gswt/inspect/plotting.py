@@ -19,7 +19,7 @@ LINE, LETTER, POINTS = 20, 8, 14  # pixels a line and a letter, points of letter
 
 def make_plotter(scene: Scene, size: tuple[int, int], off_screen: bool, legend: bool = True) -> pv.Plotter:
     """All of a scene, seen as it is to be seen first. legend: title, notes and colours are drawn, too."""
-    drawn = pv.Plotter(off_screen=off_screen, window_size=list(size))
+    drawn: Any = pv.Plotter(off_screen=off_screen, window_size=list(size))
     drawn.set_background(BACKGROUND)
     for layer in scene.layers:
         _add_layer(drawn, layer)
@@ -37,7 +37,8 @@ def make_mesh(layer: Layer) -> pv.PolyData:
         found = pv.PolyData(layer.points)
     else:
         rows = np.column_stack([np.full(len(layer.cells), layer.cells.shape[1]), layer.cells]).ravel()
-        found = pv.PolyData(layer.points, **{"lines" if layer.kind == "lines" else "faces": rows})
+        cells: dict[str, Any] = {"lines" if layer.kind == "lines" else "faces": rows}
+        found = pv.PolyData(layer.points, **cells)
     if not isinstance(layer.colours, tuple):
         (found.point_data if layer.cells is None else found.cell_data)["rgb"] = layer.colours
     if layer.picture is not None:
@@ -99,7 +100,7 @@ def _add_legend(drawn: pv.Plotter, scene: Scene, size: tuple[int, int]) -> None:
         _add_text(drawn, name, (left + 38, 10 + i * LINE), BLACK)
 
 
-def _add_text(drawn: pv.Plotter, text: str, at: tuple[int, int], colour: tuple[int, int, int]) -> pv.Text:
+def _add_text(drawn: Any, text: str, at: tuple[int, int], colour: tuple[int, int, int]) -> pv.Text:
     """Letters at pixels from the lower left."""
     letters = pv.Text(text)
     letters.prop.font_size, letters.prop.color = POINTS, _to_unit(colour)
@@ -114,7 +115,7 @@ def _shorten(text: str, width: int) -> str:
     return text if len(text) <= most else f"...{text[3 - most :]}"
 
 
-def _add_bar(drawn: pv.Plotter, bar: ColourBar, place: int, size: tuple[int, int]) -> None:
+def _add_bar(drawn: Any, bar: ColourBar, place: int, size: tuple[int, int]) -> None:
     """Bars stand side by side along the lower border."""
     mapper = pv.DataSetMapper()
     mapper.lookup_table = pv.LookupTable(bar.colours, n_values=256, scalar_range=(bar.low, bar.high))

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from typing import Any
 
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_file
@@ -120,7 +121,7 @@ def _pack_scene(render_window) -> bytes:
     return packed.getvalue()
 
 
-def _renumber(state: dict) -> dict:
+def _renumber(state: Any) -> dict:
     """Objects numbered as they come, in place of their addresses in memory; without the times of their changes."""
     text = json.dumps(state)
     numbers: dict[str, str] = {}
