@@ -107,4 +107,4 @@ def camera_to_json(camera: Camera) -> dict:
 def camera_from_json(values: dict) -> Camera:
     """The camera that `to_json` wrote."""
     rotation, translation = np.array(values["rotation"], float), np.array(values["translation"], float)
-    return Camera(**(values | {"rotation": rotation, "translation": translation}))
+    return Camera(**{**values, "rotation": rotation, "translation": translation})

@@ -107,8 +107,8 @@ def triangulate_points(
 ) -> tuple[Float[Array, "n 3"], Float32[Array, "n 3"]]:
     """Points and their colours as structure from motion would know them from the named images alone.
 
-    The points are those of `triangulated`. Colours are means over the named images in the folder `photos`; without it
-    they are mid-grey, since the model's own colours come from images that may not be captured yet.
+    The points are those of `triangulate_model`. Colours are means over the named images in the folder `photos`; without
+    it they are mid-grey, since the colours of the model come from images that may not be captured yet.
     """
     part = triangulate_model(model, names, at_least)
     return part.points, part.colours if photos is None else _colours(part, Path(photos))

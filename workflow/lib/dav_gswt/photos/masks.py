@@ -27,7 +27,7 @@ ASPECT = 0.01  # a mask whose sides differ more from its photo's is of another p
 def undistort_masks(found, folder: Path | str) -> dict[str, Float32[Array, "h w"]]:
     """Masks of a registration's pictures, by name: 1 where a picture counts, 0 where it does not.
 
-    found: an `sfm.Registered`. Raises: InputError: no folder, a mask of another shape than its photo, or none that
+    found: a `Registration`. Raises: InputError: no folder, a mask of another shape than its photo, or none that
     belongs to a photo.
     """
     listed = {path.stem: path for path in image_files.list_photos(folder)}

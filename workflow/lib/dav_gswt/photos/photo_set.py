@@ -30,7 +30,7 @@ def prepare_photos(
     """Register the photos in `source`, and write undistorted pictures, model and ground.json into the folder `out`.
 
     given: a model of another program, taken as it is. masks: a folder, see `masks`. Returns what ground.json holds.
-    Raises: InputError: see sfm.register, imported.read, masks.read and ground.frame.
+    Raises: InputError: see `register_photos`, `import_model`, `undistort_masks` and `fit_ground_frame`.
     """
     found = import_model(given, source, options) if given else register_photos(source, options)
     model, frame = fit_ground_frame(found.model, np.random.default_rng(options.seed), found.positions)
@@ -67,7 +67,7 @@ def import_field(
 ) -> SceneFrame:
     """Bring a finished 3DGS .ply into its ground frame: the field to `out`, ground.json to `ground`.
 
-    up: a direction that points roughly upwards in the file. Raises: InputError: see read_field and splat.enter.
+    up: a direction that points roughly upwards in the file. Raises: InputError: see `read_field` and `fit_field_frame`.
     """
     given = read_field(source)
     try:

@@ -1,7 +1,7 @@
 """Camera models that exist already: taken as they are, instead of structure from motion.
 
-`read` takes a folder of COLMAP's, a transforms.json (nerfstudio, instant-ngp) or a reconstruction.json (OpenSfM,
-OpenDroneMap), and returns what `sfm.register` does. Positions stay in the world that the model gives, metric if it is.
+`import_model` takes a folder of COLMAP, a transforms.json (nerfstudio, instant-ngp) or a reconstruction.json (OpenSfM,
+OpenDroneMap), and returns a `Registration`. Positions stay in the world of the model, metric if it is.
 """
 
 import logging
@@ -119,12 +119,13 @@ def _model(placed: Sequence[MatchedPhoto], pinholes: list[pycolmap.Camera], seen
     own = seen.image_of
     pixels = seen.rays * focal[own] + middle[own]
     with np.errstate(invalid="ignore"):
-        inside = (pixels >= 0).all(1) & (pixels <= size[own]).all(1)
+        inside = np.asarray((pixels >= 0).all(1) & (pixels <= size[own]).all(1))
     kept = keep_observations(seen, inside)
     order = np.lexsort((kept.image_of, kept.point_of))
     cameras = (
-        Camera(p.rotation, p.translation, *map(float, h.params), h.width, h.height)
+        Camera(p.rotation, p.translation, fx, fy, cx, cy, h.width, h.height)
         for p, h in zip(placed, pinholes, strict=True)
+        for fx, fy, cx, cy in [h.params.tolist()]
     )
     names = tuple(p.key for p in placed)
     return ColmapModel(

@@ -68,7 +68,7 @@ def fit_camera_to_photo(
     applied: programs that make models do not apply it, so a lens that fits the stored picture is turned with it.
     Raises: InputError: another shape, or a mirroring orientation.
     """
-    upright = stored[::-1] if orientation >= 5 else stored
+    upright = (stored[1], stored[0]) if orientation >= 5 else stored
     if _same_shape(camera, stored):
         if orientation not in TURNS:
             raise InputError(f"{where}: its EXIF orientation mirrors it; save it upright and without that tag")

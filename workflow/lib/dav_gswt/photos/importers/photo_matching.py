@@ -148,11 +148,14 @@ def _place(shot: ImportedImage, index: int, path: Path, key: str, source: Path) 
 def _stored(path: Path) -> tuple[int, int, int]:
     """Width, height as stored, and EXIF's orientation."""
     width, height = image_files.read_size(path)
-    value = oiio.ImageInput.open(str(path)).spec().getattribute("Orientation")
+    file = oiio.ImageInput.open(str(path))
+    value = file.spec().getattribute("Orientation") if file else None
     orientation = value if isinstance(value, int) and 1 <= value <= 8 else 1
     return (height, width, orientation) if orientation >= 5 else (width, height, orientation)
 
 
-def _scaled_pinhole(model: pycolmap.Camera, photo: pycolmap.Camera) -> bool:
+def _scaled_pinhole(model: pycolmap.Camera | None, photo: pycolmap.Camera) -> bool:
+    if model is None:
+        return False
     same = {model.width, model.height} == {photo.width, photo.height}
     return model.model_name in ("PINHOLE", "SIMPLE_PINHOLE") and not same

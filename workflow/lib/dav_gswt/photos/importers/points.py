@@ -95,7 +95,7 @@ def find_near_pairs(placed: Sequence[MatchedPhoto]) -> list[tuple[int, int]]:
         return [(i, j) for i in range(n) for j in range(i + 1, n)]
     centres = np.array([-p.rotation.T @ p.translation for p in placed])
     forward = np.array([p.rotation[2] for p in placed])
-    _, order = cKDTree(centres).query(centres, min(n, 8 * NEAREST + 1))
+    order = np.asarray(cKDTree(centres).query(centres, min(n, 8 * NEAREST + 1))[1])
     pairs = set()
     for i in range(n):
         alike = [int(j) for j in order[i] if j != i and forward[i] @ forward[j] > np.cos(np.radians(WIDEST))]

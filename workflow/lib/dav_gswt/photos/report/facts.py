@@ -34,7 +34,7 @@ class PhotoFacts:
     """points: how many hold it. error: their mean distance from where they should be, pixels; None without points.
 
     height: above z = 0, world units. tilt: degrees off straight down. partner, shared: the photo that shares most
-    points with it, and how many; None where none does. linked: photos that share at least views.LINK. tests: it only
+    points with it, and how many; None where none does. linked: photos that share splitting.LINK or more. tests: it only
     tests, no point was sought in it. weak: in words.
     """
 

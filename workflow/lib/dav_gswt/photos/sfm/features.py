@@ -34,7 +34,7 @@ def extract_features(count: int, folder: Path, database: Path, size: int, featur
 
 
 def match_photos(count: int, database: Path, neighbours: int, threads: int, seed: int) -> None:
-    """Match photos that look alike and keep what one rigid scene explains. neighbours: see `pairs.chosen`; 0: all."""
+    """Match photos that look alike and keep what one rigid scene explains. neighbours: see `select_pairs`; 0: all."""
     with closing(pycolmap.Database.open(database)) as store:
         names = {image.image_id: image.name for image in store.read_all_images()}
         found = [store.read_descriptors(i).data for i in range(1, count + 1)] if neighbours else []

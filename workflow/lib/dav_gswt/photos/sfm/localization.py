@@ -115,7 +115,7 @@ def _seen(known: ColmapModel, store: pycolmap.Database) -> list[dict[int, int]]:
         if not len(own) or not len(places):
             out.append({})
             continue
-        far, which = cKDTree(known.pixels[own]).query(places)
+        far, which = map(np.asarray, cKDTree(known.pixels[own]).query(places))
         out.append({int(k): int(known.point_of[own[which[k]]]) for k in np.flatnonzero(far <= SAME)})
     return out
 

@@ -147,7 +147,7 @@ def register_photos(folder: Path | str, options: SfmOptions) -> Registration:
 def undistort_image(registered: Registration, index: int) -> Float32[Array, "h w 3"]:
     """The picture of the model's image `index`: the photo as a pinhole camera would have taken it.
 
-    The photo is shrunk by area means to the picture's resolution, then sampled (`lenses.undistorted`).
+    The photo is shrunk by area means to the picture's resolution, then sampled (`undistort_photo`).
     """
     lens, camera = registered.lenses[index], registered.model.cameras[index]
     photo = image_files.shrink_image(image_files.read_photo(registered.sources[index]), lens.width, lens.height)
