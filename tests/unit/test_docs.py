@@ -41,6 +41,16 @@ def test_no_page_cites_what_a_reader_cannot_have(page):
     assert cited == []
 
 
+def test_every_file_that_code_and_config_name_exists(root):
+    """Pages, rules, scripts and configs that comments, docstrings and messages send readers to."""
+    named = re.compile(r"(?<![\w/{.])(?:docs/[\w/-]+\.md|rules/[\w/]+\.smk|scripts/[\w/]+\.py|config/[\w/]+\.yaml)\b")
+    files = [root / "Snakefile", root / "Makefile", root / "pyproject.toml"]
+    for folder in ("rules", "scripts", "config", "benchmarks", "workflow"):
+        files += [f for f in (root / folder).rglob("*") if f.suffix in (".py", ".smk", ".yaml", ".js", ".md", ".rst")]
+    found = {(str(f.relative_to(root)), name) for f in files for name in named.findall(f.read_text(encoding="utf-8"))}
+    assert {(file, name) for file, name in found if not (root / name).exists()} == set()
+
+
 def test_the_readme_is_short(root):
     assert len((root / "README.md").read_text(encoding="utf-8").splitlines()) <= 130
 
