@@ -25,6 +25,6 @@ rule cut_tiles_by_expansion:
     params:
         tiling=lambda wildcards: config["tilings"][wildcards.tiling] | {"energy": "expansion"},
         seed=integer("seed"),
-        source=code_of("cut_tiles"),
+        source=code_of("study/cut_tiles_by_expansion"),
     script:
-        "../../scripts/cut_tiles.py"
+        "../../scripts/study/cut_tiles_by_expansion.py"

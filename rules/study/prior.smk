@@ -1,15 +1,65 @@
-"""The prior on worlds that it was not trained on, and a deterministic network of its shape as a control.
+"""The project's own prior: its training, and how good it is on worlds that it was not trained on.
 
-In: examples of held-out worlds. Out: results/prior/regressor{member}.safetensors; docs/research/data/prior_trial.csv and
-figures/prior_*.png.
+In: nothing of a scene. Out: results/prior/examples/part{part}.npz, what it learns from (part p holds views of the synthetic worlds 20 p to
+20 p + 19); results/prior/terrain.safetensors, its weights; regressor{member}.safetensors, a deterministic network of its shape as a
+control; docs/research/data/prior_trial.csv and figures/prior_*.png. `make prior` trains it: hours.
 """
 
+WORLDS_A_PART, VIEWS_A_WORLD = 20, 16
+PARTS = 32  # of examples that the prior is trained on; later ones are for evaluation
+CODER = dict(steps=6000, batch=16, rate=2e-3, seed=0)
+DENOISER = dict(steps=8000, batch=24, rate=6e-4, seed=1)
 # Nothing random to learn: it is done sooner. The first is compared with the prior; the second only shows how far two such
 # networks lie apart.
 REGRESSORS = [dict(steps=steps, batch=24, rate=6e-4, seed=100 + i) for i, steps in enumerate((4000, 2000))]
 MEMBERS = len(REGRESSORS)
 HELD_OUT = range(40, 44)  # parts of worlds that nothing was trained on
 TRIAL = dict(m=5, p_drop=0.15, steps=8, seed=0)  # as the config asks the prior
+
+
+rule make_examples:
+    """Views of procedural worlds: the truth, and what fields fitted from few photos show of it."""
+    output:
+        examples="<results>/prior/examples/part{part}.npz",
+    log:
+        "<logs>/prior/examples/part{part}.log",
+    benchmark:
+        "<benchmarks>/prior/examples/part{part}.tsv"
+    wildcard_constraints:
+        part=NATURAL,
+    resources:
+        mem_mb=per_attempt(600),
+        runtime=per_attempt("10m"),
+    params:
+        seeds=lambda wildcards: [int(wildcards.part) * WORLDS_A_PART + i for i in range(WORLDS_A_PART)],
+        views=VIEWS_A_WORLD,
+        source=code_of("study/make_examples"),
+    script:
+        "../../scripts/study/make_examples.py"
+
+
+rule train_prior:
+    """Train the project's own prior on all examples; an interrupted training resumes at its last checkpoint."""
+    input:
+        examples=expand("<results>/prior/examples/part{part}.npz", part=range(PARTS)),
+    output:
+        weights="<results>/prior/terrain.safetensors",
+        losses="<results>/prior/terrain_losses.csv",
+    log:
+        "<logs>/prior/train_prior.log",
+    benchmark:
+        "<benchmarks>/prior/train_prior.tsv"
+    threads: 2
+    resources:
+        mem_mb=per_attempt(4000),
+        runtime=per_attempt("4h"),
+    params:
+        coder=CODER,
+        denoiser=DENOISER,
+        keep=f"{SNAPSHOTS}/prior/terrain",
+        source=code_of("study/train_prior"),
+    script:
+        "../../scripts/study/train_prior.py"
 
 
 rule train_regressor:
@@ -34,9 +84,9 @@ rule train_regressor:
         coder=CODER,
         denoiser=lambda wildcards: REGRESSORS[int(wildcards.member)],
         keep=lambda wildcards: f"{SNAPSHOTS}/prior/regressor{wildcards.member}",
-        source=code_of("train_prior"),
+        source=code_of("study/train_prior"),
     script:
-        "../../scripts/train_prior.py"
+        "../../scripts/study/train_prior.py"
 
 
 rule evaluate_prior:

@@ -3,10 +3,10 @@
 from dav_gswt.images import lpips_weights
 from dav_gswt.logs import logging_to
 from dav_gswt.prior.terrain import TerrainPrior
-from dav_gswt.prior.training import example_files
 from dav_gswt.study import csv_tables
 from dav_gswt.study.prior import evaluation, plots
 from dav_gswt.study.prior.regressor import Regressor
+from dav_gswt.study.prior.training import example_files
 
 with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params

@@ -11,10 +11,10 @@ from dav_gswt.images import lpips, lpips_weights
 from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.networks import LATENT, SIZE, Network
 from dav_gswt.prior.terrain import TerrainPrior
-from dav_gswt.prior.training.example_files import Examples
 from dav_gswt.study.prior import evaluation
 from dav_gswt.study.prior.evaluation import COLUMNS, Estimate, Setting
 from dav_gswt.study.prior.regressor import Regressor
+from dav_gswt.study.prior.training.example_files import Examples
 
 OFF = np.float32([0.125, 0.25, 0.375, 0.5])
 TINY = Setting(m=2, p_drop=0.15, steps=2)

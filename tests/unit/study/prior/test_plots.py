@@ -6,11 +6,11 @@ from dav_gswt.images import image_files
 from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.networks import LATENT, SIZE, Network
 from dav_gswt.prior.terrain import TerrainPrior
-from dav_gswt.prior.training.example_files import Examples
 from dav_gswt.study import csv_tables
 from dav_gswt.study.prior import plots
 from dav_gswt.study.prior.evaluation import Setting
 from dav_gswt.study.prior.regressor import Regressor
+from dav_gswt.study.prior.training.example_files import Examples
 
 
 def test_losses_come_back_by_file_and_what_was_trained(tmp_path):

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from dav_gswt.config.model import Config
-from dav_gswt.config.reference import HEAD, describe_policies, describe_tables, make_schema
 from dav_gswt.study.config import StudyConfig
+from dav_gswt.study.config_tables import HEAD, describe_policies, describe_tables, make_schema
 
 STUDY_HEAD = "## Study\n\nKeys of `study:`, in `config/study.yaml`."
 

@@ -20,8 +20,8 @@ from dav_gswt.images.lpips_weights import Weights
 from dav_gswt.logs import progress
 from dav_gswt.prior.networks import LATENT, SIZE
 from dav_gswt.prior.terrain import LatentModel, TerrainPrior, pack_render, pack_truth
-from dav_gswt.prior.training.example_files import Examples
 from dav_gswt.study.prior.regressor import Regressor
+from dav_gswt.study.prior.training.example_files import Examples
 from dav_gswt.views.uncertainty import ause, gradient_map, spearman, w2_sq
 from dav_gswt.views.uncertainty.texture import LUMINANCE
 

@@ -7,10 +7,10 @@ from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.prior.terrain import TerrainPrior
-from dav_gswt.prior.training.example_files import Examples
 from dav_gswt.study import csv_tables, figures
 from dav_gswt.study.prior.evaluation import Setting, opaque_mask
 from dav_gswt.study.prior.regressor import Regressor
+from dav_gswt.study.prior.training.example_files import Examples
 from dav_gswt.views.uncertainty import w2_sq
 
 WIDE = 0.01  # share of the steps over which a loss is averaged

@@ -4,7 +4,7 @@ import logging
 import os
 
 from dav_gswt.logs import logging_to, progress
-from dav_gswt.prior.training import example_files, examples
+from dav_gswt.study.prior.training import example_files, examples
 
 os.environ.setdefault("DAV_GSWT_THREADS", str(snakemake.threads))  # other parts are made at the same time
 

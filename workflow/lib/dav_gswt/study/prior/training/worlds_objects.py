@@ -8,7 +8,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 from scipy.spatial.transform import Rotation
 
-from dav_gswt.prior.training.worlds_ground import Map, draw_colour, make_noise
+from dav_gswt.study.prior.training.worlds_ground import Map, draw_colour, make_noise
 
 GOLDEN = np.pi * (3.0 - 5.0**0.5)
 DIRECTIONS = 4000  # among which the surface of a solid is sampled

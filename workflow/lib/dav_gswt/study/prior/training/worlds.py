@@ -13,11 +13,11 @@ from numpy import ndarray as Array
 from dav_gswt.field import GaussianField, concatenate_fields, rgb_to_sh
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square
-from dav_gswt.prior.training import worlds_ground as ground
-from dav_gswt.prior.training import worlds_light as light
-from dav_gswt.prior.training import worlds_objects as objects
-from dav_gswt.prior.training.worlds_objects import Cloud
 from dav_gswt.reconstruction.discs import slopes_to_quaternions
+from dav_gswt.study.prior.training import worlds_ground as ground
+from dav_gswt.study.prior.training import worlds_light as light
+from dav_gswt.study.prior.training import worlds_objects as objects
+from dav_gswt.study.prior.training.worlds_objects import Cloud
 
 FLYING_HEIGHT = 7.0  # metres, as of synthetic scenes
 THICKNESS = 0.1  # of a disc, in its spacings

@@ -11,8 +11,8 @@ from dav_gswt.geometry.poses import Pose
 from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import Condition
-from dav_gswt.prior.training import example_files, examples
 from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.study.prior.training import example_files, examples
 
 SEED, COUNT = 4, 3
 

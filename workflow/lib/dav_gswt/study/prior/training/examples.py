@@ -16,12 +16,12 @@ from dav_gswt.photos.synthetic.camera_layouts import Place
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.prior.conditions import RenderedView, find_nearest, relative_pose, render_view
 from dav_gswt.prior.interface import Condition
-from dav_gswt.prior.training.example_files import SIZE, Examples, concatenate, empty_examples
-from dav_gswt.prior.training.worlds import FLYING_HEIGHT, World, make_world
 from dav_gswt.raster import Rasterizer, to_raster_arrays
 from dav_gswt.reconstruction.coarse import fit_coarse_field
 from dav_gswt.reconstruction.fit_settings import FitSettings
 from dav_gswt.reconstruction.fitting.photo_colours import sample_colours
+from dav_gswt.study.prior.training.example_files import SIZE, Examples, concatenate, empty_examples
+from dav_gswt.study.prior.training.worlds import FLYING_HEIGHT, World, make_world
 
 FIELD_OF_VIEW = 55.0  # degrees, as of synthetic scenes
 LEAST_COVER = 0.2  # share of the true picture that must not be sky

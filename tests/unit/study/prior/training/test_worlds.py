@@ -7,8 +7,8 @@ import pytest
 
 from dav_gswt.field import GaussianField
 from dav_gswt.photos.synthetic import camera_layouts
-from dav_gswt.prior.training import worlds, worlds_ground, worlds_light, worlds_objects
 from dav_gswt.raster import render
+from dav_gswt.study.prior.training import worlds, worlds_ground, worlds_light, worlds_objects
 
 FAMILIES = ("desert", "flowers", "grass", "planet", "meadow")
 
@@ -45,7 +45,7 @@ def test_worlds_differ_in_colour_relief_and_objects():
 
 def test_no_family_that_priors_are_judged_on_is_imported():
     code = (
-        "import sys, dav_gswt.prior.training.examples;"
+        "import sys, dav_gswt.study.prior.training.examples;"
         "print([m for m in sys.modules if m.startswith('dav_gswt.photos.synthetic.')])"
     )
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout

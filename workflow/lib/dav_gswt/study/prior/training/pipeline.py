@@ -14,9 +14,9 @@ from dav_gswt.files import atomic_file
 from dav_gswt.prior import weights
 from dav_gswt.prior.networks import Network
 from dav_gswt.prior.terrain import average_opacity, pack_photo, pack_render, pack_truth
-from dav_gswt.prior.training import example_files, optimization
-from dav_gswt.prior.training.example_files import Examples
-from dav_gswt.prior.training.optimization import EncodedExamples, TrainingPlan
+from dav_gswt.study.prior.training import example_files, optimization
+from dav_gswt.study.prior.training.example_files import Examples
+from dav_gswt.study.prior.training.optimization import EncodedExamples, TrainingPlan
 
 BATCH = 128  # pictures that are encoded at a time
 

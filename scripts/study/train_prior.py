@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from dav_gswt.logs import logging_to
-from dav_gswt.prior.training import pipeline
-from dav_gswt.prior.training.optimization import TrainingPlan
+from dav_gswt.study.prior.training import pipeline
+from dav_gswt.study.prior.training.optimization import TrainingPlan
 
 with logging_to(snakemake.log[0]):
     given, out, params = snakemake.input, snakemake.output, snakemake.params

@@ -2,8 +2,8 @@ import pytest
 import torch
 
 from dav_gswt.prior.networks import LATENT, PLANES, SIZE, Network
-from dav_gswt.prior.training import optimization
-from dav_gswt.prior.training.optimization import EncodedExamples, TrainingPlan
+from dav_gswt.study.prior.training import optimization
+from dav_gswt.study.prior.training.optimization import EncodedExamples, TrainingPlan
 
 
 def pictures(count=24):

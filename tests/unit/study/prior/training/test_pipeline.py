@@ -3,10 +3,10 @@ import numpy as np
 from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.networks import SIZE
 from dav_gswt.prior.terrain import TerrainPrior
-from dav_gswt.prior.training import example_files, optimization, pipeline
-from dav_gswt.prior.training.example_files import Examples
-from dav_gswt.prior.training.optimization import TrainingPlan
 from dav_gswt.study.prior.regressor import Regressor
+from dav_gswt.study.prior.training import example_files, optimization, pipeline
+from dav_gswt.study.prior.training.example_files import Examples
+from dav_gswt.study.prior.training.optimization import TrainingPlan
 
 
 def part(path, seed, count=6):
