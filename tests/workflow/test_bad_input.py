@@ -61,7 +61,7 @@ def refused(run, checkout, tmp_path):
     return call
 
 
-PHOTOS = "{kind: photos, folder: photos, size: 320, start: 3, agent: replay, preset: draft, seam: semantic}"
+PHOTOS = "{kind: photos, folder: photos, size: 320, start: 3, agent: replay, preset: draft, tiling: semantic}"
 
 
 @pytest.mark.parametrize(
@@ -114,13 +114,13 @@ def text(folder, good) -> None:
 )
 def test_a_field_that_cannot_be_used_is_named(refused, tiny, tmp_path, break_it, said):
     break_it(tmp_path, tiny.round / "field.ply")
-    last = refused("{kind: field, field: given.ply, up: [0, 0, 1], preset: draft, seam: semantic}")[-1]
+    last = refused("{kind: field, field: given.ply, up: [0, 0, 1], preset: draft, tiling: semantic}")[-1]
     assert re.match(said, last)
 
 
 def test_a_field_on_its_side_says_what_to_give(refused, tiny, tmp_path):
     shutil.copy(tiny.round / "field.ply", tmp_path / "given.ply")
-    last = refused("{kind: field, field: given.ply, up: [1, 0, 0], preset: draft, seam: semantic}")[-1]
+    last = refused("{kind: field, field: given.ply, up: [1, 0, 0], preset: draft, tiling: semantic}")[-1]
     assert last.startswith("given.ply: ") and "up" in last
 
 

@@ -12,7 +12,7 @@ from dav_gswt.files import read_json
 
 def test_scenes_share_their_levels_and_a_seam_that_is_in_two_pairs_is_cut_once(planned, tmp_path):
     study = "{scenes: [desert, grass], pairs: [[semantic, colour], [semantic, semantic-nogamma], [semantic, floor]]}"
-    (tmp_path / "few.yaml").write_text(f"perceptual_study: {study}")
+    (tmp_path / "few.yaml").write_text(f"study: {{forced_choice: {study}}}")
     plan = planned(tmp_path, "perceptual_kit", configs=(USUAL, tmp_path / "few.yaml"))
     wanted = dict(render_pairs=2, make_levels=2, cut_tiles=6, make_kit=1, evaluate_answers=0)
     assert {rule: plan[rule] for rule in wanted} == wanted
@@ -22,9 +22,9 @@ def test_scenes_share_their_levels_and_a_seam_that_is_in_two_pairs_is_cut_once(p
 
 
 def test_tiles_of_other_sizes_cannot_be_compared(snakemake, tmp_path):
-    (tmp_path / "few.yaml").write_text("perceptual_study: {pairs: [[semantic, small]]}")
+    (tmp_path / "few.yaml").write_text("study: {forced_choice: {pairs: [[semantic, small]]}}")
     done = snakemake(tmp_path, "perceptual_kit", "--dry-run", configs=(USUAL, tmp_path / "few.yaml"), check=False)
-    assert done.returncode and "perceptual_study.pairs: seams of other `tile`" in done.stdout
+    assert done.returncode and "study.forced_choice.pairs: tilings of other `tile`" in done.stdout
 
 
 def test_a_kit_is_made_answered_and_analysed(snakemake, tiny, tmp_path):

@@ -59,7 +59,7 @@ def test_make_run_reads_the_default_profile(clone, read_as, monkeypatch):
 def test_make_run_does_not_tell_which_profile_it_reads(run, checkout, tmp_path):
     (tmp_path / "tiny.yaml").write_text("rounds: 0")
     done = run(checkout(tmp_path / "clone"), "--scene", "copr_dunes", "--configfile", tmp_path / "tiny.yaml")
-    assert "no folder" in done.stdout and "profile" not in done.stdout
+    assert "there is no" in done.stdout and "profile" not in done.stdout
 
 
 def test_a_cluster_adds_to_the_default_profile(clone, read_as):
@@ -71,7 +71,7 @@ def test_a_cluster_adds_to_the_default_profile(clone, read_as):
 def test_every_further_attempt_asks_for_more(asked):
     """Of rules that state what they need, and of those that leave it to the profile."""
     targets = ["all", "seams", "lod_table", "results/desert/photos/candidates"]
-    first, second = (asked(n, *targets, study="seam_study: {scenes: [desert]}") for n in (1, 2))
+    first, second = (asked(n, *targets, study="study: {seams: {scenes: [desert]}}") for n in (1, 2))
     assert len(first) > 20 and first["fit_coarse"] != first["select_poses"]
     work = set(first) - {"all", "seams", "lod_table"}
     for rule in work:
@@ -82,15 +82,15 @@ def test_every_further_attempt_asks_for_more(asked):
 
 def test_no_rule_states_memory_or_time_that_does_not_grow(root):
     """Also of rules that no target above plans."""
-    for path in (root / "rules").glob("*.smk"):
-        assert not re.findall(r"\b(?:mem_mb|runtime)=(?!growing\(|lambda wildcards, attempt:).*", path.read_text()), (
-            path
-        )
+    for path in (root / "rules").rglob("*.smk"):
+        assert not re.findall(
+            r"\b(?:mem_mb|runtime)=(?!per_attempt\(|lambda wildcards, attempt:).*", path.read_text()
+        ), path
 
 
 def test_a_gpu_is_asked_for_by_rules_that_are_there(asked, root):
     named = yaml.safe_load((root / PROFILES / "gpu/config.yaml").read_text())["set-resources"]
-    there = re.findall(r"^rule (\w+):", "".join(p.read_text() for p in (root / "rules").glob("*.smk")), re.M)
+    there = re.findall(r"^rule (\w+):", "".join(p.read_text() for p in (root / "rules").rglob("*.smk")), re.M)
     assert set(named) <= set(there)
     jobs = asked(1, profiles=("slurm", "gpu"))
     assert {rule for rule, needs in jobs.items() if needs.get("gpu") == "1"} == set(named) & set(jobs) != set()
@@ -113,7 +113,7 @@ def test_who_asks_people_or_devices_stays_here_and_asks_once(checkout, tmp_path)
     """On a cluster, too. All that the rule reads is empty, so it fails; the profile would have it tried twice more."""
     photos, capture = "results/mine/photos", ROUND.format(stop="", t=1).replace("desert", "mine") + "/capture"
     folder = checkout(tmp_path / "clone")
-    scene = "kind: photos, folder: mine, size: 64, start: 3, agent: handheld, preset: draft, seam: semantic"
+    scene = "kind: photos, folder: mine, size: 64, start: 3, agent: handheld, preset: draft, tiling: semantic"
     (folder / "mine.yaml").write_text(f"scenes: {{mine: {{{scene}}}}}")
     for place in ("mine", f"{photos}/images", f"{photos}/sparse"):
         (folder / place).mkdir(parents=True)

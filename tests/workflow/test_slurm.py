@@ -16,7 +16,8 @@ from dav_gswt.files import digest_files, read_json, write_json
 
 COARSE = "results/desert/seed{}/draft/coarse"
 FEW = (
-    "sweeps: {few: {scenes: [desert], vary: {k: [1, 2]}, fixed: {policy: farthest, rounds: 1}, measure: {views: [0]}}}"
+    "study: {sweeps: {few: {scenes: [desert], vary: {k: [1, 2]}, fixed: {policy: farthest, rounds: 1}, "
+    "measure: {views: [0]}}}}"
 )
 TABLE = "results/sweeps/few.csv"
 # Beside the profile what this Slurm lacks (accounts, a database), and less time between two looks at the queue.

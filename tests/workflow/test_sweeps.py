@@ -10,12 +10,13 @@ from fixtures.runs import TINY, USUAL
 from dav_gswt.images import image_files
 
 FEW = """
-sweeps:
-  few: &few
-    scenes: [desert]
-    vary: {vary}
-    fixed: {fixed}
-    measure: {measure}
+study:
+  sweeps:
+    few:
+      scenes: [desert]
+      vary: {vary}
+      fixed: {fixed}
+      measure: {measure}
 """
 SHARED = dict(render_photos=1, fit_coarse=1)
 
@@ -49,7 +50,7 @@ def test_a_sweep_runs_shared_stages_once(planned, tmp_path, vary, jobs):
     "vary, jobs",
     [
         pytest.param("{tau: [0.3, 0.6, 0.9]}", dict(cut_tiles=1, bundle_tiles=3, measure_seams=3), id="tau"),
-        pytest.param("{seam: [semantic, colour]}", dict(make_levels=1, cut_tiles=2, measure_seams=2), id="seams"),
+        pytest.param("{tiling: [semantic, colour]}", dict(make_levels=1, cut_tiles=2, measure_seams=2), id="seams"),
     ],
 )
 def test_what_is_varied_late_shares_the_reconstruction(planned, tmp_path, vary, jobs):
@@ -66,13 +67,13 @@ def test_of_each_seed_only_what_is_asked_is_measured(planned, tmp_path):
     assert plan["bundle_tiles"] == plan["render_terrain"] == 2 and not plan["measure_seams"]
 
 
-@pytest.mark.parametrize("size", ["config.yaml", "paper.yaml"])
+@pytest.mark.parametrize("size", ["study.yaml", "paper.yaml"])
 def test_the_page_of_results_plans(planned, root, tmp_path, size):
     """At `draft` and at the paper's size: every table and figure, each photo set and coarse field once."""
     config = f"config/{size}"
     plan = plan_of(planned, root, tmp_path, "docs/research/results/results.md", config)
-    asked = yaml.safe_load((root / config).read_text())
-    scenes, seeds = len(asked["sweeps"]["k"]["scenes"]), len(asked["sweeps"]["k"]["measure"]["views"])
+    sweep = yaml.safe_load((root / config).read_text())["study"]["sweeps"]["k"]
+    scenes, seeds = len(sweep["scenes"]), len(sweep["measure"]["views"])
     assert plan["fit_coarse"] == scenes * seeds and plan["render_photos"] + plan["register_photos"] == scenes
     assert plan["gather_sweep"] == 7  # those that its tables are made from
     assert all(plan[f"tabulate_{table}"] == 1 for table in ("timing", "sensitivity", "ablation"))
@@ -81,11 +82,11 @@ def test_the_page_of_results_plans(planned, root, tmp_path, size):
 
 
 def test_the_study_makes_every_page_and_each_photo_set_once(planned, root, tmp_path):
-    plan = plan_of(planned, root, tmp_path, "study", "config/config.yaml")
+    plan = plan_of(planned, root, tmp_path, "study", "config/study.yaml")
     pages = ("write_results", "write_stability", "write_tradeoff", "gather_auto")
     assert all(plan[page] == 1 for page in (*pages, "study"))
     assert plan["gather_sweep"] == plan["plot_sweep"] == 9
-    asked = yaml.safe_load((root / "config/config.yaml").read_text())
+    asked = yaml.safe_load((root / "config/study.yaml").read_text())["study"]
     scenes = {*asked["sweeps"]["k"]["scenes"], asked["tradeoff"]["scene"], *asked["auto"]["scenes"]}
     assert plan["render_photos"] + plan["register_photos"] == len(scenes)
 
@@ -104,12 +105,12 @@ def test_a_finished_run_is_swept_without_making_anything_twice(snakemake, tiny, 
     measure = "{views: [0], tiles: [0], stills: [0]}"
     configs = few(tmp_path, "{tau: [0.3, 0.6]}", "{policy: farthest}", measure)
     figures = "figures: {scenes: [desert], seed: 0, estimators: [w2], policy: farthest, rounds: 1}"
-    study = f"study: {{timing: few, sensitivity: [few], ablation: [few], also: [], {figures}}}\n"
-    configs[-1].write_text(configs[-1].read_text() + "    baseline: '0.6'\n" + study)
+    study = f"  tables: {{timing: few, sensitivity: [few], ablation: [few], also: [], {figures}}}\n"
+    configs[-1].write_text(configs[-1].read_text() + "      baseline: '0.6'\n" + study)
     tables = [f"results/tables/{name}.csv" for name in ("timing", "sensitivity", "ablation")]
-    doubt = str(tiny.bundle.relative_to(tiny.folder) / "doubt.png")
-    done = snakemake(folder, "--cores", "2", "results/sweeps/few.png", *tables, doubt, configs=configs)
-    assert "8 of 8 steps (100%) done" in done.stdout  # bundle, stills, gather, plot, three tables, doubt
+    uncertainty = str(tiny.bundle.relative_to(tiny.folder) / "uncertainty.png")
+    done = snakemake(folder, "--cores", "2", "results/sweeps/few.png", *tables, uncertainty, configs=configs)
+    assert "8 of 8 steps (100%) done" in done.stdout  # bundle, stills, gather, plot, three tables, uncertainty
     with (folder / "results/sweeps/few.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [(row["tau"], row["scene"], row["photos"]) for row in rows] == [(t, "desert", "7") for t in ("0.3", "0.6")]
@@ -122,5 +123,5 @@ def test_a_finished_run_is_swept_without_making_anything_twice(snakemake, tiny, 
             ("0.3", "29.40±0.08"),
             ("0.6", "29.41±0.08"),
         ]
-    for path in ("results/sweeps/few.png", doubt):
+    for path in ("results/sweeps/few.png", uncertainty):
         assert image_files.read_size(folder / path)[0] > 600

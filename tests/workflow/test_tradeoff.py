@@ -8,20 +8,21 @@ from fixtures.runs import TINY, USUAL
 from dav_gswt.images import image_files
 
 SMALL = """
-tradeoff:
-  scene: desert
-  base: {preset: draft, seam: semantic, prior: terrain}
-  presets: [draft]
-  only: [%s]
-  knobs:
-    max_gaussians: {values: [20000, 10000]}
-    candidates: {values: [24, 6]}
-    level_steps: {values: [10, 5]}
-auto:
-  scenes: [desert]
-  base: {preset: draft, rounds: 1, prior: terrain}
+study:
+  tradeoff:
+    scene: desert
+    base: {preset: draft, tiling: semantic, prior: terrain}
+    presets: [draft]
+    only: [%s]
+    knobs:
+      max_gaussians: {values: [20000, 10000]}
+      candidates: {values: [24, 6]}
+      level_steps: {values: [10, 5]}
+  auto:
+    scenes: [desert]
+    base: {preset: draft, rounds: 1, prior: terrain}
 presets:
-  auto: {size: 128, spacing: 1.5, max_gaussians: auto, steps: 60, steps_per_photo: 10, degree: 0, level_steps: 10}
+  auto: {size: 128, spacing: 1.5, max_gaussians: auto, steps: 60, steps_per_photo: 10, sh_degree: 0, level_steps: 10}
 """
 
 
@@ -32,7 +33,9 @@ def small(folder, *knobs):
 
 def test_settings_share_what_they_have_in_common(planned, tmp_path):
     plan = planned(
-        tmp_path, "results/tradeoff/tradeoff.csv", configs=small(tmp_path, "cap", "level_steps", "tau", "candidates")
+        tmp_path,
+        "results/tradeoff/tradeoff.csv",
+        configs=small(tmp_path, "max_gaussians", "level_steps", "tau", "candidates"),
     )
     wanted = dict(
         render_photos=1,
