@@ -32,11 +32,8 @@ def small(folder, *knobs):
 
 
 def test_settings_share_what_they_have_in_common(planned, tmp_path):
-    plan = planned(
-        tmp_path,
-        "results/tradeoff/tradeoff.csv",
-        configs=small(tmp_path, "max_gaussians", "level_steps", "tau", "candidates"),
-    )
+    configs = small(tmp_path, "max_gaussians", "level_steps", "tau", "candidates")
+    plan = planned(tmp_path, "results/tradeoff/tradeoff.csv", configs=configs)
     wanted = dict(
         render_photos=1,
         fit_coarse=3,  # the base, the cap, and the level's steps, as these belong to a quality
