@@ -14,7 +14,7 @@ rule render_pairs:
     input:
         unpack(pair_inputs),
     output:
-        pairs=directory("<results>/perceptual/{scene}/pairs"),
+        pairs=directory("<results>/forced_choice/{scene}/pairs"),
     log:
         "<logs>/forced_choice/{scene}/render_pairs.log",
     benchmark:
@@ -41,8 +41,8 @@ rule make_kit:
         pairs=lambda wildcards: expand(rules.render_pairs.output.pairs, scene=STUDY["forced_choice"]["scenes"]),
         parts=PAGE_PARTS,
     output:
-        page=directory("<results>/perceptual/kit/page"),
-        key="<results>/perceptual/kit/key.json",
+        page=directory("<results>/forced_choice/kit/page"),
+        key="<results>/forced_choice/kit/key.json",
     log:
         "<logs>/forced_choice/make_kit.log",
     benchmark:
