@@ -21,6 +21,7 @@ CONFIG, STUDY = Path("config/config.yaml"), Path("config/study.yaml")
 SCENES = Path("config/scenes")
 SMALLER = Path("config/without_compiler.yaml")
 LOGGER = Path("workflow/logger")  # a plugin of Snakemake, found by PYTHONPATH
+PROFILE_NOTE = "Using workflow specific profile"  # printed by Snakemake before its loggers begin
 JOB = re.compile(r"\[\d+ of \d+\] \w+$")  # a line of the log at which a job begins
 
 
@@ -109,7 +110,7 @@ def follow(command: list[str]) -> tuple[int, int]:
     ):
         for line in job.stdout or ():
             begun += bool(JOB.match(line))
-            if not signals:  # messages of jobs that end on a signal help nobody
+            if not signals and not line.startswith(PROFILE_NOTE):  # messages of jobs that end on a signal help nobody
                 print(line, end="", flush=True)
         code = job.wait()
     return (130 if signals and code else code), begun

@@ -15,7 +15,7 @@ from plyfile import PlyData
 from dav_gswt.bundle import chunks
 from dav_gswt.bundle.chunks import ChunkEntry
 from dav_gswt.bundle.encoding import Encoding
-from dav_gswt.cli.run import short_log
+from dav_gswt.cli.run import PROFILE_NOTE, short_log
 from dav_gswt.files import atomic_folder, read_json, write_json
 from dav_gswt.study.stability.extremes import Extreme
 
@@ -79,7 +79,7 @@ def describe_outcome(extreme: Extreme, code: int, output: str, folder: Path) -> 
 
 def extract_message(output: str) -> str:
     """The error message of a run that failed, as `make run` shows it, without lines of progress."""
-    lines = output.splitlines()
+    lines = [line for line in output.splitlines() if not line.startswith(PROFILE_NOTE)]
     all_lines = [line.strip() for line in lines if not line.startswith("[") and "jobs to do" not in line]
     ends = [i for i, line in enumerate(lines) if line.startswith("[")]
     last = [line.strip() for line in lines[ends[-1] + 1 :]] if ends else all_lines
