@@ -59,18 +59,17 @@ def test_a_run_fails_well_only_with_its_own_message_and_no_traceback():
 
 
 def test_the_message_is_what_a_user_reads_last():
-    said = """Building DAG of jobs...
-rule import_field:
-    log: results/logs/finished/photos/import_field.log
+    output = """Using workflow specific profile profiles/default for setting default command line arguments.
+1 jobs to do
+[1 of 1] import_field
   finished.ply: there is nothing in it
-Error in rule import_field:
-    log: results/logs/finished/photos/import_field.log (check log file(s) for error details)
-Exiting because a job execution failed. Look below for error messages
+import_field is not finished; its log: results/logs/finished/photos/import_field.log
 """
-    assert running.extract_message(said) == "finished.ply: there is nothing in it"
-    assert running.extract_message("Config file a.yaml is extended\nWorkflowError:\nconfig: k: 0 is too few\n") == (
-        "config: k: 0 is too few"
-    )
+    assert running.extract_message(output) == "finished.ply: there is nothing in it"
+
+
+def test_the_message_of_a_wrong_config_is_its_line():
+    assert running.extract_message("config: k: 0 is too few\n") == "config: k: 0 is too few"
 
 
 @pytest.mark.parametrize("bad", ["nan", "inf", "-inf", "NaN"])
