@@ -43,7 +43,7 @@ def machine(root, tmp_path):
     programs.mkdir()
     for tool in TOOLS:
         (programs / tool).symlink_to(shutil.which(tool))
-    for name in ("Makefile", "pyproject.toml", "requirements.lock"):
+    for name in ("Makefile", "pyproject.toml", "requirements.lock", "requirements-weights.lock"):
         shutil.copy(root / name, tmp_path)
     (tmp_path / "workflow").mkdir()
     shutil.copy(root / "workflow/prepare.py", tmp_path / "workflow")
@@ -58,7 +58,7 @@ def machine(root, tmp_path):
         env = {"PATH": str(programs)}
         done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
         asked = log.read_text().splitlines()
-        assert done.returncode == 0 and asked[-1].startswith("python -m dav_gswt.run"), done.stdout + done.stderr
+        assert done.returncode == 0 and asked[-1].startswith("python -m dav_gswt.cli.run"), done.stdout + done.stderr
         return [line for line in asked if "--editable" in line]
 
     return make_run

@@ -10,6 +10,7 @@ from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
 from dav_gswt.reconstruction.coarse import Reconstruction, fit_coarse_field
 from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fitting.plan import FitReport
 from dav_gswt.reconstruction.objects import make_blobs
 from dav_gswt.study import fit_profile
 
@@ -69,7 +70,7 @@ def test_haze_is_counted_and_what_stands_low_is_not():
 
 def test_stills_are_pictures_of_the_exemplar():
     grid = made.grid()
-    seen = fit_profile.stills(Reconstruction(made.field(), grid, {}), made.FRAME, 96, 64)
+    seen = fit_profile.stills(Reconstruction(made.field(), grid, FitReport()), made.FRAME, 96, 64)
     assert seen["oblique"].shape == (64, 96, 3)
     true = made.look(np.array([1.6]), np.array([1.6]))[0]
     assert seen["oblique"][32, 48] == pytest.approx(true, abs=0.15)  # a pixel is 0.13 of the stripes' slope
