@@ -2,6 +2,7 @@
 SCENE ?=
 CORES ?= 2
 PORT ?= 8000
+WORKERS ?= 2
 PYTHON ?= python3
 # Threads that wait sleep: other jobs use the processors too.
 export OMP_WAIT_POLICY ?= PASSIVE
@@ -17,7 +18,7 @@ view: .venv/installed
 	@$(BIN)/python -m dav_gswt.cli.run --view --port $(PORT) $(if $(SCENE),--scene $(SCENE))
 
 test: .venv/installed-test
-	@$(BIN)/python -m pytest $(TESTS)
+	@$(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup --durations 20 $(TESTS)
 
 bench: .venv/installed-test
 	@for bench in benchmarks/*.py; do PYTHONPATH=tests:tests/browser $(BIN)/python $$bench || exit 1; done
