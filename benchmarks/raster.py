@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from record import record
+from record import merge_figures
 
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import _core, cpu
@@ -188,7 +188,7 @@ def main() -> None:
     print(f"Rasterizer on {processor()}, {cpu.default_threads()} processors: shortest of {REPEATS} calls")
     table()
     print(f"{cpu.instruction_sets()[0]}, {THREADS} threads; forward and backward together:")
-    record(scenes() | training_step() | memory())
+    merge_figures(scenes() | training_step() | memory())
 
 
 if __name__ == "__main__":
