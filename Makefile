@@ -3,12 +3,14 @@ SCENE ?=
 CORES ?= 2
 PORT ?= 8000
 WORKERS ?= 2
+EXAMPLES ?= 2000
+SEED ?= 0
 PYTHON ?= python3
 # Threads that wait sleep: other jobs use the processors too.
 export OMP_WAIT_POLICY ?= PASSIVE
 BIN := .venv/bin
 
-.PHONY: reference run view test bench docs prior compiler
+.PHONY: reference run view test bench docs prior compiler sanitize faults fuzz
 .DELETE_ON_ERROR:
 
 run: .venv/installed
@@ -18,7 +20,22 @@ view: .venv/installed
 	@$(BIN)/python -m dav_gswt.cli.run --view --port $(PORT) $(if $(SCENE),--scene $(SCENE))
 
 test: .venv/installed-test
-	@$(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup --durations 20 $(TESTS)
+	@$(BIN)/python -m pytest -n $(WORKERS) --no-loadscope-reorder --durations 20 $(TESTS)
+
+# minutes: the rasterizer's tests on a core built with AddressSanitizer and UBSan, then on one with ThreadSanitizer
+sanitize: .venv/installed-test
+	@tests/sanitizers/run.sh
+
+# an hour: runs that are killed, run out of disk or memory, ...; the table is in results/faults/table.md. It goes on where
+# it was ended. Some faults need root: file systems are mounted below the folder for temporary files, and taken away.
+faults: .venv/installed-test
+	@PYTHONPATH=tests $(BIN)/python -m faults.harness --cores $(CORES) --seed $(SEED)
+
+# minutes: inputs that are damaged or ill meant, EXAMPLES of each kind by SEED; the table is in results/fuzz.md
+fuzz: .venv/installed-test
+	@mkdir -p results
+	@FUZZ_EXAMPLES=$(EXAMPLES) FUZZ_SEED=$(SEED) FUZZ_TABLE=results/fuzz.md \
+	  $(BIN)/python -m pytest tests/fuzz --hypothesis-seed=$(SEED) -q && cat results/fuzz.md
 
 bench: .venv/installed-test
 	@for bench in benchmarks/*.py; do PYTHONPATH=tests:tests/browser $(BIN)/python $$bench || exit 1; done
@@ -27,7 +44,7 @@ bench: .venv/installed-test
 docs: .venv/installed-docs
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
-# docs/reference/config.md and policies.md, and the schema: made from the config models
+# docs/reference/config.md, policies.md and reruns.md, and the schema: made from the config models
 reference: .venv/installed
 	@$(BIN)/python -m dav_gswt.study.config_reference
 

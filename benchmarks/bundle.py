@@ -17,6 +17,7 @@ from fixtures.tile_sets import report_of
 from record import report_figures
 
 from dav_gswt.bundle import build, direction_search, order_directions, orders, store
+from dav_gswt.bundle.content import BundleContent
 from dav_gswt.terrain import endless, stills
 from dav_gswt.tiles.build import TileSet
 
@@ -26,10 +27,10 @@ TARGETS = {"presort_seconds": 2.0, "terrain_presort_psnr": 40.0}
 
 
 def tile_set(cells: int, levels: int) -> TileSet:
-    """Sixteen tiles, each level with half the cells a side; half of the tiles are in doubt."""
+    """Sixteen tiles, each level with half the cells a side; half of the tiles are uncertain."""
     fields = [[rough_ground(tile, cells >> level, SIDE) for tile in range(16)] for level in range(levels)]
-    labels, doubt = np.zeros((16, cells, cells), np.uint8), np.arange(16) / 15
-    return TileSet(SIDE, SIDE / cells, fields, labels, np.zeros((16, 9, 2), int), doubt, report_of())
+    labels, uncertainty = np.zeros((16, cells, cells), np.uint8), np.arange(16) / 15
+    return TileSet(SIDE, SIDE / cells, fields, labels, np.zeros((16, 9, 2), int), uncertainty, report_of())
 
 
 def presorting(tiles: TileSet, threads: int) -> tuple[float, float, int]:
@@ -38,7 +39,7 @@ def presorting(tiles: TileSet, threads: int) -> tuple[float, float, int]:
     rings = direction_search.search_directions(tiles.fields[0], tiles.side, build.BundleOptions.decibels).rings
     searched = time.perf_counter() - start
     along = rings.directions()
-    kept = [along[rings.select(doubt, 0.5)] for doubt in tiles.uncertainty]
+    kept = [along[rings.select_directions(u, 0.5)] for u in tiles.uncertainty]
     jobs = [(f.means, kept[tile]) for row in tiles.fields for tile, f in enumerate(row)]
     start = time.perf_counter()
     with ThreadPoolExecutor(threads) as pool:
@@ -49,7 +50,8 @@ def presorting(tiles: TileSet, threads: int) -> tuple[float, float, int]:
 def walker(tiles: TileSet) -> float | None:
     """PSNR of a walker's still in pre-sorted orders against all Gaussians sorted exactly."""
     with tempfile.TemporaryDirectory() as folder:
-        build.write_bundle(tiles, Path(folder, "bundle"), build.BundleOptions(tau=0.5), SCHEMA, {})
+        content, options = BundleContent.of_one_material(tiles), build.BundleOptions(tau=0.5)
+        build.write_bundle(content, Path(folder, "bundle"), options, SCHEMA, {})
         bundle = store.read_bundle(Path(folder, "bundle"), SCHEMA)
         terrain = endless.terrain_from_bundle(bundle, {"kind": "flat"})
     value = bundle.manifest

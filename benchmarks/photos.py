@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from record import report_figures
 
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.photos.sfm.registration import SfmOptions, register_photos
-from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.photos.synthetic import scene as synthetic
 
 COPR = Path("resources/photos/copr_dunes/images")

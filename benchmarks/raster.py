@@ -12,6 +12,7 @@ from record import merge_figures
 
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import _core, cpu
+from dav_gswt.threads import default_threads
 
 REPEATS = 15
 THREADS = 2  # of the figures; the table has one thread too
@@ -185,7 +186,7 @@ def report_figures(name: str, value: float, unit: str, limit: float | None = Non
 
 
 def main() -> None:
-    print(f"Rasterizer on {processor()}, {cpu.default_threads()} processors: shortest of {REPEATS} calls")
+    print(f"Rasterizer on {processor()}, {default_threads()} processors: shortest of {REPEATS} calls")
     table()
     print(f"{cpu.instruction_sets()[0]}, {THREADS} threads; forward and backward together:")
     merge_figures(scenes() | training_step() | memory())

@@ -9,9 +9,9 @@ import time
 import numpy as np
 from record import read_installed_lpips, report_figures
 
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.images import lpips
-from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.prior import conditions
 from dav_gswt.study.prior.training import examples
 from dav_gswt.study.prior.training.worlds import FLYING_HEIGHT, make_world

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from record import report_figures
 
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fit_settings import CoarseSettings
 from dav_gswt.study import fit_profile
 
-COPR = FitSettings(size=256, spacing=1.5, max_gaussians=350_000, steps=1000, steps_per_photo=40, level_steps=80)
-HIGH = FitSettings(size=384, spacing=1.25, max_gaussians=150_000, steps=400, steps_per_photo=30, level_steps=60)
+COPR = CoarseSettings(size=256, spacing=1.5, max_gaussians=350_000, steps=1000)
+HIGH = CoarseSettings(size=384, spacing=1.25, max_gaussians=150_000, steps=400)
 SCENES = ("desert_high", "meadow_high")
 
 
@@ -39,18 +39,18 @@ def photos(scene: str) -> Path:
 
 def copr() -> dict[str, float | None]:
     """Of the 38 photos that register every tenth is for testing; all ground that any photo sees is modelled."""
-    given = fit_profile.opened(photos("copr_dunes"), COPR.size)
-    found = fit_profile.run(given, COPR)
+    given = fit_profile.read_photo_set(photos("copr_dunes"), COPR.size)
+    found = fit_profile.profile_fit(given, COPR)
     last = found.curve[-1]
     shape = f"{len(given.train)} photos, {last['gaussians']} Gaussians, {last['step']} steps"
     print(f"copr_dunes: {shape}, {last['seconds']:.1f} s")
     return {
-        "train_copr_seconds_to_33": fit_profile.seconds_to(found.curve, 33.0),
-        "train_copr_seconds_to_34": fit_profile.seconds_to(found.curve, 34.0),
+        "train_copr_seconds_to_33": fit_profile.find_time_to(found.curve, 33.0),
+        "train_copr_seconds_to_34": fit_profile.find_time_to(found.curve, 34.0),
         "train_copr_final_ccpsnr": last["psnr_colour_corrected"],
         "train_copr_final_psnr": last["psnr"],
         "train_copr_seconds": last["seconds"],
-        "train_copr_free_space_opacity": fit_profile.free_space_opacity(found.made.field, found.made.grid, given),
+        "train_copr_free_space_opacity": fit_profile.measure_haze(found.made.field, found.made.grid, given),
     }
 
 
@@ -58,8 +58,8 @@ def offpath() -> dict[str, float]:
     """Fitted from above 60 degrees of elevation: PSNR of high test views less that of test views at 45 degrees."""
     out, losses = {}, []
     for scene in SCENES:
-        given = fit_profile.opened(photos(scene), HIGH.size, 0.15)
-        seen = fit_profile.away(given, fit_profile.run(given, HIGH, every=10**6).made)
+        given = fit_profile.read_photo_set(photos(scene), HIGH.size, 0.15)
+        seen = fit_profile.measure_test_groups(given, fit_profile.profile_fit(given, HIGH, every=10**6).made)
         losses.append(seen["high"] - seen["oblique"])
         out |= {f"offpath_{scene}_{group}_psnr": value for group, value in seen.items()}
         out[f"offpath_{scene}_loss_db"] = losses[-1]

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from record import read_installed_lpips, report_figures
 
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.poses import Pose, pose_offset
-from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.views.policies import POLICIES, SelectionInput
 from dav_gswt.views.policy_names import NEEDS_FIELD, ORACLES
 from dav_gswt.views.scores import TERMS, Scores

@@ -9,6 +9,7 @@ rule bundle_tiles:
     """Pack the tiles with their pre-sorted orders."""
     input:
         unpack(photos_of_field),
+        unpack(materials_of),
         seams="<results>/<tiles>/seams.json",
         tiles="<results>/<tiles>/tiles",
         levels="<results>/<levels>",

@@ -28,7 +28,7 @@ rule capture_views:
         mem_mb=per_attempt(2500),
         runtime=per_attempt("30m"),
     params:
-        scene=entry("scenes", "scene"),
+        scene=scene_keys("capture_views"),
         source=code_of("capture_views"),
     script:
         "../scripts/capture_views.py"
@@ -44,6 +44,7 @@ use rule capture_views as request_views with:
         model="<results>/<photos>/sparse",
         lenses="<results>/<photos>/lenses.json",
         frame="<results>/<photos>/ground.json",
+        template=str(BASE / "workflow/report/shot_list.html"),
     log:
         "<logs>/<round>/request_views.log",
     benchmark:

@@ -31,7 +31,7 @@ rule inpaint_field:
         mem_mb=per_attempt(3000),
         runtime=per_attempt("30m"),
     params:
-        prior=entry("priors", "inpainter"),
+        prior=lambda wildcards: EntryKeys(config["priors"][wildcards.inpainter], PRIOR_KEYS["inpaint_field"]),
         seed=integer("seed"),
         source=code_of("inpaint_field"),
     script:
@@ -61,7 +61,7 @@ rule evaluate_inpainted:
         mem_mb=per_attempt(1500),
         runtime=per_attempt("10m"),
     params:
-        preset=entry("presets", "preset"),
+        preset=preset_keys("evaluate_inpainted"),
         source=code_of("evaluate_inpainted"),
     script:
         "../scripts/evaluate_inpainted.py"

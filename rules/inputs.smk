@@ -16,6 +16,16 @@ def entry(table, wildcard):
     return lambda wildcards: config[table][wildcards[wildcard]]
 
 
+def scene_keys(rule):
+    """A params function: what a rule reads of the scene's entry."""
+    return lambda wildcards: select_scene_keys(rule, config["scenes"][wildcards.scene])
+
+
+def preset_keys(rule):
+    """A params function: what a rule reads of the preset."""
+    return lambda wildcards: select_preset_keys(rule, config["presets"][wildcards.preset])
+
+
 def per_attempt(need):
     """A resources function: `need` at the first attempt, twice as much at the second; 2000, or "60m".
 
@@ -51,6 +61,16 @@ def existing(path, where, hint=""):
 def files_in(folder):
     """The files of a folder, as inputs: one that is added or removed is noticed."""
     return sorted(str(path) for path in Path(folder).iterdir() if path.is_file() and not path.name.startswith("."))
+
+
+def dated(files, where):
+    """Files of the user. Raises: WorkflowError: one is from the future, so that each result would be older than it."""
+    ahead = next(filter(is_from_future, files), None)
+    if ahead is not None:
+        raise WorkflowError(
+            f"config: {where}: {ahead} is dated in the future: correct this machine's clock, or touch it"
+        )
+    return files
 
 
 def lpips_weights(wildcards=None):
@@ -100,7 +120,8 @@ def source_photos(wildcards):
     """A scene's photos and what its entry names beside them: masks, a model of another program."""
     scene, where = config["scenes"][wildcards.scene], f"scenes.{wildcards.scene}"
     beside = {key: existing(scene[key], f"{where}.{key}") for key in ("masks", "model") if key in scene}
-    return {"photos": files_in(existing(scene["folder"], f"{where}.folder"))} | beside
+    photos = files_in(existing(scene["folder"], f"{where}.folder"))
+    return {"photos": dated(photos, f"{where}.folder")} | beside
 
 
 def source_field(wildcards):
@@ -154,6 +175,12 @@ def maps_of_prior(wildcards):
     return {"maps": f"<results>/{'<scored>' if wildcards.t == '0' else '<round>'}/maps.npz"}
 
 
+def materials_of(wildcards):
+    """The materials of a scene that tells them apart."""
+    asked = config["scenes"][wildcards.scene].get("materials") == "auto"
+    return {"materials": "<results>/<materials>"} if asked else {}
+
+
 def tiling_inputs(name):
     """What tells the kinds of ground apart, beside colours: LPIPS's features, a segmenter's checkpoint."""
     tiling = config["tilings"][name]
@@ -177,6 +204,12 @@ def height_map(wildcards):
     """The image that the terrain's surface is read from, where the config names one."""
     file = config["heights"].get("file")
     return {"map": existing(file, "heights.file")} if file else {}
+
+
+def class_pictures(wildcards):
+    """The pictures that the rule of classes reads."""
+    files = [term["file"] for term in config["classes"] if term["kind"] == "image"]
+    return {f"picture{number}": existing(file, "classes.file") for number, file in enumerate(files)}
 
 
 def terrain_targets(scene):

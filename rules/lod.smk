@@ -9,6 +9,7 @@ rule make_levels:
     """As many levels as the config wants and the exemplar has room for; tiles add coarser ones of their own."""
     input:
         unpack(maps_of_prior),
+        unpack(materials_of),
         field="<results>/<round>{inpainted}/field.ply",
         ground="<results>/<round>{inpainted}/ground.exr",
     output:
@@ -23,7 +24,7 @@ rule make_levels:
         runtime=per_attempt("30m"),
     params:
         levels=lambda wildcards: config["presets"][wildcards.preset].get("levels", config["levels"]),
-        preset=entry("presets", "preset"),
+        preset=preset_keys("make_levels"),
         seed=integer("seed"),
         keep=SNAPSHOTS,
         source=code_of("make_levels"),

@@ -5,12 +5,14 @@ from pathlib import Path
 
 from dav_gswt import paths
 from dav_gswt.code_digest import LIBRARY, digest_code
-from dav_gswt.config.load import add_scene_files, check_config
+from dav_gswt.config.load import add_scene_files, check_config, merge_tables, parse_command_line
+from dav_gswt.config.rule_keys import PRIOR_KEYS, EntryKeys, select_preset_keys, select_scene_keys
 from dav_gswt.errors import InputError
+from dav_gswt.files import is_from_future
 from dav_gswt.images.lpips_package import locate_weights
 from dav_gswt.paths import INPAINTED, NATURAL, POSITIVE, SNAPSHOTS
 from dav_gswt.views.policy_names import ORACLES, POLICY_NAMES
-from dav_gswt.workflow import lift_job_rate_limit
+from dav_gswt.workflow import NamedEntries, lift_job_rate_limit, list_command_line_values
 
 BASE = Path(workflow.basedir)
 BUNDLE_SCHEMA = str(BASE / "workflow/schemas/davgswt.schema.json")
@@ -20,9 +22,12 @@ PLAIN_TILING = r"[a-z][a-z0-9_-]*(?<!-refined)(?<!-expansion)"  # an entry of `t
 CHOOSING = "|".join(map(paths.policy_pattern, POLICY_NAMES))  # policies, as a constraint
 
 try:
-    config.update(check_config(add_scene_files(config, BASE / "config/scenes")))
+    given = merge_tables(config, parse_command_line(list_command_line_values(workflow)))
+    given = check_config(add_scene_files(given, BASE / "config/scenes"))
 except InputError as error:
     raise WorkflowError(str(error)) from None
+config.clear()
+config.update(given)
 
 
 pathvars:

@@ -25,7 +25,7 @@ rule register_photos:
         mem_mb=per_attempt(3000),
         runtime=per_attempt("60m"),
     params:
-        scene=entry("scenes", "scene"),
+        scene=scene_keys("register_photos"),
         source=code_of("register_photos"),
     script:
         "../scripts/register_photos.py"
@@ -49,7 +49,7 @@ rule render_photos:
         mem_mb=per_attempt(2500),
         runtime=per_attempt("60m"),
     params:
-        scene=entry("scenes", "scene"),
+        scene=scene_keys("render_photos"),
         source=code_of("render_photos"),
     script:
         "../scripts/render_photos.py"
@@ -69,7 +69,7 @@ rule import_field:
     wildcard_constraints:
         scene=scenes_of("field"),
     params:
-        scene=entry("scenes", "scene"),
+        scene=scene_keys("import_field"),
         source=code_of("import_field"),
     script:
         "../scripts/import_field.py"
@@ -87,7 +87,7 @@ rule split_views:
     benchmark:
         "<benchmarks>/<start>/split_views.tsv"
     params:
-        scene=entry("scenes", "scene"),
+        scene=scene_keys("split_views"),
         seed=integer("seed"),
         source=code_of("split_views"),
     script:

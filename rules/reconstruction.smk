@@ -26,9 +26,9 @@ rule fit_coarse:
         mem_mb=per_attempt(2000),
         runtime=per_attempt("60m"),
     params:
-        preset=entry("presets", "preset"),
+        preset=preset_keys("fit_coarse"),
         seed=integer("seed"),
-        whole=lambda wildcards: config["scenes"][wildcards.scene].get("whole", False),
+        scene=scene_keys("fit_coarse"),
         keep=SNAPSHOTS,
         source=code_of("fit_coarse"),
     script:
@@ -57,7 +57,7 @@ rule evaluate_coarse:
         mem_mb=per_attempt(1500),
         runtime=per_attempt("10m"),
     params:
-        preset=entry("presets", "preset"),
+        preset=preset_keys("evaluate_coarse"),
         t=0,
         source=code_of("evaluate_field"),
     script:
@@ -90,7 +90,7 @@ rule update_field:
         mem_mb=per_attempt(2000),
         runtime=per_attempt("60m"),
     params:
-        preset=entry("presets", "preset"),
+        preset=preset_keys("update_field"),
         seed=integer("seed"),
         t=integer("t"),
         keep=SNAPSHOTS,
@@ -120,7 +120,7 @@ use rule evaluate_coarse as evaluate_round with:
     wildcard_constraints:
         t=POSITIVE,
     params:
-        preset=entry("presets", "preset"),
+        preset=preset_keys("evaluate_round"),
         t=integer("t"),
         source=code_of("evaluate_field"),
 
@@ -163,7 +163,7 @@ rule prepare_external_field:
         "<benchmarks>/<external>/prepare_external_field.tsv"
     threads: 2
     params:
-        preset=entry("presets", "preset"),
+        preset=preset_keys("prepare_external_field"),
         source=code_of("prepare_external_field"),
     script:
         "../scripts/prepare_external_field.py"

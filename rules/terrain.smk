@@ -8,6 +8,7 @@ rule make_page:
     """A page that needs nothing else: viewer, manifest, surface and chunks in one folder."""
     input:
         unpack(height_map),
+        unpack(class_pictures),
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
         viewer=VIEWER,
@@ -19,6 +20,7 @@ rule make_page:
         "<benchmarks>/<terrain>/make_page.tsv"
     params:
         heights=lookup(dpath="heights", within=config),
+        classes=lookup(dpath="classes", within=config),
         source=code_of("make_page"),
     script:
         "../scripts/make_page.py"
@@ -32,6 +34,7 @@ rule render_terrain:
     """Stills of the endless terrain: walking, from a hill, and from above."""
     input:
         unpack(height_map),
+        unpack(class_pictures),
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
     output:
@@ -47,6 +50,7 @@ rule render_terrain:
     params:
         size=lookup(dpath="stills", within=config),
         heights=lookup(dpath="heights", within=config),
+        classes=lookup(dpath="classes", within=config),
         schema=BUNDLE_SCHEMA,
         source=code_of("render_terrain"),
     script:
@@ -78,6 +82,7 @@ rule render_flight:
     """A walk over the endless terrain, frame by frame: does anything flicker, tear or jump?"""
     input:
         unpack(height_map),
+        unpack(class_pictures),
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
     output:
@@ -93,6 +98,7 @@ rule render_flight:
     params:
         size=lookup(dpath="stills", within=config),
         heights=lookup(dpath="heights", within=config),
+        classes=lookup(dpath="classes", within=config),
         flight=lookup(dpath="flight", within=config),
         schema=BUNDLE_SCHEMA,
         source=code_of("render_flight"),

@@ -9,6 +9,7 @@ rule cut_tiles:
     """Cut sixteen tiles from the exemplar."""
     input:
         unpack(lambda wildcards: tiling_inputs(wildcards.tiling)),
+        unpack(materials_of),
         levels="<results>/<levels>",
     output:
         seams="<results>/<tiles>/seams.json",

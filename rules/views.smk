@@ -30,7 +30,7 @@ rule score_coarse:
         mem_mb=lambda wildcards, attempt: (1000 if wildcards.prior == "none" else 3000) * attempt,
         runtime=per_attempt("60m"),
     params:
-        scene=entry("scenes", "scene"),
+        scene=scene_keys("score_coarse"),
         prior=lambda wildcards: config["priors"].get(wildcards.prior),
         p_drop=real("p_drop"),
         seed=integer("seed"),
@@ -88,7 +88,7 @@ rule select_poses:
     wildcard_constraints:
         t=POSITIVE,
     params:
-        scene=entry("scenes", "scene"),
+        scene=scene_keys("select_poses"),
         size=lambda wildcards: config["presets"][wildcards.preset]["size"],
         policy=lambda wildcards: wildcards.policy,
         lam=real("lam"),

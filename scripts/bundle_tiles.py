@@ -7,17 +7,20 @@ from dav_gswt.files import read_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
 from dav_gswt.provenance import record_provenance
+from dav_gswt.terrain.fit_cover import gather_content
 from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
-    given, params, frame = snakemake.input, snakemake.params, read_scene_frame(snakemake.input.frame)
-    inputs = {name: given[name] for name in ("seams", "frame", "tiles", "levels", "photos")}
-    told = {"tiles": read_json(given.seams), "levels": read_json(Path(given.levels, "levels.json"))}
+    paths, params, frame = snakemake.input, snakemake.params, read_scene_frame(snakemake.input.frame)
+    inputs = {name: paths[name] for name in ("seams", "frame", "tiles", "levels", "photos")}
+    inputs |= {"materials": paths.materials} if paths.get("materials") else {}
+    reports = {"tiles": read_json(paths.seams), "levels": read_json(Path(paths.levels, "levels.json"))}
     source = record_provenance(inputs, {"tau": params.tau, "seed": params.seed})
+    tiles = store.read_material_tiles(paths.tiles, paths.seams)
     build.write_bundle(
-        store.read_tiles(given.tiles, given.seams),
+        gather_content(tiles, paths.get("materials"), params.seed),
         Path(snakemake.output.manifest).parent,
         build.BundleOptions(tau=params.tau, salt=params.seed, unit=frame.unit, threads=snakemake.threads),
         params.schema,
-        source | {name: table["provenance"] for name, table in told.items()},
+        source | {name: report["provenance"] for name, report in reports.items()},
     )

@@ -11,10 +11,11 @@ from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.views.selection import read_pose_selection
 
 with logging_to(snakemake.log[0]):
-    given, name = snakemake.input, snakemake.wildcards.scene
+    paths, name = snakemake.input, snakemake.wildcards.scene
     store = PhotoStore(Path("captures") / name)
-    photos = Path(given.images).parent
-    site = Site(name, snakemake.params.scene, read_scene_frame(given.frame), photos, store, given.get("field"))
-    before = list(given.captures)
-    chosen = read_pose_selection(given.poses).poses
-    capture_views(site, read_view_split(given.views), before, chosen, Path(snakemake.output.capture))
+    photos = Path(paths.images).parent
+    frame, files = read_scene_frame(paths.frame), (paths.get("field"), paths.get("template"))
+    site = Site(name, snakemake.params.scene, frame, photos, store, *files)
+    before = list(paths.captures)
+    chosen = read_pose_selection(paths.poses).poses
+    capture_views(site, read_view_split(paths.views), before, chosen, Path(snakemake.output.capture))

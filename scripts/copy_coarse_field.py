@@ -1,4 +1,4 @@
-"""Rule begin_active: round 0 is the coarse field."""
+"""Rule copy_coarse_field: round 0 is the coarse field."""
 
 from dav_gswt.files import copy_file
 from dav_gswt.logs import logging_to

@@ -14,18 +14,17 @@ from dav_gswt.reconstruction.observation import mask_to_ground
 from dav_gswt.views.selection import read_pose_selection
 
 with logging_to(snakemake.log[0]):
-    given, params = snakemake.input, snakemake.params
-    split, captures = read_view_split(given.views), list(given.get("captures", []))
-    tests = read_training_views(given.images, given.model, list(split.test), [], params.preset["size"])
+    paths, params = snakemake.input, snakemake.params
+    split, captures = read_view_split(paths.views), list(paths.get("captures", []))
+    tests = read_training_views(paths.images, paths.model, list(split.test), [], params.preset["size"])
     photos = len(split.start) + sum(len(read_capture_record(folder)) for folder in captures)
-    fitted, grid = read_field(given.field), ground.read_ground(given.ground)
-    perceptual = lpips_weights.read(given.lpips) if given.get("lpips") else None
-    groups = read_scene_frame(given.frame).test_groups
+    fitted, grid = read_field(paths.field), ground.read_ground(paths.ground)
+    perceptual = lpips_weights.read(paths.lpips) if paths.get("lpips") else None
+    groups = read_scene_frame(paths.frame).test_groups
     result = evaluation.evaluate_field(fitted, mask_to_ground(tests, grid), groups, perceptual)
     result |= {"round": params.t, "photos": photos, "gaussians": len(fitted)}
-    result |= {"fit": read_json(given.fit)}
-    if given.get("poses"):
-        chosen = read_pose_selection(given.poses)
-        result |= {"stopped": chosen.stopped, "expected": chosen.expected}
-    inputs = {"field": given.field, "ground": given.ground, "views": given.views}
+    result |= {"fit": read_json(paths.fit)}
+    if paths.get("poses"):
+        result |= read_pose_selection(paths.poses).describe_outcome()
+    inputs = {"field": paths.field, "ground": paths.ground, "views": paths.views}
     write_json(snakemake.output.metrics, result | {"provenance": record_provenance(inputs, dict(params.preset))})

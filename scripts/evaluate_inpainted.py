@@ -12,10 +12,10 @@ from dav_gswt.reconstruction import ground
 from dav_gswt.reconstruction.observation import mask_to_ground
 
 with logging_to(snakemake.log[0]):
-    given, quality = snakemake.input, snakemake.params.preset
-    names, grid = read_view_split(given.views).test, ground.read_ground(given.ground)
-    tests = mask_to_ground(read_training_views(given.images, given.model, names, [], quality["size"]), grid)
-    perceptual = lpips_weights.read(given.lpips) if given.get("lpips") else None
-    result = evaluation.evaluate_inpainting(read_field(given.before), read_field(given.after), tests, perceptual)
-    inputs = {name: given[name] for name in ("before", "after", "ground", "views")}
-    write_json(snakemake.output.metrics, result | {"provenance": record_provenance(inputs, dict(quality))})
+    paths, preset = snakemake.input, snakemake.params.preset
+    names, grid = read_view_split(paths.views).test, ground.read_ground(paths.ground)
+    tests = mask_to_ground(read_training_views(paths.images, paths.model, names, [], preset["size"]), grid)
+    perceptual = lpips_weights.read(paths.lpips) if paths.get("lpips") else None
+    result = evaluation.evaluate_inpainting(read_field(paths.before), read_field(paths.after), tests, perceptual)
+    inputs = {name: paths[name] for name in ("before", "after", "ground", "views")}
+    write_json(snakemake.output.metrics, result | {"provenance": record_provenance(inputs, dict(preset))})

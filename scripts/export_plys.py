@@ -7,5 +7,5 @@ from dav_gswt.export import splats
 from dav_gswt.logs import logging_to
 
 with logging_to(snakemake.log[0]):
-    told = manifest.read_manifest(Path(snakemake.input.manifest).parent, snakemake.params.schema)
-    splats.write_plys(snakemake.input.archive, told.tile_side, snakemake.output.plys)
+    bundle = manifest.read_manifest(Path(snakemake.input.manifest).parent, snakemake.params.schema)
+    splats.write_plys(snakemake.input.archive, bundle.tile_side, snakemake.output.plys)

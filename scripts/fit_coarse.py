@@ -10,17 +10,20 @@ from dav_gswt.photos.colmap_model import read_colmap_model, triangulate_points
 from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.reconstruction import ground
-from dav_gswt.reconstruction.coarse import fit_coarse_field
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
+from dav_gswt.reconstruction.fit_settings import CoarseSettings, select_settings
+from dav_gswt.reconstruction.fitting.trainer import FitOptions
 
 with logging_to(snakemake.log[0]):
-    given, params = snakemake.input, snakemake.params
-    quality, margin = FitSettings(**params.preset), ground.WHOLE if params.whole else ground.MARGIN
-    names = list(read_view_split(given.views).start)
-    photos = read_training_views(given.images, given.model, names, [], quality.size)
-    points, colours = triangulate_points(read_colmap_model(given.model), names, given.images)
+    paths, params = snakemake.input, snakemake.params
+    settings = select_settings(CoarseSettings, params.preset)
+    margin = ground.WHOLE if params.scene.get("whole", False) else ground.MARGIN
+    names = list(read_view_split(paths.views).start)
+    photos = read_training_views(paths.images, paths.model, names, [], settings.size)
+    points, colours = triangulate_points(read_colmap_model(paths.model), names, paths.images)
     rng = np.random.default_rng(params.seed)
-    fitted = fit_coarse_field(read_scene_frame(given.frame), photos, points, colours, quality, rng, params.keep, margin)
+    start = StartViews(read_scene_frame(paths.frame), photos, points, colours, margin)
+    fitted = fit_coarse_field(start, settings, rng, FitOptions(snapshots=params.keep))
     write_field(fitted.field, snakemake.output.field)
     ground.write_ground(fitted.grid, snakemake.output.ground)
     write_json(snakemake.output.fit, fitted.report.to_dict())

@@ -12,16 +12,16 @@ from dav_gswt.reconstruction import ground
 from dav_gswt.views import prior_sampling, scoring
 
 with logging_to(snakemake.log[0]):
-    given, out, params = snakemake.input, snakemake.output, snakemake.params
-    fitted, grid, names = read_field(given.field), ground.read_ground(given.ground), read_view_split(given.views).start
-    photos = read_training_views(given.images, given.model, names, list(given.captures), scoring.PHOTO_WIDTH)
+    paths, out, params = snakemake.input, snakemake.output, snakemake.params
+    fitted, grid, names = read_field(paths.field), ground.read_ground(paths.ground), read_view_split(paths.views).start
+    photos = read_training_views(paths.images, paths.model, names, list(paths.captures), scoring.PHOTO_WIDTH)
     config = prior_sampling.open_inpainting_prior(params.prior, params.seed)
-    result = build.inpaint_field(fitted, grid, read_scene_frame(given.frame), photos, config)
+    result = build.inpaint_field(fitted, grid, read_scene_frame(paths.frame), photos, config)
     if result.field is fitted:
-        copy_file(given.field, out.field)
+        copy_file(paths.field, out.field)
     else:
         write_field(result.field, out.field)
-    copy_file(given.ground, out.ground)
-    inputs = {name: given[name] for name in ("field", "ground", "views", "weights")}
+    copy_file(paths.ground, out.ground)
+    inputs = {name: paths[name] for name in ("field", "ground", "views", "weights")}
     about = {"prior": params.prior, "seed": params.seed}
     write_json(out.facts, result.describe(grid) | {"provenance": record_provenance(inputs, about)})

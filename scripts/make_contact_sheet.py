@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
+from dav_gswt.images import figures
 from dav_gswt.logs import logging_to
-from dav_gswt.study import figures
 
 with logging_to(snakemake.log[0]):
     stills = snakemake.input.stills
     names = [Path(path).stem for path in stills]
-    figures.save(figures.sheet({snakemake.wildcards.scene: stills}, names, 3.2), snakemake.output.sheet)
+    figures.save_figure(figures.draw_sheet({snakemake.wildcards.scene: stills}, names, 3.2), snakemake.output.sheet)

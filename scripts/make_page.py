@@ -9,4 +9,4 @@ from dav_gswt.terrain import heights, page
 with logging_to(snakemake.log[0]):
     bundle, viewer = Path(snakemake.input.manifest).parent, page.find_viewer(snakemake.input.viewer)
     surface = heights.surface_from_config(snakemake.params.heights, read_json(snakemake.input.manifest)["tile_side"])
-    page.write_page(bundle, viewer, snakemake.output.page, surface)
+    page.write_page(bundle, viewer, snakemake.output.page, surface, snakemake.params.classes)

@@ -6,5 +6,5 @@ from dav_gswt.logs import logging_to
 from dav_gswt.photos.report.page import write_report
 
 with logging_to(snakemake.log[0]):
-    given = snakemake.input
-    write_report(Path(given.frame).parent, given.template, snakemake.wildcards.scene, snakemake.output.page)
+    paths = snakemake.input
+    write_report(Path(paths.frame).parent, paths.template, snakemake.wildcards.scene, snakemake.output.page)

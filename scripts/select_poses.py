@@ -10,20 +10,20 @@ from dav_gswt.views import candidates, policy_inputs, pose_maps, scores, selecti
 from dav_gswt.views.policies import SelectionInput
 
 with logging_to(snakemake.log[0]):
-    given, params, policy = snakemake.input, snakemake.params, snakemake.params.policy
-    frame, split, scored = read_scene_frame(given.frame), read_view_split(given.views), scores.read_scores(given.scores)
-    taken = candidates.read_captured_cameras(given.model, split, given.captures)
-    state = stopping.read_state(given, len(split.start), len(taken), len(scored))
+    paths, params, policy = snakemake.input, snakemake.params, snakemake.params.policy
+    frame, split, scored = read_scene_frame(paths.frame), read_view_split(paths.views), scores.read_scores(paths.scores)
+    taken = candidates.read_captured_cameras(paths.model, split, paths.captures)
+    state = stopping.read_state(paths, len(split.start), len(taken), len(scored))
     k, chosen = selection.poses_per_round(policy, params.k, len(scored)), []
     decided = stopping.decide_poses(params.stop, k, params.scene.get("burst", 1), state)
     if not decided.stopped:
-        pool = candidates.list_remaining(params.scene, frame, given.model, split, given.captures)
+        remaining = candidates.list_remaining(params.scene, frame, paths.model, split, paths.captures)
         places, rng = candidates.camera_positions(taken, frame), np.random.default_rng([params.seed, params.t])
-        information = policy_inputs.build_information_gain(policy, scored, pool, taken, given.field)
-        errors = policy_inputs.measure_true_errors(policy, scored, pool, given, params.scene, params.size)
+        information = policy_inputs.build_information_gain(policy, scored, remaining, taken, paths.field)
+        errors = policy_inputs.measure_true_errors(policy, scored, remaining, paths, params.scene, params.size)
         inputs = SelectionInput(places, decided.poses, rng, params.lam, information, errors)
         chosen = selection.select_poses(policy, scored, inputs)
     result = selection.PoseSelection(policy, params.k, chosen, decided.stopped, decided.expected_gain())
     selection.write_pose_selection(snakemake.output.poses, result)
-    shown = pose_maps.read_pose_maps(given.maps)[0].exr_parts(scored, [pose.name for pose in chosen])
+    shown = pose_maps.read_pose_maps(paths.maps)[0].exr_parts(scored, [pose.name for pose in chosen])
     image_files.write_exr_parts(snakemake.output.shown, shown or pose_maps.EMPTY_PARTS)

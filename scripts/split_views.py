@@ -9,8 +9,8 @@ from dav_gswt.photos.splitting import split_views
 from dav_gswt.photos.view_split import write_view_split
 
 with logging_to(snakemake.log[0]):
-    given, params = snakemake.input, snakemake.params
+    paths, params = snakemake.input, snakemake.params
     start, whole = params.scene.get("start") or params.scene["photos"], params.scene.get("whole", False)
     rng = np.random.default_rng(params.seed)
-    split = split_views(read_colmap_model(given.model), read_scene_frame(given.frame), start, rng, whole)
+    split = split_views(read_colmap_model(paths.model), read_scene_frame(paths.frame), start, rng, whole)
     write_view_split(snakemake.output.views, split)

@@ -1,5 +1,6 @@
 """What all tests share: where the repository is, its real photos, one headless Chromium."""
 
+import signal
 from pathlib import Path
 
 import pytest
@@ -13,12 +14,37 @@ settings.register_profile("untimed", deadline=None)  # no test asserts times: ma
 settings.load_profile("untimed")
 
 
+# a shell that starts a command in the background has it ignore Ctrl-C, and so would the runs that tests interrupt
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
+GROUPS = {  # of tests/workflow, beside "runs"
+    "plans": {"test_plans.py", "test_documented_targets.py", "test_profiles.py", "test_snakemake_internals.py"},
+    "disturbed runs": {"test_interrupted.py", "test_slurm.py"},
+}
+
+
+_GROUP_OF_FILE = {name: group for group, files in GROUPS.items() for name in files}
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """With several workers (pytest -n), one takes a whole group: what its tests share is then made once.
+
+    A group is a folder; whole runs are two groups, and plans share nothing with them.
+    """
+    from xdist.scheduler import LoadScopeScheduling
+
+    class GroupScheduling(LoadScopeScheduling):
+        def _split_scope(self, nodeid):
+            folder, name = nodeid.split("::")[0].rsplit("/", 1)
+            return _GROUP_OF_FILE.get(name, "runs") if folder == "tests/workflow" else folder
+
+    return GroupScheduling(config, log)
+
+
 def pytest_collection_modifyitems(items):
-    """With several workers (pytest -n), one takes a whole folder: what its tests share is then made once. Whole runs
-    come first, as they take longest."""
+    """Whole runs come first, as they take longest."""
     items.sort(key=lambda item: "workflow" not in item.path.parts)  # stable: else the order stays
-    for item in items:
-        item.add_marker(pytest.mark.xdist_group(str(item.path.parent)))
 
 
 @pytest.fixture(scope="session")

@@ -27,13 +27,13 @@ def measured_of_tiles(made, entry="lod"):
     """The tables of levels, orders or frames that are gathered: the path of each one's, and what tells it from the others."""
     found = {}
     asked = STUDY[entry]
-    told = ("scene", "seed", "preset", "tiling") + (("tau",) if "tau" in made.output.table else ())
+    keys = ("scene", "seed", "preset", "tiling") + (("tau",) if "tau" in made.output.table else ())
     for scene in asked["scenes"]:
         chosen = experiment_branch(scene, asked["fixed"]) if "fixed" in asked else branch(scene)
         for seed in asked.get("seeds", config["seeds"]):
             values = chosen | {"seed": seed}
             (path,) = expand(made.output.table, **values)
-            found[path] = {key: values[key] for key in told}
+            found[path] = {key: values[key] for key in keys}
     return found
 
 
@@ -156,8 +156,8 @@ def saved_answers(wildcards):
 def sweep_experiments(name):
     """The cells of a row of the config's `sweeps`: what tells each from the others, what it varied, and its files."""
     asked, cells = STUDY["sweeps"][name], {}
-    for chosen in grid.combinations(asked["vary"], asked.get("fixed", {})):
-        for scene, seed in product(asked["scenes"], grid.seeds_of(asked["measure"])):
+    for chosen in grid.list_combinations(asked["vary"], asked.get("fixed", {})):
+        for scene, seed in product(asked["scenes"], grid.list_seeds(asked["measure"])):
             values = experiment_branch(scene, chosen) | {"seed": seed}
             measured = [key for key, seeds in asked["measure"].items() if seed in seeds]
             cell = sweep_experiment(values, measured) | {"sweep": name, "varied": chosen["shown"]}
@@ -169,7 +169,7 @@ def experiment_branch(scene, chosen):
     """The wildcards of a cell of settings of its own, which stops nowhere before its last round and paints nothing."""
     entry, over = config["scenes"][scene], {key: value for key, value in chosen.items() if key != "shown"}
     asked = config | over
-    rounds = grid.rounds_of(over, asked["policy"], grid.start_of(entry), asked["k"], asked["rounds"])
+    rounds = grid.count_rounds(over, asked["policy"], grid.count_start_photos(entry), asked["k"], asked["rounds"])
     return branch(scene, changes=over | {"rounds": rounds}) | {"stop": "", "inpainted": ""}
 
 
@@ -199,8 +199,8 @@ def sweep_experiment(values, measured):
     times |= {"bundle": of(rules.bundle_tiles.benchmark)} if {"tiles", "stills"} & set(measured) else {}
     times |= {"stills": of(rules.render_terrain.benchmark)} if "stills" in measured else {}
     prior = config["priors"].get(values["prior"], {"samples": 0, "steps": 0})
-    told = {key: values[key] for key in grid.CELL if key != "rounds"} | {"rounds": rounds}
-    return told | {
+    cell = {key: values[key] for key in grid.CELL if key != "rounds"} | {"rounds": rounds}
+    return cell | {
         "corrected": scene["kind"] == "photos",
         "samples": prior["samples"],
         "steps": prior["steps"],
@@ -211,11 +211,11 @@ def sweep_experiment(values, measured):
 
 def tradeoff_experiments():
     """A cell for every setting of every knob, each knob's most accurate first."""
-    asked, size = STUDY["tradeoff"], settings.tested_size(FLAT)
+    asked, size = STUDY["tradeoff"], settings.find_test_size(FLAT)
     return [
         {"knob": s.knob, "setting": s.shown, "most": s.most, "base": s.base, "measure": s.measure}
         | tradeoff_experiment(asked["scene"], asked["seed"], s.chosen, size, s.measure)
-        for s in settings.settings(FLAT)
+        for s in settings.list_settings(FLAT)
     ]
 
 
@@ -223,10 +223,10 @@ def auto_experiments():
     """Of each scene of `auto`: the base, then with each of what is chosen by itself alone, then with all of them."""
     asked = STUDY["auto"]
     chosen, base = asked["auto"], asked["base"]["preset"]
-    size = config["presets"][settings.sized(FLAT, base)]["size"]
+    size = config["presets"][settings.name_sized_preset(FLAT, base)]["size"]
     parts = {
-        "base": {"preset": settings.sized(FLAT, base)},
-        "fit": {"preset": settings.sized(FLAT, chosen["preset"])},
+        "base": {"preset": settings.name_sized_preset(FLAT, base)},
+        "fit": {"preset": settings.name_sized_preset(FLAT, chosen["preset"])},
         "rounds": {"stop": {"marginal_gain": chosen["marginal_gain"]}},
         "orders": {"tau": chosen["tau"]},
     }
@@ -276,7 +276,7 @@ def setting_of(sweep):
 
 
 def default_of(sweep):
-    """The value that a setting has where it is not varied, as tables spell it."""
+    """The value that a setting has where it is not varied, as tables write it."""
     return str(config.get(setting_of(sweep), ""))
 
 

@@ -90,9 +90,9 @@ rule train_regressor:
 
 
 rule evaluate_prior:
-    """How near the prior comes to the truth, and what its doubt is worth, on worlds that it was not trained on.
+    """How near the prior comes to the truth, and what its uncertainty is worth, on worlds that it was not trained on.
 
-    Columns on LPIPS are empty where its weights were not fetched.
+    Columns on LPIPS are empty with `lpips: none`.
     """
     input:
         weights="<results>/prior/terrain.safetensors",

@@ -1,6 +1,6 @@
 """Numerical stability at the extremes: every formula in float32 against float64, and the workflow at the ends of its range.
 
-In: the library; the config of the tests, with each extreme laid over it. Out: results/tables/stability.csv, a row a formula;
+In: the library; the config of the tests, overridden by each extreme. Out: results/tables/stability.csv, a row a formula;
 results/stability/{extreme}/; results/tables/stability_runs.csv, a row a run; both also in docs/research/data; the page
 docs/research/results/stability.md. `snakemake stability`.
 """

@@ -13,6 +13,8 @@ except InputError as error:
     raise WorkflowError(str(error)) from None
 
 STUDY = config["study"]  # the study's part of the config
+config.update({table: NamedEntries(table, config[table]) for table in ("scenes", "presets", "tilings", "priors")})
+STUDY["sweeps"] = NamedEntries("study.sweeps", STUDY["sweeps"])
 
 
 include: "experiments.smk"
@@ -23,6 +25,7 @@ include: "prior.smk"
 include: "expansion.smk"
 include: "refine.smk"
 include: "levels.smk"
+include: "materials.smk"
 include: "presort.smk"
 include: "frames.smk"
 include: "fits.smk"

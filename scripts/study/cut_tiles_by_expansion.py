@@ -10,12 +10,12 @@ from dav_gswt.study import expansion
 from dav_gswt.tiles import build, semantics, store
 
 with logging_to(snakemake.log[0]):
-    given, tiling = snakemake.input, snakemake.params.tiling
-    made = levels.read_levels(given.levels)
-    alexnet = lpips_weights.read(given.lpips) if given.get("lpips") else None
+    paths, tiling = snakemake.input, snakemake.params.tiling
+    made = levels.read_levels(paths.levels)
+    alexnet = lpips_weights.read(paths.lpips) if paths.get("lpips") else None
     source = semantics.SemanticSource(alexnet, tiling.get("sam2"))
-    options = build.TilingOptions.from_config(tiling, source, made.wanted)
+    options = build.TilingOptions.from_config(tiling | {"energy": "semantic"}, source, made.wanted)
     tiles = expansion.cut_by_expansion(made, options, build.make_generator(snakemake.params.seed, tiling))
-    inputs = {f"level{number}": Path(given.levels, f"level{number}.ply") for number in range(len(made.fields))}
-    inputs |= {name: given[name] for name in ("lpips", "sam2") if given.get(name)}
+    inputs = {f"level{number}": Path(paths.levels, f"level{number}.ply") for number in range(len(made.fields))}
+    inputs |= {name: paths[name] for name in ("lpips", "sam2") if paths.get(name)}
     store.write_tiles(tiles, snakemake.output.tiles, snakemake.output.seams, record_provenance(inputs, dict(tiling)))

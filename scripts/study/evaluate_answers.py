@@ -7,11 +7,11 @@ from dav_gswt.study import csv_tables
 from dav_gswt.study.forced_choice import answers, plots, results
 
 with logging_to(snakemake.log[0]):
-    given, out = snakemake.input, snakemake.output
-    key, files = answers.read_key(given.key), list(given.get("answers", []))
-    people = answers.read_answers(files, key, given.schema)
+    paths, out = snakemake.input, snakemake.output
+    key, files = answers.read_key(paths.key), list(paths.get("answers", []))
+    people = answers.read_answers(files, key, paths.schema)
     rows = results.tabulate_choices(key, people.participants)
     csv_tables.write_table(out.table, rows)
     plots.write_choice_plot(out.plot, rows)
-    origin = record_provenance({"key": given.key, "answers": files}, {"study": key["study"]})
+    origin = record_provenance({"key": paths.key, "answers": files}, {"study": key["study"]})
     write_json(out.facts, people.facts | {"provenance": origin})

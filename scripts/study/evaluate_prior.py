@@ -9,16 +9,16 @@ from dav_gswt.study.prior.regressor import Regressor
 from dav_gswt.study.prior.training import example_files
 
 with logging_to(snakemake.log[0]):
-    given, out, params = snakemake.input, snakemake.output, snakemake.params
+    paths, out, params = snakemake.input, snakemake.output, snakemake.params
     setting = evaluation.Setting(**params.setting)
-    prior, regressors = TerrainPrior.open(given.weights), [Regressor.open(path) for path in given.regressors]
-    made = example_files.concatenate([example_files.read_examples(part) for part in given.examples])
-    perceptual = lpips_weights.read(*given.lpips) if given.lpips else None  # a list of none or one
+    prior, regressors = TerrainPrior.open(paths.weights), [Regressor.open(path) for path in paths.regressors]
+    made = example_files.concatenate([example_files.read_examples(part) for part in paths.examples])
+    perceptual = lpips_weights.read(*paths.lpips) if paths.lpips else None  # a list of none or one
     rows = evaluation.evaluate_prior(
         evaluation.select_evenly(made, params.views), prior, regressors, setting, perceptual
     )
     csv_tables.write_table(out.table, rows)
-    plots.plot_losses(plots.read_losses(given.losses), out.losses)
+    plots.plot_losses(plots.read_losses(paths.losses), out.losses)
     plots.plot_samples(
         plots.make_gallery(evaluation.select_evenly(made, params.shown), prior, regressors[0], setting), out.samples
     )

@@ -5,8 +5,8 @@ from dav_gswt.study import csv_tables
 from dav_gswt.study.terrain import frames
 
 with logging_to(snakemake.log[0]):
-    given, made = snakemake.input, snakemake.output
-    rows = frames.gather_frames(snakemake.params.cells, given.library, given.page)
+    paths, made = snakemake.input, snakemake.output
+    rows = frames.gather_frames(snakemake.params.cells, paths.library, paths.page)
     for path in (made.table, made.kept):
         csv_tables.write_table(path, rows)
     csv_tables.write_table(made.viewer, frames.select_viewer_rows(rows))

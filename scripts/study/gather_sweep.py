@@ -6,6 +6,6 @@ from dav_gswt.study.sweeps import tables
 
 with logging_to(snakemake.log[0]):
     out = snakemake.output
-    rows = [tables.row(cell) for cell in snakemake.params.cells]
+    rows = [tables.tabulate_cell(cell) for cell in snakemake.params.cells]
     csv_tables.write_table(out.table, rows)
     csv_tables.update_table(out.kept, rows, tables.KEY)

@@ -6,7 +6,7 @@ from dav_gswt.study.tradeoff import tables
 
 with logging_to(snakemake.log[0]):
     out = snakemake.output
-    rows = tables.rows(snakemake.params.cells)
+    rows = tables.tabulate_settings(snakemake.params.cells)
     csv_tables.write_table(out.table, rows)
-    csv_tables.write_table(out.pareto, tables.pareto(rows))
+    csv_tables.write_table(out.pareto, tables.tabulate_front(rows))
     csv_tables.update_table(out.kept, rows, tables.KEY)

@@ -1,4 +1,4 @@
-"""Rule inspect_artefact: what does an artefact look like?"""
+"""Rule inspect_artifact: what does an artefact look like?"""
 
 from pathlib import Path
 

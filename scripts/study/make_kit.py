@@ -6,7 +6,7 @@ from dav_gswt.logs import logging_to
 from dav_gswt.study.forced_choice import kit, store, trials
 
 with logging_to(snakemake.log[0]):
-    given, params = snakemake.input, snakemake.params
-    drawn = [pair for item in zip(given.pairs, params.scenes, strict=True) for pair in store.read_pairs(*item)]
-    parts = Path(given.parts[0]).parent
+    paths, params = snakemake.input, snakemake.params
+    drawn = [pair for item in zip(paths.pairs, params.scenes, strict=True) for pair in store.read_pairs(*item)]
+    parts = Path(paths.parts[0]).parent
     kit.write_kit(snakemake.output.page, snakemake.output.key, parts, drawn, params.seed, trials.SECONDS)

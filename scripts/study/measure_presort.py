@@ -9,8 +9,8 @@ from dav_gswt.study.terrain import presort
 from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
-    given = snakemake.input
-    bundle = bundles.read_bundle(Path(given.manifest).parent, snakemake.params.schema)
+    paths = snakemake.input
+    bundle = bundles.read_bundle(Path(paths.manifest).parent, snakemake.params.schema)
     csv_tables.write_table(
-        snakemake.output.table, presort.measure_approximations(store.read_tiles(given.tiles, given.seams), bundle)
+        snakemake.output.table, presort.measure_approximations(store.read_tiles(paths.tiles, paths.seams), bundle)
     )

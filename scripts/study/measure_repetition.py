@@ -7,9 +7,9 @@ from dav_gswt.study.seams import exemplar, plots, repetition
 from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
-    given, out, params = snakemake.input, snakemake.output, snakemake.params
-    maps = exemplar.ExemplarMaps.from_levels(levels.read_levels(given.levels))
-    tiles = store.read_tiles(given.tiles, given.seams)
+    paths, out, params = snakemake.input, snakemake.output, snakemake.params
+    maps = exemplar.ExemplarMaps.from_levels(levels.read_levels(paths.levels))
+    tiles = store.read_tiles(paths.tiles, paths.seams)
     source = maps.detrend(tiles, params.tiling)
     fields = [level.field for level in source.levels]
     measured = repetition.measure_repetition(tiles, fields, source.exemplar.cells * tiles.spacing, params.seed)

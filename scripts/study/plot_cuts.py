@@ -5,6 +5,6 @@ from dav_gswt.study.seams import plots
 from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
-    given = snakemake.input
-    pair = [store.read_tiles(*files) for files in zip(given.tiles, given.seams, strict=True)]
+    paths = snakemake.input
+    pair = [store.read_tiles(*files) for files in zip(paths.tiles, paths.seams, strict=True)]
     plots.write_cuts(snakemake.output.plot, dict(zip(("colour", "semantic"), pair, strict=True)))

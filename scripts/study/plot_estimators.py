@@ -10,12 +10,12 @@ from dav_gswt.study.tables import estimators
 from dav_gswt.study.views import evolution
 
 with logging_to(snakemake.log[0]):
-    given, params = snakemake.input, snakemake.params
-    key, found = evolution.psnr_key(read_scene_frame(given.frame)), []
-    for name, *paths in zip(params.named, given.fields, given.grounds, given.metrics, given.crops, strict=True):
-        fitted, surface, measured, crops = paths
+    paths, params = snakemake.input, snakemake.params
+    key, found = evolution.psnr_key(read_scene_frame(paths.frame)), []
+    for name, *files in zip(params.named, paths.fields, paths.grounds, paths.metrics, paths.crops, strict=True):
+        fitted, surface, measured, crops = files
         read = read_field(fitted), ground.read_ground(surface), read_json(measured)
         found.append(evolution.Round(params.rounds, *read, title=name, note=estimators.format_seam_note(crops)))
     names = list(evolution.choose_test_views(found[0].metrics, key))
-    tests = read_training_views(given.images, given.model, names, [], params.size)
+    tests = read_training_views(paths.images, paths.model, names, [], params.size)
     evolution.write_figure(snakemake.output.plot, evolution.build_strips(found, tests, key), found, key)

@@ -9,11 +9,11 @@ from dav_gswt.reconstruction import ground
 from dav_gswt.study.views import evolution
 
 with logging_to(snakemake.log[0]):
-    given, params = snakemake.input, snakemake.params
-    key, rounds = evolution.psnr_key(read_scene_frame(given.frame)), []
-    for t, *paths in zip(params.rounds, given.fields, given.grounds, given.metrics, strict=True):
-        fitted, surface, measured = paths
+    paths, params = snakemake.input, snakemake.params
+    key, rounds = evolution.psnr_key(read_scene_frame(paths.frame)), []
+    for t, *files in zip(params.rounds, paths.fields, paths.grounds, paths.metrics, strict=True):
+        fitted, surface, measured = files
         rounds.append(evolution.Round(t, read_field(fitted), ground.read_ground(surface), read_json(measured)))
     names = list(evolution.choose_test_views(rounds[0].metrics, key))
-    tests = read_training_views(given.images, given.model, names, [], params.size)
+    tests = read_training_views(paths.images, paths.model, names, [], params.size)
     evolution.write_figure(snakemake.output.plot, evolution.build_strips(rounds, tests, key), rounds, key)

@@ -9,11 +9,11 @@ from dav_gswt.views.score_colours import candidate_values
 from dav_gswt.views.selection import read_pose_selection
 
 with logging_to(snakemake.log[0]):
-    given, lam = snakemake.input, snakemake.params.lam
-    frame, split = read_scene_frame(given.frame), read_view_split(given.views)
-    captures, rounds = list(given.captures), []
-    for t, (scored, poses) in enumerate(zip(given.scores, given.poses, strict=True), 1):
-        taken = candidates.read_captured_cameras(given.model, split, captures[: t - 1])
-        table = scores.read_scores(scored)
+    paths, lam = snakemake.input, snakemake.params.lam
+    frame, split = read_scene_frame(paths.frame), read_view_split(paths.views)
+    captures, rounds = list(paths.captures), []
+    tables = [scores.read_scores(path) for path in paths.scores]
+    for t, (table, poses) in enumerate(zip(tables, paths.poses, strict=True), 1):
+        taken = candidates.read_captured_cameras(paths.model, split, captures[: t - 1])
         rounds.append(sphere.build_round(t, table, read_pose_selection(poses).poses, taken, frame, lam))
-    sphere.write_figure(snakemake.output.plot, rounds, candidate_values(table, lam)[0])
+    sphere.write_figure(snakemake.output.plot, rounds, candidate_values(tables[-1], lam)[0])

@@ -4,5 +4,5 @@ from dav_gswt.logs import logging_to
 from dav_gswt.study.sweeps import plots, tables
 
 with logging_to(snakemake.log[0]):
-    rows, params = tables.read(snakemake.input.table), snakemake.params
-    plots.write(snakemake.output.plot, snakemake.wildcards.sweep, params.axes, rows)
+    rows, params = tables.read_sweep(snakemake.input.table), snakemake.params
+    plots.write_figure(snakemake.output.plot, snakemake.wildcards.sweep, params.axes, rows)

@@ -1,4 +1,4 @@
-"""Rule show_candidates: what do some candidates truly show?"""
+"""Rule render_candidates: what do some candidates truly show?"""
 
 from dav_gswt.files import atomic_folder
 from dav_gswt.geometry.scene_frame import read_scene_frame
@@ -7,7 +7,7 @@ from dav_gswt.views import candidates, oracle
 
 with logging_to(snakemake.log[0]):
     scene = snakemake.params.scene
-    pool = candidates.list_hemisphere(scene, read_scene_frame(snakemake.input.frame))
+    listed = candidates.list_hemisphere(scene, read_scene_frame(snakemake.input.frame))
     with atomic_folder(snakemake.output.truth) as folder:
-        some = oracle.spread_candidates(pool, snakemake.params.poses)
+        some = oracle.spread_candidates(listed, snakemake.params.poses)
         oracle.write_truth(folder, oracle.render_truth(scene, some, ""))

@@ -10,8 +10,8 @@ from dav_gswt.study.seams import pictures
 from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
-    given, bundle = snakemake.input, Manifest.from_dict(read_json(snakemake.input.manifest))
-    tiles = store.read_tiles(given.tiles, given.seams)
+    paths, bundle = snakemake.input, Manifest.from_dict(read_json(snakemake.input.manifest))
+    tiles = store.read_tiles(paths.tiles, paths.seams)
     for path in progress(snakemake.output.pictures, "draw grids"):
         shot, surface = Path(path).stem.split("_")
         image_files.write_png(

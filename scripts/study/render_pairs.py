@@ -9,14 +9,14 @@ from dav_gswt.study.seams import exemplar, placed_tiles
 from dav_gswt.tiles import store as tiles
 
 with logging_to(snakemake.log[0]):
-    given, params = snakemake.input, snakemake.params
-    maps = exemplar.ExemplarMaps.from_levels(levels.read_levels(given.levels))
+    paths, params = snakemake.input, snakemake.params
+    maps = exemplar.ExemplarMaps.from_levels(levels.read_levels(paths.levels))
     sets = {}
-    for name, *files in zip(params.tilings, given.tiles, given.seams, strict=True):
+    for name, *files in zip(params.tilings, paths.tiles, paths.seams, strict=True):
         cut = tiles.read_tiles(*files)
         sets[name] = placed_tiles.place_tiles(cut, maps.detrend(cut, params.tilings[name]), params.salt, params.tau)
-    alexnet = lpips_weights.read(given.lpips) if given.get("lpips") else None
-    inputs = {"seams": list(given.seams)} | ({"lpips": given.lpips} if alexnet else {})
+    alexnet = lpips_weights.read(paths.lpips) if paths.get("lpips") else None
+    inputs = {"seams": list(paths.seams)} | ({"lpips": paths.lpips} if alexnet else {})
     asked = dict(params.study)
     store.write_pairs(
         snakemake.output.pairs, pairs.sample_pairs(sets, asked, alexnet), record_provenance(inputs, asked)

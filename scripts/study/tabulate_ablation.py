@@ -5,8 +5,8 @@ from dav_gswt.study import csv_tables
 from dav_gswt.study.tables import ablation, spread
 
 with logging_to(snakemake.log[0]):
-    given, params = snakemake.input, snakemake.params
-    sweeps = spread.read_sweeps(given.sweeps, given.get("viewer"))
-    rows = ablation.rows(dict(zip(params.baselines, sweeps, strict=True)), params.baselines)
+    paths, params = snakemake.input, snakemake.params
+    sweeps = spread.read_sweeps(paths.sweeps, paths.get("viewer"))
+    rows = ablation.tabulate_ablation(dict(zip(params.baselines, sweeps, strict=True)), params.baselines)
     for path in (snakemake.output.table, snakemake.output.kept):
         csv_tables.write_table(path, rows)

@@ -5,8 +5,8 @@ from dav_gswt.study import csv_tables
 from dav_gswt.study.tables import sensitivity, spread
 
 with logging_to(snakemake.log[0]):
-    given, params = snakemake.input, snakemake.params
-    sweeps = spread.read_sweeps(given.sweeps, given.get("viewer"))
-    rows = sensitivity.rows(dict(zip(params.settings, sweeps, strict=True)), params.defaults)
+    paths, params = snakemake.input, snakemake.params
+    sweeps = spread.read_sweeps(paths.sweeps, paths.get("viewer"))
+    rows = sensitivity.tabulate_sensitivity(dict(zip(params.settings, sweeps, strict=True)), params.defaults)
     for path in (snakemake.output.table, snakemake.output.kept):
         csv_tables.write_table(path, rows)

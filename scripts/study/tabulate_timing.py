@@ -5,8 +5,8 @@ from dav_gswt.study import csv_tables
 from dav_gswt.study.tables import spread, timing
 
 with logging_to(snakemake.log[0]):
-    given, params = snakemake.input, snakemake.params
-    (cells,) = spread.read_sweeps([given.sweep], given.get("viewer"))
-    rows = timing.rows(timing.at_setting(cells, params.value), params.families)
+    paths, params = snakemake.input, snakemake.params
+    (cells,) = spread.read_sweeps([paths.sweep], paths.get("viewer"))
+    rows = timing.tabulate_timing(timing.select_setting(cells, params.value), params.families)
     for path in (snakemake.output.table, snakemake.output.kept):
         csv_tables.write_table(path, rows)

@@ -9,7 +9,7 @@ from dav_gswt.study.terrain import frames
 from dav_gswt.terrain import page
 
 with logging_to(snakemake.log[0]):
-    given = snakemake.input
-    bundle, viewer = Path(given.manifest).parent, page.find_viewer(given.viewer)
-    rows = frames.time_page(bundle, viewer, read_json(given.manifest), frames.FrameSettings(**snakemake.params.asked))
+    paths = snakemake.input
+    bundle, viewer = Path(paths.manifest).parent, page.find_viewer(paths.viewer)
+    rows = frames.time_page(bundle, viewer, read_json(paths.manifest), frames.FrameSettings(**snakemake.params.asked))
     csv_tables.write_table(snakemake.output.table, rows)

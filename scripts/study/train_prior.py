@@ -7,8 +7,8 @@ from dav_gswt.study.prior.training import pipeline
 from dav_gswt.study.prior.training.optimization import TrainingPlan
 
 with logging_to(snakemake.log[0]):
-    given, out, params = snakemake.input, snakemake.output, snakemake.params
+    paths, out, params = snakemake.input, snakemake.output, snakemake.params
     plans = TrainingPlan(**params.coder), TrainingPlan(**params.denoiser)
-    autoencoder = given.get("coded")  # a regressor takes the prior's autoencoder
-    losses = pipeline.train_prior(given.examples, out.weights, plans, Path(params.keep), autoencoder)
+    autoencoder = paths.get("coded")  # a regressor takes the prior's autoencoder
+    losses = pipeline.train_prior(paths.examples, out.weights, plans, Path(params.keep), autoencoder)
     pipeline.write_losses(out.losses, losses)

@@ -6,7 +6,7 @@ from dav_gswt.study import csv_tables
 from dav_gswt.study.stability import page, plots
 
 with logging_to(snakemake.log[0]):
-    given = snakemake.input
-    formulas, runs = csv_tables.read_table(given.formulas), csv_tables.read_table(given.runs)
+    paths = snakemake.input
+    formulas, runs = csv_tables.read_table(paths.formulas), csv_tables.read_table(paths.runs)
     plots.write_tolerance_plot(snakemake.output.plot, formulas)
-    page.write_stability_page(snakemake.output.page, given.template, formulas, runs, read_json(given.facts))
+    page.write_stability_page(snakemake.output.page, paths.template, formulas, runs, read_json(paths.facts))

@@ -2,10 +2,12 @@
 
 from dav_gswt.files import copy_file
 from dav_gswt.logs import logging_to
+from dav_gswt.study import markdown
 from dav_gswt.study.tradeoff import page, tables
 
 with logging_to(snakemake.log[0]):
-    given, out = snakemake.input, snakemake.output
-    for source, target in zip(given.figures, out.figures, strict=True):
+    paths, out = snakemake.input, snakemake.output
+    for source, target in zip(paths.figures, out.figures, strict=True):
         copy_file(source, target)
-    page.write(out.page, page.text(tables.read(given.table), tables.read(given.pareto)))
+    rows, front = tables.read_tradeoff(paths.table), tables.read_tradeoff(paths.pareto)
+    markdown.write_page(out.page, page.format_tradeoff(rows, front))

@@ -70,3 +70,10 @@ def visit(chromium):
     yield start
     for context in contexts:
         context.close()
+
+
+@pytest.fixture(scope="module")
+def target(chromium, plain):
+    """A visit that one broken zip after the other is dropped onto."""
+    with chromium.new_context(viewport={"width": 320, "height": 200}) as context:
+        yield Visit(context.new_page()).open(f"{plain}?still")

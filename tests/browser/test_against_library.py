@@ -10,10 +10,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fixtures.bundles import SKY, Ground
+from fixtures.page_visit import camera_at
 
 from dav_gswt.bundle.manifest import Manifest, Sky
 from dav_gswt.bundle.store import Bundle
-from dav_gswt.geometry import cameras
 from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain import endless, stills
 from dav_gswt.terrain.endless import EndlessTerrain
@@ -56,11 +56,3 @@ def test_the_page_draws_what_the_library_draws(still, hilly, place):
     difference = np.abs(drawn - expected)
     assert difference.mean() < MEAN and difference.max() <= MOST
     assert expected.std() > 8, "there is something to see"
-
-
-def camera_at(terrain, place) -> cameras.Camera:
-    ground, _ = terrain.heights.at(np.array([place["x"]]), np.array([place["y"]]))
-    yaw, pitch = np.radians(place["yaw"]), np.radians(place["pitch"])
-    eye = np.array([place["x"], place["y"], ground[0] + place["eye"]])
-    ahead = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
-    return cameras.pinhole(eye, eye + ahead, 160, 100, 60.0)

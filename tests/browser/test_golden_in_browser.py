@@ -124,3 +124,59 @@ def test_sorting_is_exact_and_stable(modules):
         depths.tolist(),
     )
     assert found == np.argsort(-depths, kind="stable").tolist()
+
+
+def test_classes_have_the_scores_and_keep_the_gaussians_shared_with_the_library(modules):
+    terrains = golden("classes")["terrains"]
+    computed = modules.evaluate(
+        """async terrains => {
+          const { createClasses } = await import("./terrain/classes.js");
+          const { createHeights } = await import("./terrain/heights.js");
+          return terrains.map(({ side, materials, classes, heights, pixels, cells }) => {
+            const files = classes.rule.filter(({ kind }) => kind === "image").map(({ file }) => file);
+            const pictures = new Map(files.map(file => [file, new Uint8Array(pixels.flat())]));
+            const made = createClasses(classes, materials, side, createHeights(heights), pictures);
+            return cells.map(({ i, j, places }) => {
+              const corner = new Float64Array(materials);
+              made.latticeScores(8 * i, 8 * j, corner, 0);
+              return { materials: made.materialsIn(i, j), corner: [...corner], places: places.map(p => ({
+                scores: [...made.scoresAt(i, j, p.x / side, p.y / side)],
+                jitter: [...made.jitterAt(i, j, p.x / side, p.y / side)],
+                kept: made.keep(i, j, { centres: new Float32Array([p.x, p.y, p.z]), count: 1 }, p.material).length > 0,
+              })) };
+            });
+          });
+        }""",
+        terrains,
+    )
+    for terrain, cells in zip(terrains, computed, strict=True):
+        for expected, found in zip(terrain["cells"], cells, strict=True):
+            assert found["materials"] == expected["materials"]
+            np.testing.assert_allclose(found["corner"], expected["corner"], rtol=0, atol=1e-12)
+            for place, own in zip(expected["places"], found["places"], strict=True):
+                assert own["kept"] == place["kept"]
+                for name in ("scores", "jitter"):
+                    np.testing.assert_allclose(own[name], place[name], rtol=0, atol=1e-12)
+
+
+def test_objects_stand_where_they_do_in_the_library(modules):
+    terrains = golden("scatter")["terrains"]
+    computed = modules.evaluate(
+        """async terrains => {
+          const { createClasses } = await import("./terrain/classes.js");
+          const { createHeights } = await import("./terrain/heights.js");
+          const { createScatter } = await import("./terrain/scatter.js");
+          return terrains.map(({ side, materials, classes, scatter, objects, cells }) => {
+            const cover = classes && createClasses(classes, materials, side, createHeights());
+            const made = createScatter(scatter, objects, side, cover);
+            return cells.map(({ i, j }) => [...made.instancesIn(i, j)].sort((a, b) => a.v - b.v || a.u - b.u));
+          });
+        }""",
+        terrains,
+    )
+    for terrain, cells in zip(terrains, computed, strict=True):
+        for expected, found in zip(terrain["cells"], cells, strict=True):
+            assert [one["number"] for one in found] == [one["object"] for one in expected["instances"]]
+            for name in ("u", "v", "turn", "size"):
+                values = [[one[name] for one in ones] for ones in (found, expected["instances"])]
+                np.testing.assert_allclose(*values, rtol=0, atol=1e-12)

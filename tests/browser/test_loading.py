@@ -83,12 +83,14 @@ def point_outside(folder):
         pytest.param(
             lambda f: (f / "chunks/lod0_tile_02.bin").unlink(), "lod0_tile_02.bin is not there", id="no chunk"
         ),
-        pytest.param(spoil_manifest(version=1), "version 1, this page reads version 2", id="version"),
+        pytest.param(spoil_manifest(version=1), "version 1, this page reads version 2 and 3", id="version"),
         pytest.param(spoil_manifest(format="ply"), "not a terrain", id="format"),
         pytest.param(lambda f: (f / "davgswt.json").write_text("{"), "davgswt.json is not readable", id="not JSON"),
         pytest.param(spoil_manifest(tile_side=0), "“tile_side” is missing or makes no sense", id="tile side"),
         pytest.param(spoil_manifest(encoding={}), "“encoding” is missing or makes no sense", id="encoding"),
         pytest.param(spoil_manifest(tiles=[]), "“tiles” is missing or makes no sense", id="no tiles"),
+        pytest.param(spoil_manifest(materials=[]), "“materials” is missing or makes no sense", id="no material"),
+        pytest.param(spoil_manifest(objects=[{}]), "“objects” is missing or makes no sense", id="an object"),
         pytest.param(spoil_manifest(levels=[None]), "“levels” is missing or makes no sense", id="levels"),
         pytest.param(cut, "lod1_tile_03.bin is cut short: 2", id="cut short"),
         pytest.param(lengthen, "lod1_tile_03.bin is too long", id="too long"),

@@ -17,11 +17,12 @@ LOOK = """async ({ surface, side, near, deviations, centres, sizes, cameras }) =
   const { createHeights } = await import("./terrain/heights.js");
   const { height = 0, wavelength = 1 } = surface; // in tile sides
   const heights = createHeights({ ...surface, height: height * side, wavelength: wavelength * side });
-  const count = sizes.length, cell = { di: 0, dj: 0, tile: 0, lo: 0, hi: 0, whole: true, count };
+  const count = sizes.length, cell = { di: 0, dj: 0, tiles: [0], border: null, lo: 0, hi: 0, whole: true, count };
   const entries = Uint32Array.from({ length: count }, (_, k) => k);
   const chunk = { centres: new Float32Array(centres), sizes: new Uint8Array(sizes), entries, count };
-  const sortNear = createNearSorter({ get: () => chunk }, { side, near, deviations, heights });
-  return cameras.map(camera => Array.from(sortNear([cell], camera, {}), entry => entry & 0x0fffffff));
+  const sortNear = createNearSorter({ get: () => chunk }, { side, near, deviations, heights }, null);
+  const RANGE = { switches: [Infinity], bands: [0] };
+  return cameras.map(camera => Array.from(sortNear([cell], camera, RANGE), entry => entry & 0x3fffff));
 }"""
 
 

@@ -51,6 +51,17 @@ def test_every_file_that_code_and_config_name_exists(root):
     assert {(file, name) for file, name in found if not (root / name).exists()} == set()
 
 
+def test_the_architecture_page_names_every_rule_with_its_script(root):
+    rows = re.findall(
+        r"^\|[^|]*\| (`.+?) \| (`scripts/.+?) \|", (root / "docs/architecture.md").read_text("utf-8"), re.M
+    )
+    listed = {rule for names, _ in rows for rule in re.findall(r"`(\w+)`", names)}
+    scripts = {script for _, names in rows for script in re.findall(r"`(scripts/\w+\.py)`", names)}
+    rules = "".join(path.read_text("utf-8") for path in (root / "rules").glob("*.smk"))
+    assert listed == set(re.findall(r"^(?:rule|use rule \w+ as) (\w+)", rules, re.M))
+    assert scripts == {str(path.relative_to(root)) for path in (root / "scripts").glob("*.py")}
+
+
 def test_the_readme_is_short(root):
     assert len((root / "README.md").read_text(encoding="utf-8").splitlines()) <= 130
 
@@ -78,10 +89,12 @@ EXAMPLES = [
 
 @pytest.mark.parametrize("block", EXAMPLES)
 def test_every_config_that_a_page_shows_is_valid(block, root, tmp_path):
-    (tmp_path / "example.yaml").write_text(block)
+    keys = yaml.safe_load(block)
+    example = {"scenes": {"my_scene": keys}} if "kind" in keys else keys  # a file of config/scenes, or a config
+    (tmp_path / "example.yaml").write_text(yaml.safe_dump(example))
     given = load.read_config([root / "config/config.yaml", tmp_path / "example.yaml"])
     scenes = load.check_config(load.add_scene_files(given, root / "config/scenes"))["scenes"]
-    assert set(yaml.safe_load(block)["scenes"]) <= set(scenes)
+    assert set(example.get("scenes", {})) <= set(scenes)
 
 
 def test_every_page_of_the_site_is_in_its_navigation(root):

@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,6 +11,7 @@ from dav_gswt.paths import (
     encode_branch,
     encode_number,
     encode_stop,
+    related_folder,
     stage_folder,
 )
 
@@ -106,3 +109,16 @@ def test_a_path_outside_the_tree_decodes_to_nothing():
 
 def test_the_readme_of_the_results_shows_the_tree(root):
     assert describe_tree() in (root / "results/README.md").read_text()
+
+
+def test_the_folders_of_a_run_are_found_from_any_of_its_files():
+    scores = Path("/home/me/results/sand/seed0/draft/active_w2_terrain_pdrop0.15_lam0_k4/iter2/scores.csv")
+    fit = Path("/home/me/results/sand/seed0/draft")
+    assert related_folder(scores, "round", t=1) == scores.parents[1] / "iter1"
+    assert related_folder(scores, "scored") == fit / "coarse/scores_terrain_pdrop0.15"
+    assert related_folder(scores, "fit") == fit
+
+
+def test_a_path_outside_the_tree_has_no_related_folder():
+    with pytest.raises(ValueError, match="lies in no result tree"):
+        related_folder("photos/of/mine.jpg", "fit")

@@ -1,11 +1,14 @@
 """The set-up on machines that lack something: what is said, and what is installed without it."""
 
+import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
+from packaging.specifiers import SpecifierSet
 
 TOOLS = ("sh", "grep", "touch", "rm", "echo", "test")
 
@@ -31,6 +34,42 @@ def test_a_missing_compiler_is_named_with_its_package_and_what_it_costs(root, tm
 def test_a_compiler_that_is_there_is_not_asked_for(root, tmp_path):
     script(tmp_path / "c++")
     assert "g++" not in prepared(root, tmp_path).stdout
+
+
+def prepared_as(root, folder, version="3.12.1", processor="x86_64", before="") -> subprocess.CompletedProcess:
+    """What the check says to a Python of that version on that processor. before: Python that is run first."""
+    pretended = f"""import ctypes, platform, runpy, sys
+{before}
+platform.python_version, platform.machine = lambda: {version!r}, lambda: {processor!r}
+sys.version_info, sys.argv = ({version.replace(".", ", ")}, "final", 0), ["prepare.py"]
+runpy.run_path({str(root / "workflow/prepare.py")!r}, run_name="__main__")"""
+    command = [sys.executable, "-c", pretended]
+    return subprocess.run(command, cwd=folder, env={"PATH": str(folder)}, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("version", [f"3.{minor}.0" for minor in range(8, 18)])
+def test_a_python_that_the_project_does_not_support_is_refused_in_one_line(root, tmp_path, version):
+    project = tomllib.loads((root / "pyproject.toml").read_text("utf-8"))["project"]
+    done = prepared_as(root, tmp_path, version)
+    if version in SpecifierSet(project["requires-python"]):
+        assert done.returncode == 0
+        assert f"Programming Language :: Python :: {version[:-2]}" in project["classifiers"]
+    else:
+        assert done.returncode == 1
+        assert re.fullmatch(rf"Python {version} is too (old|new): 3\.11, .* is needed \(.*\)\n", done.stderr)
+
+
+def test_a_processor_that_has_no_pycolmap_is_refused_in_one_line(root, tmp_path):
+    done = prepared_as(root, tmp_path, processor="aarch64")
+    assert done.returncode == 1 and "Linux on aarch64 is not supported" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_missing_system_library_is_named_with_its_package(root, tmp_path):
+    """Without it Mitsuba ends with a NameError that names no library."""
+    done = prepared_as(root, tmp_path, before="def fail(name): raise OSError(name)\nctypes.CDLL = fail")
+    assert done.returncode == 1
+    assert done.stderr == "Missing on this machine: libatomic1. On Debian or Ubuntu: sudo apt install libatomic1\n"
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from fixtures.runs import TINY, USUAL, Made
+from fixtures.snakemake_calls import call_snakemake
 
 COPIED = ["Snakefile", "rules", "scripts", "config", "profiles"]  # the last is a link
 COPIED += [f"workflow/{name}" for name in ("profiles", "report", "schemas", "viewer", "forced_choice", "logger")]
@@ -21,16 +22,8 @@ def snakemake(root):
     """Call Snakemake in a folder; returns the finished process with its output in stdout."""
 
     def call(folder, *arguments, configs=(USUAL,), check=True, env=None):
-        command = [sys.executable, "-m", "snakemake", "--snakefile", root / "Snakefile", "--directory", folder]
-        command += [*arguments, "--configfile", *(root / c for c in configs)]
-        done = subprocess.run(
-            command,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            check=False,
-            env=os.environ | (env or {}),
-        )
+        words = ["--snakefile", root / "Snakefile", "--directory", folder, *arguments, "--configfile"]
+        done = call_snakemake([*words, *(root / c for c in configs)], root, env)
         assert not check or done.returncode == 0, done.stdout
         return done
 

@@ -1,11 +1,10 @@
 """Every target that a page names can be planned in a copy of the repository with nothing beside it."""
 
 import shutil
-import subprocess
-import sys
 
 import pytest
 from fixtures import doc_pages
+from fixtures.snakemake_calls import call_snakemake
 
 
 @pytest.fixture(scope="module")
@@ -17,18 +16,17 @@ def alone(checkout, root, tmp_path_factory):
 
 
 def plan(folder, *arguments):
-    command = [sys.executable, "-m", "snakemake", "--dry-run", "--quiet", "rules", *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    return call_snakemake(["--dry-run", "--quiet", "rules", *arguments], folder)
 
 
 def test_targets_of_the_pages_are_planned(alone):
     targets = set().union(*(doc_pages.named_targets(page)["snakemake"] for page in doc_pages.pages()))
     assert {"study", "seams", "tradeoff", "view_benchmark", "frame_times", "presort_table"} <= targets
     done = plan(alone, "--", *sorted(targets))
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.returncode == 0, done.stdout
 
 
 @pytest.mark.parametrize("scene", ["copr_dunes", "brighton_beach", "caliterra_earthworks"])
 def test_scenes_of_the_real_photos_are_planned(alone, scene):
     done = plan(alone, "--config", f"scene={scene}")
-    assert done.returncode == 0 and "register_photos" in done.stdout, done.stdout + done.stderr
+    assert done.returncode == 0 and "register_photos" in done.stdout, done.stdout

@@ -1,4 +1,4 @@
-"""A run that ends early: on Ctrl-C, killed, or on a full disk. Nothing half made stays, and the next run goes on."""
+"""A run that ends early: on a signal, killed, or on a full disk. Nothing half made stays, and the next run goes on."""
 
 import os
 import re
@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import psutil
 import pytest
 from fixtures.runs import TINY
 
@@ -34,10 +35,11 @@ class Ended:
 
 @dataclass(frozen=True)
 class Story:
-    """One desert in three runs, with one thread: ended by Ctrl-C, killed with all its jobs, and let run."""
+    """One desert in four runs, with one thread: ended by Ctrl-C, told to end, killed with all its jobs, and let run."""
 
     folder: Path
     stopped: Ended
+    told: Ended  # SIGTERM to the run's process alone
     killed: Ended
     last: subprocess.CompletedProcess
     again: subprocess.CompletedProcess  # with nothing left to do
@@ -49,9 +51,9 @@ def files(folder: Path) -> frozenset[str]:
 
 @pytest.fixture(scope="module")
 def ended(tmp_path_factory) -> Callable[..., Ended]:
-    """Begin a run, send a signal to it and to its jobs, as a terminal does, soon after a rule begins."""
+    """Begin a run, and after a rule begins send a signal to it and its jobs, as a terminal does, or to it alone."""
 
-    def call(folder: Path, rule: str, number: int) -> Ended:
+    def call(folder: Path, rule: str, number: int, alone: bool = False) -> Ended:
         command = [sys.executable, "-m", "dav_gswt.cli.run", *ARGUMENTS]
         out = tmp_path_factory.mktemp("out") / "out"
         with out.open("w") as file:
@@ -63,8 +65,11 @@ def ended(tmp_path_factory) -> Callable[..., Ended]:
             assert job.poll() is None and time.monotonic() < end, out.read_text()
             time.sleep(0.05)
         time.sleep(0.5)  # into the job, which has its imports to do
-        os.killpg(job.pid, number)
+        jobs = psutil.Process(job.pid).children(recursive=True)
+        (os.kill if alone else os.killpg)(job.pid, number)
         status = job.wait(60)
+        if alone:
+            assert not [each for each in jobs if each.is_running() and each.status() != psutil.STATUS_ZOMBIE]
         return Ended(status, out.read_text(), files(folder))
 
     return call
@@ -74,22 +79,28 @@ def ended(tmp_path_factory) -> Callable[..., Ended]:
 def story(checkout, run, ended, tmp_path_factory) -> Story:
     folder = checkout(tmp_path_factory.mktemp("story"))
     stopped = ended(folder, "fit_coarse", signal.SIGINT)
+    told = ended(folder, "fit_coarse", signal.SIGTERM, alone=True)
+    assert not list(folder.glob(".snakemake/locks/*"))
     killed = ended(folder, "capture_views", signal.SIGKILL)
     assert any((folder / ".snakemake/locks").iterdir())
     last = run(folder, *ARGUMENTS, env=ALONE)
     again = run(folder, *ARGUMENTS)
-    return Story(folder, stopped, killed, last, again)
+    return Story(folder, stopped, told, killed, last, again)
 
 
-def test_ctrl_c_says_how_to_go_on(story):
-    assert story.stopped.status == 130
-    assert "Traceback" not in story.stopped.out
-    assert story.stopped.out.rstrip().endswith("Stopped. The same command goes on where this ended.")
+@pytest.mark.parametrize("way", ["stopped", "told"])
+def test_a_stopped_run_says_how_to_go_on(story, way):
+    ended = getattr(story, way)
+    assert ended.status == 130
+    assert "Traceback" not in ended.out
+    assert ended.out.rstrip().endswith("Stopped. The same command goes on where this ended.")
 
 
-def test_ctrl_c_leaves_what_is_whole_and_nothing_half_made(story):
-    assert f"{BRANCH.rsplit('/', 1)[0]}/views.json" in story.stopped.left
-    assert not [name for name in story.stopped.left if name.startswith(f"{BRANCH}/coarse")]
+@pytest.mark.parametrize("way", ["stopped", "told"])
+def test_a_stopped_run_leaves_what_is_whole_and_nothing_half_made(story, way):
+    ended = getattr(story, way)
+    assert f"{BRANCH.rsplit('/', 1)[0]}/views.json" in ended.left
+    assert not [name for name in ended.left if name.startswith(f"{BRANCH}/coarse")]
 
 
 def test_a_stopped_run_goes_on_where_it_was(story):
@@ -106,6 +117,12 @@ def test_the_lock_of_a_killed_run_does_not_stop_the_next_one(story):
     assert story.last.returncode == 0, story.last.stdout
     assert "The last run was cut short; going on where it stopped." in story.last.stdout
     assert "] capture_views" in story.last.stdout and "fit_coarse" not in story.last.stdout
+
+
+def test_how_long_it_will_take_is_said_before_the_first_job(story):
+    for out in (story.stopped.out, story.last.stdout):
+        assert re.search(r"^\d+ jobs to do\nIt will take about .+ on this machine\n\[1 of", out, re.M), out
+    assert "It will take" not in story.again.stdout and "plan:" not in story.again.stdout
 
 
 def test_what_is_said_at_the_end_is_there(story):

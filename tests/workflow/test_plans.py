@@ -1,8 +1,10 @@
 """What a sweep recomputes: the stages below the parameter it varies, and no others."""
 
+import os
 import re
 import subprocess
 import sys
+import time
 from collections import Counter
 
 import pytest
@@ -90,11 +92,14 @@ def test_every_policy_has_a_path(planned, tmp_path):
         way = "{}_{prior}_pdrop{p_drop}_lam{lam}".format(policy, **spelled)
         plan = planned(tmp_path, f"results/desert/seed0/draft/active_{way}_k4/iter1/field.ply")
         assert plan["update_field"] == plan["select_poses"] == 1, policy
-        assert plan["render_candidates"] == (policy in ORACLES) and plan["convert_lpips_weights"] == (
-            policy in PRIOR_POLICIES
-        )
-        default = planned(tmp_path, "--config", f"policy={policy}", configs=(USUAL, TINY))
-        assert default["make_page"] == 1 and default["select_poses"] == 1, policy
+        assert plan["render_candidates"] == (policy in ORACLES)
+        assert plan["convert_lpips_weights"] == (policy in PRIOR_POLICIES)
+
+
+@pytest.mark.parametrize("policy", ["farthest", "fisher", "oracle", "w2-lpips", "single"])
+def test_the_default_target_takes_a_policy_of_every_kind(planned, tmp_path, policy):
+    default = planned(tmp_path, "--config", f"policy={policy}", configs=(USUAL, TINY))
+    assert default["make_page"] == 1 and default["select_poses"] == 1
 
 
 STOP = "results/desert/seed0/draft/active_farthest_none_pdrop0_lam0_k4{}/iter3/metrics.json"
@@ -180,6 +185,17 @@ def test_a_refinement_needs_the_weights_of_its_prior(snakemake, tmp_path):
     assert done.returncode and "priors.mine.weights: there is no mine.safetensors" in done.stdout
 
 
+def test_a_photo_from_the_future_is_named_before_the_work(snakemake, tmp_path):
+    """Snakemake refuses results that are older than their inputs, once a job has ended."""
+    (photo := tmp_path / "a.jpg").touch()
+    os.utime(photo, (0, time.time() + 3600))
+    scene = f"{{kind: photos, folder: {tmp_path}, size: 64, start: 8, agent: replay, preset: draft, tiling: semantic}}"
+    (tmp_path / "mine.yaml").write_text(f"scene: mine\nscenes: {{mine: {scene}}}\n")
+    target = "results/mine/photos/ground.json"
+    done = snakemake(tmp_path, target, "--dry-run", configs=(USUAL, tmp_path / "mine.yaml"), check=False)
+    assert done.returncode and f"config: scenes.mine.folder: {photo} is dated in the future" in done.stdout
+
+
 def test_a_segmenter_is_an_input_of_the_cut(snakemake, tmp_path):
     target = ROUND.format(policy="farthest", k=4, t=1) + "/tiles_none/seams.json"
     folder, config = tmp_path / "sam2", tmp_path / "sam2.yaml"
@@ -234,6 +250,26 @@ def test_cuts_by_colour_need_no_weights(planned, tmp_path):
 def test_a_second_spelling_of_a_path_has_no_rule(snakemake, tmp_path, path):
     done = snakemake(tmp_path, path, "--dry-run", check=False)
     assert done.returncode != 0 and "MissingRule" in done.stdout
+
+
+@pytest.mark.parametrize(
+    "path, said",
+    [
+        ("results/sweeps/nope.png", "there is no 'nope' in study.sweeps; it has k, p_drop"),
+        ("results/desert/seed0/drat/coarse/field.ply", "there is no 'drat' in presets (is 'draft' meant?)"),
+        (f"{FARTHEST}/tiles_smal/seams.json", "there is no 'smal' in tilings (is 'small' meant?)"),
+    ],
+)
+def test_a_name_that_the_config_lacks_is_named_with_those_that_it_has(snakemake, tmp_path, path, said):
+    done = snakemake(tmp_path, path, "--dry-run", check=False)
+    assert done.returncode != 0 and said in done.stdout and "KeyError" not in done.stdout
+
+
+def test_lists_and_k_can_be_given_on_the_command_line(planned, snakemake, tmp_path):
+    given = ("--config", "seeds=[1, 2]", "views_per_round=3", "stills={width: 320, height: 180}")
+    assert planned(tmp_path, *given)["fit_coarse"] == 2
+    done = snakemake(tmp_path, *given, "--dry-run")
+    assert "seed2/draft/active_farthest_none_pdrop0_lam0_k3/iter2/levels" in done.stdout
 
 
 @pytest.mark.parametrize("policy", ["farthest", "w2-lpips"])

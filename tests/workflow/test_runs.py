@@ -4,6 +4,7 @@ import csv
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -81,7 +82,7 @@ def test_metrics_are_those_of_a_picture_of_the_place(tiny):
             assert 20 < row["psnr"] < 60 and 0.3 < row["ssim"] <= 1
 
 
-def test_doubt_is_a_share(tiny):
+def test_uncertainty_lies_between_0_and_1(tiny):
     for stage in (tiny.coarse / "scores_none_pdrop0", tiny.round):
         for channels, _ in image_files.read_exr_parts(stage / "uncertainty.exr").values():
             for values in channels.values():
@@ -90,7 +91,7 @@ def test_doubt_is_a_share(tiny):
     assert 0 <= read_field(tiny.round / "field.ply").uncertainty.min() <= 1
 
 
-def test_a_round_may_go_by_what_the_prior_doubts(snakemake, tiny, tmp_path):
+def test_a_round_may_use_the_uncertainty_of_a_prior(snakemake, tiny, tmp_path):
     """From the tiny run's coarse field on: scored by the prior, chosen, captured, refitted, and to the finest level."""
     folder = shutil.copytree(tiny.folder, tmp_path / "run", symlinks=True)
     way = folder / "results/desert/seed0/draft/active_w2-lpips_terrain_pdrop0.15_lam0.1_k2/iter1"
@@ -105,11 +106,25 @@ def test_a_round_may_go_by_what_the_prior_doubts(snakemake, tiny, tmp_path):
     assert set(shown) == set(chosen) and all(set(channels) == {"opacity", "w2_sq"} for channels, _ in shown.values())
     later = scores.read_scores(way / "scores.csv")
     assert later.scales == first.scales and not set(later.names) & set(chosen)
-    doubt, level = pose_maps.read_pose_maps(way / "maps.npz")[1], read_field(way / "levels/level0.ply")
-    assert len(doubt) == len(read_field(way / "field.ply"))
+    uncertainty, level = pose_maps.read_pose_maps(way / "maps.npz")[1], read_field(way / "levels/level0.ply")
+    assert len(uncertainty) == len(read_field(way / "field.ply"))
     top = level.ground & (level.uncertainty > 0)  # the underlay of a level has none
-    assert top.any() and np.isin(level.uncertainty[top], doubt).all()
+    assert top.any() and np.isin(level.uncertainty[top], uncertainty).all()
     assert not np.array_equal(level.uncertainty, read_field(tiny.round / "levels/level0.ply").uncertainty)
+
+
+def test_a_policy_that_reads_the_prior_makes_the_same_bytes_on_any_number_of_threads(snakemake, tiny, tmp_path):
+    branch = Path("results/desert/seed0/draft")
+    way = branch / "active_w2-lpips-diverse_terrain_pdrop0.15_lam0.1_k2/iter1"
+    made = []
+    for threads in ("1", "2"):
+        folder = shutil.copytree(tiny.folder, tmp_path / threads, symlinks=True)
+        one = {"DAV_GSWT_THREADS": threads, "OMP_NUM_THREADS": threads}
+        snakemake(folder, "--cores", threads, way / "scores.csv", configs=(USUAL, TINY), env=one)
+        files = [p for part in (branch / "coarse", way) for p in sorted((folder / part).rglob("*")) if p.is_file()]
+        made.append({p.relative_to(folder): digest_files(p) for p in files if not p.name.startswith(".")})
+    assert {"scores.csv", "maps.npz", "poses.json", "field.ply"} <= {p.name for p in made[0]}
+    assert made[0] == made[1]
 
 
 def test_a_budget_ends_inside_a_round_and_later_rounds_hand_the_field_on(snakemake, tiny, tmp_path):

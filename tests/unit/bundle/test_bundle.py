@@ -11,6 +11,7 @@ import pytest
 from fixtures.tile_sets import report_of
 
 from dav_gswt.bundle import build, gswt, level_distances, manifest, store
+from dav_gswt.bundle.content import BundleContent
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.terrain import endless, stills
@@ -18,6 +19,7 @@ from dav_gswt.tiles.build import TileSet
 
 SCHEMA = Path(__file__).parents[3] / "workflow/schemas/davgswt.schema.json"
 SIDE = 2.0
+one = BundleContent.of_one_material
 
 
 def made_up(n, sigma, seed):
@@ -36,14 +38,17 @@ def made_up(n, sigma, seed):
 @pytest.fixture(scope="module")
 def tiles():
     fields = [[made_up(60 >> level, 0.02 * 2**level, 100 * level + t) for t in range(16)] for level in range(2)]
-    doubt = np.linspace(0, 1, 16)
-    return TileSet(SIDE, 0.1, fields, np.zeros((16, 20, 20), np.uint8), np.zeros((16, 9, 2), int), doubt, report_of())
+    uncertainty = np.linspace(0, 1, 16)
+    return TileSet(
+        SIDE, 0.1, fields, np.zeros((16, 20, 20), np.uint8), np.zeros((16, 9, 2), int), uncertainty, report_of()
+    )
 
 
 @pytest.fixture(scope="module")
 def bundle(tiles, tmp_path_factory):
     folder = tmp_path_factory.mktemp("bundle") / "b"
-    return folder, build.write_bundle(tiles, folder, build.BundleOptions(tau=0.5, salt=7), SCHEMA, {"from": "a test"})
+    options = build.BundleOptions(tau=0.5, salt=7)
+    return folder, build.write_bundle(one(tiles), folder, options, SCHEMA, {"from": "a test"})
 
 
 def test_a_level_ends_where_the_next_one_has_its_size_in_pixels():
@@ -88,9 +93,9 @@ def test_a_bundle_reads_back_as_the_tiles_it_was_made_of(bundle, tiles):
                 depth = source.means[row].astype(float) @ along[direction]
                 # depths are sorted in 65535 steps of what the tile spans, at most its diagonal
                 assert (np.diff(depth) <= 2 * SIDE / 65535).all()
-    deep = [len(tile.chunks[0].orders) for tile in written.tiles if tile.uncertainty >= 0.5]
+    uncertain = [len(tile.chunks[0].orders) for tile in written.tiles if tile.uncertainty >= 0.5]
     plain = [len(tile.chunks[0].orders) for tile in written.tiles if tile.uncertainty < 0.5]
-    assert set(deep) == {len(along)} and set(plain) == {(len(along) + 1) // 2}
+    assert set(uncertain) == {len(along)} and set(plain) == {(len(along) + 1) // 2}
 
 
 def test_the_terrain_of_a_bundle_is_that_of_its_tiles_but_for_the_rounding(bundle, tiles):
@@ -121,7 +126,7 @@ def test_the_errors_stated_are_those_of_16_bytes(bundle):
 def test_the_same_tiles_give_the_same_bytes_whatever_the_threads(bundle, tiles, tmp_path, threads):
     folder, _ = bundle
     options = build.BundleOptions(tau=0.5, salt=7, threads=threads)
-    build.write_bundle(tiles, tmp_path / "again", options, SCHEMA, {"from": "a test"})
+    build.write_bundle(one(tiles), tmp_path / "again", options, SCHEMA, {"from": "a test"})
     names = sorted(p.relative_to(folder) for p in folder.rglob("*.*"))
     assert len(names) == 2 + 32
     for name in names:
@@ -223,7 +228,7 @@ def test_a_tile_without_splats_is_refused_and_nothing_is_left(tiles, tmp_path):
         gswt.write_gswt(fields, SIDE, tmp_path / "gswt.zip")
     broken = TileSet(**{**vars(tiles), "fields": fields})
     with pytest.raises(InputError):
-        build.write_bundle(broken, tmp_path / "b", build.BundleOptions(tau=0.5), SCHEMA, {})
+        build.write_bundle(one(broken), tmp_path / "b", build.BundleOptions(tau=0.5), SCHEMA, {})
     assert not (tmp_path / "b").exists() and not (tmp_path / ".b.part").exists()
 
 
@@ -238,7 +243,7 @@ def test_a_new_bundle_replaces_the_old_one_and_leaves_its_neighbours(tiles, tmp_
     (out / "chunks").mkdir(parents=True)
     (out / "chunks" / "stale.bin").write_bytes(b"x")
     (out / "terrain").mkdir()
-    build.write_bundle(tiles, out, build.BundleOptions(tau=1.0), SCHEMA, {})
+    build.write_bundle(one(tiles), out, build.BundleOptions(tau=1.0), SCHEMA, {})
     assert sorted(p.name for p in out.iterdir()) == ["chunks", "davgswt.json", "gswt.zip", "terrain"]
     assert not (out / "chunks" / "stale.bin").exists()
 
@@ -298,7 +303,7 @@ def huge(value):
         ),
         pytest.param(outwards, "lod0_tile_00.bin: lies outside of the bundle", id="a link outwards"),
         pytest.param(lambda f: rewritten(f, huge), "lod0_tile_00.bin: .* bytes where the manifest says", id="huge"),
-        pytest.param(lambda f: rewritten(f, lambda m: m.update(version=1)), "version 2; make", id="another version"),
+        pytest.param(lambda f: rewritten(f, lambda m: m.update(version=1)), "version 3; make", id="another version"),
         pytest.param(lambda f: rewritten(f, lambda m: m.update(format="x")), "format 'davgswt'", id="another format"),
         pytest.param(lambda f: (f / "davgswt.json").write_text("{"), "not readable as JSON", id="no JSON"),
         pytest.param(lambda f: (f / "davgswt.json").write_text("[]"), "format 'davgswt'", id="no manifest"),

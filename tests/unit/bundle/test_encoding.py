@@ -1,4 +1,4 @@
-"""Sixteen bytes: values by hand, errors as stated for any field, equal places across borders, smallest turns."""
+"""Sixteen bytes: values by hand, errors as stated for any field, equal places across borders, smallest rotations."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def test_a_splat_is_stored_as_its_16_bytes():
     coding = Encoding.fit([turned, corners], SIDE, PIXEL)
     assert coding.origin == [0, 0, 1] and coding.step == [2 / 65535, 2 / 65535, pytest.approx(4 / 65535)]
     assert coding.log_scale == [pytest.approx(-2), pytest.approx(2 / 255)]
-    # 0.5 of 2: 16383.75, the top, half-way up (to even); 0, -2, -1 of -2 to 0; no turn; 255, 127.5 to even, 0, 127.5
+    # 0.5 of 2: 16383.75, the top, half-way up (to even); 0, -2, -1 of -2 to 0; identity; 255, 127.5 to even, 0, 127.5
     expected = np.uint16([16384, 65535, 32768]).astype("<u2").tobytes() + bytes([255, 0, 128])
     expected += bytes([127, 127, 127]) + bytes([255, 128, 0, 128])
     assert coding.encode(turned).tobytes() == expected
@@ -53,19 +53,19 @@ def test_a_splat_is_stored_as_its_16_bytes():
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_the_smallest_turn_is_the_same_ellipsoid_within_an_eighth_of_a_turn(seed):
+def test_the_smallest_rotation_gives_the_same_ellipsoid_within_an_eighth_of_a_turn(seed):
     rng = np.random.default_rng(seed)
     quats, sizes = rng.normal(size=(20, 4)), rng.normal(size=(20, 3))
-    turn, axes = find_smallest_rotations(quats)
+    rotation, axes = find_smallest_rotations(quats)
     np.testing.assert_allclose(
-        covariance(turn, np.take_along_axis(sizes, axes, 1)), covariance(quats, sizes), rtol=1e-9
+        covariance(rotation, np.take_along_axis(sizes, axes, 1)), covariance(quats, sizes), rtol=1e-9
     )
-    assert (turn[:, 0] > 0).all() and np.abs(turn[:, 1:]).max() <= MAX_COMPONENT + 1e-9
+    assert (rotation[:, 0] > 0).all() and np.abs(rotation[:, 1:]).max() <= MAX_COMPONENT + 1e-9
     same, _ = find_smallest_rotations(-7 * quats)
-    np.testing.assert_allclose(same, turn, atol=1e-12)
+    np.testing.assert_allclose(same, rotation, atol=1e-12)
 
 
-def test_no_turn_has_no_axes():
+def test_a_quaternion_of_length_0_is_refused():
     with pytest.raises(ValueError, match="quaternion 1 has length 0"):
         find_smallest_rotations(np.array([[1.0, 0, 0, 0], [0, 0, 0, 0]]))
 
@@ -86,25 +86,25 @@ def test_what_is_read_back_errs_no_more_than_is_stated(seed, count, height, size
     field = field_of(means, deviations, rng.normal(size=(count, 4)), opacities, rng.uniform(-0.2, 1.2, (count, 3)))
     coding = Encoding.fit([field], SIDE, PIXEL)
     rows = coding.encode(field)
-    told, back = EncodingErrors.measure(coding, field, rows, PIXEL), coding.decode(rows)
+    errors, back = EncodingErrors.measure(coding, field, rows, PIXEL), coding.decode(rows)
     assert all(
         np.isfinite(getattr(back, name)).all() for name in ("means", "log_scales", "quats", "opacity_logits", "sh")
     )
     # half a step of the grid either way, and a float32's last digit
     room = 0.5 * np.array(coding.step) + 1e-7 * np.abs(field.means).max(0) + 1e-12
     away = np.abs(back.means.astype(float) - field.means)
-    assert (away <= room).all() and np.linalg.norm(away, axis=1).max() <= told.position * (1 + 1e-9)
-    turn, axes = find_smallest_rotations(field.quats)
-    exact, read = (Rotation.from_quat(q.astype(float), scalar_first=True) for q in (turn, back.quats))
-    assert np.degrees((exact.inv() * read).magnitude()).max() <= told.angle_degrees + 1e-5 <= 0.38
+    assert (away <= room).all() and np.linalg.norm(away, axis=1).max() <= errors.position * (1 + 1e-9)
+    rotation, axes = find_smallest_rotations(field.quats)
+    exact, read = (Rotation.from_quat(q.astype(float), scalar_first=True) for q in (rotation, back.quats))
+    assert np.degrees((exact.inv() * read).magnitude()).max() <= errors.angle_degrees + 1e-5 <= 0.38
     wanted = np.take_along_axis(field.log_scales.astype(float), axes, 1)
     low, high = np.log(PIXEL / 64), np.log(4 * SIDE)
     inside = (wanted > low) & (wanted < high)
     grown = np.expm1(np.abs(back.log_scales - wanted))[inside].max(initial=0)
-    assert 100 * grown <= told.scale_percent * (1 + 1e-6) + 1e-4
+    assert 100 * grown <= errors.scale_percent * (1 + 1e-6) + 1e-4
     assert (np.clip(wanted, low, high) - back.log_scales <= 0.5 * coding.log_scale[1] + 1e-5).all()
-    assert told.clipped == ((wanted < low - 1e-6) | (wanted > high + 1e-6)).sum()
-    assert told.colour <= 0.5 / 255 + 1e-6 and told.opacity <= 0.5 / 255 + 1e-6
+    assert errors.clipped == ((wanted < low - 1e-6) | (wanted > high + 1e-6)).sum()
+    assert errors.colour <= 0.5 / 255 + 1e-6 and errors.opacity <= 0.5 / 255 + 1e-6
 
 
 def test_gaussians_that_meet_across_a_border_are_moved_alike():

@@ -32,9 +32,9 @@ def record(data, encoding):
     x, y, z, *rest = struct.unpack("<3H10B", data)
     centre = [o + s * p for o, s, p in zip(encoding["origin"], encoding["step"], (x, y, z), strict=True)]
     low, rise = encoding["log_scale"]
-    turn = [math.sin(math.pi / 8) * (r - 127) / 127 for r in rest[3:6]]
-    w = math.sqrt(max(0, 1 - sum(t * t for t in turn)))
-    return centre, [math.exp(low + rise * s) for s in rest[:3]], [w, *turn], [c / 255 for c in rest[6:9]], rest[9] / 255
+    xyz = [math.sin(math.pi / 8) * (r - 127) / 127 for r in rest[3:6]]
+    w = math.sqrt(max(0, 1 - sum(t * t for t in xyz)))
+    return centre, [math.exp(low + rise * s) for s in rest[:3]], [w, *xyz], [c / 255 for c in rest[6:9]], rest[9] / 255
 
 
 def test_a_chunk_is_read_as_the_page_says(bundle):
@@ -69,11 +69,14 @@ def test_tiles_are_placed_as_the_page_says(root):
     mask = 0xFFFFFFFF
     golden = json.loads((root / "tests/golden/tile_choice.json").read_text())
 
-    def hashed(i, j, axis, salt):
-        h = ((i * 0x8DA6B343) ^ (j * 0xD8163841) ^ (axis * 0xCB1AB31F) ^ salt) & mask
+    def mix(h):
         h = ((h ^ (h >> 16)) * 0x85EBCA6B) & mask
         h = ((h ^ (h >> 13)) * 0xC2B2AE35) & mask
         return h ^ (h >> 16)
+
+    def hashed(i, j, axis, salt):
+        first = mix(((i * 0x8DA6B343) ^ (axis * 0xCB1AB31F) ^ salt) & mask)
+        return mix((first + j * 0xD8163841) & mask)
 
     def edges(i, j, salt):
         west, east = hashed(i, j, 0, salt) & 1, hashed(i + 1, j, 0, salt) & 1
@@ -106,5 +109,7 @@ def test_the_page_names_every_key_of_the_manifest(root, page):
             yield from keys(value)
         if "items" in node:
             yield from keys(node["items"])
+        for part in node.get("$defs", {}).values():
+            yield from keys(part)
 
     assert set(keys(schema)) <= named

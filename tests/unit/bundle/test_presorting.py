@@ -41,16 +41,16 @@ def test_directions_start_in_the_east_go_north_and_end_straight_down():
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1, rtol=1e-15)
 
 
-def test_tau_zero_keeps_every_tile_deep_tau_one_none_and_it_never_rises():
+def test_tau_0_keeps_all_orders_of_every_tile_tau_1_of_none_and_their_number_never_rises():
     rings = DirectionRings()
     for u in (0.0, 0.3, 1.0):
-        assert len(rings.select(u, 0.0)) == 17 and len(rings.select(u, 1.0)) == 9
-        counts = [len(rings.select(u, tau)) for tau in (0.0, 0.2, 0.3, 0.31, 0.9, 1.0)]
+        assert len(rings.select_directions(u, 0.0)) == 17 and len(rings.select_directions(u, 1.0)) == 9
+        counts = [len(rings.select_directions(u, tau)) for tau in (0.0, 0.2, 0.3, 0.31, 0.9, 1.0)]
         assert counts == sorted(counts, reverse=True)
-    assert rings.select(0.1, 0.5) == [0, 2, 4, 6, 8, 10, 12, 14, 16]
-    assert DirectionRings((20.0, 45.0), 8).select(0.1, 0.5) == [0, 2, 4, 6, 8, 10, 12, 14, 16]
+    assert rings.select_directions(0.1, 0.5) == [0, 2, 4, 6, 8, 10, 12, 14, 16]
+    assert DirectionRings((20.0, 45.0), 8).select_directions(0.1, 0.5) == [0, 2, 4, 6, 8, 10, 12, 14, 16]
     with pytest.raises(ValueError, match="uncertainty"):
-        rings.select(float("nan"), 0.5)
+        rings.select_directions(float("nan"), 0.5)
 
 
 def test_order_runs_from_back_to_front_and_is_stable():
@@ -128,7 +128,7 @@ def test_directions_are_added_until_the_error_is_small_or_the_room_is_full():
     fields = [ground(seed) for seed in range(2)]
     wanted = [15.0, 25.0, 60.0]
     found = [direction_search.search_directions(fields, SIDE, w) for w in wanted]
-    counts = [len(f.rings.select(0.0, 1.0)) for f in found]
+    counts = [len(f.rings.select_directions(0.0, 1.0)) for f in found]
     assert counts == sorted(counts) and counts[0] < counts[-1] <= direction_search.MAX_ORDERS
     assert min(found[0].decibels.values()) >= 15.0
     assert min(found[-1].decibels.values()) < 60.0, "no room for what this asks for"

@@ -125,7 +125,7 @@ def test_a_stored_photo_that_was_changed_is_refused_by_name(tmp_path):
         store.photos_of(one[1])
 
 
-def test_poses_are_told_apart_but_not_by_rounding():
+def test_poses_differ_but_not_by_rounding():
     assert (
         pose_key(at(0.0)) == pose_key(at(1e-9))
         and pose_key(at(0.0)) != pose_key(at(1e-3))
@@ -160,7 +160,7 @@ def test_what_the_store_holds_is_not_taken_again(site, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("agent", ["render", "replay", "serial", "plan", "handheld"])
-def test_where_no_pose_was_chosen_nobody_is_asked_for_anything(agent, tmp_path, monkeypatch):
+def test_where_no_pose_was_chosen_no_agent_is_called(agent, tmp_path, monkeypatch):
     def no_one(*_):
         raise AssertionError("somebody was asked for photos")
 

@@ -9,10 +9,9 @@ from dav_gswt.capture import drone, drop_folder, qgc_plan
 from dav_gswt.capture.site import Site
 from dav_gswt.capture.store import PhotoStore
 from dav_gswt.errors import InputError
-from dav_gswt.geometry import cameras
+from dav_gswt.geometry import camera_layouts, cameras
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.poses import pose_of_camera
-from dav_gswt.photos.synthetic import camera_layouts
 
 PLACE = Georeference(47.1, 8.2, 430.0, 30.0, 20.0)  # a world unit is 20 m
 FRAME = scene_frame(
@@ -25,21 +24,21 @@ ORBITS = [(90, 0, 1.0), (60, 10, 1.0), (45, 200, 1.2), (30, 100, 0.8), (10, 45, 
 
 
 @pytest.fixture
-def asked():
+def requested():
     found = [camera_layouts.orbit(*orbit, [0, 0, 0], 64, 48, 60) for orbit in ORBITS]
     return [(pose_of_camera(f"pose_{i}", camera, FRAME), camera) for i, camera in enumerate(found)]
 
 
 @pytest.fixture
 def site(tmp_path, monkeypatch):
-    monkeypatch.setattr(drop_folder, "import_dropped_photos", lambda site, asked, agent: asked)
+    monkeypatch.setattr(drop_folder, "import_dropped_photos", lambda site, requested, agent: requested)
     return Site("moor", {"agent": "plan", "burst": 2}, FRAME, tmp_path, PhotoStore(tmp_path / "captures" / "moor"))
 
 
 @pytest.fixture
-def items(site, asked):
+def items(site, requested):
     with pytest.raises(InputError):
-        drone.take_photos(site, asked)
+        drone.take_photos(site, requested)
     return json.loads((site.store.folder / "mission.plan").read_text())["mission"]["items"]
 
 
@@ -51,9 +50,9 @@ def places(items):
     return PLACE.to_world(np.array([home, *earth])), found
 
 
-def test_the_file_has_what_qgroundcontrol_reads(site, asked):
+def test_the_file_has_what_qgroundcontrol_reads(site, requested):
     with pytest.raises(InputError):
-        drone.take_photos(site, asked)
+        drone.take_photos(site, requested)
     content = json.loads((site.store.folder / "mission.plan").read_text())
     flown = content["mission"]
     items = flown.pop("items")
@@ -83,10 +82,10 @@ def test_the_file_has_what_qgroundcontrol_reads(site, asked):
     assert [items[0]["command"], items[1]["command"], items[-1]["command"]] == [22, 178, 20]
 
 
-def test_photos_are_taken_from_the_poses_with_their_views(items, asked):
+def test_photos_are_taken_from_the_poses_with_their_views(items, requested):
     stops = [i for i, item in enumerate(items) if item["command"] == 16 and items[i + 1]["command"] == 205]
-    assert len(stops) == len(asked)
-    left = {pose.name: camera for pose, camera in asked}
+    assert len(stops) == len(requested)
+    left = {pose.name: camera for pose, camera in requested}
     for i in stops:
         assert [item["command"] for item in items[i + 1 : i + 7]] == [205, 93, 2000, 93, 2000, 93]
         hold, _, _, yaw, latitude, longitude, up = items[i]["params"]
@@ -128,57 +127,57 @@ def test_detours_are_only_made_where_they_are_needed():
     np.testing.assert_array_equal(qgc_plan.plan_detour(low, low + [1, 0, 0], 5.0), [[4, 0, 5], [5, 0, 5]])
 
 
-def test_the_message_says_what_to_fly_what_is_missing_and_where_to_put_it(site, asked):
+def test_the_message_says_what_to_fly_what_is_missing_and_where_to_put_it(site, requested):
     with pytest.raises(InputError) as said:
-        drone.take_photos(site, asked[:2])
+        drone.take_photos(site, requested[:2])
     for part in ("mission.plan", "4 photos are missing, of 2 poses (pose_0, pose_1)", "drop", "same command again"):
         assert part in str(said.value)
 
 
-def test_nothing_is_written_when_nothing_is_missing(site, asked, monkeypatch):
-    monkeypatch.setattr(drop_folder, "import_dropped_photos", lambda site, asked, agent: [])
-    assert drone.take_photos(site, asked) is None
+def test_nothing_is_written_when_nothing_is_missing(site, requested, monkeypatch):
+    monkeypatch.setattr(drop_folder, "import_dropped_photos", lambda site, requested, agent: [])
+    assert drone.take_photos(site, requested) is None
     assert not (site.store.folder / "mission.plan").exists()
 
 
-def test_a_scene_without_gps_is_refused(site, asked):
+def test_a_scene_without_gps_is_refused(site, requested):
     bare = Site("moor", site.scene, replace(FRAME, georeference=None), site.photos, site.store)
     with pytest.raises(InputError, match="GPS positions in their EXIF"):
-        drone.take_photos(bare, asked)
+        drone.take_photos(bare, requested)
 
 
-def test_poses_that_are_too_low_are_refused_by_name(site, asked):
+def test_poses_that_are_too_low_are_refused_by_name(site, requested):
     low = Site("moor", {"drone": {"min_altitude": 3.6}}, FRAME, site.photos, site.store)
     with pytest.raises(InputError, match=r"pose_4, pose_5: lower than 3.6 m"):
-        drone.take_photos(low, asked)
+        drone.take_photos(low, requested)
 
 
-def test_ground_too_steep_for_altitudes_above_a_plane_is_refused(site, asked):
+def test_ground_too_steep_for_altitudes_above_a_plane_is_refused(site, requested):
     def on(slope, **flight):
         frame = replace(FRAME, georeference=replace(FRAME.georeference, slope=slope))
         return Site("moor", {"drone": flight}, frame, site.photos, site.store)
 
     # the farthest pose is 1.3 x 20 m from where the drone takes off: 10 degrees are 4.7 m, 2 degrees 0.9 m
     with pytest.raises(InputError, match=r"slopes by 10.0 degrees, .* up to 4\.\d m"):
-        drone.take_photos(on(10.0), asked)
+        drone.take_photos(on(10.0), requested)
     with pytest.raises(InputError, match="fly this mission"):
-        drone.take_photos(on(10.0, clearance=12), asked)
+        drone.take_photos(on(10.0, clearance=12), requested)
     with pytest.raises(InputError, match="fly this mission"):
-        drone.take_photos(on(2.0), asked)
+        drone.take_photos(on(2.0), requested)
 
 
-def test_the_same_poses_give_the_same_file(site, asked):
+def test_the_same_poses_give_the_same_file(site, requested):
     written = []
     for _ in range(2):
         with pytest.raises(InputError):
-            drone.take_photos(site, asked)
+            drone.take_photos(site, requested)
         written.append((site.store.folder / "mission.plan").read_bytes())
     assert written[0] == written[1]
 
 
-def test_a_pose_is_flown_whatever_its_place_in_the_list(asked):
-    views = [(pose.name, camera) for pose, camera in asked]
+def test_a_pose_is_flown_whatever_its_place_in_the_list(requested):
+    views = [(pose.name, camera) for pose, camera in requested]
     flown = qgc_plan.plan_flight(views, PLACE, np.array([0.0, -0.5]), qgc_plan.FlightRules())
-    assert sorted(flown.names) == sorted(pose.name for pose, _ in asked)
+    assert sorted(flown.names) == sorted(pose.name for pose, _ in requested)
     assert flown.highest == pytest.approx(20.0)
     assert flown.duration > flown.length / 3

@@ -18,10 +18,10 @@ from dav_gswt.capture.site import Site
 from dav_gswt.capture.store import PhotoStore
 from dav_gswt.config import load
 from dav_gswt.errors import InputError
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.cameras import look_at
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
-from dav_gswt.photos.synthetic import camera_layouts
 
 FRAME = scene_frame(exemplar=(1.0, -3.0, 4.0), flying_height=4.0)
 CENTRE = (3.0, -1.0, 0.0)
@@ -78,7 +78,7 @@ def held(store, places=PLACES):
     return [len(store.photos_of(posed(0, place)[1])) for place in places]
 
 
-def test_each_pose_is_photographed_once_from_where_it_was_asked_for(shoot):
+def test_each_pose_is_photographed_once_from_where_it_was_requested(shoot):
     device, ended, store = shoot()
     assert (ended, held(store), device.photos) == ("", [1, 1, 1, 1], 4)
     assert [record["pose"]["name"] for record in store.records()].count("pose_0000") == 1

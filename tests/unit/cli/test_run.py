@@ -16,20 +16,20 @@ def without_core(monkeypatch):
     )
 
 
-def test_where_the_core_is_missing_a_smaller_size_is_said_and_laid_over(without_core, capsys):
-    assert run.smaller(quietly=False) == [run.SMALLER]
+def test_where_the_core_is_missing_a_smaller_size_is_printed_and_used(without_core, capsys):
+    assert run.select_overlays(quietly=False) == [run.SMALLER]
     assert "slower" in (said := capsys.readouterr().out) and "it was not built" in said
-    assert run.smaller(quietly=True) == [run.SMALLER] and not capsys.readouterr().out
+    assert run.select_overlays(quietly=True) == [run.SMALLER] and not capsys.readouterr().out
 
 
-def test_where_torch_is_asked_for_that_is_the_reason(monkeypatch, capsys):
+def test_torch_by_choice_is_given_as_the_reason(monkeypatch, capsys):
     if backends.explain_unavailable("cpu"):
         pytest.skip(f"cpu: {backends.explain_unavailable('cpu')}")
     monkeypatch.setenv(backends.VARIABLE, "torch")
-    assert run.smaller(quietly=False) == [run.SMALLER]
+    assert run.select_overlays(quietly=False) == [run.SMALLER]
     assert "DAV_GSWT_BACKEND asks for it" in capsys.readouterr().out
     monkeypatch.setenv(backends.VARIABLE, "cpu")
-    assert run.smaller(quietly=False) == []
+    assert run.select_overlays(quietly=False) == []
 
 
 def test_the_smaller_config_is_valid_and_smaller_for_every_preset(root, monkeypatch):

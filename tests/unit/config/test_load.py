@@ -1,11 +1,12 @@
 """The config is closed: what is misspelt, renamed or out of range is named before the first job."""
 
+import re
 from copy import deepcopy
 from pathlib import Path
 
 import pytest
 
-from dav_gswt.config.load import add_scene_files, check_config, read_config
+from dav_gswt.config.load import add_scene_files, check_config, parse_command_line, read_config
 from dav_gswt.errors import InputError
 
 FILES = {"usual": [], "smallest": ["config/test/config.yaml"], "paper": ["config/paper.yaml"]}
@@ -149,6 +150,21 @@ def test_a_scene_of_the_config_replaces_keys_of_its_file(tmp_path):
     assert scenes == {"sand": {"kind": "synthetic", "size": 64}, "other": {"kind": "field"}}
 
 
+def test_the_commented_scenes_of_the_config_can_be_uncommented(root, tmp_path):
+    text = (root / "config/config.yaml").read_text()
+    (tmp_path / "config.yaml").write_text(re.sub(r"^# (?=scenes:|  my_)", "", text, flags=re.M))
+    config = check_config(add_scene_files(read_config([tmp_path / "config.yaml"]), root / "config/scenes"))
+    assert {"my_meadow", "my_splat", "desert"} <= set(config["scenes"])
+
+
+def test_a_table_of_scenes_may_be_empty(tmp_path):
+    (tmp_path / "config.yaml").write_text("scene: sand\nscenes:\n")
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "scenes/sand.yaml").write_text("{kind: synthetic}")
+    config = add_scene_files(read_config([tmp_path / "config.yaml"]), tmp_path / "scenes")
+    assert config["scenes"] == {"sand": {"kind": "synthetic"}}
+
+
 @pytest.mark.parametrize(
     "text, message",
     [("a: [1", "not YAML .*line"), ("", "holds no keys"), ("- a", "holds no keys"), (None, "not readable")],
@@ -158,3 +174,22 @@ def test_a_config_file_that_cannot_be_read_is_named(tmp_path, text, message):
         (tmp_path / "a.yaml").write_text(text)
     with pytest.raises(InputError, match=f"a.yaml: {message}"):
         read_config([tmp_path / "a.yaml"])
+
+
+def test_numbers_in_lists_and_tables_of_the_command_line_are_numbers():
+    """As Snakemake reads `--config`: scalars are parsed, what is in lists and tables is text."""
+    given = {"seeds": ["1", "2"], "stills": {"width": "320"}, "scene": "desert", "tau": 0.3, "inpaint": True}
+    parsed = {"seeds": [1, 2], "stills": {"width": 320}, "scene": "desert", "tau": 0.3, "inpaint": True}
+    assert parse_command_line(given) == parsed
+
+
+@pytest.mark.parametrize("order", [("k", "views_per_round"), ("views_per_round", "k")])
+def test_views_per_round_is_k_and_counts_before_it(root, order):
+    values = {"k": 4, "views_per_round": 3}
+    checked = check_config(read(root) | {name: values[name] for name in order})
+    assert checked["k"] == 3 and "views_per_round" not in checked
+
+
+def test_k_that_is_out_of_range_is_named_by_either_name(root):
+    with pytest.raises(InputError, match="config: k: input should be greater"):
+        check_config(read(root) | {"views_per_round": 0})

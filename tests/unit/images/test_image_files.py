@@ -1,5 +1,6 @@
 """Reading, writing and shrinking images, and float maps in EXR."""
 
+import resource
 import struct
 import zlib
 
@@ -188,3 +189,18 @@ def test_a_damaged_exr_is_refused_by_name(tmp_path):
     (tmp_path / "a.exr").write_bytes((tmp_path / "a.exr").read_bytes()[:900])
     with pytest.raises(InputError, match="a.exr"):
         image_files.read_exr(tmp_path / "a.exr")
+
+
+@pytest.mark.parametrize(
+    "write", [image_files.write_png, lambda path, image: image_files.write_exr(path, {"a": image[..., 0]})]
+)
+def test_an_image_that_cannot_be_written_is_named_with_the_remedy(write, tmp_path):
+    """By a limit of the size of files: the same fault as a full disk."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    try:
+        with pytest.raises(OSError, match=r"a\.\w+: not written .* free some space, then run the same again"):
+            write(tmp_path / "a.png", np.random.default_rng(0).random((64, 64, 3)).astype(np.float32))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not list(tmp_path.iterdir())

@@ -160,6 +160,6 @@ def test_pictures_that_cannot_be_compared_are_refused(random_weights):
 
 
 def test_resized_pictures_keep_their_range_and_what_is_constant():
-    big = lpips.resized(pictures(2, 40, 50), 64)
+    big = lpips.resize_pictures(pictures(2, 40, 50), 64)
     assert big.shape == (2, 64, 64, 3) and np.abs(big).max() <= 1
-    np.testing.assert_allclose(lpips.resized(np.full((1, 40, 40, 3), 0.25, np.float32), 512), 0.25, rtol=1e-6)
+    np.testing.assert_allclose(lpips.resize_pictures(np.full((1, 40, 40, 3), 0.25, np.float32), 512), 0.25, rtol=1e-6)

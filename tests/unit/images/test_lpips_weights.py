@@ -25,7 +25,7 @@ def tree(given_weights):
 
 
 def equal(a, b):
-    return all(np.array_equal(x, b.named()[name]) for name, x in a.named().items())
+    return all(np.array_equal(x, b.by_name()[name]) for name, x in a.by_name().items())
 
 
 # --- the pickle
@@ -35,7 +35,7 @@ def equal(a, b):
 def test_a_pickle_of_plain_arrays_gives_its_weights(random_weights, protocol):
     found = lpips_weights.of_pickle(pickle.dumps(tree(random_weights), protocol))
     assert equal(found, random_weights)
-    assert all(a.flags.c_contiguous and a.flags.writeable for a in found.named().values())
+    assert all(a.flags.c_contiguous and a.flags.writeable for a in found.by_name().values())
 
 
 class Calls:
@@ -95,17 +95,17 @@ def test_bytes_that_are_no_pickle_of_weights_are_an_input_error(content):
 
 
 def changed(random_weights, name, array):
-    return {**random_weights.named(), name: array}
+    return {**random_weights.by_name(), name: array}
 
 
 def test_weights_of_other_shapes_values_or_names_are_refused_by_name(random_weights):
-    named = random_weights.named()
+    named = random_weights.by_name()
     wrong = {
         "kernel2 is not float32": changed(random_weights, "kernel2", named["kernel2"][:, :-1]),
         "head4 is not float32": changed(random_weights, "head4", named["head4"].astype(np.float64)),
         "bias1 has values": changed(random_weights, "bias1", named["bias1"] * np.float32(np.nan)),
-        "extra is missing or too much": changed(random_weights, "extra", named["bias1"]),
-        "kernel0 is missing": {name: a for name, a in named.items() if name != "kernel0"},
+        "'extra' is missing or too much": changed(random_weights, "extra", named["bias1"]),
+        "'kernel0' is missing": {name: a for name, a in named.items() if name != "kernel0"},
     }
     for text, arrays in wrong.items():
         with pytest.raises(InputError, match=text):
@@ -197,5 +197,5 @@ def test_other_weights_are_refused_before_they_are_unpickled(package, tmp_path, 
 
 
 def test_the_published_weights_are_what_they_should_be(real_weights):
-    assert sum(a.size for a in real_weights.named().values()) == 2_470_848
+    assert sum(a.size for a in real_weights.by_name().values()) == 2_470_848
     assert all((head >= 0).all() and head.any() for head in real_weights.heads)

@@ -61,7 +61,7 @@ def config(prior=None, samples=2):
 
 
 def half_seen():
-    """A ground whose east no photo saw: grey, as if filled, and in doubt."""
+    """A ground whose east no photo saw: grey, as if filled, and uncertain."""
     grid = patch.grid()
     seen = grid.seen.copy()
     seen[:, FIRST:] = False
@@ -69,8 +69,8 @@ def half_seen():
     east = unseen.select_gaussians(field, grid, ~seen)
     sh = field.sh.copy()
     sh[east] = 0
-    doubt = np.where(east, np.float32(1), np.float32(0.1))
-    return replace(field, sh=sh, uncertainty=doubt), replace(grid, seen=seen)
+    uncertainty = np.where(east, np.float32(1), np.float32(0.1))
+    return replace(field, sh=sh, uncertainty=uncertainty), replace(grid, seen=seen)
 
 
 def inpaint(field, grid, prior=None):
@@ -163,9 +163,10 @@ def test_where_photos_saw_everything_the_field_is_returned():
 
 def test_a_cell_is_unseen_where_neither_the_grid_nor_the_fit_knows_it():
     field, grid = half_seen()
-    doubt = field.uncertainty.copy()
-    doubt[: grid.heights.size].reshape(grid.shape)[:10] = 0.2  # fitted since, although something once stood before it
-    found = unseen.find_unseen_cells(replace(field, uncertainty=doubt), grid)
+    uncertainty = field.uncertainty.copy()
+    # fitted since, although something once stood before it
+    uncertainty[: grid.heights.size].reshape(grid.shape)[:10] = 0.2
+    found = unseen.find_unseen_cells(replace(field, uncertainty=uncertainty), grid)
     assert not found[:10].any() and found[10:, FIRST:].all() and not found[:, :FIRST].any()
     free = replace(field, ground=np.zeros(len(field), bool))
     assert not unseen.find_unseen_cells(free, grid).any() and inpaint(free, grid).field is free
@@ -310,7 +311,7 @@ def test_evaluation_compares_before_and_after_everywhere_and_where_it_was_inpain
     assert same_again["all"]["before"] == same_again["all"]["after"]
 
 
-def test_the_maps_of_a_prior_leave_what_was_imagined_in_full_doubt():
+def test_the_maps_of_a_prior_leave_inpainted_gaussians_at_uncertainty_1():
     field = concatenate_fields([patch.field()[:4], blob(MIDDLE, [0.1] * 3, [0.5] * 3)])
     marked = np.array([False, True, False, False, True])
     field = replace(field, imagined=marked, uncertainty=np.float32([0.1, 1, 0.1, 0.1, 1]))

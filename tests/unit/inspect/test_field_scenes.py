@@ -78,7 +78,7 @@ def test_a_field_whose_name_tells_no_level_has_none(tmp_path):
 
 def test_a_field_of_nothing_opaque_is_said(tmp_path):
     fields.write_field(one([0.1] * 3, opacity=-9.0), tmp_path / "field.ply")
-    with pytest.raises(InputError, match="nothing is to be seen"):
+    with pytest.raises(InputError, match="there is nothing to draw"):
         seen.build_field(tmp_path / "field.ply", ViewOptions())
 
 
@@ -100,5 +100,5 @@ def test_maps_of_poses_colour_the_field_beside_them(tree):
     shown = map_scenes.build_pose_maps(tree.round / "maps.npz", ViewOptions())
     ground = shown.layers[0].colours
     cool, warm = ground[0].astype(int), ground[-1].astype(int)
-    assert cool[2] > cool[0] and warm[0] > cool[0]  # doubt grows along the file
+    assert cool[2] > cool[0] and warm[0] > cool[0]  # uncertainty grows along the file
     assert shown.legend == [scene.ColourBar("uncertainty", 0.0, 1.0)]

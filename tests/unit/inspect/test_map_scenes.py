@@ -37,7 +37,7 @@ def test_the_part_above_lies_over_the_ground_beside_it_with_its_first_row_in_the
 
 def test_all_channels_are_pictures_side_by_side_upright(tree):
     shown = seen.build_map(tree.round / "uncertainty.exr", ViewOptions())
-    assert [word.text for word in shown.words] == ["above uncertainty", "pose_0003 opacity"]
+    assert [word.text for word in shown.labels] == ["above uncertainty", "pose_0003 opacity"]
     above = shown.layers[0]
     assert above.picture[0, 0, 0] > above.picture[-1, 0, 0]  # the northern row is warm, and on top
     np.testing.assert_allclose(above.points[0][:2], [0, 0])
@@ -48,7 +48,7 @@ def test_all_channels_are_pictures_side_by_side_upright(tree):
 
 def test_maps_of_a_pose_are_pictures_where_they_are_asked_for(tree):
     shown = seen.build_pose_maps(tree.round / "maps.npz", ViewOptions(part="pose_0002"))
-    assert [word.text for word in shown.words] == ["pose_0002 opacity"]
+    assert [word.text for word in shown.labels] == ["pose_0002 opacity"]
     assert shown.layers[0].picture.shape == (8, 12, 3)
 
 
@@ -86,3 +86,12 @@ def test_a_header_that_promises_too_much_is_refused_before_anything_is_made_room
     (tmp_path / "a.exr").write_bytes(data[:at] + huge + data[at + 16 :])
     with pytest.raises(InputError, match="a.exr: not readable as EXR .*100000 x 100000 pixels"):
         seen.build_map(tmp_path / "a.exr", ViewOptions())
+
+
+def test_a_folder_of_materials_shows_its_map(tmp_path):
+    layers = {name: np.eye(4, dtype=np.float32) for name in ("material", "object", "excluded")}
+    image_files.write_exr(tmp_path / "materials.exr", layers, {"west": "0.0"})
+    shown = seen.build_materials(tmp_path, ViewOptions())
+    assert len(shown.layers) == len(seen.build_map(tmp_path / "materials.exr", ViewOptions()).layers) > 0
+    with pytest.raises(InputError, match="Q"):
+        seen.build_materials(tmp_path, ViewOptions(channel="Q"))

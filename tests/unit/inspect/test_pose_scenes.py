@@ -31,7 +31,7 @@ def test_scores_and_poses_find_each_other_and_show_the_same(tree):
     by_poses = pose_scenes.build_poses(tree.round / "poses.json", ViewOptions())
     for one, other in zip(by_scores.layers, by_poses.layers, strict=True):
         np.testing.assert_array_equal(one.points, other.points)
-    assert [word.text for word in by_poses.words] == ["1", "2"]
+    assert [word.text for word in by_poses.labels] == ["1", "2"]
 
 
 def test_candidates_stand_where_they_are_and_the_chosen_are_marked_in_order(tree):
@@ -41,17 +41,17 @@ def test_candidates_stand_where_they_are_and_the_chosen_are_marked_in_order(tree
     stems = next(layer for layer in shown.layers if layer.kind == "lines" and len(layer.cells) == 2)
     np.testing.assert_allclose(stems.points[0], result_tree.MIDDLE, atol=1e-6)
     np.testing.assert_allclose(stems.points[1:], at(result_tree.CHOSEN), atol=1e-5)
-    for word, above in zip(shown.words, at(result_tree.CHOSEN), strict=True):
+    for word, above in zip(shown.labels, at(result_tree.CHOSEN), strict=True):
         np.testing.assert_allclose(word.place[:2], above[:2], atol=1e-9)
 
 
-def test_colours_are_the_doubt_by_which_was_chosen_or_any_column(tree):
-    doubt = pose_scenes.build_scores(tree.scored / "scores.csv", ViewOptions())
-    assert isinstance(doubt.legend[0], ColourBar) and "W2" in doubt.legend[0].title
+def test_colours_are_the_uncertainty_that_the_policy_used_or_any_column(tree):
+    default = pose_scenes.build_scores(tree.scored / "scores.csv", ViewOptions())
+    assert isinstance(default.legend[0], ColourBar) and "W2" in default.legend[0].title
     opacity = pose_scenes.build_scores(tree.scored / "scores.csv", ViewOptions(colour="opacity"))
     first = opacity.layers[0].colours[0].astype(int)
     assert first[2] > first[0]  # cool: the first candidate has the least, and the most of the other
-    assert doubt.layers[0].colours[0][0] > doubt.layers[0].colours[0][2]
+    assert default.layers[0].colours[0][0] > default.layers[0].colours[0][2]
     with pytest.raises(InputError, match="--colour hue: these poses have opacity, w2_sq"):
         pose_scenes.build_scores(tree.scored / "scores.csv", ViewOptions(colour="hue"))
 
@@ -63,8 +63,8 @@ def test_where_several_branches_chose_none_is_marked_until_one_is_named(tree, tm
     shutil.copytree(draft / result_tree.BRANCH, twin)
     scores = draft / "coarse/scores_terrain_pdrop0.15/scores.csv"
     shown = pose_scenes.build_scores(scores, ViewOptions())
-    assert not shown.words and "2 branches" in shown.notes[0]
-    assert len(pose_scenes.build_scores(scores, ViewOptions(poses=twin / "iter1/poses.json")).words) == 2
+    assert not shown.labels and "2 branches" in shown.notes[0]
+    assert len(pose_scenes.build_scores(scores, ViewOptions(poses=twin / "iter1/poses.json")).labels) == 2
 
 
 def test_poses_of_other_scores_are_refused(tree, tmp_path):

@@ -50,7 +50,7 @@ def test_gaussians_have_the_patch_of_the_cell_they_lie_over(cut):
 
 def test_sixteen_tiles_are_laid_with_their_numbers_and_all_levels_if_levels_are_asked(tree, cut):
     plain = seen.build_tiles(tree.tiles, ViewOptions())
-    assert sorted(int(word.text) for word in plain.words) == list(range(16))
+    assert sorted(int(word.text) for word in plain.labels) == list(range(16))
     assert sum(layer.colours == seen.CUT_COLOUR for layer in plain.layers if isinstance(layer.colours, tuple)) == 16
     all_ = seen.build_tiles(tree.tiles, ViewOptions(colour="level"))
     assert list(all_.legend[0].named) == [f"level {n}" for n in range(len(cut.fields))]
@@ -63,7 +63,7 @@ def test_tiles_that_are_not_what_seams_json_says_are_refused(tree, tmp_path):
     told = read_json(tree.tiles / "seams.json")
     (tmp_path / "tiles").symlink_to(tree.tiles / "tiles")
     for change, message in (
-        ({"tiles": "many"}, "not as the workflow writes it"),
+        ({"tiles": "many"}, "not the table of a tile set"),
         ({"side": 99.0}, "their maps are not"),
         ({"levels": 9}, "no such file"),
     ):

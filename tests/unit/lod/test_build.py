@@ -1,3 +1,4 @@
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -67,8 +68,15 @@ def test_levels_that_were_written_read_back(levels, tmp_path):
     np.testing.assert_array_equal(back.fields[1].means, fields[1].means)
     assert back.grids[1].spacing == grids[1].spacing
     field_module.write_field(fields[0], tmp_path / "levels/level1.ply")
-    with pytest.raises(InputError, match="levels.json tells of"):
+    with pytest.raises(InputError, match="levels.json lists"):
         store.read_levels(tmp_path / "levels")
+
+
+@pytest.mark.parametrize("content", [[], 7, {"levels": []}, {"levels": "ab"}, {"levels": [{}]}])
+def test_a_table_that_is_none_is_refused_by_name(tmp_path, content):
+    (tmp_path / "levels.json").write_text(json.dumps(content))
+    with pytest.raises(InputError, match="levels.json: not a table of levels"):
+        store.read_levels(tmp_path)
 
 
 def test_from_afar_a_coarser_level_looks_like_its_finer_neighbour(levels):

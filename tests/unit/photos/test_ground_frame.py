@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fixtures import photos as made_up
+from fixtures import photos as synth
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
@@ -28,7 +28,7 @@ def rng():
 @pytest.fixture
 def flown(rng):
     """Twenty photos over a ground with a little relief."""
-    return made_up.model(made_up.flight(4, 5), made_up.plain(3000, 1.0, rng, relief=0.01))
+    return synth.model(synth.flight(4, 5), synth.plain(3000, 1.0, rng, relief=0.01))
 
 
 def tossed(scene, rng):
@@ -46,7 +46,7 @@ def test_the_plane_through_points_on_a_plane_by_hand(rng):
 
 
 def test_four_in_ten_points_above_the_ground_do_not_tilt_the_plane(rng):
-    points = made_up.plain(1000, 1.0, rng, relief=0.005)
+    points = synth.plain(1000, 1.0, rng, relief=0.005)
     points[:400, 2] += rng.uniform(0.05, 0.8, 400) * (points[:400, 0] + 1)  # trees, on one side more than on the other
     normal, offset, spread = fit_plane(points, rng)
     # An unweighted fit tilts by 0.1. Here 600 normal heights of 0.005 fix the tilt to about 0.005 / sqrt(600 / 3),
@@ -56,7 +56,7 @@ def test_four_in_ten_points_above_the_ground_do_not_tilt_the_plane(rng):
 
 
 def test_the_plane_moves_with_the_points(rng):
-    points = made_up.plain(300, 1.0, rng, relief=0.02)
+    points = synth.plain(300, 1.0, rng, relief=0.02)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     here = fit_plane(points, np.random.default_rng(1))
     there = fit_plane(4 * points @ turn.T + [1e3, 2e3, -5e2], np.random.default_rng(1))
@@ -104,8 +104,8 @@ def test_every_point_of_the_exemplar_is_seen_often_enough(flown, rng):
 
 def test_the_x_axis_turns_so_that_the_square_is_large(rng):
     """A flight along a diagonal: the square is as large as that of the same flight along the axes."""
-    cameras = made_up.flight(4, 4, tilt=0)
-    straight = made_up.model(cameras, made_up.plain(4000, 1.2, rng))
+    cameras = synth.flight(4, 4, tilt=0)
+    straight = synth.model(cameras, synth.plain(4000, 1.2, rng))
     c = np.sqrt(0.5)
     diagonal = transform_model(straight, 1.0, np.array([[c, -c, 0], [c, c, 0], [0, 0, 1]]), np.zeros(3))
     sides = [fit_ground_frame(m, np.random.default_rng(0))[1].exemplar.side for m in (straight, diagonal)]
@@ -114,32 +114,32 @@ def test_the_x_axis_turns_so_that_the_square_is_large(rng):
 
 def test_ground_without_points_is_not_well_seen(rng):
     """The northern half is water: photos see it, but nothing in it holds still."""
-    points = made_up.plain(4000, 1.0, rng)
-    cameras = made_up.flight(4, 5, tilt=0)
-    all_over = fit_ground_frame(made_up.model(cameras, points), rng)[1].exemplar
-    half = fit_ground_frame(made_up.model(cameras, points[points[:, 1] < 0]), rng)[1].exemplar
+    points = synth.plain(4000, 1.0, rng)
+    cameras = synth.flight(4, 5, tilt=0)
+    all_over = fit_ground_frame(synth.model(cameras, points), rng)[1].exemplar
+    half = fit_ground_frame(synth.model(cameras, points[points[:, 1] < 0]), rng)[1].exemplar
     assert half.side < 0.8 * all_over.side
 
 
 def test_photos_that_look_along_a_wall_are_refused(rng):
     """Cameras in the plane of their points: there is no ground under them."""
-    points = made_up.plain(500, 1.0, rng, relief=0.05)
-    cameras = [made_up.camera((x, -3.0, 0.01), (x, 0, 0)) for x in np.linspace(-0.5, 0.5, 8)]
+    points = synth.plain(500, 1.0, rng, relief=0.05)
+    cameras = [synth.camera((x, -3.0, 0.01), (x, 0, 0)) for x in np.linspace(-0.5, 0.5, 8)]
     with pytest.raises(InputError, match="ground"):
-        fit_ground_frame(made_up.model(cameras, points), rng)
+        fit_ground_frame(synth.model(cameras, points), rng)
 
 
 def test_photos_that_see_no_common_ground_are_refused(rng):
-    cameras = [made_up.camera((3.0 * i, 0, 1)) for i in range(4)]
-    points = np.concatenate([made_up.plain(100, 0.3, rng) + [3.0 * i, 0, 0] for i in range(4)])
+    cameras = [synth.camera((3.0 * i, 0, 1)) for i in range(4)]
+    points = np.concatenate([synth.plain(100, 0.3, rng) + [3.0 * i, 0, 0] for i in range(4)])
     with pytest.raises(InputError, match="no ground"):
-        fit_ground_frame(made_up.model(cameras, points), rng)
+        fit_ground_frame(synth.model(cameras, points), rng)
 
 
 def test_coverage_counts_photos_by_hand():
     # Two cameras at height 1 see 320 / 300 by 240 / 300 of ground each; half a width apart they share half.
     width, height = 320 / 300, 240 / 300
-    cameras = (made_up.camera((0, 0, 1)), made_up.camera((width / 2, 0, 1)))
+    cameras = (synth.camera((0, 0, 1)), synth.camera((width / 2, 0, 1)))
     corners = np.array([[-width, -height, 0], [1.5 * width, height, 0]])
     grid = count_coverage(cameras, corners, cells=400)
     area = grid.cell**2
@@ -148,7 +148,7 @@ def test_coverage_counts_photos_by_hand():
 
 
 def test_what_is_behind_or_too_far_is_not_seen():
-    camera = made_up.camera((0, 0, 1), (1, 0, 1.0))  # looks along the ground
+    camera = synth.camera((0, 0, 1), (1, 0, 1.0))  # looks along the ground
     points = np.array([[2.0, 0, 0.9], [2.99, 0, 0.99], [3.01, 0, 1.0], [-1.0, 0, 1.0]])
     assert find_visible_points(camera, points).tolist() == [True, True, False, False]
 

@@ -3,7 +3,7 @@ from types import SimpleNamespace
 import numpy as np
 import pycolmap
 import pytest
-from fixtures import photos as made_up
+from fixtures import photos as synth
 from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
@@ -17,11 +17,11 @@ from dav_gswt.photos.training_views import read_training_view
 @pytest.fixture
 def found(tmp_path):
     """One registered photo, photo.jpg, through a lens without distortion."""
-    camera = made_up.camera((0, 0, 1))
+    camera = synth.camera((0, 0, 1))
     image_files.write_png(tmp_path / "photo.png", np.full((camera.height, camera.width, 3), 0.5))
     params = [camera.fx, camera.fy, camera.cx, camera.cy]
     lens = pycolmap.Camera(model="PINHOLE", width=camera.width, height=camera.height, params=params)
-    one = made_up.model([camera], np.zeros((1, 3)))
+    one = synth.model([camera], np.zeros((1, 3)))
     return SimpleNamespace(model=one, sources=(tmp_path / "photo.png",), lenses=(lens,))
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fixtures import photos as made_up
+from fixtures import photos as synth
 
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
@@ -27,13 +27,13 @@ def rng():
 @pytest.fixture
 def flown(rng):
     """Nine photos of 300 points near the ground, matched exactly."""
-    return made_up.model(made_up.flight(3, 3), made_up.plain(300, 0.7, rng, relief=0.05))
+    return synth.model(synth.flight(3, 3), synth.plain(300, 0.7, rng, relief=0.05))
 
 
 def test_two_rays_that_cross_meet_where_they_cross_by_hand():
     # From (-1, 0, 1) and (1, 0, 1), 45 degrees each: the rays cross at the origin.
-    cameras = [made_up.camera((-1, 0, 1), (0, 0, 0)), made_up.camera((1, 0, 1), (0, 0, 0))]
-    pair = made_up.model(cameras, np.zeros((1, 3)))
+    cameras = [synth.camera((-1, 0, 1), (0, 0, 0)), synth.camera((1, 0, 1), (0, 0, 0))]
+    pair = synth.model(cameras, np.zeros((1, 3)))
     points, colours = triangulate_points(pair, pair.names)
     assert points == pytest.approx(np.zeros((1, 3)), abs=1e-12)
     assert colours.tolist() == [[0.5, 0.5, 0.5]]
@@ -75,21 +75,21 @@ def test_a_wrong_match_is_left_out(flown):
 
 
 def test_rays_that_are_nearly_parallel_are_left_out():
-    near = [made_up.camera((x, 0, 1), (0, 0, 0)) for x in (0.0, 0.02)]  # 1.1 degrees apart seen from the point
-    wide = [made_up.camera((x, 0, 1), (0, 0, 0)) for x in (0.0, 0.03)]  # 1.7 degrees
+    near = [synth.camera((x, 0, 1), (0, 0, 0)) for x in (0.0, 0.02)]  # 1.1 degrees apart seen from the point
+    wide = [synth.camera((x, 0, 1), (0, 0, 0)) for x in (0.0, 0.03)]  # 1.7 degrees
     for cameras, count in ((near, 0), (wide, 1)):
-        pair = made_up.model(cameras, np.zeros((1, 3)))
+        pair = synth.model(cameras, np.zeros((1, 3)))
         assert len(triangulate_model(pair, pair.names).points) == count
 
 
 def test_no_common_point_gives_no_points():
-    cameras = [made_up.camera((x, 0, 1)) for x in (-5.0, 5.0)]
-    pair = made_up.model(cameras, np.array([[-5.0, 0, 0], [5.0, 0, 0]]))
+    cameras = [synth.camera((x, 0, 1)) for x in (-5.0, 5.0)]
+    pair = synth.model(cameras, np.array([[-5.0, 0, 0], [5.0, 0, 0]]))
     points, colours = triangulate_points(pair, pair.names)
     assert points.shape == colours.shape == (0, 3)
 
 
-def test_fewer_images_than_asked_for_leave_a_point_out(flown):
+def test_too_few_images_leave_a_point_out(flown):
     counts = np.bincount(flown.point_of, minlength=len(flown.points))
     assert len(triangulate_model(flown, flown.names, at_least=4).points) == (counts >= 4).sum()
     with pytest.raises(ValueError, match="two rays"):
@@ -105,7 +105,7 @@ def test_an_image_that_is_not_in_the_model_is_named(flown):
 
 def test_colours_come_from_the_named_images_alone(flown, tmp_path):
     for i, name in enumerate(flown.names):
-        image_files.write_png(tmp_path / name, np.full((made_up.HEIGHT, made_up.WIDTH, 3), 0.2 if i < 3 else 1.0))
+        image_files.write_png(tmp_path / name, np.full((synth.HEIGHT, synth.WIDTH, 3), 0.2 if i < 3 else 1.0))
     _, colours = triangulate_points(flown, flown.names[:3], tmp_path)
     assert colours == pytest.approx(np.full(colours.shape, 0.2), abs=1e-6)
 

@@ -4,7 +4,7 @@ from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
-from fixtures import photos as made_up
+from fixtures import photos as synth
 from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
@@ -17,13 +17,13 @@ FRAME = scene_frame(exemplar=(-0.6, -0.6, 1.2))
 @pytest.fixture
 def flown():
     """Thirty photos in six flight lines of five."""
-    return made_up.model(made_up.flight(6, 5), made_up.plain(4000, 1.2, np.random.default_rng(1)))
+    return synth.model(synth.flight(6, 5), synth.plain(4000, 1.2, np.random.default_rng(1)))
 
 
 def first(model, count):
     """The model of the first photos of a model."""
     keep = model.image_of < count
-    return made_up.model(list(model.cameras[:count]), model.points) if keep.any() else model
+    return synth.model(list(model.cameras[:count]), model.points) if keep.any() else model
 
 
 def split(model, seed=0, start=8, frame=FRAME):
@@ -84,9 +84,9 @@ def test_start_views_are_more_spread_than_random_ones(flown):
 
 
 def test_photos_that_share_no_points_still_all_start():
-    cameras = [made_up.camera((3.0 * i, 0, 1)) for i in range(4)]
-    points = np.concatenate([made_up.plain(50, 0.3, np.random.default_rng(i)) + [3.0 * i, 0, 0] for i in range(4)])
-    assert len(split(made_up.model(cameras, points)).start) == 4
+    cameras = [synth.camera((3.0 * i, 0, 1)) for i in range(4)]
+    points = np.concatenate([synth.plain(50, 0.3, np.random.default_rng(i)) + [3.0 * i, 0, 0] for i in range(4)])
+    assert len(split(synth.model(cameras, points)).start) == 4
 
 
 def test_photos_of_other_ground_take_no_part(flown):
@@ -96,14 +96,14 @@ def test_photos_of_other_ground_take_no_part(flown):
     named = [name for part in astuple(parts) for name in part]
     assert 6 <= len(named) < 30
     assert all(
-        measure_visible_share(flown.camera(name), ground_bounds(frame, whole=False)) >= splitting.LEAST_SIGHT
+        measure_visible_share(flown.camera(name), ground_bounds(frame, whole=False)) >= splitting.MIN_VISIBLE_SHARE
         for name in named
     )
 
 
 def test_sight_is_the_share_of_the_square_by_hand():
     # From height 1 the picture covers 320 / 300 by 240 / 300 of ground, centred under the camera.
-    camera = made_up.camera((0, 0, 1))
+    camera = synth.camera((0, 0, 1))
     assert measure_visible_share(camera, (-0.3, -0.3, 0.3, 0.3)) == 1
     assert measure_visible_share(camera, (0.0, -0.4, 0.8, 0.4)) == pytest.approx(160 / 300 / 0.8, abs=1 / 16)
     assert measure_visible_share(camera, (5.0, 5.0, 6.0, 6.0)) == 0

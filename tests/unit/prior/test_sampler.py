@@ -32,12 +32,12 @@ def layers(network):
 
 
 def drawn(network, layers, views=3, m=4, p=0.2, steps=3, seed=1, batch=8, common=True):
-    """Latents of views that differ by what they are told."""
-    told = torch.randn((views, 5, 16), generator=torch.Generator().manual_seed(9))
+    """Latents of views that differ by their condition."""
+    context = torch.randn((views, 5, 16), generator=torch.Generator().manual_seed(9))
 
     def denoise(latents, time, some):
         each = len(latents) // (some.stop - some.start)
-        return network(latents, time, told[some].repeat_interleave(each, 0)).sample
+        return network(latents, time, context[some].repeat_interleave(each, 0)).sample
 
     schedule = DDIMScheduler(num_train_timesteps=100, prediction_type="v_prediction")
     return sampler.sample_latents(denoise, layers, schedule, views, SHAPE, Sampling(m, p, steps, seed, batch, common))

@@ -72,7 +72,7 @@ def test_a_view_does_not_depend_on_the_others(prior):
     np.testing.assert_allclose(all_of_them[1], alone[0], atol=1e-5)
 
 
-def test_where_nothing_is_to_be_believed_the_render_has_no_say(prior):
+def test_without_valid_pixels_the_render_has_no_influence(prior):
     one, two = condition(), replace(condition(seed=1), photo=condition().photo, relative=condition().relative)
     nothing = np.zeros((3, *LATENT[1:]), bool)
     found = [prior.sample(c, 1, 0.0, 2, 0, known=nothing) for c in (one, two)]

@@ -143,14 +143,14 @@ def test_a_view_does_not_depend_on_the_others(prior):
 
 
 def test_photo_and_pose_have_a_say_and_the_render_has_none(prior):
-    told, other = condition(1), condition(1, seed=1)
-    found = prior.sample(told, 1, 0.0, 2, 0)
+    view, other = condition(1), condition(1, seed=1)
+    found = prior.sample(view, 1, 0.0, 2, 0)
     for name, matters in (("photo", True), ("relative", True), ("colour", False), ("alpha", False)):
-        changed_one = prior.sample(replace(told, **{name: getattr(other, name)}), 1, 0.0, 2, 0)
+        changed_one = prior.sample(replace(view, **{name: getattr(other, name)}), 1, 0.0, 2, 0)
         assert np.array_equal(found, changed_one) != matters, name
 
 
-def test_the_pose_is_told_as_in_training(prior):
+def test_the_pose_is_encoded_as_in_training(prior):
     seen = []
     hook = prior.networks.projection.register_forward_pre_hook(lambda _, given: seen.append(given[0]))
     up, right = np.radians(20), np.radians(90)
@@ -161,13 +161,13 @@ def test_the_pose_is_told_as_in_training(prior):
 
 
 def test_the_denoiser_sees_the_coders_mode_as_it_is_and_without_the_photo_nothing(prior):
-    told, seen = condition(1, side=SIZE), []
+    view, seen = condition(1, side=SIZE), []
     hook = prior.networks.unet.register_forward_pre_hook(lambda _, given: seen.append(given))
-    prior.sample(told, 1, 0.0, 1, 0)
+    prior.sample(view, 1, 0.0, 1, 0)
     hook.remove()
     planes, _, tokens = seen[0]
     with torch.inference_mode():
-        photo = torch.from_numpy(told.photo.transpose(0, 3, 1, 2).copy())
+        photo = torch.from_numpy(view.photo.transpose(0, 3, 1, 2).copy())
         mode = prior.networks.vae.encode(2 * photo - 1).latent_dist.mode()
     assert planes.shape == (2, 8, 32, 32) and tokens.shape == (2, 1, WIDTH)
     assert torch.equal(planes[0, :4], planes[1, :4]) and not planes[0, 4:].any() and not tokens[0].any()
@@ -176,12 +176,12 @@ def test_the_denoiser_sees_the_coders_mode_as_it_is_and_without_the_photo_nothin
 
 def test_it_samples_as_the_authors_write_it_down(prior):
     """The plain twin: their preparation by kornia, their loop over DDIM's formula, no sampler of ours."""
-    told, steps, parts = condition(1, side=SIZE), 3, prior.networks
-    photo = 2 * torch.from_numpy(told.photo.transpose(0, 3, 1, 2).copy()) - 1
+    view, steps, parts = condition(1, side=SIZE), 3, prior.networks
+    photo = 2 * torch.from_numpy(view.photo.transpose(0, 3, 1, 2).copy()) - 1
     seen = kornia.geometry.resize(photo, (28, 28), interpolation="bicubic", align_corners=True, antialias=False)
     mean, spread = torch.tensor([0.48145466, 0.4578275, 0.40821073]), torch.tensor([0.26862954, 0.26130258, 0.27577711])
     seen = kornia.enhance.normalize((seen + 1) / 2, mean, spread)
-    elevation, sine, cosine, radius = told.relative[0].tolist()
+    elevation, sine, cosine, radius = view.relative[0].tolist()
     pose = torch.tensor([[-elevation, sine, cosine, 1.85 * radius]])
     left = torch.linspace(0.00085**0.5, 0.012**0.5, 1000).square().neg().add(1).cumprod(0)
     with torch.inference_mode():
@@ -195,7 +195,7 @@ def test_it_samples_as_the_authors_write_it_down(prior):
             noise = alone + 3.0 * (parts.unet(torch.cat([x, latent], 1), t, token).sample - alone)
             now, then = left[times[i]], left[times[i - 1]] if i else left[0]
             x = then.sqrt() * (x - (1 - now).sqrt() * noise) / now.sqrt() + (1 - then).sqrt() * noise
-    np.testing.assert_allclose(prior.sample(told, 1, 0.0, steps, 5)[:, 0], x, rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(prior.sample(view, 1, 0.0, steps, 5)[:, 0], x, rtol=1e-4, atol=1e-4)
 
 
 def test_latents_are_scaled(prior):
@@ -237,7 +237,7 @@ def test_guidance_of_one_is_none(prior):
 
 
 def test_a_sample_has_one_mask_with_and_without_the_photo(prior):
-    """Told nothing, both passes are the same, so guidance must change nothing, whatever was dropped."""
+    """Without a condition, both passes are the same, so guidance must change nothing, whatever was dropped."""
     noise = torch.randn((6, *LATENT), generator=torch.Generator().manual_seed(3))
     nothing = torch.zeros_like(noise), torch.zeros(6, 1, WIDTH)
     found = []
@@ -255,10 +255,10 @@ def test_a_guidance_that_makes_no_sense_is_refused(prior, guidance):
 
 
 def test_what_is_not_finite_is_refused_by_name(prior):
-    told = condition()
-    told.photo[1, 0, 0] = np.nan
+    view = condition()
+    view.photo[1, 0, 0] = np.nan
     with pytest.raises(ValueError, match="photo of view 1"):
-        prior.sample(told, 2, 0.1, 2, 0)
+        prior.sample(view, 2, 0.1, 2, 0)
     with pytest.raises(ValueError, match="p_drop is 1"):
         prior.sample(condition(), 2, 1.0, 2, 0)
 
@@ -304,7 +304,7 @@ DAMAGES = {
     "pickle": ("image_encoder", "pytorch_model.bin: a pickle.*docs/prior.md"),
     "gone": ("unet", f"there is no {UNET}"),
     "missing": ("unet", "conv_in.bias is missing"),
-    "extra": ("vae", "more is not of this network"),
+    "extra": ("vae", "'more' is not of this network"),
     "shape": ("cc_projection", r"projection.weight has the shape \(3, 3\), not \(16, 20\)"),
     "nan": ("image_encoder", "visual_projection.weight holds numbers that are not finite"),
     "whole": ("unet", "conv_in.bias has the type I32"),
@@ -344,9 +344,9 @@ def test_pickles_become_readable_as_the_documentation_says(folder, prior, root, 
         clip = path.parent.name == "image_encoder"
         torch.save(load_file(path), path.with_name("pytorch_model.bin" if clip else f"{path.stem}.bin"))
         path.unlink()
-    told = (root / "docs" / "prior.md").read_text(encoding="utf-8").split("<<'END'\n")[1].split("\nEND\n")[0]
+    script = (root / "docs" / "prior.md").read_text(encoding="utf-8").split("<<'END'\n")[1].split("\nEND\n")[0]
     monkeypatch.setattr(sys, "argv", ["-", str(copied)])
-    exec(told, {})
+    exec(script, {})
     found = Zero123.open(copied).sample(condition(1), 1, 0.0, 1, 0)
     np.testing.assert_array_equal(found, prior.sample(condition(1), 1, 0.0, 1, 0))
 

@@ -46,6 +46,16 @@ def test_a_gradient_left_out_counts_as_zero(given):
         assert relative(getattr(found, name), wanted[name]) < 1e-5, name
 
 
+@pytest.mark.parametrize("logit", [8.0, 14.0, 20.0])
+def test_gradients_by_nearly_full_opacity_keep_their_digits(raster, logit):
+    """1 - opacity is 1 / (1 + exp(logit)); the difference itself has lost all its digits at 17."""
+    camera, gradients = CAMERAS["pinhole"], image_gradients(CAMERAS["pinhole"], 3)
+    arrays = gaussians(40) | {"opacity_logits": np.full(40, logit, np.float32)}
+    _, wanted = oracle_answers(arrays, camera, gradients)
+    raster.forward(**arrays, camera=camera)
+    assert relative(raster.backward(*gradients).opacity_logits, wanted["opacity_logits"]) < 1e-5
+
+
 @pytest.mark.parametrize("scale, tolerance", [(1e-12, 1e-5), (1e6, 1e-5)])
 def test_scales_far_out_are_drawn_as_the_oracle_draws_them(raster, scale, tolerance):
     arrays, camera = gaussians(60), CAMERAS["pinhole"]

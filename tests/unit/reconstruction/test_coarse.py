@@ -8,18 +8,18 @@ from dav_gswt.field import rgb_to_sh
 from dav_gswt.geometry import cameras
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import render
-from dav_gswt.reconstruction.coarse import fit_coarse_field
+from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
 from dav_gswt.reconstruction.evaluation import evaluate_field
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fit_settings import CoarseSettings
 from dav_gswt.reconstruction.observation import mask_to_ground
 
-QUALITY = FitSettings(size=48, spacing=1.0, max_gaussians=5000, steps=40, steps_per_photo=10, level_steps=5)
+QUALITY = CoarseSettings(size=48, spacing=1.0, max_gaussians=5000, steps=40)
 
 
 def test_a_coarse_field_from_photos_alone():
     photos = made.photos(4)
     none = np.zeros((0, 3)), np.zeros((0, 3), np.float32)
-    found = fit_coarse_field(made.FRAME, photos, *none, QUALITY, np.random.default_rng(0))
+    found = fit_coarse_field(StartViews(made.FRAME, photos, *none), QUALITY, np.random.default_rng(0))
     assert np.isfinite(found.field.means).all()
     assert found.grid.cells % 32 == 0
     assert found.report.steps == QUALITY.steps
@@ -42,9 +42,8 @@ def test_a_scene_without_a_ground_is_fitted_as_free_gaussians():
         photos.append(TrainingView(f"photo_{i}", camera, image, (seen.alpha > 0.5).astype(np.float32)))
     frame = replace(made.FRAME, kind="synthetic", flying_height=3.0)
     quality = replace(QUALITY, max_gaussians=2000, steps=150)
-    found = fit_coarse_field(
-        frame, photos, points, np.full((400, 3), 0.5, np.float32), quality, np.random.default_rng(0)
-    )
+    given = StartViews(frame, photos, points, np.full((400, 3), 0.5, np.float32))
+    found = fit_coarse_field(given, quality, np.random.default_rng(0))
     assert not found.field.ground.any()
     grey = replace(truth, sh=rgb_to_sh(np.full((400, 3), 0.5)))
     assert evaluate_field(found.field, photos)["psnr"] > evaluate_field(grey, photos)["psnr"] + 1

@@ -78,7 +78,7 @@ def test_lpips_counts_by_the_area_that_counts():
 def test_without_weights_lpips_is_null_and_that_is_said(caplog):
     with caplog.at_level(logging.INFO):
         found = evaluation.evaluate_field(patch.field(), off([0.02]))
-    assert found["lpips"] is found["worst_decile"]["lpips"] is None and "LPIPS has no weights" in caplog.text
+    assert found["lpips"] is found["worst_decile"]["lpips"] is None and "metrics lack LPIPS" in caplog.text
 
 
 def test_no_test_view_is_null():

@@ -4,9 +4,8 @@ from fixtures.frames import scene_frame
 
 from dav_gswt.field import GaussianField, rgb_to_sh
 from dav_gswt.reconstruction import external_field
-from dav_gswt.reconstruction.fit_settings import FitSettings
 
-QUALITY = FitSettings(size=64, spacing=1.0, max_gaussians=20_000, steps=1, steps_per_photo=1, level_steps=1)
+MAX_GAUSSIANS = 20_000
 FRAME = scene_frame(
     kind="field", unit="metre", flying_height=5.0, exemplar=(0.0, 0.0, 4.0), extent=(0.0, 0.0, 4.0, 4.0)
 )
@@ -25,7 +24,7 @@ def test_the_surface_under_a_finished_field_is_found_and_what_lies_beyond_is_cut
         np.zeros(n, np.float32),
         np.ones(n, bool),  # as if it came from a ground layer of ours
     )
-    inside, grid = external_field.prepare_external_field(field, FRAME, QUALITY)
+    inside, grid = external_field.prepare_external_field(field, FRAME, MAX_GAUSSIANS)
     assert 0 < len(inside) < n and not inside.ground.any()
     assert inside.means[:, :2].min() >= 0 and inside.means[:, :2].max() <= 4
     x = grid.centres[:, 0].reshape(grid.shape)

@@ -10,13 +10,13 @@ from fixtures import ground as made
 
 from dav_gswt.field import read_field, rgb_to_sh, write_field
 from dav_gswt.reconstruction import ground, regression_guard
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fit_settings import UpdateSettings
 from dav_gswt.reconstruction.fitting.plan import AUTO, STEPS_PER_NEW_PHOTO, FitReport
 from dav_gswt.reconstruction.fitting.trainer import FitResult
 from dav_gswt.reconstruction.observation import mask_to_ground
-from dav_gswt.reconstruction.refinement import refine_field
+from dav_gswt.reconstruction.refinement import RefinementInput, refine_field
 
-QUALITY = FitSettings(size=48, spacing=1.0, max_gaussians=2000, steps=40, steps_per_photo=12, level_steps=5)
+QUALITY = UpdateSettings(size=48, max_gaussians=2000, steps_per_photo=12)
 GRAIN = 0.03  # as coarse as what a real field does not know of its photos
 SYNTHETIC = replace(made.FRAME, kind="synthetic")
 
@@ -34,7 +34,8 @@ def upside_down(view):
 
 
 def refined(before, new, quality=QUALITY, seed=0, frame=SYNTHETIC):
-    return refine_field(made.field(), made.grid(), frame, before, new, quality, np.random.default_rng(seed))
+    given = RefinementInput(made.field(), made.grid(), frame, before, new)
+    return refine_field(given, quality, np.random.default_rng(seed))
 
 
 def same(a, b):
@@ -43,11 +44,12 @@ def same(a, b):
 
 
 def another_place(view):
-    return replace(view, image=np.ascontiguousarray(1 - view.image.swapaxes(0, 1)))
+    other = 1 - view.image.swapaxes(0, 1)
+    return replace(view, image=np.ascontiguousarray(np.clip(0.5 + 3 * (other - other.mean()), 0, 1)))
 
 
 @pytest.mark.parametrize("frame", [made.FRAME, SYNTHETIC], ids=["photos", "synthetic"])
-def test_ordinary_photos_are_taken_and_both_sides_are_told(frame):
+def test_ordinary_photos_are_taken_and_both_sides_are_reported(frame):
     photos = grained(4)
     found = refined(photos[:1], photos[1:], frame=frame)
     earlier, new = found.report.earlier_views, found.report.new_views
@@ -56,11 +58,11 @@ def test_ordinary_photos_are_taken_and_both_sides_are_told(frame):
     assert [row["view"] for row in new.views] == ["photo_1", "photo_2", "photo_3"]
     if frame is SYNTHETIC:  # real photos are first brought to one exposure
         masked = mask_to_ground(photos, made.grid())
-        for told, views in ((earlier, masked[:1]), (new, masked[1:])):
-            assert told.psnr_before == pytest.approx(
+        for side, views in ((earlier, masked[:1]), (new, masked[1:])):
+            assert side.psnr_before == pytest.approx(
                 np.mean(regression_guard.measure_psnr(made.field(), views)), abs=1e-9
             )
-            assert told.psnr_after == pytest.approx(
+            assert side.psnr_after == pytest.approx(
                 np.mean(regression_guard.measure_psnr(found.field, views)), abs=1e-9
             )
     json.dumps(found.report.to_dict(), allow_nan=False)
@@ -109,7 +111,7 @@ def test_without_new_photos_field_and_ground_go_on_to_the_byte(tmp_path):
     write_field(refined(grained(3)[:2], grained(3)[2:]).field, tmp_path / "a.ply")
     ground.write_ground(made.grid(), tmp_path / "a.exr")
     last = read_field(tmp_path / "a.ply"), ground.read_ground(tmp_path / "a.exr")
-    found = refine_field(*last, SYNTHETIC, grained(2), [], QUALITY, np.random.default_rng(0))
+    found = refine_field(RefinementInput(*last, SYNTHETIC, grained(2), []), QUALITY, np.random.default_rng(0))
     write_field(found.field, tmp_path / "b.ply")
     ground.write_ground(found.grid, tmp_path / "b.exr")
     for kind in ("ply", "exr"):

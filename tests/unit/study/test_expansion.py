@@ -42,8 +42,8 @@ def test_the_energy_never_rises_and_is_that_of_the_labels(seed, count):
     start = np.random.default_rng(seed).integers(0, count, (6, 7)).astype(np.uint8)
     found = expansion.expand_labels(start, patches, terms)
     assert (np.diff(found.energies) < 0).all()
-    for labels, told in ((start, found.energies[0]), (found.labels, found.energies[-1])):
-        assert told == pytest.approx(cost(terms, labels, patches.rows, patches.columns), abs=71 * HALF)
+    for labels, record in ((start, found.energies[0]), (found.labels, found.energies[-1])):
+        assert record == pytest.approx(cost(terms, labels, patches.rows, patches.columns), abs=71 * HALF)
     assert 0 <= found.broken <= found.tested
     np.testing.assert_array_equal(found.labels[0], start[0])  # where nothing else is allowed
     again = expansion.expand_labels(found.labels, patches, terms)
@@ -132,10 +132,10 @@ def test_expansion_starts_at_the_exact_cuts_and_never_costs_more(tile_sets_cut):
     exact, moved = tile_sets_cut
     assert exact.report.places == moved.report.places
     assert exact.report.tile_energy == moved.report.tile_energy
-    for told in moved.report.more["expansion"]:
-        assert told["after"] <= told["before"] and 0 <= told["triangles_broken"] <= told["triangles_tested"]
-        assert (told["moves"] > 0) == (told["after"] < told["before"])
-    assert any(told["moves"] for told in moved.report.more["expansion"])
+    for record in moved.report.more["expansion"]:
+        assert record["after"] <= record["before"] and 0 <= record["triangles_broken"] <= record["triangles_tested"]
+        assert (record["moves"] > 0) == (record["after"] < record["before"])
+    assert any(record["moves"] for record in moved.report.more["expansion"])
     block = 4
     np.testing.assert_array_equal(exact.labels[:, :block], moved.labels[:, :block])
     np.testing.assert_array_equal(exact.labels[:, :, -block:], moved.labels[:, :, -block:])

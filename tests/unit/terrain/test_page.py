@@ -30,7 +30,7 @@ def bundle(tmp_path):
     return folder
 
 
-def rewrite(folder, chunk, version=2):
+def rewrite(folder, chunk, version=3):
     manifest = {"format": "davgswt", "version": version, "tiles": [{"tile": 0, "chunks": [chunk]}]}
     (folder / "davgswt.json").write_text(json.dumps(manifest))
 
@@ -70,7 +70,7 @@ def test_a_failure_in_the_middle_leaves_the_old_page_and_nothing_half_made(tmp_p
     def full(source, target):
         raise OSError(28, "No space left on device", str(target))
 
-    monkeypatch.setattr(page, "_copy", full)
+    monkeypatch.setattr(page, "_copy_file", full)
     with pytest.raises(OSError, match="No space left"):
         write_page(bundle, viewer, out)
     assert names(tmp_path) == before
@@ -97,7 +97,7 @@ def test_an_unsound_chunk_is_refused_by_name(tmp_path, viewer, bundle, chunk, me
 
 def test_another_version_is_refused(tmp_path, viewer, bundle):
     rewrite(bundle, {"file": "chunks/a.bin", "bytes": 4}, version=1)
-    with pytest.raises(InputError, match=r"davgswt\.json: not a bundle of format 'davgswt', version 2"):
+    with pytest.raises(InputError, match=r"davgswt\.json: not a bundle of format 'davgswt', version 3"):
         write_page(bundle, viewer, tmp_path / "page")
 
 

@@ -1,5 +1,6 @@
 """Tiles as Gaussians: no holes, no doubles, no seam at a border, equal heights."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -129,12 +130,14 @@ def test_variants_are_other_centres_in_the_same_frames(made_up):
     assert (two.shifts[:16, CENTRE] != two.shifts[16:, CENTRE]).any(1).all()
 
 
-def test_doubtful_ground_is_not_shown_where_sure_ground_serves(made_up):
-    doubt = np.zeros((96, 96))
-    doubt[:, :30] = 1
+def test_uncertain_ground_is_not_used_where_certain_ground_is_available(made_up):
+    uncertainty = np.zeros((96, 96))
+    uncertainty[:, :30] = 1
     options = build.TilingOptions(share=0.5, strip=0.17, candidates=400, tries=1)
-    found = build.cut_tiles(made_up.levels, made_up.exemplar, made_up.colour, doubt, options, np.random.default_rng(2))
-    # a patch may be up to SURE more doubtful than the surest one, which is not at all
+    found = build.cut_tiles(
+        made_up.levels, made_up.exemplar, made_up.colour, uncertainty, options, np.random.default_rng(2)
+    )
+    # a patch may be up to UNCERTAINTY_MARGIN more uncertain than the least uncertain one, which is 0
     assert found.uncertainty.max() < 0.1
 
 
@@ -154,6 +157,17 @@ def test_a_set_with_a_missing_tile_names_it(tiles, tmp_path):
     store.write_tiles(tiles, tmp_path / "tiles", tmp_path / "seams.json", {})
     (tmp_path / "tiles" / "lod1_tile_07.ply").unlink()
     with pytest.raises(InputError, match="lod1_tile_07.ply"):
+        store.read_tiles(tmp_path / "tiles", tmp_path / "seams.json")
+
+
+@pytest.mark.parametrize(
+    "changes", [{"levels": "x"}, {"levels": -1}, {"tiles": 1.5}, {"side": None}, {"side": -1}, {"seams": []}]
+)
+def test_a_table_that_is_none_is_refused_by_name(tiles, tmp_path, changes):
+    store.write_tiles(tiles, tmp_path / "tiles", tmp_path / "seams.json", {})
+    values = json.loads((tmp_path / "seams.json").read_text())
+    (tmp_path / "seams.json").write_text(json.dumps(values | changes))
+    with pytest.raises(InputError, match="seams.json: not the table of a tile set"):
         store.read_tiles(tmp_path / "tiles", tmp_path / "seams.json")
 
 

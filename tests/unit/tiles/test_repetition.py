@@ -36,7 +36,7 @@ def test_charges_sum_to_the_power_of_what_comes_back_but_for_the_patches_own():
     shown = repetition.start_overlay(exemplar(), 16, (16, 16))
     places, total = np.array([[0, 0], [8, 4], [20, 24]]), 0.0
     for place in places:
-        total += shown.cost_of(place[None])[0]
+        total += shown.compute_costs(place[None])[0]
         shown = shown.with_patch(place)
     tiles = [shown.ground[y : y + 16, x : x + 16] for x, y in places]
     assert total == pytest.approx(power(np.sum(tiles, 0)) - sum(own(tile) for tile in tiles))
@@ -47,7 +47,7 @@ def test_only_what_shows_counts():
     x, y = place = np.array([8, 4])
     tile = np.zeros((16, 16, 3))  # what does not show adds nothing to a row's mean
     tile[:6, :8] = shown.ground[y + 3 : y + 9, x + 4 : x + 12]
-    assert shown.cost_of(place[None])[0] == pytest.approx((power(tile) - own(tile)) * 16 * 16 / (6 * 8))
+    assert shown.compute_costs(place[None])[0] == pytest.approx((power(tile) - own(tile)) * 16 * 16 / (6 * 8))
 
 
 @pytest.mark.parametrize("upright", [True, False])
@@ -57,7 +57,7 @@ def test_what_adds_up_to_a_line_is_dearer_than_the_same_strewn_about(rng, uprigh
     dots[:, 2] = 1
     dots[np.arange(64), 12 + rng.integers(0, 8, 64)] = 1
     shown = repetition.start_overlay(colour, 64, (8, 64) if upright else (64, 8))
-    line, strewn = shown.cost_of(np.array([[0, 0], [12, 0]]) if upright else np.array([[0, 0], [0, 12]]))
+    line, strewn = shown.compute_costs(np.array([[0, 0], [12, 0]]) if upright else np.array([[0, 0], [0, 12]]))
     assert line > 1.3 * strewn > 0
 
 
@@ -66,14 +66,14 @@ def test_the_same_landmark_at_the_same_place_is_dearer_than_at_another():
     colour = np.full((60, 60, 3), 0.5)
     colour[30:34, 30:34] = 0
     shown = repetition.start_overlay(colour, 20, (20, 20)).with_patch(np.array([22, 22]))
-    there, beside, none = shown.cost_of(np.array([[22, 22], [14, 26], [0, 0]]))
+    there, beside, none = shown.compute_costs(np.array([[22, 22], [14, 26], [0, 0]]))
     assert there > 2 * beside > 2 * none
 
 
 @pytest.mark.parametrize("value", [0.0, 0.3])
 def test_ground_of_one_colour_costs_nothing(value):
     shown = repetition.start_overlay(np.full((30, 30, 3), value), 16, (16, 16))
-    assert shown.cost_of(np.array([[0, 0], [3, 3]])).tolist() == pytest.approx([0, 0], abs=1e-12)
+    assert shown.compute_costs(np.array([[0, 0], [3, 3]])).tolist() == pytest.approx([0, 0], abs=1e-12)
 
 
 def test_large_tiles_are_sampled_more_coarsely():
@@ -84,7 +84,7 @@ def test_large_tiles_are_sampled_more_coarsely():
 def test_pairs_are_charged_what_both_bring_back_but_for_their_own():
     empty = repetition.start_overlay(exemplar(), 16, (16, 16))
     places = np.array([[0, 0], [8, 4], [20, 24]])
-    charges = empty.pair_costs(places)
+    charges = empty.compute_pair_costs(places)
     for i, j in np.ndindex(charges.shape):
         tiles = [empty.crop(places[k]) for k in (i, j)]
         assert charges[i, j] == pytest.approx(power(sum(tiles)) - sum(own(tile) for tile in tiles))
@@ -94,7 +94,7 @@ def test_what_lies_over_a_patch_shows_in_its_place():
     over = np.zeros((16, 8), bool)
     over[:3] = over[-2:] = True
     rows, columns = (v + k for v, k in zip(np.mgrid[:16, :8], (20, 30), strict=True))
-    shown = repetition.start_overlay(exemplar(), 16, (8, 16), fast=(over, (rows, columns)))
+    shown = repetition.start_overlay(exemplar(), 16, (8, 16), cover=(over, (rows, columns)))
     crop = shown.crop(np.array([4, 6]))
     np.testing.assert_array_equal(crop[over], shown.ground[20:36, 30:38][over])
     np.testing.assert_array_equal(crop[~over], shown.ground[6:22, 4:12][~over])
@@ -106,7 +106,7 @@ def test_of_two_strips_one_makes_good_what_the_other_lacks():
     colour[:, :20], colour[:, 20:40] = 0.7, 0.3
     shown = repetition.start_overlay(colour, 20, (8, 20))
     light, dark, other = np.array([[4, 0], [28, 0], [10, 0]])
-    charges = shown.pair_costs(np.stack([light, dark, other]))
+    charges = shown.compute_pair_costs(np.stack([light, dark, other]))
     assert charges[0, 1] < 0 < charges[0, 2]
     pairs = patches.rank_pairs(np.stack([light, dark, other]), np.zeros(3), charges, (8, 20), [])
     assert pairs[0].tolist() == [light.tolist(), dark.tolist()]

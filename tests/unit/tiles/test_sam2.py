@@ -53,10 +53,10 @@ def copy(folder, tmp_path):
 @pytest.fixture
 def lenient(monkeypatch):
     """What learned nothing is sure of nothing: any answer counts, and a few points are enough."""
-    monkeypatch.setattr(sam2, "SURE", -np.inf)
-    monkeypatch.setattr(sam2, "STABLE", -np.inf)
-    monkeypatch.setattr(sam2, "POINTS", 4)
-    monkeypatch.setattr(sam2, "AT_ONCE", 5)
+    monkeypatch.setattr(sam2, "MIN_PREDICTED_IOU", -np.inf)
+    monkeypatch.setattr(sam2, "MIN_STABILITY", -np.inf)
+    monkeypatch.setattr(sam2, "GRID_POINTS", 4)
+    monkeypatch.setattr(sam2, "BATCH", 5)
 
 
 @pytest.fixture
@@ -70,10 +70,10 @@ def picture():
 def test_masks_lie_on_the_exemplars_cells_and_are_not_alike(folder, picture, lenient):
     found = sam2.predict_masks(sam2.load_model(folder), picture)
     assert found and all(mask.shape == (40, 40) and mask.dtype == bool for mask in found)
-    assert all(mask.sum() >= sam2.LEAST for mask in found)
+    assert all(mask.sum() >= sam2.MIN_CELLS for mask in found)
     for i, one in enumerate(found):
         for other in found[:i]:
-            assert (one & other).sum() / (one | other).sum() < sam2.ALIKE + 0.05  # compared on another grid
+            assert (one & other).sum() / (one | other).sum() < sam2.MAX_IOU + 0.05  # compared on another grid
 
 
 def test_what_learned_nothing_is_sure_of_nothing(folder, picture):
@@ -83,7 +83,7 @@ def test_what_learned_nothing_is_sure_of_nothing(folder, picture):
 def test_with_masks_the_semantics_are_of_them_and_of_superpixels_between(folder, picture, lenient):
     first, again = (semantics.make_semantic_layer(picture, semantics.SemanticSource(sam2=folder)) for _ in range(2))
     plain = semantics.make_semantic_layer(picture, semantics.SemanticSource())
-    assert first.said["segments"] == "sam2 and slic" and first.said["masks"] > 0
+    assert first.description["segments"] == "sam2 and slic" and first.description["masks"] > 0
     assert (first.segments != plain.segments).any()
     np.testing.assert_array_equal(first.distance, again.distance)
 
@@ -91,8 +91,8 @@ def test_with_masks_the_semantics_are_of_them_and_of_superpixels_between(folder,
 def test_of_masks_alike_the_surest_stays():
     whole, part, other = np.ones((16, 16), bool), np.ones((16, 16), bool), np.zeros((16, 16), bool)
     part[0], other[:4] = False, True
-    assert sam2._apart([part, other, whole], np.array([0.9, 0.8, 0.95])) == [2, 1]
-    assert sam2._apart([part, whole], np.array([0.9, 0.9])) == [0]
+    assert sam2.suppress_overlaps([part, other, whole], np.array([0.9, 0.8, 0.95])) == [2, 1]
+    assert sam2.suppress_overlaps([part, whole], np.array([0.9, 0.9])) == [0]
 
 
 def test_stability_is_the_overlap_at_two_thresholds():

@@ -103,7 +103,7 @@ def test_gamma_1_ignores_semantics_and_gamma_0_ignores_colour(seed):
         assert (found != another).any()
 
 
-def test_colour_alone_is_gamma_1_whatever_is_doubted():
+def test_energy_colour_is_gamma_1_whatever_the_uncertainty():
     colour = energy.SeamEnergy("colour", 2.0, made_up(1).colours, None)
     assert colour.gamma(0.9) == 1 and colour.terms(1.0) == [(1.0, colour.colours)]
 

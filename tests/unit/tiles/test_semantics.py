@@ -114,8 +114,8 @@ def test_the_same_bytes_on_any_number_of_threads(stones, weights):
 def test_without_weights_it_says_that_colours_and_superpixels_are_all(stones, caplog):
     with caplog.at_level(logging.INFO):
         found = semantics.make_semantic_layer(stones, SemanticSource())
-    assert "not at hand" in caplog.text
-    assert found.said == {"alexnet": False, "segments": "slic", "count": len(found.distance)}
+    assert "set it to `installed`" in caplog.text
+    assert found.description == {"alexnet": False, "segments": "slic", "count": len(found.distance)}
 
 
 def test_superpixels_have_about_the_size_asked_and_never_too_many(stones):

@@ -10,13 +10,15 @@ from dav_gswt.errors import InputError
 from dav_gswt.tiles import build, energy, layout
 from dav_gswt.tiles.layout import CENTRE
 
-NO_DOUBT = np.zeros((96, 96))
+CERTAIN = np.zeros((96, 96))
 FEW = build.TilingOptions(share=0.5, strip=0.17, candidates=20, tries=1)
 
 
-def cut(made_up, kind, colour=None, doubt=NO_DOUBT, options=FEW, levels=None):
+def cut(made_up, kind, colour=None, uncertainty=CERTAIN, options=FEW, levels=None):
     colour, rng = made_up.colour if colour is None else colour, np.random.default_rng(2)
-    return build.cut_tiles(levels or made_up.levels, made_up.exemplar, colour, doubt, replace(options, kind=kind), rng)
+    return build.cut_tiles(
+        levels or made_up.levels, made_up.exemplar, colour, uncertainty, replace(options, kind=kind), rng
+    )
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +33,7 @@ def test_every_way_says_what_it_used(every):
         assert ("semantics" in told["scales"]) == ("semantics" in told) == (kind != "colour")
         assert len(found.report.tile_energy) == len(found.report.tile_gamma) == 16
         assert told["standing"] == energy.OCCLUDER_WEIGHT
-        gamma = {"colour": 1.0, "semantic-nogamma": 0.5}.get(kind, 0.7310585786)  # of no doubt: 1 / (1 + exp(-1))
+        gamma = {"colour": 1.0, "semantic-nogamma": 0.5}.get(kind, 0.7310585786)  # of no uncertainty: 1 / (1 + exp(-1))
         assert found.report.tile_gamma + found.report.strip_gamma == pytest.approx([gamma] * 20)
 
 
@@ -51,10 +53,10 @@ def test_without_a_cut_seams_are_straight_and_in_the_middle_of_the_overlap(every
         np.testing.assert_array_equal(labels == CENTRE, inner)
 
 
-def test_what_is_doubted_is_cut_by_semantics_more_than_by_colour(made_up):
-    doubted = cut(made_up, "semantic", doubt=np.full((96, 96), 0.75)).report
-    assert doubted.tile_gamma == pytest.approx([1 / (1 + np.exp(0.5))] * 16)
-    steep = cut(made_up, "semantic", doubt=np.full((96, 96), 0.75), options=replace(FEW, slope=8.0)).report
+def test_uncertain_ground_is_cut_by_semantics_more_than_by_colour(made_up):
+    uncertain = cut(made_up, "semantic", uncertainty=np.full((96, 96), 0.75)).report
+    assert uncertain.tile_gamma == pytest.approx([1 / (1 + np.exp(0.5))] * 16)
+    steep = cut(made_up, "semantic", uncertainty=np.full((96, 96), 0.75), options=replace(FEW, slope=8.0)).report
     assert steep.tile_gamma == pytest.approx([1 / (1 + np.exp(2))] * 16)
 
 
@@ -75,42 +77,44 @@ def test_tiles_go_around_holes_where_they_can(made_up, kind, caplog):
     with caplog.at_level(logging.WARNING):
         found = cut(made_up, kind, colour=colour, options=options)
     assert "700 of 9216 cells of the exemplar are holes" in caplog.text
-    # a patch may be up to 0.05 more doubtful than the surest one
+    # a patch may be up to 0.05 more uncertain than the surest one
     assert found.uncertainty.max() < 0.1
     assert all(np.isfinite(field.sh).all() for level in found.fields for field in level)
 
 
-def test_unknown_uncertainty_is_doubt(made_up):
-    doubt = np.zeros((96, 96))
-    doubt[:, :30] = np.nan
-    assert cut(made_up, "semantic", doubt=doubt, options=replace(FEW, candidates=400)).uncertainty.max() < 0.1
+def test_unknown_uncertainty_counts_as_1(made_up):
+    uncertainty = np.zeros((96, 96))
+    uncertainty[:, :30] = np.nan
+    assert (
+        cut(made_up, "semantic", uncertainty=uncertainty, options=replace(FEW, candidates=400)).uncertainty.max() < 0.1
+    )
 
 
 @pytest.mark.parametrize(
-    "colour, doubt",
+    "colour, uncertainty",
     [
-        pytest.param(np.full((96, 96, 3), np.nan), NO_DOUBT, id="holes only"),
+        pytest.param(np.full((96, 96, 3), np.nan), CERTAIN, id="holes only"),
         pytest.param(None, np.ones((96, 96)), id="all of it masked"),
         pytest.param(None, np.full((96, 96), np.nan), id="nothing known"),
     ],
 )
-def test_an_exemplar_of_which_nothing_is_known_is_refused(made_up, colour, doubt):
+def test_an_exemplar_without_any_known_ground_is_refused(made_up, colour, uncertainty):
     with pytest.raises(InputError, match="nothing is known of the exemplar.*masks"):
-        cut(made_up, "semantic", colour=colour, doubt=doubt)
+        cut(made_up, "semantic", colour=colour, uncertainty=uncertainty)
 
 
-def test_ground_in_doubt_that_cannot_be_avoided_is_said(made_up, caplog):
-    doubt = np.ones((96, 96))
-    doubt[40:50, 40:50] = 0
+def test_uncertain_ground_that_cannot_be_avoided_is_logged(made_up, caplog):
+    uncertainty = np.ones((96, 96))
+    uncertainty[40:50, 40:50] = 0
     with caplog.at_level(logging.WARNING):
-        cut(made_up, "semantic", doubt=doubt)
+        cut(made_up, "semantic", uncertainty=uncertainty)
     assert "a smaller `tile`" in caplog.text
 
 
 def test_a_finest_level_from_elsewhere_is_refused(made_up):
     levels = [replace(f, means=f.means + np.float32(1000)) for f in made_up.levels]
     with pytest.raises(InputError, match=r"level 0.*ground\.json"):
-        build.cut_tiles(levels, made_up.exemplar, made_up.colour, NO_DOUBT, FEW, np.random.default_rng(0))
+        build.cut_tiles(levels, made_up.exemplar, made_up.colour, CERTAIN, FEW, np.random.default_rng(0))
 
 
 def test_options_are_those_of_the_configs_entry():
@@ -122,3 +126,8 @@ def test_options_are_those_of_the_configs_entry():
         {key: seam[key] for key in ("tile", "strip", "candidates", "variants")}, FEW.source
     )
     assert (older.kind, older.slope) == ("semantic", 2.0)
+
+
+def test_an_energy_that_is_not_the_products_is_an_error():
+    with pytest.raises(ValueError, match="'expansion' is no energy of seams: none, colour, semantic, semantic-nogamma"):
+        build.TilingOptions.from_config({"energy": "expansion"}, FEW.source)

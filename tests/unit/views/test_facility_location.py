@@ -65,13 +65,13 @@ def test_the_order_of_candidates_does_not_matter():
     assert one == [int(order[i]) for i in two]
 
 
-def test_doubt_draws_photos_and_a_photo_nearby_spares_one():
+def test_uncertain_candidates_are_chosen_unless_a_photo_is_nearby():
     at = np.array([[2.0, 0, 0], [1.9, 0.3, 0.0], [-2.0, 0, 0], [0, 2.0, 0]])
     assert facility_location.select_facilities(at, np.zeros((0, 3)), np.array([0.1, 0.1, 1, 0.1]), 1) == [2]
     assert facility_location.select_facilities(at, at[2:3], np.array([0.3, 0.3, 1, 0.1]), 1)[0] in (0, 1)
 
 
-def test_where_nothing_is_doubted_choices_go_by_index():
+def test_without_uncertainty_candidates_are_chosen_by_index():
     assert facility_location.select_facilities(places(5), np.zeros((0, 3)), np.zeros(5), 3) == [0, 1, 2]
 
 

@@ -83,7 +83,7 @@ def test_the_distance_to_the_ground_is_not_the_height_over_it():
     wall = replace(ground(), heights=np.tile(np.maximum(x, 0), (CELLS, 1)))
     site = feasibility._build_mesh(wall)
     place = np.array([[1.0, 0.0, 1.3]])
-    assert 2 * feasibility._distance(site, site.local(place))[0] == pytest.approx(0.3 / 2**0.5, rel=1e-6)
+    assert 2 * feasibility._measure_distance(site, site.local(place))[0] == pytest.approx(0.3 / 2**0.5, rel=1e-6)
 
 
 @pytest.mark.parametrize("shift", [(1e6, -1e6, 0.0), (0.0, 0.0, 1e6)])
@@ -100,7 +100,7 @@ def test_the_world_may_have_any_unit(scale):
     assert (
         found["behind the ridge"]
         == verdicts()["behind the ridge"]
-        == "hidden: 27 of 81 points of the exemplar are in sight"
+        == "hidden: 27 of 81 points of the exemplar are visible"
     )
     low = {"min_height": 2.1 * scale}
     assert kinds(verdicts(scale=scale, limits=low)) == kinds(verdicts(limits={"min_height": 2.1}))

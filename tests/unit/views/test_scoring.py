@@ -1,4 +1,4 @@
-"""Scores of poses over a made-up ground, with a prior whose doubt is known."""
+"""Scores of poses over a small ground, with a prior whose samples disagree by a known amount."""
 
 from dataclasses import replace
 
@@ -22,10 +22,10 @@ from dav_gswt.views.uncertainty.backprojection import backproject_maps
 MIDDLE = [1.6, 1.6, 0.0]
 
 
-class Doubting:
+class KnownDisagreement:
     """Samples that disagree where the render is blue, and by how much; pictures are the latents themselves."""
 
-    name, size = "doubting", 32
+    name, size = "known disagreement", 32
 
     def sample(self, condition, m, p_drop, steps, seed, common=True):
         blue = condition.colour[..., 2]
@@ -55,46 +55,46 @@ def scored(prior=None, **more):
     return scoring.score_poses(patch.field(), patch.grid(), pool(), patch.photos(), patch.FRAME, prior, **more)
 
 
-def test_without_a_prior_there_are_geometric_terms_alone():
+def test_without_a_prior_only_geometric_terms_are_computed():
     found = scored()
     assert set(found.scores.terms) == {"opacity", "fisher"} and found.maps.w2_sq is None
     assert np.array_equal(found.gaussians, patch.field().uncertainty) and not found.scores.steps.any()
     assert (found.scores.terms["fisher"] > 0).all() and found.frozen.pixels is None
 
 
-def test_a_prior_adds_what_its_samples_disagree_about():
-    still, doubting = (scored(PriorConfig(Doubting(), 2, 4, p)) for p in (0.0, 0.2))
+def test_w2_is_the_disagreement_of_the_samples_and_0_without_dropout():
+    still, dropped = (scored(PriorConfig(KnownDisagreement(), 2, 4, p)) for p in (0.0, 0.2))
     assert not still.scores.terms["w2_sq"].any() and still.scores.scales.by_term["w2_sq"] == 0
     # two samples at +-d in four channels: 2 var(ddof=1) summed is 4 (2 d)^2, and d is .2 of a blue of about .4
-    np.testing.assert_allclose(doubting.scores.terms["w2_sq"][0], 4 * (2 * 0.2 * 0.4) ** 2, rtol=0.2)
-    assert doubting.maps.w2_sq.shape == (3, 32, 32) and (doubting.scores.steps == 4).all()
-    assert "lpips" not in doubting.scores.terms
+    np.testing.assert_allclose(dropped.scores.terms["w2_sq"][0], 4 * (2 * 0.2 * 0.4) ** 2, rtol=0.2)
+    assert dropped.maps.w2_sq.shape == (3, 32, 32) and (dropped.scores.steps == 4).all()
+    assert "lpips" not in dropped.scores.terms
 
 
-def test_a_latents_own_width_counts_where_it_is_asked_for():
+def test_posterior_adds_the_variances_of_the_latents_to_w2():
     """Here all are equally wide (0), so it changes nothing; a prior whose samples differ in width disagrees more."""
 
-    class Uneven(Doubting):
+    class Uneven(KnownDisagreement):
         def estimate_variances(self, latents):
             return np.arange(latents.shape[1], dtype=np.float32)[None, :, None, None, None] + np.zeros_like(latents)
 
     point, posterior = (
-        scored(PriorConfig(Doubting(), 2, 4, 0.2, posterior=p)).scores.terms["w2_sq"] for p in (False, True)
+        scored(PriorConfig(KnownDisagreement(), 2, 4, 0.2, posterior=p)).scores.terms["w2_sq"] for p in (False, True)
     )
     assert np.array_equal(point, posterior)
     wider = scored(PriorConfig(Uneven(), 2, 4, 0.2, posterior=True)).scores.terms["w2_sq"]
     np.testing.assert_allclose(wider - point, 4.0, rtol=1e-5)  # deviations 0 and 1, in four channels
 
 
-def test_the_residual_is_how_far_the_mean_of_the_samples_lies_from_the_render():
+def test_residual_is_the_distance_of_the_samples_mean_from_the_render():
     """Samples to either side of nothing: their mean stays, whatever they differ by."""
-    little, much = (scored(PriorConfig(Doubting(), 2, 4, p)).scores.terms["residual"] for p in (0.1, 0.4))
+    little, much = (scored(PriorConfig(KnownDisagreement(), 2, 4, p)).scores.terms["residual"] for p in (0.1, 0.4))
     np.testing.assert_allclose(little, much, rtol=1e-6)
     np.testing.assert_allclose(little[0], 4 * (0.5 * 0.4) ** 2, rtol=0.2)
 
 
-def test_samples_may_start_from_noises_of_their_own():
-    class Noisy(Doubting):
+def test_independent_noise_makes_samples_disagree_without_dropout():
+    class Noisy(KnownDisagreement):
         def sample(self, condition, m, p_drop, steps, seed, common=True):
             return super().sample(condition, m, 0.0 if common else 0.3, steps, seed)
 
@@ -106,11 +106,11 @@ def test_samples_may_start_from_noises_of_their_own():
 
 def test_later_rounds_keep_the_scales_of_the_first():
     first = FrozenScales(Scales(dict.fromkeys(scores.TERMS, 7.0)), Quantiles(0.0, 1.0))
-    assert scored(PriorConfig(Doubting(), 2, 4, 0.2), frozen=first).scores.scales == first.scales
+    assert scored(PriorConfig(KnownDisagreement(), 2, 4, 0.2), frozen=first).scores.scales == first.scales
 
 
-def test_a_gaussian_gets_the_doubt_of_the_pixels_it_is_in():
-    """A map that is 1 in the picture's left half alone: what lies there is in doubt, what lies right is not."""
+def test_a_gaussian_gets_the_uncertainty_of_the_pixels_that_it_covers():
+    """With a map that is 1 in the picture's left half only, Gaussians on the left are uncertain, others are not."""
     field, (_, camera) = patch.field(), pool()[0]
     half = np.zeros((16, 16), np.float32)
     half[:, :8] = 1
@@ -122,18 +122,18 @@ def test_a_gaussian_gets_the_doubt_of_the_pixels_it_is_in():
     np.testing.assert_allclose(one[drawn], 0.25, rtol=1e-5)
 
 
-def test_what_no_camera_sees_keeps_its_geometric_doubt():
+def test_gaussians_that_no_candidate_sees_keep_their_geometric_uncertainty():
     field = replace(patch.field(), uncertainty=np.full(len(patch.field()), 0.3, np.float32))
     tele = cameras.pinhole([0.3, 0.3, 5.0], [0.3, 0.3, 0.0], 40, 40, 4.0)
     one = [(pose_of_camera("p0", tele, patch.FRAME), tele)]
     found = scoring.score_poses(
-        field, patch.grid(), one, patch.photos(), patch.FRAME, PriorConfig(Doubting(), 2, 4, 0.2)
+        field, patch.grid(), one, patch.photos(), patch.FRAME, PriorConfig(KnownDisagreement(), 2, 4, 0.2)
     )
     far = np.linalg.norm(field.means[:, :2] - 0.3, axis=1) > 1
     assert (found.gaussians[far] == np.float32(0.3)).all() and (found.gaussians[~far] != np.float32(0.3)).any()
 
 
-def test_fisher_gain_is_the_squared_blend_weights_over_what_is_known():
+def test_fisher_gain_is_the_squared_blend_weights_over_the_information_so_far():
     field, raster, camera = patch.field(), Rasterizer(), pool()[0][1]
     raster.forward(field.means, field.log_scales, field.quats, field.opacity_logits, field.sh, camera)
     seen = raster.contributions()
@@ -146,7 +146,7 @@ def test_fisher_gain_is_the_squared_blend_weights_over_what_is_known():
     assert fisher.information_gain(seen, once) < fisher.information_gain(seen, none)
 
 
-def test_gathered_information_lowers_the_gain_of_what_overlaps_it():
+def test_a_chosen_photo_lowers_the_gain_of_photos_that_overlap_it():
     field, cameras_ = patch.field(), [scoring.scoring_camera(camera) for _, camera in pool()]
     gathered = fisher.FisherInformation(field, [], cameras_)
     before = [gathered.gain(i) for i in range(3)]
@@ -173,9 +173,9 @@ def test_a_prior_sees_the_middle_square_and_the_nearest_photo():
     )  # smaller photos are enlarged
     known = conditions.prepare_photos(photos, patch.FRAME, 24)
     near = photos[1].camera.centre + [0, 0, 0.1]
-    told = conditions.build_condition(patch.field(), pool(near), known, 6.0, 24)
-    assert np.array_equal(told.photo[0], known.photos[1])
-    assert told.relative[0] == pytest.approx([0, 0, 1, 0], abs=0.05) and told.colour.shape == (1, 24, 24, 3)
+    condition = conditions.build_condition(patch.field(), pool(near), known, 6.0, 24)
+    assert np.array_equal(condition.photo[0], known.photos[1])
+    assert condition.relative[0] == pytest.approx([0, 0, 1, 0], abs=0.05) and condition.colour.shape == (1, 24, 24, 3)
     assert square.width == 40
 
 
@@ -184,7 +184,7 @@ def test_a_prior_sees_the_middle_square_and_the_nearest_photo():
     [([1.6, 1.6, -0.5], "p0: below the ground"), ([1.6, 1.6, 2.0], "p0: inside an object")],
     ids=["under", "inside"],
 )
-def test_a_pose_that_no_photo_comes_from_is_named(eye, said):
+def test_a_pose_below_the_ground_or_inside_an_object_is_an_error_that_names_it(eye, said):
     block = replace(
         patch.field()[:1],
         means=np.float32([[1.6, 1.6, 2.0]]),
@@ -197,14 +197,14 @@ def test_a_pose_that_no_photo_comes_from_is_named(eye, said):
     collision.require_free_positions(pool(), block, patch.grid())
 
 
-def test_maps_come_back_and_are_shown_with_their_pose(tmp_path):
-    found = scored(PriorConfig(Doubting(), 2, 4, 0.2))
+def test_maps_are_read_as_written_and_stand_in_an_exr_with_their_poses(tmp_path):
+    found = scored(PriorConfig(KnownDisagreement(), 2, 4, 0.2))
     pose_maps.write_pose_maps(tmp_path / "maps.npz", found.maps, found.gaussians)
     back, gaussians = pose_maps.read_pose_maps(tmp_path / "maps.npz")
     assert back.names == ["p0", "p1", "p2"] and np.array_equal(gaussians, found.gaussians)
     assert np.array_equal(back.w2_sq, found.maps.w2_sq)
     np.testing.assert_allclose(back.opacity, found.maps.opacity, atol=1e-3)
-    image_files.write_exr_parts(tmp_path / "u.exr", scoring.exr_parts(found, patch.field(), patch.grid()))
+    image_files.write_exr_parts(tmp_path / "u.exr", scoring.make_exr_parts(found, patch.field(), patch.grid()))
     read = image_files.read_exr_parts(tmp_path / "u.exr")
     assert set(read) == {"above", "p0", "p1", "p2"}
     channels, header = read["p1"]
@@ -212,20 +212,20 @@ def test_maps_come_back_and_are_shown_with_their_pose(tmp_path):
     assert float(header["w2_sq"]) == found.scores.terms["w2_sq"][1] and float(header["radius"]) == pool()[1][0].radius
 
 
-def test_a_wide_pictures_map_knows_its_middle_square_alone():
+def test_the_prior_map_of_a_wide_picture_is_nan_outside_its_middle_square():
     found = pose_maps.PoseMaps(["p0"], np.zeros((1, 64, 96), np.float32), np.ones((1, 16, 16), np.float32))
     table = scores.Scores([pool()[0][0]], {"w2_sq": np.ones(1)}, Scales({"w2_sq": 1.0}), np.ones(1, int))
     shown = found.exr_part(table, "p0")[0]["w2_sq"]
     assert (shown[:, 16:80] == 1).all() and np.isnan(shown[:, :16]).all() and np.isnan(shown[:, 80:]).all()
 
 
-def test_maps_of_something_else_are_refused(tmp_path):
+def test_a_file_without_maps_is_refused(tmp_path):
     (tmp_path / "maps.npz").write_bytes(b"PK nothing of the kind")
     with pytest.raises(InputError, match="maps.npz: not readable as maps"):
         pose_maps.read_pose_maps(tmp_path / "maps.npz")
 
 
-def test_what_is_frozen_comes_back_to_the_bit(tmp_path):
+def test_frozen_scales_are_read_as_written_and_other_files_are_refused(tmp_path):
     first = FrozenScales(Scales({"w2_sq": 1 / 3, "fisher": 0.0}), Quantiles(0.1, 2 / 3))
     frozen_scales.write_frozen_scales(tmp_path / "scores.json", first, {"candidates": 3}, {}, {})
     assert frozen_scales.read_frozen_scales(tmp_path / "scores.json") == first

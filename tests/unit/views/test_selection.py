@@ -8,7 +8,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.poses import Pose, pose_of_camera, pose_offset, select_farthest_poses
 from dav_gswt.views import policies, scores, selection
 from dav_gswt.views.policies import POLICIES, SelectionInput
-from dav_gswt.views.policy_names import POLICY_NAMES
+from dav_gswt.views.policy_names import POLICY_NAMES, POLICY_SPECS, PolicySpec
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.uncertainty import Scales
 
@@ -42,13 +42,13 @@ def chosen(policy, pool, k, captured=((1.0, 0, 0),), seed=0, lam=0.0, informatio
     return [pose.name for pose in selection.select_poses(policy, pool, inputs)]
 
 
-def test_farthest_takes_the_opposite_side_then_the_gaps():
+def test_farthest_chooses_the_opposite_side_then_the_gaps():
     names = chosen("farthest", scored(0, 90, 180, 270, 10), 3)
     assert names[0] == "p2"  # 180 is farthest from 0; then come 90 and 270, equal but for rounding
     assert set(names[1:]) == {"p1", "p3"}
 
 
-def test_equal_distances_go_by_index():
+def test_farthest_breaks_ties_by_index():
     assert chosen("farthest", scored(90, 90), 1) == ["p0"]
 
 
@@ -56,55 +56,55 @@ def test_farthest_does_not_take_a_pose_twice_when_all_coincide():
     assert sorted(chosen("farthest", scored(0, 0, 0), 3, captured=())) == ["p0", "p1", "p2"]
 
 
-def test_opacity_takes_the_most_unknown_and_ties_by_index():
+def test_opacity_chooses_the_highest_scores_and_breaks_ties_by_index():
     assert chosen("opacity", scored(0, 1, 2, 3, opacity=[0.1, 0.5, 0.5, 0.2]), 3) == ["p1", "p2", "p3"]
 
 
-def test_w2_lpips_weighs_lpips_by_lam_and_ties_go_by_index():
+def test_w2_lpips_weights_lpips_by_lam_and_breaks_ties_by_index():
     pool = scored(0, 1, 2, 3, w2_sq=[1.0, 3, 2, 3], lpips=[9.0, 0, 4, 0])
     assert chosen("w2-lpips", pool, 2) == ["p1", "p3"]
     assert chosen("w2-lpips", pool, 2, lam=1e6) == ["p0", "p2"]
 
 
-def test_w2_lpips_says_that_lpips_is_absent_and_needs_a_prior(caplog):
+def test_w2_lpips_warns_without_lpips_and_refuses_scores_without_a_prior(caplog):
     assert chosen("w2-lpips", scored(0, 1, w2_sq=[1.0, 2]), 1, lam=1.0) == ["p1"]
     assert "its term is left out" in caplog.text
     with pytest.raises(InputError, match="w2_sq: the poses were scored without it"):
         chosen("w2-lpips", scored(0, 1), 1)
 
 
-def test_w2_does_without_lpips_and_gradients_stand_in_for_it():
+def test_w2_ignores_lpips_and_grad_lpips_uses_the_gradient_in_place_of_w2():
     pool = scored(0, 1, 2, w2_sq=[1.0, 3, 2], lpips=[9.0, 0, 0], gradient=[1.0, 0, 3])
     assert chosen("w2", pool, 2, lam=1e6) == ["p1", "p2"]
     assert chosen("grad-lpips", pool, 1) == ["p2"] and chosen("grad-lpips", pool, 1, lam=1e6) == ["p0"]
 
 
-def test_the_expected_error_ranks_alone_or_weighs_what_is_to_have_a_photo_near():
+def test_residual_chooses_the_top_k_and_residual_diverse_spreads_them():
     pool = scored(0, 3, 6, 120, 240, residual=[1.0, 1.1, 1.0, 0.5, 0.1])
     assert chosen("residual", pool, 3, captured=()) == ["p1", "p0", "p2"]
     assert chosen("residual-diverse", pool, 2, captured=()) == ["p1", "p3"]
 
 
-def test_doubt_and_diversity_share_the_choice():
-    """The most doubtful are neighbours: one photo tells about all of them."""
+def test_w2_lpips_diverse_weighs_uncertainty_against_spread():
+    """The most uncertain candidates are neighbours: one photo covers all of them."""
     pool = scored(0, 3, 6, 120, 240, w2_sq=[1.0, 1.1, 1.0, 0.5, 0.4], lpips=[0.0] * 5)
     assert chosen("w2-lpips", pool, 3, captured=()) == ["p1", "p0", "p2"]
     assert chosen("w2-lpips-diverse", pool, 3, captured=()) == ["p1", "p3", "p4"]
     assert set(chosen("diverse", pool, 3, captured=())) == set(chosen("w2-lpips-diverse", pool, 3, captured=()))
 
 
-def test_a_photo_taken_where_the_doubt_is_sends_the_next_elsewhere():
+def test_w2_lpips_diverse_avoids_uncertain_poses_near_earlier_photos():
     pool = scored(0, 3, 6, 120, 240, w2_sq=[1.0, 1.1, 1.0, 0.5, 0.4], lpips=[0.0] * 5)
     assert chosen("w2-lpips-diverse", pool, 1, captured=((1.0, 0.05, 0),)) == ["p3"]
 
 
-def test_shuffled_doubt_is_dealt_by_the_generator():
+def test_shuffled_permutes_uncertainty_by_its_generator():
     pool = scored(*range(0, 360, 12), w2_sq=np.linspace(0, 1, 30) ** 4)
     draws = [chosen("shuffled", pool, 3, captured=(), seed=s) for s in (1, 1, 2)]
     assert draws[0] == draws[1] != draws[2] and draws[0] != chosen("w2-lpips-diverse", pool, 3, captured=())
 
 
-def test_a_ring_is_even_and_the_next_one_turned():
+def test_ring_is_evenly_spaced_and_the_next_ring_is_turned():
     found = [
         Pose(f"p{i}", e, float(a), 1.0)
         for i, (e, a) in enumerate((e, a) for e in (45.0, 80.0) for a in range(0, 360, 5))
@@ -116,28 +116,28 @@ def test_a_ring_is_even_and_the_next_one_turned():
     assert np.ptp(np.diff(second)) <= 5 and not set(first) & set(second)
 
 
-def test_fisher_is_greedy_with_update_and_looks_no_more_often_than_it_must():
+def test_fisher_is_greedy_with_updates_and_evaluates_few_gains():
     gains = [5.0, 4.9, 4.8, 1.0, 3.0, *([0.5] * 40)]
     sharing = Sharing(gains)
     assert chosen("fisher", scored(*range(45), fisher=gains), 3, information=sharing) == ["p0", "p2", "p4"]
     assert sharing.looks <= 5  # p0, p1 (fell), p2, p4, not all 45 each time
 
 
-def test_the_oracle_takes_the_worst_of_what_it_knows():
+def test_oracle_chooses_the_largest_known_errors():
     errors = np.array([0.1, np.nan, 0.5, 0.3])
     assert chosen("oracle", scored(0, 1, 2, 3), 2, errors=errors) == ["p2", "p3"]
 
 
-def test_the_diverse_oracle_takes_one_of_two_neighbours_that_are_both_wrong():
+def test_oracle_diverse_chooses_one_of_two_neighbours_of_equal_error():
     errors = np.array([0.5, 0.5, 0.0, 0.3, np.nan])
     near, far, away = Pose("p0", 45.0, 0.0, 1.0), Pose("p3", 45.0, 180.0, 1.0), Pose("p4", 45.0, 90.0, 1.0)
     pool = [near, replace(near, name="p1", azimuth=1.0), replace(near, name="p2", azimuth=90.0), far, away]
-    told = Scores(pool, {"opacity": np.zeros(5)}, Scales({"opacity": 0.0}), np.zeros(5, int))
-    assert chosen("oracle", told, 2, errors=errors) == ["p0", "p1"]
-    assert sorted(chosen("oracle-diverse", told, 2, errors=errors, captured=())) in (["p0", "p3"], ["p1", "p3"])
+    table = Scores(pool, {"opacity": np.zeros(5)}, Scales({"opacity": 0.0}), np.zeros(5, int))
+    assert chosen("oracle", table, 2, errors=errors) == ["p0", "p1"]
+    assert sorted(chosen("oracle-diverse", table, 2, errors=errors, captured=())) in (["p0", "p3"], ["p1", "p3"])
 
 
-def test_all_asks_for_all_whatever_k_is_and_takes_what_a_budget_leaves():
+def test_all_chooses_every_candidate_whatever_k_is_within_the_budget():
     assert selection.poses_per_round("all", 1, 3) == 3 and selection.poses_per_round("farthest", 1, 3) == 1
     assert chosen("all", scored(0, 1, 2), 3) == ["p0", "p1", "p2"]
     assert chosen("all", scored(0, 1, 2), 2) == ["p0", "p1"]
@@ -147,12 +147,25 @@ def test_every_described_policy_has_a_function():
     assert set(POLICIES) == set(POLICY_NAMES)
 
 
+@pytest.mark.parametrize("name", ["", "W2", "w2_lpips", "w2 lpips", "w2/lpips"])
+def test_the_name_of_a_policy_has_small_letters_digits_and_hyphens_only(name):
+    with pytest.raises(ValueError, match="small letters, digits and -"):
+        PolicySpec(name, "nothing")
+
+
+def test_a_policy_says_what_it_reads():
+    reads = {spec.name: spec.describe_inputs() for spec in POLICY_SPECS}
+    assert (reads["farthest"], reads["opacity"], reads["oracle"]) == ("poses", "geometric scores", "true error")
+    assert (reads["fisher"], reads["w2-lpips"]) == ("geometric scores, field", "prior")
+    assert reads["single"] == "prior (not `p_drop`, `lam`)"
+
+
 def test_a_policy_that_is_not_described_cannot_be_registered():
     with pytest.raises(ValueError, match="describe the policy"):
         policies.policy("unknown")
 
 
-def test_random_depends_on_its_generator_alone():
+def test_random_depends_on_its_generator_only():
     pool = scored(*range(20))
     draw = [chosen("random", pool, 5, seed=s) for s in (1, 1, 2)]
     assert draw[0] == draw[1] != draw[2]
@@ -160,7 +173,7 @@ def test_random_depends_on_its_generator_alone():
 
 
 @pytest.mark.parametrize("policy", POLICIES)
-def test_a_pool_that_is_too_small_is_taken_whole_and_said_so(policy, caplog):
+def test_with_fewer_candidates_than_k_all_are_chosen_with_a_warning(policy, caplog):
     terms = dict(w2_sq=[0.0, 1], gradient=[1.0, 2], fisher=[1.0, 2], lpips=[1.0, 1], single=[0.1, 0], residual=[0.1, 0])
     more = dict(information=Sharing([1.0, 2]), errors=np.array([0.5, np.nan]))
     assert sorted(chosen(policy, scored(0, 90, **terms), 5, **more)) == ["p0", "p1"]
@@ -169,25 +182,25 @@ def test_a_pool_that_is_too_small_is_taken_whole_and_said_so(policy, caplog):
     assert "no candidate pose is left" in caplog.text
 
 
-def test_spread_poses_are_far_apart_and_the_first_comes_first():
+def test_farthest_poses_start_with_the_first_candidate():
     assert select_farthest_poses(scored(0, 5, 180, 90).poses, 3) == [0, 2, 3]
     assert select_farthest_poses(scored(0, 0).poses, 5) == [0, 1]
 
 
-def test_a_selection_of_poses_comes_back(tmp_path):
+def test_a_selection_of_poses_is_read_as_written(tmp_path):
     chosen = selection.PoseSelection("farthest", 4, scored(0, 90).poses, None, {"gain": 0.1})
     selection.write_pose_selection(tmp_path / "poses.json", chosen)
     assert selection.read_pose_selection(tmp_path / "poses.json") == chosen
 
 
 @pytest.mark.parametrize("content", ["[]", "{}", '{"policy": "all", "k": 1, "poses": 3}', '{"poses": [{}]}'])
-def test_something_else_is_no_selection_of_poses(tmp_path, content):
+def test_another_file_is_refused_as_a_selection_of_poses(tmp_path, content):
     (tmp_path / "poses.json").write_text(content)
-    with pytest.raises(InputError, match=r"poses\.json: not a selection"):
+    with pytest.raises(InputError, match=r"poses\.json: not as the workflow writes it"):
         selection.read_pose_selection(tmp_path / "poses.json")
 
 
-def test_scores_come_back_to_the_bit(tmp_path):
+def test_scores_are_read_as_written_to_the_bit(tmp_path):
     pool = scored(0.1, 33.3333333333, opacity=[1 / 3, 0.25], w2_sq=[1e-30, 7e20])
     scores.write_scores(tmp_path / "s.csv", pool)
     back = scores.read_scores(tmp_path / "s.csv")
@@ -196,7 +209,7 @@ def test_scores_come_back_to_the_bit(tmp_path):
     assert np.array_equal(back.steps, pool.steps)
 
 
-def test_no_candidate_left_is_a_table_without_rows(tmp_path):
+def test_scores_without_candidates_are_a_table_without_rows(tmp_path):
     scores.write_scores(tmp_path / "s.csv", scored())
     assert len(scores.read_scores(tmp_path / "s.csv")) == 0
 
@@ -210,13 +223,13 @@ def test_scores_that_are_not_finite_name_their_poses(tmp_path):
 @pytest.mark.parametrize(
     ("line", "reason"), [("p0,1,2", "not a table"), ("p0,1,2,x" + "," * 11, "could not convert")], ids=["short", "word"]
 )
-def test_a_table_of_something_else_is_refused(tmp_path, line, reason):
+def test_another_table_is_refused_as_scores(tmp_path, line, reason):
     (tmp_path / "s.csv").write_text(",".join(scores.FIELDS) + "\n" + line + "\n")
     with pytest.raises(InputError, match=reason):
         scores.read_scores(tmp_path / "s.csv")
 
 
-def test_a_pose_is_where_its_camera_is():
+def test_a_pose_has_the_place_of_its_camera():
     from dav_gswt.geometry import cameras
 
     frame = scene_frame(exemplar=(1.0, 2.0, 2.0))
@@ -224,3 +237,8 @@ def test_a_pose_is_where_its_camera_is():
     pose = pose_of_camera("x", camera, frame)
     assert (pose.azimuth, pose.radius) == (pytest.approx(90), pytest.approx(5))
     np.testing.assert_allclose(pose_offset(pose), [0, 3, 4], atol=1e-12)
+
+
+def test_the_outcome_of_a_selection_has_the_reason_to_stop_and_the_expected_gain():
+    ended = selection.PoseSelection("farthest", 2, [], "the gain is too small", {"gain": 0.1})
+    assert ended.describe_outcome() == {"stopped": "the gain is too small", "expected": {"gain": 0.1}}

@@ -81,11 +81,11 @@ def test_a_price_above_what_the_next_photos_are_worth_stops(dearer, stops, caplo
     with caplog.at_level(logging.INFO):
         found = decide_poses({"marginal_gain": dearer * each}, 2, 1, known(12, behind(10.0)))
     assert found.expected.each == pytest.approx(each) and (found.stopped is not None) == stops
-    assert f"the next 2 photos are worth about {total} dB (" in caplog.text
+    assert f"the next 2 photos are expected to gain about {total} dB (" in caplog.text
     expected = json.loads(json.dumps(found.expected_gain(), allow_nan=False))
     assert expected["gain_per_photo"] == pytest.approx(each) and expected["photos"] == 2
     if stops:
-        assert found.stopped.startswith(f"after 12 photos: the next 2 photos are worth about {total} dB")
+        assert found.stopped.startswith(f"after 12 photos: the next 2 photos are expected to gain about {total} dB")
         assert found.stopped.endswith(f"less than {dearer * each:g} (stop.marginal_gain)") and found.poses == 0
 
 

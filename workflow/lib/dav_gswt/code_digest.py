@@ -14,15 +14,17 @@ def digest_code(script: Path) -> str:
 
     Imports inside functions count. The C++ sources count where the rasterizer is imported.
     """
-    modules: set[str] = set()
+    files: dict[str, Path] = {}
     found = list(_imported_modules(script))
     while found:
         module = found.pop()
-        if module not in modules:
-            modules.add(module)
-            found += _imported_modules(_file_of(module))  # only modules with a file are ever found
-    digest = sha256(b"".join(_file_of(module).read_bytes() for module in sorted(modules)))
-    if "dav_gswt.raster" in modules:
+        if module not in files:
+            file = _file_of(module)
+            assert file is not None, f"{module}: only modules with a file are ever found"
+            files[module] = file
+            found += _imported_modules(file)
+    digest = sha256(b"".join(files[module].read_bytes() for module in sorted(files)))
+    if "dav_gswt.raster" in files:
         digest.update(_core_sources())
     return digest.hexdigest()[:12]
 

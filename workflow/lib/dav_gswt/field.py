@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 from plyfile import PlyData, PlyElement, PlyParseError
 
-from dav_gswt.errors import InputError
-from dav_gswt.files import atomic_file
+from dav_gswt.errors import InputError, summarize_error
+from dav_gswt.files import UNREADABLE, atomic_file
 
 SH0 = 0.28209479177387814  # the constant real spherical harmonic, 1 / (2 sqrt(pi))
 HEADER_BYTES = 1 << 16  # a header is no longer than this
@@ -162,8 +162,8 @@ def _vertices(path: Path) -> Array:
         return vertices["vertex"].data
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file") from None
-    except (PlyParseError, ValueError, KeyError, UnicodeDecodeError, OSError) as error:
-        raise InputError(f"{path}: not a readable PLY ({error}); export or copy it again") from error
+    except (PlyParseError, *UNREADABLE) as error:
+        raise InputError(f"{path}: not a readable PLY ({summarize_error(error)}); export or copy it again") from error
 
 
 def _check_counts(path: Path) -> None:

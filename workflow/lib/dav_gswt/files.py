@@ -3,19 +3,28 @@
 import hashlib
 import json
 import lzma
+import math
 import os
 import shutil
+import time
 import tokenize
 import zipfile
 import zlib
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
+from typing import TypeVar
 
-from dav_gswt.errors import InputError
+from pydantic import TypeAdapter, ValidationError
+
+from dav_gswt.errors import InputError, summarize_error
+
+Record = TypeVar("Record")
 
 UNREADABLE = (  # what reading a damaged archive, or arrays in one, may end in
     OSError,
     ValueError,
+    ArithmeticError,
     TypeError,
     EOFError,
     LookupError,
@@ -26,6 +35,8 @@ UNREADABLE = (  # what reading a damaged archive, or arrays in one, may end in
     zipfile.BadZipFile,
     zlib.error,
 )
+
+CLOCK_SKEW = 2.0  # seconds by which the clock of a file system may be ahead
 
 
 @contextmanager
@@ -43,7 +54,7 @@ def atomic_file(path: Path | str):
             os.fsync(file.fileno())
         part.replace(path)
     except OSError as error:
-        raise _named(error, path) from error
+        raise _name_error(error, path) from error
     finally:
         part.unlink(missing_ok=True)
 
@@ -62,7 +73,7 @@ def atomic_folder(path: Path | str):
     """
     path = Path(path)
     part, old = path.with_name(f".{path.name}.part"), path.with_name(f".{path.name}.old")
-    _settle(path, part, old)  # after a run that was killed
+    _restore_folder(path, part, old)  # after a run that was killed
     part.mkdir(parents=True)
     try:
         yield part
@@ -70,19 +81,19 @@ def atomic_folder(path: Path | str):
             path.rename(old)
         part.rename(path)
     except OSError as error:
-        raise _named(error, path) from error
+        raise _name_error(error, path) from error
     finally:
-        _settle(path, part, old)
+        _restore_folder(path, part, old)
 
 
-def _settle(path: Path, part: Path, old: Path) -> None:
+def _restore_folder(path: Path, part: Path, old: Path) -> None:
     if old.exists() and not path.exists():
         old.rename(path)
     for rest in (part, old):
         shutil.rmtree(rest, ignore_errors=True)
 
 
-def _named(error: OSError, path: Path) -> OSError:
+def _name_error(error: OSError, path: Path) -> OSError:
     """The error with the name of what was to be written: a full disk is reported by calls that know no name."""
     if error.errno is None or error.filename not in (None, str(path)):
         return error
@@ -97,11 +108,65 @@ def write_json(path: Path | str, value) -> None:
 
 
 def read_json(path: Path | str):
-    """Read JSON. Raises: InputError: missing or malformed, by name."""
+    """Read JSON. Raises: InputError: missing, malformed, or with a number that is not finite, by name."""
     try:
-        return json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: not readable as JSON ({error})") from error
+        text = Path(path).read_text(encoding="utf-8")
+        return json.loads(text, parse_constant=_finite_number, parse_float=_finite_number, parse_int=_whole_number)
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"{path}: not readable as JSON ({summarize_error(error)}); make or copy it again") from error
+
+
+def _finite_number(text: str) -> float:
+    """A number of JSON. Python's parser takes NaN and Infinity, which JSON does not have, and 1e999 for infinite."""
+    if not math.isfinite(value := float(text)):
+        raise ValueError(f"{text} is no finite number")
+    return value
+
+
+def _whole_number(text: str) -> int:
+    if len(text) > 300:
+        raise ValueError(f"{text[:20]}... is too large a number")
+    return int(text)
+
+
+def read_record(path: Path | str, kind: type[Record], remedy: str) -> Record:
+    """Read JSON as a dataclass. Raises: InputError: as `read_json`, or a value is missing or of another type."""
+    values = read_json(path)
+    try:
+        return parse_record(values, kind)
+    except ValueError as error:
+        raise InputError(f"{path}: not as the workflow writes it ({summarize_error(error)}); {remedy}") from error
+
+
+def parse_record(values, kind: type[Record]) -> Record:
+    """A dataclass of values as JSON has them: whole numbers for `int`, no text for numbers.
+
+    Raises: ValueError: a value is missing or of another type, by its key.
+    """
+    try:
+        return _adapter(kind).validate_json(json.dumps(values), strict=True)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))[:80]
+        raise ValueError(": ".join(filter(None, (where, first["msg"])))) from None
+
+
+@cache
+def _adapter(kind: type) -> TypeAdapter:
+    return TypeAdapter(kind)
+
+
+def require_file_name(name) -> str:
+    """The name of a file that lies directly in a folder. Raises: ValueError: a path, or no name."""
+    plain = isinstance(name, str) and name not in ("", ".", "..") and name.isprintable() and len(name.encode()) <= 255
+    if not plain or {"/", "\\"} & set(name):
+        raise ValueError(f"{str(name)[:80]!r} is no name of a file")
+    return name
+
+
+def is_from_future(path: Path | str) -> bool:
+    """Whether a file is dated later than now: by another clock, or before this one was set back."""
+    return Path(path).lstat().st_mtime > time.time() + CLOCK_SKEW
 
 
 def digest_files(*paths: Path | str) -> str:

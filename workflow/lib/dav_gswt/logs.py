@@ -1,9 +1,14 @@
-"""What a job says: to its log file in full, to the terminal in short."""
+"""Logging of a job: its log file has everything, the terminal a short form."""
 
 import errno
+import io
 import logging
+import os
 import sys
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from typing import TextIO, TypeVar
 
 from tqdm import tqdm
 
@@ -11,9 +16,11 @@ from dav_gswt.errors import InputError
 
 _log = logging.getLogger("dav_gswt")
 
+Item = TypeVar("Item")
 
-class _Short(logging.Formatter):
-    """The message alone: the traceback is in the log file, and Python prints it anyway."""
+
+class _MessageFormatter(logging.Formatter):
+    """The message without a traceback: that is in the log file, and Python prints it anyway."""
 
     def format(self, record: logging.LogRecord) -> str:
         return f"  {record.getMessage()}"
@@ -23,47 +30,82 @@ class _Short(logging.Formatter):
 def logging_to(path):
     """Send messages, warnings and the traceback of a script to `path`, and a short form to the terminal.
 
-    What a user can mend (bad input, a full disk, too little memory) ends the job with its text alone on the terminal;
-    any other fault is passed on.
+    What libraries in C++ write to standard error is in the file alone. An error that a user can mend (bad input, a full
+    disk, too little memory) ends the job with its message alone on the terminal; any other is raised again.
     """
-    file = logging.FileHandler(path, mode="w", encoding="utf-8")
-    file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
-    terminal = logging.StreamHandler(sys.stderr)
-    terminal.setFormatter(_Short())
-    logging.basicConfig(level=logging.INFO, handlers=[terminal, file], force=True)
-    logging.captureWarnings(True)
     try:
-        yield
-    except InputError as error:
-        logging.error("%s", error)
+        Path(path).write_bytes(b"")
+    except OSError as error:  # a full disk, or one that is read-only: no log can say it
+        print(f"  {describe_os_error(error)}", file=sys.stderr)
         sys.exit(1)
-    except KeyboardInterrupt:
-        logging.info("stopped on request")
-        sys.exit(130)
-    except MemoryError:
-        logging.exception("out of memory: choose a smaller quality, or a machine with more")
-        sys.exit(1)
-    except OSError as error:
-        logging.exception("%s", _told(error))
-        sys.exit(1)
-    except BaseException:
-        logging.exception("failed")
-        raise
+    with _native_messages_to(path) as stream:
+        file = logging.FileHandler(path, encoding="utf-8")
+        file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+        terminal = logging.StreamHandler(stream)
+        terminal.setFormatter(_MessageFormatter())
+        shows_errors, logging.raiseExceptions = logging.raiseExceptions, False  # of writing the log, on a full disk
+        logging.basicConfig(level=logging.INFO, handlers=[terminal, file], force=True)
+        logging.captureWarnings(True)
+        try:
+            yield
+        except InputError as error:
+            logging.error("%s", error)
+            sys.exit(1)
+        except KeyboardInterrupt:
+            logging.info("stopped on request")
+            sys.exit(130)
+        except MemoryError:
+            logging.exception("out of memory: choose a smaller preset, or a machine with more")
+            sys.exit(1)
+        except OSError as error:
+            logging.exception("%s", describe_os_error(error))
+            sys.exit(1)
+        except BaseException:
+            logging.exception("failed")
+            raise
+        finally:
+            logging.shutdown()
+            logging.raiseExceptions = shows_errors
+
+
+@contextmanager
+def _native_messages_to(path: Path | str) -> Iterator[TextIO]:
+    """Let what libraries in C++ write to standard error go to a log file: the last words of one that aborts.
+
+    Yields the stream for messages of Python: standard error as it was before.
+    """
+    sys.stderr.flush()
+    before, stream = os.dup(2), sys.stderr
+    log = os.open(path, os.O_WRONLY | os.O_APPEND)
+    os.dup2(log, 2)
+    os.close(log)
+    try:
+        direct = stream.fileno() == 2
+    except (AttributeError, io.UnsupportedOperation):  # a replacement that is no file
+        direct = False
+    if direct:
+        sys.stderr = os.fdopen(os.dup(before), "w", buffering=1, encoding=stream.encoding, errors=stream.errors)
+    try:
+        yield sys.stderr
     finally:
-        logging.shutdown()
+        if direct:
+            sys.stderr.flush()  # not closed: handlers of the root logger keep it
+            sys.stderr = stream
+        os.dup2(before, 2)
+        os.close(before)
 
 
-def _told(error: OSError) -> str:
-    """The file, what is wrong with it, and what to do where that is plain."""
+def describe_os_error(error: OSError) -> str:
+    """The file, what is wrong with it, and the remedy for a full disk."""
     text = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
     full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
     return f"{text}; free some space, then run the same again" if full else text
 
 
-def progress(items, what: str, every: float = 5.0, total: int | None = None):
+def progress(items: Iterable[Item], what: str, every: float = 5.0) -> "tqdm[Item]":
     """Iterate over `items`; every few seconds one line with the share done and the time left.
 
-    A loop that ends within a second says nothing.
+    A loop that ends within a second logs nothing.
     """
 
     class Lines:
@@ -76,4 +118,4 @@ def progress(items, what: str, every: float = 5.0, total: int | None = None):
 
     bar = "{desc}: {n_fmt}/{total_fmt}, {elapsed} gone, about {remaining} left{postfix}"
     least = min(1.0, every)
-    return tqdm(items, what, total, file=Lines(), mininterval=every, bar_format=bar, miniters=1, delay=least)
+    return tqdm(items, what, file=Lines(), mininterval=every, bar_format=bar, miniters=1, delay=least)

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from decimal import Decimal
 from pathlib import Path
 
-from dav_gswt.views.policy_names import PRIOR_POLICIES, ZERO_SETTINGS
+from dav_gswt.views.policy_names import POLICY_NAME, PRIOR_POLICIES, ZERO_SETTINGS
 
 RESULTS = "results"
 # Directories beside the scenes' own; no scene may have such a name.
@@ -30,6 +30,7 @@ TREE = {
     "active": "<fit>/active_{policy}_{prior}_pdrop{p_drop}_lam{lam}_k{k}{stop}",
     "external": "<fit>/active_external_none_pdrop0_lam0_k0/iter0",
     "round": "<active>/iter{t}",
+    "materials": "<round>{inpainted}/materials",
     "levels": "<round>{inpainted}/levels",
     "tiles": "<round>{inpainted}/tiles_{tiling}",
     "bundle": "<tiles>/bundle_tau{tau}",
@@ -42,6 +43,7 @@ CONTENTS = {  # what a reader finds at each stage
     "coarse": "field.ply, ground.exr, metrics.json of the first fit",
     "scored": "scores.csv, uncertainty.exr: scores of candidate poses",
     "round": "poses.json, capture/, field.ply, scores.csv, metrics.json of round t",
+    "materials": "materials.json, a picture and an exemplar of each material, its objects (with `materials: auto`)",
     "levels": "level{l}.ply: levels of detail",
     "tiles": "seams.json and tiles/lod{l}_tile_{T}.ply",
     "bundle": "davgswt.json, chunks/, gswt.zip, exports/",
@@ -60,7 +62,7 @@ WILDCARDS = {
     "scene": NAME,
     "seed": NATURAL,
     "preset": NAME,
-    "policy": r"[a-z0-9-]+",
+    "policy": POLICY_NAME,
     "prior": r"[a-z][a-z0-9_-]*?",
     "p_drop": SHARE,
     "lam": NUMBER,
@@ -85,7 +87,7 @@ _EXTERNAL = {
 
 
 def encode_number(value: int | float | str) -> str:
-    """The one spelling of a number in paths: 0.1, never 0.10."""
+    """A number as it stands in paths: 0.1, never 0.10."""
     text = f"{Decimal(str(value)).normalize():f}"
     return "0" if text == "-0" else text
 
@@ -114,7 +116,7 @@ def encode_inpainted(inpaint: bool, prior: str) -> str:
 def encode_branch(config: Mapping, scene: str, policy: str | None = None, changes: Mapping | None = None) -> dict:
     """The wildcards of what is made of a scene, by the config or by settings that replace some of the config's.
 
-    A setting that a policy does not read has one spelling: prior `none`, `p_drop` and `lam` 0.
+    Settings that a policy does not read are always encoded as prior `none`, `p_drop` and `lam` 0.
     """
     settings = {**config, **(changes or {})}
     entry = config["scenes"][scene]
@@ -142,8 +144,8 @@ def encode_branch(config: Mapping, scene: str, policy: str | None = None, change
 def stage_template(stage: str) -> str:
     """The path of a stage below results/ with its wildcards: {scene}/seed{seed}/..."""
     template = TREE[stage]
-    while found := re.search(r"<(\w+)>", template):
-        template = template.replace(found[0], TREE[found[1]])
+    while match := re.search(r"<(\w+)>", template):
+        template = template.replace(match[0], TREE[match[1]])
     return template
 
 
@@ -153,15 +155,31 @@ def stage_folder(stage: str, wildcards: Mapping) -> Path:
 
 
 def decode_path(path: Path | str) -> dict[str, str]:
-    """The wildcards that a path in the result tree spells; {} where it spells none.
+    """The wildcards of a path in the result tree; {} where it has none.
 
     The longest stage that leads to the path is decoded. The path may lie anywhere; `results` need not be part of it.
     """
+    match = _match_stage(path)
+    return match.groupdict() if match else {}
+
+
+def related_folder(path: Path | str, stage: str, **changes: object) -> Path:
+    """The folder of another stage in the tree that a path lies in.
+
+    changes: wildcards that differ from the path's.
+    Raises: ValueError: the path lies in no result tree. KeyError: it lacks a wildcard of the stage.
+    """
+    match = _match_stage(path)
+    if not match:
+        raise ValueError(f"{path}: lies in no result tree")
+    root = Path(match.string[: match.start()] or ("/" if match.string.startswith("/") else "."))
+    return root / stage_template(stage).format(**match.groupdict() | changes)
+
+
+def _match_stage(path: Path | str) -> re.Match | None:
     text = Path(path).as_posix()
-    for stage in reversed(TREE):
-        if "{" in stage_template(stage) and (match := _stage_pattern(stage).search(text)):
-            return match.groupdict()
-    return {}
+    matches = (_stage_pattern(stage).search(text) for stage in reversed(TREE) if "{" in stage_template(stage))
+    return next((match for match in matches if match), None)
 
 
 def _stage_pattern(stage: str) -> re.Pattern:
@@ -175,7 +193,7 @@ def _stage_pattern(stage: str) -> re.Pattern:
 
 
 def policy_pattern(policy: str) -> str:
-    """A constraint: the policy, followed by a spelling that it has of prior, p_drop and lam."""
+    """A constraint: the policy, followed by prior, p_drop and lam as paths of this policy have them."""
     if policy not in PRIOR_POLICIES:
         return f"{policy}(?=_none_pdrop0_lam0_)"
     zeros = ZERO_SETTINGS.get(policy, ())

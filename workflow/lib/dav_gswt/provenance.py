@@ -2,6 +2,7 @@
 
 import os
 import platform
+from collections.abc import Mapping
 from pathlib import Path
 
 import dav_gswt
@@ -9,7 +10,7 @@ from dav_gswt.files import digest_files
 from dav_gswt.raster import backends
 
 
-def record_provenance(inputs: dict[str, Path | str | list], parameters: dict) -> dict:
+def record_provenance(inputs: Mapping[str, Path | str | list], parameters: dict) -> dict:
     """A JSON value that says what a result was made from and with. Inputs: files, folders, or lists of both."""
     return {
         "version": dav_gswt.__version__,

@@ -1,7 +1,25 @@
-"""Thread settings, applied where work starts and not on import."""
+"""Threads: how many there are, how they wait, and work whose results do not depend on their number."""
 
 import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from queue import SimpleQueue
+from typing import TypeVar
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+MAX_THREADS = 16
+
+
+def default_threads() -> int:
+    """DAV_GSWT_THREADS, or the processors that this process may use, at most MAX_THREADS."""
+    if given := os.environ.get("DAV_GSWT_THREADS"):
+        if not given.isdecimal() or int(given) < 1:
+            raise ValueError(f"DAV_GSWT_THREADS={given}: give a whole number from 1")
+        return int(given)
+    mine = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(mine, MAX_THREADS)
 
 
 def let_waiting_threads_sleep() -> None:
@@ -24,3 +42,25 @@ def one_thread():
         yield
     finally:
         torch.set_num_threads(before)
+
+
+def map_in_single_threads(workers: Sequence[Callable[[Item], Result]], items: Iterable[Item]) -> Iterator[Result]:
+    """Yield a worker's result of each item, in their order, with as many items at work as there are workers.
+
+    Each item is worked on by one thread of PyTorch, so no result depends on the number of workers. They are copies of
+    one function: what has a state of its own (a network's dropout masks) may not be shared by two threads.
+    """
+    free: SimpleQueue[Callable[[Item], Result]] = SimpleQueue()
+    for worker in workers:
+        free.put(worker)
+
+    def run(item: Item) -> Result:
+        worker = free.get()
+        try:
+            with one_thread():
+                return worker(item)
+        finally:
+            free.put(worker)
+
+    with ThreadPoolExecutor(len(workers)) as pool:
+        yield from pool.map(run, items)

@@ -1,5 +1,7 @@
 """What the Snakefile needs of Snakemake's internals, in one place."""
 
+from difflib import get_close_matches
+
 
 def lift_job_rate_limit(scheduler) -> None:
     """Lift Snakemake's default limit of 100 jobs a second; a limit that the user gave stays.
@@ -10,3 +12,25 @@ def lift_job_rate_limit(scheduler) -> None:
     limiter = getattr(scheduler, "job_rate_limiter", None)
     if limiter and (limiter.max_jobs, limiter.timespan) == (100, 1):
         scheduler.job_rate_limiter = None
+
+
+def list_command_line_values(workflow) -> dict:
+    """The keys of `--config`, as Snakemake read them: numbers in lists and tables are text."""
+    return dict(workflow.config_settings.config)
+
+
+class NamedEntries(dict):
+    """A table of the config by name, whose error for a name that a path asks for says which names there are."""
+
+    def __init__(self, table: str, entries: dict):
+        super().__init__(entries)
+        self.table = table
+
+    def __missing__(self, name: str):
+        from snakemake.exceptions import (
+            WorkflowError,
+        )  # not above: jobs unpickle tables, and this import takes a second
+
+        near = get_close_matches(name, self, 1)
+        meant = f" (is {near[0]!r} meant?)" if near else ""
+        raise WorkflowError(f"there is no {name!r} in {self.table}{meant}; it has {', '.join(self) or 'nothing'}")

@@ -3,15 +3,31 @@
 Snakemake's own events are printed in a line each; warnings and errors go through as they are.
 """
 
+import errno
+import json
 import logging
+import os
 import re
+import signal
 import sys
+from collections import deque
+from pathlib import Path
 
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
-KILLED = re.compile(r"died with <Signals\.(SIG\w+)")
-FAILED_JOB = ("RuleException", "CalledProcessError")  # of a job whose log tells more
+# How a job ended that a signal killed: as its parent saw it, or by the exit status of the shell between them.
+KILLED = re.compile(r"died with <Signals\.(SIG\w+)|returned non-zero exit status (1[2-9]\d)\b")
+ON_REQUEST = ("SIGINT", "SIGTERM")  # nothing is wrong with the job then
+# Lines of a log that say why a job ended: of Python's logging, of COLMAP (F or E and the date), of C++ and of Python.
+CAUSE = re.compile(
+    r"\S+ \S+ (ERROR|CRITICAL) |[EF]\d{8} |terminate called|  what\(\):|Fatal Python error|\w*(Error|Exception): "
+)
+CAUSE_LINES = 3  # of them, the last ones
+FAILED_JOB = ("RuleException", "CalledProcessError")
+SYSTEM_ERROR = re.compile(r"^(?:\w+: |Error recording metadata.*?\()?\[Errno (\d+)\] ([^)\n]+)", re.M)
+OWN_FILES = ("Traceback (most", "Error recording metadata")  # are in what Snakemake says of its own files, at the end
+NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
 ENDINGS = ("Exiting because a job execution failed", "At least one job did not complete")  # said by the caller
 
 
@@ -21,6 +37,8 @@ class LogHandler(LogHandlerBase):
     def __post_init__(self) -> None:
         self.jobs = 0  # to do, without the rule that only names the targets
         self.begun = 0
+        self.signals: deque[str] = deque()  # of killed jobs whose name and log are still to come
+        logging.raiseExceptions = False  # Snakemake's own log file on a full disk is not worth a traceback a line
 
     def emit(self, record: logging.LogRecord) -> None:
         text = self.describe(record)
@@ -33,16 +51,20 @@ class LogHandler(LogHandlerBase):
         if any(ending in record.getMessage() for ending in ENDINGS):
             return None
         if event == LogEvent.RUN_INFO:
-            self.jobs = record.__dict__["stats"]["total"] - 1
-            return f"{self.jobs} jobs to do"
+            return self._describe_plan(dict(record.__dict__["stats"]))
         if event == LogEvent.JOB_INFO:
             return self._describe_job(record.__dict__)
         if event == LogEvent.JOB_ERROR:
-            logs = ", ".join(map(str, record.__dict__.get("log") or []))
-            return f"{record.__dict__['rule_name']} is not finished; its log: {logs}"
+            return self._describe_failed_job(record.__dict__)
         if event == LogEvent.ERROR:
             return self._describe_error(record)
         return record.getMessage() if event is None and record.levelno >= logging.WARNING else None
+
+    def _describe_plan(self, jobs: dict[str, int]) -> str:
+        """The number of jobs; for the program that asks for it, also of each rule, as JSON."""
+        self.jobs = jobs.pop("total") - 1
+        text = f"{self.jobs} jobs to do"
+        return f"{text}\nplan: {json.dumps(jobs)}" if os.environ.get("DAV_GSWT_PLAN") else text
 
     def _describe_job(self, job: dict) -> str | None:
         if not job["log"]:  # a rule that only names targets
@@ -50,14 +72,23 @@ class LogHandler(LogHandlerBase):
         self.begun += 1
         return f"[{self.begun} of {self.jobs}] {job['rule_name']}"
 
+    def _describe_failed_job(self, job: dict) -> str:
+        logs = [Path(path) for path in job.get("log") or []]
+        text = f"{job['rule_name']} is not finished; its log: {', '.join(map(str, logs))}"
+        return "\n".join([*explain_signal(self.signals.popleft(), logs), text]) if self.signals else text
+
     def _describe_error(self, record: logging.LogRecord) -> str | None:
         message = record.getMessage()
-        if killed := KILLED.search(message):
-            return f"  the job was killed ({killed[1]}); is there too little memory? A smaller preset needs less"
+        if name := find_signal(message):
+            self.signals.append(name)
+            return None
         own = [line.strip() for line in message.splitlines() if line.strip().startswith("config:")]
         if own:  # of an error in the config, Snakemake's frame of files and wildcards is left out
             return "\n".join(own)
-        return None if record.__dict__.get("exception") in FAILED_JOB else message
+        if record.__dict__.get("exception") in FAILED_JOB:
+            return describe_system_error(message)
+        own = any(words in message for words in OWN_FILES)
+        return (own and describe_system_error(message.strip().splitlines()[-1])) or message
 
     @property
     def writes_to_stream(self) -> bool:
@@ -78,3 +109,41 @@ class LogHandler(LogHandlerBase):
     @property
     def needs_rulegraph(self) -> bool:
         return False
+
+
+def describe_system_error(message: str) -> str | None:
+    """The system's error that kept Snakemake from working; None for that of a job, whose log tells more."""
+    found = SYSTEM_ERROR.search(message)
+    if "CalledProcessError" in message or not found:
+        return None
+    return f"  {found[2]}" + ("; free some space, then run the same again" if int(found[1]) in NO_SPACE else "")
+
+
+def find_signal(message: str) -> str | None:
+    """The name of the signal that ended a job, from Snakemake's message; None where none did."""
+    killed = KILLED.search(message)
+    if not killed:
+        return None
+    try:
+        return killed[1] or signal.Signals(int(killed[2]) - 128).name
+    except ValueError:  # an exit status of the program's own
+        return None
+
+
+def explain_signal(name: str, logs: list[Path]) -> list[str]:
+    """Lines that say which signal ended a job, and why as far as its log tells."""
+    if name in ON_REQUEST:
+        return [f"  the job was stopped ({name})"]
+    if name == "SIGKILL":  # the only one that the system sends when memory runs out
+        return ["  the job was killed by SIGKILL: was there too little memory? A smaller preset needs less"]
+    cause = [line for path in logs for line in read_cause(path)]
+    return [f"  the job was killed by {name}" + (":" if cause else "; its log names no cause"), *cause]
+
+
+def read_cause(path: Path) -> list[str]:
+    """The last lines of a log that say what went wrong."""
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return []
+    return [f"    {line.strip()}" for line in lines if CAUSE.match(line)][-CAUSE_LINES:]

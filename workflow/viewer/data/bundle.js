@@ -1,8 +1,10 @@
 // Reading a bundle: davgswt.json, its height map and its chunks, coarse levels first, each checked before it is used.
 
+import { isCoordinate } from "./checks.js";
 import { PageError, REMAKE } from "./errors.js";
-import { CACHE_BYTES } from "./layout.js";
-import { findFault, NAME } from "./manifest.js";
+import { CACHE_BYTES, listChunks } from "./layout.js";
+import { findFault, NAME, pickKnown } from "./manifest.js";
+import { indexType, RECORD } from "./records.js";
 
 /**
  * @typedef {import("./manifest.js").Manifest} Manifest
@@ -35,7 +37,7 @@ export async function readManifest(source) {
   }
   const fault = findFault(manifest);
   if (fault) throw new PageError(`${NAME}: ${fault}`);
-  return manifest;
+  return pickKnown(manifest);
 }
 
 /**
@@ -49,8 +51,28 @@ export async function readHeightMap({ heights }, source) {
   const buffer = await source.read(heights.file, heights.bytes);
   await checkDigest(buffer, heights);
   const pixels = new Float32Array(buffer);
-  if (!pixels.every(Number.isFinite)) throw new PageError(`${heights.file}: a height is not finite. ${REMAKE}`);
+  if (!pixels.every(isCoordinate)) {
+    throw new PageError(`${heights.file}: a height is not finite, or beyond all bounds. ${REMAKE}`);
+  }
   return pixels;
+}
+
+/**
+ * The pixels of the classes' pictures, by file. Throws a PageError.
+ *
+ * @param {Manifest} manifest
+ * @param {Source} source
+ * @returns {Promise<import("../terrain/classes.js").Pictures>}
+ */
+export async function readPictures({ classes }, source) {
+  const pictures = new Map();
+  for (const term of classes?.rule ?? []) {
+    if (term.kind !== "image" || pictures.has(term.file)) continue;
+    const buffer = await source.read(term.file, term.bytes);
+    await checkDigest(buffer, term);
+    pictures.set(term.file, new Uint8Array(buffer));
+  }
+  return pictures;
 }
 
 /**
@@ -60,7 +82,7 @@ export async function readHeightMap({ heights }, source) {
  * @returns {QueueItem[]}
  */
 export function initialChunks(manifest) {
-  const queue = manifest.tiles.flatMap((tile) => tile.chunks.map((entry) => ({ tile: tile.tile, entry })));
+  const queue = listChunks(manifest);
   queue.sort((a, b) => b.entry.level - a.entry.level || a.tile - b.tile);
   let sum = 0;
   return queue.filter(({ entry }) => {
@@ -92,6 +114,7 @@ export async function readChunks(queue, source, { take, onProgress = () => {}, s
       const { tile, entry } = queue[next++];
       const buffer = await source.read(entry.file, entry.bytes, { signal: stop.signal, onBytes });
       await checkDigest(buffer, entry);
+      checkOrders(buffer, entry);
       stop.signal.throwIfAborted();
       take({ tile, level: entry.level, count: entry.count, buffer });
       progress.chunks += 1;
@@ -106,6 +129,25 @@ export async function readChunks(queue, source, { take, onProgress = () => {}, s
   });
   await Promise.all(Array.from({ length: PARALLEL }, guarded));
   if (first) throw first;
+}
+
+/**
+ * Every order must hold each Gaussian once: entries beyond the chunk would draw what is not there.
+ *
+ * @param {ArrayBuffer} buffer
+ * @param {ChunkEntry} entry
+ */
+function checkOrders(buffer, { file, count, orders }) {
+  const indices = new (indexType(count))(buffer, count * RECORD), seen = new Uint8Array(count);
+  for (let d = 1, at = 0; d <= orders.length; d++) {
+    for (let k = 0; k < count; k++, at++) {
+      const index = indices[at];
+      if (index >= count || seen[index] === d) {
+        throw new PageError(`${file}: an order does not hold every splat once. ${REMAKE}`);
+      }
+      seen[index] = d;
+    }
+  }
 }
 
 /**

@@ -4,3 +4,4 @@
 export class PageError extends Error {}
 
 export const REMAKE = "Make the page again with “make run”.";
+export const REMAKE_SET = "Make the set again.";

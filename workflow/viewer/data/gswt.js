@@ -2,13 +2,13 @@
 // surface; these are computed as dav_gswt/bundle/level_distances.py and orders.py do, with a fixed number of directions.
 
 import { createDepthSorter } from "../terrain/depth_sort.js";
-import { PageError } from "./errors.js";
+import { PageError, REMAKE_SET } from "./errors.js";
 import { MAX_LEVELS } from "./layout.js";
-import { NAME } from "./manifest.js";
+import { MAX_TILES, NAME } from "./manifest.js";
 import { parsePly } from "./ply.js";
 import { fitEncoding, writeRecords } from "./quantize.js";
 import { chunkBytes, indexType, RECORD, VERSION } from "./records.js";
-import { fileSource } from "./source.js";
+import { fileSource, tooLarge } from "./source.js";
 
 /**
  * @typedef {import("./quantize.js").Gaussians & { tile: number, level: number }} GaussianSet
@@ -17,6 +17,8 @@ import { fileSource } from "./source.js";
  */
 
 const SIDE = 4; // of its tiles
+const MAX_SPLATS = 8_388_608; // of a set, as the public renderer has it
+const MAX_FILE = 2 ** 28; // bytes of a PLY file
 const FOCAL = 960 / Math.tan(Math.PI / 6); // of the picture that level distances are made for
 const BAND = 0.1, FLOOR_PIXELS = 12;
 const AZIMUTHS = 16, DOWN = (20 * Math.PI) / 180;
@@ -36,8 +38,12 @@ export async function gswtSource(files) {
   const chunks = new Map();
   const { sets, levels, tiles } = await readSets(files);
   const manifest = makeManifest(sets, levels, tiles);
-  for (const set of sets) chunks.set(chunkName(set), async () => makeChunk(set, manifest));
-  chunks.set(NAME, async () => new TextEncoder().encode(JSON.stringify(manifest)).buffer);
+  for (const set of sets) {
+    const size = chunkBytes(set.count, manifest.directions.length);
+    chunks.set(chunkName(set), { size, open: async () => makeChunk(set, manifest) });
+  }
+  const text = new TextEncoder().encode(JSON.stringify(manifest)).buffer;
+  chunks.set(NAME, { size: text.byteLength, open: async () => text });
   return fileSource(chunks);
 }
 
@@ -45,24 +51,29 @@ export async function gswtSource(files) {
 async function readSets(files) {
   const byKey = new Map();
   let levels = 0, tiles = 0;
-  for (const [name, open] of files) {
+  for (const [name, entry] of files) {
     const match = FILE.exec(name);
     if (!match) continue;
     const level = Number(match[1]), tile = Number(match[2]);
-    byKey.set(`${level}/${tile}`, { name, open });
+    byKey.set(`${level}/${tile}`, { name, ...entry });
     [levels, tiles] = [Math.max(levels, level + 1), Math.max(tiles, tile + 1)];
   }
-  if (tiles % 16) throw new PageError(`The set has ${tiles} tiles, a multiple of 16 is needed. Make it again.`);
+  if (tiles % 16) throw new PageError(`The set has ${tiles} tiles, a multiple of 16 is needed. ${REMAKE_SET}`);
+  if (tiles > MAX_TILES) throw new PageError(`The set has ${tiles} tiles, this page shows ${MAX_TILES}. ${REMAKE_SET}`);
   if (levels > MAX_LEVELS) {
     throw new PageError(`The set has ${levels} levels, this page shows ${MAX_LEVELS}. Leave the coarsest ones out.`);
   }
   /** @type {GaussianSet[]} */
   const sets = [];
+  let splats = 0;
   for (let tile = 0; tile < tiles; tile++) {
     for (let level = 0; level < levels; level++) {
       const file = byKey.get(`${level}/${tile}`);
-      if (!file) throw new PageError(`Tile ${tile} of level ${level} is missing in the set. Make it again.`);
+      if (!file) throw new PageError(`Tile ${tile} of level ${level} is missing in the set. ${REMAKE_SET}`);
+      if (file.size > MAX_FILE) throw tooLarge(file.name);
       sets.push({ tile, level, ...parsePly(await file.open(), file.name) });
+      splats += sets[sets.length - 1].count;
+      if (splats > MAX_SPLATS) throw new PageError(`The set has more than ${MAX_SPLATS} splats. Make a smaller one.`);
     }
   }
   return { sets, levels, tiles };
@@ -93,12 +104,13 @@ function makeManifest(sets, levels, tiles) {
   const scales = sums.map(({ scale, count }) => scale / Math.max(1, count)), last = sums[levels - 1];
   const spacing = SIDE / Math.sqrt(sums[0].count / tiles), v = Math.atan((9 / 16) * Math.tan(Math.PI / 6));
   const encoding = fitEncoding(sets, SIDE, spacing / FLOOR_PIXELS);
-  if (!encoding) throw new PageError("A splat lies dozens of tile sides from the others. Make the set again.");
+  if (!encoding) throw new PageError(`A splat lies dozens of tile sides from the others. ${REMAKE_SET}`);
+  const colour = last.colour.map((sum) => Math.min(Math.max(sum / Math.max(1, last.count), 0), 1));
   return {
     format: "davgswt", version: VERSION, unit: "unit", tile_side: SIDE, salt: 0, sky: SKY, encoding, directions,
-    tiles: entries,
+    tiles: entries, materials: [{ name: "ground", share: 1, first_tile: 0, ground_colour: colour }],
     eye_floor: (((spacing * FOCAL) / FLOOR_PIXELS) * Math.sin(Math.PI / 6 + v)) / Math.cos(v),
-    ground_colour: last.colour.map((sum) => Math.min(Math.max(sum / Math.max(1, last.count), 0), 1)),
+    ground_colour: colour,
     levels: scales.map((scale, level) => {
       const distance = level < levels - 1 ? scales[level + 1] * FOCAL : null;
       return { level, mean_scale: scale, distance, band: distance ? BAND * distance : 0 };

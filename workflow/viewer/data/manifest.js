@@ -1,9 +1,14 @@
 // davgswt.json, checked before anything is drawn.
 
 import { MAX_OCTAVES } from "../terrain/heights.js";
+import {
+  brief, isColour, isCoordinate, isDigest, isDirection, isFilled, isInside, isLength, isNatural, isRange, isSalt,
+  isShare, isVector,
+} from "./checks.js";
 import { REMAKE } from "./errors.js";
-import { MAX_LEVELS, MAX_ORDERS } from "./layout.js";
-import { chunkBytes, isEncoding, VERSION } from "./records.js";
+import { findCoverFault, findCrowd, pickClasses } from "./land_cover.js";
+import { CACHE_BYTES, MAX_COUNT, MAX_LEVELS, MAX_ORDERS } from "./layout.js";
+import { chunkBytes, deviationOf, isEncoding, OLDEST, VERSION } from "./records.js";
 
 /**
  * @typedef {{ level: number, file: string, bytes: number, count: number, orders: number[],
@@ -13,11 +18,16 @@ import { chunkBytes, isEncoding, VERSION } from "./records.js";
  * @typedef {{ zenith: number[], horizon: number[], sun?: { direction: number[], colour?: number[] } }} Sky
  * @typedef {{ format: string, version: number, unit: string, tile_side: number, salt: number, eye_floor: number,
  *   ground_colour: number[], sky: Sky, encoding: import("./records.js").Encoding, directions: number[][],
- *   levels: LevelEntry[], tiles: TileEntry[], heights?: import("../terrain/heights.js").HeightsEntry }} Manifest
+ *   levels: LevelEntry[], tiles: TileEntry[], materials: import("./land_cover.js").MaterialEntry[],
+ *   classes?: import("../terrain/classes.js").ClassesEntry, objects?: import("./land_cover.js").ObjectEntry[],
+ *   scatter?: import("../terrain/scatter.js").ScatterEntry,
+ *   heights?: import("../terrain/heights.js").HeightsEntry }} Manifest
  */
 
 export const NAME = "davgswt.json";
-const FORMAT = "davgswt", MAX_TILES = 256, MAX_PIXELS = 67_108_864;
+export const MAX_TILES = 256; // of a material
+const FORMAT = "davgswt", MAX_SIDE = 4096; // pixels along a side of a height map
+const WIDEST = 8; // of deviations, in tile sides
 
 /**
  * Why a manifest cannot be used, or null.
@@ -27,27 +37,38 @@ const FORMAT = "davgswt", MAX_TILES = 256, MAX_PIXELS = 67_108_864;
  */
 export function findFault(m) {
   if (m === null || typeof m !== "object" || m.format !== FORMAT) {
-    return `this is not a terrain (format “${m?.format}”, “${FORMAT}” is needed).`;
+    return `this is not a terrain (format “${brief(m?.format)}”, “${FORMAT}” is needed).`;
   }
-  if (m.version !== VERSION) {
-    return `the terrain has version ${m.version}, this page reads version ${VERSION}. ${REMAKE}`;
+  if (m.version !== VERSION && m.version !== OLDEST) {
+    return `the terrain has version ${brief(m.version)}, this page reads version ${OLDEST} and ${VERSION}. ${REMAKE}`;
   }
   /** @param {string} what */
   const broken = (what) => `“${what}” is missing or makes no sense. ${REMAKE}`;
-  if (!isPositive(m.tile_side)) return broken("tile_side");
-  if (!isPositive(m.eye_floor)) return broken("eye_floor");
-  if (!Number.isInteger(m.salt) || m.salt < 0 || m.salt > 0xffffffff) return broken("salt");
-  if (!isVector(m.ground_colour)) return broken("ground_colour");
-  if (!isVector(m.sky?.zenith) || !isVector(m.sky?.horizon)) return broken("sky");
-  if (!isEncoding(m.encoding)) return broken("encoding");
-  if (!isFilled(m.directions) || m.directions.length > MAX_ORDERS || !m.directions.every(isVector)) {
+  if (typeof m.unit !== "string" || m.unit.length > 40) return broken("unit");
+  if (!isLength(m.tile_side)) return broken("tile_side");
+  if (!isLength(m.eye_floor)) return broken("eye_floor");
+  if (!isSalt(m.salt)) return broken("salt");
+  if (!isColour(m.ground_colour)) return broken("ground_colour");
+  if (!isSky(m.sky)) return broken("sky");
+  if (!isEncoding(m.encoding) || !(deviationOf(m.encoding, 255) <= WIDEST * m.tile_side)) return broken("encoding");
+  if (!isFilled(m.directions) || m.directions.length > MAX_ORDERS || !m.directions.every(isDirection)) {
     return broken("directions");
   }
   if (!areLevels(m.levels)) return broken("levels");
-  if (!isFilled(m.tiles) || m.tiles.length % 16 || m.tiles.length > MAX_TILES) return broken("tiles");
+  const count = m.version === VERSION && isFilled(m.materials) ? m.materials.length : 1;
+  if (!isFilled(m.tiles) || m.tiles.length % 16 || m.tiles.length > MAX_TILES * count) return broken("tiles");
+  const uncovered = m.version === VERSION ? findCoverFault(m) : null;
+  if (uncovered) return broken(uncovered);
+  const crowd = m.version === VERSION ? findCrowd(m) : null;
+  if (crowd) return crowd;
   if (m.heights !== undefined && !isSurface(m.heights)) return broken("heights");
   for (let t = 0; t < m.tiles.length; t++) {
     const fault = findTileFault(m, m.tiles[t], t);
+    if (fault) return fault;
+  }
+  const objects = m.version === VERSION ? m.objects ?? [] : [];
+  for (let k = 0; k < objects.length; k++) {
+    const fault = findChunkFault(m, objects[k].chunks, `object ${k}`);
     if (fault) return fault;
   }
   return null;
@@ -59,22 +80,91 @@ export function findFault(m) {
  * @param {number} t
  */
 function findTileFault(m, tile, t) {
-  const heights = Array.isArray(tile?.z) && tile.z.length === 2 && tile.z.every(Number.isFinite);
-  if (tile?.tile !== t || !heights || !Array.isArray(tile.chunks)) {
+  if (tile?.tile !== t || !isRange(tile.z) || !isShare(tile.uncertainty ?? 0)) {
     return `tile ${t} is missing or makes no sense. ${REMAKE}`;
   }
-  const levels = new Set(tile.chunks.map((/** @type {any} */ chunk) => chunk?.level));
-  if (levels.size !== m.levels.length || tile.chunks.length !== m.levels.length) {
-    return `tile ${t} does not have one chunk for each of ${m.levels.length} levels. ${REMAKE}`;
+  return findChunkFault(m, tile.chunks, `tile ${t}`);
+}
+
+/**
+ * @param {any} m
+ * @param {any} chunks
+ * @param {string} owner
+ */
+function findChunkFault(m, chunks, owner) {
+  if (!Array.isArray(chunks)) return `${owner} is missing or makes no sense. ${REMAKE}`;
+  const levels = new Set(chunks.map((/** @type {any} */ chunk) => chunk?.level));
+  if (levels.size !== m.levels.length || chunks.length !== m.levels.length) {
+    return `${owner} does not have one chunk for each of ${m.levels.length} levels. ${REMAKE}`;
   }
-  for (const chunk of tile.chunks) {
-    const sound = isNatural(chunk.level) && chunk.level < m.levels.length && isNatural(chunk.count)
-      && isFilled(chunk.orders)
-      && chunk.orders.every((/** @type {any} */ d) => isNatural(d) && d < m.directions.length)
-      && chunk.bytes === chunkBytes(chunk.count, chunk.orders.length) && isInside(chunk.file);
-    if (!sound) return `the entry of chunk “${chunk.file}” contradicts itself. ${REMAKE}`;
+  for (const chunk of chunks) {
+    const sound = isNatural(chunk?.level) && chunk.level < m.levels.length && isNatural(chunk.count) && chunk.count > 0
+      && areOrders(chunk.orders, m.directions.length)
+      && chunk.bytes === chunkBytes(chunk.count, chunk.orders.length) && isInside(chunk.file) && isDigest(chunk.sha256);
+    if (!sound) return `the entry of chunk “${brief(chunk?.file)}” contradicts itself. ${REMAKE}`;
+    if (chunk.count > MAX_COUNT || chunk.bytes > CACHE_BYTES) {
+      return `the chunk “${chunk.file}” has ${chunk.bytes} bytes, more than this page holds. Make smaller tiles.`;
+    }
   }
   return null;
+}
+
+/** Are these different numbers of directions? @param {any} orders @param {number} directions */
+const areOrders = (orders, directions) => isFilled(orders) && orders.length <= directions
+  && orders.every((/** @type {any} */ d) => isNatural(d) && d < directions) && new Set(orders).size === orders.length;
+
+/**
+ * The keys of a sound manifest that the page knows: nothing else of a file is kept or passed on.
+ *
+ * @param {Manifest} manifest
+ * @returns {Manifest}
+ */
+export function pickKnown({
+  format, version, unit, tile_side, salt, eye_floor, ground_colour, sky, encoding, directions, levels, tiles, heights,
+  ...cover
+}) {
+  const { origin, step, log_scale, sh_degree } = encoding, { zenith, horizon, sun } = sky;
+  return {
+    format, version, unit, tile_side, salt, eye_floor, ground_colour, directions,
+    sky: sun ? { zenith, horizon, sun: { direction: sun.direction, colour: sun.colour } } : { zenith, horizon },
+    encoding: { origin, step, log_scale, sh_degree },
+    levels: levels.map(({ level, mean_scale, distance, band }) => ({ level, mean_scale, distance, band })),
+    tiles: tiles.map(({ tile, uncertainty, z, chunks }) => ({ tile, uncertainty, z, chunks: chunks.map(pickChunk) })),
+    heights: heights && pickHeights(heights),
+    ...(version === OLDEST ? { materials: [onlyMaterial(ground_colour)] } : pickCover(cover)),
+  };
+}
+
+/** What version 2 does not name. @param {number[]} colour */
+const onlyMaterial = (colour) => ({ name: "ground", share: 1, first_tile: 0, ground_colour: colour });
+
+/** @param {ChunkEntry} chunk @returns {ChunkEntry} */
+const pickChunk = ({ level, file, bytes, count, orders, sha256 }) => ({ level, file, bytes, count, orders, sha256 });
+
+/** @param {Pick<Manifest, "materials" | "classes" | "objects" | "scatter">} cover */
+function pickCover({ materials, classes, objects, scatter }) {
+  return {
+    materials: materials.map(({ name, share, first_tile, ground_colour }) => (
+      { name, share, first_tile, ground_colour })),
+    classes: classes && pickClasses(classes),
+    objects: objects?.map(({ name, radius, z, ground, material, density, probability, chunks }) => (
+      { name, radius, z, ground, material, density, probability, chunks: chunks.map(pickChunk) })),
+    scatter: scatter && { cells: scatter.cells, turn: scatter.turn, size: scatter.size, salt: scatter.salt },
+  };
+}
+
+/**
+ * @param {import("../terrain/heights.js").HeightsEntry} entry
+ * @returns {import("../terrain/heights.js").HeightsEntry}
+ */
+function pickHeights(entry) {
+  if (entry.kind === "flat") return { kind: "flat" };
+  if (entry.kind === "hills") {
+    const { kind, height, wavelength, octaves, salt } = entry;
+    return { kind, height, wavelength, octaves, salt };
+  }
+  const { kind, file, bytes, sha256, rows, columns, width, beyond } = entry;
+  return { kind, file, bytes, sha256, rows, columns, width, beyond };
 }
 
 /** @param {any} levels */
@@ -85,9 +175,10 @@ function areLevels(levels) {
 
 /** @param {any[]} levels @param {number} l */
 function rises(levels, l) {
-  const far = levels[l].distance;
+  const { distance: far, band = 0, mean_scale: scale = 0 } = levels[l];
+  if (!isCoordinate(scale) || !isCoordinate(band) || band < 0) return false;
   if (l === levels.length - 1) return far === null;
-  return Number.isFinite(far) && far >= (l ? levels[l - 1].distance : 0);
+  return isCoordinate(far) && far >= (l ? levels[l - 1].distance : 0);
 }
 
 /**
@@ -98,20 +189,15 @@ function rises(levels, l) {
 function isSurface(h) {
   if (h?.kind === "flat") return true;
   if (h?.kind === "hills") {
-    return Number.isFinite(h.height) && isPositive(h.wavelength) && isNatural(h.salt) && isNatural(h.octaves)
+    return isCoordinate(h.height) && isLength(h.wavelength) && isSalt(h.salt) && isNatural(h.octaves)
       && h.octaves > 0 && h.octaves <= MAX_OCTAVES;
   }
-  return h?.kind === "image" && isPositive(h.width) && isNatural(h.rows) && isNatural(h.columns) && isInside(h.file)
-    && h.rows * h.columns > 0 && h.rows * h.columns <= MAX_PIXELS && h.bytes === 4 * h.rows * h.columns;
+  return h?.kind === "image" && isLength(h.width) && isNatural(h.rows) && isNatural(h.columns) && isInside(h.file)
+    && h.rows > 0 && h.columns > 0 && Math.max(h.rows, h.columns) <= MAX_SIDE && h.bytes === 4 * h.rows * h.columns
+    && isDigest(h.sha256);
 }
 
-/** @param {any} x */
-const isNatural = (x) => Number.isInteger(x) && x >= 0;
-/** @param {any} x */
-const isPositive = (x) => Number.isFinite(x) && x > 0;
-/** @param {any} list */
-const isFilled = (list) => Array.isArray(list) && list.length > 0;
-/** @param {any} v */
-const isVector = (v) => Array.isArray(v) && v.length === 3 && v.every(Number.isFinite);
-/** A relative path that stays in the bundle. @param {any} file */
-const isInside = (file) => typeof file === "string" && /^[\w-][\w.-]*(\/[\w-][\w.-]*)*$/.test(file);
+/** @param {any} sky */
+const isSky = (sky) => isColour(sky?.zenith) && isColour(sky.horizon) && (sky.sun === undefined
+  || (isVector(sky.sun?.direction) && Math.hypot(...sky.sun.direction) > 0
+    && (sky.sun.colour === undefined || isVector(sky.sun.colour))));

@@ -1,11 +1,12 @@
 // Gaussians from PLY files in the layout of 3D Gaussian splatting.
 
-import { PageError } from "./errors.js";
+import { PageError, REMAKE_SET } from "./errors.js";
 
 const SH_C0 = 0.28209479177387814; // the constant spherical harmonic
 const PROPERTIES = ["x", "y", "z", "opacity", "f_dc_0", "f_dc_1", "f_dc_2", "scale_0", "scale_1", "scale_2",
   "rot_0", "rot_1", "rot_2", "rot_3"];
 const END = "end_header\n", HEADER_BYTES = 16384; // at most
+const FARTHEST = 1e6, MAX_LOG = 12; // of coordinates; of logarithms of deviations
 
 /**
  * The Gaussians of a PLY file. Throws a PageError: the file is no such PLY, or a value is not finite.
@@ -22,7 +23,10 @@ export function parsePly(buffer, name) {
   for (let k = 0; k < count; k++) {
     for (let n = 0; n < offsets.length; n++) row[n] = view.getFloat32(at + step * k + offsets[n], true);
     if (!row.every(Number.isFinite)) {
-      throw new PageError(`${name}: splat ${k} has a value that is not finite. Make the set again.`);
+      throw new PageError(`${name}: splat ${k} has a value that is not finite. ${REMAKE_SET}`);
+    }
+    if (Math.hypot(row[0], row[1], row[2]) > FARTHEST || Math.max(row[7], row[8], row[9]) > MAX_LOG) {
+      throw new PageError(`${name}: splat ${k} is too far away or too large. ${REMAKE_SET}`);
     }
     centres.set(row.subarray(0, 3), 3 * k);
     for (let n = 0; n < 3; n++) paint[4 * k + n] = 255 * (0.5 + SH_C0 * row[4 + n]);
@@ -41,7 +45,7 @@ export function parsePly(buffer, name) {
  */
 function parseHeader(buffer, name) {
   /** @param {string} what */
-  const broken = (what) => new PageError(`${name} cannot be read: ${what}. Make the set again.`);
+  const broken = (what) => new PageError(`${name} cannot be read: ${what}. ${REMAKE_SET}`);
   const head = new Uint8Array(buffer, 0, Math.min(buffer.byteLength, HEADER_BYTES));
   const text = new TextDecoder("latin1").decode(head), end = text.indexOf(END);
   if (!text.startsWith("ply\n") || end < 0) throw broken("it has no PLY header");

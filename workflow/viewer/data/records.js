@@ -7,9 +7,11 @@
  * @typedef {{ origin: number[], step: number[], log_scale: number[], sh_degree: number }} Encoding
  */
 
-export const VERSION = 2; // of the manifest
+export const VERSION = 3, OLDEST = 2; // of the manifest; version 2 does not name its only material
 export const RECORD = 16; // bytes: position 3 x 16 bits; deviations, rotation 3 x 8 bits each; colour and opacity
 export const WIDE = 65536; // from this number of Gaussians on, an index of an order takes four bytes
+export const FARTHEST = 1e9; // of all lengths: single precision keeps their squares finite
+const STEPS = 65535, MAX_LOG = 60; // of the grid; of the logarithm of a deviation
 export const MAX_TURN = Math.sin(Math.PI / 8), TURN_STEPS = 127; // largest of a quaternion's x, y, z, and its steps
 
 /**
@@ -34,9 +36,12 @@ export const chunkBytes = (count, orders) => count * (RECORD + orders * indexTyp
  * @returns {value is Encoding}
  */
 export function isEncoding(value) {
-  /** @param {unknown} list @param {number} size */
-  const numbers = (list, size) => Array.isArray(list) && list.length === size && list.every(Number.isFinite);
-  return numbers(value?.origin, 3) && numbers(value.step, 3) && numbers(value.log_scale, 2) && value.sh_degree === 0;
+  /** @param {unknown} list @param {number} size @param {number} most */
+  const numbers = (list, size, most) => Array.isArray(list) && list.length === size
+    && list.every((v) => Number.isFinite(v) && Math.abs(v) <= most);
+  return numbers(value?.origin, 3, FARTHEST) && numbers(value.step, 3, FARTHEST / STEPS)
+    && value.step.every((/** @type {number} */ v) => v >= 0)
+    && numbers(value.log_scale, 2, MAX_LOG) && value.log_scale[1] >= 0 && value.sh_degree === 0;
 }
 
 /**

@@ -1,14 +1,21 @@
-// Sources of a bundle's files: the page's own folder, or files that were dropped onto the page.
+// Sources of a bundle's files: the page's own folder, or files that were dropped onto the page. Nothing is allocated
+// for a file before its size is compared with the one that is expected.
 
 import { PageError, REMAKE } from "./errors.js";
 
 /**
- * `read(file, size, options)` gives exactly `size` bytes (null: any number), or throws a PageError.
+ * `read(file, size, options)` gives exactly `size` bytes (null: at most MAX_BYTES), or throws a PageError.
  *
  * @typedef {{ signal?: AbortSignal, onBytes?: (bytes: number) => void }} ReadOptions
  * @typedef {{ read: (file: string, size: number | null, options?: ReadOptions) => Promise<ArrayBuffer> }} Source
- * @typedef {Map<string, () => Promise<ArrayBuffer>>} Files functions that read files, by name
+ *
+ * Files by name: their size, and how they are read.
+ * @typedef {{ size: number, open: () => Promise<ArrayBuffer> }} FileEntry
+ * @typedef {Map<string, FileEntry>} Files
  */
+
+export const MAX_BYTES = 2 ** 26; // of a file whose size nothing says, such as a manifest
+export const MAX_FILES = 4096; // in a folder or a zip
 
 /** @param {string} file */
 const shortName = (file) => file.split("/").slice(-2).join("/");
@@ -23,7 +30,7 @@ export function webSource(base) {
   return {
     async read(file, size, { signal, onBytes = () => {} } = {}) {
       const response = await request(new URL(file, base), file, signal);
-      if (size === null) return response.arrayBuffer();
+      if (size === null) return readAll(response, file, signal);
       const bytes = new Uint8Array(size);
       let at = 0;
       for await (const part of partsOf(response, signal, () => wrongSize(file, at, size))) {
@@ -36,6 +43,24 @@ export function webSource(base) {
       return bytes.buffer;
     },
   };
+}
+
+/**
+ * All bytes of a response.
+ *
+ * @param {Response} response
+ * @param {string} file
+ * @param {AbortSignal | undefined} signal
+ */
+async function readAll(response, file, signal) {
+  const parts = [];
+  let at = 0;
+  for await (const part of partsOf(response, signal, () => wrongSize(file, at, at + 1))) {
+    at += part.length;
+    if (at > MAX_BYTES) throw tooLarge(file);
+    parts.push(/** @type {Uint8Array<ArrayBuffer>} */ (part));
+  }
+  return new Blob(parts).arrayBuffer();
 }
 
 /**
@@ -68,17 +93,22 @@ async function* partsOf(response, signal, broken) {
 export function fileSource(files) {
   return {
     async read(file, size, { onBytes = () => {} } = {}) {
-      const open = files.get(file);
-      if (!open) {
+      const entry = files.get(file);
+      if (!entry) {
         throw new PageError(`${shortName(file)} is not among the dropped files. Drop the whole folder, or its zip.`);
       }
-      const buffer = await open();
+      if (size === null && entry.size > MAX_BYTES) throw tooLarge(file);
+      if (size !== null && entry.size !== size) throw wrongSize(file, entry.size, size);
+      const buffer = await entry.open();
       if (size !== null && buffer.byteLength !== size) throw wrongSize(file, buffer.byteLength, size);
       onBytes(buffer.byteLength);
       return buffer;
     },
   };
 }
+
+/** @param {string} file */
+export const tooLarge = (file) => new PageError(`${shortName(file)} is too large for what it is. ${REMAKE}`);
 
 /** @param {string} file @param {number} came @param {number} size */
 function wrongSize(file, came, size) {

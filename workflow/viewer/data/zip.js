@@ -2,10 +2,12 @@
 // anything is allocated, checksums after. Stored and deflated entries; no zip64.
 
 import { PageError } from "./errors.js";
+import { MAX_FILES } from "./source.js";
 
 const END = 0x06054b50, ENTRY = 0x02014b50, LOCAL = 0x04034b50; // signatures of records
 const END_SIZE = 22, ENTRY_SIZE = 46, LOCAL_SIZE = 30, MAX_COMMENT = 65535;
-const MAX_ENTRIES = 4096;
+const MAX_TABLE = 2 ** 24; // bytes of the table of entries
+const MAX_RATIO = 1032; // bytes that a deflated byte unpacks to, at most
 const MAX_BYTES = 2 ** 31; // of all entries unpacked
 
 /** @typedef {{ name: string, method: number, crc: number, packed: number, size: number, local: number }} Entry */
@@ -14,11 +16,11 @@ const MAX_BYTES = 2 ** 31; // of all entries unpacked
 const broken = (what) => new PageError(`The zip cannot be read: ${what}. Make it again, or drop the folder instead.`);
 
 /** Is this a relative path that stays in the archive? @param {string} name */
-const isSafe = (name) => name.length < 1024 && !/[\\:\0]/.test(name) && !name.startsWith("/")
+const isSafe = (name) => name.length < 1024 && !/[\\:]|\p{Cc}/u.test(name) && !name.startsWith("/")
   && name.split("/").every((part) => part !== "" && part !== "." && part !== "..");
 
 /**
- * Functions that unpack the entries of an archive, by name. Throws a PageError.
+ * The entries of an archive, by name; each is unpacked when it is opened. Throws a PageError.
  *
  * @param {Blob} blob
  * @returns {Promise<import("./source.js").Files>}
@@ -32,8 +34,8 @@ export async function openZip(blob) {
   const count = view.getUint16(at + 10, true);
   const size = view.getUint32(at + 12, true), begin = view.getUint32(at + 16, true);
   if (count === 0xffff || begin === 0xffffffff) throw broken("it is of the large kind (zip64)");
-  if (count > MAX_ENTRIES) throw broken(`it has ${count} entries, at most ${MAX_ENTRIES} are read`);
-  if (begin + size > blob.size) throw broken("its table lies outside of it");
+  if (count > MAX_FILES) throw broken(`it has ${count} entries, at most ${MAX_FILES} are read`);
+  if (begin + size > blob.size || size > MAX_TABLE) throw broken("its table lies outside of it, or is too large");
   return readTable(blob, new DataView(await blob.slice(begin, begin + size).arrayBuffer()), count);
 }
 
@@ -57,15 +59,15 @@ function readTable(blob, table, count) {
     const name = decoder.decode(new Uint8Array(table.buffer, table.byteOffset + at + ENTRY_SIZE, long));
     at = next;
     if (name.endsWith("/")) continue;
-    if (!isSafe(name)) throw broken(`the name “${name}” leads out of it`);
+    if (!isSafe(name)) throw broken(`the name “${name.slice(0, 80).replace(/\p{Cc}/gu, " ")}” leads out of it`);
     if (flags & 1) throw broken(`${name} is locked with a password`);
     if (method !== 0 && method !== 8) throw broken(`${name} is packed in a way (${method}) that browsers do not know`);
-    const fits = local + LOCAL_SIZE + packed <= blob.size && (method !== 0 || packed === size);
+    const fits = local + LOCAL_SIZE + packed <= blob.size && (method ? size <= MAX_RATIO * packed : packed === size);
     if (!fits) throw broken(`${name} contradicts its own size`);
     sum += size;
     if (sum > MAX_BYTES) throw broken("unpacked it would take more than 2 GB");
     if (files.has(name)) throw broken(`${name} is in it twice`);
-    files.set(name, () => unpack(blob, { name, method, crc, packed, size, local }));
+    files.set(name, { size, open: () => unpack(blob, { name, method, crc, packed, size, local }) });
   }
   return files;
 }

@@ -1,6 +1,8 @@
 // Shaders of the splats: decode a record, place it on the surface, project it (EWA), weight it by its level.
 
-import { LEVEL_SHIFT, MAX_LEVELS, NO_SLOT, PAGE, PAGES_A_ROW, ROW, SLOT_SHIFT } from "../data/layout.js";
+import {
+  CODE_SHIFT, MAX_LEVELS, PAGE, PAGES_A_ROW, PLACES, PLACES_A_ROW, ROW, SLOTS,
+} from "../data/layout.js";
 import { MAX_TURN, TURN_STEPS } from "../data/records.js";
 import { MAX_OCTAVES } from "../terrain/heights.js";
 
@@ -36,11 +38,13 @@ uniform vec2 placeUnder[${MAX_OCTAVES}];
 uniform float amplitude[${MAX_OCTAVES}], scale[${MAX_OCTAVES}];
 uniform int octaves;
 uniform uint salt;
-uint hashCell(ivec2 cell, uint axis) {
-  uint h = uint(cell.x) * 0x8da6b343u ^ uint(cell.y) * 0xd8163841u ^ axis * 0xcb1ab31fu ^ salt;
+uint mixBits(uint h) {
   h = (h ^ h >> 16) * 0x85ebca6bu;
   h = (h ^ h >> 13) * 0xc2b2ae35u;
   return h ^ h >> 16;
+}
+uint hashCell(ivec2 cell, uint axis) {
+  return mixBits(mixBits(uint(cell.x) * 0x8da6b343u ^ axis * 0xcb1ab31fu ^ salt) + uint(cell.y) * 0xd8163841u);
 }
 vec3 surface(vec2 at) { // height and slope at a place seen from the eye
   vec3 sum = vec3(0.0);
@@ -120,8 +124,8 @@ export const vertexShader = (kind) => `#version 300 es
 precision highp float;
 precision highp int;
 precision highp usampler2D;
-layout(location = 0) in uvec3 block;
-uniform usampler2D records, entries;
+layout(location = 0) in uvec4 block;
+uniform usampler2D records, entries, places;
 uniform highp sampler2D hues;   // of overlays, see overlays.js
 uniform vec3 right, up, ahead;  // camera axes in the world
 uniform vec3 corner;            // south-west corner of the middle cell, on the ground, seen from the eye
@@ -151,15 +155,32 @@ void main() {
   uint lane = uint(gl_InstanceID) & ${PAGE - 1}u;
   if (lane > (block.y >> 16u & ${PAGE - 1}u)) return;
   ivec2 texel = ivec2(int(block.x % ${PAGES_A_ROW}u) * ${PAGE} + int(lane), int(block.x / ${PAGES_A_ROW}u));
-  uint entry = texelFetch(entries, texel, 0).x, slot = entry >> ${SLOT_SHIFT}u, mark = block.z;
-  int level = int(entry >> ${LEVEL_SHIFT}u & 7u);
+  uint entry = texelFetch(entries, texel, 0).x, code = entry >> ${CODE_SHIFT}u, mark = block.z, place = block.w;
+  int level = int(code & ${MAX_LEVELS - 1}u);
   vec2 cell = vec2(int(block.y & 255u) - 128, int(block.y >> 8u & 255u) - 128);
-  if (slot != ${NO_SLOT}u) {
+  if (code >= ${PLACES}u) {
+    place = code - ${PLACES - 1}u;
+  } else if (code >= ${SLOTS}u) {
+    uint slot = (code - ${SLOTS}u) / ${MAX_LEVELS}u;
     cell = vec2(int(slot % 3u) - 1, int(slot / 3u) - 1);
     mark = marks[slot];
   }
-  uint place = entry & ${(1 << LEVEL_SHIFT) - 1}u;
-  Gaussian one = decodeRecord(texelFetch(records, ivec2(int(place & ${ROW - 1}u), int(place / ${ROW}u)), 0));
+  uint row = entry & ${(1 << CODE_SHIFT) - 1}u;
+  Gaussian one = decodeRecord(texelFetch(records, ivec2(int(row & ${ROW - 1}u), int(row / ${ROW}u)), 0));
+  vec2 way = vec2(1.0, 0.0); // cosine and sine of an object's turn
+  if (place > 0u) { // turned and scaled about the foot, which is the middle of a tile in the records
+    ivec2 first = ivec2(2 * int((place - 1u) % ${PLACES_A_ROW}u), int((place - 1u) / ${PLACES_A_ROW}u));
+    uvec4 where = texelFetch(places, first, 0), what = texelFetch(places, first + ivec2(1, 0), 0);
+    cell = uintBitsToFloat(where.xy);
+    vec2 large = uintBitsToFloat(where.zw), from = one.centre.xy - 0.5 * side;
+    float size = uintBitsToFloat(what.y);
+    way = large / size;
+    one.centre = vec3(large.x * from.x - large.y * from.y, large.y * from.x + large.x * from.y,
+      size * one.centre.z + uintBitsToFloat(what.x));
+    one.deviation *= size;
+    mark = what.z;
+    if (code >= ${PLACES}u) level = int(what.w);
+  }
   vec3 seen = one.centre + vec3(cell * side, 0.0) + corner;
   vec3 rise = surface(seen.xy);
   seen.z += rise.x;
@@ -174,6 +195,7 @@ void main() {
   mat3 axes = rotation(one.turn);
   for (int k = 0; k < 3; k++) {
     axes[k] *= one.deviation[k];
+    if (place > 0u) axes[k].xy = vec2(way.x * axes[k].x - way.y * axes[k].y, way.y * axes[k].x + way.x * axes[k].y);
     axes[k].z += dot(rise.yz, axes[k].xy); // the surface shears shapes along its slope
   }
   mat3 shape = transpose(mat3(right, up, ahead)) * axes;

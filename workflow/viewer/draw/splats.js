@@ -2,7 +2,9 @@
 // far tiles and one for the 3 x 3 block about the eye. A block of instances is a page of entries in one cell.
 
 import { PageError } from "../data/errors.js";
-import { BLOCK, MAX_LEVELS, NEAR, orderPages, PAGE, PAGES_A_ROW, recordRows, ROW } from "../data/layout.js";
+import {
+  BLOCK, MAX_LEVELS, NEAR, orderPages, PAGE, PAGES_A_ROW, PLACE, PLACES_A_ROW, recordRows, ROW,
+} from "../data/layout.js";
 import { MAX_OCTAVES } from "../terrain/heights.js";
 import { createProgram, createTexture, setAxes } from "./gl.js";
 import { overlayColours } from "./overlays.js";
@@ -23,7 +25,7 @@ import { FRAGMENT, vertexShader } from "./shaders.js";
 const FULL = "The terrain does not fit into this machine's graphics memory. Close other pages, make one with larger "
   + "tiles or fewer variants, or open it on a larger machine.";
 const WIDTH = PAGE * PAGES_A_ROW; // of the order textures
-const RECORDS = 0, ENTRIES = 1, RELIEF = 2, HUES = 3; // texture units
+const RECORDS = 0, ENTRIES = 1, RELIEF = 2, HUES = 3, PLACES = 4; // texture units
 
 /**
  * @param {GL} gl
@@ -38,6 +40,7 @@ export function createSplats(gl, manifest, heights) {
   const entries = createTexture(gl, gl.R32UI, WIDTH, orderPages(manifest) / PAGES_A_ROW);
   const far = createBlocks(gl), close = createBlocks(gl);
   let nearEntries = createTexture(gl, gl.R32UI, WIDTH, 1), nearRows = 1;
+  let places = createTexture(gl, gl.RGBA32UI, 2 * PLACES_A_ROW, 1), placeRows = 1;
   /** @type {FrameAnswer | null} */
   let frame = null;
   const relief = heights.kind === "image" ? createRelief(gl, heights) : null;
@@ -49,6 +52,21 @@ export function createSplats(gl, manifest, heights) {
   function bind(unit, texture) {
     gl.activeTexture(gl.TEXTURE0 + unit);
     gl.bindTexture(gl.TEXTURE_2D, texture);
+  }
+
+  /** Copy the places of objects. @param {Uint32Array} words */
+  function setPlaces(words) {
+    const rows = Math.ceil(words.length / (PLACE * PLACES_A_ROW));
+    if (!rows) return;
+    if (rows > placeRows) {
+      gl.deleteTexture(places);
+      placeRows = 2 * rows;
+      places = createTexture(gl, gl.RGBA32UI, 2 * PLACES_A_ROW, placeRows);
+    }
+    const data = new Uint32Array(rows * PLACE * PLACES_A_ROW);
+    data.set(words);
+    bind(PLACES, places);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 2 * PLACES_A_ROW, rows, gl.RGBA_INTEGER, gl.UNSIGNED_INT, data);
   }
 
   return {
@@ -89,6 +107,7 @@ export function createSplats(gl, manifest, heights) {
         gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, WIDTH, rows, gl.RED_INTEGER, gl.UNSIGNED_INT, data);
       }
       close.fill(nearBlocks(pages, answer.near.length));
+      setPlaces(answer.places);
       frame = answer;
     },
 
@@ -116,6 +135,7 @@ export function createSplats(gl, manifest, heights) {
         gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 256, 1, gl.RGBA, gl.UNSIGNED_BYTE, colours);
       }
       bind(RECORDS, records);
+      bind(PLACES, places);
       if (relief) bind(RELIEF, relief);
       bind(ENTRIES, entries);
       far.draw();
@@ -127,7 +147,7 @@ export function createSplats(gl, manifest, heights) {
 
     /** Free the textures. */
     end() {
-      for (const texture of [records, entries, nearEntries, hues, relief]) gl.deleteTexture(texture);
+      for (const texture of [records, entries, nearEntries, places, hues, relief]) gl.deleteTexture(texture);
     },
   };
 }
@@ -141,6 +161,7 @@ function setConstants(gl, uniforms, manifest) {
   gl.uniform1i(uniforms.records, RECORDS);
   gl.uniform1i(uniforms.entries, ENTRIES);
   gl.uniform1i(uniforms.hues, HUES);
+  gl.uniform1i(uniforms.places, PLACES);
   gl.uniform1i(uniforms.levels, manifest.levels.length);
   gl.uniform1f(uniforms.side, manifest.tile_side);
   gl.uniform1f(uniforms.near, NEAR * manifest.eye_floor);
@@ -228,7 +249,7 @@ function createBlocks(gl) {
   gl.bindVertexArray(array);
   gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
   gl.enableVertexAttribArray(0);
-  gl.vertexAttribIPointer(0, 3, gl.UNSIGNED_INT, 4 * BLOCK, 0);
+  gl.vertexAttribIPointer(0, BLOCK, gl.UNSIGNED_INT, 4 * BLOCK, 0);
   gl.vertexAttribDivisor(0, PAGE);
   gl.bindVertexArray(null);
   return {

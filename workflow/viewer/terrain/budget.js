@@ -47,7 +47,7 @@ export function selectCells(terrain, camera, budget) {
     distances = distancesAt(terrain, above, Math.exp(low));
   }
   const kept = cells.filter((cell) => chooseLevels(terrain, cell, distances));
-  return { ...distances, ...nearestCells(kept, budget, distances.reach), missing: missingChunks(kept) };
+  return { ...distances, ...nearestCells(kept, budget, distances.reach), missing: missingChunks(terrain, kept) };
 }
 
 /**
@@ -88,44 +88,70 @@ function eyeHeight({ heights, near }, { eye: [x, y, z] }) {
 }
 
 /**
- * Set a cell's levels lo to hi and their count; where one of them has not arrived, one that has stands in for all, the
- * next coarser first. Returns: is there anything to draw?
+ * Set a cell's levels and their count. Returns: is there anything to draw?
  *
  * @param {TerrainTables} terrain
  * @param {Cell} cell
  * @param {Distances} distances
  */
-function chooseLevels({ tiles, levels }, cell, { switches, bands, reach }) {
+function chooseLevels(terrain, cell, { switches, bands, reach }) {
   if (cell.nearest >= reach) return false;
-  const { counts, arrived } = tiles[cell.tile];
+  let arrived = -1;
+  for (const tile of cell.tiles) arrived &= terrain.tiles[tile].arrived;
+  if (!pickLevels(terrain, cell, arrived, switches, bands)) return false;
+  cell.count = 0;
+  for (let level = cell.lo; level <= cell.hi; level++) cell.count += cell.counts[level];
+  return true;
+}
+
+/**
+ * Set the levels lo to hi of what lies between two distances; where one of them has not arrived, one that has stands in
+ * for all, the next coarser first. Returns: is there anything to draw?
+ *
+ * @param {TerrainTables} terrain
+ * @param {{ nearest: number, farthest: number, lo: number, hi: number, whole: boolean, missing: number }} span
+ * @param {number} arrived bits of levels
+ * @param {number[]} switches
+ * @param {number[]} bands
+ */
+export function pickLevels({ levels }, span, arrived, switches, bands) {
   let lo = 0, hi = 0;
-  while (lo < levels - 1 && cell.nearest > switches[lo] + bands[lo]) lo += 1;
-  for (hi = lo; hi < levels - 1 && cell.farthest >= switches[hi] - bands[hi];) hi += 1;
+  while (lo < levels - 1 && span.nearest > switches[lo] + bands[lo]) lo += 1;
+  for (hi = lo; hi < levels - 1 && span.farthest >= switches[hi] - bands[hi];) hi += 1;
   const wanted = (2 << hi) - (1 << lo);
-  cell.missing = wanted & ~arrived;
-  cell.whole = cell.missing !== 0;
-  if (cell.whole) {
+  span.missing = wanted & ~arrived;
+  span.whole = span.missing !== 0;
+  if (span.whole) {
     let level = lo;
     while (level < levels && !((arrived >> level) & 1)) level += 1;
     if (level === levels) for (level = lo - 1; level >= 0 && !((arrived >> level) & 1);) level -= 1;
     if (level < 0) return false;
     lo = hi = level;
   }
-  cell.lo = lo;
-  cell.hi = hi;
-  cell.count = 0;
-  for (let level = lo; level <= hi; level++) cell.count += counts[level];
+  span.lo = lo;
+  span.hi = hi;
   return true;
 }
 
-/** @param {Cell[]} cells */
-function missingChunks(cells) {
+/** @param {TerrainTables} terrain @param {Cell[]} cells */
+function missingChunks(terrain, cells) {
   /** @type {Set<number>} */
   const chunks = new Set();
-  for (const { tile, missing } of cells) {
-    for (let level = 0; missing >> level; level++) if ((missing >> level) & 1) chunks.add(16 * tile + level);
+  for (const { tiles, missing } of cells) {
+    if (missing) for (const tile of tiles) addMissing(chunks, tile, missing & ~terrain.tiles[tile].arrived);
   }
   return chunks;
+}
+
+/**
+ * Add the keys of missing levels of a tile or an object.
+ *
+ * @param {Set<number>} chunks
+ * @param {number} tile
+ * @param {number} missing bits of levels
+ */
+export function addMissing(chunks, tile, missing) {
+  for (let level = 0; missing >> level; level++) if ((missing >> level) & 1) chunks.add(16 * tile + level);
 }
 
 /**

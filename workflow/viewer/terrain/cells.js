@@ -1,12 +1,15 @@
 // Cells of the tile grid: which tile lies in each, and where the surface is, cached while cells stay in view.
 
+import { RING } from "./cell_ring.js";
 import { tileAt } from "./choice.js";
+import { createThing } from "./things.js";
 
 /** @typedef {import("../worker/terrain_tables.js").TerrainTables} TerrainTables */
 
 export const REACH = 48; // tile sides to the last tiles: 97 x 97 cells
 const PARTS = 8; // heights within a cell are sampled at (PARTS + 1)^2 points
-const RING = 128; // cells along a side of the cache: a power of 2, more than 2 REACH + 1
+/** @type {import("./things.js").Thing[]} */
+const NONE = [];
 
 /**
  * The tile under a point of the ground.
@@ -15,13 +18,18 @@ const RING = 128; // cells along a side of the cache: a power of 2, more than 2 
  * @param {number} x
  * @param {number} y
  */
-export function tileUnder({ tile_side: side, salt, tiles }, x, y) {
+export function tileUnder({ tile_side: side, salt, tiles, materials }, x, y) {
   const i = Math.floor(x / side), j = Math.floor(y / side);
-  return { i, j, tile: tileAt(i, j, salt, tiles.length / 16) };
+  return { i, j, tile: tileAt(i, j, salt, tiles.length / (16 * materials.length)) };
 }
 
 /**
- * A cache of cells by their coordinates modulo RING: tile, height and slope at the centre, bounds of the height.
+ * A cell where materials meet. serial: distinguishes it from all others; kept: by chunk, the Gaussians that stay in it;
+ * last: key of the batch that was drawn last.
+ * @typedef {{ i: number, j: number, serial: number, kept: Map<number, Uint32Array>, last: number | null }} Border
+ *
+ * A cache of cells by their coordinates modulo RING: the tile (of the first material), height and slope at the centre,
+ * bounds of the height; the tiles of all materials that may show, their Gaussians by level, and the objects on them.
  *
  * @typedef {ReturnType<typeof createCellCache>} CellCache
  */
@@ -29,30 +37,59 @@ export function createCellCache() {
   const n = RING * RING, doubles = () => new Float64Array(n);
   return {
     i: doubles().fill(NaN), j: doubles(), tile: new Uint16Array(n), h: doubles(), east: doubles(), north: doubles(),
-    low: doubles(), high: doubles(),
+    low: doubles(), high: doubles(), borders: 0,
+    tiles: /** @type {number[][]} */ (new Array(n)), counts: /** @type {number[][]} */ (new Array(n)),
+    things: /** @type {import("./things.js").Thing[][]} */ (new Array(n)),
+    border: /** @type {(Border | null)[]} */ (new Array(n)),
   };
 }
 
 /**
- * Index of a cell in the cache; tile and surface are computed when it enters.
+ * Index of a cell in the cache; tiles, objects and surface are computed when it enters.
  *
  * @param {TerrainTables} terrain
  * @param {number} i
  * @param {number} j
  */
-export function lookUpCell({ cache, side, salt, variants, heights }, i, j) {
-  const at = (j & (RING - 1)) * RING + (i & (RING - 1));
+export function lookUpCell(terrain, i, j) {
+  const { cache, side, heights } = terrain, at = (j & (RING - 1)) * RING + (i & (RING - 1));
   if (cache.i[at] !== i || cache.j[at] !== j) {
     const [h, east, north] = heights.at((i + 0.5) * side, (j + 0.5) * side);
-    cache.i[at] = i;
-    cache.j[at] = j;
-    cache.tile[at] = tileAt(i, j, salt, variants);
     cache.h[at] = h;
     cache.east[at] = east;
     cache.north[at] = north;
     cache.low[at] = NaN;
+    coverCell(terrain, at, i, j);
+    cache.i[at] = i;
+    cache.j[at] = j;
   }
   return at;
+}
+
+/**
+ * Tiles and objects of a cell.
+ *
+ * @param {TerrainTables} terrain
+ * @param {number} at index in the cache
+ * @param {number} i
+ * @param {number} j
+ */
+function coverCell({ cache, salt, variants, each, tiles, classes, scatter, levels }, at, i, j) {
+  const first = tileAt(i, j, salt, variants), bits = classes ? classes.materialsIn(i, j) : 1;
+  const objects = each * (classes?.materials ?? 1); // number of the first
+  const things = scatter ? scatter.instancesIn(i, j).map((one) => createThing(one, objects)) : NONE;
+  const tile = first + each * (31 - Math.clz32(bits & -bits)), alone = (bits & (bits - 1)) === 0;
+  cache.tile[at] = tile;
+  cache.things[at] = things;
+  cache.border[at] = alone ? null : { i, j, serial: ++cache.borders, kept: new Map(), last: null };
+  cache.tiles[at] = tiles[tile].alone;
+  if (!alone) {
+    const materials = Array.from({ length: classes?.materials ?? 1 }, (_, m) => m).filter((m) => (bits >> m) & 1);
+    cache.tiles[at] = materials.map((m) => first + each * m);
+  }
+  const all = [...cache.tiles[at], ...things.map((thing) => thing.tile)];
+  cache.counts[at] = all.length === 1 ? tiles[tile].counts
+    : Array.from({ length: levels }, (_, level) => all.reduce((sum, number) => sum + tiles[number].counts[level], 0));
 }
 
 /**

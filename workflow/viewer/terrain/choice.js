@@ -12,10 +12,15 @@ export const WEST = 0, SOUTH = 1, CENTRE = 2; // axis of a hash: west edge, sout
  * @param {number} salt
  */
 export function hashCell(i, j, axis, salt) {
-  let h = Math.imul(i, 0x8da6b343) ^ Math.imul(j, 0xd8163841) ^ Math.imul(axis, 0xcb1ab31f) ^ salt;
+  const h = mix(Math.imul(i, 0x8da6b343) ^ Math.imul(axis, 0xcb1ab31f) ^ salt);
+  return mix((h + Math.imul(j, 0xd8163841)) | 0) >>> 0;
+}
+
+/** The finaliser of MurmurHash3. @param {number} h */
+function mix(h) {
   h = Math.imul(h ^ (h >>> 16), 0x85ebca6b);
   h = Math.imul(h ^ (h >>> 13), 0xc2b2ae35);
-  return (h ^ (h >>> 16)) >>> 0;
+  return h ^ (h >>> 16);
 }
 
 /**

@@ -6,10 +6,14 @@ import { inNearBlock, visitBackToFront } from "./draw_order.js";
 
 /**
  * A cell in view. di, dj: from the eye's cell; at: index in the cell cache; nearest, farthest: bounds of the distances
- * of its Gaussians; lo to hi: its levels; whole: one level stands in for missing ones and does not fade; missing: bits
- * of the levels that have not arrived; direction: of its pre-sorted order.
- * @typedef {{ di: number, dj: number, at: number, tile: number, close: boolean, nearest: number, farthest: number,
- *   lo: number, hi: number, whole: boolean, missing: number, count: number, direction: number }} Cell
+ * of its Gaussians; tile: of the first material; tiles: of all that may show; counts: Gaussians by level, objects
+ * included; border: where several materials meet; things: objects whose feet are in it; lo to hi: its levels; whole:
+ * one level stands in for missing ones and does not fade; missing: bits of the levels that have not arrived; direction:
+ * of its pre-sorted order.
+ * @typedef {{ di: number, dj: number, at: number, tile: number, tiles: number[], counts: number[],
+ *   border: import("./cells.js").Border | null, things: import("./things.js").Thing[], close: boolean,
+ *   nearest: number, farthest: number, lo: number, hi: number, whole: boolean, missing: number, count: number,
+ *   direction: number }} Cell
  *
  * @typedef {import("./camera.js").Camera} Camera
  * @typedef {import("../worker/terrain_tables.js").TerrainTables} TerrainTables
@@ -30,11 +34,11 @@ const SLACK = 1e-6; // cells: more than rounding can move the ends of a row
  * @returns {Cell[]}
  */
 export function cellsInFrustum(terrain, camera, reach) {
-  const { side, heights, cache, z, cells } = terrain, [x, y, height] = camera.eye;
+  const { side, heights, cache, cells } = terrain, [x, y, height] = camera.eye, { z, widest } = spanOf(terrain);
   const i0 = Math.floor(x / side), j0 = Math.floor(y / side), planes = frustumPlanes(camera, terrain.near);
-  const overhang = RIM * terrain.largest, beyond = Math.max(0, (RIM - 3) * terrain.largest);
+  const overhang = Math.max(RIM * terrain.largest, widest), slack = heights.steepest * widest;
   const most = heights.steepest * (0.5 * side + overhang) * Math.SQRT2, half = 0.5 * side, wide = half + overhang;
-  const lowest = heights.low + z[0] - beyond - height, highest = heights.high + z[1] + beyond - height;
+  const lowest = heights.low + z[0] - height, highest = heights.high + z[1] - height;
   const { first, last } = rowRanges(planes, { side, x, y, reach, wide, lowest, highest });
   let n = 0;
   visitBackToFront(REACH, (di, dj) => {
@@ -43,15 +47,14 @@ export function cellsInFrustum(terrain, camera, reach) {
     const dx = Math.max(Math.abs(east) - half, 0), dy = Math.max(Math.abs(north) - half, 0);
     if (dx * dx + dy * dy >= reach * reach) return;
     const at = lookUpCell(terrain, i0 + di, j0 + dj), h = cache.h[at];
-    const low = Math.max(h - most, heights.low) + z[0] - beyond;
-    const high = Math.min(h + most, heights.high) + z[1] + beyond;
+    const low = Math.max(h - most, heights.low) + z[0], high = Math.min(h + most, heights.high) + z[1];
     let up = 0.5 * (low + high) - height, tall = 0.5 * (high - low);
     let nearest = length(dx, dy, Math.max(Math.abs(up) - tall, 0));
     if (nearest >= reach || isOutside(planes, east, north, up, wide, tall)) return;
     if (heights.steepest && Math.abs(di) <= CLOSE && Math.abs(dj) <= CLOSE) {
       boundHeights(terrain, at);
       up = 0.5 * (cache.low[at] + cache.high[at] + z[0] + z[1]) - height;
-      tall = 0.5 * (cache.high[at] - cache.low[at] + z[1] - z[0]) + beyond;
+      tall = 0.5 * (cache.high[at] - cache.low[at] + z[1] - z[0]) + slack;
       nearest = length(dx, dy, Math.max(Math.abs(up) - tall, 0));
     }
     if (n === cells.length) cells.push(blankCell());
@@ -60,6 +63,10 @@ export function cellsInFrustum(terrain, camera, reach) {
     cell.dj = dj;
     cell.at = at;
     cell.tile = cache.tile[at];
+    cell.tiles = cache.tiles[at];
+    cell.counts = cache.counts[at];
+    cell.border = cache.border[at];
+    cell.things = cache.things[at];
     cell.close = inNearBlock(di, dj);
     cell.nearest = nearest;
     cell.farthest = length(Math.abs(east) + half, Math.abs(north) + half, Math.abs(up) + tall);
@@ -67,11 +74,27 @@ export function cellsInFrustum(terrain, camera, reach) {
   return cells.slice(0, n);
 }
 
+/**
+ * Range of the heights of all Gaussians above the surface, and the largest extent of an object from its foot.
+ *
+ * @param {TerrainTables} terrain
+ */
+function spanOf({ z: [low, high], objects, most }) {
+  let widest = 0;
+  for (const { ground, extent } of objects) {
+    widest = Math.max(widest, most * extent);
+    low = Math.min(low, ground - most * extent);
+    high = Math.max(high, ground + most * extent);
+  }
+  return { z: [low, high], widest };
+}
+
 /** @param {number} x @param {number} y @param {number} z */
 const length = (x, y, z) => Math.sqrt(x * x + y * y + z * z);
 /** @returns {Cell} */
 const blankCell = () => ({
-  di: 0, dj: 0, at: 0, tile: 0, close: false, nearest: 0.5, farthest: 0.5,
+  di: 0, dj: 0, at: 0, tile: 0, tiles: [], counts: [], border: null, things: [], close: false,
+  nearest: 0.5, farthest: 0.5,
   lo: 0, hi: 0, whole: false, missing: 0, count: 0, direction: 0,
 });
 

@@ -115,8 +115,36 @@ function gradientNoise(x, y, axis, salt, out) {
   out[2] = byY;
 }
 
+/**
+ * Gradient noise without its derivatives, x and y in cells; remembers the gradients of the last cell.
+ *
+ * @param {number} axis
+ * @param {number} salt
+ * @returns {(x: number, y: number) => number}
+ */
+export function createNoise(axis, salt) {
+  const gradients = new Float64Array(8);
+  let east = NaN, north = NaN; // the cell of the gradients
+  return (x, y) => {
+    const i = Math.floor(x), j = Math.floor(y), u = x - i, v = y - j, across = fade(u), along = fade(v);
+    if (i !== east || j !== north) {
+      for (let k = 0; k < 4; k++) {
+        const bits = hashCell(i + (k & 1), j + (k >> 1), axis, salt);
+        gradients[2 * k] = (bits & 0xffff) / 32767.5 - 1;
+        gradients[2 * k + 1] = (bits >>> 16) / 32767.5 - 1;
+      }
+      east = i;
+      north = j;
+    }
+    return (1 - across) * (1 - along) * (gradients[0] * u + gradients[1] * v)
+      + across * (1 - along) * (gradients[2] * (u - 1) + gradients[3] * v)
+      + (1 - across) * along * (gradients[4] * u + gradients[5] * (v - 1))
+      + across * along * (gradients[6] * (u - 1) + gradients[7] * (v - 1));
+  };
+}
+
 /** @param {number} t */
-const fade = (t) => t * t * t * (t * (6 * t - 15) + 10);
+export const fade = (t) => t * t * t * (t * (6 * t - 15) + 10);
 /** @param {number} t */
 const fadeSlope = (t) => 30 * t * t * (t * (t - 2) + 1);
 
@@ -128,11 +156,7 @@ const fadeSlope = (t) => 30 * t * t * (t * (t - 2) + 1);
 function createHeightMap({ rows, columns, width, beyond }, pixels) {
   const perUnit = columns / width, mirrored = beyond !== "clamp";
   /** @param {number} index @param {number} n */
-  const inside = (index, n) => {
-    if (!mirrored) return Math.min(Math.max(index, 0), n - 1);
-    const k = ((index % (2 * n)) + 2 * n) % (2 * n);
-    return k < n ? k : 2 * n - 1 - k;
-  };
+  const inside = (index, n) => wrapIndex(index, n, mirrored);
   // the pixel under the eye as a small integer: beyond the map it repeats, or stays at the border
   /** @param {number} u @param {number} n */
   const pixelUnder = (u, n) => {
@@ -162,6 +186,19 @@ function createHeightMap({ rows, columns, width, beyond }, pixels) {
       return { cells: new Int32Array([i, j]), places: new Float32Array([u, v]) };
     },
   };
+}
+
+/**
+ * Index of a picture's n pixels for any index: mirrored, or the border's.
+ *
+ * @param {number} index
+ * @param {number} n
+ * @param {boolean} mirrored
+ */
+export function wrapIndex(index, n, mirrored) {
+  if (!mirrored) return Math.min(Math.max(index, 0), n - 1);
+  const k = ((index % (2 * n)) + 2 * n) % (2 * n);
+  return k < n ? k : 2 * n - 1 - k;
 }
 
 /** @param {Float32Array} pixels @param {number} rows @param {number} columns @param {number} perUnit */

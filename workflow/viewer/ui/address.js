@@ -27,13 +27,22 @@ export function formatPlace(walker) {
  * @returns {Partial<Place>}
  */
 export function parsePlace(hash) {
-  const values = decodeURIComponent(hash.replace(/^#/, "")).split(",").map((v) => (v.trim() === "" ? NaN : Number(v)));
+  const values = decode(hash.replace(/^#/, "")).split(",").map((v) => (v.trim() === "" ? NaN : Number(v)));
   /** @type {Partial<Place>} */
   const place = {};
   PLACE_KEYS.forEach((key, k) => {
     if (Number.isFinite(values[k])) place[key] = values[k];
   });
   return place;
+}
+
+/** @param {string} text */
+function decode(text) {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    return text; // a lone % sign
+  }
 }
 
 /**

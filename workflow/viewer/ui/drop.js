@@ -3,7 +3,7 @@
 import { PageError } from "../data/errors.js";
 import { gswtSource, isGswt } from "../data/gswt.js";
 import { NAME } from "../data/manifest.js";
-import { fileSource } from "../data/source.js";
+import { fileSource, MAX_BYTES, MAX_FILES, tooLarge } from "../data/source.js";
 import { openZip } from "../data/zip.js";
 
 /**
@@ -12,6 +12,8 @@ import { openZip } from "../data/zip.js";
  * @typedef {{ openSource: (source: Source) => Promise<void>, loadPath: (json: unknown) => void,
  *   onError: (error: unknown) => void }} DropHandlers
  */
+
+const MAX_DEPTH = 16; // of folders in folders
 
 /** @param {DropHandlers} handlers */
 export function listenToDrops(handlers) {
@@ -43,7 +45,7 @@ async function handleDrop(entries, loose, { openSource, loadPath }) {
   if (only && /\.json$/i.test(only.name) && only.name !== NAME) return loadPath(await parseJson(only));
   if (only && /\.zip$/i.test(only.name)) return openSource(await sourceOf(await openZip(only)));
   /** @type {Files} */
-  const readers = new Map([...files].map(([name, file]) => [name, () => file.arrayBuffer()]));
+  const readers = new Map([...files].map(([name, file]) => [name, { size: file.size, open: () => file.arrayBuffer() }]));
   return openSource(await sourceOf(readers));
 }
 
@@ -59,7 +61,7 @@ export async function sourceOf(files) {
   if (manifest !== undefined) {
     const above = manifest.slice(0, -NAME.length);
     const inside = [...files].filter(([name]) => name.startsWith(above));
-    return fileSource(new Map(inside.map(([name, open]) => [name.slice(above.length), open])));
+    return fileSource(new Map(inside.map(([name, entry]) => [name.slice(above.length), entry])));
   }
   if (isGswt(files)) return gswtSource(files);
   throw new PageError(
@@ -69,6 +71,7 @@ export async function sourceOf(files) {
 
 /** @param {File} file */
 async function parseJson(file) {
+  if (file.size > MAX_BYTES) throw tooLarge(file.name);
   try {
     return JSON.parse(await file.text());
   } catch (error) {
@@ -85,8 +88,11 @@ async function parseJson(file) {
 async function listFiles(entries) {
   /** @type {Map<string, File>} */
   const files = new Map();
-  /** @param {FileSystemEntry} entry */
-  const walk = async (entry) => {
+  /** @param {FileSystemEntry} entry @param {number} depth */
+  const walk = async (entry, depth) => {
+    if (files.size >= MAX_FILES || depth > MAX_DEPTH) {
+      throw new PageError(`More than ${MAX_FILES} files were dropped, or folders deep in folders. Drop the bundle's alone.`);
+    }
     if (entry.isFile) {
       const { file } = /** @type {FileSystemFileEntry} */ (entry);
       files.set(entry.fullPath.replace(/^\//, ""), await new Promise((done, fail) => file.call(entry, done, fail)));
@@ -97,9 +103,9 @@ async function listFiles(entries) {
       /** @type {FileSystemEntry[]} */
       const some = await new Promise((done, fail) => reader.readEntries(done, fail));
       if (!some.length) break;
-      for (const one of some) await walk(one);
+      for (const one of some) await walk(one, depth + 1);
     }
   };
-  for (const entry of entries) await walk(entry);
+  for (const entry of entries) await walk(entry, 0);
   return files;
 }

@@ -1,8 +1,8 @@
 // The viewer: an open bundle, the walker in it, and what the worker and the GPU make of both.
 
-import { initialChunks, readChunks, readHeightMap, readManifest } from "../data/bundle.js";
+import { initialChunks, readChunks, readHeightMap, readManifest, readPictures } from "../data/bundle.js";
 import { PageError } from "../data/errors.js";
-import { chunkKey } from "../data/layout.js";
+import { chunkKey, listChunks } from "../data/layout.js";
 import { BUDGET, createFramePacing } from "../draw/frame_pacing.js";
 import { createFrameStats } from "../draw/frame_stats.js";
 import { OVERLAYS } from "../draw/overlays.js";
@@ -48,6 +48,8 @@ export class Viewer {
   pacing = createFramePacing();
   stats = createFrameStats();
   flyPath = createFlyPath();
+  /** @type {Walker | null} */
+  #walker = null; // the one that the controls move, through all bundles
   #fresh = false; // the worker has answered since the last picture
   #stop = new AbortController(); // of the bundle that is being loaded
   #restored = Promise.resolve(); // pending while the graphics context is lost
@@ -73,26 +75,34 @@ export class Viewer {
    */
   async open(source) {
     const manifest = await readManifest(source), pixels = await readHeightMap(manifest, source);
+    const pictures = await readPictures(manifest, source);
     const before = this.scene;
     this.#stop.abort();
     before?.client.end();
     before?.renderer?.end();
+    this.scene = null; // until the new one stands
     const stop = new AbortController();
     this.#stop = stop;
-    const walker = createWalker(manifest, before ? {} : parsePlace(location.hash));
+    const first = !this.#walker, begin = createWalker(manifest, first ? parsePlace(location.hash) : {});
     const heights = createHeights(manifest.heights, pixels);
-    const client = createWorkerClient(manifest, pixels, {
+    const client = createWorkerClient({ manifest, pixels, pictures }, {
       onRecords: (records) => this.#addRecords(records),
       onFrame: (frame) => this.#setFrame(frame),
       onError: (error) => this.fail(error),
     });
     this.loaded = false;
     this.error = null;
-    this.scene = {
-      manifest, source, heights, client, walker: Object.assign(before?.walker ?? walker, walker),
-      renderer: createRenderer(this.gl, manifest, heights), frame: null, coarse: 0, pending: new Set(),
-    };
-    if (!before) this.options.onFirstScene(this.scene.walker);
+    let renderer;
+    try {
+      renderer = createRenderer(this.gl, manifest, heights);
+    } catch (error) {
+      client.end();
+      throw error;
+    }
+    const walker = Object.assign(this.#walker ?? begin, begin);
+    this.#walker = walker;
+    this.scene = { manifest, source, heights, client, walker, renderer, frame: null, coarse: 0, pending: new Set() };
+    if (first) this.options.onFirstScene(walker);
     this.hud.showTools();
     this.drawFrame(); // sky and far ground at once
     try {
@@ -240,13 +250,11 @@ export class Viewer {
     const keys = missing.filter((key) => !pending.has(key));
     if (!keys.length) return;
     for (const key of keys) pending.add(key);
-    const queue = manifest.tiles.flatMap(({ tile, chunks }) => chunks.map((entry) => ({ tile, entry })))
+    const queue = listChunks(manifest)
       .filter(({ tile, entry }) => keys.includes(chunkKey(tile, entry.level)));
-    readChunks(queue, source, { take: (chunk) => client.add(chunk) })
-      .catch((error) => this.fail(error))
-      .finally(() => {
-        for (const key of keys) pending.delete(key);
-      });
+    readChunks(queue, source, { take: (chunk) => client.add(chunk) }).then(() => {
+      for (const key of keys) pending.delete(key);
+    }, (error) => this.fail(error)); // and its chunks stay pending: they are not asked for in every frame
   }
 
   #watchContext() {

@@ -5,6 +5,7 @@ const RUN = 4; // with Shift
 const TURN = 70; // degrees a second with the arrow keys
 const RISE = 1.2; // powers of e a second with Q and E
 const CEILING = 16; // highest eye, in tile sides
+const FARTHEST = 1e12; // coordinates beyond have no whole tiles left in double precision
 
 /**
  * @typedef {import("../terrain/camera.js").Place} Place
@@ -32,7 +33,7 @@ export function createWalker({ tile_side: side, eye_floor: floor }, place = {}) 
 }
 
 /**
- * Change any parts of the place, within bounds; what is not a finite number stays as it was.
+ * Change any parts of the place, within bounds; what is not a finite number, or beyond all bounds, stays as it was.
  *
  * @param {Walker} walker
  * @param {Partial<Place>} place
@@ -40,7 +41,7 @@ export function createWalker({ tile_side: side, eye_floor: floor }, place = {}) 
 export function moveTo(walker, place) {
   for (const key of PLACE_KEYS) {
     const value = place[key];
-    if (value !== undefined && Number.isFinite(value)) walker[key] = value;
+    if (value !== undefined && Math.abs(value) <= FARTHEST) walker[key] = value;
   }
   walker.eye = Math.min(Math.max(walker.eye, walker.floor), walker.ceiling);
   walker.pitch = Math.min(Math.max(walker.pitch, -90), 90);

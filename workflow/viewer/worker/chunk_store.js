@@ -1,8 +1,9 @@
 // Chunks at hand: their bytes in the worker, their rows in the record texture. Where a set is larger than the cache,
 // the least recently drawn chunks are evicted.
 
-import { CACHE_BYTES, chunkKey, LEVEL_SHIFT, NO_SLOT, ROW, SLOT_SHIFT } from "../data/layout.js";
+import { CACHE_BYTES, chunkKey, CODE_SHIFT, ROW } from "../data/layout.js";
 import { parseChunk } from "../data/records.js";
+import { RIM } from "../terrain/frustum.js";
 import { createPagePool } from "./page_pool.js";
 
 /**
@@ -50,14 +51,16 @@ export function createChunkStore(terrain, { encoding }, rows, onEvict) {
      */
     add({ tile, level, count, buffer }, stamp) {
       while (bytes + buffer.byteLength > CACHE_BYTES && evictOldest(stamp));
-      const key = chunkKey(tile, level), room = pool.allocate(key, Math.ceil(count / ROW), stamp);
+      const key = chunkKey(tile, level), room = pool.allocate(key, Math.ceil(count / ROW), stamp, count)?.pages;
       if (!room) return false;
-      const mark = ((NO_SLOT << SLOT_SHIFT) | (level << LEVEL_SHIFT)) >>> 0;
-      const entries = new Uint32Array(count);
-      for (let k = 0; k < count; k++) entries[k] = (mark | (room[k >> 10] * ROW + (k & (ROW - 1)))) >>> 0;
-      chunks.set(key, {
-        tile, level, count, buffer, ...parseChunk(buffer, count, encoding), entries, rows: room, stamp,
-      });
+      const mark = level << CODE_SHIFT, entries = new Uint32Array(count), parsed = parseChunk(buffer, count, encoding);
+      for (let k = 0; k < count; k++) entries[k] = mark | (room[k >> 10] * ROW + (k & (ROW - 1)));
+      const object = terrain.objects[tile - (terrain.tiles.length - terrain.objects.length)];
+      if (object) {
+        centreOnFoot(parsed.centres, terrain.side);
+        object.extent = Math.max(object.extent, measureExtent(parsed, terrain.deviations));
+      }
+      chunks.set(key, { tile, level, count, buffer, ...parsed, entries, rows: room, stamp });
       bytes += buffer.byteLength;
       terrain.tiles[tile].arrived |= 1 << level;
       return true;
@@ -85,4 +88,27 @@ export function createChunkStore(terrain, { encoding }, rows, onEvict) {
       return bytes;
     },
   };
+}
+
+/** An object's records have its foot in the middle of a tile. @param {Float32Array} centres @param {number} side */
+function centreOnFoot(centres, side) {
+  for (let k = 0; k < centres.length; k += 3) {
+    centres[k] -= 0.5 * side;
+    centres[k + 1] -= 0.5 * side;
+  }
+}
+
+/**
+ * Largest distance of a Gaussian's rim from the foot.
+ *
+ * @param {{ centres: Float32Array, sizes: Uint8Array }} parsed
+ * @param {ArrayLike<number>} deviations
+ */
+function measureExtent({ centres, sizes }, deviations) {
+  let most = 0;
+  for (let k = 0; k < sizes.length; k++) {
+    const away = Math.hypot(centres[3 * k], centres[3 * k + 1], centres[3 * k + 2]);
+    most = Math.max(most, away + RIM * deviations[sizes[k]]);
+  }
+  return most;
 }

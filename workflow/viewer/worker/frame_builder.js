@@ -1,8 +1,11 @@
 // From a view to what the GPU draws. Independent of the page and of messages, so worker, tests and benchmarks share it.
 
-import { BLOCK, NO_ORDER, orderPages, PAGE, recordRows } from "../data/layout.js";
+import { MAX_NEAR_PLACES, NO_ORDER, orderPages, PLACES, recordRows } from "../data/layout.js";
 import { selectCells } from "../terrain/budget.js";
 import { nearestOrder } from "../terrain/draw_order.js";
+import { placeObjects } from "../terrain/object_placement.js";
+import { cellMark, createBlockList, createPlaceList } from "./block_list.js";
+import { createBorders } from "./borders.js";
 import { createChunkStore } from "./chunk_store.js";
 import { createNearSorter } from "./near_sort.js";
 import { createSortedBatches } from "./sorted_batches.js";
@@ -10,12 +13,14 @@ import { createTerrainTables } from "./terrain_tables.js";
 
 /**
  * @typedef {import("../terrain/frustum.js").Cell} Cell
+ * @typedef {import("../terrain/things.js").Thing} Thing
  * @typedef {import("../terrain/camera.js").Camera} Camera
  * @typedef {import("./terrain_tables.js").TerrainTables} TerrainTables
  *
- * What the GPU draws. i0, j0: the eye's cell; near: entries of the near block; marks: of its 9 cells; uploads: new pages
- * of orders; blocks: of far cells; incomplete: batches were left out for lack of time.
- * @typedef {{ i0: number, j0: number, near: Uint32Array, marks: Uint32Array, blocks: Uint32Array,
+ * What the GPU draws. i0, j0: the eye's cell; near: entries of the near block; marks: of its 9 cells; uploads: new
+ * pages of orders; blocks: of far cells and objects; places: of objects; incomplete: batches were left out for lack of
+ * time.
+ * @typedef {{ i0: number, j0: number, near: Uint32Array, marks: Uint32Array, blocks: Uint32Array, places: Uint32Array,
  *   uploads: { numbers: Uint32Array, data: Uint32Array }, incomplete: boolean,
  *   milliseconds: { update: number, sort: number } }} FrameArrays
  * @typedef {import("../terrain/budget.js").Selection & FrameArrays} Frame
@@ -25,26 +30,98 @@ import { createTerrainTables } from "./terrain_tables.js";
  *   drawn: Int32Array }} FrameAnswer
  */
 
+/** @type {Thing[]} */
+const NONE = [];
+const MIDDLE = { di: 0, dj: 0 }; // an object's place does not count from its block's cell
 const TIME_LIMIT = 4; // milliseconds of making batches in an update that somebody waits for
+const BORDER_LIMIT = 1.5; // milliseconds of making those of single cells, which all have a substitute
 
 /**
  * @param {import("../data/manifest.js").Manifest} manifest
  * @param {import("../terrain/heights.js").HeightField} heights
+ * @param {import("../terrain/classes.js").Pictures} [pictures]
  */
-export function createFrameBuilder(manifest, heights) {
-  const terrain = createTerrainTables(manifest, heights);
+export function createFrameBuilder(manifest, heights, pictures) {
+  const terrain = createTerrainTables(manifest, heights, pictures);
   const store = createChunkStore(terrain, manifest, recordRows(manifest), (tile) => batches.forget(tile));
-  const batches = createSortedBatches(store, terrain, orderPages(manifest));
-  const sortNear = createNearSorter(store, terrain), blocks = createBlockList(terrain);
+  const borders = createBorders(terrain, store);
+  const batches = createSortedBatches(store, terrain, borders, orderPages(manifest));
+  const sortNear = createNearSorter(store, terrain, borders);
+  const blocks = createBlockList(), places = createPlaceList(terrain);
   const levels = new Uint16Array(terrain.tiles.length); // bits
   let stamp = 0;
 
-  /** Mark the chunks of these cells as drawn. @param {Cell[]} cells */
-  function touch(cells) {
+  /** Mark the chunks of what is drawn. @param {Cell[]} cells @param {Iterable<Thing[]>} groups */
+  function touch(cells, groups) {
     levels.fill(0);
-    for (const { tile, lo, hi } of cells) levels[tile] |= (2 << hi) - (1 << lo);
+    for (const { tiles, lo, hi } of cells) for (const tile of tiles) levels[tile] |= (2 << hi) - (1 << lo);
+    for (const group of groups) for (const { tile, lo, hi } of group) levels[tile] |= (2 << hi) - (1 << lo);
     for (let tile = 0; tile < levels.length; tile++) {
-      for (let level = 0; levels[tile] >> level; level++) if ((levels[tile] >> level) & 1) store.touch(tile, level, stamp);
+      for (let level = 0; levels[tile] >> level; level++) {
+        if ((levels[tile] >> level) & 1) store.touch(tile, level, stamp);
+      }
+    }
+  }
+
+  /**
+   * The cells of the near block, what the GPU knows of them, and the objects that are drawn with them: the nearest ones
+   * as far as there are codes, and the rest.
+   *
+   * @param {Cell[]} cells
+   * @param {Map<number, Thing[]>} groups
+   */
+  function gatherNear(cells, groups) {
+    const close = [], marks = new Uint32Array(9), things = [];
+    for (let k = 0; k < cells.length; k++) {
+      const cell = cells[k];
+      if (!cell.close) continue;
+      cell.direction = NO_ORDER;
+      marks[(cell.dj + 1) * 3 + cell.di + 1] = cellMark(cell, terrain);
+      close.push(cell);
+      things.push(...groups.get(k) ?? []);
+    }
+    things.sort((a, b) => a.distance - b.distance);
+    /** @type {import("./near_sort.js").NearThing[]} */
+    const near = [];
+    let room = MAX_NEAR_PLACES;
+    for (const thing of things) {
+      const many = thing.hi - thing.lo + 1;
+      if (room < many) break;
+      room -= many;
+      const mark = cellMark(thing, terrain);
+      near.push({
+        thing, codes: Array.from({ length: many }, (_, l) => PLACES + places.add(thing, mark, thing.lo + l)),
+      });
+    }
+    return { close, marks, near, rest: things.slice(near.length).reverse() };
+  }
+
+  /**
+   * Batches of the far cells, by index; made from the nearest on, which matter most when time is short.
+   *
+   * @param {Cell[]} cells
+   * @param {number[]} eye
+   * @param {import("./sorted_batches.js").IsLate} isLate
+   */
+  function getBatches(cells, eye, isLate) {
+    const i0 = Math.floor(eye[0] / terrain.side), j0 = Math.floor(eye[1] / terrain.side);
+    /** @type {(import("./sorted_batches.js").Batch | null)[]} */
+    const made = new Array(cells.length).fill(null);
+    for (let k = cells.length - 1; k >= 0; k--) {
+      const cell = cells[k];
+      if (cell.close) continue;
+      const order = orderOf(cell, terrain, eye, i0, j0);
+      cell.direction = terrain.tiles[cell.tile].orders[cell.lo][order];
+      made[k] = batches.get(cell, order, stamp, isLate);
+    }
+    return made;
+  }
+
+  /** Add objects to the blocks. @param {Thing[]} things @param {import("./sorted_batches.js").IsLate} isLate */
+  function addThings(things, isLate) {
+    for (const thing of things) {
+      const { lo, order } = thing, mark = cellMark(thing, terrain), batch = batches.get(thing, order, stamp, isLate);
+      if (batch) blocks.add(MIDDLE, mark, batch, 1 + places.add(thing, mark, lo));
     }
   }
 
@@ -65,31 +142,31 @@ export function createFrameBuilder(manifest, heights) {
       const start = performance.now();
       stamp += 1;
       const { eye } = camera, i0 = Math.floor(eye[0] / terrain.side), j0 = Math.floor(eye[1] / terrain.side);
-      const selection = selectCells(terrain, camera, budget), close = [], marks = new Uint32Array(9);
+      const selection = selectCells(terrain, camera, budget), { cells } = selection;
+      const groups = placeObjects(terrain, camera, selection);
       let incomplete = false;
-      const isLate = () => {
-        const late = !patient && performance.now() - start > TIME_LIMIT;
+      /** @type {import("./sorted_batches.js").IsLate} */
+      const isLate = (border, spent) => {
+        const late = !patient && (border ? spent > BORDER_LIMIT : performance.now() - start > TIME_LIMIT);
         incomplete ||= late;
         return late;
       };
-      touch(selection.cells);
+      touch(cells, groups.values());
       blocks.clear();
-      for (const cell of selection.cells) {
-        if (cell.close) {
-          cell.direction = NO_ORDER;
-          marks[(cell.dj + 1) * 3 + cell.di + 1] = cellMark(cell, terrain);
-          close.push(cell);
-          continue;
-        }
-        const order = orderOf(cell, terrain, eye, i0, j0);
-        cell.direction = terrain.tiles[cell.tile].orders[cell.lo][order];
-        const pages = batches.get(cell, order, stamp, isLate);
-        if (pages) blocks.add(cell, pages);
+      places.clear();
+      const { close, marks, near: things, rest } = gatherNear(cells, groups);
+      const made = getBatches(cells, eye, isLate);
+      for (let k = 0; k < cells.length; k++) {
+        const cell = cells[k], batch = made[k];
+        if (cell.close) continue;
+        if (batch) blocks.add(cell, cellMark(cell, terrain), batch);
+        addThings(groups.get(k) ?? NONE, isLate);
       }
+      addThings(rest, isLate);
       const uploads = batches.takeUploads(), updated = performance.now();
-      const near = sortNear(close, camera, selection);
+      const near = sortNear(close, camera, selection, things);
       return {
-        ...selection, i0, j0, near, marks, uploads, incomplete, blocks: blocks.words(),
+        ...selection, i0, j0, near, marks, uploads, incomplete, blocks: blocks.copy(), places: places.copy(),
         milliseconds: { update: updated - start, sort: performance.now() - updated },
       };
     },
@@ -112,46 +189,4 @@ function orderOf(cell, { side, cache, z, directions, tiles }, eye, i0, j0) {
     cache.h[at] + 0.5 * (z[0] + z[1]) - eye[2],
   ];
   return nearestOrder(directions, tiles[cell.tile].orders[cell.lo], to, cache.east[at], cache.north[at]);
-}
-
-/**
- * A list of blocks that grows.
- *
- * @param {TerrainTables} terrain
- */
-function createBlockList(terrain) {
-  let words = new Uint32Array(BLOCK * 4096), n = 0;
-  return {
-    clear() {
-      n = 0;
-    },
-    /** @param {Cell} cell @param {Uint32Array} pages */
-    add(cell, pages) {
-      const which = (cell.di + 128) | ((cell.dj + 128) << 8), mark = cellMark(cell, terrain);
-      if (BLOCK * (n + pages.length) > words.length) {
-        const more = new Uint32Array(2 * BLOCK * (n + pages.length));
-        more.set(words);
-        words = more;
-      }
-      let left = cell.count;
-      for (let k = 0, at = BLOCK * n; k < pages.length; k++, left -= PAGE, at += BLOCK) {
-        words[at] = pages[k];
-        words[at + 1] = which | ((Math.min(left, PAGE) - 1) << 16);
-        words[at + 2] = mark;
-      }
-      n += pages.length;
-    },
-    words: () => words.slice(0, BLOCK * n),
-  };
-}
-
-/**
- * What the GPU knows of a cell: tile, direction, uncertainty, and whether one level stands there for all.
- *
- * @param {Cell} cell
- * @param {TerrainTables} terrain
- */
-function cellMark({ tile, direction, whole }, terrain) {
-  const uncertainty = Math.round(255 * Math.min(Math.max(terrain.tiles[tile].uncertainty, 0), 1));
-  return tile | (direction << 8) | (uncertainty << 16) | (Number(whole) << 24);
 }

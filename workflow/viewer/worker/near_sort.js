@@ -1,19 +1,30 @@
 // The 3 x 3 block of cells about the eye: all its Gaussians sorted by depth, as no single direction serves a whole tile
-// there.
+// there, with those of the objects that are drawn with its cells.
 
-import { SLOT_SHIFT } from "../data/layout.js";
+import { CODE_SHIFT, MAX_LEVELS, SLOTS } from "../data/layout.js";
 import { createDepthSorter } from "../terrain/depth_sort.js";
 import { frustumPlanes, RIM } from "../terrain/frustum.js";
 
 /**
  * @typedef {import("../terrain/frustum.js").Cell} Cell
+ * @typedef {import("../terrain/things.js").Thing} Thing
+ * @typedef {import("../terrain/cells.js").Border} Border
  * @typedef {import("../terrain/camera.js").Camera} Camera
  * @typedef {Pick<import("./terrain_tables.js").TerrainTables, "side" | "near" | "deviations" | "heights">} Tables
  * @typedef {{ centres: Float32Array, sizes: Uint8Array, entries: Uint32Array, count: number }} NearChunk
+ *
+ * An object in the block, and the codes of its levels from lo on.
+ * @typedef {{ thing: Thing, codes: number[] }} NearThing
+ *
+ * Gaussians of one chunk in a cell: all of it, or those that stay. x, y, z: of the chunk's origin, from the eye; lift:
+ * of the surface under each, if it is not level; size: factor on deviations.
+ * @typedef {{ chunk: NearChunk, lift: Float32Array | null, x: number, y: number, z: number, size: number, code: number,
+ *   begin: number, end: number }} Part
  */
 
-const CACHED = 64; // cells and levels whose surface heights are kept
+const CACHED = 256; // chunks in cells, and objects, whose heights or places are kept
 const MARGIN = 0.65; // of the picture's side from its centre: where projections of farther splats are linearised
+const INDEX = (1 << CODE_SHIFT) - 1; // bits of an entry
 
 /**
  * A function that gives the entries of the close cells' Gaussians that have a weight and may reach into the picture,
@@ -21,41 +32,77 @@ const MARGIN = 0.65; // of the picture's side from its centre: where projections
  *
  * @param {{ get: (tile: number, level: number) => NearChunk }} store
  * @param {Tables} terrain
+ * @param {Pick<import("./borders.js").Borders, "keep">} borders
  */
-export function createNearSorter(store, terrain) {
-  const sort = createDepthSorter(), lifts = createLiftCache(terrain);
+export function createNearSorter(store, terrain, borders) {
+  const sort = createDepthSorter(), findLift = createLiftCache(terrain), findTurned = createTurnCache(terrain);
+  const findKept = createKeptCache(borders);
   let depths = new Float32Array(0), candidates = new Uint32Array(0);
+
+  /**
+   * The parts of a cell: its levels and materials.
+   *
+   * @param {Cell} cell
+   * @param {number[]} eye
+   * @param {{ switches: number[], bands: number[] }} distances
+   * @returns {Part[]}
+   */
+  function partsOfCell({ di, dj, tiles, border, lo, hi, whole: single }, eye, distances) {
+    const { side } = terrain, i = Math.floor(eye[0] / side) + di, j = Math.floor(eye[1] / side) + dj, parts = [];
+    const place = { x: i * side - eye[0], y: j * side - eye[1], z: -eye[2], size: 1 }, slot = (dj + 1) * 3 + di + 1;
+    for (let level = lo; level <= hi; level++) {
+      const range = rangeOf(level, single, distances);
+      for (const tile of tiles) {
+        const whole = store.get(tile, level), key = `${i},${j},${level},${tile}`;
+        const chunk = border ? findKept(key, border, tile, level, whole) : whole;
+        const lift = findLift(key, i, j, chunk);
+        parts.push({ chunk, lift, code: SLOTS + MAX_LEVELS * slot + level, ...place, ...range });
+      }
+    }
+    return parts;
+  }
+
+  /**
+   * The parts of an object: its levels.
+   *
+   * @param {NearThing} near
+   * @param {{ switches: number[], bands: number[] }} distances
+   * @returns {Part[]}
+   */
+  function partsOfThing({ thing, codes }, distances) {
+    const { lo, whole, tile, to: [x, y, z], size } = thing;
+    return codes.map((code, k) => {
+      const chunk = findTurned(thing, lo + k, store.get(tile, lo + k));
+      return { chunk, lift: null, x, y, z, size, code, ...rangeOf(lo + k, whole, distances) };
+    });
+  }
 
   /**
    * @param {Cell[]} cells
    * @param {Camera} camera
    * @param {{ switches: number[], bands: number[] }} distances
+   * @param {NearThing[]} [things]
    */
-  return function sortNear(cells, camera, { switches, bands }) {
-    const { side, near, deviations } = terrain, { eye, ahead } = camera;
+  return function sortNear(cells, camera, distances, things = []) {
+    const { near, deviations } = terrain, { eye, ahead } = camera;
     const [a0, b0, c0, across, a1, b1, c1, , a2, b2, c2, along, a3, b3, c3] = sidePlanes(camera, terrain);
-    const most = cells.reduce((sum, cell) => sum + cell.count, 0);
+    const parts = cells.flatMap((cell) => partsOfCell(cell, eye, distances));
+    parts.push(...things.flatMap((one) => partsOfThing(one, distances)));
+    const most = parts.reduce((sum, { chunk }) => sum + chunk.count, 0);
     if (depths.length < most) [depths, candidates] = [new Float32Array(2 * most), new Uint32Array(2 * most)];
-    const i0 = Math.floor(eye[0] / side), j0 = Math.floor(eye[1] / side);
     let n = 0;
-    for (const { di, dj, tile, lo, hi, whole } of cells) {
-      const west = (i0 + di) * side - eye[0], south = (j0 + dj) * side - eye[1], slot = (dj + 1) * 3 + di + 1;
-      for (let level = lo; level <= hi; level++) {
-        const chunk = store.get(tile, level), { centres, sizes, entries, count } = chunk;
-        const lift = lifts.get(i0 + di, j0 + dj, level, chunk);
-        const begin = whole || !level ? 0 : Math.max(0, switches[level - 1] - bands[level - 1]);
-        const end = whole ? Infinity : switches[level] + bands[level];
-        for (let k = 0; k < count; k++) {
-          const x = centres[3 * k] + west, y = centres[3 * k + 1] + south;
-          const z = centres[3 * k + 2] - eye[2] + (lift ? lift[k] : 0);
-          const depth = ahead[0] * x + ahead[1] * y + ahead[2] * z, square = x * x + y * y + z * z;
-          if (depth <= 0.5 * near || square < begin * begin || square > end * end) continue;
-          const size = deviations[sizes[k]], wide = -across * size, tall = -along * size;
-          if (a0 * x + b0 * y + c0 * z < wide || a1 * x + b1 * y + c1 * z < wide) continue;
-          if (a2 * x + b2 * y + c2 * z < tall || a3 * x + b3 * y + c3 * z < tall) continue;
-          depths[n] = depth;
-          candidates[n++] = ((entries[k] & 0x0fffffff) | (slot << SLOT_SHIFT)) >>> 0;
-        }
+    for (const { chunk: { centres, sizes, entries, count }, lift, begin, end, ...part } of parts) {
+      const { x: west, y: south, z: up, size: factor, code } = part, mark = code << CODE_SHIFT;
+      for (let k = 0; k < count; k++) {
+        const x = centres[3 * k] + west, y = centres[3 * k + 1] + south;
+        const z = centres[3 * k + 2] + up + (lift ? lift[k] : 0);
+        const depth = ahead[0] * x + ahead[1] * y + ahead[2] * z, square = x * x + y * y + z * z;
+        if (depth <= 0.5 * near || square < begin * begin || square > end * end) continue;
+        const size = factor * deviations[sizes[k]], wide = -across * size, tall = -along * size;
+        if (a0 * x + b0 * y + c0 * z < wide || a1 * x + b1 * y + c1 * z < wide) continue;
+        if (a2 * x + b2 * y + c2 * z < tall || a3 * x + b3 * y + c3 * z < tall) continue;
+        depths[n] = depth;
+        candidates[n++] = ((entries[k] & INDEX) | mark) >>> 0;
       }
     }
     const sequence = sort(depths, n), out = new Uint32Array(n);
@@ -65,37 +112,92 @@ export function createNearSorter(store, terrain) {
 }
 
 /**
- * Heights of the surface under the Gaussians of cells, of the most recent ones kept.
+ * The distances between which a level has a weight.
+ *
+ * @param {number} level
+ * @param {boolean} whole
+ * @param {{ switches: number[], bands: number[] }} distances
+ */
+const rangeOf = (level, whole, { switches, bands }) => ({
+  begin: whole || !level ? 0 : Math.max(0, switches[level - 1] - bands[level - 1]),
+  end: whole ? Infinity : switches[level] + bands[level],
+});
+
+/**
+ * Values by a key, with what they were made from; the most recent ones are kept.
+ *
+ * @template T
+ */
+function createRecentCache() {
+  /** @type {Map<string, { from: unknown, value: T }>} */
+  const known = new Map();
+  /** @param {string} key @param {unknown} from @param {() => T} make */
+  return (key, from, make) => {
+    const old = known.get(key), entry = old && old.from === from ? old : { from, value: make() };
+    known.delete(key);
+    known.set(key, entry); // the latest last
+    if (known.size > CACHED) known.delete(known.keys().next().value ?? "");
+    return entry.value;
+  };
+}
+
+/**
+ * A function that gives the Gaussians of a chunk that stay in a cell.
+ *
+ * @param {Pick<import("./borders.js").Borders, "keep">} borders
+ */
+function createKeptCache(borders) {
+  const recall = /** @type {ReturnType<typeof createRecentCache<NearChunk>>} */ (createRecentCache());
+  /** @param {string} key @param {Border} border @param {number} tile @param {number} level @param {NearChunk} chunk */
+  return (key, border, tile, level, chunk) => recall(key, chunk, () => {
+    const kept = borders.keep(border, tile, level), count = kept ? kept.length : chunk.count;
+    if (!kept) return chunk;
+    const centres = new Float32Array(3 * count), sizes = new Uint8Array(count), entries = new Uint32Array(count);
+    for (let m = 0; m < count; m++) {
+      const k = kept[m];
+      for (let axis = 0; axis < 3; axis++) centres[3 * m + axis] = chunk.centres[3 * k + axis];
+      sizes[m] = chunk.sizes[k];
+      entries[m] = chunk.entries[k];
+    }
+    return { centres, sizes, entries, count };
+  });
+}
+
+/**
+ * A function that gives the heights of the surface under a chunk in a cell; null: level ground.
  *
  * @param {Tables} terrain
  */
-function createLiftCache(terrain) {
-  /** @type {Map<string, Float32Array>} */
-  const lifts = new Map();
-  return {
-    /**
-     * Heights under a chunk in a cell; null: level ground.
-     *
-     * @param {number} i
-     * @param {number} j
-     * @param {number} level
-     * @param {NearChunk} chunk
-     */
-    get(i, j, level, { centres, count }) {
-      if (terrain.heights.kind === "flat") return null;
-      const key = `${i},${j},${level},${count}`;
-      let lift = lifts.get(key);
-      if (!lift) {
-        lift = new Float32Array(count);
-        for (let k = 0; k < count; k++) {
-          lift[k] = terrain.heights.at(i * terrain.side + centres[3 * k], j * terrain.side + centres[3 * k + 1])[0];
-        }
-      } else lifts.delete(key);
-      lifts.set(key, lift); // the latest last
-      if (lifts.size > CACHED) lifts.delete(lifts.keys().next().value ?? "");
-      return lift;
-    },
-  };
+function createLiftCache({ heights, side }) {
+  const recall = /** @type {ReturnType<typeof createRecentCache<Float32Array>>} */ (createRecentCache());
+  /** @param {string} key @param {number} i @param {number} j @param {NearChunk} chunk */
+  return (key, i, j, chunk) => (heights.kind === "flat" ? null : recall(key, chunk, () => {
+    const { centres, count } = chunk, lift = new Float32Array(count);
+    for (let k = 0; k < count; k++) lift[k] = heights.at(i * side + centres[3 * k], j * side + centres[3 * k + 1])[0];
+    return lift;
+  }));
+}
+
+/**
+ * A function that gives the chunk of an object with its Gaussians on the surface, from the foot.
+ *
+ * @param {Tables} terrain
+ */
+function createTurnCache({ heights, side }) {
+  const recall = /** @type {ReturnType<typeof createRecentCache<NearChunk>>} */ (createRecentCache());
+  /** @param {Thing} thing @param {number} level @param {NearChunk} chunk */
+  return (thing, level, chunk) => recall(`${thing.i},${thing.j},${thing.u},${thing.v},${level}`, chunk, () => {
+    const { i, j, u, v, cos, sin, size, h } = thing, { centres, sizes, entries, count } = chunk;
+    const out = new Float32Array(3 * count);
+    for (let k = 0; k < 3 * count; k += 3) {
+      const x = size * (cos * centres[k] - sin * centres[k + 1]);
+      const y = size * (sin * centres[k] + cos * centres[k + 1]);
+      out[k] = x;
+      out[k + 1] = y;
+      out[k + 2] = size * centres[k + 2] + heights.at((i + u) * side + x, (j + v) * side + y)[0] - h;
+    }
+    return { centres: out, sizes, entries, count };
+  });
 }
 
 /**

@@ -1,6 +1,11 @@
 // A pool of equal pages of GPU memory; the least recently used entries are evicted when it is full.
 
 /**
+ * An entry: its pages, and what its user counts in them.
+ * @typedef {{ pages: Uint32Array, count: number, stamp: number }} PoolEntry
+ */
+
+/**
  * Stamps count views: what was used at the current stamp is never evicted.
  *
  * @param {number} capacity
@@ -8,7 +13,7 @@
  */
 export function createPagePool(capacity, onEvict = () => {}) {
   const free = Uint32Array.from({ length: capacity }, (_, k) => capacity - 1 - k);
-  /** @type {Map<number, { pages: Uint32Array, stamp: number }>} */
+  /** @type {Map<number, PoolEntry>} */
   const entries = new Map();
   let left = capacity;
   /** @param {number} key */
@@ -28,30 +33,30 @@ export function createPagePool(capacity, onEvict = () => {}) {
   };
   return {
     /**
-     * The pages of an entry, marked as used, or undefined.
+     * An entry, marked as used, or undefined.
      *
      * @param {number} key
      * @param {number} stamp
      */
     use(key, stamp) {
       const entry = entries.get(key);
-      if (!entry) return undefined;
-      entry.stamp = stamp;
-      return entry.pages;
+      if (entry) entry.stamp = stamp;
+      return entry;
     },
     /**
-     * Pages for a new entry, or null where everything else is in use.
+     * A new entry, or null where everything else is in use.
      *
      * @param {number} key
-     * @param {number} count
+     * @param {number} many pages
      * @param {number} stamp
+     * @param {number} count
      */
-    allocate(key, count, stamp) {
-      if (left < count && !makeRoom(count, stamp)) return null;
-      const pages = free.slice(left - count, left).reverse();
-      left -= count;
-      entries.set(key, { pages, stamp });
-      return pages;
+    allocate(key, many, stamp, count) {
+      if (left < many && !makeRoom(many, stamp)) return null;
+      const entry = { pages: free.slice(left - many, left).reverse(), count, stamp };
+      left -= many;
+      entries.set(key, entry);
+      return entry;
     },
     /** Evict all entries with such keys. @param {(key: number) => boolean} matches */
     evictWhere(matches) {

@@ -1,40 +1,63 @@
-// Tables of a terrain for the worker: sizes and orders of its tiles, level distances, quantization.
+// Tables of a terrain for the worker: sizes and orders of its tiles and objects, level distances, classes, scatter.
 
 import { NEAR } from "../data/layout.js";
 import { deviationOf } from "../data/records.js";
+import { RING } from "../terrain/cell_ring.js";
 import { createCellCache } from "../terrain/cells.js";
+import { createClasses } from "../terrain/classes.js";
+import { RIM } from "../terrain/frustum.js";
+import { createScatter } from "../terrain/scatter.js";
 
 /**
- * A tile. counts, orders: by level; arrived: bits of the levels at hand.
- * @typedef {{ z: number[], uncertainty: number, arrived: number, counts: number[], orders: number[][] }} TileTable
+ * A tile, or an object: these are numbered after the tiles. counts, orders: by level; arrived: bits of the levels at
+ * hand; alone: a list of its own number.
+ * @typedef {{ uncertainty: number, arrived: number, counts: number[], orders: number[][],
+ *   alone: number[] }} TileTable
  *
- * cells: objects that each view uses again; deviations: standard deviation by byte.
- * @typedef {{ side: number, salt: number, directions: number[][], variants: number, levels: number, tiles: TileTable[],
+ * An object. ground: z of the foot; extent: largest distance of a Gaussian's rim from the foot, as far as is known.
+ * @typedef {{ ground: number, extent: number }} ObjectTable
+ *
+ * variants: centres of a material's tiles; each: tiles of a material; z: range of heights of tiles, rims included;
+ * most: largest size of an object; cells, window: arrays that each view uses again; deviations: standard deviation by
+ * byte.
+ * @typedef {{ side: number, salt: number, directions: number[][], variants: number, each: number, levels: number,
+ *   tiles: TileTable[], objects: ObjectTable[], classes: import("../terrain/classes.js").Classes | null,
+ *   scatter: import("../terrain/scatter.js").Scatter | null, most: number,
  *   heights: import("../terrain/heights.js").HeightField, largest: number, deviations: ArrayLike<number>,
  *   switches: number[], bands: number[], z: number[], near: number, cache: import("../terrain/cells.js").CellCache,
- *   cells: import("../terrain/frustum.js").Cell[] }} TerrainTables
+ *   cells: import("../terrain/frustum.js").Cell[], window: Int32Array }} TerrainTables
  */
 
 /**
  * @param {import("../data/manifest.js").Manifest} manifest
  * @param {import("../terrain/heights.js").HeightField} heights
+ * @param {import("../terrain/classes.js").Pictures} [pictures]
  * @returns {TerrainTables}
  */
-export function createTerrainTables(manifest, heights) {
-  const { tile_side: side, salt, levels, directions, encoding } = manifest;
-  const tiles = manifest.tiles.map(({ z, chunks, uncertainty }) => {
+export function createTerrainTables(manifest, heights, pictures) {
+  const { tile_side: side, salt, levels, directions, encoding, materials, objects = [], scatter } = manifest;
+  const owners = [...manifest.tiles, ...objects.map(({ chunks }) => ({ chunks, uncertainty: 0 }))];
+  const tiles = owners.map(({ chunks, uncertainty }, number) => {
     const byLevel = [...chunks].sort((a, b) => a.level - b.level);
     return {
-      z, uncertainty: uncertainty ?? 0, arrived: 0,
+      uncertainty: uncertainty ?? 0, arrived: 0, alone: [number],
       counts: byLevel.map((chunk) => chunk.count), orders: byLevel.map((chunk) => chunk.orders),
     };
   });
+  const each = manifest.tiles.length / materials.length, largest = deviationOf(encoding, 255);
+  const beyond = (RIM - 3) * largest; // the manifest's heights reach three deviations beyond the centres
+  const classes = manifest.classes
+    ? createClasses(manifest.classes, materials.length, side, heights, pictures) : null;
   return {
-    side, salt, directions, heights, tiles, variants: tiles.length / 16, levels: levels.length,
-    largest: deviationOf(encoding, 255),
+    side, salt, directions, heights, tiles, variants: each / 16, each, levels: levels.length, largest, classes,
+    objects: objects.map(({ ground }) => ({ ground, extent: 0 })), most: 1 + (scatter?.size ?? 0),
+    scatter: scatter ? createScatter(scatter, objects, side, classes) : null,
     deviations: Float64Array.from({ length: 256 }, (_, byte) => deviationOf(encoding, byte)),
     switches: levels.map(({ distance }) => distance ?? Infinity), bands: levels.map(({ band }) => band ?? 0),
-    z: [Math.min(...tiles.map((tile) => tile.z[0])), Math.max(...tiles.map((tile) => tile.z[1]))],
-    near: NEAR * manifest.eye_floor, cache: createCellCache(), cells: [],
+    z: [
+      Math.min(...manifest.tiles.map((tile) => tile.z[0])) - beyond,
+      Math.max(...manifest.tiles.map((tile) => tile.z[1])) + beyond,
+    ],
+    near: NEAR * manifest.eye_floor, cache: createCellCache(), cells: [], window: new Int32Array(RING * RING),
   };
 }

@@ -7,7 +7,8 @@ import { createFrameBuilder } from "./frame_builder.js";
  * @typedef {import("../data/bundle.js").Chunk} Chunk
  *
  * What the page posts.
- * @typedef {{ kind: "begin", manifest: import("../data/manifest.js").Manifest, pixels: Float32Array | null }} Begin
+ * @typedef {{ kind: "begin", manifest: import("../data/manifest.js").Manifest, pixels: Float32Array | null,
+ *   pictures: import("../terrain/classes.js").Pictures }} Begin
  * @typedef {{ kind: "view", id: number, camera: import("../terrain/camera.js").Camera, budget: number,
  *   patient: boolean }} View
  * @typedef {Begin | View | { kind: "chunk", chunk: Chunk } | { kind: "restore" }} Request
@@ -46,8 +47,8 @@ function answerView({ id, camera, budget, patient }) {
   cells.forEach(({ di, dj, tile, lo, hi, direction }, k) => {
     drawn.set([di, dj, tile, lo, hi, direction], 6 * k);
   });
-  const { near, marks, blocks, uploads } = frame;
-  const moved = [near, marks, blocks, drawn, uploads.numbers, uploads.data].map((array) => array.buffer);
+  const { near, marks, blocks, places, uploads } = frame;
+  const moved = [near, marks, blocks, places, drawn, uploads.numbers, uploads.data].map((array) => array.buffer);
   post({
     kind: "frame", frame: { ...frame, drawn, id, patient, missing: [...missing], bytes: builder.store.bytes },
   }, moved);
@@ -56,7 +57,8 @@ function answerView({ id, camera, budget, patient }) {
 /** @param {Request} request */
 function answer(request) {
   if (request.kind === "begin") {
-    builder = createFrameBuilder(request.manifest, createHeights(request.manifest.heights, request.pixels));
+    const { manifest, pixels, pictures } = request;
+    builder = createFrameBuilder(manifest, createHeights(manifest.heights, pixels), pictures);
   } else if (request.kind === "chunk") addChunk(request.chunk);
   else if (request.kind === "view") answerView(request);
   else { // the GPU has lost everything

@@ -11,11 +11,10 @@ const WIDER = 1.25; // times the picture's size, so that a turn finds tiles befo
  */
 
 /**
- * @param {import("../data/manifest.js").Manifest} manifest
- * @param {Float32Array | null} pixels of the height map
+ * @param {Omit<import("./worker.js").Begin, "kind">} bundle
  * @param {Handlers} handlers
  */
-export function createWorkerClient(manifest, pixels, { onRecords, onFrame, onError }) {
+export function createWorkerClient(bundle, { onRecords, onFrame, onError }) {
   const worker = new Worker(new URL("./worker.js", import.meta.url), { type: "module" });
   let id = 0, answered = 0, busy = false, ended = false;
   /** @type {{ id: number, resolve: () => void, reject: (error: Error) => void }[]} */
@@ -47,7 +46,7 @@ export function createWorkerClient(manifest, pixels, { onRecords, onFrame, onErr
     event.preventDefault();
     fail(new Error(event.message || "the worker did not start"));
   });
-  post({ kind: "begin", manifest, pixels });
+  post({ kind: "begin", ...bundle });
   return {
     /** Is no answer outstanding? */
     get idle() {

@@ -7,7 +7,7 @@ import numpy as np
 import OpenImageIO as oiio
 import pycolmap
 import pytest
-from fixtures import photos as made_up
+from fixtures import photos as synth
 from fixtures.imported_models import (
     HEIGHT,
     NUMBERS,
@@ -85,7 +85,7 @@ def test_points_found_under_the_given_cameras_lie_on_the_ground(three):
 
 
 def test_an_undistorted_picture_is_that_of_its_pinhole_camera(three):
-    found, ground = three["opensfm"], made_up.texture(np.random.default_rng(4))
+    found, ground = three["opensfm"], synth.texture(np.random.default_rng(4))
     c = found.model.cameras[2]
     exact = pycolmap.Camera(model="PINHOLE", width=c.width, height=c.height, params=[c.fx, c.fy, c.cx, c.cy])
     assert alike(undistort_image(found, 2), photograph(exact, c.rotation, c.translation, ground))
@@ -207,7 +207,7 @@ def test_a_turned_photo_is_turned_back_with_its_camera(tmp_path, orientation):
     upright = image_files.read_size(tmp_path / "tagged" / "000.tif")
     assert (found.lenses[0].width, found.lenses[0].height) == upright
     assert reprojection_errors(found.model).max() < 1e-4
-    ground, c = made_up.texture(np.random.default_rng(4)), found.model.cameras[0]
+    ground, c = synth.texture(np.random.default_rng(4)), found.model.cameras[0]
     exact = pycolmap.Camera(model="PINHOLE", width=c.width, height=c.height, params=[c.fx, c.fy, c.cx, c.cy])
     assert alike(undistort_image(found, 0), photograph(exact, c.rotation, c.translation, ground))
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from fixtures import photos as made_up
+from fixtures import photos as synth
 from scipy.spatial.transform import Rotation
 
 from dav_gswt.errors import InputError
@@ -14,7 +14,7 @@ from dav_gswt.photos.photo_set import import_field
 
 def ground_field(rng, n=6000, degree=0):
     """A ground of discs over a square of side 2 with z up, bushes on a tenth of it, and a few floaters."""
-    means = made_up.plain(n, 1.0, rng, relief=0.004)
+    means = synth.plain(n, 1.0, rng, relief=0.004)
     means[: n // 10, 2] += rng.uniform(0, 0.2, n // 10)
     means[-20:] = rng.normal(0, 40, (20, 3))
     scales = np.tile(np.log([0.02, 0.02, 0.002]), (n, 1))
@@ -43,7 +43,9 @@ def rng():
 def entered(rng):
     """A ground lying as COLMAP leaves it (y down), ten times as large, off the origin; and what came of it."""
     upright = ground_field(rng, degree=1)
-    lying = splat._moved(upright, np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), 10.0, np.array([3.0, 50, -7]))
+    lying = splat._transform_field(
+        upright, np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), 10.0, np.array([3.0, 50, -7])
+    )
     return lying, *fit_field_frame(lying, rng)
 
 
@@ -86,7 +88,7 @@ def test_covariances_turn_and_grow_with_the_field(rng):
     field = ground_field(rng, n=50)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
-    moved = splat._moved(field, turn, 3.0, np.ones(3))
+    moved = splat._transform_field(field, turn, 3.0, np.ones(3))
     # Through float32 quaternions and logarithms.
     assert covariances(moved) == pytest.approx(9 * turn @ covariances(field) @ turn.T, rel=1e-4, abs=1e-8)
     assert moved.means == pytest.approx(3 * field.means @ turn.T + 1, rel=1e-5, abs=1e-5)

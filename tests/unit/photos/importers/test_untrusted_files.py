@@ -284,7 +284,7 @@ def test_whatever_text_changes_there_is_a_model_or_one_message(photos, tmp_path,
     path = tmp_path / "some.json"
     path.write_text(text[:place] + new + text[place + len(new) :], encoding="utf-8", errors="replace")
     try:
-        found = importers._given(path, PhotoFolder(photos))
+        found = importers._read_model(path, PhotoFolder(photos))
     except InputError as error:
         assert "some.json" in str(error)
     else:

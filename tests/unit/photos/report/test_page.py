@@ -6,13 +6,13 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from fixtures import photos as made_up
+from fixtures import photos as synth
 from fixtures.frames import scene_frame
 from jinja2 import Environment, meta
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.geometry.scene_frame import FocalLength, LeftOutPhoto, Square
+from dav_gswt.geometry.scene_frame import FocalLength, LeftOutPhoto, SfmSign, SfmVerdict, Square
 from dav_gswt.photos.colmap_model import transform_model
 from dav_gswt.photos.folder import write_photo_folder
 from dav_gswt.photos.report import page as report
@@ -46,7 +46,7 @@ SCENE = 'dunes "<&>"'
 @pytest.fixture(scope="session")
 def flown():
     """Twelve photos in three flight lines of four; the last is held by few points, and another's are off."""
-    sparse = made_up.model(made_up.flight(3, 4), made_up.plain(3000, 0.9, np.random.default_rng(1)))
+    sparse = synth.model(synth.flight(3, 4), synth.plain(3000, 0.9, np.random.default_rng(1)))
     last, off = sparse.image_of == 11, sparse.image_of == 4
     keep = ~last | (np.cumsum(last) <= 25)
     moved = sparse.pixels + np.where(off, 3.0, 0.0)[:, None] * [1, 0]
@@ -148,10 +148,19 @@ def test_weak_spots_stand_at_the_top_in_words(page, made):
 
 
 def test_a_set_without_weak_spots_says_so(page, made):
-    sparse = made_up.model(made_up.flight(5, 5, 0.2), made_up.plain(5000, 0.9, np.random.default_rng(1)))
+    sparse = synth.model(synth.flight(5, 5, 0.2), synth.plain(5000, 0.9, np.random.default_rng(1)))
     frame = replace(FRAME, left_out=(), images=25, registered=25)
     text = page(made(sparse=sparse, frame=frame))
     assert "Nothing is weak" in text and "⚠" not in text and 'id="left-out"' not in text
+
+
+def test_the_verdict_on_the_cameras_and_what_was_tried_are_listed(page, made):
+    signs = SfmSign("tilt", "good", "photos look 5 degrees off"), SfmSign("GPS", "doubtful", "<62> m off")
+    verdict = SfmVerdict("doubtful", signs, ("incremental mapping: doubtful", "global mapping: refused"))
+    words = " ".join(Seen(page(made(frame=replace(FRAME, verdict=verdict)))).words)
+    assert "The cameras are doubtful: <62> m off." in words[: words.index("Where the photos were taken")]
+    assert "can be trusted: doubtful" in words and "photos look 5 degrees off" in words
+    assert "global mapping: refused" in words
 
 
 @pytest.mark.parametrize(
@@ -189,7 +198,7 @@ def test_a_corner_that_few_photos_see_is_named_by_the_compass_or_the_map(made, f
     ]
 
 
-def test_a_doubtful_focal_length_is_a_weak_spot(made):
+def test_an_uncertain_focal_length_is_a_weak_spot(made):
     """EXIF's is held, but the photos alone would say 1.1 times that; or no EXIF, and all look straight down."""
     held = FocalLength(300.0, 300.0, 330.0, 3.0, "EXIF's")
     none = FocalLength(None, 300.0, None, 3.0, "found by the photos alone")
@@ -210,13 +219,13 @@ def test_coverage_does_not_depend_on_the_unit(made, flown):
 
 def test_a_footprint_by_hand():
     """From height 2 a picture of 320 x 240 at focal length 300 covers 640 / 300 by 480 / 300."""
-    outline = camera_footprint(made_up.camera((1, 0, 2)), 9.0)
+    outline = camera_footprint(synth.camera((1, 0, 2)), 9.0)
     assert np.ptp(outline, axis=0) == pytest.approx([640 / 300, 480 / 300])
     assert (outline.max(0) + outline.min(0)) / 2 == pytest.approx([1, 0])
 
 
 def test_a_footprint_over_the_horizon_ends_in_reach():
-    outline = camera_footprint(made_up.camera((0, 0, 1), (1, 0, 1)), 3.0)
+    outline = camera_footprint(synth.camera((0, 0, 1), (1, 0, 1)), 3.0)
     assert np.linalg.norm(outline, axis=1).max() <= 3.0 + 1e-9 and np.isfinite(outline).all()
 
 
@@ -229,8 +238,8 @@ def test_every_number_of_photos_has_one_colour(made, most, need):
     assert len({colour for *_, colour in bin_coverage(found)}) == len(bin_coverage(found)) <= 11
 
 
-def test_masks_and_the_place_on_earth_are_told(page, made, flown):
-    cover = np.ones((made_up.HEIGHT, made_up.WIDTH), np.float32)
+def test_masks_and_the_place_on_earth_are_listed(page, made, flown):
+    cover = np.ones((synth.HEIGHT, synth.WIDTH), np.float32)
     cover[:60] = 0
     frame = replace(FRAME, georeference=PLACE)
     words = " ".join(Seen(page(made(frame=frame, covers={"003.png": cover}))).words)
@@ -259,7 +268,7 @@ def test_a_model_of_another_program_and_old_frames_are_read(page, made):
 def test_a_template_that_asks_for_what_is_not_there_is_refused(made, template, tmp_path):
     wrong = tmp_path / "wrong.html"
     wrong.write_text(template.read_text() + "{{ nothing }}")
-    with pytest.raises(InputError, match="wrong.html: not a template of this report .*nothing"):
+    with pytest.raises(InputError, match="wrong.html: not a template of this page .*nothing"):
         write_report(made(), wrong, SCENE, tmp_path / "report.html")
     assert not (tmp_path / "report.html").exists()
 
@@ -268,4 +277,4 @@ def test_the_template_uses_all_that_the_report_has(made, template):
     found = collect_facts(made(), SCENE)
     smalls = make_thumbnails(made() / "images", [photo.name for photo in found.photos])
     used = meta.find_undeclared_variables(Environment().parse(template.read_text()))
-    assert used == set(report.template_values(found, smalls))
+    assert used == set(report.make_template_values(found, smalls))

@@ -4,7 +4,7 @@ import logging
 
 import numpy as np
 import pytest
-from fixtures import photos as made_up
+from fixtures import photos as synth
 
 from dav_gswt.files import write_json
 from dav_gswt.images import image_files
@@ -16,16 +16,16 @@ HALF = 1.0
 
 @pytest.fixture(scope="module")
 def ground():
-    return made_up.texture(np.random.default_rng(4))
+    return synth.texture(np.random.default_rng(4))
 
 
 @pytest.fixture(scope="module")
 def photos(tmp_path_factory, ground):
     """A photos/ folder: pictures of a plane from known places, and points on it."""
     out = tmp_path_factory.mktemp("photos")
-    cameras = made_up.flight(3, 3, step=0.2)
-    known = made_up.model(cameras, made_up.plain(4000, 0.8, np.random.default_rng(1)))
-    made_up.shoot(out / "images", cameras, ground, HALF)
+    cameras = synth.flight(3, 3, step=0.2)
+    known = synth.model(cameras, synth.plain(4000, 0.8, np.random.default_rng(1)))
+    synth.shoot(out / "images", cameras, ground, HALF)
     (out / "sparse").mkdir()
     write_colmap_model(known, out / "sparse")
     write_json(out / "ground.json", {})
@@ -33,9 +33,12 @@ def photos(tmp_path_factory, ground):
 
 
 def test_further_photos_find_their_places_and_others_do_not(photos, ground, tmp_path):
-    asked = [made_up.camera((0.1, 0.05, 0.9), (0.12, 0.1, 0)), made_up.camera((-0.15, 0.1, 1.1), (-0.1, 0, 0))]
-    made_up.shoot(tmp_path, asked, ground, HALF)
-    other = made_up.photograph(made_up.camera((0, 0, 1)), made_up.texture(np.random.default_rng(99)), HALF)
+    asked = [
+        synth.camera((0.1, 0.05, 0.9), (0.12, 0.1, 0)),
+        synth.camera((-0.15, 0.1, 1.1), (-0.1, 0, 0)),
+    ]
+    synth.shoot(tmp_path, asked, ground, HALF)
+    other = synth.photograph(synth.camera((0, 0, 1)), synth.texture(np.random.default_rng(99)), HALF)
     image_files.write_png(tmp_path / "other.png", other)
     found = localize_photos(photos, sorted(tmp_path.iterdir()))
     assert found[2] is None

@@ -1,31 +1,33 @@
 """Structure from motion, end to end on small made-up photos, and what it says about photos it cannot use."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
 import pycolmap
 import pytest
-from fixtures import photos as made_up
+from fixtures import photos as synth
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.geometry.scene_frame import read_scene_frame
+from dav_gswt.geometry.scene_frame import FocalLength, SfmSign, SfmVerdict, read_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import read_colmap_model, reprojection_errors
 from dav_gswt.photos.photo_set import prepare_photos
 from dav_gswt.photos.sfm import registration
+from dav_gswt.photos.sfm.mapping import Approach
 from dav_gswt.photos.sfm.registration import Registration, SfmOptions, register_photos, undistort_image
 
 HALF = 1.0  # of the made-up ground
-FILM = made_up.FOCAL / np.hypot(made_up.WIDTH, made_up.HEIGHT) * 43.2666  # 35 mm equivalent of the made-up camera
+FILM = synth.FOCAL / np.hypot(synth.WIDTH, synth.HEIGHT) * 43.2666  # 35 mm equivalent of the made-up camera
 OPTIONS = SfmOptions(size=320, features=1024, side=320)
 
 
 def flight():
-    """Two flight lines of four at two heights: so the focal length can be told."""
-    cameras = made_up.flight(2, 4, step=0.2, tilt=0.2)
-    return [made_up.camera(c.centre * [1, 1, 1.0 + 0.2 * (i % 2)], [0.6 * c.centre[0], 0.6 * c.centre[1] + 1e-3, 0])
+    """Two flight lines of four at two heights: so the focal length can be determined."""
+    cameras = synth.flight(2, 4, step=0.2, tilt=0.2)
+    return [synth.camera(c.centre * [1, 1, 1.0 + 0.2 * (i % 2)], [0.6 * c.centre[0], 0.6 * c.centre[1] + 1e-3, 0])
             for i, c in enumerate(cameras)]  # fmt: skip
 
 
@@ -44,7 +46,7 @@ def as_jpeg(path, image, **attributes):
 
 @pytest.fixture(scope="module")
 def ground():
-    return made_up.texture(np.random.default_rng(4))
+    return synth.texture(np.random.default_rng(4))
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +54,7 @@ def photos(tmp_path_factory, ground):
     """Eight photos with EXIF."""
     folder = tmp_path_factory.mktemp("photos")
     for i, camera in enumerate(flight()):
-        picture = made_up.photograph(camera, ground, HALF)
+        picture = synth.photograph(camera, ground, HALF)
         as_jpeg(folder / f"{i:03d}.jpg", picture, **{"Exif:FocalLengthIn35mmFilm": round(FILM)})
     return folder
 
@@ -78,9 +80,13 @@ def test_all_photos_find_the_places_they_were_taken_from(registered):
     assert registered.error < 0.7 and np.median(reprojection_errors(registered.model)) < 0.7
 
 
+def test_good_photos_are_mapped_once(registered):
+    assert registered.verdict.grade == "good" and registered.verdict.tried == ("incremental mapping: good",)
+
+
 def test_the_focal_length_of_exif_is_held(registered):
     assert registered.focal_ratio == pytest.approx(1, abs=1e-12)
-    assert registered.model.cameras[0].fx == pytest.approx(made_up.FOCAL * round(FILM) / FILM, rel=1e-4)
+    assert registered.model.cameras[0].fx == pytest.approx(synth.FOCAL * round(FILM) / FILM, rel=1e-4)
 
 
 @pytest.mark.parametrize("threads", [1, 2])
@@ -108,21 +114,21 @@ def test_each_photo_can_have_a_camera_of_its_own(photos):
 
 def test_a_given_focal_length_takes_the_place_of_exifs(photos):
     found = register_photos(photos, replace(OPTIONS, focal=1.02 * FILM))
-    assert found.focal.exif == pytest.approx(1.02 * made_up.FOCAL, rel=1e-6)
+    assert found.focal.exif == pytest.approx(1.02 * synth.FOCAL, rel=1e-6)
 
 
 def test_oblique_views_fix_a_focal_length_that_exif_has_wrong(tmp_path, ground):
     """Photos from the side: EXIF is 8 % long, the photos know better. From above it would have been held."""
     cameras = [
-        made_up.camera((0.75 * np.cos(a), 0.75 * np.sin(a), 0.8 + 0.1 * (i % 2)), (0.02 * i, 0, 0))
+        synth.camera((0.75 * np.cos(a), 0.75 * np.sin(a), 0.8 + 0.1 * (i % 2)), (0.02 * i, 0, 0))
         for i, a in enumerate(np.linspace(-0.6, 0.6, 9))
     ]
     for i, camera in enumerate(cameras):
         film = {"Exif:FocalLengthIn35mmFilm": round(1.08 * FILM)}
-        as_jpeg(tmp_path / f"{i:03d}.jpg", made_up.photograph(camera, ground, HALF), **film)
+        as_jpeg(tmp_path / f"{i:03d}.jpg", synth.photograph(camera, ground, HALF), **film)
     found = register_photos(tmp_path, OPTIONS)
     assert "from the side" in found.focal.decision
-    assert found.focal.used == pytest.approx(made_up.FOCAL, rel=0.02)
+    assert found.focal.used == pytest.approx(synth.FOCAL, rel=0.02)
     assert found.focal_ratio == pytest.approx(found.focal.used / found.focal.exif)
 
 
@@ -137,7 +143,7 @@ def test_positions_by_gps_give_metres_and_north(tmp_path, ground):
     at = np.stack([east, north, true[:, 2]], 1) + rng.normal(0, 0.1, true.shape)
     world = Georeference(46.8, -92.0, 180.0, 0.0, 1.0)
     for i, (camera, place) in enumerate(zip(flight(), world.to_earth(at), strict=True)):
-        as_jpeg(tmp_path / f"{i:03d}.jpg", made_up.photograph(camera, ground, HALF), **gps_tags(place))
+        as_jpeg(tmp_path / f"{i:03d}.jpg", synth.photograph(camera, ground, HALF), **gps_tags(place))
     made = prepare_photos(tmp_path, tmp_path / "out", OPTIONS)
     assert made.unit == "metre" and made.flying_height == pytest.approx(np.median(true[:, 2]), rel=0.02)
     reference = made.georeference
@@ -151,10 +157,101 @@ def test_positions_that_contradict_the_photos_are_not_used(tmp_path, ground, cap
     world = Georeference(46.8, -92.0, 180.0, 0.0, 1.0)
     at = np.random.default_rng(5).normal(0, 60, (8, 3))
     for i, (camera, place) in enumerate(zip(flight(), world.to_earth(at), strict=True)):
-        as_jpeg(tmp_path / f"{i:03d}.jpg", made_up.photograph(camera, ground, HALF), **gps_tags(place))
+        as_jpeg(tmp_path / f"{i:03d}.jpg", synth.photograph(camera, ground, HALF), **gps_tags(place))
     found = register_photos(tmp_path, OPTIONS)
     assert found.positions is None and "GPS" in caplog.text
+    assert found.verdict.grade == "doubtful" and [sign.name for sign in found.verdict.objections] == ["GPS"]
+    assert [text.split(":")[0] for text in found.verdict.tried] == [
+        "incremental mapping",
+        "incremental mapping, GPS as priors, EXIF's focal length held",
+        "global mapping, EXIF's focal length held",
+    ]
     assert apart(found.model.cameras, flight()) < 0.01
+
+
+def verdict(grade: str, *names: str) -> SfmVerdict:
+    return SfmVerdict(grade, tuple(SfmSign(name, grade, f"{name} is odd") for name in names))
+
+
+class Placed(pycolmap.Reconstruction):
+    """A model of which only the number of its images is known."""
+
+    def __init__(self, count: int):
+        super().__init__()
+        self.count = count
+
+    def num_reg_images(self) -> int:
+        return self.count
+
+
+@pytest.fixture
+def solutions(monkeypatch):
+    """Ways of mapping that give what a test says, and no others; the ways that were asked for."""
+    asked = []
+
+    def give(*verdicts, placed=(8, 8, 8), unsure=0):
+        def solve(approach, scene, options):
+            asked.append(approach)
+            focal = FocalLength(300.0, 330.0, 330.0, 30.0, "freed")
+            return registration._Solution(Placed(placed[len(asked) - 1]), (), focal, verdicts[len(asked) - 1], unsure)
+
+        monkeypatch.setattr(registration, "_solve", solve)
+        scene = registration._Scene("folder", [], {1: 300.0}, None, Path("database.db"))
+        return registration._find_solution(scene, OPTIONS), asked
+
+    return give
+
+
+def test_the_best_of_several_ways_is_taken_and_all_are_named(solutions):
+    found, asked = solutions(verdict("refused", "tilt", "GPS"), verdict("good"), verdict("doubtful", "tilt"))
+    assert asked[1:] == [Approach("incremental", hold_focal=True), Approach("global", hold_focal=True)]
+    assert found.verdict.grade == "good" and len(found.verdict.tried) == 3
+    assert found.verdict.tried[0] == "incremental mapping: refused (tilt is odd; GPS is odd)"
+
+
+def test_a_model_of_few_photos_does_not_win(solutions):
+    found, _ = solutions(verdict("doubtful", "tilt"), verdict("good"), verdict("refused", "tilt"), placed=(8, 3, 8))
+    assert found.verdict.grade == "doubtful"
+
+
+def test_of_equal_models_the_first_stays(solutions):
+    found, _ = solutions(*[verdict("doubtful", "tilt")] * 3)
+    assert found.verdict.tried[0].startswith("incremental mapping: doubtful")
+
+
+def test_photos_left_out_though_they_match_are_tried_with_the_other_mapper(solutions):
+    found, asked = solutions(verdict("good"), verdict("good"), placed=(14, 19), unsure=5)
+    assert asked == [Approach("incremental"), Approach("global")] and found.best.num_reg_images() == 19
+
+
+def test_the_other_mapper_does_not_win_with_a_worse_model(solutions):
+    found, _ = solutions(verdict("good"), verdict("doubtful", "tilt"), placed=(14, 19), unsure=5)
+    assert found.best.num_reg_images() == 14
+
+
+def test_photos_left_out_alone_ask_for_no_other_way(solutions):
+    assert len(solutions(verdict("doubtful", "placed", "groups"))[1]) == 1
+
+
+def test_a_refused_model_stops_before_anything_is_written_unless_it_may_go_on(photos, tmp_path, monkeypatch):
+    monkeypatch.setattr(registration, "judge_model", lambda *_: verdict("refused", "placed"))  # maps once
+    with pytest.raises(InputError, match="do not fit together to one scene: placed is odd"):
+        prepare_photos(photos, tmp_path / "out", OPTIONS)
+    assert not (tmp_path / "out").exists()
+    made = prepare_photos(photos, tmp_path / "out", replace(OPTIONS, verdict="warn"))
+    assert read_scene_frame(tmp_path / "out" / "ground.json").verdict == made.verdict
+    assert made.verdict.grade == "refused"
+
+
+def test_photos_of_two_places_are_named_as_two_groups(tmp_path, ground, caplog):
+    synth.shoot(tmp_path / "a", flight(), ground, HALF)
+    synth.shoot(tmp_path / "b", flight()[:4], synth.texture(np.random.default_rng(9)), HALF)
+    (tmp_path / "photos").mkdir()
+    for path in tmp_path.glob("?/*.png"):
+        path.rename(tmp_path / "photos" / f"{path.parent.name}{path.name}")
+    found = register_photos(tmp_path / "photos", OPTIONS)
+    assert found.verdict.grade == "doubtful" and len(found.left_out) == 4
+    assert "your photos fall into 2 groups (a000.png ... a007.png | b000.png ... b003.png)" in caplog.text
 
 
 def gps_tags(place):
@@ -169,21 +266,21 @@ def gps_tags(place):
 
 
 def test_without_exif_the_focal_length_is_found(tmp_path, ground):
-    made_up.shoot(tmp_path, flight(), ground, HALF)
+    synth.shoot(tmp_path, flight(), ground, HALF)
     found = register_photos(tmp_path, OPTIONS)
     assert found.focal_ratio is None and len(found.model.names) == 8
     # The guess is 28 % long; heights that differ by a fifth fix it to about the noise of features, 0.1 of 30 pixels.
-    assert found.model.cameras[0].fx == pytest.approx(made_up.FOCAL, rel=0.02)
+    assert found.model.cameras[0].fx == pytest.approx(synth.FOCAL, rel=0.02)
 
 
 def test_photos_with_and_without_exif_go_together(tmp_path, ground):
     """Those with a focal length hold it, the others find theirs; lens distortion is refined for all."""
     for i, camera in enumerate(flight()):
         film = {"Exif:FocalLengthIn35mmFilm": round(FILM)} if i % 2 else {}
-        as_jpeg(tmp_path / f"{i:03d}.jpg", made_up.photograph(camera, ground, HALF), **film)
+        as_jpeg(tmp_path / f"{i:03d}.jpg", synth.photograph(camera, ground, HALF), **film)
     one, two = register_photos(tmp_path, OPTIONS), register_photos(tmp_path, OPTIONS)
     assert one.focal_ratio == pytest.approx(1, abs=0.02) and len(one.model.names) == 8
-    assert [c.fx for c in one.model.cameras] == pytest.approx([made_up.FOCAL] * 8, rel=0.02)
+    assert [c.fx for c in one.model.cameras] == pytest.approx([synth.FOCAL] * 8, rel=0.02)
     assert all(lens.params[3] != 0 for lens in one.lenses)
     assert np.array_equal(one.model.points, two.model.points)
 
@@ -193,7 +290,7 @@ def test_photos_of_two_sizes_get_a_camera_each(tmp_path, ground):
         if i % 2:
             camera = camera.resized(240, 180)
         film = {"Exif:FocalLengthIn35mmFilm": round(FILM)}
-        as_jpeg(tmp_path / f"{i:03d}.jpg", made_up.photograph(camera, ground, HALF), **film)
+        as_jpeg(tmp_path / f"{i:03d}.jpg", synth.photograph(camera, ground, HALF), **film)
     found = register_photos(tmp_path, OPTIONS)
     assert len(found.model.names) == 8
     assert all(abs(c.width - (240 if i % 2 else 320)) <= 4 for i, c in enumerate(found.model.cameras))
@@ -203,8 +300,8 @@ def test_photos_of_two_sizes_get_a_camera_each(tmp_path, ground):
 def test_a_photo_of_something_else_is_left_out_with_the_reason(photos, tmp_path):
     for path in photos.iterdir():
         (tmp_path / path.name).symlink_to(path)
-    other = made_up.texture(np.random.default_rng(77))
-    as_jpeg(tmp_path / "other.jpg", made_up.photograph(made_up.camera((0, 0, 1)), other, HALF))
+    other = synth.texture(np.random.default_rng(77))
+    as_jpeg(tmp_path / "other.jpg", synth.photograph(synth.camera((0, 0, 1)), other, HALF))
     found = register_photos(tmp_path, OPTIONS)
     assert [name for name, _ in found.left_out] == ["other.jpg"] and "matches no photo" in found.left_out[0][1]
     assert "other.png" not in found.model.names
@@ -223,11 +320,11 @@ def test_an_undistorted_picture_is_what_a_pinhole_camera_sees(tmp_path, k):
     rays = lens.cam_from_img(np.stack([x.ravel(), y.ravel()], 1)).reshape(150, 200, 2)
     image_files.write_png(tmp_path / "a.png", scene(rays[..., 0], rays[..., 1]))
     flat = replace(
-        made_up.camera((0, 0, 1)),
+        synth.camera((0, 0, 1)),
         fx=pinhole.focal_length_x, fy=pinhole.focal_length_y, cx=pinhole.principal_point_x,
         cy=pinhole.principal_point_y, width=pinhole.width, height=pinhole.height,
     )  # fmt: skip
-    one = replace(made_up.model([flat], np.zeros((1, 3))), names=("a.png",))
+    one = replace(synth.model([flat], np.zeros((1, 3))), names=("a.png",))
     seen = undistort_image(Registration(one, (tmp_path / "a.png",), (lens,), (), None, 0.0), 0)
     x, y = np.meshgrid(np.arange(flat.width) + 0.5, np.arange(flat.height) + 0.5)
     # 8 bits round by 1 / 510; cubic splines on waves of 100 pixels add less.
@@ -247,19 +344,19 @@ def test_observations_lie_where_the_pictures_show_their_points(registered, photo
 
 def test_pictures_of_equal_stem_keep_apart(tmp_path):
     paths = [tmp_path / name for name in ("a.jpg", "a.png", "b.jpg")]
-    assert registration._keys(paths) == ["a_jpg.png", "a_png.png", "b.png"]
+    assert registration._name_pictures(paths) == ["a_jpg.png", "a_png.png", "b.png"]
 
 
 def test_two_photos_are_refused_by_name(tmp_path, ground):
-    made_up.shoot(tmp_path, flight()[:2], ground, HALF)
+    synth.shoot(tmp_path, flight()[:2], ground, HALF)
     with pytest.raises(InputError, match="000.png and 001.png.*at least 3"):
         register_photos(tmp_path, OPTIONS)
 
 
 def test_photos_that_do_not_overlap_are_refused_with_how_many_were_placed(tmp_path):
     for i in range(4):
-        texture = made_up.texture(np.random.default_rng(100 + i))
-        image_files.write_png(tmp_path / f"{i}.png", made_up.photograph(made_up.camera((0, 0, 1)), texture, HALF))
+        texture = synth.texture(np.random.default_rng(100 + i))
+        image_files.write_png(tmp_path / f"{i}.png", synth.photograph(synth.camera((0, 0, 1)), texture, HALF))
     with pytest.raises(InputError, match="0 of 4 photos.*overlap"):
         register_photos(tmp_path, OPTIONS)
 
@@ -298,3 +395,4 @@ def test_brighton_beach_registers_at_half_size(photo_sets):
     found = register_photos(photo_sets / "brighton_beach/images", SfmOptions(512, 2048, side=512))
     assert len(found.model.names) == 18 and not found.left_out
     assert found.focal_ratio == pytest.approx(1, abs=1e-12) and found.error < 0.5
+    assert found.verdict.grade == "good"

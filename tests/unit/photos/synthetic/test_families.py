@@ -1,4 +1,4 @@
-"""Flowers, tall grass and the planet: what they refuse, that they repeat, where things stand, and how they look."""
+"""Flowers, tall grass, planet and oasis: what they refuse, that they repeat, where things stand, and how they look."""
 
 import zlib
 from functools import partial
@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from dav_gswt.errors import InputError
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.photos.synthetic import (
-    camera_layouts,
     flower_plants,
     flowers,
     grass,
     grass_plants,
     land,
+    oasis,
     planet,
     rocks,
     scattering,
@@ -22,11 +23,12 @@ from dav_gswt.photos.synthetic import (
 from dav_gswt.photos.synthetic.flower_plants import DISCS
 
 pytest.importorskip("mitsuba")
-FAMILIES = {"flowers": flowers, "grass": grass, "planet": planet}
+FAMILIES = {"flowers": flowers, "grass": grass, "planet": planet, "oasis": oasis}
 BARE = {
     "flowers": {"flowers": 0, "tufts": 0, "stones": 0, "pebbles": 0},
     "grass": {"tussocks": 0, "ears": 0, "docks": 0},
     "planet": {"boulders": 0, "rocks": 0, "stones": 0, "pebbles": 0},
+    "oasis": {"flowers": 0, "shrubs": 0, "single_boulders": 0, "stones": 0, "pebbles": 0},
 }
 every_family = pytest.mark.parametrize("name", FAMILIES)
 
@@ -42,6 +44,9 @@ def small(monkeypatch):
     for ring, end in {"NEAR": 4.0, "MIDDLE": 6.0, "FAR": 8.0, "REACH": 6.0}.items():
         monkeypatch.setattr(grass, ring, end)
     monkeypatch.setattr(planet, "SORTS", tuple((*span, 8.0, 3, min(fine, 2)) for *span, _, _, fine in planet.SORTS))
+    for ring, end in {"NEAR": 4.0, "FAR": 8.0}.items():
+        monkeypatch.setattr(oasis, ring, end)
+    monkeypatch.setattr(land, "STONE_SQUARE", 7.0)
     yield
     scene._load_scene.cache_clear()
 
@@ -127,7 +132,7 @@ def test_extreme_options_still_grow(name):
     assert np.isfinite(grown(name, 0, **counts).ground.vertices).all()
 
 
-@pytest.mark.parametrize("name", ["flowers", "grass"])
+@pytest.mark.parametrize("name", ["flowers", "grass", "oasis"])
 def test_plants_are_rooted_in_the_ground(name):
     made = grown(name, 2, undulation=0.3)
     near = made.places[np.abs(made.places[:, 1:3]).max(axis=1) < 6.5]
@@ -172,6 +177,7 @@ def test_the_families_look_plausible_and_unlike_each_other():
     colourful = {name: np.ptp(shot, axis=2).std() for name, shot in shots.items()}
     assert colourful["flowers"] == max(colourful.values())
     assert mean["grass"][1] > mean["grass"][2] + 0.08
+    assert mean["oasis"][0] > mean["oasis"][1] > mean["oasis"][2] + 0.03
     assert mean["planet"][0] > 1.3 * mean["planet"][1] > 1.3 * mean["planet"][2]
 
 

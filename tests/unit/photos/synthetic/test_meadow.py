@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from dav_gswt.errors import InputError
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.cameras import pinhole
-from dav_gswt.photos.synthetic import camera_layouts, land, meadow
+from dav_gswt.photos.synthetic import land, meadow
 from dav_gswt.photos.synthetic import scene as synthetic
 
 pytest.importorskip("mitsuba")
@@ -96,7 +97,7 @@ def test_mats_of_grass_follow_the_slope_and_tufts_stand_upright():
 
 
 @pytest.mark.parametrize("name", ["tufts", "seed_heads", "clover", "flowers"])
-def test_there_is_as_much_of_a_plant_as_is_asked_for(name, monkeypatch):
+def test_there_is_as_much_of_a_plant_as_the_options_say(name, monkeypatch):
     monkeypatch.setattr(meadow, "FAR", 16.0)
     none = {key: 0 for key in ("tufts", "seed_heads", "clover", "flowers", "stones", "pebbles")}
 

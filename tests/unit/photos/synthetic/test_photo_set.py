@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.cameras import look_at
 from dav_gswt.images import image_files
-from dav_gswt.photos.synthetic import camera_layouts, desert, photo_set
+from dav_gswt.photos.synthetic import desert, photo_set
 from dav_gswt.photos.synthetic import scene as synthetic
 
 ENTRY = {"family": "desert", "seed": 0, "photos": 100, "test": 0, "size": 64, "candidates": 0, "layout": "paper"}

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from dav_gswt.geometry.scene_frame import read_scene_frame
+from dav_gswt.geometry.scene_frame import Extent, read_scene_frame
 from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
 from dav_gswt.photos.synthetic import photo_set, truth
 from dav_gswt.photos.synthetic import scene as synthetic
+from dav_gswt.photos.synthetic.labels import GroundLabels, read_label_map
 
 ENTRY = {"family": "desert", "seed": 0, "photos": 3, "test": 2, "size": 64, "candidates": 0}
 
@@ -22,6 +23,7 @@ def dark(monkeypatch):
 
     monkeypatch.setattr(synthetic, "render", lambda scene, camera: np.zeros((64, 64, 3), np.float32))
     monkeypatch.setattr(truth, "write_truth", lambda path, scene, camera: path.write_text(str(camera.centre.tolist())))
+    monkeypatch.setattr(synthetic, "load_labels", lambda scene: None)
     monkeypatch.setattr(photo_set, "triangulate_points", nothing)
 
 
@@ -59,6 +61,14 @@ def test_every_picture_has_its_truth_and_the_record_says_what_rendered(tmp_path)
     assert set(read_scene_frame(tmp_path / "ground.json").renderer) == {"mitsuba", "variant", "llvm"}
     written = (tmp_path / "truth" / "test_01.exr").read_text()
     assert written == str(synthetic.test_views(ENTRY)[1].centre.tolist())
+
+
+def test_a_family_with_labels_has_a_map_of_them_beside_the_truth(tmp_path, monkeypatch):
+    known = GroundLabels({"sand": 1}, np.ones((4, 4), int), 16.0, (), frozenset())
+    monkeypatch.setattr(synthetic, "load_labels", lambda scene: known)
+    photo_set.render_set(ENTRY, tmp_path)
+    found = read_label_map(tmp_path / "truth")
+    assert (found.material == 1).all() and found.extent == Extent(-3.0, -3.0, 3.0, 3.0)
 
 
 def test_names_of_more_than_a_hundred_views_sort_by_number():

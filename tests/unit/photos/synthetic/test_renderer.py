@@ -16,7 +16,7 @@ NEW, OLD = Variant("llvm_ad_rgb", "/somewhere/libLLVM.so.19.1", 19), Variant("ll
 
 
 @pytest.fixture
-def asked(monkeypatch):
+def variant(monkeypatch):
     """Ask for a variant anew, with libraries of which only some work."""
     renderer.choose_variant.cache_clear()
 
@@ -33,7 +33,7 @@ def asked(monkeypatch):
 @pytest.mark.parametrize(
     "word, working, found",
     [
-        pytest.param("", (NEW,), Variant("scalar_rgb"), id="not asked"),
+        pytest.param("", (NEW,), Variant("scalar_rgb"), id="not set"),
         pytest.param("scalar", (NEW,), Variant("scalar_rgb"), id="scalar"),
         pytest.param("llvm", (NEW, OLD), NEW, id="the newest"),
         pytest.param("llvm", (OLD,), OLD, id="the newest that works"),
@@ -41,19 +41,19 @@ def asked(monkeypatch):
         pytest.param("auto", (NEW,), NEW, id="auto"),
     ],
 )
-def test_the_environment_says_which_variant_renders(asked, word, working, found):
-    assert asked(word, working) == found
+def test_the_environment_says_which_variant_renders(variant, word, working, found):
+    assert variant(word, working) == found
 
 
 @pytest.mark.parametrize("word, said", [("cuda", "choose from scalar, llvm, auto"), ("llvm", "libllvm19")])
-def test_what_cannot_be_had_is_said(asked, word, said):
+def test_an_unavailable_variant_is_reported(variant, word, said):
     with pytest.raises(InputError, match=said):
-        asked(word)
+        variant(word)
 
 
-def test_the_choice_is_logged_once_and_kept(asked, caplog):
+def test_the_choice_is_logged_once_and_kept(variant, caplog):
     with caplog.at_level(logging.INFO, "dav_gswt.photos.synthetic.renderer"):
-        asked("auto", (NEW,))
+        variant("auto", (NEW,))
         renderer.choose_variant()
     assert [r.message for r in caplog.records] == [
         "synthetic scenes are rendered by mitsuba's llvm_ad_rgb with LLVM 19"
@@ -104,7 +104,8 @@ def test_the_same_world_is_seen_in_a_compiled_variant(tmp_path):
     script = """
 import sys
 import numpy as np
-from dav_gswt.photos.synthetic import camera_layouts, desert, truth
+from dav_gswt.geometry import camera_layouts
+from dav_gswt.photos.synthetic import desert, truth
 from dav_gswt.photos.synthetic import scene as synthetic
 desert.TEXELS = 256
 scene = synthetic.make_scene("desert", 0, tufts=60, stones=40)

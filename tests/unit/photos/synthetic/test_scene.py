@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from dav_gswt.errors import InputError
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.cameras import pinhole, top_down
-from dav_gswt.photos.synthetic import camera_layouts, desert, land
+from dav_gswt.photos.synthetic import desert, land
 from dav_gswt.photos.synthetic import scene as synthetic
 
 mi = pytest.importorskip("mitsuba")

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from dav_gswt.errors import InputError
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.cameras import pinhole
 from dav_gswt.images import image_files
-from dav_gswt.photos.synthetic import camera_layouts, desert, renderer, truth
+from dav_gswt.photos.synthetic import desert, renderer, truth
 from dav_gswt.photos.synthetic import scene as synthetic
 from dav_gswt.photos.synthetic.land import Land, Light
 from dav_gswt.photos.synthetic.meshes import Mesh

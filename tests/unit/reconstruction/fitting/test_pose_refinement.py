@@ -41,9 +41,7 @@ def test_a_camera_that_is_off_finds_its_place():
         constraints = GroundConstraints(grid, np.full(grid.shape, 0.5))
         constraints.detail = 1e-9  # the ground stays where it is
         views = [*photos[:2], replace(photos[2], camera=off)]
-        trainer.fit_field(
-            made.field(), views, FitPlan(600, 1, pose_rate=3e-4), constraints, np.random.default_rng(0), "test"
-        )
+        trainer.fit_field(made.field(), views, FitPlan(600, 1, pose_rate=3e-4), constraints, np.random.default_rng(0))
     finally:
         PoseCorrections.descend = original
     # a turn and a shift look alike on flat ground: judged by where the ground's middle is seen

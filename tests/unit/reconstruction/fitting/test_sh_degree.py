@@ -41,7 +41,7 @@ def test_one_camera_sees_no_difference_at_all():
 
 
 @pytest.mark.parametrize("gain, degree", [(0.01, 0), (1.0, 1)])
-def test_the_least_degree_that_loses_little_is_chosen_and_told(gain, degree):
+def test_the_least_degree_that_loses_little_is_chosen_and_reported(gain, degree):
     full, report = directed(0.2), FitReport()
     found = sh_degree.choose_degree(full, [made.photos(1)[0].camera], lambda now: 30 + gain * now.sh_degree, report)
     assert found.sh_degree == degree

@@ -28,7 +28,7 @@ def fitted(field=None, plan=None, seed=0, photos=None, keep=None):
     constraints = GroundConstraints(grid, np.full(grid.shape, 0.5))
     plan = plan or FitPlan(60, len(field))
     return trainer.fit_field(
-        field, photos or made.photos(), plan, constraints, np.random.default_rng(seed), "test", keep
+        field, photos or made.photos(), plan, constraints, np.random.default_rng(seed), trainer.FitOptions("test", keep)
     )
 
 
@@ -120,7 +120,7 @@ def test_a_snapshot_that_is_none_costs_nothing(tmp_path, monkeypatch, caplog):
     assert "begins anew" in caplog.text
 
 
-def test_what_is_chosen_is_told_with_its_reason():
+def test_a_choice_is_reported_with_its_reason():
     found = fitted(plan=FitPlan(60, "auto", "auto"))
     report = found.report
     assert {choice["what"]: choice["value"] for choice in report.choices} == {

@@ -32,9 +32,9 @@ def fit(gap, photos=4):
 
 def metrics(folder, t, **groups):
     mean = {"psnr": 20.0 + t, "psnr_colour_corrected": 21.0 + t, "ssim": 0.5, "lpips": 0.25}
-    told = mean | {"worst_decile": mean, "groups": groups, "photos": 8 + 4 * t, "fit": fit(5.0) if t else {}}
-    told |= {"provenance": {"version": "0.1", "renderer": {"backend": "cpu"}, "inputs": {"field": 64 * "a"}}}
-    (path := folder / f"metrics{t}.json").write_text(json.dumps(told))
+    metrics = mean | {"worst_decile": mean, "groups": groups, "photos": 8 + 4 * t, "fit": fit(5.0) if t else {}}
+    metrics |= {"provenance": {"version": "0.1", "renderer": {"backend": "cpu"}, "inputs": {"field": 64 * "a"}}}
+    (path := folder / f"metrics{t}.json").write_text(json.dumps(metrics))
     return str(path)
 
 
@@ -63,10 +63,10 @@ def test_what_a_round_was_expected_to_gain_rests_on_the_rounds_before_it_alone(t
 
 
 def test_gains_are_checked_against_what_was_expected_of_them():
-    told = rounds([20.0, 21.0, 21.4, 21.5], (8, 12, 16, 20)) + rounds([20.0, 23.0, 25.0], scene="grass") + ALL
-    for row, (low, high) in zip((told[2], told[3], told[6]), ((0.2, 0.8), (0.2, 0.8), (1, 3)), strict=True):
+    curve = rounds([20.0, 21.0, 21.4, 21.5], (8, 12, 16, 20)) + rounds([20.0, 23.0, 25.0], scene="grass") + ALL
+    for row, (low, high) in zip((curve[2], curve[3], curve[6]), ((0.2, 0.8), (0.2, 0.8), (1, 3)), strict=True):
         row |= {"closes": 1.0, "expected": 0.5, "expected_low": low, "expected_high": high}
-    every, flowers, grass = tables.check_predictions(told)
+    every, flowers, grass = tables.check_predictions(curve)
     assert [row["scene"] for row in (every, flowers, grass)] == ["every", "flowers", "grass"]
     assert (every["rounds"], flowers["rounds"], grass["rounds"]) == (3, 2, 1)
     assert flowers["gained"] == pytest.approx(0.25) and flowers["apart"] == pytest.approx(0.25)
@@ -75,9 +75,9 @@ def test_gains_are_checked_against_what_was_expected_of_them():
 
 
 def test_rounds_that_gain_nothing_count_for_the_interval_alone():
-    told = rounds([20.0, 21.0, 20.9])
-    told[2] |= {"closes": 1.0, "expected": 0.5, "expected_low": 0.2, "expected_high": 1.0}
-    (every, _) = tables.check_predictions(told)
+    curve = rounds([20.0, 21.0, 20.9])
+    curve[2] |= {"closes": 1.0, "expected": 0.5, "expected_low": 0.2, "expected_high": 1.0}
+    (every, _) = tables.check_predictions(curve)
     assert every["covered"] == 0 and every["share"] is every["off"] is None
 
 

@@ -1,4 +1,4 @@
-"""The regressor, with weights that learned nothing: it is asked as it is trained, and told apart from the prior."""
+"""The regressor, with weights that learned nothing: it is asked as it is trained, and distinguished from the prior."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def condition():
 
 
 def test_it_predicts_what_training_compares_with_the_code(regressor, condition):
-    """The network asked as `training.train_denoiser` asks it: no noise, time 0, all of the render believed."""
+    """The network asked as `training.train_denoiser` asks it: no noise, time 0, all of the render valid."""
     network = regressor.network
     with torch.inference_mode():
         render, photo = (network.encode(p) for p in (pack_render(condition), pack_photo(condition.photo)))

@@ -82,7 +82,7 @@ def test_where_nothing_is_repaired_every_level_keeps_its_bytes():
     found, before = refine(nothing), tile_set()
     for one, two in zip(found.fields, before.fields, strict=True):
         assert all(same(a, b) for a, b in zip(one, two, strict=True))
-    assert all(told["changed"] == 0 for told in found.report.more["refined"]["tiles"])
+    assert all(tile["changed"] == 0 for tile in found.report.more["refined"]["tiles"])
 
 
 def step_at_the_cut(field, n):
@@ -96,8 +96,8 @@ def test_a_step_of_brightness_becomes_smaller_in_every_level(mended):
     for level, n in ((0, N), (1, N // 2)):
         before, after = (step_at_the_cut(tiles.fields[level][5], n) for tiles in (tile_set(), mended))
         assert after < 0.7 * before, level
-    told = mended.report.more["refined"]["tiles"][5]
-    assert told["apart"][1] < 0.8 * told["apart"][0] and told["changed"] > 0
+    tile = mended.report.more["refined"]["tiles"][5]
+    assert tile["apart"][1] < 0.8 * tile["apart"][0] and tile["changed"] > 0
 
 
 def test_what_changes_stays_within_its_bounds(mended):
@@ -214,7 +214,7 @@ def test_the_prior_is_told_not_to_believe_the_render_beside_the_cut():
     strength, steps, seed, known = model.recorded
     assert (strength, steps, seed) == (0.2, 3, 7)
     np.testing.assert_array_equal(np.argwhere(~known[0]), [[2, 3]])
-    repair.PriorRepair.from_config(model, {"strength": 0.2, "believed": True}, 7)(condition, near)
+    repair.PriorRepair.from_config(model, {"strength": 0.2, "condition": True}, 7)(condition, near)
     assert model.recorded[3] is None
 
 

@@ -24,7 +24,7 @@ def source(made_up, tiles):
 
 
 @pytest.fixture(scope="session")
-def laid(tiles, source):
+def placed(tiles, source):
     return placed_tiles.place_tiles(tiles, source, 3, 0.6)
 
 

@@ -16,49 +16,49 @@ from dav_gswt.terrain import heights, stills
 HILLS = {"kind": "hills", "height": 1.0, "wavelength": 8.0}
 
 
-def first_of(laid, terrain, view, kind, rng, border=False):
-    for place in kind(laid, rng):
-        crop = crops.make_crop(laid, terrain, view, place.at)
-        if crop and (met := crops.find_patches(laid, crop)) and (border or len(met) > 1):
-            return crops.render_patches(laid, terrain, crop, met, border)
+def first_of(placed, terrain, view, kind, rng, border=False):
+    for place in kind(placed, rng):
+        crop = crops.make_crop(placed, terrain, view, place.at)
+        if crop and (met := crops.find_patches(placed, crop)) and (border or len(met) > 1):
+            return crops.render_patches(placed, terrain, crop, met, border)
     raise AssertionError("no crop")
 
 
 @pytest.mark.parametrize("view", crops.VIEWS, ids=lambda view: view.name)
 @pytest.mark.parametrize("surface", [{"kind": "flat"}, HILLS], ids=lambda entry: entry["kind"])
-def test_a_crop_is_the_terrain_s_own_picture(laid, view, surface, rng):
-    terrain = replace(laid.terrain, heights=heights.surface_from_config(surface, laid.terrain.side))
-    shown = first_of(laid, terrain, view, places.sample_cuts, rng)
+def test_a_crop_is_the_terrain_s_own_picture(placed, view, surface, rng):
+    terrain = replace(placed.terrain, heights=heights.surface_from_config(surface, placed.terrain.side))
+    shown = first_of(placed, terrain, view, places.sample_cuts, rng)
     np.testing.assert_array_equal(
-        shown.picture, stills.render_view(terrain, shown.crop.camera, rendering.SKY, laid.colour)
+        shown.picture, stills.render_view(terrain, shown.crop.camera, rendering.SKY, placed.colour)
     )
 
 
-def test_across_every_border_the_patch_is_the_same(laid):
+def test_across_every_border_the_patch_is_the_same(placed):
     """But where a strip's cut against its corner happens to run along the border for some cells."""
-    n, a = laid.plan.side, laid.plan.corner
-    edges, along = np.arange(n, len(laid.patch), n), np.arange(len(laid.patch)) % n
+    n, a = placed.plan.side, placed.plan.corner
+    edges, along = np.arange(n, len(placed.patch), n), np.arange(len(placed.patch)) % n
     strip = (along >= a) & (along < n - a)
-    for patch in (laid.patch, laid.patch.T):
+    for patch in (placed.patch, placed.patch.T):
         before, after = patch[edges - 1], patch[edges]
         np.testing.assert_array_equal(before[:, strip], after[:, strip])
         assert (before == after)[:, ~strip].mean() > 0.9
 
 
-def test_the_exemplar_laid_whole_shows_what_a_tile_of_one_patch_shows(laid, rng):
+def test_the_exemplar_placed_whole_shows_what_a_tile_of_one_patch_shows(placed, rng):
     """A crop on a border far from any cut: tiles and exemplar hold the same Gaussians, but for the corrections."""
-    shown = first_of(laid, laid.terrain, crops.VIEWS[2], places.sample_borders, rng, border=True)
+    shown = first_of(placed, placed.terrain, crops.VIEWS[2], places.sample_borders, rng, border=True)
     assert len(shown.patches) == 1 and set(np.unique(shown.tile)) > {int(shown.tile[0, 0])}
     weight = np.ones(shown.picture.shape[:2])
     assert metrics.psnr(shown.picture, shown.own[0], weight) > 33  # what of a correction varies within the crop
 
 
-def broken(laid, change):
+def broken(placed, change):
     """The same with every tile changed in the cells within 3 cells of its western border."""
     out = {}
-    for key, field in laid.terrain.tiles.items():
-        out[key] = change(field, field.means[:, 0] < 3 * laid.spacing)
-    return replace(laid, tiles={key: SpatialIndex.from_field(field) for key, field in out.items()})
+    for key, field in placed.terrain.tiles.items():
+        out[key] = change(field, field.means[:, 0] < 3 * placed.spacing)
+    return replace(placed, tiles={key: SpatialIndex.from_field(field) for key, field in out.items()})
 
 
 def brighter(field, which):
@@ -74,16 +74,17 @@ def moved(field, which):
 
 
 @pytest.mark.parametrize("change", [brighter, moved, lambda field, which: field[~which]], ids=["step", "shift", "gap"])
-def test_a_border_broken_on_purpose_is_found(laid, change, rng):
+def test_a_border_broken_on_purpose_is_found(placed, change, rng):
     view = crops.VIEWS[2]
-    upright = [p for p in places.sample_borders(laid, rng) if p.cluster.startswith("v")][:6]
+    upright = [p for p in places.sample_borders(placed, rng) if p.cluster.startswith("v")][:6]
     for place in upright:
-        crop = crops.make_crop(laid, laid.terrain, view, place.at)
-        met = crops.find_patches(laid, crop)
+        crop = crops.make_crop(placed, placed.terrain, view, place.at)
+        met = crops.find_patches(placed, crop)
         if not met:
             continue
         whole, bad = (
-            crops.render_patches(each, each.terrain, crop, met, border=True) for each in (laid, broken(laid, change))
+            crops.render_patches(each, each.terrain, crop, met, border=True)
+            for each in (placed, broken(placed, change))
         )
         weight = np.ones(whole.picture.shape[:2])
         psnr = [metrics.psnr(each.picture, whole.own[0], weight) for each in (whole, bad)]
@@ -94,48 +95,51 @@ def test_a_border_broken_on_purpose_is_found(laid, change, rng):
     raise AssertionError("no border could be looked at")
 
 
-def raised(laid, height):
+def raised(placed, height):
     """The same with all ground and what stands on it higher."""
     out = {}
-    for key, field in laid.terrain.tiles.items():
+    for key, field in placed.terrain.tiles.items():
         out[key] = SpatialIndex.from_field(replace(field, means=field.means + np.float32([0, 0, height])))
-    ground = laid.source.ground + [0, 0, 0, height]
-    return replace(laid, tiles=out, source=replace(laid.source, ground=ground))
+    ground = placed.source.ground + [0, 0, 0, height]
+    return replace(placed, tiles=out, source=replace(placed.source, ground=ground))
 
 
 @pytest.mark.parametrize("view", crops.VIEWS, ids=lambda view: view.name)
-def test_a_crop_shows_what_it_is_of_however_high_the_ground_lies(laid, view, rng):
+def test_a_crop_shows_what_it_is_of_however_high_the_ground_lies(placed, view, rng):
     """Aimed at a plane below it, a walker's crop would show ground 2.7 times that height before the place."""
     place = next(
         p
-        for p in places.sample_borders(laid, rng)
-        if crops.find_patches(laid, crops.make_crop(laid, laid.terrain, view, p.at))
+        for p in places.sample_borders(placed, rng)
+        if crops.find_patches(placed, crops.make_crop(placed, placed.terrain, view, p.at))
     )
     tiles = []
-    for each in (laid, raised(laid, 12 * laid.spacing)):
+    for each in (placed, raised(placed, 12 * placed.spacing)):
         crop = crops.make_crop(each, each.terrain, view, place.at)
         tiles.append(crops.render_patches(each, each.terrain, crop, crops.find_patches(each, crop), border=True).tile)
     assert len(np.unique(tiles[0])) > 1
     assert (tiles[0] == tiles[1]).mean() > 0.95
 
 
-def test_the_ground_s_height_is_that_of_the_tile_s_own_cells(laid):
-    assert raised(laid, 2.0).mean_height((3, 5)) == pytest.approx(2.0 + laid.mean_height((3, 5)))
-    n, height = laid.plan.side, laid.source.ground[..., 3]
-    x, y = 3 - laid.first, 5 - laid.first
-    column, row = [3, 5] - laid.origins[laid.patch[y, x]]
-    expected = height[row, column] + laid.correction[laid.tile[y, x], y % n, x % n, 3]
-    assert laid.relief[y, x] == pytest.approx(expected, nan_ok=True)
-    bare = replace(laid, source=replace(laid.source, ground=np.full_like(laid.source.ground, np.nan)))
+def test_the_ground_s_height_is_that_of_the_tile_s_own_cells(placed):
+    assert raised(placed, 2.0).mean_height((3, 5)) == pytest.approx(2.0 + placed.mean_height((3, 5)))
+    n, height = placed.plan.side, placed.source.ground[..., 3]
+    x, y = 3 - placed.first, 5 - placed.first
+    column, row = [3, 5] - placed.origins[placed.patch[y, x]]
+    expected = height[row, column] + placed.correction[placed.tile[y, x], y % n, x % n, 3]
+    assert placed.relief[y, x] == pytest.approx(expected, nan_ok=True)
+    bare = replace(placed, source=replace(placed.source, ground=np.full_like(placed.source.ground, np.nan)))
     assert bare.mean_height((3, 5)) == 0
 
 
-def test_borders_are_shown_without_cuts_where_that_is_possible(laid, rng):
-    places_looked_at = places.sample_borders(laid, np.random.default_rng(2))[: measure.MAX_BORDER_PLACES]
+def test_borders_are_shown_without_cuts_where_that_is_possible(placed, rng):
+    places_looked_at = places.sample_borders(placed, np.random.default_rng(2))[: measure.MAX_BORDER_PLACES]
     view = crops.VIEWS[2]
-    met = [crops.find_patches(laid, crops.make_crop(laid, laid.terrain, view, place.at)) for place in places_looked_at]
+    met = [
+        crops.find_patches(placed, crops.make_crop(placed, placed.terrain, view, place.at))
+        for place in places_looked_at
+    ]
     alone = sum(bool(each) and len(each) == 1 for each in met)
-    taken = measure._sample_borders(laid, laid.terrain, view, np.random.default_rng(2))
+    taken = measure._sample_borders(placed, placed.terrain, view, np.random.default_rng(2))
     shown = [len(each.shown.patches) for each in taken]
     assert 0 < shown.count(1) == min(alone, measure.BORDERS) and shown == sorted(shown, key=lambda n: n > 1)
 
@@ -157,42 +161,42 @@ def test_a_jump_needs_two_sides():
     assert measure.measure_jump(np.zeros_like(picture), patch, np.ones(patch.shape, bool)) is None
 
 
-def test_a_hill_before_a_point_hides_it(laid):
-    steep = replace(laid.terrain, heights=heights.Hills(40 * laid.terrain.side, 8 * laid.terrain.side, 1, 0))
+def test_a_hill_before_a_point_hides_it(placed):
+    steep = replace(placed.terrain, heights=heights.Hills(40 * placed.terrain.side, 8 * placed.terrain.side, 1, 0))
     found = [
-        crops.make_crop(laid, steep, crops.VIEWS[1], place.at)
-        for place in places.sample_borders(laid, np.random.default_rng(1))[:40]
+        crops.make_crop(placed, steep, crops.VIEWS[1], place.at)
+        for place in places.sample_borders(placed, np.random.default_rng(1))[:40]
     ]
     assert None in found
 
 
-def test_ceilings_lie_in_the_tile_of_their_cuts(laid, straight, rng):
-    n = laid.plan.side
-    for place in places.sample_cuts(laid, rng)[:20]:
+def test_ceilings_lie_in_the_tile_of_their_cuts(placed, straight, rng):
+    n = placed.plan.side
+    for place in places.sample_cuts(placed, rng)[:20]:
         twin = places.find_nearest_cut(straight, place)
         assert [v // n for v in twin.at] == [v // n for v in place.at] and twin.cluster == place.cluster
 
 
-def test_tiles_without_cuts_are_named(laid, straight, rng):
-    bare = replace(laid, patch=np.zeros_like(laid.patch), origins=laid.origins[:1])
+def test_tiles_without_cuts_are_named(placed, straight, rng):
+    bare = replace(placed, patch=np.zeros_like(placed.patch), origins=placed.origins[:1])
     with pytest.raises(InputError, match="only 0 of .* cuts could be rendered"):
-        measure._sample_cuts(bare, laid.terrain, (straight, straight.terrain), crops.VIEWS[2], rng)
+        measure._sample_cuts(bare, placed.terrain, (straight, straight.terrain), crops.VIEWS[2], rng)
 
 
-def test_the_same_crops_are_drawn_by_any_number_of_threads(laid, straight, monkeypatch):
+def test_the_same_crops_are_drawn_by_any_number_of_threads(placed, straight, monkeypatch):
     monkeypatch.setattr(measure, "BORDERS", 2)
     monkeypatch.setattr(measure, "CUTS", 2)
     monkeypatch.setattr(crops, "VIEWS", crops.VIEWS[2:])
     found = []
     for threads in ("1", "2"):
         monkeypatch.setenv("DAV_GSWT_THREADS", threads)
-        found.append(measure.measure_crops(laid, straight, None, 0))
+        found.append(measure.measure_crops(placed, straight, None, 0))
     assert found[0] == found[1]
     assert [row["seam_lpips"] for row in found[0]] == [None] * len(found[0])  # no weights: absent, never made up
     assert {row["place"] for row in found[0]} == {"border", "cut", "floor", "ceiling"}
 
 
-def test_crops_that_are_hidden_altogether_are_passed_over(laid, straight, monkeypatch, rng):
+def test_crops_that_are_hidden_altogether_are_passed_over(placed, straight, monkeypatch, rng):
     shown, seen = crops.render_patches, []
 
     def every_other(*args, **kwargs):
@@ -204,8 +208,8 @@ def test_crops_that_are_hidden_altogether_are_passed_over(laid, straight, monkey
     monkeypatch.setattr(measure, "BORDERS", 4)
     monkeypatch.setattr(measure, "CUTS", 4)
     view = crops.VIEWS[2]
-    borders = measure._sample_borders(laid, laid.terrain, view, rng)
-    cuts = measure._sample_cuts(laid, laid.terrain, (straight, straight.terrain), view, rng)
+    borders = measure._sample_borders(placed, placed.terrain, view, rng)
+    cuts = measure._sample_cuts(placed, placed.terrain, (straight, straight.terrain), view, rng)
     assert len(seen) > 12 and all(each.shown.shows_patch for each in (*borders, *cuts))
     assert [each.number for each in borders] == [0, 1, 2, 3]
     assert [each.number for each in cuts] == [4, 8, 5, 9, 6, 10, 7, 11]

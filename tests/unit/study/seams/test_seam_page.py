@@ -15,7 +15,7 @@ def page_text(summary, ablation, repetition, own, pictures):
     return collapse_spaces(page.format_seam_page(template, (summary, ablation, repetition), own, pictures))
 
 
-def told(scene, variant, view="every", share="0.25"):
+def summary_row(scene, variant, view="every", share="0.25"):
     row = {
         "scene": scene,
         "seed": 0,
@@ -49,10 +49,10 @@ def line_of(text, begin):
 
 def test_every_scene_is_told_with_its_own_seam_over_all_views():
     rows = [
-        told("desert", "semantic"),
-        told("desert", "colour"),
-        told("desert", "semantic", "near"),
-        told("moon", "none"),
+        summary_row("desert", "semantic"),
+        summary_row("desert", "colour"),
+        summary_row("desert", "semantic", "near"),
+        summary_row("moon", "none"),
     ]
     text = page_text(rows, [], [], OWN, {})
     line = line_of(text, "| desert | `semantic`")
@@ -62,7 +62,7 @@ def test_every_scene_is_told_with_its_own_seam_over_all_views():
 
 def test_a_way_that_cannot_be_told_is_left_empty():
     assert "| +0.0020 (+0.0000, +0.0040) | | 1.23 |" in page_text(
-        [told("desert", "semantic", share="")], [], [], OWN, {}
+        [summary_row("desert", "semantic", share="")], [], [], OWN, {}
     )
 
 

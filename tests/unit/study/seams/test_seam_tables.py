@@ -1,4 +1,4 @@
-"""Summaries: hand-worked means, intervals that know clusters, shares that are not told, rows that add up; repeats."""
+"""Summaries: hand-worked means, intervals that know clusters, shares that are unknown, rows that add up; repeats."""
 
 import numpy as np
 import pytest

@@ -10,13 +10,13 @@ from dav_gswt.study.sweeps import grid
 
 
 def test_every_combination_comes_once_and_says_what_was_varied():
-    found = grid.combinations({"k": [2, 4], "tau": [0.3, 0.6]}, {"policy": "farthest"})
+    found = grid.list_combinations({"k": [2, 4], "tau": [0.3, 0.6]}, {"policy": "farthest"})
     assert [(f["k"], f["tau"]) for f in found] == [(2, 0.3), (2, 0.6), (4, 0.3), (4, 0.6)]
     assert all(f["policy"] == "farthest" and f["shown"] == {"k": f["k"], "tau": f["tau"]} for f in found)
 
 
 def test_a_policy_may_bring_settings_of_its_own():
-    (found,) = grid.combinations(
+    (found,) = grid.list_combinations(
         {"policy": [{"policy": "residual", "prior": "independent", "p_drop": 0}]}, {"p_drop": 0.3}
     )
     assert found == {"policy": "residual", "prior": "independent", "p_drop": 0, "shown": {"policy": "residual"}}
@@ -33,12 +33,12 @@ def test_a_policy_may_bring_settings_of_its_own():
     ],
 )
 def test_rounds_are_those_asked_for_or_as_many_as_photos_have_room_for(chosen, policy, rounds):
-    assert grid.rounds_of(chosen, policy, start=8, k=4, rounds=3) == rounds
-    assert grid.rounds_of({}, "all", start=8, k=4, rounds=0) == 0
+    assert grid.count_rounds(chosen, policy, start=8, k=4, rounds=3) == rounds
+    assert grid.count_rounds({}, "all", start=8, k=4, rounds=0) == 0
 
 
 def test_all_seeds_of_which_anything_is_measured_count():
-    assert grid.seeds_of({"views": [2, 0], "seams": [0, 1]}) == [0, 1, 2]
+    assert grid.list_seeds({"views": [2, 0], "seams": [0, 1]}) == [0, 1, 2]
 
 
 ROW = {"scenes": ["desert_pool"], "vary": {"k": [2, 4]}, "measure": {"views": [0]}}

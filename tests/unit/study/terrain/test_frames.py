@@ -40,7 +40,7 @@ def test_the_pages_first_budget_is_what_the_studys_tables_join(tmp_path: Path):
         (name, str(budget)) for name in (frames.LIBRARY, frames.PAGE) for budget in ASKED.budgets
     ]
     csv_tables.write_table(tmp_path / "viewer.csv", frames.select_viewer_rows(rows))
-    (joined,) = spread.with_viewer([CELL], spread.read_viewer(tmp_path / "viewer.csv"))
+    (joined,) = spread.join_viewer([CELL], spread.read_viewer(tmp_path / "viewer.csv"))
     assert (joined["render_ms"], joined["sort_ms"]) == (4, 1.5) and joined["update_share"] == 0.66667  # five digits
     with (tmp_path / "viewer.csv").open(newline="") as file:
         assert next(csv.reader(file)) == [*spread.CELL, *spread.VIEWER]

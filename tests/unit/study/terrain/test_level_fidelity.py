@@ -57,19 +57,19 @@ def test_errors_are_those_of_the_tile_and_of_what_is_near_its_cut():
     x = coarse[5].means[:, 0]
     dark = coarse[5].sh - np.float32(0.5) * (np.abs(x - SIDE / 2) < 0.2 * SIDE)[:, None, None]
     coarse[5] = replace(coarse[5], sh=dark)
-    told = level_fidelity.measure_errors(tile_set([fine, coarse]), 1, 200.0)
-    worst = min((t for t in told if told[t]["db"] is not None), key=lambda t: told[t]["db"])
-    assert worst[0] == 5 and told[5, "oblique"]["cut_db"] < told[5, "oblique"]["db"] - 1
+    errors = level_fidelity.measure_errors(tile_set([fine, coarse]), 1, 200.0)
+    worst = min((t for t in errors if errors[t]["db"] is not None), key=lambda t: errors[t]["db"])
+    assert worst[0] == 5 and errors[5, "oblique"]["cut_db"] < errors[5, "oblique"]["db"] - 1
 
 
 def test_a_level_that_equals_the_finest_changes_nothing():
     fine = [plain(CELLS, 0.1 + t / 20) for t in range(16)]
-    told = level_fidelity.measure_errors(tile_set([fine, fine]), 1, 200.0)
-    assert len(told) == 32 and all(t["change"] == 0 and t["db"] is None for t in told.values())
+    errors = level_fidelity.measure_errors(tile_set([fine, fine]), 1, 200.0)
+    assert len(errors) == 32 and all(t["change"] == 0 and t["db"] is None for t in errors.values())
 
 
 def test_each_variant_is_measured_by_itself():
     fine = [plain(CELLS, 0.5) for _ in range(32)]
     other = [replace(f, sh=f.sh + np.float32(0.1 * (t >= 16))) for t, f in enumerate(fine)]
-    told = level_fidelity.measure_errors(tile_set([fine, other]), 1, 200.0)
-    assert told[3, "oblique"]["change"] == 0 and told[19, "oblique"]["change"] > 5
+    errors = level_fidelity.measure_errors(tile_set([fine, other]), 1, 200.0)
+    assert errors[3, "oblique"]["change"] == 0 and errors[19, "oblique"]["change"] > 5

@@ -9,6 +9,7 @@ from fixtures.splats import rough_ground
 from fixtures.tile_sets import report_of
 
 from dav_gswt.bundle import build, store
+from dav_gswt.bundle.content import BundleContent
 from dav_gswt.study.terrain import presort
 from dav_gswt.tiles.build import TileSet
 
@@ -30,7 +31,7 @@ def small(monkeypatch):
 
 
 def bundled(tiles, folder, **more):
-    build.write_bundle(tiles, folder, build.BundleOptions(tau=1.0, **more), SCHEMA, {})
+    build.write_bundle(BundleContent.of_one_material(tiles), folder, build.BundleOptions(tau=1.0, **more), SCHEMA, {})
     return store.read_bundle(folder, SCHEMA)
 
 
@@ -40,7 +41,7 @@ def of(rows, shortcut):
 
 def test_every_shortcut_has_a_price_of_its_own(tmp_path):
     tiles = tile_set(2)
-    # coarse discs begin where one is twelve pixels wide: within what is laid
+    # coarse discs begin where one is twelve pixels wide: within what is placed
     rows = presort.measure_approximations(tiles, bundled(tiles, tmp_path / "bundle", level_pixels=12.0))
     assert [(r["view"], r["shortcut"]) for r in rows] == [
         (v.name, s) for v in presort.VIEWS for s in presort.APPROXIMATIONS

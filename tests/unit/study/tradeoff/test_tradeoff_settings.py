@@ -27,11 +27,11 @@ def config():
     ],
 )
 def test_a_setting_has_one_name(value, spelled):
-    assert settings.name("reference", "max_gaussians", value) == spelled
+    assert settings.name_entry("reference", "max_gaussians", value) == spelled
 
 
 def test_every_setting_is_an_entry_that_differs_in_one_key(config):
-    made = settings.entries(config)
+    made = settings.add_entries(config)
     new = set(made["presets"]) - set(config["presets"])
     assert {
         "draft-size-192",
@@ -55,27 +55,27 @@ def test_every_setting_is_an_entry_that_differs_in_one_key(config):
 
 
 def test_the_entries_are_valid_and_making_them_again_changes_nothing(config):
-    made = settings.entries(config)
+    made = settings.add_entries(config)
     check_flat(made)
-    assert settings.entries(made) == made
+    assert settings.add_entries(made) == made
     assert all(len(made[table]) > len(config[table]) for table in settings.CALLED)
 
 
 def test_a_config_that_compares_nothing_stays_as_it_is(config):
     del config["tradeoff"], config["auto"]
-    assert settings.entries(config) == config and settings.settings(config) == []
+    assert settings.add_entries(config) == config and settings.list_settings(config) == []
 
 
 def test_what_auto_compares_is_fitted_to_photos_of_one_size(config):
-    assert settings.sized(config, "reference") == "reference-size-384"
-    assert settings.sized(config, "draft") == "draft"  # its own size
+    assert settings.name_sized_preset(config, "reference") == "reference-size-384"
+    assert settings.name_sized_preset(config, "draft") == "draft"  # its own size
     del config["auto"]["size"]
-    assert settings.sized(config, "reference") == "reference"
-    assert "reference-size-384" not in settings.entries(config)["presets"]
+    assert settings.name_sized_preset(config, "reference") == "reference"
+    assert "reference-size-384" not in settings.add_entries(config)["presets"]
 
 
 def test_each_knob_has_a_most_accurate_and_a_base_and_no_setting_comes_twice(config):
-    found = settings.settings(config)
+    found = settings.list_settings(config)
     knobs = [settings.PRESET, *config["tradeoff"]["knobs"]]
     assert list(dict.fromkeys(s.knob for s in found)) == knobs
     for knob in knobs:
@@ -96,21 +96,21 @@ def test_each_knob_has_a_most_accurate_and_a_base_and_no_setting_comes_twice(con
 
 def test_the_base_of_a_knob_that_does_not_name_it_is_its_last(config):
     config["tradeoff"]["knobs"]["steps"]["values"] = [1000, 200]
-    found = [(s.shown, s.most, s.base) for s in settings.settings(config) if s.knob == "steps"]
+    found = [(s.shown, s.most, s.base) for s in settings.list_settings(config) if s.knob == "steps"]
     assert found == [("1000", True, False), ("200", False, False), ("400", False, True)]
 
 
 def test_all_are_tested_on_photos_of_the_largest_size(config):
-    assert settings.tested_size(settings.entries(config)) == config["presets"]["reference"]["size"]
+    assert settings.find_test_size(settings.add_entries(config)) == config["presets"]["reference"]["size"]
     config["tradeoff"]["presets"] = ["draft"]
     config["tradeoff"]["knobs"]["size"]["values"] = [500, 100]
-    assert settings.tested_size(settings.entries(config)) == 500
+    assert settings.find_test_size(settings.add_entries(config)) == 500
 
 
 def test_only_the_knobs_that_are_asked_for_are_turned(config):
     config["tradeoff"]["only"] = ["tau"]
     check_flat(config)
-    assert {s.knob for s in settings.settings(config)} == {settings.PRESET, "tau"}
+    assert {s.knob for s in settings.list_settings(config)} == {settings.PRESET, "tau"}
 
 
 def changed(config, path, value):

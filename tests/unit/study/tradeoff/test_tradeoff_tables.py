@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from fixtures.markdown import collapse_spaces
 
-from dav_gswt.images import image_files
-from dav_gswt.study import csv_tables, figures
+from dav_gswt.images import figures, image_files
+from dav_gswt.study import csv_tables
 from dav_gswt.study.tradeoff import auto, page, plots, tables
 
 SECONDS = dict(coarse=40.0, score=0.0, select=1.0, update=19.0, levels=5.0, cut=3.0, bundle=2.0)  # 70 in all
@@ -17,12 +17,12 @@ ORIGIN = {"version": "1", "renderer": {"backend": "cpu"}, "inputs": {"field": "f
 def cell(folder, setting, psnr, faster=1.0, grey=0.5, measure="views", most=False, knob="cap", size=1.0, **more):
     (place := folder / f"{knob}-{setting}").mkdir(exist_ok=True)
     mean = {"psnr": psnr, "ssim": 0.5, "lpips": 1 - psnr / 100, "worst_decile": {"psnr": psnr}, "groups": {}}
-    told = {"metrics.json": mean | {"photos": 12, "gaussians": 9, "provenance": ORIGIN}}
+    files = {"metrics.json": mean | {"photos": 12, "gaussians": 9, "provenance": ORIGIN}}
     chunk = {"count": 5, "bytes": int(250_000 * size), "orders": [0]}
     tile = {"uncertainty": 0.5, "chunks": [chunk]}
-    told["davgswt.json"] = {"tiles": [tile], "levels": [{}], "directions": [0], "provenance": ORIGIN}
-    told["fit.json"] = {"degree": 1, "steps": 300}
-    for name, content in told.items():
+    files["davgswt.json"] = {"tiles": [tile], "levels": [{}], "directions": [0], "provenance": ORIGIN}
+    files["fit.json"] = {"degree": 1, "steps": 300}
+    for name, content in files.items():
         (place / name).write_text(json.dumps(content))
     image_files.write_png(place / "still.png", np.full((4, 6, 3), grey, np.float32))
     times = {}
@@ -58,7 +58,7 @@ def table(tmp_path):
         cell(tmp_path, "0", 30.0, knob="tau", measure="stills", most=True),
         cell(tmp_path, "1", 30.0, knob="tau", measure="stills", grey=0.6, faster=2.0, size=0.5),
     ]
-    return tables.rows(cells)
+    return tables.tabulate_settings(cells)
 
 
 def test_seconds_are_those_of_all_jobs_or_of_those_on_tiles(table):
@@ -82,12 +82,12 @@ def test_what_is_lost_is_counted_from_the_most_accurate_of_the_knob(table):
 def test_a_job_that_left_no_benchmark_leaves_the_seconds_empty(tmp_path):
     mine = cell(tmp_path, "1", 30.0, most=True)
     mine["times"]["levels"] = [str(tmp_path / "none.tsv")]
-    (row,) = tables.rows([mine])
-    assert row["seconds"] is None and row["recon_s"] == 60 and tables.pareto([row]) == []
+    (row,) = tables.tabulate_settings([mine])
+    assert row["seconds"] is None and row["recon_s"] == 60 and tables.tabulate_front([row]) == []
 
 
 def test_the_front_says_who_is_better_and_by_how_much(table):
-    found = {(row["knob"], row["setting"]): row for row in tables.pareto(table)}
+    found = {(row["knob"], row["setting"]): row for row in tables.tabulate_front(table)}
     assert ("tau", "1") not in found
     assert ("cap", "1000000") not in found  # the cell of the preset: one point
     assert [found[key]["front"] for key in (("preset", "reference"), ("cap", "70000"), ("preset", "draft"))] == [
@@ -103,17 +103,17 @@ def test_the_front_says_who_is_better_and_by_how_much(table):
 def test_a_setting_behind_in_psnr_can_be_the_sharpest(table):
     draft = next(row for row in table if row["setting"] == "draft")
     draft["lpips"] = 0.6  # the others: from .70 on
-    found = {row["setting"]: (row["front"], row["sharp"]) for row in tables.pareto(table)}
+    found = {row["setting"]: (row["front"], row["sharp"]) for row in tables.tabulate_front(table)}
     assert found == {"reference": (1, 0), "draft": (0, 1), "70000": (1, 0), "100": (0, 0)}
     draft["lpips"] = None
-    assert {row["sharp"] for row in tables.pareto(table)} == {None}
+    assert {row["sharp"] for row in tables.tabulate_front(table)} == {None}
 
 
 def test_the_page_says_what_the_table_says(table, tmp_path):
     csv_tables.write_table(tmp_path / "t.csv", table)
-    csv_tables.write_table(tmp_path / "p.csv", tables.pareto(table))
-    rows, pareto = tables.read(tmp_path / "t.csv"), tables.read(tmp_path / "p.csv")
-    text = collapse_spaces(page.text(rows, pareto))
+    csv_tables.write_table(tmp_path / "p.csv", tables.tabulate_front(table))
+    rows, pareto = tables.read_tradeoff(tmp_path / "t.csv"), tables.read_tradeoff(tmp_path / "p.csv")
+    text = collapse_spaces(page.format_tradeoff(rows, pareto))
     assert "`cap` 70000 instead of 1000000: is 2.00 times as fast but costs 0.20 dB." in text
     assert "`cap` 100 instead of 1000000: takes 2.00 times as long and costs 1.00 dB." in text
     assert "costs 25.00 grey levels; the bundle is 0.50 times as large." in text
@@ -137,25 +137,29 @@ def test_the_page_says_what_the_table_says(table, tmp_path):
 def test_advice_is_time_and_loss_in_words(own, loss, said):
     best = {"setting": "8", "own_seconds": 100.0, "bundle_mb": 1.0}
     row = {"knob": "cap", "setting": "4", "measure": "views", "own_seconds": own, "loss": loss, "bundle_mb": 1.0}
-    assert page.advice(row, best) == f"`cap` 4 instead of 8: {said}."
+    assert page.describe_change(row, best) == f"`cap` 4 instead of 8: {said}."
 
 
 def test_where_a_setting_beats_the_most_accurate_it_is_said(tmp_path):
     cells = [cell(tmp_path, "2", 30.0, most=True), cell(tmp_path, "1", 30.5)]
-    csv_tables.write_table(tmp_path / "t.csv", tables.rows(cells))
-    rows = tables.read(tmp_path / "t.csv")
-    assert "`cap` 1 instead of 2: is as fast and is better by 0.50 dB." in page.text(rows, tables.pareto(rows))
+    csv_tables.write_table(tmp_path / "t.csv", tables.tabulate_settings(cells))
+    rows = tables.read_tradeoff(tmp_path / "t.csv")
+    assert "`cap` 1 instead of 2: is as fast and is better by 0.50 dB." in page.format_tradeoff(
+        rows, tables.tabulate_front(rows)
+    )
 
 
 def test_figures_are_drawn_of_what_is_known(table, tmp_path):
     table[3]["own_seconds"] = None
-    figures.save(plots.knobs(table), tmp_path / "knobs.png")
-    figures.save(plots.fronts(tables.pareto(table)), tmp_path / "pareto.png")
+    figures.save_figure(plots.draw_knobs(table), tmp_path / "knobs.png")
+    figures.save_figure(plots.draw_fronts(tables.tabulate_front(table)), tmp_path / "pareto.png")
     assert (
         image_files.read_size(tmp_path / "knobs.png")[0] > 600
         and image_files.read_size(tmp_path / "pareto.png")[0] > 600
     )
-    figures.save(plots.fronts([row | {"sharp": None} for row in tables.pareto(table)]), tmp_path / "one.png")
+    figures.save_figure(
+        plots.draw_fronts([row | {"sharp": None} for row in tables.tabulate_front(table)]), tmp_path / "one.png"
+    )
     assert (
         image_files.read_size(tmp_path / "one.png")[0] < image_files.read_size(tmp_path / "pareto.png")[0]
     )  # a panel less
@@ -173,19 +177,19 @@ def test_figures_are_drawn_of_what_is_known(table, tmp_path):
     ],
 )
 def test_the_target_is_a_third_of_the_time_for_little(saved, db, lpips, reached):
-    assert auto.met(saved, db, lpips) == reached
+    assert auto.check_target(saved, db, lpips) == reached
 
 
 def test_what_auto_chose_stands_beside_what_it_cost(tmp_path):
     base = cell(tmp_path, "b", 30.0, knob="auto", measure="stills", part="base")
     parts = {"fit": 2.0, "rounds": 1.25, "orders": 1.0, "all": 4.0}
     cells = [cell(tmp_path, p, 29.95, f, knob="auto", measure="stills", part=p) for p, f in parts.items()]
-    rows = auto.rows([base, *cells])
+    rows = auto.tabulate_auto([base, *cells])
     assert [row["part"] for row in rows] == list(parts)
     assert [row["saved"] for row in rows] == pytest.approx([0.5, 0.2, 0.0, 0.75])
     assert [row["target"] for row in rows] == [1, 0, 0, 1] and rows[0]["loss_db"] == pytest.approx(0.05)
     assert rows[0]["chosen"] == "9 Gaussians, degree 1, 300 steps, then 300" and rows[1]["chosen"] == "12 photos"
     csv_tables.write_table(tmp_path / "auto.csv", rows)
-    text = collapse_spaces(auto.text(tables.read(tmp_path / "auto.csv")))
+    text = collapse_spaces(auto.format_auto(tables.read_tradeoff(tmp_path / "auto.csv")))
     assert "1 of 1 scenes reach that with all three." in text
     assert "| cap, degree and steps | 9 Gaussians, degree 1, 300 steps, then 300 | 35 | 70 | 50% | 0.05 |" in text

@@ -5,10 +5,9 @@ import pytest
 from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
-from dav_gswt.geometry import cameras
+from dav_gswt.geometry import camera_layouts, cameras
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
-from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.study.views import sphere
 from dav_gswt.views import score_colours
 from dav_gswt.views.scores import Scores
@@ -62,10 +61,10 @@ def test_a_round_holds_the_photos_before_it_and_its_choice_in_order():
 
 def test_colours_are_on_one_scale_and_stars_stand_on_the_chosen_in_order():
     rounds = [round_of(), round_of(2, chosen=(7, 8, 50), high=0.5)]
-    figure = sphere.draw_figure(rounds, "doubt")
+    figure = sphere.draw_figure(rounds, "uncertainty")
     panels = figure.axes[:2]
     scales = {dots.norm for axes in panels for dots in axes.collections if dots.get_array() is not None}
-    assert len(scales) == 1 and figure.axes[2].get_xlabel() == "doubt"
+    assert len(scales) == 1 and figure.axes[2].get_xlabel() == "uncertainty"
     (scale,) = scales
     every = np.concatenate([one.values for one in rounds])
     assert (scale.vmin, scale.vmax) == (0, pytest.approx(np.quantile(every, score_colours.HIGHEST)))
@@ -98,22 +97,22 @@ def test_numbers_stand_where_nothing_else_does():
 
 
 def test_many_chosen_are_not_numbered_and_none_is_said():
-    many = sphere.draw_figure([round_of(chosen=range(30))], "doubt").axes[0]
+    many = sphere.draw_figure([round_of(chosen=range(30))], "uncertainty").axes[0]
     assert len(many.texts) == 0 and len(many.collections[-1].get_offsets()) == 30
-    none = sphere.draw_figure([round_of(chosen=(), photos=((0.0, 0.0, 5.0),))], "doubt").axes[0]
+    none = sphere.draw_figure([round_of(chosen=(), photos=((0.0, 0.0, 5.0),))], "uncertainty").axes[0]
     assert none.get_title() == "round 1: no pose, after 1 photo" and not none.texts
 
 
 def test_candidates_all_alike_or_none_at_all_are_drawn(tmp_path):
     alike = [round_of(high=0.0), sphere.build_round(2, scored(0), chosen_poses(), [photo(0.0, 0.0, 5.0)], FRAME, 0.0)]
-    sphere.write_figure(tmp_path / "a.png", alike, "doubt")
+    sphere.write_figure(tmp_path / "a.png", alike, "uncertainty")
     assert image_files.read_photo(tmp_path / "a.png").std() > 0.05
 
 
 def test_the_figure_is_wide_enough_to_read_and_the_same_each_time(tmp_path):
     rounds = [round_of(t) for t in (1, 2, 3)]
     for name in ("a.png", "b.png"):
-        sphere.write_figure(tmp_path / name, rounds, "doubt")
+        sphere.write_figure(tmp_path / name, rounds, "uncertainty")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     width, height = image_files.read_size(tmp_path / "a.png")
     assert width >= 1000 and height > width  # two panels side by side, the third below

@@ -254,7 +254,7 @@ def test_without_weights_the_term_is_left_out_and_said_if_it_was_asked_for(caplo
     np.testing.assert_array_equal(u, terms["w2_sq"] / scales.by_term["w2_sq"])
     assert not caplog.text
     np.testing.assert_array_equal(un.combine_terms(terms["w2_sq"], None, 0.1, scales), u)
-    assert "LPIPS has no weights" in caplog.text
+    assert "the scores lack LPIPS" in caplog.text
 
 
 def test_u_img_has_the_gradient_in_place_of_w2_and_the_appendix_adds_both():
@@ -303,7 +303,7 @@ def test_normalised_goes_from_0_at_the_low_quantile_to_1_at_the_high_one():
         un.normalise(maps, quantiles)
 
 
-def test_normalised_of_a_scene_doubted_alike_everywhere_is_0_or_1_never_nan():
+def test_equal_uncertainty_everywhere_is_normalised_to_0_or_1_never_nan():
     quantiles = un.Quantiles.from_values(np.full(10, 3.0))
     np.testing.assert_array_equal(un.normalise(np.array([2.0, 3.0, 3.1]), quantiles), [0, 0, 1])
 

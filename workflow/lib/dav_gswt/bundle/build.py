@@ -1,6 +1,7 @@
-"""A bundle from a tile set: chunks, archive and manifest, which appear together or not at all."""
+"""Make a bundle of tiles and objects: chunks, archive and manifest, which appear together or not at all."""
 
 import shutil
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -8,26 +9,36 @@ from typing import Any
 
 import numpy as np
 
-from dav_gswt.bundle import chunks, direction_search, gswt, level_distances, manifest, order_directions, orders
+from dav_gswt.bundle import baking, chunks, direction_search, gswt, level_distances, manifest, order_directions, orders
 from dav_gswt.bundle.chunks import ChunkOrders
+from dav_gswt.bundle.content import BundleContent, compute_ground_colour
 from dav_gswt.bundle.direction_search import DirectionSearchResult
 from dav_gswt.bundle.encoding import Encoding, EncodingErrors
-from dav_gswt.bundle.manifest import Manifest, OrdersReport, RoundingErrors, Sky, TileEntry, TileOrders, TileSetInfo
+from dav_gswt.bundle.land_cover import ObjectEntry, ObjectOrders
+from dav_gswt.bundle.manifest import (
+    Manifest,
+    MaterialEntry,
+    OrdersReport,
+    RoundingErrors,
+    Sky,
+    TileEntry,
+    TileOrders,
+    TileSetInfo,
+)
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, mean_scale
 from dav_gswt.files import write_json
 from dav_gswt.logs import progress
-from dav_gswt.tiles.build import TileSet
 
 
 @dataclass(frozen=True)
 class BundleOptions:
-    """How a tile set is bundled.
+    """How tiles are bundled.
 
     Attributes:
         tau: from this mean uncertainty on, a tile keeps the orders of all directions.
         salt: which of all endless terrains this is (32 bits).
-        unit: of lengths, for people.
+        unit: of lengths, for display.
         level_pixels: mean standard deviation of a level, in pixels, where it takes over from its finer neighbour.
         band: half the width of that cross-fade, as a share of the distance.
         floor_pixels: width in pixels of a finest disc in the nearest ground that the lowest eye sees.
@@ -47,13 +58,23 @@ class BundleOptions:
     sky: Sky = field(default_factory=Sky)
 
 
+@dataclass(frozen=True)
+class ChunkSource:
+    """A chunk to be written: its file's name, its Gaussians, and the orders that it keeps."""
+
+    name: str
+    field: GaussianField
+    kept: ChunkOrders
+
+
 def write_bundle(
-    tiles: TileSet, out_dir: Path | str, options: BundleOptions, schema: Path | str, provenance: dict[str, Any]
+    content: BundleContent, out_dir: Path | str, options: BundleOptions, schema: Path | str, provenance: dict[str, Any]
 ) -> Manifest:
     """Write davgswt.json, chunks/ and gswt.zip to a folder; returns the manifest.
 
     Everything is made beside the folder and moved in when it is whole, the manifest last: a manifest never names a file
-    that is not there. Other entries of the folder stay.
+    that is not there. Other entries of the folder stay. Each material has an archive (`archive_name`),
+    with its objects baked into the tiles.
 
     Args: schema: workflow/schemas/davgswt.schema.json.
     Raises: InputError: mean scales that do not rise, an empty tile, too many splats; see `level_distances`, `gswt`,
@@ -64,14 +85,16 @@ def write_bundle(
     shutil.rmtree(part, ignore_errors=True)
     (part / "chunks").mkdir(parents=True)
     try:
-        gswt.write_gswt(tiles.fields, tiles.side, part / "gswt.zip")
-        found = direction_search.search_directions(tiles.fields[0], tiles.side, options.decibels)
-        info = describe_tiles(tiles, options, found.rings)
-        pixel = tiles.spacing / options.floor_pixels
-        encoding = Encoding.fit([f for level in tiles.fields for f in level], tiles.side, pixel)
-        entries, errors = _write_chunks(tiles, encoding, info, options, part)
-        known: dict[str, Any] = vars(info) | {"tiles": entries}
-        rounding: dict[str, Any] = asdict(errors) | _measure_rounding(tiles, encoding, pixel)
+        for material in range(len(content.materials)):
+            fields = baking.bake_objects(content, material, options.salt)
+            gswt.write_gswt(fields, content.side, part / archive_name(material))
+        found = direction_search.search_directions(content.sample_tiles(), content.side, options.decibels)
+        info = describe_tiles(content, options, found.rings)
+        pixel = content.spacing / options.floor_pixels
+        encoding = Encoding.fit(list(content.iterate_fields()), content.side, pixel)
+        entries, errors = _write_chunks(content, encoding, info, options, part)
+        known: dict[str, Any] = vars(info) | entries
+        rounding: dict[str, Any] = asdict(errors) | _measure_rounding(content, encoding, pixel)
         made = Manifest(
             **known,
             format=manifest.FORMAT,
@@ -92,66 +115,122 @@ def write_bundle(
     return made
 
 
-def describe_tiles(tiles: TileSet, options: BundleOptions, rings: orders.DirectionRings) -> TileSetInfo:
-    """How the tiles are placed and drawn.
+def archive_name(material: int) -> str:
+    """The archive of a material for the public renderer: gswt.zip for the first one, gswt_material1.zip and so on."""
+    return f"gswt_material{material}.zip" if material else "gswt.zip"
+
+
+def describe_tiles(content: BundleContent, options: BundleOptions, rings: orders.DirectionRings) -> TileSetInfo:
+    """How tiles and objects are placed and drawn.
 
     Raises: InputError: mean scales that do not rise, an empty tile.
     """
-    scales = [mean_scale(level) for level in tiles.fields]
-    listed = []
-    for tile, uncertainty in enumerate(np.clip(tiles.uncertainty, 0, 1).tolist()):
-        ranges = [measure_heights(fields[tile]) for fields in tiles.fields]
-        heights = [min(low for low, _ in ranges), max(high for _, high in ranges)]
-        kept = rings.select(uncertainty, options.tau)
-        entries = [ChunkOrders(level, kept) for level in range(len(tiles.fields))]
-        listed.append(TileOrders(tile, uncertainty, heights, entries))
+    levels = [content.tile_fields(level) for level in range(content.levels)]
+    uncertainties = [u for tiles in content.tiles for u in np.clip(tiles.uncertainty, 0, 1).tolist()]
+    count = len(content.tiles[0].labels)
     return TileSetInfo(
-        tile_side=tiles.side,
+        tile_side=content.side,
         salt=options.salt,
-        eye_floor=level_distances.compute_eye_floor(tiles.spacing, options.floor_pixels),
-        ground_colour=_compute_ground_colour(tiles.fields[-1]),
+        eye_floor=level_distances.compute_eye_floor(content.spacing, options.floor_pixels),
+        ground_colour=content.ground_colour(),
         directions=rings.directions().tolist(),
-        levels=level_distances.compute_levels(scales, options.level_pixels, options.band),
-        tiles=listed,
+        levels=level_distances.compute_levels([mean_scale(f) for f in levels], options.level_pixels, options.band),
+        tiles=[
+            TileOrders(
+                tile,
+                uncertainty,
+                _combine_heights([fields[tile] for fields in levels]),
+                _keep_orders(uncertainty, content.levels, rings, options),
+            )
+            for tile, uncertainty in enumerate(uncertainties)
+        ],
+        materials=[
+            MaterialEntry(material.name, material.share, number * count, compute_ground_colour(tiles.fields[-1]))
+            for number, (material, tiles) in enumerate(zip(content.materials, content.tiles, strict=True))
+        ],
+        classes=content.classes,
+        objects=_describe_objects(content, rings, options),
+        scatter=content.scatter,
     )
 
 
+def _describe_objects(
+    content: BundleContent, rings: orders.DirectionRings, options: BundleOptions
+) -> list[ObjectOrders] | None:
+    listed = []
+    for each, probability in zip(content.objects, content.probabilities, strict=True):
+        uncertainty = float(np.clip(each.fields[0].uncertainty.mean(), 0, 1))
+        ground, z = content.ground_height(each.material), _combine_heights(each.fields)
+        place = (each.name, each.radius, z, ground, each.material, each.density, probability)
+        listed.append(ObjectOrders(*place, _keep_orders(uncertainty, content.levels, rings, options)))
+    return listed or None
+
+
+def _keep_orders(
+    uncertainty: float, levels: int, rings: orders.DirectionRings, options: BundleOptions
+) -> list[ChunkOrders]:
+    kept = rings.select_directions(uncertainty, options.tau)
+    return [ChunkOrders(level, kept) for level in range(levels)]
+
+
+def _combine_heights(fields: list[GaussianField]) -> list[float]:
+    """Lowest and highest z over all levels."""
+    ranges = [measure_heights(field) for field in fields]
+    return [min(low for low, _ in ranges), max(high for _, high in ranges)]
+
+
 def _write_chunks(
-    tiles: TileSet, encoding: Encoding, info: TileSetInfo, options: BundleOptions, part: Path
-) -> tuple[list[TileEntry], EncodingErrors]:
-    """Write all chunks; returns the tiles' entries in the manifest, and the largest errors of the records."""
-    along, pixel = np.array(info.directions), tiles.spacing / options.floor_pixels
+    content: BundleContent, encoding: Encoding, info: TileSetInfo, options: BundleOptions, part: Path
+) -> tuple[dict[str, list], EncodingErrors]:
+    """Write all chunks; returns the entries of tiles and objects in the manifest, and the largest errors."""
+    along, pixel = np.array(info.directions), content.spacing / options.floor_pixels
 
-    def write(place: tuple[int, ChunkOrders]) -> tuple[chunks.ChunkEntry, EncodingErrors]:
-        tile, kept = place
-        source, name = tiles.fields[kept.level][tile], f"chunks/lod{kept.level}_tile_{tile:02d}.bin"
-        rows, order = encoding.encode(source), orders.presort(source.means, along[kept.orders])
-        return chunks.write_chunk(rows, order, part, name, kept), EncodingErrors.measure(encoding, source, rows, pixel)
+    def write(source: ChunkSource) -> tuple[chunks.ChunkEntry, EncodingErrors]:
+        field, kept = source.field, source.kept
+        rows, order = encoding.encode(field), orders.presort(field.means, along[kept.orders])
+        entry = chunks.write_chunk(rows, order, part, source.name, kept)
+        return entry, EncodingErrors.measure(encoding, field, rows, pixel)
 
-    places = [(tile.tile, kept) for tile in info.tiles for kept in tile.chunks]
+    sources = list(_list_chunks(content, info))
     written, errors = [], EncodingErrors()
     with ThreadPoolExecutor(options.threads) as pool:
-        for _, (entry, more) in zip(progress(places, "sort tiles"), pool.map(write, places), strict=True):
+        for _, (entry, more) in zip(progress(sources, "sort tiles"), pool.map(write, sources), strict=True):
             written.append(entry)
             errors = errors.combine(more)
-    count = len(info.levels)
-    entries = [
-        TileEntry(tile.tile, tile.uncertainty, tile.z, written[number * count : (number + 1) * count])
-        for number, tile in enumerate(info.tiles)
-    ]
+    count = content.levels
+    groups = iter([written[first : first + count] for first in range(0, len(written), count)])
+    entries: dict[str, list] = {
+        "tiles": [TileEntry(tile.tile, tile.uncertainty, tile.z, next(groups)) for tile in info.tiles]
+    }
+    if info.objects:
+        known: list[dict[str, Any]] = [vars(each) | {"chunks": next(groups)} for each in info.objects]
+        entries["objects"] = [ObjectEntry(**values) for values in known]
     return entries, errors
 
 
-def _measure_rounding(tiles: TileSet, encoding: Encoding, pixel: float) -> dict[str, float | None]:
+def _list_chunks(content: BundleContent, info: TileSetInfo) -> Iterator[ChunkSource]:
+    """All chunks: tile by tile, then object by object, the finest level first."""
+    tiles = [content.tile_fields(level) for level in range(content.levels)]
+    things = [content.object_fields(level) for level in range(content.levels)]
+    for tile in info.tiles:
+        for kept in tile.chunks:
+            name = f"chunks/lod{kept.level}_tile_{tile.tile:02d}.bin"
+            yield ChunkSource(name, tiles[kept.level][tile.tile], kept)
+    for number, each in enumerate(info.objects or []):
+        for kept in each.chunks:
+            yield ChunkSource(f"chunks/lod{kept.level}_object_{number:02d}.bin", things[kept.level][number], kept)
+
+
+def _measure_rounding(content: BundleContent, encoding: Encoding, pixel: float) -> dict[str, float | None]:
     """PSNR of rounded tiles against the tiles, as near as the lowest eye sees them: {elevation}_db."""
-    found = {}
+    found, tiles = {}, content.sample_tiles()
     for name, elevation in order_directions.ELEVATIONS.items():
         pairs = []
-        for view in order_directions.spread_views(len(tiles.labels), elevation):
-            source = tiles.fields[0][view.tile]
+        for view in order_directions.spread_views(len(tiles), elevation):
+            source = tiles[view.tile]
             rounded = encoding.decode(encoding.encode(source))
             first, second = (
-                order_directions.render_in_order(f, tiles.side, view.direction, pixel) for f in (rounded, source)
+                order_directions.render_in_order(f, content.side, view.direction, pixel) for f in (rounded, source)
             )
             pairs.append((first, second))
         found[f"{name}_db"] = order_directions.compute_psnr(pairs)
@@ -169,14 +248,8 @@ def measure_heights(field: GaussianField) -> tuple[float, float]:
     """Lowest and highest z of the splats, with three of their largest standard deviations around each centre."""
     if not len(field):
         raise InputError("a tile has no splat; the field has a hole as wide as a tile")
-    z, reach = field.means[:, 2].astype(float), 3 * np.exp(field.log_scales.astype(float).max(1))
-    return float((z - reach).min()), float((z + reach).max())
-
-
-def _compute_ground_colour(fields: list[GaussianField]) -> list[float]:
-    """Mean colour of the ground, or of all splats where none is ground."""
-    ground = [f.base_colours[f.ground] for f in fields if f.ground.any()] or [f.base_colours for f in fields]
-    return np.clip(np.concatenate(ground).astype(float).mean(0), 0, 1).tolist()
+    z, radius = field.means[:, 2].astype(float), 3 * np.exp(field.log_scales.astype(float).max(1))
+    return float((z - radius).min()), float((z + radius).max())
 
 
 def _move_in(part: Path, out: Path) -> None:
@@ -184,5 +257,7 @@ def _move_in(part: Path, out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     (out / manifest.NAME).unlink(missing_ok=True)
     shutil.rmtree(out / "chunks", ignore_errors=True)
-    for name in ("chunks", "gswt.zip", manifest.NAME):
+    for old in out.glob("gswt_material*.zip"):
+        old.unlink()
+    for name in ("chunks", *sorted(path.name for path in part.glob("*.zip")), manifest.NAME):
         (part / name).replace(out / name)

@@ -22,7 +22,7 @@ from scipy.special import expit
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, rgb_to_sh
 
-RECORD = np.dtype([("position", "<u2", 3), ("scale", "u1", 3), ("turn", "u1", 3), ("rgba", "u1", 4)])
+RECORD = np.dtype([("position", "<u2", 3), ("scale", "u1", 3), ("rotation", "u1", 3), ("rgba", "u1", 4)])
 assert RECORD.itemsize == 16
 POSITION_STEPS = 65535  # of the grid along an axis
 MIN_STEPS_PER_TILE = 1024  # of the grid along a tile's side
@@ -65,10 +65,10 @@ class Encoding:
         low, high = np.min([p.min(0) for p in places], 0), np.max([p.max(0) for p in places], 0)
         west, east = min(0.0, float(low[:2].min())), max(side, float(high[:2].max()))
         # one step less where the western rim is rounded outwards
-        many = np.floor((POSITION_STEPS - (west < 0)) * side / (east - west))
-        if many < MIN_STEPS_PER_TILE:
+        steps = np.floor((POSITION_STEPS - (west < 0)) * side / (east - west))
+        if steps < MIN_STEPS_PER_TILE:
             raise InputError(f"tiles: a splat lies {(east - west) / side:.0f} tile sides from another; cut them again")
-        step = float(side / many)
+        step = float(side / steps)
         west = -float(np.ceil(-west / step)) * step if west < 0 else 0.0
         rise = float(high[2] - low[2]) / POSITION_STEPS
         sizes = np.concatenate([f.log_scales.ravel() for f in parts]).astype(float)
@@ -83,11 +83,11 @@ class Encoding:
         step = np.array(self.step)
         place = (field.means.astype(float) - self.origin) / np.where(step > 0, step, 1)
         rows["position"] = np.clip(np.rint(place), 0, POSITION_STEPS)
-        turn, axes = find_smallest_rotations(field.quats)
+        rotation, axes = find_smallest_rotations(field.quats)
         sizes = np.take_along_axis(field.log_scales.astype(float), axes, 1)
         rows["scale"] = np.clip(np.rint((sizes - self.log_scale[0]) / (self.log_scale[1] or 1)), 0, SCALE_STEPS)
-        rows["turn"] = ROTATION_STEPS + np.clip(
-            np.rint(turn[:, 1:] * (ROTATION_STEPS / MAX_COMPONENT)), -ROTATION_STEPS, ROTATION_STEPS
+        rows["rotation"] = ROTATION_STEPS + np.clip(
+            np.rint(rotation[:, 1:] * (ROTATION_STEPS / MAX_COMPONENT)), -ROTATION_STEPS, ROTATION_STEPS
         )
         opacity = expit(field.opacity_logits.astype(float))
         rgba = np.concatenate([field.base_colours.astype(float), opacity[:, None]], 1)
@@ -96,13 +96,13 @@ class Encoding:
 
     def decode(self, rows: Array) -> GaussianField:
         """The Gaussians of records. Ground and uncertainty are not stored: no ground, 0."""
-        turn = (rows["turn"].astype(float) - ROTATION_STEPS) * (MAX_COMPONENT / ROTATION_STEPS)
-        whole = np.sqrt(np.maximum(1 - (turn**2).sum(1, keepdims=True), 0))
+        xyz = (rows["rotation"].astype(float) - ROTATION_STEPS) * (MAX_COMPONENT / ROTATION_STEPS)
+        w = np.sqrt(np.maximum(1 - (xyz**2).sum(1, keepdims=True), 0))
         opacity = np.clip(rows["rgba"][:, 3] / 255, HALF_STEP, 1 - HALF_STEP)
         return GaussianField(
             (np.array(self.origin) + rows["position"] * np.array(self.step)).astype(np.float32),
             (self.log_scale[0] + self.log_scale[1] * rows["scale"]).astype(np.float32),
-            np.concatenate([whole, turn], 1).astype(np.float32),
+            np.concatenate([w, xyz], 1).astype(np.float32),
             (np.log(opacity) - np.log1p(-opacity)).astype(np.float32),
             rgb_to_sh((rows["rgba"][:, :3] / 255).astype(np.float32)),
             np.zeros(len(rows), np.float32),
@@ -161,18 +161,19 @@ class EncodingErrors:
     @classmethod
     def measure(cls, encoding: Encoding, field: GaussianField, rows: Array, pixel: float) -> "EncodingErrors":
         """The errors of a field's records."""
-        back, (turn, axes) = encoding.decode(rows), find_smallest_rotations(field.quats)
+        back, (rotation, axes) = encoding.decode(rows), find_smallest_rotations(field.quats)
         away = float(np.linalg.norm(back.means.astype(float) - field.means, axis=1).max(initial=0.0))
         sizes = np.take_along_axis(field.log_scales.astype(float), axes, 1)
         low, high = encoding.log_scale[0], encoding.log_scale[0] + SCALE_STEPS * encoding.log_scale[1]
         inside = (sizes >= low - 1e-6) & (sizes <= high + 1e-6)
-        grown = np.abs(back.log_scales - sizes)[inside]
-        half = np.linalg.norm(_multiply_quaternions(turn * [1, -1, -1, -1], back.quats.astype(float))[:, 1:], axis=1)
+        log_ratio = np.abs(back.log_scales - sizes)[inside]
+        between = _multiply_quaternions(rotation * [1, -1, -1, -1], back.quats.astype(float))
+        half = np.linalg.norm(between[:, 1:], axis=1)
         opacity = expit(field.opacity_logits.astype(float))
         return cls(
             position=away,
             position_pixels=away / pixel,
-            scale_percent=100 * float(np.expm1(grown.max(initial=0.0))),
+            scale_percent=100 * float(np.expm1(log_ratio.max(initial=0.0))),
             angle_degrees=float(np.degrees(2 * np.arcsin(np.minimum(half, 1)).max(initial=0.0))),
             colour=float(np.abs(back.base_colours - np.clip(field.base_colours, 0, 1)).max(initial=0.0)),
             opacity=float(np.abs(rows["rgba"][:, 3] / 255 - opacity).max(initial=0.0)),

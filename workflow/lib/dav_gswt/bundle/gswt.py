@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
-from dav_gswt.errors import InputError
+from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.field import GaussianField
 from dav_gswt.files import UNREADABLE
 from dav_gswt.logs import progress
@@ -32,7 +32,7 @@ PROPERTIES = [
 
 
 def to_rows(field: GaussianField, side: float) -> Float32[Array, "n 62"]:
-    """Splats of a tile `side` wide, scaled to WIDTH; view-dependent colour is left out, quaternions have length 1."""
+    """Splats of a tile `side` wide, scaled to TILE_WIDTH, without view-dependent colour; quaternions have length 1."""
     scale = TILE_WIDTH / side
     out = np.zeros((len(field), len(PROPERTIES)), np.float32)
     out[:, :3] = field.means.astype(float) * scale
@@ -76,9 +76,9 @@ def write_gswt(fields: list[list[GaussianField]], side: float, path: Path) -> No
 
 
 def read_gswt(path: Path | str, side: float) -> list[list[GaussianField]]:
-    """fields[level][tile] of an archive that `write` made, or anybody else, for tiles `side` wide.
+    """fields[level][tile] of an archive, made by `write_gswt` or another program, for tiles `side` wide.
 
-    What an entry says of its size is compared with its header before it is unpacked, and all of it with the most that
+    An entry's recorded size is compared with its header before it is unpacked, and all of it with the most that
     the renderer takes. Only base names count, so nothing is written anywhere; other entries are skipped.
     Raises: InputError: no zip, a damaged entry, a header that is not the renderer's, sizes that do not agree, levels or
     tiles that do not count up from 0, a value that is not finite.
@@ -90,10 +90,10 @@ def read_gswt(path: Path | str, side: float) -> list[list[GaussianField]]:
                 if match := TILE_NAME.search(Path(entry.filename).name):
                     key = int(match[1]), int(match[2])
                     if key in found:
-                        raise InputError(f"{path}: {entry.filename} is there twice")
+                        raise InputError(f"{path}: {entry.filename[:80]!r} is there twice; make the bundle again")
                     found[key] = _read_entry(archive, entry, side, MAX_SPLATS - sum(map(len, found.values())))
     except UNREADABLE as error:
-        raise InputError(f"{path}: not readable ({error}); make the bundle again") from error
+        raise InputError(f"{path}: not readable ({summarize_error(error)}); make the bundle again") from error
     levels, tiles = ({key[axis] for key in found} for axis in (0, 1))
     if not found or len(tiles) % 16 or set(found) != set(product(range(len(levels)), range(len(tiles)))):
         raise InputError(f"{path}: not a whole set of 16 tiles at each level; make the bundle again")
@@ -101,8 +101,8 @@ def read_gswt(path: Path | str, side: float) -> list[list[GaussianField]]:
 
 
 def _read_entry(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, side: float, room: int) -> GaussianField:
-    """An entry's Gaussians; room: how many are left of MOST."""
-    name = f"{archive.filename}: {entry.filename}"
+    """An entry's Gaussians; room: how many are left of MAX_SPLATS."""
+    name = f"{archive.filename}: {' '.join(entry.filename.split())[:80]}"
     none = format_ply(np.zeros((0, len(PROPERTIES)), np.float32))
     with archive.open(entry) as file:
         head = file.read(len(none) + 8)

@@ -1,4 +1,4 @@
-"""How far each level is used, and how low the eye may go: both follow from a splat's size in pixels.
+"""Distances at which levels of detail change, and the least eye height: both follow from a splat's size in pixels.
 
 The reference picture is 1920 pixels and 60 degrees wide, its focal length f = 960 / tan 30 degrees = 1663 pixels.
 """
@@ -26,15 +26,16 @@ def compute_levels(scales: list[float], pixels: float, band: float) -> list[Leve
                 f"level {level + 1}: mean scale {coarse:.6g} does not rise above level {level}'s {fine:.6g}; "
                 "ask for fewer levels"
             )
-    reach = [float(scale * FOCAL / pixels) for scale in scales[1:]]
+    distances = [float(scale * FOCAL / pixels) for scale in scales[1:]]
     table = [
-        LevelEntry(level, scale, far, band * far) for level, (scale, far) in enumerate(zip(scales, reach, strict=False))
+        LevelEntry(level, scale, far, band * far)
+        for level, (scale, far) in enumerate(zip(scales, distances, strict=False))
     ]
     return [*table, LevelEntry(len(scales) - 1, scales[-1], None, 0.0)]
 
 
 def compute_eye_floor(spacing: float, pixels: float, pitch: float = 30.0) -> float:
-    """Lowest sensible eye height: the nearest ground in sight then shows a finest disc `pixels` wide.
+    """Lowest sensible eye height: the nearest visible ground then shows a finest disc `pixels` wide.
 
     Looking `pitch` degrees down, the picture's lower edge looks v further, tan v = 9/16 tan 30. A disc `spacing` wide
     covers f spacing / z pixels at the depth z, and the ground there lies at z = h cos v / sin(pitch + v).

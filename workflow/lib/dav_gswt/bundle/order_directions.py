@@ -1,4 +1,4 @@
-"""Tiles seen from so far that all rays are parallel: what an order, or the rounding of chunks, does to a picture.
+"""Renders of tiles by parallel projection, in a given order: the error of pre-sorted orders and of rounding.
 
 A parallel projection does not change when a Gaussian moves along the viewing direction. So the rasterizer, which sorts
 by depth, draws any order if each Gaussian is moved to the depth of its place in it.
@@ -18,7 +18,7 @@ from dav_gswt.raster import Rasterizer, to_raster_arrays
 
 ELEVATIONS = {"walker": float(np.degrees(np.arcsin(0.1))), "oblique": 45.0}  # a walker's eye: a tenth of the distance
 WIDTH, HEIGHT = 256, 128  # pixels about the tile's middle
-VIEWS = 8  # a view and elevation
+VIEWS = 8  # at each elevation
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,8 @@ def render_in_order(
 ) -> Float32[Array, "h w 3"]:
     """The middle of a tile seen along a direction, in the order of another one, pixels `pixel` wide; black behind."""
     middle = np.array([side / 2, side / 2, np.median(field.means[:, 2])])
-    camera = _camera(along, pixel)
-    field = field[_visible(field, middle, camera)]
+    camera = _make_camera(along, pixel)
+    field = field[_find_visible(field, middle, camera)]
     means = field.means.astype(float) - middle
     place = np.empty(len(field))
     place[orders.sort_back_to_front(field.means, along if order is None else order)] = np.arange(len(field), 0, -1)
@@ -61,14 +61,14 @@ def render_in_order(
     return Rasterizer(near=1e-6).forward(**to_raster_arrays(moved), camera=camera).colour
 
 
-def _visible(field: GaussianField, middle: Float[Array, "3"], camera: Camera) -> Bool[Array, "n"]:
-    """Which Gaussians reach into the picture, four deviations about their centres."""
+def _find_visible(field: GaussianField, middle: Float[Array, "3"], camera: Camera) -> Bool[Array, "n"]:
+    """Which Gaussians overlap the picture with four standard deviations about their centres."""
     x, y, z = (field.means - middle.astype(np.float32)).T
     a, b, c = field.log_scales.T
-    reach, shown = 4 * np.exp(np.maximum(np.maximum(a, b), c)), np.ones(len(field), bool)
+    radius, visible = 4 * np.exp(np.maximum(np.maximum(a, b), c)), np.ones(len(field), bool)
     for axis, half in zip(camera.rotation.astype(np.float32), (WIDTH, HEIGHT), strict=False):
-        shown &= np.abs(x * axis[0] + y * axis[1] + z * axis[2]) - reach < 0.5 * half / np.float32(camera.fx)
-    return shown
+        visible &= np.abs(x * axis[0] + y * axis[1] + z * axis[2]) - radius < 0.5 * half / np.float32(camera.fx)
+    return visible
 
 
 def compute_psnr(pairs: list[tuple[Float32[Array, "h w 3"], Float32[Array, "h w 3"]]]) -> float | None:
@@ -77,7 +77,7 @@ def compute_psnr(pairs: list[tuple[Float32[Array, "h w 3"], Float32[Array, "h w 
     return mse_to_psnr(square)
 
 
-def _camera(along: Float[Array, "3"], pixel: float) -> Camera:
+def _make_camera(along: Float[Array, "3"], pixel: float) -> Camera:
     right = np.cross(along, [0.0, 0.0, 1.0])
     length = np.linalg.norm(right)
     right = right / length if length > 1e-9 else np.array([1.0, 0.0, 0.0])

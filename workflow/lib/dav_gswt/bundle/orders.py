@@ -1,7 +1,8 @@
 """Pre-sorted orders: the splats of a tile from back to front, for a few viewing directions.
 
 A viewer takes the order whose direction is nearest to its own and sorts nothing. How many directions that takes is
-measured (`direction_search`). Uncertain tiles keep twice as many azimuths ("uncertainty-guided caching").
+measured (`direction_search`). Uncertain tiles keep all azimuths, the others every second one (the
+paper's "uncertainty-guided caching").
 """
 
 from dataclasses import dataclass
@@ -10,9 +11,7 @@ import numpy as np
 from jaxtyping import Float, Float32, UInt16, UInt32
 from numpy import ndarray as Array
 
-DEPTH_STEPS = (
-    65535  # steps of depth across a tile: a sixteen-bit key is sorted by its digits, in time that grows with the count
-)
+DEPTH_STEPS = 65535  # across a tile: NumPy sorts sixteen-bit keys by radix, in linear time
 WIDE_INDEX = 65536  # from so many splats on an index takes four bytes
 
 
@@ -20,7 +19,7 @@ WIDE_INDEX = 65536  # from so many splats on an index takes four bytes
 class DirectionRings:
     """Viewing directions: rings of `azimuths` each, at elevations in degrees below the horizon, and straight down.
 
-    Only deep tiles keep all; the others keep every second azimuth.
+    Only uncertain tiles keep all; the others keep every second azimuth.
     """
 
     elevations: tuple[float, ...] = (20.0,)
@@ -32,10 +31,11 @@ class DirectionRings:
         rings = [unit_vectors(azimuth, np.radians(down)) for down in self.elevations]
         return np.concatenate([*rings, [[0.0, 0.0, -1.0]]])
 
-    def select(self, uncertainty: float, tau: float) -> list[int]:
-        """Indices into directions() that a tile keeps: all if it is deep, else every second azimuth and straight down.
+    def select_directions(self, uncertainty: float, tau: float) -> list[int]:
+        """Indices into directions() that a tile keeps: all if it is uncertain, else every second azimuth.
 
-        Deep is u >= tau for tau < 1: at tau = 0 every tile is, at tau = 1 none, and a larger tau never adds one.
+        Straight down is always kept: of n azimuths on r rings r n + 1 directions or r n / 2 + 1. A tile is uncertain if
+        u >= tau and tau < 1: at tau = 0 every tile is, at tau = 1 none, and a larger tau never adds one.
         Raises: ValueError: u or tau is not in [0, 1].
         """
         if not (0 <= uncertainty <= 1 and 0 <= tau <= 1):
@@ -62,14 +62,12 @@ def sort_back_to_front(means: Float32[Array, "n 3"], along: Float[Array, "3"]) -
 
 
 def presort(means: Float32[Array, "n 3"], along: Float[Array, "d 3"]) -> UInt16[Array, "d n"] | UInt32[Array, "d n"]:
-    """The order of each direction as it is stored: `back_to_front`, but that depths within a KEYS-th of all the tile's
-    count as equal. So it is ten times as fast.
-    """
+    """The stored order of each direction: `sort_back_to_front` of depths in DEPTH_STEPS steps, ten times as fast."""
     x, y, z = means.T.copy()
-    found = np.empty((len(along), len(means)), index_type(len(means)))
-    for order, (right, ahead, up) in zip(found, along.astype(np.float32), strict=True):
+    sorted_orders = np.empty((len(along), len(means)), index_type(len(means)))
+    for order, (right, ahead, up) in zip(sorted_orders, along.astype(np.float32), strict=True):
         depth = x * right + y * ahead + z * up
         top, low = depth.max(initial=-np.inf), depth.min(initial=np.inf)
         key = (top - depth) / (top - low) * DEPTH_STEPS if top > low else np.zeros_like(depth)
         order[:] = np.argsort(key.astype(np.uint16), kind="stable")
-    return found
+    return sorted_orders

@@ -1,8 +1,9 @@
 """A bundle on disk: the manifest is read and checked first, chunks when they are asked for."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 from jaxtyping import Integer
 from numpy import ndarray as Array
 
@@ -22,6 +23,13 @@ class Bundle:
     def chunk(self, tile: int, level: int) -> tuple[GaussianField, Integer[Array, "d n"]]:
         """A tile's Gaussians at a level, and their orders. Raises: InputError: see `chunks.read_chunk`."""
         return chunks.read_chunk(self.folder, self.manifest.tiles[tile].chunks[level], self.manifest.encoding)
+
+    def object_chunk(self, number: int, level: int) -> tuple[GaussianField, Integer[Array, "d n"]]:
+        """An object's Gaussians at a level, about its foot, and their orders. Raises: as `chunk`."""
+        entry = (self.manifest.objects or [])[number].chunks[level]
+        field, orders = chunks.read_chunk(self.folder, entry, self.manifest.encoding)
+        middle = np.array([0.5 * self.manifest.tile_side, 0.5 * self.manifest.tile_side, 0])
+        return replace(field, means=(field.means - middle).astype(np.float32)), orders
 
     def fields(self) -> list[list[GaussianField]]:
         """fields[level][tile] of the whole set."""

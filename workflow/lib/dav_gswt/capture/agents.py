@@ -52,11 +52,11 @@ def capture_views(site: Site, split: ViewSplit, before: list, chosen: list[Pose]
     split: views.json. before: the capture folders of earlier rounds. chosen: the poses to photograph. The agent is not
     called if no pose was chosen.
     """
-    pool = candidates.list_remaining(site.scene, site.frame, site.photos / "sparse", split, before)
-    requested = candidates.select_by_name(pool, chosen)
+    remaining = candidates.list_remaining(site.scene, site.frame, site.photos / "sparse", split, before)
+    requested = candidates.select_by_name(remaining, chosen)
     folder.mkdir(parents=True, exist_ok=True)
     agent = site.scene["agent"]
-    photos = AGENTS[agent](CaptureRequest(site, requested, pool, folder)) if requested else []
+    photos = AGENTS[agent](CaptureRequest(site, requested, remaining, folder)) if requested else []
     write_capture_record(folder, agent, photos)
 
 

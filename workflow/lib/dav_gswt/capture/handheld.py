@@ -30,6 +30,8 @@ def take_photos(site: Site, requested: list[RequestedPose], field: Path | str | 
 
 def write_shot_list(site: Site, missing: list[RequestedPose], field: Path | str | None) -> Path:
     """Write captures/{scene}/shot-list/ with the poses in a short walking order. Returns its page."""
+    if site.shot_list_template is None:
+        raise ValueError("the agent handheld needs the template of its page")
     ground = np.array([camera.centre[:2] for _, camera in missing])
     ordered = route.order_stops(ground)
     stations = [
@@ -42,5 +44,7 @@ def write_shot_list(site: Site, missing: list[RequestedPose], field: Path | str 
     )
     folder = site.store.folder / "shot-list"
     with atomic_folder(folder) as part:
-        shot_list_page.write_page(part, shot_list, stations, read_field(field) if field else None)
+        shot_list_page.write_page(
+            part, site.shot_list_template, shot_list, stations, read_field(field) if field else None
+        )
     return folder / "index.html"

@@ -19,12 +19,12 @@ RequestedPose = tuple[Pose, Camera]
 class CaptureRequest:
     """Poses to photograph.
 
-    pool: all poses that are not used yet, the requested ones included. folder: where the photos go.
+    remaining: all candidates that are not used yet, the requested ones included. folder: where the photos go.
     """
 
     site: Site
     poses: list[RequestedPose]
-    pool: Candidates
+    remaining: Candidates
     folder: Path
 
 

@@ -8,7 +8,7 @@ from dav_gswt.photos.capture_record import CapturedPhoto
 
 def capture_replayed(request: CaptureRequest) -> list[CapturedPhoto]:
     """Copy the `burst` photos nearest to each pose by `view_distance`, ties by name; fewer where the pool ends."""
-    site, remaining = request.site, {pose.name: camera for pose, camera in request.pool}
+    site, remaining = request.site, {pose.name: camera for pose, camera in request.remaining}
     photos = []
     for pose, camera in request.poses:
         for _ in range(min(site.burst, len(remaining))):

@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.photos.synthetic import camera_layouts
 
 TOLERANCE = 2.0  # degrees between a pose and how the rig holds its camera
 

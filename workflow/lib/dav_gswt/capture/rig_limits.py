@@ -44,8 +44,8 @@ def combine_limits(limits: AxisRanges, no_go: Sequence[AxisRanges], device: Floa
     for name, table in [("limits", limits), *((f"no_go {i}", zone) for i, zone in enumerate(no_go, 1))]:
         if wrong := [axis for axis in AXES if axis in table and not table[axis][0] <= table[axis][1]]:
             raise InputError(f"config: rig: {name}: {wrong[0]} goes from high to low; the lower end comes first")
-    asked = np.array([limits[axis] for axis in AXES], float)
-    both = np.stack([np.maximum(asked[:, 0], device[:, 0]), np.minimum(asked[:, 1], device[:, 1])], 1)
+    requested = np.array([limits[axis] for axis in AXES], float)
+    both = np.stack([np.maximum(requested[:, 0], device[:, 0]), np.minimum(requested[:, 1], device[:, 1])], 1)
     if empty := [axis for axis, (low, high) in zip(AXES, both, strict=True) if not low <= high]:
         raise InputError(f"config: rig: limits: {empty[0]}: nothing of it is within what the rig itself allows")
     zones, names = [], []

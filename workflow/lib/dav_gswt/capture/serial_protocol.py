@@ -34,6 +34,7 @@ VERSION = "1"
 LONGEST = 160  # bytes of a line with its end; anything longer is noise
 FIRST, LAST = 10000, 99999  # sequence numbers; a run starts at a random one, so answers to an earlier run are ignored
 SLICE = 0.05  # seconds that one read waits
+WRITE_TIMEOUT = 5.0  # seconds, at least, after which a line that takes no byte is broken: a busy machine may stall
 TIMEOUT_FACTOR = {"SHOOT": 5.0}  # of a verb's answer: cameras block while they expose
 UNHOMED = ("HELLO", "HOME", "STOP")  # verbs that need no known position: a restart before them does not matter
 STOPPED = "the rig's stop button is pressed; release it when the way is clear, then run the same again"
@@ -75,7 +76,8 @@ def open_line(name: str, baud: int, timeout: float, retries: int) -> Iterator["S
     Raises: InputError: the port does not open.
     """
     try:
-        port = serial.serial_for_url(name, baud, timeout=SLICE, write_timeout=timeout, exclusive=True)
+        patience = max(timeout, WRITE_TIMEOUT)
+        port = serial.serial_for_url(name, baud, timeout=SLICE, write_timeout=patience, exclusive=True)
     except (OSError, ValueError) as error:
         raise InputError(
             f"{name}: the rig's port does not open ({error}); check rig.port, and who may use it"

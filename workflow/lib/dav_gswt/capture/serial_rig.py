@@ -31,31 +31,33 @@ RESTARTS = 3  # restarts of the rig that one run tolerates
 POLL = 0.05  # seconds between queries of the position
 
 
-@dataclass(frozen=True)
-class RigSettings:
-    """The `rig` entry of a scene; docs/reference/config.md describes its keys."""
+@dataclass(frozen=True, kw_only=True)
+class RigReach:
+    """The keys of a scene's `rig` that say where it can stand; docs/reference/config.md describes them."""
 
-    port: str
-    inbox: Path
     millimetres: float
     limits: AxisRanges
-    baud: int = 115200
     pan_zero: float = 0.0
     tilt_zero: float = 0.0
     no_go: tuple[AxisRanges, ...] = ()
+
+    def build_mount(self, frame: SceneFrame) -> Mount:
+        return Mount(frame.exemplar.centre, self.millimetres, self.pan_zero, self.tilt_zero)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigSettings(RigReach):
+    """All of a scene's `rig`."""
+
+    port: str
+    inbox: Path
+    baud: int = 115200
     settle: float = 1.0
     timeout: float = 2.0
     retries: int = 3
     move_timeout: float = 120.0
     photo_timeout: float = 30.0
     dry_run: bool = True
-
-    @staticmethod
-    def from_config(entry: dict) -> "RigSettings":
-        return TypeAdapter(RigSettings).validate_python(entry)
-
-    def build_mount(self, frame: SceneFrame) -> Mount:
-        return Mount(frame.exemplar.centre, self.millimetres, self.pan_zero, self.tilt_zero)
 
 
 def take_photos(site: Site, requested: list[RequestedPose]) -> None:
@@ -66,7 +68,7 @@ def take_photos(site: Site, requested: list[RequestedPose]) -> None:
     """
     if "rig" not in site.scene:
         raise InputError(f"config: scenes.{site.name}.rig: the agent serial needs it (see docs/reference/config.md)")
-    settings = RigSettings.from_config(site.scene["rig"])
+    settings = TypeAdapter(RigSettings).validate_python(site.scene["rig"])
     inbox.list_photos(settings.inbox)  # raises if the folder does not exist
     mount = settings.build_mount(site.frame)
     with serial_protocol.open_line(settings.port, settings.baud, settings.timeout, settings.retries) as line:
@@ -79,14 +81,14 @@ def take_photos(site: Site, requested: list[RequestedPose]) -> None:
         raise InputError(_describe_dry_run(site, stops))
 
 
-def filter_reachable(scene: dict, frame: SceneFrame, pool: list[RequestedPose]) -> list[RequestedPose]:
+def filter_reachable(scene: dict, frame: SceneFrame, candidates: list[RequestedPose]) -> list[RequestedPose]:
     """Keep the poses within the limits of the config. The rig's own limits are checked by `take_photos`.
 
     Raises: InputError: no pose is left.
     """
     if "limits" not in scene.get("rig", {}):
-        return pool
-    settings = RigSettings.from_config(scene["rig"])
+        return candidates
+    settings = TypeAdapter(RigReach).validate_python(scene["rig"])
     mount = settings.build_mount(frame)
     limits = rig_limits.combine_limits(settings.limits, settings.no_go, np.array([[-np.inf, np.inf]] * 3))
 
@@ -94,9 +96,9 @@ def filter_reachable(scene: dict, frame: SceneFrame, pool: list[RequestedPose]) 
         places = rig_limits.list_turns(limits, mount.axes_of(camera), 0.0)
         return any(rig_limits.find_violation(limits, place) is None for place in places)
 
-    found = [(pose, camera) for pose, camera in pool if not mount.find_violation(camera) and is_allowed(camera)]
-    _log.info("the rig can stand at %d of %d candidate poses", len(found), len(pool))
-    if pool and not found:
+    found = [(pose, camera) for pose, camera in candidates if not mount.find_violation(camera) and is_allowed(camera)]
+    _log.info("the rig can stand at %d of %d candidate poses", len(found), len(candidates))
+    if candidates and not found:
         raise InputError(
             "the rig can stand at none of the candidate poses: their radius is the flying height, "
             f"{frame.flying_height * settings.millimetres:.0f} mm; check rig.limits and rig.millimetres"

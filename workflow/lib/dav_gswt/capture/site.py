@@ -13,7 +13,7 @@ class Site:
     """A scene to photograph.
 
     name, scene: its name and entry in the config. photos: its photos/ folder. store: photos taken by devices and
-    people. field: the reconstruction so far, a .ply.
+    people. field: the reconstruction so far, a .ply. shot_list_template: of the page that `handheld` writes.
     """
 
     name: str
@@ -22,6 +22,7 @@ class Site:
     photos: Path
     store: PhotoStore
     field: Path | str | None = None
+    shot_list_template: Path | str | None = None
 
     @property
     def burst(self) -> int:

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt.errors import InputError
-from dav_gswt.files import digest_files, read_json, write_json
+from dav_gswt.errors import InputError, summarize_error
+from dav_gswt.files import digest_files, read_json, require_file_name, write_json
 from dav_gswt.geometry.cameras import Camera, camera_from_json, camera_to_json
 from dav_gswt.geometry.poses import Pose
 
@@ -88,7 +88,14 @@ def pose_key(camera: Camera) -> str:
 
 def _read_photo(place: Path) -> StoredPhoto:
     record = read_json(place / "shot.json")
-    photo = place / record["photo"]
-    if not photo.is_file() or digest_files(photo) != record["sha256"]:
+    try:
+        photo, camera = place / require_file_name(record["photo"]), camera_from_json(record["got"])
+        digest, taken = record["sha256"], str(record["taken"])
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise InputError(
+            f"{place / 'shot.json'}: not the record of a photo ({summarize_error(error)}); put it back, or remove "
+            f"{place} to take the photo again"
+        ) from error
+    if not photo.is_file() or digest_files(photo) != digest:
         raise InputError(f"{photo}: is not the photo that was stored; put it back, or remove {place} to take it again")
-    return StoredPhoto(photo, camera_from_json(record["got"]), record["taken"])
+    return StoredPhoto(photo, camera, taken)

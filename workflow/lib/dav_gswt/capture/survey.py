@@ -17,9 +17,9 @@ from numpy import ndarray as Array
 from dav_gswt.capture import qgc_plan
 from dav_gswt.errors import InputError
 from dav_gswt.files import write_json
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.photos.synthetic import camera_layouts
 
 ELEVATION = 65.0  # degrees: of the circles of a start flight
 ELEVATIONS = (90.0, 65.0, 45.0)  # of an exhaustive flight

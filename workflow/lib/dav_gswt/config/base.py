@@ -4,6 +4,7 @@ import re
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
+from pydantic.config import JsonDict
 
 from dav_gswt.paths import NAME, RESERVED
 
@@ -32,5 +33,5 @@ Auto = Literal["auto"]
 
 def key(description: str, default: Any = ..., *, unit: str = "", renamed: str = "", **bounds) -> Any:
     """A key of a table: meaning, default, unit and bounds; `renamed`: its name in old config files."""
-    extra = {name: value for name, value in (("unit", unit), ("renamed", renamed)) if value}
+    extra: JsonDict = {name: value for name, value in (("unit", unit), ("renamed", renamed)) if value}
     return Field(default, description=description, json_schema_extra=extra or None, **bounds)

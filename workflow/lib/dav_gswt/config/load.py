@@ -10,11 +10,12 @@ from pydantic import BaseModel, ValidationError
 
 from dav_gswt.config.model import Config
 from dav_gswt.config.tables import matching_table, renamed_keys
-from dav_gswt.errors import InputError
+from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.paths import STUDY_TABLES
 
 Model = TypeVar("Model", bound=BaseModel)
 
+ALIASES = {"views_per_round": "k"}  # Snakemake's --config takes no key of one letter
 REFERENCE = "docs/reference/config.md lists every key"
 
 
@@ -44,14 +45,32 @@ def add_scene_files(config: dict, folder: Path) -> dict:
     return config | {"scenes": merge_tables(files, config.get("scenes") or {})}
 
 
+def parse_command_line(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys of Snakemake's `--config`, with the numbers in lists and tables that it leaves as text."""
+    return {key: _parse_nested(value) if isinstance(value, dict | list) else value for key, value in values.items()}
+
+
+def _parse_nested(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _parse_nested(part) for key, part in value.items()}
+    if isinstance(value, list):
+        return [_parse_nested(part) for part in value]
+    return yaml.safe_load(value) if isinstance(value, str) else value
+
+
 def check_config(config: Mapping) -> dict:
     """The config with all defaults, as plain values. Keys without a value (None) are left out.
+
+    An alias counts before the key that it stands for.
 
     Raises: InputError: the first key that is unknown, renamed or out of range, and what it may be.
     """
     for old, new in STUDY_TABLES.items():
         if old in config:
             raise InputError(f"config: {old}: is called `study.{new}` now; move it there ({REFERENCE})")
+    config = {key: value for key, value in config.items() if key not in ALIASES} | {
+        key: config[alias] for alias, key in ALIASES.items() if alias in config
+    }
     return check_model(Config, config).model_dump(mode="json", exclude_none=True)
 
 
@@ -68,8 +87,9 @@ def _read_yaml(file: Path) -> dict:
         values = yaml.safe_load(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{file}: not readable ({error.strerror})") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: not YAML ({' '.join(str(error).split())})") from error
+    except (yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        # PyYAML raises what int(), date() and its own tables do
+        raise InputError(f"{file}: not YAML ({summarize_error(error)})") from error
     if not isinstance(values, dict):
         raise InputError(f"{file}: holds no keys; config/config.yaml is an example")
     return values
@@ -81,6 +101,7 @@ def _describe_error(model: type[BaseModel], values: dict, error: ValidationError
     first = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
     location = first["loc"]
     if first["type"] == "value_error":
+        assert "ctx" in first  # pydantic puts the raised error there
         message = str(first["ctx"]["error"])
     elif first["type"] == "extra_forbidden":
         message = _describe_unknown_key(model, location)

@@ -1,15 +1,17 @@
 """The whole config of the product."""
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
 from dav_gswt.config.base import Auto, ConfigModel, Name, Seed, Share, Text, key
 from dav_gswt.config.scenes import FieldScene, Scene
 from dav_gswt.config.settings import (
+    ClassTerm,
     Flat,
     Flight,
     Heights,
+    NoiseClasses,
     Preset,
     PriorSettings,
     Stills,
@@ -20,7 +22,10 @@ from dav_gswt.config.settings import (
 from dav_gswt.paths import STUDY_TABLES
 from dav_gswt.views.policy_names import POLICY_NAMES
 
-Policy = Literal[POLICY_NAMES]  # pyright: ignore[reportInvalidTypeForm] - a tuple of names, known at run time
+if TYPE_CHECKING:
+    Policy = str  # the names are known at run time only
+else:
+    Policy = Literal[POLICY_NAMES]
 Lpips = Literal["installed", "none"] | Text
 
 
@@ -28,7 +33,7 @@ class Config(ConfigModel):
     """The experiment: what is made, from what, and how well."""
 
     scene: Name = key(
-        "the scene that `snakemake` and `make run` make: an entry of `scenes`, or a file of config/scenes"
+        "the scene that `snakemake` and `make run` make: a file of config/scenes, or an entry of `scenes`"
     )
     seeds: list[Seed] = key("each is a run of its own: start views, noise of the fit", [0], min_length=1)
     policy: Policy = key("how the next views are chosen: docs/reference/policies.md", "farthest")
@@ -36,21 +41,35 @@ class Config(ConfigModel):
     p_drop: float = key("share of its attention that a prior drops in each sample", 0.15, ge=0, lt=1)
     lam: float = key("weight of LPIPS beside W2 in a pose's score (the paper's lambda)", 0.1, ge=0, le=1e6)
     rounds: int = key("rounds of view selection (the paper's T)", 2, ge=0, le=100)
-    k: int = key("views chosen in a round; where fewer are left, all", 4, ge=1, le=1000)
+    k: int = key(
+        "views chosen in a round; where fewer are left, all; `--config views_per_round=3` on the command line, where "
+        "Snakemake takes no key of one letter",
+        4,
+        ge=1,
+        le=1000,
+    )
     stop: Stop = key("when rounds end before the last one", Stop())
     inpaint: bool = key("`true`: ground that no photo saw is painted by `prior`, and marked", False, renamed="complete")
     levels: Annotated[int, Field(ge=1, le=8)] | Auto = key(
         "levels of detail; `auto`: as many as are ever drawn, at most six", "auto"
     )
     tau: Share = key(
-        "tiles whose mean uncertainty reaches it keep twice the pre-sorted orders; 0: all tiles, 1: none", 0.6
+        "tiles whose mean uncertainty reaches it keep all pre-sorted orders, the others about half; 0: all tiles keep "
+        "all, 1: none does",
+        0.6,
     )
     lpips: Lpips = key(
         "the weights of LPIPS: `installed`, those that come with the set-up; a path of `alexnet.ckpt` or a converted "
         "`.safetensors`; `none`: cuts know colours and superpixels only, scores and metrics lack LPIPS",
         "installed",
     )
-    heights: Heights = key("the surface that the tiles are laid over", Flat(kind="flat"))
+    heights: Heights = key("the surface that the tiles are placed on", Flat(kind="flat"))
+    classes: list[ClassTerm] = key(
+        "which material lies where, on a terrain of several: terms whose scores are added",
+        [NoiseClasses(kind="noise")],
+        min_length=1,
+        max_length=16,
+    )
     stills: Stills = key("size of the stills", Stills())
     flight: Flight = key("a walk that is rendered frame by frame", Flight())
     scenes: dict[Name, Scene] = key("what there is to make a terrain of", {})

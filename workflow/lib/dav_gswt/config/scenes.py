@@ -84,11 +84,19 @@ class _PhotographedScene(_Scene):
     feasibility: Feasibility | None = key("bounds of candidate poses", None, renamed="reach")
 
 
+def _materials(default: str):
+    return key(
+        "`auto`: materials and objects are told apart, each material has its own tiles, and shade and what is rare or "
+        "cut off is shown nowhere; `one`: all that was photographed is tiled as one texture",
+        default,
+    )
+
+
 class SyntheticScene(_PhotographedScene):
     """A scene that is rendered, with exact poses."""
 
     kind: Literal["synthetic"]
-    family: Literal["desert", "meadow", "flowers", "grass", "planet"] = key("which generator")
+    family: Literal["desert", "meadow", "flowers", "grass", "planet", "oasis"] = key("which generator")
     seed: Seed = key("which scene of the family")
     photos: int = key("photos that are rendered beforehand", ge=3, le=200)
     start: int | None = key("photos to start from, with `agent: replay`; all if left out", None, ge=2, le=200)
@@ -102,6 +110,7 @@ class SyntheticScene(_PhotographedScene):
     oblique: int = key("further test views around the exemplar at 45 degrees", 0, ge=0, le=200)
     walkers: int = key("further test views at eye level, 0.8, 1.6 and 3.2 m above the ground in turn", 0, ge=0, le=200)
     size: int = key("width and height of the photos", unit="pixels", ge=64, le=4096)
+    materials: Literal["one", "auto"] = _materials("one")
     agent: Literal["render", "replay"] = key(
         "`render`: photos are rendered at the chosen poses; `replay`: chosen from those rendered beforehand"
     )
@@ -118,7 +127,10 @@ class PhotoScene(_PhotographedScene):
     )
     size: int = key("longer side of the undistorted photos; never enlarged", unit="pixels", ge=64, le=16_384)
     start: int = key(
-        "photos to start from; one in ten of the others only tests, the rest may be asked for", ge=2, le=1000
+        "photos to start from, or all that are left: test photos are set aside first, one in ten of all and at least "
+        "two (none of fewer than six). With `agent: replay` the remaining photos are the pool that rounds choose from",
+        ge=2,
+        le=1000,
     )
     whole: bool = key(
         "`true`: all ground in the photos is fitted and scored, not only the exemplar and a margin", False
@@ -127,10 +139,16 @@ class PhotoScene(_PhotographedScene):
         "`quick`: 4096 features a photo, 12 partners; `careful`: 8192 and 40", "quick"
     )
     mapper: Literal["incremental", "global"] = key("`global`: all photos at once, faster for hundreds", "incremental")
+    verdict: Literal["stop", "warn"] = key(
+        "what follows where structure from motion gives a model that several signs refuse: `stop` ends the run, `warn` "
+        "goes on with it",
+        "stop",
+    )
     cameras: Literal["auto", "one", "each"] = key(
         "`auto`: one camera for all photos of equal size and EXIF focal length; `one`: for all of equal size", "auto"
     )
     focal: float | None = key("where EXIF has none or is wrong", None, unit="mm (35 mm equivalent)", ge=4, le=2000)
+    materials: Literal["one", "auto"] = _materials("auto")
     masks: Text | None = key("a folder of masks named as the photos: black pixels are not ground", None)
     agent: Literal["replay", "serial", "plan", "handheld"] = key(
         "who takes further photos: `replay` takes the nearest unused photo of the folder; `serial` is a camera rig, "

@@ -2,9 +2,11 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, StringConstraints, model_validator
 
 from dav_gswt.config.base import Auto, ConfigModel, Seed, Share, Text, key
+
+Colour = Annotated[str, StringConstraints(pattern="^#[0-9a-fA-F]{6}$")]
 
 
 class Stop(ConfigModel):
@@ -45,6 +47,52 @@ class HeightMap(ConfigModel):
 
 
 Heights = Annotated[Flat | Hills | HeightMap, Field(discriminator="kind")]
+
+
+Weight = Annotated[float, Field(ge=0, le=1000)]
+
+
+class NoiseClasses(ConfigModel):
+    """The measured noise of the materials: their shares of the ground and the sizes of their patches."""
+
+    kind: Literal["noise"]
+    weight: Weight = key("of the noise among the terms", 1)
+
+
+class _RangeClasses(ConfigModel):
+    material: Text = key("name of the material")
+    low: float | None = key("lower bound", None, ge=-1e6, le=1e6)
+    high: float | None = key("upper bound", None, ge=-1e6, le=1e6)
+    soft: float = key("by how far beyond a bound the score falls by `weight`", gt=0, le=1e6)
+    weight: Weight = key("of the range; noise lies between -1 and 1", 1)
+
+
+class HeightClasses(_RangeClasses):
+    """A material where the surface's height, in tile sides, lies in a range; it gets rarer beyond."""
+
+    kind: Literal["height"]
+
+
+class SlopeClasses(_RangeClasses):
+    """A material where the surface's slope, rise over run, lies in a range; it gets rarer beyond."""
+
+    kind: Literal["slope"]
+
+
+class PictureClasses(ConfigModel):
+    """Materials by the colours of a picture."""
+
+    kind: Literal["image"]
+    file: Text = key("picture of plain colours, at most 4096 pixels a side")
+    width: float = key(
+        "of the whole picture; its middle lies at the world's origin", unit="world units", ge=0.001, le=1e7
+    )
+    colours: dict[Text, Colour] = key("name of a material: its colour in the picture, as `#rrggbb`", min_length=1)
+    beyond: Literal["mirror", "clamp"] = key("what comes after the picture's edge", "mirror")
+    weight: Weight = key("of the picture; noise lies between -1 and 1", 1)
+
+
+ClassTerm = Annotated[NoiseClasses | HeightClasses | SlopeClasses | PictureClasses, Field(discriminator="kind")]
 
 
 class Stills(ConfigModel):
@@ -141,4 +189,4 @@ class Tiling(ConfigModel):
     sam2: Text | None = key("a folder with a checkpoint of SAM 2, whose masks separate objects", None)
 
 
-__all__ = ["Flight", "Heights", "Preset", "PriorSettings", "Share", "Stills", "Stop", "Tiling"]
+__all__ = ["ClassTerm", "Flight", "Heights", "Preset", "PriorSettings", "Share", "Stills", "Stop", "Tiling"]

@@ -1,8 +1,8 @@
-"""Ways out to other viewers: a patch of terrain at each level as PLY, and from that SPZ and SOG.
+"""Export of the terrain: a patch at each level as PLY, and from that SPZ and SOG.
 
-The patch is the sixteen tiles laid four by four with every pair of neighbours once (as many of these side by side as
-there are variants): all tiles can be seen, no border shows inside it, and it closes on itself, so copies of it lie side
-by side without a seam. The tiles one by one are in gswt.zip. z is up, in the bundle's unit.
+The patch is the sixteen tiles, four by four, with every pair of neighbours once (as many of these side by side as there
+are variants): all tiles are visible, no border inside it is, and it is periodic, so copies of it can be placed side by
+side without a seam. The tiles one by one are in gswt.zip. z is up, in the bundle's unit.
 """
 
 import shutil
@@ -64,5 +64,5 @@ def _run_converter(arguments: list[str], kind: str) -> None:
         )
     done = subprocess.run([npx, "--yes", PACKAGE, "-w", "-q", *arguments], capture_output=True, text=True, check=False)
     if done.returncode:
-        told = (done.stderr or done.stdout).strip().splitlines()[-3:]
-        raise InputError(f"exports/{kind}: {PACKAGE} failed: {' '.join(told) or done.returncode}")
+        message = (done.stderr or done.stdout).strip().splitlines()[-3:]
+        raise InputError(f"exports/{kind}: {PACKAGE} failed: {' '.join(message) or done.returncode}")

@@ -105,6 +105,17 @@ def camera_to_json(camera: Camera) -> dict:
 
 
 def camera_from_json(values: dict) -> Camera:
-    """The camera that `to_json` wrote."""
+    """The camera that `camera_to_json` wrote. Raises: KeyError, TypeError or ValueError: not such values."""
     rotation, translation = np.array(values["rotation"], float), np.array(values["translation"], float)
-    return Camera(**{**values, "rotation": rotation, "translation": translation})
+    lens = [values[key] for key in ("fx", "fy", "cx", "cy", "width", "height")]
+    if any(isinstance(v, bool) or not isinstance(v, int | float) for v in lens):
+        raise TypeError("a camera's lens is none")
+    if not all(isinstance(size, int) and size > 0 for size in lens[4:]):
+        raise TypeError("a camera's lens is none")
+    if rotation.shape != (3, 3) or translation.shape != (3,) or not np.allclose(rotation @ rotation.T, np.eye(3)):
+        raise ValueError("a camera's rotation is none")
+    if not np.isfinite([*translation, *lens]).all() or not min(lens[:2]) > 0:
+        raise ValueError("a number of a camera is out of range")
+    fx, fy, cx, cy = map(float, lens[:4])
+    width, height = lens[4:]
+    return Camera(rotation, translation, fx, fy, cx, cy, width, height, values.get("orthographic") is True)

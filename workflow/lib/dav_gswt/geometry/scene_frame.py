@@ -7,10 +7,9 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
-from pydantic import TypeAdapter, ValidationError
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import read_json, write_json
+from dav_gswt.files import read_record, write_json
 from dav_gswt.geometry.georeference import Georeference
 
 _COMMON = ("kind", "unit", "flying_height", "exemplar", "extent")
@@ -18,7 +17,7 @@ _KEYS = {  # of ground.json by kind of scene, in the order in which they are wri
     "photos": (
         *_COMMON,
         *("photos_per_cell", "relief", "georeference", "test", "images", "registered", "left_out"),
-        *("focal_ratio", "focal", "reprojection_error", "points"),
+        *("focal_ratio", "focal", "reprojection_error", "points", "verdict"),
     ),
     "synthetic": (*_COMMON, "test", "test_groups", "images", "registered", "left_out", "focal_ratio", "renderer"),
     "field": (
@@ -67,6 +66,32 @@ class LeftOutPhoto:
     reason: str
 
 
+Grade = Literal["good", "doubtful", "refused"]
+
+
+@dataclass(frozen=True)
+class SfmSign:
+    """A sign of whether a model of structure from motion is right. reason: a line that has the measured value."""
+
+    name: str
+    grade: Grade
+    reason: str
+
+
+@dataclass(frozen=True)
+class SfmVerdict:
+    """Whether a model of structure from motion can be trusted. tried: each way of mapping and what came of it."""
+
+    grade: Grade
+    signs: tuple[SfmSign, ...]
+    tried: tuple[str, ...] = ()
+
+    @property
+    def objections(self) -> tuple[SfmSign, ...]:
+        """The signs that are not good, the worst first."""
+        return tuple(sign for grade in ("refused", "doubtful") for sign in self.signs if sign.grade == grade)
+
+
 @dataclass(frozen=True)
 class FocalLength:
     """How the focal length of a photo set was settled; pixels, medians over its cameras.
@@ -95,7 +120,8 @@ class SceneFrame:
     all ground that photos see. test, test_groups: names of photos that only test; None where the scene names none.
     photos_per_cell: photos that must see ground of the exemplar. relief: spread of the points about the plane, in
     flying heights. focal_ratio: the used focal length over EXIF's. reprojection_error: mean, pixels. points: of the
-    sparse model. gaussians, removed: of an imported field. renderer: versions of a synthetic scene's renderer.
+    sparse model. verdict: on structure from motion. gaussians, removed: of an imported field. renderer: versions of a
+    synthetic scene's renderer.
     """
 
     kind: Literal["photos", "synthetic", "field"]
@@ -115,6 +141,7 @@ class SceneFrame:
     focal: FocalLength | None = None
     reprojection_error: float | None = None
     points: int | None = None
+    verdict: SfmVerdict | None = None
     gaussians: int | None = None
     removed: int | None = None
     renderer: dict[str, str | None] | None = None
@@ -134,12 +161,7 @@ def read_scene_frame(path: Path | str) -> SceneFrame:
     Raises: InputError: not readable, a value is missing or of another type, an exemplar without area, or a
         georeference that no place on earth has.
     """
-    try:
-        frame = TypeAdapter(SceneFrame).validate_python(read_json(path))
-    except ValidationError as error:
-        first = error.errors()[0]
-        problem = f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
-        raise InputError(f"{path}: not as the workflow writes it ({problem}); make the photos stage again") from error
+    frame = read_record(path, SceneFrame, "make the photos stage again")
     values = [*asdict(frame.exemplar).values(), *asdict(frame.extent).values(), frame.flying_height]
     if not np.isfinite(values).all() or not frame.exemplar.side > 0:
         raise InputError(

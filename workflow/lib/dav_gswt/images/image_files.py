@@ -1,6 +1,8 @@
 """Image files: photos of any format by OpenImageIO, float maps with named channels as OpenEXR."""
 
 import logging
+import os
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +20,7 @@ _log = logging.getLogger(__name__)
 
 MAX_PIXELS = 200_000_000  # of a photo: more is a broken header, or more than two cores should work on
 SUFFIXES = {".jpg", ".jpeg", ".jpe", ".jfif", ".png", ".tif", ".tiff", ".webp", ".jp2", ".jxl", ".bmp", ".ppm", ".tga"}
+IF_FULL = "if the disk is full, free some space, then run the same again"
 UNSUPPORTED = {".heic", ".heif", ".avif", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".rw2", ".raf", ".raw"}
 
 
@@ -98,8 +101,21 @@ def write_png(path: Path | str, image: Float[Array, "h w c"]) -> None:
             raise ValueError(f"{path}: {_first_line(oiio.geterror())}")
         done = file.open(str(part), spec) and file.write_image(pixels)
         trouble = "" if done else file.geterror()
-        if not file.close() or not done:
-            raise OSError(f"{path}: not written ({_first_line(trouble or file.geterror())}); is the disk full?")
+        whole = file.close() and (part.suffix.lower() != ".png" or _is_whole_png(part))
+        if not (done and whole):
+            trouble = trouble or file.geterror() or "cut short"
+            raise OSError(f"{path}: not written ({_first_line(trouble)}); {IF_FULL}")
+
+
+def _is_whole_png(path: Path) -> bool:
+    """Whether a PNG's chunks follow each other to the last one. OpenImageIO does not notice that a disk is full."""
+    with path.open("rb") as file:
+        file.seek(8)  # the signature
+        while (head := file.read(8))[4:].isalpha():
+            if head[4:] == b"IEND":
+                return len(file.read(4)) == 4
+            file.seek(struct.unpack(">I", head[:4])[0] + 4, os.SEEK_CUR)
+    return False
 
 
 def shrink_image(image: Float32[Array, "h w c"], width: int, height: int) -> Float32[Array, "height width c"]:
@@ -150,7 +166,7 @@ def write_exr_parts(path: Path | str, parts: dict[str, tuple[dict[str, Array], d
         try:
             OpenEXR.File(written).write(str(part))
         except RuntimeError as error:
-            raise OSError(f"{path}: not written ({_first_line(str(error))}); is the disk full?") from error
+            raise OSError(f"{path}: not written ({_first_line(str(error))}); {IF_FULL}") from error
 
 
 def read_exr_parts(path: Path | str) -> dict[str, tuple[dict[str, Array], dict[str, str]]]:

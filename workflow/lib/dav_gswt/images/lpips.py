@@ -29,12 +29,17 @@ def distance(a: Float32[Array, "n h w 3"], b: Float32[Array, "n h w 3"], weights
     """
     _require_pictures(a)
     _require_pictures(b)
-    heads = _tensors(weights.heads)
+    heads = _to_tensors(weights.heads)
     out = np.zeros(len(a))
     with torch.inference_mode():
-        for rows in _chunks(len(a), a.shape[1] * a.shape[2]):
-            both = zip(_unit(_features(a[rows], weights)), _unit(_features(b[rows], weights)), heads, strict=True)
-            layers = (_weighted(first - second, head) for first, second, head in both)
+        for rows in _split_batch(len(a), a.shape[1] * a.shape[2]):
+            both = zip(
+                _normalize_features(_run_layers(a[rows], weights)),
+                _normalize_features(_run_layers(b[rows], weights)),
+                heads,
+                strict=True,
+            )
+            layers = (_weight_channels(first - second, head) for first, second, head in both)
             out[rows] = reduce(torch.add, layers).numpy()
     return out
 
@@ -51,8 +56,8 @@ def pairwise_mean(pictures: Float32[Array, "n m h w 3"], weights: Weights) -> Fl
     _require_pictures(pictures.reshape(n * m, h, w, 3), m)
     out = np.zeros(n)
     with torch.inference_mode():
-        for rows in _chunks(n, h * w):
-            out[rows] = _spread(pictures[rows], weights)
+        for rows in _split_batch(n, h * w):
+            out[rows] = _feature_variance(pictures[rows], weights)
     return out
 
 
@@ -64,12 +69,12 @@ def layers(pictures: Float32[Array, "n h w 3"], weights: Weights) -> list[Float3
     _require_pictures(pictures)
     parts = []
     with torch.inference_mode():
-        for rows in _chunks(len(pictures), pictures.shape[1] * pictures.shape[2]) or [slice(0, 0)]:
-            parts.append([f.numpy() for f in _features(pictures[rows], weights)])
+        for rows in _split_batch(len(pictures), pictures.shape[1] * pictures.shape[2]) or [slice(0, 0)]:
+            parts.append([f.numpy() for f in _run_layers(pictures[rows], weights)])
     return [np.concatenate(layer) for layer in zip(*parts, strict=True)]
 
 
-def resized(pictures: Float32[Array, "n h w 3"], side: int) -> Float32[Array, "n _ _ 3"]:
+def resize_pictures(pictures: Float32[Array, "n h w 3"], side: int) -> Float32[Array, "n _ _ 3"]:
     """The pictures at side x side pixels, bilinear: 512 is the paper's, at which enlarged pictures look more alike."""
     small = functional.interpolate(
         torch.from_numpy(np.ascontiguousarray(pictures)).movedim(-1, 1), (side, side), mode="bilinear", antialias=True
@@ -77,29 +82,29 @@ def resized(pictures: Float32[Array, "n h w 3"], side: int) -> Float32[Array, "n
     return np.ascontiguousarray(small.movedim(1, -1).numpy().clip(-1, 1))
 
 
-def _spread(sets: Float32[Array, "b m h w 3"], weights: Weights) -> Float64[Array, "b"]:
+def _feature_variance(sets: Float32[Array, "b m h w 3"], weights: Weights) -> Float64[Array, "b"]:
     """Twice the weighted unbiased variance of the unit features, taken relative to each set's first picture.
 
     Sum of |d|^2 less |sum of d|^2 / m cancels by no more than the factor m + 1, since d holds the first one's own 0.
     """
-    m, heads = sets.shape[1], _tensors(weights.heads)
-    first = list(_unit(_features(sets[:, 0], weights)))
+    m, heads = sets.shape[1], _to_tensors(weights.heads)
+    first = list(_normalize_features(_run_layers(sets[:, 0], weights)))
     total = [torch.zeros_like(f) for f in first]
     squares = torch.zeros(len(sets), dtype=torch.float64)
     for i in range(1, m):
-        for k, feature in enumerate(_unit(_features(sets[:, i], weights))):
+        for k, feature in enumerate(_normalize_features(_run_layers(sets[:, i], weights))):
             apart = feature.sub_(first[k])
-            squares += _weighted(apart, heads[k])
+            squares += _weight_channels(apart, heads[k])
             total[k] += apart
     for summed, head in zip(total, heads, strict=True):
-        squares -= _weighted(summed, head) / m
+        squares -= _weight_channels(summed, head) / m
     return (2 / (m - 1) * squares).numpy()
 
 
-def _features(pictures: Float32[Array, "b h w 3"], weights: Weights) -> Iterator[Float[Tensor, "b _ _ _"]]:
+def _run_layers(pictures: Float32[Array, "b h w 3"], weights: Weights) -> Iterator[Float[Tensor, "b _ _ _"]]:
     x = torch.from_numpy(np.ascontiguousarray(pictures)).movedim(-1, 1)
     x = (x - torch.tensor(SHIFT)[:, None, None]) / torch.tensor(SCALE)[:, None, None]
-    convolutions = zip(_tensors(weights.kernels), _tensors(weights.biases), STEPS, strict=True)
+    convolutions = zip(_to_tensors(weights.kernels), _to_tensors(weights.biases), STEPS, strict=True)
     for i, (kernel, bias, (stride, padding)) in enumerate(convolutions):
         if i in POOLED:
             x = functional.max_pool2d(x, 3, 2)
@@ -107,22 +112,22 @@ def _features(pictures: Float32[Array, "b h w 3"], weights: Weights) -> Iterator
         yield x
 
 
-def _unit(features: Iterator[Tensor]) -> Iterator[Tensor]:
+def _normalize_features(features: Iterator[Tensor]) -> Iterator[Tensor]:
     """Each pixel's features over their length; 0 where all are 0."""
     for x in features:
         yield x / (torch.linalg.vector_norm(x, dim=1, keepdim=True) + 1e-10)
 
 
-def _weighted(apart: Float[Tensor, "b c _ _"], head: Float[Tensor, "c"]) -> Float[Tensor, "b"]:
+def _weight_channels(apart: Float[Tensor, "b c _ _"], head: Float[Tensor, "c"]) -> Float[Tensor, "b"]:
     """Mean over pixels of the squares, weighted by channel."""
     return torch.einsum("bchw,bchw,c->b", apart, apart, head).double() / (apart.shape[2] * apart.shape[3])
 
 
-def _tensors(arrays: tuple[Array, ...]) -> list[Tensor]:
+def _to_tensors(arrays: tuple[Array, ...]) -> list[Tensor]:
     return [torch.from_numpy(a) for a in arrays]
 
 
-def _chunks(n: int, pixels: int) -> list[slice]:
+def _split_batch(n: int, pixels: int) -> list[slice]:
     step = max(1, CHUNK // pixels)
     return [slice(start, start + step) for start in range(0, n, step)]
 

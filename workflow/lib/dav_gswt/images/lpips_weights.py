@@ -20,8 +20,8 @@ from numpy import ndarray as Array
 from safetensors import SafetensorError
 from safetensors.numpy import load_file, save
 
-from dav_gswt.errors import InputError
-from dav_gswt.files import atomic_file
+from dav_gswt.errors import InputError, summarize_error
+from dav_gswt.files import UNREADABLE, atomic_file
 from dav_gswt.images.lpips_package import MEMBER, PACKAGE, read_member, require_digest
 
 _log = logging.getLogger(__name__)
@@ -40,7 +40,7 @@ class Weights:
     biases: tuple[Float32[Array, "_"], ...]
     heads: tuple[Float32[Array, "_"], ...]
 
-    def named(self) -> dict[str, Array]:
+    def by_name(self) -> dict[str, Array]:
         """The arrays by the names that they have in the file."""
         kinds = ("kernel", self.kernels), ("bias", self.biases), ("head", self.heads)
         return {f"{kind}{i}": a for kind, arrays in kinds for i, a in enumerate(arrays)}
@@ -61,7 +61,7 @@ class _Plain(pickle.Unpickler):
 
     def find_class(self, module: str, name: str):
         if name == "_reconstruct" and module in ("numpy.core.multiarray", "numpy._core.multiarray"):
-            return _empty
+            return _make_empty_array
         if (module, name) == ("numpy", "ndarray"):
             return np.ndarray
         if (module, name) == ("numpy", "dtype"):
@@ -69,7 +69,7 @@ class _Plain(pickle.Unpickler):
         raise pickle.UnpicklingError(f"it names {module}.{name}")
 
 
-def _empty(kind: type, shape: tuple, code: bytes) -> Array:
+def _make_empty_array(kind: type, shape: tuple, code: bytes) -> Array:
     """What NumPy's own `_reconstruct` makes of an array: nothing yet; its state follows."""
     if kind is not np.ndarray or shape != (0,):
         raise pickle.UnpicklingError("it makes an array in an unusual way")
@@ -98,7 +98,7 @@ def of_names(named: dict[str, Array], source: Path | str) -> Weights:
     shapes = {f"kernel{i}": shape for i, shape in enumerate(KERNELS)}
     shapes |= {f"{kind}{i}": shape[:1] for kind in ("bias", "head") for i, shape in enumerate(KERNELS)}
     if odd := sorted(set(shapes) ^ set(named)):
-        raise InputError(f"{source}: not LPIPS's weights on AlexNet ({odd[0]} is missing or too much)")
+        raise InputError(f"{source}: not LPIPS's weights on AlexNet ({odd[0][:80]!r} is missing or too much)")
     for name, shape in shapes.items():
         a = named[name]
         if not isinstance(a, np.ndarray) or a.dtype != np.float32 or a.shape != shape:
@@ -112,7 +112,7 @@ def of_names(named: dict[str, Array], source: Path | str) -> Weights:
 def write(path: Path | str, weights: Weights) -> None:
     """As safetensors."""
     with atomic_file(path) as part:
-        part.write_bytes(save(weights.named(), {"source": f"{PACKAGE}, {MEMBER}, BSD"}))
+        part.write_bytes(save(weights.by_name(), {"source": f"{PACKAGE}, {MEMBER}, BSD"}))
 
 
 def read(path: Path | str, published: bool = True) -> Weights:
@@ -122,10 +122,10 @@ def read(path: Path | str, published: bool = True) -> Weights:
     """
     try:
         named = load_file(path)
-    except (OSError, SafetensorError, ValueError, KeyError) as error:
-        raise InputError(f"{path}: not readable as safetensors ({error})") from error
+    except (SafetensorError, *UNREADABLE) as error:
+        raise InputError(f"{path}: not readable as safetensors ({summarize_error(error)}); copy it again") from error
     weights = of_names(named, path)
     if published:
-        content = b"".join(a.astype("<f4").tobytes() for a in weights.named().values())
+        content = b"".join(a.astype("<f4").tobytes() for a in weights.by_name().values())
         require_digest(content, VALUES_SHA256, str(path))
     return weights

@@ -36,7 +36,7 @@ class InpaintingResult:
     objects: int
 
     def describe(self, grid: Ground) -> dict:
-        """The content of completion.json."""
+        """The content of completion.json; its key `things` counts Gaussians of objects."""
         block = np.s_[grid.first_row : grid.first_row + grid.cells, grid.first_column : grid.first_column + grid.cells]
         counts = {"cells": grid.heights.size, "unseen": int(self.unseen.sum()), "painted": int(self.inpainted.sum())}
         inside = {"unseen": int(self.unseen[block].sum()), "painted": int(self.inpainted[block].sum())}
@@ -45,7 +45,7 @@ class InpaintingResult:
 
 @dataclass(frozen=True)
 class _Scene:
-    """What all steps share. ground_colour: mean colour of the discs that photos saw."""
+    """Input of all steps. ground_colour: mean colour of the discs that photos saw."""
 
     grid: Ground
     frame: SceneFrame
@@ -167,7 +167,7 @@ def _mark_gaussians(field: GaussianField, marked: Bool[Array, "n"]) -> GaussianF
 
 def _add_occluders(scene: _Scene, field: GaussianField, targets: list[Float[Array, "3"]]) -> list[GaussianField]:
     """The objects on the inpainted ground about each target."""
-    found, size, flying_height = [], scene.config.model.size, scene.frame.flying_height
+    fields, size, flying_height = [], scene.config.model.size, scene.frame.flying_height
     ground_colour = _mean_ground_colour(field, scene.grid)
     for target in progress(targets, "find objects on it"):
         places = viewpoints.ABOVE + viewpoints.ASIDE
@@ -176,5 +176,5 @@ def _add_occluders(scene: _Scene, field: GaussianField, targets: list[Float[Arra
             condition = conditions.build_condition(field, pool, scene.photos, flying_height, size)
             nothing = np.zeros((len(pool), size, size), bool)
             views = inpaint_views(scene.config, condition, nothing, ground_colour)
-            found.append(occluders.find_occluders(field, scene.grid, pool, condition, views, flying_height))
-    return found
+            fields.append(occluders.find_occluders(field, scene.grid, pool, condition, views, flying_height))
+    return fields

@@ -5,10 +5,10 @@ from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
+from dav_gswt.geometry import camera_layouts
+from dav_gswt.geometry.camera_layouts import Place
 from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.geometry.scene_frame import SceneFrame
-from dav_gswt.photos.synthetic import camera_layouts
-from dav_gswt.photos.synthetic.camera_layouts import Place
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.views import collision
 from dav_gswt.views.candidates import Candidates

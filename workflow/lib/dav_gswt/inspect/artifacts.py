@@ -1,4 +1,4 @@
-"""Which artefact a path is, by its name and by what lies in a folder."""
+"""Recognise artefacts by their paths, and build their scenes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from dav_gswt.inspect.scene import Scene
 
 @dataclass(frozen=True)
 class ArtifactKind:
-    """build: makes the scene. options: of the command line that it knows. whole: it is given the folder of the file."""
+    """build: makes the scene. options: of the command line that it has. whole: build takes the folder of the file."""
 
     build: Callable[[Path, ViewOptions], Scene]
     options: tuple[str, ...] = ()
@@ -21,6 +21,7 @@ class ArtifactKind:
 
 FIELD = ArtifactKind(field_scenes.build_field, ("colour",))
 BY_NAME = {  # in the order in which a folder is searched for them
+    "materials.json": ArtifactKind(map_scenes.build_materials, ("channel",), whole=True),
     "levels.json": ArtifactKind(field_scenes.build_levels_scene, ("colour", "level"), whole=True),
     "seams.json": ArtifactKind(tile_scenes.build_tiles, ("colour", "level"), whole=True),
     "davgswt.json": ArtifactKind(tile_scenes.build_bundle, ("colour", "level"), whole=True),
@@ -34,20 +35,20 @@ BY_NAME = {  # in the order in which a folder is searched for them
 }
 BY_SUFFIX = {".ply": FIELD, ".exr": ArtifactKind(map_scenes.build_map, ("part", "channel"))}
 KNOWN = (
-    "fields (.ply, levels/), tiles_*/ and bundle_*/, photos/, views.json, capture/, scores.csv, poses.json, maps.npz "
-    "and .exr"
+    "fields (.ply, levels/), materials/, tiles_*/ and bundle_*/, photos/, views.json, capture/, scores.csv, "
+    "poses.json, maps.npz and .exr"
 )
 
 
-def build_scene(path: Path, asked: ViewOptions) -> Scene:
-    """The scene of an artefact. Raises: InputError: nothing that is understood, or damaged."""
+def build_scene(path: Path, options: ViewOptions) -> Scene:
+    """The scene of an artefact. Raises: InputError: an unknown kind of artefact, or a damaged one."""
     path, kind = recognise(path)
-    asked.reject_others(path, *kind.options)
-    return kind.build(path.parent if kind.whole else path, asked)
+    options.reject_others(path, *kind.options)
+    return kind.build(path.parent if kind.whole else path, options)
 
 
 def recognise(path: Path) -> tuple[Path, ArtifactKind]:
-    """The file that stands for a path, and what it is. Raises: InputError: none."""
+    """The file of an artefact and its kind. Raises: InputError: there is none, or it is of an unknown kind."""
     if path.is_dir():
         inside = next((path / name for name in BY_NAME if (path / name).is_file()), None)
         if inside is None and (path / "labels.npz").is_file():

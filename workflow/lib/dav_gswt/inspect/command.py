@@ -1,4 +1,4 @@
-"""`dav-gswt inspect PATH`: open what the workflow writes, in a window, as a picture or as a page."""
+"""`dav-gswt inspect PATH`: show a result of the workflow in a window, as a picture or as a page."""
 
 import argparse
 import importlib.util
@@ -18,7 +18,7 @@ def add_command(commands) -> None:
     """Add the command to a parser's commands."""
     about = "a field, poses, photos, tiles or maps in three dimensions (docs/inspect.md)"
     parser = commands.add_parser("inspect", help=about, description=__doc__)
-    parser.add_argument("path", type=Path, help="a file or folder of results/, or a 3D Gaussian .ply of anybody's")
+    parser.add_argument("path", type=Path, help="a file or folder of results/, or any 3D Gaussian .ply")
     parser.add_argument(
         "--save", type=Path, metavar="FILE", help="a picture (.png) or a page (.html), without a window"
     )
@@ -45,8 +45,8 @@ def add_command(commands) -> None:
 
 
 def run_inspect(options: argparse.Namespace) -> int:
-    """Show or save; the exit status. Raises: InputError: whatever stands in the way."""
-    asked = ViewOptions(**{name: getattr(options, name) for name in vars(ViewOptions())})
+    """Show or save; returns the exit status. Raises: InputError: there is no display, or see `artifacts`."""
+    view_options = ViewOptions(**{name: getattr(options, name) for name in vars(ViewOptions())})
     if options.save is not None and options.save.suffix not in FORMATS:
         raise InputError(f"--save {options.save}: pictures end in .png and pages in .html")
     require_extra()
@@ -54,7 +54,7 @@ def run_inspect(options: argparse.Namespace) -> int:
 
     if options.save is None and not saving.has_display():
         raise InputError("there is no display for a window here: add --save FILE.png or --save FILE.html")
-    scene = artifacts.build_scene(options.path, asked)
+    scene = artifacts.build_scene(options.path, view_options)
     if options.save is None:
         saving.open_window(scene, options.size)
     else:
@@ -72,8 +72,8 @@ def require_extra() -> None:
 
 
 def _parse_size(text: str) -> tuple[int, int]:
-    found = re.fullmatch(r"([1-9]\d{1,3})x([1-9]\d{1,3})", text)
-    if not found or max(size := (int(found[1]), int(found[2]))) > MAX_PIXELS:
+    match = re.fullmatch(r"([1-9]\d{1,3})x([1-9]\d{1,3})", text)
+    if not match or max(size := (int(match[1]), int(match[2]))) > MAX_PIXELS:
         raise argparse.ArgumentTypeError(f"{text!r} is no size like 1280x800, at most {MAX_PIXELS} a side")
     return size
 

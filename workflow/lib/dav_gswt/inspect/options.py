@@ -1,4 +1,4 @@
-"""What the command line asks of a scene."""
+"""Options of the command line for a scene."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,8 +10,15 @@ MAX_DRAWN = 300_000  # Gaussians or pixels that are drawn: what a browser withou
 
 @dataclass(frozen=True)
 class ViewOptions:
-    """None: what suits the artefact. colour: by what. level: of levels and tiles. part, channel: of maps. poses: a
-    poses.json. most: Gaussians, or pixels a map, at most."""
+    """Options of a scene; None is the artefact's default.
+
+    Attributes:
+        colour: what to colour by.
+        level: of levels and tiles.
+        part, channel: of maps.
+        poses: a poses.json whose poses are marked.
+        most: Gaussians, or pixels of a map, at most.
+    """
 
     colour: str | None = None
     level: int | None = None
@@ -21,20 +28,20 @@ class ViewOptions:
     most: int = MAX_DRAWN
 
     def reject_others(self, path: Path, *known: str) -> None:
-        """Raises: InputError: something is asked that means nothing here, by name."""
+        """Raises: InputError: an option is set that the artefact does not have."""
         for name in ("colour", "level", "part", "channel", "poses"):
             if getattr(self, name) is not None and name not in known:
-                can = ", ".join(f"--{k}" for k in known) or "none of its options"
-                raise InputError(f"--{name}: means nothing for {path}; it knows {can}")
+                accepted = ", ".join(f"--{k}" for k in known) or "none of its options"
+                raise InputError(f"--{name}: means nothing for {path}; it knows {accepted}")
 
     def choose_colour(self, names: tuple[str, ...], what: str) -> str:
-        """What to colour by; the first of names where nothing is asked. Raises: InputError: another name."""
+        """What to colour by; by default the first of names. Raises: InputError: another name."""
         if self.colour is not None and self.colour not in names:
             raise InputError(f"--colour {self.colour}: {what} has {', '.join(names)}")
         return self.colour or names[0]
 
     def choose_levels(self, count: int, path: Path) -> list[int]:
-        """All levels, or the one asked for. Raises: InputError: there is no such level."""
+        """All levels, or the selected one. Raises: InputError: there is no such level."""
         if self.level is None:
             return list(range(count))
         if not 0 <= self.level < count:

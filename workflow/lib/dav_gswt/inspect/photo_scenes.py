@@ -1,4 +1,4 @@
-"""The photos of a scene: where they were taken from, what structure from motion found, where tiles come from."""
+"""Scenes of photos: their cameras, the points of structure from motion, the exemplar and the visible ground."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -7,13 +7,12 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.inspect import result_files
 from dav_gswt.inspect.options import ViewOptions
-from dav_gswt.inspect.scene import ColourKey, Layer, Scene, hang_picture, make_outline, to_bytes
+from dav_gswt.inspect.scene import ColourKey, Layer, Scene, make_outline, make_picture, to_bytes
 from dav_gswt.photos.view_split import read_view_split
 
 DEPTH = 0.12  # flying heights from a camera to its picture
@@ -23,38 +22,21 @@ CAPTURE_ROLE = {"taken for a round": (170, 51, 119)}
 EXEMPLAR, EXTENT = (230, 140, 0), (120, 120, 120)
 
 
-def build_photos(path: Path, asked: ViewOptions) -> Scene:
+def build_photos(path: Path, options: ViewOptions) -> Scene:
     """photos/: its ground.json, model, photos, and views.json where one seed alone says what each is for."""
-    found = sorted(path.parent.glob("seed*/views.json"))
-    return arrange_photos(path, found[0] if len(found) == 1 else None, str(path), [])
+    splits = sorted(path.parent.glob("seed*/views.json"))
+    return arrange_photos(path, splits[0] if len(splits) == 1 else None, str(path), [])
 
 
-def build_split(path: Path, asked: ViewOptions) -> Scene:
+def build_split(path: Path, options: ViewOptions) -> Scene:
     """views.json: the photos by what they are for."""
-    return arrange_photos(_require_photos(path), path, str(path), [])
+    return arrange_photos(result_files.find_photos(path), path, str(path), [])
 
 
-def build_capture(path: Path, asked: ViewOptions) -> Scene:
+def build_capture(path: Path, options: ViewOptions) -> Scene:
     """capture.json: the photos of a round among those of the scene."""
-    return arrange_photos(
-        _require_photos(path), None, str(path), [(camera, path.parent / name) for name, camera in _check_shots(path)]
-    )
-
-
-def _require_photos(path: Path) -> Path:
-    if (found := result_files.find_photos(path)) is None:
-        raise InputError(
-            f"{path}: its scene's photos/ground.json is in no folder above it; leave it in its result tree"
-        )
-    return found
-
-
-def _check_shots(path: Path) -> list[tuple[str, Camera]]:
-    shots = result_files.read_shots(path)
-    for name, _ in shots:
-        if Path(name).name != name:
-            raise InputError(f"{path}: {name!r} is no file's name; take the photos again")
-    return shots
+    captured = [(camera, path.parent / name) for name, camera in result_files.read_shots(path)]
+    return arrange_photos(result_files.find_photos(path), None, str(path), captured)
 
 
 def arrange_photos(folder: Path, split: Path | None, title: str, captured: list[tuple[Camera, Path]]) -> Scene:
@@ -62,23 +44,23 @@ def arrange_photos(folder: Path, split: Path | None, title: str, captured: list[
     from dav_gswt.photos.colmap_model import read_colmap_model  # here, not above: it loads pycolmap
 
     frame = read_scene_frame(folder / "ground.json")
-    found = read_colmap_model(folder / "sparse")
+    model = read_colmap_model(folder / "sparse")
     roles = _read_roles(split)
-    reach = DEPTH * frame.flying_height
+    depth = DEPTH * frame.flying_height
     layers, used = outline_ground(frame), {}
-    for name, camera in zip(found.names, found.cameras, strict=True):
+    for name, camera in zip(model.names, model.cameras, strict=True):
         role = roles.get(name, "photo")
         used |= {role: ROLES[role]}
-        layers += make_frustum(camera, reach, ROLES[role], folder / "images" / name)
+        layers += make_frustum(camera, depth, ROLES[role], folder / "images" / name)
     for camera, file in captured:
         used |= CAPTURE_ROLE
-        layers += make_frustum(camera, reach, next(iter(CAPTURE_ROLE.values())), file)
-    if len(found.points):
-        layers.append(Layer("points", found.points.astype(np.float32), colours=to_bytes(found.colours), width=3.0))
-    eyes = np.array([c.centre for c in [*found.cameras, *(camera for camera, _ in captured)]]).reshape(-1, 3)
+        layers += make_frustum(camera, depth, next(iter(CAPTURE_ROLE.values())), file)
+    if len(model.points):
+        layers.append(Layer("points", model.points.astype(np.float32), colours=to_bytes(model.colours), width=3.0))
+    eyes = np.array([c.centre for c in [*model.cameras, *(camera for camera, _ in captured)]]).reshape(-1, 3)
     low, high = compute_bounds(frame, eyes)
     keys = ColourKey(used | {"exemplar": EXEMPLAR, "seen by a photo": EXTENT})
-    about = f"{len(eyes)} cameras, {len(found.points)} points; unit: {frame.unit[:40]}"
+    about = f"{len(eyes)} cameras, {len(model.points)} points; unit: {frame.unit[:40]}"
     return Scene(title, layers, low, high, [about], legend=[keys])
 
 
@@ -89,7 +71,7 @@ def _read_roles(split: Path | None) -> dict[str, str]:
 
 
 def outline_ground(frame: SceneFrame) -> list[Layer]:
-    """The exemplar's border and that of all ground that is seen, at height 0."""
+    """The borders of the exemplar and of all visible ground, at height 0."""
     square, extent = frame.exemplar, frame.extent
     return [
         make_outline(square.west, square.south, square.east, square.north, 0.0, EXEMPLAR),
@@ -104,18 +86,18 @@ def compute_bounds(frame: SceneFrame, eyes: Float[Array, "n 3"]) -> tuple[Float[
     return points.min(0), points.max(0)
 
 
-def make_frustum(camera: Camera, reach: float, colour: tuple[int, int, int], photo: Path | None) -> list[Layer]:
-    """A camera as the pyramid of what it sees, `reach` deep, its photo as the base, where there is one."""
+def make_frustum(camera: Camera, depth: float, colour: tuple[int, int, int], photo: Path | None) -> list[Layer]:
+    """A camera as the pyramid of its view, `depth` deep, with its photo as the base, where there is one."""
     w, h = camera.width, camera.height
     pixels = np.array([[0, 0], [w, 0], [w, h], [0, h]])
     rays = np.c_[(pixels - [camera.cx, camera.cy]) / [camera.fx, camera.fy], np.ones(4)] @ camera.rotation
-    corners = camera.centre + reach * rays
+    corners = camera.centre + depth * rays
     points = np.concatenate([camera.centre[None], corners]).astype(np.float32)
     edges = np.array([[0, 1], [0, 2], [0, 3], [0, 4], [1, 2], [2, 3], [3, 4], [4, 1]])
-    found = [Layer("lines", points, edges, colour)]
+    layers = [Layer("lines", points, edges, colour)]
     if photo is not None and photo.is_file():
         picture = image_files.read_photo(photo)
         share = min(1.0, MAX_SIDE / max(picture.shape[:2]))
         small = image_files.shrink_image(picture, *(max(1, round(n * share)) for n in picture.shape[1::-1]))
-        found.append(hang_picture(to_bytes(small), corners[0], corners[1] - corners[0], corners[3] - corners[0]))
-    return found
+        layers.append(make_picture(to_bytes(small), corners[0], corners[1] - corners[0], corners[3] - corners[0]))
+    return layers

@@ -1,4 +1,4 @@
-"""A scene in a window, as a picture, or as a page that needs nothing else."""
+"""Show a scene in a window, or save it as a picture or as a page without external resources."""
 
 import html
 import io
@@ -11,13 +11,15 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
+from jinja2 import Template
+
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_file
-from dav_gswt.inspect.scene import ColourBar, ColourKey, Scene, to_bytes
+from dav_gswt.inspect.scene import ColourBar, ColourKey, Scene
 
-WINDOWS = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")  # what VTK can draw in where there is no display
-PACKAGES = "libegl1 libgl1-mesa-dri"  # for the first; libosmesa6 for the second, with the same pictures
-VARIABLE = "VTK_DEFAULT_OPENGL_WINDOW"  # VTK's own: which of them it takes
+WINDOWS = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")  # VTK's off-screen windows
+PACKAGES = "libegl1 libgl1-mesa-dri"  # for the first window; the second needs libosmesa6
+VARIABLE = "VTK_DEFAULT_OPENGL_WINDOW"  # environment variable of VTK that selects one of them
 PROBE = """
 import sys
 import vtkmodules.vtkRenderingOpenGL2
@@ -34,8 +36,9 @@ POLICY = (
     "img-src blob: data:; style-src 'unsafe-inline'"
 )
 ADDRESS = r'(?<=")[0-9a-f]{16}(?=["-])|(?<=\$\{)[0-9a-f]{16}(?=[}-])'  # in names of VTK's objects
-ICON = "https://kitware.github.io/vtk-js/icon/favicon-"  # that the viewer would fetch
+ICON = "https://kitware.github.io/vtk-js/icon/favicon-"  # which the viewer would request
 STAGE = '<div class="content" style="position:fixed;inset:0"></div>'  # what the viewer fills
+OVERLAY = Path(__file__).with_name("overlay.html")  # Jinja2 template
 STAMP = (1980, 1, 1, 0, 0, 0)
 
 
@@ -45,18 +48,18 @@ def has_display() -> bool:
 
 
 def prepare_rendering() -> None:
-    """Choose how VTK draws without a display; to be called before VTK is loaded.
+    """Choose an off-screen window of VTK; to be called before VTK is loaded.
 
-    Raises: InputError: this machine has no way to, with the packages that bring one. It is tried out in a process of
-    its own: VTK may end one that has no way to draw.
+    Each is tested in a process of its own, since VTK may end a process that cannot draw.
+    Raises: InputError: none works here; the message names the packages to install.
     """
     if sys.platform != "linux":
         return
     tried = [os.environ[VARIABLE]] if VARIABLE in os.environ else WINDOWS
     for window in tried:
-        surroundings = os.environ | {VARIABLE: window}
-        command = [sys.executable, "-c", PROBE, window]  # VTK would fall back on the other one, and complain
-        done = subprocess.run(command, env=surroundings, capture_output=True, check=False)
+        environment = os.environ | {VARIABLE: window}
+        command = [sys.executable, "-c", PROBE, window]  # VTK alone would fall back on the other one with an error
+        done = subprocess.run(command, env=environment, capture_output=True, check=False)
         if done.returncode == 0:
             os.environ[VARIABLE] = window
             return
@@ -72,12 +75,12 @@ def save_scene(scene: Scene, path: Path, size: tuple[int, int]) -> None:
 
     with atomic_file(path) as part:
         if path.suffix == ".png":
-            drawn = plotting.make_plotter(scene, size, off_screen=True)
-            drawn.screenshot(str(part))
+            plotter = plotting.make_plotter(scene, size, off_screen=True)
+            plotter.screenshot(str(part))
         else:
-            drawn = plotting.make_plotter(scene, size, off_screen=True, legend=False)
-            part.write_text(format_page(scene, drawn.render_window), encoding="utf-8")
-        drawn.close()
+            plotter = plotting.make_plotter(scene, size, off_screen=True, legend=False)
+            part.write_text(format_page(scene, plotter.render_window), encoding="utf-8")
+        plotter.close()
 
 
 def open_window(scene: Scene, size: tuple[int, int]) -> None:
@@ -88,7 +91,7 @@ def open_window(scene: Scene, size: tuple[int, int]) -> None:
 
 
 def format_page(scene: Scene, render_window) -> str:
-    """The scene in a page of its own, VTK's viewer for browsers in it; the policy in its head forbids all requests."""
+    """A page with the scene and VTK's viewer for browsers; its content security policy forbids all requests."""
     from trame_vtk.tools.vtksz2html import write_html
 
     render_window.Render()
@@ -122,7 +125,7 @@ def _pack_scene(render_window) -> bytes:
 
 
 def _renumber(state: Any) -> dict:
-    """Objects numbered as they come, in place of their addresses in memory; without the times of their changes."""
+    """The state with objects numbered in order of appearance instead of by address, and without times of change."""
     text = json.dumps(state)
     numbers: dict[str, str] = {}
     text = re.sub(ADDRESS, lambda m: numbers.setdefault(m[0], f"{len(numbers):016x}"), text)
@@ -131,31 +134,11 @@ def _renumber(state: Any) -> dict:
 
 def _format_overlay(scene: Scene) -> str:
     """Title, notes and legend, above the picture."""
-    lines = [
-        f"<b>{html.escape(scene.title)}</b>",
-        *map(html.escape, scene.notes),
-        "drag to turn, shift-drag to move, wheel to zoom",
-    ]
-    for entry in scene.legend:
-        lines += [_format_bar(entry)] if isinstance(entry, ColourBar) else _format_keys(entry)
-    style = "position:fixed;left:8px;top:8px;z-index:9;font:13px sans-serif;color:#191919;pointer-events:none"
-    return f'<div id="about" style="{style}">{"<br>".join(lines)}</div>'
-
-
-def _format_bar(bar: ColourBar) -> str:
     from matplotlib import colormaps
+    from matplotlib.colors import to_hex
 
-    stops = ",".join(
-        _format_colour(c) for c in to_bytes(colormaps[bar.colours].resampled(STOPS)(range(STOPS))[:, :3]).tolist()
-    )
-    look = f"display:inline-block;width:140px;height:10px;background:linear-gradient(90deg,{stops})"
-    return f'{html.escape(bar.title)}: {bar.low:.3g} <span style="{look}"></span> {bar.high:.3g}'
-
-
-def _format_keys(keys: ColourKey) -> list[str]:
-    box = "display:inline-block;width:10px;height:10px;background:"
-    return [f'<span style="{box}{_format_colour(c)}"></span> {html.escape(name)}' for name, c in keys.named.items()]
-
-
-def _format_colour(colour) -> str:
-    return "rgb({},{},{})".format(*colour)
+    bars = [entry for entry in scene.legend if isinstance(entry, ColourBar)]
+    keys = [entry for entry in scene.legend if isinstance(entry, ColourKey)]
+    gradients = [[to_hex(colour) for colour in colormaps[bar.colours].resampled(STOPS)(range(STOPS))] for bar in bars]
+    template = Template(OVERLAY.read_text(encoding="utf-8"), autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    return template.render(scene=scene, bars=bars, keys=keys, gradients=gradients)

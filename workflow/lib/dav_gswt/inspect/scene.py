@@ -1,4 +1,4 @@
-"""What there is to see, as plain arrays: layers, words, and what the colours mean."""
+"""A scene as plain arrays: layers, labels, and the meaning of the colours."""
 
 from dataclasses import dataclass, field, replace
 
@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Int, UInt8
 from numpy import ndarray as Array
 
-UNCERTAINTY_MAP = "coolwarm"  # blue where all is known, red where nothing is
+UNCERTAINTY_MAP = "coolwarm"  # blue: certain, red: uncertain
 UNKNOWN = (150, 150, 150)  # the colour of what is NaN
 BLACK = (25, 25, 25)
 MAP_ENTRIES = 4096  # entries of a colour map: more steps than eight bits tell apart
@@ -14,9 +14,15 @@ MAP_ENTRIES = 4096  # entries of a colour map: more steps than eight bits tell a
 
 @dataclass(frozen=True)
 class Layer:
-    """Things of one kind. kind: faces (rows of `cells` are corners), lines (rows are both ends), points (no cells), or
-    picture (cells is one quad, its corners from the top left clockwise). colours: of a cell, of a point where there are
-    none, or one for all. width: pixels of a line or a point. picture: rows from the top."""
+    """Geometry of one kind.
+
+    Attributes:
+        kind: faces (rows of `cells` are corners), lines (rows are both ends), points (no cells), or picture (cells is
+            one quad, its corners from the top left clockwise).
+        colours: of each cell, of each point where there are no cells, or one for all.
+        width: of a line or a point, in pixels.
+        picture: rows from the top.
+    """
 
     kind: str
     points: Float32[Array, "n 3"]
@@ -28,8 +34,8 @@ class Layer:
 
 @dataclass(frozen=True)
 class Label:
-    """Letters in the scene, `height` world units tall, centred at a place. standing: upright, towards the viewer that
-    the scene starts with; else they lie on the ground."""
+    """Text in the scene, `height` world units tall, centred at a place. upright: facing the first view; else it lies on
+    the ground."""
 
     text: str
     place: tuple[float, float, float]
@@ -56,17 +62,23 @@ class ColourKey:
 
 @dataclass(frozen=True)
 class Scene:
-    """title: a line that says what it is. notes: lines below it. seen_from: the direction in which the viewer stands at
-    first. low, high: the box that is to be seen whole at first. flat: pictures side by side, seen straight on."""
+    """Content of a window, picture or page.
+
+    Attributes:
+        title: one line. notes: lines below it.
+        low, high: the box that the first view shows whole.
+        viewer: direction from the box to the viewer in the first view.
+        flat: pictures side by side, seen straight on.
+    """
 
     title: str
     layers: list[Layer]
     low: Float[Array, "3"]
     high: Float[Array, "3"]
     notes: list[str] = field(default_factory=list)
-    words: list[Label] = field(default_factory=list)
+    labels: list[Label] = field(default_factory=list)
     legend: list[ColourBar | ColourKey] = field(default_factory=list)
-    seen_from: tuple[float, float, float] = (-0.45, -1.0, 0.75)
+    viewer: tuple[float, float, float] = (-0.45, -1.0, 0.75)
     flat: bool = False
 
 
@@ -83,20 +95,20 @@ def map_colours(values: Float[Array, "*n"], bar: ColourBar) -> UInt8[Array, "*n 
     span = bar.high - bar.low
     share = (np.where(known, values, bar.low) - bar.low) / (span if span > 0 else 1.0)
     table = to_bytes(colormaps[bar.colours].resampled(MAP_ENTRIES)(np.arange(MAP_ENTRIES))[:, :3])
-    found = table[np.rint(np.clip(share, 0, 1) * (MAP_ENTRIES - 1)).astype(int)]
-    found[~known] = UNKNOWN
-    return found
+    colours = table[np.rint(np.clip(share, 0, 1) * (MAP_ENTRIES - 1)).astype(int)]
+    colours[~known] = UNKNOWN
+    return colours
 
 
 def make_bar(title: str, values: Float[Array, "*n"], colours: str = UNCERTAINTY_MAP, most: float = 1.0) -> ColourBar:
-    """A bar from the least value to the quantile `most`; of a constant or of nothing one unit wide."""
+    """A bar from the least value to the quantile `most`; one unit wide if the values are constant or none is finite."""
     known = values[np.isfinite(values)]
     low, high = (float(known.min()), float(np.quantile(known, most))) if known.size else (0.0, 1.0)
     return ColourBar(title, low, high if high > low else low + 1.0, colours)
 
 
 def move_layer(layer: Layer, by: Float[Array, "3"]) -> Layer:
-    """The layer elsewhere."""
+    """The layer, translated."""
     return replace(layer, points=(layer.points + by).astype(np.float32))
 
 
@@ -121,9 +133,9 @@ def copy_shape(points: Float[Array, "n v 3"], faces: Int[Array, "f k"], colours:
     return Layer("faces", points.reshape(-1, 3).astype(np.float32), cells, np.repeat(colours, len(faces), 0))
 
 
-def hang_picture(
+def make_picture(
     picture: UInt8[Array, "h w 3"], corner: Float[Array, "3"], right: Float[Array, "3"], down: Float[Array, "3"]
-):
+) -> Layer:
     """A picture on a parallelogram, from its top left corner along its upper and its left border."""
     points = np.array([corner, corner + right, corner + right + down, corner + down])
     return Layer("picture", points.astype(np.float32), np.array([[0, 1, 2, 3]]), picture=picture)

@@ -1,4 +1,4 @@
-"""Tile sets: the sixteen laid so that every pair of neighbours meets, with their cuts; sets of a bundle without."""
+"""Scenes of tile sets: sixteen tiles arranged so that neighbours match, with their cuts; a bundle has no cuts."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from dav_gswt.inspect.field_scenes import (
     COLOUR_NAMES,
     LEVEL_COLOURS,
     compute_colours,
-    level_colour,
+    make_legend,
     make_solids,
     shade_colours,
     thin_field,
@@ -27,71 +27,71 @@ from dav_gswt.tiles.build import TileSet
 from dav_gswt.tiles.layout import EDGES, LABELS, arrange_torus
 
 GAP, LETTER = 0.2, 0.1  # tile sides
-CUT_WIDTH, MIN_CUT_WIDTH, CUT_LIFT = (
-    0.35,
-    0.012,
-    0.6,
-)  # a cut's width in finest cells, and at least in tiles; its height in a level's
+CUT_WIDTH, MIN_CUT_WIDTH = 0.35, 0.012  # of a cut: in finest cells, and at least in tile sides
+CUT_LIFT = 0.6  # of a cut above the ground, in cells of its level
 CUT_COLOUR = (255, 214, 10)
 PATCH_COLOURS = [(187, 187, 187), *LEVEL_COLOURS[:4], (102, 204, 238), (170, 51, 119), (153, 102, 51), (0, 0, 0)]
 SCHEMA = Path(__file__).parents[3] / "schemas" / "davgswt.schema.json"
 
 
-def build_tiles(path: Path, asked: ViewOptions) -> Scene:
+def build_tiles(path: Path, options: ViewOptions) -> Scene:
     """A folder of tiles, or its seams.json."""
     seams = path / "seams.json"
-    with result_files.blaming(seams):
-        found = store.read_tiles(path / "tiles", seams)
-        _check_labels(found, seams)
-    return arrange_tiles(str(path), found.fields, found.side, found, asked)
+    with result_files.wrap_errors(seams):
+        tiles = store.read_tiles(path / "tiles", seams)
+        _check_labels(tiles, seams)
+    return arrange_tiles(str(path), tiles.fields, tiles.side, tiles, options)
 
 
-def build_bundle(path: Path, asked: ViewOptions) -> Scene:
-    """A bundle's folder: the tiles as they were rounded; it keeps no cuts."""
+def build_bundle(path: Path, options: ViewOptions) -> Scene:
+    """A bundle's folder: the quantized tiles, without cuts."""
     if not SCHEMA.is_file():
         raise InputError(f"{path}: bundles are read by {SCHEMA}, which is not there; install from a checkout")
-    found = bundles.read_bundle(path, SCHEMA)
-    with result_files.blaming(path / "davgswt.json"):
-        side = found.manifest.tile_side
-    return arrange_tiles(str(path), found.fields(), side, None, asked)
+    bundle = bundles.read_bundle(path, SCHEMA)
+    with result_files.wrap_errors(path / "davgswt.json"):
+        side = bundle.manifest.tile_side
+    return arrange_tiles(str(path), bundle.fields(), side, None, options)
 
 
-def _check_labels(found: TileSet, seams: Path) -> None:
-    labels = found.labels
+def _check_labels(tiles: TileSet, seams: Path) -> None:
+    labels = tiles.labels
     fits = labels.ndim == 3 and labels.shape[1] == labels.shape[2] and labels.dtype.kind in "ui"
     if not fits or len(labels) % EDGES or labels.max(initial=0) >= len(LABELS):
         raise InputError(f"{seams}: labels.npz is not a map of each of its tiles; cut them again")
-    if not (0 < found.side < np.inf and abs(labels.shape[1] * found.spacing - found.side) < 1e-6 * found.side):
-        raise InputError(f"{seams}: its tiles are {found.side} wide and their maps are not; cut them again")
+    if not (0 < tiles.side < np.inf and abs(labels.shape[1] * tiles.spacing - tiles.side) < 1e-6 * tiles.side):
+        raise InputError(f"{seams}: its tiles are {tiles.side} wide and their maps are not; cut them again")
 
 
 def arrange_tiles(
-    title: str, found: list[list[GaussianField]], side: float, cut: TileSet | None, asked: ViewOptions
+    title: str, fields: list[list[GaussianField]], side: float, cut: TileSet | None, options: ViewOptions
 ) -> Scene:
-    """All tiles of a level, or at `level` all levels in a row, the finest in the west. cut: where seams run."""
-    by = asked.choose_colour((*COLOUR_NAMES, "patch") if cut else COLOUR_NAMES, title)
-    numbers = asked.choose_levels(len(found), Path(title))
-    if asked.level is None and by != "level":
+    """All tiles of a level, or, coloured by `level`, all levels in a row, the finest in the west.
+
+    cut: the tile set whose cuts are drawn; None: no cuts.
+    """
+    by = options.choose_colour((*COLOUR_NAMES, "patch") if cut else COLOUR_NAMES, title)
+    numbers = options.choose_levels(len(fields), Path(title))
+    if options.level is None and by != "level":
         numbers = numbers[:1]
     step, tall = side * (1 + GAP), TILES_PER_ROW * side * (1 + GAP)
-    wide = tall * (len(found[0]) // EDGES)
-    layers, words = [], []
+    wide = tall * (len(fields[0]) // EDGES)
+    layers, labels = [], []
     for place, number in enumerate(numbers):
-        for tile, corner in place_tiles(len(found[0]), step):
+        for tile, corner in place_tiles(len(fields[0]), step):
             corner = corner + [place * (wide + 2 * GAP * side), 0.0, 0.0]
-            some = thin_field(found[number][tile], asked.most // len(found[0]) // len(numbers))
-            layers += [move_layer(layer, corner) for layer in _tile_layers(some, by, number, tile, cut)]
+            field = thin_field(fields[number][tile], options.most // len(fields[0]) // len(numbers))
+            layers += [move_layer(layer, corner) for layer in _make_tile_layers(field, by, number, tile, cut)]
             if cut and by != "patch":
                 layers.append(move_layer(make_cuts(cut, tile, number), corner))
             if place == 0:
-                middle = float(np.median(some.means[:, 2])) if len(some) else 0.0
+                middle = float(np.median(field.means[:, 2])) if len(field) else 0.0
                 at = corner + [0.5 * side, -0.6 * GAP * side, middle]
-                words.append(Label(f"{tile}", tuple(at), LETTER * side, upright=False))
+                labels.append(Label(f"{tile}", tuple(at), LETTER * side, upright=False))
     low = np.array([0.0, -GAP * side, 0.0])
     high = np.array([wide + (len(numbers) - 1) * (wide + 2 * GAP * side), tall - GAP * side, 0.2 * side])
-    about = f"{len(found[0])} tiles, {len(found)} levels, {side:.4g} wide; by {by}"
+    about = f"{len(fields[0])} tiles, {len(fields)} levels, {side:.4g} wide; by {by}"
     shown = "levels " + ", ".join(map(str, numbers)) if len(numbers) > 1 else f"level {numbers[0]}"
-    return Scene(title, layers, low, high, [about, shown], words, _make_legend(by, numbers, cut), (-0.25, -1.0, 1.3))
+    return Scene(title, layers, low, high, [about, shown], labels, _make_legend(by, numbers, cut), (-0.25, -1.0, 1.3))
 
 
 def place_tiles(count: int, step: float) -> list[tuple[int, Float[Array, "3"]]]:
@@ -103,18 +103,19 @@ def place_tiles(count: int, step: float) -> list[tuple[int, Float[Array, "3"]]]:
     ]
 
 
-def _tile_layers(some: GaussianField, by: str, level: int, tile: int, cut: TileSet | None) -> list[Layer]:
-    if not len(some):
+def _make_tile_layers(field: GaussianField, by: str, level: int, tile: int, cut: TileSet | None) -> list[Layer]:
+    if not len(field):
         return []
     if by != "patch" or cut is None:
-        return make_solids(some, compute_colours(some, by, level))
-    return make_solids(some, shade_colours(np.array(PATCH_COLOURS)[find_patches(some, cut, tile)], some))
+        return make_solids(field, compute_colours(field, by, level))
+    patches = np.array(PATCH_COLOURS)[find_patches(field, cut, tile)]
+    return make_solids(field, shade_colours(patches, field))
 
 
-def find_patches(some: GaussianField, cut: TileSet, tile: int) -> Integer[Array, "n"]:
+def find_patches(field: GaussianField, cut: TileSet, tile: int) -> Integer[Array, "n"]:
     """The label of the cell that each Gaussian lies over; of the nearest one, beyond the tile."""
     last = cut.labels.shape[1] - 1
-    column, row = np.clip(some.means[:, :2] / cut.spacing, 0, last).astype(int).T
+    column, row = np.clip(field.means[:, :2] / cut.spacing, 0, last).astype(int).T
     return cut.labels[tile][row, column]
 
 
@@ -143,11 +144,11 @@ def _make_ribbons(starts: Float[Array, "n 3"], shape: Float[Array, "4 2"], spaci
     return points
 
 
-def compute_heights(some: GaussianField, cells: int, spacing: float) -> Float[Array, "cells cells"]:
+def compute_heights(field: GaussianField, cells: int, spacing: float) -> Float[Array, "cells cells"]:
     """The ground's height over a tile's finest cells: the highest disc's, of the nearest cell where there is none."""
     from scipy.ndimage import distance_transform_edt
 
-    ground = some[some.ground] if some.ground.any() else some
+    ground = field[field.ground] if field.ground.any() else field
     out = np.full((cells, cells), -np.inf)
     if not len(ground):
         return np.zeros_like(out)
@@ -158,13 +159,7 @@ def compute_heights(some: GaussianField, cells: int, spacing: float) -> Float[Ar
 
 
 def _make_legend(by: str, numbers: list[int], cut: TileSet | None) -> list[ColourBar | ColourKey]:
-    entries: list[ColourBar | ColourKey] = []
-    if by == "uncertainty":
-        entries.append(ColourBar("uncertainty", 0.0, 1.0))
-    elif by == "level":
-        entries.append(ColourKey({f"level {n}": level_colour(n) for n in numbers}))
-    elif by == "patch":
-        entries.append(ColourKey(dict(zip(LABELS, PATCH_COLOURS, strict=True))))
-    if cut is not None and by != "patch":
-        entries.append(ColourKey({"cut": CUT_COLOUR}))
-    return entries
+    if by == "patch":
+        return [ColourKey(dict(zip(LABELS, PATCH_COLOURS, strict=True)))]
+    cuts = [ColourKey({"cut": CUT_COLOUR})] if cut is not None else []
+    return make_legend(by, numbers) + cuts

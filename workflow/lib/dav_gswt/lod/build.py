@@ -28,13 +28,11 @@ from dav_gswt.reconstruction.observation import mask_to_ground
 _log = logging.getLogger(__name__)
 
 MIN_CELLS = 32  # cells that the exemplar is wide at least at a level that is fitted: coarser ones are made tile by tile
-MAX_SHARE = 0.5  # of a level's Gaussians that the next one must do without, or it is not worth having
-ELEVATIONS = (90.0, 50.0, 20.0, 6.0)  # degrees: pictures the coarser level is fitted to, down to a walker's
+MAX_SHARE = 0.5  # of a level's Gaussians that the next one may have at most
+ELEVATIONS = (90.0, 50.0, 20.0, 6.0)  # degrees: pictures the coarser level is fitted to, down to eye level
 AZIMUTHS = 6  # azimuths of each elevation but the zenith's
-CLEARANCE = 2.0  # discs that a thing may rise above the highest it starts from
-PIXELS_PER_DISC = (
-    2.0  # of a picture for one coarse disc: at the distance where a level is used a disc is about a pixel wide
-)
+CLEARANCE = 2.0  # discs that an object may rise above its highest start
+PIXELS_PER_DISC = 2.0  # of a coarse disc: where a level is used, a disc is about a pixel wide
 
 
 class FixedHeights(GroundConstraints):
@@ -77,7 +75,7 @@ def build_levels(
 
 
 def _reason_to_drop(finer: GaussianField, level: GaussianField) -> str | None:
-    """Why a level is not worth having; None if it is."""
+    """Why a level is not kept; None if it is."""
     if not mean_scale([level]) > mean_scale([finer]):
         return "its mean scale does not rise"
     if len(level) > MAX_SHARE * len(finer):
@@ -91,12 +89,13 @@ def fit_coarser_level(
     """The next level: half the resolution, about a quarter of the Gaussians, fitted for `steps` steps."""
     start, coarse = halve_resolution(*crop_to_blocks(field, grid, 2))
     views = mask_to_ground(render_neighbour_views(field, coarse), coarse)
-    stand = start[~start.ground]
+    objects = start[~start.ground]
     top = CLEARANCE * coarse.spacing
-    if len(stand):
-        top += float((stand.means[:, 2] - coarse.height_at(stand.means)).max())
+    if len(objects):
+        top += float((objects.means[:, 2] - coarse.height_at(objects.means)).max())
     constraints, plan = FixedHeights(coarse, np.full(coarse.shape, top)), FitPlan(steps, len(start))
-    level = trainer.fit_field(start, views, plan, constraints, rng, f"fit level of {len(start)} Gaussians", keep).field
+    options = trainer.FitOptions(f"fit level of {len(start)} Gaussians", keep)
+    level = trainer.fit_field(start, views, plan, constraints, rng, options).field
     scales = mean_scale([field]), mean_scale([level])
     _log.info("mean scale %.4g to %.4g, %d to %d Gaussians", *scales, len(field), len(level))
     return level, coarse
@@ -107,12 +106,11 @@ def render_neighbour_views(field: GaussianField, coarse: Ground) -> list[Trainin
 
     They are rendered at twice the size and averaged, so that splats finer than a pixel do not alias.
     """
-    drawn, views = raster.Rasterizer(), []
+    rasterizer, views = raster.Rasterizer(), []
     for number, camera in enumerate(_neighbour_cameras(coarse)):
         fine = camera.resized(2 * camera.width, 2 * camera.height)
-        seen = drawn.forward(**to_raster_arrays(field), camera=fine)
-        # what shines through is not the field's colour: divide it out
-        colour = seen.colour / np.maximum(seen.alpha, 0.5)[..., None]
+        render = rasterizer.forward(**to_raster_arrays(field), camera=fine)
+        colour = render.colour / np.maximum(render.alpha, 0.5)[..., None]  # without the background
         image = image_files.shrink_image(np.clip(colour, 0, 1).astype(np.float32), camera.width, camera.height)
         views.append(TrainingView(f"neighbour_{number}", camera, image, np.ones(image.shape[:2], np.float32)))
     return views
@@ -125,11 +123,11 @@ def _neighbour_cameras(grid: Ground) -> list[Camera]:
     side = int(np.clip(PIXELS_PER_DISC * max(rows, columns), 64, 1024))
     fov = 40.0
     radius = 0.6 * max(width, height) / np.tan(np.radians(fov / 2))
-    found = []
+    views = []
     for elevation in ELEVATIONS:
         for step in range(1 if elevation == 90.0 else AZIMUTHS):
             azimuth = np.radians(360 / AZIMUTHS * (step + 0.5 * (elevation < 50)))
             e = np.radians(elevation)
             away = radius * np.array([np.cos(e) * np.cos(azimuth), np.cos(e) * np.sin(azimuth), np.sin(e)])
-            found.append(cameras.pinhole(centre + away, centre, side, side, fov))
-    return found
+            views.append(cameras.pinhole(centre + away, centre, side, side, fov))
+    return views

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from dav_gswt.field import GaussianField
 from dav_gswt.reconstruction.ground import Ground
 
-AUTO = "auto"  # as many levels as are worth having
+AUTO = "auto"  # as many levels as save enough Gaussians
 MAX_LEVELS = 6  # with AUTO
 
 
@@ -16,7 +16,7 @@ class Levels:
     Attributes:
         fields, grids: the Gaussians of each level and its ground grid.
         wanted: how many levels the tiles are to have: a number or AUTO.
-        stopped: why no coarser level was fitted, for people.
+        stopped: why no coarser level was fitted, as a message.
     """
 
     fields: list[GaussianField]

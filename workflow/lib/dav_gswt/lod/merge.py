@@ -1,4 +1,4 @@
-"""From one level's Gaussians to a quarter as many: cells of the ground four to one, things by their moments."""
+"""Merge a level's Gaussians to a quarter as many: ground discs four to one, objects by moments within voxels."""
 
 from dataclasses import replace
 
@@ -15,8 +15,8 @@ from dav_gswt.reconstruction.top_view import render_top_view
 
 def crop_to_blocks(field: GaussianField, grid: Ground, block: int) -> tuple[GaussianField, Ground]:
     """Field and grid cut down to whole blocks of cells that start at the exemplar's corner."""
-    under = underlay.find_rows(field, grid)
-    had = under.stop > under.start
+    rows_of_underlay = underlay.find_rows(field, grid)
+    has_underlay = rows_of_underlay.stop > rows_of_underlay.start
     field = underlay.remove_underlay(field, grid)
     rows, columns = grid.shape
     below, left = grid.first_row % block, grid.first_column % block
@@ -32,18 +32,17 @@ def crop_to_blocks(field: GaussianField, grid: Ground, block: int) -> tuple[Gaus
         heights=grid.heights[window],
         seen=grid.seen[window],
     )
-    stand = np.flatnonzero(~field.ground)
-    stand = stand[small.contains(field.means[stand])]
-    discs_alone, standing = field[np.asarray(keep, int)], field[stand]
-    return concatenate_fields(
-        [discs_alone, underlay.make_underlay(small, discs_alone), standing] if had else [discs_alone, standing]
-    ), small
+    inside = np.flatnonzero(~field.ground)
+    inside = inside[small.contains(field.means[inside])]
+    ground_discs, objects = field[np.asarray(keep, int)], field[inside]
+    layers = [underlay.make_underlay(small, ground_discs)] if has_underlay else []
+    return concatenate_fields([ground_discs, *layers, objects]), small
 
 
 def halve_resolution(field: GaussianField, grid: Ground) -> tuple[GaussianField, Ground]:
-    """Twice the spacing: four discs become one with their mean colour, height and uncertainty; things merge likewise.
+    """Twice the spacing: four discs become one with their mean colour, height and uncertainty; objects merge likewise.
 
-    The grid's shape, first_row, first_column and cells must be even (see cropped).
+    The grid's shape, first_row, first_column and cells must be even (see `crop_to_blocks`).
     """
     coarse = replace(
         grid,
@@ -57,23 +56,23 @@ def halve_resolution(field: GaussianField, grid: Ground) -> tuple[GaussianField,
     n = grid.heights.size
     if field.ground.any():
         colours = field.base_colours[:n].reshape(*grid.shape, 3)
-        doubt, things = field.uncertainty[:n].reshape(grid.shape), underlay.remove_underlay(field, grid)[n:]
-    else:  # a finished field: its ground is what it shows from above, its things stand higher than the discs reach
+        uncertainty, objects = field.uncertainty[:n].reshape(grid.shape), underlay.remove_underlay(field, grid)[n:]
+    else:  # an imported field: its ground is its top view, objects are what lies above the height of discs
         maps = render_top_view(field, grid)
-        colours, doubt = maps.colour, maps.uncertainty
+        colours, uncertainty = maps.colour, maps.uncertainty
         above = field.means[:, 2] - grid.height_at(field.means)
-        things = field[above > discs.OBJECT_HEIGHT * coarse.spacing]
+        objects = field[above > discs.OBJECT_HEIGHT * coarse.spacing]
     base = discs.make_ground_discs(coarse, _mean4(colours.astype(float)).reshape(-1, 3))
-    base = replace(base, uncertainty=_mean4(doubt.astype(float)).ravel().astype(np.float32))
+    base = replace(base, uncertainty=_mean4(uncertainty.astype(float)).ravel().astype(np.float32))
     return concatenate_fields(
-        [base, underlay.make_underlay(coarse, base), merge_by_voxel(things, coarse.spacing)]
+        [base, underlay.make_underlay(coarse, base), merge_by_voxel(objects, coarse.spacing)]
     ), coarse
 
 
 def merge_by_voxel(field: GaussianField, voxel: float) -> GaussianField:
     """Gaussians of one voxel as one Gaussian with their common mean, covariance, colour and opaque area.
 
-    Weights are opacity times the area of the two larger axes: what a picture of them shows. The merged opacity keeps
+    Weights are opacity times the area of the two larger axes, as visible in a picture. The merged opacity keeps
     the sum of those weights, at most 0.99.
     """
     if not len(field):

@@ -1,4 +1,7 @@
-"""Levels on disk, in one folder: level{l}.ply, the grid level{l}.exr of each, and levels.json."""
+"""Levels on disk, in one folder: level{l}.ply, the grid level{l}.exr of each, and levels.json.
+
+The levels of further materials are in the folders material1, material2, ... of the first one's.
+"""
 
 from pathlib import Path
 
@@ -9,32 +12,60 @@ from dav_gswt.lod.levels import Levels
 from dav_gswt.reconstruction import ground
 
 
+def material_folder(folder: Path | str, number: int) -> Path:
+    """Where the files of a material are; those of the first are in the folder itself."""
+    return Path(folder, f"material{number}") if number else Path(folder)
+
+
 def write_levels(levels: Levels, folder: Path | str, provenance: dict) -> None:
     """Write the levels; the folder appears whole or not at all."""
+    write_material_levels([levels], folder, provenance)
+
+
+def write_material_levels(sets: list[Levels], folder: Path | str, provenance: dict) -> None:
+    """Write the levels of several materials; the folder appears whole or not at all."""
     with atomic_folder(folder) as part:
-        for number, (fitted, grid) in enumerate(zip(levels.fields, levels.grids, strict=True)):
-            write_field(fitted, part / f"level{number}.ply")
-            ground.write_ground(grid, part / f"level{number}.exr")
-        table = [
-            {"level": number, "spacing": grid.spacing, "gaussians": len(f), "mean_scale": mean_scale([f])}
-            for number, (f, grid) in enumerate(zip(levels.fields, levels.grids, strict=True))
-        ]
-        told = {"wanted": levels.wanted, "levels": table, "stopped": levels.stopped, "provenance": provenance}
-        write_json(part / "levels.json", told)
+        for number, levels in enumerate(sets):
+            own = material_folder(part, number)
+            own.mkdir(exist_ok=True)
+            _write_folder(levels, own, provenance)
+
+
+def _write_folder(levels: Levels, part: Path, provenance: dict) -> None:
+    for number, (fitted, grid) in enumerate(zip(levels.fields, levels.grids, strict=True)):
+        write_field(fitted, part / f"level{number}.ply")
+        ground.write_ground(grid, part / f"level{number}.exr")
+    table = [
+        {"level": number, "spacing": grid.spacing, "gaussians": len(f), "mean_scale": mean_scale([f])}
+        for number, (f, grid) in enumerate(zip(levels.fields, levels.grids, strict=True))
+    ]
+    content = {"wanted": levels.wanted, "levels": table, "stopped": levels.stopped, "provenance": provenance}
+    write_json(part / "levels.json", content)
+
+
+def read_material_levels(folder: Path | str) -> list[Levels]:
+    """Read what `write_material_levels` wrote. Raises: InputError: see `read_levels`."""
+    sets = [read_levels(folder)]
+    while material_folder(folder, len(sets)).is_dir():
+        sets.append(read_levels(material_folder(folder, len(sets))))
+    return sets
 
 
 def read_levels(folder: Path | str) -> Levels:
     """Read what `write_levels` wrote. Raises: InputError: a file is missing or not what levels.json says."""
     folder = Path(folder)
-    told = read_json(folder / "levels.json")
+    content = read_json(folder / "levels.json")
     try:
-        counts = [entry["gaussians"] for entry in told["levels"]]
-        wanted, stopped = told["wanted"], told["stopped"]
-    except (KeyError, TypeError) as error:
-        raise InputError(f"{folder / 'levels.json'}: {error} is missing; make the levels again") from None
+        counts = [entry["gaussians"] for entry in content["levels"]]
+        wanted, stopped = content["wanted"], content["stopped"]
+        if not counts or not isinstance(wanted, int | str) or not isinstance(stopped, str):
+            raise ValueError("a value is of another type")
+    except (KeyError, TypeError, ValueError) as error:
+        why = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+        raise InputError(f"{folder / 'levels.json'}: not a table of levels ({why}); make the levels again") from error
     fields = [read_field(folder / f"level{number}.ply") for number in range(len(counts))]
     if [len(f) for f in fields] != counts:
-        raise InputError(f"{folder}: the levels are not those that levels.json tells of; make them again")
+        raise InputError(f"{folder}: the levels are not those that levels.json lists; make them again")
     return Levels(
         fields, [ground.read_ground(folder / f"level{number}.exr") for number in range(len(counts))], wanted, stopped
     )

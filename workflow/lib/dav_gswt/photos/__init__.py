@@ -1,1 +1,1 @@
-"""Photos in: structure from motion, a synthetic scene or a finished field, all in a z-up ground frame."""
+"""Photos: structure from motion, a synthetic scene or a finished field, each in a ground frame with z up."""

@@ -3,8 +3,8 @@
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from dav_gswt.errors import InputError
-from dav_gswt.files import read_json, write_json
+from dav_gswt.errors import InputError, summarize_error
+from dav_gswt.files import parse_record, read_json, require_file_name, write_json
 from dav_gswt.geometry.cameras import Camera, camera_from_json, camera_to_json
 from dav_gswt.geometry.poses import Pose
 
@@ -41,16 +41,19 @@ def write_capture_record(folder: Path, agent: str, photos: list[CapturedPhoto]) 
 
 
 def read_capture_record(folder: Path | str) -> list[CapturedPhoto]:
-    """Read capture.json. Raises: InputError: not such a record."""
+    """Read capture.json. Raises: InputError: not such a record, or a photo's name leads out of the folder."""
     path = Path(folder) / "capture.json"
     try:
         return [_parse_photo(row) for row in read_json(path)["shots"]]
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{path}: not the record of a capture ({error}); make it again") from error
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{path}: not the record of a capture ({summarize_error(error)}); make it again") from error
 
 
 def _parse_photo(row: dict) -> CapturedPhoto:
-    pose = dict(row["asked"])
-    requested = camera_from_json(pose.pop("camera"))
+    values = dict(row["asked"])
+    requested = camera_from_json(values.pop("camera"))
     camera = camera_from_json(row["got"])
-    return CapturedPhoto(row["name"], Pose(**pose), requested, camera, row["asked_to_got"], row["taken"])
+    pose, distance, taken = parse_record(values, Pose), row["asked_to_got"], row["taken"]
+    if not isinstance(distance, int | float) or not isinstance(taken, str | None):
+        raise TypeError("a distance or a time is none")
+    return CapturedPhoto(require_file_name(row["name"]), pose, requested, camera, float(distance), taken)

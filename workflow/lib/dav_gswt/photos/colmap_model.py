@@ -1,4 +1,4 @@
-"""A sparse model as plain arrays: pinhole cameras, points, and which camera saw which point where."""
+"""A sparse model as arrays: pinhole cameras, points, and the observations of points by cameras."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -130,7 +130,7 @@ def triangulate_model(model: ColmapModel, names: Sequence[str], at_least: int = 
     part = _with_images(model, [i for i, name in enumerate(model.names) if name in set(names)])
     part = replace(part, colours=np.full(model.points.shape, 0.5, np.float32))
     part = _with_points(part, np.bincount(part.point_of, minlength=len(part.points)) >= at_least)
-    points, spread = _crossings(part)
+    points, spread = _intersect_rays(part)
     part = replace(part, points=points)
     good = spread >= 1 - np.cos(np.radians(LEAST_ANGLE))
     np.logical_and.at(good, part.point_of, reprojection_errors(part) <= WORST_ERROR)
@@ -138,11 +138,11 @@ def triangulate_model(model: ColmapModel, names: Sequence[str], at_least: int = 
 
 
 def measure_parallax(model: ColmapModel) -> Float[Array, "n"]:
-    """1 - cos of the angle under which each point is seen: see `_crossings`."""
-    return _crossings(model)[1]
+    """1 - cos of the angle under which each point is seen: see `_intersect_rays`."""
+    return _intersect_rays(model)[1]
 
 
-def _crossings(model: ColmapModel) -> tuple[Float[Array, "n 3"], Float[Array, "n"]]:
+def _intersect_rays(model: ColmapModel) -> tuple[Float[Array, "n 3"], Float[Array, "n"]]:
     """The points nearest to their rays, and how well the rays fix them.
 
     The second is the least eigenvalue of sum_i (I - d_i d_i^T): for two rays at angle a it is 1 - cos a, 0 where all

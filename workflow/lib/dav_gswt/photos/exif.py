@@ -1,4 +1,4 @@
-"""What a photo's EXIF claims: focal length in pixels of the picture as it is, position, and time."""
+"""EXIF of a photo: focal length in pixels of the picture as it is, position, and time."""
 
 import math
 from datetime import datetime

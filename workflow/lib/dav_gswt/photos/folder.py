@@ -1,4 +1,4 @@
-"""The photos/ folder: pictures, sparse model and ground.json, there whole or not at all."""
+"""The photos/ folder: pictures, sparse model and ground.json, written as a whole or not at all."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path

@@ -49,10 +49,12 @@ def fit_ground_frame(
     The frame comes from all photos of the set: it says where the scene is, as a vehicle's own positioning would.
     Raises: InputError: cameras on both sides of the plane or on it, or no square of ground seen well enough.
     """
-    flat, relief, height = _levelled(model, rng)
+    flat, relief, height = _level_model(model, rng)
     need = 3 if len(flat.names) >= 9 else 2
     turns = np.arange(0.0, 90.0, TURN)
-    flat = _turned(flat, turns[np.argmax([_square(_turned(flat, turn), need, COARSE_CELLS)[2] for turn in turns])])
+    flat = _turn_model(
+        flat, turns[np.argmax([_find_square(_turn_model(flat, turn), need, COARSE_CELLS)[2] for turn in turns])]
+    )
     grid = count_coverage(flat.cameras, flat.points)
     well = _well_seen(flat, grid, need)
     if not well.any():
@@ -60,9 +62,9 @@ def fit_ground_frame(
     rows, columns = np.nonzero(well)
     middle = np.array([grid.west, grid.south]) + grid.cell * (np.array([columns.mean(), rows.mean()]) + 0.5)
     flat = transform_model(flat, 1.0, np.eye(3), np.array([-middle[0], -middle[1], 0.0]))
-    west, south, side = _square(flat, need)
+    west, south, side = _find_square(flat, need)
     unit = height if positions else 1.0  # of the world, in flying heights; below, lengths are brought to it
-    extent = _extent(count_coverage(flat.cameras, flat.points), unit)
+    extent = _find_extent(count_coverage(flat.cameras, flat.points), unit)
     flat = transform_model(flat, unit, np.eye(3), np.zeros(3))
     _log.info("well-seen square of ground: %.2f flying heights wide; relief %.3f", side, relief)
     return flat, SceneFrame(
@@ -115,7 +117,7 @@ def fit_plane(
     if up is not None:
         proper &= np.abs(normals @ up) > np.sqrt(0.5) * np.linalg.norm(up) * lengths
     if not proper.any():
-        raise InputError("the points lie in no level plane, or all on one line: the ground cannot be told from them")
+        raise InputError("the points lie in no level plane, or all on one line: they do not determine the ground")
     normals = normals[proper] / lengths[proper, None]
     offsets = np.einsum("ti,ti->t", normals, a[proper])
     medians = np.median(np.abs(sample @ normals.T - offsets), axis=0)
@@ -190,7 +192,7 @@ def find_largest_square(mask: Bool[Array, "rows columns"]) -> tuple[int, int, in
     return int(row), int(column), side
 
 
-def _levelled(model: ColmapModel, rng: np.random.Generator) -> tuple[ColmapModel, float, float]:
+def _level_model(model: ColmapModel, rng: np.random.Generator) -> tuple[ColmapModel, float, float]:
     """The model with z up from its plane and the flying height as unit; the points' spread about the plane in it; and
     the flying height in units of before."""
     normal, offset, spread = fit_plane(model.points, rng)
@@ -211,7 +213,7 @@ def _levelled(model: ColmapModel, rng: np.random.Generator) -> tuple[ColmapModel
     return level, spread / height, height
 
 
-def _turned(model: ColmapModel, degrees: float) -> ColmapModel:
+def _turn_model(model: ColmapModel, degrees: float) -> ColmapModel:
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return transform_model(model, 1.0, np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]]), np.zeros(3))
 
@@ -226,7 +228,7 @@ def _well_seen(model: ColmapModel, grid: Coverage, need: int) -> Bool[Array, "ro
     return (grid.counts >= need) & np.isfinite(distance).reshape(rows, columns)
 
 
-def _square(model: ColmapModel, need: int, cells: int = CELLS) -> tuple[float, float, float]:
+def _find_square(model: ColmapModel, need: int, cells: int = CELLS) -> tuple[float, float, float]:
     """West, south and side of the largest well-seen square, a little inside it."""
     grid = count_coverage(model.cameras, model.points, cells)
     row, column, side = find_largest_square(_well_seen(model, grid, need))
@@ -235,7 +237,7 @@ def _square(model: ColmapModel, need: int, cells: int = CELLS) -> tuple[float, f
     return float(west), float(south), float(side * grid.cell - 2 * inset)
 
 
-def _extent(grid: Coverage, unit: float) -> Extent:
+def _find_extent(grid: Coverage, unit: float) -> Extent:
     """The bounding rectangle of the cells that at least one photo sees. unit: the grid's, in world units."""
     rows, columns = np.nonzero(grid.counts)
     return Extent(

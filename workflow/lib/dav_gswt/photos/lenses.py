@@ -1,7 +1,7 @@
-"""The lenses of a photo set: how its undistorted pictures came from its photos, so that later photos can follow.
+"""The lenses of a photo set: how its pictures were undistorted, so that later photos are treated alike.
 
 photos/lenses.json holds, for each lens, the distorted camera at the picture's size (a COLMAP camera model) and the
-pinhole that the pictures have. A scene without lenses.json has exact pinhole cameras: its photos are its pictures.
+pinhole camera of its pictures. A scene without lenses.json has exact pinhole cameras: its photos are its pictures.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from jaxtyping import Float32
 from numpy import ndarray as Array
 from scipy.ndimage import map_coordinates
 
-from dav_gswt.errors import InputError
+from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.files import read_json, write_json
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
@@ -51,17 +51,33 @@ def write_lenses(folder: Path | str, lenses: list[Lens]) -> None:
 
 
 def read_lenses(folder: Path | str) -> list[Lens]:
-    """The lenses of a photos/ folder; none where its cameras are exact pinholes."""
+    """The lenses of a photos/ folder; none where its cameras are exact pinholes.
+
+    Raises: InputError: not such a file.
+    """
     path = Path(folder) / "lenses.json"
     if not path.exists():
         return []
-    made = []
-    for row in read_json(path):
-        camera = pycolmap.Camera(
-            model=row["model"], width=row["width"], height=row["height"], params=np.array(row["params"], float)
-        )
-        made.append(Lens(camera, tuple(map(float, row["pinhole"]))))
-    return made
+    try:
+        return [_parse_lens(row) for row in read_json(path)]
+    except (KeyError, TypeError, ValueError, OverflowError, RuntimeError) as error:
+        raise InputError(
+            f"{path}: not as the workflow writes it ({summarize_error(error)}); make the photos stage again"
+        ) from error
+
+
+def _parse_lens(row: dict) -> Lens:
+    if row["model"] not in pycolmap.CameraModelId.__members__ or row["model"] == "INVALID":
+        raise ValueError(f"{str(row['model'])[:40]} is no camera model")
+    camera = pycolmap.Camera(
+        model=row["model"], width=row["width"], height=row["height"], params=np.array(row["params"], float)
+    )
+    pinhole = tuple(map(float, row["pinhole"]))
+    if not camera.verify_params() or len(pinhole) != 6 or not np.isfinite([*camera.params, *pinhole]).all():
+        raise ValueError("a lens lacks numbers")
+    if not 0 < camera.width * camera.height <= image_files.MAX_PIXELS or not min(pinhole[0], pinhole[1]) > 0:
+        raise ValueError("a number of a lens is out of range")
+    return Lens(camera, pinhole)
 
 
 def undistort_scene_photo(

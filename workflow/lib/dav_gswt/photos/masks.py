@@ -1,8 +1,8 @@
-"""Masks: what of a photo is not to become ground, as cars, people, targets, one's own shadow.
+"""Masks: parts of photos that must not become ground, such as cars, people, targets or the photographer's shadow.
 
 A folder of pictures named as their photos (any suffix that is read), white where the photo counts and black where it
-does not. What is masked in every photo is ground that nobody has seen: the field fills it from around, marks it as
-unsure, and no tile takes it where there is a choice. What moves between photos is found without masks, by the fit.
+does not. Ground that is masked in every photo is filled from around it and marked as uncertain; tiles avoid it where
+they can. Objects that move between photos need no mask: the fit finds them.
 """
 
 import logging
@@ -39,14 +39,14 @@ def undistort_masks(found, folder: Path | str) -> dict[str, Float32[Array, "h w"
         mask, (width, height) = image_files.read_photo(path), image_files.read_size(source)
         if abs(mask.shape[1] * height / (mask.shape[0] * width) - 1) > ASPECT:
             raise InputError(f"{path}: is {mask.shape[1]} x {mask.shape[0]}, its photo {width} x {height}; same shape")
-        covers[name] = _cover(mask, found.lenses[i], found.model.cameras[i])
+        covers[name] = _warp_mask(mask, found.lenses[i], found.model.cameras[i])
     if not covers:
         raise InputError(f"{folder}: no mask is named like a photo; name each as its photo, as IMG_1.png for IMG_1.jpg")
     _log.info("masks: %d of %d photos have one", len(covers), len(found.model.names))
     return covers
 
 
-def _cover(mask, lens, camera) -> Float32[Array, "h w"]:
+def _warp_mask(mask, lens, camera) -> Float32[Array, "h w"]:
     """A mask as the pinhole camera would see it."""
     rows = (np.arange(lens.height) + 0.5) * mask.shape[0] // lens.height
     columns = (np.arange(lens.width) + 0.5) * mask.shape[1] // lens.width

@@ -1,4 +1,4 @@
-"""The photos stage as one call for each kind of scene that comes from files."""
+"""The photos stage for scenes that come from files: photos with or without a camera model, or a finished field."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -43,6 +43,7 @@ def prepare_photos(
         focal=found.focal,
         reprojection_error=found.error,
         points=len(model.points),
+        verdict=found.verdict,
     )
     numbers = progress(range(len(model.names)), "undistort photos")
     pictures = ((model.names[i], undistort_image(found, i)) for i in numbers)

@@ -1,4 +1,4 @@
-"""Which photos start, which may be asked for, and which only test."""
+"""The split of a scene's photos into start views, candidates and test views."""
 
 import logging
 
@@ -17,7 +17,7 @@ _log = logging.getLogger(__name__)
 TEST_SHARE = 0.1
 LEAST_TEST = 2
 LEAST_WITH_TEST = 6  # photos, below which none can be spared for testing
-LEAST_SIGHT = 0.05  # of the ground in question that an image must see
+MIN_VISIBLE_SHARE = 0.05  # of the ground in question that an image must see
 LINK = 30  # points that a start view shares with one chosen before: enough to fix its place among them
 
 
@@ -30,15 +30,15 @@ def split_views(
     """Names of the start views, the pool and the test views.
 
     whole: all ground that the photos see is in question, not the exemplar alone.
-    Only images that see at least LEAST_SIGHT of it take part: others show ground that no tile is made of. Where too few
-    would remain, all take part.
+    Only images that see at least MIN_VISIBLE_SHARE of it take part: others show ground that no tile is made of. Where
+    too few would remain, all take part.
     Test views are those that ground.json names; where it names none, about one photo in ten, at least two, spread over
     the ground in question: the same whatever the seed. Start views are `start` others, or as many as there are.
     Raises: InputError: ground.json names a test view that is no image, or no view is left to start from.
     """
-    given = _given_test(model, frame)
+    given = _read_test_names(model, frame)
     ground = ground_bounds(frame, whole)
-    sees = [i for i, camera in enumerate(model.cameras) if measure_visible_share(camera, ground) >= LEAST_SIGHT]
+    sees = [i for i, camera in enumerate(model.cameras) if measure_visible_share(camera, ground) >= MIN_VISIBLE_SHARE]
     among = sees if len(sees) >= start + LEAST_TEST else list(range(len(model.names)))
     test = given if given is not None else choose_test_views(model, ground, among)
     others = [i for i in among if i not in test]
@@ -69,7 +69,7 @@ def choose_test_views(model: ColmapModel, ground: Bounds, among: list[int]) -> l
         inner = sorted(among, key=lambda i: off[i])[: 2 * count]
     chosen = [min(inner, key=lambda i: off[i])]
     while len(chosen) < count:
-        chosen.append(_farthest(aims, [i for i in inner if i not in chosen], chosen))
+        chosen.append(_find_farthest(aims, [i for i in inner if i not in chosen], chosen))
     return sorted(chosen)
 
 
@@ -90,7 +90,7 @@ def choose_start_views(model: ColmapModel, among: list[int], count: int, rng: np
         if not near:
             near = [i for i, points in zip(left, link, strict=True) if points == link.max()]
             _log.warning("start view %s shares only %d points with the others", model.names[near[0]], link.max())
-        chosen.append(_farthest(centres, near, chosen))
+        chosen.append(_find_farthest(centres, near, chosen))
     return chosen
 
 
@@ -120,12 +120,12 @@ def find_aim_point(camera: Camera) -> Float[Array, "2"]:
     return centre[:2] - centre[2] / forward[2] * forward[:2]
 
 
-def _farthest(places: Float[Array, "n d"], among: list[int], chosen: list[int]) -> int:
+def _find_farthest(places: Float[Array, "n d"], among: list[int], chosen: list[int]) -> int:
     apart = np.linalg.norm(places[among][:, None] - places[chosen][None], axis=2).min(1)
     return int(among[int(apart.argmax())])
 
 
-def _given_test(model: ColmapModel, frame: SceneFrame) -> list[int] | None:
+def _read_test_names(model: ColmapModel, frame: SceneFrame) -> list[int] | None:
     if frame.test is None:
         return None
     if unknown := [name for name in frame.test if name not in model.names]:

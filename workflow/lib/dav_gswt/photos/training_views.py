@@ -1,4 +1,4 @@
-"""Views: a photo with its camera, at the size at which a quality works, and the share of it that can be modelled."""
+"""Training views: a photo with its camera at the size of a preset, and a weight per pixel for the fit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,9 +8,10 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
-from dav_gswt.files import read_json
-from dav_gswt.geometry.cameras import Camera, camera_from_json
+from dav_gswt.errors import InputError
+from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
+from dav_gswt.photos.capture_record import read_capture_record
 
 WHOLE = 0.99  # of a shrunk pixel that must not be masked for it to count
 
@@ -48,16 +49,26 @@ def make_training_view(
 
 
 def read_training_view(name: str, camera: Camera, path: Path | str, size: int) -> TrainingView:
-    """The view of a picture file; what its alpha masks does not count."""
+    """The view of a picture file; what its alpha masks does not count.
+
+    Raises: InputError: not readable as an image, or smaller than the camera's picture.
+    """
     image, cover = image_files.read_photo_and_alpha(path)
+    if image.shape[0] < camera.height or image.shape[1] < camera.width:
+        raise InputError(
+            f"{path}: {image.shape[1]} x {image.shape[0]} pixels, its camera takes {camera.width} x {camera.height}; "
+            "make the photos again"
+        )
     return make_training_view(name, camera, image, size, cover)
 
 
 def read_captured_views(folder: Path | str, size: int) -> list[TrainingView]:
-    """The photos that one round's capture/ folder holds, in the order they were taken."""
+    """The photos that one round's capture/ folder holds, in the order they were taken.
+
+    Raises: InputError: see `read_capture_record`.
+    """
     folder = Path(folder)
-    shots = read_json(folder / "capture.json")["shots"]
-    return [read_training_view(s["name"], camera_from_json(s["got"]), folder / s["name"], size) for s in shots]
+    return [read_training_view(p.name, p.camera, folder / p.name, size) for p in read_capture_record(folder)]
 
 
 def mask_outside_ground(view: TrainingView, west: float, south: float, east: float, north: float) -> TrainingView:
@@ -77,6 +88,5 @@ def read_training_views(
     from dav_gswt.photos.colmap_model import read_colmap_model  # not above: it loads pycolmap
 
     known = read_colmap_model(model)
-    at = {name: camera for name, camera in zip(known.names, known.cameras, strict=True)}
-    start = [read_training_view(name, at[name], Path(images_folder) / name, size) for name in names]
+    start = [read_training_view(name, known.camera(name), Path(images_folder) / name, size) for name in names]
     return start + [view for folder in captures for view in read_captured_views(folder, size)]

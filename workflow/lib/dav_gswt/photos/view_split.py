@@ -1,12 +1,9 @@
-"""views.json: which photos start, which may be asked for, and which only test."""
+"""views.json: the start views, the candidates that a policy may request, and the test views."""
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from pydantic import TypeAdapter, ValidationError
-
-from dav_gswt.errors import InputError
-from dav_gswt.files import read_json, write_json
+from dav_gswt.files import read_record, write_json
 
 
 @dataclass(frozen=True)
@@ -25,9 +22,4 @@ def write_view_split(path: Path | str, split: ViewSplit) -> None:
 
 def read_view_split(path: Path | str) -> ViewSplit:
     """Read views.json. Raises: InputError: not readable, or not lists of names."""
-    try:
-        return TypeAdapter(ViewSplit).validate_python(read_json(path))
-    except ValidationError as error:
-        first = error.errors()[0]
-        problem = f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
-        raise InputError(f"{path}: not as the workflow writes it ({problem}); make it again") from error
+    return read_record(path, ViewSplit, "make it again")

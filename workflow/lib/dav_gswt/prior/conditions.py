@@ -49,12 +49,12 @@ def _resize(square: Float32[Array, "s s 3"], size: int) -> Float32[Array, "{size
 
 
 def build_condition(
-    field: GaussianField, pool: list[tuple[Pose, Camera]], known: ReferencePhotos, flying_height: float, size: int
+    field: GaussianField, poses: list[tuple[Pose, Camera]], known: ReferencePhotos, flying_height: float, size: int
 ) -> Condition:
-    """The condition of every candidate, at size x size pixels of the centre square of its picture."""
-    renders = [render_view(field, crop_camera(camera).resized(size, size), flying_height) for _, camera in pool]
-    at = [find_nearest(pose, known.poses) for pose, _ in pool]
-    relative = [relative_pose(known.poses[i], pose, flying_height) for i, (pose, _) in zip(at, pool, strict=True)]
+    """The condition of every pose, at size x size pixels of the centre square of its picture."""
+    renders = [render_view(field, crop_camera(camera).resized(size, size), flying_height) for _, camera in poses]
+    at = [find_nearest(pose, known.poses) for pose, _ in poses]
+    relative = [relative_pose(known.poses[i], pose, flying_height) for i, (pose, _) in zip(at, poses, strict=True)]
     return Condition(
         np.stack([r.colour for r in renders]),
         np.stack([r.alpha for r in renders]),

@@ -49,6 +49,15 @@ class DecodedViews:
 
 
 @runtime_checkable
+class CopyablePrior(Protocol):
+    """A `Prior` small enough that every thread can have one of its own."""
+
+    def copy(self) -> "Prior":
+        """A copy that shares no state with this one."""
+        ...
+
+
+@runtime_checkable
 class Prior(Protocol):
     """A generative model of views. name: as in the config. size: pixels per side of its pictures."""
 

@@ -1,5 +1,6 @@
 """The terrain prior, trained by this project: a small latent diffusion model of terrain seen from any side."""
 
+import copy
 from pathlib import Path
 from typing import TypeVar
 
@@ -46,6 +47,10 @@ class LatentModel:
             kinds = ("a regressor", "the prior") if cls.is_regressor else ("the prior", "a regressor")
             raise InputError(f"{path}: not the weights of {kinds[0]} but of {kinds[1]}; they have the same shape")
         return cls(network, facts)
+
+    def copy(self: Model) -> Model:
+        """A copy that shares no state with this one."""
+        return copy.deepcopy(self)
 
     def encode(self, planes: Float32[Tensor, "n 5 s s"]) -> Float32[Tensor, "n c hz wz"]:
         """Latents of pictures; see `pack_render`."""

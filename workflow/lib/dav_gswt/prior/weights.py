@@ -7,8 +7,8 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import nn
 
-from dav_gswt.errors import InputError
-from dav_gswt.files import atomic_file
+from dav_gswt.errors import InputError, summarize_error
+from dav_gswt.files import UNREADABLE, atomic_file
 
 TERRAIN_WEIGHTS = Path(__file__).with_name("terrain.safetensors")  # they come with the library
 MOST_BYTES = 256 * 2**20
@@ -45,8 +45,9 @@ def load_weights(network: nn.Module, path: Path | str) -> dict[str, str]:
                     raise InputError(f"{path}: {name} has the shape {shape}, not {tuple(value.shape)}")
             values = {name: file.get_tensor(name).to(value.dtype) for name, value in expected.items()}
             facts = dict(file.metadata() or {})
-    except (SafetensorError, OSError) as error:
-        raise InputError(f"{path}: not readable as safetensors ({error}); make or copy the weights again") from error
+    except (SafetensorError, *UNREADABLE) as error:
+        why = summarize_error(error)
+        raise InputError(f"{path}: not readable as safetensors ({why}); make or copy the weights again") from error
     if bad := [name for name, value in values.items() if not torch.isfinite(value.float()).all()]:
         raise InputError(f"{path}: {bad[0]} holds numbers that are not finite")
     network.load_state_dict({name: values[_stored_name(name)] for name in network.state_dict()})
@@ -64,4 +65,4 @@ def _check_names(path: Path, expected: set[str], found: set[str]) -> None:
     if missing := sorted(expected - found):
         raise InputError(f"{path}: {missing[0]} is missing; these are the weights of another network")
     if extra := sorted(found - expected):
-        raise InputError(f"{path}: {extra[0]} is not of this network")
+        raise InputError(f"{path}: {extra[0][:80]!r} is not of this network")

@@ -17,8 +17,8 @@ from diffusers.schedulers.scheduling_ddim import DDIMScheduler
 from safetensors import SafetensorError, safe_open
 from torch import nn
 
-from dav_gswt.errors import InputError
-from dav_gswt.files import read_json
+from dav_gswt.errors import InputError, summarize_error
+from dav_gswt.files import UNREADABLE, read_json
 from dav_gswt.prior import dropout
 from dav_gswt.prior.dropout import HeldDropout
 
@@ -180,8 +180,8 @@ def _fill_weights(network: nn.Module, path: Path, rename: Callable[[str], str] =
             for name, value in expected.items():
                 _check_tensor(path, names[name], file.get_slice(names[name]), tuple(value.shape))
             values = {name: file.get_tensor(names[name]).float() for name in expected}
-    except (SafetensorError, OSError) as error:
-        raise InputError(f"{path}: not readable as safetensors ({error}); copy it again") from error
+    except (SafetensorError, *UNREADABLE) as error:
+        raise InputError(f"{path}: not readable as safetensors ({summarize_error(error)}); copy it again") from error
     if bad := [names[name] for name, value in values.items() if not torch.isfinite(value).all()]:
         raise InputError(f"{path}: {bad[0]} holds numbers that are not finite; copy it again")
     network.load_state_dict(values, assign=True)
@@ -195,7 +195,7 @@ def _match_names(path: Path, expected: set[str], found: list[str], rename: Calla
         if name.endswith("position_ids"):  # older transformers kept this constant among the weights
             continue
         if rename(name) not in expected or rename(name) in names:
-            raise InputError(f"{path}: {name} is not of this network; {HELP}")
+            raise InputError(f"{path}: {name[:80]!r} is not of this network; {HELP}")
         names[rename(name)] = name
     if missing := sorted(expected - set(names)):
         raise InputError(f"{path}: {missing[0]} is missing; these are the weights of another network; {HELP}")

@@ -45,12 +45,5 @@ def render(
     return Rendering(seen.colour + (1 - seen.alpha)[..., None] * behind, seen.alpha, seen.depth)
 
 
-def _call_backend(name: str):
-    def call(*args, **kwargs):
-        return getattr(backends.load_backend(), name)(*args, **kwargs)
-
-    return call
-
-
-loss: Loss = _call_backend("loss")
-adam: Adam = _call_backend("adam")
+loss = Loss(lambda *inputs: backends.load_backend().loss.compute(*inputs))
+adam = Adam(lambda step: backends.load_backend().adam.compute(step))

@@ -14,10 +14,18 @@ from numpy import ndarray as Array
 
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import _core, interface
-from dav_gswt.raster.interface import Contributions, Forward, GaussianArrays, Gradients, PictureGradients, Rendering
+from dav_gswt.raster.interface import (
+    AdamStep,
+    Contributions,
+    Forward,
+    GaussianArrays,
+    Gradients,
+    PictureGradients,
+    Rendering,
+)
+from dav_gswt.threads import default_threads
 
 MIN_PARALLEL = 1 << 15  # Gaussians plus pixels below which a second thread costs more than it gains
-MAX_THREADS = 16
 
 
 def instruction_sets() -> list[str]:
@@ -32,16 +40,6 @@ def default_instruction_set() -> str:
     if name not in names:
         raise ValueError(f"DAV_GSWT_ISA={name}: this processor has {', '.join(names)}; choose one of them")
     return name
-
-
-def default_threads() -> int:
-    """DAV_GSWT_THREADS, or the processors that this process may use, at most 16."""
-    if given := os.environ.get("DAV_GSWT_THREADS"):
-        if not given.isdecimal() or int(given) < 1:
-            raise ValueError(f"DAV_GSWT_THREADS={given}: give a whole number from 1")
-        return int(given)
-    mine = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return min(mine, MAX_THREADS)
 
 
 class Rasterizer(interface.Rasterizer):
@@ -133,51 +131,31 @@ class _MemoryPool:
         return root.reshape(shape)
 
 
-def loss(
+def _compute_loss(
     image: Float32[Array, "h w c"],
     target: Float32[Array, "h w c"],
-    weight: Float32[Array, "h w"] | None = None,
-    structure: float = 0.2,
-    threads: int | None = None,
+    weight: Float32[Array, "h w"] | None,
+    structure: float,
+    threads: int | None,
 ) -> tuple[float, Float32[Array, "h w c"]]:
-    """See `interface.Loss`."""
-    interface.check(image, "image", (*image.shape[:2], interface.count_columns(image)))
-    interface.check(target, "target", image.shape)
-    if weight is not None:
-        interface.check(weight, "weight", image.shape[:2])
     gradient = np.empty(image.shape, np.float32)
     threads = 1 if image.size < MIN_PARALLEL else threads or default_threads()
     return _core.loss(default_instruction_set(), image, target, weight, structure, gradient, threads), gradient
 
 
-def adam(
-    values: Float32[Array, "n ..."],
-    gradient: Float32[Array, "n ..."],
-    first: Float32[Array, "n ..."],
-    second: Float32[Array, "n ..."],
-    rate: float | Float32[Array, "columns"],
-    step: int,
-    betas: tuple[float, float] = (0.9, 0.999),
-    epsilon: float = 1e-15,
-    rows: Bool[Array, "n"] | None = None,
-    threads: int | None = None,
-) -> None:
-    """See `interface.Adam`."""
-    if step < 1:
-        raise ValueError(f"step counts from 1, not {step}")
-    for name, array in (("values", values), ("gradient", gradient), ("first", first), ("second", second)):
-        interface.check(array, name, values.shape)
-        if array is not gradient and not array.flags.writeable:
-            raise ValueError(f"{name} is read-only, but is to be changed in place")
-    if rows is not None:
-        interface.check(rows, "rows", values.shape[:1], np.bool_)
-    rates, columns = np.asarray(rate, np.float32).reshape(-1), values.size // max(1, len(values))
-    if len(rates) not in (1, columns):
-        raise ValueError(f"rate must be one number or {columns}, one a column, not {len(rates)}")
-    threads = 1 if values.size < MIN_PARALLEL else threads or default_threads()
-    _core.adam(default_instruction_set(), values, gradient, first, second, rows, step, rates, *betas, epsilon, threads)
+def _step_adam(s: AdamStep) -> None:
+    threads = 1 if s.values.size < MIN_PARALLEL else s.threads or default_threads()
+    arrays = s.values, s.gradient, s.first, s.second, s.rows
+    _core.adam(default_instruction_set(), *arrays, s.step, s.rates, *s.betas, s.epsilon, threads)
 
 
-def _pack_camera(camera: Camera, near: float, dilation: float) -> Float32[Array, "18"]:
+loss = interface.Loss(_compute_loss)
+adam = interface.Adam(_step_adam)
+
+
+def _pack_camera(camera: Camera, near: float, dilation: float) -> Float32[Array, "21"]:
+    """The camera's numbers as the core takes them: its centre as two parts, as float32 alone is coarse far out."""
     inner = [camera.fx, camera.fy, camera.cx, camera.cy, near, dilation]
-    return np.concatenate([np.ravel(camera.rotation), np.ravel(camera.translation), inner]).astype(np.float32)
+    centre = np.asarray(camera.centre, float)
+    coarse = centre.astype(np.float32)
+    return np.concatenate([np.ravel(camera.rotation), coarse, centre - coarse, inner]).astype(np.float32)

@@ -10,6 +10,7 @@ Each call copies arrays to the GPU and back; `adam` runs on the CPU.
 """
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import gsplat  # pyright: ignore[reportMissingImports]  an extra
@@ -59,10 +60,10 @@ class Rasterizer(interface.Rasterizer):
     def _render(self, gaussians: GaussianArrays, camera: Camera) -> tuple[Rendering, Any]:
         interface.find_invalid(gaussians)
         given = gaussians.by_name()
+        given["means"] = (given["means"].astype(float) - camera.centre).astype(np.float32)  # R m + t cancels far out
         leaves = {name: torch.tensor(array, device=self.device).requires_grad_() for name, array in given.items()}
         view = torch.eye(4, device=self.device)
         view[:3, :3] = torch.as_tensor(np.asarray(camera.rotation))
-        view[:3, 3] = torch.as_tensor(np.asarray(camera.translation))
         view.requires_grad_()
         picture, alpha, meta = self._call_gsplat(leaves, view, camera)
         c = gaussians.colours.shape[-1]
@@ -172,12 +173,4 @@ def list_pairs(
     return gaussians, pixels, (alpha * torch.exp(before - before[first])).float()
 
 
-def loss(
-    image: Float32[Array, "h w c"],
-    target: Float32[Array, "h w c"],
-    weight: Float32[Array, "h w"] | None = None,
-    structure: float = 0.2,
-    threads: int | None = None,
-) -> tuple[float, Float32[Array, "h w c"]]:
-    """See `interface.Loss`; on the GPU in float64, by autograd."""
-    return compute_loss(torch.device("cuda"), image, target, weight, structure)
+loss = interface.Loss(partial(compute_loss, torch.device("cuda")))

@@ -4,6 +4,7 @@ A backend is a module that fits `Backend`: `cpu` (the C++ core), `torch` (plain 
 or `cuda` (gsplat). `backends` selects one. They agree within the tolerances in tests/unit/raster/test_backends.py.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -205,8 +206,7 @@ class Rasterizer:
         return self._last
 
 
-@runtime_checkable
-class Loss(Protocol):
+class Loss:
     """(1 - structure) L1 + structure (1 - SSIM), and its gradient by the image.
 
     With weights w in [0, 1] (None: 1) over N = h w c values,
@@ -215,7 +215,12 @@ class Loss(Protocol):
     divided by the window's sum of both: pixels of weight 0 and those beyond the border have no influence, and a uniform
     weight scales loss and gradient. C1 = .01^2, C2 = .03^2, as usual for values in [0, 1].
     Raises: ValueError: an array's type, shape or layout.
+
+    compute: the backend's function of the checked image, target, weight, structure and threads.
     """
+
+    def __init__(self, compute: Callable[..., tuple[float, Float32[Array, "h w c"]]]):
+        self.compute = compute
 
     def __call__(
         self,
@@ -224,17 +229,42 @@ class Loss(Protocol):
         weight: Float32[Array, "h w"] | None = None,
         structure: float = 0.2,
         threads: int | None = None,
-    ) -> tuple[float, Float32[Array, "h w c"]]: ...
+    ) -> tuple[float, Float32[Array, "h w c"]]:
+        check(image, "image", (*image.shape[:2], count_columns(image)))
+        check(target, "target", image.shape)
+        if weight is not None:
+            check(weight, "weight", image.shape[:2])
+        return self.compute(image, target, weight, structure, threads)
 
 
-@runtime_checkable
-class Adam(Protocol):
+@dataclass(frozen=True)
+class AdamStep:
+    """The checked inputs of a step of `Adam`. rates: one, or one a column."""
+
+    values: Float32[Array, "n ..."]
+    gradient: Float32[Array, "n ..."]
+    first: Float32[Array, "n ..."]
+    second: Float32[Array, "n ..."]
+    rates: Float32[Array, "columns"]
+    step: int
+    betas: tuple[float, float]
+    epsilon: float
+    rows: Bool[Array, "n"] | None
+    threads: int | None
+
+
+class Adam:
     """One step of Adam, in place: `values`, and the moments `first` and `second`, which start as zeros.
 
     values -= rate m / (sqrt(v) + epsilon) with m = first / (1 - beta1^step), v = second / (1 - beta2^step).
     rate: one for all, or one a column (values.size / n). step: counts from 1. rows: only these move; the moments of the
     others stay. Raises: ValueError: an array's type, shape or layout, or a step below 1.
+
+    compute: the backend's function that does the step.
     """
+
+    def __init__(self, compute: Callable[[AdamStep], None]):
+        self.compute = compute
 
     def __call__(
         self,
@@ -248,7 +278,19 @@ class Adam(Protocol):
         epsilon: float = 1e-15,
         rows: Bool[Array, "n"] | None = None,
         threads: int | None = None,
-    ) -> None: ...
+    ) -> None:
+        if step < 1:
+            raise ValueError(f"step counts from 1, not {step}")
+        for name, array in (("values", values), ("gradient", gradient), ("first", first), ("second", second)):
+            check(array, name, values.shape)
+            if array is not gradient and not array.flags.writeable:
+                raise ValueError(f"{name} is read-only, but is to be changed in place")
+        if rows is not None:
+            check(rows, "rows", values.shape[:1], np.bool_)
+        rates, columns = np.asarray(rate, np.float32).reshape(-1), values.size // max(1, len(values))
+        if len(rates) not in (1, columns):
+            raise ValueError(f"rate must be one number or {columns}, one a column, not {len(rates)}")
+        self.compute(AdamStep(values, gradient, first, second, rates, step, betas, epsilon, rows, threads))
 
 
 @runtime_checkable

@@ -43,8 +43,8 @@ def forward(
     antialiased: bool = False,
 ) -> tuple[Tensor, ...]:
     """Colour, alpha, depth, and where features are given theirs, differentiable; `interface.Rasterizer` says what they
-    are. motion: see `moved`."""
-    view = moved(camera, motion, means)
+    are. motion: see `move_camera`."""
+    view = move_camera(camera, motion, means)
     splats = project(means, log_scales, quats, opacity_logits, colours, camera, view, near, dilation, antialiased)
     x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     weight = weights(splats, torch.as_tensor(np.stack([x.ravel(), y.ravel()], 1)).to(means))
@@ -54,7 +54,7 @@ def forward(
     return images if features is None else (*images, (weight @ features[splats.index]).reshape(*size, -1))
 
 
-def moved(camera: Camera, motion: Float[Tensor, "6"] | None, like: Tensor) -> tuple[Tensor, Tensor]:
+def move_camera(camera: Camera, motion: Float[Tensor, "6"] | None, like: Tensor) -> tuple[Tensor, Tensor]:
     """Rotation and translation of the camera, after the small motion q' = (1 + [w]x) q + tau, (w, tau) = motion.
 
     To first order that is exp([w]x) q + tau: gradients at motion 0 are exact.

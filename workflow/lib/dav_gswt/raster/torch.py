@@ -7,6 +7,7 @@ of threads.
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import torch
@@ -16,7 +17,15 @@ from torch import Tensor
 
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import interface, oracle
-from dav_gswt.raster.interface import Contributions, Forward, GaussianArrays, Gradients, PictureGradients, Rendering
+from dav_gswt.raster.interface import (
+    AdamStep,
+    Contributions,
+    Forward,
+    GaussianArrays,
+    Gradients,
+    PictureGradients,
+    Rendering,
+)
 from dav_gswt.raster.oracle import ALPHA_MAX, ALPHA_MIN, CLEAR_MIN, Splats
 
 SIDE = 8  # pixels: smaller squares mean more lists, larger ones more splats that miss most of their square
@@ -110,7 +119,7 @@ class Rasterizer(interface.Rasterizer):
     def _project(self, leaves: dict[str, Tensor], camera: Camera, motion: Float[Tensor, "6"] | None):
         """The splats, and two float32 tables of them that end in an empty row: centre, root and opacity; colours, 1,
         depth and features."""
-        view = oracle.moved(camera, motion, leaves["means"])
+        view = oracle.move_camera(camera, motion, leaves["means"])
         features = leaves.get("features")
         given = {name: leaf for name, leaf in leaves.items() if name != "features"}
         splats = oracle.project(
@@ -236,27 +245,18 @@ def _bound_boxes(splats: Splats, camera: Camera) -> tuple[Int[Tensor, "m 2"], In
     return low.long(), high.long()
 
 
-def loss(
-    image: Float32[Array, "h w c"],
-    target: Float32[Array, "h w c"],
-    weight: Float32[Array, "h w"] | None = None,
-    structure: float = 0.2,
-    threads: int | None = None,
-) -> tuple[float, Float32[Array, "h w c"]]:
-    """See `interface.Loss`; in float64, by autograd."""
-    return compute_loss(torch.device("cpu"), image, target, weight, structure)
-
-
 @torch.enable_grad()
 def compute_loss(
-    device: torch.device, image, target, weight, structure: float
+    device: torch.device,
+    image: Float32[Array, "h w c"],
+    target: Float32[Array, "h w c"],
+    weight: Float32[Array, "h w"] | None,
+    structure: float,
+    threads: int | None = None,
 ) -> tuple[float, Float32[Array, "h w c"]]:
-    """`loss` on a device."""
-    interface.check(image, "image", (*image.shape[:2], interface.count_columns(image)))
-    interface.check(target, "target", image.shape)
+    """See `interface.Loss`: on a device, in float64, by autograd. threads: not used."""
     if weight is None:
         weight = np.ones(image.shape[:2], np.float32)
-    interface.check(weight, "weight", image.shape[:2])
     x, y, w = (torch.as_tensor(a).to(device, torch.float64) for a in (image, target, weight[..., None]))
     x.requires_grad_()
     n = _window_sums(w)
@@ -279,32 +279,17 @@ def _window_sums(values: Float[Tensor, "h w c"]) -> Float[Tensor, "h w c"]:
     return torch.nn.functional.conv2d(planes, taps.reshape(1, 1, 1, 11), padding=(0, 5))[:, 0].permute(1, 2, 0)
 
 
-def adam(
-    values: Float32[Array, "n ..."],
-    gradient: Float32[Array, "n ..."],
-    first: Float32[Array, "n ..."],
-    second: Float32[Array, "n ..."],
-    rate: float | Float32[Array, "columns"],
-    step: int,
-    betas: tuple[float, float] = (0.9, 0.999),
-    epsilon: float = 1e-15,
-    rows: Bool[Array, "n"] | None = None,
-    threads: int | None = None,
-) -> None:
+def _step_adam(s: AdamStep) -> None:
     """See `interface.Adam`; by NumPy."""
-    if step < 1:
-        raise ValueError(f"step counts from 1, not {step}")
-    for name, array in (("values", values), ("gradient", gradient), ("first", first), ("second", second)):
-        interface.check(array, name, values.shape)
-        if array is not gradient and not array.flags.writeable:
-            raise ValueError(f"{name} is read-only, but is to be changed in place")
-    if rows is not None:
-        interface.check(rows, "rows", values.shape[:1], np.bool_)
-    which = slice(None) if rows is None else np.flatnonzero(rows)
-    value, g, m, v = (a.reshape(len(a), -1)[which] for a in (values, gradient, first, second))
-    m = betas[0] * m + np.float32(1 - betas[0]) * g
-    v = betas[1] * v + np.float32(1 - betas[1]) * (g * g)
-    move = np.float32(1 / (1 - betas[0] ** step)) * m
-    move /= np.sqrt(np.float32(1 / (1 - betas[1] ** step)) * v) + np.float32(epsilon)
-    for array, new in ((values, value - np.asarray(rate, np.float32) * move), (first, m), (second, v)):
+    which = slice(None) if s.rows is None else np.flatnonzero(s.rows)
+    value, g, m, v = (a.reshape(len(a), -1)[which] for a in (s.values, s.gradient, s.first, s.second))
+    m = s.betas[0] * m + np.float32(1 - s.betas[0]) * g
+    v = s.betas[1] * v + np.float32(1 - s.betas[1]) * (g * g)
+    move = np.float32(1 / (1 - s.betas[0] ** s.step)) * m
+    move /= np.sqrt(np.float32(1 / (1 - s.betas[1] ** s.step)) * v) + np.float32(s.epsilon)
+    for array, new in ((s.values, value - s.rates * move), (s.first, m), (s.second, v)):
         array.reshape(len(array), -1)[which] = new
+
+
+loss = interface.Loss(partial(compute_loss, torch.device("cpu")))
+adam = interface.Adam(_step_adam)

@@ -1,9 +1,7 @@
 """The coarse field: from the start views and the points of structure from motion to the first Gaussian field."""
 
 import logging
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
@@ -14,11 +12,11 @@ from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import discs, ground, objects, underlay
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fit_settings import CoarseSettings
 from dav_gswt.reconstruction.fitting import trainer
 from dav_gswt.reconstruction.fitting.constraints import FreeConstraints
 from dav_gswt.reconstruction.fitting.plan import AUTO, FitReport
-from dav_gswt.reconstruction.fitting.state import State
+from dav_gswt.reconstruction.fitting.trainer import DEFAULT_OPTIONS, FitOptions
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.observation import (
     extent_of,
@@ -49,35 +47,38 @@ class Reconstruction:
     report: FitReport
 
 
+@dataclass(frozen=True)
+class StartViews:
+    """What a coarse field is fitted to.
+
+    points, colours: of structure from motion, from these views alone. margin: ground modelled around the exemplar, as
+    a share of its side.
+    """
+
+    frame: SceneFrame
+    views: list[TrainingView]
+    points: Float[Array, "n 3"]
+    colours: Float[Array, "n 3"]
+    margin: float = ground.MARGIN
+
+
 def fit_coarse_field(
-    frame: SceneFrame,
-    views: list[TrainingView],
-    points: Float[Array, "n 3"],
-    colours: Float[Array, "n 3"],
-    settings: FitSettings,
-    rng: np.random.Generator,
-    snapshots: Path | str | None = None,
-    margin: float = ground.MARGIN,
-    callback: Callable[[int, State], None] | None = None,
+    given: StartViews, settings: CoarseSettings, rng: np.random.Generator, options: FitOptions = DEFAULT_OPTIONS
 ) -> Reconstruction:
     """Fit a field of the ground and the objects on it to the start views.
 
-    points, colours: of structure from motion, from these views alone. margin: ground modelled around the exemplar, as
-    a share of its side. snapshots, callback: see `trainer.fit_field`.
     A scene that no height field explains is fitted as free Gaussians.
     """
+    frame, views, points = given.frame, given.views, given.points
     spacing = settings.spacing * pixel_size(frame, views)
-    grid = ground.fit_ground(frame, points, spacing, settings.max_discs, BLOCK, margin)
+    grid = ground.fit_ground(frame, points, spacing, settings.max_discs, BLOCK, given.margin)
     explained = _explained_share(grid, points, frame)
     if explained < MIN_EXPLAINED:
         _log.warning("a height field explains only %.0f %% of the points: free Gaussians instead", 100 * explained)
-        plan = settings.plan_coarse_fit(len(views), HALF_SHARE)
-        start, constraints = _start_from_points(points, colours, settings)
-        fit = trainer.fit_field(start, views, plan, constraints, rng, "fit free field", snapshots, callback)
-        return Reconstruction(*finish_field(fit.field, grid, views), fit.report)
+        return _fit_free_field(given, grid, settings, rng, options)
     scene = observe(frame, grid, views)
     shell = objects.make_shell(scene.relief, scene.views)
-    isolated = objects.make_isolated_points(grid, scene.relief, points, colours, BAND * frame.flying_height)
+    isolated = objects.make_isolated_points(grid, scene.relief, points, given.colours, BAND * frame.flying_height)
     room = settings.gaussian_limit - grid.heights.size - underlay.count_gaussians(grid)
     occluders = thin_at_random(concatenate_fields([isolated, shell]), room, rng)
     colour, known = ground_colours(grid, scene.views, occluders)
@@ -91,8 +92,18 @@ def fit_coarse_field(
     constraints = make_constraints(grid, scene.relief, occluders, frame)
     plan = settings.plan_coarse_fit(len(views))
     masked = mask_for_fit(scene.views, grid)
-    fit = trainer.fit_field(start, masked, plan, constraints, rng, "fit coarse field", snapshots, callback)
+    fit = trainer.fit_field(start, masked, plan, constraints, rng, replace(options, name="fit coarse field"))
     return Reconstruction(*finish_field(fit.field, grid, masked), fit.report)
+
+
+def _fit_free_field(
+    given: StartViews, grid: Ground, settings: CoarseSettings, rng: np.random.Generator, options: FitOptions
+) -> Reconstruction:
+    """Fit Gaussians that no ground holds, for a scene without a ground."""
+    plan = settings.plan_coarse_fit(len(given.views), HALF_SHARE)
+    start, constraints = _start_from_points(given.points, given.colours, settings)
+    fit = trainer.fit_field(start, given.views, plan, constraints, rng, replace(options, name="fit free field"))
+    return Reconstruction(*finish_field(fit.field, grid, given.views), fit.report)
 
 
 def finish_field(fitted: GaussianField, grid: Ground, views: list[TrainingView]) -> tuple[GaussianField, Ground]:
@@ -105,7 +116,7 @@ def finish_field(fitted: GaussianField, grid: Ground, views: list[TrainingView])
 
 
 def _start_from_points(
-    points: Float[Array, "n 3"], colours: Float[Array, "n 3"], settings: FitSettings
+    points: Float[Array, "n 3"], colours: Float[Array, "n 3"], settings: CoarseSettings
 ) -> tuple[GaussianField, FreeConstraints]:
     """Gaussians as large as the points are apart, for a scene without a ground."""
     apart = np.asarray(cKDTree(points).query(points, k=min(4, len(points)))[0])[:, 1:].mean(1)

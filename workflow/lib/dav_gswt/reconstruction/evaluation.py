@@ -33,7 +33,10 @@ def evaluate_field(
     A value is null without test views, and PSNR is where pictures are equal.
     """
     if weights is None:
-        _log.info("LPIPS has no weights here: it is left out of the metrics (docs/prior.md)")
+        _log.info(
+            "the config's `lpips` is none: metrics lack LPIPS; set it to `installed` or to a path "
+            "(docs/reference/config.md)"
+        )
     rows = [_evaluate_view(field, view, weights) for view in tests if view.weight.any()]
     named = {row["view"]: row for row in rows}
     parts = {group: [named[name] for name in names if name in named] for group, names in (groups or {}).items()}

@@ -10,7 +10,8 @@ from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.reconstruction import ground
 from dav_gswt.reconstruction.coarse import BLOCK
 from dav_gswt.reconstruction.discs import WIDTH
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fit_settings import limit_discs
+from dav_gswt.reconstruction.fitting.plan import Count
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.top_view import render_top_view
 
@@ -20,7 +21,7 @@ OPAQUE = 0.5  # alpha above which a cell takes its height from the field
 
 
 def prepare_external_field(
-    field: GaussianField, frame: SceneFrame, settings: FitSettings
+    field: GaussianField, frame: SceneFrame, max_gaussians: Count
 ) -> tuple[GaussianField, Ground]:
     """The field cut to its exemplar, and the grid of its surface as seen from above.
 
@@ -29,7 +30,7 @@ def prepare_external_field(
     across = np.sort(np.exp(field.log_scales), 1)[:, 1]
     spacing = float(np.median(across)) / WIDTH
     none = np.zeros((0, 3))
-    grid = ground.fit_ground(frame, none, spacing, settings.max_discs, BLOCK, margin=0.0)
+    grid = ground.fit_ground(frame, none, spacing, limit_discs(max_gaussians), BLOCK, margin=0.0)
     inside = field[grid.contains(field.means)]
     inside = replace(inside, ground=np.zeros(len(inside), bool))  # its discs, if any, are of another grid
     maps = render_top_view(inside, grid)

@@ -1,6 +1,8 @@
-"""The settings of a reconstruction: an entry of the config's `presets`, which trade speed for accuracy."""
+"""The settings of fits, from an entry of the config's `presets`, which trade speed for accuracy."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, TypeVar
 
 from dav_gswt.field import GaussianField
 from dav_gswt.reconstruction import underlay
@@ -16,33 +18,43 @@ from dav_gswt.reconstruction.fitting.plan import (
 GROUND_SHARE = 0.9  # of the Gaussians, that the ground may take with its underlay; objects get the rest
 
 
-@dataclass(frozen=True)
-class FitSettings:
-    """The fields are the keys of a preset in the config."""
+@dataclass(frozen=True, kw_only=True)
+class _FitSettings:
+    """What the first fit and its updates have in common."""
 
     size: int  # longer side of the photos, pixels
-    spacing: float  # of the discs, in sizes of a photo's pixel on the ground
     max_gaussians: Count
-    steps: Count  # of the coarse fit
-    steps_per_photo: Count  # of an update, for every new photo
-    level_steps: int  # of the fit of a coarser level
     sh_degree: Count = 0
     pose_rate: float = 0.0  # radians a step that cameras may turn
-    levels: Count | None = None  # of detail, if not the number of the other presets
 
     @property
     def gaussian_limit(self) -> int:
-        return MAX_GAUSSIANS if self.max_gaussians == AUTO else int(self.max_gaussians)
+        return limit_gaussians(self.max_gaussians)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoarseSettings(_FitSettings):
+    """The keys of a preset that the first fit reads."""
+
+    spacing: float  # of the discs, in sizes of a photo's pixel on the ground
+    steps: Count
 
     @property
     def max_discs(self) -> int:
         """Cells that the ground's grid may have."""
-        return int(GROUND_SHARE * self.gaussian_limit / (1 + 1 / underlay.STRIDE**2))
+        return limit_discs(self.max_gaussians)
 
     def plan_coarse_fit(self, photos: int, half_share: float = 0.0) -> FitPlan:
         """The plan of the first fit, to so many photos."""
         steps = STEPS_PER_PHOTO * photos if self.steps == AUTO else int(self.steps)
         return FitPlan(steps, self.max_gaussians, self.sh_degree, half_share, self.pose_rate)
+
+
+@dataclass(frozen=True, kw_only=True)
+class UpdateSettings(_FitSettings):
+    """The keys of a preset that the update of a field reads."""
+
+    steps_per_photo: Count  # for every new photo
 
     def plan_update(self, field: GaussianField, earlier: int, new: int) -> FitPlan:
         """The plan of an update of a field from so many earlier photos with so many new ones.
@@ -54,3 +66,21 @@ class FitSettings:
         limit = min(MAX_GAUSSIANS, len(field) * (earlier + new) // max(1, earlier))
         degree = field.sh_degree if self.sh_degree == AUTO else self.sh_degree
         return FitPlan(steps * new, self.max_gaussians, degree, pose_rate=self.pose_rate, limit=limit)
+
+
+Settings = TypeVar("Settings", CoarseSettings, UpdateSettings)
+
+
+def select_settings(kind: type[Settings], preset: Mapping[str, Any]) -> Settings:
+    """The settings of one kind from a preset, which may have keys for other stages."""
+    return kind(**{field.name: preset[field.name] for field in fields(kind) if field.name in preset})
+
+
+def limit_gaussians(max_gaussians: Count) -> int:
+    """Most Gaussians of a field."""
+    return MAX_GAUSSIANS if max_gaussians == AUTO else int(max_gaussians)
+
+
+def limit_discs(max_gaussians: Count) -> int:
+    """Most cells of the ground's grid in a field of so many Gaussians."""
+    return int(GROUND_SHARE * limit_gaussians(max_gaussians) / (1 + 1 / underlay.STRIDE**2))

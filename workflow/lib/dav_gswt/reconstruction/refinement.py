@@ -13,10 +13,11 @@ from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import objects, regression_guard, underlay
 from dav_gswt.reconstruction.coarse import Reconstruction, finish_field
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.fit_settings import UpdateSettings
 from dav_gswt.reconstruction.fitting import trainer
 from dav_gswt.reconstruction.fitting.constraints import Constraints, FreeConstraints
 from dav_gswt.reconstruction.fitting.plan import FitPlan
+from dav_gswt.reconstruction.fitting.trainer import FitOptions
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.observation import (
     extent_of,
@@ -30,15 +31,19 @@ from dav_gswt.reconstruction.observation import (
 _log = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True)
+class RefinementInput:
+    """A field with its ground, and the photos to refine it with. earlier: those that it was fitted to."""
+
+    field: GaussianField
+    grid: Ground
+    frame: SceneFrame
+    earlier: list[TrainingView]
+    new: list[TrainingView]
+
+
 def refine_field(
-    field: GaussianField,
-    grid: Ground,
-    frame: SceneFrame,
-    earlier: list[TrainingView],
-    new: list[TrainingView],
-    settings: FitSettings,
-    rng: np.random.Generator,
-    snapshots: Path | str | None = None,
+    given: RefinementInput, settings: UpdateSettings, rng: np.random.Generator, snapshots: Path | str | None = None
 ) -> Reconstruction:
     """Refine a field with new photos.
 
@@ -46,15 +51,16 @@ def refine_field(
     then all Gaussians are fitted to all photos. New photos that contradict the earlier ones change nothing (see
     `regression_guard`); without new photos the field is returned as it is.
     """
+    field, grid, new = given.field, given.grid, given.new
     if not new:
         return Reconstruction(field, grid, regression_guard.report_unchanged(field))
-    start = _prepare_start(field, grid, frame, earlier + new, settings, rng)
+    start = _prepare_start(given, settings, rng)
+    options = FitOptions(f"fit {len(new)} new photos", snapshots)
 
     def fit(begin: GaussianField, plan: FitPlan) -> trainer.FitResult:
-        what = f"fit {len(new)} new photos"
-        return trainer.fit_field(begin, start.views, plan, start.constraints, rng, what, snapshots)
+        return trainer.fit_field(begin, start.views, plan, start.constraints, rng, options)
 
-    n = len(earlier)
+    n = len(given.earlier)
     plan = settings.plan_update(field, n, len(new))
     update = regression_guard.fit_with_guard(field, start.field, start.views[:n], start.views[n:], plan, fit)
     if not update.accepted:
@@ -72,15 +78,9 @@ class _Start:
     constraints: Constraints
 
 
-def _prepare_start(
-    field: GaussianField,
-    grid: Ground,
-    frame: SceneFrame,
-    views: list[TrainingView],
-    settings: FitSettings,
-    rng: np.random.Generator,
-) -> _Start:
+def _prepare_start(given: RefinementInput, settings: UpdateSettings, rng: np.random.Generator) -> _Start:
     """The field with colours and objects that it lacks; its first Gaussians stay those of the grid."""
+    field, grid, frame, views = given.field, given.grid, given.frame, given.earlier + given.new
     if not field.ground.any():
         constraints = FreeConstraints(float(np.exp(np.median(field.log_scales))), extent_of(field.means))
         return _Start(field, grid, views, constraints)

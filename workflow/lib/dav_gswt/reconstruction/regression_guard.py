@@ -17,7 +17,7 @@ from dav_gswt.field import GaussianField
 from dav_gswt.images import metrics
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import to_raster_arrays
-from dav_gswt.reconstruction.fitting.plan import EarlierViews, FitPlan, NewViews, UpdateReport
+from dav_gswt.reconstruction.fitting.plan import EarlierViews, FitPlan, FitReport, NewViews, UpdateReport
 from dav_gswt.reconstruction.fitting.trainer import FitResult
 
 _log = logging.getLogger(__name__)
@@ -72,24 +72,30 @@ def fit_with_guard(
         )
     kept = fitted.field if accepted else field
     done = f"the field of fit {len(fits)}" if accepted else f"the field from before, after {len(fits)} fits"
-    report = UpdateReport(
+    effect = EarlierViews(
+        photos=len(earlier),
+        psnr_before=_mean(before),
+        psnr_after=_mean(reached[-1] if accepted else before),
+        psnr_of_fits=[_mean(each) for each in reached],
+        lost=loss if accepted else 0.0,
+        bound=most,
+        handed_on=done,
+    )
+    report = _join_reports(fits, effect, _report_new_views(new, field, kept, accepted), kept)
+    return GuardedUpdate(kept, accepted, report)
+
+
+def _join_reports(fits: list[FitReport], earlier: EarlierViews, new: NewViews, kept: GaussianField) -> UpdateReport:
+    """The report of an update of several fits, the later ones of which go on from the earlier."""
+    return UpdateReport(
         steps=sum(each.steps for each in fits),
         gaussians=len(kept),
         degree=fits[-1].degree,
         choices=[choice for each in fits for choice in each.choices],
         held_out=fits[-1].held_out,
-        earlier_views=EarlierViews(
-            photos=len(earlier),
-            psnr_before=_mean(before),
-            psnr_after=_mean(reached[-1] if accepted else before),
-            psnr_of_fits=[_mean(each) for each in reached],
-            lost=loss if accepted else 0.0,
-            bound=most,
-            handed_on=done,
-        ),
-        new_views=_report_new_views(new, field, kept, accepted),
+        earlier_views=earlier,
+        new_views=new,
     )
-    return GuardedUpdate(kept, accepted, report)
 
 
 def allowed_loss(earlier: int, new: int) -> float:

@@ -45,7 +45,7 @@ class FixedSettings(ConfigModel):
     k: int | None = key("views a round", None, ge=1, le=1000)
     rounds: int | None = key("rounds", None, ge=0, le=100)
     photos: int | None = key("photos that an experiment ends with, instead of `rounds`", None, ge=3, le=100_000)
-    tau: Share | None = key("threshold of the tile cache", None)
+    tau: Share | None = key("mean uncertainty from which a tile keeps all orders", None)
     tiling: Name | None = key("an entry of `tilings`", None, renamed="seam")
     preset: Name | None = key("an entry of `presets`", None, renamed="quality")
 
@@ -59,7 +59,7 @@ class BaseSettings(ConfigModel):
     lam: float | None = key("instead of the config's", None, ge=0, le=1e6)
     k: int | None = key("instead of the config's", None, ge=1, le=1000)
     rounds: int = key("rounds", ge=1, le=100)
-    tau: Share = key("threshold of the tile cache")
+    tau: Share = key("mean uncertainty from which a tile keeps all orders")
     tiling: Name = key("an entry of `tilings`", renamed="seam")
     preset: Name = key("an entry of `presets`", renamed="quality")
 
@@ -89,6 +89,10 @@ class Levels(ConfigModel):
     scenes: Names = key("whose tiles are measured")
     seeds: Seeds | None = key("of each scene; the config's if left out", None)
     fixed: FixedSettings | None = key("settings that replace the config's", None)
+
+
+class Materials(Levels):
+    """`snakemake materials_table`: materials and objects against true labels (family `oasis`, `materials: auto`)."""
 
 
 class Frames(Levels):
@@ -242,7 +246,7 @@ class AutoSettings(ConfigModel):
 
     preset: Name = key("an entry of `presets` with `auto`", renamed="quality")
     marginal_gain: float = key("below which rounds stop", unit="dB a photo", renamed="worth", ge=0.0001, le=100)
-    tau: Share = key("threshold of the tile cache")
+    tau: Share = key("mean uncertainty from which a tile keeps all orders")
 
 
 class AutoStudy(ConfigModel):
@@ -281,6 +285,7 @@ class StudyConfig(ConfigModel):
 
     refine: Refinement | None = key("how `<tiling>-refined` is made", None)
     lod: Levels | None = key("levels, orders, rounding", None)
+    materials: Materials | None = key("materials and objects against true labels", None)
     frames: Frames | None = key("frame times", None)
     calibration: Calibration | None = key("scores against true errors", None)
     view_benchmark: ViewBenchmark | None = key("policies", None, renamed="benchmark")
@@ -301,7 +306,7 @@ def expand_study(config: dict) -> dict:
     model = check_model(StudyConfig, config["study"], "study")
     study = model.model_dump(mode="json", exclude_none=True, by_alias=True)
     flat = config | study
-    for table in ("lod", "frames", "seams", "forced_choice"):
+    for table in ("lod", "materials", "frames", "seams", "forced_choice"):
         _require_names(f"study.{table}.scenes", study.get(table, {}).get("scenes", []), config["scenes"], "scenes")
     if "refine" in study:
         _check_refinement(study["refine"], config["priors"])
@@ -311,10 +316,10 @@ def expand_study(config: dict) -> dict:
         _check_seams(study["seams"], config["tilings"])
     if "forced_choice" in study:
         _check_forced_choice(study["forced_choice"], config["tilings"])
-    grid.check(flat)
+    grid.check_sweeps(flat)
     checks.check(flat)
-    settings.check(flat)
-    made = replicates.add_replicates(settings.entries(flat))
+    settings.check_tradeoff(flat)
+    made = replicates.add_replicates(settings.add_entries(flat))
     tables = {table: made[table] for table in ("presets", "tilings", "priors")}
     return check_config(config | tables) | {"study": study}  # values of knobs are in range where the entries are
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from dav_gswt.config.model import Config
 from dav_gswt.study.config import StudyConfig
 from dav_gswt.study.config_tables import HEAD, describe_policies, describe_tables, make_schema
+from dav_gswt.study.reruns import describe_reruns
 
 STUDY_HEAD = "## Study\n\nKeys of `study:`, in `config/study.yaml`."
 
@@ -15,6 +16,7 @@ def make_reference() -> dict[str, str]:
     return {
         "docs/reference/config.md": "\n\n".join(part.strip() for part in keys) + "\n",
         "docs/reference/policies.md": describe_policies(),
+        "docs/reference/reruns.md": describe_reruns(),
         "workflow/schemas/config.schema.json": make_schema(),
     }
 

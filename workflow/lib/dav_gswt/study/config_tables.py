@@ -24,8 +24,12 @@ POLICIES_HEAD = """# Policies
 
 How the next views are chosen: the config's `policy`. Made from the table in
 `workflow/lib/dav_gswt/views/policy_names.py` by `make reference`; the functions are in `policies.py` beside it, and
-[architecture](../architecture.md) says how to add one. `lam`, `p_drop` and `prior` matter to policies that read a
-prior.
+[architecture](../architecture.md) says how to add one.
+
+Every policy knows where the candidates and the photos so far are; the column `reads` says what it reads besides:
+the geometric scores (`opacity`, `fisher`), the scores by a prior, the field itself, or the true error, which is known
+for `agent: render` and `replay` only. `prior`, `p_drop` and `lam` matter to policies that read a prior; settings
+after "not" have no effect. k is the config's `k`.
 """
 
 
@@ -93,4 +97,6 @@ def _describe_bounds(bounds: list) -> str:
 def _plain(value: Any) -> str:
     if isinstance(value, BaseModel):
         value = value.model_dump(exclude_none=True)
+    if isinstance(value, list):
+        return f"[{', '.join(map(_plain, value))}]"
     return json.dumps(value)

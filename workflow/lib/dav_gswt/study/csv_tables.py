@@ -50,7 +50,9 @@ def read_table(
     if texts is not None:
         numbers = [*numbers, *frame.columns.difference([*texts, *integers])]
     kinds = dict.fromkeys(numbers, float) | dict.fromkeys(integers, int)
-    return [{name: _parse(value, kinds.get(name)) for name, value in row.items()} for row in frame.to_dict("records")]
+    columns = [str(name) for name in frame.columns]
+    rows = frame.itertuples(index=False, name=None)
+    return [{n: _parse(value, kinds.get(n)) for n, value in zip(columns, row, strict=True)} for row in rows]
 
 
 def merge_rows(before: list[dict], new: list[dict], key: Collection[str]) -> list[dict]:

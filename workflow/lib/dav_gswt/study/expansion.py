@@ -133,11 +133,15 @@ class _Price:
         """Cost of edges with one patch at the tail and another at the head; 0 where it is the same one."""
         out = np.zeros(len(at_tail), np.int64)
         seams = np.flatnonzero(at_tail != at_head)
-        pair = at_tail[seams], at_head[seams]
-        ends = (edges.tails[seams], edges.heads[seams])
-        shown = [tuple((self.rows[label, end], self.columns[label, end]) for label in pair) for end in ends]
-        out[seams] = np.rint(compute_costs_along(self.terms, *shown, edges.axis[seams]) * QUANTA)
+        first, second = at_tail[seams], at_head[seams]
+        ends = edges.tails[seams], edges.heads[seams]
+        tails, heads = ((self._source_cells(first, end), self._source_cells(second, end)) for end in ends)
+        out[seams] = np.rint(compute_costs_along(self.terms, tails, heads, edges.axis[seams]) * QUANTA)
         return out
+
+    def _source_cells(self, label: Int[Array, "s"], cell: Int[Array, "s"]) -> Cells:
+        """The exemplar's cells that patches show in cells of the tile."""
+        return self.rows[label, cell], self.columns[label, cell]
 
 
 @dataclass(frozen=True)

@@ -18,11 +18,12 @@ from dav_gswt import raster
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.scene_frame import SceneFrame, Square, read_scene_frame
-from dav_gswt.images import metrics
+from dav_gswt.images import figures, metrics
 from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
 from dav_gswt.photos.training_views import TrainingView, mask_outside_ground, read_training_view
-from dav_gswt.reconstruction.coarse import Reconstruction, fit_coarse_field
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.coarse import Reconstruction, StartViews, fit_coarse_field
+from dav_gswt.reconstruction.fit_settings import CoarseSettings
+from dav_gswt.reconstruction.fitting.trainer import FitOptions
 from dav_gswt.reconstruction.ground import WHOLE, Ground
 
 FIRST_TEST, EACH = 5, 10
@@ -51,7 +52,7 @@ class Trial:
     curve: list[dict]
 
 
-def opened(folder: Path | str, size: int, margin: float = WHOLE) -> PhotoSet:
+def read_photo_set(folder: Path | str, size: int, margin: float = WHOLE) -> PhotoSet:
     """Read a photos/ folder at a size, its test views apart.
 
     margin: see `fit_coarse_field`. All pixels of test views count where all ground that photos see is modelled (WHOLE);
@@ -77,7 +78,7 @@ def _over_exemplar(views: list[TrainingView], square: Square) -> list[TrainingVi
     return [v for v in seen if v.weight.any()]
 
 
-def run(photos: PhotoSet, quality: FitSettings, seed: int = 0, every: int = 25) -> Trial:
+def profile_fit(photos: PhotoSet, settings: CoarseSettings, seed: int = 0, every: int = 25) -> Trial:
     """Fit the training photos, looking at the first group of test views every so many steps."""
     watched, measuring = next(iter(photos.tests.values())), 0.0
     start = time.perf_counter()
@@ -90,21 +91,21 @@ def run(photos: PhotoSet, quality: FitSettings, seed: int = 0, every: int = 25) 
             return
         begun = time.perf_counter()
         row = {"seconds": begun - start - measuring, "step": step, "gaussians": len(state)}
-        curve.append(row | quality_of(lambda v: drawn.forward(**state.values, camera=v.camera).colour, watched))
+        curve.append(row | measure_quality(lambda v: drawn.forward(**state.values, camera=v.camera).colour, watched))
         measuring += time.perf_counter() - begun
 
     rng = np.random.default_rng(seed)
-    points, colours = photos.model.points, photos.model.colours
-    made = fit_coarse_field(
-        photos.frame, photos.train, points, colours, quality, rng, margin=photos.margin, callback=watch
-    )
+    given = StartViews(photos.frame, photos.train, photos.model.points, photos.model.colours, photos.margin)
+    made = fit_coarse_field(given, settings, rng, FitOptions(callback=watch))
     seconds = time.perf_counter() - start - measuring
-    last = quality_of(lambda v: raster.render(made.field, v.camera).colour, watched)
+    last = measure_quality(lambda v: raster.render(made.field, v.camera).colour, watched)
     curve.append({"seconds": seconds, "step": made.report.steps, "gaussians": len(made.field)} | last)
     return Trial(made, curve)
 
 
-def quality_of(draw: Callable[[TrainingView], Float32[Array, "h w 3"]], tests: list[TrainingView]) -> dict[str, float]:
+def measure_quality(
+    draw: Callable[[TrainingView], Float32[Array, "h w 3"]], tests: list[TrainingView]
+) -> dict[str, float]:
     """Mean PSNR of what is drawn, raw and colour-corrected, over the pixels of weight > 0."""
     raw, level = [], []
     for view in tests:
@@ -115,30 +116,33 @@ def quality_of(draw: Callable[[TrainingView], Float32[Array, "h w 3"]], tests: l
     return {"psnr": float(np.mean(raw)), "psnr_colour_corrected": float(np.mean(level))}
 
 
-def seconds_to(curve: list[dict], decibel: float) -> float | None:
+def find_time_to(curve: list[dict], decibel: float) -> float | None:
     """When the colour-corrected PSNR first reached so much; None: never."""
     reached = [row["seconds"] for row in curve if row["psnr_colour_corrected"] >= decibel]
     return reached[0] if reached else None
 
 
-def free_space_opacity(field: GaussianField, grid: Ground, photos: PhotoSet) -> float:
+def measure_haze(field: GaussianField, grid: Ground, photos: PhotoSet) -> float:
     """Mean accumulated alpha, over the test views, of what stands higher than FREE flying heights above the ground and
     not at a matched point: the haze that photos from their own places reward."""
     above = field.means[:, 2] - grid.height_at(field.means)
     high = field[above > FREE * photos.frame.flying_height]
     if len(high):
-        high = high[cKDTree(photos.model.points).query(high.means)[0] > NEAR * grid.spacing]
+        distance = np.asarray(cKDTree(photos.model.points).query(high.means)[0])
+        high = high[distance > NEAR * grid.spacing]
     views = [view for group in photos.tests.values() for view in group]
     return float(np.mean([raster.render(high, v.camera).alpha.mean() if len(high) else 0.0 for v in views]))
 
 
-def away(photos: PhotoSet, made: Reconstruction) -> dict[str, float]:
+def measure_test_groups(photos: PhotoSet, made: Reconstruction) -> dict[str, float]:
     """Mean PSNR of each group of test views, raw."""
-    seen = {g: quality_of(lambda v: raster.render(made.field, v.camera).colour, v) for g, v in photos.tests.items()}
-    return {group: quality["psnr"] for group, quality in seen.items()}
+    seen = {
+        g: measure_quality(lambda v: raster.render(made.field, v.camera).colour, v) for g, v in photos.tests.items()
+    }
+    return {group: metrics["psnr"] for group, metrics in seen.items()}
 
 
-def stills(
+def render_stills(
     made: Reconstruction, frame: SceneFrame, width: int = 768, height: int = 512
 ) -> dict[str, Float32[Array, "h w 3"]]:
     """What nobody photographed: from 45 degrees at the flying height, and from as low as the photos' detail allows.
@@ -160,14 +164,33 @@ def stills(
     return out
 
 
-def facts(found: Trial, photos: PhotoSet) -> dict:
+def describe_trial(found: Trial, photos: PhotoSet) -> dict:
     """What a trial measured, in numbers."""
     made, last = found.made, found.curve[-1]
     return {
         "photos": len(photos.train),
         "last": last,
-        "seconds_to": {str(d): seconds_to(found.curve, d) for d in (30.0, 33.0, 34.0)},
-        "free_space_opacity": free_space_opacity(made.field, made.grid, photos),
-        "away_psnr": away(photos, made),
+        "seconds_to": {str(d): find_time_to(found.curve, d) for d in (30.0, 33.0, 34.0)},
+        "free_space_opacity": measure_haze(made.field, made.grid, photos),
+        "away_psnr": measure_test_groups(photos, made),
         "choices": made.report.choices,
     }
+
+
+def plot_fit_times(curves: dict[str, list[dict[str, float]]], path: Path | str) -> None:
+    """PSNR of test photos (colour-corrected) against seconds of fitting, a line a scene."""
+    figure = figures.make_figure(6.4, 4.0)
+    axes = figure.add_subplot()
+    for scene, rows in curves.items():
+        x, y = ([row[k] for row in rows] for k in ("seconds", "psnr_colour_corrected"))
+        (line,) = axes.plot(x, y, label=scene)
+        axes.annotate(
+            f"{y[-1]:.1f} dB", (x[-1], y[-1]), xytext=(4, 0), textcoords="offset points", color=line.get_color()
+        )
+    axes.set_xlabel("seconds of fitting (looking at the photos included)")
+    axes.set_ylabel("PSNR of test photos, colour-corrected (dB)")
+    axes.set_xlim(left=0)
+    axes.margins(x=0.12)
+    axes.grid(alpha=0.3)
+    axes.legend(frameon=False)
+    figures.save_figure(figure, path)

@@ -60,7 +60,7 @@ class ClusteredShare:
 
     participants: int
     answers: int
-    share: float | None
+    share: float
     low: float | None
     high: float | None
     p: float | None
@@ -117,6 +117,18 @@ def compute_paired_test(differences: dict[str, Float[Array, "_"]]) -> PairedTest
     return PairedTest(units, boot.mean, low, high, t, df, two_sided_p(t, df), boot.mean / deviation)
 
 
+def sum_or_none(values: Iterable[float | None]) -> float | None:
+    """The sum; None where one of the values is not known."""
+    values = list(values)
+    known = [value for value in values if value is not None]
+    return float(sum(known)) if len(known) == len(values) else None
+
+
+def subtract_or_none(a: float | None, b: float | None) -> float | None:
+    """a - b; None where one of them is not known."""
+    return None if a is None or b is None else float(a - b)
+
+
 def two_sided_p(t: float, df: int) -> float:
     """Two-sided p of a t value: .013 for t = 4.28 with 4 degrees of freedom."""
     return float(2 * stats.t.sf(abs(t), df))
@@ -126,7 +138,9 @@ def adjust_holm(p: dict[str, float]) -> dict[str, float]:
     """p values of several comparisons, adjusted for their number by Holm's method."""
     if not p:
         return {}
-    return dict(zip(p, multipletests(list(p.values()), method="holm")[1].tolist(), strict=True))
+    adjusted = multipletests(list(p.values()), method="holm")[1]
+    assert adjusted is not None
+    return dict(zip(p, adjusted.tolist(), strict=True))
 
 
 def sum_by_cluster(rows: Iterable[tuple[str, list[float | None]]]) -> ClusterSums:
@@ -193,8 +207,8 @@ def compute_clustered_share(chosen: Float[Array, "g"], asked: Float[Array, "g"])
 
 def wilson_interval(share: float, n: float, z: float) -> tuple[float, float]:
     """Ends of the shares s with |share - s| <= z sqrt(s (1 - s) / n); n need not be whole."""
-    low, high = proportion_confint(share * n, n, alpha=2 * stats.norm.sf(z), method="wilson")
-    return max(0.0, float(low)), min(1.0, float(high))
+    low, high = np.array(proportion_confint(share * n, n, alpha=2 * stats.norm.sf(z), method="wilson"), float).tolist()
+    return max(0.0, low), min(1.0, high)
 
 
 def compute_binomial_test(chosen: int, answers: int) -> tuple[float, float, float]:

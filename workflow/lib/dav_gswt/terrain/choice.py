@@ -8,22 +8,31 @@ from jaxtyping import Int64
 from numpy import ndarray as Array
 
 WEST, SOUTH, CENTRE = 0, 1, 2  # axis of a hash: colour of the west edge, of the south edge, centre variant
-_MASK = 0xFFFFFFFF
 
 
 def hash_cell(
     i: int | Int64[Array, "*cells"], j: int | Int64[Array, "*cells"], axis: int, salt: int
 ) -> int | Int64[Array, "*cells"]:
-    """32 well mixed bits for cell (i, j): multiply the coordinates apart, then the finaliser of MurmurHash3.
+    """32 well mixed bits for cell (i, j): one round of the finaliser of MurmurHash3 for each coordinate.
 
-    h = i 0x8da6b343 ^ j 0xd8163841 ^ axis 0xcb1ab31f ^ salt, all modulo 2^32: negative coordinates count in two's
-    complement, and cells 2^32 apart are the same cell. Every integer is allowed. Products of arrays wrap at 2^64, which
-    keeps their low 32 bits.
+    h = mix(mix(i 0x8da6b343 ^ axis 0xcb1ab31f ^ salt) + j 0xd8163841), all modulo 2^32: negative coordinates count in
+    two's complement, and cells 2^32 apart are the same cell. Every integer is allowed. A single round over a
+    combination that is linear in i and j would mirror the world: h(i, j) = h(-i, -j) for a third of all cells.
     """
-    h = (i * 0x8DA6B343 ^ j * 0xD8163841 ^ axis * 0xCB1AB31F ^ salt) & _MASK
-    h = (h ^ h >> 16) * 0x85EBCA6B & _MASK
-    h = (h ^ h >> 13) * 0xC2B2AE35 & _MASK
+    h = _mix(_low_word(i * 0x8DA6B343 ^ axis * 0xCB1AB31F ^ salt))
+    return _mix(_low_word(h + j * 0xD8163841))
+
+
+def _mix(h):
+    """The finaliser of MurmurHash3: every bit of a 32-bit word acts on all of its bits."""
+    h = _low_word((h ^ h >> 16) * 0x85EBCA6B)
+    h = _low_word((h ^ h >> 13) * 0xC2B2AE35)
     return h ^ h >> 16
+
+
+def _low_word(h):
+    """Products and sums of arrays wrap at 2^64, which keeps their low 32 bits."""
+    return h & 0xFFFFFFFF
 
 
 def tile_at(i: int, j: int, salt: int, variants: int) -> int:
@@ -36,12 +45,12 @@ def tile_at(i: int, j: int, salt: int, variants: int) -> int:
     the next centre that differs from its four neighbours; these are even and take the centre of the hash, so no choice
     depends on another. Where the neighbours use every centre, the centre of the hash is kept.
     """
-    return int(_tile(int(i), int(j), salt, variants))
+    return int(_choose_tile(int(i), int(j), salt, variants))
 
 
 def tiles_at(i: Int64[Array, "*cells"], j: Int64[Array, "*cells"], salt: int, variants: int) -> Int64[Array, "*cells"]:
     """`tile_at` of many cells."""
-    return _tile(i, j, salt, variants)
+    return _choose_tile(i, j, salt, variants)
 
 
 def tiles_in(west: int, south: int, shape: tuple[int, int], salt: int, variants: int) -> Int64[Array, "h w"]:
@@ -51,12 +60,12 @@ def tiles_in(west: int, south: int, shape: tuple[int, int], salt: int, variants:
     return tiles_at(i, j, salt, variants)
 
 
-def _tile(i, j, salt: int, variants: int):
-    edges, centre = _edges(i, j, salt), _centre(i, j, salt, variants)
+def _choose_tile(i, j, salt: int, variants: int):
+    edges, centre = _hash_edges(i, j, salt), _hash_centre(i, j, salt, variants)
     taken = 0  # a bit for each centre that a neighbour with the same edges has
     for east, north in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-        same = _edges(i + east, j + north, salt) == edges
-        taken = taken | np.where(same, 1, 0) << _centre(i + east, j + north, salt, variants)
+        same = _hash_edges(i + east, j + north, salt) == edges
+        taken = taken | np.where(same, 1, 0) << _hash_centre(i + east, j + north, salt, variants)
     free = centre
     for step in reversed(range(variants)):
         other = (centre + step) % variants
@@ -64,11 +73,11 @@ def _tile(i, j, salt: int, variants: int):
     return 16 * np.where((i + j) % 2 == 1, free, centre) + edges
 
 
-def _edges(i, j, salt: int):
+def _hash_edges(i, j, salt: int):
     west, east = (hash_cell(i + step, j, WEST, salt) & 1 for step in (0, 1))
     south, north = (hash_cell(i, j + step, SOUTH, salt) & 1 for step in (0, 1))
     return 8 * west + 4 * north + 2 * east + south
 
 
-def _centre(i, j, salt: int, variants: int):
+def _hash_centre(i, j, salt: int, variants: int):
     return (hash_cell(i, j, CENTRE, salt) >> 1) % variants

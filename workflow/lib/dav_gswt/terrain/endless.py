@@ -1,17 +1,23 @@
 """The endless terrain: a set of Wang tiles with everything that is needed to render it from any eye."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy import ndarray as Array
 
+from dav_gswt.bundle.land_cover import ObjectOrders
 from dav_gswt.bundle.manifest import TileSetInfo
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.field import GaussianField
 from dav_gswt.raster.interface import RIM
+from dav_gswt.terrain.class_rules import NOISE, Picture, apply_rule, warn_of_missing
+from dav_gswt.terrain.classes import Classes
 from dav_gswt.terrain.heights import FlatSurface, HeightField, surface_from_config
+from dav_gswt.terrain.scatter import Scatter
+from dav_gswt.tiles.layout import EDGES
 
 NEAR = 0.1  # near plane, as a share of the eye floor
 
@@ -23,9 +29,13 @@ class EndlessTerrain:
     tiles: by (level, tile number), positions in [0, side], in no order. switches, bands: distance at which a level
     gives way to the next, and half the width of that (see `weights.level_weights`); the last switch is infinite.
     directions: of the pre-sorted orders; tile_orders: indices of the directions that each tile keeps. z: range of
-    heights of all Gaussians. overhang: largest extent of a Gaussian beyond the edge of its tile. near: distance of the
-    near plane. smooth: smoothstep fades. reach: distance to the last tiles, in tile sides; beyond it the ground has
-    the terrain's mean colour.
+    heights of all Gaussians. overhang: largest extent of a Gaussian beyond the edge of its tile. variants: centres of a
+    material's tiles. near: distance of the near plane. smooth: smoothstep fades. reach: distance to the last tiles, in
+    tile sides; beyond it the ground has the terrain's mean colour. classes: which material lies where; None with one.
+    kept: by cell, level and material, which Gaussians stay in a cell of several materials, as far as they are known.
+    objects: objects[number][level], about the foot. extents: of each object, the largest distance of a Gaussian's rim
+    from the foot. scatter: where they stand; None without objects. ordered: by object, order and levels, the Gaussians
+    in that order and the level of each, as far as they are known.
     """
 
     tiles: dict[tuple[int, int], GaussianField]
@@ -42,6 +52,23 @@ class EndlessTerrain:
     heights: HeightField = FlatSurface()
     smooth: bool = False
     reach: int = 48
+    classes: Classes | None = None
+    objects: list[list[GaussianField]] = field(default_factory=list)
+    extents: list[float] = field(default_factory=list)
+    scatter: Scatter | None = None
+    kept: dict[tuple[int, int, int, int], Int[Array, "k"]] = field(default_factory=dict, init=False, repr=False)
+    ordered: dict[tuple[int, ...], tuple[GaussianField, Int[Array, "k"]]] = field(
+        default_factory=dict, init=False, repr=False
+    )
+
+    @property
+    def object_entries(self) -> Sequence[ObjectOrders]:
+        return self.scatter.objects if self.scatter is not None else []
+
+    @property
+    def tiles_each(self) -> int:
+        """Number of tiles of a material."""
+        return EDGES * self.variants
 
     def height_range(self, x: Float[Array, "n"], y: Float[Array, "n"]) -> tuple[Float[Array, "n"], Float[Array, "n"]]:
         """Lower and upper bound of the heights of all Gaussians in cells with these centres, the surface included."""
@@ -52,24 +79,51 @@ class EndlessTerrain:
         return low, np.minimum(middle + most, self.heights.high) + self.z[1]
 
 
-def terrain_from_bundle(bundle: Bundle, surface: dict[str, Any]) -> EndlessTerrain:
-    """The Gaussians of a bundle, as they were quantized, on the surface that the config's `heights` describes.
+def terrain_from_bundle(
+    bundle: Bundle, surface: dict[str, Any], rule: Sequence[dict[str, Any]] = NOISE
+) -> EndlessTerrain:
+    """The Gaussians of a bundle, as they were quantized, on the surface and with the classes of the config.
 
-    Raises: InputError: see `bundle.chunks.read_chunk`, `heights.surface_from_config`.
+    Args:   surface: the config's `heights`. rule: the config's `classes`.
+    Raises: InputError: see `bundle.chunks.read_chunk`, `heights.surface_from_config`, `class_rules.apply_rule`.
     """
-    return terrain_from_fields(bundle.fields(), bundle.manifest, surface)
+    manifest, pictures = apply_rule(bundle.manifest, rule)
+    objects = [
+        [bundle.object_chunk(number, level)[0] for level in range(len(manifest.levels))]
+        for number in range(len(manifest.objects or []))
+    ]
+    terrain = terrain_from_fields(bundle.fields(), manifest, surface, objects, pictures)
+    if terrain.classes is not None:
+        warn_of_missing(terrain.classes, [material.name for material in manifest.materials])
+    return terrain
 
 
 def terrain_from_fields(
-    tiles: list[list[GaussianField]], manifest: TileSetInfo, surface: dict[str, Any]
+    tiles: list[list[GaussianField]],
+    manifest: TileSetInfo,
+    surface: dict[str, Any],
+    objects: Sequence[list[GaussianField]] = (),
+    pictures: Mapping[str, Picture] | None = None,
 ) -> EndlessTerrain:
-    """tiles[level][tile] with the distances of a manifest, on the surface that the config's `heights` describes.
+    """tiles[level][tile] with the distances and classes of a manifest, on the surface that the config's `heights`
+    describes.
 
+    Args:   objects: objects[number][level], about their feet. pictures: of the terms of classes, by file.
     Raises: InputError: as `heights.surface_from_config`.
     """
     levels, entries, side = manifest.levels, manifest.tiles, manifest.tile_side
     largest = max(float(np.exp(f.log_scales.max(initial=-np.inf))) for row in tiles for f in row)
+    heights = surface_from_config(surface, side)
+    classes = manifest.classes and Classes(manifest.classes, len(manifest.materials), side, heights, pictures or {})
     beyond = (RIM - 3) * largest  # the manifest's heights reach three deviations beyond the centres
+    extents, things = [measure_extent(fields) for fields in objects], manifest.objects or []
+    z = [(entry.z[0] - beyond, entry.z[1] + beyond) for entry in entries]
+    scatter, widest = None, 0.0
+    if manifest.scatter is not None:
+        scatter, most = Scatter(manifest.scatter, things, side, classes), 1 + manifest.scatter.size
+        reach = [most * extent for extent in extents]
+        z += [(each.ground - r, each.ground + r) for each, r in zip(things, reach, strict=True)]
+        widest = max(reach)
     return EndlessTerrain(
         tiles={(level, tile): f for level, row in enumerate(tiles) for tile, f in enumerate(row)},
         side=side,
@@ -77,10 +131,22 @@ def terrain_from_fields(
         bands=[level.band for level in levels],
         directions=np.array(manifest.directions, float),
         tile_orders=[entry.chunks[0].orders for entry in entries],
-        z=(min(entry.z[0] for entry in entries) - beyond, max(entry.z[1] for entry in entries) + beyond),
-        overhang=RIM * largest,
-        variants=len(tiles[0]) // 16,
+        z=(min(low for low, _ in z), max(high for _, high in z)),
+        overhang=max(RIM * largest, widest),
+        variants=len(tiles[0]) // (16 * len(manifest.materials)),
         salt=manifest.salt,
         near=NEAR * manifest.eye_floor,
-        heights=surface_from_config(surface, side),
+        heights=heights,
+        classes=classes,
+        objects=list(objects),
+        extents=extents,
+        scatter=scatter,
     )
+
+
+def measure_extent(levels: list[GaussianField]) -> float:
+    """Largest distance of the rim of an object's Gaussians from its foot, over all levels."""
+    away = [
+        np.linalg.norm(f.means.astype(float), axis=1) + RIM * np.exp(f.log_scales.astype(float)).max(1) for f in levels
+    ]
+    return float(np.concatenate(away).max(initial=0.0))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float, Float32, Int64
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
@@ -87,7 +87,9 @@ class Hills:
         height, slope = np.zeros(len(x)), np.zeros((len(x), 2))
         for octave, amplitude in enumerate(self._amplitudes()):
             cells = 2.0**octave / self.wavelength
-            noise = _noise(x * cells + octave * SHIFT[0], y * cells + octave * SHIFT[1], HILLS + octave, self.salt)
+            noise = _gradient_noise(
+                x * cells + octave * SHIFT[0], y * cells + octave * SHIFT[1], HILLS + octave, self.salt
+            )
             height += amplitude * noise[0]
             slope += amplitude * cells * noise[1]
         return height, slope
@@ -128,23 +130,25 @@ class HeightMap:
     def at(self, x: Float[Array, "n"], y: Float[Array, "n"]) -> tuple[Float[Array, "n"], Float[Array, "n 2"]]:
         rows, columns = self.pixels.shape
         per_unit = columns / self.width
-        i, across, turn_x = _taps(x * per_unit + 0.5 * columns)
-        j, along, turn_y = _taps(0.5 * rows - y * per_unit)
+        i, across, turn_x = _spline_weights(x * per_unit + 0.5 * columns)
+        j, along, turn_y = _spline_weights(0.5 * rows - y * per_unit)
         height, slope = np.zeros(len(x)), np.zeros((len(x), 2))
         for b in range(3):
-            row = self._inside(j + b - 1, rows)
+            row = wrap_index(j + b - 1, rows, self.beyond)
             for a in range(3):
-                value = self.pixels[row, self._inside(i + a - 1, columns)].astype(float)
+                value = self.pixels[row, wrap_index(i + a - 1, columns, self.beyond)].astype(float)
                 height += value * across[a] * along[b]
                 slope[:, 0] += value * turn_x[a] * along[b]
                 slope[:, 1] -= value * across[a] * turn_y[b]  # rows go south
         return height, slope * per_unit
 
-    def _inside(self, index: Array, n: int) -> Array:
-        if self.beyond == "clamp":
-            return np.clip(index, 0, n - 1)
-        index = index % (2 * n)
-        return np.where(index < n, index, 2 * n - 1 - index)
+
+def wrap_index(index: Int64[Array, "*n"], n: int, beyond: str) -> Int64[Array, "*n"]:
+    """Indices of a picture's n pixels for any index: mirrored, or the border's (beyond = "clamp")."""
+    if beyond == "clamp":
+        return np.clip(index, 0, n - 1)
+    index = index % (2 * n)
+    return np.where(index < n, index, 2 * n - 1 - index)
 
 
 def surface_from_config(entry: dict, side: float) -> HeightField:
@@ -175,7 +179,7 @@ def read_height_map(path: Path | str) -> Float32[Array, "rows columns"]:
     return pixels
 
 
-def _taps(u: Float[Array, "n"]):
+def _spline_weights(u: Float[Array, "n"]):
     """The pixel under each point, the weights of it and its two neighbours, and their derivatives."""
     pixel = np.floor(u)
     t = u - pixel - 0.5
@@ -184,12 +188,12 @@ def _taps(u: Float[Array, "n"]):
     return pixel.astype(np.int64), weights, (-before, -2 * t, after)
 
 
-def _noise(x: Float[Array, "n"], y: Float[Array, "n"], axis: int, salt: int):
+def _gradient_noise(x: Float[Array, "n"], y: Float[Array, "n"], axis: int, salt: int):
     """Gradient noise and its gradient; x and y in cells."""
     i, j = np.floor(x), np.floor(y)
     u, v = x - i, y - j
     i, j = i.astype(np.int64), j.astype(np.int64)
-    fade_x, fade_y, turn_x, turn_y = _fade(u), _fade(v), _turn(u), _turn(v)
+    fade_x, fade_y, turn_x, turn_y = smoothstep(u), smoothstep(v), _smoothstep_slope(u), _smoothstep_slope(v)
     value, by_x, by_y = np.zeros(len(x)), np.zeros(len(x)), np.zeros(len(x))
     for b in (0, 1):
         for a in (0, 1):
@@ -204,9 +208,10 @@ def _noise(x: Float[Array, "n"], y: Float[Array, "n"], axis: int, salt: int):
     return value, np.stack([by_x, by_y], 1)
 
 
-def _fade(t):
+def smoothstep(t):
+    """t^3 (t (6 t - 15) + 10): from 0 to 1, with first and second derivatives 0 at both ends."""
     return t * t * t * (t * (6 * t - 15) + 10)
 
 
-def _turn(t):
+def _smoothstep_slope(t):
     return 30 * t * t * (t * (t - 2) + 1)

@@ -3,13 +3,15 @@
 import hashlib
 import os
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path, PurePosixPath
+from typing import Any
 
-from dav_gswt.bundle.manifest import FORMAT, VERSION
+from dav_gswt.bundle.manifest import FORMAT, READABLE, VERSION, Manifest
 from dav_gswt.bundle.manifest import NAME as MANIFEST
 from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_folder, read_json, write_json
+from dav_gswt.terrain.class_rules import NOISE, Picture, apply_rule, warn_of_rule
 from dav_gswt.terrain.heights import FlatSurface, HeightField, HeightMap, Hills
 
 SURFACE = "heights.bin"
@@ -17,16 +19,22 @@ MAX_SIDE = 4096  # pixels along a side of a height map: every WebGL2 device in u
 
 
 def write_page(
-    bundle_dir: Path | str, viewer_dir: Path | str, out_dir: Path | str, surface: HeightField | None = None
+    bundle_dir: Path | str,
+    viewer_dir: Path | str,
+    out_dir: Path | str,
+    surface: HeightField | None = None,
+    rule: Sequence[dict[str, Any]] = NOISE,
 ) -> None:
     """Copy viewer, manifest and chunks to `out_dir`, atomically: an older page stays until the new one is complete.
 
     All files under `viewer_dir` are copied, and the chunks that the manifest names.
 
     Args:   surface: height field of the terrain (default: level ground), stored in the page's manifest as `heights`;
-            the pixels of a height map are heights.bin, float32, little-endian, rows from the north.
+            the pixels of a height map are heights.bin, float32, little-endian, rows from the north. rule: the config's
+            `classes`, stored as those of the page's manifest, its pictures beside it.
     Raises: InputError: the manifest is missing or of another version, a chunk is missing, has another size than the
-            manifest says, or lies outside of the bundle; the viewer is incomplete; see also `describe_surface`.
+            manifest says, or lies outside of the bundle; the viewer is incomplete; see also `describe_surface`,
+            `class_rules.apply_rule`.
     """
     bundle, viewer, out = Path(bundle_dir), Path(viewer_dir), Path(out_dir)
     if not (viewer / "index.html").is_file():
@@ -34,12 +42,15 @@ def write_page(
     copies = [(path, str(path.relative_to(viewer))) for path in sorted(viewer.rglob("*")) if path.is_file()]
     copies += [(bundle / name, name) for name in list_chunks(bundle)]
     heights, pixels = describe_surface(surface or FlatSurface())
+    value, pictures = replace_classes(read_json(bundle / MANIFEST), rule)
     with atomic_folder(out) as part:
         for source, name in copies:
-            _copy(source, part / name)
+            _copy_file(source, part / name)
         if pixels:
             (part / SURFACE).write_bytes(pixels)
-        write_json(part / MANIFEST, read_json(bundle / MANIFEST) | {"heights": heights})
+        for name, pixels in pictures.items():
+            (part / name).write_bytes(pixels.tobytes())
+        write_json(part / MANIFEST, value | {"heights": heights})
 
 
 def find_viewer(paths: Iterable[Path | str]) -> Path:
@@ -69,17 +80,27 @@ def describe_surface(surface: HeightField) -> tuple[dict, bytes]:
     return entry | {"sha256": hashlib.sha256(data).hexdigest()}, data
 
 
+def replace_classes(value: dict[str, Any], rule: Sequence[dict[str, Any]]) -> tuple[dict[str, Any], dict[str, Picture]]:
+    """A manifest with the classes of the config's rule, and the pixels of its pictures. Raises: as `apply_rule`."""
+    if "classes" not in value:
+        warn_of_rule(rule)
+        return value, {}
+    made, pictures = apply_rule(Manifest.from_dict(value), rule)
+    return value | {"classes": made.to_dict()["classes"]}, pictures
+
+
 def list_chunks(bundle: Path) -> list[str]:
     """The chunk files that a bundle's manifest names, checked against the folder. Raises: InputError, as write_page."""
     manifest = read_json(bundle / MANIFEST)
-    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT or manifest.get("version") != VERSION:
+    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT or manifest.get("version") not in READABLE:
         raise InputError(f"{bundle / MANIFEST}: not a bundle of format {FORMAT!r}, version {VERSION}; make it again")
     try:
-        chunks = [(chunk["file"], chunk["bytes"]) for tile in manifest["tiles"] for chunk in tile["chunks"]]
+        holders = [*manifest["tiles"], *manifest.get("objects", [])]
+        chunks = [(chunk["file"], chunk["bytes"]) for holder in holders for chunk in holder["chunks"]]
     except (KeyError, TypeError) as error:
         raise InputError(f"{bundle / MANIFEST}: incomplete tile table ({error}); make the bundle again") from error
     for name, size in chunks:
-        if not _inside(name):
+        if not _is_inside(name):
             raise InputError(f"{bundle / MANIFEST}: chunk {name!r} lies outside of the bundle")
         path = bundle / name
         if not path.is_file():
@@ -89,12 +110,12 @@ def list_chunks(bundle: Path) -> list[str]:
     return list(dict.fromkeys(name for name, _ in chunks))
 
 
-def _inside(name) -> bool:
+def _is_inside(name) -> bool:
     """A plain relative path that cannot leave the folder it starts from."""
     return isinstance(name, str) and "\\" not in name and not {"..", "/", ""} & set(PurePosixPath(name).parts or ("",))
 
 
-def _copy(source: Path, target: Path) -> None:
+def _copy_file(source: Path, target: Path) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(source, target)
     with target.open("rb") as file:

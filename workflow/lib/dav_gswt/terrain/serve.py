@@ -2,6 +2,7 @@
 
 import argparse
 import errno
+import re
 import sys
 from functools import partial
 from http import HTTPStatus
@@ -12,12 +13,29 @@ from dav_gswt.errors import InputError
 
 HOST = "127.0.0.1"  # only this machine is served
 CONTENT = ("davgswt.json", "trials.js")  # a terrain, or the trials of the forced-choice study
+IDLE = 60.0  # seconds after which a connection that neither asks nor reads is closed
+# names of this machine, at any port: a tunnel may have another. A page elsewhere whose name was pointed at this machine
+# (DNS rebinding) asks for its own name
+LOOPBACK = re.compile(r"(localhost|127\.0\.0\.1|\[::1\])\.?(:\d{1,5})?", re.IGNORECASE)
+HEADERS = {
+    "Content-Security-Policy": (
+        "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; worker-src 'self'; "
+        "img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    ),
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-cache",
+}
 
 
 class _Handler(SimpleHTTPRequestHandler):
-    """Serve files of one folder: no listings, no symbolic links out of it, no caching."""
+    """Serve regular files of one folder to requests for this machine: no listings, no symbolic links out of it, no
+    caching."""
 
     protocol_version = "HTTP/1.1"
+    server_version, sys_version = "DAV-GSWT", ""
+    timeout = IDLE
     # fixed here: a system's MIME table may map .js to text/plain, which browsers refuse to run as a module
     extensions_map = {
         "": "application/octet-stream",
@@ -30,18 +48,29 @@ class _Handler(SimpleHTTPRequestHandler):
     }
 
     def send_head(self):
-        asked, root = Path(self.translate_path(self.path)).resolve(), Path(self.directory).resolve()
-        if not asked.is_relative_to(root):
+        hosts = self.headers.get_all("Host", [])
+        if len(hosts) != 1 or not LOOPBACK.fullmatch(hosts[0].strip()):
+            self.send_error(HTTPStatus.MISDIRECTED_REQUEST, f"Ask for http://{HOST}:PORT/")
+            return None
+        if not self._is_served():
             self.send_error(HTTPStatus.NOT_FOUND, "File not found")
             return None
         return super().send_head()
 
-    def list_directory(self, path):
-        self.send_error(HTTPStatus.NOT_FOUND, "File not found")
+    def _is_served(self) -> bool:
+        """Whether the request is for the page itself, or a regular file in its folder."""
+        root = Path(self.directory).resolve()
+        try:
+            asked = Path(self.translate_path(self.path)).resolve()
+            if asked == root:
+                asked = (root / "index.html").resolve()
+            return asked.is_relative_to(root) and asked.is_file()
+        except (OSError, ValueError):  # too long a name, a null byte, half of a surrogate pair
+            return False
 
     def end_headers(self):
-        self.send_header("Cache-Control", "no-cache")
-        self.send_header("X-Content-Type-Options", "nosniff")
+        for name, value in HEADERS.items():
+            self.send_header(name, value)
         super().end_headers()
 
     def log_message(self, format, *arguments):
@@ -50,8 +79,8 @@ class _Handler(SimpleHTTPRequestHandler):
 
 class _Server(ThreadingHTTPServer):
     def handle_error(self, request, client_address):
-        """Ignore connections that the browser closed; report everything else."""
-        if not isinstance(sys.exception(), ConnectionError):
+        """Ignore connections that the browser closed or forgot; report everything else."""
+        if not isinstance(sys.exception(), ConnectionError | TimeoutError):
             super().handle_error(request, client_address)
 
 

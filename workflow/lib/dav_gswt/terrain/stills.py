@@ -13,6 +13,7 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.terrain import splats
 from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.endless import EndlessTerrain
+from dav_gswt.terrain.object_placement import group_by_cell
 from dav_gswt.terrain.placement import place_cell
 from dav_gswt.terrain.timing import FrameTiming
 from dav_gswt.terrain.visibility import (
@@ -94,11 +95,12 @@ def render_view(
         if count_gaussians(terrain, cells).sum() > MAX_GAUSSIANS:  # coarser levels first, then fewer cells
             terrain = coarsen_to_budget(terrain, camera, MAX_GAUSSIANS)
             cells = drop_far_cells(terrain, cells)
+        things = group_by_cell(terrain, cells, eye)
     backdrop = Backdrop.for_eye(terrain, eye, sky, ground_colour)
     far, close = [splats.EMPTY], [splats.EMPTY]
     for k in range(len(cells)):
         with timing.measure("update"):
-            field, slope = place_cell(terrain, cells[k : k + 1], eye)
+            field, slope = place_cell(terrain, cells[k : k + 1], eye, things.get(k))
         with timing.measure("render"):
             part = splats.project(backdrop.blend_far(field), slope, here, terrain.near)
         (close if exact or cells.close[k] else far).append(part)

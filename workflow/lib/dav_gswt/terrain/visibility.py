@@ -18,13 +18,15 @@ MIN_FACTOR, BISECTIONS = 1e-5, 16  # of the search for a factor on level distanc
 
 @dataclass(frozen=True)
 class GridCells:
-    """Cells of the tile grid, back to front. close: in the 3 x 3 block about the eye. nearest, farthest: bounds of the
+    """Cells of the tile grid, back to front. tile: that of the first material in the cell. materials: which materials
+    the cell may show, bit m for material m. close: in the 3 x 3 block about the eye. nearest, farthest: bounds of the
     distances from the eye to the centres of a cell's Gaussians.
     """
 
     i: Int64[Array, "n"]
     j: Int64[Array, "n"]
     tile: Int64[Array, "n"]
+    materials: Int64[Array, "n"]
     close: Bool[Array, "n"]
     nearest: Float[Array, "n"]
     farthest: Float[Array, "n"]
@@ -56,8 +58,18 @@ def visible_cells(terrain: EndlessTerrain, camera: Camera) -> GridCells:
     seen = (nearest < terrain.reach * side) & ~_outside_frustum(camera, terrain.near, middle, half + wider)
     sequence, _ = draw_order.sort_cells(i, j, at)
     sequence = sequence[seen[sequence]]
-    tile = tiles_at(i, j, terrain.salt, terrain.variants)
-    return GridCells(i, j, tile, draw_order.in_near_block(i, j, at), nearest, farthest)[sequence]
+    i, j = i[sequence], j[sequence]
+    tile, materials = tiles_at(i, j, terrain.salt, terrain.variants), np.ones(len(i), np.int64)
+    if terrain.classes is not None:
+        materials = terrain.classes.materials_in(i, j)
+        tile += terrain.tiles_each * _first_bit(materials)
+    close = draw_order.in_near_block(i, j, at)
+    return GridCells(i, j, tile, materials, close, nearest[sequence], farthest[sequence])
+
+
+def _first_bit(bits: Int64[Array, "n"]) -> Int64[Array, "n"]:
+    """Number of the lowest bit that is set, of at most eight."""
+    return np.argmax(bits[:, None] >> np.arange(8) & 1, axis=1)
 
 
 def _outside_frustum(
@@ -80,16 +92,37 @@ def _outside_frustum(
 
 def active_levels(terrain: EndlessTerrain, cells: GridCells) -> Bool[Array, "levels n"]:
     """Which levels have a weight somewhere in each cell."""
+    return active_range(terrain, cells.nearest, cells.farthest)
+
+
+def active_range(
+    terrain: EndlessTerrain, nearest: Float[Array, "n"], farthest: Float[Array, "n"]
+) -> Bool[Array, "levels n"]:
+    """Which levels have a weight somewhere between two distances from the eye."""
     switch, band = np.array(terrain.switches)[:, None], np.array(terrain.bands)[:, None]
     begin = np.concatenate([[[-np.inf]], (switch - band)[:-1]])
-    return (cells.nearest <= switch + band) & (cells.farthest >= begin)
+    return (nearest <= switch + band) & (farthest >= begin)
 
 
 def count_gaussians(terrain: EndlessTerrain, cells: GridCells) -> Int64[Array, "n"]:
     """Number of Gaussians in each cell, over its active levels."""
-    levels = range(len(terrain.switches))
-    counts = np.array([[len(terrain.tiles[level, t]) for t in cells.tile] for level in levels], np.int64)
+    levels, each = range(len(terrain.switches)), terrain.tiles_each
+    kinds = 1 if terrain.classes is None else terrain.classes.materials
+    sizes = np.array([[len(terrain.tiles[level, t]) for t in range(kinds * each)] for level in levels], np.int64)
+    counts = sum(sizes[:, m * each + cells.tile % each] * (cells.materials >> m & 1) for m in range(kinds))
+    if terrain.scatter is not None:
+        counts = counts + _count_objects(terrain, cells)
     return (counts * active_levels(terrain, cells)).sum(0)
+
+
+def _count_objects(terrain: EndlessTerrain, cells: GridCells) -> Int64[Array, "levels n"]:
+    """Number of Gaussians at each level of the objects whose feet lie in cells."""
+    assert terrain.scatter is not None
+    found = terrain.scatter.instances_in(cells.i, cells.j)
+    index = {cell: k for k, cell in enumerate(zip(cells.i.tolist(), cells.j.tolist(), strict=True))}
+    owner = np.array([index[cell] for cell in zip(found.i.tolist(), found.j.tolist(), strict=True)], int)
+    sizes = [[len(levels[level]) for levels in terrain.objects] for level in range(len(terrain.switches))]
+    return np.array([np.bincount(owner, np.array(size)[found.number], len(cells)) for size in sizes]).astype(np.int64)
 
 
 def drop_far_cells(terrain: EndlessTerrain, cells: GridCells, budget: int = MAX_GAUSSIANS) -> GridCells:

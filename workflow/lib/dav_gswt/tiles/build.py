@@ -1,8 +1,8 @@
 """The tile set of a field: trends are removed, patches searched and cut, and every level is composed of them."""
 
 import logging
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -47,12 +47,14 @@ class TilingOptions:
         trend: width of the low-pass that is removed, in tile sides.
         candidates: places that a search compares.
         tries: the best of them that are cut before one is taken.
-        kind: one of `energy.KINDS`.
+        kind: the energy of seams, one of `energy.KINDS`.
         slope: of the weight of colour as a function of uncertainty.
         source: what the semantics are made of.
         levels: of the tiles, a number or AUTO; None: as many as are given.
         corrected: steps across seams are spread out (`poisson_blending`).
         relabel: see `search.SearchProblem`.
+
+    Raises: ValueError: an unknown kind.
     """
 
     share: float | str = 0.5
@@ -68,19 +70,27 @@ class TilingOptions:
     corrected: bool = True
     relabel: search.Relabel | None = None
 
+    def __post_init__(self) -> None:
+        if self.kind not in energy.KINDS:
+            raise ValueError(f"{self.kind!r} is no energy of seams: {', '.join(energy.KINDS)}")
+
     @classmethod
     def from_config(
         cls, tiling: Mapping[str, Any], source: semantics.SemanticSource, levels: int | str | None = None
     ) -> "TilingOptions":
-        """The options that an entry of the config's tilings asks for."""
+        """The options of an entry of the config's tilings."""
         own = {"share": "tile", "kind": "energy"}
         given = {key: tiling[name] for key in vars(cls()) if (name := own.get(key, key)) in tiling}
         return cls(**given, source=source, levels=levels)
 
 
-def make_generator(seed: int, tiling: Mapping[str, Any]) -> np.random.Generator:
-    """The generator of a tile set, from the workflow's seed and, where it is not 0, the tiling's replicate number."""
-    return np.random.default_rng([seed, tiling["replicate"]] if tiling.get("replicate") else [seed])
+def make_generator(seed: int, tiling: Mapping[str, Any], material: int = 0) -> np.random.Generator:
+    """The generator of a tile set, from the workflow's seed and, where they are not 0, the tiling's replicate number
+    and the material's."""
+    replicate = tiling.get("replicate") or 0
+    if material:
+        return np.random.default_rng([seed, replicate, material])
+    return np.random.default_rng([seed, replicate] if replicate else [seed])
 
 
 @dataclass(frozen=True)
@@ -117,6 +127,48 @@ def cut_levels(levels: Levels, options: TilingOptions, rng: np.random.Generator)
     return cut_tiles(levels.fields, Exemplar.from_grid(grid), *maps, options, rng)
 
 
+def cut_materials(
+    sets: Sequence[Levels],
+    options: TilingOptions,
+    tile_side: float | None,
+    make_rng: Callable[[int], np.random.Generator],
+) -> list[TileSet]:
+    """Cut a tile set of each material: all of one side, with as many levels, and the same mean height.
+
+    Args:
+        sets: the levels of each material's exemplar; cells of all are equally wide.
+        tile_side: in cells, where the options leave it to the texture; None: by the texture of the first material.
+        make_rng: the generator of a material, by number.
+    Raises: InputError: see `cut_tiles`.
+    """
+    numbers = [own.wanted for own in sets if isinstance(own.wanted, int)]
+    options = replace(options, levels=min(numbers) if numbers else AUTO)
+    tiles: list[TileSet] = []
+    side = tile_side if options.share == AUTO else None
+    for number, own in enumerate(sets):
+        share = options.share if side is None else min(1.0, side / own.grids[0].cells)
+        tiles.append(cut_levels(own, replace(options, share=share), make_rng(number)))
+        side, options = tiles[0].report.layout.side, replace(options, levels=len(tiles[0].fields))
+    if len({(len(own.fields), own.report.layout.side) for own in tiles}) > 1:
+        raise InputError(
+            "tiles: a material's exemplar holds no such tiles: choose a smaller `tile` or `materials: one`"
+        )
+    return [_raise_to(own, _mean_height(tiles[0])) for own in tiles]
+
+
+def _mean_height(tiles: TileSet) -> float:
+    return float(np.mean([field.means[:, 2].astype(float).mean() for field in tiles.fields[0]]))
+
+
+def _raise_to(tiles: TileSet, height: float) -> TileSet:
+    """The tiles at another mean height."""
+    by = np.array([0, 0, height - _mean_height(tiles)], np.float32)
+    if not by.any():
+        return tiles
+    fields = [[replace(field, means=field.means + by) for field in level] for level in tiles.fields]
+    return replace(tiles, fields=fields)
+
+
 def cut_tiles(
     levels: list[GaussianField],
     exemplar: Exemplar,
@@ -139,24 +191,18 @@ def cut_tiles(
     shape = (exemplar.cells, exemplar.cells)
     if colour.shape[:2] != shape or uncertainty.shape != shape:
         raise ValueError(f"maps of {colour.shape[:2]} and {uncertainty.shape} cells for an exemplar of {shape}")
-    known, doubt = _fill_holes(colour, uncertainty)
-    scale = texture.measure_texture_scale(known)
-    plan = layout.plan_layout(
-        exemplar.cells, options.levels or len(levels), *_choose_sizes(options, scale, exemplar), len(levels)
-    )
+    filled, uncertainty = _fill_holes(colour, uncertainty)
+    scale = texture.measure_texture_scale(filled)
+    plan = _plan_layout(options, scale, exemplar, len(levels))
     _, height = compute_ground_maps(levels[0], exemplar)
     trend = trends.fit_trend(colour, height, exemplar, options.trend * plan.side)
-    binned = [
-        _check_level(compose.bin_gaussians(trends.remove_trend(field, trend), exemplar, 2**number), number)
-        for number, field in enumerate(levels[: plan.composed_levels])
-    ]
+    binned = _bin_levels(levels[: plan.composed_levels], exemplar, trend)
     hidden = energy.make_occluder_layer(occluders.compute_cover(levels[0], exemplar, height))
-    colour = np.clip(known - trend.colour, 0, 1).astype(float)
+    colour = np.clip(filled - trend.colour, 0, 1).astype(float)
     height = np.nan_to_num(height - trend.height, nan=float(np.nanmean(height)))
-    semantic = None if options.kind == "colour" else semantics.make_semantic_layer(colour, options.source)
-    priced = energy.SeamEnergy(options.kind, options.slope, energy.make_colour_layer(colour), semantic, hidden)
-    guide = patches.make_guidance(colour, height, doubt, plan)
-    problem = search.SearchProblem(plan, guide, priced, options.candidates, options.tries, options.relabel)
+    seam_energy, energy_report = _make_seam_energy(options, colour, hidden)
+    guide = patches.make_guidance(colour, height, uncertainty, plan)
+    problem = search.SearchProblem(plan, guide, seam_energy, options.candidates, options.tries, options.relabel)
     found = search.search_patches(problem, options.variants, rng)
     shifts = np.stack([layout.label_shifts(plan, found.places, tile) for tile in range(len(found.tiles))])
     corrections = _solve_corrections(plan, found, shifts, poisson_blending.make_soft_maps(colour, height))
@@ -171,21 +217,33 @@ def cut_tiles(
         layout=plan,
         texture=scale * exemplar.spacing,
         raised=raised.tolist(),
-        energy=_describe_energy(priced, semantic),
+        energy=energy_report,
         trend={"colour": float(np.ptp(trend.colour)), "height": float(np.ptp(trend.height))},
         correction=np.abs(corrections).max((0, 1, 2)).tolist(),
     )
-    means = [doubt[layout.source_cells(*pair)].mean() for pair in zip(found.labels, shifts, strict=True)]
-    if max(means) > WARN_UNCERTAINTY:
+    means = _average_uncertainty(uncertainty, found.labels, shifts)
+    return TileSet(plan.side * exemplar.spacing, exemplar.spacing, fields, found.labels, shifts, means, report)
+
+
+def _bin_levels(levels: list[GaussianField], exemplar: Exemplar, trend: trends.Trend) -> list[compose.BinnedLevel]:
+    """The levels without the trend, sorted by the exemplar's cells."""
+    return [
+        _check_level(compose.bin_gaussians(trends.remove_trend(field, trend), exemplar, 2**number), number)
+        for number, field in enumerate(levels)
+    ]
+
+
+def _average_uncertainty(uncertainty: Array, labels: Array, shifts: Array) -> Float[Array, "tiles"]:
+    """Mean uncertainty of every tile's cells; a warning where a tile shows uncertain ground."""
+    means = np.array([uncertainty[layout.source_cells(*pair)].mean() for pair in zip(labels, shifts, strict=True)])
+    if means.max() > WARN_UNCERTAINTY:
         _log.warning(
-            "the tiles show uncertain ground (mean uncertainty %.2f to %.2f): a smaller `tile` in the config's tilings "
-            "would show surer ground, or more photos",
-            min(means),
-            max(means),
+            "the tiles show uncertain ground (mean uncertainty %.2f to %.2f): choose a smaller `tile` in the config's "
+            "tilings, or take more photos",
+            means.min(),
+            means.max(),
         )
-    return TileSet(
-        plan.side * exemplar.spacing, exemplar.spacing, fields, found.labels, shifts, np.array(means), report
-    )
+    return means
 
 
 def _compose_tiles(
@@ -202,26 +260,33 @@ def _compose_tiles(
     return [list(level) for level in zip(*tiles, strict=True)], raised
 
 
-def _describe_energy(priced: energy.SeamEnergy, semantic: semantics.SemanticLayer | None) -> EnergyReport:
-    scales = {"colour": priced.colours.unit} | ({"semantics": semantic.unit} if semantic is not None else {})
-    hidden = energy.OCCLUDER_WEIGHT if priced.occluders is not None else None
-    if semantic is None:
-        return EnergyReport(priced.kind, scales, energy.EPS, hidden)
-    constant = priced.kind == "semantic-nogamma"
-    gamma, slope = (0.5, None) if constant else (None, priced.slope)
-    return EnergyReport(priced.kind, scales, energy.EPS, hidden, gamma, slope, semantic.said)
+def _make_seam_energy(
+    options: TilingOptions, colour: Float[Array, "m m 3"], occluder_layer: energy.ColourLayer | None
+) -> tuple[energy.SeamEnergy, EnergyReport]:
+    """The energy that seams are cut with, and its description for seams.json."""
+    colour_layer = energy.make_colour_layer(colour)
+    weight = energy.OCCLUDER_WEIGHT if occluder_layer is not None else None
+    scales = {"colour": colour_layer.unit}
+    if options.kind == "colour":
+        seam_energy = energy.SeamEnergy(options.kind, options.slope, colour_layer, None, occluder_layer)
+        return seam_energy, EnergyReport(options.kind, scales, energy.EPS, weight)
+    semantic = semantics.make_semantic_layer(colour, options.source)
+    scales["semantics"] = semantic.unit
+    gamma, slope = (0.5, None) if options.kind == "semantic-nogamma" else (None, options.slope)
+    seam_energy = energy.SeamEnergy(options.kind, options.slope, colour_layer, semantic, occluder_layer)
+    return seam_energy, EnergyReport(options.kind, scales, energy.EPS, weight, gamma, slope, semantic.description)
 
 
-def _choose_sizes(options: TilingOptions, scale: float, exemplar: Exemplar) -> tuple[float, float]:
-    """Share and strip as numbers; where they are AUTO, by the texture's scale in cells."""
+def _plan_layout(options: TilingOptions, scale: float, exemplar: Exemplar, fitted: int) -> Layout:
+    """Sizes of tiles for a number of fitted levels; where they are AUTO, by the texture's scale in cells."""
     by_texture = texture.choose_sizes(scale / exemplar.cells)
     share, strip = (
-        own if isinstance(asked, str) else asked
-        for asked, own in zip((options.share, options.strip), by_texture, strict=True)
+        automatic if isinstance(value, str) else value
+        for value, automatic in zip((options.share, options.strip), by_texture, strict=True)
     )
     if AUTO in (options.share, options.strip):
         _log.info("texture of scale %.3g: tiles of %.2f of the exemplar", scale * exemplar.spacing, share)
-    return share, strip
+    return layout.plan_layout(exemplar.cells, options.levels or fitted, share, strip, fitted)
 
 
 def _fill_holes(colour: Array, uncertainty: Array) -> tuple[Float[Array, "m m 3"], Float[Array, "m m"]]:
@@ -230,8 +295,8 @@ def _fill_holes(colour: Array, uncertainty: Array) -> tuple[Float[Array, "m m 3"
     Raises: InputError: there is nothing but holes or uncertain ground.
     """
     known = np.asarray(np.isfinite(colour).all(-1))
-    doubt = np.where(known, np.clip(np.nan_to_num(uncertainty, nan=1.0), 0, 1), 1.0).astype(float)
-    if not (doubt < 1).any():
+    uncertainty = np.where(known, np.clip(np.nan_to_num(uncertainty, nan=1.0), 0, 1), 1.0).astype(float)
+    if not (uncertainty < 1).any():
         raise InputError(
             "tiles: nothing is known of the exemplar: no photo shows its ground, or all of it is masked; take photos "
             "of it, or leave `masks` out of the scene"
@@ -240,7 +305,7 @@ def _fill_holes(colour: Array, uncertainty: Array) -> tuple[Float[Array, "m m 3"
         _log.warning("%d of %d cells of the exemplar are holes", (~known).sum(), known.size)
         rows, columns = distance_transform_edt(~known, return_distances=False, return_indices=True)
         colour = colour[rows, columns]
-    return colour, doubt
+    return colour, uncertainty
 
 
 def _solve_corrections(
@@ -257,14 +322,11 @@ def _solve_corrections(
             for mask, place in zip(masks, places, strict=True)
         ]
         strips.append(np.stack([poisson_blending.solve_strip(labels, shift, plan, ground) for labels, shift in pair]))
-    out = []
+    corrections = []
     for tile, (labels, shift) in enumerate(zip(found.labels, shifts, strict=True)):
-        out.append(
-            poisson_blending.solve_tile(
-                labels, shift, poisson_blending.border_values(plan, strips[0], strips[1], tile), plan, ground
-            )
-        )
-    return np.stack(out)
+        border = poisson_blending.border_values(plan, strips[0], strips[1], tile)
+        corrections.append(poisson_blending.solve_tile(labels, shift, border, plan, ground))
+    return np.stack(corrections)
 
 
 def _compose_level(level: compose.BinnedLevel, labels: Array, shift: Array, correction: Array) -> GaussianField:

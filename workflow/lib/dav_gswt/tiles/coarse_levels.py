@@ -1,7 +1,7 @@
-"""Coarser levels of a tile from its own cells, two by two.
+"""Coarser levels of a tile, merged from its own cells, two by two.
 
-Patches of the exemplar are placed by whole cells of the coarsest level that is composed of them. Beyond that a tile is
-merged as it is, cuts and corrections included: cells never reach over its border, so neighbours still meet.
+Patches are placed by whole cells of the coarsest level that is composed of them. Beyond that level the composed tile,
+with its cuts and corrections, is merged: cells do not cross its border, so neighbours still match.
 """
 
 from dataclasses import replace
@@ -22,15 +22,15 @@ def merge_cells(tile: GaussianField, cells: int, spacing: float) -> GaussianFiel
     """The next level of a tile of `cells` x `cells` cells, an even number, each `spacing` wide.
 
     The discs of four cells become one with their mean colour, height, opacity and uncertainty, twice as wide and
-    tangent to the surface of these means: as sharp as they were fitted to be. What stands is merged by moments in
-    voxels of the new spacing; a tile that has an underlay gets a new one. A cell over which there was no disc has none.
+    tangent to the surface of these means. Other Gaussians are merged by moments in voxels of the new spacing; a tile
+    that has an underlay gets a new one. A cell over which there was no disc has none.
 
     Raises: ValueError: an odd number of cells, or too few for a slope.
     """
     if cells % 2 or cells < 4:
         raise ValueError(f"{cells} cells do not make a coarser level: an even number is needed, at least 4")
     under = find_underlay(tile, spacing)
-    known, (*colour, height, doubt, logit, size) = _average_discs(tile[tile.ground], cells // 2, 2 * spacing)
+    known, (*colour, height, uncertainty, logit, size) = _average_discs(tile[tile.ground], cells // 2, 2 * spacing)
     grid = Ground(0.0, 0.0, 2 * spacing, 0, 0, cells // 2, height, known)
     layer = discs.make_ground_discs(grid, np.stack(colour, -1).reshape(-1, 3))
     scales = layer.log_scales.copy()
@@ -39,7 +39,7 @@ def merge_cells(tile: GaussianField, cells: int, spacing: float) -> GaussianFiel
         layer,
         log_scales=scales,
         opacity_logits=logit.ravel().astype(np.float32),
-        uncertainty=doubt.ravel().astype(np.float32),
+        uncertainty=uncertainty.ravel().astype(np.float32),
     )
     parts = [layer[known.ravel()], merge_by_voxel(tile[~tile.ground & ~under], 2 * spacing)]
     return concatenate_fields([parts[0], underlay.make_underlay(grid, layer), parts[1]] if under.any() else parts)

@@ -1,4 +1,4 @@
-"""From label maps to the Gaussians of a tile: each Gaussian follows the label of the cell that its centre is in."""
+"""Compose the Gaussians of a tile by its label map: each follows the label of the cell that holds its centre."""
 
 from dataclasses import dataclass, replace
 
@@ -53,17 +53,23 @@ def coarsen_labels(labels: UInt8[Array, "n n"], factor: int) -> UInt8[Array, "k 
     return counts.argmax(0).astype(np.uint8)
 
 
-def compose_tile(level: BinnedLevel, labels: UInt8[Array, "n n"], shift: Int[Array, "9 2"]) -> GaussianField:
-    """A tile's Gaussians at one level, cell by cell from the south-west; x and y from its south-western corner, z kept.
-
-    labels: of this level's cells (see coarser); shift in finest cells.
-    """
-    row, column = source_cells(labels, shift, level.cell)
-    key = (row * level.cells + column).ravel()
+def gather_cells(
+    level: BinnedLevel, rows: Int[Array, "h w"], columns: Int[Array, "h w"]
+) -> tuple[Int[Array, "n"], Int[Array, "c"]]:
+    """Indices of the Gaussians in cells, cell by cell, and how many each cell holds."""
+    key = (rows * level.cells + columns).ravel()
     first, count = level.start[key], level.start[key + 1] - level.start[key]
     # the c-th Gaussian of a cell is the c-th after the first: positions within runs of varying length
     within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    index = np.repeat(first, count) + within
+    return np.repeat(first, count) + within, count
+
+
+def compose_tile(level: BinnedLevel, labels: UInt8[Array, "n n"], shift: Int[Array, "9 2"]) -> GaussianField:
+    """A tile's Gaussians at one level, cell by cell from the south-west; x and y from its south-western corner, z kept.
+
+    labels: of this level's cells (see `coarsen_labels`); shift in finest cells.
+    """
+    index, count = gather_cells(level, *source_cells(labels, shift, level.cell))
     tile = level.field[index]
     move = (shift[labels.ravel()] * level.exemplar.spacing).repeat(count, axis=0)
     means = tile.means.astype(float)

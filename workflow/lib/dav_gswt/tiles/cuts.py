@@ -1,4 +1,4 @@
-"""Exact binary cuts between two patches: where the eye is least likely to find the seam, at the prices of `energy`."""
+"""Exact binary cuts between two patches (max-flow): the seam of the least cost, by the costs of `energy`."""
 
 from dataclasses import dataclass
 
@@ -71,7 +71,7 @@ def find_cut(
 
 
 def price_cut(right: Float[Array, "h w1"], upper: Float[Array, "h1 w"], labels: Bool[Array, "h w"]) -> Cut:
-    """What a seam that is there already costs. Raises: ValueError: a cost is negative or not finite."""
+    """The cost of a given seam. Raises: ValueError: a cost is negative or not finite."""
     right, upper, unit = _quantize(right, upper)
     cost = _sum_costs(labels, right, upper)
     return Cut(labels, float(cost / unit), cost, cost)

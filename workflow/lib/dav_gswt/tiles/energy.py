@@ -117,10 +117,10 @@ class SeamEnergy:
 
         Without semantics 1, `semantic-nogamma` 1/2. Raises: ValueError: uncertainty is NaN.
         """
-        found = float(gamma(np.array([uncertainty], float), self.slope)[0])
+        weight = float(gamma(np.array([uncertainty], float), self.slope)[0])
         if self.semantics is None:
             return 1.0
-        return 0.5 if self.kind == "semantic-nogamma" else found
+        return 0.5 if self.kind == "semantic-nogamma" else weight
 
     def terms(self, share: float) -> list[tuple[float, CostLayer]]:
         """The layers with their weights, at a weight of colour of `share`; one that weighs nothing is left out.
@@ -150,4 +150,4 @@ def compute_edge_costs(
 def divide_terms(parts: list[tuple[Array, Array, LayerScales]]) -> Array:
     """Eq. (graphcut_main) from each layer's weighed D and G."""
     difference = sum(d / unit.difference for d, _, unit in parts)
-    return difference / (sum(g / unit.gradient for _, g, unit in parts) + EPS)
+    return np.asarray(difference / (sum(g / unit.gradient for _, g, unit in parts) + EPS))

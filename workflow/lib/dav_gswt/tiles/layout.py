@@ -1,11 +1,12 @@
-"""Where everything lies: the exemplar, a tile, its strips and corners, in cells of the finest ground grid.
+"""Sizes and positions of the exemplar, a tile, its strips and corners, in cells of the finest ground grid.
 
 A tile of n x n cells shows nine pieces of the exemplar, its labels: the centre, half a strip along each side, and a
 quarter of the corner patch in each corner. A strip is centred on an edge: its right (upper) half lies in the tile to
 the right (above), its left (lower) half in the tile to the left (below), and the common corner patch is centred on
 the corners, so the exemplar goes on across every border. All places and half-widths are multiples of a block, the
-coarsest cell that patches are laid by, so the same patches are whole cells in every level up to it. Coarser levels are
-merged from the cells of each tile (`coarse_levels`), so a tile is a whole number of the coarsest level's cells wide.
+coarsest cell that patches are placed by, so the same patches are whole cells in every level up to it. Coarser levels
+are merged from the cells of each tile (`coarse_levels`), so a tile is a whole number of the coarsest level's cells
+wide.
 
 Arrays over cells are indexed [y, x], and **row 0 is the southern one**, as cell numbers grow to the north; pictures
 of maps have it at the bottom.
@@ -17,6 +18,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Bool, Int, Integer, UInt8
 from numpy import ndarray as Array
+from scipy.ndimage import distance_transform_edt
 
 from dav_gswt.errors import InputError
 from dav_gswt.lod.levels import AUTO, MAX_LEVELS
@@ -55,7 +57,7 @@ class Layout:
     """Sizes in finest cells; all but `levels` and `exemplar` are multiples of `block`.
 
     side: of a tile, a multiple of the coarsest level's cell. strip, corner: half-widths, strip < corner. block: the
-    coarsest cell that patches are laid by; the outermost `block` cells of a tile always belong to its frame of strips
+    coarsest cell that patches are placed by; the outermost `block` cells of a tile always belong to its frame of strips
     and corners.
     """
 
@@ -72,7 +74,7 @@ class Layout:
         return cls(**{own.name: value[own.name] for own in fields(cls)})
 
     def to_dict(self) -> dict[str, int]:
-        """The JSON object; `laid` is `composed_levels`."""
+        """The JSON object; its key `laid` holds `composed_levels`."""
         keys = ("exemplar", "levels", "laid", "side", "strip", "corner", "block")
         return {key: int(getattr(self, "composed_levels" if key == "laid" else key)) for key in keys}
 
@@ -95,10 +97,10 @@ class PatchPlaces:
 def plan_layout(exemplar: int, levels: int | str, share: float, strip: float, fitted: int = MAX_LEVELS) -> Layout:
     """Sizes for an exemplar of `exemplar` cells: tiles about `share` of it wide, strips `strip` of a tile either side.
 
-    Args:   levels: of the tiles, or AUTO: as many as are ever drawn (see SMALLEST), at most MOST. share: tile side as a
-    share of the exemplar's side, in (0, 1]. strip: half-width as a share of the tile's side. fitted: levels that the
-    exemplar has.
-    Where the exemplar holds no tile with so many levels there are fewer, and a warning says so.
+    Args:   levels: of the tiles, or AUTO: as many as are ever drawn (see SMALLEST_DRAWN), at most MAX_LEVELS. share:
+    tile side as a share of the exemplar's side, in (0, 1]. strip: half-width as a share of the tile's side. fitted:
+    levels that the exemplar has. Where the exemplar holds no tile with so many levels there are fewer, and a warning
+    says so.
     Raises: InputError: the exemplar cannot hold any tile.
     """
     most = _count_drawn_levels(exemplar * share) if isinstance(levels, str) else levels
@@ -107,7 +109,7 @@ def plan_layout(exemplar: int, levels: int | str, share: float, strip: float, fi
     if not number:
         raise InputError(
             f"tiles: a tile needs {MIN_BLOCKS} ground cells a side and the exemplar has {exemplar}: use a finer "
-            "quality or photos of a larger ground"
+            "preset or photos of a larger ground"
         )
     if levels not in (AUTO, number):
         _log.warning("the exemplar's %d cells a side hold tiles with %d levels, not %d", exemplar, number, levels)
@@ -121,7 +123,7 @@ def plan_layout(exemplar: int, levels: int | str, share: float, strip: float, fi
 
 
 def _count_drawn_levels(side: float) -> int:
-    """How many levels of tiles about so many cells wide are ever drawn, at most MOST."""
+    """How many levels of tiles about so many cells wide are ever drawn, at most MAX_LEVELS."""
     return max([1, *(n for n in range(1, MAX_LEVELS + 1) if side / 2 ** (n - 1) >= SMALLEST_DRAWN - 0.5)])
 
 
@@ -206,6 +208,12 @@ def frame_labels(
     labels[ends, :b] = np.where(vertical[west][ends, b:], np.where(rows, NW, SW), W)
     labels[ends, n - b :] = np.where(vertical[east][ends, :b], np.where(rows, NE, SE), E)
     return labels
+
+
+def extend_frame(labels: UInt8[Array, "side side"]) -> UInt8[Array, "side side"]:
+    """A frame's labels (`frame_labels`) with those of the nearest cells of the frame in the place of the centre."""
+    rows, columns = distance_transform_edt(labels == CENTRE, return_distances=False, return_indices=True)
+    return labels[rows, columns]
 
 
 def source_cells(

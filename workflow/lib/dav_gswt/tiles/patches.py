@@ -1,8 +1,8 @@
-"""Which places of the exemplar become patches: searched for cheap seams, sure ground and little repetition.
+"""Choose the places of the exemplar that become patches: cheap seams, well known ground, little repetition.
 
-Every search draws candidate places with the generator passed in, drops the doubtful ones where sure ones serve, and
-ranks the rest by the mean squared difference in the zone where the seam may run, in units of the candidates' median,
-plus a charge for showing ground that other patches show already.
+Every search draws candidate places with the generator passed in, drops those over uncertain ground where others exist,
+and ranks the rest by the mean squared difference in the zone where the seam may run, in units of the candidates'
+median, plus a charge for ground that other patches show already.
 """
 
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from scipy.ndimage import gaussian_filter
 
 from dav_gswt.tiles.layout import Layout
 
-UNCERTAINTY_MARGIN = 0.05  # of mean uncertainty above the surest candidate's: still as good as sure
+UNCERTAINTY_MARGIN = 0.05  # of mean uncertainty above the least candidate's: still accepted
 REPEAT_COST = 0.5  # charge for ground shown twice, a median seam's cost
-FIT_FACTOR = 1.75  # times the best seam's cost: as good as the best
-OUTLIER = 2.0  # times the mean squared distance from the median colour: more is no grain
-NEAR_SHARE = 0.25  # of a patch's shorter side: nearer places show nearly the same
+FIT_FACTOR = 1.75  # times the best seam's cost: accepted as well
+OUTLIER = 2.0  # times the mean squared distance from the median colour: beyond it a cell is no grain
+NEAR_SHARE = 0.25  # of a patch's shorter side: places that are nearer show nearly the same
 SAMPLES = 3000  # cells of a seam zone that are compared
 
 
@@ -27,7 +27,7 @@ UsedPatch = tuple[Array, tuple[int, int]]  # a place (x, y) and a size (width, h
 
 @dataclass(frozen=True)
 class GuidanceMaps:
-    """What a search looks at, per finest cell of the exemplar: features to match, and uncertainty in [0, 1]."""
+    """Features that patches are matched by, and uncertainty in [0, 1], per finest cell of the exemplar."""
 
     features: Float[Array, "m m k"]
     uncertainty: Float[Array, "m m"]
@@ -65,9 +65,9 @@ def patch_means(values: Float[Array, "m m"], places: Int[Array, "n 2"], size: tu
 
 
 def keep_certain(guide: GuidanceMaps, places: Int[Array, "n 2"], size: tuple[int, int]) -> Int[Array, "m 2"]:
-    """The places that are about as sure as the surest of them."""
-    doubt = patch_means(guide.uncertainty, places, size)
-    return places[doubt <= doubt.min() + UNCERTAINTY_MARGIN]
+    """The places whose mean uncertainty is about the least."""
+    uncertainty = patch_means(guide.uncertainty, places, size)
+    return places[uncertainty <= uncertainty.min() + UNCERTAINTY_MARGIN]
 
 
 def overlap_share(
@@ -79,37 +79,35 @@ def overlap_share(
 
 
 def compute_saliency(guide: GuidanceMaps) -> Float[Array, "m m"]:
-    """How far each cell is from what is everywhere.
+    """How conspicuous each cell is against the whole exemplar.
 
     The squared distance of its soft colour from the median one, over that distance's mean, plus a quarter of its
-    square: one conspicuous bush weighs more than many pale shades. Grain does not count (among trees the blandest
-    ground is more trees, not the one bare spot) but for what is beyond OUTLIER times its mean: a white twig is a
-    landmark.
+    square, so that one conspicuous bush weighs more than many pale shades. Grain counts only beyond OUTLIER times its
+    mean: a white twig is a landmark, but among trees the least conspicuous ground is more trees, not the one bare spot.
     """
 
-    def away(values: Array) -> Array:
+    def distance_from_median(values: Array) -> Array:
         distance = ((values - np.median(values, axis=(0, 1))) ** 2).sum(-1)
         return distance / (distance.mean() or 1.0)
 
-    grain, soft = away(guide.features[..., :3]), away(guide.features[..., 3:6])
+    grain, soft = (distance_from_median(guide.features[..., part]) for part in (np.s_[:3], np.s_[3:6]))
     return soft + 0.25 * soft**2 + 0.25 * np.maximum(grain - OUTLIER, 0) ** 2
 
 
 def patch_saliency(guide: GuidanceMaps, places: Int[Array, "n 2"], size: tuple[int, int]) -> Float[Array, "n"]:
-    """Mean oddness of a patch at each place, at least the places' median.
+    """Mean saliency of a patch at each place, at least the places' median.
 
-    A strip with a landmark is a row of landmarks; but one barer than half of the ground is a bare line along every
-    border, which the eye finds from farther: nothing is gained by it. (flowers, desert of seeds for development: the
-    strongest row of local contrast in the mean tile falls from .65, .38 of the tiles' deviation to .23, .17)
+    A strip with a landmark becomes a row of landmarks. A strip that is plainer than the median becomes a bare line
+    along every border, which is visible from farther away, so such strips are not preferred.
     """
-    odd = patch_means(compute_saliency(guide), places, size)
-    return np.maximum(odd, np.median(odd))
+    saliency = patch_means(compute_saliency(guide), places, size)
+    return np.maximum(saliency, np.median(saliency))
 
 
 def find_least_salient(guide: GuidanceMaps, layout: Layout) -> Int[Array, "2"]:
-    """Place of the corner patch: it comes back at every corner, so it should show no landmark.
+    """Place of the corner patch: it is repeated at every corner, so it should show no landmark.
 
-    Every place on the coarsest grid is tried; of equal ones the most south-western.
+    Every place on the coarsest grid is compared; of equal ones the most south-western is taken.
     """
     size = (2 * layout.corner, 2 * layout.corner)
     places = keep_certain(guide, draw_candidates(layout, size, layout.exemplar**2, np.random.default_rng(0)), size)
@@ -119,12 +117,12 @@ def find_least_salient(guide: GuidanceMaps, layout: Layout) -> Int[Array, "2"]:
 def compute_mismatch(
     guide: GuidanceMaps, zone: tuple[Array, Array], shown: tuple[Array, Array], places: Int[Array, "n 2"]
 ) -> Float[Array, "n"]:
-    """What a seam against a patch at each place would cost at least: the squared feature difference, at its smallest
-    along each of many lines that the seam has to cross, in the mean over the lines.
+    """Lower bound of a seam's cost against a patch at each place: the least squared feature difference along each of
+    many lines that the seam has to cross, averaged over the lines.
 
-    A shrub that fills a line from end to end is dear, one that the seam can go around is not.
+    A shrub that fills a line from end to end is expensive, one that the seam can go around is not.
     zone: cells (y, x) of the lines, [line, cell], in the patch's own coordinates. shown: the exemplar's cells (y, x)
-    that lie there now.
+    that are visible there before the cut.
     """
     step = max(1, zone[0].size // SAMPLES)
     y, x = (v[::step] for v in zone)
@@ -140,18 +138,18 @@ def compute_mismatch(
 
 
 def find_fitting(cost: Float[Array, "n"]) -> Int[Array, "k"]:
-    """Which places fit about as well as the best: variety is sought among these alone.
+    """Indices of the places that fit about as well as the best; variety is sought among these alone.
 
-    In a texture that is nearly all of them. Where the exemplar holds what cannot go on (a road that ends at a tile's
-    border), it is the rest: a centre that comes back is seen less than a road cut off.
+    In a texture these are nearly all. Where the exemplar has a road, they are the places at which it is not cut off at
+    the tile's border: a repeated centre is less visible than an interrupted road.
     """
     return np.flatnonzero(cost <= FIT_FACTOR * np.quantile(cost, 0.02))
 
 
 def divide_by_median(cost: Float[Array, "n"]) -> Float[Array, "n"]:
     """Costs in units of their median; unchanged if that is 0."""
-    middle = np.median(cost)
-    return cost / middle if middle > 0 else cost
+    median = np.median(cost)
+    return cost / median if median > 0 else cost
 
 
 def rank_places(
@@ -163,8 +161,8 @@ def rank_places(
 ) -> Int[Array, "n 2"]:
     """Candidate places from best to worst.
 
-    cost: relative. used: patches (place, size) seen beside this one. taken: places of this patch's siblings: nearly the
-    same place again is worth nothing.
+    cost: relative. used: patches (place, size) next to this one. taken: places of this patch's siblings; nearly the
+    same place again ranks last.
     """
     score = cost.copy()
     for place, other in used:
@@ -178,20 +176,20 @@ def rank_places(
 def rank_pairs(
     places: Int[Array, "n 2"],
     cost: Float[Array, "n"],
-    together: Float[Array, "n n"],
+    pair_cost: Float[Array, "n n"],
     size: tuple[int, int],
     used: list[UsedPatch],
 ) -> Int[Array, "p 2 2"]:
-    """Pairs of different candidate places from best to worst; a place twice where there is but one.
+    """Pairs of different candidate places from best to worst; of a single candidate, the place twice.
 
-    cost: relative, of each. together: what two cost beside that, symmetric. used: as in `ranked`. Two that show nearly
-    the same come last.
+    cost: relative, of each. pair_cost: additional cost of two together, symmetric. used: see `rank_places`. Pairs that
+    show nearly the same come last.
     """
     for place, other in used:
         cost = cost + REPEAT_COST * overlap_share(places, size, place, other)
     first, second = np.triu_indices(len(places), len(places) > 1)
     apart = np.abs(places[first] - places[second])
     common = np.maximum(np.subtract(size, apart), 0).prod(1) / np.prod(size)
-    score = cost[first] + cost[second] + together[first, second] + REPEAT_COST * common
+    score = cost[first] + cost[second] + pair_cost[first, second] + REPEAT_COST * common
     order = np.lexsort((score, apart.max(1) < NEAR_SHARE * min(size)))
     return np.stack([places[first[order]], places[second[order]]], 1)

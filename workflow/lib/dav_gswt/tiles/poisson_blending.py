@@ -1,11 +1,11 @@
-"""Steps of brightness and height across the seams, spread out: what is left of them after the best cut, the eye finds.
+"""Poisson blending: spread out the steps of brightness and height that the best cuts leave across seams.
 
-Every tile gets a correction c per cell, smooth but at the seams, where it jumps against the step between the two
+Every tile gets a correction c per cell, smooth except at the seams, where it jumps against the step between the two
 patches: it minimises sum over neighbours s, t of |c_t - c_s + J_st|^2 (Poisson fusion with the step as its source).
 J_st is 0 inside a patch and on a seam the soft difference of the patches: for colour limited, so that a shrub cut in
-two does not bleed over the sand; for height whole, since a step left in the ground is a gap that one sees through. A
+two does not bleed over the sand; for height whole, since a step left in the ground is a visible gap. A
 strip's correction belongs to its colour and is 0 in the corner patch, and a tile's takes the strips' values along its
-border: neighbours still continue one another. All levels take the same correction.
+border: neighbours still match. All levels take the same correction.
 """
 
 from dataclasses import dataclass, replace

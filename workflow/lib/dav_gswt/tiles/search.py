@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 from numpy import ndarray as Array
 
 from dav_gswt.logs import progress
@@ -12,16 +12,16 @@ from dav_gswt.tiles import cuts, layout, patches, repetition
 from dav_gswt.tiles.energy import Cells, SeamEnergy, compute_edge_costs
 from dav_gswt.tiles.layout import CENTRE, EDGES, Layout, PatchPlaces
 
-MIN_FITTING = 4  # times the number of tries: fewer fitting places leave no choice
-MAX_PAIRED = 200  # strips of which every two are compared
-REPETITION_COST = 2.0  # of what comes back with every tile, where a median seam costs 1
+MIN_FITTING = 4  # times the number of tries: least number of fitting places
+MAX_PAIRED = 200  # strips that are compared pairwise
+REPETITION_COST = 2.0  # of `repetition`, where a median seam costs 1
 
 Relabel = Callable[..., UInt8[Array, "n n"]]  # (problem, centre, labels, shift) -> labels
 
 
 @dataclass(frozen=True)
 class SearchProblem:
-    """An exemplar as the search sees it.
+    """Input of the search.
 
     Attributes:
         plan: sizes of tiles and patches.
@@ -122,27 +122,36 @@ def _search_strips(
     y, x = np.mgrid[: size[1], : size[0]]
     along = y if upright else x
     depth = np.minimum(along, n - 1 - along)
-    ends_at = (a + b) // 2  # where a straight cut lies
-    free = cuts.OverlapZone(depth < b, depth >= a, depth >= ends_at)
+    straight = depth >= (a + b) // 2  # the strip where it is not cut
+    overlap = cuts.OverlapZone(depth < b, depth >= a, straight)
     ends = np.where(along < n // 2, 1, 2)
-    shift = layout.strip_shifts(plan, np.zeros(2, int), corner, upright)
-    shown = problem.source_cells(ends, shift)
-    zone = _end_lines(plan, upright)
-    places = patches.keep_certain(problem.guide, patches.draw_candidates(plan, size, problem.candidates, rng), size)
-    cost = patches.compute_mismatch(problem.guide, zone, (shown[0][zone], shown[1][zone]), places)
-    odd = patches.patch_saliency(problem.guide, places, size)
-    fits = np.intersect1d(patches.find_fitting(cost), patches.find_fitting(odd))
-    cost = patches.divide_by_median(cost) + patches.divide_by_median(odd)
+    shown = problem.source_cells(ends, layout.strip_shifts(plan, np.zeros(2, int), corner, upright))
+    drawn = patches.keep_certain(problem.guide, patches.draw_candidates(plan, size, problem.candidates, rng), size)
+    places, cost = _choose_strip_candidates(problem, shown, _end_lines(plan, upright), drawn, size)
+    overlay = repetition.start_overlay(problem.guide.features[..., :3], n, size, cover=(~straight, shown))
+    pair_cost = REPETITION_COST * overlay.compute_pair_costs(places)
+    pairs = patches.rank_pairs(places, cost, pair_cost, size, used)[: problem.tries]
+    placed = [[_place_patch(problem, shown, place, size, overlap) for place in pair] for pair in pairs]
+    best = min(placed, key=lambda strips: sum(strip.seam.energy for strip in strips))
+    used += [(strip.place, size) for strip in best]
+    return best
+
+
+def _choose_strip_candidates(
+    problem: SearchProblem, shown: Cells, lines: Cells, places: Int[Array, "n 2"], size: tuple[int, int]
+) -> tuple[Int[Array, "k 2"], Float[Array, "k"]]:
+    """At most MAX_PAIRED places that fit the corner patch and are inconspicuous, with their relative costs.
+
+    shown: the exemplar's cells that the corner patch shows in the strip. lines: see `patches.compute_mismatch`.
+    """
+    mismatch = patches.compute_mismatch(problem.guide, lines, (shown[0][lines], shown[1][lines]), places)
+    saliency = patches.patch_saliency(problem.guide, places, size)
+    fits = np.intersect1d(patches.find_fitting(mismatch), patches.find_fitting(saliency))
+    cost = patches.divide_by_median(mismatch) + patches.divide_by_median(saliency)
     if len(fits) < MIN_FITTING * problem.tries:  # too few fit both ways: take the best of the sum
         fits = np.argsort(cost, kind="stable")[: MIN_FITTING * problem.tries]
     fits = fits[np.argsort(cost[fits], kind="stable")[:MAX_PAIRED]]
-    places, cost = places[fits], cost[fits]
-    seen = repetition.start_overlay(problem.guide.features[..., :3], n, size, fast=(depth < ends_at, shown))
-    pairs = patches.rank_pairs(places, cost, REPETITION_COST * seen.pair_costs(places), size, used)[: problem.tries]
-    placed = [[_place_patch(problem, shown, place, size, free) for place in pair] for pair in pairs]
-    found = min(placed, key=lambda strips: sum(strip.seam.energy for strip in strips))
-    used += [(strip.place, size) for strip in found]
-    return found
+    return places[fits], cost[fits]
 
 
 def _search_centres(
@@ -154,35 +163,52 @@ def _search_centres(
     y, x = np.mgrid[:n, :n]
     depth = np.minimum(np.minimum(x, n - 1 - x), np.minimum(y, n - 1 - y))
     frame = (plan.block + b) // 2  # its width where the cut is straight
-    free = cuts.OverlapZone(depth < plan.block, depth >= b, depth >= frame)
-    zone = _ring_lines(plan)
+    overlap = cuts.OverlapZone(depth < plan.block, depth >= b, depth >= frame)
     size = (n, n)
-    choice = patches.keep_certain(problem.guide, patches.draw_candidates(plan, size, problem.candidates, rng), size)
-    seen = repetition.start_overlay(problem.guide.features[..., :3], n, size, (frame, frame))
-    found = []
+    drawn = patches.keep_certain(problem.guide, patches.draw_candidates(plan, size, problem.candidates, rng), size)
+    overlay = repetition.start_overlay(problem.guide.features[..., :3], n, size, (frame, frame))
+    tiles: list[CutTile] = []
     for tile in progress(range(len(places.centres)), "cut tiles"):
-        west, north, east, south = layout.edge_colours(tile)
-        around = layout.frame_labels(plan, masks[0], masks[1], tile)
+        frame_labels = layout.frame_labels(plan, masks[0], masks[1], tile)
         shift = layout.label_shifts(plan, places, tile)
-        # inside, where the centre is forced, the frame's cells do not matter
-        shown = problem.source_cells(around, shift)
-        cost = patches.compute_mismatch(problem.guide, zone, (shown[0][zone], shown[1][zone]), choice)
-        fits = patches.find_fitting(cost)
-        cost = patches.divide_by_median(cost[fits]) + REPETITION_COST * seen.cost_of(choice[fits])
-        beside = [(places.vertical[c], (2 * b, n)) for c in sorted({west, east})]
-        beside += [(places.horizontal[c], (n, 2 * b)) for c in sorted({south, north})]
-        taken = np.array([tile.centre.place for tile in found], int).reshape(-1, 2)
-        order = patches.rank_places(choice[fits], cost, size, beside, taken)
-        variants = {tuple(other.centre.place) for other in found[tile % EDGES :: EDGES]}  # a centre of its own
-        order = np.array([place for place in order if tuple(place) not in variants] or order)
-        centre = _place_best(problem, shown, order, size, free)
-        labels = np.where(centre.seam.labels, CENTRE, around).astype(np.uint8)
+        # a seam along the frame's inner rim is priced by what the strips would show beyond it
+        shown = problem.source_cells(layout.extend_frame(frame_labels), shift)
+        order = _rank_centres(problem, places, shown, drawn, overlay, tiles)
+        centre = _place_best(problem, shown, order, size, overlap)
+        labels = np.where(centre.seam.labels, CENTRE, frame_labels).astype(np.uint8)
         shift[CENTRE] = centre.place
         if problem.relabel is not None:
             labels = problem.relabel(problem, centre, labels, shift)
-        found.append(CutTile(centre, labels))
-        seen = seen.with_patch(centre.place)
-    return found
+        tiles.append(CutTile(centre, labels))
+        overlay = overlay.with_patch(centre.place)
+    return tiles
+
+
+def _rank_centres(
+    problem: SearchProblem,
+    places: PatchPlaces,
+    shown: Cells,
+    drawn: Int[Array, "n 2"],
+    overlay: repetition.OverlaidPatches,
+    tiles: list[CutTile],
+) -> Int[Array, "k 2"]:
+    """Candidate places of the next tile's centre from best to worst, without those of its other variants.
+
+    shown: the exemplar's cells that the tile's frame shows. tiles: those that are cut already.
+    """
+    plan, tile = problem.plan, len(tiles)
+    n, b = plan.side, plan.strip
+    lines = _ring_lines(plan)
+    cost = patches.compute_mismatch(problem.guide, lines, (shown[0][lines], shown[1][lines]), drawn)
+    fits = patches.find_fitting(cost)
+    cost = patches.divide_by_median(cost[fits]) + REPETITION_COST * overlay.compute_costs(drawn[fits])
+    west, north, east, south = layout.edge_colours(tile)
+    adjacent = [(places.vertical[c], (2 * b, n)) for c in sorted({west, east})]
+    adjacent += [(places.horizontal[c], (n, 2 * b)) for c in sorted({south, north})]
+    taken = np.array([other.centre.place for other in tiles], int).reshape(-1, 2)
+    order = patches.rank_places(drawn[fits], cost, (n, n), adjacent, taken)
+    variants = {tuple(other.centre.place) for other in tiles[tile % EDGES :: EDGES]}
+    return np.array([place for place in order if tuple(place) not in variants] or order)
 
 
 def _end_lines(plan: Layout, upright: bool) -> tuple[Array, Array]:
@@ -210,14 +236,14 @@ def _place_best(
     problem: SearchProblem, shown: Cells, order: Int[Array, "n 2"], size: tuple[int, int], zone: cuts.OverlapZone
 ) -> PlacedPatch:
     """Cut a patch from each of the first `tries` places; returns the one whose seam is cheapest."""
-    found = (_place_patch(problem, shown, place, size, zone) for place in order[: problem.tries])
-    return min(found, key=lambda patch: patch.seam.energy)
+    placed = (_place_patch(problem, shown, place, size, zone) for place in order[: problem.tries])
+    return min(placed, key=lambda patch: patch.seam.energy)
 
 
 def _place_patch(
     problem: SearchProblem, shown: Cells, place: Int[Array, "2"], size: tuple[int, int], zone: cuts.OverlapZone
 ) -> PlacedPatch:
-    """Cut a patch from a place against the cells that are shown now."""
+    """Cut a patch from a place against the exemplar's cells that are visible there before the cut."""
     y, x = np.mgrid[: size[1], : size[0]]
     gamma = problem.gamma(place, size)
     return PlacedPatch(place, problem.cut(shown, (y + place[1], x + place[0]), gamma, zone), gamma)

@@ -1,13 +1,14 @@
-"""What the ground is, cell by cell: features of the segments that an exemplar falls into, seen from above.
+"""The semantic layer of the seam energy: features of the segments that an exemplar divides into, seen from above.
 
-A segment (a superpixel, or an object that a segmenter masks) has one vector of features: its mean colour and, where
-LPIPS's weights are at hand, the mean of what AlexNet sees there. Two cells are as far apart as their segments'
-features. A segment's number says nothing and is never compared: other numbers for the same segments change nothing.
+A segment (a superpixel, or an object that a segmenter masks) has one vector of features: its mean colour and, with the
+weights of LPIPS, the mean of AlexNet's features. Two cells are as far apart as their segments' features. The numbers of
+segments are only names: other numbers for the same segments change nothing.
 """
 
 import logging
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Float32, Int, Integer
@@ -22,16 +23,16 @@ from dav_gswt.tiles.energy import Cells, LayerScales, make_scales, safe_unit
 _log = logging.getLogger(__name__)
 
 SUPERPIXELS = 2000  # superpixels of an exemplar: their distances are a table
-MIN_WIDTH = 6.0  # cells that they are wide at least
-SAME_KIND = 0.75  # of neighbouring segments are taken to be of one kind of ground
-LAYERS = 2  # of AlexNet, the finest first: the others see more than a bush at a time
-PIXELS_PER_CELL = 2  # pixels a cell that AlexNet looks at: its second layer has a value every 8 pixels
-MARGIN = 32  # pixels of mirrored picture around, for AlexNet takes what is beyond for black
+MIN_WIDTH = 6.0  # cells
+SAME_KIND = 0.75  # share of neighbouring segments that are taken to be of one kind of ground
+LAYERS = 2  # of AlexNet, the finest first: a value of the others covers more than a bush
+PIXELS_PER_CELL = 2  # in AlexNet's input: its second layer has a value every 8 pixels
+MARGIN = 32  # pixels of mirrored picture around the input: AlexNet pads with black
 
 
 @dataclass(frozen=True)
 class SemanticSource:
-    """What describes an exemplar beside its colours: AlexNet (LPIPS's weights), the folder of a segmenter; or None."""
+    """What the semantic layer is made of beside colours: weights of AlexNet (LPIPS), a folder with SAM 2; or None."""
 
     alexnet: lpips_weights.Weights | None = None
     sam2: Path | str | None = None
@@ -39,13 +40,13 @@ class SemanticSource:
 
 @dataclass(frozen=True)
 class SemanticLayer:
-    """An energy.Layer. distance: between the features of two segments. said: what they are made of, as JSON."""
+    """An `energy.CostLayer`. distance: between two segments' features. description: what they are made of, as JSON."""
 
     segments: Int[Array, "m m"]
     distance: Float32[Array, "s s"]
     slope: Float[Array, "m m 2"]
     unit: LayerScales
-    said: dict
+    description: dict[str, Any]
 
     def distances(self, first: Cells, second: Cells) -> Float[Array, "..."]:
         return self.distance[self.segments[first], self.segments[second]].astype(float)
@@ -57,22 +58,26 @@ def make_semantic_layer(colour: Float[Array, "m m 3"], source: SemanticSource) -
     Raises: InputError: see `sam2.load_model`.
     """
     segments = segment_superpixels(colour, max(MIN_WIDTH, len(colour) / SUPERPIXELS**0.5))
-    said = {"alexnet": source.alexnet is not None, "segments": "slic"}
+    description: dict[str, Any] = {"alexnet": source.alexnet is not None, "segments": "slic"}
     if source.sam2 is not None:
         from dav_gswt.tiles import sam2
 
         with one_thread():
             masks = sam2.predict_masks(sam2.load_model(source.sam2), colour)
-        segments, said = overlay_masks(segments, masks), said | {"segments": "sam2 and slic", "masks": len(masks)}
+        segments = overlay_masks(segments, masks)
+        description |= {"segments": "sam2 and slic", "masks": len(masks)}
     if source.alexnet is None:
-        _log.info("LPIPS's weights are not at hand: seams know colours and superpixels, not what AlexNet sees")
-    return describe_segments(segments, colour, source.alexnet, said)
+        _log.info(
+            "the config's `lpips` is none: cuts know colours and superpixels only; set it to `installed` or to a path "
+            "(docs/reference/config.md)"
+        )
+    return describe_segments(segments, colour, source.alexnet, description)
 
 
 def segment_superpixels(colour: Float[Array, "m m 3"], side: float) -> Int[Array, "m m"]:
-    """SLIC (Achanta et al. 2012): segments of about side x side cells that keep to the edges of things.
+    """SLIC (Achanta et al. 2012): segments of about side x side cells that keep to the edges of objects.
 
-    The picture is softened by a cell: single grains would tear segments, and the torn ones are merged into huge ones.
+    The picture is blurred by a cell: otherwise grain breaks segments up, and SLIC merges the fragments into huge ones.
     """
     from skimage.segmentation import slic  # here, not above: it takes half a second to load
 
@@ -80,7 +85,7 @@ def segment_superpixels(colour: Float[Array, "m m 3"], side: float) -> Int[Array
 
 
 def overlay_masks(segments: Integer[Array, "m m"], masks: list[Array]) -> Int[Array, "m m"]:
-    """Segments with masks laid over them, larger ones first: where two overlap, the smaller is the thing on top."""
+    """Segments overlaid with masks, larger ones first: where two overlap, the smaller is the object on top."""
     out = np.array(segments, np.int64)
     for mask in sorted(masks, key=lambda mask: -mask.sum()):
         out[mask] = out.max() + 1
@@ -88,7 +93,10 @@ def overlay_masks(segments: Integer[Array, "m m"], masks: list[Array]) -> Int[Ar
 
 
 def describe_segments(
-    segments: Integer[Array, "m m"], colour: Float[Array, "m m 3"], alexnet: lpips_weights.Weights | None, said: dict
+    segments: Integer[Array, "m m"],
+    colour: Float[Array, "m m 3"],
+    alexnet: lpips_weights.Weights | None,
+    description: dict[str, Any],
 ) -> SemanticLayer:
     """Describe an exemplar that has been segmented; the segments may have any numbers.
 
@@ -102,14 +110,14 @@ def describe_segments(
     slope = np.stack([_feature_gradient(index.T, distance).T, _feature_gradient(index, distance)], -1)
     share = count / count.sum()
     spread = float(np.sqrt(share @ distance.astype(float) ** 2 @ share))
-    return SemanticLayer(index, distance, slope, make_scales(spread, slope), said | {"count": len(count)})
+    return SemanticLayer(index, distance, slope, make_scales(spread, slope), description | {"count": len(count)})
 
 
 def _subtract_kind(distance: Float[Array, "s s"], index: Int[Array, "m m"]) -> Float[Array, "s s"]:
     """Distances less what two segments of one kind of ground differ by: sqrt(max(0, d^2 - d0^2)).
 
-    Features are many, and grain makes any two segments of the same sand differ in some of them. d0 is what KIND of
-    the neighbouring segments stay below: most neighbours are of one kind.
+    Grain makes any two segments of the same sand differ in some of their many features. d0 is the quantile SAME_KIND of
+    the distances of neighbouring segments: most neighbours are of one kind.
     """
     sides = [(index[:, :-1], index[:, 1:]), (index[:-1], index[1:])]
     pairs = np.concatenate([np.stack([a.ravel(), b.ravel()], 1) for a, b in sides])
@@ -119,7 +127,7 @@ def _subtract_kind(distance: Float[Array, "s s"], index: Int[Array, "m m"]) -> F
 
 
 def _renumber(segments: Integer[Array, "m m"]) -> tuple[Int[Array, "m m"], Int[Array, "s"]]:
-    """Segments numbered as they come, and how many cells each has: whatever they were called, sums run the same way."""
+    """Segments renumbered in order of appearance, so that sums run in the same order, and the cells of each."""
     _, first, index, count = np.unique(segments, return_index=True, return_inverse=True, return_counts=True)
     order = np.argsort(first)
     return np.argsort(order)[index].reshape(segments.shape), count[order]
@@ -147,7 +155,7 @@ def _alexnet_features(
 
     m = len(colour)
     with one_thread():
-        large = lpips.resized(2 * colour[None].astype(np.float32) - 1, PIXELS_PER_CELL * m)[0]
+        large = lpips.resize_pictures(2 * colour[None].astype(np.float32) - 1, PIXELS_PER_CELL * m)[0]
         framed = np.pad(large, ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)), mode="symmetric")
         layers = lpips.layers(framed[None], alexnet)[:LAYERS]
     middle = MARGIN + PIXELS_PER_CELL * (np.arange(m) + 0.5) - 0.5  # of each cell, in pixels

@@ -1,6 +1,7 @@
 """A tile set on disk: lod{l}_tile_{TT}.ply and labels.npz in one folder, seams.json beside it.
 
-seams.json is written last and holds the counts: where it exists, the set is whole.
+seams.json is written last and holds the counts: where it exists, the set is whole. The sets of further materials are
+in the folders material1, material2, ... of the first one's, their tables in its seams.json under `materials`.
 """
 
 import zipfile
@@ -9,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from dav_gswt.errors import InputError
+from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.field import read_field, write_field
 from dav_gswt.files import UNREADABLE, atomic_folder, read_json, write_json
+from dav_gswt.lod.store import material_folder
 from dav_gswt.logs import progress
 from dav_gswt.tiles.build import TileSet
 from dav_gswt.tiles.report import TileReport
@@ -24,34 +26,68 @@ def tile_file_name(level: int, tile: int) -> str:
 
 
 def write_tiles(tiles: TileSet, folder: Path | str, seams: Path | str, provenance: dict[str, Any]) -> None:
-    """Write the set; `folder` and `seams` appear whole or not at all, the folder first."""
+    """Write a set; `folder` and `seams` appear whole or not at all, the folder first."""
+    write_material_tiles([tiles], folder, seams, provenance)
+
+
+def write_material_tiles(
+    sets: list[TileSet], folder: Path | str, seams: Path | str, provenance: dict[str, Any]
+) -> None:
+    """Write the sets of several materials; `folder` and `seams` appear whole or not at all, the folder first."""
     folder, seams = Path(folder), Path(seams)
     seams.unlink(missing_ok=True)
     with atomic_folder(folder) as part:
-        for level, fields in enumerate(tiles.fields):
-            for tile, splats in enumerate(progress(fields, f"write tiles of level {level}")):
-                write_field(splats, part / tile_file_name(level, tile))
-        _write_npz(part / "labels.npz", labels=tiles.labels, shifts=tiles.shifts)
-    table = {
+        for number, tiles in enumerate(sets):
+            own = material_folder(part, number)
+            own.mkdir(exist_ok=True)
+            _write_folder(tiles, own)
+    first, *more = [_describe_tiles(tiles) for tiles in sets]
+    write_json(seams, first | {"provenance": provenance} | ({"materials": more} if more else {}))
+
+
+def _write_folder(tiles: TileSet, folder: Path) -> None:
+    for level, fields in enumerate(tiles.fields):
+        for tile, splats in enumerate(progress(fields, f"write tiles of level {level}")):
+            write_field(splats, folder / tile_file_name(level, tile))
+    _write_npz(folder / "labels.npz", labels=tiles.labels, shifts=tiles.shifts)
+
+
+def _describe_tiles(tiles: TileSet) -> dict[str, Any]:
+    return {
         "side": tiles.side,
         "spacing": tiles.spacing,
         "levels": len(tiles.fields),
         "tiles": len(tiles.labels),
         "uncertainty": tiles.uncertainty.tolist(),
         "counts": [[len(f) for f in fields] for fields in tiles.fields],
+        "seams": tiles.report.to_dict(),
     }
-    write_json(seams, table | {"seams": tiles.report.to_dict(), "provenance": provenance})
 
 
 def read_tiles(folder: Path | str, seams: Path | str) -> TileSet:
-    """Read what `write_tiles` wrote. Raises: InputError: a file is missing or not what seams.json says."""
-    folder, table = Path(folder), read_json(seams)
+    """Read the set of the first material. Raises: InputError: a file is missing or not what seams.json says."""
+    return _read_folder(Path(folder), read_json(seams), seams)
+
+
+def read_material_tiles(folder: Path | str, seams: Path | str) -> list[TileSet]:
+    """Read what `write_material_tiles` wrote. Raises: InputError: as `read_tiles`."""
+    table = read_json(seams)
+    more = table.get("materials", []) if isinstance(table, dict) else []
+    if not isinstance(more, list):
+        raise InputError(f"{seams}: not the table of a tile set (materials is no list); cut the tiles again")
+    return [_read_folder(material_folder(folder, k), own, seams) for k, own in enumerate([table, *more])]
+
+
+def _read_folder(folder: Path, table: Any, seams: Path | str) -> TileSet:
     try:
         levels, count = table["levels"], table["tiles"]
         side, spacing, counts = table["side"], table["spacing"], table["counts"]
         uncertainty, report = np.array(table["uncertainty"]), TileReport.from_dict(table["seams"])
-    except (KeyError, TypeError) as error:
-        raise InputError(f"{seams}: {error} is missing; cut the tiles again") from None
+        if not all(type(n) is int and n > 0 for n in (levels, count)) or not 0 < side < np.inf:
+            raise ValueError("a size is out of range")
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        why = f"{error} is missing" if isinstance(error, KeyError) else summarize_error(error)
+        raise InputError(f"{seams}: not the table of a tile set ({why}); cut the tiles again") from error
     fields = [[read_field(folder / tile_file_name(level, tile)) for tile in range(count)] for level in range(levels)]
     if [[len(f) for f in level] for level in fields] != counts:
         raise InputError(f"{folder}: the tiles are not those of {seams}; cut them again")

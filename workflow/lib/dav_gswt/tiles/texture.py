@@ -1,8 +1,8 @@
-"""How large the things are that ground is made of, and the size of tiles that this asks for.
+"""The scale of a ground's texture, and the size of tiles for it.
 
-Ground full of small things looks alike everywhere, and the larger a tile, the less of it lies along seams. Larger
-things are fewer: tiles of half the exemplar then all show the same ones, in rows when seen from above. Smaller tiles
-have more places to choose from.
+Where objects on the ground are small, all of it looks alike, and a larger tile has less of its area along seams. Where
+they are large there are few: tiles of half the exemplar would all show the same ones, in rows when seen from above.
+Smaller tiles have more places to choose from.
 """
 
 import numpy as np
@@ -11,10 +11,9 @@ from numpy import ndarray as Array
 from scipy.ndimage import gaussian_filter
 
 TREND = 0.1  # of the exemplar's side: what is wider is no texture
-FARTHEST = 1 / 3  # of the exemplar's side that is looked at: beyond, too few cells are compared
-RELATED = 0.1  # correlation below which cells have nothing to do with one another
-# Scales, as shares of the exemplar's side, between which tiles get smaller. (seeds for development: flowers .013, grass
-# .015, meadow .017, where half the exemplar looks best from above; planet .027 and desert .034, where .38 does)
+FARTHEST = 1 / 3  # of the exemplar's side that is measured: beyond it too few cells are compared
+RELATED = 0.1  # correlation below which cells count as unrelated
+# scales, as shares of the exemplar's side, between which tiles get smaller
 SCALES = 0.017, 0.027
 TILES = 0.5, 0.38
 AROUND = 1.6  # half-width of a strip over the scale: a cut can go around what lies in it
@@ -22,19 +21,19 @@ STRIPS = 0.06, 0.125  # of a tile's side: narrower ones hardly hold a cut, wider
 
 
 def measure_texture_scale(colour: Float[Array, "m m c"]) -> float:
-    """Radius in cells of a disc as large as the area over which colours go together; 0 where all are the same.
+    """Radius in cells of a disc as large as the area over which colours correlate; 0 where all are the same.
 
     That area is 2 pi sum_d r(d) d with the autocorrelation r at a distance of d cells, in the mean over all directions,
     up to where it first falls below RELATED. (Noise blurred by s cells: r = exp(-d^2 / 4 s^2), a scale of 1.9 s.)
     """
     m = len(colour)
-    rest = np.stack([v - gaussian_filter(v, TREND * m, mode="nearest") for v in np.moveaxis(colour, -1, 0)], -1)
-    rest -= rest.mean((0, 1))
-    together = _autocorrelate(rest) / np.maximum(_autocorrelate(np.ones((m, m, 1))), 1)
+    residual = np.stack([v - gaussian_filter(v, TREND * m, mode="nearest") for v in np.moveaxis(colour, -1, 0)], -1)
+    residual -= residual.mean((0, 1))
+    correlation = _autocorrelate(residual) / np.maximum(_autocorrelate(np.ones((m, m, 1))), 1)
     x = np.minimum(np.arange(2 * m), 2 * m - np.arange(2 * m))
     distance = np.rint(np.hypot(x[:, None], x)).astype(int).ravel()
     count = int(m * FARTHEST) + 1
-    r = (np.bincount(distance, together.ravel()) / np.bincount(distance))[:count]
+    r = (np.bincount(distance, correlation.ravel()) / np.bincount(distance))[:count]
     if r[0] <= np.finfo(np.float32).eps ** 2:  # of colours from 0 to 1: rounding
         return 0.0
     r /= r[0]

@@ -1,7 +1,7 @@
 """Large-scale trends of brightness and height, taken out of an exemplar so that its tiles repeat without a pattern.
 
 The trend is a low-pass over the ground: a plane, and a Gaussian average of what is left. The average is robust, since
-a shrub or a boulder is a thing to keep, not a trend: cells far from their surroundings' mean lose weight and it is
+a shrub or a boulder is an object to keep: cells far from the mean of their surroundings lose weight, and the average is
 taken again.
 """
 
@@ -69,7 +69,7 @@ def fit_low_pass(values: Float[Array, "m m"], known: Bool[Array, "m m"], width: 
 
 
 def fit_trend(colour: Float[Array, "m m 3"], height: Float[Array, "m m"], exemplar: Exemplar, width: float) -> Trend:
-    """The trend of an exemplar from its maps; NaN where a map knows nothing. Each part's mean is left to the field."""
+    """The trend of an exemplar from its maps; NaN where a map has no value. Each part's mean is left to the field."""
     parts = []
     for values in (*np.moveaxis(colour, -1, 0), height):
         known = np.isfinite(values)

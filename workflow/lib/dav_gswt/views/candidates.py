@@ -7,12 +7,12 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import Pose, pose_of_camera
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.capture_record import read_capture_record
 from dav_gswt.photos.colmap_model import read_colmap_model
-from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.photos.synthetic import scene as synthetic
 from dav_gswt.photos.view_split import ViewSplit
 
@@ -29,16 +29,16 @@ def list_remaining(
     split: views.json. captures: folders of earlier rounds.
     """
     if scene["agent"] == "render":
-        pool = list_hemisphere(scene, frame)
+        listed = list_hemisphere(scene, frame)
     else:
         known = read_colmap_model(model_folder)
         at = dict(zip(known.names, known.cameras, strict=True))
         if scene["agent"] == "replay":
-            pool = [(pose_of_camera(name, at[name], frame), at[name]) for name in split.pool]
+            listed = [(pose_of_camera(name, at[name], frame), at[name]) for name in split.pool]
         else:
-            pool = list_orbit(scene, frame, at[split.start[0]])
+            listed = list_orbit(scene, frame, at[split.start[0]])
     used = {name for folder in captures for name in _used_names(folder)}
-    return [(pose, camera) for pose, camera in pool if pose.name not in used]
+    return [(pose, camera) for pose, camera in listed if pose.name not in used]
 
 
 def list_hemisphere(scene: dict, frame: SceneFrame) -> Candidates:
@@ -74,12 +74,12 @@ def camera_positions(taken: list[Camera], frame: SceneFrame) -> Float[Array, "m 
     return np.array([camera.centre - frame.exemplar.centre for camera in taken]).reshape(-1, 3)
 
 
-def select_by_name(pool: Candidates, chosen: list[Pose]) -> Candidates:
+def select_by_name(candidates: Candidates, chosen: list[Pose]) -> Candidates:
     """Return the candidates of chosen poses, by their names."""
-    by_name = {pose.name: (pose, camera) for pose, camera in pool}
+    by_name = {pose.name: (pose, camera) for pose, camera in candidates}
     return [by_name[pose.name] for pose in chosen]
 
 
 def _used_names(folder: Path | str) -> list[str]:
-    """Names of requested poses and of captured photos: a photo taken in place of another leaves the pool too."""
+    """Names of requested poses and of captured photos: a photo taken in place of another is used too."""
     return [name for photo in read_capture_record(folder) for name in (photo.pose.name, photo.name)]

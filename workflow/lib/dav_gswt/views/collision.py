@@ -15,22 +15,22 @@ from dav_gswt.views.uncertainty.finite import format_names
 SOLID = 0.5  # opacity from which a Gaussian counts as solid
 
 
-def require_free_positions(pool: Candidates, field: GaussianField, grid: Ground) -> None:
+def require_free_positions(candidates: Candidates, field: GaussianField, grid: Ground) -> None:
     """Raises: InputError: candidates below the ground, or within one standard deviation of a solid Gaussian, by
     name."""
-    if not pool:
+    if not candidates:
         return
-    centres = np.stack([camera.centre for _, camera in pool])
+    centres = np.stack([camera.centre for _, camera in candidates])
     checks = {
         "below the ground": find_below_ground(centres, grid),
         "inside an object": find_inside_objects(centres, field),
     }
     for what, bad in checks.items():
         if bad.any():
-            names = format_names(bad, [pose.name for pose, _ in pool])
+            names = format_names(bad, [pose.name for pose, _ in candidates])
             raise InputError(
-                f"pose {names}: {what}; no photo can be taken there. Set `reach` or `lowest` of the scene, or check "
-                f"its ground"
+                f"pose {names}: {what}; no photo can be taken there. Set `feasibility` or `min_elevation` of the "
+                f"scene, or check its ground"
             )
 
 

@@ -52,10 +52,10 @@ def select_facilities(
     covered = similarity(places, taken, width).max(1, initial=0.0)
     weight = u.astype(np.float64)
 
-    def look(i: int) -> float:
+    def gain(i: int) -> float:
         return float(weight @ np.maximum(near[:, i] - covered, 0))
 
     def take(i: int) -> None:
         np.maximum(covered, near[:, i], out=covered)
 
-    return lazy_greedy(coverage_gains(near, covered, weight), look, take, k)
+    return lazy_greedy(coverage_gains(near, covered, weight), gain, take, k)

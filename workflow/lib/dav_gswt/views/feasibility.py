@@ -86,12 +86,12 @@ def find_infeasible(
         clearance = CLEARANCE * float(np.median(np.linalg.norm(centres - site.middle, axis=1)))
     if not trimesh.ray.has_embree:
         _log.warning("embreex is not installed: rays are marched in steps, which is slower")
-    why = (
+    reasons = (
         _find_hidden(site, cameras, centres)
         | _find_outside_limits(site, centres, limits or {})
         | _find_near(site, centres, clearance)
     )
-    return {candidates[i][0].name: why[i] for i in sorted(why)}
+    return {candidates[i][0].name: reasons[i] for i in sorted(reasons)}
 
 
 def _build_mesh(grid: Ground) -> _GroundMesh:
@@ -103,7 +103,7 @@ def _build_mesh(grid: Ground) -> _GroundMesh:
     y = (rows + 0.5 - n - cells / 2) / cells
     z = (grid.heights[np.ix_(rows, columns)] - middle[2]) / side
     vertices = np.stack([*np.meshgrid(x, y), z], -1).reshape(-1, 3)
-    mesh = trimesh.Trimesh(vertices, _faces(len(rows), len(columns)), process=False)
+    mesh = trimesh.Trimesh(vertices, _make_faces(len(rows), len(columns)), process=False)
     at = (np.arange(LATTICE) + 0.5) / LATTICE - 0.5
     i, j = (np.abs(axis[:, None] - at).argmin(0) for axis in (y, x))
     places = (i[:, None] * len(x) + j).ravel()
@@ -113,7 +113,7 @@ def _build_mesh(grid: Ground) -> _GroundMesh:
     return _GroundMesh(grid, middle, side, x, y, mesh, vertices[places], normals)
 
 
-def _faces(rows: int, columns: int) -> Int[Array, "n 3"]:
+def _make_faces(rows: int, columns: int) -> Int[Array, "n 3"]:
     """Two triangles a cell, upwards; the cells row by row."""
     a = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     b, c, d = a + 1, a + columns, a + columns + 1
@@ -123,7 +123,7 @@ def _faces(rows: int, columns: int) -> Int[Array, "n 3"]:
 def _find_near(site: _GroundMesh, centres: Float[Array, "n 3"], clearance: float) -> dict[int, str]:
     """Find cameras below the surface or nearer to it than the clearance."""
     above = centres[:, 2] - site.grid.height_at(centres)
-    away = np.minimum(np.abs(above), site.side * _distance(site, site.local(centres)))
+    away = np.minimum(np.abs(above), site.side * _measure_distance(site, site.local(centres)))
     reasons = {
         i: f"too near the ground: {away[i]:.3g} from it, {clearance:.3g} is the least"
         for i in _indices(away < clearance)
@@ -131,13 +131,13 @@ def _find_near(site: _GroundMesh, centres: Float[Array, "n 3"], clearance: float
     return reasons | {i: f"buried: {-above[i]:.3g} below the ground" for i in _indices(above <= 0)}
 
 
-def _distance(site: _GroundMesh, places: Float[Array, "n 3"]) -> Float[Array, "n"]:
+def _measure_distance(site: _GroundMesh, places: Float[Array, "n 3"]) -> Float[Array, "n"]:
     """Distance to the mesh: to the triangles of the four cells around the nearest vertex."""
     rows, columns = len(site.y), len(site.x)
     nearest = cKDTree(site.mesh.vertices).query(places)[1]
     row, column = np.divmod(nearest, columns)
-    i = np.clip(row[:, None] + [-1, -1, 0, 0], 0, rows - 2)
-    j = np.clip(column[:, None] + [-1, 0, -1, 0], 0, columns - 2)
+    i = np.clip(row[:, None] + np.array([-1, -1, 0, 0]), 0, rows - 2)
+    j = np.clip(column[:, None] + np.array([-1, 0, -1, 0]), 0, columns - 2)
     cells = i * (columns - 1) + j
     faces = np.stack([2 * cells, 2 * cells + 1], -1).reshape(len(places), -1)
     corners = site.mesh.vertices[site.mesh.faces[faces.ravel()]]
@@ -165,14 +165,14 @@ def _indices(mask: Bool[Array, "n"]) -> list[int]:
 
 def _find_hidden(site: _GroundMesh, cameras: list[Camera], centres: Float[Array, "n 3"]) -> dict[int, str]:
     """Find cameras that show too little of the exemplar, or no ground in the middle of the picture."""
-    shown, seen = _count_visible(site, cameras, centres)
+    in_picture, visible = _count_visible(site, cameras, centres)
     ground = np.isfinite(_cast_rays(site, site.local(centres), np.stack([camera.forward for camera in cameras])))
     reasons = {i: "past the ground: the middle of the picture shows none" for i in _indices(~ground)}
     reasons |= {
-        i: f"hidden: {seen[i]} of {shown[i]} points of the exemplar are in sight"
-        for i in _indices(seen < SHARE * shown)
+        i: f"hidden: {visible[i]} of {in_picture[i]} points of the exemplar are visible"
+        for i in _indices(visible < SHARE * in_picture)
     }
-    return reasons | {i: "off the exemplar: none of it is in the picture" for i in _indices(shown == 0)}
+    return reasons | {i: "off the exemplar: none of it is in the picture" for i in _indices(in_picture == 0)}
 
 
 def _count_visible(

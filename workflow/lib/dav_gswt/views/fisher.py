@@ -25,12 +25,12 @@ def accumulate_information(field: GaussianField, cameras: list[Camera], raster: 
     return total
 
 
-def information_gain(seen: Contributions, already: Float64[Array, "n"]) -> float:
+def information_gain(contributions: Contributions, known: Float64[Array, "n"]) -> float:
     """Information gain of a photo: the trace of H (H_known)^-1, both diagonal.
 
     Source: Jiang et al., FisherRF, ECCV 2024, for colours only.
     """
-    return float((seen.squared / already).sum())
+    return float((contributions.squared / known).sum())
 
 
 class FisherInformation:
@@ -43,12 +43,12 @@ class FisherInformation:
 
     def gain(self, i: int) -> float:
         """Return the gain of a photo from candidate i over all photos so far."""
-        return information_gain(self._seen(i), self.known)
+        return information_gain(self._render_contributions(i), self.known)
 
     def take(self, i: int) -> None:
         """Add the photo from candidate i."""
-        self.known = self.known + self._seen(i).squared
+        self.known = self.known + self._render_contributions(i).squared
 
-    def _seen(self, i: int) -> Contributions:
+    def _render_contributions(self, i: int) -> Contributions:
         self.raster.forward(**to_raster_arrays(self.field), camera=self.candidates[i])
         return self.raster.contributions()

@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from dav_gswt.errors import InputError
+from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.files import read_json, write_json
 from dav_gswt.provenance import record_provenance
 from dav_gswt.views.uncertainty.weighting import Quantiles, Scales
@@ -24,8 +24,10 @@ def read_frozen_scales(path: Path | str) -> FrozenScales:
     try:
         pixels = found["pixels"] and Quantiles(float(found["pixels"]["low"]), float(found["pixels"]["high"]))
         return FrozenScales(Scales({name: float(scale) for name, scale in found["scales"].items()}), pixels)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"{path}: does not hold the scales of a first round ({error}); make it again") from error
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise InputError(
+            f"{path}: does not hold the scales of a first round ({summarize_error(error)}); make it again"
+        ) from error
 
 
 def write_frozen_scales(

@@ -12,7 +12,7 @@ from scipy.special import ndtri, stdtrit  # scipy.stats has them too, but loads 
 LEVEL = 0.95  # of the interval
 LEAST = 3  # new photos needed for an estimate
 SHARE = 0.5  # of the closed gap that test views gain, measured on development scenes
-SPREAD = 0.4  # standard deviation of the logarithm of SHARE between cells
+SPREAD = 0.4  # standard deviation of the logarithm of SHARE between experiments
 SCENES = 4  # behind both constants; the interval uses Student's t for so few
 
 
@@ -59,16 +59,16 @@ def predict_gain(history: FitHistory) -> ExpectedGain | None:
     scene, t_(SCENES - 1) SPREAD sqrt(1 + 1 / SCENES). If c <= 0 the gain is 0, and its upper end follows from c alone.
     Returns: None with fewer than LEAST new photos so far, or none to come.
     """
-    found = np.array([r.fitted * gap for r in history.rounds for gap in r.gaps])
-    if len(found) < LEAST or history.coming < 1:
+    gaps = np.array([r.fitted * gap for r in history.rounds for gap in r.gaps])
+    if len(gaps) < LEAST or history.coming < 1:
         return None
-    n, k, reach = history.fitted, history.coming, float(ndtri((1 + LEVEL) / 2))
+    n, k, z = history.fitted, history.coming, float(ndtri((1 + LEVEL) / 2))
     part = 1 / n - 1 / (n + k)
-    c, error = float(found.mean()), float(found.std(ddof=1) / np.sqrt(len(found)))
+    c, error = float(gaps.mean()), float(gaps.std(ddof=1) / np.sqrt(len(gaps)))
     if not c > 0:
-        return ExpectedGain(k, 0.0, 0.0, SHARE * part * max(0.0, c + reach * error), 0.0)
+        return ExpectedGain(k, 0.0, 0.0, SHARE * part * max(0.0, c + z * error), 0.0)
     scene = float(stdtrit(SCENES - 1, (1 + LEVEL) / 2)) * SPREAD * np.sqrt(1 + 1 / SCENES)
-    gain, wide = SHARE * part * c, float(np.exp(np.hypot(scene, reach * error / c)))
+    gain, wide = SHARE * part * c, float(np.exp(np.hypot(scene, z * error / c)))
     return ExpectedGain(k, gain, gain / wide, gain * wide, part * c)
 
 

@@ -26,7 +26,7 @@ from dav_gswt.views.scoring import WIDTH, ground_mask, scoring_camera
 FINE = 4  # supersampling: photos are clipped and encoded before they are shrunk, so rendering at WIDTH is too bright
 
 
-def render_truth(scene: dict, pool: Candidates, images_folder: Path | str) -> Iterator[TrainingView]:
+def render_truth(scene: dict, candidates: Candidates, images_folder: Path | str) -> Iterator[TrainingView]:
     """Yield the photo of each candidate, WIDTH pixels across, named by its pose; weight 0 where it is masked.
 
     scene: its entry in the config. Agent `render`: the photo is rendered, at most FINE times as wide, then shrunk.
@@ -35,10 +35,10 @@ def render_truth(scene: dict, pool: Candidates, images_folder: Path | str) -> It
     """
     if scene["agent"] == "render":
         world = synthetic.scene_from_config(scene)
-        for pose, camera in progress(pool, "render candidates"):
+        for pose, camera in progress(candidates, "render candidates"):
             yield _shrink_view(pose.name, camera, synthetic.render(world, _render_camera(camera)))
     elif scene["agent"] == "replay":
-        for pose, camera in pool:
+        for pose, camera in candidates:
             yield _shrink_view(pose.name, camera, *image_files.read_photo_and_alpha(Path(images_folder) / pose.name))
     else:
         agent = scene["agent"]
@@ -51,9 +51,9 @@ def write_truth(folder: Path | str, views: Iterator[TrainingView]) -> None:
         image_files.write_png(Path(folder) / f"{view.name}.png", view.image)
 
 
-def read_truth(pool: Candidates, folder: Path | str) -> tuple[Candidates, list[TrainingView]]:
+def read_truth(candidates: Candidates, folder: Path | str) -> tuple[Candidates, list[TrainingView]]:
     """Read the candidates whose pictures exist, and the pictures. Raises: InputError: a picture of another size."""
-    some = [(pose, camera) for pose, camera in pool if (Path(folder) / f"{pose.name}.png").is_file()]
+    some = [(pose, camera) for pose, camera in candidates if (Path(folder) / f"{pose.name}.png").is_file()]
     found = []
     for pose, camera in some:
         image = image_files.read_photo(path := Path(folder) / f"{pose.name}.png")
@@ -66,9 +66,9 @@ def read_truth(pool: Candidates, folder: Path | str) -> tuple[Candidates, list[T
     return some, found
 
 
-def spread_candidates(pool: Candidates, count: int) -> Candidates:
+def spread_candidates(candidates: Candidates, count: int) -> Candidates:
     """Choose `count` candidates, or all, by farthest point sampling from the first one."""
-    return [pool[i] for i in select_farthest_poses([pose for pose, _ in pool], count)]
+    return [candidates[i] for i in select_farthest_poses([pose for pose, _ in candidates], count)]
 
 
 def _render_camera(camera: Camera) -> Camera:
@@ -104,15 +104,15 @@ def measure_errors(
     error, maps = np.full(len(views), np.nan), []
     for i, view in enumerate(views):
         weight = view.weight * ground_mask(grid, view.camera)
-        counts = weight > 0
-        squares = np.full(counts.shape, np.nan)
-        if counts.any():
+        mask = weight > 0
+        squares = np.full(mask.shape, np.nan)
+        if mask.any():
             picture = _render_at_size(field, view.camera, size)
             if corrected:
                 picture = np.clip(metrics.correct_colours(picture, view.image, weight), 0, 1)
-            apart = picture[counts].astype(np.float64) - view.image[counts]
-            squares[counts] = (apart**2).mean(-1)
-            error[i] = np.sqrt(squares[counts].mean())
+            apart = picture[mask].astype(np.float64) - view.image[mask]
+            squares[mask] = (apart**2).mean(-1)
+            error[i] = np.sqrt(squares[mask].mean())
         maps.append(np.sqrt(squares).astype(np.float32))
     return error, maps
 

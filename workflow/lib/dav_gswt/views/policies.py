@@ -40,8 +40,8 @@ class SelectionInput:
     """What a policy reads beside the scores.
 
     captured: camera centres of the photos so far, relative to the exemplar's middle. k: number of poses to choose, at
-    most the number of candidates. lam: weight of LPIPS. information: for policies with `needs_field`. errors: true
-    error of each candidate, NaN where unknown, for policies with `needs_truth`.
+    most the number of candidates. lam: weight of LPIPS. information: for policies with `needs_field`, else None.
+    errors: true error of each candidate, NaN where unknown, for policies with `needs_truth`, else None.
     """
 
     captured: Float[Array, "m 3"]
@@ -101,7 +101,7 @@ def diverse(scores: Scores, inputs: SelectionInput) -> list[int]:
 
 @policy("opacity")
 def opacity(scores: Scores, inputs: SelectionInput) -> list[int]:
-    """The k candidates whose pictures are least opaque."""
+    """The k candidates of highest mean rendered uncertainty."""
     return top(scores.term("opacity"), inputs.k)
 
 
@@ -184,7 +184,7 @@ def oracle_diverse(scores: Scores, inputs: SelectionInput) -> list[int]:
 
 @policy("all")
 def everything(scores: Scores, inputs: SelectionInput) -> list[int]:
-    """The whole pool, whatever k is."""
+    """All candidates, whatever k is."""
     return list(range(len(scores)))
 
 

@@ -20,7 +20,7 @@ from dav_gswt.views.scoring import scoring_camera
 
 
 def build_information_gain(
-    policy: str, scores: Scores, pool: Candidates, taken: list[Camera], file: Path | str
+    policy: str, scores: Scores, candidates: Candidates, taken: list[Camera], file: Path | str
 ) -> InformationGain | None:
     """Build the information gain for policies with `needs_field`; None for others.
 
@@ -28,14 +28,14 @@ def build_information_gain(
     """
     if policy not in NEEDS_FIELD:
         return None
-    at = {pose.name: camera for pose, camera in pool}
+    at = {pose.name: camera for pose, camera in candidates}
     return fisher.FisherInformation(
         read_field(file), [scoring_camera(c) for c in taken], [scoring_camera(at[name]) for name in scores.names]
     )
 
 
 def measure_true_errors(
-    policy: str, scores: Scores, pool: Candidates, files: dict[str, Path | str], scene: dict, size: int
+    policy: str, scores: Scores, candidates: Candidates, files: dict[str, Path | str], scene: dict, size: int
 ) -> Float64[Array, "n"] | None:
     """Measure the true error at each candidate for policies with `needs_truth`; None for others.
 
@@ -46,9 +46,9 @@ def measure_true_errors(
     if policy not in ORACLES:
         return None
     if scene["agent"] == "replay":
-        some, views = pool, list(oracle.render_truth(scene, pool, files["images"]))
+        some, views = candidates, list(oracle.render_truth(scene, candidates, files["images"]))
     else:
-        some, views = oracle.read_truth(pool, files["truth"])
+        some, views = oracle.read_truth(candidates, files["truth"])
     corrected = read_scene_frame(files["frame"]).kind == "photos"  # photos differ in exposure
     found, _ = oracle.measure_errors(
         read_field(files["field"]), ground.read_ground(files["ground"]), views, size, corrected

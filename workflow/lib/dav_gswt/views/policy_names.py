@@ -1,66 +1,94 @@
-"""The table of policies: their names, what each reads, and how its results are spelled in paths.
+"""The table of policies: their names, what each reads, and how its settings stand in paths.
 
 The functions are in `policies.py`. This module imports no numerics, so that the workflow can read it before any job.
 """
 
+import re
 from dataclasses import dataclass
 
 EXTERNAL = "external"  # stands in paths in place of a policy: a finished field, refined by no photo
+POLICY_NAME = r"[a-z0-9-]+"  # what a policy's name is made of: it stands in paths between underscores
 
 
 @dataclass(frozen=True)
 class PolicySpec:
-    """What a policy reads beside the geometric scores.
+    """A policy: its name, which poses it chooses, and what it reads beside the places of the candidates.
 
-    reads_prior: terms of a prior. needs_truth: the true error at the candidates (oracles). needs_field: the field
-    itself, not only its scores. fixed_zero: of the prior's settings (p_drop, lam), those that have no effect and are 0
-    in paths. chooses: which poses, in words.
+    name: as in the config and in paths; small letters, digits and -. chooses: which poses, in words.
+    reads_geometry: the geometric scores `opacity` or `fisher`. reads_prior: scores by a prior.
+    needs_field: the field itself. The policy gets an `InformationGain` object (views/fisher.py) as
+    `SelectionInput.information`; for others that is None.
+    needs_truth: the true error at the candidates, as `SelectionInput.errors` (oracles).
+    fixed_zero: of the prior's settings (p_drop, lam), those that have no effect and are 0 in paths.
+    Raises: ValueError: another character in the name.
     """
 
     name: str
     chooses: str
+    reads_geometry: bool = False
     reads_prior: bool = False
-    needs_truth: bool = False
     needs_field: bool = False
+    needs_truth: bool = False
     fixed_zero: tuple[str, ...] = ()
+
+    def __post_init__(self):
+        if not re.fullmatch(POLICY_NAME, self.name):
+            raise ValueError(f"policy {self.name!r}: a name has small letters, digits and - only")
 
     def describe_inputs(self) -> str:
         """What the policy reads, in words."""
         if self.reads_prior:
-            return "a prior" + (f"; without {', '.join(self.fixed_zero)}" if self.fixed_zero else "")
-        return "the true error" if self.needs_truth else "the field" if self.needs_field else "poses"
+            return "prior" + (f" (not {', '.join(f'`{key}`' for key in self.fixed_zero)})" if self.fixed_zero else "")
+        flags = {"geometric scores": self.reads_geometry, "field": self.needs_field, "true error": self.needs_truth}
+        return ", ".join(name for name, read in flags.items() if read) or "poses"
 
 
 POLICY_SPECS = (
-    PolicySpec("random", "any"),
-    PolicySpec("ring", "the nearest to places evenly on a ring at 45 degrees, turned each round"),
-    PolicySpec("farthest", "greedily the farthest from every view so far"),
-    PolicySpec("diverse", "what covers the pool best: facility location with equal weights"),
-    PolicySpec("opacity", "those that see most of what is not known to be opaque"),
-    PolicySpec("fisher", "the most information on the Gaussians' colours, greedily", needs_field=True),
-    PolicySpec("oracle", "the greatest true error: what a perfect score would choose", needs_truth=True),
-    PolicySpec("oracle-diverse", "facility location, weighted by the true error", needs_truth=True),
-    PolicySpec("all", "the whole pool, whatever `k` is"),
-    PolicySpec("grad-lpips", "texture of what the prior expects, plus `lam` LPIPS (ablation)", reads_prior=True),
-    PolicySpec("w2-lpips", "the greatest u = W2 + `lam` LPIPS over frozen scales: the paper's top k", reads_prior=True),
-    PolicySpec("w2-lpips-diverse", "facility location, weighted by u", reads_prior=True),
-    PolicySpec("shuffled", "as `w2-lpips-diverse`, with u permuted (ablation)", reads_prior=True),
-    PolicySpec("w2", "where samples lie farthest apart in latents", reads_prior=True, fixed_zero=("lam",)),
+    PolicySpec("random", "k drawn at random"),
+    PolicySpec(
+        "ring", "those nearest to k points spaced evenly on a ring at 45 degrees; the next round's ring is turned"
+    ),
+    PolicySpec("farthest", "greedily, the one farthest from all photos so far: farthest point sampling"),
+    PolicySpec("diverse", "facility location with equal weights: every candidate is to have a photo nearby"),
+    PolicySpec(
+        "opacity",
+        "the highest mean uncertainty of the render (1 - opacity, plus that of the Gaussians in view) over the pixels "
+        "that see ground",
+        reads_geometry=True,
+    ),
+    PolicySpec(
+        "fisher",
+        "greedily, the largest information gain on the Gaussians' colours over all photos so far and chosen",
+        reads_geometry=True,
+        needs_field=True,
+    ),
+    PolicySpec("oracle", "the largest true error of the render: what a perfect score would choose", needs_truth=True),
+    PolicySpec("oracle-diverse", "facility location weighted by the true error", needs_truth=True),
+    PolicySpec("all", "all candidates, whatever `k` is"),
+    PolicySpec(
+        "grad-lpips",
+        "the largest image gradient of the prior's mean sample plus `lam` LPIPS, each over its frozen scale (ablation)",
+        reads_prior=True,
+    ),
+    PolicySpec(
+        "w2-lpips", "the largest u = W2 + `lam` LPIPS, each over its frozen scale: the paper's top k", reads_prior=True
+    ),
+    PolicySpec("w2-lpips-diverse", "facility location weighted by u", reads_prior=True),
+    PolicySpec("shuffled", "as `w2-lpips-diverse`, with u permuted at random (ablation)", reads_prior=True),
+    PolicySpec("w2", "the largest W2 between the prior's samples, in latents", reads_prior=True, fixed_zero=("lam",)),
     PolicySpec(
         "single",
-        "where one sample looks least like the render (ablation)",
+        "the largest LPIPS between one sample without dropout and the render (ablation)",
         reads_prior=True,
         fixed_zero=("p_drop", "lam"),
     ),
     PolicySpec(
         "residual",
-        "where the mean sample lies farthest from the render, in latents",
+        "the largest distance of the samples' mean from the render, in latents",
         reads_prior=True,
         fixed_zero=("lam",),
     ),
-    PolicySpec(
-        "residual-diverse", "facility location, weighted by that residual", reads_prior=True, fixed_zero=("lam",)
-    ),
+    PolicySpec("residual-diverse", "facility location weighted by `residual`", reads_prior=True, fixed_zero=("lam",)),
 )
 
 POLICY_NAMES = tuple(spec.name for spec in POLICY_SPECS)

@@ -19,8 +19,9 @@ EMPTY_PARTS: dict[str, Part] = {"none": ({"opacity": np.zeros((1, 1), np.float32
 
 @dataclass(frozen=True)
 class PoseMaps:
-    """Maps of n candidates. opacity: 1 - opacity of the whole picture, NaN below a picture of less height. w2_sq:
-    disagreement of the prior's samples in the picture's middle square; None without a prior."""
+    """Maps of n candidates. opacity: rendered uncertainty (1 - opacity, plus that of the Gaussians in view) of the
+    whole picture, NaN below a picture of less height. w2_sq: disagreement of the prior's samples in the picture's
+    middle square; None without a prior."""
 
     names: list[str]
     opacity: Float32[Array, "n h w"]

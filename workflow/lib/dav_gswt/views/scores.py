@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float64, Int
 from numpy import ndarray as Array
 
-from dav_gswt.errors import InputError
+from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.files import atomic_file
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.views.uncertainty.weighting import Scales
@@ -40,12 +40,18 @@ class Scores:
     def term(self, name: str) -> Float64[Array, "n"]:
         """Return a term. Raises: InputError: it is not available."""
         if name not in self.terms:
-            raise InputError(f"{name}: the poses were scored without it; it needs {_requirement(name)} (docs/prior.md)")
+            raise InputError(f"{name}: the poses were scored without it; it needs {_describe_requirement(name)}")
         return self.terms[name]
 
 
-def _requirement(name: str) -> str:
-    return "a prior without dropout (p_drop 0), and LPIPS" if name == "single" else "a prior"
+def _describe_requirement(name: str) -> str:
+    """What a term needs, and where that is documented."""
+    if name == "single":
+        return (
+            "a prior without dropout (p_drop 0), and the config's `lpips` as `installed` or a path "
+            "(docs/reference/config.md)"
+        )
+    return "a prior (docs/prior.md)"
 
 
 def write_scores(path: Path | str, scores: Scores) -> None:
@@ -63,16 +69,18 @@ def write_scores(path: Path | str, scores: Scores) -> None:
 
 def read_scores(path: Path | str) -> Scores:
     """Read scores.csv. Raises: InputError: not such a table, or scores that are not finite, naming the poses."""
-    with Path(path).open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
     try:
+        with Path(path).open(newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
         poses = [Pose(r["pose"], *(float(r[k]) for k in ("elevation", "azimuth", "radius"))) for r in rows]
         known = [name for name in TERMS if rows and rows[0][name]]
         terms = {name: np.array([float(r[name]) for r in rows]) for name in known}
         scales = Scales({name: float(rows[0][f"{name}_scale"]) for name in known})
         steps = np.array([int(r["steps"]) for r in rows], int)
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{path}: not a table of scores ({error}); make it again") from error
+        if not np.isfinite([(p.elevation, p.azimuth, p.radius) for p in poses]).all():
+            raise ValueError("a pose is not finite")
+    except (KeyError, TypeError, ValueError, OverflowError, OSError, csv.Error) as error:
+        raise InputError(f"{path}: not a table of scores ({summarize_error(error)}); make it again") from error
     bad = sorted({i for values in terms.values() for i in np.flatnonzero(~np.isfinite(values))})
     if bad:
         raise InputError(f"{path}: the scores of {', '.join(poses[i].name for i in bad[:5])} are not finite")

@@ -29,7 +29,7 @@ from dav_gswt.views.uncertainty.weighting import Quantiles, Scales, normalise
 
 WIDTH = 96  # pixels across a picture for scoring
 PHOTO_WIDTH = 384  # pixels across a captured photo that conditions a prior, before cropping and shrinking
-SHOWN = 16  # candidates whose maps are shown
+SHOWN = 16  # candidates whose maps are written for display
 
 
 @dataclass(frozen=True)
@@ -48,12 +48,13 @@ class ScoringResult:
         return {"candidates": len(self.scores), "terms": list(self.scores.terms), "poses_by_steps": by_steps}
 
 
-def exr_parts(found: ScoringResult, field: GaussianField, grid: Ground) -> dict[str, Part]:
+def make_exr_parts(result: ScoringResult, field: GaussianField, grid: Ground) -> dict[str, Part]:
     """Maps for display as parts of an EXR: the ground from above, and candidates spread over the hemisphere."""
-    above = render_top_view(replace(field, uncertainty=found.gaussians), grid).uncertainty[::-1]
-    some = [found.scores.names[i] for i in select_farthest_poses(found.scores.poses, SHOWN)]
-    shown = found.maps.exr_parts(found.scores, some)
-    return {"above": ({"uncertainty": above}, {"camera": "straight above"})} | shown
+    above = render_top_view(replace(field, uncertainty=result.gaussians), grid).uncertainty[::-1]
+    names = [result.scores.names[i] for i in select_farthest_poses(result.scores.poses, SHOWN)]
+    return {"above": ({"uncertainty": above}, {"camera": "straight above"})} | result.maps.exr_parts(
+        result.scores, names
+    )
 
 
 def scoring_camera(camera: Camera) -> Camera:
@@ -64,7 +65,7 @@ def scoring_camera(camera: Camera) -> Camera:
 def score_poses(
     field: GaussianField,
     grid: Ground,
-    pool: Candidates,
+    candidates: Candidates,
     taken: list[TrainingView],
     frame: SceneFrame,
     prior: PriorConfig | None = None,
@@ -75,45 +76,45 @@ def score_poses(
     taken: the photos so far. prior: None for geometric terms only. frozen: of the first round; None in the first round.
     Raises: InputError: a candidate below the ground or inside an object, by name.
     """
-    collision.require_free_positions(pool, field, grid)
-    terms, opacity = _score_geometry(field, grid, pool, [scoring_camera(view.camera) for view in taken])
-    steps, w2_sq = np.zeros(len(pool), int), None
-    if prior is not None and pool:
-        condition, counts = build_conditions(field, grid, pool, taken, frame, prior.model.size)
-        found, steps = prior_sampling.sample_terms(prior, condition, [pose.name for pose, _ in pool], counts)
-        terms |= {name: values.astype(np.float64) for name, values in found.by_name().items()}
-        w2_sq = found.maps
-    poses, names = [pose for pose, _ in pool], [pose.name for pose, _ in pool]
+    collision.require_free_positions(candidates, field, grid)
+    terms, opacity = _score_geometry(field, grid, candidates, [scoring_camera(view.camera) for view in taken])
+    steps, w2_sq = np.zeros(len(candidates), int), None
+    if prior is not None and candidates:
+        condition, masks = build_conditions(field, grid, candidates, taken, frame, prior.model.size)
+        sampled, steps = prior_sampling.sample_terms(prior, condition, [pose.name for pose, _ in candidates], masks)
+        terms |= {name: values.astype(np.float64) for name, values in sampled.by_name().items()}
+        w2_sq = sampled.maps
+    poses, names = [pose for pose, _ in candidates], [pose.name for pose, _ in candidates]
     frozen = frozen or _freeze_scales(terms, w2_sq, names)
     scores, maps = Scores(poses, terms, frozen.scales, steps), PoseMaps(names, opacity, w2_sq)
-    return ScoringResult(scores, maps, frozen, _gaussian_uncertainty(field, pool, w2_sq, frozen))
+    return ScoringResult(scores, maps, frozen, _gaussian_uncertainty(field, candidates, w2_sq, frozen))
 
 
 def build_conditions(
-    field: GaussianField, grid: Ground, pool: Candidates, taken: list[TrainingView], frame: SceneFrame, size: int
+    field: GaussianField, grid: Ground, candidates: Candidates, taken: list[TrainingView], frame: SceneFrame, size: int
 ) -> tuple[Condition, Float32[Array, "n s s"]]:
     """Build the conditions of a prior at the candidates, and masks of pixels that look at the modelled ground (1)."""
     known = conditions.prepare_photos(taken, frame, size)
-    squares = [conditions.crop_camera(camera).resized(size, size) for _, camera in pool]
-    counts = np.stack([ground_mask(grid, camera) for camera in squares])
-    return conditions.build_condition(field, pool, known, frame.flying_height, size), counts
+    squares = [conditions.crop_camera(camera).resized(size, size) for _, camera in candidates]
+    masks = np.stack([ground_mask(grid, camera) for camera in squares])
+    return conditions.build_condition(field, candidates, known, frame.flying_height, size), masks
 
 
 def _score_geometry(
-    field: GaussianField, grid: Ground, pool: Candidates, taken: list[Camera]
+    field: GaussianField, grid: Ground, candidates: Candidates, taken: list[Camera]
 ) -> tuple[dict[str, Float64[Array, "n"]], Float32[Array, "n h w"]]:
     """Geometric terms and opacity maps. opacity: mean of the map over pixels on the modelled ground; 0 if there are
     none."""
     raster = Rasterizer()
-    already = fisher.accumulate_information(field, taken, raster)
-    terms, maps = {"opacity": np.zeros(len(pool)), "fisher": np.zeros(len(pool))}, []
-    for i, (_, camera) in enumerate(progress(pool, "score poses")):
+    known = fisher.accumulate_information(field, taken, raster)
+    terms, maps = {"opacity": np.zeros(len(candidates)), "fisher": np.zeros(len(candidates))}, []
+    for i, (_, camera) in enumerate(progress(candidates, "score poses")):
         maps.append(render_uncertainty(field, scoring_camera(camera), raster))
-        terms["fisher"][i] = fisher.information_gain(raster.contributions(), already)
+        terms["fisher"][i] = fisher.information_gain(raster.contributions(), known)
         weight = ground_mask(grid, scoring_camera(camera))
         terms["opacity"][i] = float((maps[-1] * weight).sum() / max(1.0, weight.sum()))
     shape = (0, 1, 1) if not maps else (len(maps), *np.max([m.shape for m in maps], axis=0))
-    out = np.full(shape, np.nan, np.float32)  # cameras of one pool may differ in their height
+    out = np.full(shape, np.nan, np.float32)  # cameras of the candidates may differ in their height
     for i, m in enumerate(maps):
         out[i, : m.shape[0], : m.shape[1]] = m
     return terms, out
@@ -134,11 +135,11 @@ def _freeze_scales(
 
 
 def _gaussian_uncertainty(
-    field: GaussianField, pool: Candidates, w2_sq: Float32[Array, "n h w"] | None, frozen: FrozenScales
+    field: GaussianField, candidates: Candidates, w2_sq: Float32[Array, "n h w"] | None, frozen: FrozenScales
 ) -> Float32[Array, "gaussians"]:
     """Uncertainty of each Gaussian from the prior's maps; geometric where no candidate sees it, or without a prior."""
     if w2_sq is None or frozen.pixels is None:
         return field.uncertainty
-    cameras = [conditions.crop_camera(camera) for _, camera in pool]
-    found = backproject_maps(field, cameras, normalise(w2_sq, frozen.pixels))
-    return np.where(np.isnan(found), field.uncertainty, found).astype(np.float32)
+    cameras = [conditions.crop_camera(camera) for _, camera in candidates]
+    backprojected = backproject_maps(field, cameras, normalise(w2_sq, frozen.pixels))
+    return np.where(np.isnan(backprojected), field.uncertainty, backprojected).astype(np.float32)

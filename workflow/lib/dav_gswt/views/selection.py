@@ -4,8 +4,7 @@ import logging
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from dav_gswt.errors import InputError
-from dav_gswt.files import read_json, write_json
+from dav_gswt.files import read_record, write_json
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.views.policies import POLICIES, SelectionInput
 from dav_gswt.views.scores import Scores
@@ -27,6 +26,10 @@ class PoseSelection:
     stopped: str | None = None
     expected: dict | None = None
 
+    def describe_outcome(self) -> dict:
+        """Why no pose is requested and the predicted gain, as metrics.json holds them."""
+        return {"stopped": self.stopped, "expected": self.expected}
+
 
 def poses_per_round(policy: str, k: int, candidates: int) -> int:
     """Return k, or the number of candidates for the policy `all`, which takes them in one round."""
@@ -34,7 +37,7 @@ def poses_per_round(policy: str, k: int, candidates: int) -> int:
 
 
 def select_poses(policy: str, scores: Scores, inputs: SelectionInput) -> list[Pose]:
-    """Return the poses that a policy chooses, at most k. If k exceeds the pool, all are taken, with a warning."""
+    """Return the poses that a policy chooses, at most k. Of fewer candidates all are taken, with a warning."""
     if not len(scores):
         _log.warning("no candidate pose is left: no photo is taken, the field stays as it is")
         return []
@@ -51,8 +54,4 @@ def write_pose_selection(path: Path | str, selection: PoseSelection) -> None:
 
 def read_pose_selection(path: Path | str) -> PoseSelection:
     """Read poses.json. Raises: InputError: not such a file."""
-    values = read_json(path)
-    try:
-        return PoseSelection(**values | {"poses": [Pose(**pose) for pose in values["poses"]]})
-    except (KeyError, TypeError) as error:
-        raise InputError(f"{path}: not a selection of poses ({error}); make it again") from error
+    return read_record(path, PoseSelection, "make it again")

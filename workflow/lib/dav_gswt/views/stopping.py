@@ -70,9 +70,10 @@ def decide_poses(stop: dict, k: int, burst: int, state: StoppingState) -> Decisi
 
 
 def describe_gain(found: ExpectedGain) -> str:
-    """Format an expected gain."""
-    many = "the next photo is" if found.photos == 1 else f"the next {found.photos} photos are"
-    return f"{many} worth about {found.gain:.2f} dB ({found.low:.2f} to {found.high:.2f}), {found.each:.3f} a photo"
+    """An expected gain as text."""
+    photos = "photo is" if found.photos == 1 else f"{found.photos} photos are"
+    interval = f"{found.gain:.2f} dB ({found.low:.2f} to {found.high:.2f})"
+    return f"the next {photos} expected to gain about {interval}, {found.each:.3f} dB a photo"
 
 
 def _budget_reason(stop: dict, burst: int, state: StoppingState, poses: int) -> str | None:

@@ -7,11 +7,12 @@ import pytest
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, rgb_to_sh
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.poses import Pose
-from dav_gswt.photos.synthetic import camera_layouts
 from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import Condition
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.coarse import StartViews
+from dav_gswt.reconstruction.fit_settings import CoarseSettings
 from dav_gswt.study.prior.training import example_files, examples
 
 SEED, COUNT = 4, 3
@@ -198,8 +199,8 @@ def test_a_fit_stays_under_its_cap(monkeypatch):
     """The cap is what bounds the seconds of a fit."""
     seen = []
 
-    def fit(frame, photos, points, colours, quality: FitSettings, rng, margin):
-        seen.append((quality, len(points), len(photos), frame.extent.east))
+    def fit(given: StartViews, quality: CoarseSettings, rng):
+        seen.append((quality, len(given.points), len(given.views), given.frame.extent.east))
         raise InterruptedError
 
     monkeypatch.setattr(examples, "fit_coarse_field", fit)

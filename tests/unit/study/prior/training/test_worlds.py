@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from dav_gswt.field import GaussianField
-from dav_gswt.photos.synthetic import camera_layouts
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.raster import render
 from dav_gswt.study.prior.training import worlds, worlds_ground, worlds_light, worlds_objects
 
-FAMILIES = ("desert", "flowers", "grass", "planet", "meadow")
+FAMILIES = ("desert", "flowers", "grass", "planet", "meadow", "oasis")
 
 
 def same(a: GaussianField, b: GaussianField) -> bool:

@@ -1,4 +1,4 @@
-"""Camera models that exist already: taken as they are, instead of structure from motion.
+"""Import of camera models, which take the place of structure from motion.
 
 `import_model` takes a folder of COLMAP, a transforms.json (nerfstudio, instant-ngp) or a reconstruction.json (OpenSfM,
 OpenDroneMap), and returns a `Registration`. Positions stay in the world of the model, metric if it is.
@@ -50,7 +50,7 @@ def import_model(path: Path | str, folder: Path | str, options: SfmOptions) -> R
     Raises: InputError: not a model, damaged, one that is not read, or fewer than three photos have a camera in it.
     """
     path, photos = Path(path), PhotoFolder(Path(folder))
-    given = _given(path, photos)
+    given = _read_model(path, photos)
     placed, left_out = match_photos_to_images(given, photos, path)
     if len(placed) < LEAST_PHOTOS:
         raise InputError(
@@ -60,15 +60,15 @@ def import_model(path: Path | str, folder: Path | str, options: SfmOptions) -> R
     for name, reason in left_out:
         _log.warning("%s is left out: %s", name, reason)
     seen = collect_observations(given, placed) if len(given.point_of) else triangulate_features(placed, options)
-    pairs = _pinholes(placed, options.side, path)
-    model = _model(placed, [pinhole for _, pinhole in pairs], seen)
+    pairs = _make_pinholes(placed, options.side, path)
+    model = _make_sparse_model(placed, [pinhole for _, pinhole in pairs], seen)
     if not len(model.points):
         raise InputError(
             f"{path}: under its cameras the photos share no point; either they are not those that the model was made "
             "of, or they show too little texture"
         )
     if not len(given.point_of):
-        model = _with_loose(model, *_thinned(given.points, given.colours, placed))
+        model = _with_loose(model, *_thin_points(given.points, given.colours, placed))
     centres = np.stack([camera.centre for camera in model.cameras])
     return Registration(
         model=model,
@@ -81,7 +81,7 @@ def import_model(path: Path | str, folder: Path | str, options: SfmOptions) -> R
     )
 
 
-def _given(path: Path, photos: PhotoFolder) -> ImportedModel:
+def _read_model(path: Path, photos: PhotoFolder) -> ImportedModel:
     """What a file says, whichever kind it is of."""
     if path.is_dir():
         if model := find_colmap_folder(path):
@@ -101,7 +101,9 @@ def _given(path: Path, photos: PhotoFolder) -> ImportedModel:
     )
 
 
-def _pinholes(placed: Sequence[MatchedPhoto], side: int, path: Path) -> list[tuple[pycolmap.Camera, pycolmap.Camera]]:
+def _make_pinholes(
+    placed: Sequence[MatchedPhoto], side: int, path: Path
+) -> list[tuple[pycolmap.Camera, pycolmap.Camera]]:
     """Of each photo the lens at the size of its picture, and the pinhole camera of that; equal lenses share one."""
     made = {}
     for place in placed:
@@ -110,7 +112,9 @@ def _pinholes(placed: Sequence[MatchedPhoto], side: int, path: Path) -> list[tup
     return [made[camera_key(place.lens)] for place in placed]
 
 
-def _model(placed: Sequence[MatchedPhoto], pinholes: list[pycolmap.Camera], seen: Observations) -> ColmapModel:
+def _make_sparse_model(
+    placed: Sequence[MatchedPhoto], pinholes: list[pycolmap.Camera], seen: Observations
+) -> ColmapModel:
     """Pinhole cameras, and the observations that fall into their pictures; points that have none are left out."""
     focal, middle, size = (
         np.array(column, float)
@@ -139,7 +143,7 @@ def _model(placed: Sequence[MatchedPhoto], pinholes: list[pycolmap.Camera], seen
     )
 
 
-def _thinned(
+def _thin_points(
     places: Float[Array, "n 3"], colours: Float32[Array, "n 3"], placed: Sequence[MatchedPhoto]
 ) -> tuple[Float[Array, "k 3"], Float32[Array, "k 3"]]:
     """The points that lie in two photos or more, every n-th where there are many."""

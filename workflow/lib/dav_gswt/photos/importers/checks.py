@@ -1,6 +1,6 @@
-"""Files from outside: JSON of bounded size, finite numbers, proper rotations, names that stay in their folder.
+"""Checks of untrusted files: size of JSON, finite numbers, proper rotations, names that stay in their folder.
 
-Whatever is refused is named: the file, and the key or image within it.
+Errors name the file, and the key or image within it.
 """
 
 import json
@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.errors import InputError
+from dav_gswt.errors import InputError, summarize_error
 
 LARGEST_JSON = 1 << 28  # bytes; as Python objects a file takes about ten times its size
 LARGEST = 1 << 31  # bytes of any other file
@@ -36,7 +36,7 @@ def check_size(path: Path, most: int) -> int:
 def read_untrusted_json(path: Path):
     """The JSON of a file, in which no object has a key twice. Raises: InputError: malformed or too large."""
 
-    def unique(pairs: list) -> dict:
+    def require_unique_keys(pairs: list) -> dict:
         values = dict(pairs)
         if len(values) < len(pairs):
             twice = Counter(key for key, _ in pairs).most_common(1)[0][0]
@@ -45,9 +45,9 @@ def read_untrusted_json(path: Path):
 
     check_size(path, LARGEST_JSON)
     try:
-        return json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=unique)
+        return json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=require_unique_keys)
     except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{path}: not readable as JSON ({error}); export or copy it again") from error
+        raise InputError(f"{path}: not readable as JSON ({summarize_error(error)}); export or copy it again") from error
 
 
 def check_entry(values, key: str, kind: type, where: str):

@@ -1,7 +1,7 @@
-"""COLMAP's sparse models, binary or text, as far as cameras, images and points go.
+"""Reader of COLMAP's sparse models, binary or text: cameras, images and points.
 
-Read here and not by the library, which takes a file's counts at their word and may end the process over a damaged one.
-Formats: colmap.github.io/format.html. Rigs and frames, where a model has them, repeat what images say.
+pycolmap is not used to read them, because it trusts the counts in a file: a damaged one may end the process.
+Formats: colmap.github.io/format.html. Rigs and frames are skipped: they repeat what images say.
 """
 
 import struct
@@ -28,12 +28,12 @@ MOST_NUMBER = 2**53  # of points: below, numbers are exact in tables of floats
 def find_colmap_folder(folder: Path) -> Path | None:
     """The folder at or below this one that holds a model, if any."""
     places = [folder / place for place in _PLACES]
-    return next((p for p in places if any(_both(p, kind) for kind in ("bin", "txt"))), None)
+    return next((p for p in places if any(_has_both(p, kind) for kind in ("bin", "txt"))), None)
 
 
 def import_colmap(folder: Path, photos: Path) -> ImportedModel:
     """Read a model. Raises: InputError: damaged, or what it says cannot be."""
-    kind = "bin" if _both(folder, "bin") else "txt"
+    kind = "bin" if _has_both(folder, "bin") else "txt"
     cameras = _cameras(folder / f"cameras.{kind}", {"bin": _binary_cameras, "txt": _text_cameras}[kind])
     shots, seen = _images(
         folder / f"images.{kind}", {"bin": _binary_images, "txt": _text_images}[kind], cameras, photos
@@ -48,19 +48,19 @@ def import_colmap(folder: Path, photos: Path) -> ImportedModel:
     points, colours = check_finite(rows[order, 1:4], str(path)), (rows[order, 4:7] / 255).astype(np.float32)
     owners = np.repeat(np.arange(len(shots)), [len(s) for s in seen])
     flat = np.concatenate(seen) if seen else np.zeros((0, 3))
-    wanted = flat[:, 2]
-    place = np.searchsorted(ids, wanted)
+    references = flat[:, 2]
+    place = np.searchsorted(ids, references)
     known = place < len(ids)
-    known[known] = ids[place[known]] == wanted[known]
+    known[known] = ids[place[known]] == references[known]
     if not known.all():
         k = int(np.flatnonzero(~known)[0])
         raise InputError(
-            f"{path}: has no point {wanted[k]:.0f}, which {shots[owners[k]].name} sees; export the model again"
+            f"{path}: has no point {references[k]:.0f}, which {shots[owners[k]].name} sees; export the model again"
         )
     return ImportedModel(shots, points, colours, place, owners, flat[:, :2])
 
 
-def _both(folder: Path, kind: str) -> bool:
+def _has_both(folder: Path, kind: str) -> bool:
     return all((folder / f"{part}.{kind}").is_file() for part in ("cameras", "images"))
 
 
@@ -106,7 +106,7 @@ def _rotation(quaternion: Array, where: str) -> Array:
 
 
 class _Bytes:
-    """A binary file that is read from its start to its end; no count in it is believed beyond what is there."""
+    """A binary file that is read from its start to its end; a count is checked against the bytes that are left."""
 
     def __init__(self, path: Path):
         check_size(path, checks.LARGEST)
@@ -114,17 +114,17 @@ class _Bytes:
 
     def take(self, form: str) -> tuple:
         size = struct.calcsize("<" + form)
-        self.room(size)
+        self.check_room(size)
         self.at += size
         return struct.unpack_from("<" + form, self.data, self.at - size)
 
     def count(self, each: int) -> int:
-        """A number of things of at least `each` bytes."""
+        """A number of records of at least `each` bytes."""
         (n,) = self.take("Q")
-        self.room(n * each)
+        self.check_room(n * each)
         return n
 
-    def room(self, size: int) -> None:
+    def check_room(self, size: int) -> None:
         if size > len(self.data) - self.at:
             raise InputError(f"{self.path}: cut short or damaged at byte {self.at}; copy or export it again")
 
@@ -135,7 +135,7 @@ class _Bytes:
         raw, self.at = self.data[self.at : end], end + 1
         return raw.decode("utf-8", errors="replace")
 
-    def ended(self) -> None:
+    def check_end(self) -> None:
         if self.at != len(self.data):
             raise InputError(f"{self.path}: {len(self.data) - self.at} bytes too long; copy or export it again")
 
@@ -147,7 +147,7 @@ def _binary_cameras(path: Path) -> Iterator[tuple]:
         if model not in _MODELS:
             raise InputError(f"{path}: camera {number}: there is no camera model {model}; export the model again")
         yield number, _MODELS[model], width, height, file.take("d" * _COUNTS[_MODELS[model]])
-    file.ended()
+    file.check_end()
 
 
 def _binary_images(path: Path) -> Iterator[tuple]:
@@ -159,20 +159,20 @@ def _binary_images(path: Path) -> Iterator[tuple]:
         rows = np.frombuffer(file.data, [("xy", "<f8", 2), ("point", "<i8")], n, file.at)
         file.at += 24 * n
         yield pose, camera, name, np.c_[rows["xy"], rows["point"]]
-    file.ended()
+    file.check_end()
 
 
 def _binary_points(path: Path) -> Array:
     """Rows of number, x, y, z, red, green, blue."""
     file = _Bytes(path)
-    rows = np.empty((_bounded(file.count(51), path), 7))
+    rows = np.empty((_check_point_count(file.count(51), path), 7))
     for row in rows:
         *row[:], _, track = file.take("Q3d3BdQ")
         if not row[0] < MOST_NUMBER:
             raise InputError(f"{path}: a point of number {row[0]:.0f}; copy or export the model again")
-        file.room(8 * track)
+        file.check_room(8 * track)
         file.at += 8 * track
-    file.ended()
+    file.check_end()
     return rows
 
 
@@ -191,7 +191,7 @@ def _text_cameras(path: Path) -> Iterator[tuple]:
             number, model, width, height, *params = line.split()
             values = int(number), model, int(width), int(height), tuple(map(float, params))
         except ValueError:
-            raise _unread(path, line, "CAMERA_ID MODEL WIDTH HEIGHT PARAMS") from None
+            raise _unreadable_line(path, line, "CAMERA_ID MODEL WIDTH HEIGHT PARAMS") from None
         yield values
 
 
@@ -207,7 +207,9 @@ def _text_images(path: Path) -> Iterator[tuple]:
             if len(values[0]) != 7:
                 raise ValueError
         except ValueError:
-            raise _unread(path, line, "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, and X Y POINT3D_ID") from None
+            raise _unreadable_line(
+                path, line, "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, and X Y POINT3D_ID"
+            ) from None
         yield *values, seen
 
 
@@ -220,15 +222,15 @@ def _text_points(path: Path) -> Array:
             if len(rows[-1]) != 7 or not 0 <= rows[-1][0] < MOST_NUMBER or not all(0 <= c <= 255 for c in rows[-1][4:]):
                 raise ValueError
         except ValueError:
-            raise _unread(path, line, "POINT3D_ID X Y Z R G B") from None
-    return np.array(rows, float).reshape(_bounded(len(rows), path), 7)
+            raise _unreadable_line(path, line, "POINT3D_ID X Y Z R G B") from None
+    return np.array(rows, float).reshape(_check_point_count(len(rows), path), 7)
 
 
-def _bounded(points: int, path: Path) -> int:
+def _check_point_count(points: int, path: Path) -> int:
     if points > checks.MOST_POINTS:
         raise InputError(f"{path}: {points} points; at most {checks.MOST_POINTS} are read: export a sparse model")
     return points
 
 
-def _unread(path: Path, line: str, wanted: str) -> InputError:
-    return InputError(f"{path}: {line[:60]!r} does not read as {wanted}; export the model as text again")
+def _unreadable_line(path: Path, line: str, expected: str) -> InputError:
+    return InputError(f"{path}: {line[:60]!r} does not read as {expected}; export the model as text again")

@@ -1,4 +1,4 @@
-"""What a file says about photos: where each was taken and through which lens, and perhaps points of the scene."""
+"""An imported model: the pose and the lens of each photo, and points of the scene if the file has any."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""Lenses: distorted cameras from the numbers of a file, fitted to their photos, and the pinholes that replace them."""
+"""Lens models: distorted cameras from the numbers in a file, fitted to photos, and the pinholes that replace them."""
 
 import math
 
@@ -72,12 +72,12 @@ def fit_camera_to_photo(
     if _same_shape(camera, stored):
         if orientation not in TURNS:
             raise InputError(f"{where}: its EXIF orientation mirrors it; save it upright and without that tag")
-        camera = _scaled(camera, *stored)
+        camera = _scale_camera(camera, *stored)
         for _ in range(TURNS[orientation]):
-            camera = _turned(camera)
+            camera = _turn_camera(camera)
         return camera, TURNS[orientation]
     if _same_shape(camera, upright):
-        return _scaled(camera, *upright), 0
+        return _scale_camera(camera, *upright), 0
     raise InputError(
         f"{where}: the photo has {upright[0]} x {upright[1]} pixels, its camera in the model {camera.width} x "
         f"{camera.height}, another shape; use the pictures that the model was made of (not cut, not undistorted)"
@@ -92,7 +92,7 @@ def undistort_camera(camera: pycolmap.Camera, side: int, where: str) -> tuple[py
     small = shrink_camera(camera, side)
     limits = pycolmap.UndistortCameraOptions(blank_pixels=0, max_image_size=side)
     found = pycolmap.undistort_camera(limits, small)
-    if not _undone(small, found):
+    if not _is_invertible(small, found):
         raise InputError(
             f"{where}: the distortion of its camera cannot be undone over the whole picture (parameters "
             f"{camera.params_info}: {camera.params_to_string()}); check them, or calibrate again with fewer terms"
@@ -103,7 +103,7 @@ def undistort_camera(camera: pycolmap.Camera, side: int, where: str) -> tuple[py
 def shrink_camera(camera: pycolmap.Camera, side: int) -> pycolmap.Camera:
     """The lens of the picture shrunk to at most `side` pixels; pictures are never enlarged."""
     share = min(1.0, side / max(camera.width, camera.height))
-    return _scaled(camera, max(1, round(camera.width * share)), max(1, round(camera.height * share)))
+    return _scale_camera(camera, max(1, round(camera.width * share)), max(1, round(camera.height * share)))
 
 
 def unproject_pixels(camera: pycolmap.Camera, pixels: Float[Array, "m 2"]) -> Float[Array, "m 2"]:
@@ -120,7 +120,7 @@ def camera_key(camera: pycolmap.Camera) -> tuple:
     return camera.model_name, camera.width, camera.height, *camera.params.tolist()
 
 
-def _undone(small: pycolmap.Camera, found: pycolmap.Camera) -> bool:
+def _is_invertible(small: pycolmap.Camera, found: pycolmap.Camera) -> bool:
     """Whether what the pinhole sees lies in the photo, and the way back leads to the same ray."""
     if not np.isfinite(found.params).all() or min(found.params[:2]) <= 0:
         return False
@@ -140,14 +140,14 @@ def _same_shape(camera: pycolmap.Camera, size: tuple[int, int]) -> bool:
     return abs(h - w / u * v) <= max(1.0, w / u) or abs(w - h / v * u) <= max(1.0, h / v)
 
 
-def _scaled(camera: pycolmap.Camera, width: int, height: int) -> pycolmap.Camera:
+def _scale_camera(camera: pycolmap.Camera, width: int, height: int) -> pycolmap.Camera:
     camera = pycolmap.Camera(camera.todict())
     if (camera.width, camera.height) != (width, height):
         camera.rescale(width, height)
     return camera
 
 
-def _turned(camera: pycolmap.Camera) -> pycolmap.Camera:
+def _turn_camera(camera: pycolmap.Camera) -> pycolmap.Camera:
     """The lens of the picture turned clockwise by 90 degrees: (x, y) is seen at (height - y, x).
 
     Radial terms stay; tangential and prism terms are vectors in the picture and turn with it.

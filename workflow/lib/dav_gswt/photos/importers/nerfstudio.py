@@ -1,7 +1,7 @@
-"""transforms.json of nerfstudio and instant-ngp: cameras in OpenGL's axes, intrinsics for all frames or for each.
+"""Reader of transforms.json of nerfstudio and instant-ngp: OpenGL camera axes, intrinsics for all frames or for each.
 
-Where a program moved the world (`applied_transform`, `applied_scale`) that is undone: the world is that of the model
-which the file was made from. Pixels are counted as COLMAP does, pixel centres at half integers.
+Where a program moved the world (`applied_transform`, `applied_scale`), the move is undone: the world is that of the
+model from which the file was made. Pixel centres are at half integers, as in COLMAP.
 """
 
 import logging
@@ -43,28 +43,28 @@ def import_nerfstudio(
     size_of: of a photo by its name, for files that give no size. Raises: InputError: with file, frame and key.
     """
     frames = check_entry(values, "frames", list, str(path))
-    world, scale = _moved(values, path)
+    world, scale = _read_world_transform(values, path)
     shots, lens_of = [], {}
     for i, frame in enumerate(frames):
         label = check_entry(frame, "file_path", str, f"{path}: frame {i}")
         name = check_image_name(label, photos, f"{path}: frame {i}")
         where = f"{path}: frame {name}"
         rotation, translation = _pose(frame, world, scale, where)
-        wanted = _intrinsics(values, frame, name, size_of, where)
-        if wanted is not None and wanted not in lens_of:
-            lens_of[wanted] = _lens(dict(wanted), where)
-        shots.append(ImportedImage(name, lens_of.get(wanted), rotation, translation))
+        intrinsics = _intrinsics(values, frame, name, size_of, where)
+        if intrinsics is not None and intrinsics not in lens_of:
+            lens_of[intrinsics] = _lens(dict(intrinsics), where)
+        shots.append(ImportedImage(name, lens_of.get(intrinsics), rotation, translation))
     check_distinct([s.name for s in shots], str(path))
     points, colours = _points(path, values, shots, world, scale)
     return ImportedModel(tuple(shots), points, colours)
 
 
-def _moved(values: dict, path: Path) -> tuple[Float[Array, "4 4"], float]:
+def _read_world_transform(values: dict, path: Path) -> tuple[Float[Array, "4 4"], float]:
     """What undoes the moves of the world: a rigid matrix after lengths are divided by a scale."""
     matrix, scale = np.eye(4), 1.0
     if values.get("applied_transform") is not None:
         where = f"{path}: applied_transform"
-        matrix = _affine(values["applied_transform"], where)
+        matrix = _check_affine(values["applied_transform"], where)
         determinant = float(np.linalg.det(matrix[:3, :3]))
         if not determinant > 1e-18:
             raise InputError(f"{where} mirrors or flattens the world; export the file again")
@@ -81,7 +81,7 @@ def _moved(values: dict, path: Path) -> tuple[Float[Array, "4 4"], float]:
     return back, scale
 
 
-def _affine(values, where: str) -> Float[Array, "4 4"]:
+def _check_affine(values, where: str) -> Float[Array, "4 4"]:
     """A matrix of three rows, or of four of which the last is 0 0 0 1."""
     rows = 4 if isinstance(values, list) and len(values) == 4 else 3
     matrix = np.eye(4)
@@ -93,15 +93,15 @@ def _affine(values, where: str) -> Float[Array, "4 4"]:
 
 def _pose(frame: dict, world: Array, scale: float, where: str) -> tuple[Float[Array, "3 3"], Float[Array, "3"]]:
     """Rotation and translation into the camera, with x right and y down, from the undone world."""
-    matrix = _affine(check_entry(frame, "transform_matrix", list, where), f"{where}: transform_matrix")
+    matrix = _check_affine(check_entry(frame, "transform_matrix", list, where), f"{where}: transform_matrix")
     turn = world[:3, :3] @ nearest_rotation(matrix[:3, :3], f"{where}: transform_matrix") * OPENGL
     return turn.T, -turn.T @ (world[:3, :3] @ matrix[:3, 3] / scale + world[:3, 3])
 
 
 def _intrinsics(values: dict, frame: dict, name: str, size_of: Callable, where: str) -> tuple | None:
-    """What is said about a frame's lens, its own words before those for all; None where there is no size."""
+    """What the file says about a frame's lens, its own words before those for all; None where there is no size."""
 
-    def said(*keys: str) -> dict:
+    def read_value(*keys: str) -> dict:
         """The first of these keys that the frame, or else the file, has."""
         for source in (frame, values):
             for key in keys:
@@ -111,9 +111,9 @@ def _intrinsics(values: dict, frame: dict, name: str, size_of: Callable, where: 
 
     out = {}
     for keys in (("w",), ("h",), ("fl_x", "camera_angle_x"), ("fl_y", "camera_angle_y"), ("cx",), ("cy",)):
-        out |= said(*keys)
+        out |= read_value(*keys)
     for key in ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"):
-        out |= said(key)
+        out |= read_value(key)
     if "w" not in out or "h" not in out:
         if (size := size_of(name)) is None:
             return None
@@ -124,40 +124,49 @@ def _intrinsics(values: dict, frame: dict, name: str, size_of: Callable, where: 
     return (("model", str(model or "OPENCV")), *sorted(out.items()))
 
 
-def _lens(said: dict, where: str) -> pycolmap.Camera:
+def _lens(intrinsics: dict, where: str) -> pycolmap.Camera:
     """The lens that a frame's words describe."""
-    width, height = (_whole(said[key], f"{where}: {key}") for key in ("w", "h"))
-    if "camera_angle_x" in said:
-        said["fl_x"] = lens_models.angle_to_focal(said["camera_angle_x"], width, f"{where}: camera_angle_x")
-    if "camera_angle_y" in said:
-        said["fl_y"] = lens_models.angle_to_focal(said["camera_angle_y"], height, f"{where}: camera_angle_y")
-    if "fl_x" not in said:
+    width, height = (_check_pixels(intrinsics[key], f"{where}: {key}") for key in ("w", "h"))
+    if "camera_angle_x" in intrinsics:
+        intrinsics["fl_x"] = lens_models.angle_to_focal(intrinsics["camera_angle_x"], width, f"{where}: camera_angle_x")
+    if "camera_angle_y" in intrinsics:
+        intrinsics["fl_y"] = lens_models.angle_to_focal(
+            intrinsics["camera_angle_y"], height, f"{where}: camera_angle_y"
+        )
+    if "fl_x" not in intrinsics:
         raise InputError(f"{where}: neither fl_x nor camera_angle_x; add the focal length in pixels, for all or for it")
-    pinhole = (said["fl_x"], said.get("fl_y", said["fl_x"]), said.get("cx", width / 2), said.get("cy", height / 2))
-    k = [said.get(f"k{i}", 0.0) for i in range(1, 7)]
-    p = [said.get(key, 0.0) for key in ("p1", "p2")]
-    if said["model"] == FISHEYE:
-        _unused(said, ("k5", "k6", "p1", "p2"), where)
+    pinhole = (
+        intrinsics["fl_x"],
+        intrinsics.get("fl_y", intrinsics["fl_x"]),
+        intrinsics.get("cx", width / 2),
+        intrinsics.get("cy", height / 2),
+    )
+    k = [intrinsics.get(f"k{i}", 0.0) for i in range(1, 7)]
+    p = [intrinsics.get(key, 0.0) for key in ("p1", "p2")]
+    if intrinsics["model"] == FISHEYE:
+        _check_unused(intrinsics, ("k5", "k6", "p1", "p2"), where)
         return make_fisheye_camera(width, height, pinhole, tuple(k[:4]), where)
-    if said["model"] in PERSPECTIVE:
-        _unused(said, ("k4", "k5", "k6"), where)  # programs differ about what they mean
+    if intrinsics["model"] in PERSPECTIVE:
+        _check_unused(intrinsics, ("k4", "k5", "k6"), where)  # programs differ about what they mean
         return make_perspective_camera(width, height, pinhole, tuple(k[:3]), tuple(p), where)
     known = ", ".join((*PERSPECTIVE, FISHEYE))
     raise InputError(
-        f"{where}: camera_model {said['model'][:40]} is not read, only {known}; undistort the pictures first"
+        f"{where}: camera_model {intrinsics['model'][:40]} is not read, only {known}; undistort the pictures first"
     )
 
 
-def _whole(value: float, where: str) -> int:
+def _check_pixels(value: float, where: str) -> int:
     if value != round(value) or not 1 <= value < 1e6:
         raise InputError(f"{where} is {value:g}; it is a number of pixels")
     return round(value)
 
 
-def _unused(said: dict, keys: tuple[str, ...], where: str) -> None:
+def _check_unused(intrinsics: dict, keys: tuple[str, ...], where: str) -> None:
     for key in keys:
-        if said.get(key, 0.0) != 0:
-            raise InputError(f"{where}: {key} is not read with camera_model {said['model']}; calibrate without it")
+        if intrinsics.get(key, 0.0) != 0:
+            raise InputError(
+                f"{where}: {key} is not read with camera_model {intrinsics['model']}; calibrate without it"
+            )
 
 
 def _points(path: Path, values: dict, shots: list[ImportedImage], world: Array, scale: float) -> tuple[Array, Array]:

@@ -1,6 +1,7 @@
-"""reconstruction.json of OpenSfM and OpenDroneMap: lengths in longer sides of the picture, from its middle.
+"""Reader of reconstruction.json of OpenSfM and OpenDroneMap: normalised image coordinates from the picture's middle.
 
-Poses lead from the world into the camera. Where the file has a reference, the world is metric: x east, y north, z up.
+Lengths are in longer sides of the picture. Poses map the world to the camera. Where the file has a reference, the world
+is metric: x east, y north, z up.
 """
 
 import logging
@@ -54,12 +55,14 @@ def import_opensfm(path: Path, values: list, photos: Path) -> ImportedModel:
         key: _lens(camera, f"{path}: camera {key[:80]!r}")
         for key, camera in check_entry(chosen, "cameras", dict, str(path)).items()
     }
-    shots = tuple(_shot(name, shot, cameras, photos, path) for name, shot in chosen["shots"].items())
+    shots = tuple(_read_shot(name, shot, cameras, photos, path) for name, shot in chosen["shots"].items())
     check_distinct([s.name for s in shots], str(path))
-    return ImportedModel(shots, *_points(chosen.get("points"), path), reasons=others, about=_about(chosen, path))
+    return ImportedModel(
+        shots, *_points(chosen.get("points"), path), reasons=others, about=_read_georeference(chosen, path)
+    )
 
 
-def _about(chosen: dict, path: Path) -> Georeference | None:
+def _read_georeference(chosen: dict, path: Path) -> Georeference | None:
     """The place that the world's metres are counted from, if the file has one."""
     if chosen.get("reference_lla") is None:
         return None
@@ -85,24 +88,24 @@ def _lens(camera, where: str) -> pycolmap.Camera:
             "pictures, or choose another camera type for the reconstruction"
         )
 
-    def said(key: str, default: float | None = None) -> float:
+    def read_value(key: str, default: float | None = None) -> float:
         if default is None and key not in camera:
             raise InputError(f"{where}: {key} is missing; export the file again")
         return check_number(camera.get(key, default), f"{where}: {key}")
 
-    width, height = (round(said(key)) for key in ("width", "height"))
+    width, height = (round(read_value(key)) for key in ("width", "height"))
     side = max(width, height)
-    fx, fy = (said("focal"),) * 2 if kind in _ONE_FOCAL else (said("focal_x"), said("focal_y"))
-    cx, cy = (0.0, 0.0) if kind in _ONE_FOCAL else (said("c_x", 0.0), said("c_y", 0.0))
+    fx, fy = (read_value("focal"),) * 2 if kind in _ONE_FOCAL else (read_value("focal_x"), read_value("focal_y"))
+    cx, cy = (0.0, 0.0) if kind in _ONE_FOCAL else (read_value("c_x", 0.0), read_value("c_y", 0.0))
     pinhole = (fx * side, fy * side, cx * side + width / 2, cy * side + height / 2)
-    k = tuple(said(f"k{i + 1}", 0.0) for i in range((RADIAL | FISHEYE)[kind]))
+    k = tuple(read_value(f"k{i + 1}", 0.0) for i in range((RADIAL | FISHEYE)[kind]))
     if kind in FISHEYE:
         return make_fisheye_camera(width, height, pinhole, k, where)
-    p = (said("p1", 0.0), said("p2", 0.0)) if kind == "brown" else ()
+    p = (read_value("p1", 0.0), read_value("p2", 0.0)) if kind == "brown" else ()
     return make_perspective_camera(width, height, pinhole, k, p, where)
 
 
-def _shot(label: str, shot, cameras: dict[str, pycolmap.Camera], photos: Path, path: Path) -> ImportedImage:
+def _read_shot(label: str, shot, cameras: dict[str, pycolmap.Camera], photos: Path, path: Path) -> ImportedImage:
     name = check_image_name(label, photos, str(path))
     where = f"{path}: shot {name}"
     camera = check_entry(shot, "camera", str, where)

@@ -1,4 +1,4 @@
-"""The photos of a folder, and which of them belongs to which image of a model."""
+"""Matching of the photos in a folder with the images of an imported model, by their names."""
 
 import logging
 import os
@@ -62,14 +62,14 @@ class PhotoFolder:
             raise InputError(f"{folder}: no photos in this folder; put .jpg, .png or .tif files into it")
         self._tables: list[Mapping[str, list[str]]] = [defaultdict(list) for _ in range(3)]
         for name in self.photos:
-            for table, label in zip(self._tables, _labels(name), strict=True):
+            for table, label in zip(self._tables, _split_name(name), strict=True):
                 table[label].append(name)
 
     def find(self, name: str) -> str | None:
         """The photo of that name: the same path, else without suffix, else the one of this file name, or stem."""
         if name in self.photos:
             return name
-        for table, label in zip(self._tables, _labels(name), strict=True):
+        for table, label in zip(self._tables, _split_name(name), strict=True):
             if len(found := table.get(label, [])) == 1:
                 return found[0]
         return None
@@ -77,7 +77,7 @@ class PhotoFolder:
     def stored_size(self, name: str) -> tuple[int, int] | None:
         """Width and height of a photo as stored, without EXIF's orientation; None where there is no such photo."""
         found = self.find(name)
-        return None if found is None else _stored(self.photos[found])[:2]
+        return None if found is None else _read_size(self.photos[found])[:2]
 
 
 def match_photos_to_images(
@@ -85,7 +85,7 @@ def match_photos_to_images(
 ) -> tuple[list[MatchedPhoto], tuple[tuple[str, str], ...]]:
     """The photos that have a camera, by their pictures' names; and the others, and images without photo, with reasons.
 
-    Photos without a camera are told where another photo of the same folder has one.
+    A photo without a camera is reported where another photo of the same folder has one.
     Raises: InputError: a photo that does not fit its camera, or is that of two images.
     """
     owners: dict[str, int] = {}
@@ -104,8 +104,8 @@ def match_photos_to_images(
         if name not in owners and PurePosixPath(name).parent in homes:
             left_out.append((name, reasons.get(name, "the model has no camera for it")))
     out = [
-        _place(given.shots[owners[name]], owners[name], folder.photos[name], key, source)
-        for name, key in _keys(sorted(owners)).items()
+        _match_photo(given.shots[owners[name]], owners[name], folder.photos[name], key, source)
+        for name, key in _name_pictures(sorted(owners)).items()
     ]
     if scaled := [p for p in out if _scaled_pinhole(given.shots[p.index].lens, p.lens)]:
         _log.warning(
@@ -115,19 +115,19 @@ def match_photos_to_images(
     return sorted(out, key=lambda p: p.key), tuple(left_out)
 
 
-def _labels(name: str) -> tuple[str, str, str]:
+def _split_name(name: str) -> tuple[str, str, str]:
     """Path without suffix, file name, stem. A suffix is that of a picture: a name may have other points in it."""
     path = PurePosixPath(name)
     bare = path.with_suffix("") if path.suffix.lower() in image_files.SUFFIXES and path.stem else path
     return str(bare), path.name, bare.name
 
 
-def _keys(names: list[str]) -> dict[str, str]:
+def _name_pictures(names: list[str]) -> dict[str, str]:
     """Names of the pictures made of photos: the stem; where two are equal the whole path, and a number if need be."""
-    stems = Counter(_labels(n)[2] for n in names)
+    stems = Counter(_split_name(n)[2] for n in names)
     keys, used = {}, set()
     for name in names:
-        stem = _labels(name)[2]
+        stem = _split_name(name)[2]
         plain = stem if stems[stem] == 1 else name.replace("/", "_").replace(".", "_")
         number, free = 1, plain
         while free in used:
@@ -137,15 +137,15 @@ def _keys(names: list[str]) -> dict[str, str]:
     return keys
 
 
-def _place(shot: ImportedImage, index: int, path: Path, key: str, source: Path) -> MatchedPhoto:
-    width, height, orientation = _stored(path)
+def _match_photo(shot: ImportedImage, index: int, path: Path, key: str, source: Path) -> MatchedPhoto:
+    width, height, orientation = _read_size(path)
     assert shot.lens is not None  # its photo is there, so its size is known
     lens, turns = fit_camera_to_photo(shot.lens, (width, height), orientation, f"{source}: {shot.name}")
     turn = np.linalg.matrix_power(lens_models.QUARTER, turns)
     return MatchedPhoto(path, key, index, lens, turns, turn @ shot.rotation, turn @ shot.translation)
 
 
-def _stored(path: Path) -> tuple[int, int, int]:
+def _read_size(path: Path) -> tuple[int, int, int]:
     """Width, height as stored, and EXIF's orientation."""
     width, height = image_files.read_size(path)
     file = oiio.ImageInput.open(str(path))

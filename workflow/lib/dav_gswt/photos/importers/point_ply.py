@@ -1,4 +1,4 @@
-"""Clouds of points from a .ply file."""
+"""Point clouds from PLY files."""
 
 from pathlib import Path
 
@@ -7,7 +7,8 @@ from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 from plyfile import PlyData, PlyParseError
 
-from dav_gswt.errors import InputError
+from dav_gswt.errors import InputError, summarize_error
+from dav_gswt.files import UNREADABLE
 from dav_gswt.photos.importers import checks
 from dav_gswt.photos.importers.checks import check_finite, check_size
 
@@ -32,6 +33,7 @@ def read_point_ply(path: Path) -> tuple[Float[Array, "n 3"], Float32[Array, "n 3
             whole = rows.dtype["red"].kind in "ui"
             stack = np.stack([np.asarray(rows[c], np.float32) for c in ("red", "green", "blue")], -1)
             colours = np.clip(stack / (np.iinfo(rows.dtype["red"]).max if whole else 1), 0, 1)
-    except (PlyParseError, ValueError, KeyError, TypeError, UnicodeDecodeError, OSError) as error:
-        raise InputError(f"{path}: not readable as a PLY of points ({error}); export or copy it again") from error
+    except (PlyParseError, *UNREADABLE) as error:
+        why = summarize_error(error)
+        raise InputError(f"{path}: not readable as a PLY of points ({why}); export or copy it again") from error
     return check_finite(places, str(path)), check_finite(colours.astype(np.float32), str(path))

@@ -1,6 +1,6 @@
-"""Points under cameras that are known: observed in the model, or found from features of the photos.
+"""Sparse points for known cameras: the observations of the model, or new ones triangulated from features.
 
-Features and matches may use several threads, as in structure from motion, points use one: a run repeats to the bit.
+Features and matches may use several threads, triangulation uses one, so that a run repeats to the bit.
 """
 
 import tempfile
@@ -21,13 +21,13 @@ from dav_gswt.photos.importers import lens_models
 from dav_gswt.photos.importers.imported_model import ImportedImage, ImportedModel
 from dav_gswt.photos.importers.lens_models import camera_key, shrink_camera, unproject_pixels
 from dav_gswt.photos.importers.photo_matching import MatchedPhoto
-from dav_gswt.photos.sfm.features import extract_features, match_image_pairs
+from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_image_pairs
 from dav_gswt.photos.sfm.registration import SfmOptions
 
 ALL_PAIRS = 60  # photos up to which each is matched with every other
 NEAREST = 20  # photos with which each is matched otherwise
 WIDEST = 90.0  # degrees between two viewing directions, beyond which features do not match
-SAMPLE = 2000  # points, and a tenth as many shots, from which it is told how much is seen
+SAMPLE = 2000  # points, and a tenth as many shots, sampled to estimate how much is seen
 
 
 @dataclass(frozen=True)
@@ -72,17 +72,17 @@ def triangulate_features(placed: Sequence[MatchedPhoto], options: SfmOptions) ->
     middle = np.mean([-p.rotation.T @ p.translation for p in placed], axis=0)
     with tempfile.TemporaryDirectory(prefix="points-") as scratch:
         folder, database = Path(scratch), Path(scratch) / "database.db"
-        known = _entered(placed, middle, database, options.size)
+        known = _enter_images(placed, middle, database, options.size)
         names = [known.images[i + 1].name for i in range(len(placed))]
-        _shrink(placed, known, folder)
-        extract_features(len(names), folder, database, options.size, options.features, options.threads)
+        _write_shrunk_photos(placed, known, folder)
+        extract_features(folder, database, options.size, options.features, options.threads)
         pairs = [(names[i], names[j]) for i, j in find_near_pairs(placed)]
         match_image_pairs(pairs, database, options.threads, options.seed)
         choice = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=options.seed)
         choice.triangulation.random_seed = choice.mapper.random_seed = options.seed
         choice.mapper.num_threads = 1
         found = pycolmap.triangulate_points(known, database, folder, folder, options=choice)
-        return _seen(found, len(placed), middle)
+        return _read_observations(found, len(placed), middle)
 
 
 def find_near_pairs(placed: Sequence[MatchedPhoto]) -> list[tuple[int, int]]:
@@ -125,30 +125,22 @@ def find_visible_points(
     return np.asarray((pixels > 0).all(1) & (pixels < [lens.width, lens.height]).all(1))
 
 
-def _entered(placed: Sequence[MatchedPhoto], middle: Array, database: Path, size: int) -> pycolmap.Reconstruction:
+def _enter_images(placed: Sequence[MatchedPhoto], middle: Array, database: Path, size: int) -> pycolmap.Reconstruction:
     """Cameras and images by numbers from 1 on, the same in a new database and in a reconstruction without points."""
     known, numbers = pycolmap.Reconstruction(), {}
     with closing(pycolmap.Database.open(database)) as store:
         for i, place in enumerate(placed, 1):
             lens = shrink_camera(place.lens, size)
             if (key := camera_key(lens)) not in numbers:
-                numbers[key] = lens.camera_id = len(numbers) + 1
-                rig = pycolmap.Rig(rig_id=lens.camera_id)
-                rig.add_ref_sensor(lens.sensor_id)
-                store.write_camera(lens, use_camera_id=True)
-                store.write_rig(rig, use_rig_id=True)
+                numbers[key] = enter_camera(store, lens)
                 known.add_camera_with_trivial_rig(lens)
-            image = pycolmap.Image(name=f"{i:06d}.png", camera_id=numbers[key], image_id=i)
-            store.write_image(image, use_image_id=True)
-            frame = pycolmap.Frame(frame_id=i, rig_id=numbers[key])
-            frame.add_data_id(image.data_id)
-            store.write_frame(frame, use_frame_id=True)
+            image = enter_image(store, f"{i:06d}.png", *numbers[key])
             pose = np.c_[place.rotation, place.translation + place.rotation @ middle]
             known.add_image_with_trivial_frame(image, pycolmap.Rigid3d(pose))
     return known
 
 
-def _shrink(placed: Sequence[MatchedPhoto], known: pycolmap.Reconstruction, folder: Path) -> None:
+def _write_shrunk_photos(placed: Sequence[MatchedPhoto], known: pycolmap.Reconstruction, folder: Path) -> None:
     """Write what features are looked for in: the photos upright, shrunk by area means."""
     for i in progress(range(len(placed)), "read photos"):
         image = known.images[i + 1]
@@ -157,7 +149,7 @@ def _shrink(placed: Sequence[MatchedPhoto], known: pycolmap.Reconstruction, fold
         image_files.write_png(folder / image.name, image_files.shrink_image(photo, camera.width, camera.height))
 
 
-def _seen(found: pycolmap.Reconstruction, photos: int, middle: Array) -> Observations:
+def _read_observations(found: pycolmap.Reconstruction, photos: int, middle: Array) -> Observations:
     """Arrays of a reconstruction whose images are numbered from 1 on."""
     ids = np.array(sorted(found.points3D), np.int64)
     points = np.array([found.points3D[i].xyz for i in ids]).reshape(-1, 3)

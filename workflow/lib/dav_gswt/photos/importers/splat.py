@@ -1,4 +1,4 @@
-"""A finished field of Gaussians, from anybody's training: brought into the ground frame, far floaters removed."""
+"""Import of a finished Gaussian field of any training program: into the ground frame, without far floaters."""
 
 import logging
 from collections.abc import Sequence
@@ -51,17 +51,10 @@ def fit_field_frame(
     if degree > 0:
         _log.warning("view-dependent colour (degree %d) is dropped: the colour from all sides is kept", degree)
         field = replace(field, sh=np.ascontiguousarray(field.sh[:, :1]))
-    field = field[_near(field)]
-    field, relief = _levelled(field, direction, rng)
-    turns = np.arange(0.0, 90.0, ground_frame.TURN)
-    places, widths = _discs(field)
-    sides = [_square(places @ _turn(turn)[:2, :2].T, widths, COARSE_CELLS)[2] for turn in turns]
-    turn = _turn(turns[np.argmax(sides)])
-    west, south, side = _square(places @ turn[:2, :2].T, widths, CELLS)
-    height = 0.5 * side / np.tan(np.radians(0.5 * VIEW))
-    middle = np.array([west + side / 2, south + side / 2, 0.0])
-    field = _moved(field, turn, 1 / height, -middle / height)
-    mask, west, south, cell = _opaque_ground(*_discs(field), CELLS)
+    field = field[_select_near(field)]
+    field, relief = _level_field(field, direction, rng)
+    field, side, height = _center_on_exemplar(field)
+    mask, west, south, cell = _opaque_ground(*_project_discs(field), CELLS)
     rows, columns = np.nonzero(mask)
     side, relief = float(side / height), float(relief / height)
     frame = SceneFrame(
@@ -83,7 +76,20 @@ def fit_field_frame(
     return field, frame
 
 
-def _near(field: GaussianField) -> Bool[Array, "n"]:
+def _center_on_exemplar(field: GaussianField) -> tuple[GaussianField, float, float]:
+    """A level field turned so that its exemplar is largest, with that square's middle as origin and the flying height
+    as unit; the square's side and the flying height in the old unit."""
+    turns = np.arange(0.0, 90.0, ground_frame.TURN)
+    places, widths = _project_discs(field)
+    sides = [_find_square(places @ _rotation_about_z(turn)[:2, :2].T, widths, COARSE_CELLS)[2] for turn in turns]
+    turn = _rotation_about_z(turns[np.argmax(sides)])
+    west, south, side = _find_square(places @ turn[:2, :2].T, widths, CELLS)
+    height = 0.5 * side / np.tan(np.radians(0.5 * VIEW))
+    middle = np.array([west + side / 2, south + side / 2, 0.0])
+    return _transform_field(field, turn, 1 / height, -middle / height), side, height
+
+
+def _select_near(field: GaussianField) -> Bool[Array, "n"]:
     """Gaussians within the scene: not far outside the box that holds nearly all opaque ones, and not as large as it."""
     opaque = expit(field.opacity_logits) >= OPAQUE
     if opaque.sum() < LEAST:
@@ -94,7 +100,7 @@ def _near(field: GaussianField) -> Bool[Array, "n"]:
     return inside.all(1) & (field.log_scales.max(1) <= np.log(LARGEST * size))
 
 
-def _levelled(field: GaussianField, up: Float[Array, "3"], rng: np.random.Generator) -> tuple[GaussianField, float]:
+def _level_field(field: GaussianField, up: Float[Array, "3"], rng: np.random.Generator) -> tuple[GaussianField, float]:
     """The field with z up and its plane at 0; and its surface's spread about the plane."""
     surface = field.means[expit(field.opacity_logits) >= OPAQUE].astype(float)
     size = float(np.ptp(np.percentile(surface, ROBUST, axis=0), axis=0).max())
@@ -106,10 +112,10 @@ def _levelled(field: GaussianField, up: Float[Array, "3"], rng: np.random.Genera
         )
     axes = np.eye(3)
     east = axes[0] if abs(normal[0]) < 0.9 else axes[1]
-    return _moved(field, make_upright_rotation(normal, east), 1.0, np.array([0.0, 0.0, -offset])), spread
+    return _transform_field(field, make_upright_rotation(normal, east), 1.0, np.array([0.0, 0.0, -offset])), spread
 
 
-def _moved(
+def _transform_field(
     field: GaussianField, rotation: Float[Array, "3 3"], scale: float = 1.0, shift: Float[Array, "3"] | None = None
 ) -> GaussianField:
     """The field in another world frame: p becomes scale * rotation @ p + shift. Colours of degree 0 do not turn."""
@@ -125,12 +131,12 @@ def _moved(
     )
 
 
-def _turn(degrees: float) -> Float[Array, "3 3"]:
+def _rotation_about_z(degrees: float) -> Float[Array, "3 3"]:
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
 
 
-def _discs(field: GaussianField) -> tuple[Float[Array, "m 2"], Float[Array, "m"]]:
+def _project_discs(field: GaussianField) -> tuple[Float[Array, "m 2"], Float[Array, "m"]]:
     """Where the opaque Gaussians are over the ground, and the geometric means of their two larger deviations."""
     opaque = expit(field.opacity_logits) >= OPAQUE
     larger = np.sort(field.log_scales[opaque].astype(float), axis=1)[:, 1:]
@@ -162,7 +168,7 @@ def _opaque_ground(
     return padded[3:-3, 3:-3], float(low[0]), float(low[1]), cell
 
 
-def _square(places: Float[Array, "m 2"], widths: Float[Array, "m"], cells: int) -> tuple[float, float, float]:
+def _find_square(places: Float[Array, "m 2"], widths: Float[Array, "m"], cells: int) -> tuple[float, float, float]:
     """West, south and side of the largest square of opaque ground, a little inside it."""
     mask, west, south, cell = _opaque_ground(places, widths, cells)
     row, column, side = find_largest_square(mask)

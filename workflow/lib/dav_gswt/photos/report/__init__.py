@@ -1,1 +1,1 @@
-"""The photo report: how the photos fit together, what was left out, what is weak."""
+"""The photo report: how well the photos were registered, which were left out, which are weak."""

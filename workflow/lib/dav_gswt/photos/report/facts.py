@@ -1,4 +1,4 @@
-"""What a photos/ folder says of its photos: how well each is placed, how often the ground is seen, what is weak."""
+"""The facts of the photo report: how well each photo is registered, how often the ground is seen, what is weak."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -157,7 +157,23 @@ def describe_part(found: ReportFacts, east: int, north: int) -> str:
 
 def list_weak_spots(found: ReportFacts) -> list[str]:
     """What is weak about the set, the worst first, in sentences that say what can be done."""
-    return [*_left_out(found), *_thin(found), *_loose(found), *_unsure_lens(found), *_small(found)]
+    return [
+        *_warn_of_doubts(found),
+        *_left_out(found),
+        *_warn_of_thin_coverage(found),
+        *_warn_of_weak_photos(found),
+        *_unsure_lens(found),
+        *_warn_of_small_exemplar(found),
+    ]
+
+
+def _warn_of_doubts(found: ReportFacts) -> list[str]:
+    """What the verdict on structure from motion has against the model."""
+    verdict = found.frame.verdict
+    if verdict is None or verdict.grade == "good":
+        return []
+    reasons = "; ".join(sign.reason for sign in verdict.objections)
+    return [f"The cameras are {verdict.grade}: {reasons}."]
 
 
 def _left_out(found: ReportFacts) -> list[str]:
@@ -170,7 +186,7 @@ def _left_out(found: ReportFacts) -> list[str]:
     ]
 
 
-def _thin(found: ReportFacts) -> list[str]:
+def _warn_of_thin_coverage(found: ReportFacts) -> list[str]:
     """Parts of the exemplar that few photos see."""
     counts, said = crop_to_exemplar(found), []
     if min(counts.shape) < 3:
@@ -187,7 +203,7 @@ def _thin(found: ReportFacts) -> list[str]:
     return [f"{text} More photos of it make it sharper and surer." for text in said]
 
 
-def _loose(found: ReportFacts) -> list[str]:
+def _warn_of_weak_photos(found: ReportFacts) -> list[str]:
     weak = [photo.name for photo in found.photos if photo.weak]
     if not weak:
         return []
@@ -211,7 +227,7 @@ def _unsure_lens(found: ReportFacts) -> list[str]:
     return said
 
 
-def _small(found: ReportFacts) -> list[str]:
+def _warn_of_small_exemplar(found: ReportFacts) -> list[str]:
     side = found.exemplar[2] / found.frame.flying_height
     if side >= LEAST_SIDE:
         return []

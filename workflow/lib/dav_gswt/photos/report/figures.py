@@ -1,6 +1,6 @@
 """The report's pictures: a plan of the cameras over the ground, a map of how often it is seen, and thumbnails.
 
-Plans are inline SVG over small pictures. A unit of their drawing is a thousandth of the longer side.
+Plans are inline SVG over small pictures; their units are thousandths of the longer side.
 """
 
 import base64
@@ -87,15 +87,15 @@ def draw_plan(found: ReportFacts, smalls: list[Thumbnail]) -> str:
     """Cameras over the points, each with its footprint, as SVG."""
     on = make_sheet(found)
     shots = zip(found.photos, found.model.cameras, strict=True)
-    drawn = [_shot(i, photo, camera, found, on) for i, (photo, camera) in enumerate(shots)]
+    drawn = [_draw_camera(i, photo, camera, found, on) for i, (photo, camera) in enumerate(shots)]
     ground_picture = draw_points(found.model, average_colours(found.model, smalls), on)
     layers = [
-        _picture(ground_picture, 0.0, 0.0, on.width, on.height),
-        _exemplar(found, on),
+        _format_picture(ground_picture, 0.0, 0.0, on.width, on.height),
+        _draw_exemplar(found, on),
         *drawn,
-        _furniture(found, on),
+        _draw_scale_and_north(found, on),
     ]
-    return _svg("Plan: cameras over the ground, seen from above", on, layers)
+    return _format_svg("Plan: cameras over the ground, seen from above", on, layers)
 
 
 def draw_coverage(found: ReportFacts) -> str:
@@ -109,11 +109,11 @@ def draw_coverage(found: ReportFacts) -> str:
         mask = (cover.counts >= low) & (cover.counts <= high)
         painted[mask] = [*(int(colour[k : k + 2], 16) for k in (1, 3, 5)), 255]
     layers = [
-        _picture(painted[::-1], float(x), float(y), *size, kind="cells"),
-        _exemplar(found, on),
-        _furniture(found, on),
+        _format_picture(painted[::-1], float(x), float(y), *size, kind="cells"),
+        _draw_exemplar(found, on),
+        _draw_scale_and_north(found, on),
     ]
-    return _svg("Coverage: how many photos see each place of the ground", on, layers)
+    return _format_svg("Coverage: how many photos see each place of the ground", on, layers)
 
 
 def bin_coverage(found: ReportFacts) -> list[CoverageBin]:
@@ -184,7 +184,7 @@ def make_thumbnail(path: Path, longer: int) -> Thumbnail:
         image_files.shrink_image(cover[..., None], width, height),
     )
     shown = counts * small + (1 - counts) * (0.5 * small + 0.5 * MASKED)
-    return Thumbnail(small, _uri(shown, "jpeg"), float(1 - cover.mean()))
+    return Thumbnail(small, _encode_data_uri(shown, "jpeg"), float(1 - cover.mean()))
 
 
 def make_thumbnails(folder: Path, names: list[str]) -> list[Thumbnail]:
@@ -193,7 +193,7 @@ def make_thumbnails(folder: Path, names: list[str]) -> list[Thumbnail]:
     return [make_thumbnail(folder / name, longer) for name in progress(names, "shrink photos")]
 
 
-def _uri(picture: Array, kind: str) -> str:
+def _encode_data_uri(picture: Array, kind: str) -> str:
     """A picture as a data URI: bytes that depend on its pixels alone."""
     file = io.BytesIO()
     pixels = picture if picture.dtype == np.uint8 else np.rint(255 * np.clip(picture, 0, 1)).astype(np.uint8)
@@ -202,7 +202,7 @@ def _uri(picture: Array, kind: str) -> str:
     return f"data:image/{kind};base64,{base64.b64encode(file.getvalue()).decode('ascii')}"
 
 
-def _svg(label: str, on: MapSheet, layers: list[str]) -> str:
+def _format_svg(label: str, on: MapSheet, layers: list[str]) -> str:
     inside = "\n".join(layers)
     return (
         f'<svg viewBox="0 0 {on.width:.1f} {on.height:.1f}" role="group" aria-label="{escape(label)}">\n'
@@ -210,14 +210,14 @@ def _svg(label: str, on: MapSheet, layers: list[str]) -> str:
     )
 
 
-def _picture(
+def _format_picture(
     pixels: UInt8[Array, "h w 4"], x: float, y: float, width: float, height: float, kind: str = "points"
 ) -> str:
     place = f'x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}"'
-    return f'<image class="{kind}" {place} preserveAspectRatio="none" href="{_uri(pixels, "png")}"/>'
+    return f'<image class="{kind}" {place} preserveAspectRatio="none" href="{_encode_data_uri(pixels, "png")}"/>'
 
 
-def _exemplar(found: ReportFacts, on: MapSheet) -> str:
+def _draw_exemplar(found: ReportFacts, on: MapSheet) -> str:
     west, south, side = found.exemplar
     ((x, y),) = on.at(np.array([[west, south + side]]))
     length = side * on.per_unit
@@ -226,7 +226,7 @@ def _exemplar(found: ReportFacts, on: MapSheet) -> str:
     return f'<rect class="halo" {box}/><rect class="exemplar" {box}><title>{escape(said)}</title></rect>'
 
 
-def _shot(index: int, photo: PhotoFacts, camera: Camera, found: ReportFacts, on: MapSheet) -> str:
+def _draw_camera(index: int, photo: PhotoFacts, camera: Camera, found: ReportFacts, on: MapSheet) -> str:
     """A camera: its footprint, an arrow to where it looks, and a dot that leads to its row."""
     unit = found.frame.flying_height
     outline = " ".join(f"{x:.1f},{y:.1f}" for x, y in on.at(camera_footprint(camera, ground_frame.REACH * unit)))
@@ -236,12 +236,12 @@ def _shot(index: int, photo: PhotoFacts, camera: Camera, found: ReportFacts, on:
     said += "".join(f"; {text}" for text in photo.weak) + ("; only tests" if photo.tests else "")
     return (
         f'<a href="#photo-{index}" class="{kind}" aria-label="{escape(said)}"><title>{escape(said)}</title>'
-        f'<polygon class="foot" points="{outline}"/>{_arrow(photo, camera, unit, on)}'
+        f'<polygon class="foot" points="{outline}"/>{_draw_arrow(photo, camera, unit, on)}'
         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="9"/></a>'
     )
 
 
-def _arrow(photo: PhotoFacts, camera: Camera, unit: float, on: MapSheet) -> str:
+def _draw_arrow(photo: PhotoFacts, camera: Camera, unit: float, on: MapSheet) -> str:
     """From the camera towards where the middle of its picture lies, at most half a flying height long."""
     start, ahead = camera.centre[:2], camera.forward[:2]
     if photo.tilt < DOWN:
@@ -258,11 +258,11 @@ def _arrow(photo: PhotoFacts, camera: Camera, unit: float, on: MapSheet) -> str:
     )
 
 
-def _furniture(found: ReportFacts, on: MapSheet) -> str:
+def _draw_scale_and_north(found: ReportFacts, on: MapSheet) -> str:
     """A scale bar, and where north is if that is known."""
-    wanted = 0.2 * on.width / on.per_unit
-    tens = 10 ** np.floor(np.log10(wanted))
-    length = float(tens * STEPS[STEPS * tens <= wanted * 1.0001].max())
+    target = 0.2 * on.width / on.per_unit
+    tens = 10 ** np.floor(np.log10(target))
+    length = float(tens * STEPS[STEPS * tens <= target * 1.0001].max())
     name = f"{length:g} flying height{'' if length == 1 else 's'}" if found.frame.unit == "flying height" else ""
     x, y, end = 24.0, on.height - 24, 24 + length * on.per_unit
     bar = f'<path class="bar" d="M{x},{y - 10:.1f} V{y:.1f} H{end:.1f} V{y - 10:.1f}"/>'

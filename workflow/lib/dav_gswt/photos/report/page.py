@@ -1,7 +1,7 @@
-"""The report on a scene's photos as one page that needs nothing else: what was found, what was left out, what is weak.
+"""The report on a scene's photos: one HTML page with the registration, the photos left out, and the weak ones.
 
-The page asks nothing of the net: pictures are data URIs, plans inline SVG. The same photos/ folder and template give
-the same bytes.
+The page loads nothing: pictures are data URIs, plans are inline SVG. The same photos/ folder and template give the same
+bytes.
 """
 
 from dataclasses import dataclass
@@ -9,10 +9,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from jinja2 import Environment, StrictUndefined, TemplateError
 from markupsafe import Markup
 
-from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_file
 from dav_gswt.photos import splitting
 from dav_gswt.photos.report import figures
@@ -27,6 +25,7 @@ from dav_gswt.photos.report.facts import (
 )
 from dav_gswt.photos.report.figures import Thumbnail, bin_coverage, draw_coverage, draw_plan, make_thumbnails
 from dav_gswt.photos.splitting import ground_bounds, measure_visible_share
+from dav_gswt.templates import render_template
 
 
 class Fact(NamedTuple):
@@ -60,29 +59,25 @@ def write_report(folder: Path | str, template: Path | str, scene: str, out: Path
     """
     found = collect_facts(folder, scene)
     thumbnails = make_thumbnails(Path(folder) / "images", [photo.name for photo in found.photos])
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    try:
-        page = environment.from_string(Path(template).read_text(encoding="utf-8"))
-        text = page.render(template_values(found, thumbnails)) + "\n"
-    except TemplateError as error:
-        raise InputError(f"{template}: not a template of this report ({error})") from error
+    text = render_template(template, make_template_values(found, thumbnails))
     with atomic_file(out) as part:
         part.write_text(text, encoding="utf-8")
 
 
-def template_values(found: ReportFacts, thumbnails: list[Thumbnail]) -> dict[str, object]:
+def make_template_values(found: ReportFacts, thumbnails: list[Thumbnail]) -> dict[str, object]:
     """What the template's names stand for. Photos that only test come last."""
-    rows = [_photo_row(i, *pair, found) for i, pair in enumerate(zip(found.photos, thumbnails, strict=True))]
+    rows = [_make_photo_row(i, *pair, found) for i, pair in enumerate(zip(found.photos, thumbnails, strict=True))]
     return {
         "scene": found.scene,
-        "summary": summary(found),
+        "summary": summarize(found),
         "weak_spots": list_weak_spots(found),
         "plan": Markup(draw_plan(found, thumbnails)),
-        "plan_notes": plan_notes(found),
+        "plan_notes": explain_plan(found),
         "coverage": Markup(draw_coverage(found)),
         "bins": bin_coverage(found),
         "need": found.need,
-        "facts": [*registration_facts(found), *camera_facts(found), *mask_facts(thumbnails)],
+        "facts": [*list_registration_facts(found), *list_camera_facts(found), *list_mask_facts(thumbnails)],
+        "verdict": found.frame.verdict,
         "left_out": found.frame.left_out,
         "photos": sorted(rows, key=lambda row: found.photos[row.index].tests),
         "height_unit": "m" if found.frame.unit == "metre" else "flying heights",
@@ -90,7 +85,7 @@ def template_values(found: ReportFacts, thumbnails: list[Thumbnail]) -> dict[str
     }
 
 
-def summary(found: ReportFacts) -> str:
+def summarize(found: ReportFacts) -> str:
     """The page's first sentences."""
     frame, side = found.frame, found.length(found.exemplar[2])
     if frame.kind == "synthetic":
@@ -101,7 +96,7 @@ def summary(found: ReportFacts) -> str:
     return f"{first} Tiles are made of a square of ground {side} wide: the exemplar, framed on both maps."
 
 
-def plan_notes(found: ReportFacts) -> str:
+def explain_plan(found: ReportFacts) -> str:
     """What the plan's signs mean, as far as it has them."""
     notes = ["Each dot is a camera. Point at it for its name and what it sees (thin outline); select it for its row."]
     if any(photo.tilt >= figures.DOWN for photo in found.photos):
@@ -116,24 +111,24 @@ def plan_notes(found: ReportFacts) -> str:
     return " ".join(notes)
 
 
-def registration_facts(found: ReportFacts) -> list[Fact]:
+def list_registration_facts(found: ReportFacts) -> list[Fact]:
     """How well the photos fit together."""
     frame, error = found.frame, mean_reprojection_error(found)
     counts = crop_to_exemplar(found)
     low, usual, high = min_median_max(counts.ravel()) if counts.size else (0, 0, 0)
     pairs = zip(found.photos, found.model.cameras, strict=True)
-    sights = [
+    shares = [
         measure_visible_share(camera, ground_bounds(frame, whole=False)) for photo, camera in pairs if not photo.tests
     ]
-    sees = sum(sight >= splitting.LEAST_SIGHT for sight in sights)
-    rest = "all of them" if sees == len(sights) else "the others show too little of it to take part"
+    count = sum(share >= splitting.MIN_VISIBLE_SHARE for share in shares)
+    others = "all of them" if count == len(shares) else "the others show too little of it to take part"
     if frame.kind == "synthetic":
         first = Fact("Photos", f"{len(found.placed)} and {len(found.photos) - len(found.placed)} tests", "rendered")
     else:
         first = Fact("Photos in the folder", f"{frame.images}", f"{frame.registered} of them found their place")
     return [
         first,
-        Fact("Photos of the exemplar", f"{sees}", rest),
+        Fact("Photos of the exemplar", f"{count}", others),
         Fact("Photos of each place", f"{low:.0f} to {high:.0f}, mostly {usual:.0f}", "over the exemplar"),
         Fact("Points", f"{len(found.model.points):,}", "places on the ground that several photos agree on"),
         Fact(
@@ -141,11 +136,11 @@ def registration_facts(found: ReportFacts) -> list[Fact]:
             "not known" if error is None else f"{error:.2f} px",
             "how far a point lies from where its photos show it: below 1 is good",
         ),
-        Fact("Focal length", *focal_length(found)),
+        Fact("Focal length", *describe_focal_length(found)),
     ]
 
 
-def focal_length(found: ReportFacts) -> tuple[str, str]:
+def describe_focal_length(found: ReportFacts) -> tuple[str, str]:
     """The focal length over EXIF's, and what was decided about it."""
     frame, lens = found.frame, found.frame.focal
     if frame.kind == "synthetic":
@@ -160,7 +155,7 @@ def focal_length(found: ReportFacts) -> tuple[str, str]:
     return value, f"{lens.decision}{free if 'alone' not in lens.decision else ''}"
 
 
-def camera_facts(found: ReportFacts) -> list[Fact]:
+def list_camera_facts(found: ReportFacts) -> list[Fact]:
     """Where the cameras are, and where the place is."""
     frame, cameras = found.frame, found.photos
     low, usual, high = min_median_max(np.array([c.height for c in cameras]))
@@ -190,7 +185,7 @@ def camera_facts(found: ReportFacts) -> list[Fact]:
     return facts
 
 
-def mask_facts(thumbnails: list[Thumbnail]) -> list[Fact]:
+def list_mask_facts(thumbnails: list[Thumbnail]) -> list[Fact]:
     """How many photos are masked, and how much of them."""
     shares = [thumbnail.masked for thumbnail in thumbnails if thumbnail.masked > 0]
     if not shares:
@@ -199,7 +194,7 @@ def mask_facts(thumbnails: list[Thumbnail]) -> list[Fact]:
     return [Fact("Masks", many, f"{100 * np.mean(shares):.1f} % does not count there (pink below)")]
 
 
-def _photo_row(index: int, photo: PhotoFacts, thumbnail: Thumbnail, found: ReportFacts) -> PhotoRow:
+def _make_photo_row(index: int, photo: PhotoFacts, thumbnail: Thumbnail, found: ReportFacts) -> PhotoRow:
     unit = "" if found.frame.unit == "flying height" else " m"
     overlap = "–"
     if photo.partner:

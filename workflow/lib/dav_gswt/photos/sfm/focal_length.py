@@ -1,8 +1,8 @@
-"""Is the focal length that a set of photos was solved with to be believed?
+"""Choice of the focal length of a photo set: that of EXIF, or the one that bundle adjustment finds.
 
-Seen from straight above, flat ground hardly fixes it: a longer lens higher up gives the same pictures, and every photo
-registers whatever it is. So where EXIF has one it is held. Where photos look at the ground from the side as well they
-fix it themselves, and the adjusted one is taken.
+Photos of flat ground from straight above hardly determine it: a longer lens higher up gives the same pictures, and
+every photo registers with either. So EXIF's focal length is kept there. Oblique photos determine it, and then the
+adjusted one is taken.
 """
 
 import numpy as np
@@ -23,28 +23,32 @@ LENSES = 0.35, 6.0  # focal length in longer sides of the picture: a fisheye's t
 LEAST_ANGLE = 2.0  # degrees, median over the points of the widest angle under which photos see them
 
 
-def settle_focal_length(best: pycolmap.Reconstruction, held: dict[int, float], rng: np.random.Generator) -> FocalLength:
-    """Settle the focal length of a reconstruction, in place. held: EXIF's by camera, kept so far.
+def settle_focal_length(
+    best: pycolmap.Reconstruction, held: dict[int, float], rng: np.random.Generator, hold: bool = False
+) -> FocalLength:
+    """Settle the focal length of a reconstruction, in place. held: EXIF's by camera, kept so far. hold: it stays.
 
     Raises: InputError: a solution that no lens gives, or photos from one spot.
     """
-    tilts = _tilts(best, rng)
+    tilts = _measure_tilts(best, rng)
     oblique = int((tilts > OBLIQUE).sum())
     fixes = oblique >= LEAST_OBLIQUE and oblique >= LEAST_SHARE * len(tilts)
     tilt = float(np.percentile(tilts, 95))
     used = [c for c in best.cameras if any(best.images[i].camera_id == c for i in best.reg_image_ids())]
     exif = [held[c] for c in used if c in held]
-    free = _adjusted(best) if exif else None
+    free = _free_focal_lengths(best) if exif else None
     if free:
         ratio = float(np.median([free.cameras[c].focal_length / held[c] for c in used if c in held]))
         near = abs(ratio - 1) <= HELD
-        if fixes:
+        if hold and not near:
+            decision = f"EXIF's, held: the photos alone would say {ratio:.3f} times that, which led to a model in doubt"
+        elif fixes and not hold:
             decision = f"taken from the photos, {oblique} of which look at the ground from the side"
         elif near:
             decision = "EXIF's, which the photos confirm"
         else:
             decision = f"EXIF's: the photos alone would say {ratio:.3f} times that, but look too straight down to know"
-        if fixes:
+        if fixes and not hold:
             _take_over(best, free)
     else:
         decision = "found by the photos alone: no EXIF says it"
@@ -69,7 +73,7 @@ def require_parallax(spread: Float[Array, "n"]) -> None:
         )
 
 
-def _tilts(best: pycolmap.Reconstruction, rng: np.random.Generator) -> Float[Array, "n"]:
+def _measure_tilts(best: pycolmap.Reconstruction, rng: np.random.Generator) -> Float[Array, "n"]:
     """Degrees between each view and the normal of the points' plane."""
     points = np.array([p.xyz for p in best.points3D.values()])
     normal, _, _ = fit_plane(points, rng)
@@ -77,7 +81,7 @@ def _tilts(best: pycolmap.Reconstruction, rng: np.random.Generator) -> Float[Arr
     return np.degrees(np.arccos(np.clip(np.abs(forward @ normal), 0, 1)))
 
 
-def _adjusted(best: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
+def _free_focal_lengths(best: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
     """A copy whose focal lengths are free."""
     copy = pycolmap.Reconstruction(best)
     bundle_adjust(copy, refine_focal_length=True)

@@ -1,8 +1,7 @@
-"""Where photos were taken, by their own GPS: metres and north for a set that is placed only relative to itself.
+"""GPS positions of photos: they give a registered photo set its metres and its north.
 
-Receivers in cameras lag and drift, so positions are judged by the photos before they count: a robust similarity brings
-the cameras to them, and where they still differ by more than receivers do, they are not used. Where they agree they
-enter the last adjustment as priors.
+Receivers in cameras lag and drift. A robust similarity aligns the cameras with the positions; where the residuals
+exceed the error of receivers, the positions are not used. Otherwise they are priors of the last bundle adjustment.
 """
 
 import logging
@@ -66,13 +65,13 @@ def align_to_gps(best: pycolmap.Reconstruction, at: dict[str, Float[Array, "3"]]
     if len(numbers) < 3:
         return False
     centres = np.stack([best.images[i].projection_center() for i in numbers])
-    wanted = np.stack([at[best.images[i].name] for i in numbers])
-    scale, turn, shift, off = fit_similarity(centres, wanted)
+    positions = np.stack([at[best.images[i].name] for i in numbers])
+    scale, turn, shift, off = fit_similarity(centres, positions)
     if off > WORST * ACROSS:
         _log.warning("the photos' GPS positions are %.0f m off where the photos themselves place them: unused", off)
         return False
     best.transform(pycolmap.Sim3d(scale, pycolmap.Rotation3d(turn), shift))
-    bundle_adjust_with_priors(best, [_prior(best.images[i], at[best.images[i].name]) for i in numbers])
+    bundle_adjust_with_priors(best, [make_pose_prior(best.images[i], at[best.images[i].name]) for i in numbers])
     _log.info("GPS: the photos lie in metres, %.1f m from their positions (median)", off)
     return True
 
@@ -98,7 +97,8 @@ def fit_similarity(
     return scale, turn, shift, float(np.median(off))
 
 
-def _prior(image: pycolmap.Image, at: Float[Array, "3"]) -> pycolmap.PosePrior:
+def make_pose_prior(image: pycolmap.Image, at: Float[Array, "3"]) -> pycolmap.PosePrior:
+    """A GPS position (metres east, north and up) as bundle adjustment takes it, with the error of a receiver."""
     prior = pycolmap.PosePrior(corr_data_id=image.data_id, position=at)
     prior.position_covariance = np.diag([ACROSS**2, ACROSS**2, UP**2])
     prior.coordinate_system = pycolmap.PosePriorCoordinateSystem.CARTESIAN

@@ -1,4 +1,4 @@
-"""Where were further photos taken? Each finds its place against the pictures and points that a scene already has."""
+"""Localisation: the cameras of further photos, from the pictures and points of a registered scene."""
 
 import logging
 import tempfile
@@ -19,7 +19,7 @@ from dav_gswt.logs import progress
 from dav_gswt.photos import lenses
 from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
 from dav_gswt.photos.lenses import pinhole_parameters, read_lenses, undistort_scene_photo
-from dav_gswt.photos.sfm.features import extract_features, match_image_pairs
+from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_image_pairs
 from dav_gswt.photos.sfm.pairs import compare_descriptions, describe_photos
 
 _log = logging.getLogger(__name__)
@@ -41,27 +41,29 @@ def localize_photos(photos: Path, paths: list[Path], seed: int = 0) -> list[Came
         return []
     known = read_colmap_model(photos / "sparse")
     with tempfile.TemporaryDirectory(prefix="locate-") as scratch:
-        return _located(known, photos, paths, Path(scratch), seed)
+        return _localize_photos(known, photos, paths, Path(scratch), seed)
 
 
-def _located(known: ColmapModel, photos: Path, paths: list[Path], scratch: Path, seed: int) -> list[Camera | None]:
-    pinhole = _main(known, photos)
-    new = [_developed(path, photos, pinhole, scratch / f"new_{i:04d}.png") for i, path in enumerate(paths)]
+def _localize_photos(
+    known: ColmapModel, photos: Path, paths: list[Path], scratch: Path, seed: int
+) -> list[Camera | None]:
+    pinhole = _find_main_camera(known, photos)
+    new = [_write_undistorted(path, photos, pinhole, scratch / f"new_{i:04d}.png") for i, path in enumerate(paths)]
     for name in progress(known.names, "read pictures"):
         image_files.write_png(scratch / f"old_{name}", image_files.read_photo(photos / "images" / name))
     database = scratch / "database.db"
     names = [f"old_{name}" for name in known.names] + [name for name in new if name]
     size = max(pinhole.width, pinhole.height)
     with closing(pycolmap.Database.open(database)) as store:
-        _enter(names, [*known.cameras, *[pinhole] * (len(names) - len(known.names))], store)
-    extract_features(len(names), scratch, database, size, FEATURES, 1)
-    _match(names, len(known.names), database, seed)
+        _enter_images(names, [*known.cameras, *[pinhole] * (len(names) - len(known.names))], store)
+    extract_features(scratch, database, size, FEATURES, 1)
+    _match_photos(names, len(known.names), database, seed)
     with closing(pycolmap.Database.open(database)) as store:
-        seen = _seen(known, store)
-        return [_placed(names.index(name), seen, known, pinhole, store, seed) if name else None for name in new]
+        seen = _match_features_to_points(known, store)
+        return [_estimate_pose(names.index(name), seen, known, pinhole, store, seed) if name else None for name in new]
 
 
-def _main(known: ColmapModel, photos: Path) -> Camera:
+def _find_main_camera(known: ColmapModel, photos: Path) -> Camera:
     """A camera with the lens of most pictures."""
     kinds = read_lenses(photos)
     if not kinds:
@@ -69,7 +71,7 @@ def _main(known: ColmapModel, photos: Path) -> Camera:
     return next(c for c in known.cameras if np.allclose(pinhole_parameters(c), kinds[0].pinhole, atol=lenses.SAME))
 
 
-def _developed(path: Path, photos: Path, pinhole: Camera, out: Path) -> str | None:
+def _write_undistorted(path: Path, photos: Path, pinhole: Camera, out: Path) -> str | None:
     """Write the photo as a picture of the scene's; None, with the reason in the log, where it is not of its camera."""
     try:
         image_files.write_png(out, undistort_scene_photo(image_files.read_photo(path), photos, pinhole))
@@ -79,23 +81,15 @@ def _developed(path: Path, photos: Path, pinhole: Camera, out: Path) -> str | No
     return out.name
 
 
-def _enter(names: list[str], cameras: list[Camera], store: pycolmap.Database) -> None:
+def _enter_images(names: list[str], cameras: list[Camera], store: pycolmap.Database) -> None:
     """Images numbered from 1 in the order of their names' list, each with a pinhole of its own."""
     for name, camera in zip(names, cameras, strict=True):
         params = [camera.fx, camera.fy, camera.cx, camera.cy]
         lens = pycolmap.Camera(model="PINHOLE", width=camera.width, height=camera.height, params=params)
-        lens.camera_id = store.write_camera(lens)
-        rig = pycolmap.Rig()
-        rig.add_ref_sensor(lens.sensor_id)
-        number = store.write_rig(rig)
-        image = pycolmap.Image(name=name, camera_id=lens.camera_id)
-        image.image_id = store.write_image(image)
-        frame = pycolmap.Frame(rig_id=number)
-        frame.add_data_id(image.data_id)
-        store.write_frame(frame)
+        enter_image(store, name, *enter_camera(store, lens))
 
 
-def _match(names: list[str], old: int, database: Path, seed: int) -> None:
+def _match_photos(names: list[str], old: int, database: Path, seed: int) -> None:
     """Match every new photo with the pictures that it looks like most."""
     with closing(pycolmap.Database.open(database)) as store:
         found = [store.read_descriptors(i + 1).data for i in range(len(names))]
@@ -106,12 +100,12 @@ def _match(names: list[str], old: int, database: Path, seed: int) -> None:
     match_image_pairs([(names[i], names[j]) for j, i in some], database, 1, seed)
 
 
-def _seen(known: ColmapModel, store: pycolmap.Database) -> list[dict[int, int]]:
+def _match_features_to_points(known: ColmapModel, store: pycolmap.Database) -> list[dict[int, int]]:
     """Per picture of the scene: which of its features shows which point."""
     out = []
     for i in range(len(known.names)):
         own = np.flatnonzero(known.image_of == i)
-        places = _keypoints(store, i)
+        places = _read_keypoints(store, i)
         if not len(own) or not len(places):
             out.append({})
             continue
@@ -120,15 +114,15 @@ def _seen(known: ColmapModel, store: pycolmap.Database) -> list[dict[int, int]]:
     return out
 
 
-def _keypoints(store: pycolmap.Database, index: int) -> Float[Array, "n 2"]:
+def _read_keypoints(store: pycolmap.Database, index: int) -> Float[Array, "n 2"]:
     return store.read_keypoints(index + 1)[:, :2].astype(float)
 
 
-def _placed(
+def _estimate_pose(
     index: int, seen: list[dict[int, int]], known: ColmapModel, pinhole: Camera, store: pycolmap.Database, seed: int
 ) -> Camera | None:
     """The camera whose view of the matched points fits best, if enough of them agree."""
-    own, at = _keypoints(store, index), {}
+    own, at = _read_keypoints(store, index), {}
     for i, points in enumerate(seen):
         if not store.exists_two_view_geometry(i + 1, index + 1):
             continue

@@ -1,9 +1,8 @@
-"""Which photos are worth matching with each other: those that look alike, by a description of each photo as a whole.
+"""Selection of the pairs of photos to match: those whose global descriptors are similar.
 
-Every photo is described by its own SIFT features against a small vocabulary learned from the set itself (VLAD: Jegou et
-al. 2010, with the root of SIFT and each word normalised: Arandjelovic and Zisserman 2013): nothing is downloaded. Each
-photo is matched with its nearest neighbours, with those before and after it by name, and along a tree that ties all
-photos together.
+A photo's descriptor is VLAD of its SIFT features over a small vocabulary learned from the set itself (Jegou et al.
+2010, with RootSIFT and intra-normalisation: Arandjelovic and Zisserman 2013), so that nothing is downloaded. A photo is
+matched with its nearest neighbours, with those before and after it by name, and along a spanning tree of all photos.
 """
 
 import numpy as np
@@ -37,13 +36,13 @@ def select_pairs(descriptors: list[UInt8[Array, "_ 128"]], neighbours: int, seed
 def describe_photos(descriptors: list[UInt8[Array, "_ 128"]], seed: int) -> Float32[Array, "photos d"]:
     """A unit vector for each photo; zero for one without features."""
     rng = np.random.default_rng(seed)
-    some = [_rooted(_evenly(d, EACH)) for d in descriptors]
+    some = [_root_features(_thin_evenly(d, EACH)) for d in descriptors]
     pooled = np.concatenate(some)
     if len(pooled) < WORDS:
         return np.zeros((len(some), WORDS * 128), np.float32)
     sample = pooled[rng.choice(len(pooled), min(SAMPLE, len(pooled)), replace=False)]
     words, _ = kmeans2(sample, WORDS, minit="++", rng=np.random.default_rng(seed))
-    return np.stack([_aggregated(photo, words) for photo in some])
+    return np.stack([_aggregate_features(photo, words) for photo in some])
 
 
 def compare_descriptions(described: Float32[Array, "photos d"]) -> Float[Array, "photos photos"]:
@@ -51,7 +50,7 @@ def compare_descriptions(described: Float32[Array, "photos d"]) -> Float[Array, 
     return np.clip(described.astype(float) @ described.T.astype(float), -1, 1)
 
 
-def _aggregated(features: Float32[Array, "n 128"], words: Float[Array, "w 128"]) -> Float32[Array, "d"]:
+def _aggregate_features(features: Float32[Array, "n 128"], words: Float[Array, "w 128"]) -> Float32[Array, "d"]:
     """Per word the sum of what its features differ from it, each word's of length 1, and the whole."""
     out = np.zeros((len(words), 128))
     if len(features):
@@ -61,11 +60,11 @@ def _aggregated(features: Float32[Array, "n 128"], words: Float[Array, "w 128"])
     return (out / max(np.linalg.norm(out), 1e-12)).ravel().astype(np.float32)
 
 
-def _rooted(features: UInt8[Array, "n 128"]) -> Float32[Array, "n 128"]:
+def _root_features(features: UInt8[Array, "n 128"]) -> Float32[Array, "n 128"]:
     """Square roots of features that sum to 1: their distance is then Hellinger's."""
     f = features.astype(np.float32)
     return np.sqrt(f / np.maximum(f.sum(1, keepdims=True), 1e-12))
 
 
-def _evenly(rows: Array, count: int) -> Array:
+def _thin_evenly(rows: Array, count: int) -> Array:
     return rows if len(rows) <= count else rows[np.linspace(0, len(rows) - 1, count).astype(int)]

@@ -1,1 +1,1 @@
-"""Synthetic photo sets: five families of ground, rendered with exact poses."""
+"""Synthetic photo sets: six families of ground, rendered with exact poses."""

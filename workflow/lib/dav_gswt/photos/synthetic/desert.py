@@ -42,7 +42,7 @@ class Options(FamilyOptions):
 def make_land(o: Options, seed: int, exemplar: float) -> Land:
     """The desert of a seed. exemplar: side of the square about the origin whose mean height becomes 0."""
     rng = np.random.default_rng([seed, 0x5A4D])
-    sand, small = _draw_sand(rng, o)
+    sand, small = draw_sand(rng, o, TEXELS)
     large = o.undulation * noise.make_noise(rng, 512, PERIOD, longest=7.0, shortest=1.6, slope=1.6)
     plants = [meshes.make_shrub(rng) for _ in range(7)] + [meshes.make_tuft(rng) for _ in range(5)]
     shrubs = scatter_disjoint(rng, o.shrubs, 24.0, 0.20, 0.50, 1.6)
@@ -65,11 +65,14 @@ def make_land(o: Options, seed: int, exemplar: float) -> Land:
     return Land(land.make_ground_mesh(height), sand, PERIOD, stones, plants, places, light)
 
 
-def _draw_sand(rng, o: Options) -> tuple[Float32[Array, "n n 3"], Float[Array, "n n"]]:
-    """The sand's colour and its small heights: ripples, fading out where gravel lies bare, and roughness."""
-    n, p = TEXELS, PERIOD
+def draw_sand(rng, o: Options, n: int, gravel: float = 1.0) -> tuple[Float32[Array, "n n 3"], Float[Array, "n n"]]:
+    """The sand's colour and its small heights: ripples, fading out where gravel lies bare, and roughness.
+
+    n: texels a side. gravel: how bare it lies, 0 to 1.
+    """
+    p = PERIOD
     phase, strength = noise.make_ripples(rng, n, p, o.ripple_length, np.radians(o.wind))
-    bare = smoothstep(0.75, 1.5, noise.make_noise(rng, n, p, 3.5, 0.25, 1.0))
+    bare = gravel * smoothstep(0.75, 1.5, noise.make_noise(rng, n, p, 3.5, 0.25, 1.0))
     calm = smoothstep(-0.4, 1.0, noise.make_noise(rng, n, p, 5.0, 1.5, 1.0))
     strength = strength * (1 - bare) * (0.35 + 0.65 * calm)
     profile = noise.ripple_profile(phase) * strength

@@ -1,4 +1,4 @@
-"""What the families of synthetic ground share: the land that is rendered, options, relief, and scattered stones.
+"""The land of a synthetic scene, and what its families share: options, relief and scattered stones.
 
 Metres, z up; the mean ground over the exemplar square about the origin is at z = 0.
 """
@@ -13,6 +13,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.photos.synthetic import meshes, noise
+from dav_gswt.photos.synthetic.labels import GroundLabels
 from dav_gswt.photos.synthetic.meshes import Mesh
 
 STONE_SQUARE = 16.0  # metres: side of the square about the origin that has stones
@@ -38,7 +39,7 @@ class Land:
 
     ground: coloured by `albedo`, which repeats after `period` metres. plants: kinds, each about 1 high. places: one row
     per plant: its kind, x, y, z, size in metres, yaw in radians, and the ground's slope along x and along y that it
-    follows (0 0: it is upright).
+    follows (0 0: it is upright). labels: true materials and objects, where a family knows them.
     """
 
     ground: Mesh
@@ -48,6 +49,7 @@ class Land:
     plants: list[Mesh]
     places: Float[Array, "m 8"]
     light: Light
+    labels: GroundLabels | None = None
 
 
 @dataclass(frozen=True)

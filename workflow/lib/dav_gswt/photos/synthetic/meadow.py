@@ -50,7 +50,7 @@ def make_land(o: Options, seed: int, exemplar: float) -> Land:
     """The meadow of a seed. exemplar: side of the square about the origin whose mean height becomes 0."""
     rng = np.random.default_rng([seed, 0x3EAD])
     cover, lush = _draw_cover(rng, o)
-    albedo = _albedo(rng, cover, lush)
+    albedo = draw_sward(rng, cover, lush, TEXELS)
     large = o.undulation * noise.make_noise(rng, 512, PERIOD, longest=7.5, shortest=2.0, slope=1.8)
     small = 0.012 * noise.make_noise(rng, 1024, PERIOD, longest=0.9, shortest=0.12, slope=1.0)
     height = land.level_ground(lambda x, y: _height(x, y, large, small, o), exemplar)
@@ -70,9 +70,8 @@ def _draw_cover(rng, o: Options) -> tuple[Float[Array, "n n"], Float[Array, "n n
     return cover, smoothstep(-1.3, 1.5, spread) * cover
 
 
-def _albedo(rng, cover, lush) -> Float32[Array, "n n 3"]:
-    """The ground's own colour: soil, dead grass and turf, in fibres and crumbs as fine as a texel."""
-    n = TEXELS
+def draw_sward(rng, cover, lush, n: int) -> Float32[Array, "n n 3"]:
+    """The ground's own colour: soil, dead grass and turf, in fibres and crumbs as fine as a texel. n: texels a side."""
     x, y = noise.texel_centres(n, PERIOD)
     cover, lush = (noise.sample_raster(m, PERIOD, x, y)[..., None] for m in (cover, lush))
     grain = noise.make_noise(rng, n, PERIOD, 0.05, 0.012, 0.4)[..., None]

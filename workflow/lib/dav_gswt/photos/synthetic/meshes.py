@@ -73,8 +73,13 @@ def make_stone(rng: np.random.Generator, subdivisions: int, palette: Colours = D
     return Mesh(vertices.astype(np.float32), faces, colours.astype(np.float32))
 
 
-def make_shrub(rng: np.random.Generator) -> Mesh:
-    """A dry desert shrub: bent stems that spread from one root, with twigs and small stiff leaves."""
+def make_shrub(
+    rng: np.random.Generator, palette: Float[Array, "k 3"] = LEAF, leaves: tuple[int, int] = (7, 15)
+) -> Mesh:
+    """A desert shrub: bent stems that spread from one root, with twigs and small stiff leaves.
+
+    palette: of its leaves. leaves: on a twig, from the first number to below the second.
+    """
     stems = int(rng.integers(26, 36))
     lean = np.radians(rng.uniform(8, 78, stems))
     length = rng.uniform(0.7, 1.05, stems) * (0.82 + 0.18 * np.cos(lean))
@@ -85,9 +90,9 @@ def make_shrub(rng: np.random.Generator) -> Mesh:
     heading = np.repeat(path_directions(paths)[:, -1], 13, axis=0) + rng.normal(0, 0.62, (stems * 13, 3)) + [0, 0, 0.12]
     long = rng.uniform(0.16, 0.36, stems * 13)
     twigs = grow_paths(rng, start.reshape(-1, 3), normalize(heading), long, joints=3, bend=0.22)
-    bark, leaf = mix_palette(rng, BARK), mix_palette(rng, LEAF)
+    bark, leaf = mix_palette(rng, BARK), mix_palette(rng, palette)
     parts = [make_rods(paths, 0.012, 0.005, bark, rng), make_rods(twigs, 0.0045, 0.002, bark * 1.12, rng)]
-    parts.append(make_leaves(rng, twigs, int(rng.integers(7, 15)), leaf))
+    parts.append(make_leaves(rng, twigs, int(rng.integers(*leaves)), leaf))
     return merge_meshes(parts)
 
 

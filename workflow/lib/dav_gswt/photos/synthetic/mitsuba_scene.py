@@ -4,6 +4,8 @@ Compiled variants trace their kernel through every instance, again for each pict
 all plants of a kind are one mesh. They also sum the rays of a pixel in no fixed order.
 """
 
+from dataclasses import replace
+
 import mitsuba as mi
 import numpy as np
 from jaxtyping import Float, Float32
@@ -40,6 +42,16 @@ def isolate_shapes(world) -> dict:
     """The ground and the stones of a scene, if there are any, each as a scene without light."""
     found = {shape.id(): shape for shape in world.shapes() if shape.id() in ("ground", "stones")}
     return {name: mi.load_dict({"type": "scene", name: shape}) for name, shape in found.items()}
+
+
+def build_objects(land: Land):
+    """The plants that are single objects (`labels`), as a scene without light; None: there are none."""
+    if land.labels is None:
+        return None
+    alone = replace(land, places=land.places[np.isin(land.places[:, 0], list(land.labels.plants))])
+    if not len(alone.places):
+        return None
+    return mi.load_dict({"type": "scene"} | (_merge_plants(alone) if _is_compiled() else _instance_plants(alone)))
 
 
 def _is_compiled() -> bool:

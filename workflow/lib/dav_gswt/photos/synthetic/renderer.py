@@ -84,13 +84,13 @@ def describe_renderer() -> dict[str, str | int | None]:
 @cache
 def choose_variant() -> Variant:
     """The variant of this process. Raises: InputError: an unknown choice, or llvm where no library works."""
-    asked = os.environ.get(VARIABLE) or "scalar"
-    if asked not in CHOICES:
-        raise InputError(f"{VARIABLE}={asked}: choose from {', '.join(CHOICES)}")
+    variant = os.environ.get(VARIABLE) or "scalar"
+    if variant not in CHOICES:
+        raise InputError(f"{VARIABLE}={variant}: choose from {', '.join(CHOICES)}")
     choice = Variant("scalar_rgb")
-    if asked != "scalar":
+    if variant != "scalar":
         found = next((v for v in find_libraries() if check_library(v.library)), None)
-        if found is None and asked == "llvm":
+        if found is None and variant == "llvm":
             raise InputError(f"{VARIABLE}=llvm: no LLVM library that works here; install one (Debian: libllvm19)")
         choice = found or choice
     llvm = f" with LLVM {choice.llvm}" if choice.llvm else ""

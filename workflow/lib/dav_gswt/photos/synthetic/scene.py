@@ -10,15 +10,18 @@ import zlib
 from dataclasses import dataclass
 from functools import lru_cache
 from types import ModuleType
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
+from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square
-from dav_gswt.photos.synthetic import camera_layouts, desert, flowers, grass, land, meadow, planet, renderer
+from dav_gswt.photos.synthetic import desert, flowers, grass, land, meadow, oasis, planet, renderer
+from dav_gswt.photos.synthetic.labels import GroundLabels
 
 FAMILIES: dict[str, ModuleType] = {
     "desert": desert,
@@ -26,6 +29,7 @@ FAMILIES: dict[str, ModuleType] = {
     "flowers": flowers,
     "grass": grass,
     "planet": planet,
+    "oasis": oasis,
 }
 EXEMPLAR = 6.0  # metres: side of the square of ground that is photographed
 RADIUS = 7.0  # metres from the middle of the ground to the cameras
@@ -151,7 +155,7 @@ def render(scene: Scene, camera: Camera, samples: int = SAMPLES, again: int = 0)
             photos from one place, each with noise of its own.
     Raises: ValueError: a camera that mitsuba cannot hold (see `make_sensor`).
     """
-    mi, world = renderer.load_mitsuba(), _load_scene(scene)
+    mi, world = renderer.load_mitsuba(), _load_scene(scene).world
     view = mi.load_dict(make_sensor(camera, {"type": "multijitter", "sample_count": samples}))
     light = mi.render(world, sensor=view, spp=view.sampler().sample_count(), seed=_noise_seed(scene, camera, again))
     return encode_srgb(np.array(light, np.float32)[..., :3])
@@ -159,12 +163,23 @@ def render(scene: Scene, camera: Camera, samples: int = SAMPLES, again: int = 0)
 
 def render_depth(scene: Scene, camera: Camera) -> Float32[Array, "h w"]:
     """Depth (camera z) along the ray through every pixel's centre; infinite where the sky is seen."""
-    return _render_depth(_load_scene(scene), camera)
+    return _render_depth(_load_scene(scene).world, camera)
 
 
-def render_isolated_depths(scene: Scene, camera: Camera) -> dict[str, Float32[Array, "h w"]]:
-    """Depths as of `render_depth`, of the `ground` alone and of the `stones` alone, if there are any."""
-    return {name: _render_depth(part, camera) for name, part in _load_isolated(scene).items()}
+def render_isolated_depths(
+    scene: Scene, camera: Camera, names: tuple[str, ...] = ("ground", "stones")
+) -> dict[str, Float32[Array, "h w"]]:
+    """Depths as of `render_depth`, of parts of the scene alone: those that it has of `ground`, `stones` and `objects`.
+
+    objects: plants that are single objects (`labels`).
+    """
+    parts = _load_isolated(scene)
+    return {name: _render_depth(parts[name], camera) for name in names if name in parts}
+
+
+def load_labels(scene: Scene) -> GroundLabels | None:
+    """The true materials and objects of the ground; None: the family has none."""
+    return _load_scene(scene).labels
 
 
 def _render_depth(world, camera: Camera) -> Float32[Array, "h w"]:
@@ -224,17 +239,28 @@ def _noise_seed(scene: Scene, camera: Camera, again: int) -> int:
     return zlib.crc32(place.astype("<f8").tobytes(), (scene.seed + again * 0x9E3779B1) & 0xFFFFFFFF)
 
 
+class _LoadedScene(NamedTuple):
+    """world, objects: mitsuba scenes, of everything and of the plants that are objects."""
+
+    world: Any
+    objects: Any
+    labels: GroundLabels | None
+
+
 @lru_cache(maxsize=1)
-def _load_scene(scene: Scene):
+def _load_scene(scene: Scene) -> _LoadedScene:
     """The mitsuba scene, built once for all its pictures."""
     renderer.load_mitsuba()
     from dav_gswt.photos.synthetic import mitsuba_scene
 
-    return mitsuba_scene.build_scene(FAMILIES[scene.family].make_land(scene.options, scene.seed, scene.exemplar))
+    made = FAMILIES[scene.family].make_land(scene.options, scene.seed, scene.exemplar)
+    return _LoadedScene(mitsuba_scene.build_scene(made), mitsuba_scene.build_objects(made), made.labels)
 
 
 @lru_cache(maxsize=1)
 def _load_isolated(scene: Scene) -> dict:
     from dav_gswt.photos.synthetic import mitsuba_scene
 
-    return mitsuba_scene.isolate_shapes(_load_scene(scene))
+    loaded = _load_scene(scene)
+    objects = {} if loaded.objects is None else {"objects": loaded.objects}
+    return mitsuba_scene.isolate_shapes(loaded.world) | objects

@@ -1,7 +1,8 @@
 """Ground truth of synthetic pictures: depth and label at the centre of every pixel.
 
 It is stored as an EXR with the channels Z (camera depth, infinite in the sky) and label; the header holds the names of
-the labels and the camera as JSON.
+the labels and the camera as JSON. Families that know their materials and objects (`labels`) add the channels material
+and object, with the numbers of the map from above.
 """
 
 import json
@@ -15,6 +16,7 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera, camera_from_json, camera_to_json
 from dav_gswt.images import image_files
+from dav_gswt.photos.synthetic import labels
 from dav_gswt.photos.synthetic import scene as synthetic
 
 SKY, GROUND, STONE, PLANT = range(4)
@@ -54,7 +56,33 @@ def write_truth(path: Path | str, scene: synthetic.Scene, camera: Camera) -> Non
     """Render and write the ground truth of a camera."""
     depth, label = render_truth(scene, camera)
     header = {"labels": json.dumps(LABELS), "camera": json.dumps(camera_to_json(camera))}
-    image_files.write_exr(path, {"Z": depth, "label": label}, header)
+    channels = {"Z": depth, "label": label}
+    if (known := synthetic.load_labels(scene)) is not None:
+        objects = synthetic.render_isolated_depths(scene, camera, ("objects",)).get("objects")
+        channels |= label_surfaces(known, camera, depth, label, objects)
+        header["materials"] = json.dumps(known.materials)
+    image_files.write_exr(path, channels, header)
+
+
+def label_surfaces(
+    known: labels.GroundLabels,
+    camera: Camera,
+    depth: Float32[Array, "h w"],
+    label: Float32[Array, "h w"],
+    objects: Float32[Array, "h w"] | None,
+) -> dict[str, Float32[Array, "h w"]]:
+    """The material and the object of every pixel, 0 where there is none.
+
+    The material is that of the ground at the place (x, y) that is seen. objects: depth of the plants that are objects.
+    """
+    origin, step = camera.rays()
+    seen = np.isfinite(depth)
+    x, y, _ = np.moveaxis(origin + step * np.where(seen, depth, 0)[..., None], -1, 0)
+    shrub = seen & (depth >= objects * (1 - TOLERANCE)) if objects is not None else np.zeros_like(seen)
+    found = np.where(shrub, labels.label_places(known, x, y, "shrub"), 0)
+    found = np.where(label == STONE, labels.label_places(known, x, y, "boulder"), found)
+    material = np.where(seen, known.material_at(x, y), 0)
+    return {"material": material.astype(np.float32), "object": found.astype(np.float32)}
 
 
 def read_truth(path: Path | str) -> tuple[Float32[Array, "h w"], Float32[Array, "h w"], Camera]:

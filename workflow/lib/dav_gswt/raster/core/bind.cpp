@@ -26,18 +26,14 @@ namespace {
 const float* pointer(const MaybeIn& a) { return a ? a->data() : nullptr; }
 float* pointer(const MaybeOut& a) { return a ? a->data() : nullptr; }
 
-// numbers: rotation (9), translation (3), fx, fy, cx, cy, near, dilation
+// numbers: rotation (9), centre (3), rest of the centre (3), fx, fy, cx, cy, near, dilation
 View view_of(const In& numbers, int width, int height, bool orthographic, bool antialiased) {
   View v;
   const float* from = numbers.data();
   std::copy(from, from + 9, v.rotation);
-  std::copy(from + 9, from + 12, v.translation);
-  for (int k = 0; k < 3; k++) {
-    double centre = 0;
-    for (int r = 0; r < 3; r++) centre -= double(from[3 * r + k]) * from[9 + r];
-    v.centre[k] = float(centre);
-  }
-  v.fx = from[12], v.fy = from[13], v.cx = from[14], v.cy = from[15], v.near = from[16], v.dilation = from[17];
+  std::copy(from + 9, from + 12, v.centre);
+  std::copy(from + 12, from + 15, v.centre_rest);
+  v.fx = from[15], v.fy = from[16], v.cx = from[17], v.cy = from[18], v.near = from[19], v.dilation = from[20];
   v.width = width, v.height = height, v.orthographic = orthographic, v.antialiased = antialiased;
   return v;
 }

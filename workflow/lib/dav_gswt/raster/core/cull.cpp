@@ -23,12 +23,12 @@ static inline Three triples(const float* rows, size_t first, int count) {
 // Lanes of the Gaussians that certainly have no pixel.
 static inline Mask outside(const Scene& scene, const View& view, size_t first, int count) {
   Projection c;
-  c.mean = triples(scene.means, first, count);
+  const Three mean = triples(scene.means, first, count);
   const Three log_scales = triples(scene.log_scales, first, count);
   Whole finite = finite_bits(all(0));
-  for (int k = 0; k < 3; k++) finite &= finite_bits(c.mean[k]) & finite_bits(log_scales[k]);
+  for (int k = 0; k < 3; k++) finite &= finite_bits(mean[k]) & finite_bits(log_scales[k]);
   const Lanes log_scale = max(log_scales[0], max(log_scales[1], log_scales[2]));
-  to_camera(c, view);
+  to_camera(c, mean, view);
   const Lanes scale = exp(clamp(log_scale, -LOG_SCALE_MAX * 1.5f, LOG_SCALE_MAX)), ss = scale * scale;
   const Lanes half_x = SLACK * sqrt(REACH * (ss * dot(c.u, c.u) + view.dilation)) + ROUNDING;
   const Lanes half_y = SLACK * sqrt(REACH * (ss * dot(c.v, c.v) + view.dilation)) + ROUNDING;

@@ -14,11 +14,11 @@ constexpr float SH3A = 0.59004359f, SH3B = 2.89061144f, SH3C = 0.45704580f, SH3D
 struct ViewDirection {
   Three to;
   Lanes per_length;
-  ViewDirection(const Three& mean, const View& view) {
+  ViewDirection(const Three& offset, const View& view) {
     if (view.orthographic) {
       for (int k = 0; k < 3; k++) to[k] = all(view.rotation[6 + k]);
     } else {
-      for (int k = 0; k < 3; k++) to[k] = mean[k] - view.centre[k];
+      for (int k = 0; k < 3; k++) to[k] = offset[k];
     }
     per_length = 1.f / sqrt(max(dot(to, to), all(1e-37f)));
     for (int k = 0; k < 3; k++) to[k] *= per_length;
@@ -59,11 +59,11 @@ static inline Three basis_gradient(const Three& to, int count, const Lanes* w) {
 }
 
 // max(0, 1/2 + sum over k of basis_k sh_k). Clears `valid` where a coefficient is not finite.
-static inline Three shade(const Scene& scene, const View& view, const Rows& rows, const Three& mean, Mask visible,
+static inline Three shade(const Scene& scene, const View& view, const Rows& rows, const Three& offset, Mask visible,
                           bool& valid) {
   const int count = scene.coefficients;
   Lanes basis[COEFFICIENTS];
-  basis_of(ViewDirection(mean, view).to, count, basis);
+  basis_of(ViewDirection(offset, view).to, count, basis);
   Three colour = {{all(0.5f), all(0.5f), all(0.5f)}};
   Whole finite = finite_bits(all(0));
   for (int k = 0; k < count; k++)
@@ -79,10 +79,10 @@ static inline Three shade(const Scene& scene, const View& view, const Rows& rows
 
 // The backward pass of `shade` from `by_colour`, 0 where the colour was clamped at 0: writes the gradients by the
 // coefficients, returns those by the Gaussian's position (orthographic: by the view's direction).
-static inline Three shade_backward(const Scene& scene, const View& view, const Rows& rows, const Three& mean,
+static inline Three shade_backward(const Scene& scene, const View& view, const Rows& rows, const Three& offset,
                                    const Three& by_colour, float* out) {
   const int count = scene.coefficients;
-  const ViewDirection direction(mean, view);
+  const ViewDirection direction(offset, view);
   Lanes basis[COEFFICIENTS], weight[COEFFICIENTS];
   basis_of(direction.to, count, basis);
   for (int k = 0; k < count; k++) {

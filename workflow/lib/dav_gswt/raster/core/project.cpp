@@ -67,7 +67,7 @@ bool project(const Scene& scene, const View& view, const Candidates& candidates,
     const Mask visible = store_splats(c, view, splats + first, rows.count);
     if (!scene.coefficients || !any(visible)) continue;
     bool valid;
-    const Three colour = shade(scene, view, rows, c.mean, visible, valid);
+    const Three colour = shade(scene, view, rows, c.offset, visible, valid);
     invalid |= !valid;
     for (int k = 0; k < 3; k++) store_column(sh_colours + k, 3, first, rows.count, colour[k]);
   }

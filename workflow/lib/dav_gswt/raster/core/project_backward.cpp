@@ -115,7 +115,7 @@ static inline void colour_backward(const Scene& scene, const View& view, const R
     const Lanes by = load_column(by_sh_colours + k, 3, first, rows.count);
     by_colour[k] = where(visible & below(all(0), colour), by);
   }
-  const Three by_direction = shade_backward(scene, view, rows, c.mean, by_colour, out.colours);
+  const Three by_direction = shade_backward(scene, view, rows, c.offset, by_colour, out.colours);
   const Three h = to_camera_frame(view, by_direction);
   if (view.orthographic) {  // the view's direction, which is the third row of the rotation
     dmotion[0] += where(visible, h[1]);
@@ -167,7 +167,8 @@ static void project_backward_group(const Scene& scene, const View& view, const C
     rows.store(out.log_scales + k, 3, where(visible, d.log_scale[k]));
   }
   for (int k = 0; k < 4; k++) rows.store(out.quats + k, 4, where(visible, dquat[k]));
-  rows.store(out.opacity_logits, 1, where(visible, moments[0] * (1.f - c.opacity)));
+  const Lanes transparency = 1.f / (1.f + exp(c.logit));  // 1 - opacity would cancel
+  rows.store(out.opacity_logits, 1, where(visible, moments[0] * transparency));
   store_sums<6>(motion, dmotion);
 }
 

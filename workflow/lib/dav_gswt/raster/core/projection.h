@@ -44,7 +44,7 @@ struct Rows {
 };
 
 struct Projection {
-  Three mean;  // in the world
+  Three offset;  // of the mean from the camera, in the axes of the world
   Lanes x, y, z;  // in the camera
   Lanes per_z;  // 1 / z, or 1
   Lanes slope_x, slope_y;  // x / z, y / z
@@ -58,7 +58,8 @@ struct Projection {
   Lanes cxy[3];  // p x q: components 01, 02, 12
   Lanes sxx, sxy, syy;
   Lanes area, trace, det;  // |p x q|^2, |p|^2 + |q|^2, det S
-  Lanes opacity, compensation;  // sqrt(det S0 / det S) of an antialiased splat, else 1
+  Lanes logit, opacity;
+  Lanes compensation;  // sqrt(det S0 / det S) of an antialiased splat, else 1
   bool valid;  // inputs are finite and no quaternion is zero
 };
 
@@ -69,12 +70,14 @@ static inline void rotation_of(const Lanes q[4], Lanes m[9]) {
   m[6] = 2 * (x * z - w * y), m[7] = 2 * (y * z + w * x), m[8] = 1 - 2 * (x * x + y * y);
 }
 
-// From c.mean to the camera's frame and its Jacobian there.
-static inline void to_camera(Projection& c, const View& view) {
-  const float *r = view.rotation, *t = view.translation;
-  c.x = r[0] * c.mean[0] + r[1] * c.mean[1] + r[2] * c.mean[2] + t[0];
-  c.y = r[3] * c.mean[0] + r[4] * c.mean[1] + r[5] * c.mean[2] + t[1];
-  c.z = r[6] * c.mean[0] + r[7] * c.mean[1] + r[8] * c.mean[2] + t[2];
+// From the mean to the camera's frame and its Jacobian there. Near a camera that is far out R m + t would cancel; the
+// difference of two near numbers is exact.
+static inline void to_camera(Projection& c, const Three& mean, const View& view) {
+  for (int k = 0; k < 3; k++) c.offset[k] = (mean[k] - view.centre[k]) - view.centre_rest[k];
+  const float* r = view.rotation;
+  c.x = r[0] * c.offset[0] + r[1] * c.offset[1] + r[2] * c.offset[2];
+  c.y = r[3] * c.offset[0] + r[4] * c.offset[1] + r[5] * c.offset[2];
+  c.z = r[6] * c.offset[0] + r[7] * c.offset[1] + r[8] * c.offset[2];
   c.per_z = view.orthographic ? all(1) : 1.f / max(c.z, all(view.near));
   c.slope_x = c.x * c.per_z;
   c.slope_y = c.y * c.per_z;
@@ -113,13 +116,13 @@ static inline void to_screen(Projection& c, const View& view) {
 
 static inline Projection project_lanes(const Scene& scene, const View& view, const Rows& rows) {
   Projection c;
-  c.mean = rows.load3(scene.means);
+  const Three mean = rows.load3(scene.means);
   const Three log_scale = rows.load3(scene.log_scales);
   for (int k = 0; k < 4; k++) c.quat[k] = rows.load(scene.quats + k, 4);
-  const Lanes logit = rows.load(scene.opacity_logits, 1);
+  const Lanes logit = c.logit = rows.load(scene.opacity_logits, 1);
 
   Whole finite = finite_bits(logit);
-  for (int k = 0; k < 3; k++) finite &= finite_bits(c.mean[k]) & finite_bits(log_scale[k]);
+  for (int k = 0; k < 3; k++) finite &= finite_bits(mean[k]) & finite_bits(log_scale[k]);
   for (int k = 0; k < 4; k++) finite &= finite_bits(c.quat[k]);
   // a quaternion is first divided by its largest component: its square may be out of range
   Lanes largest = all(0);
@@ -135,7 +138,7 @@ static inline Projection project_lanes(const Scene& scene, const View& view, con
   rotation_of(c.quat, c.rotation);
   for (int k = 0; k < 3; k++) c.scale[k] = exp(clamp(log_scale[k], -LOG_SCALE_MAX * 1.5f, LOG_SCALE_MAX));
   c.opacity = 1.f / (1.f + exp(-logit));
-  to_camera(c, view);
+  to_camera(c, mean, view);
   to_screen(c, view);
   return c;
 }

@@ -21,8 +21,8 @@ constexpr float LN2 = 0.6931471806f;
 
 // A camera, and how Gaussians are drawn by it.
 struct View {
-  float rotation[9], translation[3];  // world to camera: x right, y down, z forward
-  float centre[3];  // the camera's place in the world
+  float rotation[9];  // world to camera: x right, y down, z forward
+  float centre[3], centre_rest[3];  // the camera's place in the world is the sum of the two: far out float32 is coarse
   float fx, fy, cx, cy;
   float near;  // Gaussians whose centre is nearer are left out
   float dilation;  // variance added on the screen, in square pixels

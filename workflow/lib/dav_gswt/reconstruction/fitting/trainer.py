@@ -58,6 +58,22 @@ class FitResult:
     report: FitReport
 
 
+@dataclass(frozen=True)
+class FitOptions:
+    """How a fit runs, which does not change its result.
+
+    name: in the log. snapshots: a folder; a fit that was killed and is called again with the same arguments continues
+    from there. callback: called with the step and the state after every step.
+    """
+
+    name: str = "fit"
+    snapshots: Path | str | None = None
+    callback: Callable[[int, State], None] | None = None
+
+
+DEFAULT_OPTIONS = FitOptions()
+
+
 @dataclass
 class TrainingState:
     """All that changes from step to step; a snapshot stores it."""
@@ -91,20 +107,18 @@ def fit_field(
     plan: FitPlan,
     constraints: Constraints,
     rng: np.random.Generator,
-    what: str = "fit",
-    snapshots: Path | str | None = None,
-    callback: Callable[[int, State], None] | None = None,
+    options: FitOptions = DEFAULT_OPTIONS,
 ) -> FitResult:
     """Fit a field to views.
 
-    A view's weight says which of its pixels count. snapshots: a folder; a fit that was killed and is called again with
-    the same arguments continues from there. callback: called with the step and the state after every step.
+    A view's weight says which of its pixels count.
     Returns: the field, its first `constraints.fixed` Gaussians in their order, and the report.
     Raises: ValueError: no view.
     """
     if not views:
         raise ValueError("a fit needs at least one view")
-    store = snapshot.SnapshotStore(snapshots, _digest(field, views, plan, rng) if snapshots else "")
+    what, folder = options.name, options.snapshots
+    store = snapshot.SnapshotStore(folder, _digest(field, views, plan, rng) if folder else "")
     run = _start_training(field, views, plan, rng)
     task = _make_task(len(field), views, plan, constraints, np.random.default_rng(len(views)))
     if stored := store.load():
@@ -112,8 +126,8 @@ def fit_field(
         _log.info("%s: goes on from step %d", what, run.step)
     for _ in progress(range(run.step, plan.steps), what):
         _advance(run, task)
-        if callback:
-            callback(run.step, run.state)
+        if options.callback:
+            options.callback(run.step, run.state)
         if store.due():
             store.save(*_to_snapshot(run))
     store.clear()

@@ -7,18 +7,19 @@ import numpy as np
 from jaxtyping import Float32, Float64
 from numpy import ndarray as Array
 
-from dav_gswt.field import GaussianField
+from dav_gswt.field import GaussianField, read_field
 from dav_gswt.geometry.poses import Pose, pose_of_camera, pose_offset
-from dav_gswt.geometry.scene_frame import SceneFrame
-from dav_gswt.photos.training_views import TrainingView
-from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
+from dav_gswt.photos.training_views import TrainingView, read_training_views
+from dav_gswt.photos.view_split import ViewSplit
+from dav_gswt.reconstruction.ground import Ground, read_ground
 from dav_gswt.study.calibration import controls, measures
 from dav_gswt.views import oracle, prior_sampling
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.pose_maps import PoseMaps
 from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.scores import Scores
-from dav_gswt.views.scoring import build_conditions
+from dav_gswt.views.scoring import PHOTO_WIDTH, build_conditions
 from dav_gswt.views.uncertainty import combine_terms
 
 
@@ -32,6 +33,13 @@ class CalibrationTarget:
     frame: SceneFrame
     taken: list[TrainingView]
     size: int
+
+
+def read_target(given, scene: dict, split: ViewSplit, captures: list[str], size: int) -> CalibrationTarget:
+    """Read the target. given: files `field`, `ground`, `frame`, `images`, `model`. captures: of earlier rounds."""
+    taken = read_training_views(given.images, given.model, split.start, captures, PHOTO_WIDTH)
+    field, grid = read_field(given.field), read_ground(given.ground)
+    return CalibrationTarget(scene, field, grid, read_scene_frame(given.frame), taken, size)
 
 
 def calibrate_scores(
@@ -56,11 +64,11 @@ def calibrate_scores(
     )
     if prior is not None and some:
         given = judged.field, judged.grid, some, judged.taken, judged.frame
-        condition, counts = build_conditions(*given, prior.model.size)
+        condition, masks = build_conditions(*given, prior.model.size)
         others = controls.control_maps(prior, regressors, condition)
         shown |= others
         # `residual` takes the place of the scores' term: that of samples from other noises, whatever was asked for them
-        terms |= {name: prior_sampling.weighted_mean(m, counts) for name, m in others.items()}
+        terms |= {name: prior_sampling.weighted_mean(m, masks) for name, m in others.items()}
     corrected = judged.frame.kind == "photos"  # photos differ in exposure
     error, error_maps = oracle.measure_errors(judged.field, judged.grid, views, judged.size, corrected)
     table = [
@@ -71,14 +79,14 @@ def calibrate_scores(
 
 
 def choose_candidates(
-    judged: CalibrationTarget, pool: Candidates, scored: Scores, given: dict, count: int
+    judged: CalibrationTarget, candidates: Candidates, scored: Scores, given: dict, count: int
 ) -> tuple[Candidates, list[TrainingView]]:
     """Choose candidates, spread over the scored ones. Returns them and their true pictures.
 
     given: folders, `images` of photos and, where a scene can be rendered, `truth` (see `oracle.write_truth`).
     """
     names = set(scored.names)
-    known = [(pose, camera) for pose, camera in pool if pose.name in names]
+    known = [(pose, camera) for pose, camera in candidates if pose.name in names]
     if given.get("truth"):
         return oracle.read_truth(known, given["truth"])
     some = oracle.spread_candidates(known, count)
@@ -99,6 +107,7 @@ def _select_terms(
     terms = {name: values[rows] for name, values in scores.terms.items()}
     shown = {"opacity": maps.opacity[rows]}
     if "w2_sq" in scores.terms:
+        assert maps.w2_sq is not None  # it is written beside the term
         u = combine_terms(scores.term("w2_sq"), scores.terms.get("lpips"), lam, scores.scales, scores.names)
         terms, shown = terms | {"u": u[rows]}, shown | {"w2_sq": maps.w2_sq[rows]}
     return terms, shown

@@ -1,5 +1,7 @@
 """Agreement of scores with the true error of the field, over whole pictures and over their pixels."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64
 from numpy import ndarray as Array
@@ -54,7 +56,7 @@ def _intervals(
     return float(np.mean(inside)), float(np.mean(width))
 
 
-def evaluate_pixels(maps: dict[str, Maps], error_maps: Maps) -> dict[str, Judgement]:
+def evaluate_pixels(maps: Mapping[str, Maps], error_maps: Maps) -> dict[str, Judgement]:
     """Of each kind of map: `pixel_spearman` and `pixel_ause` over the pixels of all poses whose error is known.
 
     A map as wide as its picture is of the whole of it (rows below a lower picture are left out), any other one of its
@@ -103,7 +105,7 @@ def average_cells(error_map: Float[Array, "h w"], rows: int, columns: int) -> Fl
 
 def summarise(
     scores: dict[str, Float[Array, "n"]],
-    maps: dict[str, Maps],
+    maps: Mapping[str, Maps],
     error: Float[Array, "n"],
     error_maps: Maps,
     seed: int,

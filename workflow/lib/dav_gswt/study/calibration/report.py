@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt.study import figures
+from dav_gswt.images import figures
 
 CELL = ("scene", "seed", "preset", "policy", "prior", "p_drop", "round")
 MEASURES = ("spearman", "ause", "ause_chance", "coverage", "width", "pixel_spearman", "pixel_ause", "pixel_ause_chance")
@@ -41,7 +41,7 @@ def tabulate_scores(cells: list[dict], results: list[dict]) -> list[dict]:
 
 def write_figure(path: Path | str, table: list[dict], level: float) -> None:
     """The figure of `tabulate_scores`, as a PNG. level: of the intervals."""
-    figures.save(draw_figure(table, level), path)
+    figures.save_figure(draw_figure(table, level), path)
 
 
 def draw_figure(table: list[dict], level: float):
@@ -51,8 +51,7 @@ def draw_figure(table: list[dict], level: float):
     layers = [(poses, _rank_scores(table, "spearman")), (pixels, _rank_scores(table, "pixel_spearman", known=True))]
     layers = [(panels, names) for panels, names in layers if names]
     tall = [AROUND + ROW * len(names) for _, names in layers]
-    figure = figures.blank(WIDE, sum(tall) + 0.4)
-    figure.get_layout_engine().set(w_pad=0.08, h_pad=0.1)
+    figure = figures.make_figure(WIDE, sum(tall) + 0.4, w_pad=0.08, h_pad=0.1)
     grid = figure.subplots(len(layers), 3, squeeze=False, height_ratios=tall)
     looks = _assign_styles(table)
     for axes, (panels, names) in zip(grid, layers, strict=True):
@@ -84,7 +83,8 @@ def _rank_scores(table: list[dict], measure: str, known: bool = False) -> list[s
     """Scores, those of the greatest mean first; those without a value last, or (known) left out."""
     means = {row["score"]: _mean(table, row["score"], measure) for row in table}
     names = [name for name, mean in means.items() if mean is not None or not known]
-    return sorted(names, key=lambda name: -np.inf if means[name] is None else means[name], reverse=True)
+    order = {name: -np.inf if mean is None else mean for name, mean in means.items()}
+    return sorted(names, key=lambda name: order[name], reverse=True)
 
 
 def _mean(table: list[dict], score: str, measure: str) -> float | None:

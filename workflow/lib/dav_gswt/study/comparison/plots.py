@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt.study import figures
+from dav_gswt.images import figures
 from dav_gswt.study.comparison.tables import EVERY, EVERYTHING
 from dav_gswt.views.policy_names import ORACLES
 
@@ -13,7 +13,14 @@ PANEL = 3.3, 3.4  # inches
 FOREST = 0.34  # inches a policy
 SHOWN = 6  # curves that a panel holds legibly: the baseline, an oracle and the best
 BASE, TRUTH = {"color": "black", "linewidth": 2.4}, {"color": "0.55", "linestyle": "--"}
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito: told apart by everybody
+COLOURS = (
+    "#0072b2",
+    "#d55e00",
+    "#009e73",
+    "#cc79a7",
+    "#e69f00",
+    "#56b4e9",
+)  # Okabe and Ito: for any colour vision
 
 
 def write_figure(path: Path | str, curves: list[dict], compared: list[dict], baseline: str) -> None:
@@ -28,8 +35,9 @@ def write_figure(path: Path | str, curves: list[dict], compared: list[dict], bas
     )
     columns = min(3, len(panels))
     above = -(-len(panels) // columns)
-    figure = figures.blank(PANEL[0] * 3, PANEL[1] * above + FOREST * len(policies) + 1.3)
-    top, bottom = figure.subfigures(2, 1, height_ratios=[PANEL[1] * above, FOREST * len(policies) + 1.3])
+    heights = [PANEL[1] * above, FOREST * len(policies) + 1.3]
+    figure = figures.make_figure(PANEL[0] * 3, PANEL[1] * above + FOREST * len(policies) + 1.3)
+    top, bottom = figure.subfigures(2, 1, squeeze=False, height_ratios=heights).ravel()
     grid = top.subplots(above, columns, squeeze=False).ravel()
     for axes, (scene, k) in zip(grid, panels, strict=False):
         _draw_curves(axes, [row for row in curves if row["scene"] == scene], k, looks)
@@ -39,7 +47,7 @@ def write_figure(path: Path | str, curves: list[dict], compared: list[dict], bas
     handles, labels = grid[0].get_legend_handles_labels()
     top.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
     _draw_forest(bottom.subplots(), compared, baseline)
-    figures.save(figure, path)
+    figures.save_figure(figure, path)
 
 
 def _draw_curves(axes, rows: list[dict], k: int, looks: dict[str, dict]) -> None:

@@ -39,7 +39,7 @@ def summarise_cells(curves: list[dict]) -> list[dict]:
 def compare_to_baseline(table: list[dict], baseline: str) -> list[dict]:
     """Every policy less the baseline, in dB of nAUC: over all scenes, and of each scene and k alone.
 
-    Cells are paired by scene, quality, seed, k and the photos that they end with. holm: p values over all scenes,
+    Cells are paired by scene, preset, seed, k and the photos that they end with. holm: p values over all scenes,
     raised by how many policies were compared. One cell alone has neither interval nor p.
     """
     units = [(*(row[key] for key in UNIT), row["photos"]) for row in table]

@@ -118,24 +118,39 @@ def _order_places(placed: PlacedTiles, used: set[str], rng: np.random.Generator)
 def _sample_comparison(look: Setup, a: str, b: str, used: set[str], rng: np.random.Generator) -> Iterator[Item]:
     """Crops of the cuts of `a`, each with the nearest cut of `b` in the same tile, or the same ground without a cut."""
     for place in _order_places(look.placed[a][0], used, rng):
-        if not (spot := _find_spot(look, a, place)):
-            continue
-        twin = None if b == FLOOR else places.find_nearest_cut(look.placed[b][0], place)
-        other = _find_covering_patch(look.placed[a][0], spot) if b == FLOOR else twin and _find_spot(look, b, twin)
-        if other is None or not (first := _render_cut(look, a, spot)):
-            continue
-        if second := _render_whole(look, a, spot, other) if b == FLOOR else _render_cut(look, b, other):
+        halves = _pair_with_floor(look, a, place) if b == FLOOR else _pair_with_cut(look, a, b, place)
+        if halves:
             used.add(place.cluster)
-            yield Item((first, second), look.view.name, look.ground, place.cluster)
+            yield Item(halves, look.view.name, look.ground, place.cluster)
+
+
+def _pair_with_floor(look: Setup, name: str, place: Place) -> tuple[Half, Half] | None:
+    """A crop of a cut, and the same ground with the patch that covers all of it."""
+    spot = _find_spot(look, name, place)
+    patch = _find_covering_patch(look.placed[name][0], spot) if spot else None
+    if spot is None or patch is None or not (first := _render_cut(look, name, spot)):
+        return None
+    return first, _render_whole(look, name, spot, patch)
+
+
+def _pair_with_cut(look: Setup, a: str, b: str, place: Place) -> tuple[Half, Half] | None:
+    """A crop of a cut of `a`, and one of the nearest cut of `b`."""
+    spot = _find_spot(look, a, place)
+    nearest = places.find_nearest_cut(look.placed[b][0], place) if spot else None
+    other = _find_spot(look, b, nearest) if nearest else None
+    if spot is None or other is None or not (first := _render_cut(look, a, spot)):
+        return None
+    second = _render_cut(look, b, other)
+    return (first, second) if second else None
 
 
 def _find_spot(look: Setup, name: str, place: Place) -> Spot | None:
     """The crops of a cut before rendering; None where it cannot be judged."""
     placed, terrain = look.placed[name]
-    small = crops.make_crop(placed, terrain, look.view, place.at)
-    met = crops.find_patches(placed, small) if small else None
-    large = crops.make_crop(placed, terrain, look.view, place.at, look.size) if met and len(met) > 1 else None
-    return Spot(small, large, met) if large else None
+    if not (found := crops.find_cut(placed, terrain, look.view, place.at)):
+        return None
+    large = crops.make_crop(placed, terrain, look.view, place.at, look.size)
+    return Spot(found[0], large, found[1]) if large else None
 
 
 def _find_covering_patch(placed: PlacedTiles, spot: Spot) -> int | None:
@@ -144,7 +159,7 @@ def _find_covering_patch(placed: PlacedTiles, spot: Spot) -> int | None:
 
 
 def _render_cut(look: Setup, name: str, spot: Spot) -> Half | None:
-    """A crop with a cut in its middle; None where things hide it."""
+    """A crop with a cut in its middle; None where objects hide it."""
     placed, terrain = look.placed[name]
     shown = crops.render_patches(placed, terrain, spot.small, spot.met)
     return Half(name, crops.render_crop(placed, terrain, spot.large), shown) if shown.shows_patch else None
@@ -186,8 +201,12 @@ def _measure_excess(look: Setup, items: list[Item], weights: Weights, rng: np.ra
 
     All tile sets share one bank of crops of the exemplar.
     """
-    at = [(i, k) for i, item in enumerate(items) for k in (0, 1) if item.halves[k].shown]
-    taken = [measure.SampledCrop("cut", i, items[i].cluster, items[i].halves[k].shown) for i, k in at]
+    at, taken = [], []
+    for i, item in enumerate(items):
+        for k, half in enumerate(item.halves):
+            if half.shown:
+                at.append((i, k))
+                taken.append(measure.SampledCrop("cut", i, item.cluster, half.shown))
     if not taken:
         return items
     seen = [each.shown.crop for each in taken]

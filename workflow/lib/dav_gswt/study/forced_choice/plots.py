@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dav_gswt.study import figures
+from dav_gswt.images import figures
 from dav_gswt.study.forced_choice.results import MODEL, PEOPLE
 from dav_gswt.study.seams.summary import EVERY
 
@@ -12,7 +12,7 @@ def write_choice_plot(path: Path | str, rows: list[dict]) -> None:
     observer as an open diamond. rows: of `results.tabulate_choices`.
     """
     pairs = sorted({(row["first"], row["second"]) for row in rows})
-    figure = figures.blank(8.0, 1.6 + 0.7 * len(pairs))
+    figure = figures.make_figure(8.0, 1.6 + 0.7 * len(pairs))
     axes = figure.add_subplot()
     for place, pair in enumerate(pairs):
         mine = [row for row in rows if (row["first"], row["second"]) == pair]
@@ -35,7 +35,7 @@ def write_choice_plot(path: Path | str, rows: list[dict]) -> None:
     axes.set_xlabel(f"share of answers that chose the first; participants {people}", fontsize=9)
     axes.grid(axis="x", alpha=0.3)
     axes.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    figures.save(figure, path)
+    figures.save_figure(figure, path)
 
 
 def _plot_people(axes, place: int, rows: list[dict]) -> None:

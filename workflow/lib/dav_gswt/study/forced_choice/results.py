@@ -28,7 +28,7 @@ def tabulate_choices(key: dict, participants: list[Participant]) -> list[dict]:
         for scene in (EVERY, *sorted({item["scene"] for item in mine.values()})):
             some = {name: item for name, item in mine.items() if scene in (EVERY, item["scene"])}
             about = {"first": first, "second": second, "scene": scene}
-            printed = paper.beside("perceptual", f"{first} {second}" if scene == EVERY else "", ("preference",))
+            printed = paper.find_printed("perceptual", f"{first} {second}" if scene == EVERY else "", ("preference",))
             rows += [
                 about | row | printed for row in (_tabulate_people(some, participants), _tabulate_model(some)) if row
             ]
@@ -64,5 +64,5 @@ def _tabulate_model(items: dict[str, dict]) -> dict | None:
 
 
 def _row(observer: str, participants: int, answers: int, share: float) -> dict:
-    told = {"observer": observer, "participants": participants, "answers": answers, "share": share}
-    return told | dict.fromkeys(MEASURES)
+    row = {"observer": observer, "participants": participants, "answers": answers, "share": share}
+    return row | dict.fromkeys(MEASURES)

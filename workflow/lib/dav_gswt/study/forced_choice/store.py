@@ -45,10 +45,10 @@ def read_pairs(folder: Path | str, scene: str) -> list[StoredPair]:
     folder, found = Path(folder), []
     for number, about in enumerate(read_json(folder / TABLE)["pairs"]):
         try:
-            pictures = tuple((folder / _picture_name(number, letter)).read_bytes() for letter in "ab")
+            first, second = ((folder / _picture_name(number, letter)).read_bytes() for letter in "ab")
         except OSError as error:
             raise InputError(f"{error.filename}: not readable ({error.strerror}); draw the pairs again") from error
-        found.append(StoredPair({"scene": scene} | about, pictures))
+        found.append(StoredPair({"scene": scene} | about, (first, second)))
     return found
 
 

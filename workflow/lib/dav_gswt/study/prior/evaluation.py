@@ -128,6 +128,8 @@ def evaluate_prior(
     _require_same_autoencoder(prior, regressors)
     if not len(made):
         raise ValueError("there is no view to evaluate the prior on")
+    if setting.m < 2:
+        raise ValueError(f"m is {setting.m}: a spread takes at least 2 samples")
     truth = compute_truth(made)
     parts: dict[tuple[str, str], list[dict[str, Array]]] = {}
     for start in progress(range(0, len(made), BATCH), "evaluate prior"):

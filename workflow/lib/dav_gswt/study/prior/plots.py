@@ -6,8 +6,9 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
+from dav_gswt.images import figures
 from dav_gswt.prior.terrain import TerrainPrior
-from dav_gswt.study import csv_tables, figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.prior.evaluation import Setting, opaque_mask
 from dav_gswt.study.prior.regressor import Regressor
 from dav_gswt.study.prior.training.example_files import Examples
@@ -39,7 +40,7 @@ def smooth(values: Float[Array, "n"]) -> tuple[Float[Array, "k"], Float[Array, "
 
 def plot_losses(curves: dict[str, Float[Array, "_"]], path: Path | str) -> None:
     """Plot the losses against the step. They are of different kinds: levels do not compare."""
-    figure = figures.blank(7.2, 4.2)
+    figure = figures.make_figure(7.2, 4.2)
     axes = figure.add_subplot()
     for name, values in curves.items():
         axes.plot(*smooth(values), label=name, linewidth=1.2)
@@ -48,7 +49,7 @@ def plot_losses(curves: dict[str, Float[Array, "_"]], path: Path | str) -> None:
     axes.set_ylabel(f"loss, mean over {100 * WIDE:.0f} % of the steps")
     axes.grid(alpha=0.3, which="both")
     axes.legend(frameon=False)
-    figures.save(figure, path)
+    figures.save_figure(figure, path)
 
 
 def make_gallery(
@@ -84,7 +85,7 @@ def composite_over_grey(rgba: Float32[Array, "n s s 4"]) -> Float32[Array, "n s 
 def plot_samples(columns: dict[str, Array], path: Path | str) -> None:
     """Plot a grid: one row per view, one column per picture or map, with the colour range of a map in its title."""
     count = len(next(iter(columns.values())))
-    figure = figures.blank(INCH * len(columns), INCH * count + 0.5)
+    figure = figures.make_figure(INCH * len(columns), INCH * count + 0.5)
     grid = figure.subplots(count, len(columns), squeeze=False)
     for column, (title, values) in zip(grid.T, columns.items(), strict=True):
         how = {}
@@ -95,4 +96,4 @@ def plot_samples(columns: dict[str, Array], path: Path | str) -> None:
         for axes, value in zip(column, values, strict=True):
             axes.imshow(value, interpolation="nearest", **how)
             axes.set_axis_off()
-    figures.save(figure, path)
+    figures.save_figure(figure, path)

@@ -37,25 +37,25 @@ class Repairer(Prior, Protocol):
 class PriorRepair:
     """Adds the difference that the repair makes to an encoded picture, without the loss of the autoencoder.
 
-    believed: whether the render beside the seam counts as valid.
+    render_is_valid: whether the render beside the seam counts as valid.
     """
 
     model: Repairer
     strength: float
     steps: int = 4
     seed: int = 0
-    believed: bool = False
+    render_is_valid: bool = False
 
     @classmethod
     def from_config(cls, model: Prior, entry: dict, seed: int) -> "PriorRepair":
         """The repair under `refine` of an entry of the config."""
-        given = {key: entry[key] for key in ("steps", "believed") if key in entry}
-        return cls(cast(Repairer, model), entry["strength"], seed=seed, **given)
+        steps, valid = entry.get("steps", cls.steps), entry.get("condition", cls.render_is_valid)
+        return cls(cast(Repairer, model), entry["strength"], steps, seed, valid)
 
     def __call__(self, condition: Condition, near: Float32[Array, "b s s"]) -> Float32[Array, "b s s 3"]:
         b, size = len(condition), condition.colour.shape[1]
         cells = near.reshape(b, size // CELL, CELL, size // CELL, CELL).max((2, 4))
-        known = None if self.believed else cells <= TOUCHED
+        known = None if self.render_is_valid else cells <= TOUCHED
         with one_thread():
             made = self.model.repair(condition, self.strength, self.steps, self.seed, known)
             after, before = (

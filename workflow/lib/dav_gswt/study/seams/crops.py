@@ -76,7 +76,7 @@ class RenderedCrop:
 
     @property
     def shows_patch(self) -> bool:
-        """Whether any patch is visible: things in front may hide them all."""
+        """Whether any patch is visible: objects in front may hide them all."""
         return bool((self.patch >= 0).any())
 
     @property
@@ -137,6 +137,15 @@ def find_patches(placed: PlacedTiles, crop: Crop) -> list[int] | None:
     values, counts = np.unique(placed.patch[index[..., 1], index[..., 0]], return_counts=True)
     patches = values[np.argsort(-counts, kind="stable")][:MAX_PATCHES].tolist()
     return patches if all(covers_crop(placed, crop, placed.origins[p]) for p in patches) else None
+
+
+def find_cut(
+    placed: PlacedTiles, terrain: EndlessTerrain, view: View, at: tuple[int, int]
+) -> tuple[Crop, list[int]] | None:
+    """The crop around a point on a cut, and its patches; None where it cannot be judged, or shows one patch alone."""
+    crop = make_crop(placed, terrain, view, at)
+    patches = find_patches(placed, crop) if crop else None
+    return (crop, patches) if crop and patches and len(patches) > 1 else None
 
 
 def render_crop(placed: PlacedTiles, terrain: EndlessTerrain, crop: Crop) -> Float32[Array, "h w 3"]:

@@ -9,7 +9,7 @@ from numpy import ndarray as Array
 from dav_gswt.field import GaussianField
 from dav_gswt.lod.levels import Levels
 from dav_gswt.reconstruction import top_view
-from dav_gswt.study.seams.placed_tiles import DetrendedExemplar, detrend_exemplar
+from dav_gswt.study.seams.placed_tiles import DetrendedExemplar, PlacedTiles, detrend_exemplar, place_tiles
 from dav_gswt.tiles import build, semantics
 from dav_gswt.tiles.layout import Exemplar
 
@@ -57,3 +57,11 @@ class ExemplarMaps:
         """The exemplar without the trend that was removed for a tile set."""
         width = build.TilingOptions.from_config(dict(seam), semantics.SemanticSource()).trend * tiles.report.layout.side
         return detrend_exemplar(self.levels, self.exemplar, self.colour, width)
+
+    def place_with_straight(
+        self, tiles: build.TileSet, seam: dict, source: semantics.SemanticSource, seed: int, tau: float
+    ) -> tuple[PlacedTiles, PlacedTiles]:
+        """Place a tile set, and beside it tiles of the same sizes that are cut straight."""
+        straight = self.cut_straight(seam, source, build.make_generator(seed, seam))
+        patches = self.detrend(tiles, seam)
+        return place_tiles(tiles, patches, seed, tau), place_tiles(straight, patches, seed, tau)

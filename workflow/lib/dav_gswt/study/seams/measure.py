@@ -106,16 +106,14 @@ def _sample_cuts(
     samples = []
     for place in places.sample_cuts(placed, rng):
         beside = places.find_nearest_cut(straight[0], place)
-        pair = [(placed, terrain, place), (*straight, beside)] if beside else []
-        both = [(who, on, crops.make_crop(who, on, view, there.at)) for who, on, there in pair]
-        found = [crops.find_patches(who, crop) if crop else None for who, _, crop in both]
-        # with a single patch the seam is not in the crop's middle
-        if found and all(patches and len(patches) > 1 for patches in found):
+        cut = crops.find_cut(placed, terrain, view, place.at) if beside else None
+        ceiling = crops.find_cut(*straight, view, beside.at) if beside else None
+        if cut and ceiling:
             number = BORDERS + len(samples) // 2  # of the cut; its ceiling's is CUTS more
-            cut, ceiling = (crops.render_patches(*sample, patches) for sample, patches in zip(both, found, strict=True))
-            if cut.shows_patch and ceiling.shows_patch:
-                samples.append(SampledCrop("cut", number, place.cluster, cut))
-                samples.append(SampledCrop("ceiling", number + CUTS, place.cluster, ceiling))
+            shown = crops.render_patches(placed, terrain, *cut), crops.render_patches(*straight, *ceiling)
+            if shown[0].shows_patch and shown[1].shows_patch:
+                samples.append(SampledCrop("cut", number, place.cluster, shown[0]))
+                samples.append(SampledCrop("ceiling", number + CUTS, place.cluster, shown[1]))
         if len(samples) == 2 * CUTS:
             return samples
     return _require_enough(samples, 2 * CUTS, "cuts")
@@ -175,7 +173,8 @@ def _tabulate_crop(
     row = {"place": sample.place} | about | {"seam_lpips": value, "psnr": min(psnr or MAX_PSNR, MAX_PSNR)}
     yield row | {"jump": measure_jump(shown.picture, side, known)}
     jumps = [measure_jump(picture, side, known) for picture in shown.own]
-    mean = None if None in jumps else float(np.dot(jumps, shown.share))
+    known_jumps = [jump for jump in jumps if jump is not None]
+    mean = float(np.dot(known_jumps, shown.share)) if len(known_jumps) == len(jumps) else None
     yield {"place": "floor"} | about | {"seam_lpips": floor, "psnr": None, "jump": mean}
 
 

@@ -92,4 +92,4 @@ def compute_floor(
 def exclude_overlaps(boxes: Int[Array, "k 2 2"], bank: Int[Array, "m 2 2"]) -> Bool[Array, "m"]:
     """Which crops of the bank overlap none of a crop's sources; boxes of exemplar cells, both ends included."""
     low, high = boxes[:, None, 0] <= bank[None, :, 1], boxes[:, None, 1] >= bank[None, :, 0]
-    return ~(low & high).all(-1).any(0)
+    return np.logical_not((low & high).all(-1).any(0))

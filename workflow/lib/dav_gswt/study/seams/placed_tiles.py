@@ -13,6 +13,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.bundle import direction_search
 from dav_gswt.bundle.build import BundleOptions, describe_tiles
+from dav_gswt.bundle.content import BundleContent
 from dav_gswt.field import GaussianField
 from dav_gswt.study.seams.spatial_index import SpatialIndex
 from dav_gswt.terrain import endless
@@ -92,7 +93,7 @@ def detrend_exemplar(
     _, height = build.compute_ground_maps(levels[0], exemplar)
     trend = trends.fit_trend(colour, height, exemplar, width)
     flat = [trends.remove_trend(field, trend) for field in levels]
-    corner = np.float32([exemplar.west, exemplar.south, 0])
+    corner = np.array([exemplar.west, exemplar.south, 0], np.float32)
     home = replace(exemplar, west=0.0, south=0.0)
     flat = [replace(field, means=field.means - corner) for field in flat]
     return DetrendedExemplar(home, [SpatialIndex.from_field(field) for field in flat], _mean_cells(flat[0], home))
@@ -104,7 +105,7 @@ def place_tiles(tiles: build.TileSet, source: DetrendedExemplar, salt: int, tau:
     """
     options = BundleOptions(tau=tau, salt=salt)
     rings = direction_search.search_directions(tiles.fields[0], tiles.side, options.decibels).rings
-    manifest = describe_tiles(tiles, options, rings)
+    manifest = describe_tiles(BundleContent.of_one_material(tiles), options, rings)
     terrain = replace(endless.terrain_from_fields(tiles.fields, manifest, {"kind": "flat"}), reach=REACH)
     plan = tiles.report.layout
     first = -(WINDOW // 2)

@@ -7,8 +7,8 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.geometry import cameras
+from dav_gswt.images import figures
 from dav_gswt.raster import render
-from dav_gswt.study import figures
 from dav_gswt.study.seams.repetition import Autocorrelations
 from dav_gswt.study.seams.summary import EVERY, MEASURES
 from dav_gswt.tiles.build import TileSet
@@ -20,7 +20,7 @@ NAMES = {"seam_lpips": "Seam-LPIPS of cuts over their floor", "psnr": "PSNR of c
 def write_ablation(path: Path | str, rows: list[dict], baseline: str) -> None:
     """A panel for each measure: every variant minus the baseline with its 95 % interval; dots are scenes."""
     variants = sorted({row["variant"] for row in rows})
-    figure = figures.blank(11.0, 1.4 + 0.5 * max(len(variants), 1))
+    figure = figures.make_figure(11.0, 1.4 + 0.5 * max(len(variants), 1))
     for axes, measure in zip(figure.subplots(1, len(MEASURES)), MEASURES, strict=True):
         for place, variant in enumerate(variants):
             mine = [r for r in rows if (r["variant"], r["measure"]) == (variant, measure)]
@@ -36,12 +36,12 @@ def write_ablation(path: Path | str, rows: list[dict], baseline: str) -> None:
         axes.set_xlabel(f"{NAMES[measure]}, less that of {baseline}", fontsize=8)
         axes.tick_params(axis="x", labelsize=7)
         axes.grid(axis="x", alpha=0.3)
-    figures.save(figure, path)
+    figures.save_figure(figure, path)
 
 
 def write_cuts(path: Path | str, variants: dict[str, TileSet]) -> None:
     """Some tiles from above with their cuts, a row for each variant."""
-    figure = figures.blank(3.0 * TILES_SHOWN, 3.2 * len(variants))
+    figure = figures.make_figure(3.0 * TILES_SHOWN, 3.2 * len(variants))
     grid = figure.subplots(len(variants), TILES_SHOWN, squeeze=False)
     for line, (name, tiles) in zip(grid, variants.items(), strict=True):
         for axes, number in zip(line, np.linspace(0, 15, TILES_SHOWN).astype(int).tolist(), strict=True):
@@ -49,7 +49,7 @@ def write_cuts(path: Path | str, variants: dict[str, TileSet]) -> None:
             _draw_cuts(axes, tiles.labels[number], tiles.spacing)
             axes.set_title(f"{name}, tile {number}", fontsize=9, loc="left")
             axes.axis("off")
-    figures.save(figure, path)
+    figures.save_figure(figure, path)
 
 
 def render_tile(tiles: TileSet, number: int) -> Float[Array, "h w 3"]:
@@ -68,20 +68,19 @@ def _draw_cuts(axes, labels: Array, spacing: float) -> None:
     y, x = np.nonzero(labels[1:] != labels[:-1])
     flat = np.stack([np.stack([x, y + 1], 1), np.stack([x + 1, y + 1], 1)], 1)
     lines = np.concatenate([upright, flat]) * spacing
-    axes.add_collection(LineCollection(lines, colors="#d55e00", linewidths=1.0))
+    axes.add_collection(LineCollection(list(lines), colors="#d55e00", linewidths=1.0))
 
 
 def write_autocorrelations(path: Path | str, measured: Autocorrelations) -> None:
     """Both autocorrelations over lags in tiles; dotted lines mark the tile's period."""
-    figure = figures.blank(9.0, 4.4)
+    figure, images = figures.make_figure(9.0, 4.4), []
     for axes, (name, r) in zip(
         figure.subplots(1, 2), (("terrain", measured.terrain), ("exemplar", measured.exemplar)), strict=True
     ):
         reach = 2.5 if name == "terrain" else 0.45 * len(measured.exemplar) / measured.pixels
         half = [n / 2 / measured.pixels for n in r.shape]
-        image = axes.imshow(
-            r, extent=(-half[1], half[1], -half[0], half[0]), vmin=-0.2, vmax=0.2, cmap="RdBu_r", interpolation="none"
-        )
+        extent = (-half[1], half[1], -half[0], half[0])
+        images.append(axes.imshow(r, extent=extent, vmin=-0.2, vmax=0.2, cmap="RdBu_r", interpolation="none"))
         axes.set_xlim(-reach, reach)
         axes.set_ylim(-reach, reach)
         for lag in (-1, 1):
@@ -89,5 +88,5 @@ def write_autocorrelations(path: Path | str, measured: Autocorrelations) -> None
             axes.axhline(lag, color="0.4", linewidth=0.6, linestyle=":")
         axes.set_title(f"autocorrelation of the {name}", fontsize=10, loc="left")
         axes.set_xlabel("tiles east", fontsize=9)
-    figure.colorbar(image, ax=figure.axes, shrink=0.8)
-    figures.save(figure, path)
+    figure.colorbar(images[-1], ax=figure.axes, shrink=0.8)
+    figures.save_figure(figure, path)

@@ -57,7 +57,7 @@ def _place_tiles(tiles: TileSet, level: int, first: int, salt: int) -> GaussianF
 
 
 def _move(field: GaussianField, east: float, north: float) -> GaussianField:
-    return replace(field, means=field.means + np.float32([east, north, 0]))
+    return replace(field, means=field.means + np.array([east, north, 0], np.float32))
 
 
 def _render_top_view(field: GaussianField, side: float, pixel: float) -> Float[Array, "h w 3"]:

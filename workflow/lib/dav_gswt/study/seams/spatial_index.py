@@ -10,7 +10,7 @@ from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster.interface import RIM
 
-MAX_SLOPE = 1.5  # ground that a thing may hide behind it, over what it hides on level ground
+MAX_SLOPE = 1.5  # ground that an object may hide behind it, over what it hides on level ground
 
 Box = Float[Array, "2 2"]  # south-western and north-eastern corner, in world units
 
@@ -30,9 +30,9 @@ class Footprint:
     def occlusion_range(
         self, axis: int, low: Float[Array, "n"], high: Float[Array, "n"]
     ) -> tuple[Float[Array, "n"], ...]:
-        """Interval along an axis, relative to their places, in which things between two heights may hide the ground.
+        """Interval along an axis, relative to their places, in which objects between two heights may hide the ground.
 
-        A thing at height z hides it up to MAX_SLOPE z per_height behind itself: less on a slope up, more on a slope
+        An object at height z hides it up to MAX_SLOPE z per_height behind itself: less on a slope up, more on a slope
         down. A patch that is placed higher or lower as a whole takes its ground along.
         """
         offset = MAX_SLOPE * self.per_height[axis]

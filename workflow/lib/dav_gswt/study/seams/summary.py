@@ -80,8 +80,9 @@ def compare_variants(rows: list[dict], baseline: str) -> list[dict]:
         for measure in MEASURES:
             differences = []
             for scene, seed, _ in sorted(key for key in cells if key[2] == variant):
-                pair = [cells.get((scene, seed, name)) for name in (variant, baseline)]
-                if not all(pair) or not all(sums := [_sum_variant(some, measure) for some in pair]):
+                keys = [(scene, seed, name) for name in (variant, baseline)]
+                sums = [_sum_variant(cells[key], measure) for key in keys if key in cells]
+                if len(sums) < 2 or not all(sums):
                     continue
                 first, second = statistics.bootstrap_clusters(*sums)
                 differences.append(first[:, 0] - second[:, 0])

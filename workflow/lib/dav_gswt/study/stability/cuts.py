@@ -57,14 +57,14 @@ def _gradient_terms(colour: Array, ground: Array, share: float, shift: int, kind
     return d, g
 
 
-def _weights_reference(*layers) -> Array:
-    d, g = _gradient_terms(*layers, np.float64)
+def _weights_reference(colour: Array, ground: Array, share: float, shift: int) -> Array:
+    d, g = _gradient_terms(colour, ground, share, shift, np.float64)
     return d / (g + energy.EPS)
 
 
-def _weights_printed(*layers) -> Array:
+def _weights_printed(colour: Array, ground: Array, share: float, shift: int) -> Array:
     """The appendix: G over D."""
-    d, g = _gradient_terms(*layers, np.float32)
+    d, g = _gradient_terms(colour, ground, share, shift, np.float32)
     return g / d
 
 

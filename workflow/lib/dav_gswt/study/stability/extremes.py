@@ -37,7 +37,8 @@ def make_ground_field(count: int, side: float) -> GaussianField:
     step = side / count
     x, y = np.meshgrid((np.arange(count) + 0.5) * step, (np.arange(count) + 0.5) * step)
     waves = rng.uniform(0, 2 * np.pi, (6, 2)), rng.uniform(2, 9, (6, 2)) * 2 * np.pi / side
-    blotch = sum(np.sin(k[0] * x + p[0]) * np.sin(k[1] * y + p[1]) for p, k in zip(*waves, strict=True)).ravel()
+    parts = (np.sin(k[0] * x + p[0]) * np.sin(k[1] * y + p[1]) for p, k in zip(*waves, strict=True))
+    blotch = sum(parts, np.zeros_like(x)).ravel()
     grain = 0.04 * rng.standard_normal((count**2, 1))
     colour = np.array([0.55, 0.45, 0.32]) + 0.07 * blotch[:, None] * np.array([1.0, 0.4, -0.6]) + grain
     n = count**2

@@ -88,7 +88,7 @@ def _similar_cases() -> list[Case]:
     ]
 
 
-def _psnr(a: Array, b: Array, weight: Array) -> float:
+def _psnr(a: Array, b: Array, weight: Array) -> float | None:
     return metrics.psnr(a, b, weight)
 
 

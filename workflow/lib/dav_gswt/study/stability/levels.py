@@ -80,7 +80,9 @@ def _equal_splat_cases() -> list[Case]:
 
 
 def _switch_distance(scale: float) -> float:
-    return level_distances.compute_levels([0.5 * scale, scale], 1.0, 0.1)[0].distance
+    distance = level_distances.compute_levels([0.5 * scale, scale], 1.0, 0.1)[0].distance
+    assert distance is not None  # of the last level alone
+    return distance
 
 
 def _shape_cases() -> list[Case]:
@@ -157,7 +159,7 @@ def _octave(k: int, x: Fraction, y: Fraction) -> tuple[float, float, float]:
     value = by_x = by_y = Fraction(0)
     for a in (0, 1):
         for b in (0, 1):
-            bits = hash_cell(i + a, j + b, HILLS + k, 3)
+            bits = int(hash_cell(i + a, j + b, HILLS + k, 3))
             east, north = Fraction(bits & 0xFFFF) / Fraction(32767.5) - 1, Fraction(bits >> 16) / Fraction(32767.5) - 1
             (fx, tx), (fy, ty) = fade(u), fade(v)
             (fx, tx), (fy, ty) = (fx, tx) if a else (1 - fx, -tx), (fy, ty) if b else (1 - fy, -ty)
@@ -176,17 +178,19 @@ def _cell_cases() -> list[Case]:
 
 def _hash(i: Array, j: Array, salt: int) -> Array:
     with np.errstate(over="ignore"):
-        return hash_cell(i, j, 2, salt).astype(np.float64)
+        return np.asarray(hash_cell(i, j, 2, salt), np.float64)
 
 
 def _hash_reference(i: Array, j: Array, salt: int) -> Array:
     """In integers of any size."""
-    cases = []
-    for a, b in zip(i.tolist(), j.tolist(), strict=True):
-        h = (a * 0x8DA6B343 ^ b * 0xD8163841 ^ 2 * 0xCB1AB31F ^ salt) % 2**32
+
+    def mix(h: int) -> int:
         h = (h ^ h >> 16) * 0x85EBCA6B % 2**32
         h = (h ^ h >> 13) * 0xC2B2AE35 % 2**32
-        cases.append(h ^ h >> 16)
+        return h ^ h >> 16
+
+    pairs = zip(i.tolist(), j.tolist(), strict=True)
+    cases = [mix((mix((a * 0x8DA6B343 ^ 2 * 0xCB1AB31F ^ salt) % 2**32) + b * 0xD8163841) % 2**32) for a, b in pairs]
     return np.array(cases, np.float64)
 
 

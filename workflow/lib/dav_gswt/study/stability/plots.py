@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt.study import figures
+from dav_gswt.images import figures
 
 MIN_SHARE, MAX_SHARE = 1e-6, 1e18  # ends of the axis: exact results are at the left end, infinite errors at the right
 WIDTH, ROW_HEIGHT = 9.0, 0.215  # inches
@@ -13,20 +13,20 @@ COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple", "tab:
 
 def write_tolerance_plot(path: Path | str, rows: list[dict]) -> None:
     """Write the figure. rows: of the table of formulas, as text."""
-    figures.save(plot_tolerances(rows), path)
+    figures.save_figure(plot_tolerances(rows), path)
 
 
 def plot_tolerances(rows: list[dict]):
     """A line for each formula, a colour for each group: a dot for ours, a cross for the printed form."""
-    figure = figures.blank(WIDTH, 1.3 + ROW_HEIGHT * len(rows))
+    figure = figures.make_figure(WIDTH, 1.3 + ROW_HEIGHT * len(rows))
     axes = figure.add_subplot()
     groups = list(dict.fromkeys(row["group"] for row in rows))
     for i, row in enumerate(rows):
-        style = {"color": COLOURS[groups.index(row["group"]) % len(COLOURS)], "linestyle": ""}
-        axes.plot(_clip_share(row["share_of_tolerance"]), i, marker="o", markersize=5, **style)
+        colour = COLOURS[groups.index(row["group"]) % len(COLOURS)]
+        axes.plot(_clip_share(row["share_of_tolerance"]), i, marker="o", markersize=5, color=colour, linestyle="")
         if row["printed_share_of_tolerance"]:
             x = _clip_share(row["printed_share_of_tolerance"])
-            axes.plot(x, i, marker="x", markersize=6, markeredgewidth=2, **style)
+            axes.plot(x, i, marker="x", markersize=6, markeredgewidth=2, color=colour, linestyle="")
             label = f"gives {float(row['printed_gives']):.6g} for {float(row['printed_right']):.4g}"
             offset = {"xytext": (-8, 0), "ha": "right"} if x > 1e10 else {"xytext": (8, 0), "ha": "left"}
             axes.annotate(label, (x, i), textcoords="offset points", va="center", fontsize=7, **offset)

@@ -16,6 +16,7 @@ AHEAD = Camera(np.eye(3), np.zeros(3), 20.0, 20.0, SIDE / 2, SIDE / 2, SIDE, SID
 VIEWS = (("pinhole", PINHOLE), ("map", MAP))
 RIM = 1 / 255  # step of alpha where a splat ends
 Arrays = dict[str, Array]
+PARAMETERS = ("means", "log_scales", "quats", "opacity_logits", "colours")  # of Gaussians, in the oracle's order
 
 
 def random_cloud(n: int, seed: int = 0, channels: int = 3, **more) -> Arrays:
@@ -42,8 +43,11 @@ def render_reference(arrays: Arrays, camera: Camera, near: float = 0.01, antiali
 
     from dav_gswt.raster import oracle
 
-    tensors = {name: torch.tensor(a, dtype=torch.float64) for name, a in arrays.items()}
-    colour, alpha, _ = oracle.forward(**tensors, camera=camera, near=near, antialiased=antialiased)
+    gaussians = (torch.tensor(arrays[name], dtype=torch.float64) for name in PARAMETERS)
+    means, log_scales, quats, opacity_logits, colours = gaussians
+    colour, alpha, _ = oracle.forward(
+        means, log_scales, quats, opacity_logits, colours, camera, near=near, antialiased=antialiased
+    )
     return torch.cat([colour, alpha[..., None]], -1).numpy()
 
 
@@ -173,10 +177,11 @@ def _oracle_gradients(arrays: Arrays, camera: Camera) -> Arrays:
 
     from dav_gswt.raster import oracle
 
-    leaves = {name: torch.tensor(a, dtype=torch.float64, requires_grad=True) for name, a in arrays.items()}
-    colour, _, _ = oracle.forward(**leaves, camera=camera)
-    (colour * torch.from_numpy(_output_gradient()).double()).sum().backward()
-    return {name: leaf.grad.numpy() for name, leaf in leaves.items()}
+    leaves = [torch.tensor(arrays[name], dtype=torch.float64, requires_grad=True) for name in PARAMETERS]
+    means, log_scales, quats, opacity_logits, colours = leaves
+    colour, _, _ = oracle.forward(means, log_scales, quats, opacity_logits, colours, camera)
+    loss = (colour * torch.from_numpy(_output_gradient()).double()).sum()
+    return {name: g.numpy() for name, g in zip(PARAMETERS, torch.autograd.grad(loss, leaves), strict=True)}
 
 
 def _output_gradient() -> Array:
@@ -202,8 +207,10 @@ def _information_reference(arrays: Arrays, camera: Camera, know: float) -> float
 
     from dav_gswt.raster import oracle
 
-    tensors = {name: torch.tensor(a, dtype=torch.float64) for name, a in arrays.items()}
-    splats = oracle.project(**tensors, camera=camera, view=oracle.moved(camera, None, tensors["means"]))
+    gaussians = (torch.tensor(arrays[name], dtype=torch.float64) for name in PARAMETERS)
+    means, log_scales, quats, opacity_logits, colours = gaussians
+    view = oracle.move_camera(camera, None, means)
+    splats = oracle.project(means, log_scales, quats, opacity_logits, colours, camera, view)
     x, y = np.meshgrid(np.arange(SIDE) + 0.5, np.arange(SIDE) + 0.5)
     weight = oracle.weights(splats, torch.from_numpy(np.stack([x.ravel(), y.ravel()], 1)))
     return float((weight**2).sum() / know)

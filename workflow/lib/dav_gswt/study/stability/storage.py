@@ -15,7 +15,7 @@ from dav_gswt.views import pose_maps
 from dav_gswt.views.pose_maps import PoseMaps
 
 COUNT = 200
-PIXELS = 128  # of the nearest ground in sight, along a tile's side
+PIXELS = 128  # of the nearest visible ground, along a tile's side
 SIDES = (1e-12, 1e-3, 1.0, 1e6)
 
 

@@ -132,12 +132,12 @@ def _normalise_reference(u: Array, low: float, high: float) -> Array:
 
 
 def _threshold_cases() -> list[Case]:
-    near = np.float64([0, 1e-12, 0.3, 0.6 - 1e-12, 0.6, 0.6 + 1e-12, 1 - 1e-12, 1])
+    near = np.array([0, 1e-12, 0.3, 0.6 - 1e-12, 0.6, 0.6 + 1e-12, 1 - 1e-12, 1], np.float64)
     return [Case(f"tau {tau:g}, u = ", (near, tau), near) for tau in (0.0, 1e-12, 0.6, 1 - 1e-12, 1.0)]
 
 
 def _order_count(u: Array, tau: float) -> Array:
-    return np.array([len(DirectionRings().select(float(x), tau)) for x in u])
+    return np.array([len(DirectionRings().select_directions(float(x), tau)) for x in u])
 
 
 def _order_count_reference(u: Array, tau: float) -> Array:

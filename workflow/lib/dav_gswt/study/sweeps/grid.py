@@ -14,7 +14,7 @@ ASKING = ("prior", "p_drop", "lam")  # what only a prior that is asked depends o
 EVERYTHING = "all"  # the policy that takes the whole pool in one round
 
 
-def combinations(vary: dict[str, list], fixed: dict) -> list[dict]:
+def list_combinations(vary: dict[str, list], fixed: dict) -> list[dict]:
     """The settings of every combination, in the order they stand in: `fixed`, and a value of each of `vary` over it.
 
     A policy with settings of its own, {policy: residual, prior: independent, p_drop: 0}, brings these. `shown` holds
@@ -25,33 +25,33 @@ def combinations(vary: dict[str, list], fixed: dict) -> list[dict]:
         chosen = dict(fixed)
         for key, value in zip(vary, values, strict=True):
             chosen |= value if isinstance(value, dict) else {key: value}
-        found.append(chosen | {"shown": dict(zip(vary, map(named, values), strict=True))})
+        found.append(chosen | {"shown": dict(zip(vary, map(name_value, values), strict=True))})
     return found
 
 
-def named(value):
+def name_value(value):
     """A varied value as tables name it: of a policy with settings of its own the policy."""
     return value["policy"] if isinstance(value, dict) else value
 
 
-def rounds_of(chosen: dict, policy: str, start: int, k: int, rounds: int) -> int:
+def count_rounds(chosen: dict, policy: str, start: int, k: int, rounds: int) -> int:
     """How many rounds a cell takes: those asked for, or as many of k as `photos` of `chosen` have room for."""
     if "photos" in chosen:
         rounds = (chosen["photos"] - start) // k
     return min(rounds, 1) if policy == EVERYTHING else rounds
 
 
-def seeds_of(measure: dict[str, list[int]]) -> list[int]:
+def list_seeds(measure: dict[str, list[int]]) -> list[int]:
     """All seeds of which anything is measured."""
     return sorted({seed for seeds in measure.values() for seed in seeds})
 
 
-def start_of(scene: dict) -> int:
+def count_start_photos(scene: dict) -> int:
     """Photos that a scene starts from."""
     return scene["start"] if "start" in scene else scene["photos"]
 
 
-def check(config: dict) -> None:
+def check_sweeps(config: dict) -> None:
     """Check the rows of `sweeps` against the rest of the config.
 
     Raises: InputError: the row and key, what is wrong with it, and what it may be.
@@ -64,8 +64,8 @@ def check(config: dict) -> None:
         if both := [key for key in asked["vary"] if key in asked.get("fixed", {})]:
             raise InputError(f"{where}.fixed.{both[0]}: is varied already; leave it out there")
         _check_names(where, asked, config)
-        for chosen in combinations(asked["vary"], asked.get("fixed", {})):
-            _check_asking(where, asked["vary"], chosen.get("policy", config["policy"]))
+        for chosen in list_combinations(asked["vary"], asked.get("fixed", {})):
+            _check_effect(where, asked["vary"], chosen.get("policy", config["policy"]))
             _check_photos(where, asked["scenes"], chosen, config)
 
 
@@ -87,7 +87,7 @@ def _check_names(where: str, asked: dict, config: dict) -> None:
             raise InputError(f"{where}.scenes: {scene} is no scene with photos; they are {able}")
 
 
-def _check_asking(where: str, vary: dict, policy: str) -> None:
+def _check_effect(where: str, vary: dict, policy: str) -> None:
     """What is varied must matter: two cells of one path would be one."""
     for key in ASKING:
         if key in vary and len(vary) == 1 and (policy in GEOMETRIC or key in ZERO_SETTINGS.get(policy, ())):
@@ -100,7 +100,7 @@ def _check_asking(where: str, vary: dict, policy: str) -> None:
 def _check_photos(where: str, scenes: list[str], chosen: dict, config: dict) -> None:
     k = chosen.get("k", config["k"])
     for name in scenes:
-        start = start_of(config["scenes"][name])
+        start = count_start_photos(config["scenes"][name])
         if "photos" in chosen and "rounds" in chosen:
             raise InputError(f"{where}: photos and rounds cannot both be given; leave one out")
         if chosen.get("photos", start + k) < start + k:

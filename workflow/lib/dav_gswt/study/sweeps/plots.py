@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dav_gswt.study import figures
+from dav_gswt.images import figures
 from dav_gswt.study.comparison.plots import COLOURS
 from dav_gswt.study.sweeps.grid import EVERYTHING
 
@@ -27,12 +27,12 @@ COLUMNS, WIDE, TALL = 3, 3.3, 2.5  # inches a panel
 LONG = 8  # letters of a name, above which names lie askew
 
 
-def write(path: Path | str, name: str, axes: list[str], rows: list[dict]) -> None:
-    """The figure of `drawn`, as a PNG."""
-    figures.save(drawn(name, axes, rows), path)
+def write_figure(path: Path | str, name: str, axes: list[str], rows: list[dict]) -> None:
+    """The figure of `draw_figure`, as a PNG."""
+    figures.save_figure(draw_figure(name, axes, rows), path)
 
 
-def drawn(name: str, axes: list[str], rows: list[dict]):
+def draw_figure(name: str, axes: list[str], rows: list[dict]):
     """A line a scene: means over seeds, and a dot a seed. name: of the sweep; axes: what is varied, as the config names
     it. Of two axes the last value of the second is shown, but for curves of PSNR against photos, a line a value of the
     first."""
@@ -41,13 +41,13 @@ def drawn(name: str, axes: list[str], rows: list[dict]):
     last = [row for row in rows if len(axes) < 2 or row["varied_1"] == _last(rows, row["varied_0"])]
     shown = [key for key in PANELS if any(row[key] is not None for row in last)]
     count = len(curves) + len(shown)
-    figure = figures.blank(WIDE * min(COLUMNS, count), TALL * -(-count // COLUMNS) + 0.5)
+    figure = figures.make_figure(WIDE * min(COLUMNS, count), TALL * -(-count // COLUMNS) + 0.5)
     grid = figure.subplots(-(-count // COLUMNS), min(COLUMNS, count), squeeze=False).ravel()
     for panel, scene in zip(grid, curves, strict=False):
-        _curves(panel, [row for row in rows if row["scene"] == scene])
+        _draw_curves(panel, [row for row in rows if row["scene"] == scene])
         panel.set_title(scene, fontsize=9, loc="left")
     for panel, key in zip(grid[len(curves) :], shown, strict=False):
-        _panel(panel, axes[0], key, last, scenes)
+        _draw_panel(panel, axes[0], key, last, scenes)
     for empty in grid[count:]:
         empty.axis("off")
     key = grid[len(curves)].get_legend_handles_labels()
@@ -63,14 +63,14 @@ def _last(rows: list[dict], value: str) -> str:
     return [row["varied_1"] for row in rows if row["varied_0"] == value][-1]
 
 
-def _panel(panel, axis: str, key: str, rows: list[dict], scenes: list[str]) -> None:
+def _draw_panel(panel, axis: str, key: str, rows: list[dict], scenes: list[str]) -> None:
     values = list(dict.fromkeys(row["varied_0"] for row in rows))
     for scene, colour in zip(scenes, COLOURS * len(scenes), strict=False):
         found = {v: [r[key] for r in rows if (r["scene"], r["varied_0"]) == (scene, v)] for v in values}
         known = {v: [x for x in each if x is not None] for v, each in found.items()}
         at = [i for i, v in enumerate(values) if known[v]]
         means = [float(np.mean(known[values[i]])) for i in at]
-        line = 1.2 if all(map(_number, values)) else 0  # between names there is nothing
+        line = 1.2 if all(map(_is_number, values)) else 0  # between names there is nothing
         panel.plot(at, means, marker="_", markersize=14, markeredgewidth=2, color=colour, linewidth=line, label=scene)
         for i in at:
             panel.plot([i] * len(known[values[i]]), known[values[i]], "o", color=colour, markersize=3.5, alpha=0.6)
@@ -78,14 +78,14 @@ def _panel(panel, axis: str, key: str, rows: list[dict], scenes: list[str]) -> N
     panel.set_xticks(range(len(values)), values, fontsize=8, **askew)
     panel.set_xlim(-0.5, len(values) - 0.5)
     panel.set_xlabel(axis, fontsize=9)
-    _dress(panel, PANELS[key])
+    _label_axes(panel, PANELS[key])
 
 
-def _number(text: str) -> bool:
+def _is_number(text: str) -> bool:
     return text.replace(".", "", 1).isdigit()
 
 
-def _curves(panel, rows: list[dict]) -> None:
+def _draw_curves(panel, rows: list[dict]) -> None:
     for value, colour in zip(dict.fromkeys(row["varied_0"] for row in rows), COLOURS * len(rows), strict=False):
         mine = [row for row in rows if row["varied_0"] == value and row["psnr"] is not None]
         photos = sorted({row["photos"] for row in mine})
@@ -95,10 +95,10 @@ def _curves(panel, rows: list[dict]) -> None:
         else:
             panel.plot(photos, means, marker="o", markersize=3.5, linewidth=1.4, color=colour, label=value)
     panel.set_xlabel("photos", fontsize=9)
-    _dress(panel, PANELS["psnr"])
+    _label_axes(panel, PANELS["psnr"])
 
 
-def _dress(panel, label: str) -> None:
+def _label_axes(panel, label: str) -> None:
     panel.set_ylabel(label, fontsize=9)
     panel.tick_params(labelsize=8)
     panel.grid(alpha=0.3)

@@ -8,6 +8,7 @@ from dav_gswt.study import csv_tables
 from dav_gswt.study.comparison import curves
 from dav_gswt.study.seams import summary
 from dav_gswt.study.seams import tables as crops
+from dav_gswt.study.statistics import sum_or_none
 from dav_gswt.study.sweeps.grid import CELL
 
 KEY = ("sweep", *CELL)  # what tells rows apart
@@ -23,7 +24,7 @@ SOURCES = ("psnr_is", "version", "renderer", "field", "tiles")
 MEGA = 1e6
 
 
-def row(cell: dict) -> dict:
+def tabulate_cell(cell: dict) -> dict:
     """The row of an experiment; what was not measured is None.
 
     psnr_is: `colour-corrected` of photos, whose exposure changes, else `raw`. uncertainty: mean over the tiles; deep:
@@ -37,54 +38,55 @@ def row(cell: dict) -> dict:
     files, found = cell["files"], {key: cell[key] for key in (*KEY, *ABOUT)}
     found |= {f"varied_{k}": value for k, value in enumerate(cell["varied"].values())}
     found |= {"psnr_is": "colour-corrected" if cell["corrected"] else "raw"}
-    found |= _views(files["metrics"], cell["corrected"]) if "metrics" in files else {}
-    found |= _tiles(files["manifest"]) if "manifest" in files else {}
-    found |= _seams(cell | files) if "crops" in files else {}
-    return dict.fromkeys(columns(len(cell["varied"]))) | found | times(cell["times"])
+    found |= _read_views(files["metrics"], cell["corrected"]) if "metrics" in files else {}
+    found |= _read_tiles(files["manifest"]) if "manifest" in files else {}
+    found |= _read_seams(cell | files) if "crops" in files else {}
+    return dict.fromkeys(list_columns(len(cell["varied"]))) | found | sum_times(cell["times"])
 
 
-def columns(axes: int) -> tuple[str, ...]:
+def list_columns(axes: int) -> tuple[str, ...]:
     """The table's columns, in order. axes: how many settings are varied together."""
     return (*KEY, *(f"varied_{k}" for k in range(axes)), *ABOUT, *VIEWS, *TILES, *SEAMS, *TIMES, *SOURCES)
 
 
-def read(path: Path | str) -> list[dict]:
+def read_sweep(path: Path | str) -> list[dict]:
     """Read a sweep's table, NUMBERS as floats, None where empty; no rows where there is no file yet."""
     return csv_tables.read_table(path, numbers=NUMBERS, missing_ok=True)
 
 
-def times(jobs: dict[str, list[str]]) -> dict:
+def sum_times(jobs: dict[str, list[str]]) -> dict:
     """Seconds by job and the largest memory, of benchmarks; None where one of them is not there."""
-    told = {job: [_benchmark(path) for path in paths] for job, paths in jobs.items()}
-    seconds = {job: None if None in found or not found else sum(s for s, _ in found) for job, found in told.items()}
-    out = dict.fromkeys(TIMES) | {f"{job}_s": seconds.get(job) for job in ONCE}
+    runs = {job: [_read_benchmark(path) for path in paths] for job, paths in jobs.items() if paths}
+    seconds = {job: sum_or_none(one and one[0] for one in found) for job, found in runs.items()}
+    out: dict[str, float | None] = dict.fromkeys(TIMES) | {f"{job}_s": seconds.get(job) for job in ONCE}
     for job in ROUNDS:
-        out[f"{job}_s"] = None if seconds.get(job) is None else seconds[job] / len(told[job])
-    parts = [seconds[job] for job in ("coarse", *ROUNDS) if told.get(job)]
-    out["recon_s"] = None if None in parts or not parts else sum(parts)
-    memory = [one[1] for found in told.values() for one in found if one and one[1] is not None]
+        total = seconds.get(job)
+        out[f"{job}_s"] = None if total is None else total / len(runs[job])
+    parts = [seconds[job] for job in ("coarse", *ROUNDS) if job in runs]
+    out["recon_s"] = sum_or_none(parts) if parts else None
+    memory = [one[1] for found in runs.values() for one in found if one and one[1] is not None]
     return out | {"peak_mb": max(memory, default=None)}
 
 
-def _benchmark(path: str) -> tuple[float, float | None] | None:
+def _read_benchmark(path: str) -> tuple[float, float | None] | None:
     """Seconds and megabytes of a job; memory is None for a job that was over at once."""
     if not Path(path).is_file():
         return None
     with Path(path).open(newline="", encoding="utf-8") as text:
-        told = next(csv.DictReader(text, delimiter="\t"))
-    memory = told.get("max_rss", "")
-    return float(told["s"]), float(memory) if memory.replace(".", "", 1).isdigit() else None
+        row = next(csv.DictReader(text, delimiter="\t"))
+    memory = row.get("max_rss", "")
+    return float(row["s"]), float(memory) if memory.replace(".", "", 1).isdigit() else None
 
 
-def _views(path: str, corrected: bool) -> dict:
-    told = read_json(path)
-    about = told["provenance"]
-    found = {key: told[key] for key in ("photos", "gaussians")}
-    found |= curves.select_metrics(told, "psnr_colour_corrected" if corrected else "psnr")
-    return found | _origin(about) | {"field": about["inputs"]["field"][:12]}
+def _read_views(path: str, corrected: bool) -> dict:
+    metrics = read_json(path)
+    about = metrics["provenance"]
+    found = {key: metrics[key] for key in ("photos", "gaussians")}
+    found |= curves.select_metrics(metrics, "psnr_colour_corrected" if corrected else "psnr")
+    return found | _describe_origin(about) | {"field": about["inputs"]["field"][:12]}
 
 
-def _tiles(path: str) -> dict:
+def _read_tiles(path: str) -> dict:
     manifest = read_json(path)
     tiles = manifest["tiles"]
     chunks = [chunk for tile in tiles for chunk in tile["chunks"]]
@@ -96,18 +98,18 @@ def _tiles(path: str) -> dict:
         "splats": sum(chunk["count"] for chunk in chunks),
         "orders": sum(len(chunk["orders"]) for chunk in chunks),
         "bundle_mb": sum(chunk["bytes"] for chunk in chunks) / MEGA,
-    } | _origin(manifest["provenance"])
+    } | _describe_origin(manifest["provenance"])
 
 
-def _seams(cell: dict) -> dict:
+def _read_seams(cell: dict) -> dict:
     rows = crops.tabulate_crops(cell | {"table": cell["crops"], "variant": cell["tiling"], "replicate": 0})
-    told = next(r for r in summary.summarise_crops(rows) if r["view"] == r["ground"] == summary.EVERY)
+    row = next(r for r in summary.summarise_crops(rows) if r["view"] == r["ground"] == summary.EVERY)
     named = {"seam_lpips": "cut", "seam_lpips_low": "cut_low", "seam_lpips_high": "cut_high"}
-    found = {key: told[name] for key, name in (named | {"seam_psnr": "cut_psnr", "seam_jump": "cut_jump"}).items()}
+    found = {key: row[name] for key, name in (named | {"seam_psnr": "cut_psnr", "seam_jump": "cut_jump"}).items()}
     facts = read_json(cell["facts"])
-    return found | {"seam_density": facts["dense"], "tiles": told["tiles"]} | _origin(facts["provenance"])
+    return found | {"seam_density": facts["dense"], "tiles": row["tiles"]} | _describe_origin(facts["provenance"])
 
 
-def _origin(provenance: dict) -> dict:
+def _describe_origin(provenance: dict) -> dict:
     renderer = " ".join(str(value) for value in provenance["renderer"].values())
     return {"version": provenance["version"], "renderer": renderer}

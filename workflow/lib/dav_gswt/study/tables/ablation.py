@@ -13,7 +13,7 @@ COMPARED = ("psnr", "seam_lpips")  # measures that are tested
 PRINTED = ("psnr", "seam_lpips", "memory_gb", "render_ms", "score_s", "p")
 
 
-def rows(sweeps: dict[str, list[dict]], baselines: dict[str, str]) -> list[dict]:
+def tabulate_ablation(sweeps: dict[str, list[dict]], baselines: dict[str, str]) -> list[dict]:
     """A row for each variant of each sweep: means and deviations over seeds as in `sensitivity`, and for each measure
     of COMPARED its difference from the sweep's baseline, paired by scene and seed (`statistics.PairedTest`).
 
@@ -26,11 +26,10 @@ def rows(sweeps: dict[str, list[dict]], baselines: dict[str, str]) -> list[dict]
         variants = list(dict.fromkeys(row["varied_0"] for row in last))
         block = [_variant(name, variant, last, baselines[name]) for variant in variants]
         for key in COMPARED:
-            adjusted = statistics.adjust_holm(
-                {row["variant"]: row[f"{key}_p"] for row in block if row[f"{key}_p"] is not None}
-            )
-            block = [row | {f"{key}_holm": adjusted.get(row["variant"])} for row in block]
-        found += [row | paper.beside("ablation", row["variant"], PRINTED) for row in block]
+            known = {v: p for v, row in zip(variants, block, strict=True) if (p := row[f"{key}_p"]) is not None}
+            adjusted = statistics.adjust_holm(known)
+            block = [row | {f"{key}_holm": adjusted.get(v)} for v, row in zip(variants, block, strict=True)]
+        found += [row | paper.find_printed("ablation", v, PRINTED) for v, row in zip(variants, block, strict=True)]
     return found
 
 
@@ -44,7 +43,7 @@ def _variant(sweep: str, variant: str, cells: list[dict], baseline: str) -> dict
     mine, base = ([row for row in cells if row["varied_0"] == name] for name in (variant, baseline))
     row = {"sweep": sweep, "variant": variant, "less": baseline, "cells": len(mine)}
     for key in MEANS:
-        row |= spread.both(mine, key)
+        row |= spread.mean_and_deviation(mine, key)
     for key in COMPARED:
         row |= {f"{key}_{name}": value for name, value in _compared(key, mine, base, variant == baseline).items()}
     return row
@@ -59,5 +58,5 @@ def _compared(key: str, mine: list[dict], base: list[dict], same: bool) -> dict:
             pairs.setdefault(row["scene"], []).append(row[key] - at[unit])
     if same or not pairs:
         return dict.fromkeys(("units", "difference", "low", "high", "t", "df", "p", "d"))
-    told = asdict(statistics.compute_paired_test({scene: np.array(values) for scene, values in pairs.items()}))
-    return {"units": told["units"], "difference": told.pop("mean")} | told
+    test = asdict(statistics.compute_paired_test({scene: np.array(values) for scene, values in pairs.items()}))
+    return {"units": test["units"], "difference": test.pop("mean")} | test

@@ -1,7 +1,7 @@
 """Whether the config's `study` asks for sweeps, baselines and scenes that are there; loads no numerics."""
 
 from dav_gswt.errors import InputError
-from dav_gswt.study.sweeps.grid import named
+from dav_gswt.study.sweeps.grid import name_value
 
 
 def sweeps_of(study: dict) -> list[str]:
@@ -21,7 +21,7 @@ def check(config: dict) -> None:
                 f"config: study.tables: there is no sweep {name!r}; sweeps has {', '.join(sweeps) or 'nothing'}"
             )
     for name in study["ablation"]:
-        values = [str(named(value)) for value in next(iter(sweeps[name]["vary"].values()))]
+        values = [str(name_value(value)) for value in next(iter(sweeps[name]["vary"].values()))]
         if sweeps[name].get("baseline") not in values:
             raise InputError(
                 f"config: study.sweeps.{name}.baseline: must be one of {', '.join(values)}, for study.tables.ablation"

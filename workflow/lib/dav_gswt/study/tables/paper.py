@@ -13,19 +13,19 @@ PRINTED = Path(__file__).with_name("paper.csv")
 THOUSAND = 1e3
 
 
-def read() -> dict[tuple[str, str, str], str]:
+def read_paper() -> dict[tuple[str, str, str], str]:
     """All values, by table, row and column."""
     rows = csv_tables.read_table(PRINTED)
     return {(row["table"], row["row"], row["column"]): row["printed"] for row in rows}
 
 
-def beside(table: str, row: str, columns: tuple[str, ...]) -> dict[str, str | None]:
+def find_printed(table: str, row: str, columns: tuple[str, ...]) -> dict[str, str | None]:
     """Columns `paper_...` with what is printed in a row; None where the paper has no such row or value."""
-    printed = read()
+    printed = read_paper()
     return {f"paper_{column}": printed.get((table, row, column)) for column in columns}
 
 
-def number(printed: str) -> float:
+def parse_number(printed: str) -> float:
     """The number that is printed first: 29.41 of 29.41±0.08, 64200 of 64.2K. Raises: ValueError: there is none."""
     if not (found := re.search(r"\d+(?:\.\d+)?", printed)):
         raise ValueError(f"{printed!r} has no number")

@@ -40,13 +40,13 @@ ABLATION = {
 TESTED = {"PSNR (dB)": ("psnr", 2), "Seam-LPIPS": ("seam_lpips", 4)}
 
 
-def write(path: Path | str, tables: dict[str, list[dict]], figures: dict[str, str]) -> None:
+def write_results(path: Path | str, tables: dict[str, list[dict]], figures: dict[str, str]) -> None:
     """The page of `text`, as a file."""
     with atomic_file(path) as part:
-        part.write_text(text(tables, figures), encoding="utf-8")
+        part.write_text(format_results(tables, figures), encoding="utf-8")
 
 
-def text(tables: dict[str, list[dict]], figures: dict[str, str]) -> str:
+def format_results(tables: dict[str, list[dict]], figures: dict[str, str]) -> str:
     """tables: rows of timing, lod, sensitivity and ablation. figures: paths from the page, by what they show."""
     parts = [
         "# Results",
@@ -118,7 +118,7 @@ def _levels(rows: list[dict]) -> tuple[list[str], list[list[str]]]:
             at = {n: [float(r[key]) for r in rows if r["scene"] == scene and int(r["level"]) == n] for n in levels}
             means = [form.format(np.mean(values)) if values else UNKNOWN for values in at.values()]
             found.append([scene, key.replace("_", " "), *means])
-            printed = paper.beside("lod", scene.split("_")[0], tuple(f"{key.split('_')[-1]}{n}" for n in levels))
+            printed = paper.find_printed("lod", scene.split("_")[0], tuple(f"{key.split('_')[-1]}{n}" for n in levels))
             if any(printed.values()):
                 found.append([f"paper, {scene.split('_')[0]}", "", *(value or UNKNOWN for value in printed.values())])
     return ["scene", "", *(f"level {n}" for n in levels)], found
@@ -134,24 +134,24 @@ def _tested(rows: list[dict]) -> tuple[list[str], list[list[str]]]:
 
 
 def _test(row: dict, key: str, digits: int) -> list[str]:
-    def told(name: str, form: str) -> str:
+    def format_value(name: str, form: str) -> str:
         value = row[f"{key}_{name}"]
         return form.format(float(value)) if value else UNKNOWN
 
     number = f"{{:+.{digits}f}}"
-    interval = f"({told('low', number)}, {told('high', number)})" if row[f"{key}_low"] else UNKNOWN
-    t = f"{told('t', '{:.2f}')} ({row[f'{key}_df']})" if row[f"{key}_t"] else UNKNOWN
+    interval = f"({format_value('low', number)}, {format_value('high', number)})" if row[f"{key}_low"] else UNKNOWN
+    t = f"{format_value('t', '{:.2f}')} ({row[f'{key}_df']})" if row[f"{key}_t"] else UNKNOWN
     printed = row["paper_p"] or UNKNOWN
-    about = [row[f"{key}_units"], told("difference", number), interval, t]
-    return [*about, told("p", "{:.3f}"), told("holm", "{:.3f}"), printed if key == "psnr" else UNKNOWN]
+    about = [row[f"{key}_units"], format_value("difference", number), interval, t]
+    return [*about, format_value("p", "{:.3f}"), format_value("holm", "{:.3f}"), printed if key == "psnr" else UNKNOWN]
 
 
 def _slips() -> str:
     """What the paper's text says and its numbers do not."""
-    printed = paper.read()
-    t, df = (paper.number(printed["ablation", "caption", key]) for key in ("t", "df"))
+    printed = paper.read_paper()
+    t, df = (paper.parse_number(printed["ablation", "caption", key]) for key in ("t", "df"))
     start, k, rounds, views = (
-        paper.number(printed["protocol", "views", key]) for key in ("start", "k", "rounds", "all")
+        paper.parse_number(printed["protocol", "views", key]) for key in ("start", "k", "rounds", "all")
     )
     taken = start + k * rounds
     return (

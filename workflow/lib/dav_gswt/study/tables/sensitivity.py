@@ -4,10 +4,11 @@ from dav_gswt.paths import encode_number
 from dav_gswt.study.tables import paper, spread
 
 MEANS = ("psnr", "lpips", "seam_lpips", "score_s", "orders", "bundle_mb", "stills_s", "render_ms")
+VALUES = ("sensitivity", "value")  # table and column of the paper
 PRINTED = ("value", "psnr", "seam_lpips", "score_s")
 
 
-def rows(sweeps: dict[str, list[dict]], defaults: dict[str, str]) -> list[dict]:
+def tabulate_sensitivity(sweeps: dict[str, list[dict]], defaults: dict[str, str]) -> list[dict]:
     """A row for each setting and value: means over scenes and seeds, deviations over seeds, and the paper's values.
 
     score_s: seconds to score all candidates once, the paper's uncertainty time; stills_s: to draw three stills;
@@ -23,15 +24,16 @@ def rows(sweeps: dict[str, list[dict]], defaults: dict[str, str]) -> list[dict]:
             row = {"setting": setting, "value": value, "default": value == defaults.get(setting)}
             row |= {"scenes": len({r["scene"] for r in mine}), "cells": len(mine)}
             for key in MEANS:
-                row |= spread.both(mine, key)
-            found.append(row | paper.beside("sensitivity", f"{setting}.{_place(setting, values, place)}", PRINTED))
+                row |= spread.mean_and_deviation(mine, key)
+            printed = f"{setting}.{_find_place(setting, values, place)}"
+            found.append(row | paper.find_printed("sensitivity", printed, PRINTED))
     return found
 
 
-def _place(setting: str, values: list[str], place: int) -> int | None:
+def _find_place(setting: str, values: list[str], place: int) -> int | None:
     """Which of the paper's rows of a setting stands beside the value at a place of all values."""
-    printed = {where: text for where, text in paper.read().items() if (where[0], where[2]) == ("sensitivity", "value")}
-    known = [encode_number(text) for where, text in printed.items() if where[1].startswith(f"{setting}.")]
+    printed = {row: text for (table, row, key), text in paper.read_paper().items() if (table, key) == VALUES}
+    known = [encode_number(text) for row, text in printed.items() if row.startswith(f"{setting}.")]
     if set(values) & set(known):
         return known.index(values[place]) if values[place] in known else None
     return place if len(values) == len(known) else None

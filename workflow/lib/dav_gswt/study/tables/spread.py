@@ -14,7 +14,7 @@ VIEWER = (
 CELL = ("scene", "seed", "preset", "tiling", "tau")  # key of the viewer's measurements
 
 
-def mean(rows: list[dict], key: str) -> float | None:
+def compute_mean(rows: list[dict], key: str) -> float | None:
     """Mean over scenes of the means over their seeds: scenes with more seeds do not count more."""
     by_scene: dict[str, list[float]] = {}
     for row in rows:
@@ -23,7 +23,7 @@ def mean(rows: list[dict], key: str) -> float | None:
     return float(np.mean([np.mean(values) for values in by_scene.values()])) if by_scene else None
 
 
-def deviation(rows: list[dict], key: str) -> float | None:
+def compute_deviation(rows: list[dict], key: str) -> float | None:
     """The standard deviation (ddof 1) over seeds of the mean over scenes, as the paper's; None of fewer than two seeds
     that all scenes have."""
     scenes = {row["scene"] for row in rows if row.get(key) is not None}
@@ -35,12 +35,12 @@ def deviation(rows: list[dict], key: str) -> float | None:
     return float(np.std(whole, ddof=1)) if len(whole) > 1 else None
 
 
-def both(rows: list[dict], key: str) -> dict[str, float | None]:
+def mean_and_deviation(rows: list[dict], key: str) -> dict[str, float | None]:
     """`mean` under the key, `deviation` under key_sd."""
-    return {key: mean(rows, key), f"{key}_sd": deviation(rows, key)}
+    return {key: compute_mean(rows, key), f"{key}_sd": compute_deviation(rows, key)}
 
 
-def with_viewer(rows: list[dict], viewer: list[dict]) -> list[dict]:
+def join_viewer(rows: list[dict], viewer: list[dict]) -> list[dict]:
     """The rows with what the viewer measured of their bundle, None where nothing. viewer: see `read_viewer`."""
     at = {tuple(str(row[key]) for key in CELL): row for row in viewer}
     found = [at.get(tuple(str(row[key]) for key in CELL), {}) for row in rows]
@@ -50,7 +50,7 @@ def with_viewer(rows: list[dict], viewer: list[dict]) -> list[dict]:
 def read_sweeps(paths: list[Path | str], viewer: Path | str | None) -> list[list[dict]]:
     """The rows of each sweep's table, with what the viewer measured of their bundles."""
     measured = read_viewer(viewer)
-    return [with_viewer(sweep.read(path), measured) for path in paths]
+    return [join_viewer(sweep.read_sweep(path), measured) for path in paths]
 
 
 def read_viewer(path: Path | str | None) -> list[dict]:

@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from dav_gswt.bundle.store import Bundle
+from dav_gswt.images import figures
 from dav_gswt.logs import progress
 from dav_gswt.provenance import describe_machine
-from dav_gswt.study import csv_tables, figures
+from dav_gswt.study import csv_tables
 from dav_gswt.study.tables import spread
 from dav_gswt.study.terrain import browser
 from dav_gswt.terrain import endless, heights, stills, visibility
@@ -71,15 +72,15 @@ def time_library(bundle: Bundle, settings: FrameSettings) -> list[dict]:
 
     update holds the orders, too, which the library makes again for every frame; the page reads them from the bundle.
     """
-    terrain, told, rows = endless.terrain_from_bundle(bundle, settings.heights), bundle.manifest, []
+    terrain, manifest, rows = endless.terrain_from_bundle(bundle, settings.heights), bundle.manifest, []
     for budget in progress(settings.budgets, "measure frames of the library"):
         meters = []
         for shot in settings.shots():
             meters.append(FrameTiming())
-            camera = stills.shot_camera(shot, terrain, told.eye_floor, settings.width, settings.height)
+            camera = stills.shot_camera(shot, terrain, manifest.eye_floor, settings.width, settings.height)
             with meters[-1].measure("update"):
                 coarser = visibility.coarsen_to_budget(terrain, camera, budget)
-            stills.render_view(coarser, camera, told.sky, told.ground_colour, timing=meters[-1])
+            stills.render_view(coarser, camera, manifest.sky, manifest.ground_colour, timing=meters[-1])
         times = {part: [meter.milliseconds[part] for meter in meters] for part in PARTS}
         rows.append(
             _tabulate_times(settings, budget, times, [meter.gaussians for meter in meters], len(meters))
@@ -125,8 +126,8 @@ def _tabulate_times(
 ) -> dict:
     """Means and standard deviations (ddof 1); None for what the worker never did."""
     frames = len(counts)
-    row = {"width": settings.width, "height": settings.height, "frames": frames, "budget": budget}
-    row |= {"splats": float(np.mean(counts))}
+    row: dict[str, float | None] = {"width": settings.width, "height": settings.height, "frames": frames}
+    row |= {"budget": budget, "splats": float(np.mean(counts))}
     for part in PARTS:
         values = times[part]
         row[f"{part}_ms"] = float(np.mean(values)) if values else None
@@ -159,9 +160,9 @@ def select_viewer_rows(rows: list[dict]) -> list[dict]:
 
 def write_frame_plot(path: Path | str, rows: list[dict]) -> None:
     """Milliseconds of a frame's parts over Gaussians in view, a panel for each renderer; rows hold text."""
-    from matplotlib.ticker import LogLocator  # here, not above: see `figures.blank`
+    from matplotlib.ticker import LogLocator  # here, not above: see `figures.make_figure`
 
-    figure = figures.blank(10.0, 4.4)
+    figure = figures.make_figure(10.0, 4.4)
     panels = figure.subplots(1, 2)
     for axes, renderer in zip(panels, (LIBRARY, PAGE), strict=True):
         mine = [row for row in rows if row["renderer"] == renderer]
@@ -185,7 +186,7 @@ def write_frame_plot(path: Path | str, rows: list[dict]) -> None:
     panels[0].set_ylabel("milliseconds a frame (mean, sd)")
     named = next((axes for axes in panels if axes.get_legend_handles_labels()[0]), panels[0])
     figure.legend(*named.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=8)
-    figures.save(figure, path)
+    figures.save_figure(figure, path)
 
 
 def _format_title(renderer: str, rows: list[dict]) -> str:

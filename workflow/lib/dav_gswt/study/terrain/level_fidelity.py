@@ -44,12 +44,12 @@ def measure_levels(tiles: TileSet, pixels: float, band: float) -> list[dict]:
         errors = measure_errors(tiles, level, distance) if level else {}
         for tile, field in enumerate(fields):
             row = {"tile": tile, "level": level, "mean_scale": mean_scale([field]), "count": len(field)}
-            told = {
+            measures = {
                 f"{view}_{key}": errors.get((tile, view), {}).get(key)
                 for view in ELEVATIONS
                 for key in ("db", "change", "cut_db")
             }
-            found.append(row | {"distance": distance} | told)
+            found.append(row | {"distance": distance} | measures)
     return found
 
 

@@ -13,22 +13,22 @@ AZIMUTHS = (4, 8, 16, 32, 64)
 def measure_orders(tiles: TileSet, wanted: float) -> list[dict]:
     """One row a tile and number of azimuths, at the elevations that the set needs.
 
-    `doubtful`: of the half of the tiles that are most in doubt. `orders`, `bytes` a Gaussian with its record.
+    `uncertain`: of the half of the tiles that is more uncertain. `orders`, `bytes` a Gaussian with its record.
     `{view}_db`: PSNR half-way between azimuths against the exact order; None: no difference.
     """
     elevations = search_directions(tiles.fields[0], tiles.side, wanted).rings.elevations
-    doubt, found = np.argsort(np.argsort(-tiles.uncertainty, kind="stable")), []
+    rank, found = np.argsort(np.argsort(-tiles.uncertainty, kind="stable")), []
     for tile, field in enumerate(progress(tiles.fields[0], "measure orders")):
         for azimuths in AZIMUTHS:
             count = len(elevations) * azimuths + 1
-            told = {
+            row = {
                 "tile": tile,
                 "uncertainty": float(tiles.uncertainty[tile]),
-                "doubtful": int(doubt[tile] < len(doubt) // 2),
+                "uncertain": int(rank[tile] < len(rank) // 2),
                 "azimuths": azimuths,
                 "orders": count,
                 "bytes": chunk_size(len(field), count) / len(field),
             }
             errors = measure_elevations([field], tiles.side, elevations, azimuths)
-            found.append(told | {f"{view}_db": value for view, value in errors.items()})
+            found.append(row | {f"{view}_db": value for view, value in errors.items()})
     return found

@@ -12,8 +12,8 @@ from numpy import ndarray as Array
 
 from dav_gswt.bundle import order_directions
 from dav_gswt.bundle.store import Bundle
+from dav_gswt.images import figures
 from dav_gswt.logs import progress
-from dav_gswt.study import figures
 from dav_gswt.terrain import endless, stills
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.stills import SHOTS, Shot
@@ -72,7 +72,7 @@ def keep_finest(terrain: EndlessTerrain) -> EndlessTerrain:
 def write_presort_plot(path: Path | str, rows: list[dict]) -> None:
     """A panel for each view, a group of bars for each approximation, a bar for each scene; rows hold text."""
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
-    figure = figures.blank(11.0, 3.6)
+    figure = figures.make_figure(11.0, 3.6)
     for axes, shot in zip(figure.subplots(1, len(VIEWS), sharey=True), VIEWS, strict=True):
         for k, scene in enumerate(scenes):
             mine = {r["shortcut"]: r["psnr"] for r in rows if (r["scene"], r["view"]) == (scene, shot.name)}
@@ -84,4 +84,4 @@ def write_presort_plot(path: Path | str, rows: list[dict]) -> None:
         axes.set_title(shot.name)
     figure.axes[0].set_ylabel("PSNR (dB)")
     figure.axes[0].legend(frameon=False)
-    figures.save(figure, path)
+    figures.save_figure(figure, path)

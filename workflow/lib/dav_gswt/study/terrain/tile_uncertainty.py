@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.study import figures
+from dav_gswt.images import figures
 from dav_gswt.terrain import choice
 
 MARGIN = 4  # cells shown beyond the walk, on all sides
@@ -26,10 +26,10 @@ def make_walk(steps: int, length: float) -> Float[Array, "steps 2"]:
 def read_cells(manifest: dict, west: int, south: int, shape: tuple[int, int]) -> tuple[Array, Array]:
     """Uncertainty of the tile in each cell of a window, rows from the south, and whether it keeps all orders."""
     tiles = manifest["tiles"]
-    laid = choice.tiles_in(west, south, shape, manifest["salt"], len(tiles) // 16)
-    doubt = np.array([tile["uncertainty"] for tile in tiles])
+    numbers = choice.tiles_in(west, south, shape, manifest["salt"], len(tiles) // 16)
+    uncertainty = np.array([tile["uncertainty"] for tile in tiles])
     deep = np.array([len(tile["chunks"][0]["orders"]) == len(manifest["directions"]) for tile in tiles])
-    return doubt[laid], deep[laid]
+    return uncertainty[numbers], deep[numbers]
 
 
 def write_figure(path: Path | str, manifest: dict, tau: float, length: float) -> None:
@@ -38,11 +38,11 @@ def write_figure(path: Path | str, manifest: dict, tau: float, length: float) ->
     way = make_walk(200, length)
     (west, south), (east, north) = np.floor(way.min(0)).astype(int) - MARGIN, np.floor(way.max(0)).astype(int) + MARGIN
     shape = int(north - south + 1), int(east - west + 1)
-    doubt, deep = read_cells(manifest, int(west), int(south), shape)
-    figure = figures.blank(9.0, 7.2 * shape[0] / shape[1] + 0.9)
+    uncertainty, deep = read_cells(manifest, int(west), int(south), shape)
+    figure = figures.make_figure(9.0, 7.2 * shape[0] / shape[1] + 0.9)
     axes = figure.subplots()
     extent = (west, east + 1, south, north + 1)
-    seen = axes.imshow(doubt, origin="lower", extent=extent, cmap="inferno", interpolation="none")
+    seen = axes.imshow(uncertainty, origin="lower", extent=extent, cmap="inferno", interpolation="none")
     rows, columns = np.nonzero(deep)
     if deep.any():
         axes.plot(
@@ -59,4 +59,4 @@ def write_figure(path: Path | str, manifest: dict, tau: float, length: float) ->
     axes.set_title(f"mean uncertainty of tiles; {share}", fontsize=10, loc="left")
     axes.legend(loc="upper right", fontsize=9)
     figure.colorbar(seen, ax=axes, shrink=0.8, label="mean uncertainty of the tile")
-    figures.save(figure, path)
+    figures.save_figure(figure, path)

@@ -1,14 +1,11 @@
 """docs/research/results/tradeoff.md: which settings are worth their time; every number comes from the table."""
 
-from pathlib import Path
-
-from dav_gswt.files import atomic_file
-from dav_gswt.study.markdown import format_table
+from dav_gswt.study.markdown import format_number, format_table
 from dav_gswt.study.tradeoff.settings import PRESET
 from dav_gswt.study.tradeoff.tables import UNITS
 
 SAME = 0.02  # of the time: a setting that takes that much more or less is as fast
-TOLD = {"dB": 0.005, "LPIPS": 0.00005, "grey levels": 0.005}  # a smaller loss is none: it would be written as 0
+MIN_LOSS = {"dB": 0.005, "LPIPS": 0.00005, "grey levels": 0.005}  # a smaller loss is none: it would be written as 0
 DIGITS = {"dB": 2, "LPIPS": 4, "grey levels": 2}
 WHAT = {
     "views": "of PSNR of test views; seconds of all jobs to the bundle",
@@ -17,38 +14,33 @@ WHAT = {
 }
 
 
-def write(path: Path | str, text: str) -> None:
-    """A page, whole or not at all."""
-    with atomic_file(path) as part:
-        part.write_text(text, encoding="utf-8")
-
-
-def text(rows: list[dict], pareto: list[dict]) -> str:
-    """rows, pareto: as `tables.read` gives them; the base and a most accurate setting for every knob."""
+def format_tradeoff(rows: list[dict], pareto: list[dict]) -> str:
+    """rows, pareto: as `tables.read_tradeoff` gives them; the base and a most accurate setting for every knob."""
     base, first = next(row for row in rows if row["base"]), rows[0]
+    knobs = dict.fromkeys(row["knob"] for row in rows if row["knob"] != PRESET)
     parts = [
         "# Speed against accuracy",
         "Made by `snakemake tradeoff` from `docs/research/data/tradeoff.csv`; do not edit. "
         f"Scene `{first['scene']}`, seed {first['seed']:.0f}, on {first['cores']:.0f} cores of {first['processor']}. "
-        f"Each knob is turned by itself from the base, which has the quality `{base['preset']}`, the seam "
+        f"Each knob is turned by itself from the base, which has the preset `{base['preset']}`, the tiling "
         f"`{base['tiling']}` and tau {base['tau']:g}; its own settings are bold. Losses are counted from each knob's "
         "first setting, taken for the most accurate. Seconds are those of whole jobs from the start views to the "
         "bundle, without the taking of photos; what settings share counts for each. One scene and one seed: "
         "differences of a few hundredths of a decibel are within what another seed changes.",
         "## Presets",
-        format_table(*_presets(pareto)),
+        format_table(*_tabulate_presets(pareto)),
         "On the front is what no other setting here is as fast as and better than: in PSNR, and beside it in LPIPS, as "
         "what is ahead in PSNR can be the less sharp picture.",
-        "\n".join(f"- {preset(row)}" for row in pareto if row["knob"] == PRESET),
+        "\n".join(f"- {describe_preset(row)}" for row in pareto if row["knob"] == PRESET),
         "![PSNR and LPIPS over seconds](../figures/tradeoff_pareto.png)",
         "## Knobs",
-        *(part for knob in dict.fromkeys(row["knob"] for row in rows) if knob != PRESET for part in _knob(knob, rows)),
+        *(part for knob in knobs for part in _format_knob(knob, rows)),
         "![Every knob by itself](../figures/tradeoff_knobs.png)",
     ]
     return "\n\n".join(part.rstrip("\n") for part in parts if part) + "\n"
 
 
-def preset(row: dict) -> str:
+def describe_preset(row: dict) -> str:
     """Whether a preset lies on the front, and if not, by how much it does not. row: of pareto.csv."""
     if row["front"]:
         return f"`{row['setting']}` lies on the front: no other setting is as fast and better."
@@ -60,62 +52,57 @@ def preset(row: dict) -> str:
     return f"`{row['setting']}` lies behind the front: another setting is as good and faster."
 
 
-def advice(row: dict, best: dict) -> str:
+def describe_change(row: dict, best: dict) -> str:
     """What turning a knob from its most accurate setting to another brings and costs, as a sentence."""
     unit, own, other = UNITS[row["measure"]], row["own_seconds"], best["own_seconds"]
     said = f"`{row['knob']}` {row['setting']} instead of {best['setting']}: "
     if None in (own, other, row["loss"]):
         return f"{said}not measured."
-    lost = row["loss"] if abs(row["loss"]) >= TOLD[unit] else 0.0
+    lost = row["loss"] if abs(row["loss"]) >= MIN_LOSS[unit] else 0.0
     amount = f"{abs(lost):.{DIGITS[unit]}f} {unit}"
     value = {1: f"costs {amount}", 0: "costs nothing", -1: f"is better by {amount}"}[(lost > 0) - (lost < 0)]
     joined = "but" if (own > other) == (lost < 0) and lost else "and"
-    return f"{said}{_pace(own / other)} {joined} {value}{_bytes(row, best)}."
+    return f"{said}{_describe_pace(own / other)} {joined} {value}{_describe_bytes(row, best)}."
 
 
-def _bytes(row: dict, best: dict) -> str:
+def _describe_bytes(row: dict, best: dict) -> str:
     if None in (row["bundle_mb"], best["bundle_mb"]) or abs(row["bundle_mb"] / best["bundle_mb"] - 1) <= SAME:
         return ""
     return f"; the bundle is {row['bundle_mb'] / best['bundle_mb']:.2f} times as large"
 
 
-def _pace(share: float) -> str:
+def _describe_pace(share: float) -> str:
     """share: of the most accurate setting's time."""
     if abs(share - 1) <= SAME:
         return "is as fast"
     return f"is {1 / share:.2f} times as fast" if share < 1 else f"takes {share:.2f} times as long"
 
 
-def number(value: float | None, digits: int) -> str:
-    """A value with so many digits behind the point, nothing where there is none."""
-    return "" if value is None else f"{value:.{digits}f}"
-
-
-def _presets(pareto: list[dict]) -> tuple[list[str], list[list[str]]]:
+def _tabulate_presets(pareto: list[dict]) -> tuple[list[str], list[list[str]]]:
     form = {"seconds": 0, "psnr": 2, "ssim": 3, "lpips": 3, "peak_mb": 0, "bundle_mb": 1}
     head = ["preset", "seconds", "PSNR (dB)", "SSIM", "LPIPS", "memory (MB)", "bundle (MB)"]
     head += ["on the front", "on that of LPIPS"]
     said = {1: "yes", 0: "no", None: ""}
     found = []
     for row in (row for row in pareto if row["knob"] == PRESET):
-        cells = [number(row[key], digits) for key, digits in form.items()]
+        cells = [format_number(row[key], digits) for key, digits in form.items()]
         found.append([f"`{row['setting']}`", *cells, said[row["front"]], said[row["sharp"]]])
     return head, found
 
 
-def _knob(knob: str, rows: list[dict]) -> list[str]:
+def _format_knob(knob: str, rows: list[dict]) -> list[str]:
     mine = [row for row in rows if row["knob"] == knob]
     best, unit = next(row for row in mine if row["most"]), UNITS[mine[0]["measure"]]
     head = ["setting", "seconds", "PSNR (dB)", "LPIPS", f"loss ({unit})", "memory (MB)", "bundle (MB)"]
     form = {"own_seconds": 1, "psnr": 2, "lpips": 3, "loss": DIGITS[unit], "peak_mb": 0, "bundle_mb": 1}
     bold = {0: "{}", 1: "**{}**"}
     shown = [
-        [bold[row["base"]].format(row["setting"]), *(number(row[key], digits) for key, digits in form.items())]
+        [bold[row["base"]].format(row["setting"]), *(format_number(row[key], digits) for key, digits in form.items())]
         for row in mine
     ]
     return [
         f"### {knob}",
         f"Loss: {WHAT[best['measure']]}; policy `{best['policy']}`.",
         format_table(head, shown),
-        "\n".join(f"- {advice(row, best)}" for row in mine if not row["most"]),
+        "\n".join(f"- {describe_change(row, best)}" for row in mine if not row["most"]),
     ]

@@ -1,6 +1,6 @@
 """Figures of the trade-off: all settings with their Pareto front, and a panel for each knob."""
 
-from dav_gswt.study import figures
+from dav_gswt.images import figures
 from dav_gswt.study.comparison.plots import COLOURS
 from dav_gswt.study.tradeoff.settings import PRESET
 
@@ -14,13 +14,13 @@ MARKS = "osD^vP*X"
 COLUMNS, WIDE, TALL = 4, 2.9, 2.3  # inches a panel
 
 
-def fronts(pareto: list[dict]):
+def draw_fronts(pareto: list[dict]):
     """PSNR and, where it was measured, LPIPS over seconds of all settings that test views tell apart, the front of each
     as a line; presets have their names."""
     shown = [("psnr", "front", AXES["views"][1])]
     if any(row["sharp"] is not None for row in pareto):
         shown.append(("lpips", "sharp", "LPIPS of test views (less is better)"))
-    figure = figures.blank(1.5 + 4.5 * len(shown), 4.6)
+    figure = figures.make_figure(1.5 + 4.5 * len(shown), 4.6)
     panels = figure.subplots(1, len(shown), squeeze=False)[0]
     for axes, (key, on, up) in zip(panels, shown, strict=True):
         _front(axes, pareto, key, on)
@@ -56,11 +56,11 @@ def _named(axes, points: list[tuple[float, float, str]], size: int) -> None:
         axes.annotate(name, (x, y), fontsize=size, va="bottom" if above else "top", ha="right" if end else "left", **at)
 
 
-def knobs(rows: list[dict]):
+def draw_knobs(rows: list[dict]):
     """Quality of each knob's settings over their seconds; the base is filled."""
     names = list(dict.fromkeys(row["knob"] for row in rows))
     columns, lines = min(COLUMNS, len(names)), -(-len(names) // COLUMNS)
-    figure = figures.blank(WIDE * columns, TALL * lines)
+    figure = figures.make_figure(WIDE * columns, TALL * lines)
     grid = figure.subplots(lines, columns, squeeze=False).ravel()
     for panel, knob in zip(grid, names, strict=False):
         _panel(panel, knob, [row for row in rows if row["knob"] == knob])

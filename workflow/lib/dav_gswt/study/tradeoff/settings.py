@@ -33,38 +33,38 @@ class Setting:
     base: bool
 
 
-def name(base: str, key: str, value: int | float | str) -> str:
-    """The name of the entry that is `base` but for one value: reference-spacing-1_25. One spelling a number."""
-    return f"{base}-{key}-{_spelled(value).replace('.', '_')}"
+def name_entry(base: str, key: str, value: int | float | str) -> str:
+    """The name of the entry that is `base` but for one value, equal numbers written alike: reference-spacing-1_25."""
+    return f"{base}-{key}-{_encode_value(value).replace('.', '_')}"
 
 
-def settings(config: dict) -> list[Setting]:
+def list_settings(config: dict) -> list[Setting]:
     """Every setting of `tradeoff`, by knob, in the config's order, each knob's most accurate first.
 
     The base's own value, where a knob does not name it, is its last; no value comes twice.
     """
     asked = config.get("tradeoff")
-    return [setting for each in _knobs(asked) for setting in _of_knob(config, *each)] if asked else []
+    return [setting for each in _list_knobs(asked) for setting in _list_of_knob(config, *each)] if asked else []
 
 
-def tested_size(config: dict) -> int:
+def find_test_size(config: dict) -> int:
     """The size of the photos that all settings are tested on: the largest that one is fitted to. config: `entries`'."""
-    return max(config["presets"][setting.chosen["preset"]]["size"] for setting in settings(config))
+    return max(config["presets"][setting.chosen["preset"]]["size"] for setting in list_settings(config))
 
 
-def sized(config: dict, quality: str) -> str:
-    """The entry that is this quality at the size of the config's `auto`."""
-    size = config["auto"].get("size", config["presets"][quality]["size"])
-    return quality if config["presets"][quality]["size"] == size else name(quality, "size", size)
+def name_sized_preset(config: dict, preset: str) -> str:
+    """The entry that is this preset at the size of the config's `auto`."""
+    size = config["auto"].get("size", config["presets"][preset]["size"])
+    return preset if config["presets"][preset]["size"] == size else name_entry(preset, "size", size)
 
 
-def entries(config: dict) -> dict:
+def add_entries(config: dict) -> dict:
     """The config with the entries that its `tradeoff` and `auto` name; what it holds already stays as it is.
 
     Raises: InputError: the config has another entry of such a name.
     """
     made = {table: dict(config[table]) for table in CALLED}
-    for table, entry, below, key, value in _made(config):
+    for table, entry, below, key, value in _list_entries(config):
         found = config[table][below] | {key: value}
         if made[table].setdefault(entry, found) != found:
             raise InputError(
@@ -73,7 +73,7 @@ def entries(config: dict) -> dict:
     return config | made
 
 
-def check(config: dict) -> None:
+def check_tradeoff(config: dict) -> None:
     """Check `tradeoff` and `auto` against the rest of the config.
 
     Raises: InputError: the key, what is wrong with it, and what it may be.
@@ -87,8 +87,8 @@ def check(config: dict) -> None:
         for part in ("base", "auto"):
             _check_names(f"{section}.{part}", asked.get(part, {}), config)
     asked = config.get("tradeoff", {"knobs": {}, "presets": []})
-    for quality in asked["presets"]:
-        _check_names("tradeoff.presets", {"preset": quality}, config)
+    for preset in asked["presets"]:
+        _check_names("tradeoff.presets", {"preset": preset}, config)
     for knob in asked.get("only", []):
         if knob not in asked["knobs"]:
             raise InputError(f"config: tradeoff.only: there is no knob {knob!r}; knobs has {', '.join(asked['knobs'])}")
@@ -109,55 +109,55 @@ def _check_names(where: str, chosen: dict, config: dict) -> None:
             raise InputError(f"config: {where}: there is no {called} {chosen[called]!r}; {table} has {known}")
 
 
-def _knobs(asked: dict) -> Iterator[tuple[str, dict]]:
+def _list_knobs(asked: dict) -> Iterator[tuple[str, dict]]:
     yield PRESET, {"key": "preset", "values": asked["presets"], "measure": "views"}
     for knob in asked.get("only", asked["knobs"]):
         yield knob, asked["knobs"][knob]
 
 
-def _of_knob(config: dict, knob: str, turned: dict) -> list[Setting]:
-    base, called, key = _turned(config, knob, turned)
-    usual, found = _usual(config, knob, turned), {}
+def _list_of_knob(config: dict, knob: str, turned: dict) -> list[Setting]:
+    base, called, key = _resolve_knob(config, knob, turned)
+    usual, found = _own_value(config, knob, turned), {}
     for value in [*turned["values"], usual]:
-        chosen = base | {called: name(base[called], key, value) if "of" in turned else value}
-        own = _spelled(value) == _spelled(usual)
-        made = Setting(knob, _spelled(value), base if own else chosen, turned["measure"], not found, own)
+        chosen = base | {called: name_entry(base[called], key, value) if "of" in turned else value}
+        own = _encode_value(value) == _encode_value(usual)
+        made = Setting(knob, _encode_value(value), base if own else chosen, turned["measure"], not found, own)
         found.setdefault(made.shown, made)
     return list(found.values())
 
 
-def _turned(config: dict, knob: str, turned: dict) -> tuple[dict, str, str]:
+def _resolve_knob(config: dict, knob: str, turned: dict) -> tuple[dict, str, str]:
     """What a knob is turned from, how this calls what the knob changes, and the key of the entry, if it is one."""
     key = turned.get("key", knob)
     called = CALLED[turned["of"]] if "of" in turned else key
     return config["tradeoff"]["base"] | turned.get("base", {}), called, key
 
 
-def _usual(config: dict, knob: str, turned: dict) -> int | float | str:
+def _own_value(config: dict, knob: str, turned: dict) -> int | float | str:
     """The base's own value of a knob."""
-    base, called, key = _turned(config, knob, turned)
+    base, called, key = _resolve_knob(config, knob, turned)
     return config[turned["of"]][base[called]].get(key, LEFT_OUT.get(key, "")) if "of" in turned else base[called]
 
 
-def _made(config: dict) -> Iterator[tuple[str, str, str, str, int | float | str]]:
+def _list_entries(config: dict) -> Iterator[tuple[str, str, str, str, int | float | str]]:
     """Table, name, the entry below, key and value of every entry that is made."""
     for knob, turned in config.get("tradeoff", {"knobs": {}})["knobs"].items():
         if table := turned.get("of"):
-            base, called, key = _turned(config, knob, turned)
-            usual = _spelled(_usual(config, knob, turned))
-            for value in (value for value in turned["values"] if _spelled(value) != usual):
-                yield table, name(base[called], key, value), base[called], key, value
-    for quality in _of_auto(config):
-        if (made := sized(config, quality)) != quality:
-            yield "presets", made, quality, "size", config["auto"]["size"]
+            base, called, key = _resolve_knob(config, knob, turned)
+            usual = _encode_value(_own_value(config, knob, turned))
+            for value in (value for value in turned["values"] if _encode_value(value) != usual):
+                yield table, name_entry(base[called], key, value), base[called], key, value
+    for preset in _list_auto_presets(config):
+        if (made := name_sized_preset(config, preset)) != preset:
+            yield "presets", made, preset, "size", config["auto"]["size"]
 
 
-def _of_auto(config: dict) -> list[str]:
+def _list_auto_presets(config: dict) -> list[str]:
     """The qualities that `auto` compares; one that does not exist is `check`'s to tell."""
     asked = config.get("auto")
     named = [asked[part]["preset"] for part in ("base", "auto")] if asked else []
-    return [quality for quality in named if quality in config["presets"]]
+    return [preset for preset in named if preset in config["presets"]]
 
 
-def _spelled(value: int | float | str) -> str:
+def _encode_value(value: int | float | str) -> str:
     return value if isinstance(value, str) else encode_number(value)

@@ -8,6 +8,7 @@ from dav_gswt.images import image_files
 from dav_gswt.images.metrics import mse_to_psnr
 from dav_gswt.provenance import describe_machine
 from dav_gswt.study import csv_tables
+from dav_gswt.study.statistics import subtract_or_none, sum_or_none
 from dav_gswt.study.sweeps import tables as sweeps
 from dav_gswt.study.sweeps.grid import CELL
 from dav_gswt.study.tradeoff.front import find_pareto_front, find_rivals
@@ -20,54 +21,44 @@ TEXTS = ("scene", "knob", "setting", "measure", "preset", "policy", "prior", "ti
 TEXTS += ("fixed_quality", "field", "tiles", "processor", "part", "chosen", "rival_knob", "rival_setting")
 
 
-def rows(cells: list[dict]) -> list[dict]:
+def tabulate_settings(cells: list[dict]) -> list[dict]:
     """A row for each experiment; the most accurate setting of a knob comes first, and the others are compared with it.
 
     seconds: of all jobs from the start views to the bundle, but the taking of photos; what cells share counts for each.
     own_seconds: of those that the knob can change: all of them where views tell its accuracy, else the jobs on tiles.
     loss: of PSNR in dB (views), of Seam-LPIPS over its floor (seams), or the root mean square difference of the stills
     in grey levels (stills); 0 for what is taken for the most accurate, below 0 where a setting is better than it.
-    stills_psnr: empty where equal. cells: what `sweeps.tables.row` reads, with `knob`, `setting`, `most`, `base`,
-    `measure` and the paths of `stills`.
+    stills_psnr: empty where equal. cells: what `sweeps.tables.tabulate_cell` reads, with `knob`, `setting`, `most`,
+    `base`, `measure` and the paths of `stills`.
     """
     found, best = [], {}
     for cell in cells:
-        told = measured(cell)
+        row = measure_cell(cell)
         if cell["most"]:
-            best[cell["knob"]] = cell | told
+            best[cell["knob"]] = cell | row
         about = {key: cell[key] for key in ("knob", "setting", "measure")}
         about |= {key: int(cell[key]) for key in ("most", "base")}
-        found.append(about | told | _lost(cell | told, best[cell["knob"]]) | describe_machine())
+        found.append(about | row | _lost(cell | row, best[cell["knob"]]) | describe_machine())
     return found
 
 
-def measured(cell: dict) -> dict:
+def measure_cell(cell: dict) -> dict:
     """Measures and cost of an experiment: the columns of a sweep's row, seconds and own_seconds."""
-    told = {key: value for key, value in sweeps.row(cell).items() if key not in ("sweep", "samples", "steps")}
-    tiles = total(told[key] for key in TILE_JOBS)
-    seconds = total([told["recon_s"], tiles])
-    return told | {"seconds": seconds, "own_seconds": seconds if cell.get("measure") == "views" else tiles}
-
-
-def total(values) -> float | None:
-    """The sum, None where one of them is not known."""
-    values = list(values)
-    return None if None in values else float(sum(values))
+    row = {key: value for key, value in sweeps.tabulate_cell(cell).items() if key not in ("sweep", "samples", "steps")}
+    tiles = sum_or_none(row[key] for key in TILE_JOBS)
+    seconds = sum_or_none([row["recon_s"], tiles])
+    return row | {"seconds": seconds, "own_seconds": seconds if cell.get("measure") == "views" else tiles}
 
 
 def _lost(mine: dict, best: dict) -> dict:
-    found = {"loss_lpips": _difference(mine["lpips"], best["lpips"]), "stills_psnr": None}
+    found = {"loss_lpips": subtract_or_none(mine["lpips"], best["lpips"]), "stills_psnr": None}
     if mine["measure"] == "stills":
         error = mean_square(mine["stills"], best["stills"])
         found["stills_psnr"] = mse_to_psnr(error)
         return found | {"loss": LEVELS_OF_GREY * float(np.sqrt(error))}
     if mine["measure"] == "seams":
-        return found | {"loss": _difference(mine["seam_lpips"], best["seam_lpips"])}
-    return found | {"loss": _difference(best["psnr"], mine["psnr"])}
-
-
-def _difference(a: float | None, b: float | None) -> float | None:
-    return None if None in (a, b) else float(a - b)
+        return found | {"loss": subtract_or_none(mine["seam_lpips"], best["seam_lpips"])}
+    return found | {"loss": subtract_or_none(best["psnr"], mine["psnr"])}
 
 
 def mean_square(mine: list[str], others: list[str]) -> float:
@@ -79,7 +70,7 @@ def mean_square(mine: list[str], others: list[str]) -> float:
     return float(np.mean([difference.mean() for difference in found]))
 
 
-def pareto(table: list[dict]) -> list[dict]:
+def tabulate_front(table: list[dict]) -> list[dict]:
     """The rows that test views tell apart: `front`, 1 where nothing is as fast and better (or as good and faster);
     else by how many dB (`behind`) the best that is as fast (`rival_knob`, `rival_setting`) is better. `sharp`: 1 where
     nothing is as fast with a lower LPIPS; empty where LPIPS was not measured of all."""
@@ -108,6 +99,6 @@ def pareto(table: list[dict]) -> list[dict]:
     ]
 
 
-def read(path: Path | str) -> list[dict]:
+def read_tradeoff(path: Path | str) -> list[dict]:
     """Read a table of the trade-off: numbers as floats, None where empty; TEXTS as text."""
     return csv_tables.read_table(path, texts=TEXTS)

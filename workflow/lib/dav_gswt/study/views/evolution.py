@@ -14,12 +14,11 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.scene_frame import SceneFrame
-from dav_gswt.images import metrics
+from dav_gswt.images import figures, metrics
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import render
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.observation import mask_to_ground
-from dav_gswt.study import figures
 
 WIDE = 9.0  # inches of the figure
 HEAD, LABEL, FOOT, KEY = 0.25, 0.25, 0.5, 0.85  # inches: titles, a line under maps, two under all, the colours' scale
@@ -128,7 +127,7 @@ def error_limit(found: list[Strip]) -> float:
 
 def write_figure(path: Path | str, found: list[Strip], rounds: list[Round], key: str) -> None:
     """The figure of strips, as a PNG."""
-    figures.save(draw_figure(found, rounds, key), path)
+    figures.save_figure(draw_figure(found, rounds, key), path)
 
 
 def draw_figure(found: list[Strip], rounds: list[Round], key: str):
@@ -142,8 +141,9 @@ def draw_figure(found: list[Strip], rounds: list[Round], key: str):
     side = WIDE / columns
     tall = [side * strip.photo.shape[0] / strip.photo.shape[1] for strip in found for _ in range(2)]
     foot = FOOT + NOTE * any(one.note for one in rounds)
-    figure = figures.blank(WIDE, sum(tall) + HEAD + LABEL * len(found) + foot + KEY)
-    figure.get_layout_engine().set(w_pad=0.02, h_pad=0.02, hspace=0.0, wspace=0.0)
+    figure = figures.make_figure(
+        WIDE, sum(tall) + HEAD + LABEL * len(found) + foot + KEY, w_pad=0.02, h_pad=0.02, hspace=0.0, wspace=0.0
+    )
     grid = figure.subplots(len(tall) + 2, columns, squeeze=False, height_ratios=[HEAD, *tall, foot])
     colours = {"norm": Normalize(0, error_limit(found)), "cmap": colormaps[MAP].with_extremes(bad=str(GREY))}
     for axes in grid.flat:

@@ -17,7 +17,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.poses import Pose, pose_of_camera
 from dav_gswt.geometry.scene_frame import SceneFrame
-from dav_gswt.study import figures
+from dav_gswt.images import figures
 from dav_gswt.views.score_colours import HIGHEST, candidate_values
 from dav_gswt.views.scores import Scores
 
@@ -82,7 +82,7 @@ def build_round(
 
 def write_figure(path: Path | str, rounds: list[Round], label: str) -> None:
     """The figure of rounds, as a PNG. label: what the colours are."""
-    figures.save(draw_figure(rounds, label), path)
+    figures.save_figure(draw_figure(rounds, label), path)
 
 
 def draw_figure(rounds: list[Round], label: str):
@@ -91,8 +91,7 @@ def draw_figure(rounds: list[Round], label: str):
     from matplotlib.cm import ScalarMappable
 
     rows, columns = ceil(len(rounds) / BESIDE), min(BESIDE, len(rounds))
-    figure = figures.blank(WIDE, rows * TALL + KEY)
-    figure.get_layout_engine().set(w_pad=0.06, h_pad=0.06)
+    figure = figures.make_figure(WIDE, rows * TALL + KEY, w_pad=0.06, h_pad=0.06)
     panels = figure.subplots(rows, columns, squeeze=False, subplot_kw={"projection": "polar"})
     rim = RING * int(min(one.lowest for one in rounds) // RING)
     colours = {"norm": _colour_scale(rounds), "cmap": "viridis"}

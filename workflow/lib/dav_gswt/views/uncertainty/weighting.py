@@ -108,7 +108,11 @@ def _weighted_sum(name: str, first, lpips, lam: float, scales: Scales, names) ->
     if lpips is not None:
         return total + lam * _divide_by_scale("lpips", lpips, scales, names)
     if lam > 0:
-        _log.warning("LPIPS has no weights here: its term is left out, the uncertainty is %s alone", name)
+        _log.warning(
+            "the scores lack LPIPS, its term is left out: the uncertainty is %s alone; "
+            "set the config's `lpips` to `installed` or to a path (docs/reference/config.md)",
+            name,
+        )
     return total
 
 

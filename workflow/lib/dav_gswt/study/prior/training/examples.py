@@ -7,18 +7,18 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
+from dav_gswt.geometry import camera_layouts
+from dav_gswt.geometry.camera_layouts import Place
 from dav_gswt.geometry.cameras import Camera, look_at
 from dav_gswt.geometry.poses import Pose, pose_of_camera
 from dav_gswt.geometry.scene_frame import Extent
 from dav_gswt.images import image_files
-from dav_gswt.photos.synthetic import camera_layouts
-from dav_gswt.photos.synthetic.camera_layouts import Place
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.prior.conditions import RenderedView, find_nearest, relative_pose, render_view
 from dav_gswt.prior.interface import Condition
 from dav_gswt.raster import Rasterizer, to_raster_arrays
-from dav_gswt.reconstruction.coarse import fit_coarse_field
-from dav_gswt.reconstruction.fit_settings import FitSettings
+from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
+from dav_gswt.reconstruction.fit_settings import CoarseSettings
 from dav_gswt.reconstruction.fitting.photo_colours import sample_colours
 from dav_gswt.study.prior.training.example_files import SIZE, Examples, concatenate, empty_examples
 from dav_gswt.study.prior.training.worlds import FLYING_HEIGHT, World, make_world
@@ -127,14 +127,15 @@ def simulate_points(
 def fit_field(world: World, photos: list[TrainingView], rng: np.random.Generator) -> GaussianField:
     """The coarse fit of the reconstruction, small and short; in some worlds of more or less ground than usual."""
     steps = int(rng.integers(*STEPS, endpoint=True))
-    quality = FitSettings(photos[0].camera.width, 1.25, MOST_GAUSSIANS, steps, 0, 0)
+    settings = CoarseSettings(size=photos[0].camera.width, spacing=1.25, max_gaussians=MOST_GAUSSIANS, steps=steps)
     frame = world.frame
     if rng.uniform() < OTHER_EXTENT:
         share = rng.uniform(*EXTENTS) / 1.25
         extent = Extent(*(share * at for at in astuple(frame.extent)))
         frame = replace(frame, extent=extent)
     points, colours = simulate_points(world, photos, rng)
-    return fit_coarse_field(frame, photos, points, colours, quality, rng, margin=0.5 * (EXTENTS[1] - 1)).field
+    given = StartViews(frame, photos, points, colours, margin=0.5 * (EXTENTS[1] - 1))
+    return fit_coarse_field(given, settings, rng).field
 
 
 def draw_camera(rng: np.random.Generator, photos: list[Pose]) -> Camera:

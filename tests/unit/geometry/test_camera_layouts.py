@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dav_gswt.photos.synthetic import camera_layouts
+from dav_gswt.geometry import camera_layouts
 
 
 def camera(elevation, azimuth, radius=7.0, target=(1.0, 2.0, 0.5)):

@@ -1,4 +1,4 @@
-"""Matplotlib figures of the studies: create, save, arrange pictures."""
+"""Matplotlib figures: create, save, arrange pictures."""
 
 from pathlib import Path
 
@@ -8,14 +8,23 @@ from dav_gswt.images import image_files
 QUALITY = 88  # of JPEGs
 
 
-def blank(width: float, height: float):
-    """An empty figure, inches wide and high, 120 dots an inch."""
+def make_figure(
+    width: float,
+    height: float,
+    w_pad: float | None = None,
+    h_pad: float | None = None,
+    wspace: float | None = None,
+    hspace: float | None = None,
+):
+    """An empty figure, inches wide and high, 120 dots an inch. Padding: as of matplotlib's ConstrainedLayoutEngine."""
     from matplotlib.figure import Figure  # here, not above: it takes a second to load, and most jobs draw nothing
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    return Figure(figsize=(width, height), dpi=120, layout="constrained")
+    engine = ConstrainedLayoutEngine(w_pad=w_pad, h_pad=h_pad, wspace=wspace, hspace=hspace)
+    return Figure(figsize=(width, height), dpi=120, layout=engine)
 
 
-def save(figure, path: Path | str) -> None:
+def save_figure(figure, path: Path | str) -> None:
     """A figure as a PNG, or as a JPEG by the path's ending: the same bytes each time."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -28,7 +37,7 @@ def save(figure, path: Path | str) -> None:
             figure.savefig(part, format="png", metadata={"Software": None})
 
 
-def kept(source: Path | str, target: Path | str) -> None:
+def copy_figure(source: Path | str, target: Path | str) -> None:
     """A picture for docs/: the same file, or as a JPEG, a fifth of the bytes where it shows photos, by the target's
     ending.
     """
@@ -41,14 +50,14 @@ def kept(source: Path | str, target: Path | str) -> None:
             imsave(part, image_files.read_photo(source), format="jpg", pil_kwargs={"quality": QUALITY})
 
 
-def sheet(pictures: dict[str, list[Path | str]], heads: list[str], tall: float = 2.05):
+def draw_sheet(pictures: dict[str, list[Path | str]], heads: list[str], tall: float = 2.05):
     """Pictures of files beside each other, small: a row, so many inches tall, a name; each row's pictures under heads.
 
     As wide as the first row's pictures are for their height.
     """
     shown = {name: [image_files.read_photo(file) for file in files] for name, files in pictures.items()}
     wide = [float(picture.shape[1] / picture.shape[0]) for picture in next(iter(shown.values()))]
-    figure = blank(tall * sum(wide), tall * len(shown))
+    figure = make_figure(tall * sum(wide), tall * len(shown))
     grid = figure.subplots(len(shown), len(heads), squeeze=False, width_ratios=wide)
     for (name, row), line in zip(shown.items(), grid, strict=True):
         for axes, picture, head in zip(line, row, heads, strict=True):
@@ -56,22 +65,3 @@ def sheet(pictures: dict[str, list[Path | str]], heads: list[str], tall: float =
             axes.set_title(f"{name}: {head}" if axes is line[0] else head, fontsize=7, loc="left", pad=2)
             axes.axis("off")
     return figure
-
-
-def fit_time(curves: dict[str, list[dict[str, float]]], path: Path | str) -> None:
-    """PSNR of test photos (colour-corrected) against seconds of fitting, a line a scene."""
-    figure = blank(6.4, 4.0)
-    axes = figure.add_subplot()
-    for scene, rows in curves.items():
-        x, y = ([row[k] for row in rows] for k in ("seconds", "psnr_colour_corrected"))
-        (line,) = axes.plot(x, y, label=scene)
-        axes.annotate(
-            f"{y[-1]:.1f} dB", (x[-1], y[-1]), xytext=(4, 0), textcoords="offset points", color=line.get_color()
-        )
-    axes.set_xlabel("seconds of fitting (looking at the photos included)")
-    axes.set_ylabel("PSNR of test photos, colour-corrected (dB)")
-    axes.set_xlim(left=0)
-    axes.margins(x=0.12)
-    axes.grid(alpha=0.3)
-    axes.legend(frameon=False)
-    save(figure, path)

@@ -1,0 +1,19 @@
+"""Rule find_materials: materials and objects of a field, and an exemplar of each material."""
+
+from dav_gswt.field import read_field
+from dav_gswt.logs import logging_to
+from dav_gswt.materials import build, store
+from dav_gswt.provenance import record_provenance
+from dav_gswt.reconstruction import ground
+from dav_gswt.threads import one_thread
+from dav_gswt.views import pose_maps
+
+with logging_to(snakemake.log[0]):
+    paths, seed = snakemake.input, snakemake.params.seed
+    field = read_field(paths.field)
+    if paths.get("maps"):  # scored by a prior: tiles use its uncertainty instead of the field's own
+        field = pose_maps.apply_uncertainty(field, pose_maps.read_pose_maps(paths.maps)[1])
+    with one_thread():
+        found = build.find_materials(field, ground.read_ground(paths.ground), seed)
+    provenance = record_provenance({"field": paths.field, "ground": paths.ground}, {"seed": seed})
+    store.write_materials(found, snakemake.output.materials, provenance)

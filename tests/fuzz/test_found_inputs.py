@@ -1,0 +1,217 @@
+"""Inputs that fuzzing found: each once ended in another exception, a hang, or was taken for sound."""
+
+import json
+import shutil
+import time
+import zipfile
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fixtures import bundles
+from fixtures.bundles import Ground
+from fixtures.fuzzing import LONGEST
+from fixtures.random_field import random_field
+
+from dav_gswt.bundle import gswt
+from dav_gswt.bundle.store import read_bundle
+from dav_gswt.capture.store import PhotoStore
+from dav_gswt.config.load import check_config, read_config
+from dav_gswt.errors import InputError
+from dav_gswt.geometry.camera_layouts import orbit
+from dav_gswt.geometry.cameras import camera_to_json
+from dav_gswt.geometry.poses import Pose
+from dav_gswt.geometry.scene_frame import read_scene_frame
+from dav_gswt.images import image_files
+from dav_gswt.photos.capture_record import read_capture_record
+from dav_gswt.photos.importers.point_ply import read_point_ply
+from dav_gswt.photos.lenses import read_lenses
+from dav_gswt.photos.training_views import read_captured_views
+from dav_gswt.photos.view_split import read_view_split
+from dav_gswt.views.frozen_scales import read_frozen_scales
+from dav_gswt.views.scores import FIELDS, read_scores
+from dav_gswt.views.selection import read_pose_selection
+
+SCHEMA = Path(__file__).parents[2] / "workflow/schemas/davgswt.schema.json"
+POSE = Pose("pose_0001", 60.0, 10.0, 4.0)
+CAMERA = orbit(60.0, 10.0, 4.0, (0.0, 0.0, 0.0), 8, 6, 60.0)
+SQUARE = {"west": 0, "south": 0, "side": 1}
+FRAME = {"kind": "photos", "unit": "metre", "flying_height": 1, "exemplar": SQUARE}
+FRAME |= {"extent": {"west": 0, "south": 0, "east": 1, "north": 1}}
+SHOT = {"name": "a.png", "asked": asdict(POSE) | {"camera": camera_to_json(CAMERA)}, "got": camera_to_json(CAMERA)}
+SHOT |= {"asked_to_got": 0.0, "taken": None}
+LENS = {"model": "PINHOLE", "width": 8, "height": 6, "params": [9, 9, 4, 3], "pinhole": [9, 9, 4, 3, 8, 6]}
+SELECTION = {"policy": "farthest", "k": 1, "poses": [asdict(POSE)]}
+SCORES = f"{','.join(FIELDS)}\na,{{}},1,1,{{}},,,,,,,{{}},1,,,,,,\n"
+
+
+def read_found(path: Path):
+    """Read a file by its name, as the workflow does."""
+    return {
+        "views.json": read_view_split,
+        "ground.json": read_scene_frame,
+        "poses.json": read_pose_selection,
+        "capture.json": lambda path: read_capture_record(path.parent),
+        "lenses.json": lambda path: read_lenses(path.parent),
+        "scores.json": read_frozen_scales,
+        "scores.csv": read_scores,
+        "cloud.ply": read_point_ply,
+        "config.yaml": lambda path: check_config(read_config([path])),
+    }[path.name](path)
+
+
+def record(**changes) -> str:
+    return json.dumps({"agent": "render", "shots": [SHOT | changes]})
+
+
+def camera(**changes) -> dict:
+    return {"got": camera_to_json(CAMERA) | changes}
+
+
+@pytest.mark.parametrize(
+    "name, text, message",
+    [
+        ("views.json", '{"start": ' + "[" * 100_000, "not readable as JSON"),
+        ("views.json", '{"start": [], "pool": [NaN], "test": []}', "NaN is no finite number"),
+        ("views.json", '{"start": [' + "9" * 4500 + "]}", "not readable as JSON"),
+        ("ground.json", json.dumps(FRAME | {"relief": "x"}).replace('"x"', "1e999"), "1e999 is no finite number"),
+        ("ground.json", json.dumps(FRAME | {"relief": "nan"}), "relief: "),
+        ("ground.json", json.dumps(FRAME | {"images": True}), "images: "),
+        ("ground.json", json.dumps(FRAME | {"points": 10**400}), "too large a number"),
+        ("poses.json", json.dumps(SELECTION | {"k": "1"}), "k: "),
+        ("poses.json", json.dumps(SELECTION | {"policy": 3}), "policy: "),
+        ("poses.json", json.dumps(SELECTION | {"poses": [asdict(POSE) | {"radius": "far"}]}), "poses.0.radius: "),
+        ("capture.json", "[" + "[" * 100_000, "not readable as JSON"),
+        ("capture.json", record(name="../../outside.png"), "is no name of a file"),
+        ("capture.json", record(name="a\0b.png"), "is no name of a file"),
+        ("capture.json", record(name="x" * 3000), "is no name of a file"),
+        ("capture.json", record(name=None), "is no name of a file"),
+        ("capture.json", record(**camera(width=8.5)), "not the record of a capture"),
+        ("capture.json", record(**camera(fx=-1.0)), "out of range"),
+        ("capture.json", record(**camera(rotation=[[1, 0, 0]] * 3)), "rotation is none"),
+        ("capture.json", record(**camera(translation=[1, 2])), "rotation is none"),
+        ("capture.json", record(asked_to_got="far"), "a distance or a time is none"),
+        ("capture.json", record(asked=asdict(POSE) | {"elevation": [], "camera": SHOT["got"]}), "elevation: "),
+        ("lenses.json", "7", "not as the workflow writes it"),
+        ("lenses.json", json.dumps([LENS | {"model": "BANANA"}]), "BANANA is no camera model"),
+        ("lenses.json", json.dumps([LENS | {"params": [9]}]), "a lens lacks numbers"),
+        ("lenses.json", json.dumps([LENS | {"width": -8}]), "not as the workflow writes it"),
+        ("lenses.json", json.dumps([{"model": "PINHOLE"}]), "not as the workflow writes it"),
+        ("scores.json", '{"scales": {"opacity": 1}, "pixels": {"low": 1, "high": 1' + "0" * 400 + "}}", "too large"),
+        ("scores.csv", SCORES.format("nan", 1, 1), "a pose is not finite"),
+        ("scores.csv", SCORES.format(1, 1, 10**30), "not a table of scores"),
+        ("scores.csv", "pose\udcff", "not a table of scores"),
+        ("scores.csv", '"' + "x" * 200_000, "not a table of scores"),
+        (
+            "cloud.ply",
+            "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+            "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n1 2 3 0 999 0\n",
+            "not readable as a PLY",
+        ),
+        ("config.yaml", "seeds: 2001-99-99\n", "not YAML"),
+        ("config.yaml", "k: 0b_\n", "not YAML"),
+        ("config.yaml", "k: !!bool z\n", "not YAML"),
+        ("config.yaml", "k: !!timestamp x\n", "not YAML"),
+        ("config.yaml", "k: " + "[" * 3000 + "\n", "not YAML"),
+        ("config.yaml", "k: " + "9" * 5000 + "\n", "not YAML"),
+    ],
+    ids=lambda value: str(value)[:50],
+)
+def test_what_was_found_is_refused_by_name(tmp_path, name, text, message):
+    path = tmp_path / name
+    path.write_bytes(text.encode("utf-8", "surrogateescape"))
+    with pytest.raises(InputError, match=message) as refusal:
+        read_found(path)
+    assert name in str(refusal.value) and "\n" not in str(refusal.value) and len(str(refusal.value)) < LONGEST
+
+
+@pytest.fixture
+def bundle(tmp_path):
+    folder = tmp_path / "bundle"
+    bundles.write_bundle(folder, Ground(discs=4))
+    return folder
+
+
+def nested(manifest: dict, where: tuple, value) -> dict:
+    inner = manifest
+    for key in where[:-1]:
+        inner = inner[key]
+    inner[where[-1]] = value
+    return manifest
+
+
+CHUNK = ("tiles", 0, "chunks", 0)
+
+
+@pytest.mark.parametrize(
+    "where, value, message",
+    [
+        (("tile_side",), np.nan, "no finite number"),
+        (("eye_floor",), np.inf, "no finite number"),
+        (("encoding", "origin"), [0, 0, 1e300], "a length is beyond"),
+        (("encoding", "log_scale"), [0, 1e300], "log_scale makes no sense"),
+        (("tiles", 3, "z"), [0, 1e20], "a length is beyond"),
+        ((*CHUNK, "count"), 16.0, "count"),
+        ((*CHUNK, "bytes"), 544.0, "bytes"),
+        ((*CHUNK, "orders"), [{"a": k} for k in range(20_000)], "not of type 'integer'"),
+        (("unit",), ["x" * 100_000], "not of type 'string'"),
+        (("provenance",), {"a": 10**400}, "too large a number"),
+    ],
+    ids=lambda value: str(value)[:40],
+)
+def test_manifests_that_were_found_are_refused_soon(bundle, where, value, message):
+    path = bundle / "davgswt.json"
+    path.write_text(json.dumps(nested(json.loads(path.read_text()), where, value)))
+    start = time.process_time()
+    with pytest.raises(InputError, match=message) as refusal:
+        read_bundle(bundle, SCHEMA)
+    assert time.process_time() - start < 2
+    assert "davgswt.json" in str(refusal.value) and len(str(refusal.value)) < LONGEST
+
+
+def test_whole_numbers_stand_for_lengths(bundle):
+    path = bundle / "davgswt.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"tile_side": 4}))
+    assert read_bundle(bundle, SCHEMA).manifest.tile_side == 4.0
+
+
+def test_no_photo_of_a_round_is_read_from_elsewhere(tmp_path):
+    image_files.write_png(tmp_path / "outside.png", np.zeros((6, 8, 3)))
+    (tmp_path / "capture").mkdir()
+    (tmp_path / "capture/capture.json").write_text(record(name="../outside.png"))
+    with pytest.raises(InputError, match="capture.json: .*no name of a file"):
+        read_captured_views(tmp_path / "capture", 8)
+
+
+def test_a_photo_smaller_than_its_camera_is_refused(tmp_path):
+    image_files.write_png(tmp_path / "a.png", np.zeros((6, 8, 3)))
+    (tmp_path / "capture.json").write_text(record(**camera(height=65535)))
+    with pytest.raises(InputError, match="a.png: 8 x 6 pixels, its camera takes 8 x 65535"):
+        read_captured_views(tmp_path, 8)
+
+
+@pytest.mark.parametrize("changes", [{"photo": "../../outside.png"}, {"photo": 3}, {"got": None}, {"sha256": ...}])
+def test_no_photo_of_the_store_is_read_from_elsewhere(tmp_path, changes):
+    image_files.write_png(tmp_path / "a.png", np.full((6, 8, 3), 0.5))
+    store = PhotoStore(tmp_path / "store")
+    store.folder.mkdir()
+    place = store.add(tmp_path / "a.png", "shots", (POSE, CAMERA), CAMERA, "2026-01-01T00:00:00").photo.parent
+    shutil.copyfile(place / "photo.png", place.parent / "outside.png")
+    values = json.loads((place / "shot.json").read_text()) | changes
+    (place / "shot.json").write_text(json.dumps({key: value for key, value in values.items() if value is not ...}))
+    with pytest.raises(InputError, match="shot.json: not the record of a photo"):
+        store.photos_of(CAMERA)
+
+
+def test_a_zip_with_another_name_in_its_header_is_refused_in_few_words(tmp_path):
+    path = tmp_path / "gswt.zip"
+    gswt.write_gswt([[random_field(4) for _ in range(16)]], 3.0, path)
+    with zipfile.ZipFile(path) as archive:
+        at = archive.infolist()[1].header_offset + 30
+    data = bytearray(path.read_bytes())
+    data[at - 4 : at - 2] = (2000).to_bytes(2, "little")
+    path.write_bytes(data)
+    with pytest.raises(InputError, match="gswt.zip: not readable") as refusal:
+        gswt.read_gswt(path, 3.0)
+    assert len(str(refusal.value)) < 600

@@ -1,0 +1,129 @@
+"""Bundles of several materials with objects: numbers of tiles, chunks of objects, and refusals."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fixtures.land_covers import TILES, cover_content
+from fixtures.tile_sets import report_of
+
+from dav_gswt.bundle import build, manifest, store
+from dav_gswt.bundle.content import BundleContent
+from dav_gswt.errors import InputError
+from dav_gswt.images import image_files
+from dav_gswt.terrain import endless, page, stills
+from dav_gswt.tiles.build import TileSet
+
+SCHEMA = Path(__file__).parents[3] / "workflow/schemas/davgswt.schema.json"
+
+
+@pytest.fixture(scope="module")
+def content():
+    return cover_content()
+
+
+@pytest.fixture(scope="module")
+def bundle(content, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bundle") / "b"
+    build.write_bundle(content, folder, build.BundleOptions(tau=0.5, salt=7), SCHEMA, {})
+    return store.read_bundle(folder, SCHEMA)
+
+
+def test_tiles_of_a_material_follow_those_of_the_one_before(bundle, content):
+    assert [entry.first_tile for entry in bundle.manifest.materials] == [0, TILES]
+    assert len(bundle.manifest.tiles) == 2 * TILES
+    for number in (3, TILES + 3):
+        source = content.tiles[number // TILES].fields[1][3]
+        assert bundle.chunk(number, 1)[0].means == pytest.approx(source.means, abs=1e-3)
+
+
+def test_materials_keep_their_names_shares_and_colours(bundle, content):
+    assert [(each.name, each.share) for each in bundle.manifest.materials] == [("sand", 0.6), ("grass", 0.4)]
+    green = bundle.manifest.materials[1].ground_colour
+    assert green == pytest.approx(content.materials[1].colour, abs=0.02)
+    mixed = 0.6 * np.array(bundle.manifest.materials[0].ground_colour) + 0.4 * np.array(green)
+    assert bundle.manifest.ground_colour == pytest.approx(mixed)
+
+
+def test_an_object_is_stored_in_the_middle_of_a_tile_and_read_back_about_its_foot(bundle, content):
+    entry = bundle.manifest.objects[0]
+    assert (entry.name, entry.radius, entry.material) == ("shrub", content.objects[0].radius, 1)
+    for level, source in enumerate(content.objects[0].fields):
+        field, orders = bundle.object_chunk(0, level)
+        assert field.means == pytest.approx(source.means, abs=2 * bundle.manifest.error.position)
+        assert orders.shape[1] == len(source) and len(orders) == len(entry.chunks[level].orders)
+    stored = store.chunks.read_chunk(bundle.folder, entry.chunks[0], bundle.manifest.encoding)[0].means
+    assert stored[:, :2].mean(0) == pytest.approx([0.5 * content.side] * 2, abs=0.05)
+
+
+def test_the_terrain_of_a_bundle_has_its_classes_and_objects(bundle, content):
+    terrain = endless.terrain_from_bundle(bundle, {"kind": "flat"})
+    assert terrain.classes.entry == content.classes and terrain.variants == 1
+    assert terrain.scatter.entry == content.scatter
+    assert [len(level) for level in terrain.objects[0]] == [len(f) for f in content.objects[0].fields]
+    image = stills.render_shot(replace(terrain, reach=6), stills.SHOTS[1], bundle.manifest, 64, 36)
+    assert np.isfinite(image).all()
+
+
+def test_a_page_of_several_materials_has_the_rule_of_the_config(bundle, tmp_path):
+    viewer, picture = tmp_path / "viewer", np.zeros((4, 4, 3))
+    viewer.mkdir()
+    (viewer / "index.html").write_text("<html>")
+    picture[:2, :, 1] = 1
+    image_files.write_png(tmp_path / "classes.png", picture)
+    colours = {"grass": "#00ff00", "sand": "#000000"}
+    rule = [{"kind": "image", "file": str(tmp_path / "classes.png"), "width": 40, "colours": colours}]
+    page.write_page(bundle.folder, viewer, tmp_path / "page", rule=rule)
+    made = store.read_bundle(tmp_path / "page", SCHEMA)
+    (term,) = made.manifest.classes.rule
+    pixels = (tmp_path / "page" / term.file).read_bytes()
+    assert list(pixels) == [1] * 8 + [0] * 8
+    assert made.object_chunk(0, 0)[0].means.shape == bundle.object_chunk(0, 0)[0].means.shape
+
+
+def test_materials_with_tiles_of_other_sizes_are_refused(content):
+    other = replace(content.tiles[1], side=2 * content.side)
+    with pytest.raises(InputError, match="the same tile side"):
+        BundleContent([content.tiles[0], other], content.materials)
+
+
+def test_an_object_with_fewer_levels_than_the_tiles_is_refused(content):
+    flat = replace(content.objects[0], fields=content.objects[0].fields[:1])
+    with pytest.raises(InputError, match="2 levels"):
+        replace(content, objects=[flat])
+
+
+@pytest.mark.parametrize(
+    "key, change",
+    [
+        ("first tiles", lambda m: m["materials"][1].update(first_tile=8)),
+        ("16 C", lambda m: m["materials"].append(m["materials"][0])),
+        ("classes", lambda m: m.pop("classes")),
+        ("one value for each", lambda m: m["classes"]["rise"].update(ground=[0.0])),
+        ("wavelengths", lambda m: m["classes"]["rule"][0].update(wavelengths=[1.0, -1.0])),
+        ("scatter", lambda m: m.pop("scatter")),
+        ("objects", lambda m: m.update(objects=[])),
+        ("material", lambda m: m["objects"][0].update(material=2)),
+        ("probability", lambda m: m["objects"][0].update(probability=1.5)),
+        ("object 0", lambda m: m["objects"][0]["chunks"].pop()),
+    ],
+)
+def test_a_manifest_whose_cover_contradicts_itself_is_refused(bundle, key, change):
+    value = bundle.manifest.to_dict()
+    change(value)
+    with pytest.raises(InputError, match=f"(?i){key}"):
+        manifest.check_manifest(value, SCHEMA)
+
+
+def test_one_material_is_named_ground(content):
+    one = BundleContent.of_one_material(content.tiles[0])
+    assert [(each.name, each.share) for each in one.materials] == [("ground", 1.0)]
+
+
+def test_a_set_of_one_material_has_no_classes(content):
+    tiles = TileSet(
+        content.side, 0.1, content.tiles[0].fields, np.zeros((16, 20, 20), np.uint8), np.zeros((16, 9, 2), int),
+        np.zeros(16), report_of(),
+    )  # fmt: skip
+    assert BundleContent.of_one_material(tiles).classes is None

@@ -1,0 +1,45 @@
+"""Which candidates remain, by agent: over flat ground, a pose above it and one below it."""
+
+import numpy as np
+import pytest
+from fixtures.frames import scene_frame
+
+from dav_gswt.capture import attainable, serial_rig
+from dav_gswt.geometry import cameras
+from dav_gswt.geometry.poses import Pose
+from dav_gswt.reconstruction.ground import Ground
+
+FRAME = scene_frame(exemplar=(-1.0, -1.0, 2.0), flying_height=2.0)
+GRID = Ground(-3.0, -3.0, 6 / 48, 16, 16, 16, np.zeros((48, 48)), np.ones((48, 48), bool))
+POOL = [
+    (Pose("above", 90.0, 0.0, 2.5), cameras.pinhole([0, 0.01, 2.5], [0, 0, 0], 64, 64, 100.0)),
+    (Pose("below", -90.0, 0.0, 0.2), cameras.pinhole([0, 0.01, -0.2], [0, 0, 0], 64, 64, 100.0)),
+]
+
+
+def names(scene):
+    return [pose.name for pose, _ in attainable.filter_attainable(scene, FRAME, GRID, POOL)]
+
+
+def test_poses_of_a_replayed_scene_all_remain():
+    assert names({"agent": "replay"}) == ["above", "below"]
+
+
+@pytest.mark.parametrize("agent", ["render", "plan", "handheld", "serial"])
+def test_infeasible_poses_are_left_out(agent):
+    assert names({"agent": agent}) == ["above"]
+
+
+def test_the_clearance_is_a_share_of_the_flying_height():
+    near = [*POOL, (Pose("near", 90.0, 0.0, 0.09), cameras.pinhole([0.5, 0.01, 0.09], [0, 0, 0], 64, 64, 100.0))]
+    found = attainable.filter_attainable({"agent": "render"}, FRAME, GRID, near)
+    assert [pose.name for pose, _ in found] == ["above"]
+
+
+def test_only_a_rig_is_checked_for_reach(monkeypatch):
+    monkeypatch.setattr(serial_rig, "filter_reachable", lambda scene, frame, pool: pool[:1])
+    assert names({"agent": "serial"}) == ["above"]
+    asked = []
+    monkeypatch.setattr(serial_rig, "filter_reachable", lambda *given: asked.append(given))
+    names({"agent": "render"})
+    assert asked == []

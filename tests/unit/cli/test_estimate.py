@@ -1,0 +1,131 @@
+"""The arithmetic of the estimate that `make run` prints. No test asserts times of this machine."""
+
+import re
+from dataclasses import replace
+
+import pytest
+from fixtures.configs import ROOT, checked_config
+
+from dav_gswt.cli import estimate
+from dav_gswt.cli.estimate import COSTS, PER_JOB, describe_estimate, describe_work, estimate_seconds, format_duration
+from dav_gswt.cli.machine_speed import MachineSpeed, measure_speed, share_cores
+
+SAME = MachineSpeed()
+JOBS = {"render_photos": 1, "fit_coarse": 1, "update_field": 2, "score_coarse": 1, "score_round": 2, "capture_views": 2}
+JOBS |= {"select_poses": 2, "make_levels": 1, "cut_tiles": 1, "bundle_tiles": 1, "render_terrain": 1}
+
+
+@pytest.fixture
+def config(monkeypatch) -> dict:
+    monkeypatch.chdir(ROOT)
+    return checked_config()
+
+
+def test_a_job_s_parts_take_as_much_longer_as_the_machine_is_slower(config):
+    work = describe_work(config)
+    cost = COSTS["fit_coarse"](work)
+    assert estimate_seconds({"fit_coarse": 1}, work, SAME) == pytest.approx(PER_JOB + cost.general + cost.raster)
+    assert estimate_seconds({"fit_coarse": 3}, work, MachineSpeed(5.0, 2.0)) == pytest.approx(
+        3 * (2 * (PER_JOB + cost.general) + 5 * cost.raster)
+    )
+
+
+def test_no_jobs_take_no_time_and_every_rule_has_a_cost(config):
+    work = describe_work(config)
+    assert estimate_seconds({}, work, SAME) == 0
+    assert estimate_seconds({"split_views": 2}, work, SAME) == pytest.approx(
+        2 * (PER_JOB + estimate.OTHER_RULE.general)
+    )
+    rules = "".join(path.read_text() for path in (ROOT / "rules").glob("*.smk"))
+    assert all(re.search(rf"rule {rule}:| as {rule} with:", rules) for rule in COSTS)
+
+
+@pytest.mark.parametrize("key", ["steps", "steps_per_photo", "max_gaussians", "size", "level_steps", "sh_degree"])
+def test_more_work_takes_longer(config, key):
+    draft = config["presets"]["draft"]
+    more = {"size": 320, "sh_degree": 1}.get(key, draft[key] * 2)
+    config["presets"] |= {"less": draft | {"size": 256}, "more": draft | {"size": 256} | {key: more}}
+    less, more = (estimate_seconds(JOBS, describe_work(config, name), SAME) for name in ("less", "more"))
+    assert more > less
+
+
+def test_presets_are_ordered_by_their_time(config):
+    draft, standard, reference = (
+        estimate_seconds(JOBS, describe_work(config, name), SAME) for name in ("draft", "standard", "reference")
+    )
+    assert draft < standard < reference
+
+
+def test_photos_of_a_folder_are_counted(config, tmp_path):
+    for name in ("a.jpg", "b.jpg", ".hidden"):
+        (tmp_path / name).touch()
+    config["scenes"]["mine"] = config["scenes"]["copr_dunes"] | {"folder": str(tmp_path), "start": 2}
+    work = describe_work(config | {"scene": "mine"})
+    assert (work.total, work.start, work.tests, work.rendered) == (2, 2, 1, False)
+    assert describe_work(config | {"scene": "mine", "policy": "w2-lpips"}).samples == 5 * 8
+
+
+def test_a_finished_field_has_an_estimate_too(config):
+    field = {"kind": "field", "field": "a.ply", "up": [0, 0, 1], "preset": "standard", "tiling": "auto"}
+    config["scenes"]["given"] = field
+    jobs = {"import_field": 1, "prepare_external_field": 1, "make_levels": 1, "cut_tiles": 1}
+    assert estimate_seconds(jobs, describe_work(config | {"scene": "given"}), SAME) > 0
+
+
+def test_a_short_run_is_told_no_preset(config):
+    assert describe_estimate(config, {"fit_coarse": 1}, SAME) == "It will take about 20 seconds on this machine"
+
+
+def test_a_long_run_is_told_the_best_preset_that_is_short_enough(config):
+    config["scenes"]["desert"] |= {"preset": "reference"}
+    speed = MachineSpeed(6.0, 1.0)
+    times = {name: estimate_seconds(JOBS, describe_work(config, name), speed) for name in config["presets"]}
+    assert times["reference"] > estimate.LONG
+    name = max((n for n in times if times[n] <= estimate.LONG and times[n] < 0.8 * times["reference"]), key=times.get)
+    told = describe_estimate(config, JOBS, speed)
+    assert f"with preset: {name} {format_duration(times[name])}" in told
+
+
+def test_a_run_that_is_long_with_every_preset_is_told_the_fastest(config):
+    config["scenes"]["desert"] |= {"preset": "reference"}
+    assert "with preset: draft" in describe_estimate(config, JOBS, MachineSpeed(500.0, 1.0))
+
+
+def test_a_run_that_is_beyond_its_fits_is_told_no_preset(config):
+    assert "preset" not in describe_estimate(config, {"make_levels": 1}, MachineSpeed(1e4, 1e4))
+
+
+@pytest.mark.parametrize(
+    "seconds, text",
+    [
+        (3, "10 seconds"),
+        (44, "40 seconds"),
+        (70, "a minute"),
+        (170, "3 minutes"),
+        (1300, "20 minutes"),
+        (7000, "1.9 hours"),
+    ],
+)
+def test_a_duration_has_no_more_digits_than_are_known(seconds, text):
+    assert format_duration(float(seconds)) == f"about {text}"
+
+
+def test_the_speed_of_this_machine_is_two_positive_numbers(monkeypatch):
+    monkeypatch.setattr("dav_gswt.cli.machine_speed.DURATION", 0.0)
+    speed = measure_speed(1)
+    assert speed.raster > 0 and speed.general > 0
+
+
+def test_work_is_that_of_the_config(config):
+    work = describe_work(config)
+    assert (work.total, work.tests, work.start, work.new, work.rounds) == (8, 6, 8, 4, 2)
+    assert work.photo_pixels == work.fit_pixels == 384**2 and work.gaussians == 140_000
+    assert replace(work, gaussians=70_000.0).field_size == 0.5
+
+
+@pytest.mark.parametrize(
+    "threads, others, cores, longer",
+    [(2, 0, 2, 1), (2, 2, 2, 2), (1, 1, 2, 1), (1, 5, 2, 3), (2, 4, 16, 1), (2, 0, 1, 1)],
+)
+def test_jobs_share_the_cores_with_others(threads, others, cores, longer):
+    assert share_cores(threads, float(others), cores) == longer

@@ -1,0 +1,107 @@
+"""Rules are given the keys that they read, and no others."""
+
+import pickle
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fixtures.configs import ROOT
+
+from dav_gswt.capture import serial_rig
+from dav_gswt.config import rule_keys
+from dav_gswt.config.load import check_model
+from dav_gswt.config.rule_keys import EntryKeys, select_preset_keys, select_scene_keys
+from dav_gswt.config.scenes import PhotoScene, SyntheticScene
+from dav_gswt.config.settings import Preset
+from dav_gswt.errors import InputError
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.photos.sfm.registration import choose_sfm_options
+from dav_gswt.photos.synthetic import scene as synthetic
+from dav_gswt.reconstruction.fit_settings import CoarseSettings, UpdateSettings, select_settings
+from dav_gswt.views import candidates
+
+RIG = {"port": "p", "inbox": "in", "millimetres": 250.0, "limits": dict.fromkeys(("pan", "tilt", "radius"), (0, 1000))}
+SYNTHETIC = {"kind": "synthetic", "family": "desert", "seed": 0, "photos": 5, "test": 2, "size": 128}
+SYNTHETIC |= {"agent": "render", "preset": "draft", "tiling": "auto", "oblique": 2, "walkers": 2, "layout": "cap"}
+PHOTOS = {"kind": "photos", "folder": "x", "size": 512, "start": 8, "preset": "draft", "tiling": "auto"}
+
+
+def photo_scene(agent: str) -> dict:
+    given = PHOTOS | {"agent": agent} | ({"rig": RIG} if agent == "serial" else {})
+    return check_model(PhotoScene, given).model_dump(mode="json", exclude_none=True)
+
+
+@pytest.fixture
+def synthetic_scene() -> dict:
+    return check_model(SyntheticScene, SYNTHETIC).model_dump(mode="json", exclude_none=True)
+
+
+def test_a_rule_has_the_keys_that_it_is_given():
+    keys = EntryKeys({"a": 1, "b": 2, "rig": {"limits": 3, "port": 4}}, ("a", "missing", "rig.limits"))
+    assert keys == {"a": 1, "rig": {"limits": 3}} and repr(keys) == "{'a': 1, 'rig': {'limits': 3}}"
+    assert keys.get("missing", 5) == 5 and "missing" not in keys
+
+
+@pytest.mark.parametrize("read", [lambda keys: keys["b"], lambda keys: keys.get("b", 0), lambda keys: "b" in keys])
+def test_a_key_that_a_rule_is_not_given_has_no_default(read):
+    with pytest.raises(LookupError, match="not given the key 'b'"):
+        read(EntryKeys({"a": 1, "b": 2}, ["a"]))
+
+
+def test_jobs_receive_keys_with_their_guard():
+    sent = pickle.loads(pickle.dumps(EntryKeys({"a": 1, "rig": {"limits": 3}}, ["a", "rig.limits"])))
+    assert sent == {"a": 1, "rig": {"limits": 3}}
+    with pytest.raises(LookupError):
+        sent["rig"].get("port")
+
+
+def test_an_agent_that_a_rule_does_not_serve_is_named():
+    with pytest.raises(InputError, match="render_candidates serves no scene with agent replay"):
+        select_scene_keys("render_candidates", {"agent": "replay"})
+
+
+@pytest.mark.parametrize("rule, settings", [("fit_coarse", CoarseSettings), ("update_field", UpdateSettings)])
+def test_a_fit_is_given_all_keys_of_its_settings(rule, settings):
+    assert set(rule_keys.PRESET_KEYS[rule]) == {field.name for field in fields(settings)}
+    preset = {key: 1.0 if key in ("spacing", "pose_rate") else 1 for key in Preset.model_fields}
+    assert select_settings(settings, select_preset_keys(rule, preset)) == select_settings(settings, preset)
+
+
+def test_scores_are_given_all_keys_of_a_rig_s_reach():
+    given = select_scene_keys("score_coarse", photo_scene("serial"))["rig"]
+    assert given.allowed == {field.name for field in fields(serial_rig.RigReach)}
+    assert serial_rig.filter_reachable({"rig": given}, synthetic.make_scene("desert", 0).frame, []) == []
+
+
+def test_what_renders_photos_reads_only_its_keys(synthetic_scene):
+    given = select_scene_keys("render_photos", synthetic_scene)
+    assert synthetic.scene_from_config(given) == synthetic.scene_from_config(synthetic_scene)
+    assert len(synthetic.start_views(given)) == 5 and len(synthetic.test_views(given)) == 6
+    assert synthetic.test_groups(given) == synthetic.test_groups(synthetic_scene)
+
+
+@pytest.mark.parametrize("rule", ["score_coarse", "select_poses", "capture_views", "render_candidates"])
+def test_what_lists_rendered_candidates_reads_only_its_keys(synthetic_scene, rule):
+    assert len(synthetic.candidates(select_scene_keys(rule, synthetic_scene))) == 250
+
+
+@pytest.mark.parametrize("agent", ["serial", "plan", "handheld"])
+@pytest.mark.parametrize("rule", ["score_round", "select_poses", "request_views", "calibrate_round"])
+def test_what_lists_candidates_for_devices_reads_only_its_keys(agent, rule):
+    frame = synthetic.make_scene("desert", 0).frame
+    camera = Camera(np.eye(3), np.zeros(3), 100.0, 100.0, 64.0, 64.0, 128, 128)
+    given = select_scene_keys(rule, photo_scene(agent))
+    assert given["agent"] == agent and len(candidates.list_orbit(given, frame, camera)) == 250
+
+
+def test_structure_from_motion_reads_only_its_keys():
+    entry = photo_scene("replay") | {"focal": 28.0, "mapper": "global", "sfm": "careful"}
+    given = select_scene_keys("register_photos", entry)
+    assert choose_sfm_options(given, 1) == choose_sfm_options(entry, 1)
+
+
+def test_every_rule_with_keys_is_a_rule_of_the_workflow():
+    text = "".join(path.read_text() for path in Path(ROOT, "rules").rglob("*.smk"))
+    for rule in (*rule_keys.SCENE_KEYS, *rule_keys.PRESET_KEYS, *rule_keys.PRIOR_KEYS):
+        assert f"rule {rule}:" in text or f" as {rule} with:" in text, rule

@@ -1,0 +1,170 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fixtures import mixed_ground as made
+
+from dav_gswt.errors import InputError
+from dav_gswt.field import concatenate_fields
+from dav_gswt.materials import build, extraction, store, verdict
+from dav_gswt.materials.filling import CellSources
+from dav_gswt.materials.objects import Footprint
+from dav_gswt.reconstruction import top_view, underlay
+from dav_gswt.reconstruction.objects import make_blobs
+
+
+@pytest.fixture(scope="module")
+def found():
+    return build.find_materials(made.field(), made.grid(), 0)
+
+
+def picture(material):
+    return top_view.render_exemplar(material.field, material.grid).colour
+
+
+@pytest.mark.parametrize(("number", "colour"), [(0, made.SAND), (1, made.GRASS)])
+def test_an_exemplar_shows_its_material_alone(found, number, colour):
+    away = np.abs(picture(found.materials[number]) - colour).max(-1)
+    assert (away < 0.15).mean() > 0.99
+
+
+def test_exemplars_have_a_disc_a_cell_and_an_underlay(found):
+    for material in found.materials:
+        grid, field = material.grid, material.field
+        assert grid.shape == (grid.cells, grid.cells)
+        assert field.ground.sum() == grid.cells**2
+        assert underlay.find_rows(field, grid) == slice(grid.cells**2, grid.cells**2 + underlay.count_gaussians(grid))
+
+
+def test_discs_lie_in_their_cells(found):
+    grid, field = found.materials[0].grid, found.materials[0].field
+    np.testing.assert_allclose(field.means[: grid.cells**2, :2], grid.centres[:, :2], atol=1e-5)
+
+
+def test_no_shrub_is_left_on_the_ground(found):
+    grid, field = found.materials[0].grid, found.materials[0].field
+    assert len(field) == grid.cells**2 + underlay.count_gaussians(grid)
+
+
+def test_filled_ground_is_marked_as_uncertain(found):
+    field = found.materials[0].field
+    assert field.uncertainty[field.ground].max() == pytest.approx(extraction.FILLED)
+    assert found.materials[0].filled == pytest.approx(np.mean(field.uncertainty[field.ground] > 0), abs=1e-6)
+
+
+def test_objects_stand_around_their_foot(found):
+    for each in found.objects:
+        assert np.abs(each.field.means[:, :2].mean(0)).max() < 2 * made.SPACING
+        assert each.height == pytest.approx((made.HEIGHT - 2) * made.SPACING, abs=made.SPACING)
+        assert each.radius == pytest.approx(made.RADIUS * made.SPACING, abs=3 * made.SPACING)
+
+
+def test_density_counts_objects_on_the_area_of_their_material(found):
+    area = found.classes.shares[0] * (~found.classes.excluded).sum() * made.SPACING**2
+    assert sum(each.density for each in found.objects) == pytest.approx(len(made.SHRUBS) / area)
+
+
+def test_an_object_on_a_slope_stands_on_level_ground():
+    field, grid = made.field(mixed=False, slope=0.3), made.grid(0.3)
+    maps = build.measure_ground(field, grid)
+    rows, columns = np.mgrid[: made.CELLS, : made.CELLS]
+    r, c = made.SHRUBS[0]
+    cells = (rows - r) ** 2 + (columns - c) ** 2 <= made.RADIUS**2
+    own = extraction.extract_object(field, grid, maps, extraction.bin_standing(field, grid, maps), Footprint(cells, 0))
+    discs = own.means[own.ground]
+    assert np.abs(discs[:, 2] - extraction.LIFT * made.SPACING).max() < 0.02 * made.SPACING
+
+
+def test_what_floats_far_above_a_material_is_left_out():
+    """Low growth everywhere, and a crown high above a few cells."""
+    field, grid = made.field(mixed=False, shrubs=False), made.grid()
+    rng = np.random.default_rng(0)
+    low = np.concatenate([rng.uniform(1, 11, (400, 2)), rng.uniform(0.1, 0.4, (400, 1))], 1)
+    crown = np.concatenate([rng.uniform(3, 4, (40, 2)), rng.uniform(3, 4, (40, 1))], 1)
+    points = np.concatenate([low, crown])
+    blobs = make_blobs(points, np.full((440, 3), 0.3), np.full(440, 0.05))
+    maps = build.measure_ground(field, grid)
+    whole = np.ones((made.CELLS, made.CELLS), bool)
+    sources = CellSources.identity(made.CELLS)
+    kept, _ = extraction.extract_exemplar(concatenate_fields([field, blobs]), grid, maps, sources, whole)
+    assert (kept.means[:, 2] > 0.05).sum() == 400
+    assert kept.means[:, 2].max() < 1
+
+
+def test_copied_ground_follows_the_slope():
+    field, grid = made.field(mixed=False, shrubs=False, slope=0.3), made.grid(0.3)
+    maps = build.measure_ground(field, grid)
+    own = np.ones((made.CELLS, made.CELLS), bool)
+    own[40:60, 90:110] = False
+    sources = CellSources.identity(made.CELLS)
+    sources = CellSources(sources.rows, np.where(own, sources.columns, sources.columns - 60))
+    made_field, made_grid = extraction.extract_exemplar(field, grid, maps, sources, own)
+    heights = made_field.means[: made.CELLS**2, 2].reshape(made.CELLS, made.CELLS)
+    wanted = maps.height
+    assert np.abs(heights - wanted)[45:55, 95:105].max() < 0.35 * made.SPACING
+    assert np.abs(made_grid.heights - wanted)[45:55, 95:105].max() < 0.35 * made.SPACING
+
+
+def test_the_same_seed_gives_the_same_gaussians(found):
+    again = build.find_materials(made.field(), made.grid(), 0)
+    for one, two in zip(found.materials, again.materials, strict=True):
+        np.testing.assert_array_equal(one.field.means, two.field.means)
+        np.testing.assert_array_equal(one.field.sh, two.field.sh)
+
+
+def test_a_field_without_ground_is_refused():
+    field = made.field()
+    with pytest.raises(InputError, match="no ground layer.*materials: one"):
+        build.find_materials(replace(field, ground=np.zeros(len(field), bool)), made.grid(), 0)
+
+
+def test_ground_of_which_nothing_is_left_is_tiled_as_one(monkeypatch, caplog):
+    classes = build.classify_ground(made.maps())
+    nowhere = replace(classes, excluded=np.ones_like(classes.excluded))
+    monkeypatch.setattr(build, "classify_ground", lambda maps: nowhere)
+    field = made.field()
+    found = build.find_materials(field, made.grid(), 0)
+    assert [each.field is field for each in found.materials] == [True]
+    assert "all of the ground is tiled as one" in caplog.text
+
+
+def test_even_ground_is_given_back_as_it_is():
+    field, grid = made.field(mixed=False, shrubs=False), made.grid()
+    found = build.find_materials(field, grid, 0)
+    assert found.materials[0].field is field and found.materials[0].grid is grid
+    assert (found.materials[0].info.share, found.objects, found.tile_side) == (1.0, [], None)
+
+
+def test_materials_are_written_and_read(found, tmp_path):
+    store.write_materials(found, tmp_path / "materials", {"version": "x"})
+    report = store.read_report(tmp_path / "materials")
+    assert [each.share for each in report.materials] == [each.info.share for each in found.materials]
+    exemplars = store.read_exemplars(tmp_path / "materials")
+    for (field, grid), material in zip(exemplars, found.materials, strict=True):
+        np.testing.assert_array_equal(field.means, material.field.means)
+        assert grid.exemplar == pytest.approx(material.grid.exemplar)
+    objects = store.read_objects(tmp_path / "materials", 3, made.SPACING)
+    assert [len(each.fields) for each in objects] == [3] * len(found.objects)
+    assert all(len(each.fields[1]) < len(each.fields[0]) for each in objects)
+
+
+def test_a_damaged_report_is_named(found, tmp_path):
+    store.write_materials(found, tmp_path / "materials", {})
+    (tmp_path / "materials/materials.json").write_text('{"verdict": 3}')
+    with pytest.raises(InputError, match=r"materials\.json.*find the materials again"):
+        store.read_report(tmp_path / "materials")
+
+
+@pytest.mark.parametrize(("areas", "grade"), [(8.0, "good"), (3.0, "marginal"), (0.5, "no")])
+def test_the_verdict_follows_the_photographed_area(areas, grade):
+    judged = verdict.judge_material("sand", areas, 0.3)
+    assert judged.grade == grade
+    assert judged.reason.startswith(f"sand was photographed on {areas:.1f} tile areas")
+
+
+def test_a_window_is_filled_by_its_material_where_it_can_be():
+    own = np.zeros((128, 128), bool)
+    own[32:120, 20:120] = True
+    row, column, side = build.choose_window(own, 30.0)
+    assert own[row : row + side, column : column + side].mean() >= build.OWN_SHARE
+    assert side % build.BLOCK == 0

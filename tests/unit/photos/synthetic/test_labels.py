@@ -1,0 +1,127 @@
+"""The map of true materials and objects: what it shows of known ground, and that files keep it."""
+
+import json
+
+import numpy as np
+import pytest
+
+from dav_gswt.errors import InputError
+from dav_gswt.files import write_json
+from dav_gswt.geometry.scene_frame import Extent, Square
+from dav_gswt.images import image_files
+from dav_gswt.photos.synthetic import labels, meshes
+from dav_gswt.photos.synthetic.labels import GroundLabels, LabelMap, LandObject
+
+SQUARE = Square(-2.0, -1.0, 4.0)  # x from -2 to 2, y from -1 to 3
+
+
+def ball(kind, x, y, radius):
+    """A sphere of a kind about a place."""
+    mesh = meshes.make_stone(np.random.default_rng(0), 4)
+    unit = mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True)
+    return LandObject(kind, (radius * unit + [x, y, 0.0]).astype(np.float32))
+
+
+@pytest.fixture
+def known():
+    """Meadow where y is from 0 to 4, sand elsewhere, over a period of 8; a shrub and two boulders, one far away."""
+    material = np.ones((16, 16), int)
+    material[:8] = 2
+    objects = ball("shrub", 1.0, 2.0, 0.5), ball("boulder", -1.0, 0.0, 0.25), ball("boulder", 9.0, 0.0, 0.5)
+    return GroundLabels({"sand": 1, "meadow": 2}, material, 8.0, objects, frozenset())
+
+
+def test_the_material_repeats_after_the_period(known):
+    y = np.array([-0.1, 0.1, 3.9, 4.1, 8.1, -7.9])
+    assert known.material_at(np.full(6, 33.0), y).tolist() == [1, 2, 2, 1, 2, 2]
+
+
+def test_rows_of_the_map_run_to_the_north_and_columns_to_the_east(known):
+    found = labels.draw_label_map(known, SQUARE, 80)
+    assert (found.material[:20] == 1).all() and (found.material[20:] == 2).all()
+    row, column = np.argwhere(found.object == 1).mean(axis=0)
+    assert (column, row) == pytest.approx(((1.0 + 2.0) * 20 - 0.5, (2.0 + 1.0) * 20 - 0.5), abs=0.3)
+
+
+def test_the_footprint_of_an_object_is_its_outline_from_above(known):
+    found = labels.draw_label_map(known, SQUARE, 200)
+    cell = SQUARE.side / 200
+    for thing, radius in zip(found.objects, (0.5, 0.25), strict=True):
+        area = (found.object == thing.id).sum() * cell**2
+        assert area == pytest.approx(np.pi * radius**2, rel=0.12)  # half a cell around
+        assert thing.radius == pytest.approx(radius, rel=0.01)
+
+
+def test_objects_outside_of_the_map_are_not_named(known):
+    found = labels.draw_label_map(known, SQUARE, 80)
+    assert [(thing.id, thing.kind) for thing in found.objects] == [(1, "shrub"), (2, "boulder")]
+    assert set(np.unique(found.object)) == {0, 1, 2}
+
+
+def test_an_object_at_the_border_is_cut_there():
+    known = GroundLabels({"sand": 1}, np.ones((4, 4), int), 8.0, (ball("shrub", 2.0, 0.0, 0.5),), frozenset())
+    found = labels.draw_label_map(known, SQUARE, 200)
+    assert (found.object == 1).sum() * 0.02**2 == pytest.approx(np.pi * 0.5**2 / 2, rel=0.12)
+
+
+def test_twigs_with_gaps_between_them_are_one_footprint():
+    twigs = np.array([[x, y, 0.1] for x in np.arange(-0.3, 0.31, 0.05) for y in np.arange(-0.3, 0.31, 0.05)])
+    far_leaf = [[0.8, 0.8, 0.1]]
+    covered = labels.rasterize_footprint(np.vstack([twigs, far_leaf]).astype(np.float32), Square(-1.0, -1.0, 2.0), 200)
+    assert covered.sum() * 0.01**2 == pytest.approx(0.6**2, rel=0.1)
+
+
+def test_a_mask_of_a_material_leaves_objects_out(known):
+    found = labels.draw_label_map(known, SQUARE, 80)
+    assert found.mask("meadow").sum() == (found.material == 2).sum() - (found.object[20:] > 0).sum()
+    with pytest.raises(KeyError):
+        found.mask("water")
+
+
+def test_a_place_belongs_to_the_nearest_object_of_the_kind_that_holds_it(known):
+    x, y = np.array([1.0, 1.3, 1.6, -1.0]), np.array([2.0, 2.3, 2.0, 0.2])
+    assert labels.label_places(known, x, y, "shrub").tolist() == [1, 1, 0, 0]
+    assert labels.label_places(known, x, y, "boulder").tolist() == [0, 0, 0, 2]
+
+
+def test_files_keep_a_map(known, tmp_path):
+    made = labels.draw_label_map(known, SQUARE, 40)
+    labels.write_label_map(tmp_path, made)
+    found = labels.read_label_map(tmp_path)
+    assert isinstance(found, LabelMap)
+    assert (found.material == made.material).all() and (found.object == made.object).all()
+    assert (found.extent, found.materials, found.objects) == (made.extent, made.materials, made.objects)
+
+
+def test_on_disk_the_first_row_is_the_northern_one_and_the_header_has_the_extent(known, tmp_path):
+    labels.write_label_map(tmp_path, labels.draw_label_map(known, SQUARE, 40))
+    channels, header = image_files.read_exr(tmp_path / labels.MAP)
+    assert set(channels) == {"material", "object"}
+    assert channels["material"][0, 0] == 2 and channels["material"][-1, 0] == 1
+    assert Extent(**json.loads(header["extent"])) == Extent(-2.0, -1.0, 2.0, 3.0)
+
+
+@pytest.mark.parametrize("missing", [labels.MAP, labels.NAMES])
+def test_a_folder_without_a_map_is_refused_by_name(known, tmp_path, missing):
+    labels.write_label_map(tmp_path, labels.draw_label_map(known, SQUARE, 40))
+    (tmp_path / missing).unlink()
+    with pytest.raises(InputError, match=missing):
+        labels.read_label_map(tmp_path)
+
+
+def test_labels_without_a_name_and_a_missing_channel_are_refused(known, tmp_path):
+    labels.write_label_map(tmp_path, labels.draw_label_map(known, SQUARE, 40))
+    ones = np.ones((4, 4), np.float32)
+    image_files.write_exr(tmp_path / labels.MAP, {"material": 7 * ones, "object": 0 * ones})
+    with pytest.raises(InputError, match="does not name.*7"):
+        labels.read_label_map(tmp_path)
+    image_files.write_exr(tmp_path / labels.MAP, {"material": ones})
+    with pytest.raises(InputError, match="object"):
+        labels.read_label_map(tmp_path)
+
+
+def test_names_of_another_kind_are_refused(known, tmp_path):
+    labels.write_label_map(tmp_path, labels.draw_label_map(known, SQUARE, 40))
+    write_json(tmp_path / labels.NAMES, {"materials": {"sand": "one"}})
+    with pytest.raises(InputError, match=labels.NAMES):
+        labels.read_label_map(tmp_path)

@@ -1,0 +1,154 @@
+"""Classes: the numbers shared with the page, bounds of cells, covered ground, and what reaches over a border."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fixtures.land_covers import SIDE, gaussians, two_classes
+
+from dav_gswt.bundle.land_cover import ClassesEntry, ImageTerm, RangeTerm
+from dav_gswt.files import parse_record
+from dav_gswt.terrain.classes import JITTER, LATTICE, NOISE, Classes
+from dav_gswt.terrain.heights import FlatSurface, HeightMap, Hills
+
+GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "classes.json").read_text())["terrains"]
+
+
+def classes_of(terrain) -> Classes:
+    surface, entry = terrain["heights"], parse_record(terrain["classes"], ClassesEntry)
+    heights = FlatSurface()
+    if surface["kind"] == "hills":
+        heights = Hills(*(surface[key] for key in ("height", "wavelength", "octaves", "salt")))
+    pictures = {
+        term.file: np.array(terrain["pixels"], np.uint8).reshape(term.rows, term.columns)
+        for term in entry.rule
+        if isinstance(term, ImageTerm)
+    }
+    return Classes(entry, terrain["materials"], terrain["side"], heights, pictures)
+
+
+@pytest.fixture
+def sand_and_grass():
+    return Classes(two_classes(), 2, SIDE)
+
+
+@pytest.fixture
+def border(sand_and_grass):
+    """A cell of both materials."""
+    i, j = (v.ravel() for v in np.mgrid[0:9, 0:9].astype(np.int64))
+    mixed = np.flatnonzero(sand_and_grass.materials_in(i, j) == 3)
+    return int(i[mixed[0]]), int(j[mixed[0]])
+
+
+def discs_at(places, z=0.0):
+    means = np.concatenate([places * SIDE, np.full((len(places), 1), z)], 1)
+    return gaussians(means, [0.5] * 3, 0.1).means
+
+
+@pytest.mark.parametrize("terrain", GOLDEN, ids=range(len(GOLDEN)))
+def test_numbers_are_those_shared_with_the_page(terrain):
+    classes = classes_of(terrain)
+    for cell in terrain["cells"]:
+        i, j, places = cell["i"], cell["j"], cell["places"]
+        assert classes.materials_in(np.array([i]), np.array([j])).tolist() == [cell["materials"]]
+        corner = classes.lattice_scores(np.array([LATTICE * i]), np.array([LATTICE * j]))[0]
+        np.testing.assert_allclose(corner, cell["corner"], rtol=0, atol=1e-9)
+        means = np.array([[place[axis] for axis in "xyz"] for place in places], np.float32)
+        u, v = (means[:, axis].astype(float) / terrain["side"] for axis in (0, 1))
+        scores = classes.scores_at(np.full(len(u), i), np.full(len(u), j), u, v)
+        np.testing.assert_allclose(scores, [place["scores"] for place in places], rtol=0, atol=1e-9)
+        jitter = classes.jitter_at(i, j, u, v)
+        np.testing.assert_allclose(jitter, [place["jitter"] for place in places], rtol=0, atol=1e-9)
+        kept = classes.keep(i, j, means, np.array([place["material"] for place in places]))
+        assert kept.tolist() == [place["kept"] for place in places]
+
+
+def test_no_axis_of_the_hash_serves_two_noises():
+    assert NOISE + 8 * 8 <= JITTER
+
+
+@pytest.mark.parametrize("cell", [(0, 0), (-5, 3), (1_000_000, -1_000_000)])
+def test_neighbouring_cells_agree_on_the_scores_along_their_edge(sand_and_grass, cell):
+    i, j = (np.full(9, v) for v in cell)
+    along = np.linspace(0, 1, 9)
+    east = sand_and_grass.scores_at(i, j, np.ones(9), along)
+    np.testing.assert_allclose(sand_and_grass.scores_at(i + 1, j, np.zeros(9), along), east, rtol=0, atol=1e-12)
+    jitter = sand_and_grass.jitter_at(*cell, np.ones(9), along)
+    beside = sand_and_grass.jitter_at(cell[0] + 1, cell[1], np.zeros(9), along)
+    np.testing.assert_allclose(beside, jitter, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("amplitude", [0.0, 0.05])
+def test_every_place_keeps_the_disc_of_a_material(amplitude):
+    classes = Classes(two_classes(amplitude), 2, SIDE)
+    rng = np.random.default_rng(1)
+    for i, j in rng.integers(-1000, 1000, (20, 2)).tolist():
+        discs = discs_at(rng.random((200, 2)))
+        sand, grass = (classes.keep(i, j, discs, np.full(200, m)) for m in (0, 1))
+        assert (sand | grass).all()
+        assert not (sand & grass).any(), "flat discs of both at one place: a blend"
+
+
+def test_what_a_cell_may_not_hold_is_dropped_from_it(sand_and_grass):
+    rng, i, j = np.random.default_rng(2), *np.random.default_rng(3).integers(-500, 500, (2, 40))
+    for cell in zip(i.tolist(), j.tolist(), sand_and_grass.materials_in(i, j).tolist(), strict=True):
+        tall = discs_at(rng.random((300, 2)), z=5.0)
+        for material in (0, 1):
+            kept = sand_and_grass.keep(*cell[:2], tall, np.full(300, material))
+            if not cell[2] >> material & 1:
+                assert not kept.any()
+            if cell[2] == 1 << material:
+                assert kept.all()
+
+
+def test_what_stands_above_the_ground_reaches_over_the_border(sand_and_grass, border):
+    places = np.random.default_rng(4).random((4000, 2))
+    low, tall, deep = (sand_and_grass.keep(*border, discs_at(places, z), np.ones(4000, int)) for z in (0.01, 0.3, -0.3))
+    assert (tall >= low).all() and tall.sum() > low.sum()
+    assert (deep == tall).all(), "what lies below the ground stays under the border as far"
+
+
+def test_jitter_frays_a_border_by_its_amplitude_at_most(sand_and_grass, border):
+    places = np.random.default_rng(5).random((4000, 2))
+    cell = [np.full(4000, v) for v in border]
+    scores = sand_and_grass.scores_at(*cell, *places.T)
+    margin = scores[:, 0] - scores[:, 1]
+    kept = sand_and_grass.keep(*border, discs_at(places), np.zeros(4000, int))
+    amplitude = sand_and_grass.entry.jitter.amplitude
+    assert kept[margin > 2 * amplitude].all() and not kept[margin < -2 * amplitude].any()
+    assert (kept != (margin >= 0)).any()
+
+
+def rule_of(*terms, heights=None, pictures=None):
+    entry = replace(two_classes(0.0), rule=list(terms))
+    return Classes(entry, 2, SIDE, heights or FlatSurface(), pictures or {})
+
+
+def test_a_range_takes_a_material_from_where_the_surface_is_too_low():
+    ramp = HeightMap(np.tile(np.float32([0, 1, 2, 3]), (4, 1)), 16.0, "clamp")  # rises to the east, 4 units a pixel
+    classes = rule_of(RangeTerm("height", 2.0, 1, 2.0, None, 0.5), heights=ramp)
+    scores = classes.lattice_scores(np.array([-16, 4, 16]), np.zeros(3, int))  # heights 0, 2 and 3
+    height = ramp.at(np.array([-8.0, 2.0, 8.0]), np.zeros(3))[0]
+    np.testing.assert_allclose(scores[:, 1], -2.0 * np.minimum(np.maximum(2.0 - height, 0) / 0.5, 4.0))
+    assert not scores[:, 0].any()
+
+
+def test_a_picture_names_materials_in_the_middles_of_its_pixels():
+    pixels = np.array([[0, 1], [255, 0]], np.uint8)
+    term = ImageTerm("image", 1.0, "a.bin", 4, "0" * 64, 2, 2, 8.0, "clamp")
+    classes = rule_of(term, pictures={"a.bin": pixels})
+    middles = [(-4, 4), (4, 4), (-4, -4), (4, -4)]  # lattice points; two units from the origin each way
+    scores = classes.lattice_scores(*np.array(middles).T)
+    assert scores.tolist() == [[1, 0], [0, 1], [0, 0], [1, 0]]
+
+
+def test_a_mirrored_picture_repeats_and_a_clamped_one_goes_on():
+    pixels = np.array([[0, 1], [0, 1]], np.uint8)
+    found = {}
+    for beyond in ("mirror", "clamp"):
+        term = ImageTerm("image", 1.0, "a.bin", 4, "0" * 64, 2, 2, 8.0, beyond)
+        far = np.array([12, 20, 28])  # 6, 10 and 14 units to the east: pixels 2, 3 and 4
+        found[beyond] = rule_of(term, pictures={"a.bin": pixels}).lattice_scores(far, np.zeros(3, int)).argmax(1)
+    assert found["mirror"].tolist() == [1, 0, 0] and found["clamp"].tolist() == [1, 1, 1]

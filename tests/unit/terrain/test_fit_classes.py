@@ -1,0 +1,69 @@
+"""Fitted classes: shares and patch scales of the noise, biases, and the transition."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fixtures.land_covers import SIDE, cover_content
+
+from dav_gswt.bundle.content import BundleContent
+from dav_gswt.materials.model import MaterialInfo
+from dav_gswt.terrain import fit_classes
+from dav_gswt.terrain.classes import Classes
+
+
+def content_of(*materials):
+    tiles = cover_content().tiles
+    named = [MaterialInfo(str(k), share, scale, [0.5] * 3) for k, (share, scale) in enumerate(materials)]
+    return BundleContent([tiles[k % 2] for k in range(len(named))], named)
+
+
+@pytest.fixture(scope="module", params=[((0.6, 12.0), (0.4, 8.0)), ((0.5, 14.0), (0.3, 14.0), (0.2, 10.0))], ids=len)
+def fitted(request):
+    content = content_of(*request.param)
+    return content, Classes(fit_classes.fit_classes(content, 7), len(content.materials), SIDE)
+
+
+def test_every_material_has_its_share_of_ground_that_was_not_fitted(fitted):
+    content, classes = fitted
+    points = np.random.default_rng(99).integers(-(2**30), 2**30, (2, 100_000))
+    reached = np.bincount(classes.lattice_scores(*points).argmax(1)) / 100_000
+    # 40 000 or more samples of the fit and these: 0.25 % each
+    assert reached == pytest.approx([m.share for m in content.materials], abs=0.01)
+
+
+def test_stretches_have_the_wanted_length_in_the_mean(fitted):
+    content, classes = fitted
+    stretches, _ = fit_classes.measure_lines(classes, 8)
+    ratio = np.log(stretches * SIDE / [m.patch_scale for m in content.materials])
+    assert abs(ratio @ [m.share for m in content.materials]) < 0.1
+
+
+def test_jitter_moves_a_border_by_a_small_part_of_a_tile(fitted):
+    _, classes = fitted
+    u, v = np.random.default_rng(0).random((2, 5000))
+    jitter = classes.jitter_at(3, 4, u, v)
+    _, steepness = fit_classes.measure_lines(classes, 8)
+    moved = np.abs(jitter[:, 0] - jitter[:, 1]).mean() / steepness
+    assert moved == pytest.approx(fit_classes.FRAY, rel=0.2)
+
+
+def test_biases_of_two_materials_are_half_of_the_quantile_of_their_difference():
+    scores = np.random.default_rng(0).normal(size=(20_000, 2))
+    biases = fit_classes.fit_biases(scores, np.array([0.9, 0.1]))
+    quantile = np.quantile(scores[:, 1] - scores[:, 0], 0.9)
+    assert biases[0] - biases[1] == pytest.approx(quantile, abs=0.03)
+    assert biases.sum() == pytest.approx(0, abs=1e-12)
+
+
+def test_the_relief_of_the_ground_itself_does_not_count_as_height():
+    content = content_of((0.5, 10.0), (0.5, 10.0))
+    rng = np.random.default_rng(1)
+    fields = [
+        [replace(f, means=f.means + np.float32([0, 0, 1]) * rng.normal(0.3, 0.05, (len(f), 1)).astype(np.float32))
+         for f in level] for level in content.tiles[0].fields
+    ]  # fmt: skip
+    content = replace(content, tiles=[replace(content.tiles[0], fields=fields), content.tiles[1]])
+    rise = fit_classes.fit_classes(content, 0).rise
+    assert rise.ground == pytest.approx([0.3, 0.0], abs=0.01)
+    assert rise.clearance == pytest.approx([0.1, 0.0], abs=0.01)

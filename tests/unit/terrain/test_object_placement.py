@@ -1,0 +1,117 @@
+"""Objects on the terrain: turned, scaled, on the surface, drawn after the right cell, and counted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fixtures.land_covers import SIDE, cover_content
+from fixtures.terrains import HILLS, SKY, walking
+from scipy.spatial.transform import Rotation
+
+from dav_gswt.bundle.build import BundleOptions, describe_tiles
+from dav_gswt.bundle.orders import DirectionRings
+from dav_gswt.lod.merge import compute_covariances
+from dav_gswt.materials import placing
+from dav_gswt.terrain import endless, object_placement, placement, stills, visibility
+from dav_gswt.terrain.fit_cover import fit_cover
+from dav_gswt.terrain.scatter import concatenate_instances
+
+
+@pytest.fixture(scope="module")
+def cover():
+    content = fit_cover(cover_content(), 7)
+    info = describe_tiles(content, BundleOptions(tau=0.5, salt=7), DirectionRings((20.0,), 8))
+    fields = [content.tile_fields(level) for level in range(content.levels)]
+    objects = [each.fields for each in content.objects]
+    return replace(endless.terrain_from_fields(fields, info, {"kind": "flat"}, objects), reach=10)
+
+
+@pytest.fixture(scope="module")
+def seen(cover):
+    """Visible cells of a walker, and the objects by the cell that they are drawn with."""
+    camera = walking(cover)
+    cells = visibility.visible_cells(cover, camera)
+    return camera.centre, cells, object_placement.group_by_cell(cover, cells, camera.centre)
+
+
+def test_an_object_is_turned_and_scaled_about_its_foot(cover):
+    source = cover.objects[0][0]
+    n, foot = len(source), np.array([3.0, 4.0, 0.5])
+    way = placing.turn_rows(np.full(n, 0.3))
+    made = placing.turn_and_scale(source, way, np.full(n, 1.1), np.tile(foot, (n, 1)))
+    turn = Rotation.from_euler("z", 0.3).as_matrix()
+    assert made.means == pytest.approx(1.1 * source.means @ turn.T + foot, abs=1e-5)
+    expected = 1.1**2 * turn @ compute_covariances(source) @ turn.T
+    assert compute_covariances(made) == pytest.approx(expected, rel=1e-4, abs=1e-9)
+
+
+def test_every_visible_foot_is_drawn_once(cover, seen):
+    _, cells, things = seen
+    drawn = concatenate_instances(list(things.values()))
+    every = cover.scatter.instances_in(cells.i, cells.j)
+    assert len(drawn) == len(every) > 20
+    assert set(zip(drawn.i.tolist(), drawn.u.tolist(), strict=True)) == set(
+        zip(every.i.tolist(), every.u.tolist(), strict=True)
+    )
+
+
+def test_an_object_is_drawn_with_the_last_of_the_cells_that_it_touches(cover, seen):
+    eye, cells, things = seen
+    moved = 0
+    for k, some in things.items():
+        radius = cover.scatter.objects[0].radius * some.size / SIDE
+        for n in range(len(some)):
+            x, y = some.i[n] + some.u[n], some.j[n] + some.v[n]
+            touched = (np.abs(cells.i + 0.5 - x) < 0.5 + radius[n]) & (np.abs(cells.j + 0.5 - y) < 0.5 + radius[n])
+            last = int(np.flatnonzero(touched)[-1])  # cells come back to front
+            steps = np.abs(cells.i - np.floor(eye[0] / SIDE)) + np.abs(cells.j - np.floor(eye[1] / SIDE))
+            assert steps[k] == steps[last]
+            moved += (cells.i[k], cells.j[k]) != (some.i[n], some.j[n])
+    assert moved > 0
+
+
+def test_objects_come_after_the_tiles_of_their_cell_the_farthest_first(cover, seen):
+    eye, cells, things = seen
+    k, some = next((k, some) for k, some in things.items() if len(some) > 1)
+    alone, _ = placement.place_cell(cover, cells[k : k + 1], eye)
+    field, slope = placement.place_cell(cover, cells[k : k + 1], eye, some)
+    np.testing.assert_array_equal(field.means[: len(alone)], alone.means)
+    assert len(slope) == len(field) > len(alone)
+    feet = np.stack([(some.i + some.u) * SIDE, (some.j + some.v) * SIDE], 1) - eye[:2]
+    first = field.means[len(alone), :2]
+    farthest = feet[np.argmax(np.linalg.norm(feet, axis=1))]
+    assert np.linalg.norm(first - farthest) < 1.0
+
+
+def test_an_object_stands_on_the_surface(cover, seen):
+    hilly = replace(cover, heights=HILLS)
+    eye, cells, things = seen
+    k, some = next(iter(things.items()))
+    cell = cells[k : k + 1]
+    flat, raised = (placement.place_cell(terrain, cell, eye, some)[0] for terrain in (cover, hilly))
+    tall = flat.means[:, 2] + eye[2] > 0.3
+    assert tall.any()
+    height, _ = HILLS.at(flat.means[tall, 0].astype(float) + eye[0], flat.means[tall, 1].astype(float) + eye[1])
+    assert raised.means[tall, 2] - flat.means[tall, 2] == pytest.approx(height, abs=1e-3)
+
+
+def test_a_budget_counts_objects(cover, seen):
+    _, cells, _ = seen
+    without = visibility.count_gaussians(replace(cover, scatter=None), cells)
+    counts = visibility.count_gaussians(cover, cells)
+    levels = visibility.active_levels(cover, cells)
+    more = np.zeros(len(cells), int)
+    for n, cell in enumerate(zip(cells.i, cells.j, strict=True)):
+        found = cover.scatter.instances_in(*(np.array([v]) for v in cell))
+        more[n] = sum(len(cover.objects[k][lv]) for k in found.number for lv in np.flatnonzero(levels[:, n]))
+    np.testing.assert_array_equal(counts - without, more)
+
+
+def test_a_still_shows_the_objects(cover):
+    camera = stills.shot_camera(stills.Shot("down", (0.3, 0.2), 12.0, 90.0, 90.0), cover, 1.0, 96, 96)
+    bare, full = (
+        stills.render_view(terrain, camera, SKY, [0.5] * 3) for terrain in (replace(cover, scatter=None), cover)
+    )
+    changed = np.abs(bare - full).max(-1) > 0.05
+    assert 0.001 < changed.mean() < 0.3
+    assert full[changed].mean(0) == pytest.approx([0.2, 0.35, 0.15], abs=0.1)

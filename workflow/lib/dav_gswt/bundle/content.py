@@ -1,0 +1,100 @@
+"""What a bundle is made of: a tile set for each material, and objects."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from dav_gswt.bundle.land_cover import ClassesEntry, ScatterEntry
+from dav_gswt.bundle.manifest import ONLY_MATERIAL
+from dav_gswt.errors import InputError
+from dav_gswt.field import GaussianField
+from dav_gswt.materials.model import MaterialInfo, ObjectLevels
+from dav_gswt.tiles.build import TileSet
+
+
+@dataclass(frozen=True)
+class BundleContent:
+    """Tiles, materials and objects of a terrain.
+
+    Attributes:
+        tiles: of each material, all of the same size and number.
+        materials: in the order of their tiles.
+        objects: may be none.
+        classes: which material lies where; needed with several materials (`terrain.fit_cover`).
+        scatter: where objects stand, and the probability of each; needed with objects.
+    """
+
+    tiles: list[TileSet]
+    materials: list[MaterialInfo]
+    objects: list[ObjectLevels] = field(default_factory=list)
+    classes: ClassesEntry | None = None
+    scatter: ScatterEntry | None = None
+    probabilities: list[float] = field(default_factory=list)
+
+    @classmethod
+    def of_one_material(cls, tiles: TileSet) -> "BundleContent":
+        """One tile set, without objects."""
+        colour = compute_ground_colour(tiles.fields[-1])
+        return cls([tiles], [MaterialInfo(ONLY_MATERIAL, 1.0, tiles.side, colour)])
+
+    def __post_init__(self) -> None:
+        sizes = {(t.side, t.spacing, len(t.fields), len(t.labels)) for t in self.tiles}
+        if len(sizes) != 1 or len(self.materials) != len(self.tiles):
+            raise InputError(
+                "materials: each needs a tile set, all with the same tile side, spacing, levels and variants; cut the "
+                "tiles again"
+            )
+        if any(len(each.fields) != self.levels for each in self.objects):
+            raise InputError(f"objects: each needs the tiles' {self.levels} levels; make the levels again")
+
+    @property
+    def side(self) -> float:
+        return self.tiles[0].side
+
+    @property
+    def spacing(self) -> float:
+        return self.tiles[0].spacing
+
+    @property
+    def levels(self) -> int:
+        return len(self.tiles[0].fields)
+
+    def tile_fields(self, level: int) -> list[GaussianField]:
+        """All tiles of a level by number, those of the first material first."""
+        return [each for tiles in self.tiles for each in tiles.fields[level]]
+
+    def object_fields(self, level: int) -> list[GaussianField]:
+        """All objects at a level, as chunks store them: in the middle of a tile."""
+        middle = np.array([0.5 * self.side, 0.5 * self.side, 0], np.float32)
+        return [replace(each.fields[level], means=each.fields[level].means + middle) for each in self.objects]
+
+    def ground_height(self, material: int) -> float:
+        """Mean z of a material's ground discs at the finest level; 0 without any."""
+        heights = [f.means[f.ground, 2].astype(float) for f in self.tiles[material].fields[0]]
+        flat = np.concatenate(heights)
+        return float(flat.mean()) if len(flat) else 0.0
+
+    def sample_tiles(self) -> list[GaussianField]:
+        """The finest tiles, the materials in turn: what errors are measured on."""
+        return [each for same in zip(*(tiles.fields[0] for tiles in self.tiles), strict=True) for each in same]
+
+    def iterate_fields(self) -> Iterator[GaussianField]:
+        """The fields of all chunks."""
+        for level in range(self.levels):
+            yield from self.tile_fields(level)
+            yield from self.object_fields(level)
+
+    def ground_colour(self) -> list[float]:
+        """Mean colour of the ground of all materials, by their shares."""
+        colours = [compute_ground_colour(tiles.fields[-1]) for tiles in self.tiles]
+        if len(colours) == 1:
+            return colours[0]
+        shares = np.array([material.share for material in self.materials])
+        return np.clip(shares @ np.array(colours) / shares.sum(), 0, 1).tolist()
+
+
+def compute_ground_colour(fields: list[GaussianField]) -> list[float]:
+    """Mean colour of the ground, or of all splats where none is ground."""
+    ground = [f.base_colours[f.ground] for f in fields if f.ground.any()] or [f.base_colours for f in fields]
+    return np.clip(np.concatenate(ground).astype(float).mean(0), 0, 1).tolist()

@@ -1,0 +1,176 @@
+"""Entries of the manifest that say which material lies where, and where objects stand.
+
+`terrain.classes` and `terrain.scatter` compute from them; docs/formats.md has the formulas.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from dav_gswt.bundle.chunks import ChunkEntry, ChunkOrders
+
+
+@dataclass(frozen=True)
+class NoiseTerm:
+    """A term of the rule of classes: gradient noise whose classes have the materials' shares.
+
+    Attributes:
+        weight: of the term in the sum.
+        wavelengths: by material, of the widest octave, in tile sides.
+        octaves: by material.
+        biases: by material, added to the noise.
+    """
+
+    kind: Literal["noise"]
+    weight: float
+    wavelengths: list[float]
+    octaves: list[int]
+    biases: list[float]
+
+
+@dataclass(frozen=True)
+class RangeTerm:
+    """A term of the rule of classes: a material is found where the surface's height or slope lies in a range.
+
+    Attributes:
+        weight: of the term in the sum.
+        material: number of the material.
+        low, high: bounds of the range; None: none.
+        soft: by how far beyond a bound the material's score falls by `weight`.
+    """
+
+    kind: Literal["height", "slope"]
+    weight: float
+    material: int
+    low: float | None
+    high: float | None
+    soft: float
+
+
+@dataclass(frozen=True)
+class ImageTerm:
+    """A term of the rule of classes: a picture of materials, one byte a pixel, the northern row first.
+
+    Attributes:
+        weight: of the term in the sum.
+        file, bytes, sha256: of the pixels; a pixel is the number of a material, or that of none.
+        rows, columns: of the picture, whose middle lies at the world's origin.
+        width: of the picture, in world units.
+        beyond: what comes after its edge.
+    """
+
+    kind: Literal["image"]
+    weight: float
+    file: str
+    bytes: int
+    sha256: str
+    rows: int
+    columns: int
+    width: float
+    beyond: Literal["mirror", "clamp"]
+
+
+@dataclass(frozen=True)
+class JitterEntry:
+    """Fine noise that frays the borders of classes: its widest octave has `cells` cells along a tile's side, each next
+    one twice as many; scores change by `amplitude` at most.
+    """
+
+    cells: int
+    octaves: int
+    amplitude: float
+
+
+@dataclass(frozen=True)
+class RiseEntry:
+    """How far what rises above the ground reaches over a border of classes.
+
+    Attributes:
+        slope: score per unit of length away from the ground.
+        most: largest gain of score.
+        ground: by material, mean z of its ground.
+        clearance: by material, the relief of the ground itself, which gains nothing.
+    """
+
+    slope: float
+    most: float
+    ground: list[float]
+    clearance: list[float]
+
+
+@dataclass(frozen=True)
+class ClassesEntry:
+    """Which material lies where: a sum of terms, and the transition between two materials.
+
+    Attributes:
+        salt: of the noises, 32 bits.
+        rule: the terms whose sum is the score of a material.
+        jitter, rise: of the transition.
+    """
+
+    salt: int
+    rule: list[NoiseTerm | RangeTerm | ImageTerm]
+    jitter: JitterEntry
+    rise: RiseEntry
+
+    def find_faults(self, materials: int) -> Iterator[str]:
+        """What does not fit a number of materials."""
+        lists = [self.rise.ground, self.rise.clearance]
+        for term in self.rule:
+            if isinstance(term, NoiseTerm):
+                lists += [term.wavelengths, term.octaves, term.biases]
+            elif isinstance(term, RangeTerm) and term.material >= materials:
+                yield "a term is of a material that is not there"
+            elif isinstance(term, ImageTerm) and term.bytes != term.rows * term.columns:
+                yield f"{term.file}: bytes do not fit rows and columns"
+        if any(len(values) != materials for values in lists):
+            yield f"a list does not have one value for each of {materials} materials"
+
+
+@dataclass(frozen=True)
+class ObjectOrders:
+    """An object on the terrain.
+
+    Attributes:
+        name: for people.
+        radius: of its footprint.
+        z: lowest and highest z of its Gaussians, from its foot.
+        ground: z of the foot in a tile: the mean height of its material's ground.
+        material: number of the material that it stands on.
+        density: wanted number per unit of area of its material.
+        probability: that a candidate on its material is this object.
+        chunks: one a level.
+    """
+
+    name: str
+    radius: float
+    z: list[float]
+    ground: float
+    material: int
+    density: float
+    probability: float
+    chunks: Sequence[ChunkOrders]
+
+
+@dataclass(frozen=True)
+class ObjectEntry(ObjectOrders):
+    """An object whose chunks are files."""
+
+    chunks: Sequence[ChunkEntry]
+
+
+@dataclass(frozen=True)
+class ScatterEntry:
+    """Where objects stand.
+
+    Attributes:
+        cells: of the scatter grid along a tile's side; each has one candidate.
+        turn: largest turn either way, in degrees.
+        size: largest change of size either way, as a share.
+        salt: of the hashes, 32 bits.
+    """
+
+    cells: int
+    turn: float
+    size: float
+    salt: int

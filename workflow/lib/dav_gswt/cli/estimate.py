@@ -1,0 +1,195 @@
+"""How long a run will take: seconds of each rule by the size of its work, times the speed of this machine.
+
+The coefficients are fitted to benchmarks of runs on the reference machine (`machine_speed`), and their growth to the
+settings of docs/research/data/tradeoff.csv: docs/research/lab-notes.md. Work is counted before anything is known of the
+photos; the aim is a factor of 1.5.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dav_gswt.cli.machine_speed import MachineSpeed
+from dav_gswt.reconstruction.fitting import plan
+from dav_gswt.views.policy_names import PRIOR_POLICIES
+
+LONG = 600.0  # seconds: a run that takes longer is told of a faster preset
+PER_JOB = 1.6  # seconds to start a job: Snakemake, Python, imports
+PHOTO_SHAPE = 0.75  # height over width
+SH_COST = {0: 1.0, 1: 1.6, 2: 2.2, 3: 3.0, "auto": 1.15}  # of a step, by the degree of the spherical harmonics
+PER_PIXEL = 2.5  # Gaussians that a fit ends with, at most, for each pixel of a photo
+
+
+@dataclass(frozen=True)
+class Work:
+    """What jobs of a scene have to do.
+
+    Attributes:
+        start, new, tests, total: photos to start from, of a round, that test, and all that are registered or rendered.
+        rounds: of view selection.
+        photo_pixels, fit_pixels: of a photo, and of a photo as the fit sees it.
+        gaussians: of the field.
+        step_cost: relative, by the degree of the spherical harmonics.
+        steps, steps_per_photo, level_steps: of the optimiser.
+        candidates: poses that are scored.
+        samples: denoising steps of all samples of a pose; 0 without a prior.
+        still_pixels: of a still.
+        features: relative cost of structure from motion, by the scene's `sfm`.
+        rendered: whether captured photos are rendered.
+    """
+
+    start: int
+    new: int
+    tests: int
+    total: int
+    rounds: int
+    photo_pixels: float
+    fit_pixels: float
+    gaussians: float
+    step_cost: float
+    steps: int
+    steps_per_photo: int
+    level_steps: int
+    candidates: int
+    samples: int
+    still_pixels: float
+    features: float
+    rendered: bool
+
+    @property
+    def mean_photos(self) -> float:
+        """Photos of a fit in a round, the mean over the rounds."""
+        return self.start + self.new * (self.rounds + 1) / 2
+
+    @property
+    def step_seconds(self) -> float:
+        """One step of a fit: forward, loss, backward, Adam."""
+        return self.step_cost * (1.05e-7 * self.gaussians + 8.4e-8 * self.fit_pixels)
+
+    @property
+    def observation_seconds(self) -> float:
+        """Plane sweep, colours and uncertainty, for each photo of a fit."""
+        return 1.6e-6 * self.fit_pixels
+
+    @property
+    def field_size(self) -> float:
+        """Gaussians of the field, 1 for those of the preset draft."""
+        return self.gaussians / 140_000
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Seconds of a job on the reference machine: in the rasterizer, and in all else."""
+
+    general: float
+    raster: float = 0.0
+
+
+OTHER_RULE = Cost(0.8)
+COSTS: dict[str, Callable[[Work], Cost]] = {
+    "register_photos": lambda work: Cost(3 + 0.8 * work.features * work.total),
+    "render_photos": lambda work: Cost(10 + 1.9e-5 * work.photo_pixels * (work.total + work.tests)),
+    "fit_coarse": lambda work: Cost(1.2 + work.observation_seconds * work.start, work.step_seconds * work.steps),
+    "evaluate_coarse": lambda work: Cost(1.6 + 1e-6 * work.fit_pixels * work.tests),
+    "evaluate_round": lambda work: Cost(1.6 + 1e-6 * work.fit_pixels * work.tests),
+    "evaluate_inpainted": lambda work: Cost(1.6 + 2e-6 * work.fit_pixels * work.tests),
+    "score_coarse": lambda work: Cost(1 + work.candidates * (0.018 + 0.012 * work.samples)),
+    "score_round": lambda work: Cost(1 + work.candidates * (0.018 + 0.012 * work.samples)),
+    "capture_views": lambda work: Cost(7.2 + 1.3e-5 * work.photo_pixels * work.new if work.rendered else 1.5),
+    "update_field": lambda work: Cost(
+        1.2 + work.observation_seconds * work.mean_photos, work.step_seconds * work.steps_per_photo * work.new
+    ),
+    "inpaint_field": lambda work: Cost(15.0),
+    "find_materials": lambda work: Cost(2.0 + 8.0 * work.field_size),
+    "make_levels": lambda work: Cost(0.7, 1.4 * (0.5 + work.level_steps / 120) * (0.5 + 0.5 * work.field_size)),
+    "cut_tiles": lambda work: Cost(1.2 + 2.3 * work.field_size),
+    "bundle_tiles": lambda work: Cost(0.5 + 1.3 * work.field_size),
+    "render_terrain": lambda work: Cost(10.5, 5e-7 * work.still_pixels),
+}
+
+
+def estimate_seconds(jobs: Mapping[str, int], work: Work, speed: MachineSpeed) -> float:
+    """Seconds of a run. jobs: how many of each rule."""
+    total = 0.0
+    for rule, count in jobs.items():
+        cost = COSTS[rule](work) if rule in COSTS else OTHER_RULE
+        total += count * ((PER_JOB + cost.general) * speed.general + cost.raster * speed.raster)
+    return total
+
+
+def describe_work(config: Mapping[str, Any], preset: str | None = None) -> Work:
+    """The work of the config's scene. preset: instead of the scene's own."""
+    scene, chosen = config["scenes"][config["scene"]], config["presets"]
+    entry = chosen[preset or scene.get("preset")]
+    photographed = scene["kind"] != "field"
+    photos, size = count_photos(scene), scene.get("size", entry["size"])
+    shape = PHOTO_SHAPE if scene["kind"] == "photos" else 1.0
+    seen = min(size, entry["size"])
+    most = plan.MAX_GAUSSIANS if entry["max_gaussians"] == "auto" else entry["max_gaussians"]
+    start, new = scene.get("start") or photos, config["k"] * scene.get("burst", 1)
+    settings = config["priors"][config["prior"]] if config["policy"] in PRIOR_POLICIES else None
+    replayed = max(0, photos - start)
+    return Work(
+        start=start,
+        new=new,
+        tests=scene.get("test", max(1, photos // 10)) + scene.get("oblique", 0) + scene.get("walkers", 0),
+        total=photos,
+        rounds=config["rounds"],
+        photo_pixels=shape * float(size) ** 2,
+        fit_pixels=shape * float(seen) ** 2,
+        gaussians=float(min(most, PER_PIXEL * seen**2) if photographed else most / 2),
+        step_cost=SH_COST[entry["sh_degree"]],
+        steps=plan.STEPS_PER_PHOTO * start if entry["steps"] == "auto" else entry["steps"],
+        steps_per_photo=plan.STEPS_PER_NEW_PHOTO if entry["steps_per_photo"] == "auto" else entry["steps_per_photo"],
+        level_steps=entry["level_steps"],
+        candidates=replayed if scene.get("agent") == "replay" else scene.get("candidates", 0),
+        samples=settings["samples"] * settings["steps"] if settings else 0,
+        still_pixels=3.0 * config["stills"]["width"] * config["stills"]["height"],
+        features=5.0 if scene.get("sfm") == "careful" else 1.0,
+        rendered=scene.get("agent") == "render",
+    )
+
+
+def count_photos(scene: Mapping[str, Any]) -> int:
+    """Photos of a scene: those that are rendered, or the files in its folder (0 where it is missing)."""
+    if scene["kind"] == "synthetic":
+        return scene["photos"]
+    folder = Path(scene.get("folder", ""))
+    if scene["kind"] == "field" or not folder.is_dir():
+        return 0
+    return sum(path.is_file() and not path.name.startswith(".") for path in folder.iterdir())
+
+
+def describe_estimate(config: Mapping[str, Any], jobs: Mapping[str, int], speed: MachineSpeed) -> str:
+    """One line: how long the run takes, and, where that is long, a preset that takes less.
+
+    The preset that is named is the slowest of those that stay below LONG, or else the fastest of all.
+    """
+    own = config["scenes"][config["scene"]]["preset"]
+    seconds = estimate_seconds(jobs, describe_work(config), speed)
+    text = f"It will take {format_duration(seconds)} on this machine"
+    if seconds <= LONG or not {"fit_coarse", "prepare_external_field"} & set(jobs):
+        return text
+    others = {
+        name: estimate_seconds(jobs, describe_work(config, name), speed) for name in config["presets"] if name != own
+    }
+    faster = {name: other for name, other in others.items() if other < 0.8 * seconds}
+    if not faster:
+        return text
+    fitting = {name: other for name, other in faster.items() if other <= LONG}
+    name = max(fitting, key=fitting.__getitem__) if fitting else min(faster, key=faster.__getitem__)
+    return f"{text}; with preset: {name} {format_duration(faster[name])} (a key of the scene {config['scene']!r})"
+
+
+def format_duration(seconds: float) -> str:
+    """About how long, in words: no more digits than an estimate has."""
+    if seconds < 55:
+        return f"about {max(10, round(seconds, -1)):.0f} seconds"
+    if seconds < 100:
+        return "about a minute"
+    minutes = seconds / 60
+    if minutes < 60:
+        step = 1 if minutes < 15 else 5
+        return f"about {step * round(minutes / step)} minutes"
+    return f"about {minutes / 60:.1f} hours"

@@ -1,0 +1,113 @@
+"""The keys of scenes and presets that each rule reads: a change of any other key makes nothing of it again.
+
+Read by the workflow before the first job, so it imports nothing heavy.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from dav_gswt.errors import InputError
+
+
+class EntryKeys(dict):
+    """Some keys of an entry of the config. To read another key is an error: it would have its default unnoticed.
+
+    Attributes:
+        allowed: the keys that may be read, whether the entry has them or not.
+    """
+
+    def __init__(self, entry: Mapping[str, Any], keys: Iterable[str]):
+        """keys: `rig` is the whole table, `rig.limits` one of its keys."""
+        nested: dict[str, list[str]] = {}
+        whole = []
+        for key in keys:
+            table, _, rest = key.partition(".")
+            nested.setdefault(table, []).append(rest) if rest else whole.append(key)
+        super().__init__({key: entry[key] for key in whole if key in entry})
+        self.update({key: EntryKeys(entry[key], inner) for key, inner in nested.items() if key in entry})
+        self.allowed = frozenset([*whole, *nested])
+
+    def __missing__(self, key: str) -> Any:
+        self._require_allowed(key)
+        raise KeyError(key)
+
+    def __contains__(self, key: object) -> bool:
+        self._require_allowed(key)
+        return super().__contains__(key)
+
+    def get(self, key: str, default: Any = None) -> Any:
+        self._require_allowed(key)
+        return super().get(key, default)
+
+    def _require_allowed(self, key: object) -> None:
+        if key not in self.allowed:
+            raise LookupError(f"the rule is not given the key {key!r}: name it in dav_gswt.config.rule_keys")
+
+
+_HEMISPHERE = ("candidates", "min_elevation", "size")  # poses of a scene that is rendered
+_ORBIT = ("candidates", "min_elevation")  # poses for devices and people
+_REACH = tuple(f"rig.{key}" for key in ("millimetres", "pan_zero", "tilt_zero", "limits", "no_go"))
+_CANDIDATES = {"render": _HEMISPHERE, "replay": (), "serial": _ORBIT, "plan": _ORBIT, "handheld": _ORBIT}
+_SCORED = {
+    "render": (*_HEMISPHERE, "feasibility"),
+    "replay": (),
+    "serial": (*_ORBIT, "feasibility", *_REACH),
+    "plan": (*_ORBIT, "feasibility"),
+    "handheld": (*_ORBIT, "feasibility"),
+}
+_DEVICES = {"render": ("family", "seed"), "replay": (), "serial": ("rig",), "plan": ("drone",), "handheld": ()}
+_SELECTED = {agent: (*keys, "burst") for agent, keys in _CANDIDATES.items()}
+_CAPTURED = {agent: (*keys, *_DEVICES[agent]) for agent, keys in _SELECTED.items()}
+_RENDERED = ("family", "seed", "photos", "layout", "min_elevation", "size", "test", "oblique", "walkers")
+
+# of a scene, by rule; where they depend on the scene's agent, by agent, and `agent` itself is one of them
+SCENE_KEYS: dict[str, tuple[str, ...] | dict[str, tuple[str, ...]]] = {
+    "register_photos": ("folder", "model", "masks", "size", "sfm", "mapper", "cameras", "focal", "verdict"),
+    "render_photos": _RENDERED,
+    "import_field": ("up",),
+    "split_views": ("start", "photos", "whole"),
+    "fit_coarse": ("whole",),
+    "score_coarse": _SCORED,
+    "score_round": _SCORED,
+    "select_poses": _SELECTED,
+    "capture_views": _CAPTURED,
+    "request_views": _CAPTURED,
+    "render_candidates": {"render": (*_HEMISPHERE, "family", "seed")},
+    "calibrate_coarse": _CANDIDATES,
+    "calibrate_round": _CANDIDATES,
+}
+
+_COARSE = ("size", "spacing", "max_gaussians", "steps", "sh_degree", "pose_rate")
+_UPDATE = ("size", "max_gaussians", "steps_per_photo", "sh_degree", "pose_rate")
+_ALL_FITS = (*_COARSE, "steps_per_photo")
+
+# of a preset, by rule; metrics.json records what its field was fitted with
+PRESET_KEYS: dict[str, tuple[str, ...]] = {
+    "fit_coarse": _COARSE,
+    "evaluate_coarse": _COARSE,
+    "prepare_external_field": ("max_gaussians",),
+    "update_field": _UPDATE,
+    "evaluate_round": _ALL_FITS,
+    "evaluate_at": _ALL_FITS,
+    "evaluate_inpainted": _ALL_FITS,
+    "make_levels": ("level_steps", "levels"),
+}
+
+# of a prior, for the rules that read less than all of it
+PRIOR_KEYS = {"inpaint_field": ("model", "samples", "steps", "weights")}
+
+
+def select_scene_keys(rule: str, scene: Mapping[str, Any]) -> EntryKeys:
+    """What a rule reads of a scene's entry. Raises: InputError: the rule does not serve the scene's agent."""
+    keys = SCENE_KEYS[rule]
+    if isinstance(keys, dict):
+        agent = scene["agent"]
+        if agent not in keys:
+            raise InputError(f"rule {rule} serves no scene with agent {agent}, only {', '.join(keys)}")
+        keys = ("agent", *keys[agent])
+    return EntryKeys(scene, keys)
+
+
+def select_preset_keys(rule: str, preset: Mapping[str, Any]) -> EntryKeys:
+    """What a rule reads of a preset."""
+    return EntryKeys(preset, PRESET_KEYS[rule])

@@ -1,0 +1,1 @@
+"""Materials: the classes of ground of an exemplar, and the single objects that stand on them."""

@@ -1,0 +1,233 @@
+"""The materials of a field: their exemplars, the objects on them, and a verdict."""
+
+import logging
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool
+from numpy import ndarray as Array
+from scipy.ndimage import distance_transform_edt
+
+from dav_gswt.errors import InputError
+from dav_gswt.field import GaussianField
+from dav_gswt.logs import progress
+from dav_gswt.materials import extraction, verdict
+from dav_gswt.materials.classes import GroundClasses, classify_ground
+from dav_gswt.materials.filling import CellSources, box_sums, fill_cells
+from dav_gswt.materials.maps import GroundMaps, measure_ground
+from dav_gswt.materials.model import MaterialInfo
+from dav_gswt.materials.verdict import MaterialVerdict
+from dav_gswt.reconstruction.ground import Ground
+from dav_gswt.tiles import energy, layout, patches, texture
+
+_log = logging.getLogger(__name__)
+
+WINDOWS = (1.0, 0.9, 0.8, 0.7, 0.6)  # sides of a material's exemplar over the whole one's
+OWN_SHARE = 0.8  # of its exemplar that a material fills itself, if a smaller window can do that
+BLOCK = 32  # cells: exemplars are whole numbers of it, as far as the whole one is
+AREAS = 2.0  # tile areas that the scarcest material has at least, if tiles are made smaller for it
+SMALLEST_TILE = 0.22  # of the exemplar's side
+ROOM = 1.6  # sides of a tile that an exemplar is wide at least
+PATCH, SMALLEST_PATCH = 3.0, 8  # side of a filling patch, in scales of the texture and in cells, at least
+
+
+@dataclass(frozen=True)
+class Material:
+    """A material: what it is, its exemplar (a field whose grid has no margin), and whether there is enough of it.
+
+    filled: share of the exemplar's cells that show copies of others.
+    """
+
+    info: MaterialInfo
+    field: GaussianField
+    grid: Ground
+    filled: float
+    verdict: MaterialVerdict
+
+
+@dataclass(frozen=True)
+class ExtractedObject:
+    """An object around its foot. radius, height: in world units; density: of such objects on its material."""
+
+    name: str
+    field: GaussianField
+    material: int
+    radius: float
+    height: float
+    density: float
+
+
+@dataclass(frozen=True)
+class FoundMaterials:
+    """All materials of an exemplar, the largest first, and the objects on them.
+
+    tile_side: of tiles of these materials, in cells: by the texture of the largest one, smaller where there is little
+    of a material; None: as without materials.
+    """
+
+    maps: GroundMaps
+    classes: GroundClasses
+    tile_side: float | None
+    materials: list[Material]
+    objects: list[ExtractedObject]
+    verdict: MaterialVerdict
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """What all steps read."""
+
+    field: GaussianField
+    grid: Ground
+    maps: GroundMaps
+    classes: GroundClasses
+    tile_side: float
+    seed: int
+
+
+def find_materials(field: GaussianField, grid: Ground, seed: int) -> FoundMaterials:
+    """Find the materials of a field's exemplar and the objects on them.
+
+    Ground of one material without objects is given back as it is. So is, with a warning, ground of which nothing would
+    be left to tile.
+    Raises: InputError: the field has no ground layer (one that was imported).
+    """
+    if not field.ground.any():
+        raise InputError("materials: this field has no ground layer; use `materials: one` in its scene")
+    maps = measure_ground(field, grid)
+    classes = classify_ground(maps)
+    sources = [classes.source(k) for k in range(classes.number)]
+    if all(source.all() for source in sources):
+        return _keep_whole(field, grid, maps)
+    parts = _Parts(field, grid, maps, classes, choose_tile_side(maps, sources), seed)
+    made = {k: _make_material(parts, k) for k in progress(range(classes.number), "fill materials")}
+    kept = {k: each for k, each in made.items() if each is not None}
+    if not kept:
+        _log.warning(
+            "materials: nothing is left to tile (shade, objects or cut off): all of the ground is tiled as one"
+        )
+        return _keep_whole(field, grid, maps)
+    materials = _rescale_shares(list(kept.values()))
+    objects = _extract_objects(parts, {k: place for place, k in enumerate(kept)})
+    judged = verdict.judge_set([each.verdict for each in materials], float(classes.excluded.mean()))
+    return _report(FoundMaterials(maps, classes, parts.tile_side, materials, objects, judged))
+
+
+def _keep_whole(field: GaussianField, grid: Ground, maps: GroundMaps) -> FoundMaterials:
+    """All of the ground as one material."""
+    everything, nothing = np.ones(maps.known.shape, bool), np.zeros(maps.known.shape, bool)
+    side = choose_tile_side(maps, [everything])
+    info = MaterialInfo("material0", 1.0, maps.cells * grid.spacing, [float(v) for v in maps.colour.mean((0, 1))])
+    judged = verdict.judge_material(info.name, (maps.cells / side) ** 2, 0.0)
+    classes = GroundClasses(np.zeros(maps.known.shape, int), [], nothing, 1)
+    material = Material(info, field, grid, 0.0, judged)
+    return _report(FoundMaterials(maps, classes, None, [material], [], verdict.judge_set([judged], 0.0)))
+
+
+def _report(found: FoundMaterials) -> FoundMaterials:
+    for each in found.materials:
+        _log.info("%s: %s: %s", each.info.name, each.verdict.grade, each.verdict.reason)
+    _log.info("%d objects; %s: %s", len(found.objects), found.verdict.grade, found.verdict.reason)
+    return found
+
+
+def choose_tile_side(maps: GroundMaps, sources: list[Bool[Array, "m m"]]) -> float:
+    """Side of a tile in cells: by the texture of the first material; the area of the scarcest holds AREAS tiles of it.
+
+    At least SMALLEST_TILE of the exemplar's side.
+    """
+    first = sources[0] if sources[0].any() else np.ones_like(sources[0])
+    by_texture, _ = texture.choose_sizes(_texture_scale(maps, first) / maps.cells)
+    by_area = min([1.0, *(float(np.sqrt(source.mean() / AREAS)) for source in sources if source.any())])
+    return max(SMALLEST_TILE, min(by_texture, by_area)) * maps.cells
+
+
+def _make_material(parts: _Parts, number: int) -> Material | None:
+    """The exemplar of one material; None where it has no room for a patch."""
+    own, grid = parts.classes.source(number), parts.grid
+    if not own.any():
+        return None
+    row, column, cells = choose_window(own, parts.tile_side)
+    window, source = parts.maps.crop(row, column, cells), own[row : row + cells, column : column + cells]
+    sources = _fill_window(window, source, parts.tile_side, np.random.default_rng([parts.seed, number]))
+    if sources is None:
+        _log.warning("material %d is too small and narrow to be tiled; it is left out", number)
+        return None
+    small = replace(grid, first_row=grid.first_row + row, first_column=grid.first_column + column, cells=cells)
+    made, made_grid = extraction.extract_exemplar(parts.field, small, window, sources, source)
+    filled = float(sources.copied.mean())
+    # with the excluded ground beside it: shade of a tree parts no material
+    patch_scale = _measure_patches(parts.classes.materials == number) * grid.spacing
+    colour = [float(value) for value in parts.maps.colour[own].mean(0)]
+    info = MaterialInfo(f"material{number}", float(parts.classes.shares[number]), patch_scale, colour)
+    judged = verdict.judge_material(info.name, float(own.sum()) / parts.tile_side**2, filled)
+    return Material(info, made, made_grid, filled, judged)
+
+
+def _fill_window(
+    window: GroundMaps, source: Bool[Array, "m m"], tile_side: float, rng: np.random.Generator
+) -> CellSources | None:
+    colours = energy.make_colour_layer(window.colour)
+    hidden = energy.make_occluder_layer(window.cover)
+    terms = energy.SeamEnergy("colour", 0.0, colours, None, hidden).terms(1.0)
+    plan = layout.plan_layout(window.cells, 1, min(1.0, tile_side / window.cells), 0.125)
+    features = patches.make_guidance(window.colour, window.height, np.zeros(source.shape), plan).features
+    return fill_cells(features, terms, source, _choose_patch(window, source), rng)
+
+
+def _rescale_shares(materials: list[Material]) -> list[Material]:
+    """Shares that sum to 1 where a material was left out."""
+    total = sum(each.info.share for each in materials)
+    return [replace(each, info=replace(each.info, share=each.info.share / total)) for each in materials]
+
+
+def choose_window(own: Bool[Array, "m m"], tile_side: float) -> tuple[int, int, int]:
+    """South-western cell (row, column) and side of the square that a material's exemplar is made of.
+
+    The largest square that the material fills by OWN_SHARE, or else the smallest one; wide enough that patches of a
+    tile's side have places to choose from.
+    """
+    m = len(own)
+    unit = int(np.gcd(m, BLOCK))
+    least = min(m, ROOM * tile_side)
+    sides = sorted({min(m, -(-int(max(share * m, least)) // unit) * unit) for share in WINDOWS}, reverse=True)
+    for side in sides:
+        counts = box_sums(own, side)
+        if counts.max() >= OWN_SHARE * side * side or side == sides[-1]:
+            row, column = np.unravel_index(int(counts.argmax()), counts.shape)
+            return int(row), int(column), side
+    raise AssertionError("the last side is always taken")
+
+
+def _choose_patch(maps: GroundMaps, source: Bool[Array, "m m"]) -> int:
+    """Side of a patch in cells: some scales of the texture, and not too wide for the source."""
+    width = 2 * float(distance_transform_edt(np.pad(source, 1)).max())
+    scale = _texture_scale(maps, source)
+    return int(np.clip(round(PATCH * scale), SMALLEST_PATCH, max(SMALLEST_PATCH, width / 3)))
+
+
+def _texture_scale(maps: GroundMaps, source: Bool[Array, "m m"]) -> float:
+    """Scale of the texture in cells; cells of other ground have the blurred colour of the source."""
+    blur = texture.TREND * len(source)
+    soft = [extraction.blur_over(layer, source, blur) for layer in np.moveaxis(maps.colour, -1, 0)]
+    return texture.measure_texture_scale(np.where(source[..., None], maps.colour, np.dstack(soft)))
+
+
+def _measure_patches(own: Bool[Array, "m m"]) -> float:
+    """Mean length in cells of what lines along rows and columns cross in one piece."""
+    entered = [np.diff(np.pad(cells, ((0, 0), (1, 0))).astype(int), axis=1) == 1 for cells in (own, own.T)]
+    return 2 * float(own.sum()) / max(sum(int(each.sum()) for each in entered), 1)
+
+
+def _extract_objects(parts: _Parts, index: dict[int, int]) -> list[ExtractedObject]:
+    """All objects; index: new number of each material that is kept. Others' objects stand on the largest one."""
+    spacing, objects = parts.grid.spacing, []
+    areas = parts.classes.shares * float((~parts.classes.excluded).sum()) * spacing**2
+    standing = extraction.bin_standing(parts.field, parts.grid, parts.maps)
+    for number, footprint in enumerate(parts.classes.footprints):
+        own = extraction.extract_object(parts.field, parts.grid, parts.maps, standing, footprint)
+        radius = float(np.sqrt(footprint.cells.sum() / np.pi)) * spacing
+        height, density = float(own.means[:, 2].max()), 1 / float(areas[footprint.material])
+        material = index.get(footprint.material, 0)
+        objects.append(ExtractedObject(f"object{number:02d}", own, material, radius, height, density))
+    return objects

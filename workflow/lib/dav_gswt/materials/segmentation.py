@@ -1,0 +1,178 @@
+"""Segmentation of an exemplar into classes of ground that differ in colour or grain.
+
+Cells are clustered by their soft colour (CIELAB, after the exposure was normalised) and the contrast of their grain.
+Clusters are merged (Ward 1963) while two of them look alike: a small difference of their means, distributions that
+overlap, or a border that is a gradual change, as between light and shade. Labels are smoothed by graph cuts (alpha
+expansion, Boykov et al. 2001).
+"""
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray as Array
+from scipy.cluster.vq import kmeans2
+from scipy.ndimage import gaussian_filter
+
+CLUSTERS = 12  # before merging
+STARTS = 5  # of k-means: the segmentation that explains most of the variance is taken
+WORKING_SIZE = 256  # cells along a side that are clustered; larger exemplars are averaged
+BRIGHTEST, QUANTILE = 0.9, 0.95  # exposure: this quantile of the brightest channel becomes so bright
+SOFT, GRAIN = 1 / 150, 1 / 30  # of the side: blur of colours, window of the grain's contrast
+WEIGHTS = (0.5, 1.0, 1.0, 1.5)  # of lightness (shade changes it), a, b, contrast
+LEAST_DIFFERENCE = 13.0  # of two classes' means, in weighed CIELAB units: 2.3 is just noticeable between flat patches
+LEAST_WITH_GRAIN = 10.0  # the same for classes of other grain: light does not change it
+OTHER_GRAIN = 4.0  # difference of contrasts from which grain is another
+LEAST_SEPARATION = 2.4  # of their distributions (Ashman's D: beyond 2 they are two)
+LEAST_SHARPNESS = 0.35  # of their border: the step across it over the difference of the means
+REACH = 1 / 25  # of the side, either way, over which that step is measured: wider than the blur of the grain's contrast
+SMOOTHING = 3.0  # cost of a border between two cells, in units of log likelihood
+UNLIKELY = 20.0  # largest cost of a label
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How unlike two classes are. grain: difference of their contrasts. cost: Ward's, of merging them."""
+
+    first: int
+    second: int
+    distance: float
+    grain: float
+    separation: float
+    sharpness: float
+    cost: float
+
+    @property
+    def is_small(self) -> bool:
+        return self.distance < (LEAST_DIFFERENCE if self.grain < OTHER_GRAIN else LEAST_WITH_GRAIN)
+
+    @property
+    def is_gradual(self) -> bool:
+        return self.separation < LEAST_SEPARATION or self.sharpness < LEAST_SHARPNESS
+
+
+def segment_ground(colour: Float[Array, "m m 3"]) -> Int[Array, "m m"]:
+    """Classes of an exemplar by descending share, from 0. colour: sRGB in [0, 1]."""
+    features = describe_cells(_shrink(colour))
+    merged = [merge_clusters(features, _cluster(features, start)) for start in range(STARTS)]
+    labels = max(merged, key=lambda labels: _explained_variance(features, labels))
+    labels = _enlarge(smooth_labels(features, labels), len(colour))
+    order = np.argsort(-np.bincount(labels.ravel()), kind="stable")
+    return np.argsort(order)[labels]
+
+
+def describe_cells(colour: Float[Array, "m m 3"]) -> Float[Array, "m m 4"]:
+    """Weighed lightness, a, b, and the contrast of the grain around each cell."""
+    from skimage.color import rgb2lab  # here, not above: it takes half a second to load
+
+    m = len(colour)
+    bright = float(np.quantile(colour.max(-1), QUANTILE))
+    lab = rgb2lab(np.clip(colour * (BRIGHTEST / max(bright, 1e-3)), 0, 1))
+    soft = np.stack([gaussian_filter(lab[..., c], SOFT * m, mode="nearest") for c in range(3)], -1)
+    grain = lab[..., 0] - gaussian_filter(lab[..., 0], GRAIN * m / 2, mode="nearest")
+    contrast = np.sqrt(gaussian_filter(grain**2, GRAIN * m, mode="nearest"))
+    return np.concatenate([soft, contrast[..., None]], -1) * WEIGHTS
+
+
+def _cluster(features: Float[Array, "m m k"], start: int) -> Int[Array, "m m"]:
+    cells = features.reshape(-1, features.shape[-1])
+    if not np.ptp(cells, axis=0).any():
+        return np.zeros(features.shape[:2], int)
+    centres, _ = kmeans2(cells[::2], CLUSTERS, iter=30, minit="++", rng=start, missing="warn")
+    distances = np.stack([((features - centre) ** 2).sum(-1) for centre in centres])
+    return np.unique(distances.argmin(0), return_inverse=True)[1].reshape(features.shape[:2])
+
+
+def _explained_variance(features: Float[Array, "m m k"], labels: Int[Array, "m m"]) -> float:
+    """Variance between the classes, as a part of all."""
+    total = features.reshape(-1, features.shape[-1]).var(0).sum()
+    means = np.stack([features[labels == c].mean(0) for c in range(labels.max() + 1)])
+    share = np.bincount(labels.ravel()) / labels.size
+    away = means - share @ means
+    return float((share @ away**2).sum() / max(total, 1e-12))
+
+
+def merge_clusters(features: Float[Array, "m m k"], labels: Int[Array, "m m"]) -> Int[Array, "m m"]:
+    """Merge what looks alike: first classes of a small difference, then those of a gradual one, the cheapest first."""
+    while True:
+        number = int(labels.max()) + 1
+        found = [compare_classes(features, labels, a, b) for a in range(number) for b in range(a + 1, number)]
+        alike = [each for each in found if each.is_small] or [each for each in found if each.is_gradual]
+        if not alike:
+            return labels
+        best = min(alike, key=lambda each: each.cost)
+        labels = np.where(labels == best.second, best.first, labels)
+        labels -= labels > best.second
+
+
+def compare_classes(features: Float[Array, "m m k"], labels: Int[Array, "m m"], first: int, second: int) -> Difference:
+    """How unlike two classes are, along the line between their means."""
+    one, two = labels == first, labels == second
+    step = features[two].mean(0) - features[one].mean(0)
+    distance = float(np.linalg.norm(step))
+    along = features @ (step / max(distance, 1e-12))
+    spread = float(np.sqrt(0.5 * (along[one].var() + along[two].var())))
+    share = one.mean() * two.mean() / (one.mean() + two.mean())
+    sharpness = _measure_border(along, one, two) / max(distance, 1e-12)
+    grain, separation = float(abs(step[-1]) / WEIGHTS[-1]), distance / max(spread, 1e-12)
+    return Difference(first, second, distance, grain, separation, sharpness, distance**2 * share)
+
+
+def _measure_border(along: Float[Array, "m m"], one: Array, two: Array) -> float:
+    """Median step across the border of two classes; infinite where they hardly touch."""
+    m = len(along)
+    reach = max(2, round(REACH * m))
+    steps = []
+    for values, a, b in ((along, one, two), (along.T, one.T, two.T)):
+        rise = values[2 * reach :] - values[: m - 2 * reach]
+        steps += [rise[a[: m - 2 * reach] & b[2 * reach :]], -rise[b[: m - 2 * reach] & a[2 * reach :]]]
+    every = np.concatenate(steps)
+    return float(np.median(every)) if len(every) > 2 * reach else float("inf")
+
+
+def smooth_labels(features: Float[Array, "m m k"], labels: Int[Array, "m m"]) -> Int[Array, "m m"]:
+    """Labels of the least cost: minus the log likelihood of each class's normal distribution, and borders."""
+    from maxflow import fastmin
+
+    number = int(labels.max()) + 1
+    if number == 1:
+        return labels
+    costs = np.stack([_negative_log_likelihood(features, features[labels == c]) for c in range(number)], -1)
+    costs = np.minimum(costs - costs.min(-1, keepdims=True), UNLIKELY)
+    with _without_messages("maxflow.fastmin"):  # of every cut
+        smoothed = fastmin.aexpansion_grid(costs, SMOOTHING * (1 - np.eye(number)), labels=labels.astype(np.int64))
+    return np.unique(smoothed, return_inverse=True)[1].reshape(labels.shape)
+
+
+@contextmanager
+def _without_messages(name: str) -> Iterator[None]:
+    """Keep a library's messages below warnings out of the log."""
+    logger = logging.getLogger(name)
+    level = logger.level
+    logger.setLevel(logging.WARNING)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
+
+
+def _negative_log_likelihood(features: Float[Array, "m m k"], members: Float[Array, "n k"]) -> Float[Array, "m m"]:
+    covariance = np.cov(members.T) + np.eye(members.shape[1])  # a just noticeable difference of each
+    away = features - members.mean(0)
+    square = np.einsum("...i,ij,...j->...", away, np.linalg.inv(covariance), away)
+    return 0.5 * (square + np.linalg.slogdet(covariance)[1])
+
+
+def _shrink(colour: Float[Array, "m m 3"]) -> Float[Array, "k k 3"]:
+    """Blocks of cells averaged, so that at most WORKING_SIZE are left along a side."""
+    block = -(-len(colour) // WORKING_SIZE)
+    k = len(colour) // block
+    return colour[: k * block, : k * block].reshape(k, block, k, block, 3).mean((1, 3))
+
+
+def _enlarge(labels: Int[Array, "k k"], cells: int) -> Int[Array, "m m"]:
+    index = np.minimum(np.arange(cells) // -(-cells // WORKING_SIZE), len(labels) - 1)
+    return labels[np.ix_(index, index)]

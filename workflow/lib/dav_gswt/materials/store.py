@@ -1,0 +1,151 @@
+"""Materials on disk, in one folder: materials.json, maps and a picture of the exemplar, a PLY of everything.
+
+material{k}.ply and its grid material{k}.exr: an exemplar of each material alone. object{kk}.ply: an object around its
+foot. materials.exr: what each cell of the exemplar is, the northern row first. materials.png: the same, for people.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray as Array
+from scipy.ndimage import binary_dilation
+
+from dav_gswt.errors import InputError
+from dav_gswt.field import read_field, write_field
+from dav_gswt.files import atomic_folder, parse_record, read_json, write_json
+from dav_gswt.images import image_files
+from dav_gswt.lod.merge import merge_by_voxel
+from dav_gswt.materials.build import ExtractedObject, FoundMaterials, Material
+from dav_gswt.materials.model import MaterialInfo, ObjectLevels
+from dav_gswt.materials.verdict import MaterialVerdict
+from dav_gswt.reconstruction import ground
+
+NAME = "materials.json"
+PALETTE = ((0.90, 0.62, 0.0), (0.0, 0.62, 0.45), (0.0, 0.45, 0.70), (0.80, 0.47, 0.65))  # Okabe and Ito's, of materials
+SHADED, DARKENED = 0.35, 0.35  # weight of a material's colour; light of what is shown nowhere
+
+
+@dataclass(frozen=True)
+class MaterialRecord(MaterialInfo):
+    """A material in materials.json: see `build.Material`."""
+
+    filled: float
+    verdict: MaterialVerdict
+
+
+@dataclass(frozen=True)
+class ObjectRecord:
+    """An object in materials.json: see `build.ExtractedObject`."""
+
+    name: str
+    material: int
+    radius: float
+    height: float
+    density: float
+
+
+@dataclass(frozen=True)
+class MaterialsReport:
+    """materials.json.
+
+    Attributes:
+        verdict: on the set.
+        excluded: share of the exemplar that is shown nowhere.
+        tile_side: of tiles of these materials, in cells, where a tiling leaves it open; None: by the texture.
+        materials, objects: by number.
+        provenance: of the files that they were made from.
+    """
+
+    verdict: MaterialVerdict
+    excluded: float
+    tile_side: float | None
+    materials: list[MaterialRecord]
+    objects: list[ObjectRecord]
+    provenance: dict[str, Any]
+
+
+def write_materials(found: FoundMaterials, folder: Path | str, provenance: dict[str, Any]) -> None:
+    """Write the materials; the folder appears whole or not at all."""
+    with atomic_folder(folder) as part:
+        for number, material in enumerate(found.materials):
+            write_field(material.field, part / f"material{number}.ply")
+            ground.write_ground(material.grid, part / f"material{number}.exr")
+        for each in found.objects:
+            write_field(each.field, part / f"{each.name}.ply")
+        _write_maps(found, part / "materials.exr")
+        image_files.write_png(part / "materials.png", draw_classes(found))
+        write_json(part / NAME, _describe(found, provenance))
+
+
+def _describe(found: FoundMaterials, provenance: dict[str, Any]) -> dict[str, Any]:
+    def describe_material(each: Material) -> dict[str, Any]:
+        return vars(each.info) | {"filled": each.filled, "verdict": vars(each.verdict)}
+
+    def describe_object(each: ExtractedObject) -> dict[str, Any]:
+        return {key: value for key, value in vars(each).items() if key != "field"}
+
+    return {
+        "verdict": vars(found.verdict),
+        "excluded": float(found.classes.excluded.mean()),
+        "tile_side": found.tile_side,
+        "materials": [describe_material(each) for each in found.materials],
+        "objects": [describe_object(each) for each in found.objects],
+        "provenance": provenance,
+    }
+
+
+def read_report(folder: Path | str) -> MaterialsReport:
+    """Read materials.json. Raises: InputError: not readable, or not such a file."""
+    path = Path(folder, NAME)
+    try:
+        return parse_record(read_json(path), MaterialsReport)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}; find the materials again") from error
+
+
+def read_exemplars(folder: Path | str) -> list[tuple[Any, ground.Ground]]:
+    """Field and grid of each material's exemplar. Raises: InputError: see `read_report`, `read_field`."""
+    numbers = range(len(read_report(folder).materials))
+    return [
+        (read_field(Path(folder, f"material{k}.ply")), ground.read_ground(Path(folder, f"material{k}.exr")))
+        for k in numbers
+    ]
+
+
+def _write_maps(found: FoundMaterials, path: Path) -> None:
+    classes, place = found.classes, found.maps.exemplar
+    objects = np.zeros(classes.materials.shape)
+    for number, footprint in enumerate(classes.footprints, 1):
+        objects[footprint.cells] = number
+    layers = {"material": classes.materials, "object": objects, "excluded": classes.excluded}
+    header = {name: repr(getattr(place, name)) for name in ("west", "south", "spacing")}
+    image_files.write_exr(path, {name: layer[::-1].astype(np.float32) for name, layer in layers.items()}, header)
+
+
+def draw_classes(found: FoundMaterials) -> Float[Array, "h w 3"]:
+    """The exemplar from above, north up, as it is and with materials in colours, objects outlined, the rest dark."""
+    classes = found.classes
+    palette = np.array(PALETTE)[np.arange(classes.number) % len(PALETTE)]
+    picture = (1 - SHADED) * found.maps.colour + SHADED * palette[classes.materials]
+    picture[classes.excluded] *= DARKENED
+    for footprint in classes.footprints:
+        picture[binary_dilation(footprint.cells, iterations=2) & ~footprint.cells] = 1
+    pair = np.concatenate([found.maps.colour, picture], 1)[::-1]
+    return np.clip(pair, 0, 1)
+
+
+def read_objects(folder: Path | str, levels: int, spacing: float) -> list[ObjectLevels]:
+    """The objects at as many levels as the tiles have: at each, Gaussians of a cell twice as wide are merged.
+
+    spacing: width of a finest cell. Raises: InputError: see `read_report`, `read_field`.
+    """
+    objects = []
+    for record in read_report(folder).objects:
+        fields = [read_field(Path(folder, f"{record.name}.ply"))]
+        for level in range(1, levels):
+            fields.append(merge_by_voxel(fields[-1], 2**level * spacing))
+        objects.append(ObjectLevels(record.name, fields, record.radius, record.material, record.density))
+    return objects

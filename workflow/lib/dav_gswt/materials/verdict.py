@@ -1,0 +1,36 @@
+"""Verdict on each material and on the set: is there enough of it for a terrain, and what would help."""
+
+from dataclasses import dataclass
+
+GOOD, MARGINAL = 4.0, 2.0  # tile areas that were photographed
+
+
+@dataclass(frozen=True)
+class MaterialVerdict:
+    """good, marginal or no; the reason, and what to do, as a sentence for people."""
+
+    grade: str
+    reason: str
+
+
+def judge_material(name: str, areas: float, filled: float) -> MaterialVerdict:
+    """The verdict on a material.
+
+    Args: areas: how many tiles' areas of it were photographed. filled: share of its exemplar that is made of patches.
+    """
+    seen = f"{name} was photographed on {areas:.1f} tile areas"
+    if areas >= GOOD:
+        return MaterialVerdict("good", seen)
+    more = f"photograph {GOOD / max(areas, 0.1):.1f} times as much of it"
+    if areas >= MARGINAL:
+        return MaterialVerdict("marginal", f"{seen}: repeats may be seen; {more}")
+    made = f", and {filled:.0%} of what its tiles are cut from is made of patches" if filled > 0.05 else ""
+    return MaterialVerdict("no", f"{seen}{made}: repeats will be seen; {more}, or leave it out")
+
+
+def judge_set(verdicts: list[MaterialVerdict], excluded: float) -> MaterialVerdict:
+    """The verdict on all: that of the largest material, which is the first. excluded: share of ground shown nowhere."""
+    grades = [verdict.grade for verdict in verdicts]
+    if excluded > 0.5 and grades[0] == "good":
+        return MaterialVerdict("marginal", f"{excluded:.0%} of the ground is shade, rare or cut off, and shown nowhere")
+    return MaterialVerdict(grades[0], f"{len(verdicts)} materials, {excluded:.0%} of the ground is shown nowhere")

@@ -1,0 +1,271 @@
+"""Verdict on a model of structure from motion, from several signs together: good, doubtful or refused.
+
+Every photo can be registered in a model that is nonsense, and no single number shows it. Each sign is graded by itself;
+two signs, one of them refused, or three doubts refuse the model.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray as Array
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from dav_gswt.errors import InputError
+from dav_gswt.geometry.scene_frame import Grade, SfmSign, SfmVerdict
+from dav_gswt.photos.colmap_model import ColmapModel
+from dav_gswt.photos.ground_frame import fit_plane, make_upright_rotation
+from dav_gswt.photos.sfm.gps import ACROSS, WORST, fit_similarity
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """Beyond which a sign is doubtful, and beyond which refused. alone: refused, it refuses the model by itself."""
+
+    doubtful: float
+    refused: float
+    why: str
+    alone: bool = False
+
+
+THRESHOLDS = {
+    "reprojection error": Threshold(0.9, 2.0, "pixels; good sets have 0.18 to 0.57, one of fog had 1.39", alone=True),
+    "track length": Threshold(1 / 2.6, 1 / 2.2, "1 / photos a point; points by chance have two, others three or more"),
+    "GPS": Threshold(0.5, 0.7, "of the flight's extent; receivers that lag have 0.35, positions by chance 0.8"),
+    "ground": Threshold(30.0, 50.0, "degrees between the ground's normal and the vertical; slopes stay below 30"),
+    "climb": Threshold(15.0, 30.0, "degrees; over ground that stands upright a level flight climbs by 45"),
+    "tilt": Threshold(75.0, 85.0, "degrees off the vertical, median; ground seen so flat fills no square"),
+    "focal length": Threshold(1.25, 1.6, "times EXIF's or its inverse; from above, free estimates end up to 1.15 off"),
+    "roughness": Threshold(0.04, 0.1, "of the distance, between points side by side in a photo; fog has no surface"),
+    "relief": Threshold(0.2, 1 / 3, "of the flying height; above a third no plane is a ground"),
+    "placed": Threshold(0.5, 0.9, "of the photos that found no place; then the set is not what was meant"),
+}  # fmt: skip
+FAR = 10 * ACROSS  # metres: no receiver is so wrong, however long the flight
+COVERAGE = ("placed", "groups")  # signs about what is missing: they contradict nothing
+FLAT, WIDE = 0.35, 0.2  # singular values of camera positions: third over second, second over first, of a flight plane
+ACROSS_FLIGHT = 30.0  # degrees between the views and the normal of their flight plane, within which they look down
+NEIGHBOURS = 6  # points beside a point in a photo
+LEAST_INLIERS = 30  # matches that hold two photos together; mapping needs as many
+LEAST_GROUP = 3  # photos
+FEW = 5  # photos; in smaller sets tracks are short anyway
+
+
+@dataclass(frozen=True)
+class SfmEvidence:
+    """What is known beside the model.
+
+    error: mean reprojection error at the size of features, pixels. images: of the set. focal_ratio: the freely adjusted
+    focal length over EXIF's. positions: by GPS, of the model's images, metres east, north and up; NaN where a photo has
+    none. groups: names of photos that hang together, see `find_groups`.
+    """
+
+    error: float
+    images: int
+    focal_ratio: float | None = None
+    positions: Float[Array, "n 3"] | None = None
+    groups: tuple[tuple[str, ...], ...] = ()
+
+
+def judge_model(model: ColmapModel, evidence: SfmEvidence, rng: np.random.Generator) -> SfmVerdict:
+    """The verdict on a model, its world frame being any."""
+    normal, offset, spread = fit_plane(model.points, rng)
+    turn, gps = _judge_gps(model, evidence.positions, normal)
+    signs = [
+        _grade("reprojection error", evidence.error, f"points lie {evidence.error:.2f} px off on average"),
+        _judge_tracks(model),
+        gps,
+        *_judge_directions(model, normal, turn),
+        _judge_climb(model, evidence.positions, normal),
+        _judge_focal_length(evidence.focal_ratio),
+        _judge_roughness(model),
+        _judge_relief(model, normal, offset, spread),
+        _judge_share(len(model.names), evidence.images),
+        _judge_groups(evidence.groups),
+    ]
+    known = tuple(sign for sign in signs if sign)
+    return SfmVerdict(combine_grades(known), known)
+
+
+def combine_grades(signs: Iterable[SfmSign]) -> Grade:
+    """Refused: by two signs one of which is refused, by three doubts, or by one sign that is enough alone."""
+    bad = [sign for sign in signs if sign.grade != "good"]
+    against = [sign for sign in bad if sign.name not in COVERAGE]
+    refused = [sign for sign in against if sign.grade == "refused"]
+    if len(against) >= 3 or (refused and len(against) >= 2) or any(THRESHOLDS[sign.name].alone for sign in refused):
+        return "refused"
+    return "doubtful" if bad else "good"
+
+
+def find_groups(
+    names: list[str], pairs: Iterable[tuple[int, int, int]], placed: Sequence[int] = ()
+) -> tuple[tuple[str, ...], ...]:
+    """Groups of photos that matches hold together, the largest first; those of fewer than three photos are left out.
+
+    pairs: indices of two photos, and how many matches of theirs one rigid scene explains. placed: those of one model,
+    which are one group whatever their matches.
+    """
+    edges = [(i, j) for i, j, inliers in pairs if inliers >= LEAST_INLIERS]
+    edges += [(placed[0], i) for i in placed[1:]]
+    rows, columns = zip(*edges, strict=True) if edges else ((), ())
+    graph = coo_array((np.ones(len(edges)), (rows, columns)), shape=(len(names), len(names)))
+    count, label = connected_components(graph, directed=False)
+    groups = [tuple(np.array(names, object)[label == k]) for k in range(count)]
+    return tuple(sorted((g for g in groups if len(g) >= LEAST_GROUP), key=lambda g: (-len(g), g[0])))
+
+
+def _grade(name: str, value: float, reason: str) -> SfmSign:
+    limit = THRESHOLDS[name]
+    grade = "refused" if value > limit.refused else "doubtful" if not value <= limit.doubtful else "good"
+    return SfmSign(name, grade, reason)
+
+
+def _judge_tracks(model: ColmapModel) -> SfmSign | None:
+    if len(model.names) < FEW or not len(model.points):
+        return None
+    length = len(model.pixels) / len(model.points)
+    return _grade("track length", 1 / length, f"a point is seen by {length:.1f} photos on average")
+
+
+def _judge_gps(
+    model: ColmapModel, positions: Float[Array, "n 3"] | None, normal: Float[Array, "3"]
+) -> tuple[Float[Array, "3 3"] | None, SfmSign | None]:
+    """The rotation into the frame of the GPS positions, where they agree with the model, and the sign.
+
+    The sign looks at distances along the ground: altitudes drift by tens of metres in flights that are else right.
+    """
+    known = np.isfinite(positions).all(1) if positions is not None else np.zeros(0, bool)
+    if positions is None or known.sum() < 4:
+        return None, None
+    centres, at = np.stack([camera.centre for camera in model.cameras])[known], positions[known]
+    _, turn, _, off = fit_similarity(centres, at)
+    flat = np.array([1.0, 1.0, 0.0])
+    east = np.eye(3)[np.abs(normal).argmin()]
+    _, _, _, across = fit_similarity(centres @ make_upright_rotation(normal, east).T * flat, at * flat)
+    extent = float(np.sqrt(at[:, :2].var(axis=0).sum()))
+    reason = (
+        f"cameras lie {across:.1f} m from their GPS positions (median), {across / extent:.0%} of the flight's extent"
+    )
+    if across <= WORST * ACROSS:  # within the error of receivers, also of a small flight
+        sign = SfmSign("GPS", "good", reason)
+    else:
+        sign = _grade("GPS", across / extent, reason)
+        if sign.grade == "good" and across > FAR:
+            sign = SfmSign("GPS", "doubtful", reason)
+    return (turn if off <= WORST * ACROSS else None), sign
+
+
+def _judge_directions(
+    model: ColmapModel, normal: Float[Array, "3"], turn: Float[Array, "3 3"] | None
+) -> list[SfmSign | None]:
+    """The ground's normal against the vertical as GPS or the flight itself says it; and how flat the ground is seen."""
+    forward = np.stack([camera.forward for camera in model.cameras])
+    tilt = float(np.median(_measure_angles(forward, normal)))
+    seen = _grade("tilt", tilt, f"photos look {tilt:.0f} degrees off the ground's vertical (median)")
+    if turn is not None:
+        angle = float(_measure_angles(turn[2][None], normal)[0])
+        return [_grade("ground", angle, f"the ground lies {angle:.0f} degrees from level, as GPS says it"), seen]
+    across = _find_flight_normal(model)
+    if across is None:
+        return [None, seen]
+    angle = float(_measure_angles(across[None], normal)[0])
+    reason = (
+        f"the photos look straight down from their flight, which lies {angle:.0f} degrees from parallel to the ground"
+    )
+    return [_grade("ground", angle, reason), seen]
+
+
+def _judge_climb(
+    model: ColmapModel, positions: Float[Array, "n 3"] | None, normal: Float[Array, "3"]
+) -> SfmSign | None:
+    """How much steeper the flight is over the model's ground than by GPS, each in its own frame."""
+    known = np.isfinite(positions).all(1) if positions is not None else np.zeros(0, bool)
+    if positions is None or known.sum() < 4:
+        return None
+    centres = np.stack([camera.centre for camera in model.cameras])[known]
+    by_model, by_gps = _measure_climb(centres, normal), _measure_climb(positions[known], np.array([0.0, 0.0, 1.0]))
+    reason = f"the flight climbs by {by_model:.0f} degrees over the ground, by GPS {by_gps:.0f}"
+    return _grade("climb", by_model - by_gps, reason)
+
+
+def _measure_climb(at: Float[Array, "n 3"], up: Float[Array, "3"]) -> float:
+    """Degrees: the spread of positions upwards against that across."""
+    centred = at - at.mean(0)
+    upwards = centred @ up
+    across = np.sqrt(max((centred**2).sum() - (upwards**2).sum(), 0.0))
+    return float(np.degrees(np.arctan2(np.linalg.norm(upwards), across)))
+
+
+def _find_flight_normal(model: ColmapModel) -> Float[Array, "3"] | None:
+    """The normal of the plane that the cameras flew in; None where they did not, or did not look across it."""
+    centres = np.stack([camera.centre for camera in model.cameras])
+    _, size, axes = np.linalg.svd(centres - centres.mean(0))
+    if len(centres) < 4 or size[1] < WIDE * size[0] or size[2] > FLAT * size[1]:
+        return None
+    forward = np.stack([camera.forward for camera in model.cameras])
+    return axes[2] if np.median(_measure_angles(forward, axes[2])) <= ACROSS_FLIGHT else None
+
+
+def _measure_angles(lines: Float[Array, "n 3"], line: Float[Array, "3"]) -> Float[Array, "n"]:
+    """Degrees between lines and another, all of unit vectors."""
+    return np.degrees(np.arccos(np.clip(np.abs(lines @ line), 0, 1)))
+
+
+def _judge_focal_length(ratio: float | None) -> SfmSign | None:
+    if ratio is None:
+        return None
+    return _grade(
+        "focal length", max(ratio, 1 / ratio), f"the photos alone say {ratio:.2f} times the focal length of EXIF"
+    )
+
+
+def _judge_roughness(model: ColmapModel) -> SfmSign | None:
+    """How much the distance changes between points that are neighbours in a photo, over the distance; median."""
+    found = []
+    for i, camera in enumerate(model.cameras):
+        own = np.flatnonzero(model.image_of == i)
+        if len(own) <= NEIGHBOURS:
+            continue
+        _, depth = camera.project(model.points[model.point_of[own]])
+        near = np.asarray(cKDTree(model.pixels[own]).query(model.pixels[own], k=NEIGHBOURS + 1)[1])
+        beside = np.median(np.abs(depth[near[:, 1:]] - depth[:, None]), axis=1)
+        found.append(beside / np.maximum(np.abs(depth), 1e-12))
+    if not found:
+        return None
+    value = float(np.median(np.concatenate(found)))
+    return _grade(
+        "roughness", value, f"points side by side in a photo differ by {value:.1%} of their distance (median)"
+    )
+
+
+def _judge_relief(model: ColmapModel, normal: Float[Array, "3"], offset: float, spread: float) -> SfmSign:
+    heights = np.array([camera.centre @ normal for camera in model.cameras]) - offset
+    relief = spread / max(abs(float(np.median(heights))), 1e-12)
+    return _grade("relief", relief, f"points lie {relief:.2f} flying heights off their plane")
+
+
+def _judge_share(placed: int, images: int) -> SfmSign:
+    return _grade("placed", 1 - placed / images, f"{placed} of {images} photos found a place")
+
+
+def _judge_groups(groups: tuple[tuple[str, ...], ...]) -> SfmSign | None:
+    if len(groups) < 2:
+        return None
+    said = " | ".join(f"{group[0]} ... {group[-1]}" for group in groups)
+    reason = f"your photos fall into {len(groups)} groups ({said}) that share no ground: only one of them can be used"
+    return SfmSign("groups", "doubtful", reason)
+
+
+def require_trust(verdict: SfmVerdict) -> None:
+    """Raises: InputError: the verdict is refused; the message has its reasons and what was tried."""
+    if verdict.grade != "refused":
+        return
+    reasons = "; ".join(sign.reason for sign in verdict.objections)
+    tried = f" (tried: {'; '.join(verdict.tried)})" if len(verdict.tried) > 1 else ""
+    raise InputError(
+        f"the photos do not fit together to one scene: {reasons}{tried}. Take photos that overlap more and show "
+        "texture, give the scene's `focal` if EXIF is wrong, remove GPS from the photos if it is wrong, or try "
+        "`sfm: careful`; with `verdict: warn` the run goes on"
+    )

@@ -1,0 +1,174 @@
+"""The true materials and objects of synthetic ground, and their map from above, which evaluations read.
+
+The map is a pair of files in truth/: ground_labels.exr, with the channels material and object, and ground_labels.json,
+with what their numbers mean. The product reads neither.
+"""
+
+import json
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Int
+from numpy import ndarray as Array
+from scipy import ndimage
+
+from dav_gswt.errors import InputError
+from dav_gswt.files import read_record, write_json
+from dav_gswt.geometry.scene_frame import Extent, Square
+from dav_gswt.images import image_files
+
+MAP, NAMES = "ground_labels.exr", "ground_labels.json"
+CELLS = 600  # of the map along a side of the exemplar: 1 cm each
+GAP = 3  # cells: gaps between twigs and leaves up to twice as wide belong to a footprint
+REMEDY = "make the photos stage again"
+
+
+@dataclass(frozen=True)
+class LandObject:
+    """A single thing on the ground. kind: shrub or boulder. vertices: of its mesh, in the world, above the ground."""
+
+    kind: str
+    vertices: Float32[Array, "v 3"]
+
+    @cached_property
+    def centre(self) -> Float[Array, "2"]:
+        """The middle of its bounding box from above."""
+        return (self.vertices[:, :2].min(axis=0) + self.vertices[:, :2].max(axis=0)).astype(float) / 2
+
+    @cached_property
+    def radius(self) -> float:
+        """Of the circle about its centre that holds it, from above."""
+        return float(np.hypot(*(self.vertices[:, :2] - self.centre).T).max())
+
+
+@dataclass(frozen=True)
+class GroundLabels:
+    """What a piece of land consists of.
+
+    materials: numbers by name, from 1. material: that of every place, over a square that repeats after `period` metres
+    (as in `noise`). objects: numbered from 1 in their order. plants: kinds of `Land.plants` that are objects.
+    """
+
+    materials: dict[str, int]
+    material: Int[Array, "n n"]
+    period: float
+    objects: tuple[LandObject, ...]
+    plants: frozenset[int]
+
+    def material_at(self, x: Float[Array, "*s"], y: Float[Array, "*s"]) -> Int[Array, "*s"]:
+        """The material of the ground at places."""
+        n = len(self.material)
+        column, row = (np.floor(np.asarray(v) * n / self.period).astype(int) % n for v in (x, y))
+        return self.material[row, column]
+
+
+@dataclass(frozen=True)
+class ObjectLabel:
+    """An object of a map: its number there, its kind, and the circle that holds it from above, metres."""
+
+    id: int
+    kind: str
+    x: float
+    y: float
+    radius: float
+
+
+@dataclass(frozen=True)
+class _Names:
+    """The content of NAMES."""
+
+    extent: Extent
+    materials: dict[str, int]
+    objects: tuple[ObjectLabel, ...]
+
+
+@dataclass(frozen=True)
+class LabelMap:
+    """The labels of a rectangle of ground from above. Rows run from south to north, columns from west to east.
+
+    material: numbers of `materials`, also below objects. object: numbers of `objects`; 0: none.
+    """
+
+    material: Int[Array, "rows columns"]
+    object: Int[Array, "rows columns"]
+    extent: Extent
+    materials: dict[str, int]
+    objects: tuple[ObjectLabel, ...]
+
+    def mask(self, material: str) -> Bool[Array, "rows columns"]:
+        """The cells of a material without an object. Raises: KeyError: no such material."""
+        return (self.material == self.materials[material]) & (self.object == 0)
+
+
+def draw_label_map(labels: GroundLabels, square: Square, cells: int = CELLS) -> LabelMap:
+    """The map of a square, of cells x cells, each labelled by its centre. Objects that do not reach it are left out."""
+    at = (np.arange(cells) + 0.5) * square.side / cells
+    material = labels.material_at(*np.meshgrid(square.west + at, square.south + at))
+    objects, named = np.zeros((cells, cells), int), []
+    for i, thing in enumerate(labels.objects, start=1):
+        covered = rasterize_footprint(thing.vertices, square, cells) & (objects == 0)
+        if covered.any():
+            objects[covered] = i
+            x, y = thing.centre.tolist()
+            named.append(ObjectLabel(i, thing.kind, x, y, thing.radius))
+    extent = Extent(square.west, square.south, square.east, square.north)
+    return LabelMap(material, objects, extent, labels.materials, tuple(named))
+
+
+def rasterize_footprint(vertices: Float32[Array, "v 3"], square: Square, cells: int) -> Bool[Array, "cells cells"]:
+    """The cells that an object covers from above: those of its vertices, and gaps between them; one piece."""
+    edge = GAP + 1  # so that closing does not end at the border
+    column, row = (
+        np.floor((vertices[:, k] - low) * cells / square.side).astype(int) + edge
+        for k, low in enumerate((square.west, square.south))
+    )
+    size = cells + 2 * edge
+    inside = (np.minimum(column, row) >= 0) & (np.maximum(column, row) < size)
+    hit = np.zeros((size, size), bool)
+    hit[row[inside], column[inside]] = True
+    whole = ndimage.binary_fill_holes(ndimage.binary_closing(hit, np.ones((3, 3), int), iterations=GAP))
+    pieces, count = ndimage.label(whole)
+    if count > 1:
+        whole = pieces == 1 + np.argmax(np.bincount(pieces.ravel())[1:])
+    return whole[edge:-edge, edge:-edge]
+
+
+def label_places(labels: GroundLabels, x: Float[Array, "*s"], y: Float[Array, "*s"], kind: str) -> Int[Array, "*s"]:
+    """The object of a kind whose circle holds a place, by its number, the nearest if there are several; 0: none."""
+    found, nearest = np.zeros(np.shape(x), int), np.full(np.shape(x), np.inf)
+    for i, thing in enumerate(labels.objects, start=1):
+        if thing.kind == kind:
+            away = np.hypot(x - thing.centre[0], y - thing.centre[1])
+            closer = (away <= 1.001 * thing.radius) & (away < nearest)
+            found[closer], nearest[closer] = i, away[closer]
+    return found
+
+
+def write_label_map(folder: Path | str, labels: LabelMap) -> None:
+    """Write the two files of a map. On disk the first row is the northern one, as in any image of a map."""
+    names = asdict(_Names(labels.extent, labels.materials, labels.objects))
+    channels = {"material": labels.material[::-1], "object": labels.object[::-1]}
+    texts = {key: json.dumps(names[key]) for key in ("extent", "materials")}
+    image_files.write_exr(Path(folder) / MAP, {k: v.astype(np.float32) for k, v in channels.items()}, texts)
+    write_json(Path(folder) / NAMES, names)
+
+
+def read_label_map(folder: Path | str) -> LabelMap:
+    """Read the map of a photo set from its truth/ folder.
+
+    Raises: InputError: there is none, as for families without labels, or the files are of another kind.
+    """
+    path = Path(folder) / MAP
+    names = read_record(Path(folder) / NAMES, _Names, REMEDY)
+    channels, _ = image_files.read_exr(path)
+    try:
+        material, objects = (np.rint(channels[name][::-1]).astype(int) for name in ("material", "object"))
+    except KeyError as error:
+        raise InputError(f"{path}: has no channel {error}; {REMEDY}") from error
+    unknown = set(np.unique(material)) - {0, *names.materials.values()}
+    unknown |= set(np.unique(objects)) - {0, *(thing.id for thing in names.objects)}
+    if unknown:
+        raise InputError(f"{path}: has labels that {NAMES} does not name ({min(unknown)}); {REMEDY}")
+    return LabelMap(material, objects, names.extent, names.materials, names.objects)

@@ -1,0 +1,1 @@
+"""Materials and objects of synthetic scenes against their true labels."""

@@ -1,0 +1,119 @@
+"""Fit the rule of classes to measured materials: noise with their shares and patch scales, and the transition."""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray as Array
+
+from dav_gswt.bundle.content import BundleContent
+from dav_gswt.bundle.land_cover import ClassesEntry, JitterEntry, NoiseTerm, RiseEntry
+from dav_gswt.terrain.classes import LATTICE, Classes
+
+SHORTEST, WIDEST = 4.0, 4096.0  # lattice steps: wavelengths of noise that the lattice shows
+MAX_OCTAVES = 5
+SAMPLES, LINES, LINE = 60_000, 48, 2048  # lattice points; lines of them, and points of a line
+PASSES, STEPS = 3, 150
+TYPICAL = 0.6  # mean difference of two jitters, in amplitudes
+
+FRAY = 0.06  # tile sides: how far the jitter typically moves a border
+WAVES = 3.0  # wavelength of the widest jitter, as a multiple of that
+FINEST = 3.0  # ground cells: wavelength of the finest jitter
+LEAN = 1.0  # how far something reaches over a border, as a multiple of its height above the ground
+MOST_LEAN = 0.04  # tile sides
+CLEARANCE = 2.0  # standard deviations of the ground's own relief
+
+
+def fit_classes(content: BundleContent, salt: int) -> ClassesEntry:
+    """The rule that gives every material its share of the ground and, as far as possible, its patch scale.
+
+    Wavelengths are in proportion to the patch scales; one factor brings the mean length of stretches on straight lines
+    to the measured one. Biases give the shares. Both are measured on the noise itself and repeated, since wavelengths
+    decide how many octaves the lattice shows.
+    """
+    side = content.side
+    wanted = np.maximum([material.patch_scale / side for material in content.materials], 1 / LATTICE)
+    shares = np.array([material.share for material in content.materials])
+    shares, waves = shares / shares.sum(), wanted.copy()
+    entry = ClassesEntry(salt, [], JitterEntry(1, 1, 0.0), RiseEntry(0.0, 0.0, *2 * [[0.0] * len(shares)]))
+    steepness = 1.0
+    for _ in range(PASSES):
+        waves = np.clip(waves, SHORTEST / LATTICE, WIDEST / LATTICE)
+        octaves = [count_octaves(wave * LATTICE, SHORTEST, MAX_OCTAVES) for wave in waves.tolist()]
+        noise = NoiseTerm("noise", 1.0, waves.tolist(), octaves, [0.0] * len(waves))
+        plain = Classes(replace(entry, rule=[noise]), len(waves), side)
+        noise = replace(noise, biases=fit_biases(plain.lattice_scores(*_spread_points(salt)), shares).tolist())
+        entry = replace(entry, rule=[noise])
+        stretches, steepness = measure_lines(Classes(entry, len(waves), side), salt)
+        waves = waves * np.exp(shares @ np.log(wanted / stretches))
+    return replace(entry, jitter=_fit_jitter(content, steepness), rise=_fit_rise(content, steepness / side))
+
+
+def fit_biases(scores: Float[Array, "n m"], shares: Float[Array, "m"]) -> Float[Array, "m"]:
+    """What to add to scores so that each is the highest in its share of the samples; the mean is 0.
+
+    The gradient of a convex function of the biases is the difference of shares: it is followed in ever smaller steps.
+    """
+    biases, spread = np.zeros(len(shares)), float(scores.std())
+    for step in range(STEPS):
+        best = (scores + biases).argmax(1)
+        reached = np.bincount(best, minlength=len(shares)) / len(scores)
+        biases += 3 * spread / (1 + 0.1 * step) * (shares - reached)
+    return biases - biases.mean()
+
+
+def measure_lines(classes: Classes, salt: int) -> tuple[Float[Array, "m"], float]:
+    """Mean length of each material's stretches on straight lines, in tile sides, and how steeply scores cross.
+
+    The latter is the mean change of the difference of the two scores where one material gives way to another, per tile
+    side. A material that no line meets has the length of a lattice step.
+    """
+    rng = np.random.default_rng([salt, 1])
+    rows, starts = rng.integers(-(2**30), 2**30, (2, LINES))
+    along = np.arange(LINE)[None] + starts[:, None]
+    i, j = along.ravel(), np.repeat(rows, LINE)
+    half = len(i) // 2  # half of the lines go north
+    i, j = np.concatenate([i[:half], j[half:]]), np.concatenate([j[:half], i[half:]])
+    scores = classes.lattice_scores(i, j).reshape(LINES, LINE, classes.materials)
+    best = scores.argmax(-1)
+    change = best[:, 1:] != best[:, :-1]
+    counts = np.bincount(best.ravel(), minlength=classes.materials)
+    runs = np.bincount(np.concatenate([best[:, 0], best[:, 1:][change]]), minlength=classes.materials)
+    before, after = scores[:, :-1][change], scores[:, 1:][change]
+    own, new, k = best[:, :-1][change], best[:, 1:][change], np.arange(change.sum())
+    turn = (after[k, new] - after[k, own]) - (before[k, new] - before[k, own])
+    steepness = LATTICE * float(turn.mean()) if len(turn) else 1.0
+    return np.maximum(counts, 1) / np.maximum(runs, 1) / LATTICE, steepness
+
+
+def count_octaves(widest: float, finest: float, most: int) -> int:
+    """Octaves of a noise from a widest to a finest wavelength, at least one."""
+    return int(np.clip(1 + np.floor(np.log2(widest / finest)), 1, most))
+
+
+def _spread_points(salt: int) -> tuple[Array, Array]:
+    i, j = np.random.default_rng(salt).integers(-(2**30), 2**30, (2, SAMPLES))
+    return i, j
+
+
+def _fit_jitter(content: BundleContent, steepness: float) -> JitterEntry:
+    """The jitter that moves borders by FRAY; less where patches are small. steepness: of scores, per tile side."""
+    smallest = max(min(material.patch_scale for material in content.materials) / content.side, 1 / LATTICE)
+    fray = min(FRAY, 0.15 * smallest)
+    cells = int(np.clip(np.rint(1 / (WAVES * fray)), 1, 4096))
+    octaves = count_octaves(content.side / cells, FINEST * content.spacing, 4)
+    return JitterEntry(cells, octaves, float(fray * steepness / TYPICAL))
+
+
+def _fit_rise(content: BundleContent, steepness: float) -> RiseEntry:
+    """steepness: of scores, per unit of length."""
+    grounds = []
+    for tiles in content.tiles:
+        heights = [f.means[f.ground, 2].astype(float) for f in tiles.fields[0] if f.ground.any()]
+        grounds.append(np.concatenate(heights or [f.means[:, 2].astype(float) for f in tiles.fields[0]]))
+    return RiseEntry(
+        LEAN * steepness,
+        MOST_LEAN * content.side * steepness,
+        [float(z.mean()) for z in grounds],
+        [float(CLEARANCE * z.std()) for z in grounds],
+    )

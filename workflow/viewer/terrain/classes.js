@@ -1,0 +1,332 @@
+// Classes of the terrain: which material lies at a place, and which Gaussians stay where materials meet.
+// The same numbers as dav_gswt/terrain/classes.py, where the idea is; tests/golden/classes.json holds both to it.
+
+import { createCellRing } from "./cell_ring.js";
+import { createNoise, wrapIndex } from "./heights.js";
+import { createJitter, MAX_OCTAVES, octaveGains, SHIFT } from "./jitter.js";
+
+/**
+ * Terms of the rule in the manifest's `classes`.
+ *
+ * @typedef {{ kind: "noise", weight: number, wavelengths: number[], octaves: number[], biases: number[] }} NoiseTerm
+ * @typedef {{ kind: "height" | "slope", weight: number, material: number, low: number | null, high: number | null,
+ *   soft: number }} RangeTerm
+ * @typedef {{ kind: "image", weight: number, file: string, bytes: number, sha256?: string, rows: number,
+ *   columns: number, width: number, beyond: string }} PictureTerm
+ * @typedef {NoiseTerm | RangeTerm | PictureTerm} Term
+ * @typedef {{ salt: number, rule: Term[], jitter: { cells: number, octaves: number, amplitude: number },
+ *   rise: { slope: number, most: number, ground: number[], clearance: number[] } }} ClassesEntry
+ *
+ * Pixels of the rule's pictures by file, the northern row first.
+ * @typedef {Map<string, Uint8Array>} Pictures
+ * @typedef {import("./heights.js").HeightField} HeightField
+ *
+ * Scores at the corners of a cell's lattice, row by row from the south-west, of all materials.
+ * @typedef {Float64Array} Lattice
+ * @typedef {ReturnType<typeof createClasses>} Classes
+ */
+
+export const LATTICE = 8; // squares of the lattice of scores along a tile's side
+export const MAX_MATERIALS = 8;
+const POINTS = LATTICE + 1;
+const NOISE = 16; // axis of the hash: octave k of material m uses NOISE + MAX_OCTAVES m + k
+const TURN = [0.8, 0.6]; // cosine and sine by which each octave is turned against the last
+const FARTHEST = 4; // weights by which a score falls at most outside of a range
+const SURE = 1e-9; // of scores: more than rounding can change
+const GOES = 0, UNDECIDED = 1, STAYS = 2; // what happens to a material's Gaussians in a square of the lattice
+
+/**
+ * The class function of a terrain.
+ *
+ * @param {ClassesEntry} entry
+ * @param {number} materials
+ * @param {number} side of a tile
+ * @param {HeightField} heights
+ * @param {Pictures} [pictures]
+ */
+export function createClasses(entry, materials, side, heights, pictures = new Map()) {
+  const { jitter, rise } = entry, wave = 2 * jitter.amplitude, here = new Float64Array(materials);
+  const addTerms = entry.rule.map((term) => createTerm(term, { materials, side, heights, pictures, salt: entry.salt }));
+  const jitterAt = createJitter(entry, materials), waves = new Float64Array(materials);
+  const corners = Array.from({ length: 4 }, () => new Float64Array(materials));
+  const cells = createCellRing((i, j) => {
+    const lattice = cellLattice(i, j), bits = findMaterials(lattice, materials, wave + rise.most);
+    return { bits, lattice: bits & (bits - 1) ? lattice : null };
+  });
+
+  /**
+   * Scores of all materials at a point of the lattice, `at` an index in `out`.
+   *
+   * @param {number} i
+   * @param {number} j
+   * @param {Float64Array} out
+   * @param {number} at
+   */
+  function latticeScores(i, j, out, at) {
+    out.fill(0, at, at + materials);
+    for (const add of addTerms) add(i, j, out, at);
+  }
+
+  /** @param {number} i @param {number} j @returns {Lattice} */
+  function cellLattice(i, j) {
+    const lattice = new Float64Array(POINTS * POINTS * materials);
+    for (let b = 0, at = 0; b < POINTS; b++) {
+      for (let a = 0; a < POINTS; a++, at += materials) latticeScores(i * LATTICE + a, j * LATTICE + b, lattice, at);
+    }
+    return lattice;
+  }
+
+  /**
+   * Scores of all materials at a place of a cell, in tile sides from its corner; without jitter. The next call
+   * overwrites them.
+   *
+   * @param {number} i
+   * @param {number} j
+   * @param {number} u
+   * @param {number} v
+   */
+  function scoresAt(i, j, u, v) {
+    const a = squareOf(u), b = squareOf(v), { lattice } = cells.get(i, j);
+    if (lattice) return interpolate(lattice, a, b, u * LATTICE - a, v * LATTICE - b);
+    for (let k = 0; k < 4; k++) latticeScores(i * LATTICE + a + (k & 1), j * LATTICE + b + (k >> 1), corners[k], 0);
+    const s = u * LATTICE - a, t = v * LATTICE - b;
+    const [sw, se, nw, ne] = corners;
+    for (let m = 0; m < materials; m++) here[m] = between(sw[m], se[m], nw[m], ne[m], s, t);
+    return here;
+  }
+
+  /** @param {Lattice} lattice @param {number} a @param {number} b @param {number} s @param {number} t */
+  function interpolate(lattice, a, b, s, t) {
+    const south = (b * POINTS + a) * materials, north = south + POINTS * materials;
+    for (let m = 0; m < materials; m++) {
+      here[m] = between(lattice[south + m], lattice[south + materials + m], lattice[north + m],
+        lattice[north + materials + m], s, t);
+    }
+    return here;
+  }
+
+  return {
+    materials,
+    amplitude: jitter.amplitude,
+    latticeScores,
+    scoresAt,
+    /** Jitter at a place of a cell. @param {number} i @param {number} j @param {number} u @param {number} v */
+    jitterAt: (i, j, u, v) => jitterAt(i, j, u, v, waves),
+    /**
+     * Which materials may have a Gaussian in a cell: bit m for material m.
+     *
+     * @param {number} i
+     * @param {number} j
+     */
+    materialsIn: (i, j) => cells.get(i, j).bits,
+    /**
+     * Indices of the Gaussians of a material's tile that stay in cell (i, j).
+     *
+     * @param {number} i
+     * @param {number} j
+     * @param {{ centres: Float32Array, count: number }} chunk
+     * @param {number} material
+     */
+    keep(i, j, { centres, count }, material) {
+      const lattice = cells.get(i, j).lattice ?? cellLattice(i, j), kept = new Uint32Array(count);
+      const states = decideSquares(lattice, materials, material, wave, rise.most);
+      let n = 0;
+      for (let k = 0; k < count; k++) {
+        const u = centres[3 * k] / side, v = centres[3 * k + 1] / side, a = squareOf(u), b = squareOf(v);
+        const state = states[b * LATTICE + a];
+        if (state === GOES) continue;
+        if (state === UNDECIDED) {
+          const scores = interpolate(lattice, a, b, u * LATTICE - a, v * LATTICE - b);
+          const away = Math.abs(centres[3 * k + 2] - rise.ground[material]) - rise.clearance[material];
+          const bonus = Math.min(rise.slope * Math.max(away, 0), rise.most), lead = leadOf(scores, material, bonus);
+          if (lead < -wave - SURE) continue;
+          if (lead < wave + SURE && !isHighest(scores, jitterAt(i, j, u, v, waves), material, bonus)) continue;
+        }
+        kept[n++] = k;
+      }
+      return kept.slice(0, n);
+    },
+  };
+}
+
+/**
+ * By how much a material's score exceeds the highest of the others, without jitter.
+ *
+ * @param {Float64Array} scores
+ * @param {number} material
+ * @param {number} bonus
+ */
+function leadOf(scores, material, bonus) {
+  let most = -Infinity;
+  for (let m = 0; m < scores.length; m++) if (m !== material && scores[m] > most) most = scores[m];
+  return scores[material] + bonus - most;
+}
+
+/**
+ * Is a material's score the highest, with jitter?
+ *
+ * @param {Float64Array} scores
+ * @param {Float64Array} moved
+ * @param {number} material
+ * @param {number} bonus
+ */
+function isHighest(scores, moved, material, bonus) {
+  const own = scores[material] + moved[material] + bonus;
+  for (let m = 0; m < scores.length; m++) if (m !== material && !(own >= scores[m] + moved[m])) return false;
+  return true;
+}
+
+/** The square of a cell's lattice over a place; beyond the cell the nearest one. @param {number} u */
+const squareOf = (u) => Math.min(Math.max(Math.floor(u * LATTICE), 0), LATTICE - 1);
+
+/**
+ * Bilinear between the south-western, south-eastern, north-western and north-eastern corner of a square.
+ *
+ * @param {number} sw
+ * @param {number} se
+ * @param {number} nw
+ * @param {number} ne
+ * @param {number} s
+ * @param {number} t
+ */
+function between(sw, se, nw, ne, s, t) {
+  const south = sw + s * (se - sw), north = nw + s * (ne - nw);
+  return south + t * (north - south);
+}
+
+/**
+ * A function that adds a term's scores of all materials at a lattice point.
+ *
+ * @param {Term} term
+ * @param {{ materials: number, side: number, heights: HeightField, pictures: Pictures, salt: number }} terrain
+ * @returns {(i: number, j: number, out: Float64Array, at: number) => void}
+ */
+function createTerm(term, { materials, side, heights, pictures, salt }) {
+  const { weight } = term, step = side / LATTICE;
+  if (term.kind === "noise") {
+    const noises = term.wavelengths.map((wavelength, m) => createClassNoise(wavelength, term.octaves[m], m, salt));
+    return (i, j, out, at) => {
+      for (let m = 0; m < materials; m++) out[at + m] += weight * (noises[m](i, j) + term.biases[m]);
+    };
+  }
+  if (term.kind === "image") {
+    const pixels = pictures.get(term.file);
+    if (!pixels) throw new TypeError("a picture of materials needs its pixels");
+    const shares = new Float64Array(256); // by the value of a pixel: 255 is no material
+    return (i, j, out, at) => {
+      pictureShares(term, pixels, i * step, j * step, shares);
+      for (let m = 0; m < materials; m++) out[at + m] += weight * shares[m];
+    };
+  }
+  const low = term.low ?? -Infinity, high = term.high ?? Infinity;
+  return (i, j, out, at) => {
+    const [height, east, north] = heights.at(i * step, j * step);
+    const value = term.kind === "height" ? height : Math.sqrt(east * east + north * north);
+    const outside = Math.max(Math.max(low - value, value - high), 0);
+    out[at + term.material] += weight * -Math.min(outside / term.soft, FARTHEST);
+  };
+}
+
+/**
+ * Gradient noise of a material at lattice points, in [-1, 1].
+ *
+ * @param {number} wavelength
+ * @param {number} octaves
+ * @param {number} material
+ * @param {number} salt
+ */
+function createClassNoise(wavelength, octaves, material, salt) {
+  const step = 1 / (wavelength * LATTICE), { gains, total } = octaveGains(octaves);
+  const noises = gains.map((_, k) => createNoise(NOISE + MAX_OCTAVES * material + k, salt));
+  /** @param {number} i @param {number} j */
+  return (i, j) => {
+    let x = i * step, y = j * step, noise = 0;
+    for (let k = 0; k < octaves; k++) {
+      const east = TURN[0] * x - TURN[1] * y, north = TURN[1] * x + TURN[0] * y;
+      noise += gains[k] * noises[k](east + k * SHIFT[0], north + k * SHIFT[1]);
+      x = 2 * east;
+      y = 2 * north;
+    }
+    return noise / total;
+  };
+}
+
+/**
+ * Share of each value among the four pixels around a place, by the distances to their centres.
+ *
+ * @param {PictureTerm} term
+ * @param {Uint8Array} pixels
+ * @param {number} x
+ * @param {number} y
+ * @param {Float64Array} shares
+ */
+function pictureShares({ rows, columns, width, beyond }, pixels, x, y, shares) {
+  const perUnit = columns / width, p = x * perUnit + 0.5 * columns - 0.5, q = 0.5 * rows - y * perUnit - 0.5;
+  const column = Math.floor(p), row = Math.floor(q), s = p - column, t = q - row, mirrored = beyond === "mirror";
+  shares.fill(0);
+  for (let k = 0; k < 4; k++) {
+    const a = k & 1, b = k >> 1;
+    const at = wrapIndex(row + b, rows, mirrored) * columns + wrapIndex(column + a, columns, mirrored);
+    shares[pixels[at]] += (a ? s : 1 - s) * (b ? t : 1 - t);
+  }
+}
+
+/**
+ * Materials that may have a Gaussian in a cell: those that come within `slack` of all others in a square.
+ *
+ * @param {Lattice} lattice
+ * @param {number} materials
+ * @param {number} slack
+ */
+function findMaterials(lattice, materials, slack) {
+  let bits = 0;
+  for (let m = 0; m < materials; m++) {
+    for (let square = 0; square < LATTICE * LATTICE && !((bits >> m) & 1); square++) {
+      let close = true;
+      for (let o = 0; o < materials && close; o++) {
+        close = o === m || mostLead(lattice, materials, square, m, o) >= -slack;
+      }
+      if (close) bits |= 1 << m;
+    }
+  }
+  return bits;
+}
+
+/**
+ * What happens to a material's Gaussians in each square of a cell's lattice.
+ *
+ * @param {Lattice} lattice
+ * @param {number} materials
+ * @param {number} m the material
+ * @param {number} wave
+ * @param {number} most
+ */
+function decideSquares(lattice, materials, m, wave, most) {
+  const states = new Uint8Array(LATTICE * LATTICE);
+  for (let square = 0; square < states.length; square++) {
+    let state = STAYS;
+    for (let o = 0; o < materials && state !== GOES; o++) {
+      if (o === m) continue;
+      if (mostLead(lattice, materials, square, m, o) < -wave - most) state = GOES;
+      else if (!(-mostLead(lattice, materials, square, o, m) >= wave)) state = UNDECIDED;
+    }
+    states[square] = state;
+  }
+  return states;
+}
+
+/**
+ * Largest lead of material m over o in a square: a difference of scores is bilinear there, so it is at a corner.
+ *
+ * @param {Lattice} lattice
+ * @param {number} materials
+ * @param {number} square
+ * @param {number} m
+ * @param {number} o
+ */
+function mostLead(lattice, materials, square, m, o) {
+  const south = ((square >> 3) * POINTS + (square & 7)) * materials, north = south + POINTS * materials;
+  const sw = lattice[south + m] - lattice[south + o], nw = lattice[north + m] - lattice[north + o];
+  const se = lattice[south + materials + m] - lattice[south + materials + o];
+  return Math.max(sw, se, nw, lattice[north + materials + m] - lattice[north + materials + o]);
+}
