@@ -1,5 +1,7 @@
 """Objects baked into tiles for the public renderer."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -38,6 +40,25 @@ def test_objects_stay_inside_of_their_tiles(content, baked):
     for tile in range(TILES):
         means = added(content, baked, tile).means
         assert len(means) == 0 or (means[:, :2].min() >= 0 and means[:, :2].max() <= SIDE)
+
+
+def test_tiles_keep_the_same_mean_height_and_their_borders(content, baked):
+    """The public renderer shifts each tile by its own mean height."""
+    heights = [float(field.means[:, 2].astype(float).mean()) for field in baked[0]]
+    assert np.ptp(heights) < 1e-5 * SIDE
+    for before, after in zip(content.tiles[1].fields[0], baked[0], strict=True):
+        edge = np.abs(before.means[:, :2] - SIDE / 2).max(1) > 0.49 * SIDE
+        np.testing.assert_allclose(after.means[: len(before)][edge], before.means[edge], atol=2e-4)
+        middle = after.means[len(before) :, :2]
+        assert len(middle) == 0 or np.abs(middle - SIDE / 2).max() <= 0.46 * SIDE
+
+
+def test_the_public_renderers_checker_finds_no_fault_with_objects(content, gswt_checker, tmp_path):
+    fields = baking.bake_objects(replace(content, objects=[shrub(0.4, 0.2), shrub(0.2, 0.5)]), 1, 7)
+    gswt.write_gswt(fields, SIDE, tmp_path / "objects.zip")
+    command = [sys.executable, gswt_checker, tmp_path / "objects.zip"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and " 0 faults" in done.stdout, done.stdout + done.stderr
 
 
 def test_every_level_has_the_same_objects(content, baked):

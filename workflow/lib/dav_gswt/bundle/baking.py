@@ -11,11 +11,13 @@ from dav_gswt.bundle.content import BundleContent
 from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.materials.model import ObjectLevels
 from dav_gswt.materials.placing import turn_and_scale, turn_rows
+from dav_gswt.tiles.compose import equalise_heights
 
 _log = logging.getLogger(__name__)
 
 TURN, SIZE = np.radians(15.0), 0.15  # largest turn and change of size of an object
 TRIES = 60  # places that are tried for each object
+EDGE = 0.04  # of a tile's side: a border that no object touches, so that tiles fit as they did without objects
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,8 @@ def bake_objects(content: BundleContent, material: int, salt: int) -> list[list[
     """fields[level][tile] of a material with its objects in them: another draw for each tile, none over an edge.
 
     A tile has as many of an object as its area and the density give, rounded by chance. Footprints do not overlap; what
-    finds no room is left out.
+    finds no room is left out. The public renderer shifts each tile by its own mean height, so these are made equal
+    again.
     """
     tiles = content.tiles[material]
     mine = [each for each in content.objects if each.material == material]
@@ -43,14 +46,16 @@ def bake_objects(content: BundleContent, material: int, salt: int) -> list[list[
     wanted = placed = 0
     for tile in range(len(tiles.labels)):
         rng = np.random.default_rng([salt, material, tile])
-        counts = [int(rng.poisson(each.density * content.side**2)) for each in mine]
+        counts = [int(each.density * content.side**2 + rng.random()) for each in mine]
         drawn = _draw_objects(mine, counts, content.side, ground, rng)
         wanted, placed = wanted + sum(counts), placed + len(drawn)
         for level in range(content.levels):
             fields[level][tile] = concatenate_fields([fields[level][tile], *(_place(each, level) for each in drawn)])
     if placed < wanted:
         _log.info("gswt: %d of %d objects find room in the middle of tiles", placed, wanted)
-    return fields
+    tiles_first = [list(levels) for levels in zip(*fields, strict=True)]
+    raised, _ = equalise_heights(tiles_first, content.side)
+    return [list(level) for level in zip(*raised, strict=True)]
 
 
 def _draw_objects(
@@ -62,7 +67,7 @@ def _draw_objects(
         reach = max(float(np.abs(f.means[:, :2]).max(initial=0.0)) for f in each.fields)
         for _ in range(count):
             turn, size = rng.uniform(-TURN, TURN), 1 + rng.uniform(-SIZE, SIZE)
-            margin, radius = 2**0.5 * reach * size, each.radius * size
+            margin, radius = 2**0.5 * reach * size + EDGE * side, each.radius * size
             places = rng.uniform(margin, side - margin, (TRIES, 2)) if 2 * margin < side else np.zeros((0, 2))
             free = [p for p in places if all(np.hypot(*(p - o.foot[:2])) >= radius + o.radius for o in drawn)]
             if free:
