@@ -177,8 +177,16 @@ def maps_of_prior(wildcards):
 
 def materials_of(wildcards):
     """The materials of a scene that tells them apart."""
-    asked = config["scenes"][wildcards.scene].get("materials") == "auto"
+    asked = config["scenes"][wildcards.scene].get("materials", "one") != "one"
     return {"materials": "<results>/<materials>"} if asked else {}
+
+
+def masks_of_materials(wildcards):
+    """The images that name a scene's materials, where the config has such."""
+    named = config["scenes"][wildcards.scene].get("materials")
+    where = f"scenes.{wildcards.scene}.materials"
+    files = named if isinstance(named, dict) else {}
+    return {f"mask_{name}": existing(file, f"{where}.{name}") for name, file in files.items()}
 
 
 def tiling_inputs(name):

@@ -1,7 +1,7 @@
 """Materials: the classes of ground of the exemplar, an exemplar of each alone, and the single objects on them.
 
 In: the last round's field and ground. Out: materials/ with materials.json (shares, verdicts, objects), a picture, the label map
-materials.exr, material{k}.ply and object{kk}.ply. Only scenes with `materials: auto` have it.
+materials.exr, material{k}.ply and object{kk}.ply. Scenes with `materials: one` have none.
 """
 
 
@@ -9,6 +9,7 @@ rule find_materials:
     """Tell materials and objects apart; fill each material's exemplar with its own ground."""
     input:
         unpack(maps_of_prior),
+        unpack(masks_of_materials),
         field="<results>/<round>{inpainted}/field.ply",
         ground="<results>/<round>{inpainted}/ground.exr",
     output:

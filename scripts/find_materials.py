@@ -13,7 +13,8 @@ with logging_to(snakemake.log[0]):
     field = read_field(paths.field)
     if paths.get("maps"):  # scored by a prior: tiles use its uncertainty instead of the field's own
         field = pose_maps.apply_uncertainty(field, pose_maps.read_pose_maps(paths.maps)[1])
+    masks = {name.removeprefix("mask_"): path for name, path in paths.items() if name.startswith("mask_")}
     with one_thread():
-        found = build.find_materials(field, ground.read_ground(paths.ground), seed)
+        found = build.find_materials(field, ground.read_ground(paths.ground), seed, masks)
     provenance = record_provenance({"field": paths.field, "ground": paths.ground}, {"seed": seed})
     store.write_materials(found, snakemake.output.materials, provenance)

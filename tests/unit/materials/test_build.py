@@ -121,7 +121,7 @@ def test_a_field_without_ground_is_refused():
 def test_ground_of_which_nothing_is_left_is_tiled_as_one(monkeypatch, caplog):
     classes = build.classify_ground(made.maps())
     nowhere = replace(classes, excluded=np.ones_like(classes.excluded))
-    monkeypatch.setattr(build, "classify_ground", lambda maps: nowhere)
+    monkeypatch.setattr(build, "classify_ground", lambda maps, masks: nowhere)
     field = made.field()
     found = build.find_materials(field, made.grid(), 0)
     assert [each.field is field for each in found.materials] == [True]

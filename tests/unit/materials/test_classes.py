@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from fixtures import mixed_ground as made
 
-from dav_gswt.materials import classes, objects
+from dav_gswt.materials import classes
+from dav_gswt.materials.mask_images import GroundMasks
 
 
 @pytest.fixture(scope="module")
@@ -65,14 +66,6 @@ def test_darker_ground_of_coarser_grain_is_a_material():
     assert classes.classify_ground(replace(maps, colour=np.clip(colour, 0, 1))).number == 2
 
 
-@pytest.mark.parametrize(
-    ("ratio", "shade"), [((0.3, 0.35, 0.45), True), ((0.3, 0.3, 0.2), False), ((0.9, 0.9, 1.0), False)]
-)
-def test_shade_is_darker_and_bluer(ratio, shade):
-    light = np.array([0.5, 0.4, 0.3])
-    assert classes.is_shade(light * ratio, light) == shade
-
-
 def test_dense_growth_of_several_colours_is_texture():
     maps, rng = made.maps(mixed=False, shrubs=False), np.random.default_rng(2)
     colour = np.broadcast_to(np.array(made.GRASS), maps.colour.shape) + rng.normal(0, 0.02, maps.colour.shape)
@@ -83,31 +76,29 @@ def test_dense_growth_of_several_colours_is_texture():
     assert (found.number, found.excluded.mean() < 0.02) == (1, True)
 
 
-def test_things_at_the_border_are_excluded_and_no_objects():
-    things = np.zeros((100, 100), bool)
-    things[0:10, 40:50] = True
-    things[40:50, 40:50] = True
-    footprints, excluded = objects.find_footprints(things, np.zeros((100, 100), int), np.ones((100, 100), bool))
-    assert [footprint.cells[45, 45] for footprint in footprints] == [True]
-    assert excluded[5, 45] and not excluded[45, 45]
+def test_named_materials_are_taken_as_they_are():
+    maps = made.maps(mixed=False, shrubs=False)
+    left = np.zeros(maps.known.shape, bool)
+    left[:, :40] = True
+    top = np.zeros_like(left)
+    top[100:] = True
+    found = classes.classify_ground(maps, GroundMasks({"west": left, "east": ~left}, top))
+    assert found.names == ["east", "west"]
+    assert (found.materials[:100, :40] == 1).all() and (found.materials[:100, 40:] == 0).all()
+    assert found.excluded[100:].all() and not found.excluded[:95, 50:].any()
 
 
-def test_long_things_are_no_objects():
-    things = np.zeros((100, 100), bool)
-    things[50:54, 20:80] = True
-    footprints, excluded = objects.find_footprints(things, np.zeros((100, 100), int), np.ones((100, 100), bool))
-    assert not footprints and excluded[52, 50]
+def test_a_mask_excludes_ground_and_materials_are_found_beside_it():
+    maps = made.maps(shrubs=False)
+    out = np.zeros(maps.known.shape, bool)
+    out[:30] = True
+    found = classes.classify_ground(maps, GroundMasks({}, out))
+    assert found.excluded[:30].all() and found.number == 2
 
 
-def test_specks_stay_texture():
-    things = np.zeros((100, 100), bool)
-    things[50, 50] = True
-    footprints, excluded = objects.find_footprints(things, np.zeros((100, 100), int), np.ones((100, 100), bool))
-    assert not footprints and not excluded.any()
-
-
-def test_dense_growth_is_texture():
-    things = np.zeros((10, 10), bool)
-    things[:, ::2] = True
-    assert objects.is_dense(things, np.ones((10, 10), bool))
-    assert not objects.is_dense(np.zeros((10, 10), bool), np.ones((10, 10), bool))
+def test_ground_that_masks_do_not_name_is_excluded():
+    maps = made.maps(mixed=False, shrubs=False)
+    left = np.zeros(maps.known.shape, bool)
+    left[:, :40] = True
+    found = classes.classify_ground(maps, GroundMasks({"west": left}, np.zeros_like(left)))
+    assert found.excluded[:, 40:].all() and not found.excluded[:, :40].any()

@@ -67,10 +67,10 @@ def test_a_shifted_exemplar_is_compared_place_by_place():
 
 
 def test_the_label_map_of_a_materials_folder_is_read(tmp_path):
-    layers = {"material": np.arange(4.0).reshape(2, 2), "object": np.zeros((2, 2)), "excluded": np.eye(2)}
+    layers = {"kind": np.arange(4.0).reshape(2, 2), "object": np.zeros((2, 2)), "excluded": np.eye(2)}
     header = {"west": "1.5", "south": "-2.0", "spacing": "0.5"}
     image_files.write_exr(tmp_path / "materials.exr", {k: v.astype(np.float32) for k, v in layers.items()}, header)
     labels = accuracy.read_found_labels(tmp_path)
-    assert labels.material.tolist() == [[2, 3], [0, 1]]
+    assert labels.kind.tolist() == [[2, 3], [0, 1]]
     assert labels.excluded.tolist() == [[False, True], [True, False]]
     np.testing.assert_allclose((labels.x, labels.y), ([1.75, 2.25], [-1.75, -1.25]))

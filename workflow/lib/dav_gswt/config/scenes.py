@@ -87,9 +87,14 @@ class _PhotographedScene(_Scene):
 def _materials(default: str):
     return key(
         "`auto`: materials and objects are told apart, each material has its own tiles, and shade and what is rare or "
-        "cut off is shown nowhere; `one`: all that was photographed is tiled as one texture",
+        "cut off is shown nowhere; `one`: all that was photographed is tiled as one texture; or mask images by "
+        "name, as `{lawn: lawn.png, road: road.png, exclude: other.png}`: those materials and no others, and `exclude` "
+        "nowhere (docs/photos.md)",
         default,
     )
+
+
+Materials = Literal["one", "auto"] | Annotated[dict[Name, Text], Field(min_length=1, max_length=9)]
 
 
 class SyntheticScene(_PhotographedScene):
@@ -110,7 +115,7 @@ class SyntheticScene(_PhotographedScene):
     oblique: int = key("further test views around the exemplar at 45 degrees", 0, ge=0, le=200)
     walkers: int = key("further test views at eye level, 0.8, 1.6 and 3.2 m above the ground in turn", 0, ge=0, le=200)
     size: int = key("width and height of the photos", unit="pixels", ge=64, le=4096)
-    materials: Literal["one", "auto"] = _materials("one")
+    materials: Materials = _materials("one")
     agent: Literal["render", "replay"] = key(
         "`render`: photos are rendered at the chosen poses; `replay`: chosen from those rendered beforehand"
     )
@@ -148,7 +153,7 @@ class PhotoScene(_PhotographedScene):
         "`auto`: one camera for all photos of equal size and EXIF focal length; `one`: for all of equal size", "auto"
     )
     focal: float | None = key("where EXIF has none or is wrong", None, unit="mm (35 mm equivalent)", ge=4, le=2000)
-    materials: Literal["one", "auto"] = _materials("auto")
+    materials: Materials = _materials("auto")
     masks: Text | None = key("a folder of masks named as the photos: black pixels are not ground", None)
     agent: Literal["replay", "serial", "plan", "handheld"] = key(
         "who takes further photos: `replay` takes the nearest unused photo of the folder; `serial` is a camera rig, "

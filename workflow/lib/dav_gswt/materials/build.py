@@ -1,7 +1,9 @@
 """The materials of a field: their exemplars, the objects on them, and a verdict."""
 
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool
@@ -11,7 +13,7 @@ from scipy.ndimage import distance_transform_edt
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 from dav_gswt.logs import progress
-from dav_gswt.materials import extraction, verdict
+from dav_gswt.materials import extraction, mask_images, verdict
 from dav_gswt.materials.classes import GroundClasses, classify_ground
 from dav_gswt.materials.filling import CellSources, box_sums, fill_cells
 from dav_gswt.materials.maps import GroundMaps, measure_ground
@@ -85,8 +87,12 @@ class _Parts:
     seed: int
 
 
-def find_materials(field: GaussianField, grid: Ground, seed: int) -> FoundMaterials:
+def find_materials(
+    field: GaussianField, grid: Ground, seed: int, mask_files: Mapping[str, Path | str] | None = None
+) -> FoundMaterials:
     """Find the materials of a field's exemplar and the objects on them.
+
+    mask_files: by material, or `exclude`; see `mask_images`.
 
     Ground of one material without objects is given back as it is. So is, with a warning, ground of which nothing would
     be left to tile.
@@ -95,9 +101,10 @@ def find_materials(field: GaussianField, grid: Ground, seed: int) -> FoundMateri
     if not field.ground.any():
         raise InputError("materials: this field has no ground layer; use `materials: one` in its scene")
     maps = measure_ground(field, grid)
-    classes = classify_ground(maps)
+    masks = mask_images.read_masks(mask_files, maps.cells) if mask_files else None
+    classes = classify_ground(maps, masks)
     sources = [classes.source(k) for k in range(classes.number)]
-    if all(source.all() for source in sources):
+    if all(source.all() for source in sources) and masks is None:
         return _keep_whole(field, grid, maps)
     parts = _Parts(field, grid, maps, classes, choose_tile_side(maps, sources), seed)
     made = {k: _make_material(parts, k) for k in progress(range(classes.number), "fill materials")}
@@ -109,7 +116,8 @@ def find_materials(field: GaussianField, grid: Ground, seed: int) -> FoundMateri
         return _keep_whole(field, grid, maps)
     materials = _rescale_shares(list(kept.values()))
     objects = _extract_objects(parts, {k: place for place, k in enumerate(kept)})
-    judged = verdict.judge_set([each.verdict for each in materials], float(classes.excluded.mean()))
+    strips = int(classes.kinds.max()) + 1 - classes.number
+    judged = verdict.judge_set([each.verdict for each in materials], float(classes.excluded.mean()), max(strips, 0))
     return _report(FoundMaterials(maps, classes, parts.tile_side, materials, objects, judged))
 
 
@@ -119,9 +127,11 @@ def _keep_whole(field: GaussianField, grid: Ground, maps: GroundMaps) -> FoundMa
     side = choose_tile_side(maps, [everything])
     info = MaterialInfo("material0", 1.0, maps.cells * grid.spacing, [float(v) for v in maps.colour.mean((0, 1))])
     judged = verdict.judge_material(info.name, (maps.cells / side) ** 2, 0.0)
-    classes = GroundClasses(np.zeros(maps.known.shape, int), [], nothing, 1)
+    classes = GroundClasses(
+        np.zeros(maps.known.shape, int), np.zeros(maps.known.shape, int), [], nothing, ["material0"]
+    )
     material = Material(info, field, grid, 0.0, judged)
-    return _report(FoundMaterials(maps, classes, None, [material], [], verdict.judge_set([judged], 0.0)))
+    return _report(FoundMaterials(maps, classes, None, [material], [], verdict.judge_set([judged], 0.0, 0)))
 
 
 def _report(found: FoundMaterials) -> FoundMaterials:
@@ -151,7 +161,7 @@ def _make_material(parts: _Parts, number: int) -> Material | None:
     window, source = parts.maps.crop(row, column, cells), own[row : row + cells, column : column + cells]
     sources = _fill_window(window, source, parts.tile_side, np.random.default_rng([parts.seed, number]))
     if sources is None:
-        _log.warning("material %d is too small and narrow to be tiled; it is left out", number)
+        _log.warning("%s is too small and narrow to be tiled; it is left out", parts.classes.names[number])
         return None
     small = replace(grid, first_row=grid.first_row + row, first_column=grid.first_column + column, cells=cells)
     made, made_grid = extraction.extract_exemplar(parts.field, small, window, sources, source)
@@ -159,7 +169,7 @@ def _make_material(parts: _Parts, number: int) -> Material | None:
     # with the excluded ground beside it: shade of a tree parts no material
     patch_scale = _measure_patches(parts.classes.materials == number) * grid.spacing
     colour = [float(value) for value in parts.maps.colour[own].mean(0)]
-    info = MaterialInfo(f"material{number}", float(parts.classes.shares[number]), patch_scale, colour)
+    info = MaterialInfo(parts.classes.names[number], float(parts.classes.shares[number]), patch_scale, colour)
     judged = verdict.judge_material(info.name, float(own.sum()) / parts.tile_side**2, filled)
     return Material(info, made, made_grid, filled, judged)
 

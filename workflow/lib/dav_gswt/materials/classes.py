@@ -1,24 +1,25 @@
 """Which cells of an exemplar belong to which material, which to an object, and which are not tiled at all."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
 from scipy.ndimage import distance_transform_edt, label
 
-from dav_gswt.materials import objects, segmentation
+from dav_gswt.materials import objects, segmentation, standing
 from dav_gswt.materials.maps import GroundMaps
-from dav_gswt.materials.objects import Footprint
+from dav_gswt.materials.mask_images import GroundMasks
+from dav_gswt.materials.objects import Footprint, Surroundings
+from dav_gswt.materials.shade import is_shade, linear_light
 
 MAX_MATERIALS = 4
 LEAST_SHARE = 0.05  # of the exemplar, of a material
 LEAST_WIDTH = 0.13  # of its side: a disc so wide lies in a material
 FINE = 0.1  # of its side: classes that are nowhere wider are growth or things; where they are dense, they are texture
-SHADE = 0.75  # of a material's light, in every channel, at most: darker and bluer is its shade
+ROUGH = 0.5  # cells that blobs usually rise by, from which ground is dense with growth or stones
 MORE_GRAIN = 1.6  # times a material's contrast: rougher ground is no shade of it (that under trees is dappled)
 SCATTERED = 0.03  # of the exemplar: a smaller and narrow piece of a material, within another, is a thing on that
-BLUER = 1.1  # ratio of blue light to red in the shade over that in the sun, at least
 
 
 @dataclass(frozen=True)
@@ -29,13 +30,21 @@ class GroundClasses:
         materials: of every cell, by number; cells of objects and of excluded ground have the nearest one's.
         footprints: the objects.
         excluded: cells that are shown nowhere: shade, what is rare or cut off, ground that no photo saw.
-        number: of materials.
+        kinds: what every cell is: its material's number, also of small pieces within another material, which are
+            excluded there; from `number` on each strip (a path, a road).
+        names: of the materials.
     """
 
     materials: Int[Array, "m m"]
+    kinds: Int[Array, "m m"]
     footprints: list[Footprint]
     excluded: Bool[Array, "m m"]
-    number: int
+    names: list[str]
+
+    @property
+    def number(self) -> int:
+        """How many materials there are."""
+        return len(self.names)
 
     @property
     def occupied(self) -> Bool[Array, "m m"]:
@@ -56,28 +65,53 @@ class GroundClasses:
         return count / max(count.sum(), 1)
 
 
-def classify_ground(maps: GroundMaps) -> GroundClasses:
+def classify_ground(maps: GroundMaps, masks: GroundMasks | None = None) -> GroundClasses:
     """Find materials and objects.
 
     A class is a material if it is wide somewhere, common enough, and not the shade of another; at most MAX_MATERIALS
     are kept, the largest. Without any, all of the ground is one material. What is left is objects and excluded ground.
+    masks: drawn by people; materials that they name are taken as they are, and ground that they do not is excluded.
     """
-    classes = segmentation.segment_ground(maps.colour)
+    maps = replace(maps, known=maps.known & ~masks.excluded) if masks else maps
     features = segmentation.describe_cells(maps.colour)
-    chosen = choose_materials(classes, maps.colour, features[..., -1])
-    wide = np.isin(classes, chosen) & maps.known & ~find_scattered(classes, chosen)
+    if masks and masks.materials:
+        classes, names = masks.label()
+        maps, strips, chosen = replace(maps, known=maps.known & (classes >= 0)), [], list(range(len(names)))
+        pieces = np.zeros(classes.shape, bool)
+    else:
+        classes, strips = segmentation.segment_ground(maps.colour)
+        chosen = choose_materials(classes, maps.colour, features[..., -1])
+        names, pieces = [f"material{k}" for k in range(len(chosen))], find_scattered(classes, chosen)
+    crossing = np.any([np.zeros(classes.shape, bool), *strips], axis=0)
+    wide = np.isin(classes, chosen) & maps.known & ~pieces & ~crossing
     nearest = tuple(distance_transform_edt(~wide, return_distances=False, return_indices=True))
     materials = np.searchsorted(chosen, classes[nearest])
-    wide |= find_growth(classes, chosen) & maps.known
-    things = ~wide & maps.known
-    for number in range(len(chosen)):
-        own = materials == number
-        found = objects.find_outliers(features[..., :3], maps, own & wide) | (things & own)
+    wide |= find_growth(classes, chosen) & maps.known & ~crossing
+    rise = standing.measure_rise(maps)
+    rough = frozenset(
+        k for k in range(len(chosen)) if standing.measure_roughness(rise, wide & (materials == k)) > ROUGH
+    )
+    around = Surroundings(maps.colour, features[..., :3], materials, wide, pieces, crossing, maps.known, rough)
+    tall = standing.find_standing_things(around.features, rise, maps, materials, wide)
+    footprints, excluded = objects.find_footprints(tall, _find_outstanding(maps, around), around)
+    kinds = np.where(pieces, np.searchsorted(chosen, np.maximum(classes, 0)), materials)
+    for place, strip in enumerate(strips):
+        kinds[strip] = len(chosen) + place
+    return GroundClasses(materials, kinds, footprints, excluded | crossing, names)
+
+
+def _find_outstanding(maps: GroundMaps, around: Surroundings) -> Bool[Array, "m m"]:
+    """Cells that are no ground of a material, or stand out of a smooth one that is not dense with such."""
+    things = ~around.ground & maps.known & ~around.strips
+    for number in np.unique(around.materials):
+        own = around.materials == number
+        found = things & own
+        if number not in around.rough:
+            found |= objects.find_outliers(around.features, maps, own & around.ground)
         things = things & ~own | (found & own)
-        if objects.is_dense(found & wide, own):
-            things = things & ~(own & wide)
-    footprints, excluded = objects.find_footprints(things, materials, maps.known)
-    return GroundClasses(materials, footprints, excluded, len(chosen))
+        if objects.is_dense(found & around.ground, own):
+            things = things & ~(own & around.ground)
+    return things
 
 
 def find_scattered(classes: Int[Array, "m m"], chosen: list[int]) -> Bool[Array, "m m"]:
@@ -122,14 +156,3 @@ def choose_materials(
         if not any(is_shade(light, linear_light(colour[classes == other])) for other in smoother):
             chosen.append(number)
     return chosen[:MAX_MATERIALS] or [0]
-
-
-def linear_light(colour: Float[Array, "n 3"]) -> Float[Array, "3"]:
-    """Mean linear light of sRGB colours."""
-    return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4).mean(0)
-
-
-def is_shade(light: Float[Array, "3"], other: Float[Array, "3"]) -> bool:
-    """Whether ground of this light may be the other in shade: darker in all channels, and bluer, as the sky is."""
-    ratio = light / np.maximum(other, 1e-6)
-    return bool(ratio.max() < SHADE and ratio[2] >= BLUER * ratio[0] and ratio[1] >= ratio[0])

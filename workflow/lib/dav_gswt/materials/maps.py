@@ -23,6 +23,7 @@ class GroundMaps:
     Attributes:
         colour: seen from straight above, sRGB in [0, 1]; holes have the nearest cell's.
         height: of the ground discs.
+        surface: height of what is seen from straight above: of the ground or of what stands on it.
         cover: share of a cell that is hidden by what stands there.
         known: cells that a photo saw.
         exemplar: its place and the width of its cells.
@@ -30,6 +31,7 @@ class GroundMaps:
 
     colour: Float[Array, "m m 3"]
     height: Float[Array, "m m"]
+    surface: Float[Array, "m m"]
     cover: Float[Array, "m m"]
     known: Bool[Array, "m m"]
     exemplar: Exemplar
@@ -43,7 +45,8 @@ class GroundMaps:
         own, box = self.exemplar, np.s_[row : row + cells, column : column + cells]
         corner = own.west + column * own.spacing, own.south + row * own.spacing
         place = Exemplar(*corner, own.spacing, cells)
-        return GroundMaps(self.colour[box], self.height[box], self.cover[box], self.known[box], place)
+        layers = (self.colour, self.height, self.surface, self.cover, self.known)
+        return GroundMaps(*(layer[box] for layer in layers), place)
 
 
 def measure_ground(field: GaussianField, grid: Ground) -> GroundMaps:
@@ -57,4 +60,5 @@ def measure_ground(field: GaussianField, grid: Ground) -> GroundMaps:
     nearest = tuple(distance_transform_edt(~known, return_distances=False, return_indices=True))
     height = np.nan_to_num(height[nearest].astype(float))
     colour = np.clip(above.colour[nearest].astype(float), 0, 1)
-    return GroundMaps(colour, height, occluders.compute_cover(field, exemplar, height), known, exemplar)
+    surface = above.height[nearest].astype(float)
+    return GroundMaps(colour, height, surface, occluders.compute_cover(field, exemplar, height), known, exemplar)

@@ -8,19 +8,36 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
-from scipy.ndimage import binary_closing, binary_fill_holes, binary_opening, find_objects, gaussian_filter, label
+from scipy.ndimage import (
+    binary_closing,
+    binary_dilation,
+    binary_fill_holes,
+    binary_opening,
+    distance_transform_edt,
+    find_objects,
+    gaussian_filter,
+    label,
+)
 
 from dav_gswt.materials.maps import GroundMaps
+from dav_gswt.materials.shade import is_shade, linear_light
 
 AROUND = 1 / 10  # of the side: blur that gives the ground around a thing
 ROUNDS = 3  # of the estimate of that ground, each without what stood out in the last
 SURE, LIKELY = 6.0, 3.5  # robust standard deviations from the ground around: of an object's core, and of its rim
 NOTICEABLE = 4.0  # weighed CIELAB units that such a deviation has at least: even ground has little spread
-SMALLEST = 1 / 45  # of the side: smaller things are texture
-LARGEST = 0.22  # of the side: larger things are ground that is not tiled
+SMALLEST = 1 / 30  # of the side: smaller things are texture
+SMALLEST_STANDING = 1 / 22  # of the side, likewise: growth and rough ground have blobs of all sizes
+LARGEST = 0.13  # of the side: larger things are ground that is not tiled
 BORDER = 2  # cells: nearer to the border of the exemplar a thing may be cut off
 MIN_FILL = 0.35  # of its bounding box that an object fills
 MAX_STRETCH = 3.5  # length over width
+MIN_SOLIDITY, SPLIT_SOLIDITY = 0.7, 0.8  # of its convex hull that an object fills; below the second it is split
+RING = 3  # cells around an object
+OPEN, WITHIN = 0.45, 0.7  # share of these that is plain ground, and share of that which is its material's
+MANY = 0.5  # area of smaller things of a thing's colour over its own, from which it is the largest of many
+ALIKE = 0.85  # cosine of the angle between the differences of two things of one colour
+OTHER = 0.5  # of what stands out, that is ground of another material: then it is a piece of that, not a thing
 DENSE = 0.25  # of a material that is covered by things: then they are texture
 
 
@@ -64,29 +81,168 @@ def find_outliers(features: Float[Array, "m m k"], maps: GroundMaps, ground: Boo
     return apply_hysteresis_threshold(np.where(ground, score, 0), LIKELY, SURE)
 
 
-def find_footprints(
-    candidates: Bool[Array, "m m"], materials: Int[Array, "m m"], known: Bool[Array, "m m"]
-) -> tuple[list[Footprint], Bool[Array, "m m"]]:
-    """Objects among the cells that stand out, and the cells of everything else that is no texture.
+@dataclass(frozen=True)
+class Surroundings:
+    """What things are judged by, of every cell.
 
-    materials: the nearest material of every cell. Things at the border of the exemplar are cut off, so they are no
-    objects; nor are things that are long, frayed or large. Returns: footprints; cells to be filled beside them.
+    Attributes:
+        colour: sRGB in [0, 1].
+        features: weighed CIELAB.
+        materials: the nearest material.
+        ground: whether it is ground of a material.
+        pieces: whether it is a small piece of one material within another.
+        strips: whether it is of a strip.
+        known: whether a photo saw it.
+        rough: numbers of the materials that are dense with growth or stones.
+    """
+
+    colour: Float[Array, "m m 3"]
+    features: Float[Array, "m m k"]
+    materials: Int[Array, "m m"]
+    ground: Bool[Array, "m m"]
+    pieces: Bool[Array, "m m"]
+    strips: Bool[Array, "m m"]
+    known: Bool[Array, "m m"]
+    rough: frozenset[int]
+
+
+def find_footprints(
+    standing: list[Bool[Array, "m m"]], candidates: Bool[Array, "m m"], around: Surroundings
+) -> tuple[list[Footprint], Bool[Array, "m m"]]:
+    """Objects, and the cells of everything else that is no texture.
+
+    Things at the border of the exemplar are cut off, so they are no objects; nor are things that are long, frayed or
+    large, lie between two materials, are small pieces of another material, or shade. On rough ground the largest of
+    many specks is texture.
+    Args: standing: cells of each thing that stands on the ground. candidates: cells that stand out by colour or height.
+    Returns: footprints; cells to be filled beside them.
     """
     m = len(candidates)
-    things, number = label(_clean(candidates), np.ones((3, 3)))
-    footprints, excluded = [], ~known
-    for k, box in enumerate(find_objects(things), 1):
-        own = things == k
-        sides = sorted(part.stop - part.start for part in box)
-        if sides[1] < SMALLEST * m:
+    footprints, excluded, taken = [], ~around.known, np.zeros((m, m), bool)
+    tall = [own for own in standing if _measure_size(own) >= SMALLEST_STANDING * m]
+    for own in tall:
+        taken |= binary_dilation(own)
+    flat = split_things(_clean(candidates & ~taken))
+    tall, flat = _join_rims(tall, flat)
+    for own in tall:
+        taken |= binary_dilation(own)
+    flat = split_things(_clean(candidates & ~taken))
+    tall, flat = _join_rims(tall, flat)
+    small = [own for own in flat if _measure_size(own) < SMALLEST * m]
+    for own in tall:
+        material = int(np.bincount(around.materials[own]).argmax())
+        if _is_single(own, material, around):
+            footprints.append(Footprint(own, material))
+        else:
+            excluded = excluded | own
+    small = [own for own in flat if _measure_size(own) < SMALLEST_STANDING * m]
+    for own in flat:
+        material, piece = int(np.bincount(around.materials[own]).argmax()), around.pieces[own].mean() >= OTHER
+        rough = material in around.rough
+        if _measure_size(own) < (SMALLEST_STANDING if rough else SMALLEST) * m:
             continue
-        whole = min(part.start for part in box) >= BORDER and max(part.stop for part in box) <= m - BORDER
-        compact = sides[1] <= MAX_STRETCH * sides[0] and own.sum() >= MIN_FILL * sides[0] * sides[1]
-        if whole and compact and sides[1] <= LARGEST * m and known[own].all():
-            footprints.append(Footprint(own, int(np.bincount(materials[own]).argmax())))
+        if rough and not piece and _is_one_of_many(own, material, small, around):
+            continue
+        if not piece and not _is_shaded(own, material, around) and _is_single(own, material, around):
+            footprints.append(Footprint(own, material))
         else:
             excluded = excluded | own
     return footprints, excluded
+
+
+def _join_rims(
+    tall: list[Bool[Array, "m m"]], flat: list[Bool[Array, "m m"]]
+) -> tuple[list[Bool[Array, "m m"]], list[Bool[Array, "m m"]]]:
+    """What lies along a standing thing and is smaller is part of it, as its contact shadow, if both are compact."""
+    rest = []
+    for rim in flat:
+        around = binary_dilation(rim, iterations=2)
+        touched = [k for k, own in enumerate(tall) if (around & own).any()]
+        if len(touched) == 1 and rim.sum() < tall[touched[0]].sum():
+            joined = binary_closing(tall[touched[0]] | rim, np.ones((3, 3)))
+            if _is_compact(joined):
+                tall = [joined if k == touched[0] else own for k, own in enumerate(tall)]
+                continue
+        rest.append(rim)
+    return tall, rest
+
+
+def _is_shaded(own: Bool[Array, "m m"], material: int, around: Surroundings) -> bool:
+    """Whether a thing looks like shade of its material."""
+    plain = around.ground & (around.materials == material)
+    return bool(plain.any() and is_shade(linear_light(around.colour[own]), linear_light(around.colour[plain])))
+
+
+def split_things(cells: Bool[Array, "m m"]) -> list[Bool[Array, "m m"]]:
+    """Connected things; one with bays in its outline is split where it is narrow, if its parts are compact.
+
+    Parts are the basins of the distance to what is no thing (Beucher and Lantuejoul 1979).
+    """
+    from skimage.feature import peak_local_max  # here, not above: they take half a second to load
+    from skimage.segmentation import watershed
+
+    pieces, number = label(cells, np.ones((3, 3)))
+    things, apart = [], max(2, round(SMALLEST * len(cells) / 2))
+    for k in range(1, number + 1):
+        own = pieces == k
+        inner = gaussian_filter(distance_transform_edt(own), 1.0) * own
+        peaks = peak_local_max(inner, min_distance=apart, labels=own.astype(int), exclude_border=False)
+        if len(peaks) < 2 or _measure_solidity(own) >= SPLIT_SOLIDITY:
+            things.append(own)
+            continue
+        marks = np.zeros(own.shape, int)
+        marks[tuple(peaks.T)] = 1 + np.arange(len(peaks))
+        basins = watershed(-inner, marks, mask=own)
+        parts = [basins == mark for mark in range(1, len(peaks) + 1)]
+        things += parts if sum(_is_compact(part) for part in parts) > len(parts) / 2 else [own]
+    return things
+
+
+def _is_single(own: Bool[Array, "m m"], material: int, around: Surroundings) -> bool:
+    """Whether a thing is an object: compact, and within ground of one material."""
+    ring = binary_dilation(own, iterations=RING) & ~own
+    plain = around.ground[ring]
+    within = plain.mean() >= OPEN and (around.materials[ring] == material)[plain].mean() >= WITHIN
+    return bool(within and _is_compact(own) and around.known[own].all() and not around.strips[ring].any())
+
+
+def _is_one_of_many(
+    own: Bool[Array, "m m"], material: int, small: list[Bool[Array, "m m"]], around: Surroundings
+) -> bool:
+    """Whether smaller things differ from its material as it does and cover as much of it, as blooms in a meadow."""
+    plain = around.ground & (around.materials == material)
+    if not plain.any():
+        return False
+    usual = np.median(around.features[plain], 0)
+    away, area = np.median(around.features[own], 0) - usual, 0
+    for other in small:
+        if np.bincount(around.materials[other]).argmax() == material:
+            step = np.median(around.features[other], 0) - usual
+            length = max(float(np.linalg.norm(step) * np.linalg.norm(away)), 1e-9)
+            area += int(other.sum()) if float(step @ away) > ALIKE * length else 0
+    return bool(area >= MANY * own.sum())
+
+
+def _measure_size(cells: Bool[Array, "m m"]) -> int:
+    """The longer side of the bounding box."""
+    return max(part.stop - part.start for part in find_objects(cells.astype(int))[0])
+
+
+def _measure_solidity(own: Bool[Array, "m m"]) -> float:
+    """Share of its convex hull that a thing fills."""
+    from skimage.measure import regionprops  # here, not above: it takes half a second to load
+
+    return float(regionprops(own[find_objects(own.astype(int))[0]].astype(int))[0].solidity)
+
+
+def _is_compact(own: Bool[Array, "m m"]) -> bool:
+    """Whether a thing is whole, compact and not too large."""
+    m, box = len(own), find_objects(own.astype(int))[0]
+    sides = sorted(part.stop - part.start for part in box)
+    whole = min(part.start for part in box) >= BORDER and max(part.stop for part in box) <= m - BORDER
+    compact = sides[1] <= MAX_STRETCH * sides[0] and own.sum() >= MIN_FILL * sides[0] * sides[1]
+    solid = compact and _measure_solidity(own) >= MIN_SOLIDITY
+    return bool(whole and solid and sides[1] <= LARGEST * m)
 
 
 def _clean(cells: Bool[Array, "m m"]) -> Bool[Array, "m m"]:

@@ -12,10 +12,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
 from scipy.cluster.vq import kmeans2
 from scipy.ndimage import gaussian_filter
+
+from dav_gswt.materials import strips
 
 CLUSTERS = 12  # before merging
 STARTS = 5  # of k-means: the segmentation that explains most of the variance is taken
@@ -54,14 +56,19 @@ class Difference:
         return self.separation < LEAST_SEPARATION or self.sharpness < LEAST_SHARPNESS
 
 
-def segment_ground(colour: Float[Array, "m m 3"]) -> Int[Array, "m m"]:
-    """Classes of an exemplar by descending share, from 0. colour: sRGB in [0, 1]."""
+def segment_ground(colour: Float[Array, "m m 3"]) -> tuple[Int[Array, "m m"], list[Bool[Array, "m m"]]]:
+    """Classes of an exemplar by descending share, from 0, and the strips that cross it. colour: sRGB in [0, 1].
+
+    Strips may be of any class: they are found in clusters before these are merged.
+    """
     features = describe_cells(_shrink(colour))
-    merged = [merge_clusters(features, _cluster(features, start)) for start in range(STARTS)]
-    labels = max(merged, key=lambda labels: _explained_variance(features, labels))
-    labels = _enlarge(smooth_labels(features, labels), len(colour))
+    traces = [merge_clusters(features, _cluster(features, start)) for start in range(STARTS)]
+    trace = max(traces, key=lambda trace: _explained_variance(features, trace[-1]))
+    labels = smooth_labels(features, trace[-1])
+    found = [each for each in strips.find_strips(trace) if not strips.is_transition(each, features[..., :3], labels)]
+    labels, crossing = _enlarge(labels, len(colour)), [_enlarge(each, len(colour)) for each in found]
     order = np.argsort(-np.bincount(labels.ravel()), kind="stable")
-    return np.argsort(order)[labels]
+    return np.argsort(order)[labels], crossing
 
 
 def describe_cells(colour: Float[Array, "m m 3"]) -> Float[Array, "m m 4"]:
@@ -95,17 +102,22 @@ def _explained_variance(features: Float[Array, "m m k"], labels: Int[Array, "m m
     return float((share @ away**2).sum() / max(total, 1e-12))
 
 
-def merge_clusters(features: Float[Array, "m m k"], labels: Int[Array, "m m"]) -> Int[Array, "m m"]:
-    """Merge what looks alike: first classes of a small difference, then those of a gradual one, the cheapest first."""
+def merge_clusters(features: Float[Array, "m m k"], labels: Int[Array, "m m"]) -> list[Int[Array, "m m"]]:
+    """Merge what looks alike: first classes of a small difference, then those of a gradual one, the cheapest first.
+
+    Returns: the labels before the first merger, after it, and so on.
+    """
+    trace = [labels]
     while True:
         number = int(labels.max()) + 1
         found = [compare_classes(features, labels, a, b) for a in range(number) for b in range(a + 1, number)]
         alike = [each for each in found if each.is_small] or [each for each in found if each.is_gradual]
         if not alike:
-            return labels
+            return trace
         best = min(alike, key=lambda each: each.cost)
         labels = np.where(labels == best.second, best.first, labels)
-        labels -= labels > best.second
+        labels = labels - (labels > best.second)
+        trace.append(labels)
 
 
 def compare_classes(features: Float[Array, "m m k"], labels: Int[Array, "m m"], first: int, second: int) -> Difference:
@@ -173,6 +185,6 @@ def _shrink(colour: Float[Array, "m m 3"]) -> Float[Array, "k k 3"]:
     return colour[: k * block, : k * block].reshape(k, block, k, block, 3).mean((1, 3))
 
 
-def _enlarge(labels: Int[Array, "k k"], cells: int) -> Int[Array, "m m"]:
+def _enlarge(labels: Array, cells: int) -> Array:
     index = np.minimum(np.arange(cells) // -(-cells // WORKING_SIZE), len(labels) - 1)
     return labels[np.ix_(index, index)]

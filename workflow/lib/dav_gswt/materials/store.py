@@ -2,6 +2,7 @@
 
 material{k}.ply and its grid material{k}.exr: an exemplar of each material alone. object{kk}.ply: an object around its
 foot. materials.exr: what each cell of the exemplar is, the northern row first. materials.png: the same, for people.
+ground.png: the exemplar from above, north up, to draw masks over.
 """
 
 from dataclasses import dataclass
@@ -24,6 +25,7 @@ from dav_gswt.materials.verdict import MaterialVerdict
 from dav_gswt.reconstruction import ground
 
 NAME = "materials.json"
+STRIP = (0.8, 0.1, 0.1)
 PALETTE = ((0.90, 0.62, 0.0), (0.0, 0.62, 0.45), (0.0, 0.45, 0.70), (0.80, 0.47, 0.65))  # Okabe and Ito's, of materials
 SHADED, DARKENED = 0.35, 0.35  # weight of a material's colour; light of what is shown nowhere
 
@@ -77,6 +79,7 @@ def write_materials(found: FoundMaterials, folder: Path | str, provenance: dict[
             write_field(each.field, part / f"{each.name}.ply")
         _write_maps(found, part / "materials.exr")
         image_files.write_png(part / "materials.png", draw_classes(found))
+        image_files.write_png(part / "ground.png", np.clip(found.maps.colour[::-1], 0, 1))
         write_json(part / NAME, _describe(found, provenance))
 
 
@@ -120,17 +123,22 @@ def _write_maps(found: FoundMaterials, path: Path) -> None:
     objects = np.zeros(classes.materials.shape)
     for number, footprint in enumerate(classes.footprints, 1):
         objects[footprint.cells] = number
-    layers = {"material": classes.materials, "object": objects, "excluded": classes.excluded}
+    layers = {"material": classes.materials, "kind": classes.kinds, "object": objects, "excluded": classes.excluded}
     header = {name: repr(getattr(place, name)) for name in ("west", "south", "spacing")}
     image_files.write_exr(path, {name: layer[::-1].astype(np.float32) for name, layer in layers.items()}, header)
 
 
 def draw_classes(found: FoundMaterials) -> Float[Array, "h w 3"]:
-    """The exemplar from above, north up, as it is and with materials in colours, objects outlined, the rest dark."""
+    """The exemplar from above, north up, as it is and with what was found.
+
+    Materials have colours, strips are red, objects outlined, and what is shown nowhere is dark.
+    """
     classes = found.classes
     palette = np.array(PALETTE)[np.arange(classes.number) % len(PALETTE)]
     picture = (1 - SHADED) * found.maps.colour + SHADED * palette[classes.materials]
     picture[classes.excluded] *= DARKENED
+    strips = classes.kinds >= classes.number
+    picture[strips] = 0.5 * (found.maps.colour[strips] + STRIP)
     for footprint in classes.footprints:
         picture[binary_dilation(footprint.cells, iterations=2) & ~footprint.cells] = 1
     pair = np.concatenate([found.maps.colour, picture], 1)[::-1]

@@ -28,9 +28,16 @@ def judge_material(name: str, areas: float, filled: float) -> MaterialVerdict:
     return MaterialVerdict("no", f"{seen}{made}: repeats will be seen; {more}, or leave it out")
 
 
-def judge_set(verdicts: list[MaterialVerdict], excluded: float) -> MaterialVerdict:
-    """The verdict on all: that of the largest material, which is the first. excluded: share of ground shown nowhere."""
+def judge_set(verdicts: list[MaterialVerdict], excluded: float, strips: int) -> MaterialVerdict:
+    """The verdict on all: that of the largest material, which is the first.
+
+    Args: excluded: share of ground that is shown nowhere. strips: paths, roads and the like, among it.
+    """
     grades = [verdict.grade for verdict in verdicts]
     if excluded > 0.5 and grades[0] == "good":
-        return MaterialVerdict("marginal", f"{excluded:.0%} of the ground is shade, rare or cut off, and shown nowhere")
-    return MaterialVerdict(grades[0], f"{len(verdicts)} materials, {excluded:.0%} of the ground is shown nowhere")
+        reason = f"{excluded:.0%} of the ground is shade, rare or cut off, and shown nowhere"
+        return MaterialVerdict("marginal", reason)
+    crossing = f" ({strips} of it a path, a road or the like)" if strips == 1 else f" ({strips} paths, roads)"
+    crossing = crossing if strips else ""
+    many = "1 material" if len(verdicts) == 1 else f"{len(verdicts)} materials"
+    return MaterialVerdict(grades[0], f"{many}, {excluded:.0%} of the ground is shown nowhere{crossing}")

@@ -9,20 +9,21 @@ from numpy import ndarray as Array
 from scipy.optimize import linear_sum_assignment
 
 from dav_gswt.images import image_files
+from dav_gswt.materials.objects import BORDER, SMALLEST
 from dav_gswt.photos.synthetic.labels import LabelMap
 
 LEAST_IOU = 0.4  # of an object with its true footprint, above which it counts as found
-SMALLEST = 1 / 45  # of the side: true objects that are smaller are texture (`dav_gswt.materials.objects`)
 
 
 @dataclass(frozen=True)
 class FoundLabels:
     """materials.exr: what was found in each cell of the exemplar, row 0 in the south, and the cells' middles.
 
-    object: numbers from 1; 0: none. excluded: cells that are shown nowhere.
+    kind: its material, or a strip from the number of materials on. object: numbers from 1; 0: none. excluded: cells
+    that are shown nowhere.
     """
 
-    material: Int[Array, "m m"]
+    kind: Int[Array, "m m"]
     object: Int[Array, "m m"]
     excluded: Bool[Array, "m m"]
     x: Float[Array, "m"]
@@ -32,12 +33,10 @@ class FoundLabels:
 def read_found_labels(folder: Path | str) -> FoundLabels:
     """Read the label map of a materials folder. Raises: InputError: not readable."""
     channels, header = image_files.read_exr(Path(folder, "materials.exr"))
-    material, objects, excluded = (
-        np.rint(channels[name][::-1]).astype(int) for name in ("material", "object", "excluded")
-    )
+    kind, objects, excluded = (np.rint(channels[name][::-1]).astype(int) for name in ("kind", "object", "excluded"))
     west, south, spacing = (float(header[name]) for name in ("west", "south", "spacing"))
-    middles = (np.arange(len(material)) + 0.5) * spacing
-    return FoundLabels(material, objects, excluded > 0, west + middles, south + middles)
+    middles = (np.arange(len(kind)) + 0.5) * spacing
+    return FoundLabels(kind, objects, excluded > 0, west + middles, south + middles)
 
 
 def sample_labels(truth: LabelMap, found: FoundLabels) -> tuple[Int[Array, "m m"], Int[Array, "m m"]]:
@@ -59,10 +58,10 @@ def score_materials(truth: LabelMap, found: FoundLabels) -> dict[str, float]:
     material, thing = sample_labels(truth, found)
     counted = (material > 0) & (thing == 0)
     names = {name: number for name, number in truth.materials.items() if (material[counted] == number).any()}
-    shares = np.zeros((len(names), int(found.material.max()) + 1))
+    shares = np.zeros((len(names), int(found.kind.max()) + 1))
     for i, number in enumerate(names.values()):
         for j in range(shares.shape[1]):
-            true, own = (material == number) & counted, (found.material == j) & counted
+            true, own = (material == number) & counted, (found.kind == j) & counted
             shares[i, j] = (true & own).sum() / max((true | own).sum(), 1)
     ious = dict.fromkeys(names, 0.0)
     for i, j in zip(*linear_sum_assignment(-shares), strict=True):
@@ -81,7 +80,7 @@ def score_objects(truth: LabelMap, found: FoundLabels) -> dict[str, float | int]
     for number in np.unique(thing[thing > 0]).tolist():
         own = thing == number
         rows, columns = np.nonzero(own)
-        cut = min(rows.min(), columns.min()) == 0 or max(rows.max(), columns.max()) == m - 1
+        cut = min(rows.min(), columns.min()) < BORDER or max(rows.max(), columns.max()) >= m - BORDER
         wide = max(np.ptp(rows), np.ptp(columns)) + 1 >= SMALLEST * m
         if wide and not cut:
             wanted[number] = own

@@ -1,0 +1,99 @@
+import numpy as np
+import pytest
+
+from dav_gswt.materials import objects
+from dav_gswt.materials.objects import Surroundings
+
+M = 120
+
+
+def around(things, pieces=None, strips=None, rough=(), colour=None):
+    """Even ground of one material around things."""
+    features = np.zeros((M, M, 3))
+    features[things] = [-20.0, 5.0, 5.0]
+    none = np.zeros((M, M), bool)
+    light = np.full((M, M, 3), 0.6)
+    light[things] = [0.2, 0.25, 0.1] if colour is None else colour
+    pieces, strips = none if pieces is None else pieces, none if strips is None else strips
+    return Surroundings(
+        light, features, np.zeros((M, M), int), ~things, pieces, strips, np.ones((M, M), bool), frozenset(rough)
+    )
+
+
+def box(*edges):
+    cells = np.zeros((M, M), bool)
+    top, bottom, left, right = edges
+    cells[top:bottom, left:right] = True
+    return cells
+
+
+def find(things, standing=(), **options):
+    return objects.find_footprints(list(standing), things, around(things, **options))
+
+
+def test_things_at_the_border_are_excluded_and_no_objects():
+    footprints, excluded = find(box(0, 10, 40, 50) | box(50, 60, 40, 50))
+    assert [footprint.cells[55, 45] for footprint in footprints] == [True]
+    assert excluded[5, 45] and not excluded[55, 45]
+
+
+def test_long_things_are_no_objects():
+    footprints, excluded = find(box(50, 54, 20, 80))
+    assert not footprints and excluded[52, 50]
+
+
+def test_specks_stay_texture():
+    footprints, excluded = find(box(50, 52, 50, 52))
+    assert not footprints and not excluded.any()
+
+
+def test_large_things_are_no_objects():
+    footprints, excluded = find(box(40, 70, 40, 70))
+    assert not footprints and excluded[55, 55]
+
+
+def test_small_pieces_of_another_material_are_no_objects():
+    things = box(50, 60, 50, 60)
+    footprints, excluded = find(things, pieces=things)
+    assert not footprints and excluded[55, 55]
+
+
+def test_what_touches_a_strip_is_no_object():
+    footprints, _ = find(box(50, 60, 50, 60), strips=box(0, M, 61, 66))
+    assert not footprints
+
+
+def test_shade_is_no_object():
+    footprints, excluded = find(box(50, 60, 50, 60), colour=[0.25, 0.27, 0.33])
+    assert not footprints and excluded[55, 55]
+
+
+def test_the_largest_of_many_specks_is_texture_on_rough_ground():
+    specks = np.any([box(r, r + 3, c, c + 3) for r in range(10, 110, 12) for c in range(10, 110, 12)], 0)
+    specks[45:75, 45:75] = False
+    things = specks | box(56, 63, 56, 63)
+    footprints, excluded = find(things, rough=(0,))
+    assert not footprints and not excluded.any()
+    assert len(find(things)[0]) == 1
+
+
+def test_things_that_touch_are_split():
+    rows, columns = np.mgrid[:M, :M]
+    middles = [(60, 45), (60, 56), (60, 67), (71, 67), (82, 67)]
+    discs = [(rows - r) ** 2 + (columns - c) ** 2 <= 36 for r, c in middles]
+    things = objects.split_things(np.any(discs, 0))
+    assert len(things) == len(middles)
+    assert all(any((thing & disc).sum() > 0.8 * disc.sum() for disc in discs) for thing in things)
+
+
+def test_contact_shadow_belongs_to_what_casts_it():
+    thing, shadow = box(50, 60, 50, 60), box(52, 58, 61, 64)
+    footprints, excluded = find(thing | shadow, standing=[thing])
+    assert len(footprints) == 1 and footprints[0].cells[55, 62] and not excluded.any()
+
+
+@pytest.mark.parametrize(("step", "dense"), [(2, True), (8, False)])
+def test_dense_growth_is_texture(step, dense):
+    things = np.zeros((16, 16), bool)
+    things[:, ::step] = True
+    assert objects.is_dense(things, np.ones((16, 16), bool)) == dense

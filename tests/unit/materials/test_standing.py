@@ -1,0 +1,75 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fixtures import mixed_ground as made
+from scipy.ndimage import gaussian_filter
+
+from dav_gswt.materials import segmentation, standing
+
+M = made.CELLS
+
+
+def hill(row, column, radius, height):
+    """A smooth bump of some cells, in cells."""
+    rows, columns = np.mgrid[:M, :M]
+    return height * np.exp(-(((rows - row) ** 2 + (columns - column) ** 2) / (2 * (radius / 2) ** 2)))
+
+
+def scene(bumps, noise=0.05, colour_too=True):
+    """Even ground with bumps, which are darker."""
+    maps, rng = made.maps(mixed=False, shrubs=False), np.random.default_rng(0)
+    up = np.sum([np.zeros((M, M)), *(hill(*each) for each in bumps)], 0)
+    colour = maps.colour.copy()
+    if colour_too:
+        colour -= 0.3 * np.clip(up / 4, 0, 1)[..., None]
+    surface = (up + noise * gaussian_filter(rng.normal(size=(M, M)), 1)) * made.SPACING
+    return replace(maps, colour=np.clip(colour, 0, 1), surface=surface)
+
+
+def find(maps):
+    features = segmentation.describe_cells(maps.colour)[..., :3]
+    ground = np.ones((M, M), bool)
+    return standing.find_standing_things(features, standing.measure_rise(maps), maps, np.zeros((M, M), int), ground)
+
+
+def test_bumps_are_found_with_their_outlines():
+    bumps = [(30, 30, 7, 6), (90, 40, 6, 5), (60, 95, 8, 7)]
+    things = find(scene(bumps))
+    assert len(things) == len(bumps)
+    for row, column, radius, _ in bumps:
+        thing = next(each for each in things if each[row, column])
+        assert 0.25 * np.pi * radius**2 < thing.sum() < 2 * np.pi * radius**2
+    assert np.sum(things, 0).max() == 1
+
+
+def test_even_ground_has_none():
+    assert find(scene([])) == []
+
+
+def test_what_rises_without_another_colour_is_none():
+    """The heights of a fit are wrong in places where nothing stands."""
+    assert find(scene([(60, 60, 7, 6)], colour_too=False)) == []
+
+
+def test_one_stone_among_many_is_none():
+    rng = np.random.default_rng(1)
+    field = [(r + rng.uniform(-2, 2), c + rng.uniform(-2, 2), 6, 5) for r in range(8, M, 13) for c in range(8, M, 13)]
+    assert find(scene(field)) == []
+
+
+def test_ground_that_slopes_has_none():
+    maps = scene([])
+    slope = 0.5 * made.SPACING * np.arange(M)[None, :]
+    assert find(replace(maps, surface=maps.surface + slope)) == []
+
+
+@pytest.mark.parametrize(("bumps", "rough"), [([], False), ("field", True)])
+def test_roughness_is_that_of_usual_blobs(bumps, rough):
+    field = [(r, c, 5, 5) for r in range(4, M, 9) for c in range(4, M, 9)] if bumps else []
+    rise = standing.measure_rise(scene(field))
+    assert (standing.measure_roughness(rise, np.ones((M, M), bool)) > 0.5) == rough
+
+
+def test_no_ground_has_no_roughness():
+    assert standing.measure_roughness(np.zeros((64, 64)), np.zeros((64, 64), bool)) == 0.0

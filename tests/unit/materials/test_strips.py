@@ -1,0 +1,52 @@
+import numpy as np
+import pytest
+
+from dav_gswt.materials import strips
+
+K = 200
+ROWS, COLUMNS = np.mgrid[:K, :K]
+
+
+def clusters(cells):
+    return [cells.astype(int)]
+
+
+def test_a_winding_path_is_found():
+    path = np.abs(COLUMNS - 100 - 30 * np.sin(ROWS / 35)) < 8
+    found = strips.find_strips(clusters(path))
+    assert len(found) == 1 and (found[0] & path).sum() > 0.95 * path.sum()
+
+
+def test_a_fork_of_roads_is_found():
+    road = (np.abs(ROWS - 150) < 7) | ((np.abs(COLUMNS - 90) < 7) & (ROWS < 150))
+    assert len(strips.find_strips(clusters(road))) == 1
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        np.hypot(ROWS - 100, COLUMNS - 100) < 60,  # round
+        np.abs(COLUMNS - 100) < 30,  # as wide as a material
+        (np.abs(COLUMNS - 100) < 8) & (np.abs(ROWS - 100) < 50),  # short
+        np.abs(COLUMNS - 100) < 2,  # a thread
+        (COLUMNS // 25) % 2 == 0,  # one of many
+        np.zeros((K, K), bool),
+    ],
+)
+def test_other_ground_is_none(cells):
+    assert strips.find_strips(clusters(cells)) == []
+
+
+def test_a_strip_that_is_found_twice_counts_once():
+    path = np.abs(COLUMNS - 100) < 8
+    assert len(strips.find_strips([path.astype(int), 2 * path.astype(int)])) == 1
+
+
+@pytest.mark.parametrize(("own", "transition"), [(0.5, True), (0.0, True), (-1.0, False), ("other", False)])
+def test_a_mixture_of_both_sides_is_a_transition(own, transition):
+    one, two, other = np.array([40.0, 0, 0]), np.array([60.0, 20, 10]), np.array([50.0, -10, 20])
+    labels = (COLUMNS > 100).astype(int)
+    strip = np.abs(COLUMNS - 100) < 8
+    colours = np.where(labels[..., None] == 1, two, one)
+    colours[strip] = other if own == "other" else one + own * (two - one)
+    assert strips.is_transition(strip, colours, labels) == transition

@@ -1,0 +1,83 @@
+"""Strips: long ground of constant width that differs from both its sides, as a path, a road or a ditch.
+
+Tiles cannot show one: it would begin and end in nothing. Its cells are left out of the materials beside it.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray as Array
+from scipy.ndimage import binary_dilation, binary_opening, distance_transform_edt, label
+
+LEAST_LENGTH, LEAST_WIDTH = 0.8, 0.03  # of the exemplar's side
+MARGIN = 2  # cells that a strip is widened by: the opening takes one, and cells on its border are of no cluster
+WIDEST = 0.13  # of the side: wider ground has room for patches
+MOST_VARIATION = 0.32  # standard deviation of the width over its mean
+LEAST_SHARE = 0.5  # of the cells that look like it, that lie in the strip
+FORK_LENGTH, FORK_VARIATION, FORK_SHARE = 1.5, 0.5, 0.9  # the same of strips that fork: they are wider there
+LEAST_DIFFERENCE = 4.0  # weighed CIELAB units between a strip and what is beside it
+SIDE = 0.25  # of what is beside a strip, that a class has at least if it lies on a side of it
+BESIDE = 0.06  # of the side: so near to a strip its blurred rim may look like another
+MOST_OVERLAP = 0.1  # of a second strip with the first one and what is beside it
+
+
+def find_strips(clusterings: Sequence[Int[Array, "k k"]]) -> list[Bool[Array, "k k"]]:
+    """Strips among the clusters of any of these clusterings, those first that most of their cluster belongs to."""
+    candidates: list[tuple[float, Bool[Array, "k k"]]] = []
+    for labels in clusterings:
+        for number in range(int(labels.max()) + 1):
+            candidates += _measure_strip(labels == number)
+    found: list[Bool[Array, "k k"]] = []
+    for _, cells in sorted(candidates, key=lambda each: -each[0]):
+        reach = max(1, round(BESIDE * len(cells)))
+        if all(
+            (cells & binary_dilation(other, iterations=reach)).sum() <= MOST_OVERLAP * cells.sum() for other in found
+        ):
+            found.append(cells)
+    return found
+
+
+def is_transition(strip: Bool[Array, "k k"], colours: Float[Array, "k k c"], labels: Int[Array, "k k"]) -> bool:
+    """Whether a strip's colour is that beside it, or a mixture of what lies on its two sides, as on a border.
+
+    colours: weighed CIELAB. labels: classes of the ground.
+    """
+    ring = binary_dilation(strip, iterations=max(2, round(BESIDE * len(strip)))) & ~strip
+    count = np.bincount(labels[ring])
+    means = [colours[ring & (labels == k)].mean(0) for k in np.flatnonzero(count >= SIDE * ring.sum())]
+    own = colours[strip].mean(0)
+    return any(_measure_distance(own, one, two) < LEAST_DIFFERENCE for one in means for two in means)
+
+
+def _measure_distance(point: Float[Array, "c"], one: Float[Array, "c"], two: Float[Array, "c"]) -> float:
+    """From a point to the line between two others."""
+    way = two - one
+    t = float(np.clip((point - one) @ way / max(float(way @ way), 1e-12), 0, 1))
+    return float(np.linalg.norm(point - one - t * way))
+
+
+def _measure_strip(cluster: Bool[Array, "k k"]) -> list[tuple[float, Bool[Array, "k k"]]]:
+    """The largest piece of a cluster and its share of that, if it is a strip."""
+    from skimage.morphology import skeletonize  # here, not above: it takes half a second to load
+
+    k = len(cluster)
+    own = binary_opening(cluster, np.ones((3, 3)))
+    pieces, number = label(own)
+    if not number:
+        return []
+    sizes = np.bincount(pieces.ravel())[1:]
+    piece = pieces == 1 + sizes.argmax()
+    share = float(sizes.max() / own.sum())
+    if share < LEAST_SHARE or sizes.max() < LEAST_LENGTH * LEAST_WIDTH * k * k:
+        return []
+    line = skeletonize(piece)
+    inner = distance_transform_edt(np.pad(piece, 1))[1:-1, 1:-1]
+    widths = 2 * inner[line]
+    length, width = line.sum() / k, widths.mean() / k
+    variation = widths.std() / widths.mean()
+    straight = length >= LEAST_LENGTH and variation <= MOST_VARIATION
+    forked = length >= FORK_LENGTH and variation <= FORK_VARIATION and share >= FORK_SHARE
+    if not (straight or forked) or width < LEAST_WIDTH or 2 * inner.max() > WIDEST * k:
+        return []
+    return [(share, binary_dilation(piece, iterations=MARGIN))]
