@@ -18,6 +18,7 @@ from dav_gswt.photos.folder import write_photo_folder
 from dav_gswt.photos.report import page as report
 from dav_gswt.photos.report.facts import PhotoFacts, collect_facts, find_weaknesses, list_weak_spots
 from dav_gswt.photos.report.figures import bin_coverage, camera_footprint, make_thumbnails
+from dav_gswt.photos.report.mosaic import GroundKinds
 from dav_gswt.photos.report.page import write_report
 
 FRAME = scene_frame(
@@ -40,6 +41,13 @@ FRAME = scene_frame(
     points=3000,
 )
 PLACE = Georeference(-33.5, 151.25, 10.0, north=30.0, metres_per_unit=1.0)
+
+
+def segment(colour):
+    """Two kinds of ground, in the west and in the east."""
+    return (np.arange(colour.shape[1]) > 0.6 * colour.shape[1]).astype(int) * np.ones(len(colour), int)[:, None]
+
+
 SCENE = 'dunes "<&>"'
 
 
@@ -79,7 +87,7 @@ def page(template, tmp_path):
     """Writes a report and returns its text."""
 
     def write(photos):
-        write_report(photos, template, SCENE, tmp_path / "report.html")
+        write_report(photos, template, SCENE, tmp_path / "report.html", segment)
         return (tmp_path / "report.html").read_text()
 
     return write
@@ -269,7 +277,7 @@ def test_a_template_that_asks_for_what_is_not_there_is_refused(made, template, t
     wrong = tmp_path / "wrong.html"
     wrong.write_text(template.read_text() + "{{ nothing }}")
     with pytest.raises(InputError, match="wrong.html: not a template of this page .*nothing"):
-        write_report(made(), wrong, SCENE, tmp_path / "report.html")
+        write_report(made(), wrong, SCENE, tmp_path / "report.html", segment)
     assert not (tmp_path / "report.html").exists()
 
 
@@ -277,4 +285,16 @@ def test_the_template_uses_all_that_the_report_has(made, template):
     found = collect_facts(made(), SCENE)
     smalls = make_thumbnails(made() / "images", [photo.name for photo in found.photos])
     used = meta.find_undeclared_variables(Environment().parse(template.read_text()))
-    assert used == set(report.make_template_values(found, smalls))
+    assert used == set(report.make_template_values(found, smalls, None))
+
+
+@pytest.mark.parametrize(
+    ("shares", "said"),
+    [((0.6, 0.3, 0.1), "mixed: it has 3 kinds that look unlike (60 %, 30 %, 10 %"), ((0.98,), "one material")],
+)
+def test_kinds_of_ground_are_told(shares, said):
+    assert said in report.describe_kinds(GroundKinds(shares, np.zeros((2, 2, 3))))
+
+
+def test_the_report_says_that_ground_is_mixed(page, made):
+    assert "The ground is mixed: it has 2 kinds" in page(made())

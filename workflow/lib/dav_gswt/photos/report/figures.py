@@ -184,7 +184,7 @@ def make_thumbnail(path: Path, longer: int) -> Thumbnail:
         image_files.shrink_image(cover[..., None], width, height),
     )
     shown = counts * small + (1 - counts) * (0.5 * small + 0.5 * MASKED)
-    return Thumbnail(small, _encode_data_uri(shown, "jpeg"), float(1 - cover.mean()))
+    return Thumbnail(small, encode_data_uri(shown, "jpeg"), float(1 - cover.mean()))
 
 
 def make_thumbnails(folder: Path, names: list[str]) -> list[Thumbnail]:
@@ -193,7 +193,7 @@ def make_thumbnails(folder: Path, names: list[str]) -> list[Thumbnail]:
     return [make_thumbnail(folder / name, longer) for name in progress(names, "shrink photos")]
 
 
-def _encode_data_uri(picture: Array, kind: str) -> str:
+def encode_data_uri(picture: Array, kind: str) -> str:
     """A picture as a data URI: bytes that depend on its pixels alone."""
     file = io.BytesIO()
     pixels = picture if picture.dtype == np.uint8 else np.rint(255 * np.clip(picture, 0, 1)).astype(np.uint8)
@@ -214,7 +214,7 @@ def _format_picture(
     pixels: UInt8[Array, "h w 4"], x: float, y: float, width: float, height: float, kind: str = "points"
 ) -> str:
     place = f'x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}"'
-    return f'<image class="{kind}" {place} preserveAspectRatio="none" href="{_encode_data_uri(pixels, "png")}"/>'
+    return f'<image class="{kind}" {place} preserveAspectRatio="none" href="{encode_data_uri(pixels, "png")}"/>'
 
 
 def _draw_exemplar(found: ReportFacts, on: MapSheet) -> str:

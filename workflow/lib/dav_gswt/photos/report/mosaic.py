@@ -1,9 +1,11 @@
-"""The exemplar as the photos show it from above, before anything is fitted."""
+"""The exemplar as the photos show it from above, before anything is fitted, and the kinds of ground in it."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
 
 from dav_gswt.geometry.cameras import Camera
@@ -14,7 +16,36 @@ from dav_gswt.photos.splitting import ground_bounds, measure_visible_share
 CELLS = 192  # along a side of the exemplar
 PHOTOS = 12  # at most, those that look at the exemplar from most nearly above
 STEEP = 8  # power of the cosine of the angle off straight down that a photo's weight is
+COMMON = 0.05  # of the exemplar: rarer kinds of ground are not listed
+COLOURS = np.array(((0.90, 0.62, 0.0), (0.0, 0.62, 0.45), (0.0, 0.45, 0.70), (0.80, 0.47, 0.65)))  # Okabe and Ito's
+TINT = 0.4  # weight of a kind's colour
 LONGEST = 1024  # pixels of a photo's longer side
+
+
+Segment = Callable[[Float[Array, "m m 3"]], Int[Array, "m m"]]
+
+
+@dataclass(frozen=True)
+class GroundKinds:
+    """Kinds of ground. shares: of the exemplar, of those that are common. picture: as it is, and with their colours."""
+
+    shares: tuple[float, ...]
+    picture: Float[Array, "h w 3"]
+
+
+def find_kinds(folder: Path, found: ReportFacts, segment: Segment) -> GroundKinds | None:
+    """Kinds of ground by their looks alone; None where no photo looks down at the exemplar.
+
+    segment: labels of the cells of a picture by descending share, from 0.
+    """
+    mosaic = make_mosaic(folder, found)
+    if mosaic is None:
+        return None
+    labels = segment(mosaic)
+    shares = np.bincount(labels.ravel()) / labels.size
+    coloured = (1 - TINT) * mosaic + TINT * COLOURS[labels % len(COLOURS)]
+    pair = np.concatenate([mosaic, np.ones((len(mosaic), 4, 3)), coloured], 1)[::-1]
+    return GroundKinds(tuple(float(share) for share in shares if share >= COMMON), pair)
 
 
 def make_mosaic(folder: Path, found: ReportFacts) -> Float[Array, "m m 3"] | None:

@@ -24,6 +24,7 @@ from dav_gswt.photos.report.facts import (
     min_median_max,
 )
 from dav_gswt.photos.report.figures import Thumbnail, bin_coverage, draw_coverage, draw_plan, make_thumbnails
+from dav_gswt.photos.report.mosaic import GroundKinds, Segment, find_kinds
 from dav_gswt.photos.splitting import ground_bounds, measure_visible_share
 from dav_gswt.templates import render_template
 
@@ -52,19 +53,23 @@ class PhotoRow:
     verdict: str
 
 
-def write_report(folder: Path | str, template: Path | str, scene: str, out: Path | str) -> None:
+def write_report(folder: Path | str, template: Path | str, scene: str, out: Path | str, segment: Segment) -> None:
     """Write the report on a photos/ folder (images/, sparse/, ground.json) to `out`.
 
+    segment: tells kinds of ground apart, see `mosaic.find_kinds`.
     Raises: InputError: the folder is not readable, or the template asks for what is not there.
     """
     found = collect_facts(folder, scene)
     thumbnails = make_thumbnails(Path(folder) / "images", [photo.name for photo in found.photos])
-    text = render_template(template, make_template_values(found, thumbnails))
+    kinds = find_kinds(Path(folder) / "images", found, segment)
+    text = render_template(template, make_template_values(found, thumbnails, kinds))
     with atomic_file(out) as part:
         part.write_text(text, encoding="utf-8")
 
 
-def make_template_values(found: ReportFacts, thumbnails: list[Thumbnail]) -> dict[str, object]:
+def make_template_values(
+    found: ReportFacts, thumbnails: list[Thumbnail], kinds: GroundKinds | None
+) -> dict[str, object]:
     """What the template's names stand for. Photos that only test come last."""
     rows = [_make_photo_row(i, *pair, found) for i, pair in enumerate(zip(found.photos, thumbnails, strict=True))]
     return {
@@ -77,6 +82,8 @@ def make_template_values(found: ReportFacts, thumbnails: list[Thumbnail]) -> dic
         "bins": bin_coverage(found),
         "need": found.need,
         "facts": [*list_registration_facts(found), *list_camera_facts(found), *list_mask_facts(thumbnails)],
+        "kinds": describe_kinds(kinds),
+        "kinds_picture": figures.encode_data_uri(kinds.picture, "png") if kinds else None,
         "verdict": found.frame.verdict,
         "left_out": found.frame.left_out,
         "photos": sorted(rows, key=lambda row: found.photos[row.index].tests),
@@ -94,6 +101,20 @@ def summarize(found: ReportFacts) -> str:
     else:
         first = f"{frame.registered} of {frame.images} photos found their place over the ground."
     return f"{first} Tiles are made of a square of ground {side} wide: the exemplar, framed on both maps."
+
+
+def describe_kinds(kinds: GroundKinds | None) -> str:
+    """What the ground consists of, and what that means for tiles, in sentences."""
+    if kinds is None:
+        return "No photo looks down at the exemplar, so the kinds of its ground are not known before it is fitted."
+    if len(kinds.shares) < 2:
+        return "The ground looks like one material: its tiles are cut from all of it."
+    shares = ", ".join(f"{100 * share:.0f} %" for share in kinds.shares)
+    return (
+        f"The ground is mixed: it has {len(kinds.shares)} kinds that look unlike ({shares} of the exemplar). Tiles of "
+        "all of it as one texture would repeat its borders. With `materials: auto` those that are wide enough get "
+        "tiles of their own; the report on materials, made after the fit, has the verdict."
+    )
 
 
 def explain_plan(found: ReportFacts) -> str:
