@@ -37,7 +37,7 @@ def judge_set(verdicts: list[MaterialVerdict], excluded: float, strips: int) -> 
     if excluded > 0.5 and grades[0] == "good":
         reason = f"{excluded:.0%} of the ground is shade, rare or cut off, and shown nowhere"
         return MaterialVerdict("marginal", reason)
-    crossing = f" ({strips} of it a path, a road or the like)" if strips == 1 else f" ({strips} paths, roads)"
-    crossing = crossing if strips else ""
+    several = "a path, road or the like" if strips == 1 else f"{strips} paths, roads or the like"
+    crossing = f", {several} among it" if strips else ""
     many = "1 material" if len(verdicts) == 1 else f"{len(verdicts)} materials"
     return MaterialVerdict(grades[0], f"{many}, {excluded:.0%} of the ground is shown nowhere{crossing}")
