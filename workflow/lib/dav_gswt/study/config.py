@@ -95,6 +95,10 @@ class Materials(Levels):
     """`snakemake materials_table`: materials and objects against true labels (family `oasis`, `materials: auto`)."""
 
 
+class Repetition(Levels):
+    """`snakemake repetition_table`: how visibly terrains repeat, from above."""
+
+
 class Frames(Levels):
     """`snakemake frame_times`: milliseconds of a frame on a walk, by the library and by the page in a browser."""
 
@@ -286,6 +290,7 @@ class StudyConfig(ConfigModel):
     refine: Refinement | None = key("how `<tiling>-refined` is made", None)
     lod: Levels | None = key("levels, orders, rounding", None)
     materials: Materials | None = key("materials and objects against true labels", None)
+    repetition: Repetition | None = key("how visibly terrains repeat", None)
     frames: Frames | None = key("frame times", None)
     calibration: Calibration | None = key("scores against true errors", None)
     view_benchmark: ViewBenchmark | None = key("policies", None, renamed="benchmark")
@@ -306,7 +311,7 @@ def expand_study(config: dict) -> dict:
     model = check_model(StudyConfig, config["study"], "study")
     study = model.model_dump(mode="json", exclude_none=True, by_alias=True)
     flat = config | study
-    for table in ("lod", "materials", "frames", "seams", "forced_choice"):
+    for table in ("lod", "materials", "repetition", "frames", "seams", "forced_choice"):
         _require_names(f"study.{table}.scenes", study.get(table, {}).get("scenes", []), config["scenes"], "scenes")
     if "refine" in study:
         _check_refinement(study["refine"], config["priors"])

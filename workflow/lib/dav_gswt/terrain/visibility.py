@@ -62,12 +62,12 @@ def visible_cells(terrain: EndlessTerrain, camera: Camera) -> GridCells:
     tile, materials = tiles_at(i, j, terrain.salt, terrain.variants), np.ones(len(i), np.int64)
     if terrain.classes is not None:
         materials = terrain.classes.materials_in(i, j)
-        tile += terrain.tiles_each * _first_bit(materials)
+        tile += terrain.tiles_each * first_bit(materials)
     close = draw_order.in_near_block(i, j, at)
     return GridCells(i, j, tile, materials, close, nearest[sequence], farthest[sequence])
 
 
-def _first_bit(bits: Int64[Array, "n"]) -> Int64[Array, "n"]:
+def first_bit(bits: Int64[Array, "n"]) -> Int64[Array, "n"]:
     """Number of the lowest bit that is set, of at most eight."""
     return np.argmax(bits[:, None] >> np.arange(8) & 1, axis=1)
 
