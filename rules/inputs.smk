@@ -78,6 +78,18 @@ def lpips_weights(wildcards=None):
     return {} if config["lpips"] == "none" else {"lpips": rules.convert_lpips_weights.output.weights}
 
 
+def segmenter_networks(wildcards=None):
+    """The segmenter's networks as inputs of what finds objects; none where the config says so."""
+    asked = config["segmenter"]
+    if asked == mobilesam_package.NONE:
+        return {}
+    mobilesam_package.require_runtime()
+    if asked != mobilesam_package.FETCH:
+        return mobilesam_package.locate_networks(existing(asked, "segmenter"))
+    fetched = rules.fetch_mobilesam.output
+    return {"encoder": fetched.encoder, "decoder": fetched.decoder}
+
+
 def terrain_weights(prior):
     """The file of weights of an entry of `priors` of model terrain."""
     weights = config["priors"][prior].get("weights")

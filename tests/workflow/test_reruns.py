@@ -1,6 +1,7 @@
 """A changed key makes again what docs/reference/reruns.md says, on finished runs of a scene of each kind."""
 
 import json
+from importlib.util import find_spec
 
 import pytest
 from fixtures.runs import TINY, USUAL
@@ -36,6 +37,7 @@ PRIOR = {"samples": 3, "steps": 3, "staged": False, "posterior": True, "independ
 PRIOR |= {"weights": "other/other.ply"}
 TOP_LEVEL = {"seeds": [1], "policy": "random", "prior": "other", "p_drop": 0.2, "lam": 0.2, "rounds": 2, "k": 3}
 TOP_LEVEL |= {"stop": {"photos": 20}, "inpaint": True, "levels": 2, "tau": 0.3, "lpips": "installed"}
+TOP_LEVEL |= {"segmenter": "fetch"}
 TOP_LEVEL |= {"heights": {"kind": "hills", "height": 2, "wavelength": 20}, "stills": {"width": 320, "height": 180}}
 TOP_LEVEL |= {"classes": [{"kind": "noise", "weight": 2}]}
 TOP_LEVEL |= {"flight": {"frames": 2, "length": 1, "height": 1}}
@@ -47,7 +49,7 @@ def replanned(planned, tmp_path_factory):
     folder = tmp_path_factory.mktemp("changes")
     other = folder / "other"
     other.mkdir()
-    for name in ("other.ply", "model.safetensors", "photo.jpg"):
+    for name in ("other.ply", "model.safetensors", "photo.jpg", "encoder.onnx", "decoder.onnx"):
         (other / name).touch()
 
     def plan(made, change, configs=()):
@@ -111,6 +113,14 @@ def test_a_key_of_a_tiling_makes_again_what_reads_it(tiny, replanned, key):
 @pytest.mark.parametrize("key", TOP_LEVEL)
 def test_a_key_of_the_top_level_makes_again_what_reads_it(tiny, replanned, key):
     assert replanned(tiny, {key: TOP_LEVEL[key]}) == reruns.list_top_level_reruns("synthetic", key)
+
+
+@pytest.mark.skipif(not find_spec("onnxruntime"), reason="needs the extra `mobilesam`")
+def test_a_segmenter_makes_again_what_follows_from_materials(beach, replanned):
+    change = {"segmenter": replanned.other}
+    assert replanned(beach, change, [beach.folder / "beach.yaml"]) == reruns.list_top_level_reruns(
+        "photos", "segmenter"
+    )
 
 
 def test_a_prior_that_no_policy_reads_makes_nothing_again(tiny, replanned):

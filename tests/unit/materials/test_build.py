@@ -168,3 +168,20 @@ def test_a_window_is_filled_by_its_material_where_it_can_be():
     row, column, side = build.choose_window(own, 30.0)
     assert own[row : row + side, column : column + side].mean() >= build.OWN_SHARE
     assert side % build.BLOCK == 0
+
+
+def test_what_an_outline_leaves_out_is_excluded(monkeypatch):
+    def halve(maps, footprints, segmenter):
+        assert segmenter is None
+        kept = np.arange(maps.cells) < maps.cells // 2
+        return [replace(each, cells=each.cells & kept) for each in footprints]
+
+    cells = np.zeros((8, 8), bool)
+    cells[2:6, 2:6] = True
+    nothing = np.zeros((8, 8), int)
+    classes = build.GroundClasses(nothing, nothing, [Footprint(cells, 0)], nothing > 0, ["sand"])
+    maps = build.measure_ground(made.field(), made.grid()).crop(0, 0, 8)
+    monkeypatch.setattr(build.outlines, "refine_footprints", halve)
+    refined = build._refine_objects(maps, classes, None)
+    assert (refined.occupied | refined.excluded == cells).all() and not (refined.occupied & refined.excluded).any()
+    assert refined.excluded.sum() == 8

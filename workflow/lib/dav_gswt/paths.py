@@ -17,6 +17,7 @@ RESERVED = ("logs", "benchmarks", "snapshots", "weights", "prior", "sweeps", "ta
 RESERVED = (*RESERVED, "stability", "forced_choice")
 SNAPSHOTS = f"{RESULTS}/snapshots"  # of running fits: outside the outputs, so that a killed fit can go on
 LPIPS_WEIGHTS = f"{RESULTS}/weights/lpips_alexnet.safetensors"
+MOBILESAM = f"{RESULTS}/weights/mobilesam"  # a folder
 
 # One directory level a stage, which names only the settings that the stage adds. <name> stands for another entry.
 TREE = {

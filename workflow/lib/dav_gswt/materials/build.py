@@ -13,10 +13,11 @@ from scipy.ndimage import distance_transform_edt
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 from dav_gswt.logs import progress
-from dav_gswt.materials import extraction, mask_images, verdict
+from dav_gswt.materials import extraction, mask_images, outlines, verdict
 from dav_gswt.materials.classes import GroundClasses, classify_ground
 from dav_gswt.materials.filling import CellSources, box_sums, fill_cells
 from dav_gswt.materials.maps import GroundMaps, measure_ground
+from dav_gswt.materials.mobilesam import Segmenter
 from dav_gswt.materials.model import MaterialInfo
 from dav_gswt.materials.verdict import MaterialVerdict
 from dav_gswt.reconstruction.ground import Ground
@@ -88,11 +89,16 @@ class _Parts:
 
 
 def find_materials(
-    field: GaussianField, grid: Ground, seed: int, mask_files: Mapping[str, Path | str] | None = None
+    field: GaussianField,
+    grid: Ground,
+    seed: int,
+    mask_files: Mapping[str, Path | str] | None = None,
+    segmenter: Segmenter | None = None,
 ) -> FoundMaterials:
     """Find the materials of a field's exemplar and the objects on them.
 
-    mask_files: by material, or `exclude`; see `mask_images`.
+    mask_files: by material, or `exclude`; see `mask_images`. segmenter: of the outlines of objects; None: they are cut
+    by colour and height.
 
     Ground of one material without objects is given back as it is. So is, with a warning, ground of which nothing would
     be left to tile.
@@ -102,7 +108,7 @@ def find_materials(
         raise InputError("materials: this field has no ground layer; use `materials: one` in its scene")
     maps = measure_ground(field, grid)
     masks = mask_images.read_masks(mask_files, maps.cells) if mask_files else None
-    classes = classify_ground(maps, masks)
+    classes = _refine_objects(maps, classify_ground(maps, masks), segmenter)
     sources = [classes.source(k) for k in range(classes.number)]
     if all(source.all() for source in sources) and masks is None:
         return _keep_whole(field, grid, maps)
@@ -119,6 +125,13 @@ def find_materials(
     strips = int(classes.kinds.max()) + 1 - classes.number
     judged = verdict.judge_set([each.verdict for each in materials], float(classes.excluded.mean()), max(strips, 0))
     return _report(FoundMaterials(maps, classes, parts.tile_side, materials, objects, judged))
+
+
+def _refine_objects(maps: GroundMaps, classes: GroundClasses, segmenter: Segmenter | None) -> GroundClasses:
+    """Closer outlines of objects, off excluded ground. What stood out beside them is no ground to tile: excluded too."""
+    free = replace(maps, known=maps.known & ~classes.excluded)
+    refined = replace(classes, footprints=outlines.refine_footprints(free, classes.footprints, segmenter))
+    return replace(refined, excluded=classes.excluded | (classes.occupied & ~refined.occupied))
 
 
 def _keep_whole(field: GaussianField, grid: Ground, maps: GroundMaps) -> FoundMaterials:

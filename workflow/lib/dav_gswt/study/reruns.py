@@ -40,6 +40,7 @@ READERS: dict[str, list[str]] = {
     "prepare_external_field": ["make_levels"],
     "inpaint_field": ["evaluate_inpainted", "find_materials", "make_levels"],
     "evaluate_inpainted": [],
+    "fetch_mobilesam": ["find_materials"],
     "find_materials": ["make_levels", "cut_tiles", "bundle_tiles"],
     "make_levels": ["cut_tiles", "bundle_tiles"],
     "cut_tiles": ["bundle_tiles"],
@@ -72,6 +73,7 @@ _TOP_LEVEL: dict[str, tuple[str, ...]] = {
     "levels": ("make_levels",),
     "tau": ("bundle_tiles",),
     "lpips": ("convert_lpips_weights",),
+    "segmenter": ("find_materials",),
     "heights": ("make_page", "render_terrain", "render_flight"),
     "classes": ("make_page", "render_terrain", "render_flight"),
     "stills": ("render_terrain", "render_flight"),
@@ -90,8 +92,9 @@ keys of `priors.<name>` also make the scores again (`score_coarse`, `score_round
 `lpips` what is chosen by them, and the levels follow from the scores. With `inpaint: true`, `inpaint_field` and
 `evaluate_inpainted` run after the last round; of the prior's keys they read `model`, `weights`, `samples` and `steps`.
 A key that stands in a path (`preset`, `tiling`, `seeds`, `policy`, `k`, ...) leaves the old files beside the new ones.
-`render_flight` runs where the config has a `flight`. The tables are of one round: all rounds after one that runs again
-run again too.
+`segmenter` is read where a scene has `materials: auto`: `find_materials` and what follows from it, and with `fetch`
+`fetch_mobilesam` before it. `render_flight` runs where the config has a `flight`. The tables are of one round: all
+rounds after one that runs again run again too.
 """
 
 
@@ -107,7 +110,14 @@ def follow_rules(first: Iterable[str], scope: Iterable[str] = tuple(READERS)) ->
 
 def list_rules(kind: str, agent: str) -> list[str]:
     """The rules that a scene of a kind goes through, without those that the default config does not ask for."""
-    optional = {"convert_lpips_weights", "find_materials", "inpaint_field", "evaluate_inpainted", "render_flight"}
+    optional = {
+        "convert_lpips_weights",
+        "fetch_mobilesam",
+        "find_materials",
+        "inpaint_field",
+        "evaluate_inpainted",
+        "render_flight",
+    }
     if kind == "photos":
         optional.remove("find_materials")
     left_out = {"request_views" if agent not in _DEVICES else "capture_views"}
