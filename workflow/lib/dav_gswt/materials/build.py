@@ -128,7 +128,7 @@ def find_materials(
 
 
 def _refine_objects(maps: GroundMaps, classes: GroundClasses, segmenter: Segmenter | None) -> GroundClasses:
-    """Closer outlines of objects, off excluded ground. What stood out beside them is no ground to tile: excluded too."""
+    """Closer outlines of objects, off excluded ground. What stood out beside them is excluded too."""
     free = replace(maps, known=maps.known & ~classes.excluded)
     refined = replace(classes, footprints=outlines.refine_footprints(free, classes.footprints, segmenter))
     return replace(refined, excluded=classes.excluded | (classes.occupied & ~refined.occupied))
