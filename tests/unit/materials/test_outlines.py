@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.ndimage import binary_dilation, label
@@ -26,7 +28,9 @@ def maps():
     colour = np.where(SHRUB[..., None], [0.2, 0.4, 0.15], [0.8, 0.7, 0.5])
     colour = np.clip(np.where(STONE[..., None], [0.4, 0.4, 0.42], colour) + noise, 0, 1)
     height = 0.3 * (SHRUB | STONE)
-    return GroundMaps(colour, height, np.zeros((M, M)), np.ones((M, M), bool), Exemplar(0.0, 0.0, 0.1, M))
+    return GroundMaps(
+        colour, np.zeros((M, M)), height, np.zeros((M, M)), np.ones((M, M), bool), Exemplar(0.0, 0.0, 0.1, M)
+    )
 
 
 def iou(one, two):
@@ -65,13 +69,13 @@ def test_a_cut_finds_the_outline(maps, before):
 
 
 def test_a_cut_depends_on_height_where_colours_agree(maps):
-    flat = GroundMaps(np.full((M, M, 3), 0.5), maps.height, maps.cover, maps.known, maps.exemplar)
+    flat = replace(maps, colour=np.full((M, M, 3), 0.5))
     (found,) = outlines.refine_footprints(flat, [Footprint(disc(21, 21, 7), 0)])
     assert iou(found.cells, SHRUB) > 0.9
 
 
 def test_ground_that_looks_like_the_object_leaves_the_footprint_as_it_is(maps):
-    even = GroundMaps(np.full((M, M, 3), 0.5), np.zeros((M, M)), maps.cover, maps.known, maps.exemplar)
+    even = replace(maps, colour=np.full((M, M, 3), 0.5), surface=np.zeros((M, M)))
     before = disc(20, 22, 6)
     (found,) = outlines.refine_footprints(even, [Footprint(before, 0)])
     assert iou(found.cells, before) >= outlines.LEAST_AGREEMENT
@@ -115,7 +119,7 @@ def test_an_outline_is_one_piece_without_holes_on_known_ground(maps):
     answer = (SHRUB & ~disc(20, 22, 2)) | disc(50, 50, 4)
     known = maps.known.copy()
     known[:, :17] = False
-    maps = GroundMaps(maps.colour, maps.height, maps.cover, known, maps.exemplar)
+    maps = replace(maps, known=known)
     (found,) = outlines.refine_footprints(maps, [Footprint(disc(20, 22, 7) & known, 0)], Segmenter(answer))
     assert (found.cells == SHRUB & known).all() and label(found.cells)[1] == 1
 

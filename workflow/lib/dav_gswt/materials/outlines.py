@@ -23,7 +23,7 @@ Finder = Callable[[Array], Array | None]  # a footprint's cells to those of what
 LEAST_AGREEMENT = 0.4  # IoU of a refined outline with the one before it: less is another thing
 GROWN = 1  # cells that a prompt is wider than the footprint, to each side
 LEAST_REST = 0.1  # of a footprint: what an outline left out may be another object
-REST_WIDTH = 1 / 6  # of the root of the footprint's area: threads of such a rest are left out
+REST_WIDTH = 1 / 6  # of the root of the footprint's area: narrower parts of such a rest do not count
 LEAST_WIDTH = 4  # cells, of such an object
 AROUND, LEAST_AROUND = 0.5, 4  # of the footprint's box, and cells: what the cut sees beside it, to each side
 CORE = 0.5  # of the depth of a footprint: deeper cells are the object for sure
@@ -82,11 +82,16 @@ def accept_outline(
 def _list_rests(before: list[Footprint], after: list[Footprint]) -> Iterator[Footprint]:
     """Pieces of footprints that their new outlines left out, where they may be other objects."""
     for old, new in zip(before, after, strict=True):
-        width = max(3, round(REST_WIDTH * np.sqrt(old.cells.sum())))
-        pieces, number = label(binary_opening(old.cells & ~new.cells, np.ones((width, width), bool)))
+        pieces, number = label(binary_opening(old.cells & ~new.cells, _square(old.cells, REST_WIDTH)))
         for piece in range(1, number + 1):
             if (pieces == piece).sum() >= LEAST_REST * old.cells.sum():
                 yield replace(old, cells=pieces == piece)
+
+
+def _square(cells: Bool[Array, "m m"], share: float) -> Bool[Array, "w w"]:
+    """A square whose side is a share of the root of an area."""
+    width = max(3, round(share * float(np.sqrt(cells.sum()))))
+    return np.ones((width, width), bool)
 
 
 def _interior(cells: int) -> Bool[Array, "m m"]:
@@ -114,7 +119,7 @@ def _cut_objects(maps: GroundMaps, footprints: list[Footprint]) -> Finder:
     """Cuts an object out of its surroundings; what may be another object is not taken for ground."""
     from skimage.color import rgb2lab  # here, not above: it takes half a second to load
 
-    relief = maps.height / maps.exemplar.spacing
+    relief = maps.surface / maps.exemplar.spacing
     features = np.dstack([rgb2lab(maps.colour), HEIGHT_WEIGHT * relief])
     near = binary_dilation(np.any([each.cells for each in footprints], axis=0), iterations=RING)
     ground = maps.known & ~near
