@@ -45,8 +45,8 @@ class GroundMaps:
         own, box = self.exemplar, np.s_[row : row + cells, column : column + cells]
         corner = own.west + column * own.spacing, own.south + row * own.spacing
         place = Exemplar(*corner, own.spacing, cells)
-        layers = (self.colour, self.height, self.surface, self.cover, self.known)
-        return GroundMaps(*(layer[box] for layer in layers), place)
+        colour, height, surface = self.colour[box], self.height[box], self.surface[box]
+        return GroundMaps(colour, height, surface, self.cover[box], self.known[box], place)
 
 
 def measure_ground(field: GaussianField, grid: Ground) -> GroundMaps:

@@ -127,7 +127,7 @@ def _open_session(path: Path, threads: int) -> Session:
     if OUTSIDE in content:
         raise InputError(f"{path}: keeps weights in other files, which are not read; {ELSE}")
     try:
-        import onnxruntime  # pyright: ignore[reportMissingImports]  an extra
+        import onnxruntime  # an extra
     except ImportError as error:
         raise InputError(f"config: segmenter: needs onnxruntime: pip install '{EXTRA}' ({error})") from error
     options = onnxruntime.SessionOptions()
@@ -135,7 +135,8 @@ def _open_session(path: Path, threads: int) -> Session:
     options.use_deterministic_compute = True
     options.log_severity_level = 4  # errors are raised
     try:
-        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+        session: Any = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+        return session
     except Exception as error:  # onnxruntime's own exceptions have no common base
         raise InputError(f"{path}: onnxruntime cannot read it ({summarize_error(error)}); {ELSE}") from error
 

@@ -159,7 +159,7 @@ def _join_rims(
         around = binary_dilation(rim, iterations=2)
         touched = [k for k, own in enumerate(tall) if (around & own).any()]
         if len(touched) == 1 and rim.sum() < tall[touched[0]].sum():
-            joined = binary_closing(tall[touched[0]] | rim, np.ones((3, 3)))
+            joined = binary_closing(tall[touched[0]] | rim, np.ones((3, 3), bool))
             if _is_compact(joined):
                 tall = [joined if k == touched[0] else own for k, own in enumerate(tall)]
                 continue
@@ -181,7 +181,7 @@ def split_things(cells: Bool[Array, "m m"]) -> list[Bool[Array, "m m"]]:
     from skimage.feature import peak_local_max  # here, not above: they take half a second to load
     from skimage.segmentation import watershed
 
-    pieces, number = label(cells, np.ones((3, 3)))
+    pieces, number = label(cells, np.ones((3, 3), bool))
     things, apart = [], max(2, round(SMALLEST * len(cells) / 2))
     for k in range(1, number + 1):
         own = pieces == k

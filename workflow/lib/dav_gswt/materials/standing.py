@@ -136,7 +136,7 @@ def trace_outline(layers: Float[Array, "m m k"], blob: Blob) -> Bool[Array, "m m
     spread = 0.5 * (values[core].var(0) + values[ring].var(0)) + 1
     axis = (inner - outer) / spread
     along = (values @ axis - outer @ axis) / max(float((inner - outer) @ axis), 1e-9)  # 0 in the ring, 1 in the core
-    pieces, _ = label(binary_opening(along > 0.5, np.ones((2, 2))) | (away < 1.5))
+    pieces, _ = label(binary_opening(along > 0.5, np.ones((2, 2), bool)) | (away < 1.5))
     own = pieces == pieces[blob.row - top, blob.column - left]
     own = binary_fill_holes(own) & (away <= 1.3 * blob.diameter)
     area = np.pi * (blob.diameter / 2) ** 2

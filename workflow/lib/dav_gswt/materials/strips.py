@@ -62,7 +62,7 @@ def _measure_strip(cluster: Bool[Array, "k k"]) -> list[tuple[float, Bool[Array,
     from skimage.morphology import skeletonize  # here, not above: it takes half a second to load
 
     k = len(cluster)
-    own = binary_opening(cluster, np.ones((3, 3)))
+    own = binary_opening(cluster, np.ones((3, 3), bool))
     pieces, number = label(own)
     if not number:
         return []
