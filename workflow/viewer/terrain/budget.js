@@ -33,6 +33,7 @@ const NEVER = -1; // switch distance of a level that is not used
  */
 export function selectCells(terrain, camera, budget) {
   const cells = cellsInFrustum(terrain, camera, REACH * terrain.side), above = eyeHeight(terrain, camera);
+  for (const cell of cells) cell.arrived = arrivedLevels(terrain, cell.tiles);
   /** @param {Distances} distances */
   const cost = (distances) =>
     cells.reduce((sum, cell) => (chooseLevels(terrain, cell, distances) ? sum + cell.count : sum), 0);
@@ -87,6 +88,13 @@ function eyeHeight({ heights, near }, { eye: [x, y, z] }) {
   return Math.max(near, z - heights.at(x, y)[0]);
 }
 
+/** Bits of the levels that have arrived of all tiles. @param {TerrainTables} terrain @param {number[]} numbers */
+function arrivedLevels({ tiles }, numbers) {
+  let arrived = -1;
+  for (let k = 0; k < numbers.length; k++) arrived &= tiles[numbers[k]].arrived;
+  return arrived;
+}
+
 /**
  * Set a cell's levels and their count. Returns: is there anything to draw?
  *
@@ -96,9 +104,7 @@ function eyeHeight({ heights, near }, { eye: [x, y, z] }) {
  */
 function chooseLevels(terrain, cell, { switches, bands, reach }) {
   if (cell.nearest >= reach) return false;
-  let arrived = -1;
-  for (const tile of cell.tiles) arrived &= terrain.tiles[tile].arrived;
-  if (!pickLevels(terrain, cell, arrived, switches, bands)) return false;
+  if (!pickLevels(terrain, cell, cell.arrived, switches, bands)) return false;
   cell.count = 0;
   for (let level = cell.lo; level <= cell.hi; level++) cell.count += cell.counts[level];
   return true;

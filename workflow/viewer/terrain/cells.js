@@ -25,11 +25,13 @@ export function tileUnder({ tile_side: side, salt, tiles, materials }, x, y) {
 
 /**
  * A cell where materials meet. serial: distinguishes it from all others; kept: by chunk, the Gaussians that stay in it;
- * last: key of the batch that was drawn last.
- * @typedef {{ i: number, j: number, serial: number, kept: Map<number, Uint32Array>, last: number | null }} Border
+ * last, batch: key of the batch that was drawn last, and the batch.
+ * @typedef {{ i: number, j: number, serial: number, kept: Map<number, Uint32Array>, last: number | null,
+ *   batch: { pages: Uint32Array, count: number, stamp: number } | null }} Border
  *
  * A cache of cells by their coordinates modulo RING: the tile (of the first material), height and slope at the centre,
- * bounds of the height; the tiles of all materials that may show, their Gaussians by level, and the objects on them.
+ * bounds of the height; the tiles of all materials that may show, the Gaussians by level that stay of them and of the
+ * objects (where materials meet an estimate by their shares of the cell), and the objects.
  *
  * @typedef {ReturnType<typeof createCellCache>} CellCache
  */
@@ -81,15 +83,22 @@ function coverCell({ cache, salt, variants, each, tiles, classes, scatter, level
   const tile = first + each * (31 - Math.clz32(bits & -bits)), alone = (bits & (bits - 1)) === 0;
   cache.tile[at] = tile;
   cache.things[at] = things;
-  cache.border[at] = alone ? null : { i, j, serial: ++cache.borders, kept: new Map(), last: null };
+  cache.border[at] = alone ? null : { i, j, serial: ++cache.borders, kept: new Map(), last: null, batch: null };
   cache.tiles[at] = tiles[tile].alone;
   if (!alone) {
     const materials = Array.from({ length: classes?.materials ?? 1 }, (_, m) => m).filter((m) => (bits >> m) & 1);
     cache.tiles[at] = materials.map((m) => first + each * m);
   }
-  const all = [...cache.tiles[at], ...things.map((thing) => thing.tile)];
-  cache.counts[at] = all.length === 1 ? tiles[tile].counts
-    : Array.from({ length: levels }, (_, level) => all.reduce((sum, number) => sum + tiles[number].counts[level], 0));
+  if (alone && !things.length) {
+    cache.counts[at] = tiles[tile].counts;
+    return;
+  }
+  const shares = classes && !alone ? classes.sharesIn(i, j) : null;
+  cache.counts[at] = Array.from({ length: levels }, (_, level) => {
+    const sum = cache.tiles[at].reduce((all, number) => (
+      all + (shares ? shares[Math.floor(number / each)] : 1) * tiles[number].counts[level]), 0);
+    return things.reduce((all, thing) => all + tiles[thing.tile].counts[level], Math.ceil(sum));
+  });
 }
 
 /**

@@ -49,6 +49,9 @@ export function createClasses(entry, materials, side, heights, pictures = new Ma
   const addTerms = entry.rule.map((term) => createTerm(term, { materials, side, heights, pictures, salt: entry.salt }));
   const jitterAt = createJitter(entry, materials), waves = new Float64Array(materials);
   const corners = Array.from({ length: 4 }, () => new Float64Array(materials));
+  /** @type {WeakMap<Float32Array, Uint8Array>} */
+  const squaresOf = new WeakMap(); // by the centres of a chunk
+  let kept = new Uint32Array(0);
   const cells = createCellRing((i, j) => {
     const lattice = cellLattice(i, j), bits = findMaterials(lattice, materials, wave + rise.most);
     return { bits, lattice: bits & (bits - 1) ? lattice : null };
@@ -105,6 +108,19 @@ export function createClasses(entry, materials, side, heights, pictures = new Ma
     return here;
   }
 
+  /** The square of the lattice under each Gaussian of a chunk, which is the same in all cells. @param {Float32Array} centres */
+  function squaresUnder(centres) {
+    let squares = squaresOf.get(centres);
+    if (!squares) {
+      squares = new Uint8Array(centres.length / 3);
+      for (let k = 0; k < squares.length; k++) {
+        squares[k] = squareOf(centres[3 * k + 1] / side) * LATTICE + squareOf(centres[3 * k] / side);
+      }
+      squaresOf.set(centres, squares);
+    }
+    return squares;
+  }
+
   return {
     materials,
     amplitude: jitter.amplitude,
@@ -120,6 +136,17 @@ export function createClasses(entry, materials, side, heights, pictures = new Ma
      */
     materialsIn: (i, j) => cells.get(i, j).bits,
     /**
+     * Shares of a cell by material, without jitter: of the squares of its lattice, by the score in their middle.
+     *
+     * @param {number} i
+     * @param {number} j
+     */
+    sharesIn(i, j) {
+      const { bits, lattice } = cells.get(i, j);
+      return lattice ? measureShares(lattice, materials)
+        : Float64Array.from({ length: materials }, (_, m) => (bits >> m) & 1);
+    },
+    /**
      * Indices of the Gaussians of a material's tile that stay in cell (i, j).
      *
      * @param {number} i
@@ -128,14 +155,15 @@ export function createClasses(entry, materials, side, heights, pictures = new Ma
      * @param {number} material
      */
     keep(i, j, { centres, count }, material) {
-      const lattice = cells.get(i, j).lattice ?? cellLattice(i, j), kept = new Uint32Array(count);
+      const lattice = cells.get(i, j).lattice ?? cellLattice(i, j), squares = squaresUnder(centres);
       const states = decideSquares(lattice, materials, material, wave, rise.most);
+      if (kept.length < count) kept = new Uint32Array(2 * count);
       let n = 0;
       for (let k = 0; k < count; k++) {
-        const u = centres[3 * k] / side, v = centres[3 * k + 1] / side, a = squareOf(u), b = squareOf(v);
-        const state = states[b * LATTICE + a];
+        const square = squares[k], state = states[square];
         if (state === GOES) continue;
         if (state === UNDECIDED) {
+          const u = centres[3 * k] / side, v = centres[3 * k + 1] / side, a = square & 7, b = square >> 3;
           const scores = interpolate(lattice, a, b, u * LATTICE - a, v * LATTICE - b);
           const away = Math.abs(centres[3 * k + 2] - rise.ground[material]) - rise.clearance[material];
           const bonus = Math.min(rise.slope * Math.max(away, 0), rise.most), lead = leadOf(scores, material, bonus);
@@ -290,6 +318,27 @@ function findMaterials(lattice, materials, slack) {
     }
   }
   return bits;
+}
+
+/**
+ * Shares of the squares of a cell's lattice by the material with the highest score in the middle, of equals the first.
+ *
+ * @param {Lattice} lattice
+ * @param {number} materials
+ */
+function measureShares(lattice, materials) {
+  const shares = new Float64Array(materials), square = 1 / (LATTICE * LATTICE), above = POINTS * materials;
+  for (let b = 0; b < LATTICE; b++) {
+    for (let a = 0; a < LATTICE; a++) {
+      let best = 0, most = -Infinity;
+      for (let m = 0, at = (b * POINTS + a) * materials; m < materials; m++, at++) {
+        const sum = lattice[at] + lattice[at + materials] + lattice[at + above] + lattice[at + above + materials];
+        if (sum > most) [best, most] = [m, sum];
+      }
+      shares[best] += square;
+    }
+  }
+  return shares;
 }
 
 /**

@@ -7,13 +7,13 @@ import { inNearBlock, visitBackToFront } from "./draw_order.js";
 /**
  * A cell in view. di, dj: from the eye's cell; at: index in the cell cache; nearest, farthest: bounds of the distances
  * of its Gaussians; tile: of the first material; tiles: of all that may show; counts: Gaussians by level, objects
- * included; border: where several materials meet; things: objects whose feet are in it; lo to hi: its levels; whole:
- * one level stands in for missing ones and does not fade; missing: bits of the levels that have not arrived; direction:
+ * included; border: where several materials meet; things: objects whose feet are in it; arrived: bits of the levels at
+ * hand; lo to hi: its levels; whole: one level stands in for missing ones and does not fade; missing: bits of the levels that have not arrived; direction:
  * of its pre-sorted order.
  * @typedef {{ di: number, dj: number, at: number, tile: number, tiles: number[], counts: number[],
  *   border: import("./cells.js").Border | null, things: import("./things.js").Thing[], close: boolean,
- *   nearest: number, farthest: number, lo: number, hi: number, whole: boolean, missing: number, count: number,
- *   direction: number }} Cell
+ *   nearest: number, farthest: number, arrived: number, lo: number, hi: number, whole: boolean, missing: number,
+ *   count: number, direction: number }} Cell
  *
  * @typedef {import("./camera.js").Camera} Camera
  * @typedef {import("../worker/terrain_tables.js").TerrainTables} TerrainTables
@@ -94,7 +94,7 @@ const length = (x, y, z) => Math.sqrt(x * x + y * y + z * z);
 /** @returns {Cell} */
 const blankCell = () => ({
   di: 0, dj: 0, at: 0, tile: 0, tiles: [], counts: [], border: null, things: [], close: false,
-  nearest: 0.5, farthest: 0.5,
+  nearest: 0.5, farthest: 0.5, arrived: 0,
   lo: 0, hi: 0, whole: false, missing: 0, count: 0, direction: 0,
 });
 

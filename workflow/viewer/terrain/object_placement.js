@@ -12,7 +12,7 @@ import { frustumPlanes } from "./frustum.js";
  */
 
 /**
- * The objects in view of cells, by the index of the cell that each is drawn with, by falling distance.
+ * The objects in view of cells, by the index of the cell that each is drawn with, by falling distance; null: none.
  *
  * An object reaches over the edges of its own cell. Of the cells that its footprint touches, the one nearest to the eye
  * is drawn last, and the object right after it: else the ground of a nearer cell would cover what hangs over it. Where
@@ -23,8 +23,8 @@ import { frustumPlanes } from "./frustum.js";
  * @param {import("./budget.js").Selection} selection
  */
 export function placeObjects(terrain, camera, { cells, switches, bands, missing }) {
-  /** @type {Map<number, Thing[]>} */
-  const groups = new Map();
+  /** @type {(Thing[] | null)[]} */
+  const groups = new Array(cells.length).fill(null);
   if (!terrain.scatter) return groups;
   const planes = frustumPlanes(camera, terrain.near), norms = planes.map(([a, b, c]) => Math.hypot(a, b, c));
   const { eye } = camera, drawnWith = terrain.window.fill(-1);
@@ -41,13 +41,19 @@ export function placeObjects(terrain, camera, { cells, switches, bands, missing 
       orderThing(thing, terrain);
       const east = nearestTouched(thing.i - i0, thing.u, thing.radius);
       const north = nearestTouched(thing.j - j0, thing.v, thing.radius);
-      const found = drawnWith[windowIndex(east, north)], owner = found < 0 ? k : found, group = groups.get(owner);
-      if (group) group.push(thing);
-      else groups.set(owner, [thing]);
+      const found = drawnWith[windowIndex(east, north)], owner = found < 0 ? k : found, group = groups[owner];
+      if (group) insertByDistance(group, thing);
+      else groups[owner] = [thing];
     }
   }
-  for (const group of groups.values()) group.sort((a, b) => b.distance - a.distance);
   return groups;
+}
+
+/** Add an object to a list by falling distance, after those at its own. @param {Thing[]} group @param {Thing} thing */
+function insertByDistance(group, thing) {
+  let at = group.push(thing) - 1;
+  for (; at > 0 && group[at - 1].distance < thing.distance; at--) group[at] = group[at - 1];
+  group[at] = thing;
 }
 
 /** @param {number} di @param {number} dj */
@@ -94,9 +100,10 @@ function aimThing(thing, { side, heights, objects }, eye, i0, j0) {
  * @param {Thing} thing
  */
 function isOutside(planes, norms, { to, distance, farthest }) {
+  const x = to[0], y = to[1], z = to[2], beyond = distance - farthest;
   for (let k = 0; k < planes.length; k++) {
-    const [a, b, c, d] = planes[k];
-    if (a * to[0] + b * to[1] + c * to[2] + d < (distance - farthest) * norms[k]) return true;
+    const plane = planes[k];
+    if (plane[0] * x + plane[1] * y + plane[2] * z + plane[3] < beyond * norms[k]) return true;
   }
   return false;
 }

@@ -148,10 +148,13 @@ export function materialAt(classes, i, j, u, v) {
  * @param {number} material
  */
 function liesInside(classes, { i, j, u, v, radius }, material) {
-  return RIM.every(([east, north]) => {
-    const x = u + east * radius, y = v + north * radius, right = Math.floor(x), up = Math.floor(y);
-    if (classes.materialsIn(i + right, j + up) === 1 << material) return true;
+  for (let k = 0; k < RIM.length; k++) {
+    const x = u + RIM[k][0] * radius, y = v + RIM[k][1] * radius, right = Math.floor(x), up = Math.floor(y);
+    if (classes.materialsIn(i + right, j + up) === 1 << material) continue;
     const scores = classes.scoresAt(i + right, j + up, x - right, y - up);
-    return scores.every((score, m) => m === material || scores[material] - score >= classes.amplitude);
-  });
+    for (let m = 0; m < scores.length; m++) {
+      if (m !== material && !(scores[material] - scores[m] >= classes.amplitude)) return false;
+    }
+  }
+  return true;
 }

@@ -17,7 +17,7 @@ function createWordList(size) {
     get length() {
       return n;
     },
-    /** Room for more items; the index of the first of their words. @param {number} more */
+    /** Room for more items, after which `words` has them; the index of the first of their words. @param {number} more */
     extend(more) {
       if (size * (n + more) > words.length) {
         const wider = new Uint32Array(2 * size * (n + more));
@@ -30,7 +30,10 @@ function createWordList(size) {
     },
     /** The words as integers and as floats; valid until the next `extend`. */
     get words() {
-      return { words, floats };
+      return words;
+    },
+    get floats() {
+      return floats;
     },
     copy: () => words.slice(0, size * n),
   };
@@ -51,7 +54,7 @@ export function createBlockList() {
      * @param {number} [place] number of an object's place, counted from 1; 0: a tile
      */
     add({ di, dj }, mark, { pages, count }, place = 0) {
-      const which = (di + 128) | ((dj + 128) << 8), at = list.extend(pages.length), { words } = list.words;
+      const which = (di + 128) | ((dj + 128) << 8), at = list.extend(pages.length), { words } = list;
       for (let k = 0, w = at, left = count; k < pages.length; k++, left -= PAGE, w += BLOCK) {
         words[w] = pages[k];
         words[w + 1] = which | ((Math.min(left, PAGE) - 1) << 16);
@@ -80,7 +83,7 @@ export function createPlaceList({ objects }) {
      * @param {number} level for places in the near block
      */
     add({ x, y, cos, sin, size, number }, mark, level) {
-      const at = list.extend(1), { words, floats } = list.words;
+      const at = list.extend(1), { words, floats } = list;
       floats[at] = x;
       floats[at + 1] = y;
       floats[at + 2] = cos * size;

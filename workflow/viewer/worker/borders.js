@@ -1,8 +1,9 @@
-// Cells where materials meet: which Gaussians of each tile stay there, found when first needed.
+// Cells where materials meet: which Gaussians of each tile stay there. That depends on the place alone, so it is found
+// when first needed and kept while there is room, longest for the cells that were asked for last.
 
 import { chunkKey } from "../data/layout.js";
 
-const MOST = 2 ** 24; // indices that are kept in memory, of all cells
+const MOST_BYTES = 64e6; // of indices, of all cells
 
 /**
  * @typedef {import("../terrain/cells.js").Border} Border
@@ -10,13 +11,27 @@ const MOST = 2 ** 24; // indices that are kept in memory, of all cells
  */
 
 /**
- * @param {import("./terrain_tables.js").TerrainTables} terrain
+ * @param {Pick<import("./terrain_tables.js").TerrainTables, "classes" | "each">} terrain
  * @param {{ get: (tile: number, level: number) => { centres: Float32Array, count: number } }} store
+ * @param {number} [most] bytes
  */
-export function createBorders({ classes, each }, store) {
-  /** @type {Set<Border>} */
-  const known = new Set();
-  let total = 0;
+export function createBorders({ classes, each }, store, most = MOST_BYTES) {
+  /** @type {Map<Border, number>} */
+  const known = new Map(); // bytes of each, the latest last
+  let bytes = 0, tested = 0;
+
+  /**
+   * Forget what stays in a cell: its classes have changed, or there is no more room. A cell that is covered anew has a
+   * Border of its own, so only the memory of the old one is at stake.
+   *
+   * @param {Border} border
+   */
+  function forget(border) {
+    bytes -= known.get(border) ?? 0;
+    known.delete(border);
+    border.kept.clear();
+  }
+
   return {
     /**
      * Indices of a tile's Gaussians that stay in a cell.
@@ -26,19 +41,28 @@ export function createBorders({ classes, each }, store) {
      * @param {number} level
      */
     keep(border, tile, level) {
-      const key = chunkKey(tile, level);
-      let kept = border.kept.get(key);
-      if (kept || !classes) return kept ?? null;
-      if (total > MOST) {
-        for (const one of known) one.kept.clear();
-        known.clear();
-        total = 0;
-      }
-      kept = classes.keep(border.i, border.j, store.get(tile, level), Math.floor(tile / each));
+      const key = chunkKey(tile, level), old = border.kept.get(key);
+      if (old || !classes) return old ?? null;
+      const chunk = store.get(tile, level), kept = classes.keep(border.i, border.j, chunk, Math.floor(tile / each));
+      const own = (known.get(border) ?? 0) + kept.byteLength;
       border.kept.set(key, kept);
-      known.add(border);
-      total += kept.length;
+      known.delete(border);
+      known.set(border, own);
+      bytes += kept.byteLength;
+      tested += chunk.count;
+      for (const oldest of known.keys()) {
+        if (bytes <= most || oldest === border) break;
+        forget(oldest);
+      }
       return kept;
+    },
+    forget,
+    /** Gaussians that were tested so far. */
+    get tested() {
+      return tested;
+    },
+    get bytes() {
+      return bytes;
     },
   };
 }

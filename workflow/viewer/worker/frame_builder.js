@@ -16,6 +16,7 @@ import { createTerrainTables } from "./terrain_tables.js";
  * @typedef {import("../terrain/things.js").Thing} Thing
  * @typedef {import("../terrain/camera.js").Camera} Camera
  * @typedef {import("./terrain_tables.js").TerrainTables} TerrainTables
+ * @typedef {ReturnType<typeof placeObjects>} Groups
  *
  * What the GPU draws. i0, j0: the eye's cell; near: entries of the near block; marks: of its 9 cells; uploads: new
  * pages of orders; blocks: of far cells and objects; places: of objects; incomplete: batches were left out for lack of
@@ -51,11 +52,13 @@ export function createFrameBuilder(manifest, heights, pictures) {
   const levels = new Uint16Array(terrain.tiles.length); // bits
   let stamp = 0;
 
-  /** Mark the chunks of what is drawn. @param {Cell[]} cells @param {Iterable<Thing[]>} groups */
+  /** Mark the chunks of what is drawn. @param {Cell[]} cells @param {Groups} groups */
   function touch(cells, groups) {
     levels.fill(0);
     for (const { tiles, lo, hi } of cells) for (const tile of tiles) levels[tile] |= (2 << hi) - (1 << lo);
-    for (const group of groups) for (const { tile, lo, hi } of group) levels[tile] |= (2 << hi) - (1 << lo);
+    for (const group of groups) {
+      if (group) for (const { tile, lo, hi } of group) levels[tile] |= (2 << hi) - (1 << lo);
+    }
     for (let tile = 0; tile < levels.length; tile++) {
       for (let level = 0; levels[tile] >> level; level++) {
         if ((levels[tile] >> level) & 1) store.touch(tile, level, stamp);
@@ -68,7 +71,7 @@ export function createFrameBuilder(manifest, heights, pictures) {
    * as far as there are codes, and the rest.
    *
    * @param {Cell[]} cells
-   * @param {Map<number, Thing[]>} groups
+   * @param {Groups} groups
    */
   function gatherNear(cells, groups) {
     const close = [], marks = new Uint32Array(9), things = [];
@@ -78,7 +81,7 @@ export function createFrameBuilder(manifest, heights, pictures) {
       cell.direction = NO_ORDER;
       marks[(cell.dj + 1) * 3 + cell.di + 1] = cellMark(cell, terrain);
       close.push(cell);
-      things.push(...groups.get(k) ?? []);
+      things.push(...groups[k] ?? NONE);
     }
     things.sort((a, b) => a.distance - b.distance);
     /** @type {import("./near_sort.js").NearThing[]} */
@@ -151,7 +154,7 @@ export function createFrameBuilder(manifest, heights, pictures) {
         incomplete ||= late;
         return late;
       };
-      touch(cells, groups.values());
+      touch(cells, groups);
       blocks.clear();
       places.clear();
       const { close, marks, near: things, rest } = gatherNear(cells, groups);
@@ -160,7 +163,7 @@ export function createFrameBuilder(manifest, heights, pictures) {
         const cell = cells[k], batch = made[k];
         if (cell.close) continue;
         if (batch) blocks.add(cell, cellMark(cell, terrain), batch);
-        addThings(groups.get(k) ?? NONE, isLate);
+        addThings(groups[k] ?? NONE, isLate);
       }
       addThings(rest, isLate);
       const uploads = batches.takeUploads(), updated = performance.now();

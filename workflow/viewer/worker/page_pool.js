@@ -1,7 +1,7 @@
 // A pool of equal pages of GPU memory; the least recently used entries are evicted when it is full.
 
 /**
- * An entry: its pages, and what its user counts in them.
+ * An entry: its pages, what its user counts in them, and when it was last used; -1: it was evicted.
  * @typedef {{ pages: Uint32Array, count: number, stamp: number }} PoolEntry
  */
 
@@ -18,7 +18,10 @@ export function createPagePool(capacity, onEvict = () => {}) {
   let left = capacity;
   /** @param {number} key */
   const evict = (key) => {
-    for (const page of entries.get(key)?.pages ?? []) free[left++] = page;
+    const entry = entries.get(key);
+    if (!entry) return;
+    for (const page of entry.pages) free[left++] = page;
+    entry.stamp = -1;
     entries.delete(key);
     onEvict(key);
   };

@@ -3,9 +3,10 @@
 // long unused.
 
 import { MAX_LEVELS, MAX_ORDERS, PAGE } from "../data/layout.js";
-import { createDepthSorter } from "../terrain/depth_sort.js";
 import { materialAt } from "../terrain/scatter.js";
+import { createDepthOrders } from "./depth_orders.js";
 import { createPagePool } from "./page_pool.js";
+import { createRunMerger } from "./run_merge.js";
 
 const FIRST = 6; // times as long may the first batches of cells take: another material may stand in for them
 
@@ -28,11 +29,11 @@ const FIRST = 6; // times as long may the first batches of cells take: another m
  * @param {number} capacity pages
  */
 export function createSortedBatches(store, terrain, borders, capacity) {
-  const pool = createPagePool(capacity), sort = createDepthSorter();
+  const pool = createPagePool(capacity), depthOrders = createDepthOrders(store, terrain), runs = createRunMerger();
   const owners = terrain.tiles.length, orderKeys = MAX_LEVELS * MAX_LEVELS * MAX_ORDERS;
   /** @type {{ pages: Uint32Array, entries: Uint32Array }[]} */
   let filled = [];
-  let spent = 0, depths = new Float32Array(0), union = new Uint32Array(0);
+  let spent = 0;
   /** @param {Source} source @param {number} order */
   const keyOf = ({ tile, border, lo, hi }, order) =>
     ((((border?.serial ?? 0) * owners + tile) * MAX_LEVELS + lo) * MAX_LEVELS + hi) * MAX_ORDERS + order;
@@ -52,35 +53,23 @@ export function createSortedBatches(store, terrain, borders, capacity) {
   }
 
   /**
-   * Entries of several levels or tiles, sorted together so that none covers another.
+   * Entries of several levels or tiles, merged by depth so that none covers another.
    *
    * @param {Source} source
    * @param {number} order
    */
   function mergedEntries({ tile: first, tiles, border, lo, hi }, order) {
-    const parts = [];
-    let n = 0;
+    const along = terrain.tiles[first].orders[lo][order], direction = terrain.directions[along];
+    runs.clear();
     for (let level = lo; level <= hi; level++) {
       for (const tile of tiles) {
-        const chunk = store.get(tile, level), kept = border && borders.keep(border, tile, level);
-        parts.push({ chunk, kept });
-        n += kept ? kept.length : chunk.count;
+        const kept = border && borders.keep(border, tile, level);
+        runs.add(store.get(tile, level), depthOrders.get(tile, level, along), direction, kept);
       }
     }
-    if (depths.length < n) [depths, union] = [new Float32Array(2 * n), new Uint32Array(2 * n)];
-    const [x, y, z] = terrain.directions[terrain.tiles[first].orders[lo][order]];
-    let at = 0;
-    for (const { chunk: { centres, entries, count }, kept } of parts) {
-      const many = kept ? kept.length : count;
-      for (let n = 0; n < many; n++, at++) {
-        const k = kept ? kept[n] : n;
-        depths[at] = centres[3 * k] * x + centres[3 * k + 1] * y + centres[3 * k + 2] * z;
-        union[at] = entries[k];
-      }
-    }
-    const out = new Uint32Array(padded(n)), sequence = sort(depths, n);
-    for (let k = 0; k < n; k++) out[k] = union[sequence[k]];
-    return { entries: out, count: n };
+    const merged = runs.merge(), entries = new Uint32Array(padded(merged.length));
+    entries.set(merged);
+    return { entries, count: merged.length };
   }
 
   /**
@@ -116,8 +105,13 @@ export function createSortedBatches(store, terrain, borders, capacity) {
    * @returns {Batch | null}
    */
   function get(source, order, stamp, isLate = () => false) {
-    const { tile, border, lo, hi } = source, key = keyOf(source, order), there = pool.use(key, stamp);
-    if (border && there) border.last = key;
+    const { tile, border, lo, hi } = source, key = keyOf(source, order), shown = border ? border.batch : null;
+    if (shown && border && border.last === key && shown.stamp >= 0) { // most cells show what they showed last
+      shown.stamp = stamp;
+      return shown;
+    }
+    const there = pool.use(key, stamp);
+    if (border && there) remember(border, key, there);
     if (there) return there;
     const waits = border && border.last === null ? spent / FIRST : spent;
     const other = isLate(border !== null, waits) ? substitute(source, order, stamp) : null;
@@ -128,7 +122,7 @@ export function createSortedBatches(store, terrain, borders, capacity) {
     if (!batch) return null;
     filled.push({ pages: batch.pages, entries });
     if (border) {
-      border.last = key;
+      remember(border, key, batch);
       spent += performance.now() - begin;
     }
     return batch;
@@ -136,6 +130,10 @@ export function createSortedBatches(store, terrain, borders, capacity) {
 
   return {
     get,
+    /** Gaussians that were sorted and merged so far. */
+    get work() {
+      return { sorted: depthOrders.sorted, merged: runs.merged };
+    },
     /** What was made since the last call: page numbers, and PAGE entries for each. */
     takeUploads() {
       const count = filled.reduce((all, { pages }) => all + pages.length, 0);
@@ -168,3 +166,9 @@ export function createSortedBatches(store, terrain, borders, capacity) {
 
 /** @param {number} count */
 const padded = (count) => Math.ceil(count / PAGE) * PAGE;
+
+/** @param {import("../terrain/cells.js").Border} border @param {number} key @param {Batch} batch */
+function remember(border, key, batch) {
+  border.last = key;
+  border.batch = batch;
+}
