@@ -33,6 +33,7 @@ const NOISE = 16; // axis of the hash: octave k of material m uses NOISE + MAX_O
 const TURN = [0.8, 0.6]; // cosine and sine by which each octave is turned against the last
 const FARTHEST = 4; // weights by which a score falls at most outside of a range
 const SURE = 1e-9; // of scores: more than rounding can change
+const LOW = LATTICE * LATTICE; // added to the square of a Gaussian that has no bonus
 const GOES = 0, UNDECIDED = 1, STAYS = 2; // what happens to a material's Gaussians in a square of the lattice
 
 /**
@@ -49,7 +50,7 @@ export function createClasses(entry, materials, side, heights, pictures = new Ma
   const addTerms = entry.rule.map((term) => createTerm(term, { materials, side, heights, pictures, salt: entry.salt }));
   const jitterAt = createJitter(entry, materials), waves = new Float64Array(materials);
   const corners = Array.from({ length: 4 }, () => new Float64Array(materials));
-  /** @type {WeakMap<Float32Array, Uint8Array>} */
+  /** @type {WeakMap<Float32Array, { material: number, squares: Uint8Array }>} */
   const squaresOf = new WeakMap(); // by the centres of a chunk
   let kept = new Uint32Array(0);
   const cells = createCellRing((i, j) => {
@@ -108,16 +109,24 @@ export function createClasses(entry, materials, side, heights, pictures = new Ma
     return here;
   }
 
-  /** The square of the lattice under each Gaussian of a chunk, which is the same in all cells. @param {Float32Array} centres */
-  function squaresUnder(centres) {
-    let squares = squaresOf.get(centres);
-    if (!squares) {
-      squares = new Uint8Array(centres.length / 3);
-      for (let k = 0; k < squares.length; k++) {
-        squares[k] = squareOf(centres[3 * k + 1] / side) * LATTICE + squareOf(centres[3 * k] / side);
-      }
-      squaresOf.set(centres, squares);
+  /** Height of a Gaussian above (or below) its material's ground and what stands on it. @param {number} z @param {number} m */
+  const heightOver = (z, m) => Math.abs(z - rise.ground[m]) - rise.clearance[m];
+
+  /**
+   * The square of the lattice under each Gaussian of a chunk, and LOW where it has no bonus: the same in all cells.
+   *
+   * @param {Float32Array} centres
+   * @param {number} material
+   */
+  function squaresUnder(centres, material) {
+    const known = squaresOf.get(centres);
+    if (known?.material === material) return known.squares;
+    const squares = new Uint8Array(centres.length / 3);
+    for (let k = 0; k < squares.length; k++) {
+      const square = squareOf(centres[3 * k + 1] / side) * LATTICE + squareOf(centres[3 * k] / side);
+      squares[k] = square + (heightOver(centres[3 * k + 2], material) > 0 ? 0 : LOW);
     }
+    squaresOf.set(centres, { material, squares });
     return squares;
   }
 
@@ -155,17 +164,17 @@ export function createClasses(entry, materials, side, heights, pictures = new Ma
      * @param {number} material
      */
     keep(i, j, { centres, count }, material) {
-      const lattice = cells.get(i, j).lattice ?? cellLattice(i, j), squares = squaresUnder(centres);
+      const lattice = cells.get(i, j).lattice ?? cellLattice(i, j), squares = squaresUnder(centres, material);
       const states = decideSquares(lattice, materials, material, wave, rise.most);
       if (kept.length < count) kept = new Uint32Array(2 * count);
       let n = 0;
       for (let k = 0; k < count; k++) {
-        const square = squares[k], state = states[square];
+        const square = squares[k] & (LATTICE * LATTICE - 1), state = states[squares[k]];
         if (state === GOES) continue;
         if (state === UNDECIDED) {
           const u = centres[3 * k] / side, v = centres[3 * k + 1] / side, a = square & 7, b = square >> 3;
           const scores = interpolate(lattice, a, b, u * LATTICE - a, v * LATTICE - b);
-          const away = Math.abs(centres[3 * k + 2] - rise.ground[material]) - rise.clearance[material];
+          const away = heightOver(centres[3 * k + 2], material);
           const bonus = Math.min(rise.slope * Math.max(away, 0), rise.most), lead = leadOf(scores, material, bonus);
           if (lead < -wave - SURE) continue;
           if (lead < wave + SURE && !isHighest(scores, jitterAt(i, j, u, v, waves), material, bonus)) continue;
@@ -342,7 +351,7 @@ function measureShares(lattice, materials) {
 }
 
 /**
- * What happens to a material's Gaussians in each square of a cell's lattice.
+ * What happens to a material's Gaussians in each square of a cell's lattice, and from LOW on to those without a bonus.
  *
  * @param {Lattice} lattice
  * @param {number} materials
@@ -351,15 +360,19 @@ function measureShares(lattice, materials) {
  * @param {number} most
  */
 function decideSquares(lattice, materials, m, wave, most) {
-  const states = new Uint8Array(LATTICE * LATTICE);
-  for (let square = 0; square < states.length; square++) {
-    let state = STAYS;
+  const states = new Uint8Array(2 * LOW);
+  for (let square = 0; square < LOW; square++) {
+    let state = STAYS, low = STAYS;
     for (let o = 0; o < materials && state !== GOES; o++) {
       if (o === m) continue;
-      if (mostLead(lattice, materials, square, m, o) < -wave - most) state = GOES;
+      const lead = mostLead(lattice, materials, square, m, o);
+      if (lead < -wave - most) state = GOES;
       else if (!(-mostLead(lattice, materials, square, o, m) >= wave)) state = UNDECIDED;
+      if (state === GOES || lead < -wave - SURE) low = GOES;
+      else if (low !== GOES) low = state;
     }
     states[square] = state;
+    states[LOW + square] = low;
   }
   return states;
 }

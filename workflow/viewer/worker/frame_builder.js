@@ -2,6 +2,7 @@
 
 import { MAX_NEAR_PLACES, NO_ORDER, orderPages, PLACES, recordRows } from "../data/layout.js";
 import { selectCells } from "../terrain/budget.js";
+import { lookUpCell, REACH } from "../terrain/cells.js";
 import { nearestOrder } from "../terrain/draw_order.js";
 import { placeObjects } from "../terrain/object_placement.js";
 import { cellMark, createBlockList, createPlaceList } from "./block_list.js";
@@ -35,7 +36,7 @@ import { createTerrainTables } from "./terrain_tables.js";
 const NONE = [];
 const MIDDLE = { di: 0, dj: 0 }; // an object's place does not count from its block's cell
 const TIME_LIMIT = 4; // milliseconds of making batches in an update that somebody waits for
-const BORDER_LIMIT = 1.5; // milliseconds of making those of single cells, which all have a substitute
+const BORDER_LIMIT = 0.2; // milliseconds of making those of single cells, which all have a substitute
 
 /**
  * @param {import("../data/manifest.js").Manifest} manifest
@@ -51,6 +52,7 @@ export function createFrameBuilder(manifest, heights, pictures) {
   const blocks = createBlockList(), places = createPlaceList(terrain);
   const levels = new Uint16Array(terrain.tiles.length); // bits
   let stamp = 0;
+  const ahead = { i0: 0, j0: 0, row: REACH + 1 }; // of the window about the eye, the next row to cover
 
   /** Mark the chunks of what is drawn. @param {Cell[]} cells @param {Groups} groups */
   function touch(cells, groups) {
@@ -123,9 +125,18 @@ export function createFrameBuilder(manifest, heights, pictures) {
   /** Add objects to the blocks. @param {Thing[]} things @param {import("./sorted_batches.js").IsLate} isLate */
   function addThings(things, isLate) {
     for (const thing of things) {
-      const { lo, order } = thing, mark = cellMark(thing, terrain), batch = batches.get(thing, order, stamp, isLate);
-      if (batch) blocks.add(MIDDLE, mark, batch, 1 + places.add(thing, mark, lo));
+      const batch = batches.get(thing, thing.order, stamp, isLate, thing), mark = cellMark(thing, terrain);
+      if (batch) blocks.add(MIDDLE, mark, batch, 1 + places.add(thing, mark, thing.lo));
     }
+  }
+
+  /** Cover the next row of the window about the eye. Returns: was there one? */
+  function coverAhead() {
+    const { i0, j0, row } = ahead;
+    if (row > REACH) return false;
+    for (let di = -REACH; di <= REACH; di++) lookUpCell(terrain, i0 + di, j0 + row);
+    ahead.row += 1;
+    return true;
   }
 
   return {
@@ -133,6 +144,19 @@ export function createFrameBuilder(manifest, heights, pictures) {
     batches,
     /** @param {import("../data/bundle.js").Chunk} chunk */
     add: (chunk) => store.add(chunk, stamp),
+    /**
+     * Work ahead between two views: batches that were late for the last one, then the cells about its eye that have not
+     * been in view yet. Returns: is there more to do?
+     *
+     * @param {number} milliseconds about as long
+     */
+    workAhead(milliseconds) {
+      const end = performance.now() + milliseconds;
+      while (performance.now() < end) {
+        if (!batches.makeLate(stamp) && !coverAhead()) return false;
+      }
+      return true;
+    },
     /**
      * The frame of a view.
      *
@@ -144,7 +168,9 @@ export function createFrameBuilder(manifest, heights, pictures) {
     build(camera, budget, patient) {
       const start = performance.now();
       stamp += 1;
+      batches.begin();
       const { eye } = camera, i0 = Math.floor(eye[0] / terrain.side), j0 = Math.floor(eye[1] / terrain.side);
+      if (i0 !== ahead.i0 || j0 !== ahead.j0 || stamp === 1) Object.assign(ahead, { i0, j0, row: -REACH });
       const selection = selectCells(terrain, camera, budget), { cells } = selection;
       const groups = placeObjects(terrain, camera, selection);
       let incomplete = false;

@@ -8,14 +8,15 @@ import { createDepthOrders } from "./depth_orders.js";
 import { createPagePool } from "./page_pool.js";
 import { createRunMerger } from "./run_merge.js";
 
-const FIRST = 6; // times as long may the first batches of cells take: another material may stand in for them
-
 /**
  * What a batch is of: see Cell. A batch of a border is of that cell alone.
  * @typedef {{ tile: number, tiles: number[], border: import("../terrain/cells.js").Border | null, lo: number,
  *   hi: number }} Source
  *
- * Is there no more time? spent: milliseconds of making batches of borders since `takeUploads`.
+ * What a cell or an object showed last: see Border.
+ * @typedef {{ last: number | null, batch: Batch | null }} Shown
+ *
+ * Is there no more time? spent: milliseconds of making batches of borders since `begin`.
  * @typedef {(border: boolean, spent: number) => boolean} IsLate
  *
  * A batch: its pages, and the number of entries in them.
@@ -33,6 +34,8 @@ export function createSortedBatches(store, terrain, borders, capacity) {
   const owners = terrain.tiles.length, orderKeys = MAX_LEVELS * MAX_LEVELS * MAX_ORDERS;
   /** @type {{ pages: Uint32Array, entries: Uint32Array }[]} */
   let filled = [];
+  /** @type {{ source: Source, order: number, memory: Shown | null }[]} */
+  let late = []; // substitutes stand in for these, of the last view
   let spent = 0;
   /** @param {Source} source @param {number} order */
   const keyOf = ({ tile, border, lo, hi }, order) =>
@@ -102,20 +105,23 @@ export function createSortedBatches(store, terrain, borders, capacity) {
    * @param {number} order
    * @param {number} stamp
    * @param {IsLate} [isLate] then a substitute is used if there is one
+   * @param {Shown | null} [memory] of the cell or object
    * @returns {Batch | null}
    */
-  function get(source, order, stamp, isLate = () => false) {
-    const { tile, border, lo, hi } = source, key = keyOf(source, order), shown = border ? border.batch : null;
-    if (shown && border && border.last === key && shown.stamp >= 0) { // most cells show what they showed last
+  function get(source, order, stamp, isLate = never, memory = source.border) {
+    const { tile, border, lo, hi } = source, key = keyOf(source, order), shown = memory ? memory.batch : null;
+    if (shown && memory && memory.last === key && shown.stamp >= 0) { // most show what they showed last
       shown.stamp = stamp;
       return shown;
     }
     const there = pool.use(key, stamp);
-    if (border && there) remember(border, key, there);
+    if (memory && there) remember(memory, key, there);
     if (there) return there;
-    const waits = border && border.last === null ? spent / FIRST : spent;
-    const other = isLate(border !== null, waits) ? substitute(source, order, stamp) : null;
-    if (other) return other;
+    const other = isLate(border !== null, spent) ? substitute(source, order, stamp) : null;
+    if (other) {
+      late.push({ source, order, memory });
+      return other;
+    }
     const begin = border ? performance.now() : 0;
     const { entries, count } = lo === hi && !border ? levelEntries(tile, lo, order) : mergedEntries(source, order);
     const batch = pool.allocate(key, entries.length / PAGE, stamp, count);
@@ -130,6 +136,25 @@ export function createSortedBatches(store, terrain, borders, capacity) {
 
   return {
     get,
+    /** A view begins: what was late for the last one does not matter any more. */
+    begin() {
+      late = [];
+      spent = 0;
+    },
+    /**
+     * Make a batch that was late for the last view. Returns: was there one?
+     *
+     * @param {number} stamp
+     */
+    makeLate(stamp) {
+      const next = late.shift();
+      if (!next) return false;
+      const { source: { tiles, lo, hi }, source, order, memory } = next, levels = (2 << hi) - (1 << lo);
+      if (tiles.every((tile) => (terrain.tiles[tile].arrived & levels) === levels)) {
+        get(source, order, stamp, never, memory);
+      }
+      return true;
+    },
     /** Gaussians that were sorted and merged so far. */
     get work() {
       return { sorted: depthOrders.sorted, merged: runs.merged };
@@ -145,7 +170,6 @@ export function createSortedBatches(store, terrain, borders, capacity) {
         at += pages.length;
       }
       filled = [];
-      spent = 0;
       return { numbers, data };
     },
     /**
@@ -167,8 +191,10 @@ export function createSortedBatches(store, terrain, borders, capacity) {
 /** @param {number} count */
 const padded = (count) => Math.ceil(count / PAGE) * PAGE;
 
-/** @param {import("../terrain/cells.js").Border} border @param {number} key @param {Batch} batch */
-function remember(border, key, batch) {
-  border.last = key;
-  border.batch = batch;
+/** @param {Shown} memory @param {number} key @param {Batch} batch */
+function remember(memory, key, batch) {
+  memory.last = key;
+  memory.batch = batch;
 }
+
+const never = () => false;

@@ -21,8 +21,11 @@ import { createFrameBuilder } from "./frame_builder.js";
  *   | { kind: "frame", frame: import("./frame_builder.js").FrameAnswer }} Reply
  */
 
+const SLICE = 2; // milliseconds of work between two looks for messages
+
 /** @type {ReturnType<typeof createFrameBuilder>} */
 let builder;
+let busy = false; // a turn of working ahead is due
 
 /** @param {Reply} reply @param {Transferable[]} [moved] */
 const post = (reply, moved = []) => postMessage(reply, { transfer: moved });
@@ -54,24 +57,37 @@ function answerView({ id, camera, budget, patient }) {
   }, moved);
 }
 
+/** Between views: work ahead, in slices, so that the next one waits for little. */
+function workAhead() {
+  busy = builder.workAhead(SLICE);
+  if (busy) setTimeout(() => attempt(workAhead));
+}
+
 /** @param {Request} request */
 function answer(request) {
   if (request.kind === "begin") {
     const { manifest, pixels, pictures } = request;
     builder = createFrameBuilder(manifest, createHeights(manifest.heights, pixels), pictures);
   } else if (request.kind === "chunk") addChunk(request.chunk);
-  else if (request.kind === "view") answerView(request);
+  else if (request.kind === "view") {
+    answerView(request);
+    if (!busy) setTimeout(() => attempt(workAhead));
+    busy = true;
+  }
   else { // the GPU has lost everything
     builder.batches.forget();
     for (const chunk of builder.store.all()) postRecords(chunk);
   }
 }
 
-addEventListener("message", ({ data }) => {
+/** Tell the page what goes wrong. @param {() => void} act */
+function attempt(act) {
   try {
-    answer(data);
+    act();
   } catch (error) {
     const { name, message } = /** @type {Error} */ (error);
     post({ kind: "failed", name, message });
   }
-});
+}
+
+addEventListener("message", ({ data }) => attempt(() => answer(data)));
