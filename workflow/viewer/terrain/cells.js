@@ -89,16 +89,28 @@ function coverCell({ cache, salt, variants, each, tiles, classes, scatter, level
     const materials = Array.from({ length: classes?.materials ?? 1 }, (_, m) => m).filter((m) => (bits >> m) & 1);
     cache.tiles[at] = materials.map((m) => first + each * m);
   }
-  if (alone && !things.length) {
-    cache.counts[at] = tiles[tile].counts;
-    return;
+  cache.counts[at] = alone && !things.length ? tiles[tile].counts
+    : countGaussians(cache.tiles[at], things, { tiles, each, levels, shares: alone ? null : classes?.sharesIn(i, j) });
+}
+
+/**
+ * Gaussians of a cell by level: of its tiles by their materials' shares, and of its objects.
+ *
+ * @param {number[]} numbers of the tiles
+ * @param {import("./things.js").Thing[]} things
+ * @param {Pick<TerrainTables, "tiles" | "each" | "levels"> & { shares?: Float64Array | null }} terrain
+ */
+function countGaussians(numbers, things, { tiles, each, levels, shares }) {
+  const counts = [];
+  for (let level = 0; level < levels; level++) {
+    let sum = 0;
+    for (const number of numbers) {
+      sum += (shares ? shares[Math.floor(number / each)] : 1) * tiles[number].counts[level];
+    }
+    for (const { tile } of things) sum += tiles[tile].counts[level];
+    counts.push(Math.ceil(sum) | 0);
   }
-  const shares = classes && !alone ? classes.sharesIn(i, j) : null;
-  cache.counts[at] = Array.from({ length: levels }, (_, level) => {
-    const sum = cache.tiles[at].reduce((all, number) => (
-      all + (shares ? shares[Math.floor(number / each)] : 1) * tiles[number].counts[level]), 0);
-    return things.reduce((all, thing) => all + tiles[thing.tile].counts[level], Math.ceil(sum));
-  });
+  return counts;
 }
 
 /**

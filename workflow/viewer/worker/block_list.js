@@ -104,6 +104,5 @@ export function createPlaceList({ objects }) {
  * @param {import("./terrain_tables.js").TerrainTables} terrain
  */
 export function cellMark({ tile, direction, whole }, { tiles }) {
-  const uncertainty = Math.round(255 * Math.min(Math.max(tiles[tile].uncertainty, 0), 1));
-  return (tile & 255) | (direction << 8) | (uncertainty << 16) | (Number(whole) << 24);
+  return (tile & 255) | (direction << 8) | (tiles[tile].uncertainty << 16) | ((whole ? 1 : 0) << 24);
 }

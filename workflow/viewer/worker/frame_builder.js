@@ -57,9 +57,10 @@ export function createFrameBuilder(manifest, heights, pictures) {
   /** Mark the chunks of what is drawn. @param {Cell[]} cells @param {Groups} groups */
   function touch(cells, groups) {
     levels.fill(0);
-    for (const { tiles, lo, hi } of cells) for (const tile of tiles) levels[tile] |= (2 << hi) - (1 << lo);
-    for (const group of groups) {
-      if (group) for (const { tile, lo, hi } of group) levels[tile] |= (2 << hi) - (1 << lo);
+    for (let k = 0; k < cells.length; k++) {
+      const { tiles, lo, hi } = cells[k], group = groups[k], bits = (2 << hi) - (1 << lo);
+      for (let n = 0; n < tiles.length; n++) levels[tiles[n]] |= bits;
+      for (let n = 0; group && n < group.length; n++) levels[group[n].tile] |= (2 << group[n].hi) - (1 << group[n].lo);
     }
     for (let tile = 0; tile < levels.length; tile++) {
       for (let level = 0; levels[tile] >> level; level++) {
@@ -124,9 +125,11 @@ export function createFrameBuilder(manifest, heights, pictures) {
 
   /** Add objects to the blocks. @param {Thing[]} things @param {import("./sorted_batches.js").IsLate} isLate */
   function addThings(things, isLate) {
-    for (const thing of things) {
-      const batch = batches.get(thing, thing.order, stamp, isLate, thing), mark = cellMark(thing, terrain);
-      if (batch) blocks.add(MIDDLE, mark, batch, 1 + places.add(thing, mark, thing.lo));
+    for (let k = 0; k < things.length; k++) {
+      const thing = things[k], batch = batches.get(thing, thing.order, stamp, isLate, thing);
+      if (!batch) continue;
+      const mark = cellMark(thing, terrain);
+      blocks.add(MIDDLE, mark, batch, 1 + places.add(thing, mark, thing.lo));
     }
   }
 

@@ -55,8 +55,8 @@ export function createNearSorter(store, terrain, borders) {
       for (const tile of tiles) {
         const whole = store.get(tile, level), key = `${i},${j},${level},${tile}`;
         const chunk = border ? findKept(key, border, tile, level, whole) : whole;
-        const lift = findLift(key, i, j, chunk);
-        parts.push({ chunk, lift, code: SLOTS + MAX_LEVELS * slot + level, ...place, ...range });
+        const lift = findLift(key, i, j, chunk), code = SLOTS + MAX_LEVELS * slot + level;
+        if (chunk.count) parts.push({ chunk, lift, ...place, code, begin: range.begin, end: range.end });
       }
     }
     return parts;
@@ -73,7 +73,8 @@ export function createNearSorter(store, terrain, borders) {
     const { lo, whole, tile, to: [x, y, z], size } = thing;
     return codes.map((code, k) => {
       const chunk = findTurned(thing, lo + k, store.get(tile, lo + k));
-      return { chunk, lift: null, x, y, z, size, code, ...rangeOf(lo + k, whole, distances) };
+      const { begin, end } = rangeOf(lo + k, whole, distances);
+      return { chunk, lift: null, x, y, z, size, code, begin, end };
     });
   }
 
@@ -91,8 +92,9 @@ export function createNearSorter(store, terrain, borders) {
     const most = parts.reduce((sum, { chunk }) => sum + chunk.count, 0);
     if (depths.length < most) [depths, candidates] = [new Float32Array(2 * most), new Uint32Array(2 * most)];
     let n = 0;
-    for (const { chunk: { centres, sizes, entries, count }, lift, begin, end, ...part } of parts) {
-      const { x: west, y: south, z: up, size: factor, code } = part, mark = code << CODE_SHIFT;
+    for (const part of parts) {
+      const { chunk: { centres, sizes, entries, count }, lift, begin, end, x: west, y: south, z: up, size: factor } = part;
+      const mark = part.code << CODE_SHIFT;
       for (let k = 0; k < count; k++) {
         const x = centres[3 * k] + west, y = centres[3 * k + 1] + south;
         const z = centres[3 * k + 2] + up + (lift ? lift[k] : 0);
@@ -126,17 +128,20 @@ const rangeOf = (level, whole, { switches, bands }) => ({
 /**
  * Values by a key, with what they were made from; the most recent ones are kept.
  *
- * @template T
+ * @template K, T
  */
 function createRecentCache() {
-  /** @type {Map<string, { from: unknown, value: T }>} */
+  /** @type {Map<K, { from: unknown, value: T }>} */
   const known = new Map();
-  /** @param {string} key @param {unknown} from @param {() => T} make */
+  /** @param {K} key @param {unknown} from @param {() => T} make */
   return (key, from, make) => {
     const old = known.get(key), entry = old && old.from === from ? old : { from, value: make() };
     known.delete(key);
     known.set(key, entry); // the latest last
-    if (known.size > CACHED) known.delete(known.keys().next().value ?? "");
+    for (const oldest of known.keys()) {
+      if (known.size <= CACHED) break;
+      known.delete(oldest);
+    }
     return entry.value;
   };
 }
@@ -147,7 +152,7 @@ function createRecentCache() {
  * @param {Pick<import("./borders.js").Borders, "keep">} borders
  */
 function createKeptCache(borders) {
-  const recall = /** @type {ReturnType<typeof createRecentCache<NearChunk>>} */ (createRecentCache());
+  const recall = /** @type {ReturnType<typeof createRecentCache<string, NearChunk>>} */ (createRecentCache());
   /** @param {string} key @param {Border} border @param {number} tile @param {number} level @param {NearChunk} chunk */
   return (key, border, tile, level, chunk) => recall(key, chunk, () => {
     const kept = borders.keep(border, tile, level), count = kept ? kept.length : chunk.count;
@@ -169,7 +174,7 @@ function createKeptCache(borders) {
  * @param {Tables} terrain
  */
 function createLiftCache({ heights, side }) {
-  const recall = /** @type {ReturnType<typeof createRecentCache<Float32Array>>} */ (createRecentCache());
+  const recall = /** @type {ReturnType<typeof createRecentCache<string, Float32Array>>} */ (createRecentCache());
   /** @param {string} key @param {number} i @param {number} j @param {NearChunk} chunk */
   return (key, i, j, chunk) => (heights.kind === "flat" ? null : recall(key, chunk, () => {
     const { centres, count } = chunk, lift = new Float32Array(count);
@@ -184,10 +189,11 @@ function createLiftCache({ heights, side }) {
  * @param {Tables} terrain
  */
 function createTurnCache({ heights, side }) {
-  const recall = /** @type {ReturnType<typeof createRecentCache<NearChunk>>} */ (createRecentCache());
-  /** @param {Thing} thing @param {number} level @param {NearChunk} chunk */
-  return (thing, level, chunk) => recall(`${thing.i},${thing.j},${thing.u},${thing.v},${level}`, chunk, () => {
-    const { i, j, u, v, cos, sin, size, h } = thing, { centres, sizes, entries, count } = chunk;
+  /** @typedef {{ from: NearChunk, value: NearChunk }[]} Levels */
+  const recall = /** @type {ReturnType<typeof createRecentCache<Thing, Levels>>} */ (createRecentCache());
+
+  /** @param {Thing} thing @param {NearChunk} chunk @returns {NearChunk} */
+  function turn({ i, j, u, v, cos, sin, size, h }, { centres, sizes, entries, count }) {
     const out = new Float32Array(3 * count);
     for (let k = 0; k < 3 * count; k += 3) {
       const x = size * (cos * centres[k] - sin * centres[k + 1]);
@@ -197,7 +203,14 @@ function createTurnCache({ heights, side }) {
       out[k + 2] = size * centres[k + 2] + heights.at((i + u) * side + x, (j + v) * side + y)[0] - h;
     }
     return { centres: out, sizes, entries, count };
-  });
+  }
+
+  /** @param {Thing} thing @param {number} level @param {NearChunk} chunk */
+  return (thing, level, chunk) => {
+    const levels = recall(thing, null, () => []);
+    if (levels[level]?.from !== chunk) levels[level] = { from: chunk, value: turn(thing, chunk) };
+    return levels[level].value;
+  };
 }
 
 /**

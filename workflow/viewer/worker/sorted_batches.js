@@ -16,7 +16,7 @@ import { createRunMerger } from "./run_merge.js";
  * What a cell or an object showed last: see Border.
  * @typedef {{ last: number | null, batch: Batch | null }} Shown
  *
- * Is there no more time? spent: milliseconds of making batches of borders since `begin`.
+ * Is there no more time? spent: milliseconds of making batches of borders since `takeUploads`, ahead of the view too.
  * @typedef {(border: boolean, spent: number) => boolean} IsLate
  *
  * A batch: its pages, and the number of entries in them.
@@ -139,7 +139,6 @@ export function createSortedBatches(store, terrain, borders, capacity) {
     /** A view begins: what was late for the last one does not matter any more. */
     begin() {
       late = [];
-      spent = 0;
     },
     /**
      * Make a batch that was late for the last view. Returns: was there one?
@@ -170,6 +169,7 @@ export function createSortedBatches(store, terrain, borders, capacity) {
         at += pages.length;
       }
       filled = [];
+      spent = 0;
       return { numbers, data };
     },
     /**

@@ -9,8 +9,8 @@ import { RIM } from "../terrain/frustum.js";
 import { createScatter } from "../terrain/scatter.js";
 
 /**
- * A tile, or an object: these are numbered after the tiles. counts, orders: by level; arrived: bits of the levels at
- * hand; alone: a list of its own number.
+ * A tile, or an object: these are numbered after the tiles. uncertainty: in 255ths; counts, orders: by level; arrived:
+ * bits of the levels at hand; alone: a list of its own number.
  * @typedef {{ uncertainty: number, arrived: number, counts: number[], orders: number[][],
  *   alone: number[] }} TileTable
  *
@@ -40,7 +40,7 @@ export function createTerrainTables(manifest, heights, pictures) {
   const tiles = owners.map(({ chunks, uncertainty }, number) => {
     const byLevel = [...chunks].sort((a, b) => a.level - b.level);
     return {
-      uncertainty: uncertainty ?? 0, arrived: 0, alone: [number],
+      uncertainty: Math.round(255 * Math.min(Math.max(uncertainty ?? 0, 0), 1)), arrived: 0, alone: [number],
       counts: byLevel.map((chunk) => chunk.count), orders: byLevel.map((chunk) => chunk.orders),
     };
   });
