@@ -145,6 +145,10 @@ export function createFrameBuilder(manifest, heights, pictures) {
   return {
     store,
     batches,
+    /** Gaussians so far that were tested for staying in a cell, sorted for an order of their chunk, and merged. */
+    get work() {
+      return { tested: borders.tested, ...batches.work };
+    },
     /** @param {import("../data/bundle.js").Chunk} chunk */
     add: (chunk) => store.add(chunk, stamp),
     /**

@@ -1,0 +1,173 @@
+"""What the worker does anew for a view of two materials with objects, in Gaussians: little, and nothing twice."""
+
+from pathlib import Path
+
+import pytest
+from fixtures.land_covers import SIDE, write_cover_bundle
+from fixtures.page_visit import VIEWER
+
+from dav_gswt.study.terrain.browser import served
+from dav_gswt.terrain.heights import Hills
+from dav_gswt.terrain.page import write_page
+
+SCHEMA = Path(__file__).parents[2] / "workflow/schemas/davgswt.schema.json"
+OPEN = """
+  const { createFrameBuilder } = await import("./worker/frame_builder.js");
+  const { createHeights } = await import("./terrain/heights.js");
+  const { cameraAt } = await import("./terrain/camera.js");
+  const { listChunks } = await import("./data/layout.js");
+  const manifest = await (await fetch("davgswt.json")).json(), heights = createHeights(manifest.heights);
+  const builder = createFrameBuilder(manifest, heights), chunks = listChunks(manifest);
+  for (const { tile, entry: { level, count, file } } of chunks) {
+    builder.add({ tile, level, count, buffer: await (await fetch(file)).arrayBuffer() });
+  }
+  const view = (place, patient = true) => {
+    const before = builder.work, frame = builder.build(cameraAt(place, 640, 400, heights), 1e6, patient);
+    const { work } = builder, did = name => work[name] - before[name];
+    return { frame, tested: did("tested"), sorted: did("sorted"), merged: did("merged") };
+  };
+  const place = { x: 3, y: 5, eye: 0.8, yaw: 60, pitch: -12 };
+"""
+LOOK_AROUND = """async () => {
+  const turn = patient => Array.from({ length: 24 }, (_, k) => view({ ...place, yaw: 15 * k }, patient));
+  const sums = views => Object.fromEntries(["tested", "sorted", "merged"].map(name => (
+    [name, views.reduce((sum, one) => sum + one[name], 0)])));
+  const uploads = views => views.reduce((sum, { frame }) => sum + frame.uploads.numbers.length, 0);
+  const first = turn(true), again = turn(true), hurried = turn(false);
+  return { first: sums(first), again: [sums(again), sums(hurried)], uploads: [uploads(again), uploads(hurried)],
+    incomplete: hurried.filter(({ frame }) => frame.incomplete).length };
+}"""
+WALK = """async () => {
+  let most = 0; // if each chunk is sorted once for each direction
+  for (const { entry: { count } } of chunks) most += count * manifest.directions.length;
+  for (let k = 0; k < 60; k++) view({ ...place, x: 3 + 0.7 * k, yaw: 60 + 9 * k });
+  return { most, ...builder.work };
+}"""
+AHEAD = """async () => {
+  const describe = ({ blocks, near, cells }) => {
+    let drawn = 0;
+    for (let k = 1; k < blocks.length; k += 4) drawn += ((blocks[k] >>> 16) & 63) + 1;
+    return { drawn, near: near.length, cells: cells.length };
+  };
+  const first = view(place, false).frame.incomplete;
+  while (builder.workAhead(1000));
+  const next = view(place, false), patient = view(place, true);
+  return { first, second: next.frame.incomplete, tested: next.tested + patient.tested,
+    frames: [describe(next.frame), describe(patient.frame)] };
+}"""
+COUNT = """async () => {
+  const { createTerrainTables } = await import("./worker/terrain_tables.js");
+  const { createBorders } = await import("./worker/borders.js");
+  const terrain = createTerrainTables(manifest, heights), borders = createBorders(terrain, builder.store);
+  return [[1e9, -12], [1e9, -40], [40000, -12]].map(([budget, pitch]) => {
+    const frame = builder.build(cameraAt({ ...place, pitch }, 640, 400, heights), budget, true);
+    let stay = 0;
+    for (const { tiles, things, border, lo, hi } of frame.cells) {
+      for (let level = lo; level <= hi; level++) {
+        for (const t of tiles) stay += border ? borders.keep(border, t, level).length : terrain.tiles[t].counts[level];
+        for (const { tile } of things) stay += terrain.tiles[tile].counts[level];
+      }
+    }
+    return { budget, stay, count: frame.count };
+  });
+}"""
+FORGET = """async () => {
+  const { createBorders } = await import("./worker/borders.js");
+  const centres = new Float32Array(300), store = { get: () => ({ centres, count: 100 }) };
+  const classes = { keep: () => new Uint32Array(50) };
+  const borders = createBorders({ classes, each: 16 }, store, 1000); // bytes: room for five lists
+  const cells = Array.from({ length: 8 }, (_, i) => ({ i, j: 0, serial: i, kept: new Map(), last: null, batch: null }));
+  const held = () => cells.map(({ kept }) => kept.size);
+  for (const cell of cells) borders.keep(cell, 0, 0);
+  const after = held(), { bytes } = borders;
+  borders.keep(cells[7], 0, 0);
+  const { tested } = borders;
+  borders.forget(cells[7]);
+  return { after, bytes, tested, then: held(), left: borders.bytes };
+}"""
+MERGE = """async () => {
+  const { createRunMerger } = await import("./worker/run_merge.js");
+  const { createDepthOrders } = await import("./worker/depth_orders.js");
+  let seed = 1;
+  const random = () => (seed = (seed * 16807) % 2147483647) / 2147483647;
+  const direction = [0.6, -0.3, -0.2], runs = createRunMerger(), results = [];
+  for (let parts = 1; parts < 8; parts++) {
+    const chunks = Array.from({ length: parts }, (_, p) => {
+      const count = Math.floor(400 * random());
+      // places on a coarse grid: many depths are equal
+      const centres = Float32Array.from({ length: 3 * count }, () => Math.round(8 * random()) / 4);
+      return { count, centres, entries: Uint32Array.from({ length: count }, (_, k) => 1000 * p + k) };
+    });
+    const orders = createDepthOrders({ get: tile => chunks[tile] }, { directions: [direction] });
+    runs.clear();
+    const listed = [];
+    chunks.forEach((chunk, p) => {
+      const all = Array.from(chunk.entries.keys()), some = p % 3 ? all.filter(() => random() < 0.4) : all;
+      runs.add(chunk, orders.get(p, 0, 0), direction, p % 3 ? Uint32Array.from(some) : null);
+      for (const k of some) {
+        const [x, y, z] = chunk.centres.subarray(3 * k, 3 * k + 3), [a, b, c] = direction;
+        listed.push([Math.fround(x * a + y * b + z * c), chunk.entries[k]]);
+      }
+    });
+    listed.sort((p, q) => q[0] - p[0]); // stable
+    results.push({ merged: Array.from(runs.merge()), expected: listed.map(([, entry]) => entry) });
+  }
+  return results;
+}"""
+
+
+@pytest.fixture(scope="module")
+def page(chromium, tmp_path_factory):
+    """A tab beside the viewer's modules and a bundle of two materials over hills."""
+    folder = tmp_path_factory.mktemp("work")
+    write_cover_bundle(folder / "bundle", SCHEMA)
+    write_page(folder / "bundle", VIEWER, folder / "page", Hills(1.5 * SIDE, 12.0 * SIDE, 3, 5))
+    with served(folder / "page") as address, chromium.new_context() as context:
+        tab = context.new_page()
+        tab.route("**/blank.html", lambda route: route.fulfill(body="<!doctype html>", content_type="text/html"))
+        tab.goto(f"{address}blank.html")
+        yield tab
+
+
+def run(page, act: str):
+    """The result of a function's body after `OPEN`."""
+    return page.evaluate(act.replace("async () => {", "async () => {" + OPEN, 1))
+
+
+def test_where_the_eye_has_looked_around_nothing_is_made_again(page):
+    found = run(page, LOOK_AROUND)
+    assert all(count > 0 for count in found["first"].values())
+    assert all(set(again.values()) == {0} for again in found["again"])
+    assert found["uploads"] == [0, 0] and found["incomplete"] == 0
+
+
+def test_each_chunk_is_sorted_once_for_a_direction_wherever_its_cells_are(page):
+    found = run(page, WALK)
+    assert 0 < found["sorted"] <= found["most"] < found["tested"]
+
+
+def test_what_is_late_is_made_between_views(page):
+    found = run(page, AHEAD)
+    assert found["first"] and not found["second"] and found["tested"] == 0
+    assert found["frames"][0] == found["frames"][1]
+
+
+def test_the_budget_counts_what_stays(page):
+    whole, oblique, bounded = run(page, COUNT)
+    for found in (whole, oblique, bounded):
+        assert found["count"] == pytest.approx(found["stay"], rel=0.05)
+    assert 0.5 * bounded["budget"] < bounded["count"] <= bounded["budget"] < whole["count"]
+
+
+def test_cells_that_were_asked_for_long_ago_are_forgotten(page):
+    found = page.evaluate(FORGET)
+    assert found["after"] == [0, 0, 0, 1, 1, 1, 1, 1] and found["bytes"] == 1000
+    assert found["tested"] == 800, "what is known is not tested again"
+    assert found["then"] == [0, 0, 0, 1, 1, 1, 1, 0] and found["left"] == 800
+
+
+def test_merged_runs_are_in_the_order_of_a_stable_sort(page):
+    results = page.evaluate(MERGE)
+    assert len(results) == 7
+    for found in results:
+        assert found["merged"] == found["expected"]
