@@ -109,7 +109,7 @@ export function createClasses(entry, materials, side, heights, pictures = new Ma
     return here;
   }
 
-  /** Height of a Gaussian above (or below) its material's ground and what stands on it. @param {number} z @param {number} m */
+  /** Height of a Gaussian over the ground, or depth under it, less its clearance. @param {number} z @param {number} m */
   const heightOver = (z, m) => Math.abs(z - rise.ground[m]) - rise.clearance[m];
 
   /**

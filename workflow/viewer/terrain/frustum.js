@@ -8,8 +8,8 @@ import { inNearBlock, visitBackToFront } from "./draw_order.js";
  * A cell in view. di, dj: from the eye's cell; at: index in the cell cache; nearest, farthest: bounds of the distances
  * of its Gaussians; tile: of the first material; tiles: of all that may show; counts: Gaussians by level, objects
  * included; border: where several materials meet; things: objects whose feet are in it; arrived: bits of the levels at
- * hand; lo to hi: its levels; whole: one level stands in for missing ones and does not fade; missing: bits of the levels that have not arrived; direction:
- * of its pre-sorted order.
+ * hand; lo to hi: its levels; whole: one level stands in for missing ones and does not fade; missing: bits of the levels
+ * that have not arrived; direction: of its pre-sorted order.
  * @typedef {{ di: number, dj: number, at: number, tile: number, tiles: number[], counts: number[],
  *   border: import("./cells.js").Border | null, things: import("./things.js").Thing[], close: boolean,
  *   nearest: number, farthest: number, arrived: number, lo: number, hi: number, whole: boolean, missing: number,

@@ -17,7 +17,7 @@ function createWordList(size) {
     get length() {
       return n;
     },
-    /** Room for more items, after which `words` has them; the index of the first of their words. @param {number} more */
+    /** Room for more items; the index of the first of their words. @param {number} more */
     extend(more) {
       if (size * (n + more) > words.length) {
         const wider = new Uint32Array(2 * size * (n + more));

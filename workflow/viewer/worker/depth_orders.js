@@ -1,5 +1,5 @@
-// Exact orders of chunks by depth: found when first needed, kept while there is room. A cell that shows several levels or
-// materials merges them instead of sorting its own Gaussians.
+// Exact orders of chunks by depth: found when first needed, kept while there is room. A cell that shows several levels
+// or materials merges them instead of sorting its own Gaussians.
 
 import { chunkKey, MAX_ORDERS } from "../data/layout.js";
 import { indexType } from "../data/records.js";

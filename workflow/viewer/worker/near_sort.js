@@ -93,8 +93,8 @@ export function createNearSorter(store, terrain, borders) {
     if (depths.length < most) [depths, candidates] = [new Float32Array(2 * most), new Uint32Array(2 * most)];
     let n = 0;
     for (const part of parts) {
-      const { chunk: { centres, sizes, entries, count }, lift, begin, end, x: west, y: south, z: up, size: factor } = part;
-      const mark = part.code << CODE_SHIFT;
+      const { chunk: { centres, sizes, entries, count }, lift, begin, end, size: factor } = part;
+      const { x: west, y: south, z: up } = part, mark = part.code << CODE_SHIFT;
       for (let k = 0; k < count; k++) {
         const x = centres[3 * k] + west, y = centres[3 * k + 1] + south;
         const z = centres[3 * k + 2] + up + (lift ? lift[k] : 0);
