@@ -126,7 +126,7 @@ export function createFrameBuilder(manifest, heights, pictures) {
   /** Add objects to the blocks. @param {Thing[]} things @param {import("./sorted_batches.js").IsLate} isLate */
   function addThings(things, isLate) {
     for (let k = 0; k < things.length; k++) {
-      const thing = things[k], batch = batches.get(thing, thing.order, stamp, isLate, thing);
+      const thing = things[k], batch = batches.get(thing, thing.order, stamp, isLate);
       if (!batch) continue;
       const mark = cellMark(thing, terrain);
       blocks.add(MIDDLE, mark, batch, 1 + places.add(thing, mark, thing.lo));

@@ -13,9 +13,6 @@ import { createRunMerger } from "./run_merge.js";
  * @typedef {{ tile: number, tiles: number[], border: import("../terrain/cells.js").Border | null, lo: number,
  *   hi: number }} Source
  *
- * What a cell or an object showed last: see Border.
- * @typedef {{ last: number | null, batch: Batch | null }} Shown
- *
  * Is there no more time? spent: milliseconds of making batches of borders since `takeUploads`, ahead of the view too.
  * @typedef {(border: boolean, spent: number) => boolean} IsLate
  *
@@ -34,7 +31,7 @@ export function createSortedBatches(store, terrain, borders, capacity) {
   const owners = terrain.tiles.length, orderKeys = MAX_LEVELS * MAX_LEVELS * MAX_ORDERS;
   /** @type {{ pages: Uint32Array, entries: Uint32Array }[]} */
   let filled = [];
-  /** @type {{ source: Source, order: number, memory: Shown | null }[]} */
+  /** @type {{ source: Source, order: number }[]} */
   let late = []; // substitutes stand in for these, of the last view
   let spent = 0;
   /** @param {Source} source @param {number} order */
@@ -105,21 +102,20 @@ export function createSortedBatches(store, terrain, borders, capacity) {
    * @param {number} order
    * @param {number} stamp
    * @param {IsLate} [isLate] then a substitute is used if there is one
-   * @param {Shown | null} [memory] of the cell or object
    * @returns {Batch | null}
    */
-  function get(source, order, stamp, isLate = never, memory = source.border) {
-    const { tile, border, lo, hi } = source, key = keyOf(source, order), shown = memory ? memory.batch : null;
-    if (shown && memory && memory.last === key && shown.stamp >= 0) { // most show what they showed last
+  function get(source, order, stamp, isLate = never) {
+    const { tile, border, lo, hi } = source, key = keyOf(source, order), shown = border ? border.batch : null;
+    if (shown && border && border.last === key && shown.stamp >= 0) { // most cells show what they showed last
       shown.stamp = stamp;
       return shown;
     }
     const there = pool.use(key, stamp);
-    if (memory && there) remember(memory, key, there);
+    if (border && there) remember(border, key, there);
     if (there) return there;
     const other = isLate(border !== null, spent) ? substitute(source, order, stamp) : null;
     if (other) {
-      late.push({ source, order, memory });
+      late.push({ source, order });
       return other;
     }
     const begin = border ? performance.now() : 0;
@@ -148,10 +144,8 @@ export function createSortedBatches(store, terrain, borders, capacity) {
     makeLate(stamp) {
       const next = late.shift();
       if (!next) return false;
-      const { source: { tiles, lo, hi }, source, order, memory } = next, levels = (2 << hi) - (1 << lo);
-      if (tiles.every((tile) => (terrain.tiles[tile].arrived & levels) === levels)) {
-        get(source, order, stamp, never, memory);
-      }
+      const { source: { tiles, lo, hi }, source, order } = next, levels = (2 << hi) - (1 << lo);
+      if (tiles.every((tile) => (terrain.tiles[tile].arrived & levels) === levels)) get(source, order, stamp);
       return true;
     },
     /** Gaussians that were sorted and merged so far. */
@@ -191,10 +185,10 @@ export function createSortedBatches(store, terrain, borders, capacity) {
 /** @param {number} count */
 const padded = (count) => Math.ceil(count / PAGE) * PAGE;
 
-/** @param {Shown} memory @param {number} key @param {Batch} batch */
-function remember(memory, key, batch) {
-  memory.last = key;
-  memory.batch = batch;
+/** @param {import("../terrain/cells.js").Border} border @param {number} key @param {Batch} batch */
+function remember(border, key, batch) {
+  border.last = key;
+  border.batch = batch;
 }
 
 const never = () => false;
