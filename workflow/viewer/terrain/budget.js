@@ -105,8 +105,9 @@ function arrivedLevels({ tiles }, numbers) {
 function chooseLevels(terrain, cell, { switches, bands, reach }) {
   if (cell.nearest >= reach) return false;
   if (!pickLevels(terrain, cell, cell.arrived, switches, bands)) return false;
+  const { counts } = terrain.cache, first = cell.at * terrain.levels;
   cell.count = 0;
-  for (let level = cell.lo; level <= cell.hi; level++) cell.count += cell.counts[level];
+  for (let level = cell.lo; level <= cell.hi; level++) cell.count += counts[first + level];
   return true;
 }
 

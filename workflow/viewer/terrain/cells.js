@@ -34,13 +34,14 @@ export function tileUnder({ tile_side: side, salt, tiles, materials }, x, y) {
  * objects (where materials meet an estimate by their shares of the cell), and the objects.
  *
  * @typedef {ReturnType<typeof createCellCache>} CellCache
+ * @param {number} levels
  */
-export function createCellCache() {
+export function createCellCache(levels) {
   const n = RING * RING, doubles = () => new Float64Array(n);
   return {
     i: doubles().fill(NaN), j: doubles(), tile: new Uint16Array(n), h: doubles(), east: doubles(), north: doubles(),
     low: doubles(), high: doubles(), borders: 0,
-    tiles: /** @type {number[][]} */ (new Array(n)), counts: /** @type {number[][]} */ (new Array(n)),
+    tiles: /** @type {number[][]} */ (new Array(n)), counts: new Int32Array(n * levels),
     things: /** @type {import("./things.js").Thing[][]} */ (new Array(n)),
     border: /** @type {(Border | null)[]} */ (new Array(n)),
   };
@@ -89,28 +90,15 @@ function coverCell({ cache, salt, variants, each, tiles, classes, scatter, level
     const materials = Array.from({ length: classes?.materials ?? 1 }, (_, m) => m).filter((m) => (bits >> m) & 1);
     cache.tiles[at] = materials.map((m) => first + each * m);
   }
-  cache.counts[at] = alone && !things.length ? tiles[tile].counts
-    : countGaussians(cache.tiles[at], things, { tiles, each, levels, shares: alone ? null : classes?.sharesIn(i, j) });
-}
-
-/**
- * Gaussians of a cell by level: of its tiles by their materials' shares, and of its objects.
- *
- * @param {number[]} numbers of the tiles
- * @param {import("./things.js").Thing[]} things
- * @param {Pick<TerrainTables, "tiles" | "each" | "levels"> & { shares?: Float64Array | null }} terrain
- */
-function countGaussians(numbers, things, { tiles, each, levels, shares }) {
-  const counts = [];
+  const shares = classes && !alone ? classes.sharesIn(i, j) : null;
   for (let level = 0; level < levels; level++) {
     let sum = 0;
-    for (const number of numbers) {
+    for (const number of cache.tiles[at]) {
       sum += (shares ? shares[Math.floor(number / each)] : 1) * tiles[number].counts[level];
     }
-    for (const { tile } of things) sum += tiles[tile].counts[level];
-    counts.push(Math.ceil(sum) | 0);
+    for (const thing of things) sum += tiles[thing.tile].counts[level];
+    cache.counts[at * levels + level] = Math.ceil(sum);
   }
-  return counts;
 }
 
 /**

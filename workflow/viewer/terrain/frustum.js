@@ -6,11 +6,11 @@ import { inNearBlock, visitBackToFront } from "./draw_order.js";
 
 /**
  * A cell in view. di, dj: from the eye's cell; at: index in the cell cache; nearest, farthest: bounds of the distances
- * of its Gaussians; tile: of the first material; tiles: of all that may show; counts: Gaussians by level, objects
- * included; border: where several materials meet; things: objects whose feet are in it; arrived: bits of the levels at
- * hand; lo to hi: its levels; whole: one level stands in for missing ones and does not fade; missing: bits of the levels
- * that have not arrived; direction: of its pre-sorted order.
- * @typedef {{ di: number, dj: number, at: number, tile: number, tiles: number[], counts: number[],
+ * of its Gaussians; tile: of the first material; tiles: of all that may show; border: where several materials meet;
+ * things: objects whose feet are in it; arrived: bits of the levels at hand; lo to hi: its levels; whole: one level stands
+ * in for missing ones and does not fade; missing: bits of the levels that have not arrived; count: of its Gaussians;
+ * direction: of its pre-sorted order.
+ * @typedef {{ di: number, dj: number, at: number, tile: number, tiles: number[],
  *   border: import("./cells.js").Border | null, things: import("./things.js").Thing[], close: boolean,
  *   nearest: number, farthest: number, arrived: number, lo: number, hi: number, whole: boolean, missing: number,
  *   count: number, direction: number }} Cell
@@ -64,7 +64,6 @@ export function cellsInFrustum(terrain, camera, reach) {
     cell.at = at;
     cell.tile = cache.tile[at];
     cell.tiles = cache.tiles[at];
-    cell.counts = cache.counts[at];
     cell.border = cache.border[at];
     cell.things = cache.things[at];
     cell.close = inNearBlock(di, dj);
@@ -93,7 +92,7 @@ function spanOf({ z: [low, high], objects, most }) {
 const length = (x, y, z) => Math.sqrt(x * x + y * y + z * z);
 /** @returns {Cell} */
 const blankCell = () => ({
-  di: 0, dj: 0, at: 0, tile: 0, tiles: [], counts: [], border: null, things: [], close: false,
+  di: 0, dj: 0, at: 0, tile: 0, tiles: [], border: null, things: [], close: false,
   nearest: 0.5, farthest: 0.5, arrived: 0,
   lo: 0, hi: 0, whole: false, missing: 0, count: 0, direction: 0,
 });

@@ -58,6 +58,6 @@ export function createTerrainTables(manifest, heights, pictures) {
       Math.min(...manifest.tiles.map((tile) => tile.z[0])) - beyond,
       Math.max(...manifest.tiles.map((tile) => tile.z[1])) + beyond,
     ],
-    near: NEAR * manifest.eye_floor, cache: createCellCache(), cells: [], window: new Int32Array(RING * RING),
+    near: NEAR * manifest.eye_floor, cache: createCellCache(levels.length), cells: [], window: new Int32Array(RING * RING),
   };
 }
