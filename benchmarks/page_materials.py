@@ -1,10 +1,10 @@
 """Time of updating and sorting a view of two materials with objects, against one material's, drawn as densely.
 
-What `page.py` times for a ground of one material is timed here for two versions of the same ground: one material, and two
-that meet in most cells, with shrubs. The worker's modules run in headless Chromium over the same hills; both are given the
-budgets with which they draw the same number of Gaussians. Walks alternate between the versions, and of each view the least
-time of all walks counts, as other work of the machine lengthens some. What is late for a view is made between views and
-timed there ("between"). "All at once" is a walk that waits for every batch. Prints tables, asserts nothing.
+What `page.py` times for a ground of one material is timed here for two versions of the same ground: one material, and
+two that meet in most cells, with shrubs. The worker's modules run in headless Chromium over the same hills; both are
+given the budgets with which they draw the same number of Gaussians. Walks alternate between the versions, and of each
+view the least time of all walks counts, as other work of the machine lengthens some. What is late for a view is made
+between views and timed there ("between"). "All at once" is a walk that waits for every batch. Asserts nothing.
 """
 
 import json
@@ -68,8 +68,9 @@ SETUP = """async () => {
       const between = performance.now() - start, { update, sort } = frame.milliseconds, now = builder.work;
       const did = Object.fromEntries(Object.keys(now).map(name => [name, now[name] - work[name]]));
       work = now;
-      if (k >= 40) views.push({ update, sort, both: update + sort, between, drawn: countDrawn(frame), ...did,
-        near: frame.near.length, cells: frame.cells.length, border: frame.cells.filter(({ border }) => border).length });
+      const { near, cells } = frame, border = cells.filter(one => one.border).length;
+      if (k >= 40) views.push({ update, sort, both: update + sort, between, ...did, drawn: countDrawn(frame),
+        near: near.length, cells: cells.length, border });
     }
     return views;
   };
