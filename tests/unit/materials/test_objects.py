@@ -68,6 +68,13 @@ def test_shade_is_no_object():
     assert not footprints and excluded[55, 55]
 
 
+def test_a_marker_in_black_and_white_is_no_object():
+    things = box(50, 60, 50, 60)
+    colours = np.where(np.indices((10, 10)).sum(0) % 2, 0.95, 0.05).reshape(-1, 1) * np.ones(3)
+    footprints, excluded = find(things, colour=colours)
+    assert not footprints and excluded[55, 55]
+
+
 def test_the_largest_of_many_specks_is_texture_on_rough_ground():
     specks = np.any([box(r, r + 3, c, c + 3) for r in range(10, 110, 12) for c in range(10, 110, 12)], 0)
     specks[45:75, 45:75] = False

@@ -37,6 +37,7 @@ RING = 3  # cells around an object
 OPEN, WITHIN = 0.45, 0.7  # share of these that is plain ground, and share of that which is its material's
 MANY = 0.5  # area of smaller things of a thing's colour over its own, from which it is the largest of many
 ALIKE = 0.85  # cosine of the angle between the differences of two things of one colour
+MARKER, LEAST_CONTRAST = 2.2, 0.12  # contrast of a marker over its material's, and the least that this counts as
 OTHER = 0.5  # of what stands out, that is ground of another material: then it is a piece of that, not a thing
 DENSE = 0.25  # of a material that is covered by things: then they are texture
 
@@ -112,8 +113,8 @@ def find_footprints(
     """Objects, and the cells of everything else that is no texture.
 
     Things at the border of the exemplar are cut off, so they are no objects; nor are things that are long, frayed or
-    large, lie between two materials, are small pieces of another material, or shade. On rough ground the largest of
-    many specks is texture.
+    large, lie between two materials, are small pieces of another material, shade, or markers. On rough ground the
+    largest of many specks is texture.
     Args: standing: cells of each thing that stands on the ground. candidates: cells that stand out by colour or height.
     Returns: footprints; cells to be filled beside them.
     """
@@ -143,7 +144,8 @@ def find_footprints(
             continue
         if rough and not piece and _is_one_of_many(own, material, small, around):
             continue
-        if not piece and not _is_shaded(own, material, around) and _is_single(own, material, around):
+        unwanted = piece or _is_shaded(own, material, around) or _is_marker(own, material, around)
+        if not unwanted and _is_single(own, material, around):
             footprints.append(Footprint(own, material))
         else:
             excluded = excluded | own
@@ -171,6 +173,15 @@ def _is_shaded(own: Bool[Array, "m m"], material: int, around: Surroundings) -> 
     """Whether a thing looks like shade of its material."""
     plain = around.ground & (around.materials == material)
     return bool(plain.any() and is_shade(linear_light(around.colour[own]), linear_light(around.colour[plain])))
+
+
+def _is_marker(own: Bool[Array, "m m"], material: int, around: Surroundings) -> bool:
+    """Whether a thing is far richer in contrast than its material, as a survey's marker in black and white."""
+    plain, bright = around.ground & (around.materials == material), around.colour.mean(-1)
+    if not plain.any():
+        return False
+    inside, outside = np.ptp(np.quantile(bright[own], [0.05, 0.95])), np.ptp(np.quantile(bright[plain], [0.01, 0.99]))
+    return bool(inside > MARKER * max(float(outside), LEAST_CONTRAST))
 
 
 def split_things(cells: Bool[Array, "m m"]) -> list[Bool[Array, "m m"]]:
