@@ -1,7 +1,7 @@
 // What tests see of a page: window.davgswt. Served beside the page by fixtures/page_visit.py; no user's page loads it.
 
 import { OVERLAYS } from "./draw/overlays.js";
-import { ready, viewer } from "./main.js";
+import { paint, ready, viewer } from "./main.js";
 
 Object.assign(window, {
   davgswt: {
@@ -14,6 +14,12 @@ Object.assign(window, {
     },
     get flyPath() {
       return viewer.flyPath;
+    },
+    get painting() {
+      return viewer.scene?.painting;
+    },
+    get paint() {
+      return paint;
     },
     /** @param {Partial<import("./terrain/camera.js").Place>} place */
     set: (place) => viewer.setPlace(place),

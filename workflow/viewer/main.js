@@ -4,12 +4,13 @@
 import { webSource } from "./data/source.js";
 import { BUDGET } from "./draw/frame_pacing.js";
 import { createContext } from "./draw/gl.js";
-import { syncAddress } from "./ui/address.js";
+import { parsePaint, syncAddress } from "./ui/address.js";
 import { listenToControls } from "./ui/controls.js";
 import { element } from "./ui/dom.js";
 import { listenToDrops } from "./ui/drop.js";
 import { runFrameLoop } from "./ui/frame_loop.js";
 import { createHud } from "./ui/hud.js";
+import { createPaintPanel } from "./ui/paint_panel.js";
 import { listenToTools } from "./ui/tools.js";
 import { explainError, Viewer } from "./ui/viewer.js";
 
@@ -18,6 +19,8 @@ const hud = createHud();
 
 /** @type {Viewer} */
 export let viewer;
+/** @type {ReturnType<typeof createPaintPanel>} */
+export let paint;
 
 /** Resolves when the page's own bundle is loaded. */
 export const ready = start().catch((error) => {
@@ -35,20 +38,27 @@ async function start() {
     still,
     firstBudget: Number(asked) || BUDGET.most,
     onFirstScene(walker) {
-      listenToControls(walker, canvas, element("pad", HTMLElement), redraw);
+      listenToControls(walker, canvas, element("pad", HTMLElement), paint.brush, redraw);
       new ResizeObserver(redraw).observe(canvas);
       listenToTools(viewer);
       if (still) return;
       runFrameLoop(viewer);
-      syncAddress(walker, redraw);
+      syncAddress(walker, paint.keep, { onChange: redraw, onError: (error) => viewer.fail(error) });
     },
+    async onScene(scene, first) {
+      paint.showScene(scene);
+      if (first) await paint.keep.follow(parsePaint(location.hash), false).catch((error) => viewer.fail(error));
+    },
+    onPaint: () => paint.note(),
+    onPicture: () => paint.brush.draw(),
   });
+  paint = createPaintPanel(viewer);
   listenToDrops({
     async openSource(source) {
       hud.showOpening();
       await viewer.open(source);
     },
-    loadPath: (json) => viewer.flyPath.load(json),
+    loadJson: (json) => (paint.keep.isPaint(json) ? paint.keep.load(json) : viewer.flyPath.load(json)),
     onError: (error) => viewer.fail(error),
   });
   await viewer.open(webSource(new URL(".", location.href)));

@@ -2,6 +2,7 @@
 
 import { MAX_MATERIALS } from "../terrain/classes.js";
 import { MAX_OCTAVES } from "../terrain/jitter.js";
+import { findRunFault } from "../terrain/painted.js";
 import { MAX_RADIUS } from "../terrain/scatter.js";
 import {
   isColour, isCoordinate, isDigest, isFilled, isInside, isLength, isList, isName, isNatural, isRange, isSalt, isShare,
@@ -18,7 +19,7 @@ import {
 
 const MAX_TERMS = 64, MAX_OBJECTS = 256, MAX_CELLS = 64; // of a rule; of a terrain; of the scatter along a tile's side
 const MAX_SIDE = 4096, MAX_PIXELS = 2 ** 26; // pixels along a side of a picture of materials; of all pictures together
-const MAX_CANDIDATES = 512; // objects on a tile at most
+export const MAX_CANDIDATES = 512; // objects on a tile at most
 const MAX_WAVES = 4096; // cells of the jitter along a tile's side
 const UNTURNED = 180; // degrees
 
@@ -60,7 +61,8 @@ const isMaterial = (one, firstTile) => isName(one?.name) && isShare(one.share) &
 
 /** @param {any} classes @param {number} count of materials */
 function areClasses(classes, count) {
-  const { salt, rule, jitter, rise } = classes ?? {};
+  const { salt, rule, jitter, rise, painted } = classes ?? {};
+  if (painted !== undefined && findRunFault(painted, count)) return false;
   if (!isSalt(salt) || !isFilled(rule) || rule.length > MAX_TERMS) return false;
   if (!rule.every((/** @type {any} */ term) => isSize(term?.weight) && isTerm(term, count))) return false;
   const pixels = rule.reduce((/** @type {number} */ sum, /** @type {any} */ term) => (
@@ -104,8 +106,9 @@ const isScatter = (scatter) => isWhole(scatter?.cells, 1, MAX_CELLS) && isSize(s
  * @param {ClassesEntry} classes
  * @returns {ClassesEntry}
  */
-export function pickClasses({ salt, rule, jitter, rise }) {
+export function pickClasses({ salt, rule, jitter, rise, painted }) {
   return {
+    ...(painted && { painted: painted.map(([i, j, length, m]) => [i, j, length, m]) }),
     salt, rule: rule.map(pickTerm),
     jitter: { cells: jitter.cells, octaves: jitter.octaves, amplitude: jitter.amplitude },
     rise: { slope: rise.slope, most: rise.most, ground: rise.ground, clearance: rise.clearance },

@@ -1,10 +1,16 @@
-// Overlays: colours that show tiles, levels, orders or uncertainty instead of the picture.
+// Overlays: colours that show tiles, levels, orders, uncertainty or materials instead of the picture.
 
 import { NO_ORDER } from "../data/layout.js";
 
-export const OVERLAYS = ["picture", "tile", "level", "order", "uncertainty"];
+export const OVERLAYS = ["picture", "tile", "level", "order", "uncertainty", "material"];
+export const OBJECTS = 255; // number of objects in the overlay of materials
 
 const COOL = [0.23, 0.3, 0.75], LIGHT = [0.87, 0.86, 0.85], WARM = [0.71, 0.02, 0.15]; // uncertainty, low to high
+const MATERIALS = [ // told apart by people of all kinds of colour vision; after Okabe and Ito
+  [0.9, 0.62, 0], [0, 0.62, 0.45], [0.34, 0.71, 0.91], [0.8, 0.4, 0], [0.94, 0.89, 0.26], [0, 0.45, 0.7],
+  [0.8, 0.47, 0.65], [0.25, 0.25, 0.25],
+];
+const STANDING = [0.97, 0.97, 0.97]; // objects
 const SORTED = [0.95, 0.95, 0.95]; // cells that are sorted by depth have no order
 
 /**
@@ -18,10 +24,14 @@ export function overlayColours(overlay, { directions }) {
     if (OVERLAYS[overlay] === "tile") return hue(n * 0.618034);
     if (OVERLAYS[overlay] === "level") return hue(0.33 - (n / 32) * 0.13);
     if (OVERLAYS[overlay] === "order") return n === NO_ORDER ? SORTED : hue(n / Math.max(1, directions.length));
+    if (OVERLAYS[overlay] === "material") return materialColour(n);
     return n < 128 ? mix(COOL, LIGHT, n / 127.5) : mix(LIGHT, WARM, n / 127.5 - 1);
   });
   return Uint8Array.from(colours.flatMap((colour) => [...colour.map((v) => Math.round(255 * v)), 255]));
 }
+
+/** The colour of a material in its overlay, 0 to 1; OBJECTS: that of objects. @param {number} m */
+export const materialColour = (m) => (m === OBJECTS ? STANDING : MATERIALS[m % MATERIALS.length]);
 
 /** @param {number[]} a @param {number[]} b @param {number} share */
 const mix = (a, b, share) => a.map((v, k) => v + share * (b[k] - v));

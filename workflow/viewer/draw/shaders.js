@@ -126,6 +126,7 @@ precision highp int;
 precision highp usampler2D;
 layout(location = 0) in uvec4 block;
 uniform usampler2D records, entries, places;
+uniform usampler2D owners;      // of each row of records, the number of the material, or of objects
 uniform highp sampler2D hues;   // of overlays, see overlays.js
 uniform vec3 right, up, ahead;  // camera axes in the world
 uniform vec3 corner;            // south-west corner of the middle cell, on the ground, seen from the eye
@@ -219,7 +220,8 @@ void main() {
   float going = 1.0 - clamp(2.0 - 2.0 * distance / end, 0.0, 1.0); // smoothstep from half the reach to its end
   vec3 paint = mix(one.paint.rgb, backdrop(seen.z / distance), going * going * (3.0 - 2.0 * going));
   if (overlay > 0) {
-    uint numbers[4] = uint[4](mark & 255u, uint(level) * 32u, mark >> 8u & 255u, mark >> 16u & 255u);
+    uint owner = texelFetch(owners, ivec2(0, int(row / ${ROW}u)), 0).x;
+    uint numbers[5] = uint[5](mark & 255u, uint(level) * 32u, mark >> 8u & 255u, mark >> 16u & 255u, owner);
     uint number = numbers[overlay - 1];
     paint = mix(vec3(dot(paint, vec3(0.3, 0.6, 0.1))), texelFetch(hues, ivec2(int(number), 0), 0).rgb, 0.7);
   }

@@ -7,7 +7,7 @@ import {
 } from "../data/layout.js";
 import { MAX_OCTAVES } from "../terrain/heights.js";
 import { createProgram, createTexture, setAxes } from "./gl.js";
-import { overlayColours } from "./overlays.js";
+import { OBJECTS, overlayColours } from "./overlays.js";
 import { FRAGMENT, vertexShader } from "./shaders.js";
 
 /**
@@ -25,7 +25,7 @@ import { FRAGMENT, vertexShader } from "./shaders.js";
 const FULL = "The terrain does not fit into this machine's graphics memory. Close other pages, make one with larger "
   + "tiles or fewer variants, or open it on a larger machine.";
 const WIDTH = PAGE * PAGES_A_ROW; // of the order textures
-const RECORDS = 0, ENTRIES = 1, RELIEF = 2, HUES = 3, PLACES = 4; // texture units
+const RECORDS = 0, ENTRIES = 1, RELIEF = 2, HUES = 3, PLACES = 4, OWNERS = 5; // texture units
 
 /**
  * @param {GL} gl
@@ -44,7 +44,8 @@ export function createSplats(gl, manifest, heights) {
   /** @type {FrameAnswer | null} */
   let frame = null;
   const relief = heights.kind === "image" ? createRelief(gl, heights) : null;
-  const hues = createTexture(gl, gl.RGBA8, 256, 1);
+  const hues = createTexture(gl, gl.RGBA8, 256, 1), owners = createTexture(gl, gl.R32UI, 1, recordRows(manifest));
+  const each = manifest.tiles.length / manifest.materials.length;
   let shownOverlay = -1;
   if (gl.getError() === gl.OUT_OF_MEMORY) throw new PageError(FULL);
 
@@ -73,9 +74,12 @@ export function createSplats(gl, manifest, heights) {
     /**
      * Copy a chunk's records to their rows.
      *
-     * @param {{ rows: Uint32Array, records: Uint32Array }} chunk
+     * @param {{ tile: number, rows: Uint32Array, records: Uint32Array }} chunk
      */
-    addRecords({ rows, records: words }) {
+    addRecords({ tile, rows, records: words }) {
+      const owner = Uint32Array.of(tile < manifest.tiles.length ? Math.floor(tile / each) : OBJECTS);
+      bind(OWNERS, owners);
+      for (const row of rows) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, 1, 1, gl.RED_INTEGER, gl.UNSIGNED_INT, owner);
       bind(RECORDS, records);
       const wordsARow = 4 * ROW;
       for (let k = 0; k < rows.length; k++) {
@@ -136,6 +140,7 @@ export function createSplats(gl, manifest, heights) {
       }
       bind(RECORDS, records);
       bind(PLACES, places);
+      bind(OWNERS, owners);
       if (relief) bind(RELIEF, relief);
       bind(ENTRIES, entries);
       far.draw();
@@ -147,7 +152,7 @@ export function createSplats(gl, manifest, heights) {
 
     /** Free the textures. */
     end() {
-      for (const texture of [records, entries, nearEntries, places, hues, relief]) gl.deleteTexture(texture);
+      for (const texture of [records, entries, nearEntries, places, hues, owners, relief]) gl.deleteTexture(texture);
     },
   };
 }
@@ -162,6 +167,7 @@ function setConstants(gl, uniforms, manifest) {
   gl.uniform1i(uniforms.entries, ENTRIES);
   gl.uniform1i(uniforms.hues, HUES);
   gl.uniform1i(uniforms.places, PLACES);
+  gl.uniform1i(uniforms.owners, OWNERS);
   gl.uniform1i(uniforms.levels, manifest.levels.length);
   gl.uniform1f(uniforms.side, manifest.tile_side);
   gl.uniform1f(uniforms.near, NEAR * manifest.eye_floor);

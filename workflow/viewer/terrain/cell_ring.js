@@ -27,5 +27,14 @@ export function createCellRing(compute) {
       }
       return values[at];
     },
+    /** Compute a cell again when it is next asked for. @param {number} x @param {number} y */
+    forget(x, y) {
+      const at = (y & (RING - 1)) * RING + (x & (RING - 1));
+      if (i[at] === x && j[at] === y) i[at] = NaN;
+    },
+    /** Compute all cells again. */
+    clear() {
+      i.fill(NaN);
+    },
   };
 }

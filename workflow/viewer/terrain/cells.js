@@ -25,9 +25,9 @@ export function tileUnder({ tile_side: side, salt, tiles, materials }, x, y) {
 
 /**
  * A cell where materials meet. serial: distinguishes it from all others; kept: by chunk, the Gaussians that stay in it;
- * last, batch: key of the batch that was drawn last, and the batch.
+ * last, batch: key of the batch that was drawn last, and the batch; stale: its classes have changed.
  * @typedef {{ i: number, j: number, serial: number, kept: Map<number, Uint32Array>, last: number | null,
- *   batch: { pages: Uint32Array, count: number, stamp: number } | null }} Border
+ *   batch: { pages: Uint32Array, count: number, stamp: number } | null, stale: boolean }} Border
  *
  * A cache of cells by their coordinates modulo RING: the tile (of the first material), height and slope at the centre,
  * bounds of the height; the tiles of all materials that may show, the Gaussians by level that stay of them and of the
@@ -84,7 +84,10 @@ function coverCell({ cache, salt, variants, each, tiles, classes, scatter, level
   const tile = first + each * (31 - Math.clz32(bits & -bits)), alone = (bits & (bits - 1)) === 0;
   cache.tile[at] = tile;
   cache.things[at] = things;
-  cache.border[at] = alone ? null : { i, j, serial: ++cache.borders, kept: new Map(), last: null, batch: null };
+  const old = cache.border[at], same = old && old.i === i && old.j === j ? old : null;
+  const { last, batch } = same ?? { last: null, batch: null };
+  cache.border[at] = alone ? null : same?.stale === false ? same
+    : { i, j, serial: ++cache.borders, kept: new Map(), last, batch, stale: false };
   cache.tiles[at] = tiles[tile].alone;
   if (!alone) {
     const materials = Array.from({ length: classes?.materials ?? 1 }, (_, m) => m).filter((m) => (bits >> m) & 1);
@@ -98,6 +101,23 @@ function coverCell({ cache, salt, variants, each, tiles, classes, scatter, level
     }
     for (const thing of things) sum += tiles[thing.tile].counts[level];
     cache.counts[at * levels + level] = Math.ceil(sum);
+  }
+}
+
+/**
+ * Cover cells again when they are next in view: their objects have changed, or their classes (`stale`) too.
+ *
+ * @param {CellCache} cache
+ * @param {boolean} stale
+ * @param {[number, number] | null} [cell] null: all cells
+ */
+export function forgetCells(cache, stale, cell = null) {
+  const only = cell && (cell[1] & (RING - 1)) * RING + (cell[0] & (RING - 1));
+  for (let at = only ?? 0; at < (only === null ? RING * RING : only + 1); at++) {
+    const border = cache.border[at];
+    if (cell && (cache.i[at] !== cell[0] || cache.j[at] !== cell[1]) && !Number.isNaN(cache.i[at])) continue;
+    cache.i[at] = NaN;
+    if (stale && border && (!cell || (border.i === cell[0] && border.j === cell[1]))) border.stale = true;
   }
 }
 

@@ -7,6 +7,7 @@ import {
 } from "./class_squares.js";
 import { createNoise, wrapIndex } from "./heights.js";
 import { createJitter, MAX_OCTAVES, octaveGains, SHIFT } from "./jitter.js";
+import { applyPaint, createPainted } from "./painted.js";
 
 /**
  * Terms of the rule in the manifest's `classes`.
@@ -18,7 +19,7 @@ import { createJitter, MAX_OCTAVES, octaveGains, SHIFT } from "./jitter.js";
  *   columns: number, width: number, beyond: string }} PictureTerm
  * @typedef {NoiseTerm | RangeTerm | PictureTerm} Term
  * @typedef {{ salt: number, rule: Term[], jitter: { cells: number, octaves: number, amplitude: number },
- *   rise: { slope: number, most: number, ground: number[], clearance: number[] } }} ClassesEntry
+ *   rise: { slope: number, most: number, ground: number[], clearance: number[] }, painted?: number[][] }} ClassesEntry
  *
  * Pixels of the rule's pictures by file, the northern row first.
  * @typedef {Map<string, Uint8Array>} Pictures
@@ -33,6 +34,7 @@ export const MAX_MATERIALS = 8;
 const NOISE = 16; // axis of the hash: octave k of material m uses NOISE + MAX_OCTAVES m + k
 const TURN = [0.8, 0.6]; // cosine and sine by which each octave is turned against the last
 const FARTHEST = 4; // weights by which a score falls at most outside of a range
+const PAINT = 1.25; // lead of what is painted over all others, as a multiple of what border effects can change
 
 /**
  * The class function of a terrain.
@@ -45,7 +47,10 @@ const FARTHEST = 4; // weights by which a score falls at most outside of a range
  */
 export function createClasses(entry, materials, side, heights, pictures = new Map()) {
   const { jitter, rise } = entry, wave = 2 * jitter.amplitude, here = new Float64Array(materials);
-  const addTerms = entry.rule.map((term) => createTerm(term, { materials, side, heights, pictures, salt: entry.salt }));
+  const painted = createPainted(LATTICE), weights = new Float64Array(materials), lead = paintLead(entry);
+  for (const [i, j, length, m] of entry.painted ?? []) for (let k = 0; k < length; k++) painted.set(i + k, j, m);
+  const rule = entry.rule.map((term) => (term.kind === "noise" ? { ...term, biases: [...term.biases] } : term));
+  const addTerms = rule.map((term) => createTerm(term, { materials, side, heights, pictures, salt: entry.salt }));
   const jitterAt = createJitter(entry, materials), waves = new Float64Array(materials);
   const corners = Array.from({ length: 4 }, () => new Float64Array(materials));
   /** @type {WeakMap<Float32Array, { material: number, squares: Uint8Array }>} */
@@ -67,6 +72,8 @@ export function createClasses(entry, materials, side, heights, pictures = new Ma
   function latticeScores(i, j, out, at) {
     out.fill(0, at, at + materials);
     for (const add of addTerms) add(i, j, out, at);
+    const sum = painted.weightsAt(i, j, weights);
+    if (sum) applyPaint(out, at, weights, sum, lead);
   }
 
   /** @param {number} i @param {number} j @returns {Lattice} */
@@ -131,6 +138,18 @@ export function createClasses(entry, materials, side, heights, pictures = new Ma
   return {
     materials,
     amplitude: jitter.amplitude,
+    painted,
+    /** Compute a cell again: paint in it or beside it has changed. @param {number} i @param {number} j */
+    forget: (i, j) => cells.forget(i, j),
+    /** Add to the biases of the rule's noise, by material. @param {number[]} offsets */
+    setOffsets(offsets) {
+      rule.forEach((term, k) => {
+        const { [k]: old } = entry.rule;
+        if (term.kind !== "noise" || old.kind !== "noise") return;
+        for (let m = 0; m < materials; m++) term.biases[m] = old.biases[m] + offsets[m];
+      });
+      cells.clear();
+    },
     latticeScores,
     scoresAt,
     /** Jitter at a place of a cell. @param {number} i @param {number} j @param {number} u @param {number} v */
@@ -183,6 +202,13 @@ export function createClasses(entry, materials, side, heights, pictures = new Ma
     },
   };
 }
+
+/**
+ * By how much the score of what is painted exceeds the others: just enough that nothing of them is left.
+ *
+ * @param {ClassesEntry} entry
+ */
+const paintLead = ({ jitter, rise }) => PAINT * (2 * jitter.amplitude + rise.most) || 1;
 
 /**
  * By how much a material's score exceeds the highest of the others, without jitter.

@@ -35,8 +35,10 @@ export const MAX_RADIUS = 1; // of a footprint, in tile sides: at most 4 cells a
 export function createScatter({ cells: n, turn, size, salt }, objects, side, classes) {
   const square = side / n, widest = 2 * Math.max(...objects.map(({ radius }) => radius)) * (1 + size);
   const ring = Math.ceil(Math.ceil((widest * n) / side) / n), materials = classes ? classes.materials : 1;
-  const thresholds = Array.from({ length: materials }, (_, m) => sumProbabilities(objects, m));
-  const most = Math.max(...thresholds.map((sums) => sums[sums.length - 1]));
+  /** @type {number[][]} */
+  let thresholds = [];
+  let most = 0;
+  const rim = Math.ceil(widest / 2 / side); // cells around a cell whose classes decide about its candidates
   const candidates = createCellRing((i, j) => {
     const found = [];
     for (let row = 0; row < n; row++) {
@@ -93,7 +95,34 @@ export function createScatter({ cells: n, turn, size, salt }, objects, side, cla
     return dx * dx + dy * dy < reach * reach;
   }
 
+  function clear() {
+    candidates.clear();
+    standing.clear();
+  }
+
+  /** @param {number[]} probabilities by object */
+  function setProbabilities(probabilities) {
+    thresholds = Array.from({ length: materials }, (_, m) => sumProbabilities(objects, probabilities, m));
+    most = Math.max(...thresholds.map((sums) => sums[sums.length - 1]));
+    clear();
+  }
+  setProbabilities(objects.map(({ probability }) => probability));
+
   return {
+    setProbabilities,
+    /** Compute all objects again. */
+    clear,
+    /** Cells around one whose classes have changed in which other objects may stand. */
+    margin: rim + ring,
+    /** Compute the objects again about a cell whose classes have changed. @param {number} i @param {number} j */
+    forget(i, j) {
+      for (let north = -rim - ring; north <= rim + ring; north++) {
+        for (let east = -rim - ring; east <= rim + ring; east++) {
+          standing.forget(i + east, j + north);
+          if (Math.max(Math.abs(east), Math.abs(north)) <= rim) candidates.forget(i + east, j + north);
+        }
+      }
+    },
     /**
      * The objects whose feet lie in a cell.
      *
@@ -115,11 +144,12 @@ function leads(p, q) {
  * By object, the sum of the probabilities of those on a material up to it.
  *
  * @param {ScatterObject[]} objects
+ * @param {number[]} probabilities
  * @param {number} m
  */
-function sumProbabilities(objects, m) {
+function sumProbabilities(objects, probabilities, m) {
   let sum = 0;
-  return objects.map(({ material, probability }) => (sum += material === m ? probability : 0));
+  return objects.map(({ material }, k) => (sum += material === m ? probabilities[k] : 0));
 }
 
 /**

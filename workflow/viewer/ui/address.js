@@ -1,4 +1,4 @@
-// The place in the page's address: `#x,y,eye,yaw,pitch`.
+// The place in the page's address, and what is painted: `#x,y,eye,yaw,pitch&paint=...`.
 
 import { moveTo, PLACE_KEYS } from "./walker.js";
 
@@ -8,6 +8,7 @@ import { moveTo, PLACE_KEYS } from "./walker.js";
  */
 
 const EVERY = 500; // milliseconds between updates of the address
+const PAINT = "&paint=";
 
 /**
  * The address's part for a walker's place, to a thousandth of the eye floor and of a degree.
@@ -27,7 +28,7 @@ export function formatPlace(walker) {
  * @returns {Partial<Place>}
  */
 export function parsePlace(hash) {
-  const values = decode(hash.replace(/^#/, "")).split(",").map((v) => (v.trim() === "" ? NaN : Number(v)));
+  const values = decode(hash.replace(/^#/, "")).split(PAINT)[0].split(",").map((v) => (v.trim() === "" ? NaN : Number(v)));
   /** @type {Partial<Place>} */
   const place = {};
   PLACE_KEYS.forEach((key, k) => {
@@ -35,6 +36,17 @@ export function parsePlace(hash) {
   });
   return place;
 }
+
+/** The painted part of an address; "": none. @param {string} hash */
+export const parsePaint = (hash) => hash.split(PAINT)[1] ?? "";
+
+/**
+ * The address's part for a place and what is painted.
+ *
+ * @param {Walker} walker
+ * @param {string} paint "": nothing
+ */
+export const formatAddress = (walker, paint) => formatPlace(walker) + (paint && PAINT + paint);
 
 /** @param {string} text */
 function decode(text) {
@@ -49,12 +61,13 @@ function decode(text) {
  * Keep the address at the walker's place, and follow an address that a person enters.
  *
  * @param {Walker} walker
- * @param {() => void} onChange
+ * @param {Pick<import("./paint_keep.js").PaintKeep, "link" | "follow">} paint
+ * @param {{ onChange: () => void, onError: (error: unknown) => void }} handlers
  */
-export function syncAddress(walker, onChange) {
+export function syncAddress(walker, paint, { onChange, onError }) {
   let last = location.hash;
   const write = () => {
-    const hash = formatPlace(walker);
+    const hash = formatAddress(walker, paint.link);
     if (hash === last) return;
     last = hash;
     history.replaceState(null, "", hash);
@@ -65,6 +78,7 @@ export function syncAddress(walker, onChange) {
     if (location.hash === last) return;
     last = location.hash;
     moveTo(walker, parsePlace(last));
+    paint.follow(parsePaint(last)).catch(onError);
     onChange();
   });
 }

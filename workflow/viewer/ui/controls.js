@@ -1,6 +1,7 @@
 // Controls of the walker: keys, mouse, wheel, touch and the pad.
 
 import { FIELD_OF_VIEW } from "../terrain/camera.js";
+import { isField } from "./dom.js";
 import { moveTo } from "./walker.js";
 
 /**
@@ -13,6 +14,7 @@ const KEYS = {
   KeyW: "forward", ArrowUp: "forward", KeyS: "back", ArrowDown: "back", KeyA: "left", KeyD: "right",
   ArrowLeft: "turnLeft", ArrowRight: "turnRight", KeyQ: "lower", KeyE: "higher", ShiftLeft: "run", ShiftRight: "run",
 };
+const ARROWS = /^Arrow/; // keys that lists and sliders need themselves
 const WHEEL_PIXELS = [1, 16, 400]; // by deltaMode: pixels, lines, pages
 
 /**
@@ -21,12 +23,14 @@ const WHEEL_PIXELS = [1, 16, 400]; // by deltaMode: pixels, lines, pages
  * @param {Walker} walker
  * @param {HTMLElement} canvas
  * @param {HTMLElement} pad
+ * @param {Pick<import("./paint_brush.js").Brush, "begin" | "move" | "end" | "cancel">} brush may take pointers
  * @param {() => void} onChange
  */
-export function listenToControls(walker, canvas, pad, onChange) {
+export function listenToControls(walker, canvas, pad, brush, onChange) {
   addEventListener("keydown", (event) => {
     const action = KEYS[event.code];
     if (!action || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (ARROWS.test(event.code) && isField(event.target)) return;
     if (action !== "run") event.preventDefault();
     walker.held.add(action);
     onChange();
@@ -39,7 +43,7 @@ export function listenToControls(walker, canvas, pad, onChange) {
     moveTo(walker, { eye: walker.eye * Math.exp(Math.min(Math.max(pixels, -200), 200) / 500) });
     onChange();
   }, { passive: false });
-  listenToPointers(walker, canvas, onChange);
+  listenToPointers(walker, canvas, brush, onChange);
   pad.addEventListener("pointerdown", (event) => {
     pad.setPointerCapture(event.pointerId);
     walker.held.add("forward");
@@ -49,26 +53,33 @@ export function listenToControls(walker, canvas, pad, onChange) {
 }
 
 /**
- * One pointer turns the view, as if the picture were held; two fingers walk (drag) and change height (pinch).
+ * One pointer turns the view, as if the picture were held, unless the brush takes it; two fingers walk (drag) and change
+ * height (pinch).
  *
  * @param {Walker} walker
  * @param {HTMLElement} canvas
+ * @param {Pick<import("./paint_brush.js").Brush, "begin" | "move" | "end" | "cancel">} brush
  * @param {() => void} onChange
  */
-function listenToPointers(walker, canvas, onChange) {
+function listenToPointers(walker, canvas, brush, onChange) {
   /** @type {Map<number, Point>} */
   const down = new Map();
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
     down.set(event.pointerId, [event.clientX, event.clientY]);
+    if (down.size > 1) brush.cancel();
+    else brush.begin(event);
   });
   /** @param {PointerEvent} event */
-  const release = (event) => down.delete(event.pointerId);
+  const release = (event) => {
+    brush.end(event);
+    down.delete(event.pointerId);
+  };
   canvas.addEventListener("pointerup", release);
   canvas.addEventListener("pointercancel", release);
   canvas.addEventListener("pointermove", (event) => {
-    const from = down.get(event.pointerId);
-    if (!from) return;
+    const painted = brush.move(event), from = down.get(event.pointerId);
+    if (painted || !from) return;
     const to = [event.clientX, event.clientY], size = Math.max(canvas.clientWidth, canvas.clientHeight);
     const other = [...down].find(([id]) => id !== event.pointerId)?.[1];
     down.set(event.pointerId, to);

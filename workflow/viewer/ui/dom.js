@@ -3,7 +3,7 @@
 /**
  * An element of index.html. Throws: there is none of this id and type.
  *
- * @template {HTMLElement} T
+ * @template {Element} T
  * @param {string} id
  * @param {new () => T} type
  * @returns {T}
@@ -12,6 +12,18 @@ export function element(id, type) {
   const found = document.getElementById(id);
   if (!(found instanceof type)) throw new TypeError(`index.html has no ${type.name} of id ${id}`);
   return found;
+}
+
+/** Is this where keys enter or choose something? @param {EventTarget | null} target */
+export const isField = (target) => target instanceof HTMLInputElement || target instanceof HTMLSelectElement
+  || target instanceof HTMLButtonElement || (target instanceof HTMLElement && target.tagName === "SUMMARY");
+
+/** A patch of a colour, 0 to 1. @param {number[]} colour */
+export function swatch(colour) {
+  const patch = document.createElement("i");
+  patch.className = "swatch";
+  patch.style.backgroundColor = `rgb(${colour.map((v) => Math.round(255 * v)).join(" ")})`;
+  return patch;
 }
 
 /**

@@ -1,4 +1,5 @@
-// Files dropped onto the page: a bundle's folder, its zip, a gswt.zip for the public renderer, or a fly path.
+// Files dropped onto the page: a bundle's folder, its zip, a gswt.zip for the public renderer, or a JSON file of a fly
+// path or of painted materials.
 
 import { PageError } from "../data/errors.js";
 import { gswtSource, isGswt } from "../data/gswt.js";
@@ -9,7 +10,7 @@ import { openZip } from "../data/zip.js";
 /**
  * @typedef {import("../data/source.js").Source} Source
  * @typedef {import("../data/source.js").Files} Files
- * @typedef {{ openSource: (source: Source) => Promise<void>, loadPath: (json: unknown) => void,
+ * @typedef {{ openSource: (source: Source) => Promise<void>, loadJson: (json: unknown) => void,
  *   onError: (error: unknown) => void }} DropHandlers
  */
 
@@ -39,10 +40,10 @@ export function listenToDrops(handlers) {
  * @param {File[]} loose
  * @param {DropHandlers} handlers
  */
-async function handleDrop(entries, loose, { openSource, loadPath }) {
+async function handleDrop(entries, loose, { openSource, loadJson }) {
   const files = entries.length ? await listFiles(entries) : new Map(loose.map((file) => [file.name, file]));
   const only = files.size === 1 ? [...files.values()][0] : null;
-  if (only && /\.json$/i.test(only.name) && only.name !== NAME) return loadPath(await parseJson(only));
+  if (only && /\.json$/i.test(only.name) && only.name !== NAME) return loadJson(await parseJson(only));
   if (only && /\.zip$/i.test(only.name)) return openSource(await sourceOf(await openZip(only)));
   /** @type {Files} */
   const readers = new Map([...files].map(([name, file]) => [name, { size: file.size, open: () => file.arrayBuffer() }]));
@@ -76,7 +77,7 @@ async function parseJson(file) {
     return JSON.parse(await file.text());
   } catch (error) {
     const { message } = /** @type {Error} */ (error);
-    throw new PageError(`${file.name} is not readable as JSON (${message}). Drop a fly path that this page saved.`);
+    throw new PageError(`${file.name} is not readable as JSON (${message}). Drop a file that this page saved.`);
   }
 }
 

@@ -1,6 +1,7 @@
 // Texts of the page: progress while loading, place and speed, help, errors.
 
-import { element } from "./dom.js";
+import { OBJECTS, materialColour } from "../draw/overlays.js";
+import { element, swatch } from "./dom.js";
 
 /**
  * What the numbers show.
@@ -17,7 +18,7 @@ export function createHud() {
   const status = element("status", HTMLElement), bar = element("bar", HTMLProgressElement);
   const place = element("place", HTMLElement), speed = element("speed", HTMLElement);
   const times = element("times", HTMLElement), tools = element("tools", HTMLElement);
-  const help = createHelp(), footer = /** @type {HTMLElement} */ (place.parentElement);
+  const legend = element("legend", HTMLElement), help = createHelp(), footer = /** @type {HTMLElement} */ (place.parentElement);
   let announced = -Infinity, numbered = -Infinity;
   error.addEventListener("click", () => (error.hidden = true));
   footer.hidden = tools.hidden = true;
@@ -57,6 +58,21 @@ export function createHud() {
     },
     showTools() {
       footer.hidden = tools.hidden = false;
+    },
+    /**
+     * The names of the colours in the overlay of materials; null: none are shown.
+     *
+     * @param {import("../data/manifest.js").Manifest | null} manifest
+     */
+    showLegend(manifest) {
+      const names = manifest?.materials.map(({ name }, m) => ({ name, number: m })) ?? [];
+      if (manifest?.objects?.length) names.push({ name: "objects", number: OBJECTS });
+      legend.hidden = !manifest;
+      legend.replaceChildren(...names.map(({ name, number }) => {
+        const item = document.createElement("li");
+        item.append(swatch(materialColour(number)), name);
+        return item;
+      }));
     },
     /**
      * Place, speed and times; a few times a second at most, unless forced.

@@ -11,24 +11,28 @@ import { cameraAt } from "../terrain/camera.js";
 import { REACH, tileUnder } from "../terrain/cells.js";
 import { createHeights } from "../terrain/heights.js";
 import { createWorkerClient } from "../worker/worker_client.js";
-import { parsePlace } from "./address.js";
+import { formatAddress, parsePlace } from "./address.js";
 import { createFlyPath } from "./fly_path.js";
+import { createPainting } from "./painting.js";
 import { createWalker, moveTo } from "./walker.js";
 
 /**
  * @typedef {import("../data/source.js").Source} Source
  * @typedef {import("./walker.js").Walker} Walker
  *
- * An open bundle. renderer: null while the graphics context is lost; frame: the worker's last; coarse: chunks of the
+ * An open bundle. lift: mean height of the ground of its tiles above the surface; renderer: null while the graphics context is lost; frame: the worker's last; coarse: chunks of the
  * coarsest level that have arrived; pending: keys of chunks that are being read again.
  * @typedef {{ manifest: import("../data/manifest.js").Manifest, source: Source, walker: Walker,
  *   heights: import("../terrain/heights.js").HeightField, client: import("../worker/worker_client.js").WorkerClient,
  *   renderer: import("../draw/renderer.js").Renderer | null,
- *   frame: import("../worker/frame_builder.js").FrameAnswer | null, coarse: number, pending: Set<number> }} Scene
+ *   frame: import("../worker/frame_builder.js").FrameAnswer | null, coarse: number, pending: Set<number>,
+ *   painting: import("./painting.js").Painting, lift: number }} Scene
  *
  * still: draw only when asked, for tests and screenshots; firstBudget: of the first picture then; onFirstScene: called
- * when the first bundle's manifest is read.
- * @typedef {{ still: boolean, firstBudget: number, onFirstScene: (walker: Walker) => void }} Options
+ * when the first bundle's manifest is read; onScene: called, and awaited, when any is, `first` or not; onPaint: something
+ * was painted or set; onPicture: a picture was drawn.
+ * @typedef {{ still: boolean, firstBudget: number, onFirstScene: (walker: Walker) => void,
+ *   onScene: (scene: Scene, first: boolean) => Promise<void>, onPaint: () => void, onPicture: () => void }} Options
  */
 
 const MAX_PIXEL_RATIO = 1.5; // device pixels a CSS pixel: splats are soft, pixels cost
@@ -101,10 +105,20 @@ export class Viewer {
     }
     const walker = Object.assign(this.#walker ?? begin, begin);
     this.#walker = walker;
-    this.scene = { manifest, source, heights, client, walker, renderer, frame: null, coarse: 0, pending: new Set() };
+    const painting = createPainting(manifest, client, () => {
+      this.options.onPaint();
+      this.redraw();
+    });
+    this.scene = {
+      manifest, source, heights, client, walker, renderer, frame: null, coarse: 0, pending: new Set(), painting,
+      lift: mean(manifest.classes?.rise.ground ?? [0]),
+    };
     if (first) this.options.onFirstScene(walker);
     this.hud.showTools();
+    this.#showLegend();
     this.drawFrame(); // sky and far ground at once
+    await this.options.onScene(this.scene, first);
+    if (stop.signal.aborted) return;
     try {
       await readChunks(initialChunks(manifest), source, {
         take: (chunk) => client.add(chunk), onProgress: (progress) => this.hud.showProgress(progress),
@@ -120,8 +134,8 @@ export class Viewer {
     this.hud.showLoaded(this.options.still);
   }
 
-  /** @param {Scene} scene */
-  #camera({ walker, heights }) {
+  /** The camera of the walker's eye. @param {Scene} scene */
+  camera({ walker, heights }) {
     const ratio = Math.min(devicePixelRatio, MAX_PIXEL_RATIO);
     /** @param {number} size */
     const pixels = (size) => Math.max(1, Math.round(size * ratio));
@@ -137,14 +151,14 @@ export class Viewer {
   askWorker(budget, patient) {
     if (!this.scene) return;
     this.stale = false;
-    this.scene.client.ask(this.#camera(this.scene), budget, patient);
+    this.scene.client.ask(this.camera(this.scene), budget, patient);
   }
 
   /** Draw the picture now, of the worker's last frame. */
   drawFrame() {
     const { scene, canvas } = this;
     if (!scene?.renderer) return;
-    const start = performance.now(), { manifest, heights, frame, renderer } = scene, camera = this.#camera(scene);
+    const start = performance.now(), { manifest, heights, frame, renderer } = scene, camera = this.camera(scene);
     const { width, height } = camera, farthest = REACH * manifest.tile_side;
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     this.gl.viewport(0, 0, width, height);
@@ -158,6 +172,7 @@ export class Viewer {
       now: start, state: () => describeScene(scene), stats: this.stats.summary(), fps: this.pacing.fps,
       unit: manifest.unit, force: this.options.still,
     });
+    this.options.onPicture();
   }
 
   /**
@@ -194,7 +209,17 @@ export class Viewer {
   /** @param {number} overlay */
   showOverlay(overlay) {
     this.overlay = overlay;
+    this.#showLegend();
     this.redraw();
+  }
+
+  #showLegend() {
+    this.hud.showLegend(OVERLAYS[this.overlay] === "material" ? this.scene?.manifest ?? null : null);
+  }
+
+  /** The address of this place. @param {string} paint of what is painted */
+  address(paint) {
+    return this.scene ? formatAddress(this.scene.walker, paint) : "";
   }
 
   /** The picture on the screen as a PNG file. @returns {Promise<Blob>} */
@@ -277,6 +302,9 @@ export class Viewer {
     });
   }
 }
+
+/** @param {number[]} values */
+const mean = (values) => values.reduce((sum, v) => sum + v, 0) / values.length;
 
 /** Place and picture of a scene, in plain values. @param {Scene} scene */
 function describeScene({ manifest, walker, frame }) {

@@ -9,6 +9,7 @@ import { cellMark, createBlockList, createPlaceList } from "./block_list.js";
 import { createBorders } from "./borders.js";
 import { createChunkStore } from "./chunk_store.js";
 import { createNearSorter } from "./near_sort.js";
+import { adjustCover, paintPoints } from "./repaint.js";
 import { createSortedBatches } from "./sorted_batches.js";
 import { createTerrainTables } from "./terrain_tables.js";
 
@@ -149,6 +150,10 @@ export function createFrameBuilder(manifest, heights, pictures) {
     get work() {
       return { tested: borders.tested, ...batches.work };
     },
+    /** @param {Int32Array} points see `paintPoints` */
+    paint: (points) => paintPoints(terrain, points),
+    /** @param {import("./worker.js").Changes} changes */
+    adjust: (changes) => adjustCover(terrain, changes),
     /** @param {import("../data/bundle.js").Chunk} chunk */
     add: (chunk) => store.add(chunk, stamp),
     /**

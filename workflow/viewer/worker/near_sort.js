@@ -53,7 +53,7 @@ export function createNearSorter(store, terrain, borders) {
     for (let level = lo; level <= hi; level++) {
       const range = rangeOf(level, single, distances);
       for (const tile of tiles) {
-        const whole = store.get(tile, level), key = `${i},${j},${level},${tile}`;
+        const whole = store.get(tile, level), key = `${i},${j},${level},${tile},${border?.serial ?? 0}`;
         const chunk = border ? findKept(key, border, tile, level, whole) : whole;
         const lift = findLift(key, i, j, chunk), code = SLOTS + MAX_LEVELS * slot + level;
         if (chunk.count) parts.push({ chunk, lift, ...place, code, begin: range.begin, end: range.end });

@@ -11,7 +11,9 @@ import { createFrameBuilder } from "./frame_builder.js";
  *   pictures: import("../terrain/classes.js").Pictures }} Begin
  * @typedef {{ kind: "view", id: number, camera: import("../terrain/camera.js").Camera, budget: number,
  *   patient: boolean }} View
- * @typedef {Begin | View | { kind: "chunk", chunk: Chunk } | { kind: "restore" }} Request
+ * @typedef {{ offsets: number[] | null, probabilities: number[] | null }} Changes see `adjustCover`
+ * @typedef {Begin | View | { kind: "chunk", chunk: Chunk } | { kind: "restore" }
+ *   | { kind: "paint", points: Int32Array } | { kind: "adjust", changes: Changes }} Request
  *
  * What the worker posts. records: of a chunk that was added, for the GPU.
  * @typedef {{ kind: "records", tile: number, level: number, rows: Uint32Array, records: Uint32Array }} Records
@@ -74,6 +76,8 @@ function answer(request) {
     if (!busy) setTimeout(() => attempt(workAhead));
     busy = true;
   }
+  else if (request.kind === "paint") builder.paint(request.points);
+  else if (request.kind === "adjust") builder.adjust(request.changes);
   else { // the GPU has lost everything
     builder.batches.forget();
     for (const chunk of builder.store.all()) postRecords(chunk);

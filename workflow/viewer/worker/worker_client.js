@@ -56,6 +56,10 @@ export function createWorkerClient(bundle, { onRecords, onFrame, onError }) {
     add: (chunk) => post({ kind: "chunk", chunk }, [chunk.buffer]),
     /** Post all records again: the GPU has lost them. */
     restore: () => post({ kind: "restore" }),
+    /** Paint points: I, J and material of each. @param {Int32Array} points */
+    paint: (points) => post({ kind: "paint", points }),
+    /** @param {import("./worker.js").Changes} changes */
+    adjust: (changes) => post({ kind: "adjust", changes }),
     /**
      * Ask for the frame of a camera.
      *

@@ -1,0 +1,158 @@
+// The panel of materials: brushes, history, densities and shares, links and files.
+
+import { MAX_PAINTED } from "../terrain/painted.js";
+import { element, isField, swatch } from "./dom.js";
+import { createBrush, ERASER, SIZES } from "./paint_brush.js";
+import { createPaintKeep } from "./paint_keep.js";
+import { addDensities, addShares } from "./paint_sliders.js";
+
+/**
+ * @typedef {import("./viewer.js").Viewer} Viewer
+ * @typedef {ReturnType<typeof createPaintPanel>} PaintPanel
+ */
+
+const TROUBLES = {
+  sky: "There is no ground under the brush.", far: "So far from the origin nothing can be painted.",
+  full: `No more can be painted: ${MAX_PAINTED.toLocaleString("en")} places is the most. Erase some.`,
+};
+const LOOK = "look"; // value of the choice that paints nothing
+const TOO_LONG = "This is too much for a link. Save it as a file.";
+
+/** @param {Viewer} viewer */
+export function createPaintPanel(viewer) {
+  const panel = element("paint", HTMLElement), toggle = element("paintButton", HTMLButtonElement);
+  const brushes = element("brushes", HTMLFieldSetElement), status = element("paintStatus", HTMLElement);
+  const [undo, redo, clear, copy, save, open, close] = ["undo", "redo", "clear", "copyLink", "savePaint", "openPaint",
+    "paintClose"].map((id) => element(id, HTMLButtonElement));
+  const file = element("paintFile", HTMLInputElement), size = element("brushSize", HTMLInputElement);
+  const brush = createBrush(viewer, (trouble) => say(trouble ? TROUBLES[trouble] : ""));
+  const keep = createPaintKeep(viewer, (tooLong) => tooLong && say(TOO_LONG));
+  /** @type {(() => void)[]} */
+  let refreshers = []; // of sliders
+  Object.assign(size, { min: SIZES.least, max: SIZES.most, step: 0.1, value: SIZES.first });
+
+  /** @param {string} text */
+  function say(text) {
+    if (status.textContent !== text) status.textContent = text;
+  }
+
+  /** @param {boolean} on */
+  function show(on) {
+    panel.hidden = !on;
+    toggle.setAttribute("aria-expanded", String(on));
+    if (!on) choose(LOOK);
+  }
+
+  /** @param {string} value of a brush */
+  function choose(value) {
+    const radio = brushes.querySelector(`input[value="${value}"]`);
+    if (!(radio instanceof HTMLInputElement)) return;
+    radio.checked = true;
+    brush.material = value === LOOK ? null : Number(value);
+    document.documentElement.classList.toggle("painting", brush.material !== null);
+    brush.draw();
+  }
+
+  /** @param {string} value @param {string} name @param {string} key @param {number[] | null} colour */
+  function addBrush(value, name, key, colour) {
+    const label = document.createElement("label"), radio = document.createElement("input");
+    Object.assign(radio, { type: "radio", name: "brush", value });
+    radio.addEventListener("change", () => choose(value));
+    label.append(radio, ...colour ? [swatch(colour)] : [], name);
+    label.title = `${name} (${key})`;
+    brushes.append(label);
+  }
+
+  function update() {
+    const { painting } = viewer.scene ?? {};
+    undo.disabled = !painting?.canUndo;
+    redo.disabled = !painting?.canRedo;
+    for (const refresh of refreshers) refresh();
+  }
+
+  /** @param {() => unknown} act */
+  const guarded = (act) => async () => {
+    try {
+      await act();
+    } catch (error) {
+      viewer.fail(error);
+    }
+  };
+  const take = () => viewer.scene?.painting.undo(), again = () => viewer.scene?.painting.redo();
+
+  async function copyLink() {
+    const link = await keep.findLink();
+    if (link === null) return say(TOO_LONG);
+    const address = new URL(location.href);
+    address.hash = viewer.address(link);
+    history.replaceState(null, "", address.hash);
+    try {
+      await navigator.clipboard.writeText(address.href);
+      say("The link is copied.");
+    } catch {
+      say("The link is in the address bar.");
+    }
+  }
+
+  toggle.addEventListener("click", () => show(Boolean(panel.hidden)));
+  close.addEventListener("click", () => show(false));
+  undo.addEventListener("click", take);
+  redo.addEventListener("click", again);
+  clear.addEventListener("click", () => viewer.scene?.painting.load(viewer.scene.painting.blank));
+  copy.addEventListener("click", guarded(copyLink));
+  save.addEventListener("click", () => keep.save());
+  open.addEventListener("click", () => file.click());
+  file.addEventListener("change", guarded(async () => {
+    const chosen = file.files?.[0];
+    if (chosen) await keep.open(chosen).finally(() => (file.value = ""));
+  }));
+  size.addEventListener("input", () => {
+    brush.radius = Number(size.value);
+    brush.draw();
+  });
+  addEventListener("keydown", (event) => {
+    if (toggle.hidden || event.altKey) return;
+    if (event.ctrlKey || event.metaKey) {
+      const redoes = event.code === "KeyY" || (event.code === "KeyZ" && event.shiftKey);
+      if (!redoes && event.code !== "KeyZ") return;
+      event.preventDefault();
+      return redoes ? again() : take();
+    }
+    if (event.code === "KeyM" && event.target !== element("overlay", HTMLSelectElement)) show(Boolean(panel.hidden));
+    if (panel.hidden || (isField(event.target) && event.code !== "Escape")) return;
+    if (event.code === "Escape") choose(LOOK);
+    else if (event.code === "KeyX") choose(String(ERASER));
+    else if (/^Digit[1-8]$/.test(event.code)) choose(String(Number(event.code[5]) - 1));
+    else if (event.code === "BracketLeft" || event.code === "BracketRight") {
+      if (event.code === "BracketLeft") size.stepDown(2);
+      else size.stepUp(2);
+      size.dispatchEvent(new Event("input"));
+    }
+  });
+
+  return {
+    brush,
+    keep,
+    /** Something was painted, set, or taken back. */
+    note() {
+      keep.note();
+      update();
+    },
+    /** A terrain was opened. @param {import("./viewer.js").Scene} scene */
+    showScene({ manifest, painting }) {
+      const { materials, objects = [] } = manifest;
+      toggle.hidden = materials.length < 2 && !objects.length;
+      keep.reset();
+      show(false);
+      say("");
+      brushes.replaceChildren(brushes.children[0]);
+      addBrush(LOOK, "look around", "Esc", null);
+      for (const [m, { name, ground_colour: colour }] of materials.entries()) addBrush(String(m), name, String(m + 1), colour);
+      addBrush(String(ERASER), "eraser", "X", null);
+      choose(LOOK);
+      element("brushBox", HTMLElement).hidden = materials.length < 2;
+      refreshers = [...addDensities(manifest, painting), ...addShares(manifest, painting)];
+      update();
+    },
+  };
+}
