@@ -227,8 +227,8 @@ def height_map(wildcards):
 
 
 def class_pictures(wildcards):
-    """The pictures that the rule of classes reads."""
-    files = [term["file"] for term in config["classes"] if term["kind"] == "image"]
+    """The pictures and painted files that the rule of classes reads."""
+    files = [term["file"] for term in config["classes"] if term["kind"] in ("image", "painted")]
     return {f"picture{number}": existing(file, "classes.file") for number, file in enumerate(files)}
 
 

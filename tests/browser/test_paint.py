@@ -7,16 +7,20 @@ import numpy as np
 import pytest
 from fixtures.dropped_files import drop
 from fixtures.land_covers import SIDE, write_cover_bundle
-from fixtures.page_visit import VIEWER
+from fixtures.page_visit import VIEWER, camera_at
 
+from dav_gswt.bundle.manifest import Manifest
+from dav_gswt.bundle.store import Bundle
 from dav_gswt.files import read_json, write_json
 from dav_gswt.study.terrain.browser import served
+from dav_gswt.terrain import endless, stills
 from dav_gswt.terrain.heights import Hills
 from dav_gswt.terrain.page import write_page
 
 SCHEMA = Path(__file__).parents[2] / "workflow/schemas/davgswt.schema.json"
 EYE = 20.0
 ABOVE = dict(x=6.0, y=5.0, eye=EYE, yaw=90.0, pitch=-90.0)  # a picture of 240 x 240: its upper edge is north
+WALKER = dict(x=1.0, y=4.0, eye=2.0, yaw=40.0, pitch=-25.0)
 PIXEL = 2 * EYE * np.tan(np.radians(30)) / 240  # on the ground
 SPREAD = 3 / 8 * SIDE  # how far beyond a painted point the classes change
 THINGS = 3 * 0.46  # and how far from there other objects may stand: an extent, and the reach of the one it displaces
@@ -186,7 +190,7 @@ def test_a_broken_link_is_told_and_the_terrain_is_there(visit, address, link, me
 
 
 def test_too_much_for_a_link_is_told_and_goes_into_a_file(seen):
-    noise = np.random.default_rng(0).integers(0, [30, 30, 2], (20_000, 3)).tolist()
+    noise = np.random.default_rng(0).integers(0, [30, 20, 2], (12_000, 3)).tolist()
     runs = [[40 * (k % 200) + i, k // 200, 1 + length, m] for k, (i, length, m) in enumerate(noise)]
     runs = [[i, j, min(length, 40 - i % 40), m] for i, j, length, m in runs]
     seen.page.evaluate("paint => davgswt.paint.keep.load(paint)", BLANK | {"runs": runs})
@@ -334,6 +338,32 @@ def test_where_other_terms_fix_places_there_are_no_sliders_of_shares(cover, tmp_
         assert seen.page.locator("#shares input").count() == 0
 
 
+def test_stills_show_what_was_painted_and_set(cover, tmp_path, seen, still):
+    """The saved file in the config: the library's picture, a page that begins with it, and the page it was painted on."""
+    seen.at(**ABOVE)
+    paint(seen, 4.0, 7.0, 3.0, 1)
+    paint(seen, 8.0, 2.0, 2.0, 0)
+    seen.page.evaluate("davgswt.painting.setDensity(0, 2, true)")
+    seen.page.evaluate("davgswt.painting.setOffsets([0.03, -0.03], true)")
+    with seen.page.expect_download() as download:
+        seen.page.locator("#savePaint").dispatch_event("click")
+    download.value.save_as(tmp_path / "painted.json")
+    rule = [{"kind": "noise"}, {"kind": "painted", "file": str(tmp_path / "painted.json")}]
+    write_page(cover / "bundle", VIEWER, tmp_path / "page", None, rule)
+    with served(tmp_path / "page") as address:
+        begun = still(address, 240, 240)
+        assert (begun.at(**ABOVE) == seen.picture()).all()
+        assert begun.page.evaluate("davgswt.paint.keep.findLink()") == ""
+    manifest = Manifest.from_dict(read_json(cover / "page/davgswt.json"))
+    terrain = endless.terrain_from_bundle(Bundle(cover / "page", manifest), {"kind": "flat"}, rule)
+    camera = camera_at(terrain, WALKER)
+    expected = np.rint(255 * stills.render_view(terrain, camera, manifest.sky, manifest.ground_colour))
+    seen.page.set_viewport_size({"width": 160, "height": 100})
+    difference = np.abs(seen.at(**WALKER) - expected)
+    seen.page.set_viewport_size({"width": 240, "height": 240})
+    assert difference.mean() < 1.0 and difference.max() <= 32
+
+
 def test_a_terrain_of_one_material_has_no_panel(still, plain):
     assert not still(plain, 160, 100).page.locator("#paintButton").is_visible()
 
@@ -353,7 +383,9 @@ def test_on_hills_the_brush_paints_what_is_seen_under_it(cover, tmp_path, visit)
     pitch, yaw, across, up = np.radians(-25), np.radians(30), (70 - 120) / 120, (80 - 60) / 120
     ahead, rise = 1 / np.tan(np.radians(30)), np.array([np.cos(pitch), np.sin(pitch)])
     way = np.array([ahead * rise[0] - up * rise[1], -across, ahead * rise[1] + up * rise[0]])
-    turned = np.array([np.cos(yaw) * way[0] - np.sin(yaw) * way[1], np.sin(yaw) * way[0] + np.cos(yaw) * way[1], way[2]])
+    turned = np.array(
+        [np.cos(yaw) * way[0] - np.sin(yaw) * way[1], np.sin(yaw) * way[0] + np.cos(yaw) * way[1], way[2]]
+    )
     seen_at = np.array([*place - [6.0, 5.0], ground - foot - 3.0])
     distance = np.linalg.norm(seen_at)
     assert distance < 15

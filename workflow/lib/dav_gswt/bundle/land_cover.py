@@ -4,10 +4,13 @@
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from dav_gswt.bundle.chunks import ChunkEntry, ChunkOrders
+
+MAX_PAINTED = 2**18  # points
+MAX_COORDINATE = 2**23  # of a painted point
 
 
 @dataclass(frozen=True)
@@ -106,12 +109,15 @@ class ClassesEntry:
         salt: of the noises, 32 bits.
         rule: the terms whose sum is the score of a material.
         jitter, rise: of the transition.
+        painted: runs [I, J, length, material] of points where what a person painted takes the rule's place; only in
+            the manifest of a page.
     """
 
     salt: int
     rule: list[NoiseTerm | RangeTerm | ImageTerm]
     jitter: JitterEntry
     rise: RiseEntry
+    painted: list[list[int]] = field(default_factory=list)
 
     def find_faults(self, materials: int) -> Iterator[str]:
         """What does not fit a number of materials."""
@@ -125,6 +131,22 @@ class ClassesEntry:
                 yield f"{term.file}: bytes do not fit rows and columns"
         if any(len(values) != materials for values in lists):
             yield f"a list does not have one value for each of {materials} materials"
+        if fault := find_run_fault(self.painted, materials):
+            yield f"painted: {fault}"
+
+
+def find_run_fault(runs: Sequence[Sequence[int]], materials: int) -> str | None:
+    """What makes no sense in runs [I, J, length, material] of painted points; None: nothing."""
+    if any(len(run) != 4 for run in runs):
+        return "a run is not four numbers"
+    if sum(run[2] for run in runs) > MAX_PAINTED:
+        return f"more than {MAX_PAINTED} places"
+    for i, j, length, material in runs:
+        if not (length > 0 and abs(i) < MAX_COORDINATE and abs(j) < MAX_COORDINATE and i + length < MAX_COORDINATE):
+            return "a run beyond the bounds"
+        if not 0 <= material < materials:
+            return "a material that is not there"
+    return None
 
 
 @dataclass(frozen=True)

@@ -177,6 +177,8 @@ class Manifest(TileSetInfo):
         for key in ("classes", "objects", "scatter", "heights"):
             if value[key] is None:
                 del value[key]
+        if "classes" in value and not value["classes"]["painted"]:
+            del value["classes"]["painted"]
         return value
 
     @classmethod

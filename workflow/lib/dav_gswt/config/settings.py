@@ -92,7 +92,16 @@ class PictureClasses(ConfigModel):
     weight: Weight = key("of the picture; noise lies between -1 and 1", 1)
 
 
-ClassTerm = Annotated[NoiseClasses | HeightClasses | SlopeClasses | PictureClasses, Field(discriminator="kind")]
+class PaintedClasses(ConfigModel):
+    """What was painted and set on the page, in the place of the other terms where it is painted."""
+
+    kind: Literal["painted"]
+    file: Text = key("file that the page's “Save” has saved")
+
+
+ClassTerm = Annotated[
+    NoiseClasses | HeightClasses | SlopeClasses | PictureClasses | PaintedClasses, Field(discriminator="kind")
+]
 
 
 class Stills(ConfigModel):

@@ -1,4 +1,4 @@
-"""Rules of classes from the config: ranges of height and slope, pictures, and the noise of the bundle."""
+"""Rules of classes from the config: ranges of height and slope, pictures, the noise of the bundle, painted places."""
 
 import hashlib
 import logging
@@ -15,6 +15,7 @@ from dav_gswt.bundle.manifest import TileSetInfo
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.terrain.classes import LATTICE, Classes
+from dav_gswt.terrain.paint_file import PaintFile, read_paint, scale_objects
 
 _log = logging.getLogger(__name__)
 
@@ -30,15 +31,21 @@ UNKNOWN = 255  # a pixel of no material
 def apply_rule(manifest: M, rule: Sequence[dict[str, Any]]) -> tuple[M, dict[str, Picture]]:
     """The manifest with the config's rule in the place of its own noise, and the pixels of the rule's pictures by file.
 
-    A bundle of one material has no classes: the rule changes nothing, which a warning says.
+    A bundle of one material has no classes: the rule changes nothing, which a warning says; densities of objects that
+    were set on the page count nevertheless.
     Raises: InputError: a material that is not there, a picture that cannot be read, is too large or shows none of the
-        materials.
+        materials; two painted files, or nothing but one; see also `paint_file.read_paint`.
     """
+    names = {material.name: number for number, material in enumerate(manifest.materials)}
+    manifest, paint = _read_painted(manifest, rule)
+    rule = [entry for entry in rule if entry["kind"] != "painted"]
     if manifest.classes is None:
         warn_of_rule(rule)
         return manifest, {}
-    names = {material.name: number for number, material in enumerate(manifest.materials)}
     noise = next((term for term in manifest.classes.rule if isinstance(term, NoiseTerm)), None)
+    if noise and paint:
+        offsets = [paint.offsets.get(name, 0.0) for name in names]
+        noise = replace(noise, biases=[bias + offset for bias, offset in zip(noise.biases, offsets, strict=True)])
     terms, pictures = [], {}
     for entry in rule:
         if entry["kind"] == "noise":
@@ -51,7 +58,22 @@ def apply_rule(manifest: M, rule: Sequence[dict[str, Any]]) -> tuple[M, dict[str
             pictures[term.file] = pixels
         else:
             terms.append(_make_range(entry, names, manifest.tile_side))
-    return replace(manifest, classes=replace(manifest.classes, rule=terms)), pictures
+    classes = replace(manifest.classes, rule=terms, painted=paint.runs if paint else manifest.classes.painted)
+    return replace(manifest, classes=classes), pictures
+
+
+def _read_painted(manifest: M, rule: Sequence[dict[str, Any]]) -> tuple[M, PaintFile | None]:
+    """The painted file of a rule, if there is one, and the manifest with its densities of objects."""
+    files = [entry["file"] for entry in rule if entry["kind"] == "painted"]
+    if not files:
+        return manifest, None
+    if len(files) > 1 or len(rule) == 1:
+        raise InputError("classes: `painted` takes one file, beside other terms such as {kind: noise}")
+    paint = read_paint(files[0], [material.name for material in manifest.materials])
+    if manifest.objects and manifest.scatter:
+        objects = scale_objects(manifest.objects, manifest.scatter.cells, paint)
+        manifest = replace(manifest, objects=objects)
+    return manifest, paint
 
 
 def warn_of_missing(classes: Classes, names: Sequence[str]) -> None:

@@ -1,7 +1,8 @@
 """Classes of the terrain: which material lies at a place, and which Gaussians stay where materials meet.
 
 Every material has a score; the highest one lies there. Scores are sums of terms (noise, ranges of height and slope, a
-picture) at the points of a lattice, LATTICE of them along a tile's side, and bilinear in between. So a cell is decided
+picture) at the points of a lattice, LATTICE of them along a tile's side, or what is painted there (`painted`), and
+bilinear in between. So a cell is decided
 by its own lattice points, and most cells hold one material.
 
 Where materials meet, their tiles are placed together and each Gaussian is kept or dropped on its own. A Gaussian of
@@ -20,6 +21,7 @@ square roots, floor, minima and maxima of float64 are used, in the order written
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int64, UInt8
@@ -28,6 +30,7 @@ from numpy import ndarray as Array
 from dav_gswt.bundle.land_cover import ClassesEntry, ImageTerm, NoiseTerm, RangeTerm
 from dav_gswt.terrain.choice import hash_cell
 from dav_gswt.terrain.heights import FlatSurface, HeightField, smoothstep, wrap_index
+from dav_gswt.terrain.painted import Painted, apply_paint, paint_lead
 
 LATTICE = 8  # points of the lattice of scores along a tile's side
 MAX_OCTAVES = 8
@@ -66,7 +69,13 @@ class Classes:
         scores = np.zeros((len(i), self.materials))
         for term in self.entry.rule:
             scores += term.weight * self._evaluate_term(term, i, j)
+        if self.entry.painted:
+            scores = apply_paint(scores, self._painted.weights_at(i, j, self.materials), paint_lead(self.entry))
         return scores
+
+    @cached_property
+    def _painted(self) -> Painted:
+        return Painted(self.entry.painted)
 
     def cell_lattices(self, i: Int64[Array, "n"], j: Int64[Array, "n"]) -> Float[Array, "n y x m"]:
         """Scores at the LATTICE + 1 points along each side of cells."""

@@ -82,11 +82,13 @@ def describe_surface(surface: HeightField) -> tuple[dict, bytes]:
 
 def replace_classes(value: dict[str, Any], rule: Sequence[dict[str, Any]]) -> tuple[dict[str, Any], dict[str, Picture]]:
     """A manifest with the classes of the config's rule, and the pixels of its pictures. Raises: as `apply_rule`."""
-    if "classes" not in value:
+    painted = any(entry["kind"] == "painted" for entry in rule)
+    if "classes" not in value and not painted:
         warn_of_rule(rule)
         return value, {}
     made, pictures = apply_rule(Manifest.from_dict(value), rule)
-    return value | {"classes": made.to_dict()["classes"]}, pictures
+    changed = made.to_dict()
+    return value | {key: changed[key] for key in ("classes", "objects") if key in changed}, pictures
 
 
 def list_chunks(bundle: Path) -> list[str]:
