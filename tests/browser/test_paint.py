@@ -109,6 +109,19 @@ def test_a_stroke_of_the_mouse_paints_along_its_way_and_is_one_step(seen):
     assert seen.page.evaluate("davgswt.painting.painted.count") == 0
 
 
+def test_a_stroke_while_the_page_draws_by_itself_ends_as_one_on_a_page_that_waits(seen, visit, address):
+    moving = visit(240, 240).open(address)
+    moving.at(**ABOVE)
+    for one in (moving, seen):
+        one.at(**ABOVE)
+        one.page.evaluate("davgswt.paint.brush.material = 1")
+        one.page.mouse.move(40, 90)
+        one.page.mouse.down()
+        one.page.mouse.move(200, 150, steps=12)
+        one.page.mouse.up()
+    assert (moving.picture() == seen.picture()).all()
+
+
 def test_keys_choose_a_brush_and_the_space_bar_paints_under_it(visit, address):
     seen = visit(240, 240).open(f"{address}?still")
     seen.at(**ABOVE)
@@ -339,7 +352,7 @@ def test_where_other_terms_fix_places_there_are_no_sliders_of_shares(cover, tmp_
 
 
 def test_stills_show_what_was_painted_and_set(cover, tmp_path, seen, still):
-    """The saved file in the config: the library's picture, a page that begins with it, and the page it was painted on."""
+    """The saved file in the config: the library's picture, and a page that begins with it, are those painted on."""
     seen.at(**ABOVE)
     paint(seen, 4.0, 7.0, 3.0, 1)
     paint(seen, 8.0, 2.0, 2.0, 0)

@@ -125,7 +125,8 @@ export function createBrush(viewer, onDab) {
   }
 
   addEventListener("keydown", (event) => {
-    if (event.code !== "Space" || brush.material === null || isField(event.target)) return;
+    const chosen = event.target instanceof HTMLInputElement && event.target.type === "radio"; // it has no use for space
+    if (event.code !== "Space" || brush.material === null || (isField(event.target) && !chosen)) return;
     event.preventDefault();
     if (event.repeat) continueStroke();
     else if (holder === null) startStroke("key");

@@ -128,7 +128,7 @@ export function createPainting(manifest, client, onChange) {
       apply(back);
     },
     undo() {
-      const last = done.pop();
+      const last = stroke ? null : done.pop();
       if (!last) return;
       undone.push(last);
       apply(last.points.map(([i, j, was]) => [i, j, was]));
@@ -136,7 +136,7 @@ export function createPainting(manifest, client, onChange) {
       onChange();
     },
     redo() {
-      const next = undone.pop();
+      const next = stroke ? null : undone.pop();
       if (!next) return;
       done.push(next);
       apply(next.points.map(([i, j, , now]) => [i, j, now]));
@@ -178,6 +178,7 @@ export function createPainting(manifest, client, onChange) {
      * @param {boolean} [undoable]
      */
     load(paint, undoable = true) {
+      if (stroke) this.end();
       const changes = changesTo(painted, paint.runs), old = settings();
       const points = changes.map(([i, j, now]) => [i, j, painted.get(i, j), now]);
       apply(changes);
