@@ -1,8 +1,8 @@
 """Materials and objects against the true labels of a synthetic scene that has them: `snakemake materials_table`. How visibly
-terrains repeat: `snakemake repetition_table`.
+terrains repeat: `snakemake lattice_table`. Both with the pictures of docs/research/results/materials.md: `snakemake materials_pages`.
 
-In: the materials of the scenes of the config's `study.materials` and their true labels, the bundles of `study.repetition`.
-Out: results/tables/materials.csv, results/tables/repetition.csv, and beside each bundle a picture of 20 x 20 tiles from above.
+In: the materials of the scenes of the config's `study.materials` and their true labels, the bundles of `study.lattice`.
+Out: results/tables/materials.csv, results/tables/lattice.csv, and beside each bundle a picture of 20 x 20 tiles from above.
 """
 
 
@@ -33,6 +33,7 @@ use rule gather_lod as gather_materials with:
             category="Tables",
             labels={"table": "materials and objects"},
         ),
+        kept="docs/research/data/materials.csv",
     log:
         "<logs>/tables/gather_materials.log",
     benchmark:
@@ -71,26 +72,92 @@ rule measure_lattice:
         "../../scripts/study/measure_lattice.py"
 
 
-use rule gather_lod as gather_repetition with:
+use rule gather_lod as gather_lattice with:
     input:
-        tables=lambda wildcards: list(measured_of_tiles(rules.measure_lattice, "repetition")),
+        tables=lambda wildcards: list(measured_of_tiles(rules.measure_lattice, "lattice")),
     output:
         table=report(
-            "results/tables/repetition.csv",
-            caption="../../workflow/report/repetition.rst",
+            "results/tables/lattice.csv",
+            caption="../../workflow/report/lattice.rst",
             category="Tables",
-            labels={"table": "repetition"},
+            labels={"table": "repetition of terrains"},
         ),
+        kept="docs/research/data/lattice.csv",
     log:
-        "<logs>/tables/gather_repetition.log",
+        "<logs>/tables/gather_lattice.log",
     benchmark:
-        "<benchmarks>/tables/gather_repetition.tsv"
+        "<benchmarks>/tables/gather_lattice.tsv"
     params:
-        cells=lambda wildcards: list(measured_of_tiles(rules.measure_lattice, "repetition").values()),
+        cells=lambda wildcards: list(measured_of_tiles(rules.measure_lattice, "lattice").values()),
         source=code_of("study/gather_lod"),
 
 
-rule repetition_table:
+rule lattice_table:
     """The table of repetition."""
     input:
-        rules.gather_repetition.output.table,
+        rules.gather_lattice.output.table,
+
+
+rule draw_materials_sheet:
+    """What was found over the ground, and the terrain from above, obliquely, and as a walker sees it."""
+    input:
+        materials="<results>/<materials>",
+        above=rules.measure_lattice.output.picture,
+        stills=rules.render_terrain.output.stills,
+    output:
+        sheet="<results>/<bundle>/lattice/sheet.jpg",
+    log:
+        "<logs>/<bundle>/draw_materials_sheet.log",
+    benchmark:
+        "<benchmarks>/<bundle>/draw_materials_sheet.tsv"
+    params:
+        source=code_of("study/draw_materials_sheet"),
+    script:
+        "../../scripts/study/draw_materials_sheet.py"
+
+
+rule keep_materials_sheet:
+    """The sheet of a scene for the documentation."""
+    input:
+        lambda wildcards: expand(
+            rules.draw_materials_sheet.output.sheet, **(branch(wildcards.shown) | {"seed": config["seeds"][0]})
+        ),
+    output:
+        "docs/research/figures/materials_{shown}.jpg",
+    log:
+        "<logs>/figures/materials_{shown}.log",
+    benchmark:
+        "<benchmarks>/figures/materials_{shown}.tsv"
+    shell:
+        "cp {input} {output} 2> {log}"
+
+
+rule draw_cover:
+    """The picture of the README: photos above, the terrain made of them below."""
+    input:
+        images=lambda wildcards: expand(rules.register_photos.output.images, scene=STUDY["cover"]),
+        views=lambda wildcards: expand(
+            rules.split_views.output.views, **(branch(STUDY["cover"]) | {"seed": config["seeds"][0]})
+        ),
+        stills=lambda wildcards: expand(
+            rules.render_terrain.output.stills, **(branch(STUDY["cover"]) | {"seed": config["seeds"][0]})
+        ),
+    output:
+        picture="docs/terrain.jpg",
+    log:
+        "<logs>/figures/draw_cover.log",
+    benchmark:
+        "<benchmarks>/figures/draw_cover.tsv"
+    params:
+        source=code_of("study/draw_cover"),
+    script:
+        "../../scripts/study/draw_cover.py"
+
+
+rule materials_pages:
+    """Tables and pictures of docs/research/results/materials.md, and the README's picture."""
+    input:
+        rules.gather_materials.output.kept,
+        rules.gather_lattice.output.kept,
+        rules.draw_cover.output.picture,
+        expand(rules.keep_materials_sheet.output, shown=STUDY.get("lattice", {}).get("scenes", [])),

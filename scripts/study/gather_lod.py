@@ -7,4 +7,5 @@ with logging_to(snakemake.log[0]):
     found = []
     for path, cell in zip(snakemake.input.tables, snakemake.params.cells, strict=True):
         found += [cell | row for row in csv_tables.read_table(path)]
-    csv_tables.write_table(snakemake.output.table, found)
+    for target in snakemake.output:  # in results/, and of some tables in docs/, too
+        csv_tables.write_table(target, found)

@@ -95,8 +95,8 @@ class Materials(Levels):
     """`snakemake materials_table`: materials and objects against true labels (family `oasis`, `materials: auto`)."""
 
 
-class Repetition(Levels):
-    """`snakemake repetition_table`: how visibly terrains repeat, from above."""
+class Lattice(Levels):
+    """`snakemake lattice_table`: how visibly terrains repeat, from above."""
 
 
 class Frames(Levels):
@@ -290,7 +290,8 @@ class StudyConfig(ConfigModel):
     refine: Refinement | None = key("how `<tiling>-refined` is made", None)
     lod: Levels | None = key("levels, orders, rounding", None)
     materials: Materials | None = key("materials and objects against true labels", None)
-    repetition: Repetition | None = key("how visibly terrains repeat", None)
+    lattice: Lattice | None = key("how visibly terrains repeat", None)
+    cover: Name | None = key("the scene of the README's picture", None)
     frames: Frames | None = key("frame times", None)
     calibration: Calibration | None = key("scores against true errors", None)
     view_benchmark: ViewBenchmark | None = key("policies", None, renamed="benchmark")
@@ -311,7 +312,7 @@ def expand_study(config: dict) -> dict:
     model = check_model(StudyConfig, config["study"], "study")
     study = model.model_dump(mode="json", exclude_none=True, by_alias=True)
     flat = config | study
-    for table in ("lod", "materials", "repetition", "frames", "seams", "forced_choice"):
+    for table in ("lod", "materials", "lattice", "frames", "seams", "forced_choice"):
         _require_names(f"study.{table}.scenes", study.get(table, {}).get("scenes", []), config["scenes"], "scenes")
     if "refine" in study:
         _check_refinement(study["refine"], config["priors"])
