@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fixtures import mixed_ground as made
+from scipy.ndimage import gaussian_filter
 
 from dav_gswt.materials import classes
 from dav_gswt.materials.mask_images import GroundMasks
@@ -102,3 +103,15 @@ def test_ground_that_masks_do_not_name_is_excluded():
     left[:, :40] = True
     found = classes.classify_ground(maps, GroundMasks({"west": left}, np.zeros_like(left)))
     assert found.excluded[:, 40:].all() and not found.excluded[:, :40].any()
+
+
+def test_a_thing_in_dense_growth_stays_in_it():
+    """One material of grass that rises by cells: a tuft more is no landmark."""
+    maps, rng = made.maps(mixed=False, shrubs=False), np.random.default_rng(0)
+    blades = gaussian_filter(rng.normal(size=maps.known.shape), 1.5)
+    colour, surface = maps.colour.copy(), 8 * made.SPACING * blades
+    colour[60:68, 60:68] -= 0.3
+    for rough in (True, False):
+        up = surface if rough else 0 * surface
+        found = classes.classify_ground(replace(maps, colour=colour, surface=up))
+        assert (found.footprints == [] and not found.excluded.any()) == rough

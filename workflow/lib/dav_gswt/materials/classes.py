@@ -17,6 +17,7 @@ MAX_MATERIALS = 4
 LEAST_SHARE = 0.05  # of the exemplar, of a material
 LEAST_WIDTH = 0.13  # of its side: a disc so wide lies in a material
 FINE = 0.1  # of its side: classes that are nowhere wider are growth or things; where they are dense, they are texture
+LITTLE = 0.02  # of the exemplar: so little that stands out of one rough material is left in it
 ROUGH = 0.5  # cells that blobs usually rise by, from which ground is dense with growth or stones
 MORE_GRAIN = 1.6  # times a material's contrast: rougher ground is no shade of it (that under trees is dappled)
 SCATTERED = 0.03  # of the exemplar: a smaller and narrow piece of a material, within another, is a thing on that
@@ -97,6 +98,9 @@ def classify_ground(maps: GroundMaps, masks: GroundMasks | None = None) -> Groun
     kinds = np.where(pieces, np.searchsorted(chosen, np.maximum(classes, 0)), materials)
     for place, strip in enumerate(strips):
         kinds[strip] = len(chosen) + place
+    taken = np.any([excluded | crossing, *(each.cells for each in footprints)], axis=0)
+    if masks is None and rough == {0} and len(chosen) == 1 and taken.mean() < LITTLE:
+        return GroundClasses(materials, kinds, [], ~maps.known, names)
     return GroundClasses(materials, kinds, footprints, excluded | crossing, names)
 
 
