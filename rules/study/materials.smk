@@ -98,6 +98,53 @@ rule lattice_table:
         rules.gather_lattice.output.table,
 
 
+rule measure_transitions:
+    """Seam-LPIPS of crops across borders of materials, beside photographed ones."""
+    input:
+        unpack(lambda wildcards: lpips_weights()),
+        unpack(class_pictures),
+        field="<results>/<round>{inpainted}/field.ply",
+        ground="<results>/<round>{inpainted}/ground.exr",
+        materials="<results>/<materials>",
+        manifest="<results>/<bundle>/davgswt.json",
+        chunks="<results>/<bundle>/chunks",
+    output:
+        table="<results>/<bundle>/lattice/transitions.csv",
+    log:
+        "<logs>/<bundle>/measure_transitions.log",
+    benchmark:
+        "<benchmarks>/<bundle>/measure_transitions.tsv"
+    resources:
+        mem_mb=per_attempt(6000),
+    params:
+        classes=lookup(dpath="classes", within=config),
+        schema=BUNDLE_SCHEMA,
+        seed=integer("seed"),
+        source=code_of("study/measure_transitions"),
+    script:
+        "../../scripts/study/measure_transitions.py"
+
+
+use rule gather_lod as gather_transitions with:
+    input:
+        tables=lambda wildcards: list(measured_of_tiles(rules.measure_transitions, "transitions")),
+    output:
+        table=report(
+            "results/tables/transitions.csv",
+            caption="../../workflow/report/transitions.rst",
+            category="Tables",
+            labels={"table": "borders of materials"},
+        ),
+        kept="docs/research/data/transitions.csv",
+    log:
+        "<logs>/tables/gather_transitions.log",
+    benchmark:
+        "<benchmarks>/tables/gather_transitions.tsv"
+    params:
+        cells=lambda wildcards: list(measured_of_tiles(rules.measure_transitions, "transitions").values()),
+        source=code_of("study/gather_lod"),
+
+
 rule draw_materials_sheet:
     """What was found over the ground, and the terrain from above, obliquely, and as a walker sees it."""
     input:
@@ -159,5 +206,6 @@ rule materials_pages:
     input:
         rules.gather_materials.output.kept,
         rules.gather_lattice.output.kept,
+        rules.gather_transitions.output.kept,
         rules.draw_cover.output.picture,
         expand(rules.keep_materials_sheet.output, shown=STUDY.get("lattice", {}).get("scenes", [])),

@@ -25,7 +25,7 @@ def truth():
 def found(material, objects=None):
     objects = np.zeros((20, 20), int) if objects is None else objects
     middles = (np.arange(20) + 0.5) * 0.1
-    return accuracy.FoundLabels(material, objects, np.zeros((20, 20), bool), middles, middles)
+    return accuracy.FoundLabels(material, material, objects, np.zeros((20, 20), bool), middles, middles)
 
 
 def test_the_truth_itself_has_all_points():
@@ -62,12 +62,19 @@ def test_a_shifted_exemplar_is_compared_place_by_place():
     half = np.ones((10, 10), int)
     half[:, 2:] = 0  # the exemplar begins at x = 1.0: two columns of sand, then meadow
     middles = (np.arange(10) + 0.5) * 0.1
-    own = accuracy.FoundLabels(half, np.zeros((10, 10), int), np.zeros((10, 10), bool), 1.0 + middles, 1.0 + middles)
+    own = accuracy.FoundLabels(
+        half, half, np.zeros((10, 10), int), np.zeros((10, 10), bool), 1.0 + middles, 1.0 + middles
+    )
     assert accuracy.score_materials(truth(), own)["mean_iou"] == 1
 
 
 def test_the_label_map_of_a_materials_folder_is_read(tmp_path):
-    layers = {"kind": np.arange(4.0).reshape(2, 2), "object": np.zeros((2, 2)), "excluded": np.eye(2)}
+    layers = {
+        "material": np.zeros((2, 2)),
+        "kind": np.arange(4.0).reshape(2, 2),
+        "object": np.zeros((2, 2)),
+        "excluded": np.eye(2),
+    }
     header = {"west": "1.5", "south": "-2.0", "spacing": "0.5"}
     image_files.write_exr(tmp_path / "materials.exr", {k: v.astype(np.float32) for k, v in layers.items()}, header)
     labels = accuracy.read_found_labels(tmp_path)

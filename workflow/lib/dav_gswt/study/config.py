@@ -99,6 +99,10 @@ class Lattice(Levels):
     """`snakemake lattice_table`: how visibly terrains repeat, from above."""
 
 
+class Transitions(Levels):
+    """Seam-LPIPS of borders between materials against photographed ones (`snakemake materials_pages`)."""
+
+
 class Frames(Levels):
     """`snakemake frame_times`: milliseconds of a frame on a walk, by the library and by the page in a browser."""
 
@@ -291,6 +295,7 @@ class StudyConfig(ConfigModel):
     lod: Levels | None = key("levels, orders, rounding", None)
     materials: Materials | None = key("materials and objects against true labels", None)
     lattice: Lattice | None = key("how visibly terrains repeat", None)
+    transitions: Transitions | None = key("borders of materials against photographed ones", None)
     cover: Name | None = key("the scene of the README's picture", None)
     frames: Frames | None = key("frame times", None)
     calibration: Calibration | None = key("scores against true errors", None)
@@ -312,7 +317,7 @@ def expand_study(config: dict) -> dict:
     model = check_model(StudyConfig, config["study"], "study")
     study = model.model_dump(mode="json", exclude_none=True, by_alias=True)
     flat = config | study
-    for table in ("lod", "materials", "lattice", "frames", "seams", "forced_choice"):
+    for table in ("lod", "materials", "lattice", "transitions", "frames", "seams", "forced_choice"):
         _require_names(f"study.{table}.scenes", study.get(table, {}).get("scenes", []), config["scenes"], "scenes")
     if "refine" in study:
         _check_refinement(study["refine"], config["priors"])

@@ -19,10 +19,11 @@ LEAST_IOU = 0.4  # of an object with its true footprint, above which it counts a
 class FoundLabels:
     """materials.exr: what was found in each cell of the exemplar, row 0 in the south, and the cells' middles.
 
-    kind: its material, or a strip from the number of materials on. object: numbers from 1; 0: none. excluded: cells
-    that are shown nowhere.
+    material: the nearest one. kind: its material, or a strip from the number of materials on. object: numbers from 1;
+    0: none. excluded: cells that are shown nowhere.
     """
 
+    material: Int[Array, "m m"]
     kind: Int[Array, "m m"]
     object: Int[Array, "m m"]
     excluded: Bool[Array, "m m"]
@@ -33,10 +34,12 @@ class FoundLabels:
 def read_found_labels(folder: Path | str) -> FoundLabels:
     """Read the label map of a materials folder. Raises: InputError: not readable."""
     channels, header = image_files.read_exr(Path(folder, "materials.exr"))
-    kind, objects, excluded = (np.rint(channels[name][::-1]).astype(int) for name in ("kind", "object", "excluded"))
+    material, kind, objects, excluded = (
+        np.rint(channels[name][::-1]).astype(int) for name in ("material", "kind", "object", "excluded")
+    )
     west, south, spacing = (float(header[name]) for name in ("west", "south", "spacing"))
     middles = (np.arange(len(kind)) + 0.5) * spacing
-    return FoundLabels(kind, objects, excluded > 0, west + middles, south + middles)
+    return FoundLabels(material, kind, objects, excluded > 0, west + middles, south + middles)
 
 
 def sample_labels(truth: LabelMap, found: FoundLabels) -> tuple[Int[Array, "m m"], Int[Array, "m m"]]:
