@@ -14,3 +14,15 @@ def test_shade_is_darker_and_bluer(ratio, shaded):
 
 def test_linear_light_is_that_of_srgb():
     np.testing.assert_allclose(shade.linear_light(np.full((2, 3), 0.5)), 0.21404114, rtol=1e-6)
+
+
+def test_rare_shade_is_found_and_shade_everywhere_is_texture():
+    ground = np.ones((100, 100), bool)
+    colour = np.full((100, 100, 3), 0.6)
+    colour[20:40, 20:30] *= [0.5, 0.55, 0.65]
+    shaded = shade.find_shade(colour, ground)
+    assert shaded[22:38, 22:28].all() and shaded.sum() < 300
+    stripes = np.full((100, 100, 3), 0.6)
+    stripes[:, np.arange(100) % 6 < 2] *= [0.5, 0.55, 0.65]
+    assert not shade.find_shade(stripes, ground).any()
+    assert not shade.find_shade(colour, ~ground).any()

@@ -5,18 +5,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
-from scipy.ndimage import distance_transform_edt, label
+from scipy.ndimage import binary_dilation, distance_transform_edt, label
 
 from dav_gswt.materials import objects, segmentation, standing
 from dav_gswt.materials.maps import GroundMaps
 from dav_gswt.materials.mask_images import GroundMasks
 from dav_gswt.materials.objects import Footprint, Surroundings
-from dav_gswt.materials.shade import is_shade, linear_light
+from dav_gswt.materials.shade import find_shade, is_shade, linear_light
 
 MAX_MATERIALS = 4
 LEAST_SHARE = 0.05  # of the exemplar, of a material
 LEAST_WIDTH = 0.13  # of its side: a disc so wide lies in a material
 FINE = 0.1  # of its side: classes that are nowhere wider are growth or things; where they are dense, they are texture
+RIM = 1 / 128  # of the side: width of the blurred rim of shade and of other excluded ground
 LITTLE = 0.02  # of the exemplar: so little that stands out of one rough material is left in it
 ROUGH = 0.5  # cells that blobs usually rise by, from which ground is dense with growth or stones
 MORE_GRAIN = 1.6  # times a material's contrast: rougher ground is no shade of it (that under trees is dappled)
@@ -95,13 +96,27 @@ def classify_ground(maps: GroundMaps, masks: GroundMasks | None = None) -> Groun
     around = Surroundings(maps.colour, features[..., :3], materials, wide, pieces, crossing, maps.known, rough)
     tall = standing.find_standing_things(around.features, rise, maps, materials, wide)
     footprints, excluded = objects.find_footprints(tall, _find_outstanding(maps, around), around)
+    for number in rough:  # on smooth ground shade stands out as things do
+        excluded = excluded | find_shade(maps.colour, wide & (materials == number))
     kinds = np.where(pieces, np.searchsorted(chosen, np.maximum(classes, 0)), materials)
     for place, strip in enumerate(strips):
         kinds[strip] = len(chosen) + place
     taken = np.any([excluded | crossing, *(each.cells for each in footprints)], axis=0)
     if masks is None and rough == {0} and len(chosen) == 1 and taken.mean() < LITTLE:
         return GroundClasses(materials, kinds, [], ~maps.known, names)
-    return GroundClasses(materials, kinds, footprints, excluded | crossing, names)
+    return GroundClasses(
+        materials, kinds, footprints, _widen(excluded & maps.known | crossing, footprints) | ~maps.known, names
+    )
+
+
+def _widen(excluded: Bool[Array, "m m"], footprints: list[Footprint]) -> Bool[Array, "m m"]:
+    """Excluded ground with its blurred rim, off the objects."""
+    if not excluded.any():
+        return excluded
+    wide = binary_dilation(excluded, iterations=max(1, round(RIM * len(excluded))))
+    for each in footprints:
+        wide &= ~each.cells
+    return wide | excluded
 
 
 def _find_outstanding(maps: GroundMaps, around: Surroundings) -> Bool[Array, "m m"]:
