@@ -30,6 +30,7 @@ def test_a_fork_of_roads_is_found():
         (np.abs(COLUMNS - 100) < 8) & (np.abs(ROWS - 100) < 50),  # short
         np.abs(COLUMNS - 100) < 2,  # a thread
         (COLUMNS // 25) % 2 == 0,  # one of many
+        ((ROWS % 24 < 9) | (COLUMNS % 24 < 9)) & (ROWS > 60),  # a net
         np.zeros((K, K), bool),
     ],
 )

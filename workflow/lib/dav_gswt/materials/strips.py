@@ -8,11 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
-from scipy.ndimage import binary_dilation, binary_opening, distance_transform_edt, label
+from scipy.ndimage import binary_closing, binary_dilation, binary_opening, distance_transform_edt, label
 
 LEAST_LENGTH, LEAST_WIDTH = 0.8, 0.03  # of the exemplar's side
 MARGIN = 2  # cells that a strip is widened by: the opening takes one, and cells on its border are of no cluster
 WIDEST = 0.13  # of the side: wider ground has room for patches
+WIDEST_CLOSED = 0.2  # the same of a strip with its gaps closed: a net, as between stones, fills a wide field
 MOST_VARIATION = 0.32  # standard deviation of the width over its mean
 LEAST_SHARE = 0.5  # of the cells that look like it, that lie in the strip
 FORK_LENGTH, FORK_VARIATION, FORK_SHARE = 1.5, 0.5, 0.9  # the same of strips that fork: they are wider there
@@ -79,5 +80,8 @@ def _measure_strip(cluster: Bool[Array, "k k"]) -> list[tuple[float, Bool[Array,
     straight = length >= LEAST_LENGTH and variation <= MOST_VARIATION
     forked = length >= FORK_LENGTH and variation <= FORK_VARIATION and share >= FORK_SHARE
     if not (straight or forked) or width < LEAST_WIDTH or 2 * inner.max() > WIDEST * k:
+        return []
+    closed = binary_closing(np.pad(piece, k), iterations=1 + round(width * k))
+    if 2 * distance_transform_edt(closed).max() > WIDEST_CLOSED * k:
         return []
     return [(share, binary_dilation(piece, iterations=MARGIN))]
