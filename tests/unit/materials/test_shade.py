@@ -16,13 +16,22 @@ def test_linear_light_is_that_of_srgb():
     np.testing.assert_allclose(shade.linear_light(np.full((2, 3), 0.5)), 0.21404114, rtol=1e-6)
 
 
-def test_rare_shade_is_found_and_shade_everywhere_is_texture():
-    ground = np.ones((100, 100), bool)
+def test_dapples_beside_larger_shade_are_found():
+    ground, dark = np.ones((100, 100), bool), np.array([0.5, 0.55, 0.65])
     colour = np.full((100, 100, 3), 0.6)
-    colour[20:40, 20:30] *= [0.5, 0.55, 0.65]
-    shaded = shade.find_shade(colour, ground)
-    assert shaded[22:38, 22:28].all() and shaded.sum() < 300
+    colour[20:40, 20:30] *= dark
+    colour[70:90, 60:70] *= dark
+    beside = np.zeros((100, 100), bool)
+    beside[20:40, 32:60] = True
+    shaded = shade.find_shade(colour, ground & ~beside, beside)
+    assert shaded[22:38, 22:28].all() and not shaded[60:].any()
+    assert not shade.find_shade(colour, ground, ~ground).any()
+    assert not shade.find_shade(colour, ~ground, beside).any()
+
+
+def test_shade_that_is_everywhere_is_texture():
     stripes = np.full((100, 100, 3), 0.6)
     stripes[:, np.arange(100) % 6 < 2] *= [0.5, 0.55, 0.65]
-    assert not shade.find_shade(stripes, ground).any()
-    assert not shade.find_shade(colour, ~ground).any()
+    beside = np.zeros((100, 100), bool)
+    beside[:4] = True
+    assert not shade.find_shade(stripes, ~beside, beside).any()

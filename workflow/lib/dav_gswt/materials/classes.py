@@ -96,14 +96,15 @@ def classify_ground(maps: GroundMaps, masks: GroundMasks | None = None) -> Groun
     around = Surroundings(maps.colour, features[..., :3], materials, wide, pieces, crossing, maps.known, rough)
     tall = standing.find_standing_things(around.features, rise, maps, materials, wide)
     footprints, excluded = objects.find_footprints(tall, _find_outstanding(maps, around), around)
-    for number in rough:  # on smooth ground shade stands out as things do
-        excluded = excluded | find_shade(maps.colour, wide & (materials == number))
     kinds = np.where(pieces, np.searchsorted(chosen, np.maximum(classes, 0)), materials)
     for place, strip in enumerate(strips):
         kinds[strip] = len(chosen) + place
     taken = np.any([excluded | crossing, *(each.cells for each in footprints)], axis=0)
     if masks is None and rough == {0} and len(chosen) == 1 and taken.mean() < LITTLE:
         return GroundClasses(materials, kinds, [], ~maps.known, names)
+    shown_nowhere = excluded & maps.known
+    for number in sorted(rough):  # on smooth ground shade stands out as things do
+        excluded = excluded | find_shade(maps.colour, wide & (materials == number), shown_nowhere)
     return GroundClasses(
         materials, kinds, footprints, _widen(excluded & maps.known | crossing, footprints) | ~maps.known, names
     )
