@@ -163,6 +163,35 @@ rule draw_materials_sheet:
         "../../scripts/study/draw_materials_sheet.py"
 
 
+rule gather_verdicts:
+    """The verdict on each scene and on each of its materials."""
+    input:
+        materials=[
+            folder
+            for scene in STUDY.get("lattice", {}).get("scenes", [])
+            for folder in expand(
+                rules.find_materials.output.materials, **(branch(scene) | {"seed": config["seeds"][0]})
+            )
+        ],
+    output:
+        table=report(
+            "results/tables/verdicts.csv",
+            caption="../../workflow/report/verdicts.rst",
+            category="Tables",
+            labels={"table": "verdicts on materials"},
+        ),
+        kept="docs/research/data/verdicts.csv",
+    log:
+        "<logs>/tables/gather_verdicts.log",
+    benchmark:
+        "<benchmarks>/tables/gather_verdicts.tsv"
+    params:
+        scenes=STUDY.get("lattice", {}).get("scenes", []),
+        source=code_of("study/gather_verdicts"),
+    script:
+        "../../scripts/study/gather_verdicts.py"
+
+
 rule keep_materials_sheet:
     """The sheet of a scene for the documentation."""
     input:
@@ -207,5 +236,6 @@ rule materials_pages:
         rules.gather_materials.output.kept,
         rules.gather_lattice.output.kept,
         rules.gather_transitions.output.kept,
+        rules.gather_verdicts.output.kept,
         rules.draw_cover.output.picture,
         expand(rules.keep_materials_sheet.output, shown=STUDY.get("lattice", {}).get("scenes", [])),
