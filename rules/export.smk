@@ -1,7 +1,33 @@
-"""Export: a patch of terrain at each level, for other viewers. Not part of `all`: files are asked for by their paths.
+"""Export: the photos of a round for other programs that train fields, and a patch of terrain at each level for other
+viewers. Not part of `all`: files are asked for by their paths.
 
-In: the bundle. Out: exports/ply, exports/spz, exports/sog.
+In: a round's photos; the bundle. Out: of the round exports/model; of the bundle exports/ply, exports/spz, exports/sog.
 """
+
+
+rule export_model:
+    """All photos that a round's field was made of, with their cameras, as COLMAP and nerfstudio read them."""
+    input:
+        captures=captures_until,
+        fits=fits_until,
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+    output:
+        model=directory("<results>/<round>/exports/model"),
+    log:
+        "<logs>/<round>/export_model.log",
+    benchmark:
+        "<benchmarks>/<round>/export_model.tsv"
+    wildcard_constraints:
+        policy=CHOOSING,
+    resources:
+        mem_mb=per_attempt(1500),
+        runtime=per_attempt("10m"),
+    params:
+        source=code_of("export_model"),
+    script:
+        "../scripts/export_model.py"
 
 
 rule export_plys:

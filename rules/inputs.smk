@@ -141,9 +141,14 @@ def source_field(wildcards):
     return existing(config["scenes"][wildcards.scene]["field"], f"scenes.{wildcards.scene}.field")
 
 
+def fits_until(wildcards):
+    """The reports of the updates of rounds 1 to t."""
+    return [f"{round_folder(t)}/fit.json" for t in range(1, int(wildcards.t) + 1)]
+
+
 def fits_before(wildcards):
     """The reports of the updates of rounds 1 to t - 1."""
-    return {"fits": [f"{round_folder(t)}/fit.json" for t in range(1, int(wildcards.t))]}
+    return {"fits": fits_until(wildcards)[:-1]}
 
 
 def prior_weights(wildcards):

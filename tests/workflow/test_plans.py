@@ -97,6 +97,13 @@ def test_every_policy_has_a_path(planned, tmp_path):
         assert plan["convert_lpips_weights"] == (policy in PRIOR_POLICIES)
 
 
+@pytest.mark.parametrize("t", [0, 1, 2])
+def test_a_round_s_photos_leave_with_those_of_the_rounds_before(planned, tmp_path, t):
+    plan = planned(tmp_path, ROUND.format(policy="farthest", k=4, t=t) + "/exports/model")
+    assert plan["export_model"] == 1 and plan["capture_views"] == plan["update_field"] == t
+    assert plan["render_photos"] == plan["split_views"] == 1 and "make_levels" not in plan
+
+
 @pytest.mark.parametrize("policy", ["farthest", "fisher", "oracle", "w2-lpips", "single"])
 def test_the_default_target_takes_a_policy_of_every_kind(planned, tmp_path, policy):
     default = planned(tmp_path, "--config", f"policy={policy}", configs=(USUAL, TINY))

@@ -161,6 +161,21 @@ def test_a_bundle_keeps_its_contract(tiny, root):
     assert {"field", "ground"} == set(source["levels"]["inputs"]) and source["parameters"]["tau"] == 0.6
 
 
+def test_a_round_s_photos_leave_as_a_model_of_what_it_saw(tiny, snakemake, tmp_path):
+    folder = shutil.copytree(tiny.folder, tmp_path / "exported")
+    target = tiny.round.relative_to(tiny.folder) / "exports/model"
+    snakemake(folder, "--cores", "2", str(target), configs=CONFIGS)
+    views, shots = read_json(tiny.start / "views.json"), read_json(tiny.round / "capture/capture.json")["shots"]
+    known = read_colmap_model(folder / target / "sparse/0")
+    assert set(known.names) == {*views["start"], *(shot["name"] for shot in shots)} and len(known.points)
+    assert read_colmap_model(folder / target / "test/sparse/0").names == tuple(sorted(views["test"]))
+    transforms = read_json(folder / target / "transforms.json")
+    assert [Path(frame["file_path"]).name for frame in transforms["frames"]] == [
+        *views["start"],
+        *(shot["name"] for shot in shots),
+    ]
+
+
 def test_levels_leave_as_patches_for_other_viewers(tiny, snakemake, tmp_path):
     folder = shutil.copytree(tiny.folder, tmp_path / "exported")
     plys = tiny.bundle.relative_to(tiny.folder) / "exports/ply"

@@ -111,7 +111,8 @@ def triangulate_points(
     it they are mid-grey, since the colours of the model come from images that may not be captured yet.
     """
     part = triangulate_model(model, names, at_least)
-    return part.points, part.colours if photos is None else _colours(part, Path(photos))
+    colours = part.colours if photos is None else colour_points(part, [Path(photos) / name for name in part.names])
+    return part.points, colours
 
 
 def triangulate_model(model: ColmapModel, names: Sequence[str], at_least: int = 2) -> ColmapModel:
@@ -202,12 +203,12 @@ def _with_points(model: ColmapModel, kept: Bool[Array, "n"]) -> ColmapModel:
     )
 
 
-def _colours(model: ColmapModel, photos: Path) -> Float32[Array, "n 3"]:
-    """Every point's mean colour over the pixels that see it."""
+def colour_points(model: ColmapModel, pictures: Sequence[Path]) -> Float32[Array, "n 3"]:
+    """Every point's mean colour over the pixels that see it; black where none does. pictures: files of the images."""
     total = np.zeros((len(model.points), 3))
-    for i, name in enumerate(model.names):
+    for i, picture in enumerate(pictures):
         own = model.image_of == i
-        image = image_files.read_photo(photos / name)
+        image = image_files.read_photo(picture)
         column, row = np.clip(model.pixels[own].astype(int), 0, [image.shape[1] - 1, image.shape[0] - 1]).T
         np.add.at(total, model.point_of[own], image[row, column])
     count = np.bincount(model.point_of, minlength=len(model.points))

@@ -1,0 +1,136 @@
+"""A round's photos as other programs read them: cameras, points and pictures, without a trace of the test photos."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pycolmap
+import pytest
+from fixtures import photos as synth
+
+from dav_gswt.errors import InputError
+from dav_gswt.export import photo_model
+from dav_gswt.files import digest_files
+from dav_gswt.geometry.poses import Pose
+from dav_gswt.images import image_files
+from dav_gswt.photos.capture_record import CapturedPhoto, write_capture_record
+from dav_gswt.photos.colmap_model import read_colmap_model
+from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
+from dav_gswt.photos.view_split import ViewSplit
+
+HALF = 1.0
+POSE = Pose("c1", 30.0, 40.0, 1.0)
+SPLIT = ViewSplit(start=("000.png", "001.png", "004.png"), pool=("002.png", "003.png", "005.png"), test=("006.png",))
+
+
+@pytest.fixture(scope="module")
+def known():
+    """Seven photos of 200 points near the ground, matched exactly."""
+    rng = np.random.default_rng(5)
+    found = synth.model(synth.flight(2, 4)[:7], synth.plain(200, 0.6, rng, relief=0.05))
+    return replace(found, colours=np.full(found.points.shape, 0.5, np.float32))
+
+
+@pytest.fixture
+def taken(known, tmp_path):
+    """Three start views, a replayed photo of the pool, and one that a device took under a name that is there."""
+    ground = synth.texture(np.random.default_rng(4), 300)
+    synth.shoot(tmp_path / "images", known.cameras, ground, HALF)
+    other = replace(synth.camera((0.1, 0.2, 1.1), (0, 0, 0)), fx=250.0, cy=100.0)
+    for number, (name, camera) in enumerate([("002.png", known.camera("002.png")), ("001.png", other)], 1):
+        folder = tmp_path / f"capture{number}"
+        folder.mkdir()
+        image_files.write_png(folder / name, synth.photograph(camera, ground, HALF))
+        write_capture_record(folder, "replay", [CapturedPhoto(name, POSE, camera, camera, 0.0)])
+    return photo_model.list_taken_photos(
+        tmp_path / "images", known, SPLIT.start, [tmp_path / "capture1", tmp_path / "capture2"]
+    )
+
+
+@pytest.fixture
+def written(taken, known, tmp_path):
+    photo_model.write_photo_models(tmp_path / "model", tmp_path / "images", known, SPLIT, taken)
+    return tmp_path / "model"
+
+
+NAMES = ("000.png", "001.png", "004.png", "002.png", "iter2_001.png")
+
+
+def assert_same(one, other, tolerance=1e-9):
+    assert one.rotation == pytest.approx(other.rotation, abs=tolerance)
+    assert one.translation == pytest.approx(other.translation, abs=tolerance)
+    lenses = [(c.fx, c.fy, c.cx, c.cy, c.width, c.height) for c in (one, other)]
+    assert lenses[0] == pytest.approx(lenses[1])
+
+
+def test_colmap_reads_all_photos_that_were_taken_and_no_other(written, taken):
+    stored = pycolmap.Reconstruction(str(written / "sparse/0"))
+    assert sorted(image.name for image in stored.images.values()) == sorted(NAMES)
+    assert {camera.model_name for camera in stored.cameras.values()} == {"PINHOLE"}
+    assert sorted(p.name for p in (written / "images").iterdir()) == sorted(NAMES)
+    read = read_colmap_model(written / "sparse/0")
+    for photo in taken:
+        assert_same(read.camera(photo.name), photo.camera)
+        assert digest_files(written / "images" / photo.name) == digest_files(photo.source)
+
+
+def test_points_lie_where_the_photos_see_them(written, known):
+    stored = pycolmap.Reconstruction(str(written / "sparse/0"))
+    assert len(stored.points3D) > 100 and stored.compute_mean_reprojection_error() < 1e-6
+    for point in stored.points3D.values():
+        assert np.linalg.norm(known.points - point.xyz, axis=1).min() < 1e-6
+        assert point.track.length() >= 2
+    colours = np.array([p.color for p in stored.points3D.values()])
+    assert np.ptp(colours.mean(1)) > 30  # of the pictures, not the model's grey
+
+
+def test_the_importer_reads_the_poses_of_transforms_json_back(written, taken):
+    path = written / "transforms.json"
+    read = import_nerfstudio(path, json.loads(path.read_text()), written, lambda name: None)
+    assert tuple(shot.name for shot in read.shots) == tuple(f"images/{name}" for name in NAMES)
+    for shot, photo in zip(read.shots, taken, strict=True):
+        camera = photo.camera
+        assert shot.rotation == pytest.approx(camera.rotation, abs=1e-9)
+        assert shot.translation == pytest.approx(camera.translation, abs=1e-9)
+        assert shot.lens.params == pytest.approx(np.array([camera.fx, camera.fy, camera.cx, camera.cy]))
+    stored = read_colmap_model(written / "sparse/0")
+    assert read.points == pytest.approx(stored.points, abs=1e-6)
+    assert read.colours == pytest.approx(stored.colours, abs=1e-6)
+
+
+def test_a_camera_of_transforms_json_looks_along_its_own_minus_z_with_y_up(known):
+    one = replace(known, names=("a.png",), cameras=(synth.camera((0, -1, 1), (0, 0, 1)),))
+    pose = np.array(photo_model.describe_transforms(one)["frames"][0]["transform_matrix"])
+    assert pose[:3, 2] == pytest.approx([0, -1, 0]) and pose[:3, 1] == pytest.approx([0, 0, 1])  # it looks north
+    assert pose[:3, 3] == pytest.approx([0, -1, 1])
+
+
+def test_photos_that_test_have_a_folder_of_their_own(written, known):
+    tests = read_colmap_model(written / "test/sparse/0")
+    assert tests.names == SPLIT.test and len(tests.point_of) == 0
+    assert_same(tests.cameras[0], known.camera("006.png"))
+    assert tests.points == pytest.approx(read_colmap_model(written / "sparse/0").points)
+    frames = json.loads((written / "test/transforms.json").read_text())["frames"]
+    assert [frame["file_path"] for frame in frames] == ["images/006.png"]
+
+
+def test_what_the_test_photos_see_leaves_no_trace(written, taken, known, tmp_path):
+    unseen = known.image_of == known.names.index("006.png")
+    pixels = known.pixels + unseen[:, None] * 30.0
+    moved = replace(known, pixels=pixels, points=known.points + unseen.sum(), colours=1 - known.colours)
+    photo_model.write_photo_models(tmp_path / "other", tmp_path / "images", moved, SPLIT, taken)
+    for name in ("sparse/0/points3D.bin", "sparse/0/images.bin", "sparse_pc.ply", "transforms.json"):
+        assert digest_files(written / name) == digest_files(tmp_path / "other" / name), name
+
+
+def test_a_photo_that_the_fit_left_out_is_left_out(known, tmp_path, taken):
+    captures = [tmp_path / "capture1", tmp_path / "capture2"]
+    kept = photo_model.list_taken_photos(tmp_path / "images", known, SPLIT.start, captures, {"002.png"})
+    assert [photo.name for photo in kept] == [*SPLIT.start, "iter2_001.png"]
+
+
+def test_a_picture_of_another_size_is_named_and_nothing_is_left(known, taken, tmp_path):
+    image_files.write_png(taken[1].source, np.zeros((8, 9, 3), np.float32))
+    with pytest.raises(InputError, match=r"001\.png: 9 x 8 pixels, its camera takes 320 x 240; make the photos again"):
+        photo_model.write_photo_models(tmp_path / "model", tmp_path / "images", known, SPLIT, taken)
+    assert not list(tmp_path.glob("*model*"))
