@@ -1,7 +1,8 @@
 """Export: the photos of a round for other programs that train fields, and a patch of terrain at each level for other
 viewers. Not part of `all`: files are asked for by their paths.
 
-In: a round's photos; the bundle. Out: of the round exports/model; of the bundle exports/ply, exports/spz, exports/sog.
+In: a round's photos; the bundle. Out: of the round exports/model; of the bundle exports/ply (y down, as viewers take it),
+exports/ply_z-up (as it lies here), exports/spz, exports/sog.
 """
 
 
@@ -31,16 +32,16 @@ rule export_model:
 
 
 rule export_plys:
-    """A patch of terrain at each level as a PLY that any viewer of splats opens."""
+    """A patch of terrain at each level as a PLY that any viewer of splats opens, y down or z up."""
     input:
         manifest="<results>/<bundle>/davgswt.json",
         archive="<results>/<bundle>/gswt.zip",
     output:
-        plys=directory("<results>/<bundle>/exports/ply"),
+        plys=directory("<results>/<bundle>/exports/{axes}"),
     log:
-        "<logs>/<bundle>/export_plys.log",
+        "<logs>/<bundle>/export_plys_{axes}.log",
     benchmark:
-        "<benchmarks>/<bundle>/export_plys.tsv"
+        "<benchmarks>/<bundle>/export_plys_{axes}.tsv"
     resources:
         mem_mb=per_attempt(2500),
         runtime=per_attempt("10m"),
@@ -52,7 +53,7 @@ rule export_plys:
 
 
 rule convert_plys:
-    """The same patches as SPZ, or as SOG whose levels are streamed, by splat-transform: needs Node.js and the network."""
+    """The same patches as SPZ, or as SOG (files, and a set that is streamed), by splat-transform: Node.js, the network."""
     input:
         plys="<results>/<bundle>/exports/ply",
     output:

@@ -1,10 +1,17 @@
 """Patches of terrain for other viewers: every tile once, where its colours meet; what is said without Node.js."""
 
+import gzip
+import json
+import shutil
+import subprocess
+import zipfile
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from fixtures.splats import rough_ground
+from plyfile import PlyData
+from scipy.spatial import cKDTree
 
 from dav_gswt import field
 from dav_gswt.bundle import gswt
@@ -43,33 +50,50 @@ def test_colours_meet_inside_a_patch_and_where_it_closes(fields):
 
 def test_patches_are_plys_of_every_level_in_the_bundle_s_unit(fields, tmp_path):
     gswt.write_gswt(fields, SIDE, tmp_path / "gswt.zip")
+    patch = splats.assemble_patch(fields[1], SIDE)
+    x, y, z = patch.means.T
+    for axes, means in (("ply", [x, -z, y]), ("ply_z-up", [x, y, z])):
+        splats.write_plys(tmp_path / "gswt.zip", SIDE, tmp_path / axes, axes)
+        assert sorted(p.name for p in (tmp_path / axes).iterdir()) == ["level0.ply", "level1.ply"]
+        read = field.read_field(tmp_path / axes / "level1.ply")
+        np.testing.assert_allclose(read.means, np.stack(means, 1), atol=1e-5)
+        np.testing.assert_allclose(read.log_scales, patch.log_scales, atol=1e-5)
+
+
+def test_patches_have_float_columns_alone_as_plain_readers_need(fields, tmp_path):
+    gswt.write_gswt(fields, SIDE, tmp_path / "gswt.zip")
     splats.write_plys(tmp_path / "gswt.zip", SIDE, tmp_path / "ply")
-    assert sorted(p.name for p in (tmp_path / "ply").iterdir()) == ["level0.ply", "level1.ply"]
-    read, patch = field.read_field(tmp_path / "ply/level1.ply"), splats.assemble_patch(fields[1], SIDE)
-    np.testing.assert_allclose(read.means, patch.means, atol=1e-5)
-    np.testing.assert_allclose(read.log_scales, patch.log_scales, atol=1e-5)
+    data = PlyData.read(str(tmp_path / "ply/level0.ply"))["vertex"].data
+    assert set(data.dtype.descr) == {(name, "<f4") for name in PLAIN}
+
+
+PLAIN = [*("x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "opacity")]
+PLAIN += [*("scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3")]
 
 
 def test_without_node_the_message_says_what_to_do(tmp_path, monkeypatch):
     monkeypatch.setattr(splats.shutil, "which", lambda name: None)
     (tmp_path / "ply").mkdir()
+    (tmp_path / "ply/level0.ply").write_bytes(b"")
     with pytest.raises(InputError, match=r"exports/sog: needs Node\.js 20 .* exports/ply needs neither"):
         splats.convert_plys(tmp_path / "ply", "sog", tmp_path / "sog")
     assert not (tmp_path / "sog").exists()
 
 
-@pytest.mark.parametrize("kind, calls", [("spz", 2), ("sog", 1)])
-def test_the_converter_is_asked_for_every_level(tmp_path, monkeypatch, kind, calls):
+@pytest.mark.parametrize("kind, calls", [("spz", 2), ("sog", 3)])
+def test_the_converter_is_asked_for_every_level(fields, tmp_path, monkeypatch, kind, calls):
     asked = []
     monkeypatch.setattr(splats.shutil, "which", lambda name: "/bin/npx")
     monkeypatch.setattr(splats.subprocess, "run", lambda words, **_: asked.append(words) or Done(0, ""))
     (tmp_path / "ply").mkdir()
     for level in (0, 1):
-        (tmp_path / f"ply/level{level}.ply").write_bytes(b"")
+        field.write_field(splats.assemble_patch(fields[level], SIDE), tmp_path / f"ply/level{level}.ply")
     splats.convert_plys(tmp_path / "ply", kind, tmp_path / kind)
     assert len(asked) == calls and all(words[2] == "@playcanvas/splat-transform@2.7.1" for words in asked)
+    assert [name in words[5] for name, words in zip(("level0.", "level1."), asked, strict=False)] == [True, True]
     if kind == "sog":
-        assert [words for words in asked[0] if words in ("0", "1")] == ["0", "1"] and asked[0].count("-l") == 2
+        assert [words for words in asked[2] if words in ("0", "1")] == ["0", "1"] and asked[2].count("-l") == 2
+        assert asked[2][-1] == "2"  # chunks as wide as a tile
 
 
 def test_what_the_converter_complains_of_is_passed_on(tmp_path, monkeypatch):
@@ -87,3 +111,53 @@ class Done:
 
     def __init__(self, returncode, stderr):
         self.returncode, self.stderr, self.stdout = returncode, stderr, ""
+
+
+@pytest.fixture(scope="module")
+def converted(fields, tmp_path_factory):
+    """PLYs of the patch, and what splat-transform makes of them."""
+    if shutil.which("npx") is None:
+        pytest.skip("npx is not here")
+    probe = subprocess.run(
+        ["npx", "--yes", splats.PACKAGE, "--version"], capture_output=True, text=True, check=False, timeout=120
+    )
+    if probe.returncode:
+        pytest.skip(f"{splats.PACKAGE} cannot be fetched: {probe.stderr.strip()[-100:]}")
+    folder = tmp_path_factory.mktemp("converted")
+    gswt.write_gswt(fields, SIDE, folder / "gswt.zip")
+    splats.write_plys(folder / "gswt.zip", SIDE, folder / "ply")
+    for kind in ("spz", "sog"):
+        splats.convert_plys(folder / "ply", kind, folder / kind)
+    return folder
+
+
+def test_an_spz_is_of_the_stated_version_with_y_up_and_north_away(fields, converted):
+    """Read by the format's own description: 16 bytes of header, then positions of 24 bits an axis."""
+    x, y, z = splats.assemble_patch(fields[0], SIDE).means.T
+    data = gzip.decompress((converted / "spz/level0.spz").read_bytes())
+    assert data[:4] == b"NGSP" and data[4] == splats.SPZ_VERSION == 3
+    n = int.from_bytes(data[8:12], "little")
+    digits = np.frombuffer(data[16 : 16 + 9 * n], np.uint8).reshape(n, 3, 3).astype(int) @ [1, 1 << 8, 1 << 16]
+    means = np.where(digits >= 1 << 23, digits - (1 << 24), digits) / 2.0 ** data[13]
+    expected = np.stack([x, z, -y], 1)  # right, up, back
+    assert n == len(x)
+    distance, _ = cKDTree(expected).query(means)
+    assert distance.max() < 1e-3
+
+
+def test_a_single_sog_lies_beside_the_streamed_set_and_both_hold_every_gaussian(fields, converted):
+    counts = [sum(map(len, tiles)) for tiles in fields]
+    assert json.loads((converted / "sog/lod-meta.json").read_text())["counts"] == counts
+    for level, count in enumerate(counts):
+        with zipfile.ZipFile(converted / f"sog/level{level}.sog") as archive:
+            meta = json.loads(archive.read("meta.json"))
+        assert meta["count"] == count and "means" in meta
+
+
+def test_a_sog_has_the_axes_of_the_ply(fields, converted):
+    """Its own positions are compressed; their bounds are not: sign(v) log(1 + |v|)."""
+    means = field.read_field(converted / "ply/level0.ply").means
+    with zipfile.ZipFile(converted / "sog/level0.sog") as archive:
+        bounds = json.loads(archive.read("meta.json"))["means"]
+    for key, value in (("mins", means.min(0)), ("maxs", means.max(0))):
+        np.testing.assert_allclose(bounds[key], np.sign(value) * np.log1p(np.abs(value)), atol=1e-4)

@@ -87,10 +87,11 @@ def _columns(k: int) -> dict[str, list[str]]:
     }
 
 
-def write_field(field: GaussianField, path: Path | str) -> None:
-    """Write a standard 3DGS PLY, with `uncertainty` and `ground` as two more properties, which viewers ignore.
+def write_field(field: GaussianField, path: Path | str, plain: bool = False) -> None:
+    """Write a standard 3DGS PLY, with `uncertainty` and `ground` as two more properties, which most viewers ignore.
 
-    `imagined` is a third one, written only if it is set anywhere.
+    `imagined` is a third one, written only if it is set anywhere. plain: none of them, and so nothing but float32, as
+    readers that know no other type need it.
     """
     n, k = field.sh.shape[:2]
     names = _columns(k)
@@ -105,15 +106,15 @@ def write_field(field: GaussianField, path: Path | str) -> None:
         "quats": field.quats,
     }
     names["normals"] = ["nx", "ny", "nz"]
-    columns = [(name, "<f4") for key in order for name in names[key]] + [("uncertainty", "<f4"), ("ground", "u1")]
-    columns += [("imagined", "u1")] * bool(field.imagined.any())
-    rows = np.empty(n, dtype=columns)
+    columns = [(name, "<f4") for key in order for name in names[key]]
+    own = [("uncertainty", "<f4"), ("ground", "u1")] + [("imagined", "u1")] * bool(field.imagined.any())
+    own = [] if plain else own
+    rows = np.empty(n, dtype=columns + own)
     for key in order:
         for j, name in enumerate(names[key]):
             rows[name] = values[key][:, j]
-    rows["uncertainty"], rows["ground"] = field.uncertainty, field.ground
-    if field.imagined.any():
-        rows["imagined"] = field.imagined
+    for name, _ in own:
+        rows[name] = getattr(field, name)
     with atomic_file(path) as part:
         PlyData([PlyElement.describe(rows, "vertex")], byte_order="<").write(str(part))
 
