@@ -80,6 +80,11 @@ def test_without_node_the_message_says_what_to_do(tmp_path, monkeypatch):
     assert not (tmp_path / "sog").exists()
 
 
+def test_a_folder_without_a_level_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"there is no level\{l\}\.ply in it; make exports/ply again"):
+        splats.convert_plys(tmp_path, "spz", tmp_path / "spz")
+
+
 @pytest.mark.parametrize("kind, calls", [("spz", 2), ("sog", 3)])
 def test_the_converter_is_asked_for_every_level(fields, tmp_path, monkeypatch, kind, calls):
     asked = []

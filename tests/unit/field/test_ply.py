@@ -138,6 +138,16 @@ def test_what_was_imagined_comes_back_and_costs_a_field_without_it_no_byte(tmp_p
     assert np.array_equal(concatenate_fields([back, field]).imagined, [*marked, *np.zeros(6, bool)])
 
 
+def test_a_plain_file_has_floats_alone_and_the_same_gaussians(tmp_path):
+    field = replace(random_field(6, 1), imagined=np.ones(6, bool))
+    write_field(field, tmp_path / "a.ply", plain=True)
+    data = PlyData.read(str(tmp_path / "a.ply"))["vertex"].data
+    assert {kind for _, kind in data.dtype.descr} == {"<f4"} and not {"uncertainty", "ground"} & set(data.dtype.names)
+    back = read_field(tmp_path / "a.ply")
+    assert np.array_equal(back.means, field.means) and np.array_equal(back.sh, field.sh)
+    assert not back.imagined.any() and not back.ground.any()
+
+
 @pytest.mark.parametrize("value", [2, -1, 0.5, np.nan, np.inf])
 def test_a_flag_that_is_none_is_refused_with_its_index(tmp_path, value):
     path = foreign(tmp_path / "a.ply", extra=["imagined"], change={(0, "imagined"): 0, (2, "imagined"): value})

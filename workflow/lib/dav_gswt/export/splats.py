@@ -58,6 +58,8 @@ def convert_plys(plys: Path | str, kind: str, out: Path | str) -> None:
     By PACKAGE, which npx fetches the first time. Raises: InputError: no Node.js, or what the program complains of.
     """
     names = sorted(Path(plys).glob("level*.ply"), key=lambda path: int(path.stem.removeprefix("level")))
+    if not names:
+        raise InputError(f"{plys}: there is no level{{l}}.ply in it; make exports/ply again")
     with atomic_folder(out) as folder:
         for name in names:
             options = ["--spz-version", str(SPZ_VERSION)] if kind == "spz" else ["-g", "cpu"]
