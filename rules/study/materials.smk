@@ -145,18 +145,23 @@ use rule gather_lod as gather_transitions with:
         source=code_of("study/gather_lod"),
 
 
+def made_of(scene):
+    """The wildcards of what is made of a scene with the config's first seed."""
+    return branch(scene) | {"seed": config["seeds"][0]}
+
+
 rule draw_materials_sheet:
     """What was found over the ground, and the terrain from above, obliquely, and as a walker sees it."""
     input:
-        materials="<results>/<materials>",
-        above=rules.measure_lattice.output.picture,
-        stills=rules.render_terrain.output.stills,
+        materials=lambda wildcards: expand(rules.find_materials.output.materials, **made_of(wildcards.shown)),
+        above=lambda wildcards: expand(rules.measure_lattice.output.picture, **made_of(wildcards.shown)),
+        stills=lambda wildcards: expand(rules.render_terrain.output.stills, **made_of(wildcards.shown)),
     output:
-        sheet="<results>/<bundle>/lattice/sheet.jpg",
+        sheet="docs/research/figures/materials_{shown}.jpg",
     log:
-        "<logs>/<bundle>/draw_materials_sheet.log",
+        "<logs>/figures/materials_{shown}.log",
     benchmark:
-        "<benchmarks>/<bundle>/draw_materials_sheet.tsv"
+        "<benchmarks>/figures/materials_{shown}.tsv"
     params:
         source=code_of("study/draw_materials_sheet"),
     script:
@@ -169,9 +174,7 @@ rule gather_verdicts:
         materials=[
             folder
             for scene in STUDY.get("lattice", {}).get("scenes", [])
-            for folder in expand(
-                rules.find_materials.output.materials, **(branch(scene) | {"seed": config["seeds"][0]})
-            )
+            for folder in expand(rules.find_materials.output.materials, **made_of(scene))
         ],
     output:
         table=report(
@@ -192,32 +195,12 @@ rule gather_verdicts:
         "../../scripts/study/gather_verdicts.py"
 
 
-rule keep_materials_sheet:
-    """The sheet of a scene for the documentation."""
-    input:
-        lambda wildcards: expand(
-            rules.draw_materials_sheet.output.sheet, **(branch(wildcards.shown) | {"seed": config["seeds"][0]})
-        ),
-    output:
-        "docs/research/figures/materials_{shown}.jpg",
-    log:
-        "<logs>/figures/materials_{shown}.log",
-    benchmark:
-        "<benchmarks>/figures/materials_{shown}.tsv"
-    shell:
-        "cp {input} {output} 2> {log}"
-
-
 rule draw_cover:
     """The picture of the README: photos above, the terrain made of them below."""
     input:
         images=lambda wildcards: expand(rules.register_photos.output.images, scene=STUDY["cover"]),
-        views=lambda wildcards: expand(
-            rules.split_views.output.views, **(branch(STUDY["cover"]) | {"seed": config["seeds"][0]})
-        ),
-        stills=lambda wildcards: expand(
-            rules.render_terrain.output.stills, **(branch(STUDY["cover"]) | {"seed": config["seeds"][0]})
-        ),
+        views=lambda wildcards: expand(rules.split_views.output.views, **made_of(STUDY["cover"])),
+        stills=lambda wildcards: expand(rules.render_terrain.output.stills, **made_of(STUDY["cover"])),
     output:
         picture="docs/terrain.jpg",
     log:
@@ -238,4 +221,4 @@ rule materials_pages:
         rules.gather_transitions.output.kept,
         rules.gather_verdicts.output.kept,
         rules.draw_cover.output.picture,
-        expand(rules.keep_materials_sheet.output, shown=STUDY.get("lattice", {}).get("scenes", [])),
+        expand(rules.draw_materials_sheet.output, shown=STUDY.get("lattice", {}).get("scenes", [])),

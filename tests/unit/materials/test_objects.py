@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from dav_gswt.materials import objects
-from dav_gswt.materials.objects import Surroundings
+from dav_gswt.materials.surroundings import Surroundings
 
 M = 120
 
@@ -16,7 +16,15 @@ def around(things, pieces=None, strips=None, rough=(), colour=None):
     light[things] = [0.2, 0.25, 0.1] if colour is None else colour
     pieces, strips = none if pieces is None else pieces, none if strips is None else strips
     return Surroundings(
-        light, features, np.zeros((M, M), int), ~things, pieces, strips, np.ones((M, M), bool), frozenset(rough)
+        light,
+        features,
+        np.zeros((M, M)),
+        np.zeros((M, M), int),
+        ~things,
+        pieces,
+        strips,
+        np.ones((M, M), bool),
+        frozenset(rough),
     )
 
 

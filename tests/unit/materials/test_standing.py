@@ -6,6 +6,7 @@ from fixtures import mixed_ground as made
 from scipy.ndimage import gaussian_filter
 
 from dav_gswt.materials import segmentation, standing
+from dav_gswt.materials.surroundings import Surroundings
 
 M = made.CELLS
 
@@ -29,8 +30,12 @@ def scene(bumps, noise=0.05, colour_too=True):
 
 def find(maps):
     features = segmentation.describe_cells(maps.colour)[..., :3]
-    ground = np.ones((M, M), bool)
-    return standing.find_standing_things(features, standing.measure_rise(maps), maps, np.zeros((M, M), int), ground)
+    everything, nothing = np.ones((M, M), bool), np.zeros((M, M), bool)
+    rise = standing.measure_rise(maps)
+    around = Surroundings(
+        maps.colour, features, rise, np.zeros((M, M), int), everything, nothing, nothing, everything, frozenset()
+    )
+    return standing.find_standing_things(around, maps)
 
 
 def test_bumps_are_found_with_their_outlines():

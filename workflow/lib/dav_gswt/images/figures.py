@@ -6,6 +6,13 @@ from dav_gswt.files import atomic_file, copy_file
 from dav_gswt.images import image_files
 
 QUALITY = 88  # of JPEGs
+OKABE_ITO = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # for any colour vision
+KINDS = (
+    (0.90, 0.62, 0.0),
+    (0.0, 0.62, 0.45),
+    (0.0, 0.45, 0.70),
+    (0.80, 0.47, 0.65),
+)  # some of them, of kinds of ground
 
 
 def make_figure(

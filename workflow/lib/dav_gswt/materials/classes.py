@@ -10,8 +10,9 @@ from scipy.ndimage import binary_dilation, distance_transform_edt, label
 from dav_gswt.materials import objects, segmentation, standing
 from dav_gswt.materials.maps import GroundMaps
 from dav_gswt.materials.mask_images import GroundMasks
-from dav_gswt.materials.objects import Footprint, Surroundings
+from dav_gswt.materials.objects import Footprint
 from dav_gswt.materials.shade import find_shade, is_shade, linear_light
+from dav_gswt.materials.surroundings import Surroundings
 
 MAX_MATERIALS = 4
 LEAST_SHARE = 0.05  # of the exemplar, of a material
@@ -74,18 +75,56 @@ def classify_ground(maps: GroundMaps, masks: GroundMasks | None = None) -> Groun
     are kept, the largest. Without any, all of the ground is one material. What is left is objects and excluded ground.
     masks: drawn by people; materials that they name are taken as they are, and ground that they do not is excluded.
     """
-    maps = replace(maps, known=maps.known & ~masks.excluded) if masks else maps
     features = segmentation.describe_cells(maps.colour)
-    if masks and masks.materials:
-        classes, names = masks.label()
-        maps, strips, chosen = replace(maps, known=maps.known & (classes >= 0)), [], list(range(len(names)))
-        pieces = np.zeros(classes.shape, bool)
-    else:
-        classes, strips = segmentation.segment_ground(maps.colour)
-        chosen = choose_materials(classes, maps.colour, features[..., -1])
-        names, pieces = [f"material{k}" for k in range(len(chosen))], find_scattered(classes, chosen)
-    crossing = np.any([np.zeros(classes.shape, bool), *strips], axis=0)
-    wide = np.isin(classes, chosen) & maps.known & ~pieces & ~crossing
+    ground = _name_ground(maps, masks) if masks and masks.materials else _segment_ground(maps, features[..., -1])
+    known = maps.known & (ground.classes >= 0)
+    maps = replace(maps, known=known & ~masks.excluded if masks else known)
+    around = _describe_surroundings(maps, features[..., :3], ground)
+    tall = standing.find_standing_things(around, maps)
+    footprints, excluded = objects.find_footprints(tall, _find_outstanding(maps, around), around)
+    kinds = np.where(ground.pieces, np.searchsorted(ground.chosen, np.maximum(ground.classes, 0)), around.materials)
+    for place, strip in enumerate(ground.strips):
+        kinds[strip] = len(ground.chosen) + place
+    taken = np.any([excluded | around.strips, *(each.cells for each in footprints)], axis=0)
+    if masks is None and around.rough == {0} and len(ground.chosen) == 1 and taken.mean() < LITTLE:
+        return GroundClasses(around.materials, kinds, [], ~maps.known, ground.names)
+    shown_nowhere = excluded & maps.known
+    for number in sorted(around.rough):  # on smooth ground shade stands out as things do
+        excluded = excluded | find_shade(maps.colour, around.plain(number), shown_nowhere)
+    wide = _widen(excluded & maps.known | around.strips, footprints) | ~maps.known
+    return GroundClasses(around.materials, kinds, footprints, wide, ground.names)
+
+
+@dataclass(frozen=True)
+class _LabelledGround:
+    """Classes of all cells, -1 for none; those that are materials; small pieces of these within others; strips."""
+
+    classes: Int[Array, "m m"]
+    chosen: list[int]
+    names: list[str]
+    pieces: Bool[Array, "m m"]
+    strips: list[Bool[Array, "m m"]]
+
+
+def _name_ground(maps: GroundMaps, masks: GroundMasks) -> _LabelledGround:
+    """Ground as masks name it."""
+    classes, names = masks.label()
+    return _LabelledGround(classes, list(range(len(names))), names, np.zeros(maps.known.shape, bool), [])
+
+
+def _segment_ground(maps: GroundMaps, contrast: Float[Array, "m m"]) -> _LabelledGround:
+    """Ground by its looks. contrast: of the grain around each cell."""
+    classes, strips = segmentation.segment_ground(maps.colour)
+    chosen = choose_materials(classes, maps.colour, contrast)
+    names = [f"material{k}" for k in range(len(chosen))]
+    return _LabelledGround(classes, chosen, names, find_scattered(classes, chosen), strips)
+
+
+def _describe_surroundings(maps: GroundMaps, features: Float[Array, "m m 3"], ground: _LabelledGround) -> Surroundings:
+    """What things are judged by."""
+    classes, chosen = ground.classes, ground.chosen
+    crossing = np.any([np.zeros(classes.shape, bool), *ground.strips], axis=0)
+    wide = np.isin(classes, chosen) & maps.known & ~ground.pieces & ~crossing
     nearest = tuple(distance_transform_edt(~wide, return_distances=False, return_indices=True))
     materials = np.searchsorted(chosen, classes[nearest])
     wide |= find_growth(classes, chosen) & maps.known & ~crossing
@@ -93,21 +132,7 @@ def classify_ground(maps: GroundMaps, masks: GroundMasks | None = None) -> Groun
     rough = frozenset(
         k for k in range(len(chosen)) if standing.measure_roughness(rise, wide & (materials == k)) > ROUGH
     )
-    around = Surroundings(maps.colour, features[..., :3], materials, wide, pieces, crossing, maps.known, rough)
-    tall = standing.find_standing_things(around.features, rise, maps, materials, wide)
-    footprints, excluded = objects.find_footprints(tall, _find_outstanding(maps, around), around)
-    kinds = np.where(pieces, np.searchsorted(chosen, np.maximum(classes, 0)), materials)
-    for place, strip in enumerate(strips):
-        kinds[strip] = len(chosen) + place
-    taken = np.any([excluded | crossing, *(each.cells for each in footprints)], axis=0)
-    if masks is None and rough == {0} and len(chosen) == 1 and taken.mean() < LITTLE:
-        return GroundClasses(materials, kinds, [], ~maps.known, names)
-    shown_nowhere = excluded & maps.known
-    for number in sorted(rough):  # on smooth ground shade stands out as things do
-        excluded = excluded | find_shade(maps.colour, wide & (materials == number), shown_nowhere)
-    return GroundClasses(
-        materials, kinds, footprints, _widen(excluded & maps.known | crossing, footprints) | ~maps.known, names
-    )
+    return Surroundings(maps.colour, features, rise, materials, wide, ground.pieces, crossing, maps.known, rough)
 
 
 def _widen(excluded: Bool[Array, "m m"], footprints: list[Footprint]) -> Bool[Array, "m m"]:

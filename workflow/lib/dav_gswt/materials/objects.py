@@ -6,7 +6,7 @@ Dense growth is texture, not objects: where much of a material is covered, nothi
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 from scipy.ndimage import (
     binary_closing,
@@ -21,6 +21,7 @@ from scipy.ndimage import (
 
 from dav_gswt.materials.maps import GroundMaps
 from dav_gswt.materials.shade import is_shade, linear_light
+from dav_gswt.materials.surroundings import Surroundings
 
 AROUND = 1 / 10  # of the side: blur that gives the ground around a thing
 ROUNDS = 3  # of the estimate of that ground, each without what stood out in the last
@@ -82,31 +83,6 @@ def find_outliers(features: Float[Array, "m m k"], maps: GroundMaps, ground: Boo
     return apply_hysteresis_threshold(np.where(ground, score, 0), LIKELY, SURE)
 
 
-@dataclass(frozen=True)
-class Surroundings:
-    """What things are judged by, of every cell.
-
-    Attributes:
-        colour: sRGB in [0, 1].
-        features: weighed CIELAB.
-        materials: the nearest material.
-        ground: whether it is ground of a material.
-        pieces: whether it is a small piece of one material within another.
-        strips: whether it is of a strip.
-        known: whether a photo saw it.
-        rough: numbers of the materials that are dense with growth or stones.
-    """
-
-    colour: Float[Array, "m m 3"]
-    features: Float[Array, "m m k"]
-    materials: Int[Array, "m m"]
-    ground: Bool[Array, "m m"]
-    pieces: Bool[Array, "m m"]
-    strips: Bool[Array, "m m"]
-    known: Bool[Array, "m m"]
-    rough: frozenset[int]
-
-
 def find_footprints(
     standing: list[Bool[Array, "m m"]], candidates: Bool[Array, "m m"], around: Surroundings
 ) -> tuple[list[Footprint], Bool[Array, "m m"]]:
@@ -119,26 +95,18 @@ def find_footprints(
     Returns: footprints; cells to be filled beside them.
     """
     m = len(candidates)
-    footprints, excluded, taken = [], ~around.known, np.zeros((m, m), bool)
+    footprints, excluded = [], ~around.known
     tall = [own for own in standing if _measure_size(own) >= SMALLEST_STANDING * m]
+    tall, flat = _join_rims(tall, candidates)
     for own in tall:
-        taken |= binary_dilation(own)
-    flat = split_things(_clean(candidates & ~taken))
-    tall, flat = _join_rims(tall, flat)
-    for own in tall:
-        taken |= binary_dilation(own)
-    flat = split_things(_clean(candidates & ~taken))
-    tall, flat = _join_rims(tall, flat)
-    small = [own for own in flat if _measure_size(own) < SMALLEST * m]
-    for own in tall:
-        material = int(np.bincount(around.materials[own]).argmax())
+        material = around.material_of(own)
         if _is_single(own, material, around):
             footprints.append(Footprint(own, material))
         else:
             excluded = excluded | own
     small = [own for own in flat if _measure_size(own) < SMALLEST_STANDING * m]
     for own in flat:
-        material, piece = int(np.bincount(around.materials[own]).argmax()), around.pieces[own].mean() >= OTHER
+        material, piece = around.material_of(own), around.pieces[own].mean() >= OTHER
         rough = material in around.rough
         if _measure_size(own) < (SMALLEST_STANDING if rough else SMALLEST) * m:
             continue
@@ -153,31 +121,38 @@ def find_footprints(
 
 
 def _join_rims(
-    tall: list[Bool[Array, "m m"]], flat: list[Bool[Array, "m m"]]
+    tall: list[Bool[Array, "m m"]], candidates: Bool[Array, "m m"]
 ) -> tuple[list[Bool[Array, "m m"]], list[Bool[Array, "m m"]]]:
-    """What lies along a standing thing and is smaller is part of it, as its contact shadow, if both are compact."""
-    rest = []
-    for rim in flat:
-        around = binary_dilation(rim, iterations=2)
-        touched = [k for k, own in enumerate(tall) if (around & own).any()]
-        if len(touched) == 1 and rim.sum() < tall[touched[0]].sum():
-            joined = binary_closing(tall[touched[0]] | rim, np.ones((3, 3), bool))
-            if _is_compact(joined):
-                tall = [joined if k == touched[0] else own for k, own in enumerate(tall)]
-                continue
-        rest.append(rim)
-    return tall, rest
+    """Standing things with what lies along them and is smaller, as contact shadow, and all other things.
+
+    What would make a thing less compact is not joined. A thing that has grown may touch more, until none grows.
+    """
+    while True:
+        taken = np.any([np.zeros_like(candidates), *(binary_dilation(own) for own in tall)], axis=0)
+        rest, grown = [], list(tall)
+        for rim in split_things(_clean(candidates & ~taken)):
+            around = binary_dilation(rim, iterations=2)
+            touched = [k for k, own in enumerate(grown) if (around & own).any()]
+            if len(touched) == 1 and rim.sum() < grown[touched[0]].sum():
+                joined = binary_closing(grown[touched[0]] | rim, np.ones((3, 3), bool))
+                if _is_compact(joined):
+                    grown[touched[0]] = joined
+                    continue
+            rest.append(rim)
+        if all((a == b).all() for a, b in zip(tall, grown, strict=True)):
+            return tall, rest
+        tall = grown
 
 
 def _is_shaded(own: Bool[Array, "m m"], material: int, around: Surroundings) -> bool:
     """Whether a thing looks like shade of its material."""
-    plain = around.ground & (around.materials == material)
+    plain = around.plain(material)
     return bool(plain.any() and is_shade(linear_light(around.colour[own]), linear_light(around.colour[plain])))
 
 
 def _is_marker(own: Bool[Array, "m m"], material: int, around: Surroundings) -> bool:
     """Whether a thing is far richer in contrast than its material, as a survey's marker in black and white."""
-    plain, bright = around.ground & (around.materials == material), around.colour.mean(-1)
+    plain, bright = around.plain(material), around.colour.mean(-1)
     if not plain.any():
         return False
     inside, outside = np.ptp(np.quantile(bright[own], [0.05, 0.95])), np.ptp(np.quantile(bright[plain], [0.01, 0.99]))
@@ -221,13 +196,13 @@ def _is_one_of_many(
     own: Bool[Array, "m m"], material: int, small: list[Bool[Array, "m m"]], around: Surroundings
 ) -> bool:
     """Whether smaller things differ from its material as it does and cover as much of it, as blooms in a meadow."""
-    plain = around.ground & (around.materials == material)
+    plain = around.plain(material)
     if not plain.any():
         return False
     usual = np.median(around.features[plain], 0)
     away, area = np.median(around.features[own], 0) - usual, 0
     for other in small:
-        if np.bincount(around.materials[other]).argmax() == material:
+        if around.material_of(other) == material:
             step = np.median(around.features[other], 0) - usual
             length = max(float(np.linalg.norm(step) * np.linalg.norm(away)), 1e-9)
             area += int(other.sum()) if float(step @ away) > ALIKE * length else 0

@@ -8,7 +8,7 @@ cells which look more like its core than like the ring around it (Fisher's discr
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 from scipy.ndimage import (
     binary_dilation,
@@ -22,6 +22,7 @@ from scipy.ndimage import (
 )
 
 from dav_gswt.materials.maps import GroundMaps
+from dav_gswt.materials.surroundings import Surroundings
 
 DIAMETERS = (1 / 28, 1 / 20, 1 / 14, 1 / 10, 1 / 7)  # of blobs, of the side
 AROUND, LOW = 1 / 10, 20  # the ground below: this percentile of the heights within so much of the side
@@ -44,21 +45,11 @@ class Blob:
     score: float
 
 
-def find_standing_things(
-    features: Float[Array, "m m k"],
-    rise: Float[Array, "m m"],
-    maps: GroundMaps,
-    materials: Int[Array, "m m"],
-    ground: Bool[Array, "m m"],
-) -> list[Bool[Array, "m m"]]:
-    """Cells of each thing, those of the strongest contrast first; they do not overlap.
-
-    Args: features: weighed CIELAB of each cell. rise: `measure_rise`. materials: of each cell, the nearest one. ground:
-        cells of materials.
-    """
-    layers = np.concatenate([RISE_WEIGHT * gaussian_filter(rise, 1.0)[..., None], features], -1)
-    taken, things = np.zeros(ground.shape, bool), []
-    for blob in find_blobs(rise, features, materials, ground & maps.known):
+def find_standing_things(around: Surroundings, maps: GroundMaps) -> list[Bool[Array, "m m"]]:
+    """Cells of each thing, those of the strongest contrast first; they do not overlap."""
+    layers = np.concatenate([RISE_WEIGHT * gaussian_filter(around.rise, 1.0)[..., None], around.features], -1)
+    taken, things = np.zeros(maps.known.shape, bool), []
+    for blob in find_blobs(around):
         if taken[blob.row, blob.column]:
             continue
         thing = trace_outline(layers, blob)
@@ -81,18 +72,16 @@ def measure_roughness(rise: Float[Array, "m m"], ground: Bool[Array, "m m"]) -> 
     return float(np.quantile(_respond(rise, DIAMETERS[0] * len(rise))[ground], USUAL)) if ground.any() else 0.0
 
 
-def find_blobs(
-    rise: Float[Array, "m m"], features: Float[Array, "m m k"], materials: Int[Array, "m m"], ground: Bool[Array, "m m"]
-) -> list[Blob]:
+def find_blobs(around: Surroundings) -> list[Blob]:
     """Blobs by descending score."""
-    m, found = len(rise), []
+    m, found = len(around.rise), []
     for diameter in (share * m for share in DIAMETERS):
-        up = _respond(rise, diameter)
+        up = _respond(around.rise, diameter)
         colour = np.linalg.norm(
-            np.stack([_respond(layer, diameter) for layer in np.moveaxis(features, -1, 0)], -1), axis=-1
+            np.stack([_respond(layer, diameter) for layer in np.moveaxis(around.features, -1, 0)], -1), axis=-1
         )
-        up = _compare(up, materials, ground, LEAST_RISE)
-        colour = _compare(colour, materials, ground, LEAST_COLOUR)
+        up = _compare(up, around, LEAST_RISE)
+        colour = _compare(colour, around, LEAST_COLOUR)
         score = np.minimum(up, colour / COLOUR_SHARE)
         peaks = (score > 1) & (score == maximum_filter(score, size=max(3, int(diameter / 2))))
         found += [Blob(int(y), int(x), diameter, float(score[y, x])) for y, x in np.argwhere(peaks)]
@@ -106,14 +95,12 @@ def _respond(values: Float[Array, "m m"], diameter: float) -> Float[Array, "m m"
     )
 
 
-def _compare(
-    contrast: Float[Array, "m m"], materials: Int[Array, "m m"], ground: Bool[Array, "m m"], least: float
-) -> Float[Array, "m m"]:
+def _compare(contrast: Float[Array, "m m"], around: Surroundings, least: float) -> Float[Array, "m m"]:
     """Contrasts over what is unusual in their material."""
     over = np.zeros(contrast.shape)
-    for number in np.unique(materials):
-        own = materials == number
-        usual = float(np.quantile(contrast[own & ground], USUAL)) if (own & ground).any() else 0.0
+    for number in np.unique(around.materials).tolist():
+        own, plain = around.materials == number, around.plain(number) & around.known
+        usual = float(np.quantile(contrast[plain], USUAL)) if plain.any() else 0.0
         over[own] = contrast[own] / max(UNUSUAL * usual, least)
     return over
 

@@ -17,7 +17,7 @@ from scipy.ndimage import binary_dilation
 from dav_gswt.errors import InputError
 from dav_gswt.field import read_field, write_field
 from dav_gswt.files import atomic_folder, parse_record, read_json, write_json
-from dav_gswt.images import image_files
+from dav_gswt.images import figures, image_files
 from dav_gswt.lod.merge import merge_by_voxel
 from dav_gswt.materials.build import ExtractedObject, FoundMaterials, Material
 from dav_gswt.materials.model import MaterialInfo, ObjectLevels
@@ -26,7 +26,6 @@ from dav_gswt.reconstruction import ground
 
 NAME = "materials.json"
 STRIP = (0.8, 0.1, 0.1)
-PALETTE = ((0.90, 0.62, 0.0), (0.0, 0.62, 0.45), (0.0, 0.45, 0.70), (0.80, 0.47, 0.65))  # Okabe and Ito's, of materials
 SHADED, DARKENED = 0.35, 0.35  # weight of a material's colour; light of what is shown nowhere
 
 
@@ -134,7 +133,7 @@ def draw_classes(found: FoundMaterials) -> Float[Array, "h w 3"]:
     Materials have colours, strips are red, objects outlined, and what is shown nowhere is dark.
     """
     classes = found.classes
-    palette = np.array(PALETTE)[np.arange(classes.number) % len(PALETTE)]
+    palette = np.array(figures.KINDS)[np.arange(classes.number) % len(figures.KINDS)]
     picture = (1 - SHADED) * found.maps.colour + SHADED * palette[classes.materials]
     picture[classes.excluded] *= DARKENED
     strips = classes.kinds >= classes.number

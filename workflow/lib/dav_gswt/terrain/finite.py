@@ -9,11 +9,10 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.materials.placing import turn_and_scale, turn_rows
-from dav_gswt.terrain.choice import tiles_at
 from dav_gswt.terrain.displacement import displace_field
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.placement import collect_tiles
-from dav_gswt.terrain.visibility import GridCells, first_bit
+from dav_gswt.terrain.visibility import GridCells, choose_tiles
 
 
 def list_cells(
@@ -21,11 +20,7 @@ def list_cells(
 ) -> tuple[Int64[Array, "n"], Int64[Array, "n"], Int64[Array, "n"], Int64[Array, "n"]]:
     """Column, row, tile number and materials (bit m for material m) of cells, row by row from the south-western one."""
     i, j = (v.ravel() for v in np.meshgrid(west + np.arange(columns), south + np.arange(rows)))
-    tile, materials = tiles_at(i, j, terrain.salt, terrain.variants), np.ones(len(i), np.int64)
-    if terrain.classes is not None:
-        materials = terrain.classes.materials_in(i, j)
-        tile = tile + terrain.tiles_each * first_bit(materials)
-    return i, j, tile, materials
+    return i, j, *choose_tiles(terrain, i, j)
 
 
 def collect_cells(terrain: EndlessTerrain, west: int, south: int, columns: int, rows: int, level: int) -> GaussianField:

@@ -59,15 +59,23 @@ def visible_cells(terrain: EndlessTerrain, camera: Camera) -> GridCells:
     sequence, _ = draw_order.sort_cells(i, j, at)
     sequence = sequence[seen[sequence]]
     i, j = i[sequence], j[sequence]
-    tile, materials = tiles_at(i, j, terrain.salt, terrain.variants), np.ones(len(i), np.int64)
-    if terrain.classes is not None:
-        materials = terrain.classes.materials_in(i, j)
-        tile += terrain.tiles_each * first_bit(materials)
+    tile, materials = choose_tiles(terrain, i, j)
     close = draw_order.in_near_block(i, j, at)
     return GridCells(i, j, tile, materials, close, nearest[sequence], farthest[sequence])
 
 
-def first_bit(bits: Int64[Array, "n"]) -> Int64[Array, "n"]:
+def choose_tiles(
+    terrain: EndlessTerrain, i: Int64[Array, "n"], j: Int64[Array, "n"]
+) -> tuple[Int64[Array, "n"], Int64[Array, "n"]]:
+    """Tile of the first material in each cell, and which materials it may show, bit m for material m."""
+    tile = tiles_at(i, j, terrain.salt, terrain.variants)
+    if terrain.classes is None:
+        return tile, np.ones(len(i), np.int64)
+    materials = terrain.classes.materials_in(i, j)
+    return tile + terrain.tiles_each * _first_bit(materials), materials
+
+
+def _first_bit(bits: Int64[Array, "n"]) -> Int64[Array, "n"]:
     """Number of the lowest bit that is set, of at most eight."""
     return np.argmax(bits[:, None] >> np.arange(8) & 1, axis=1)
 

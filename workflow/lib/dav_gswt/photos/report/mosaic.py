@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray as Array
 
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.images import image_files
+from dav_gswt.images import figures, image_files
 from dav_gswt.photos.report.facts import ReportFacts
 from dav_gswt.photos.splitting import ground_bounds, measure_visible_share
 
@@ -17,7 +17,6 @@ CELLS = 192  # along a side of the exemplar
 PHOTOS = 12  # at most, those that look at the exemplar from most nearly above
 STEEP = 8  # power of the cosine of the angle off straight down that a photo's weight is
 COMMON = 0.05  # of the exemplar: rarer kinds of ground are not listed
-COLOURS = np.array(((0.90, 0.62, 0.0), (0.0, 0.62, 0.45), (0.0, 0.45, 0.70), (0.80, 0.47, 0.65)))  # Okabe and Ito's
 TINT = 0.4  # weight of a kind's colour
 LONGEST = 1024  # pixels of a photo's longer side
 
@@ -43,7 +42,7 @@ def find_kinds(folder: Path, found: ReportFacts, segment: Segment) -> GroundKind
         return None
     labels = segment(mosaic)
     shares = np.bincount(labels.ravel()) / labels.size
-    coloured = (1 - TINT) * mosaic + TINT * COLOURS[labels % len(COLOURS)]
+    coloured = (1 - TINT) * mosaic + TINT * np.array(figures.KINDS)[labels % len(figures.KINDS)]
     pair = np.concatenate([mosaic, np.ones((len(mosaic), 4, 3)), coloured], 1)[::-1]
     return GroundKinds(tuple(float(share) for share in shares if share >= COMMON), pair)
 

@@ -13,14 +13,6 @@ PANEL = 3.3, 3.4  # inches
 FOREST = 0.34  # inches a policy
 SHOWN = 6  # curves that a panel holds legibly: the baseline, an oracle and the best
 BASE, TRUTH = {"color": "black", "linewidth": 2.4}, {"color": "0.55", "linestyle": "--"}
-COLOURS = (
-    "#0072b2",
-    "#d55e00",
-    "#009e73",
-    "#cc79a7",
-    "#e69f00",
-    "#56b4e9",
-)  # Okabe and Ito: for any colour vision
 
 
 def write_figure(path: Path | str, curves: list[dict], compared: list[dict], baseline: str) -> None:
@@ -31,7 +23,7 @@ def write_figure(path: Path | str, curves: list[dict], compared: list[dict], bas
     looks = (
         {baseline: BASE}
         | {p: TRUTH for p in [p for p in policies if p in ORACLES][:1]}
-        | {policy: {"color": colour, "linewidth": 1.6} for policy, colour in zip(best, COLOURS, strict=False)}
+        | {policy: {"color": colour, "linewidth": 1.6} for policy, colour in zip(best, figures.OKABE_ITO, strict=False)}
     )
     columns = min(3, len(panels))
     above = -(-len(panels) // columns)
@@ -91,7 +83,7 @@ def _draw_forest(axes, compared: list[dict], baseline: str) -> None:
             axes.plot([row["low"], row["high"]], [place, place], color="0.25", linewidth=2)
         axes.plot(row["mean"], place, "s", color="0.25", markersize=6)
         alone = [r["mean"] for r in compared if r["policy"] == row["policy"] and r["scene"] != EVERY]
-        axes.plot(alone, [place] * len(alone), "o", color=COLOURS[0], markersize=4, alpha=0.7)
+        axes.plot(alone, [place] * len(alone), "o", color=figures.OKABE_ITO[0], markersize=4, alpha=0.7)
     axes.axvline(0, color="black", linewidth=1, linestyle=":")
     axes.set_yticks(range(len(ranked)), [row["policy"] for row in ranked], fontsize=9)
     axes.set_ylim(len(ranked) - 0.5, -0.5)
