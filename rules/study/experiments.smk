@@ -23,6 +23,11 @@ def plain_tiling(wildcards):
     return replicates.split_tiling(wildcards.tiling)[0]
 
 
+def made_of(scene):
+    """The wildcards of what is made of a scene with the config's first seed."""
+    return branch(scene) | {"seed": config["seeds"][0]}
+
+
 def measured_of_tiles(made, entry="lod"):
     """The tables of levels, orders or frames that are gathered: the path of each one's, and what tells it from the others."""
     found = {}

@@ -145,11 +145,6 @@ use rule gather_lod as gather_transitions with:
         source=code_of("study/gather_lod"),
 
 
-def made_of(scene):
-    """The wildcards of what is made of a scene with the config's first seed."""
-    return branch(scene) | {"seed": config["seeds"][0]}
-
-
 rule draw_materials_sheet:
     """What was found over the ground, and the terrain from above, obliquely, and as a walker sees it."""
     input:

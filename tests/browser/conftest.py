@@ -3,7 +3,8 @@
 from pathlib import Path
 
 import pytest
-from fixtures import bundles
+from fixtures import bundles, paint_pages
+from fixtures.land_covers import write_cover_bundle
 from fixtures.page_visit import VIEWER, Visit
 
 from dav_gswt.study.terrain.browser import served
@@ -12,7 +13,7 @@ from dav_gswt.terrain.page import write_page
 
 @pytest.fixture(scope="session")
 def page_of(tmp_path_factory):
-    """Make the page folder of a made-up ground."""
+    """Make the page folder of a synthetic ground."""
 
     def make(ground: bundles.Ground, rows_of=None, surface=None) -> Path:
         folder = tmp_path_factory.mktemp("page")
@@ -77,3 +78,27 @@ def target(chromium, plain):
     """A visit that one broken zip after the other is dropped onto."""
     with chromium.new_context(viewport={"width": 320, "height": 200}) as context:
         yield Visit(context.new_page()).open(f"{plain}?still")
+
+
+@pytest.fixture(scope="module")
+def cover(tmp_path_factory):
+    """The folder of a page of sand and grass with shrubs, on level ground."""
+    folder = tmp_path_factory.mktemp("cover")
+    write_cover_bundle(folder / "bundle", paint_pages.SCHEMA)
+    write_page(folder / "bundle", VIEWER, folder / "page")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def address(cover):
+    with served(cover / "page") as found:
+        yield found
+
+
+@pytest.fixture
+def seen(still, address):
+    """A shared visit, as the bundle was made."""
+    found = still(address, 240, 240)
+    found.page.evaluate("davgswt.painting.load(davgswt.painting.blank)")
+    yield found
+    found.page.evaluate("davgswt.paint.brush.material = null")

@@ -1,13 +1,9 @@
-"""Painted materials on the page: strokes, history, links, files, settings, and the overlay of materials."""
-
-import json
-from pathlib import Path
+"""Painted materials on the page: strokes, history, settings, and the overlay of materials."""
 
 import numpy as np
-import pytest
-from fixtures.dropped_files import drop
-from fixtures.land_covers import SIDE, write_cover_bundle
+from fixtures.land_covers import SIDE
 from fixtures.page_visit import VIEWER, camera_at
+from fixtures.paint_pages import ABOVE, BLANK, PIXEL, SPREAD, THINGS, WALKER, is_grass, paint, places_of
 
 from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.bundle.store import Bundle
@@ -16,54 +12,6 @@ from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain import endless, stills
 from dav_gswt.terrain.heights import Hills
 from dav_gswt.terrain.page import write_page
-
-SCHEMA = Path(__file__).parents[2] / "workflow/schemas/davgswt.schema.json"
-EYE = 20.0
-ABOVE = dict(x=6.0, y=5.0, eye=EYE, yaw=90.0, pitch=-90.0)  # a picture of 240 x 240: its upper edge is north
-WALKER = dict(x=1.0, y=4.0, eye=2.0, yaw=40.0, pitch=-25.0)
-PIXEL = 2 * EYE * np.tan(np.radians(30)) / 240  # on the ground
-SPREAD = 3 / 8 * SIDE  # how far beyond a painted point the classes change
-THINGS = 3 * 0.46  # and how far from there other objects may stand: an extent, and the reach of the one it displaces
-DAB = "([x, y, r, m]) => { const p = davgswt.painting; p.begin(); p.dab(x, y, r, m); p.end(); }"
-BLANK = {"format": "davgswt-paint", "version": 1, "materials": ["sand", "grass"], "runs": []}
-
-
-@pytest.fixture(scope="module")
-def cover(tmp_path_factory):
-    """The folder of a page of sand and grass with shrubs, on level ground."""
-    folder = tmp_path_factory.mktemp("cover")
-    write_cover_bundle(folder / "bundle", SCHEMA)
-    write_page(folder / "bundle", VIEWER, folder / "page")
-    return folder
-
-
-@pytest.fixture(scope="module")
-def address(cover):
-    with served(cover / "page") as found:
-        yield found
-
-
-@pytest.fixture
-def seen(still, address):
-    """A shared visit, as the bundle was made."""
-    found = still(address, 240, 240)
-    found.page.evaluate("davgswt.painting.load(davgswt.painting.blank)")
-    yield found
-    found.page.evaluate("davgswt.paint.brush.material = null")
-
-
-def paint(seen, x, y, radius, material):
-    seen.page.evaluate(DAB, [x, y, radius, material])
-
-
-def places_of(picture) -> tuple[np.ndarray, np.ndarray]:
-    """East and north of each pixel's place on the ground, from above."""
-    rows, columns = np.indices(picture.shape[:2])
-    return ABOVE["x"] + (columns - 119.5) * PIXEL, ABOVE["y"] + (119.5 - rows) * PIXEL
-
-
-def is_grass(picture):
-    return picture[..., 1] > picture[..., 0]
 
 
 def test_a_dab_changes_the_picture_there_and_nowhere_else(seen):
@@ -159,106 +107,6 @@ def test_one_finger_paints_and_a_second_one_takes_it_back_and_walks(visit, addre
     touch("touchStart", (120, 120))
     touch("touchEnd")
     assert 0 < seen.page.evaluate("davgswt.painting.painted.count") <= first
-
-
-def test_a_link_restores_what_was_painted_and_set_to_the_bit(seen, visit, address):
-    seen.at(**ABOVE)
-    paint(seen, 4.0, 7.0, 3.0, 1)
-    paint(seen, -9.0, -3.0, 1.0, 0)
-    seen.page.evaluate("davgswt.painting.setDensity(0, 2, true)")
-    seen.page.evaluate("davgswt.painting.setOffsets([0.03, -0.03], true)")
-    painted = seen.picture()
-    link = seen.page.evaluate("davgswt.paint.keep.findLink()")
-    assert 0 < len(link) < 400
-    fresh = visit(240, 240).open(f"{address}?still#6,5,20,90,-90&paint={link}")
-    assert fresh.state["y"] == 5.0 and fresh.state["pitch"] == -90.0
-    assert (fresh.picture() == painted).all()
-    assert fresh.page.evaluate("davgswt.paint.keep.findLink()") == link
-    assert not fresh.page.evaluate("davgswt.painting.canUndo")
-
-
-def test_the_address_follows_what_is_painted_and_a_pasted_one_is_followed(visit, address):
-    seen = visit(120, 80).open(address)
-    paint(seen, 3.0, 3.0, 1.0, 1)
-    seen.until("location.hash.includes('&paint=')")
-    link = seen.page.evaluate("location.hash.split('&paint=')[1]")
-    count = seen.page.evaluate("davgswt.painting.painted.count")
-    seen.page.evaluate("davgswt.painting.undo()")
-    seen.until("!location.hash.includes('paint')")
-    seen.page.evaluate("link => { location.hash = `#1,1,2,0,-20&paint=${link}` }", link)
-    seen.until(f"davgswt.painting.painted.count === {count}")
-
-
-@pytest.mark.parametrize(
-    "link, message",
-    [
-        pytest.param("AAAA", "cut short or changed", id="cut"),
-        pytest.param("a" * 20_000, "cut short or changed", id="long"),
-        pytest.param("%00<b>", "cut short or changed", id="letters"),
-    ],
-)
-def test_a_broken_link_is_told_and_the_terrain_is_there(visit, address, link, message):
-    seen = visit(120, 80).open(f"{address}?still#1,1,2,0,-20&paint={link}")
-    assert message in seen.page.get_by_role("alert").inner_text()
-    assert seen.state["loaded"] and seen.page.evaluate("davgswt.painting.painted.count") == 0
-
-
-def test_too_much_for_a_link_is_told_and_goes_into_a_file(seen):
-    noise = np.random.default_rng(0).integers(0, [30, 20, 2], (12_000, 3)).tolist()
-    runs = [[40 * (k % 200) + i, k // 200, 1 + length, m] for k, (i, length, m) in enumerate(noise)]
-    runs = [[i, j, min(length, 40 - i % 40), m] for i, j, length, m in runs]
-    seen.page.evaluate("paint => davgswt.paint.keep.load(paint)", BLANK | {"runs": runs})
-    assert seen.page.evaluate("davgswt.paint.keep.findLink()") is None
-    seen.until("document.getElementById('paintStatus').textContent.includes('Save it as a file')")
-
-
-def test_a_saved_file_restores_what_was_painted_and_set(seen, visit, address):
-    seen.at(**ABOVE)
-    paint(seen, 4.0, 7.0, 3.0, 1)
-    seen.page.evaluate("davgswt.painting.setDensity(0, 0.5, true)")
-    painted = seen.picture()
-    with seen.page.expect_download() as download:
-        seen.page.locator("#savePaint").dispatch_event("click")
-    data = download.value.path().read_bytes()
-    fresh = visit(240, 240).open(f"{address}?still")
-    fresh.at(**ABOVE)
-    fresh.page.set_input_files("#paintFile", {"name": "p.json", "mimeType": "application/json", "buffer": data})
-    fresh.until("davgswt.painting.painted.count > 0")
-    assert (fresh.picture() == painted).all()
-    fresh.page.evaluate("davgswt.painting.undo()")
-    assert fresh.page.evaluate("davgswt.painting.painted.count") == 0
-    drop(fresh, "p.json", data)
-    fresh.until("davgswt.painting.painted.count > 0")
-    assert (fresh.picture() == painted).all()
-
-
-@pytest.mark.parametrize(
-    "change, message",
-    [
-        pytest.param({"version": 7}, "version 7", id="version"),
-        pytest.param({"materials": ["sand", 3]}, "“materials”", id="names"),
-        pytest.param({"runs": [[0, 0, 1]]}, "“runs”", id="short run"),
-        pytest.param({"runs": [[0, 0.5, 1, 0]]}, "“runs”", id="half a place"),
-        pytest.param({"runs": [[0, 0, -3, 0]]}, "“runs”", id="negative run"),
-        pytest.param({"runs": [[2**40, 0, 1, 0]]}, "“runs”", id="far run"),
-        pytest.param({"runs": [[0, k, 2**18, 0] for k in range(2)]}, "“runs”", id="too many"),
-        pytest.param({"runs": [[0, 0, 1, 2]]}, "“runs”", id="material of a run"),
-        pytest.param({"runs": {}}, "“runs”", id="no list"),
-        pytest.param({"densities": {"shrub": -1}}, "“densities”", id="density"),
-        pytest.param({"densities": []}, "“densities”", id="list of densities"),
-        pytest.param({"offsets": {"sand": 99}}, "“offsets”", id="offset"),
-        pytest.param({"materials": ["mud", "grass"], "runs": [[0, 0, 1, 0]]}, "“mud”", id="other materials"),
-        pytest.param({"format": "x"}, "not a fly path", id="another file"),
-    ],
-)
-def test_a_bad_file_is_told_and_changes_nothing(seen, change, message):
-    drop(seen, "painted.json", json.dumps(BLANK | change).encode())
-    alert = seen.page.get_by_role("alert")
-    alert.wait_for(state="visible")
-    text = alert.inner_text()
-    alert.click()
-    assert message in text
-    assert seen.page.evaluate("davgswt.painting.painted.count") == 0
 
 
 def test_no_more_is_painted_than_the_page_keeps(seen):

@@ -22,7 +22,7 @@ SIDE = 2.0
 one = BundleContent.of_one_material
 
 
-def made_up(n, sigma, seed):
+def random_field(n, sigma, seed):
     rng = np.random.default_rng(seed)
     return GaussianField(
         (rng.random((n, 3)) * [SIDE, SIDE, 0.2]).astype(np.float32),
@@ -37,7 +37,7 @@ def made_up(n, sigma, seed):
 
 @pytest.fixture(scope="module")
 def tiles():
-    fields = [[made_up(60 >> level, 0.02 * 2**level, 100 * level + t) for t in range(16)] for level in range(2)]
+    fields = [[random_field(60 >> level, 0.02 * 2**level, 100 * level + t) for t in range(16)] for level in range(2)]
     uncertainty = np.linspace(0, 1, 16)
     return TileSet(
         SIDE, 0.1, fields, np.zeros((16, 20, 20), np.uint8), np.zeros((16, 9, 2), int), uncertainty, report_of()

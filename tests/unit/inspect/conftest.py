@@ -21,4 +21,4 @@ def drawable():
 @pytest.fixture(scope="session")
 def tree(tmp_path_factory) -> result_tree.Tree:
     """Tests leave it as it is."""
-    return result_tree.write(tmp_path_factory.mktemp("inspect") / "results" / "made_up")
+    return result_tree.write(tmp_path_factory.mktemp("inspect") / "results" / "sample_ground")

@@ -5,10 +5,10 @@ from fixtures import tile_sets
 
 
 @pytest.fixture(scope="session")
-def made_up():
+def sample_ground():
     return tile_sets.exemplar()
 
 
 @pytest.fixture(scope="session")
-def tiles(made_up):
-    return tile_sets.tiles_of(made_up)
+def tiles(sample_ground):
+    return tile_sets.tiles_of(sample_ground)

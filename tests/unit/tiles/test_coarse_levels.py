@@ -81,11 +81,16 @@ def test_cells_that_do_not_halve_are_refused(tile, cells):
 
 
 @pytest.fixture(scope="module")
-def five(made_up):
+def five(sample_ground):
     """Tiles at five levels, of which the exemplar gives three."""
     options = build.TilingOptions(share=0.5, strip=0.17, candidates=20, tries=1, levels=5)
     return build.cut_tiles(
-        made_up.levels, made_up.exemplar, made_up.colour, np.zeros((96, 96)), options, np.random.default_rng(2)
+        sample_ground.levels,
+        sample_ground.exemplar,
+        sample_ground.colour,
+        np.zeros((96, 96)),
+        options,
+        np.random.default_rng(2),
     )
 
 

@@ -48,9 +48,9 @@ def test_tiles_with_the_same_colour_on_a_side_hold_the_same_gaussians_along_it(t
                 np.testing.assert_array_equal(other.sh, strips[0].sh)
 
 
-def test_a_strip_goes_on_over_the_border_as_one_piece_of_the_exemplar(tiles, made_up):
+def test_a_strip_goes_on_over_the_border_as_one_piece_of_the_exemplar(tiles, sample_ground):
     """The two halves of a vertical strip, seen in two tiles, are neighbours in the exemplar."""
-    n, columns = tiles.labels.shape[1], made_up.exemplar.cells
+    n, columns = tiles.labels.shape[1], sample_ground.exemplar.cells
     left, right = 2, 8  # E = 1 of the one is W = 1 of the other
     assert edge_colours(left)[2] == edge_colours(right)[0] == 1
     rows = np.arange(n)
@@ -91,15 +91,15 @@ def test_a_coarse_cell_takes_the_label_of_most_of_its_cells():
     np.testing.assert_array_equal(compose.coarsen_labels(np.concatenate([labels, labels]), 2), [[1, 0], [1, 0]])
 
 
-def test_things_follow_the_cell_under_their_centre(made_up):
-    level = compose.bin_gaussians(made_up.levels[0], made_up.exemplar, 1)
+def test_things_follow_the_cell_under_their_centre(sample_ground):
+    level = compose.bin_gaussians(sample_ground.levels[0], sample_ground.exemplar, 1)
     n, shift = 8, np.zeros((9, 2), int)
     shift[1] = [16, 4]
     labels = np.zeros((n, n), np.uint8)
     labels[:, 4:] = 1
     tile = compose.compose_tile(level, labels, shift)
     found = tile[~tile.ground].means[:, :2].astype(float)
-    field, e = made_up.levels[0], made_up.exemplar
+    field, e = sample_ground.levels[0], sample_ground.exemplar
     at = field[~field.ground].means[:, :2].astype(float) - [e.west, e.south]
     here = (at < [0.5, 1]).all(1)
     moved = at - [2, 0.5]
@@ -109,20 +109,30 @@ def test_things_follow_the_cell_under_their_centre(made_up):
     np.testing.assert_allclose(order(found), order(expected), atol=1e-6)  # float32 positions near 10
 
 
-def test_the_same_seed_gives_the_same_tiles(tiles, made_up):
+def test_the_same_seed_gives_the_same_tiles(tiles, sample_ground):
     options = build.TilingOptions(share=0.5, strip=0.17, candidates=40, tries=2)
     again = build.cut_tiles(
-        made_up.levels, made_up.exemplar, made_up.colour, np.zeros((96, 96)), options, np.random.default_rng(2)
+        sample_ground.levels,
+        sample_ground.exemplar,
+        sample_ground.colour,
+        np.zeros((96, 96)),
+        options,
+        np.random.default_rng(2),
     )
     np.testing.assert_array_equal(again.labels, tiles.labels)
     for a, b in zip(again.fields[0], tiles.fields[0], strict=True):
         np.testing.assert_array_equal(a.means, b.means)
 
 
-def test_variants_are_other_centres_in_the_same_frames(made_up):
+def test_variants_are_other_centres_in_the_same_frames(sample_ground):
     options = build.TilingOptions(share=0.5, strip=0.17, variants=2, candidates=40, tries=1)
     two = build.cut_tiles(
-        made_up.levels, made_up.exemplar, made_up.colour, np.zeros((96, 96)), options, np.random.default_rng(2)
+        sample_ground.levels,
+        sample_ground.exemplar,
+        sample_ground.colour,
+        np.zeros((96, 96)),
+        options,
+        np.random.default_rng(2),
     )
     assert len(two.labels) == 32 and two.variants == 2
     frame = two.labels[:, :4]
@@ -130,12 +140,17 @@ def test_variants_are_other_centres_in_the_same_frames(made_up):
     assert (two.shifts[:16, CENTRE] != two.shifts[16:, CENTRE]).any(1).all()
 
 
-def test_uncertain_ground_is_not_used_where_certain_ground_is_available(made_up):
+def test_uncertain_ground_is_not_used_where_certain_ground_is_available(sample_ground):
     uncertainty = np.zeros((96, 96))
     uncertainty[:, :30] = 1
     options = build.TilingOptions(share=0.5, strip=0.17, candidates=400, tries=1)
     found = build.cut_tiles(
-        made_up.levels, made_up.exemplar, made_up.colour, uncertainty, options, np.random.default_rng(2)
+        sample_ground.levels,
+        sample_ground.exemplar,
+        sample_ground.colour,
+        uncertainty,
+        options,
+        np.random.default_rng(2),
     )
     # a patch may be up to UNCERTAINTY_MARGIN more uncertain than the least uncertain one, which is 0
     assert found.uncertainty.max() < 0.1
@@ -171,13 +186,13 @@ def test_a_table_that_is_none_is_refused_by_name(tiles, tmp_path, changes):
         store.read_tiles(tmp_path / "tiles", tmp_path / "seams.json")
 
 
-def test_a_level_from_elsewhere_is_refused(made_up):
-    away = [replace(f, means=f.means + np.float32(1000)) for f in made_up.levels]
+def test_a_level_from_elsewhere_is_refused(sample_ground):
+    away = [replace(f, means=f.means + np.float32(1000)) for f in sample_ground.levels]
     with pytest.raises(InputError, match="ground.json"):
         build.cut_tiles(
-            [made_up.levels[0], *away[1:]],
-            made_up.exemplar,
-            made_up.colour,
+            [sample_ground.levels[0], *away[1:]],
+            sample_ground.exemplar,
+            sample_ground.colour,
             np.zeros((96, 96)),
             build.TilingOptions(tries=1, candidates=5),
             np.random.default_rng(0),

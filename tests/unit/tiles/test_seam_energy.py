@@ -26,7 +26,7 @@ def patches(*values):
     return layer, [where(i * w, 0, h, w) for i in range(len(values))]
 
 
-def made_up(seed, kind="semantic", side=12, dtype=float):
+def noise_exemplar(seed, kind="semantic", side=12, dtype=float):
     """An exemplar of noise, in segments of 3 x 3 cells."""
     rng = np.random.default_rng(seed)
     colour = rng.random((side, side, 3)).astype(dtype)
@@ -81,7 +81,7 @@ def test_equal_patches_cost_nothing_and_no_scale_is_zero():
 @given(seed=st.integers(0, 2**32 - 1), share=SHARES, place=st.tuples(*[st.integers(0, 8)] * 4))
 @settings(max_examples=60)
 def test_weights_are_symmetric_finite_not_negative_and_0_for_the_same_patch(seed, share, place):
-    terms, (x, y, u, v) = made_up(seed).terms(share), place
+    terms, (x, y, u, v) = noise_exemplar(seed).terms(share), place
     there, back = (
         energy.compute_edge_costs(terms, *p) for p in ((where(x, y), where(u, v)), (where(u, v), where(x, y)))
     )
@@ -94,7 +94,7 @@ def test_weights_are_symmetric_finite_not_negative_and_0_for_the_same_patch(seed
 
 @pytest.mark.parametrize("seed", range(5))
 def test_gamma_1_ignores_semantics_and_gamma_0_ignores_colour(seed):
-    one, other = made_up(seed), made_up(seed + 1)
+    one, other = noise_exemplar(seed), noise_exemplar(seed + 1)
     mixed = energy.SeamEnergy("semantic", 2.0, one.colours, other.semantics)
     pair = where(0, 0, 6, 6), where(5, 3, 6, 6)
     for share, like, unlike in ((1.0, one, other), (0.0, other, one)):
@@ -104,22 +104,22 @@ def test_gamma_1_ignores_semantics_and_gamma_0_ignores_colour(seed):
 
 
 def test_energy_colour_is_gamma_1_whatever_the_uncertainty():
-    colour = energy.SeamEnergy("colour", 2.0, made_up(1).colours, None)
+    colour = energy.SeamEnergy("colour", 2.0, noise_exemplar(1).colours, None)
     assert colour.gamma(0.9) == 1 and colour.terms(1.0) == [(1.0, colour.colours)]
 
 
 @pytest.mark.parametrize("kind", ["semantic", "none"])
 def test_the_surer_a_patch_the_more_its_colours_count(kind):
-    e = made_up(1, kind)
+    e = noise_exemplar(1, kind)
     assert e.gamma(0.5) == 0.5 and e.gamma(0.0) == pytest.approx(0.7310585786)  # 1 / (1 + exp(-1))
     assert e.gamma(0.0) + e.gamma(1.0) == pytest.approx(1)
-    assert made_up(1, "semantic-nogamma").gamma(0.0) == 0.5
+    assert noise_exemplar(1, "semantic-nogamma").gamma(0.0) == 0.5
 
 
 @pytest.mark.parametrize("kind", energy.KINDS)
 def test_gamma_of_what_is_not_a_number_is_refused(kind):
     with pytest.raises(ValueError, match="not a number"):
-        made_up(1, kind).gamma(float("nan"))
+        noise_exemplar(1, kind).gamma(float("nan"))
 
 
 def test_weights_do_not_depend_on_the_unit_of_colour():
@@ -132,7 +132,7 @@ def test_weights_do_not_depend_on_the_unit_of_colour():
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 def test_weights_in_single_precision_agree_with_double(share):
-    wide = made_up(4)
+    wide = noise_exemplar(4)
     narrow = energy.SeamEnergy(
         "semantic", 2.0, energy.make_colour_layer(wide.colours.values.astype(np.float32)), wide.semantics
     )
@@ -149,7 +149,7 @@ def test_weights_in_single_precision_agree_with_double(share):
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.731, 1.0])
 @pytest.mark.parametrize("seed", range(3))
 def test_the_cut_of_a_small_grid_is_as_cheap_as_the_best_of_all_partitions(seed, share):
-    right, upper = energy.compute_edge_costs(made_up(seed).terms(share), where(0, 0), where(6, 7))
+    right, upper = energy.compute_edge_costs(noise_exemplar(seed).terms(share), where(0, 0), where(6, 7))
     first, second = np.zeros((4, 4), bool), np.zeros((4, 4), bool)
     first[:, 0], second[:, -1] = True, True
     found = cuts.find_cut(right, upper, first, second)

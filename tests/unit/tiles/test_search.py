@@ -9,7 +9,7 @@ from dav_gswt.tiles.layout import CENTRE
 
 
 @pytest.mark.parametrize("kind", ["colour", "semantic"])
-def test_the_energy_of_a_tile_is_that_of_the_seam_around_its_centre(made_up, kind):
+def test_the_energy_of_a_tile_is_that_of_the_seam_around_its_centre(sample_ground, kind):
     """Priced again in the finished tile, edge by edge; they differ only where a strip's own seam meets the centre's."""
     pairs = []
 
@@ -31,7 +31,9 @@ def test_the_energy_of_a_tile_is_that_of_the_seam_around_its_centre(made_up, kin
 
     options = build.TilingOptions(share=0.5, strip=0.17, candidates=40, tries=2, kind=kind, relabel=price_again)
     rng = np.random.default_rng(2)
-    build.cut_tiles(made_up.levels, made_up.exemplar, made_up.colour, np.zeros((96, 96)), options, rng)
+    build.cut_tiles(
+        sample_ground.levels, sample_ground.exemplar, sample_ground.colour, np.zeros((96, 96)), options, rng
+    )
     reported, own = np.array(pairs).T
     np.testing.assert_allclose(reported, own, rtol=0.02)
     assert reported.sum() == pytest.approx(own.sum(), rel=2e-3)

@@ -47,13 +47,15 @@ def test_tiles_get_smaller_and_strips_wider_with_the_scale():
     assert texture.choose_sizes(texture.SCALES[1])[0] == 0.38 and texture.choose_sizes(0.3) == (0.38, 0.125)
 
 
-def test_tiles_by_their_texture_are_those_of_its_sizes(made_up):
+def test_tiles_by_their_texture_are_those_of_its_sizes(sample_ground):
     options = build.TilingOptions(share=AUTO, strip=AUTO, candidates=40, tries=1)
-    share, strip = texture.choose_sizes(texture.measure_texture_scale(made_up.colour) / 96)
+    share, strip = texture.choose_sizes(texture.measure_texture_scale(sample_ground.colour) / 96)
 
     def cut(options):
         rng = np.random.default_rng(2)
-        return build.cut_tiles(made_up.levels, made_up.exemplar, made_up.colour, np.zeros((96, 96)), options, rng)
+        return build.cut_tiles(
+            sample_ground.levels, sample_ground.exemplar, sample_ground.colour, np.zeros((96, 96)), options, rng
+        )
 
     own, given = cut(options), cut(replace(options, share=share, strip=strip))
     np.testing.assert_array_equal(own.labels, given.labels)

@@ -33,10 +33,10 @@ def test_unknown_cells_take_no_part():
     np.testing.assert_allclose(trends.fit_low_pass(values, known, 6.0), 2, atol=1e-9)
 
 
-def test_detrending_flattens_a_slope_and_keeps_mean_and_cover(made_up):
-    field = made_up.levels[0]
+def test_detrending_flattens_a_slope_and_keeps_mean_and_cover(sample_ground):
+    field = sample_ground.levels[0]
     ground = field[field.ground]
-    e = made_up.exemplar
+    e = sample_ground.exemplar
     x = np.mgrid[: e.cells, : e.cells][1] * e.spacing
     tilted = ground.means.copy()
     tilted[:, 2] = 0.4 * x.ravel()

@@ -14,16 +14,16 @@ CERTAIN = np.zeros((96, 96))
 FEW = build.TilingOptions(share=0.5, strip=0.17, candidates=20, tries=1)
 
 
-def cut(made_up, kind, colour=None, uncertainty=CERTAIN, options=FEW, levels=None):
-    colour, rng = made_up.colour if colour is None else colour, np.random.default_rng(2)
+def cut(sample_ground, kind, colour=None, uncertainty=CERTAIN, options=FEW, levels=None):
+    colour, rng = sample_ground.colour if colour is None else colour, np.random.default_rng(2)
     return build.cut_tiles(
-        levels or made_up.levels, made_up.exemplar, colour, uncertainty, replace(options, kind=kind), rng
+        levels or sample_ground.levels, sample_ground.exemplar, colour, uncertainty, replace(options, kind=kind), rng
     )
 
 
 @pytest.fixture(scope="module")
-def every(made_up):
-    return {kind: cut(made_up, kind) for kind in energy.KINDS}
+def every(sample_ground):
+    return {kind: cut(sample_ground, kind) for kind in energy.KINDS}
 
 
 def test_every_way_says_what_it_used(every):
@@ -53,40 +53,41 @@ def test_without_a_cut_seams_are_straight_and_in_the_middle_of_the_overlap(every
         np.testing.assert_array_equal(labels == CENTRE, inner)
 
 
-def test_uncertain_ground_is_cut_by_semantics_more_than_by_colour(made_up):
-    uncertain = cut(made_up, "semantic", uncertainty=np.full((96, 96), 0.75)).report
+def test_uncertain_ground_is_cut_by_semantics_more_than_by_colour(sample_ground):
+    uncertain = cut(sample_ground, "semantic", uncertainty=np.full((96, 96), 0.75)).report
     assert uncertain.tile_gamma == pytest.approx([1 / (1 + np.exp(0.5))] * 16)
-    steep = cut(made_up, "semantic", uncertainty=np.full((96, 96), 0.75), options=replace(FEW, slope=8.0)).report
+    steep = cut(sample_ground, "semantic", uncertainty=np.full((96, 96), 0.75), options=replace(FEW, slope=8.0)).report
     assert steep.tile_gamma == pytest.approx([1 / (1 + np.exp(2))] * 16)
 
 
 @pytest.mark.parametrize("kind", energy.KINDS)
-def test_patches_that_are_all_the_same_cost_nothing(made_up, kind):
-    bare = [level[level.ground] for level in made_up.levels]
-    found = cut(made_up, kind, colour=np.full((96, 96, 3), 0.5), levels=bare)
+def test_patches_that_are_all_the_same_cost_nothing(sample_ground, kind):
+    bare = [level[level.ground] for level in sample_ground.levels]
+    found = cut(sample_ground, kind, colour=np.full((96, 96, 3), 0.5), levels=bare)
     # colours without their trend differ by rounding
     assert found.report.tile_energy + found.report.strip_energy == pytest.approx([0] * 20, abs=1e-9)
     assert np.isfinite(found.fields[0][0].means).all()
 
 
 @pytest.mark.parametrize("kind", ["colour", "semantic"])
-def test_tiles_go_around_holes_where_they_can(made_up, kind, caplog):
-    colour = made_up.colour.copy()
+def test_tiles_go_around_holes_where_they_can(sample_ground, kind, caplog):
+    colour = sample_ground.colour.copy()
     colour[30:44, 0:50] = np.nan
     options = replace(FEW, candidates=400)
     with caplog.at_level(logging.WARNING):
-        found = cut(made_up, kind, colour=colour, options=options)
+        found = cut(sample_ground, kind, colour=colour, options=options)
     assert "700 of 9216 cells of the exemplar are holes" in caplog.text
     # a patch may be up to 0.05 more uncertain than the surest one
     assert found.uncertainty.max() < 0.1
     assert all(np.isfinite(field.sh).all() for level in found.fields for field in level)
 
 
-def test_unknown_uncertainty_counts_as_1(made_up):
+def test_unknown_uncertainty_counts_as_1(sample_ground):
     uncertainty = np.zeros((96, 96))
     uncertainty[:, :30] = np.nan
     assert (
-        cut(made_up, "semantic", uncertainty=uncertainty, options=replace(FEW, candidates=400)).uncertainty.max() < 0.1
+        cut(sample_ground, "semantic", uncertainty=uncertainty, options=replace(FEW, candidates=400)).uncertainty.max()
+        < 0.1
     )
 
 
@@ -98,23 +99,23 @@ def test_unknown_uncertainty_counts_as_1(made_up):
         pytest.param(None, np.full((96, 96), np.nan), id="nothing known"),
     ],
 )
-def test_an_exemplar_without_any_known_ground_is_refused(made_up, colour, uncertainty):
+def test_an_exemplar_without_any_known_ground_is_refused(sample_ground, colour, uncertainty):
     with pytest.raises(InputError, match="nothing is known of the exemplar.*masks"):
-        cut(made_up, "semantic", colour=colour, uncertainty=uncertainty)
+        cut(sample_ground, "semantic", colour=colour, uncertainty=uncertainty)
 
 
-def test_uncertain_ground_that_cannot_be_avoided_is_logged(made_up, caplog):
+def test_uncertain_ground_that_cannot_be_avoided_is_logged(sample_ground, caplog):
     uncertainty = np.ones((96, 96))
     uncertainty[40:50, 40:50] = 0
     with caplog.at_level(logging.WARNING):
-        cut(made_up, "semantic", uncertainty=uncertainty)
+        cut(sample_ground, "semantic", uncertainty=uncertainty)
     assert "a smaller `tile`" in caplog.text
 
 
-def test_a_finest_level_from_elsewhere_is_refused(made_up):
-    levels = [replace(f, means=f.means + np.float32(1000)) for f in made_up.levels]
+def test_a_finest_level_from_elsewhere_is_refused(sample_ground):
+    levels = [replace(f, means=f.means + np.float32(1000)) for f in sample_ground.levels]
     with pytest.raises(InputError, match=r"level 0.*ground\.json"):
-        build.cut_tiles(levels, made_up.exemplar, made_up.colour, CERTAIN, FEW, np.random.default_rng(0))
+        build.cut_tiles(levels, sample_ground.exemplar, sample_ground.colour, CERTAIN, FEW, np.random.default_rng(0))
 
 
 def test_options_are_those_of_the_configs_entry():

@@ -8,19 +8,19 @@ from dav_gswt.study.seams import placed_tiles
 
 
 @pytest.fixture(scope="session")
-def made_up():
+def sample_ground():
     return tile_sets.exemplar()
 
 
 @pytest.fixture(scope="session")
-def tiles(made_up):
-    return tile_sets.tiles_of(made_up, "colour")
+def tiles(sample_ground):
+    return tile_sets.tiles_of(sample_ground, "colour")
 
 
 @pytest.fixture(scope="session")
-def source(made_up, tiles):
+def source(sample_ground, tiles):
     width = 0.2 * tiles.report.layout.side
-    return placed_tiles.detrend_exemplar(made_up.levels, made_up.exemplar, made_up.colour, width)
+    return placed_tiles.detrend_exemplar(sample_ground.levels, sample_ground.exemplar, sample_ground.colour, width)
 
 
 @pytest.fixture(scope="session")
@@ -29,8 +29,8 @@ def placed(tiles, source):
 
 
 @pytest.fixture(scope="session")
-def straight(made_up, source):
-    return placed_tiles.place_tiles(tile_sets.tiles_of(made_up, "none", corrected=False), source, 3, 0.6)
+def straight(sample_ground, source):
+    return placed_tiles.place_tiles(tile_sets.tiles_of(sample_ground, "none", corrected=False), source, 3, 0.6)
 
 
 @pytest.fixture()
