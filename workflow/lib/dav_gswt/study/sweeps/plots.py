@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 
 from dav_gswt.images import figures
-from dav_gswt.study.comparison.plots import COLOURS
 from dav_gswt.study.sweeps.grid import EVERYTHING
 
 PANELS = {
@@ -65,7 +64,7 @@ def _last(rows: list[dict], value: str) -> str:
 
 def _draw_panel(panel, axis: str, key: str, rows: list[dict], scenes: list[str]) -> None:
     values = list(dict.fromkeys(row["varied_0"] for row in rows))
-    for scene, colour in zip(scenes, COLOURS * len(scenes), strict=False):
+    for scene, colour in zip(scenes, figures.OKABE_ITO * len(scenes), strict=False):
         found = {v: [r[key] for r in rows if (r["scene"], r["varied_0"]) == (scene, v)] for v in values}
         known = {v: [x for x in each if x is not None] for v, each in found.items()}
         at = [i for i, v in enumerate(values) if known[v]]
@@ -86,7 +85,9 @@ def _is_number(text: str) -> bool:
 
 
 def _draw_curves(panel, rows: list[dict]) -> None:
-    for value, colour in zip(dict.fromkeys(row["varied_0"] for row in rows), COLOURS * len(rows), strict=False):
+    for value, colour in zip(
+        dict.fromkeys(row["varied_0"] for row in rows), figures.OKABE_ITO * len(rows), strict=False
+    ):
         mine = [row for row in rows if row["varied_0"] == value and row["psnr"] is not None]
         photos = sorted({row["photos"] for row in mine})
         means = [float(np.mean([row["psnr"] for row in mine if row["photos"] == n])) for n in photos]
