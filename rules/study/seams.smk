@@ -8,9 +8,9 @@ docs/research/results/seams.md.
 
 
 rule measure_seams:
-    """Crops on borders and cuts, beside the same of uncut patches and of tiles cut straight."""
+    """Crops on borders and cuts of each material, beside the same of uncut patches and of tiles cut straight."""
     input:
-        unpack(lambda wildcards: tiling_inputs(plain_tiling(wildcards)) | lpips_weights()),
+        unpack(lambda wildcards: lpips_weights()),
         levels="<results>/<levels>",
         seams="<results>/<tiles>/seams.json",
         tiles="<results>/<tiles>/tiles",

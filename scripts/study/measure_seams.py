@@ -1,4 +1,4 @@
-"""Rule measure_seams: Seam-LPIPS of crops on borders and cuts, with floors and ceilings."""
+"""Rule measure_seams: Seam-LPIPS of crops on borders and cuts of each material, with floors and ceilings."""
 
 from pathlib import Path
 
@@ -8,19 +8,16 @@ from dav_gswt.lod import store as levels
 from dav_gswt.logs import logging_to
 from dav_gswt.provenance import record_provenance
 from dav_gswt.study import csv_tables
-from dav_gswt.study.seams import density, exemplar, measure
-from dav_gswt.tiles import semantics, store
+from dav_gswt.study.seams import measure
+from dav_gswt.tiles import store
 
 with logging_to(snakemake.log[0]):
-    paths, params = snakemake.input, snakemake.params
-    maps = exemplar.ExemplarMaps.from_levels(levels.read_levels(paths.levels))
+    paths, params, tiling = snakemake.input, snakemake.params, dict(snakemake.params.tiling)
     alexnet = lpips_weights.read(paths.lpips) if paths.get("lpips") else None
-    tiles = store.read_tiles(paths.tiles, paths.seams)
-    source = semantics.SemanticSource(alexnet, paths.get("sam2"))
-    placed, straight = maps.place_with_straight(tiles, params.tiling, source, params.seed, params.tau)
-    csv_tables.write_table(snakemake.output.crops, measure.measure_crops(placed, straight, alexnet, params.seed))
+    cut = store.read_material_tiles(paths.tiles, paths.seams)
+    sets = zip(levels.read_material_levels(paths.levels), cut, strict=True)
+    rows, dense = measure.measure_materials(sets, tiling, alexnet, params.seed, params.tau)
+    csv_tables.write_table(snakemake.output.crops, rows)
     inputs = {"seams": paths.seams, "level0": Path(paths.levels, "level0.ply")}
     inputs |= {"lpips": paths.lpips} if alexnet else {}
-    dense = density.seam_density(tiles, placed.source)
-    origin = record_provenance(inputs, dict(params.tiling))
-    write_json(snakemake.output.facts, {"dense": dense, "provenance": origin})
+    write_json(snakemake.output.facts, {"dense": dense, "provenance": record_provenance(inputs, tiling)})

@@ -19,11 +19,10 @@ UNSEARCHED = 40  # candidate places: enough that sixteen centres differ
 @dataclass(frozen=True)
 class ExemplarMaps:
     """The levels of an exemplar, finest first, and maps of its finest cells from above, row 0 in the south; NaN for
-    holes. level_count: how many levels the tiles get.
+    holes.
     """
 
     levels: list[GaussianField]
-    level_count: int | str
     exemplar: Exemplar
     colour: Float[Array, "m m 3"]
     uncertainty: Float[Array, "m m"]
@@ -35,33 +34,32 @@ class ExemplarMaps:
         west, south, _ = grid.exemplar
         return cls(
             levels.fields,
-            levels.wanted,
             Exemplar(west, south, grid.spacing, grid.cells),
             top.colour_or_nan().astype(float),
             top.uncertainty,
         )
 
-    def cut_straight(self, seam: dict, source: semantics.SemanticSource, rng: np.random.Generator) -> build.TileSet:
-        """Tiles of the same sizes with straight seams at unsearched places: the ceiling of every measure.
+    def cut_straight(self, tiles: build.TileSet, tiling: dict, rng: np.random.Generator) -> build.TileSet:
+        """Tiles of the sizes of a set with straight seams at unsearched places: the ceiling of every measure.
 
         Patches lie at the first of UNSEARCHED places, and steps of brightness and height stay: with the search and the
         corrections straight seams would be hardly worse than cut ones.
         """
-        options = build.TilingOptions.from_config(
-            dict(seam) | {"energy": "none", "candidates": UNSEARCHED}, source, self.level_count
-        )
+        plan, own = tiles.report.layout, {"energy": "none", "candidates": UNSEARCHED}
+        sizes = {"tile": plan.side / plan.exemplar, "strip": plan.strip / plan.side}
+        options = build.TilingOptions.from_config(tiling | own | sizes, semantics.SemanticSource(), len(tiles.fields))
         options = replace(options, tries=1, corrected=False)
         return build.cut_tiles(self.levels, self.exemplar, self.colour, self.uncertainty, options, rng)
 
-    def detrend(self, tiles: build.TileSet, seam: dict) -> DetrendedExemplar:
+    def detrend(self, tiles: build.TileSet, tiling: dict) -> DetrendedExemplar:
         """The exemplar without the trend that was removed for a tile set."""
-        width = build.TilingOptions.from_config(dict(seam), semantics.SemanticSource()).trend * tiles.report.layout.side
-        return detrend_exemplar(self.levels, self.exemplar, self.colour, width)
+        options = build.TilingOptions.from_config(tiling, semantics.SemanticSource())
+        return detrend_exemplar(self.levels, self.exemplar, self.colour, options.trend * tiles.report.layout.side)
 
     def place_with_straight(
-        self, tiles: build.TileSet, seam: dict, source: semantics.SemanticSource, seed: int, tau: float
+        self, tiles: build.TileSet, tiling: dict, seed: int, tau: float, material: int = 0
     ) -> tuple[PlacedTiles, PlacedTiles]:
         """Place a tile set, and beside it tiles of the same sizes that are cut straight."""
-        straight = self.cut_straight(seam, source, build.make_generator(seed, seam))
-        patches = self.detrend(tiles, seam)
+        straight = self.cut_straight(tiles, tiling, build.make_generator(seed, tiling, material))
+        patches = self.detrend(tiles, tiling)
         return place_tiles(tiles, patches, seed, tau), place_tiles(straight, patches, seed, tau)

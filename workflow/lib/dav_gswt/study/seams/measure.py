@@ -8,7 +8,7 @@ no jump.
 """
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,12 +18,16 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.images import metrics
 from dav_gswt.images.lpips_weights import Weights
+from dav_gswt.lod.levels import Levels
 from dav_gswt.logs import progress
 from dav_gswt.study.seams import crops, perceptual_distance, places
 from dav_gswt.study.seams.crops import Crop, RenderedCrop, View
+from dav_gswt.study.seams.density import seam_density
+from dav_gswt.study.seams.exemplar import ExemplarMaps
 from dav_gswt.study.seams.placed_tiles import PlacedTiles
 from dav_gswt.terrain import heights
 from dav_gswt.terrain.endless import EndlessTerrain
+from dav_gswt.tiles.build import TileSet
 
 _log = logging.getLogger(__name__)
 
@@ -51,6 +55,27 @@ class CropBank:
 
     vectors: Float32[Array, "m d"]
     boxes: Int[Array, "m 2 2"]
+
+
+def measure_materials(
+    sets: Iterable[tuple[Levels, TileSet]], tiling: dict, weights: Weights | None, seed: int, tau: float
+) -> tuple[list[dict], float]:
+    """The rows of `measure_crops` of all materials' tile sets, each beside its own exemplar, and their mean density."""
+    rows, dense = [], []
+    for number, (levels, tiles) in enumerate(sets):
+        maps = ExemplarMaps.from_levels(levels)
+        placed, straight = maps.place_with_straight(tiles, tiling, seed, tau, number)
+        rows += _number_material(measure_crops(placed, straight, weights, seed), number)
+        dense.append(seam_density(tiles, placed.source))
+    return rows, float(np.mean(dense))
+
+
+def _number_material(rows: list[dict], material: int) -> list[dict]:
+    """The rows with numbers of crops and names of clusters that no other material has."""
+    if not material:
+        return rows
+    first = material * (BORDERS + 2 * CUTS)
+    return [row | {"crop": row["crop"] + first, "cluster": f"m{material}:{row['cluster']}"} for row in rows]
 
 
 def measure_crops(placed: PlacedTiles, straight: PlacedTiles, weights: Weights | None, seed: int) -> list[dict]:
