@@ -122,6 +122,11 @@ def test_another_signal_is_named_with_the_last_errors_of_the_log(handler, tmp_pa
     assert "memory" not in said and "find features" not in said
 
 
+def test_a_limit_of_memory_is_named_beside_a_signal(handler, tmp_path, monkeypatch):
+    monkeypatch.setattr("resource.getrlimit", lambda of: (1_200_000_000, -1))
+    assert "limited to 1.2 GB here (ulimit -v)" in kill(handler, "died with <Signals.SIGABRT: 6>", tmp_path / "a.log")
+
+
 def test_a_killed_job_without_a_log_is_named_all_the_same(handler, tmp_path):
     assert "SIGSEGV; its log names no cause" in kill(handler, "died with <Signals.SIGSEGV: 11>", tmp_path / "none.log")
 

@@ -8,6 +8,7 @@ import json
 import logging
 import os
 import re
+import resource
 import signal
 import sys
 from collections import deque
@@ -137,7 +138,13 @@ def explain_signal(name: str, logs: list[Path]) -> list[str]:
     if name == "SIGKILL":  # the only one that the system sends when memory runs out
         return ["  the job was killed by SIGKILL: was there too little memory? A smaller preset needs less"]
     cause = [line for path in logs for line in read_cause(path)]
-    return [f"  the job was killed by {name}" + (":" if cause else "; its log names no cause"), *cause]
+    return [f"  the job was killed by {name}" + (":" if cause else "; its log names no cause"), *cause, *limit_of_memory()]
+
+
+def limit_of_memory() -> list[str]:
+    """A line that names the limit of the address space; none where there is no limit."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    return [] if limit == resource.RLIM_INFINITY else [f"  memory is limited to {limit / 1e9:.1f} GB here (ulimit -v)"]
 
 
 def read_cause(path: Path) -> list[str]:
