@@ -159,7 +159,7 @@ def prior_weights(wildcards):
     files = lpips_weights(wildcards) if prior["lpips"] else {}
     if prior["model"] == "terrain":
         return files | {"weights": terrain_weights(wildcards.prior)}
-    return files | {"folder": existing(prior["folder"], f"{where}.folder", "; see docs/research/results/prior.md")}
+    return files | {"folder": existing(prior["folder"], f"{where}.folder", "; see docs/prior.md")}
 
 
 def earlier_decisions(wildcards):

@@ -55,8 +55,8 @@ class Config(ConfigModel):
         "levels of detail; `auto`: as many as are ever drawn, at most six", "auto"
     )
     tau: Share = key(
-        "tiles whose mean uncertainty reaches it keep all pre-sorted orders, the others about half; 0: all tiles keep "
-        "all, 1: none does",
+        "tiles and objects whose mean uncertainty reaches it keep all pre-sorted orders, the others about half; 0: all "
+        "do, 1: none does. It acts in the bundle only",
         0.6,
     )
     lpips: Lpips = key(

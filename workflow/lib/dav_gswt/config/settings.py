@@ -172,7 +172,7 @@ class Zero123Settings(_Prior):
     """Zero-1-to-3 from a folder of published weights."""
 
     model: Literal["zero123"]
-    folder: Text = key("its weights: docs/research/results/prior.md")
+    folder: Text = key("its weights: docs/prior.md")
     guidance: float = key("strength of classifier-free guidance", 3, ge=1, le=100)
 
 

@@ -24,7 +24,7 @@ POLICIES_HEAD = """# Policies
 
 How the next views are chosen: the config's `policy`. Made from the table in
 `workflow/lib/dav_gswt/views/policy_names.py` by `make reference`; the functions are in `policies.py` beside it, and
-[architecture](../architecture.md) says how to add one.
+[architecture](../architecture.md#a-policy) says how to add one.
 
 Every policy knows where the candidates and the photos so far are; the column `reads` says what it reads besides:
 the geometric scores (`opacity`, `fisher`), the scores by a prior, the field itself, or the true error, which is known
