@@ -1,3 +1,5 @@
+import re
+import textwrap
 from dataclasses import replace
 
 import numpy as np
@@ -158,6 +160,17 @@ def test_a_policy_says_what_it_reads():
     assert (reads["farthest"], reads["opacity"], reads["oracle"]) == ("poses", "geometric scores", "true error")
     assert (reads["fisher"], reads["w2-lpips"]) == ("geometric scores, field", "prior")
     assert reads["single"] == "prior (not `p_drop`, `lam`)"
+
+
+def test_the_policy_that_the_architecture_page_shows_chooses_as_it_says(root, monkeypatch):
+    page = (root / "docs/architecture.md").read_text(encoding="utf-8").split("### A policy")[1]
+    code = textwrap.dedent(re.search(r" *```python\n(.*?) *```", page, re.S)[1])
+    monkeypatch.setattr(policies, "POLICY_NAMES", (*POLICY_NAMES, "lowest"))
+    monkeypatch.setitem(POLICIES, "lowest", None)  # so that it leaves the table again
+    exec(code, dict(vars(policies)))
+    low, high = Pose("low", 40.0, 0.0, 1.0), Pose("high", 80.0, 0.0, 1.0)
+    pool = Scores([high, low], {"opacity": np.zeros(2)}, Scales({"opacity": 0.0}), np.zeros(2, int))
+    assert chosen("lowest", pool, 1) == ["low"]
 
 
 def test_a_policy_that_is_not_described_cannot_be_registered():

@@ -8,7 +8,7 @@ from dav_gswt.study.tradeoff.tables import mean_square, measure_cell
 
 KEY = ("scene", "seed", "part", "processor", "cores")  # what tells rows apart
 PARTS = {
-    "fit": "cap, degree and steps",
+    "fit": "Gaussians, degree and steps",
     "rounds": "when to ask for no more photos",
     "orders": "pre-sorted orders",
     "all": "all three",

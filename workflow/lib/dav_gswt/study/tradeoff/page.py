@@ -25,8 +25,9 @@ def format_tradeoff(rows: list[dict], pareto: list[dict]) -> str:
         f"Each knob is turned by itself from the base, which has the preset `{base['preset']}`, the tiling "
         f"`{base['tiling']}` and tau {base['tau']:g}; its own settings are bold. Losses are counted from each knob's "
         "first setting, taken for the most accurate. Seconds are those of whole jobs from the start views to the "
-        "bundle, without the taking of photos; what settings share counts for each. One scene and one seed: "
-        "differences of a few hundredths of a decibel are within what another seed changes.",
+        "bundle, without the taking of photos; what settings share counts for each. Memory is the largest that was "
+        "sampled of any job: of those up to the bundle and, where stills tell the loss, of rendering these. One scene "
+        "and one seed: differences of a few hundredths of a decibel are within what another seed changes.",
         "## Presets",
         format_table(*_tabulate_presets(pareto)),
         "On the front is what no other setting here is as fast as and better than: in PSNR, and beside it in LPIPS, as "
