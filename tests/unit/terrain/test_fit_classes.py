@@ -12,9 +12,9 @@ from dav_gswt.terrain import fit_classes
 from dav_gswt.terrain.classes import Classes
 
 
-def content_of(*materials):
+def content_of(*materials, fray=None):
     tiles = cover_content().tiles
-    named = [MaterialInfo(str(k), share, scale, [0.5] * 3) for k, (share, scale) in enumerate(materials)]
+    named = [MaterialInfo(str(k), share, scale, [0.5] * 3, fray) for k, (share, scale) in enumerate(materials)]
     return BundleContent([tiles[k % 2] for k in range(len(named))], named)
 
 
@@ -39,13 +39,28 @@ def test_stretches_have_the_wanted_length_in_the_mean(fitted):
     assert abs(ratio @ [m.share for m in content.materials]) < 0.1
 
 
-def test_jitter_moves_a_border_by_a_small_part_of_a_tile(fitted):
-    _, classes = fitted
+def measure_movement(classes):
+    """How far jitter moves a border in the mean, in tile sides."""
     u, v = np.random.default_rng(0).random((2, 5000))
     jitter = classes.jitter_at(3, 4, u, v)
     _, steepness = fit_classes.measure_lines(classes, 8)
-    moved = np.abs(jitter[:, 0] - jitter[:, 1]).mean() / steepness
-    assert moved == pytest.approx(fit_classes.FRAY, rel=0.2)
+    return np.abs(jitter[:, 0] - jitter[:, 1]).mean() / steepness
+
+
+def test_jitter_moves_a_border_by_a_small_part_of_a_tile_where_none_was_seen(fitted):
+    assert measure_movement(fitted[1]) == pytest.approx(fit_classes.FRAY, rel=0.2)
+
+
+@pytest.mark.parametrize("fray", [0.08, 0.12])
+def test_jitter_moves_a_border_as_far_as_photographed_ones_stray(fray):
+    content = content_of((0.6, 12.0), (0.4, 12.0), fray=fray * SIDE)
+    assert measure_movement(Classes(fit_classes.fit_classes(content, 7), 2, SIDE)) == pytest.approx(fray, rel=0.2)
+
+
+def test_jitter_is_no_finer_than_the_ground_cells():
+    content = content_of((0.6, 12.0), (0.4, 12.0), fray=0.0)
+    jitter = fit_classes.fit_classes(content, 7).jitter
+    assert jitter.amplitude > 0 and SIDE / jitter.cells >= fit_classes.WAVES * content.spacing
 
 
 def test_biases_of_two_materials_are_half_of_the_quantile_of_their_difference():

@@ -138,7 +138,11 @@ def explain_signal(name: str, logs: list[Path]) -> list[str]:
     if name == "SIGKILL":  # the only one that the system sends when memory runs out
         return ["  the job was killed by SIGKILL: was there too little memory? A smaller preset needs less"]
     cause = [line for path in logs for line in read_cause(path)]
-    return [f"  the job was killed by {name}" + (":" if cause else "; its log names no cause"), *cause, *limit_of_memory()]
+    return [
+        f"  the job was killed by {name}" + (":" if cause else "; its log names no cause"),
+        *cause,
+        *limit_of_memory(),
+    ]
 
 
 def limit_of_memory() -> list[str]:

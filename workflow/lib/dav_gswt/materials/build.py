@@ -13,7 +13,8 @@ from scipy.ndimage import distance_transform_edt
 from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 from dav_gswt.logs import progress
-from dav_gswt.materials import extraction, mask_images, outlines, verdict
+from dav_gswt.materials import extraction, mask_images, outlines, segmentation, verdict
+from dav_gswt.materials.borders import measure_fray
 from dav_gswt.materials.classes import GroundClasses, classify_ground
 from dav_gswt.materials.filling import CellSources, box_sums, fill_cells
 from dav_gswt.materials.maps import GroundMaps, measure_ground
@@ -138,7 +139,7 @@ def _keep_whole(field: GaussianField, grid: Ground, maps: GroundMaps) -> FoundMa
     """All of the ground as one material."""
     everything, nothing = np.ones(maps.known.shape, bool), np.zeros(maps.known.shape, bool)
     side = choose_tile_side(maps, [everything])
-    info = MaterialInfo("material0", 1.0, maps.cells * grid.spacing, [float(v) for v in maps.colour.mean((0, 1))])
+    info = MaterialInfo("material0", 1.0, maps.cells * grid.spacing, [float(v) for v in maps.colour.mean((0, 1))], None)
     judged = verdict.judge_material(info.name, (maps.cells / side) ** 2, 0.0)
     classes = GroundClasses(
         np.zeros(maps.known.shape, int), np.zeros(maps.known.shape, int), [], nothing, ["material0"]
@@ -182,7 +183,8 @@ def _make_material(parts: _Parts, number: int) -> Material | None:
     # with the excluded ground beside it: shade of a tree parts no material
     patch_scale = _measure_patches(parts.classes.materials == number) * grid.spacing
     colour = [float(value) for value in parts.maps.colour[own].mean(0)]
-    info = MaterialInfo(parts.classes.names[number], float(parts.classes.shares[number]), patch_scale, colour)
+    share, fray = float(parts.classes.shares[number]), _measure_fray(parts, number)
+    info = MaterialInfo(parts.classes.names[number], share, patch_scale, colour, fray)
     judged = verdict.judge_material(info.name, float(own.sum()) / parts.tile_side**2, filled)
     return Material(info, made, made_grid, filled, judged)
 
@@ -234,6 +236,14 @@ def _texture_scale(maps: GroundMaps, source: Bool[Array, "m m"]) -> float:
     blur = texture.TREND * len(source)
     soft = [extraction.blur_over(layer, source, blur) for layer in np.moveaxis(maps.colour, -1, 0)]
     return texture.measure_texture_scale(np.where(source[..., None], maps.colour, np.dstack(soft)))
+
+
+def _measure_fray(parts: _Parts, number: int) -> float | None:
+    """How far a material's borders stray from their smooth course, in world units."""
+    classes, features = parts.classes, segmentation.describe_cells(parts.maps.colour)[..., :3]
+    counted = parts.maps.known & ~classes.excluded & ~classes.occupied
+    found = measure_fray(features, classes.materials == number, counted, parts.tile_side)
+    return None if found is None else found * parts.grid.spacing
 
 
 def _measure_patches(own: Bool[Array, "m m"]) -> float:

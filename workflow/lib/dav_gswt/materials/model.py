@@ -15,12 +15,14 @@ class MaterialInfo:
         patch_scale: typical width of a stretch of it: the mean length, in world units, of what a straight line crosses
             in one piece.
         colour: mean sRGB colour, in [0, 1].
+        fray: mean distance, in world units, of its borders from their smooth course; None where none was seen.
     """
 
     name: str
     share: float
     patch_scale: float
     colour: list[float]
+    fray: float | None
 
 
 @dataclass(frozen=True)

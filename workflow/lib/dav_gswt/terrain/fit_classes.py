@@ -16,7 +16,8 @@ SAMPLES, LINES, LINE = 60_000, 48, 2048  # lattice points; lines of them, and po
 PASSES, STEPS = 3, 150
 TYPICAL = 0.6  # mean difference of two jitters, in amplitudes
 
-FRAY = 0.06  # tile sides: how far the jitter typically moves a border
+FRAY = 0.06  # tile sides: how far the jitter typically moves a border, where no border was seen
+LEAST_FRAY = 1.0  # ground cells: finer jitter is not drawn
 WAVES = 3.0  # wavelength of the widest jitter, as a multiple of that
 FINEST = 3.0  # ground cells: wavelength of the finest jitter
 LEAN = 1.0  # how far something reaches over a border, as a multiple of its height above the ground
@@ -97,9 +98,14 @@ def _spread_points(salt: int) -> tuple[Array, Array]:
 
 
 def _fit_jitter(content: BundleContent, steepness: float) -> JitterEntry:
-    """The jitter that moves borders by FRAY; less where patches are small. steepness: of scores, per tile side."""
+    """The jitter that moves borders as far as those that were seen stray; less where patches are small.
+
+    steepness: of scores, per tile side.
+    """
     smallest = max(min(material.patch_scale for material in content.materials) / content.side, 1 / LATTICE)
-    fray = min(FRAY, 0.15 * smallest)
+    seen = [material.fray / content.side for material in content.materials if material.fray is not None]
+    wanted = max(float(np.mean(seen)), LEAST_FRAY * content.spacing / content.side) if seen else FRAY
+    fray = min(wanted, 0.15 * smallest)
     cells = int(np.clip(np.rint(1 / (WAVES * fray)), 1, 4096))
     octaves = count_octaves(content.side / cells, FINEST * content.spacing, 4)
     return JitterEntry(cells, octaves, float(fray * steepness / TYPICAL))

@@ -39,7 +39,9 @@ class ExemplarMaps:
             top.uncertainty,
         )
 
-    def cut_straight(self, tiles: build.TileSet, tiling: dict, rng: np.random.Generator) -> build.TileSet:
+    def cut_straight(
+        self, tiles: build.TileSet, tiling: dict, source: semantics.SemanticSource, rng: np.random.Generator
+    ) -> build.TileSet:
         """Tiles of the sizes of a set with straight seams at unsearched places: the ceiling of every measure.
 
         Patches lie at the first of UNSEARCHED places, and steps of brightness and height stay: with the search and the
@@ -47,7 +49,7 @@ class ExemplarMaps:
         """
         plan, own = tiles.report.layout, {"energy": "none", "candidates": UNSEARCHED}
         sizes = {"tile": plan.side / plan.exemplar, "strip": plan.strip / plan.side}
-        options = build.TilingOptions.from_config(tiling | own | sizes, semantics.SemanticSource(), len(tiles.fields))
+        options = build.TilingOptions.from_config(tiling | own | sizes, source, len(tiles.fields))
         options = replace(options, tries=1, corrected=False)
         return build.cut_tiles(self.levels, self.exemplar, self.colour, self.uncertainty, options, rng)
 
@@ -57,9 +59,9 @@ class ExemplarMaps:
         return detrend_exemplar(self.levels, self.exemplar, self.colour, options.trend * tiles.report.layout.side)
 
     def place_with_straight(
-        self, tiles: build.TileSet, tiling: dict, seed: int, tau: float, material: int = 0
+        self, tiles: build.TileSet, tiling: dict, source: semantics.SemanticSource, seed: int, tau: float, number: int
     ) -> tuple[PlacedTiles, PlacedTiles]:
-        """Place a tile set, and beside it tiles of the same sizes that are cut straight."""
-        straight = self.cut_straight(tiles, tiling, build.make_generator(seed, tiling, material))
+        """Place the tile set of a material, by number, and beside it tiles of the same sizes that are cut straight."""
+        straight = self.cut_straight(tiles, tiling, source, build.make_generator(seed, tiling, number))
         patches = self.detrend(tiles, tiling)
         return place_tiles(tiles, patches, seed, tau), place_tiles(straight, patches, seed, tau)

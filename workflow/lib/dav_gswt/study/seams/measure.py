@@ -28,6 +28,7 @@ from dav_gswt.study.seams.placed_tiles import PlacedTiles
 from dav_gswt.terrain import heights
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.tiles.build import TileSet
+from dav_gswt.tiles.semantics import SemanticSource
 
 _log = logging.getLogger(__name__)
 
@@ -64,7 +65,7 @@ def measure_materials(
     rows, dense = [], []
     for number, (levels, tiles) in enumerate(sets):
         maps = ExemplarMaps.from_levels(levels)
-        placed, straight = maps.place_with_straight(tiles, tiling, seed, tau, number)
+        placed, straight = maps.place_with_straight(tiles, tiling, SemanticSource(weights), seed, tau, number)
         rows += _number_material(measure_crops(placed, straight, weights, seed), number)
         dense.append(seam_density(tiles, placed.source))
     return rows, float(np.mean(dense))

@@ -1,0 +1,56 @@
+"""How far borders stray: of straight, wavy, soft and hidden borders."""
+
+import numpy as np
+import pytest
+
+from dav_gswt.materials.borders import measure_fray
+
+CELLS, TILE = 160, 60.0
+EVERY = np.ones((CELLS, CELLS), bool)
+
+
+def paint(share):
+    """Features of two colours that are mixed by a share."""
+    return share[..., None] * np.array([10.0, 0.0, 5.0]) + (1 - share[..., None]) * np.array([-10.0, 3.0, 0.0])
+
+
+def away_from_middle():
+    return np.broadcast_to(np.arange(CELLS) - CELLS / 2 + 0.5, (CELLS, CELLS))
+
+
+def test_a_straight_border_strays_by_less_than_a_cell():
+    own = away_from_middle() > 0
+    assert measure_fray(paint(own.astype(float)), own, EVERY, TILE) < 1
+
+
+@pytest.mark.parametrize("far", [2.0, 4.0])
+def test_a_frayed_border_strays_as_far_as_it_was_moved(far):
+    moved = np.random.default_rng(0).uniform(-2 * far, 2 * far, (CELLS, CELLS))  # a mean distance of `far`
+    share = (away_from_middle() > moved).astype(float)
+    assert measure_fray(paint(share), away_from_middle() > 0, EVERY, TILE) == pytest.approx(far, rel=0.2)
+
+
+def test_a_soft_border_counts_as_a_frayed_one():
+    share = np.clip(away_from_middle() / 16 + 0.5, 0, 1)
+    assert measure_fray(paint(share), away_from_middle() > 0, EVERY, TILE) == pytest.approx(4, rel=0.2)
+
+
+def test_slow_bends_do_not_count():
+    bend = 15 * np.sin(np.arange(CELLS) / CELLS * 2 * np.pi)[:, None]
+    own = away_from_middle() > bend
+    assert measure_fray(paint(own.astype(float)), own, EVERY, TILE) < 1.2
+
+
+def test_of_a_border_that_is_hidden_nothing_is_known():
+    own = away_from_middle() > 0
+    assert measure_fray(paint(own.astype(float)), own, np.abs(away_from_middle()) > 30, TILE) is None
+
+
+@pytest.mark.parametrize("own", [EVERY, ~EVERY])
+def test_ground_of_one_material_has_no_border(own):
+    assert measure_fray(paint(own.astype(float)), own, EVERY, TILE) is None
+
+
+def test_equal_colours_give_a_finite_number():
+    own = away_from_middle() > 0
+    assert np.isfinite(measure_fray(paint(np.ones((CELLS, CELLS))), own, EVERY, TILE))
