@@ -128,6 +128,20 @@ def test_ground_of_which_nothing_is_left_is_tiled_as_one(monkeypatch, caplog):
     assert "all of the ground is tiled as one" in caplog.text
 
 
+def test_a_material_of_which_next_to_nothing_is_left_is_left_out(monkeypatch, caplog):
+    classes = build.classify_ground(made.maps())
+    grass = classes.materials == 1
+    few = grass & (np.cumsum(grass.ravel()).reshape(grass.shape) <= 0.02 * grass.size)
+    monkeypatch.setattr(
+        build, "classify_ground", lambda maps, masks: replace(classes, excluded=classes.excluded | grass & ~few)
+    )
+    left, whole = build.find_materials(made.field(), made.grid(), 0), classes.source(0)
+    assert [each.info.name for each in left.materials] == [classes.names[0]]
+    assert left.materials[0].info.share == pytest.approx(1)
+    assert left.tile_side == build.choose_tile_side(made.maps(), [whole])  # no smaller tiles for what is left out
+    assert f"left of {classes.names[1]}" in caplog.text and "left out" in caplog.text
+
+
 def test_even_ground_is_given_back_as_it_is():
     field, grid = made.field(mixed=False, shrubs=False), made.grid()
     found = build.find_materials(field, grid, 0)

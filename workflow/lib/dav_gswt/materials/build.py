@@ -31,6 +31,7 @@ OWN_SHARE = 0.8  # of its exemplar that a material fills itself, if a smaller wi
 BLOCK = 32  # cells: exemplars are whole numbers of it, as far as the whole one is
 AREAS = 2.0  # tile areas that the scarcest material has at least, if tiles are made smaller for it
 SMALLEST_TILE = 0.22  # of the exemplar's side
+LEAST_AREAS = 0.5  # smallest tiles' areas of a material, of which less was photographed: it is left out
 ROOM = 1.6  # sides of a tile that an exemplar is wide at least
 PATCH, SMALLEST_PATCH = 3.0, 8  # side of a filling patch, in scales of the texture and in cells, at least
 
@@ -110,11 +111,11 @@ def find_materials(
     maps = measure_ground(field, grid)
     masks = mask_images.read_masks(mask_files, maps.cells) if mask_files else None
     classes = _refine_objects(maps, classify_ground(maps, masks), segmenter)
-    sources = [classes.source(k) for k in range(classes.number)]
+    sources = [_ignore_scarce(classes, k) for k in range(classes.number)]
     if all(source.all() for source in sources) and masks is None:
         return _keep_whole(field, grid, maps)
     parts = _Parts(field, grid, maps, classes, choose_tile_side(maps, sources), seed)
-    made = {k: _make_material(parts, k) for k in progress(range(classes.number), "fill materials")}
+    made = {k: _make_material(parts, k, sources[k]) for k in progress(range(classes.number), "fill materials")}
     kept = {k: each for k, each in made.items() if each is not None}
     if not kept:
         _log.warning(
@@ -166,9 +167,19 @@ def choose_tile_side(maps: GroundMaps, sources: list[Bool[Array, "m m"]]) -> flo
     return max(SMALLEST_TILE, min(by_texture, by_area)) * maps.cells
 
 
-def _make_material(parts: _Parts, number: int) -> Material | None:
-    """The exemplar of one material; None where it has no room for a patch."""
-    own, grid = parts.classes.source(number), parts.grid
+def _ignore_scarce(classes: GroundClasses, number: int) -> Bool[Array, "m m"]:
+    """The cells that a material is made of; none, with a warning, where they are too few for any tile."""
+    own = classes.source(number)
+    if own.mean() >= LEAST_AREAS * SMALLEST_TILE**2:
+        return own
+    left = f"{own.mean():.1%} of the ground is left of {classes.names[number]} without shade, objects and the like"
+    _log.warning("%s, too little for a tile: it is left out", left)
+    return np.zeros_like(own)
+
+
+def _make_material(parts: _Parts, number: int, own: Bool[Array, "m m"]) -> Material | None:
+    """The exemplar of one material, made of its own cells; None where it has no room for a patch."""
+    grid = parts.grid
     if not own.any():
         return None
     row, column, cells = choose_window(own, parts.tile_side)
