@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dav_gswt.materials.borders import measure_fray
+from dav_gswt.materials.borders import measure_bend, measure_fray
 
 CELLS, TILE = 160, 60.0
 EVERY = np.ones((CELLS, CELLS), bool)
@@ -54,3 +54,27 @@ def test_ground_of_one_material_has_no_border(own):
 def test_equal_colours_give_a_finite_number():
     own = away_from_middle() > 0
     assert np.isfinite(measure_fray(paint(np.ones((CELLS, CELLS))), own, EVERY, TILE))
+
+
+def wave(height, length):
+    return away_from_middle() > height * np.sin(np.arange(CELLS) / length * 2 * np.pi)[:, None]
+
+
+def test_a_straight_border_does_not_bend():
+    assert measure_bend(away_from_middle() > 0, EVERY, TILE) == 0
+
+
+@pytest.mark.parametrize("height", [3.0, 6.0])
+def test_a_wave_bends_by_the_mean_of_its_height(height):
+    # of which the finer filter leaves exp(-2 pi² s² / l²) = .89, the smoother one .17
+    assert measure_bend(wave(height, 40.0), EVERY, TILE) == pytest.approx(0.72 * 2 / np.pi * height, rel=0.25)
+
+
+def test_a_narrow_gap_hides_no_bend_but_a_wide_one_does():
+    gap = np.abs(away_from_middle()) > 3
+    assert measure_bend(wave(3.0, 40.0), gap, TILE) == measure_bend(wave(3.0, 40.0), EVERY, TILE)
+    assert measure_bend(wave(3.0, 40.0), np.abs(away_from_middle()) > 40, TILE) is None
+
+
+def test_of_ground_without_a_border_no_bend_is_known():
+    assert measure_bend(EVERY, EVERY, TILE) is None

@@ -12,9 +12,9 @@ from dav_gswt.terrain import fit_classes
 from dav_gswt.terrain.classes import Classes
 
 
-def content_of(*materials, fray=None):
+def content_of(*materials, fray=None, bend=None):
     tiles = cover_content().tiles
-    named = [MaterialInfo(str(k), share, scale, [0.5] * 3, fray) for k, (share, scale) in enumerate(materials)]
+    named = [MaterialInfo(str(k), share, scale, [0.5] * 3, fray, bend) for k, (share, scale) in enumerate(materials)]
     return BundleContent([tiles[k % 2] for k in range(len(named))], named)
 
 
@@ -55,6 +55,15 @@ def test_jitter_moves_a_border_by_a_small_part_of_a_tile_where_none_was_seen(fit
 def test_jitter_moves_a_border_as_far_as_photographed_ones_stray(fray):
     content = content_of((0.6, 12.0), (0.4, 12.0), fray=fray * SIDE)
     assert measure_movement(Classes(fit_classes.fit_classes(content, 7), 2, SIDE)) == pytest.approx(fray, rel=0.2)
+
+
+def test_borders_bend_as_photographed_ones_do():
+    found = []
+    for bend in (0.0, 1.0):
+        content = content_of((0.6, 24.0), (0.4, 24.0), bend=bend * SIDE)
+        entry = fit_classes.fit_classes(content, 7)
+        found.append((max(entry.rule[0].octaves), fit_classes.measure_bends(Classes(entry, 2, SIDE), 7)))
+    assert found[0][0] == 1 < found[1][0] and found[0][1] < found[1][1]
 
 
 def test_jitter_is_no_finer_than_the_ground_cells():

@@ -1,4 +1,4 @@
-"""How far the borders of a material stray from their smooth course.
+"""How the borders of a material run: how far they stray from their smooth course, and how that bends.
 
 Over the signed distance d from the smooth course, the colour of the ground changes from one side's to the other's. If
 P(d) is the share of the material's own colour there, and H(d) is 1 inside and 0 outside, the mean distance of the real
@@ -11,7 +11,9 @@ from numpy import ndarray as Array
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
 SMOOTH = 0.05  # tile sides: standard deviation of the filter that gives the smooth course
+SMOOTHER = 0.2  # the same of the filter against whose course bends are measured
 REACH = 0.35  # tile sides: half-width of the band that is looked at
+GAP = 0.07  # tile sides: half-width of a gap of what is counted, through which bends are measured
 BAND = 0.5  # cells to either side of a distance that are averaged
 FEW = 10  # cells, with fewer of which nothing is known of a distance
 
@@ -41,3 +43,21 @@ def measure_fray(
         if here.sum() >= FEW:
             strayed += abs((distance > 0) - float(share[here].mean()))
     return strayed
+
+
+def measure_bend(own: Bool[Array, "m m"], counted: Bool[Array, "m m"], tile_side: float) -> float | None:
+    """Mean distance in cells between the smooth course of borders and a still smoother one: 0 for straight ones.
+
+    It is the area between the two over the length of the border. Narrow gaps of what is counted, as kerbs are, do not
+    hide it. None where fewer than FEW cells of border are seen.
+    """
+    counted = distance_transform_edt(~counted) <= GAP * tile_side
+    fine, coarse = (
+        gaussian_filter(own.astype(float), share * tile_side, mode="nearest") > 0.5 for share in (SMOOTH, SMOOTHER)
+    )
+    crossings = sum(
+        int((np.diff(fine, axis=axis) & np.delete(counted, 0, axis) & np.delete(counted, -1, axis)).sum())
+        for axis in (0, 1)
+    )
+    length = np.pi / 4 * crossings  # of a line at a random angle to the grid
+    return float(((fine != coarse) & counted).sum()) / length if length >= FEW else None

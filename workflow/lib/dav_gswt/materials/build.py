@@ -14,7 +14,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 from dav_gswt.logs import progress
 from dav_gswt.materials import extraction, mask_images, outlines, segmentation, verdict
-from dav_gswt.materials.borders import measure_fray
+from dav_gswt.materials.borders import measure_bend, measure_fray
 from dav_gswt.materials.classes import GroundClasses, classify_ground
 from dav_gswt.materials.filling import CellSources, box_sums, fill_cells
 from dav_gswt.materials.maps import GroundMaps, measure_ground
@@ -140,7 +140,8 @@ def _keep_whole(field: GaussianField, grid: Ground, maps: GroundMaps) -> FoundMa
     """All of the ground as one material."""
     everything, nothing = np.ones(maps.known.shape, bool), np.zeros(maps.known.shape, bool)
     side = choose_tile_side(maps, [everything])
-    info = MaterialInfo("material0", 1.0, maps.cells * grid.spacing, [float(v) for v in maps.colour.mean((0, 1))], None)
+    colour = [float(value) for value in maps.colour.mean((0, 1))]
+    info = MaterialInfo("material0", 1.0, maps.cells * grid.spacing, colour, None, None)
     judged = verdict.judge_material(info.name, (maps.cells / side) ** 2, 0.0)
     classes = GroundClasses(
         np.zeros(maps.known.shape, int), np.zeros(maps.known.shape, int), [], nothing, ["material0"]
@@ -194,8 +195,8 @@ def _make_material(parts: _Parts, number: int, own: Bool[Array, "m m"]) -> Mater
     # with the excluded ground beside it: shade of a tree parts no material
     patch_scale = _measure_patches(parts.classes.materials == number) * grid.spacing
     colour = [float(value) for value in parts.maps.colour[own].mean(0)]
-    share, fray = float(parts.classes.shares[number]), _measure_fray(parts, number)
-    info = MaterialInfo(parts.classes.names[number], share, patch_scale, colour, fray)
+    share, (fray, bend) = float(parts.classes.shares[number]), _measure_borders(parts, number)
+    info = MaterialInfo(parts.classes.names[number], share, patch_scale, colour, fray, bend)
     judged = verdict.judge_material(info.name, float(own.sum()) / parts.tile_side**2, filled)
     return Material(info, made, made_grid, filled, judged)
 
@@ -249,18 +250,23 @@ def _texture_scale(maps: GroundMaps, source: Bool[Array, "m m"]) -> float:
     return texture.measure_texture_scale(np.where(source[..., None], maps.colour, np.dstack(soft)))
 
 
-def _measure_fray(parts: _Parts, number: int) -> float | None:
-    """How far a material's borders stray from their smooth course, in world units."""
+def _measure_borders(parts: _Parts, number: int) -> tuple[float | None, float | None]:
+    """Fray and bend of a material's borders, in world units."""
     classes, features = parts.classes, segmentation.describe_cells(parts.maps.colour)[..., :3]
     counted = parts.maps.known & ~classes.excluded & ~classes.occupied
-    found = measure_fray(features, classes.materials == number, counted, parts.tile_side)
-    return None if found is None else found * parts.grid.spacing
+    own, spacing = classes.materials == number, parts.grid.spacing
+    fray = measure_fray(features, own, counted, parts.tile_side)
+    bend = measure_bend(own, counted, parts.tile_side)
+    return None if fray is None else fray * spacing, None if bend is None else bend * spacing
 
 
 def _measure_patches(own: Bool[Array, "m m"]) -> float:
-    """Mean length in cells of what lines along rows and columns cross in one piece."""
-    entered = [np.diff(np.pad(cells, ((0, 0), (1, 0))).astype(int), axis=1) == 1 for cells in (own, own.T)]
-    return 2 * float(own.sum()) / max(sum(int(each.sum()) for each in entered), 1)
+    """Mean length in cells of what lines along rows and columns cross in one piece.
+
+    Each piece has two ends; those that the exemplar's border cuts off are not counted, as the piece goes on there.
+    """
+    ends = sum(int(np.diff(own, axis=axis).sum()) for axis in (0, 1))
+    return 4 * float(own.sum()) / max(ends, 1) if ends else float(own.sum())
 
 
 def _extract_objects(parts: _Parts, index: dict[int, int]) -> list[ExtractedObject]:

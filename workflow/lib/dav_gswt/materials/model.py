@@ -16,6 +16,7 @@ class MaterialInfo:
             in one piece.
         colour: mean sRGB colour, in [0, 1].
         fray: mean distance, in world units, of its borders from their smooth course; None where none was seen.
+        bend: the same between that course and a still smoother one (`borders`).
     """
 
     name: str
@@ -23,6 +24,7 @@ class MaterialInfo:
     patch_scale: float
     colour: list[float]
     fray: float | None
+    bend: float | None
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,14 @@ from numpy import ndarray as Array
 
 from dav_gswt.bundle.content import BundleContent
 from dav_gswt.bundle.land_cover import ClassesEntry, JitterEntry, NoiseTerm, RiseEntry
+from dav_gswt.materials.borders import measure_bend
 from dav_gswt.terrain.classes import LATTICE, Classes
 
 SHORTEST, WIDEST = 4.0, 4096.0  # lattice steps: wavelengths of noise that the lattice shows
 MAX_OCTAVES = 5
 SAMPLES, LINES, LINE = 60_000, 48, 2048  # lattice points; lines of them, and points of a line
 PASSES, STEPS = 3, 150
+WINDOWS, WINDOW, FINE = 6, 10, 24  # places in which bends are measured; their sides in tile sides; cells of one
 TYPICAL = 0.6  # mean difference of two jitters, in amplitudes
 
 FRAY = 0.06  # tile sides: how far the jitter typically moves a border, where no border was seen
@@ -28,6 +30,37 @@ CLEARANCE = 2.0  # standard deviations of the ground's own relief
 def fit_classes(content: BundleContent, salt: int) -> ClassesEntry:
     """The rule that gives every material its share of the ground and, as far as possible, its patch scale.
 
+    Where borders were seen, the noise has so many octaves that its borders bend as those do.
+    """
+    number, side = len(content.materials), content.side
+    seen = [material.bend / side for material in content.materials if material.bend is not None]
+    choices = [_fit_noise(content, salt, 1)]
+    while len(choices) < MAX_OCTAVES and (more := _fit_noise(content, salt, len(choices) + 1)) != choices[-1]:
+        choices.append(more)  # as long as the lattice shows another octave
+    entry, steepness = choices[-1]
+    if seen:
+        bends = np.array([measure_bends(Classes(choice, number, side), salt) for choice, _ in choices])
+        entry, steepness = choices[int(np.abs(bends - np.mean(seen)).argmin())]
+    return replace(entry, jitter=_fit_jitter(content, steepness), rise=_fit_rise(content, steepness / side))
+
+
+def measure_bends(classes: Classes, salt: int) -> float:
+    """Mean of `borders.measure_bend` over materials and some places of the terrain, in tile sides; without jitter."""
+    rng, found = np.random.default_rng([salt, 2]), []
+    for corner in rng.integers(-(2**20), 2**20, (WINDOWS, 2)).tolist():
+        x, y = (v.ravel() for v in np.meshgrid(*[(np.arange(WINDOW * FINE) + 0.5) / FINE] * 2))
+        i, j = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+        scores = classes.scores_at(i + corner[0], j + corner[1], x - i, y - j)
+        material = scores.argmax(1).reshape(WINDOW * FINE, WINDOW * FINE)
+        every = np.ones(material.shape, bool)
+        found += [measure_bend(material == number, every, float(FINE)) for number in range(classes.materials)]
+    seen = [bend for bend in found if bend is not None]
+    return float(np.mean(seen)) / FINE if seen else 0.0
+
+
+def _fit_noise(content: BundleContent, salt: int, most: int) -> tuple[ClassesEntry, float]:
+    """Classes by noise of at most so many octaves, and how steeply their scores cross, per tile side.
+
     Wavelengths are in proportion to the patch scales; one factor brings the mean length of stretches on straight lines
     to the measured one. Biases give the shares. Both are measured on the noise itself and repeated, since wavelengths
     decide how many octaves the lattice shows.
@@ -40,14 +73,14 @@ def fit_classes(content: BundleContent, salt: int) -> ClassesEntry:
     steepness = 1.0
     for _ in range(PASSES):
         waves = np.clip(waves, SHORTEST / LATTICE, WIDEST / LATTICE)
-        octaves = [count_octaves(wave * LATTICE, SHORTEST, MAX_OCTAVES) for wave in waves.tolist()]
+        octaves = [count_octaves(wave * LATTICE, SHORTEST, most) for wave in waves.tolist()]
         noise = NoiseTerm("noise", 1.0, waves.tolist(), octaves, [0.0] * len(waves))
         plain = Classes(replace(entry, rule=[noise]), len(waves), side)
         noise = replace(noise, biases=fit_biases(plain.lattice_scores(*_spread_points(salt)), shares).tolist())
         entry = replace(entry, rule=[noise])
         stretches, steepness = measure_lines(Classes(entry, len(waves), side), salt)
         waves = waves * np.exp(shares @ np.log(wanted / stretches))
-    return replace(entry, jitter=_fit_jitter(content, steepness), rise=_fit_rise(content, steepness / side))
+    return entry, steepness
 
 
 def fit_biases(scores: Float[Array, "n m"], shares: Float[Array, "m"]) -> Float[Array, "m"]:
