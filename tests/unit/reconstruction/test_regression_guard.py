@@ -10,7 +10,7 @@ from fixtures import ground as made
 
 from dav_gswt.field import read_field, rgb_to_sh, write_field
 from dav_gswt.reconstruction import ground, regression_guard
-from dav_gswt.reconstruction.fit_settings import UpdateSettings
+from dav_gswt.reconstruction.fit_settings import UPDATE_RATE, UpdateSettings
 from dav_gswt.reconstruction.fitting.plan import AUTO, STEPS_PER_NEW_PHOTO, FitReport
 from dav_gswt.reconstruction.fitting.trainer import FitResult
 from dav_gswt.reconstruction.observation import mask_to_ground
@@ -221,6 +221,7 @@ def test_what_may_be_lost_grows_with_every_doubling_of_the_photos():
 def test_an_update_takes_so_many_steps_for_each_new_photo_and_keeps_the_degree_that_was_found():
     flat, rich = made.field(), replace(made.field(), sh=np.repeat(made.field().sh, 4, 1))
     assert QUALITY.plan_update(flat, 2, 3).steps == 36
+    assert QUALITY.plan_update(flat, 2, 3).first_rate == UPDATE_RATE < QUALITY.plan_update(flat, 0, 3).first_rate
     found = replace(QUALITY, steps_per_photo=AUTO, sh_degree=AUTO).plan_update(rich, 2, 3)
     assert found.steps == 3 * STEPS_PER_NEW_PHOTO and found.sh_degree == 1
     assert QUALITY.plan_update(rich, 2, 3).sh_degree == QUALITY.sh_degree

@@ -57,6 +57,18 @@ def test_rates_fall_to_what_is_left_of_them():
     assert Schedule(FitPlan(0, 1), 1).rate(0) == 1
 
 
+def test_rates_begin_where_the_plan_says_and_end_as_in_any_fit():
+    schedule = Schedule(FitPlan(80, 1, first_rate=0.3), 1)
+    rates = [schedule.rate(step) for step in range(81)]
+    assert rates[0] == pytest.approx(0.3) and rates[-1] == pytest.approx(FINAL_RATE) and (np.diff(rates) < 0).all()
+
+
+@pytest.mark.parametrize("rate", [0.0, -0.1, 1.5, float("nan")])
+def test_a_first_rate_that_is_no_share_is_refused(rate):
+    with pytest.raises(ValueError, match="first_rate"):
+        FitPlan(80, 1, first_rate=rate)
+
+
 def test_without_a_number_visible_errors_say_how_many_and_growth_is_bounded():
     schedule, asked = Schedule(FitPlan(100, "auto"), 1000), 5000 * 1.01 * VISIBLE**2
     assert schedule.max_gaussians(7, 4900, asked) == 5050

@@ -15,6 +15,9 @@ from dav_gswt.reconstruction.fitting.plan import (
     FitPlan,
 )
 
+# Learning rates of an update at its first step, as a share of a first fit's: the field is nearly right, and rates as at
+# first would undo its detail faster than a round's few steps make it again (docs/active-views.md)
+UPDATE_RATE = 0.3
 GROUND_SHARE = 0.9  # of the Gaussians, that the ground may take with its underlay; objects get the rest
 
 
@@ -60,12 +63,13 @@ class UpdateSettings(_FitSettings):
         """The plan of an update of a field from so many earlier photos with so many new ones.
 
         Steps: a number for each new photo. With "auto", the Gaussians per photo are at most those of the field, and the
-        spherical harmonics have the field's degree.
+        spherical harmonics have the field's degree. Rates begin at UPDATE_RATE.
         """
         steps = STEPS_PER_NEW_PHOTO if self.steps_per_photo == AUTO else int(self.steps_per_photo)
         limit = min(MAX_GAUSSIANS, len(field) * (earlier + new) // max(1, earlier))
         degree = field.sh_degree if self.sh_degree == AUTO else self.sh_degree
-        return FitPlan(steps * new, self.max_gaussians, degree, pose_rate=self.pose_rate, limit=limit)
+        rates = {"pose_rate": self.pose_rate, "first_rate": UPDATE_RATE if earlier else 1.0}
+        return FitPlan(steps * new, self.max_gaussians, degree, limit=limit, **rates)
 
 
 Settings = TypeVar("Settings", CoarseSettings, UpdateSettings)

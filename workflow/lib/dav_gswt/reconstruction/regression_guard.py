@@ -23,7 +23,7 @@ from dav_gswt.reconstruction.fitting.trainer import FitResult
 _log = logging.getLogger(__name__)
 
 # dB that the earlier photos may lose on average, and how much more for each doubling of the photos
-ALLOWED_LOSS, LOSS_PER_DOUBLING = 2.5, 0.5
+ALLOWED_LOSS, LOSS_PER_DOUBLING = 1.5, 0.5
 RETRIES = 2  # more fits of as many steps
 VISIBLE_PSNR = 40.0  # dB: pixels differ by 2.6 of 255 grey levels
 EQUAL_PSNR = 100.0  # dB that stand for equal pictures

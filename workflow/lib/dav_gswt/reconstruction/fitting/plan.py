@@ -21,7 +21,7 @@ class FitPlan:
     their number grows as long as errors are visible (see `schedule.Schedule.max_gaussians`), up to `limit`.
     sh_degree: of the spherical harmonics, added degree by degree; with "auto" the lowest that held-out pixels need.
     half_share: share of the steps at half the resolution. pose_rate: radians (and distances over the mean depth) that a
-    camera may turn a step, at the start; 0: cameras stay.
+    camera may turn a step, at the start; 0: cameras stay. first_rate: share of full learning rates to begin with.
     """
 
     steps: int
@@ -30,6 +30,7 @@ class FitPlan:
     half_share: float = 0.0
     pose_rate: float = 0.0
     limit: int = MAX_GAUSSIANS
+    first_rate: float = 1.0
 
     def __post_init__(self):
         if self.steps < 0:
@@ -40,6 +41,8 @@ class FitPlan:
                 raise ValueError(
                     f"{name} is {value}; give {AUTO!r} or a whole number" + (f" to {most}" if most else "")
                 )
+        if not 0 < self.first_rate <= 1:
+            raise ValueError(f"first_rate is {self.first_rate}; give a share above 0, at most 1")
         if not 0 <= self.half_share < 1 or not self.pose_rate >= 0:
             raise ValueError(f"half_share is {self.half_share}, pose_rate {self.pose_rate}: shares and rates from 0")
 

@@ -21,8 +21,9 @@ class Schedule:
     start: int
 
     def rate(self, step: int) -> float:
-        """Factor of all learning rates: 1, falling to FINAL_RATE."""
-        return FINAL_RATE ** (step / max(1, self.plan.steps))
+        """Factor of all learning rates: the plan's first, falling to FINAL_RATE."""
+        first = self.plan.first_rate
+        return first * (FINAL_RATE / first) ** (step / max(1, self.plan.steps))
 
     def to_growth(self, step: int) -> int | None:
         """Steps to the next growth event; 0: it is due now; None: there is none left."""
