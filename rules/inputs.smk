@@ -225,6 +225,13 @@ def photos_of_field(wildcards):
     return {"photos": ["<results>/<photos>/images", *captures_until(wildcards)]}
 
 
+def views_of_field(wildcards):
+    """What names the photos that a round's field was made of; nothing for a finished field that came instead."""
+    if config["scenes"][wildcards.scene]["kind"] == "field":
+        return {}
+    return {"views": "<results>/<start>/views.json", "captures": captures_until(wildcards)}
+
+
 def height_map(wildcards):
     """The image that the terrain's surface is read from, where the config names one."""
     file = config["heights"].get("file")

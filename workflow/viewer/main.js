@@ -8,14 +8,17 @@ import { parsePaint, syncAddress } from "./ui/address.js";
 import { listenToControls } from "./ui/controls.js";
 import { element } from "./ui/dom.js";
 import { listenToDrops } from "./ui/drop.js";
+import { createFirstView } from "./ui/first_view.js";
 import { runFrameLoop } from "./ui/frame_loop.js";
 import { createHud } from "./ui/hud.js";
 import { createPaintPanel } from "./ui/paint_panel.js";
+import { createPanel } from "./ui/panel.js";
 import { listenToTools } from "./ui/tools.js";
 import { explainError, Viewer } from "./ui/viewer.js";
 
 document.documentElement.classList.add("running"); // hides the hint that nothing happens
-const hud = createHud();
+const hud = createHud(), menu = createPanel("menu");
+const firstView = createFirstView({ onStep: () => menu.show(false) });
 
 /** @type {Viewer} */
 export let viewer;
@@ -26,6 +29,7 @@ export let paint;
 export const ready = start().catch((error) => {
   if (viewer) viewer.fail(error);
   else hud.showError(explainError(error));
+  firstView.showTerrain();
   throw error;
 });
 ready.catch(() => {}); // shown above; whoever waits for `ready` still learns of it
@@ -34,25 +38,35 @@ async function start() {
   const canvas = element("picture", HTMLCanvasElement);
   const asked = new URLSearchParams(location.search).get("still"), still = asked !== null;
   const redraw = () => viewer.redraw();
+  canvas.addEventListener("pointerdown", () => menu.show(false));
   viewer = new Viewer(canvas, createContext(canvas), hud, {
     still,
     firstBudget: Number(asked) || BUDGET.most,
     onFirstScene(walker) {
       listenToControls(walker, canvas, element("pad", HTMLElement), paint.brush, redraw);
       new ResizeObserver(redraw).observe(canvas);
-      listenToTools(viewer);
+      listenToTools(viewer, paint.keep);
       if (still) return;
       runFrameLoop(viewer);
       syncAddress(walker, paint.keep, { onChange: redraw, onError: (error) => viewer.fail(error) });
     },
     async onScene(scene, first) {
       paint.showScene(scene);
+      firstView.showScene(scene.walker, first);
       if (first) await paint.keep.follow(parsePaint(location.hash), false).catch((error) => viewer.fail(error));
     },
-    onPaint: () => paint.note(),
-    onPicture: () => paint.brush.draw(),
+    onPaint() {
+      paint.note();
+      firstView.showTerrain();
+    },
+    onPicture() {
+      paint.brush.draw();
+      if (viewer.scene) firstView.note(viewer.scene.walker, viewer.overlay);
+    },
+    onWhole: firstView.showTerrain,
   });
   paint = createPaintPanel(viewer);
+  element("paintButton", HTMLButtonElement).addEventListener("click", () => menu.show(false));
   listenToDrops({
     async openSource(source) {
       hud.showOpening();
@@ -62,4 +76,5 @@ async function start() {
     onError: (error) => viewer.fail(error),
   });
   await viewer.open(webSource(new URL(".", location.href)));
+  if (!still) firstView.showHint();
 }
