@@ -225,11 +225,19 @@ def photos_of_field(wildcards):
     return {"photos": ["<results>/<photos>/images", *captures_until(wildcards)]}
 
 
-def views_of_field(wildcards):
-    """What names the photos that a round's field was made of; nothing for a finished field that came instead."""
+def story_of_field(wildcards):
+    """The photos that a round's field was made of, and what tests said of each; nothing for a finished field."""
     if config["scenes"][wildcards.scene]["kind"] == "field":
         return {}
-    return {"views": "<results>/<start>/views.json", "captures": captures_until(wildcards)}
+    rounds = range(int(wildcards.t) + 1)
+    return {
+        "views": "<results>/<start>/views.json",
+        "images": "<results>/<photos>/images",
+        "model": "<results>/<photos>/sparse",
+        "frame": "<results>/<photos>/ground.json",
+        "captures": captures_until(wildcards),
+        "metrics": [f"{round_folder(t)}/metrics.json" for t in rounds],
+    }
 
 
 def height_map(wildcards):

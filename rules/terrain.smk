@@ -5,11 +5,11 @@ In: the bundle. Out: page/ (`make view` serves it), walker.png, oblique.png, abo
 
 
 rule make_page:
-    """A page that needs nothing else: viewer, manifest, surface, chunks and a first still in one folder."""
+    """A page that needs nothing else: viewer, manifest, surface, chunks, a first still and how it was made in one folder."""
     input:
         unpack(height_map),
         unpack(class_pictures),
-        unpack(views_of_field),
+        unpack(story_of_field),
         still="<results>/<terrain>/walker.png",
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",

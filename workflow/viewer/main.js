@@ -13,12 +13,14 @@ import { runFrameLoop } from "./ui/frame_loop.js";
 import { createHud } from "./ui/hud.js";
 import { createPaintPanel } from "./ui/paint_panel.js";
 import { createPanel } from "./ui/panel.js";
+import { createStoryPanel } from "./ui/story_panel.js";
 import { listenToTools } from "./ui/tools.js";
 import { explainError, Viewer } from "./ui/viewer.js";
 
 document.documentElement.classList.add("running"); // hides the hint that nothing happens
 const hud = createHud(), menu = createPanel("menu");
-const firstView = createFirstView({ onStep: () => menu.show(false) });
+const story = createStoryPanel((error) => hud.showError(explainError(error)));
+const firstView = createFirstView({ onStep: closePanels });
 
 /** @type {Viewer} */
 export let viewer;
@@ -34,11 +36,16 @@ export const ready = start().catch((error) => {
 });
 ready.catch(() => {}); // shown above; whoever waits for `ready` still learns of it
 
+function closePanels() {
+  menu.show(false);
+  story.show(false);
+}
+
 async function start() {
   const canvas = element("picture", HTMLCanvasElement);
   const asked = new URLSearchParams(location.search).get("still"), still = asked !== null;
   const redraw = () => viewer.redraw();
-  canvas.addEventListener("pointerdown", () => menu.show(false));
+  canvas.addEventListener("pointerdown", closePanels);
   viewer = new Viewer(canvas, createContext(canvas), hud, {
     still,
     firstBudget: Number(asked) || BUDGET.most,
@@ -53,6 +60,7 @@ async function start() {
     async onScene(scene, first) {
       paint.showScene(scene);
       firstView.showScene(scene.walker, first);
+      if (!first) element("storyButton", HTMLButtonElement).hidden = true; // it is of the page's own terrain
       if (first) await paint.keep.follow(parsePaint(location.hash), false).catch((error) => viewer.fail(error));
     },
     onPaint() {
@@ -66,7 +74,9 @@ async function start() {
     onWhole: firstView.showTerrain,
   });
   paint = createPaintPanel(viewer);
-  element("paintButton", HTMLButtonElement).addEventListener("click", () => menu.show(false));
+  for (const id of ["paintButton", "storyButton"]) {
+    element(id, HTMLButtonElement).addEventListener("click", () => menu.show(false));
+  }
   listenToDrops({
     async openSource(source) {
       hud.showOpening();

@@ -6,7 +6,7 @@ import pytest
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.terrain import page_front
-from dav_gswt.terrain.page_front import Front, count_photos, encode_still, fill_front, line_of_photos, name_of_scene
+from dav_gswt.terrain.page_front import Front, encode_still, fill_front, line_of_photos, name_of_scene
 
 SOURCE = (
     '<meta content="An endless terrain made from a few photos"><title>Endless terrain</title><!-- modules -->'
@@ -34,18 +34,6 @@ def test_name_line_still_and_modules_are_in_the_page():
 def test_without_a_front_the_page_keeps_its_own_texts_and_asks_for_no_still():
     filled = fill_front(SOURCE, None, [])
     assert "first.jpg" not in filled and "<title>Endless terrain</title>" in filled
-
-
-def test_photos_are_those_of_the_start_and_of_all_rounds(tmp_path):
-    (tmp_path / "views.json").write_text('{"start": ["a", "b", "c"], "pool": ["d"], "test": ["e"]}')
-    for number, shots in enumerate(("[1, 2]", "[1]")):
-        (tmp_path / f"{number}").mkdir()
-        (tmp_path / f"{number}" / "capture.json").write_text(f'{{"shots": {shots}}}')
-    assert count_photos(tmp_path / "views.json", [tmp_path / "0", tmp_path / "1"]) == 6
-    assert count_photos(None, []) == 0
-    (tmp_path / "1" / "capture.json").write_text("{}")
-    with pytest.raises(InputError, match=r"views\.json.*make it again"):
-        count_photos(tmp_path / "views.json", [tmp_path / "1"])
 
 
 def test_what_a_scene_is_called_is_text():

@@ -14,6 +14,7 @@ from dav_gswt.files import atomic_folder, read_json, write_json
 from dav_gswt.terrain.class_rules import NOISE, Picture, apply_rule, warn_of_rule
 from dav_gswt.terrain.heights import FlatSurface, HeightField, HeightMap, Hills
 from dav_gswt.terrain.page_front import STILL, Front, fill_front
+from dav_gswt.terrain.page_story import SHEET, STORY
 
 SURFACE = "heights.bin"
 INDEX = "index.html"
@@ -36,7 +37,7 @@ def write_page(
     Args:   surface: height field of the terrain (default: level ground), stored in the page's manifest as `heights`;
             the pixels of a height map are heights.bin, float32, little-endian, rows from the north. rule: the config's
             `classes`, stored as those of the page's manifest, its pictures beside it. front: name of the scene, line
-            about it and first still (default: the viewer's own texts, and no still).
+            about it, first still and story (default: the viewer's own texts, no still, no story).
     Raises: InputError: the manifest is missing or of another version, a chunk is missing, has another size than the
             manifest says, or lies outside of the bundle; the viewer is incomplete; see also `describe_surface`,
             `class_rules.apply_rule`.
@@ -61,10 +62,13 @@ def write_page(
 
 
 def _write_index(path: Path, front: Front | None, modules: list[str]) -> None:
-    """Fill the copied index.html, and write the first still beside it."""
+    """Fill the copied index.html, and write the first still and the story beside it."""
     path.write_text(fill_front(path.read_text(encoding="utf-8"), front, modules), encoding="utf-8")
     if front:
         (path.parent / STILL).write_bytes(front.still)
+    if front and front.story:
+        write_json(path.parent / STORY, front.story.value)
+        (path.parent / SHEET).write_bytes(front.story.sheet)
 
 
 def find_viewer(paths: Iterable[Path | str]) -> Path:

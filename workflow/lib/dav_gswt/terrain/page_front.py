@@ -5,30 +5,33 @@ They are written into the page's HTML, so that they show before any script runs,
 
 import html
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import read_json
 from dav_gswt.images.image_files import read_photo, shrink_image
 from dav_gswt.images.jpeg import encode_jpeg
+from dav_gswt.terrain.page_story import Story
 
 STILL = "first.jpg"
 STILL_WIDTH = 1280  # pixels, at most
 STILL_BYTES = 90_000  # at most: it is there within a second at 1 Mbit/s
 QUALITIES = (80, 70, 60, 50, 40, 30)  # the best that fits is taken; the last one anyhow
+STORY_BUTTON = '<button id="storyButton" type="button" aria-controls="story" aria-expanded="false"'
 DEFAULT_NAME = "Endless terrain"
 DEFAULT_LINE = "An endless terrain made from a few photos"
 
 
 @dataclass(frozen=True)
 class Front:
-    """What a page says of its scene. still: a JPEG of what the page shows first, see `encode_still`."""
+    """What a page says of its scene. still: a JPEG of what the page shows first, see `encode_still`. story: how it was
+    made, where that is known."""
 
     name: str
     line: str
     still: bytes
+    story: Story | None = None
 
 
 def name_of_scene(scene: str) -> str:
@@ -44,23 +47,10 @@ def line_of_photos(photos: int) -> str:
     return f"An endless terrain made from {photos} photo{'s' * (photos > 1)}"
 
 
-def count_photos(views: Path | str | None, captures: Sequence[Path | str]) -> int:
-    """Photos of a round's field; 0 without views. views: views.json; captures: folders of the rounds' photos.
-
-    Raises: InputError: a file is missing or not of this kind.
-    """
-    if not views:
-        return 0
-    try:
-        shots = [len(read_json(Path(folder) / "capture.json")["shots"]) for folder in captures]
-        return len(read_json(views)["start"]) + sum(shots)
-    except (KeyError, TypeError) as error:
-        raise InputError(f"{views}, or capture.json of a round: incomplete ({error}); make it again") from error
-
-
-def front_of_scene(scene: str, photos: int, still: Path | str) -> Front:
+def front_of_scene(scene: str, story: Story | None, still: Path | str) -> Front:
     """The front of a scene's page, from the still of the place where everybody begins. Raises: as `encode_still`."""
-    return Front(name_of_scene(scene), line_of_photos(photos), encode_still(still))
+    photos = len(story.value["photos"]) if story else 0
+    return Front(name_of_scene(scene), line_of_photos(photos), encode_still(still), story)
 
 
 def encode_still(path: Path | str) -> bytes:
@@ -92,6 +82,8 @@ def fill_front(source: str, front: Front | None, modules: Iterable[str]) -> str:
         return _replace(filled, "<!-- first -->", "")
     name, line = html.escape(front.name), html.escape(front.line)
     filled = _replace(filled, "<!-- first -->", f'<img id="first" src="{STILL}" alt="">')
+    if front.story:
+        filled = _replace(filled, f"{STORY_BUTTON} hidden>", f"{STORY_BUTTON}>")
     filled = _replace(filled, f"<title>{DEFAULT_NAME}</title>", f"<title>{name} · {line}</title>")
     filled = _replace(filled, f'content="{DEFAULT_LINE}"', f'content="{name}: {line}"')
     filled = _replace(filled, f'<h1 id="name">{DEFAULT_NAME}</h1>', f'<h1 id="name">{name}</h1>')
