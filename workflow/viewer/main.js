@@ -11,6 +11,9 @@ import { listenToDrops } from "./ui/drop.js";
 import { createFirstView } from "./ui/first_view.js";
 import { runFrameLoop } from "./ui/frame_loop.js";
 import { createHud } from "./ui/hud.js";
+import { createMinimap } from "./ui/minimap.js";
+import { listenToModes } from "./ui/modes.js";
+import { createOrbit } from "./ui/orbit.js";
 import { createPaintPanel } from "./ui/paint_panel.js";
 import { createPanel } from "./ui/panel.js";
 import { createStoryPanel } from "./ui/story_panel.js";
@@ -26,6 +29,9 @@ const firstView = createFirstView({ onStep: closePanels });
 export let viewer;
 /** @type {ReturnType<typeof createPaintPanel>} */
 export let paint;
+
+/** @type {ReturnType<typeof createMinimap> | null} */
+let map = null;
 
 /** Resolves when the page's own bundle is loaded. */
 export const ready = start().catch((error) => {
@@ -50,9 +56,11 @@ async function start() {
     still,
     firstBudget: Number(asked) || BUDGET.most,
     onFirstScene(walker) {
-      listenToControls(walker, canvas, element("pad", HTMLElement), paint.brush, redraw);
+      listenToControls(walker, createOrbit(viewer), canvas, element("pad", HTMLElement), paint.brush, redraw);
       new ResizeObserver(redraw).observe(canvas);
       listenToTools(viewer, paint.keep);
+      listenToModes(walker, (text) => hud.say(text));
+      map = createMinimap(viewer);
       if (still) return;
       runFrameLoop(viewer);
       syncAddress(walker, paint.keep, { onChange: redraw, onError: (error) => viewer.fail(error) });
@@ -69,6 +77,7 @@ async function start() {
     },
     onPicture() {
       paint.brush.draw();
+      map?.draw();
       if (viewer.scene) firstView.note(viewer.scene.walker, viewer.overlay);
     },
     onWhole: firstView.showTerrain,

@@ -26,7 +26,7 @@ export const SORTED = [0.95, 0.95, 0.95]; // cells that are sorted by depth have
  */
 export function overlayColours(overlay, { directions }) {
   const colours = Array.from({ length: 256 }, (_, n) => {
-    if (OVERLAYS[overlay] === "tile") return hue(n * 0.618034);
+    if (OVERLAYS[overlay] === "tile") return tileColour(n);
     if (OVERLAYS[overlay] === "level") return levelColour(n >> 5);
     if (OVERLAYS[overlay] === "order") return n === NO_ORDER ? SORTED : hue(n / Math.max(1, directions.length));
     if (OVERLAYS[overlay] === "material") return materialColour(n);
@@ -37,6 +37,9 @@ export function overlayColours(overlay, { directions }) {
 
 /** The colour of a material in its overlay, 0 to 1; OBJECTS: that of objects. @param {number} m */
 export const materialColour = (m) => (m === OBJECTS ? STANDING : MATERIALS[m % MATERIALS.length]);
+
+/** The colour of a tile. @param {number} tile */
+export const tileColour = (tile) => hue(tile * 0.618034);
 
 /** The colour of a level of detail. @param {number} level */
 export const levelColour = (level) => LEVELS[level % LEVELS.length];

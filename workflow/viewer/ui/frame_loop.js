@@ -1,6 +1,7 @@
 // The frame loop: draws while something changes, holds the frame rate by drawing less, and draws finer at rest.
 
 import { BUDGET } from "../draw/frame_pacing.js";
+import { createGamepads } from "./gamepads.js";
 import { stepWalker } from "./walker.js";
 
 const MAX_STEP = 250; // milliseconds of walking that one frame makes up for
@@ -8,6 +9,7 @@ const MAX_STEP = 250; // milliseconds of walking that one frame makes up for
 /** @param {import("./viewer.js").Viewer} viewer */
 export function runFrameLoop(viewer) {
   const { pacing, flyPath, resting } = viewer;
+  const pads = createGamepads();
   let last = performance.now(), drew = false, paced = false;
 
   /** May a frame be drawn? While chunks arrive, previews at most. @param {import("./viewer.js").Scene} scene @param {number} now */
@@ -36,7 +38,8 @@ export function runFrameLoop(viewer) {
     if (!scene) return;
     const { walker, renderer } = scene;
     const flown = flyPath.step(walker, gap / 1000);
-    if (stepWalker(walker, Math.min(gap, MAX_STEP) / 1000) || flown) viewer.dirty = viewer.stale = true;
+    const seconds = Math.min(gap, MAX_STEP) / 1000, stepped = stepWalker(walker, seconds), pushed = pads.step(walker, seconds);
+    if (stepped || pushed || flown) viewer.dirty = viewer.stale = true;
     const may = mayDraw(scene, now);
     ask(scene, now, may);
     // the frame of a picture at rest may take the GPU seconds: it is drawn in slices alone

@@ -107,7 +107,7 @@ export class Viewer {
       client.end();
       throw error;
     }
-    const walker = Object.assign(this.#walker ?? begin, begin);
+    const walker = Object.assign(this.#walker ?? begin, begin, { mode: this.#walker?.mode ?? begin.mode });
     this.#walker = walker;
     const painting = createPainting(manifest, client, () => {
       this.options.onPaint();
@@ -279,7 +279,7 @@ export class Viewer {
   state() {
     const { loaded, opened, error, overlay, pacing: { budget } } = this;
     const view = this.scene ? describeScene(this.scene) : { drawn: [], count: 0, bytes: 0 };
-    return { ...view, overlay: OVERLAYS[overlay], budget, loaded, opened, error, whole: this.resting.whole };
+    return { ...view, overlay: OVERLAYS[overlay], budget, loaded, opened, error, whole: this.resting.whole, mode: this.scene?.walker.mode };
   }
 
   /** Tell the person what went wrong. @param {unknown} error */
