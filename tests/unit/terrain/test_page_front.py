@@ -7,6 +7,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.terrain import page_front
 from dav_gswt.terrain.page_front import Front, encode_still, fill_front, line_of_photos, name_of_scene
+from dav_gswt.terrain.page_story import Story
 
 SOURCE = (
     '<meta content="An endless terrain made from a few photos"><title>Endless terrain</title><!-- modules -->'
@@ -34,6 +35,23 @@ def test_name_line_still_and_modules_are_in_the_page():
 def test_without_a_front_the_page_keeps_its_own_texts_and_asks_for_no_still():
     filled = fill_front(SOURCE, None, [])
     assert "first.jpg" not in filled and "<title>Endless terrain</title>" in filled
+
+
+@pytest.mark.parametrize(
+    "value, text",
+    [
+        ({"grade": None, "rounds": [{"psnr": None}]}, ""),
+        ({"grade": "good", "rounds": []}, "The photos fit together well."),
+        (
+            {"grade": "doubtful", "rounds": [{"psnr": 20.0}, {"psnr": 31.88}, {"psnr": None}]},
+            "It is doubtful that the photos fit together. Photos that were not used are predicted to 31.9 dB.",
+        ),
+    ],
+)
+def test_the_verdict_is_what_tests_said(value, text):
+    front = Front("Desert", "A line", b"", Story(value, b""))
+    assert front.to_dict() == {"name": "Desert", "line": "A line", "verdict": text}
+    assert Front("Desert", "A line", b"").to_dict()["verdict"] == ""
 
 
 def test_what_a_scene_is_called_is_text():

@@ -68,7 +68,7 @@ def test_places_rounds_and_pictures_are_told(made):
     assert [photo["at"] for photo in story.value["photos"]] == [[1, 2, 3], [-1, 0, 3], [0, -4, 5]]
     assert [photo["picture"] for photo in story.value["photos"]] == [0, 1, 2]
     assert story.value["photos"][1]["look"][0] > 0, "it looks at the middle, which lies to the east"
-    assert story.value["half"] == 2 and story.sheet[:3] == b"\xff\xd8\xff"
+    assert story.value["grade"] is None and story.value["half"] == 2 and story.sheet[:3] == b"\xff\xd8\xff"
     assert story == tell_story(made)
 
 

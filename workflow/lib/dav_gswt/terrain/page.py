@@ -13,7 +13,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_folder, read_json, write_json
 from dav_gswt.terrain.class_rules import NOISE, Picture, apply_rule, warn_of_rule
 from dav_gswt.terrain.heights import FlatSurface, HeightField, HeightMap, Hills
-from dav_gswt.terrain.page_front import STILL, Front, fill_front
+from dav_gswt.terrain.page_front import FRONT, STILL, Front, fill_front
 from dav_gswt.terrain.page_story import SHEET, STORY
 
 SURFACE = "heights.bin"
@@ -66,6 +66,7 @@ def _write_index(path: Path, front: Front | None, modules: list[str]) -> None:
     path.write_text(fill_front(path.read_text(encoding="utf-8"), front, modules), encoding="utf-8")
     if front:
         (path.parent / STILL).write_bytes(front.still)
+        write_json(path.parent / FRONT, front.to_dict())
     if front and front.story:
         write_json(path.parent / STORY, front.story.value)
         (path.parent / SHEET).write_bytes(front.story.sheet)

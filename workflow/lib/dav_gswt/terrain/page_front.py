@@ -14,7 +14,7 @@ from dav_gswt.images.image_files import read_photo, shrink_image
 from dav_gswt.images.jpeg import encode_jpeg
 from dav_gswt.terrain.page_story import Story
 
-STILL = "first.jpg"
+STILL, FRONT = "first.jpg", "front.json"
 STILL_WIDTH = 1280  # pixels, at most
 STILL_BYTES = 90_000  # at most: it is there within a second at 1 Mbit/s
 QUALITIES = (80, 70, 60, 50, 40, 30)  # the best that fits is taken; the last one anyhow
@@ -33,6 +33,10 @@ class Front:
     still: bytes
     story: Story | None = None
 
+    def to_dict(self) -> dict[str, str]:
+        """What front.json holds, for pages that list pages."""
+        return {"name": self.name, "line": self.line, "verdict": describe_verdict(self.story)}
+
 
 def name_of_scene(scene: str) -> str:
     """A scene's key as a title: my_meadow becomes My meadow."""
@@ -45,6 +49,18 @@ def line_of_photos(photos: int) -> str:
     if not photos:
         return "An endless terrain made from a Gaussian field"
     return f"An endless terrain made from {photos} photo{'s' * (photos > 1)}"
+
+
+def describe_verdict(story: Story | None) -> str:
+    """What tests said of a terrain's photos and of the field made of them; nothing where nobody tested."""
+    if not story:
+        return ""
+    said = {"good": "The photos fit together well.", "doubtful": "It is doubtful that the photos fit together."}
+    parts = [said.get(story.value.get("grade") or "", "")]
+    tested = [one["psnr"] for one in story.value["rounds"] if one["psnr"] is not None]
+    if tested:
+        parts.append(f"Photos that were not used are predicted to {tested[-1]:.1f} dB.")
+    return " ".join(filter(None, parts))
 
 
 def front_of_scene(scene: str, story: Story | None, still: Path | str) -> Front:

@@ -64,7 +64,7 @@ def tell_story(given: Mapping[str, Any]) -> Story | None:
     half = frame.exemplar.side / 2
     value = {
         "unit": frame.unit, "half": half, "photos": photos, "rounds": rounds, "thumb": THUMB, "columns": COLUMNS,
-        "pictures": len(shown),
+        "pictures": len(shown), "grade": frame.verdict.grade if frame.verdict else None,
     }  # fmt: skip
     return Story(value, encode_jpeg(draw_sheet([make_small(read_photo(taken[k].path)) for k in shown]), QUALITY))
 
