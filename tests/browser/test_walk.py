@@ -52,7 +52,7 @@ def test_the_eye_stays_above_its_floor(visit, plain):
     assert seen.state["eye"] == Ground().eye_floor
     seen.at(eye=-5)
     assert seen.state["eye"] == Ground().eye_floor
-    seen.page.mouse.move(80, 50)
+    seen.page.mouse.move(80, 20)  # above the tools
     for _ in range(3):
         seen.page.mouse.wheel(0, -200)
     assert seen.state["eye"] == Ground().eye_floor
