@@ -39,6 +39,8 @@ def test_nothing_is_wrong_in_any_state(visit, address, axe, width, height, touch
     for name in ("menu", "paint"):
         seen.page.locator(f"#{name}Button").click()
         found[name] = seen.page.evaluate(RUN)
+    seen.page.locator("#paintClose").click()
     seen.page.keyboard.press("i")
+    seen.page.keyboard.press("n")
     found["numbers"] = seen.page.evaluate(RUN)
     assert {state: faults for state, faults in found.items() if faults} == {}

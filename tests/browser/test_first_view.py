@@ -17,7 +17,7 @@ LAYOUT = """() => {
   // boxes of what may be pressed, and of what shows text, with what is wrong with them
   const { innerWidth: wide, innerHeight: high } = window, faults = [], seen = [];
   const visible = element => element.checkVisibility({ checkOpacity: true, checkVisibilityCSS: true });
-  const all = "button, select, summary, input, #title, #hint, #legend, #toast, .panel";
+  const all = "button, select, summary, input, #title, #hint, #legend, #toast, #map, .panel";
   for (const element of document.querySelectorAll(all)) {
     if (!visible(element) || element.type === "file") continue;
     const box = element.getBoundingClientRect(), name = element.id || element.textContent;
@@ -124,6 +124,10 @@ def test_nothing_is_cut_off_small_or_covered(visit, address, width, height, touc
         faults[overlay] = seen.page.evaluate(LAYOUT)
     seen.page.locator("#menuButton").click()
     faults["menu"] = seen.page.evaluate(LAYOUT)
+    seen.page.locator("#mapButton").click()
+    seen.page.locator("#menuClose").click()
+    faults["map"] = seen.page.evaluate(LAYOUT)
+    seen.page.locator("#menuButton").click()
     seen.page.locator("#paintButton").click()
     faults["materials"] = seen.page.evaluate(LAYOUT)
     assert {state: found for state, found in faults.items() if found} == {}
