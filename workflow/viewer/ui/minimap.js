@@ -2,7 +2,7 @@
 
 import { tileColour } from "../draw/overlays.js";
 import { tileUnder } from "../terrain/cells.js";
-import { element, isField } from "./dom.js";
+import { element, takesLetters } from "./dom.js";
 import { moveTo } from "./walker.js";
 
 const CELLS = 9; // along a side
@@ -45,7 +45,7 @@ export function createMinimap(viewer) {
   };
   button.addEventListener("click", toggle);
   addEventListener("keydown", (event) => {
-    if (event.code === "KeyN" && !event.ctrlKey && !event.metaKey && !event.altKey && !isField(event.target)) toggle();
+    if (event.code === "KeyN" && !event.ctrlKey && !event.metaKey && !event.altKey && !takesLetters(event.target)) toggle();
   });
   map.addEventListener("click", ({ offsetX, offsetY }) => {
     const { scene } = viewer;

@@ -1,6 +1,6 @@
 // Ways to go: walk, fly, orbit.
 
-import { element, isField } from "./dom.js";
+import { element, takesLetters } from "./dom.js";
 import { MODES } from "./walker.js";
 
 const SAYS = { walk: "Walking", fly: "Flying: forward is where you look", orbit: "Orbiting: drag to turn about what you look at" };
@@ -19,7 +19,7 @@ export function listenToModes(walker, say) {
   };
   for (const [k, radio] of radios.entries()) radio.addEventListener("change", () => choose(MODES[k]));
   addEventListener("keydown", (event) => {
-    if (event.code !== "KeyV" || event.ctrlKey || event.metaKey || event.altKey || isField(event.target)) return;
+    if (event.code !== "KeyV" || event.ctrlKey || event.metaKey || event.altKey || takesLetters(event.target)) return;
     choose(MODES[(MODES.indexOf(walker.mode) + 1) % MODES.length]);
   });
 }

@@ -1,7 +1,7 @@
 // The bar: overlays, a picture to keep, the link; and the fly path behind it.
 
 import { OVERLAYS, TITLES } from "../draw/overlays.js";
-import { element, isField, saveFile } from "./dom.js";
+import { element, saveFile, takesLetters } from "./dom.js";
 import { tellValues } from "./pointer_values.js";
 import { createSaving } from "./saving.js";
 import { sharePlace } from "./share.js";
@@ -42,8 +42,7 @@ export function listenToTools(viewer, paint) {
     KeyO: () => viewer.showOverlay((viewer.overlay + 1) % OVERLAYS.length),
   };
   addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.target === overlay) return;
-    if (isField(event.target) && !(event.target instanceof HTMLButtonElement)) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || takesLetters(event.target)) return;
     keys[event.code]?.();
   });
   setInterval(update, 250);
