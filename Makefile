@@ -10,7 +10,7 @@ PYTHON ?= python3
 export OMP_WAIT_POLICY ?= PASSIVE
 BIN := .venv/bin
 
-.PHONY: reference run view test bench docs prior compiler sanitize faults fuzz
+.PHONY: reference run view gallery test bench docs prior compiler sanitize faults fuzz
 .DELETE_ON_ERROR:
 
 run: .venv/installed
@@ -18,6 +18,10 @@ run: .venv/installed
 
 view: .venv/installed
 	@$(BIN)/python -m dav_gswt.cli.run --view --port $(PORT) $(if $(SCENE),--scene $(SCENE))
+
+# results/gallery: a static page over the newest terrain of every scene, for any web server
+gallery: .venv/installed
+	@$(BIN)/python -m dav_gswt.cli.gallery
 
 test: .venv/installed-test
 	@$(BIN)/python -m pytest -n $(WORKERS) --no-loadscope-reorder --durations 20 $(TESTS)

@@ -225,6 +225,21 @@ def photos_of_field(wildcards):
     return {"photos": ["<results>/<photos>/images", *captures_until(wildcards)]}
 
 
+def story_of_field(wildcards):
+    """The photos that a round's field was made of, and what tests said of each; nothing for a finished field."""
+    if config["scenes"][wildcards.scene]["kind"] == "field":
+        return {}
+    rounds = range(int(wildcards.t) + 1)
+    return {
+        "views": "<results>/<start>/views.json",
+        "images": "<results>/<photos>/images",
+        "model": "<results>/<photos>/sparse",
+        "frame": "<results>/<photos>/ground.json",
+        "captures": captures_until(wildcards),
+        "metrics": [f"{round_folder(t)}/metrics.json" for t in rounds],
+    }
+
+
 def height_map(wildcards):
     """The image that the terrain's surface is read from, where the config names one."""
     file = config["heights"].get("file")

@@ -5,10 +5,12 @@ In: the bundle. Out: page/ (`make view` serves it), walker.png, oblique.png, abo
 
 
 rule make_page:
-    """A page that needs nothing else: viewer, manifest, surface and chunks in one folder."""
+    """A page that needs nothing else: viewer, manifest, surface, chunks, a first still and how it was made in one folder."""
     input:
         unpack(height_map),
         unpack(class_pictures),
+        unpack(story_of_field),
+        still="<results>/<terrain>/walker.png",
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
         viewer=VIEWER,

@@ -1,24 +1,7 @@
-"""The splat budget: fewer splats where frames come slowly, more where they come fast, and no to and fro."""
+"""What is drawn while something moves: less where frames come slowly, more where they come fast, and no to and fro."""
 
-REST = """async ([cost, all]) => {
-  // budgets of the pictures at rest, where a Gaussian costs so many milliseconds and there are `all` of them
-  const { createIdleRefine } = await import("./draw/idle_refine.js");
-  let now = 0, done = 0;
-  const gl = { fenceSync: () => 1, deleteSync: () => {}, SIGNALED: 1, getSyncParameter: () => Number(now >= done) };
-  const idle = createIdleRefine(gl), budgets = [];
-  let used = 20000;
-  const draw = () => (idle.addPicture(now), (done = now + cost * used));
-  idle.restart(now, used);
-  draw();
-  for (; now < 20000; now += 16) {
-    const more = idle.nextBudget(now, used === all);
-    if (!more) continue;
-    budgets.push([now, more]);
-    used = Math.min(more, all);
-    draw();
-  }
-  return budgets;
-}"""
+import pytest
+
 PACE = """async ([frames, cost]) => {
   // `cost(budget)`: milliseconds a frame with that many splats, at least one refresh of 60 Hz
   const { createFramePacing } = await import("./draw/frame_pacing.js");
@@ -53,17 +36,36 @@ def test_few_frames_say_nothing(modules):
     assert set(budgets(modules, 2, 1)) == {100_000}
 
 
-def pictures_at_rest(modules, cost, all_):
-    return modules.evaluate(REST, [cost, all_])
+SCALE = """async ([frames, cost]) => {
+  // `cost`: milliseconds a frame of the full resolution takes, in proportion to its pixels
+  const { createFramePacing } = await import("./draw/frame_pacing.js");
+  const pacing = createFramePacing(), seen = [];
+  for (let k = 0; k < frames; k++) {
+    pacing.addFrame(Math.max(1000 / 60, cost * pacing.scale ** 2), pacing.budget);
+    seen.push([pacing.scale, pacing.budget]);
+  }
+  return seen;
+}"""
 
 
-def test_at_rest_the_picture_gets_all_there_is_after_a_while(modules):
-    found = pictures_at_rest(modules, 1e-5, 1_000_000)
-    assert [budget for _, budget in found] == [80_000, 320_000, 1_280_000]
-    assert found[0][0] >= 500
+def test_where_pixels_are_slow_the_resolution_is_lower_and_the_budget_stays(modules):
+    seen = modules.evaluate(SCALE, [600, 100])[200:]
+    scales = [scale for scale, _ in seen]
+    # 24 ms allow 0.49 of the resolution along each side, 19 ms 0.44
+    assert min(scales) > 0.4 and max(scales) < 0.5 and len(set(scales)) < 4
+    assert {budget for _, budget in seen} == {100_000}
 
 
-def test_at_rest_a_slow_machine_is_not_kept_busy_for_long(modules):
-    # 400 ms for 20,000: four times as many would take longer than somebody who walks on may wait
-    assert pictures_at_rest(modules, 400 / 20_000, 1_000_000) == []
-    assert [budget for _, budget in pictures_at_rest(modules, 100 / 20_000, 1_000_000)] == [80_000]
+def test_a_fast_machine_has_the_full_resolution_soon(modules):
+    assert modules.evaluate(SCALE, [150, 1])[-1][0] == 1
+
+
+@pytest.mark.parametrize("took, scale", [(5, 1), (21, 0.5), (84, 0.3), (1000, 0.3), (10, 0.7246)])
+def test_the_first_picture_says_which_resolution_to_begin_with(modules, took, scale):
+    begin = """async took => {
+      const { createFramePacing } = await import("./draw/frame_pacing.js");
+      const pacing = createFramePacing();
+      pacing.begin(took);
+      return pacing.scale;
+    }"""
+    assert modules.evaluate(begin, took) == pytest.approx(scale, abs=1e-3)

@@ -60,7 +60,6 @@ def test_a_stroke_of_the_mouse_paints_along_its_way_and_is_one_step(seen):
 def test_a_stroke_while_the_page_draws_by_itself_shows_what_is_shown_of_it_elsewhere(seen, visit, address):
     moving = visit(240, 240).open(address)
     moving.at(**ABOVE)
-    moving.page.evaluate("document.getElementById('helpClose').click()")
     moving.page.evaluate("davgswt.paint.brush.material = 1")
     moving.page.mouse.move(40, 90)
     moving.page.mouse.down()

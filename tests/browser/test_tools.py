@@ -107,5 +107,7 @@ def test_the_page_says_how_long_render_sort_and_update_take(visit, plain):
     seen.picture()
     stats = seen.page.evaluate("davgswt.stats")
     assert {"render", "sort", "update", "share"} == set(stats) and 0 < stats["share"] <= 1
+    assert not seen.page.locator("#numbers").is_visible(), "nobody asked for them yet"
+    seen.page.keyboard.press("i")
     text = seen.page.locator("#times").inner_text()
     assert all(word in text for word in ("render", "sort", "update", "±", "% of frames"))

@@ -4,8 +4,6 @@ import pytest
 from fixtures.bundles import Ground
 from fixtures.page_visit import Visit
 
-from dav_gswt.study.terrain.browser import served
-
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
 
 
@@ -54,7 +52,7 @@ def test_the_eye_stays_above_its_floor(visit, plain):
     assert seen.state["eye"] == Ground().eye_floor
     seen.at(eye=-5)
     assert seen.state["eye"] == Ground().eye_floor
-    seen.page.mouse.move(80, 50)
+    seen.page.mouse.move(80, 20)  # above the tools
     for _ in range(3):
         seen.page.mouse.wheel(0, -200)
     assert seen.state["eye"] == Ground().eye_floor
@@ -166,16 +164,3 @@ def test_the_budget_takes_fewer_splats_and_still_draws_near_tiles_back_to_front(
         assert each["steps"] == sorted(each["steps"], reverse=True)
         assert len({tuple(cell) for cell in each["cells"]}) == len(each["cells"])
         assert min(each["steps"]) == 0, "the tile underfoot is drawn"
-
-
-def test_help_is_shown_on_the_first_visit_and_not_again(visit, page_of):
-    with served(page_of(Ground())) as address:
-        seen = visit().open(address)
-        help_ = seen.page.get_by_role("heading", name="Drag to look, WASD to walk")
-        assert help_.is_visible()
-        seen.page.get_by_role("button", name="Walk", exact=True).click()
-        assert not help_.is_visible()
-        seen.open(address)
-        assert not help_.is_visible()
-        seen.page.get_by_role("button", name="Help").click()
-        assert help_.is_visible()

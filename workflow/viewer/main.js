@@ -8,51 +8,84 @@ import { parsePaint, syncAddress } from "./ui/address.js";
 import { listenToControls } from "./ui/controls.js";
 import { element } from "./ui/dom.js";
 import { listenToDrops } from "./ui/drop.js";
+import { createFirstView } from "./ui/first_view.js";
 import { runFrameLoop } from "./ui/frame_loop.js";
 import { createHud } from "./ui/hud.js";
+import { createMinimap } from "./ui/minimap.js";
+import { listenToModes } from "./ui/modes.js";
+import { createOrbit } from "./ui/orbit.js";
 import { createPaintPanel } from "./ui/paint_panel.js";
+import { createPanel } from "./ui/panel.js";
+import { createStoryPanel } from "./ui/story_panel.js";
 import { listenToTools } from "./ui/tools.js";
 import { explainError, Viewer } from "./ui/viewer.js";
 
 document.documentElement.classList.add("running"); // hides the hint that nothing happens
-const hud = createHud();
+const hud = createHud(), menu = createPanel("menu");
+const story = createStoryPanel((error) => hud.showError(explainError(error)));
+const firstView = createFirstView({ onStep: closePanels });
 
 /** @type {Viewer} */
 export let viewer;
 /** @type {ReturnType<typeof createPaintPanel>} */
 export let paint;
 
+/** @type {ReturnType<typeof createMinimap> | null} */
+let map = null;
+
 /** Resolves when the page's own bundle is loaded. */
 export const ready = start().catch((error) => {
   if (viewer) viewer.fail(error);
   else hud.showError(explainError(error));
+  firstView.showTerrain();
   throw error;
 });
 ready.catch(() => {}); // shown above; whoever waits for `ready` still learns of it
+
+function closePanels() {
+  menu.show(false);
+  story.show(false);
+}
 
 async function start() {
   const canvas = element("picture", HTMLCanvasElement);
   const asked = new URLSearchParams(location.search).get("still"), still = asked !== null;
   const redraw = () => viewer.redraw();
+  canvas.addEventListener("pointerdown", closePanels);
   viewer = new Viewer(canvas, createContext(canvas), hud, {
     still,
     firstBudget: Number(asked) || BUDGET.most,
     onFirstScene(walker) {
-      listenToControls(walker, canvas, element("pad", HTMLElement), paint.brush, redraw);
+      listenToControls(walker, createOrbit(viewer), canvas, element("pad", HTMLElement), paint.brush, redraw);
       new ResizeObserver(redraw).observe(canvas);
-      listenToTools(viewer);
+      listenToTools(viewer, paint.keep);
+      listenToModes(walker, (text) => hud.say(text));
+      map = createMinimap(viewer);
       if (still) return;
       runFrameLoop(viewer);
       syncAddress(walker, paint.keep, { onChange: redraw, onError: (error) => viewer.fail(error) });
     },
     async onScene(scene, first) {
       paint.showScene(scene);
+      firstView.showScene(scene.walker, first);
+      if (!first) element("storyButton", HTMLButtonElement).hidden = true; // it is of the page's own terrain
       if (first) await paint.keep.follow(parsePaint(location.hash), false).catch((error) => viewer.fail(error));
     },
-    onPaint: () => paint.note(),
-    onPicture: () => paint.brush.draw(),
+    onPaint() {
+      paint.note();
+      firstView.showTerrain();
+    },
+    onPicture() {
+      paint.brush.draw();
+      map?.draw();
+      if (viewer.scene) firstView.note(viewer.scene.walker, viewer.overlay);
+    },
+    onWhole: firstView.showTerrain,
   });
   paint = createPaintPanel(viewer);
+  for (const id of ["paintButton", "storyButton"]) {
+    element(id, HTMLButtonElement).addEventListener("click", () => menu.show(false));
+  }
   listenToDrops({
     async openSource(source) {
       hud.showOpening();
@@ -62,4 +95,5 @@ async function start() {
     onError: (error) => viewer.fail(error),
   });
   await viewer.open(webSource(new URL(".", location.href)));
+  if (!still) firstView.showHint();
 }

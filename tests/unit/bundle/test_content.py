@@ -69,7 +69,7 @@ def test_the_terrain_of_a_bundle_has_its_classes_and_objects(bundle, content):
 def test_a_page_of_several_materials_has_the_rule_of_the_config(bundle, tmp_path):
     viewer, picture = tmp_path / "viewer", np.zeros((4, 4, 3))
     viewer.mkdir()
-    (viewer / "index.html").write_text("<html>")
+    (viewer / "index.html").write_text("<html><!-- modules --><!-- first -->")
     picture[:2, :, 1] = 1
     image_files.write_png(tmp_path / "classes.png", picture)
     colours = {"grass": "#00ff00", "sand": "#000000"}

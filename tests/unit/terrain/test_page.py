@@ -15,7 +15,7 @@ from dav_gswt.terrain.page import write_page
 def viewer(tmp_path):
     folder = tmp_path / "viewer"
     folder.mkdir()
-    (folder / "index.html").write_text("<html>")
+    (folder / "index.html").write_text("<html><!-- modules --><!-- first --></html>")
     (folder / "main.js").write_text("//")
     return folder
 

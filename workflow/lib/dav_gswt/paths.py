@@ -14,7 +14,7 @@ from dav_gswt.views.policy_names import POLICY_NAME, PRIOR_POLICIES, ZERO_SETTIN
 RESULTS = "results"
 # Directories beside the scenes' own; no scene may have such a name.
 RESERVED = ("logs", "benchmarks", "snapshots", "weights", "prior", "sweeps", "tables", "figures", "tradeoff")
-RESERVED = (*RESERVED, "stability", "forced_choice")
+RESERVED = (*RESERVED, "stability", "forced_choice", "gallery")
 SNAPSHOTS = f"{RESULTS}/snapshots"  # of running fits: outside the outputs, so that a killed fit can go on
 LPIPS_WEIGHTS = f"{RESULTS}/weights/lpips_alexnet.safetensors"
 MOBILESAM = f"{RESULTS}/weights/mobilesam"  # a folder

@@ -7,10 +7,14 @@ const SHARE = 5; // times a picture's own duration that passes before the next
 
 /** @param {import("./gl.js").GL} gl */
 export function createPreview(gl) {
-  let start = 0, next = 0;
+  let start = 0, next = 0, took = 0;
   /** @type {WebGLSync | null} */
   let fence = null;
   return {
+    /** Milliseconds that the last finished picture took; 0: there is none. */
+    get took() {
+      return took;
+    },
     /**
      * May a preview be drawn now?
      *
@@ -22,7 +26,8 @@ export function createPreview(gl) {
         if (!hasPassed(gl, fence)) return false;
         gl.deleteSync(fence);
         fence = null;
-        next = now + SHARE * (now - start);
+        took = now - start;
+        next = now + SHARE * took;
       }
       if (now < next || !ready) return false;
       start = now;

@@ -1,9 +1,10 @@
-// What draws a bundle on a graphics context: backdrop and splats, previews and idle refinement. Made again after the
+// What draws a bundle on a graphics context: backdrop and splats, previews and pictures at rest. Made again after the
 // context was lost.
 
-import { createIdleRefine } from "./idle_refine.js";
 import { createPreview } from "./preview.js";
+import { createRest } from "./rest.js";
 import { createSky } from "./sky.js";
+import { createSlicedPicture } from "./sliced_picture.js";
 import { createSplats } from "./splats.js";
 
 /** @typedef {ReturnType<typeof createRenderer>} Renderer */
@@ -15,9 +16,11 @@ import { createSplats } from "./splats.js";
  */
 export function createRenderer(gl, manifest, heights) {
   const sky = createSky(gl, manifest), splats = createSplats(gl, manifest, heights);
+  const picture = createSlicedPicture(gl, sky, splats);
   return {
     splats,
-    idle: createIdleRefine(gl),
+    rest: createRest(),
+    picture,
     preview: createPreview(gl),
     /**
      * @param {import("../terrain/camera.js").Camera} camera
@@ -27,6 +30,9 @@ export function createRenderer(gl, manifest, heights) {
       sky.draw(camera, options);
       splats.draw(camera, options);
     },
-    end: () => splats.end(),
+    end() {
+      picture.end();
+      splats.end();
+    },
   };
 }

@@ -5,6 +5,9 @@ import {
 } from "../data/layout.js";
 import { MAX_TURN, TURN_STEPS } from "../data/records.js";
 import { MAX_OCTAVES } from "../terrain/heights.js";
+import { OBJECTS, OVERLAYS } from "./overlays.js";
+
+const UNCERTAINTY = OVERLAYS.indexOf("uncertainty");
 
 /** A record as a Gaussian; the other end of data/records.js. */
 const DECODE = `
@@ -153,7 +156,7 @@ void main() {
   at = vec2(0.0);
   colour = vec4(0.0);
   weight = 1.0;
-  uint lane = uint(gl_InstanceID) & ${PAGE - 1}u;
+  uint lane = uint(gl_VertexID) >> 2u; // four corners each
   if (lane > (block.y >> 16u & ${PAGE - 1}u)) return;
   ivec2 texel = ivec2(int(block.x % ${PAGES_A_ROW}u) * ${PAGE} + int(lane), int(block.x / ${PAGES_A_ROW}u));
   uint entry = texelFetch(entries, texel, 0).x, code = entry >> ${CODE_SHIFT}u, mark = block.z, place = block.w;
@@ -215,7 +218,7 @@ void main() {
   major = spread < 1e-6 * mean ? vec2(1.0, 0.0) : normalize(major);
   vec2 lengths = sqrt(vec2(mean + spread, max((a * c - b * b) / (mean + spread), 0.3)));
   float reach = sqrt(2.0 * log(255.0 * opacity)); // beyond it the Gaussian is fainter than 1/255
-  at = (vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0) * reach;
+  at = (vec2(gl_VertexID & 1, gl_VertexID >> 1 & 1) * 2.0 - 1.0) * reach;
   vec2 pixel = focal * p.xy / p.z + at.x * lengths.x * major + at.y * lengths.y * vec2(-major.y, major.x);
   float going = 1.0 - clamp(2.0 - 2.0 * distance / end, 0.0, 1.0); // smoothstep from half the reach to its end
   vec3 paint = mix(one.paint.rgb, backdrop(seen.z / distance), going * going * (3.0 - 2.0 * going));
@@ -223,7 +226,8 @@ void main() {
     uint owner = texelFetch(owners, ivec2(0, int(row / ${ROW}u)), 0).x;
     uint numbers[5] = uint[5](mark & 255u, uint(level) * 32u, mark >> 8u & 255u, mark >> 16u & 255u, owner);
     uint number = numbers[overlay - 1];
-    paint = mix(vec3(dot(paint, vec3(0.3, 0.6, 0.1))), texelFetch(hues, ivec2(int(number), 0), 0).rgb, 0.7);
+    float share = overlay == ${UNCERTAINTY} && owner == ${OBJECTS}u ? 0.0 : 0.7; // objects have no uncertainty
+    paint = mix(vec3(dot(paint, vec3(0.3, 0.6, 0.1))), texelFetch(hues, ivec2(int(number), 0), 0).rgb, share);
   }
   colour = vec4(paint, opacity);
   gl_Position = vec4(pixel / halfSize, 0.0, 1.0);

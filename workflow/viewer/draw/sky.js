@@ -4,7 +4,10 @@
 import { createProgram, setAxes } from "./gl.js";
 import { BACKDROP } from "./shaders.js";
 
-/** @typedef {import("../terrain/camera.js").Camera} Camera */
+/**
+ * @typedef {import("../terrain/camera.js").Camera} Camera
+ * @typedef {ReturnType<typeof createSky>} Sky
+ */
 
 const VERTEX = `#version 300 es
 out vec2 at;

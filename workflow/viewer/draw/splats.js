@@ -25,6 +25,7 @@ import { FRAGMENT, vertexShader } from "./shaders.js";
 const FULL = "The terrain does not fit into this machine's graphics memory. Close other pages, make one with larger "
   + "tiles or fewer variants, or open it on a larger machine.";
 const WIDTH = PAGE * PAGES_A_ROW; // of the order textures
+const QUADS = Uint16Array.from({ length: 6 * PAGE }, (_, k) => 4 * Math.floor(k / 6) + [0, 1, 2, 2, 1, 3][k % 6]);
 const RECORDS = 0, ENTRIES = 1, RELIEF = 2, HUES = 3, PLACES = 4, OWNERS = 5; // texture units
 
 /**
@@ -115,13 +116,20 @@ export function createSplats(gl, manifest, heights) {
       frame = answer;
     },
 
+    /** Blocks of the last frame. */
+    get length() {
+      return far.length + close.length;
+    },
+
     /**
-     * Draw the last frame over the backdrop, as the camera sees it now.
+     * Draw blocks of the last frame over what is there, as the camera sees them now.
      *
      * @param {import("../terrain/camera.js").Camera} camera
      * @param {DrawOptions} options
+     * @param {number} [from] the first block
+     * @param {number} [many] of them; all of a picture, in slices or at once, are drawn in order
      */
-    draw(camera, { end, low, overlay }) {
+    draw(camera, { end, low, overlay }, from = 0, many = far.length + close.length) {
       if (!frame) return;
       use();
       setConstants(gl, uniforms, manifest);
@@ -143,9 +151,9 @@ export function createSplats(gl, manifest, heights) {
       bind(OWNERS, owners);
       if (relief) bind(RELIEF, relief);
       bind(ENTRIES, entries);
-      far.draw();
+      far.draw(from, many);
       bind(ENTRIES, nearEntries);
-      close.draw();
+      close.draw(from - far.length, many);
       gl.activeTexture(gl.TEXTURE0);
       gl.bindVertexArray(null);
     },
@@ -245,7 +253,8 @@ function uploadPages(gl, { numbers, data }) {
 }
 
 /**
- * Blocks of an instanced draw; each serves PAGE instances.
+ * Blocks of an instanced draw: an instance draws the PAGE Gaussians of a block as quads. Software renderers, and many a
+ * GPU, have a cost for each instance, so an instance of one Gaussian would take several times as long.
  *
  * @param {GL} gl
  */
@@ -253,10 +262,10 @@ function createBlocks(gl) {
   const array = gl.createVertexArray(), buffer = gl.createBuffer();
   let count = 0;
   gl.bindVertexArray(array);
-  gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+  gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, QUADS, gl.STATIC_DRAW);
   gl.enableVertexAttribArray(0);
-  gl.vertexAttribIPointer(0, BLOCK, gl.UNSIGNED_INT, 4 * BLOCK, 0);
-  gl.vertexAttribDivisor(0, PAGE);
+  gl.vertexAttribDivisor(0, 1);
   gl.bindVertexArray(null);
   return {
     /** @param {Uint32Array} words */
@@ -265,10 +274,17 @@ function createBlocks(gl) {
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
       gl.bufferData(gl.ARRAY_BUFFER, words, gl.DYNAMIC_DRAW);
     },
-    draw() {
-      if (!count) return;
+    get length() {
+      return count;
+    },
+    /** Draw those of blocks `from` to `from + many` that there are. @param {number} from @param {number} many */
+    draw(from, many) {
+      const first = Math.max(0, from), past = Math.min(count, from + many);
+      if (past <= first) return;
       gl.bindVertexArray(array);
-      gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, count * PAGE);
+      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+      gl.vertexAttribIPointer(0, BLOCK, gl.UNSIGNED_INT, 4 * BLOCK, 4 * BLOCK * first);
+      gl.drawElementsInstanced(gl.TRIANGLES, QUADS.length, gl.UNSIGNED_SHORT, 0, past - first);
     },
   };
 }

@@ -6,6 +6,7 @@ import { moveTo } from "./walker.js";
 
 /**
  * @typedef {import("./walker.js").Walker} Walker
+ * @typedef {import("./orbit.js").Orbit} Orbit
  * @typedef {number[]} Point x, y in CSS pixels
  */
 
@@ -21,12 +22,13 @@ const WHEEL_PIXELS = [1, 16, 400]; // by deltaMode: pixels, lines, pages
  * Let a person move the walker; onChange is called after each change that needs a picture.
  *
  * @param {Walker} walker
+ * @param {Orbit} orbit
  * @param {HTMLElement} canvas
  * @param {HTMLElement} pad
  * @param {Pick<import("./paint_brush.js").Brush, "begin" | "move" | "end" | "cancel">} brush may take pointers
  * @param {() => void} onChange
  */
-export function listenToControls(walker, canvas, pad, brush, onChange) {
+export function listenToControls(walker, orbit, canvas, pad, brush, onChange) {
   addEventListener("keydown", (event) => {
     const action = KEYS[event.code];
     if (!action || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -40,10 +42,12 @@ export function listenToControls(walker, canvas, pad, brush, onChange) {
   canvas.addEventListener("wheel", (event) => {
     event.preventDefault();
     const pixels = event.deltaY * WHEEL_PIXELS[event.deltaMode];
-    moveTo(walker, { eye: walker.eye * Math.exp(Math.min(Math.max(pixels, -200), 200) / 500) });
+    const factor = Math.exp(Math.min(Math.max(pixels, -200), 200) / 500);
+    if (walker.mode === "orbit") orbit.zoom(factor);
+    else moveTo(walker, { eye: walker.eye * factor });
     onChange();
   }, { passive: false });
-  listenToPointers(walker, canvas, brush, onChange);
+  listenToPointers(walker, orbit, canvas, brush, onChange);
   pad.addEventListener("pointerdown", (event) => {
     pad.setPointerCapture(event.pointerId);
     walker.held.add("forward");
@@ -57,11 +61,12 @@ export function listenToControls(walker, canvas, pad, brush, onChange) {
  * height (pinch).
  *
  * @param {Walker} walker
+ * @param {Orbit} orbit
  * @param {HTMLElement} canvas
  * @param {Pick<import("./paint_brush.js").Brush, "begin" | "move" | "end" | "cancel">} brush
  * @param {() => void} onChange
  */
-function listenToPointers(walker, canvas, brush, onChange) {
+function listenToPointers(walker, orbit, canvas, brush, onChange) {
   /** @type {Map<number, Point>} */
   const down = new Map();
   canvas.addEventListener("pointerdown", (event) => {
@@ -84,7 +89,9 @@ function listenToPointers(walker, canvas, brush, onChange) {
     const other = [...down].find(([id]) => id !== event.pointerId)?.[1];
     down.set(event.pointerId, to);
     if (other) moveByTwoFingers(walker, from, to, other, size);
-    else {
+    else if (walker.mode === "orbit") {
+      orbit.turn((180 * (from[0] - to[0])) / size, (180 * (from[1] - to[1])) / size);
+    } else {
       const degrees = FIELD_OF_VIEW / size;
       moveTo(walker, {
         yaw: walker.yaw + degrees * (to[0] - from[0]), pitch: walker.pitch + degrees * (to[1] - from[1]),

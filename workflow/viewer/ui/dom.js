@@ -18,6 +18,9 @@ export function element(id, type) {
 export const isField = (target) => target instanceof HTMLInputElement || target instanceof HTMLSelectElement
   || target instanceof HTMLButtonElement || (target instanceof HTMLElement && target.tagName === "SUMMARY");
 
+/** Do letters mean something to this itself, so that they are no commands? @param {EventTarget | null} target */
+export const takesLetters = (target) => target instanceof HTMLSelectElement;
+
 /** A patch of a colour, 0 to 1. @param {number[]} colour */
 export function swatch(colour) {
   const patch = document.createElement("i");

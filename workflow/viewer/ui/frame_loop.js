@@ -1,32 +1,33 @@
-// The frame loop: draws while something changes, and holds the frame rate by drawing fewer Gaussians.
+// The frame loop: draws while something changes, holds the frame rate by drawing less, and draws finer at rest.
 
 import { BUDGET } from "../draw/frame_pacing.js";
+import { createGamepads } from "./gamepads.js";
 import { stepWalker } from "./walker.js";
 
 const MAX_STEP = 250; // milliseconds of walking that one frame makes up for
 
 /** @param {import("./viewer.js").Viewer} viewer */
 export function runFrameLoop(viewer) {
-  const { pacing, flyPath } = viewer;
-  let last = performance.now(), drew = false;
+  const { pacing, flyPath, resting } = viewer;
+  const pads = createGamepads();
+  let last = performance.now(), drew = false, paced = false;
 
-  /** @param {import("./viewer.js").Scene} scene @param {number} now @param {boolean} mayDraw */
-  const ask = ({ client, renderer, frame }, now, mayDraw) => {
-    if (viewer.stale) renderer?.idle.restart(now, pacing.budget);
-    if (viewer.stale && mayDraw && client.idle) viewer.askWorker(viewer.loaded ? pacing.budget : BUDGET.least, false);
-    else if (viewer.loaded && !viewer.dirty && client.idle) {
-      const more = renderer?.idle.nextBudget(now, frame?.shrink === 1);
-      if (more) viewer.askWorker(more, true);
+  /** May a frame be drawn? While chunks arrive, previews at most. @param {import("./viewer.js").Scene} scene @param {number} now */
+  const mayDraw = ({ renderer, manifest, coarse }, now) => {
+    if (viewer.loaded) return true;
+    const due = renderer?.preview.isDue(now, coarse >= manifest.tiles.length) ?? false;
+    if (due && !paced && renderer?.preview.took) {
+      pacing.begin(renderer.preview.took);
+      paced = true;
     }
+    return due;
   };
 
-  /** @param {import("./viewer.js").Scene} scene @param {number} now */
-  const draw = (scene, now) => {
-    const { renderer } = scene;
-    viewer.drawFrame();
-    if (!viewer.loaded) renderer?.preview.addPicture();
-    renderer?.idle.addPicture(now);
-    return !scene.frame?.patient; // a refined picture may take its time
+  /** @param {import("./viewer.js").Scene} scene @param {number} now @param {boolean} may */
+  const ask = (scene, now, may) => {
+    if (viewer.stale) resting.restart(scene, now);
+    if (viewer.stale && may && scene.client.idle) viewer.askWorker(viewer.loaded ? pacing.budget : BUDGET.least, false);
+    else if (viewer.loaded && !viewer.stale) resting.step(scene, now);
   };
 
   /** @param {number} now */
@@ -35,15 +36,19 @@ export function runFrameLoop(viewer) {
     const { scene } = viewer, gap = now - last;
     last = now;
     if (!scene) return;
-    const { walker, renderer, manifest, coarse } = scene;
+    const { walker, renderer } = scene;
     const flown = flyPath.step(walker, gap / 1000);
-    if (stepWalker(walker, Math.min(gap, MAX_STEP) / 1000) || flown) viewer.dirty = viewer.stale = true;
-    const mayDraw = viewer.loaded || (renderer?.preview.isDue(now, coarse >= manifest.tiles.length) ?? false);
-    ask(scene, now, mayDraw);
-    const due = viewer.dirty && mayDraw;
+    const seconds = Math.min(gap, MAX_STEP) / 1000, stepped = stepWalker(walker, seconds), pushed = pads.step(walker, seconds);
+    if (stepped || pushed || flown) viewer.dirty = viewer.stale = true;
+    const may = mayDraw(scene, now);
+    ask(scene, now, may);
+    // the frame of a picture at rest may take the GPU seconds: it is drawn in slices alone
+    const due = viewer.dirty && may && !scene.frame?.patient;
     if (!due || !drew) pacing.reset();
     else if (pacing.addFrame(gap, scene.frame?.count ?? 0)) viewer.stale = true;
-    drew = due && draw(scene, now);
+    if (due) viewer.drawFrame(pacing.scale);
+    if (due && !viewer.loaded) renderer?.preview.addPicture();
+    drew = due;
   };
   requestAnimationFrame(next);
 }

@@ -5,6 +5,7 @@ import { element, isField, swatch } from "./dom.js";
 import { createBrush, ERASER, SIZES } from "./paint_brush.js";
 import { createPaintKeep } from "./paint_keep.js";
 import { addDensities, addShares } from "./paint_sliders.js";
+import { createPanel } from "./panel.js";
 
 /**
  * @typedef {import("./viewer.js").Viewer} Viewer
@@ -20,10 +21,11 @@ const TOO_LONG = "This is too much for a link. Save it as a file.";
 
 /** @param {Viewer} viewer */
 export function createPaintPanel(viewer) {
-  const panel = element("paint", HTMLElement), toggle = element("paintButton", HTMLButtonElement);
+  const toggle = element("paintButton", HTMLButtonElement);
+  const panel = createPanel("paint", { onShow: (on) => on || choose(LOOK), closesOnEscape: false });
   const brushes = element("brushes", HTMLFieldSetElement), status = element("paintStatus", HTMLElement);
-  const [undo, redo, clear, copy, save, open, close] = ["undo", "redo", "clear", "copyLink", "savePaint", "openPaint",
-    "paintClose"].map((id) => element(id, HTMLButtonElement));
+  const [undo, redo, clear, save, open] = ["undo", "redo", "clear", "savePaint", "openPaint"]
+    .map((id) => element(id, HTMLButtonElement));
   const file = element("paintFile", HTMLInputElement), size = element("brushSize", HTMLInputElement);
   const brush = createBrush(viewer, (trouble) => say(trouble ? TROUBLES[trouble] : ""));
   const keep = createPaintKeep(viewer, (tooLong) => tooLong && say(TOO_LONG));
@@ -34,13 +36,6 @@ export function createPaintPanel(viewer) {
   /** @param {string} text */
   function say(text) {
     if (status.textContent !== text) status.textContent = text;
-  }
-
-  /** @param {boolean} on */
-  function show(on) {
-    panel.hidden = !on;
-    toggle.setAttribute("aria-expanded", String(on));
-    if (!on) choose(LOOK);
   }
 
   /** @param {string} value of a brush */
@@ -80,26 +75,9 @@ export function createPaintPanel(viewer) {
   };
   const take = () => viewer.scene?.painting.undo(), again = () => viewer.scene?.painting.redo();
 
-  async function copyLink() {
-    const link = await keep.findLink();
-    if (link === null) return say(TOO_LONG);
-    const address = new URL(location.href);
-    address.hash = viewer.address(link);
-    history.replaceState(null, "", address.hash);
-    try {
-      await navigator.clipboard.writeText(address.href);
-      say("The link is copied.");
-    } catch {
-      say("The link is in the address bar.");
-    }
-  }
-
-  toggle.addEventListener("click", () => show(Boolean(panel.hidden)));
-  close.addEventListener("click", () => show(false));
   undo.addEventListener("click", take);
   redo.addEventListener("click", again);
   clear.addEventListener("click", () => viewer.scene?.painting.load(viewer.scene.painting.blank));
-  copy.addEventListener("click", guarded(copyLink));
   save.addEventListener("click", () => keep.save());
   open.addEventListener("click", () => file.click());
   file.addEventListener("change", guarded(async () => {
@@ -118,8 +96,8 @@ export function createPaintPanel(viewer) {
       event.preventDefault();
       return redoes ? again() : take();
     }
-    if (event.code === "KeyM" && event.target !== element("overlay", HTMLSelectElement)) show(Boolean(panel.hidden));
-    if (panel.hidden || (isField(event.target) && event.code !== "Escape")) return;
+    if (event.code === "KeyM" && event.target !== element("overlay", HTMLSelectElement)) panel.show(!panel.open);
+    if (!panel.open || (isField(event.target) && event.code !== "Escape")) return;
     if (event.code === "Escape") choose(LOOK);
     else if (event.code === "KeyX") choose(String(ERASER));
     else if (/^Digit[1-8]$/.test(event.code)) choose(String(Number(event.code[5]) - 1));
@@ -143,7 +121,7 @@ export function createPaintPanel(viewer) {
       const { materials, objects = [] } = manifest;
       toggle.hidden = materials.length < 2 && !objects.length;
       keep.reset();
-      show(false);
+      panel.show(false);
       say("");
       brushes.replaceChildren(brushes.children[0]);
       addBrush(LOOK, "look around", "Esc", null);

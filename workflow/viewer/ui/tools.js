@@ -1,19 +1,24 @@
-// The row of tools: overlays, the fly path, a picture to keep.
+// The bar: overlays, a picture to keep, the link; and the fly path behind it.
 
-import { OVERLAYS } from "../draw/overlays.js";
-import { element, saveFile } from "./dom.js";
+import { OVERLAYS, TITLES } from "../draw/overlays.js";
+import { element, saveFile, takesLetters } from "./dom.js";
+import { tellValues } from "./pointer_values.js";
+import { createSaving } from "./saving.js";
+import { sharePlace } from "./share.js";
 
 /**
  * @param {import("./viewer.js").Viewer} viewer
+ * @param {import("./paint_keep.js").PaintKeep} paint
  */
-export function listenToTools(viewer) {
-  const { flyPath } = viewer, overlay = element("overlay", HTMLSelectElement);
-  const [record, play, save, keep] = ["record", "play", "save", "keep"].map((id) => element(id, HTMLButtonElement));
-  for (const name of OVERLAYS) overlay.add(new Option(name[0].toUpperCase() + name.slice(1), name));
+export function listenToTools(viewer, paint) {
+  const { flyPath, hud } = viewer, overlay = element("overlay", HTMLSelectElement);
+  const [record, play, save] = ["record", "play", "save"].map((id) => element(id, HTMLButtonElement));
+  for (const [k, name] of OVERLAYS.entries()) overlay.add(new Option(TITLES[k], name));
   overlay.addEventListener("change", () => viewer.showOverlay(overlay.selectedIndex));
+  tellValues(viewer);
   const update = () => {
-    record.textContent = flyPath.mode === "record" ? "Stop" : "Record";
-    play.textContent = flyPath.mode === "play" ? "Stop" : "Play";
+    record.textContent = flyPath.mode === "record" ? "Stop recording" : "Record a fly path";
+    play.textContent = flyPath.mode === "play" ? "Stop playing" : "Play it";
     play.disabled = save.disabled = !flyPath.path.length;
   };
   /** @param {"record" | "play"} mode */
@@ -22,23 +27,23 @@ export function listenToTools(viewer) {
     else flyPath[mode]();
     viewer.redraw();
     update();
+    if (flyPath.mode === "record") hud.say("Recording: walk, and press R to stop.");
   };
   const savePath = () =>
     saveFile(new Blob([JSON.stringify(flyPath, null, 1)], { type: "application/json" }), "flight.json");
-  const savePicture = async () => saveFile(await viewer.takePicture(), "terrain.png");
+  const savePicture = createSaving(viewer), share = () => sharePlace(viewer, paint);
   record.addEventListener("click", () => toggle("record"));
   play.addEventListener("click", () => toggle("play"));
   save.addEventListener("click", savePath);
-  keep.addEventListener("click", savePicture);
+  element("copyLink", HTMLButtonElement).addEventListener("click", share);
+  /** @type {Record<string, () => void>} */
+  const keys = {
+    KeyR: () => toggle("record"), KeyP: () => toggle("play"), KeyC: savePicture, KeyL: share, KeyI: hud.numbers.toggle,
+    KeyO: () => viewer.showOverlay((viewer.overlay + 1) % OVERLAYS.length),
+  };
   addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.target === overlay) return;
-    if (event.code === "KeyR") toggle("record");
-    if (event.code === "KeyP") toggle("play");
-    if (event.code === "KeyC") savePicture();
-    if (event.code === "KeyO") {
-      viewer.showOverlay((viewer.overlay + 1) % OVERLAYS.length);
-      overlay.selectedIndex = viewer.overlay;
-    }
+    if (event.ctrlKey || event.metaKey || event.altKey || takesLetters(event.target)) return;
+    keys[event.code]?.();
   });
   setInterval(update, 250);
   update();

@@ -12,8 +12,10 @@ import { REACH, tileUnder } from "../terrain/cells.js";
 import { createHeights } from "../terrain/heights.js";
 import { createWorkerClient } from "../worker/worker_client.js";
 import { formatAddress, parsePlace } from "./address.js";
+import { element } from "./dom.js";
 import { createFlyPath } from "./fly_path.js";
 import { createPainting } from "./painting.js";
+import { createResting } from "./resting.js";
 import { createWalker, moveTo } from "./walker.js";
 
 /**
@@ -30,9 +32,10 @@ import { createWalker, moveTo } from "./walker.js";
  *
  * still: draw only when asked, for tests and screenshots; firstBudget: of the first picture then; onFirstScene: called
  * when the first bundle's manifest is read; onScene: called, and awaited, when any is, `first` or not; onPaint: something
- * was painted or set; onPicture: a picture was drawn.
+ * was painted or set; onPicture: a picture was drawn; onWhole: one of all Gaussians.
  * @typedef {{ still: boolean, firstBudget: number, onFirstScene: (walker: Walker) => void,
- *   onScene: (scene: Scene, first: boolean) => Promise<void>, onPaint: () => void, onPicture: () => void }} Options
+ *   onScene: (scene: Scene, first: boolean) => Promise<void>, onPaint: () => void, onPicture: () => void,
+ *   onWhole: () => void }} Options
  */
 
 const MAX_PIXEL_RATIO = 1.5; // device pixels a CSS pixel: splats are soft, pixels cost
@@ -52,6 +55,7 @@ export class Viewer {
   pacing = createFramePacing();
   stats = createFrameStats();
   flyPath = createFlyPath();
+  resting = createResting(this);
   /** @type {Walker | null} */
   #walker = null; // the one that the controls move, through all bundles
   #fresh = false; // the worker has answered since the last picture
@@ -103,7 +107,7 @@ export class Viewer {
       client.end();
       throw error;
     }
-    const walker = Object.assign(this.#walker ?? begin, begin);
+    const walker = Object.assign(this.#walker ?? begin, begin, { mode: this.#walker?.mode ?? begin.mode });
     this.#walker = walker;
     const painting = createPainting(manifest, client, () => {
       this.options.onPaint();
@@ -129,14 +133,18 @@ export class Viewer {
       throw error;
     }
     this.loaded = true;
-    await this.settle(this.options.still ? this.options.firstBudget : this.pacing.budget);
+    if (this.options.still) await this.settle(this.options.firstBudget);
+    else {
+      this.askWorker(this.pacing.budget, false);
+      await client.answered();
+    }
     this.opened += 1;
-    this.hud.showLoaded(this.options.still);
+    this.hud.showLoaded();
   }
 
-  /** The camera of the walker's eye. @param {Scene} scene */
-  camera({ walker, heights }) {
-    const ratio = Math.min(devicePixelRatio, MAX_PIXEL_RATIO);
+  /** The camera of the walker's eye. @param {Scene} scene @param {number} [scale] of the resolution */
+  camera({ walker, heights }, scale = 1) {
+    const ratio = scale * Math.min(devicePixelRatio, MAX_PIXEL_RATIO);
     /** @param {number} size */
     const pixels = (size) => Math.max(1, Math.round(size * ratio));
     return cameraAt(walker, pixels(this.canvas.clientWidth), pixels(this.canvas.clientHeight), heights);
@@ -154,23 +162,57 @@ export class Viewer {
     this.scene.client.ask(this.camera(this.scene), budget, patient);
   }
 
-  /** Draw the picture now, of the worker's last frame. */
-  drawFrame() {
-    const { scene, canvas } = this;
+  /** Draw the picture now, of the worker's last frame. @param {number} [scale] of the resolution */
+  drawFrame(scale = 1) {
+    const { scene } = this;
     if (!scene?.renderer) return;
-    const start = performance.now(), { manifest, heights, frame, renderer } = scene, camera = this.camera(scene);
-    const { width, height } = camera, farthest = REACH * manifest.tile_side;
-    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-    this.gl.viewport(0, 0, width, height);
-    const low = Math.max(MIN_LOW, (camera.eye[2] - heights.low) / farthest);
-    renderer.draw(camera, { end: frame?.reach ?? farthest, low, overlay: this.overlay });
+    const start = performance.now(), camera = this.camera(scene, scale);
+    this.#fit(camera);
+    this.gl.viewport(0, 0, camera.width, camera.height);
+    scene.renderer.draw(camera, this.#drawOptions(scene, camera));
     this.dirty = false;
     this.stats.addTime("render", performance.now() - start);
     this.stats.addFrame(this.#fresh);
     this.#fresh = false;
-    this.hud.showNumbers({
-      now: start, state: () => describeScene(scene), stats: this.stats.summary(), fps: this.pacing.fps,
-      unit: manifest.unit, force: this.options.still,
+    this.#tellNumbers(scene, start);
+  }
+
+  /** Begin the picture of the worker's last frame in slices. @param {import("../draw/sliced_picture.js").SlicedPicture} picture */
+  begin(picture) {
+    const { scene } = this;
+    if (!scene) return;
+    const camera = this.camera(scene);
+    picture.begin(camera, this.#drawOptions(scene, camera));
+    this.dirty = false;
+  }
+
+  /** Show a picture that was drawn in slices. @param {import("../draw/sliced_picture.js").SlicedPicture} picture */
+  show(picture) {
+    const { scene } = this;
+    if (!scene) return;
+    this.#fit(this.camera(scene));
+    picture.show();
+    this.#tellNumbers(scene, performance.now());
+  }
+
+  /** @param {import("../terrain/camera.js").Camera} camera */
+  #fit({ width, height }) {
+    const { canvas } = this;
+    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+  }
+
+  /** @param {Scene} scene @param {import("../terrain/camera.js").Camera} camera */
+  #drawOptions({ manifest, heights, frame }, camera) {
+    const farthest = REACH * manifest.tile_side;
+    const low = Math.max(MIN_LOW, (camera.eye[2] - heights.low) / farthest);
+    return { end: frame?.reach ?? farthest, low, overlay: this.overlay };
+  }
+
+  /** @param {Scene} scene @param {number} now */
+  #tellNumbers(scene, now) {
+    this.hud.numbers.show({
+      now, state: () => describeScene(scene), stats: () => this.stats.summary(), fps: this.pacing.fps,
+      unit: scene.manifest.unit, force: this.options.still,
     });
     this.options.onPicture();
   }
@@ -214,7 +256,8 @@ export class Viewer {
   }
 
   #showLegend() {
-    this.hud.showLegend(OVERLAYS[this.overlay] === "material" ? this.scene?.manifest ?? null : null);
+    this.hud.legend.show(this.overlay, this.scene?.manifest ?? null);
+    element("overlay", HTMLSelectElement).selectedIndex = this.overlay;
   }
 
   /** The address of this place. @param {string} paint of what is painted */
@@ -222,18 +265,21 @@ export class Viewer {
     return this.scene ? formatAddress(this.scene.walker, paint) : "";
   }
 
-  /** The picture on the screen as a PNG file. @returns {Promise<Blob>} */
+  /** The finest picture of this place as a PNG file, when it is drawn. @returns {Promise<Blob>} */
   async takePicture() {
-    await this.settle();
-    return new Promise((done, refuse) =>
-      this.canvas.toBlob((blob) => (blob ? done(blob) : refuse(new Error("the picture cannot be saved")))));
+    if (this.options.still) await this.settle();
+    return new Promise((done, refuse) => {
+      const take = () => this.canvas.toBlob((blob) => (blob ? done(blob) : refuse(new Error("the picture cannot be saved"))));
+      if (this.options.still) take();
+      else this.resting.whenWhole(take);
+    });
   }
 
   /** What is on the screen, in plain values. */
   state() {
     const { loaded, opened, error, overlay, pacing: { budget } } = this;
     const view = this.scene ? describeScene(this.scene) : { drawn: [], count: 0, bytes: 0 };
-    return { ...view, overlay: OVERLAYS[overlay], budget, loaded, opened, error };
+    return { ...view, overlay: OVERLAYS[overlay], budget, loaded, opened, error, whole: this.resting.whole, mode: this.scene?.walker.mode };
   }
 
   /** Tell the person what went wrong. @param {unknown} error */

@@ -11,9 +11,15 @@ const FARTHEST = 1e12; // coordinates beyond have no whole tiles left in double 
  * @typedef {import("../terrain/camera.js").Place} Place
  * @typedef {"forward" | "back" | "left" | "right" | "turnLeft" | "turnRight" | "lower" | "higher" | "run"} Action
  *
+ * walk: over the ground, at one height; fly: where one looks; orbit: dragging turns about what one looks at.
+ * @typedef {"walk" | "fly" | "orbit"} Mode
+ *
  * A place, the bounds of the eye's height above the surface, and the actions of held keys.
- * @typedef {Place & { floor: number, ceiling: number, held: Set<Action> }} Walker
+ * @typedef {Place & { floor: number, ceiling: number, held: Set<Action>, mode: Mode }} Walker
  */
+
+/** @type {Mode[]} */
+export const MODES = ["walk", "fly", "orbit"];
 
 /** @type {(keyof Place)[]} */
 export const PLACE_KEYS = ["x", "y", "eye", "yaw", "pitch"];
@@ -27,6 +33,7 @@ export function createWalker({ tile_side: side, eye_floor: floor }, place = {}) 
   const walker = {
     x: side / 2, y: side / 2, eye: floor, yaw: 60, pitch: -12,
     floor, ceiling: Math.max(CEILING * side, 4 * floor), held: new Set(),
+    mode: /** @type {Mode} */ ("walk"),
   };
   moveTo(walker, place);
   return walker;
@@ -57,16 +64,30 @@ export function moveTo(walker, place) {
 export function stepWalker(walker, seconds) {
   /** @param {Action} action */
   const on = (action) => Number(walker.held.has(action));
-  const forward = on("forward") - on("back"), right = on("right") - on("left");
-  const turn = on("turnLeft") - on("turnRight"), rise = on("higher") - on("lower");
-  if (!forward && !right && !turn && !rise) return false;
-  const yaw = (walker.yaw * Math.PI) / 180;
-  const stride = (SPEED * walker.eye * seconds * (on("run") ? RUN : 1)) / Math.max(1, Math.hypot(forward, right));
+  return moveBy(walker, {
+    forward: on("forward") - on("back"), right: on("right") - on("left"), turn: on("turnLeft") - on("turnRight"),
+    tilt: 0, rise: on("higher") - on("lower"), run: on("run"),
+  }, seconds);
+}
+
+/**
+ * Move as somebody wants to for some seconds; all wishes from -1 to 1. Returns: did anything change?
+ *
+ * @param {Walker} walker
+ * @param {{ forward: number, right: number, turn: number, tilt: number, rise: number, run: number }} wish
+ * @param {number} seconds
+ */
+export function moveBy(walker, { forward, right, turn, tilt, rise, run }, seconds) {
+  if (!forward && !right && !turn && !rise && !tilt) return false;
+  const yaw = (walker.yaw * Math.PI) / 180, pitch = walker.mode === "fly" ? (walker.pitch * Math.PI) / 180 : 0;
+  const stride = (SPEED * walker.eye * seconds * (1 + (RUN - 1) * run)) / Math.max(1, Math.hypot(forward, right));
+  const along = forward * Math.cos(pitch);
   moveTo(walker, {
-    x: walker.x + stride * (forward * Math.cos(yaw) + right * Math.sin(yaw)),
-    y: walker.y + stride * (forward * Math.sin(yaw) - right * Math.cos(yaw)),
+    x: walker.x + stride * (along * Math.cos(yaw) + right * Math.sin(yaw)),
+    y: walker.y + stride * (along * Math.sin(yaw) - right * Math.cos(yaw)),
     yaw: walker.yaw + turn * TURN * seconds,
-    eye: walker.eye * Math.exp(rise * RISE * seconds),
+    pitch: walker.pitch + tilt * TURN * seconds,
+    eye: walker.eye * Math.exp(rise * RISE * seconds) + stride * forward * Math.sin(pitch),
   });
   return true;
 }

@@ -2,6 +2,7 @@
 
 import { NEAR } from "../data/layout.js";
 import { deviationOf } from "../data/records.js";
+import { shareOfRange, uncertaintyRange } from "../data/uncertainty.js";
 import { RING } from "../terrain/cell_ring.js";
 import { createCellCache } from "../terrain/cells.js";
 import { createClasses } from "../terrain/classes.js";
@@ -9,8 +10,8 @@ import { RIM } from "../terrain/frustum.js";
 import { createScatter } from "../terrain/scatter.js";
 
 /**
- * A tile, or an object: these are numbered after the tiles. uncertainty: in 255ths; counts, orders: by level; arrived:
- * bits of the levels at hand; alone: a list of its own number.
+ * A tile, or an object: these are numbered after the tiles. uncertainty: in 255ths of the set's range; counts, orders:
+ * by level; arrived: bits of the levels at hand; alone: a list of its own number.
  * @typedef {{ uncertainty: number, arrived: number, counts: number[], orders: number[][],
  *   alone: number[] }} TileTable
  *
@@ -36,11 +37,12 @@ import { createScatter } from "../terrain/scatter.js";
  */
 export function createTerrainTables(manifest, heights, pictures) {
   const { tile_side: side, salt, levels, directions, encoding, materials, objects = [], scatter } = manifest;
-  const owners = [...manifest.tiles, ...objects.map(({ chunks }) => ({ chunks, uncertainty: 0 }))];
+  const range = uncertaintyRange(manifest.tiles);
+  const owners = [...manifest.tiles, ...objects.map(({ chunks }) => ({ chunks, uncertainty: range[0] }))];
   const tiles = owners.map(({ chunks, uncertainty }, number) => {
     const byLevel = [...chunks].sort((a, b) => a.level - b.level);
     return {
-      uncertainty: Math.round(255 * Math.min(Math.max(uncertainty ?? 0, 0), 1)), arrived: 0, alone: [number],
+      uncertainty: Math.round(255 * shareOfRange(uncertainty ?? range[0], range)), arrived: 0, alone: [number],
       counts: byLevel.map((chunk) => chunk.count), orders: byLevel.map((chunk) => chunk.orders),
     };
   });

@@ -14,8 +14,9 @@ from dav_gswt.config.settings import Preset, Tiling
 
 _SPLIT_READERS = ["fit_coarse", "evaluate_coarse", "score_coarse", "select_poses", "capture_views", "request_views"]
 _SPLIT_READERS += ["update_field", "evaluate_round", "score_round", "inpaint_field", "evaluate_inpainted"]
-_PHOTO_READERS = ["report_photos", "split_views", *_SPLIT_READERS, "bundle_tiles"]
+_PHOTO_READERS = ["report_photos", "split_views", *_SPLIT_READERS, "bundle_tiles", "make_page"]
 _CAPTURE_READERS = ["update_field", "evaluate_round", "score_round", "inpaint_field", "bundle_tiles"]
+_CAPTURE_READERS += ["make_page"]
 
 # the rules of the product in their order; of each those that read what it makes
 READERS: dict[str, list[str]] = {
@@ -23,10 +24,10 @@ READERS: dict[str, list[str]] = {
     "render_photos": _PHOTO_READERS,
     "import_field": ["prepare_external_field", "bundle_tiles"],
     "report_photos": [],
-    "split_views": _SPLIT_READERS,
+    "split_views": [*_SPLIT_READERS, "make_page"],
     "convert_lpips_weights": ["evaluate_coarse", "evaluate_round", "evaluate_inpainted", "cut_tiles"],
     "fit_coarse": ["evaluate_coarse", "score_coarse", "select_poses", "update_field"],
-    "evaluate_coarse": [],
+    "evaluate_coarse": ["make_page"],
     "score_coarse": ["select_poses", "score_round"],
     "select_poses": ["capture_views", "request_views", "evaluate_round"],
     "capture_views": _CAPTURE_READERS,
@@ -35,7 +36,7 @@ READERS: dict[str, list[str]] = {
         *("evaluate_round", "score_round", "inpaint_field", "evaluate_inpainted"),
         *("find_materials", "make_levels"),
     ],
-    "evaluate_round": [],
+    "evaluate_round": ["make_page"],
     "score_round": [],  # a later round follows from it
     "prepare_external_field": ["make_levels"],
     "inpaint_field": ["evaluate_inpainted", "find_materials", "make_levels"],
@@ -46,7 +47,7 @@ READERS: dict[str, list[str]] = {
     "cut_tiles": ["bundle_tiles"],
     "bundle_tiles": ["make_page", "render_terrain", "render_flight"],
     "make_page": [],
-    "render_terrain": ["make_contact_sheet"],
+    "render_terrain": ["make_page", "make_contact_sheet"],
     "make_contact_sheet": [],
     "render_flight": [],
 }

@@ -13,8 +13,12 @@ from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_folder, read_json, write_json
 from dav_gswt.terrain.class_rules import NOISE, Picture, apply_rule, warn_of_rule
 from dav_gswt.terrain.heights import FlatSurface, HeightField, HeightMap, Hills
+from dav_gswt.terrain.page_front import FRONT, STILL, Front, fill_front
+from dav_gswt.terrain.page_story import SHEET, STORY
 
 SURFACE = "heights.bin"
+INDEX = "index.html"
+OWN_SCRIPTS = ("early.js", "worker/")  # that are no modules of the page itself
 MAX_SIDE = 4096  # pixels along a side of a height map: every WebGL2 device in use takes textures of this size
 
 
@@ -24,6 +28,7 @@ def write_page(
     out_dir: Path | str,
     surface: HeightField | None = None,
     rule: Sequence[dict[str, Any]] = NOISE,
+    front: Front | None = None,
 ) -> None:
     """Copy viewer, manifest and chunks to `out_dir`, atomically: an older page stays until the new one is complete.
 
@@ -31,13 +36,14 @@ def write_page(
 
     Args:   surface: height field of the terrain (default: level ground), stored in the page's manifest as `heights`;
             the pixels of a height map are heights.bin, float32, little-endian, rows from the north. rule: the config's
-            `classes`, stored as those of the page's manifest, its pictures beside it.
+            `classes`, stored as those of the page's manifest, its pictures beside it. front: name of the scene, line
+            about it, first still and story (default: the viewer's own texts, no still, no story).
     Raises: InputError: the manifest is missing or of another version, a chunk is missing, has another size than the
             manifest says, or lies outside of the bundle; the viewer is incomplete; see also `describe_surface`,
             `class_rules.apply_rule`.
     """
     bundle, viewer, out = Path(bundle_dir), Path(viewer_dir), Path(out_dir)
-    if not (viewer / "index.html").is_file():
+    if not (viewer / INDEX).is_file():
         raise InputError(f"{viewer}: no viewer here (index.html is missing)")
     copies = [(path, str(path.relative_to(viewer))) for path in sorted(viewer.rglob("*")) if path.is_file()]
     copies += [(bundle / name, name) for name in list_chunks(bundle)]
@@ -46,6 +52,8 @@ def write_page(
     with atomic_folder(out) as part:
         for source, name in copies:
             _copy_file(source, part / name)
+        modules = [name for _, name in copies if name.endswith(".js") and not name.startswith(OWN_SCRIPTS)]
+        _write_index(part / INDEX, front, modules)
         if pixels:
             (part / SURFACE).write_bytes(pixels)
         for name, pixels in pictures.items():
@@ -53,10 +61,21 @@ def write_page(
         write_json(part / MANIFEST, value | {"heights": heights})
 
 
+def _write_index(path: Path, front: Front | None, modules: list[str]) -> None:
+    """Fill the copied index.html, and write the first still and the story beside it."""
+    path.write_text(fill_front(path.read_text(encoding="utf-8"), front, modules), encoding="utf-8")
+    if front:
+        (path.parent / STILL).write_bytes(front.still)
+        write_json(path.parent / FRONT, front.to_dict())
+    if front and front.story:
+        write_json(path.parent / STORY, front.story.value)
+        (path.parent / SHEET).write_bytes(front.story.sheet)
+
+
 def find_viewer(paths: Iterable[Path | str]) -> Path:
     """The folder of the viewer, given its files. Raises: InputError: there is no index.html among them."""
     for path in map(Path, paths):
-        if path.name == "index.html":
+        if path.name == INDEX:
             return path.parent
     raise InputError("the viewer's files hold no index.html")
 

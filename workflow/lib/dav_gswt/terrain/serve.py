@@ -45,6 +45,7 @@ class _Handler(SimpleHTTPRequestHandler):
         ".json": "application/json",
         ".bin": "application/octet-stream",
         ".png": "image/png",
+        ".jpg": "image/jpeg",
     }
 
     def send_head(self):

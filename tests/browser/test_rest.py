@@ -1,0 +1,104 @@
+"""Pictures at rest: on every device all Gaussians are drawn in the end, in slices, and walking on is not held up."""
+
+import numpy as np
+import pytest
+from fixtures.bundles import Ground
+
+from dav_gswt.study.terrain.browser import served
+
+OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
+BUDGETS = """async ([drawn, all]) => {
+  // budgets of the pictures at rest, and when each was due, where there are `all` Gaussians
+  const { createRest } = await import("./draw/rest.js");
+  const rest = createRest(), seen = [], progress = [];
+  rest.restart(1000, drawn);
+  for (let now = 1000; now < 3000; now += 16) {
+    const next = rest.next(now);
+    if (!next) continue;
+    seen.push([now, next]);
+    progress.push(rest.progress(next, 0), rest.progress(next, 1));
+    rest.finish(next, next >= all);
+  }
+  return [seen, progress, rest.whole];
+}"""
+SLICES = """async ([blocks, cost]) => {
+  // slices of a picture of so many blocks, of `cost` milliseconds each
+  const { createSlicedPicture } = await import("./draw/sliced_picture.js");
+  let now = 0, done = 0;
+  const gl = new Proxy({}, { get: (_, name) => ({
+    SIGNALED: 1, fenceSync: () => 1, getSyncParameter: () => Number(now >= done), createTexture: () => ({}),
+  })[name] ?? (/^[A-Z]/.test(name) ? 0 : () => null) });
+  const slices = [], splats = {
+    length: blocks,
+    draw(camera, options, from, many) {
+      slices.push([from, many]);
+      done = now + cost * Math.min(many, blocks - from);
+    },
+  };
+  const picture = createSlicedPicture(gl, { draw() {} }, splats);
+  picture.begin({ width: 8, height: 8 }, {});
+  while (now < 1e6 && !picture.advance(now)) now += 16;
+  return [slices, picture.share, now];
+}"""
+
+
+@pytest.mark.parametrize(
+    "drawn, all_, budgets",
+    [
+        pytest.param(20_000, 9e9, [250_000, 1_000_000, 6_000_000], id="slow device"),
+        pytest.param(200_000, 9e9, [1_000_000, 6_000_000], id="no step that is hardly seen"),
+        pytest.param(20_000, 900_000, [250_000, 1_000_000], id="all are drawn"),
+        pytest.param(6_000_000, 9e9, [6_000_000], id="fast device"),
+    ],
+)
+def test_budgets_grow_until_all_is_drawn_whatever_the_device(modules, drawn, all_, budgets):
+    seen, progress, whole = modules.evaluate(BUDGETS, [drawn, all_])
+    assert [budget for _, budget in seen] == budgets and whole
+    assert seen[0][0] - 1000 >= 300
+    assert progress == sorted(progress) and progress[0] >= 0 and progress[-1] <= 1
+
+
+@pytest.mark.parametrize("cost", [0.0, 0.1, 5.0, 300.0])
+def test_slices_follow_each_other_and_are_short(modules, cost):
+    slices, share, _ = modules.evaluate(SLICES, [3000, cost])
+    ends = np.cumsum([many for _, many in slices])
+    assert [first for first, _ in slices] == [0, *ends[:-1]] and ends[-1] >= 3000 > ends[-2]
+    assert share == 1
+    # after the first ones a slice takes about 40 ms, or is one of 250
+    assert max(many for _, many in slices[3:]) * cost <= max(60, 12 * cost)
+    assert len(slices) <= 252
+
+
+def test_a_picture_at_rest_is_the_one_that_is_drawn_at_once(visit, plain):
+    seen = visit(320, 200).open(plain)
+    seen.page.evaluate("place => davgswt.set(place)", OBLIQUE)
+    seen.until("davgswt.state.whole")
+    grabbed = seen.page.evaluate("davgswt.grab()")
+    assert (seen.decode(*grabbed) == seen.at(**OBLIQUE)).all()
+
+
+def test_who_walks_on_gets_pictures_at_once_and_the_finest_again_at_rest(visit, plain):
+    seen = visit(320, 200).open(plain)
+    seen.until("davgswt.state.whole")
+    seen.page.keyboard.down("w")
+    seen.until("davgswt.state.x > 2.3 && !davgswt.state.whole")
+    seen.page.keyboard.up("w")
+    seen.until("davgswt.state.whole")
+
+
+def test_progress_is_shown_while_a_picture_takes_long(visit, page_of):
+    with served(page_of(Ground(discs=48))) as address:
+        seen = visit(640, 400)
+        # a device on which every slice takes long: fences pass late
+        seen.page.add_init_script(
+            """const ask = WebGL2RenderingContext.prototype.getSyncParameter, born = new WeakMap();
+            WebGL2RenderingContext.prototype.getSyncParameter = function (sync, name) {
+              if (!born.has(sync)) born.set(sync, performance.now());
+              return performance.now() - born.get(sync) < 60 ? this.UNSIGNALED : ask.call(this, sync, name);
+            };"""
+        )
+        seen.open(address)
+        seen.until("!refining.hidden && refining.value > 0")
+        assert not seen.state["whole"]
+        seen.until("davgswt.state.whole", seconds=90)
+        assert not seen.page.locator("#refining").is_visible()

@@ -1,0 +1,80 @@
+"""The panel that says how a terrain was made."""
+
+import json
+
+import numpy as np
+import pytest
+from fixtures import bundles
+from fixtures.page_visit import VIEWER
+
+from dav_gswt.images.jpeg import encode_jpeg
+from dav_gswt.study.terrain.browser import served
+from dav_gswt.terrain.page import write_page
+from dav_gswt.terrain.page_front import Front
+from dav_gswt.terrain.page_story import Story
+
+PHOTOS = [{"round": int(k > 2), "at": [k - 2.0, 1.0, 3.0], "look": [0.5, -0.5], "picture": k} for k in range(5)]
+ROUNDS = [{"photos": 3, "psnr": 27.1}, {"photos": 2, "psnr": None}]
+VALUE = {
+    "unit": "metre",
+    "half": 2.0,
+    "photos": PHOTOS,
+    "rounds": ROUNDS,
+    "thumb": 120,
+    "columns": 8,
+    "pictures": 5,
+}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    bundles.write_bundle(tmp_path / "bundle", bundles.Ground())
+    picture = encode_jpeg(np.full((120, 960, 3), 0.5), 60)
+    front = Front("Meadow", "From 5 photos", picture, Story(VALUE, picture))
+    write_page(tmp_path / "bundle", VIEWER, tmp_path / "page", front=front)
+    return tmp_path / "page"
+
+
+@pytest.mark.parametrize("width, height", [(360, 640), (844, 390), (1280, 720)])
+def test_the_panel_shows_places_rounds_and_photos(visit, folder, width, height):
+    with served(folder) as address:
+        seen = visit(width, height).open(f"{address}?still")
+        seen.page.locator("#menuButton").click()
+        seen.page.locator("#storyButton").click()
+        panel = seen.page.locator("#story")
+        panel.locator("svg").wait_for()
+        assert panel.locator("circle").count() == 5 and panel.locator(".photos div").count() == 5
+        assert [text.strip() for text in panel.locator("tbody tr").all_inner_texts()] == [
+            "start\t3\t27.1 dB",
+            "round 1\t+ 2\tnone",
+        ]
+        assert panel.evaluate("panel => panel.scrollWidth <= panel.clientWidth")
+        seen.page.keyboard.press("Escape")
+        assert not panel.is_visible() and not seen.page.locator("#menu").is_visible()
+
+
+def test_a_page_without_a_story_offers_none(visit, plain):
+    seen = visit(480, 300).open(f"{plain}?still")
+    seen.page.locator("#menuButton").click()
+    assert not seen.page.locator("#storyButton").is_visible()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"photos": 3},
+        {"thumb": 0},
+        {"rounds": [{"photos": -1, "psnr": 1}]},
+        {"photos": [{"round": 0, "at": ["1", 2, 3], "look": [0, 0]}]},
+        {"photos": [PHOTOS[0] | {"picture": 7}]},
+    ],
+)
+def test_a_story_that_is_none_is_told(visit, folder, change):
+    (folder / "story.json").write_text(json.dumps(VALUE | change))
+    with served(folder) as address:
+        seen = visit(480, 300).open(f"{address}?still")
+        seen.page.locator("#menuButton").click()
+        seen.page.locator("#storyButton").click()
+        alert = seen.page.get_by_role("alert")
+        alert.wait_for(state="visible")
+        assert "story.json is not as the workflow writes it" in alert.inner_text()

@@ -1,0 +1,72 @@
+"""A gallery shows every terrain with its still, verdict and size, and nothing of a page becomes HTML."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from dav_gswt.cli import gallery as cli
+from dav_gswt.errors import InputError
+from dav_gswt.terrain.gallery import list_entries, write_gallery
+
+TEMPLATES = Path(__file__).parents[3] / "workflow" / "gallery"
+
+
+@pytest.fixture
+def page(tmp_path):
+    def make(where, title, **changes):
+        folder = tmp_path / where
+        folder.mkdir(parents=True)
+        (folder / "first.jpg").write_bytes(b"\xff\xd8\xff" + 1_200_000 * b"0")
+        (folder / "index.html").write_text("<html>")
+        front = {"name": title, "line": "From 5 photos", "verdict": "Well"} | changes
+        (folder / "front.json").write_text(json.dumps(front))
+        return folder
+
+    return make
+
+
+def test_every_terrain_has_its_still_verdict_size_and_page(tmp_path, page):
+    pages = [page("a", "Desert"), page("b", "Meadow <b>")]
+    write_gallery(pages, TEMPLATES, tmp_path / "gallery")
+    html = (tmp_path / "gallery" / "index.html").read_text()
+    assert '<a href="desert/">' in html and 'src="meadow-b/first.jpg"' in html
+    assert "From 5 photos. Well" in html and html.count("1.2 MB") == 2
+    assert "Meadow &lt;b&gt;" in html and "<b>" not in html
+    assert (tmp_path / "gallery/desert/index.html").is_file() and (tmp_path / "gallery/gallery.css").is_file()
+
+
+def test_terrains_of_one_name_have_folders_of_their_own(page):
+    entries = list_entries([page("a", "Desert"), page("b", "desert"), page("c", "…")])
+    assert [entry.folder for entry in entries] == ["desert", "desert-2", "terrain"]
+
+
+@pytest.mark.parametrize("changes", [{"name": None}, {"line": 3}, {"verdict": "x" * 500}])
+def test_a_front_that_is_none_is_named(tmp_path, page, changes):
+    with pytest.raises(InputError, match=r"front\.json.*make the page again"):
+        write_gallery([page("a", "Desert", **changes)], TEMPLATES, tmp_path / "gallery")
+    assert not (tmp_path / "gallery").exists()
+
+
+def test_without_a_page_one_is_told_what_to_do(tmp_path, page):
+    with pytest.raises(InputError, match="make run"):
+        write_gallery([], TEMPLATES, tmp_path / "gallery")
+    (page("a", "Desert") / "first.jpg").unlink()
+    with pytest.raises(InputError, match="without name and still"):
+        write_gallery([tmp_path / "a"], TEMPLATES, tmp_path / "gallery")
+
+
+def test_the_newest_page_of_every_scene_is_found(tmp_path, page, monkeypatch, capsys):
+    ages = {"meadow/seed0/x/terrain/page": 3, "meadow/seed1/terrain/page": 2, "desert/seed0/terrain/page": 1}
+    for where, age in ages.items():
+        os.utime(page(f"results/{where}", where[:3]) / "front.json", (1e9 - age, 1e9 - age))
+    found = cli.find_pages(tmp_path / "results")
+    assert [str(path.relative_to(tmp_path)) for path in found] == [
+        "results/desert/seed0/terrain/page",
+        "results/meadow/seed1/terrain/page",
+    ]
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(cli, "TEMPLATES", TEMPLATES)
+    assert cli.main([]) == 0 and "results/gallery/index.html: des, mea" in capsys.readouterr().out
+    assert cli.main(["--out", "elsewhere", "nowhere"]) == 1 and "nowhere" in capsys.readouterr().err

@@ -1,0 +1,81 @@
+"""The story of a page: which photos, where, and what tests said."""
+
+import json
+
+import numpy as np
+import pytest
+
+from dav_gswt.errors import InputError
+from dav_gswt.images import image_files
+from dav_gswt.terrain import page_story
+from dav_gswt.terrain.page_story import Taken, draw_sheet, list_taken, make_small, spread, tell_story
+
+
+def test_a_finished_field_has_no_story():
+    assert tell_story({}) is None and tell_story({"views": None}) is None
+
+
+@pytest.mark.parametrize("count, most, found", [(0, 5, []), (3, 5, [0, 1, 2]), (9, 3, [0, 4, 8]), (1, 1, [0])])
+def test_photos_that_are_shown_are_spread_over_all(count, most, found):
+    assert spread(count, most) == found
+
+
+def test_a_sheet_holds_each_photo_in_the_middle_of_its_square():
+    wide, tall = np.full((60, 240, 3), 1, np.float32), np.full((40, 20, 3), 0.5, np.float32)
+    sheet = draw_sheet([make_small(photo) for photo in [wide] * 8 + [tall]])
+    thumb = page_story.THUMB
+    assert sheet.shape == (2 * thumb, 8 * thumb, 3)
+    assert (sheet[thumb // 2, :thumb] == 1).all() and (sheet[:40, :thumb] == 0).all()
+    below = sheet[thumb:, :thumb]
+    assert (below[40:80, 50:70] == 0.5).all() and below.sum() == pytest.approx(0.5 * 40 * 20 * 3)
+
+
+@pytest.fixture
+def made(tmp_path, monkeypatch):
+    """What a round of two photos at the start and one captured leaves, with the cameras given."""
+    from dav_gswt.geometry import cameras
+    from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square, write_scene_frame
+
+    images = tmp_path / "images"
+    images.mkdir()
+    for name in ("a.png", "b.png", "c.png"):
+        image_files.write_png(images / name, np.full((30, 40, 3), 0.5))
+    eyes = {"a.png": (1.0, 2.0, 3.0), "b.png": (-1.0, 0.0, 3.0), "c.png": (0.0, -4.0, 5.0)}
+    taken = [
+        Taken(images / name, cameras.pinhole(np.array(eye), np.zeros(3), 40, 30, 60.0), int(name == "c.png"))
+        for name, eye in eyes.items()
+    ]
+    monkeypatch.setattr(page_story, "list_taken", lambda *_: taken)
+    write_scene_frame(
+        tmp_path / "ground.json",
+        SceneFrame("synthetic", "metre", 3.0, Square(-2.0, -2.0, 4.0), Extent(-5.0, -5.0, 5.0, 5.0), images=3),
+    )
+    for number, psnr in enumerate((27.123, None)):
+        (tmp_path / f"{number}.json").write_text(json.dumps({"psnr": psnr}))
+    return {
+        "views": "views.json",
+        "images": images,
+        "model": "sparse",
+        "frame": tmp_path / "ground.json",
+        "captures": ["capture"],
+        "metrics": [tmp_path / "0.json", tmp_path / "1.json"],
+    }
+
+
+def test_places_rounds_and_pictures_are_told(made):
+    story = tell_story(made)
+    assert story.value["rounds"] == [{"photos": 2, "psnr": 27.12}, {"photos": 1, "psnr": None}]
+    assert [photo["at"] for photo in story.value["photos"]] == [[1, 2, 3], [-1, 0, 3], [0, -4, 5]]
+    assert [photo["picture"] for photo in story.value["photos"]] == [0, 1, 2]
+    assert story.value["photos"][1]["look"][0] > 0, "it looks at the middle, which lies to the east"
+    assert story.value["grade"] is None and story.value["half"] == 2 and story.sheet[:3] == b"\xff\xd8\xff"
+    assert story == tell_story(made)
+
+
+def test_views_that_are_none_are_named(tmp_path, monkeypatch):
+    import dav_gswt.photos.colmap_model as colmap_model
+
+    monkeypatch.setattr(colmap_model, "read_colmap_model", lambda path: None)
+    (tmp_path / "views.json").write_text("{}")
+    with pytest.raises(InputError, match=r"views\.json: no start views"):
+        list_taken(tmp_path / "views.json", tmp_path, tmp_path, [])

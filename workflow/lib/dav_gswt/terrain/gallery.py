@@ -1,0 +1,73 @@
+"""A gallery: a static page over several terrains, with their pages beside it, ready for any web server."""
+
+import re
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from dav_gswt.errors import InputError
+from dav_gswt.files import atomic_folder, read_json
+from dav_gswt.templates import render_template
+from dav_gswt.terrain.page_front import FRONT, STILL
+
+TEMPLATE, STYLE = "index.html", "gallery.css"
+TEXTS = ("name", "line", "verdict")
+LONGEST = 400  # letters of a text
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A terrain in the gallery. folder: of its page there. megabytes: of all files of the page."""
+
+    page: Path
+    folder: str
+    name: str
+    line: str
+    verdict: str
+    megabytes: str
+
+
+def write_gallery(pages: Sequence[Path | str], template_dir: Path | str, out_dir: Path | str) -> list[Entry]:
+    """Copy pages into `out_dir`, a folder each, with a page over all of them; whole or not at all.
+
+    pages: folders as `write_page` makes them with a front, in the order in which they are shown.
+    Raises: InputError: there is no page, or a folder is none with a front.
+    """
+    if not pages:
+        raise InputError("there is no page yet that a gallery could show: type `make run` first")
+    entries = list_entries(pages)
+    with atomic_folder(out_dir) as part:
+        for entry in entries:
+            shutil.copytree(entry.page, part / entry.folder, ignore=shutil.ignore_patterns(".*"))
+        html = render_template(Path(template_dir) / TEMPLATE, {"scenes": entries})
+        (part / TEMPLATE).write_text(html, encoding="utf-8")
+        shutil.copyfile(Path(template_dir) / STYLE, part / STYLE)
+    return entries
+
+
+def list_entries(pages: Sequence[Path | str]) -> list[Entry]:
+    """What the gallery says of each page; pages of the same name have numbered folders. Raises: as `write_gallery`."""
+    entries: list[Entry] = []
+    for page in map(Path, pages):
+        name, line, verdict = _read_front(page)
+        size = sum(path.stat().st_size for path in page.rglob("*") if path.is_file())
+        folder = _free_name(re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "terrain", entries)
+        entries.append(Entry(page, folder, name, line, verdict, f"{size / 1e6:.1f}"))
+    return entries
+
+
+def _read_front(page: Path) -> tuple[str, ...]:
+    if not ((page / FRONT).is_file() and (page / STILL).is_file()):
+        raise InputError(f"{page}: a page without name and still ({FRONT}, {STILL}); make it again with `make run`")
+    value = read_json(page / FRONT)
+    texts = tuple(value.get(key) for key in TEXTS) if isinstance(value, dict) else ()
+    if not texts or not all(isinstance(text, str) and len(text) <= LONGEST for text in texts):
+        raise InputError(f"{page / FRONT}: no name, line and verdict; make the page again")
+    return tuple(str(text) for text in texts)
+
+
+def _free_name(wanted: str, entries: list[Entry]) -> str:
+    taken = {entry.folder for entry in entries}
+    names = [wanted, *(f"{wanted}-{number}" for number in range(2, len(taken) + 2))]
+    return next(name for name in names if name not in taken)

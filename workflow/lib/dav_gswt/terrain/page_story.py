@@ -1,0 +1,119 @@
+"""How a page's terrain was made: the photos in small with their places over the ground, the rounds, what tests said.
+
+A page holds story.json and photos.jpg, the photos beside and below each other, and shows both when somebody asks.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float32
+from numpy import ndarray as Array
+
+from dav_gswt.errors import InputError
+from dav_gswt.files import read_json
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
+from dav_gswt.images.image_files import read_photo, shrink_image
+from dav_gswt.images.jpeg import encode_jpeg
+from dav_gswt.photos.capture_record import read_capture_record
+
+STORY, SHEET = "story.json", "photos.jpg"
+MOST = 64  # photos that are shown in small, spread over all
+THUMB, COLUMNS, QUALITY = 120, 8, 60  # longer side in pixels; of the sheet; of its JPEG
+
+
+@dataclass(frozen=True)
+class Story:
+    """value: what story.json holds. sheet: photos.jpg."""
+
+    value: dict[str, Any]
+    sheet: bytes
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A photo that the field was made of. round: 0 is the start."""
+
+    path: Path
+    camera: Camera
+    round: int
+
+
+def tell_story(given: Mapping[str, Any]) -> Story | None:
+    """The story of a round's field, or None for a finished field, which has no photos.
+
+    Args:   given: `views` (views.json), `images` and `model` of the scene, `frame` (ground.json), `captures` of the
+            rounds and `metrics` (metrics.json of the first fit and of each round); without `views`: a finished field.
+    Raises: InputError: a file is missing or not of its kind.
+    """
+    if not given.get("views"):
+        return None
+    taken = list_taken(given["views"], given["images"], given["model"], given["captures"])
+    shown = spread(len(taken), MOST)
+    frame = read_scene_frame(given["frame"])
+    photos = [_place(photo, frame) for photo in taken]
+    for number, k in enumerate(shown):
+        photos[k]["picture"] = number
+    rounds = [
+        {"photos": sum(photo.round == t for photo in taken), "psnr": _psnr(path)}
+        for t, path in enumerate(given["metrics"])
+    ]
+    half = frame.exemplar.side / 2
+    value = {
+        "unit": frame.unit, "half": half, "photos": photos, "rounds": rounds, "thumb": THUMB, "columns": COLUMNS,
+        "pictures": len(shown), "grade": frame.verdict.grade if frame.verdict else None,
+    }  # fmt: skip
+    return Story(value, encode_jpeg(draw_sheet([make_small(read_photo(taken[k].path)) for k in shown]), QUALITY))
+
+
+def list_taken(views: Path | str, images: Path | str, model: Path | str, captures: Sequence[Path | str]) -> list[Taken]:
+    """All photos of a round's field in the order they were taken. Raises: as `tell_story`."""
+    from dav_gswt.photos.colmap_model import read_colmap_model  # not above: it loads pycolmap
+
+    known = read_colmap_model(model)
+    try:
+        start = [Taken(Path(images) / name, known.camera(name), 0) for name in read_json(views)["start"]]
+    except (KeyError, TypeError) as error:
+        raise InputError(f"{views}: no start views ({error}); make it again") from error
+    rounds = enumerate(map(Path, captures), start=1)
+    return start + [Taken(folder / p.name, p.camera, t) for t, folder in rounds for p in read_capture_record(folder)]
+
+
+def spread(count: int, most: int) -> list[int]:
+    """At most `most` of the numbers below `count`, evenly."""
+    return sorted({int(k) for k in np.linspace(0, count - 1, min(count, most)).round()}) if count else []
+
+
+def make_small(photo: Float32[Array, "h w 3"]) -> Float32[Array, "height width 3"]:
+    """A photo at most THUMB pixels wide or high."""
+    share = min(1.0, THUMB / max(photo.shape[:2]))
+    height, width = (max(1, round(share * side)) for side in photo.shape[:2])
+    return shrink_image(photo, width, height)
+
+
+def draw_sheet(smalls: Sequence[Float32[Array, "_ _ 3"]]) -> Float32[Array, "height width 3"]:
+    """Small photos, each in the middle of a square of THUMB pixels, COLUMNS in a row."""
+    rows = max(1, -(-len(smalls) // COLUMNS))
+    sheet = np.zeros((rows * THUMB, COLUMNS * THUMB, 3), np.float32)
+    for k, small in enumerate(smalls):
+        height, width = small.shape[:2]
+        top, left = k // COLUMNS * THUMB + (THUMB - height) // 2, k % COLUMNS * THUMB + (THUMB - width) // 2
+        sheet[top : top + height, left : left + width] = small
+    return sheet
+
+
+def _place(photo: Taken, frame: SceneFrame) -> dict[str, Any]:
+    """Where a camera is, seen from the exemplar's centre, and where it looks, on the ground."""
+    x, y, z = photo.camera.centre - frame.exemplar.centre
+    ahead = photo.camera.rotation[2]
+    at = [round(float(v), 3) for v in (x, y, z)]
+    return {"round": photo.round, "at": at, "look": [round(float(v), 3) for v in ahead[:2]]}
+
+
+def _psnr(path: Path | str) -> float | None:
+    """PSNR of the test photos in metrics.json; None: none could be spared."""
+    value = read_json(path).get("psnr")
+    return round(value, 2) if isinstance(value, int | float) and np.isfinite(value) else None

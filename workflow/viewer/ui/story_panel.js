@@ -1,0 +1,97 @@
+// How this was made: a plan of the photos over the ground, the rounds, and the photos themselves; read when asked for.
+
+import { webSource } from "../data/source.js";
+import { readStory, SHEET, STORY } from "../data/story.js";
+import { element } from "./dom.js";
+import { createPanel } from "./panel.js";
+
+/** @typedef {import("../data/story.js").Story} Story */
+
+const SVG = "http://www.w3.org/2000/svg", SIZE = 240, MARGIN = 16;
+const ROUNDS = ["#e3b778", "#7fc4e8", "#8fd18a", "#e79bc0", "#d8d06a", "#b7a6f0"]; // colours, from the start on
+
+/** @param {(error: unknown) => void} onError */
+export function createStoryPanel(onError) {
+  const body = element("storyBody", HTMLElement);
+  return createPanel("story", {
+    onShow(on) {
+      if (!on || body.firstChild) return;
+      readOwnStory().then((story) => body.replaceChildren(...describe(story)), onError);
+    },
+  });
+}
+
+async function readOwnStory() {
+  const bytes = await webSource(new URL(".", location.href)).read(STORY, null);
+  return readStory(JSON.parse(new TextDecoder().decode(bytes)));
+}
+
+/** @param {Story} story */
+function describe(story) {
+  const { photos, rounds } = story, tested = rounds.filter(({ psnr }) => psnr !== null);
+  const text = document.createElement("p");
+  text.textContent = `${photos.length} photos became a field of Gaussians, the field tiles, and the tiles this terrain. `
+    + `${rounds.length > 1 ? `After the first, ${rounds.length - 1} times new photos were chosen where they told most. ` : ""}`
+    + `${tested.length ? "PSNR says how well photos that were not used are predicted; more is better." : ""}`;
+  return [drawPlan(story), listRounds(story), text, showPhotos(story)];
+}
+
+/** @param {string} name @param {Record<string, string | number>} attributes */
+function draw(name, attributes) {
+  const shape = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) shape.setAttribute(key, String(value));
+  return shape;
+}
+
+/** The ground from above, north up, with cameras and where they look. @param {Story} story */
+function drawPlan({ photos, half }) {
+  const reach = Math.max(half, ...photos.map(({ at }) => Math.max(Math.abs(at[0]), Math.abs(at[1]))));
+  const scale = (SIZE / 2 - MARGIN) / reach, side = 2 * half * scale;
+  const svg = draw("svg", { viewBox: `0 0 ${SIZE} ${SIZE}`, role: "img", "aria-label": "Places of the photos over the ground" });
+  svg.append(draw("rect", { x: (SIZE - side) / 2, y: (SIZE - side) / 2, width: side, height: side, fill: "#6b5b40" }));
+  for (const { at, look, round } of photos) {
+    const x = SIZE / 2 + scale * at[0], y = SIZE / 2 - scale * at[1], colour = ROUNDS[round % ROUNDS.length];
+    svg.append(
+      draw("line", { x1: x, y1: y, x2: x + 12 * look[0], y2: y - 12 * look[1], stroke: colour, "stroke-width": 2 }),
+      draw("circle", { cx: x, cy: y, r: 4, fill: colour }));
+  }
+  return svg;
+}
+
+/** @param {Story} story */
+function listRounds({ rounds }) {
+  const table = document.createElement("table"), head = table.createTHead().insertRow();
+  for (const title of ["", "photos", "PSNR"]) {
+    const cell = document.createElement("th");
+    cell.textContent = title;
+    head.append(cell);
+  }
+  const rows = table.createTBody();
+  for (const [k, { photos, psnr }] of rounds.entries()) {
+    const row = rows.insertRow(), mark = document.createElement("i");
+    mark.className = "swatch";
+    mark.style.backgroundColor = ROUNDS[k % ROUNDS.length];
+    row.insertCell().append(mark, k ? ` round ${k}` : " start");
+    row.insertCell().append(k ? `+ ${photos}` : String(photos));
+    row.insertCell().append(psnr === null ? "none" : `${psnr.toFixed(1)} dB`);
+  }
+  return table;
+}
+
+/** @param {Story} story */
+function showPhotos({ photos, thumb, columns }) {
+  const list = document.createElement("div");
+  list.className = "photos";
+  for (const { picture, round } of photos) {
+    if (picture === undefined) continue;
+    const photo = document.createElement("div"), [column, row] = [picture % columns, Math.floor(picture / columns)];
+    photo.setAttribute("role", "img");
+    photo.setAttribute("aria-label", round ? `Photo of round ${round}` : "Photo of the start");
+    Object.assign(photo.style, {
+      width: `${thumb}px`, height: `${thumb}px`, backgroundImage: `url("${SHEET}")`,
+      backgroundPosition: `${-column * thumb}px ${-row * thumb}px`, borderColor: ROUNDS[round % ROUNDS.length],
+    });
+    list.append(photo);
+  }
+  return list;
+}
