@@ -31,7 +31,7 @@ function describe(story) {
   const { photos, rounds } = story, tested = rounds.filter(({ psnr }) => psnr !== null);
   const text = document.createElement("p");
   text.textContent = `${photos.length} photos became a field of Gaussians, the field tiles, and the tiles this terrain. `
-    + `${rounds.length > 1 ? `After the first, ${rounds.length - 1} times new photos were chosen where they told most. ` : ""}`
+    + `${rounds.length > 1 ? `After the first, ${rounds.length - 1} times further photos were asked for. ` : ""}`
     + `${tested.length ? "PSNR says how well photos that were not used are predicted; more is better." : ""}`;
   return [drawPlan(story), listRounds(story), text, showPhotos(story)];
 }
