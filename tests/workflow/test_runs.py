@@ -188,6 +188,21 @@ def test_levels_leave_as_patches_for_other_viewers(tiny, snakemake, tmp_path):
         assert (east, north) == pytest.approx((4 * bundle["tile_side"],) * 2, rel=0.2) and down < 0.5 * north
 
 
+def test_a_finite_terrain_leaves_as_files_of_the_cells_asked_for(tiny, snakemake, tmp_path):
+    folder = shutil.copytree(tiny.folder, tmp_path / "exported")
+    target = tiny.bundle.relative_to(tiny.folder) / "exports/terrain"
+    asked = "export={columns: 3, rows: 2, level: by_distance, formats: [ply, glb]}"
+    snakemake(folder, str(target), "--cores", "2", "--config", asked, configs=CONFIGS)
+    facts = read_json(folder / target / "terrain.json")
+    assert facts["cells"] == {"west": -1, "south": -1, "columns": 3, "rows": 2}
+    assert facts["files"] == {"ply": "y-down", "glb": "y-up"}
+    assert len(read_field(folder / target / "terrain.ply")) == facts["gaussians"]
+    small = ("--cores", "2", "--config", "export={max_gb: 0.0001}")
+    refused = snakemake(folder, str(target), *small, configs=CONFIGS, check=False)
+    assert refused.returncode and "export: glb: 8 x 8 cells have up to" in refused.stdout
+    assert not list((folder / target).parent.glob(".terrain*"))
+
+
 @pytest.mark.parametrize("made", ["tiny", "finished", "beach"])
 def test_the_public_renderers_checker_finds_no_fault(made, gswt_checker, request):
     archive = request.getfixturevalue(made).bundle / "gswt.zip"
