@@ -2,7 +2,7 @@
 terrain at each level and a finite terrain. Not part of `all`: files are asked for by their paths (docs/exports.md).
 
 In: a round's photos; the bundle. Out: of the round exports/model; of the bundle exports/ply (y down, as viewers take it),
-exports/ply_z-up (as it lies here), exports/spz, exports/sog, exports/terrain.
+exports/ply_z-up (as it lies here), exports/spz, exports/sog, exports/terrain, exports/ground.
 """
 
 
@@ -97,3 +97,32 @@ rule export_terrain:
         source=code_of("export_terrain"),
     script:
         "../scripts/export_terrain.py"
+
+
+rule export_ground:
+    """The ground under the same cells: a collision mesh, height maps, a model for MuJoCo, hulls of the objects."""
+    input:
+        unpack(height_map),
+        unpack(class_pictures),
+        manifest="<results>/<bundle>/davgswt.json",
+        chunks="<results>/<bundle>/chunks",
+        seams="<results>/<tiles>/seams.json",
+        tiles="<results>/<tiles>/tiles",
+        frame="<results>/<photos>/ground.json",
+    output:
+        ground=directory("<results>/<bundle>/exports/ground"),
+    log:
+        "<logs>/<bundle>/export_ground.log",
+    benchmark:
+        "<benchmarks>/<bundle>/export_ground.tsv"
+    resources:
+        mem_mb=per_attempt(2500),
+        runtime=per_attempt("20m"),
+    params:
+        export=export_keys("export_ground"),
+        heights=lookup(dpath="heights", within=config),
+        classes=lookup(dpath="classes", within=config),
+        schema=BUNDLE_SCHEMA,
+        source=code_of("export_ground"),
+    script:
+        "../scripts/export_ground.py"

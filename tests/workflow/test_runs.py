@@ -203,6 +203,25 @@ def test_a_finite_terrain_leaves_as_files_of_the_cells_asked_for(tiny, snakemake
     assert not list((folder / target).parent.glob(".terrain*"))
 
 
+def test_the_ground_leaves_as_a_mesh_images_and_a_model(tiny, snakemake, tmp_path):
+    folder = shutil.copytree(tiny.folder, tmp_path / "exported")
+    target = tiny.bundle.relative_to(tiny.folder) / "exports/ground"
+    asked = (
+        "--config",
+        "export={columns: 2, rows: 3, mesh_error: 0.5}",
+        "heights={kind: hills, height: 1, wavelength: 9}",
+    )
+    snakemake(folder, str(target), "--cores", "2", *asked, configs=CONFIGS)
+    facts = read_json(folder / target / "ground.json")
+    side = read_json(tiny.bundle / "davgswt.json")["tile_side"]
+    assert facts["cells"] == {"west": -1, "south": -1, "columns": 2, "rows": 3} and facts["map"] is None
+    assert facts["heights"]["step"] * (facts["heights"]["columns"] - 1) == pytest.approx(2 * side)
+    assert facts["heights"]["png"]["white"] > facts["heights"]["png"]["black"]
+    there = {path.name for path in (folder / target).iterdir() if not path.name.startswith(".")}
+    made = {f"ground.{kind}" for kind in ("glb", "json", "png", "tif", "hfield", "xml")}
+    assert there - {"objects.glb"} == made
+
+
 @pytest.mark.parametrize("made", ["tiny", "finished", "beach"])
 def test_the_public_renderers_checker_finds_no_fault(made, gswt_checker, request):
     archive = request.getfixturevalue(made).bundle / "gswt.zip"

@@ -20,6 +20,7 @@ SETTINGS = {
     "axes": "own",
     "spz_version": 3,
     "max_gb": 1.0,
+    "surface": "ground",
     "mesh_error": 0.25,
 }
 

@@ -120,3 +120,75 @@ def test_gsply_reads_the_ply(exported):
     code = "import sys, gsply; print(len(gsply.plyread(sys.argv[1]).means))"
     done = subprocess.run([sys.executable, "-c", code, exported / "terrain.ply"], capture_output=True, text=True)
     assert done.returncode == 0 and int(done.stdout) == len(read_field(exported / "terrain.ply")), done.stderr
+
+
+@pytest.fixture(scope="module")
+def ground(cover_bundle, hills, export_settings, tmp_path_factory):
+    """The ground of the same cells, of a scene that is known on earth."""
+    from fixtures.land_covers import cover_content
+
+    from dav_gswt.export import ground_files
+    from dav_gswt.geometry.georeference import Georeference
+    from dav_gswt.terrain import endless
+
+    out = tmp_path_factory.mktemp("ground") / "out"
+    terrain = endless.terrain_from_bundle(cover_bundle, hills)
+    settings = export_settings | {"columns": 6, "rows": 5, "centre": [3.0, 1.5]}
+    place = Georeference(47.1, 11.3, 600.0, 20.0, metres_per_unit=1.0)
+    ground_files.export_ground(terrain, cover_bundle.manifest, cover_content().tiles, place, settings, out)
+    return out
+
+
+@pytest.mark.parametrize("name", ["ground", "objects"])
+def test_gltf_validator_finds_nothing_in_meshes(ground, run_node, name):
+    assert json.loads(run_node(VALIDATE, ground / f"{name}.glb"))["issues"]["messages"] == []
+
+
+def test_trimesh_reads_a_node_an_object(ground):
+    trimesh = pytest.importorskip("trimesh", reason="trimesh is not installed")
+    scene = trimesh.load(ground / "objects.glb")
+    assert len(scene.geometry) == json.loads((ground / "ground.json").read_text())["objects"]
+    assert all(mesh.is_watertight and mesh.is_convex for mesh in scene.geometry.values())
+
+
+def test_mujoco_loads_the_model_and_its_rays_meet_the_heights(ground):
+    mujoco = pytest.importorskip("mujoco", reason="mujoco is not installed")
+    model = mujoco.MjModel.from_xml_path(str(ground / "ground.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    tiff, known = read_heights(ground)
+    rng, hit = np.random.default_rng(2), np.zeros(1, np.int32)
+    for row, column in rng.integers([1, 1], [known["rows"] - 1, known["columns"] - 1], (200, 2)):
+        x, y = known["north_west"][0] + column * known["step"], known["north_west"][1] - row * known["step"]
+        away = mujoco.mj_ray(model, data, np.array([x + 1e-4, y - 1e-4, 20]), np.array([0, 0, -1.0]), None, 1, -1, hit)
+        name = model.geom(hit[0]).name
+        assert name != "ground" or abs(20 - away - tiff[row, column]) < 2e-3
+        assert name == "ground" or 20 - away > tiff[row, column] - 0.1  # an object stands there
+
+
+def read_heights(ground):
+    import tifffile
+
+    return tifffile.imread(ground / "ground.tif"), json.loads((ground / "ground.json").read_text())["heights"]
+
+
+def test_rasterio_knows_where_on_earth_the_heights_lie(ground):
+    rasterio = pytest.importorskip("rasterio", reason="rasterio is not installed")
+    from pyproj import Transformer
+
+    tiff, known = read_heights(ground)
+    origin = json.loads((ground / "ground.json").read_text())["origin"]
+    with rasterio.open(ground / "ground.tif") as image:
+        assert image.crs.to_epsg() == 32632 and image.scales == (1.0,) and image.offsets == (600.0,)
+        np.testing.assert_array_equal(image.read(1), tiff)
+        found = np.array([image.xy(row, column) for row, column in ((0, 0), (10, 30))])
+    east, north = np.radians(110.0), np.radians(20.0)  # the azimuths of the world's x and y
+    places = []
+    for row, column in ((0, 0), (10, 30)):
+        x = known["north_west"][0] + column * known["step"] + origin[0]
+        y = known["north_west"][1] - row * known["step"] + origin[1]
+        places.append([x * np.sin(east) + y * np.sin(north), x * np.cos(east) + y * np.cos(north)])
+    zero = Transformer.from_crs("EPSG:4326", "EPSG:32632", always_xy=True).transform(11.3, 47.1)
+    grid = np.radians((11.3 - 9) * np.sin(np.radians(47.1)))  # convergence of the meridians
+    turn = np.array([[np.cos(grid), -np.sin(grid)], [np.sin(grid), np.cos(grid)]])
+    np.testing.assert_allclose(found, zero + np.array(places) @ turn.T, atol=0.02)

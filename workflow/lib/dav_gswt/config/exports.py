@@ -39,6 +39,10 @@ class Export(ConfigModel):
     max_gb: float = key(
         "most that a file may take; what would be larger is refused before any work", 2, unit="GB", gt=0, le=64
     )
+    surface: Literal["ground", "visible"] = key(
+        "what `exports/ground` takes for ground: the ground layer alone, or all but the objects, seen from above",
+        "ground",
+    )
     mesh_error: float = key(
         "of the collision mesh: most that it is off the ground's height field", 0.25, unit="ground cells", ge=0, le=100
     )

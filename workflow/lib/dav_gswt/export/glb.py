@@ -1,7 +1,7 @@
 """Binary glTF 2.0: one JSON chunk and one chunk of binary data, which is written in parts."""
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -39,7 +39,7 @@ class GlbWriter:
         width: int,
         kind: str = "<f4",
         *,
-        bounds: tuple[list[float], list[float]] | None = None,
+        bounds: tuple[Sequence[float | int], Sequence[float | int]] | None = None,
         normalized: bool = False,
         target: int = ARRAY_BUFFER,
     ) -> int:
@@ -58,7 +58,7 @@ class GlbWriter:
         if normalized:
             accessor["normalized"] = True
         if bounds:
-            accessor["min"], accessor["max"] = bounds
+            accessor["min"], accessor["max"] = map(list, bounds)
         self._accessors.append(accessor)
         self._sources.append((size, parts))
         return len(self._accessors) - 1

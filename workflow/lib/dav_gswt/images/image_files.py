@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import OpenImageIO as oiio
-from jaxtyping import Float, Float32
+from jaxtyping import Float, Float32, UInt16
 from numpy import ndarray as Array
 from scipy.ndimage import map_coordinates
 from scipy.sparse import csr_array
@@ -89,11 +89,21 @@ def write_png(path: Path | str, image: Float[Array, "h w c"]) -> None:
 
     A fourth channel is alpha, not premultiplied.
     """
-    oiio.attribute("threads", 1)
     pixels = np.ascontiguousarray(np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8))
     spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], oiio.UINT8)
     spec["oiio:UnassociatedAlpha"] = 1
     spec["oiio:ColorSpace"] = "srgb_rec709_scene"
+    _write_pixels(path, spec, pixels)
+
+
+def write_grey16(path: Path | str, values: UInt16[Array, "h w"]) -> None:
+    """Write a grey PNG of 16 bits whose values are no colours, atomically."""
+    spec = oiio.ImageSpec(values.shape[1], values.shape[0], 1, oiio.UINT16)
+    _write_pixels(path, spec, np.ascontiguousarray(values)[..., None])
+
+
+def _write_pixels(path: Path | str, spec: oiio.ImageSpec, pixels: Array) -> None:
+    oiio.attribute("threads", 1)
     spec["compression"] = "zip:4"
     with atomic_file(path) as part:
         file = oiio.ImageOutput.create(str(part))
