@@ -103,7 +103,8 @@ def test_a_round_may_use_the_uncertainty_of_a_prior(snakemake, tiny, tmp_path):
     best = np.argsort(-first.term("w2_sq"), kind="stable")[:2]
     assert chosen == [first.names[i] for i in best]
     shown = image_files.read_exr_parts(way / "poses.exr")
-    assert set(shown) == set(chosen) and all(set(channels) == {"opacity", "w2_sq"} for channels, _ in shown.values())
+    assert set(shown) == set(chosen)
+    assert all(set(channels) == {"uncertainty", "w2_sq"} for channels, _ in shown.values())
     later = scores.read_scores(way / "scores.csv")
     assert later.scales == first.scales and not set(later.names) & set(chosen)
     uncertainty, level = pose_maps.read_pose_maps(way / "maps.npz")[1], read_field(way / "levels/level0.ply")

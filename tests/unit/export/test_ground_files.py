@@ -90,6 +90,19 @@ def test_the_ground_layer_alone_is_taken_and_blades_only_where_all_is_asked_for(
     assert ground.shape == (32, 17, 17)
 
 
+def test_at_a_border_the_neighbour_is_seen_too(sets):
+    """A ridge along the western border of every tile is there at the eastern one, which its neighbour's covers."""
+    ridge = [[_raise_west(field) for field in level] for level in sets[0].fields]
+    heights = ground_surface.measure_tiles([replace(sets[0], fields=ridge)]).heights
+    assert heights[:, :, 0].min() > 0.1 and heights[:, :, 8].max() < 0.01
+    np.testing.assert_allclose(heights[:, 1:-1, -1], heights[:, 1:-1, 0], atol=0.02)
+
+
+def _raise_west(field):
+    west = field.means[:, 0] < 0.3
+    return replace(field, means=field.means + 0.3 * np.stack([0 * west, 0 * west, west], 1).astype(np.float32))
+
+
 def test_of_several_materials_the_one_that_lies_there_is_taken(terrain, sets):
     raised = [sets[0], replace(sets[1], fields=[[_lift(f, 0.5) for f in level] for level in sets[1].fields])]
     tiles = ground_surface.measure_tiles(raised)

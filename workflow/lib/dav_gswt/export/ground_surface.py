@@ -5,7 +5,7 @@ smoothed by SMOOTHING: no photo measures how one disc of the ground layer lies a
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Float32
@@ -14,16 +14,18 @@ from scipy.ndimage import distance_transform_edt, gaussian_filter
 
 from dav_gswt.errors import InputError
 from dav_gswt.export.terrain_area import suggest_area
-from dav_gswt.field import GaussianField
+from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.geometry import cameras
 from dav_gswt.logs import progress
 from dav_gswt.raster import render
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.finite import Area, list_cells
 from dav_gswt.tiles.build import TileSet
+from dav_gswt.tiles.layout import EDGES, arrange_torus
 
 MIN_ALPHA = 0.05  # of a lattice point whose height is known; others take their nearest neighbour's
 SMOOTHING = 1.0  # standard deviation of what heights are averaged over, in ground cells
+AROUND = 0.2  # of the neighbours that are seen beside a tile, as a share of its side
 MAX_STEPS = 1024  # of the lattice in a tile's side
 MAX_POINTS = 2**25  # of an area's height field
 
@@ -69,17 +71,33 @@ def measure_tiles(sets: Sequence[TileSet], whole: bool = False) -> TileSurfaces:
     """
     side, spacing = sets[0].side, min(each.spacing for each in sets)
     steps = min(MAX_STEPS, 1 << max(1, int(np.ceil(np.log2(side / spacing - 1e-6)))))
-    fields = [field for each in sets for field in each.fields[0]]
-    heights = [_look_down(field, side, steps, whole) for field in progress(fields, "measure the tiles' ground")]
+    heights = [
+        _look_down(_surround(each, tile, whole), side, steps)
+        for each in progress(sets, "measure the tiles' ground")
+        for tile in range(len(each.fields[0]))
+    ]
     return TileSurfaces(steps, spacing, np.stack(heights))
 
 
-def _look_down(field: GaussianField, side: float, steps: int, whole: bool) -> Float32[Array, "n n"]:
+def _surround(tiles: TileSet, tile: int, whole: bool) -> GaussianField:
+    """The ground of a tile and of neighbours whose borders fit: what is seen at its own border is theirs, too."""
+    torus = arrange_torus(tile // EDGES)
+    (row,), (column,) = np.nonzero(torus[1:-1, 1:-1] == tile)
+    parts = []
+    for (north, east), number in np.ndenumerate(torus[row : row + 3, column : column + 3]):
+        field, by = tiles.fields[0][number], np.array([east - 1, north - 1, 0]) * tiles.side
+        shown = np.ones(len(field), bool) if whole or not field.ground.any() else field.ground
+        means = field.means + by
+        near = (np.abs(means[:, :2] - 0.5 * tiles.side) < (0.5 + AROUND) * tiles.side).all(1)
+        parts.append(replace(field, means=means.astype(np.float32))[shown & near])
+    return concatenate_fields(parts)
+
+
+def _look_down(field: GaussianField, side: float, steps: int) -> Float32[Array, "n n"]:
     """Mean height of what covers each lattice point of a tile, weighted as it is drawn from above."""
-    ground = field if whole or not field.ground.any() else field[field.ground]
-    pitch, top = side / steps, float(ground.means[:, 2].max()) + side
+    pitch, top = side / steps, float(field.means[:, 2].max()) + side
     camera = cameras.top_down(-0.5 * pitch, -0.5 * pitch, steps + 1, steps + 1, pitch, top)
-    seen = render(ground, camera)
+    seen = render(field, camera)
     known = seen.alpha[::-1] > MIN_ALPHA
     heights = top - seen.depth[::-1] / np.maximum(seen.alpha[::-1], MIN_ALPHA)
     nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
