@@ -1,8 +1,8 @@
-"""Export: the photos of a round for other programs that train fields, and a patch of terrain at each level for other
-viewers. Not part of `all`: files are asked for by their paths.
+"""Export: the photos of a round for other programs that train fields; for viewers, engines and simulators a patch of
+terrain at each level and a finite terrain. Not part of `all`: files are asked for by their paths (docs/exports.md).
 
 In: a round's photos; the bundle. Out: of the round exports/model; of the bundle exports/ply (y down, as viewers take it),
-exports/ply_z-up (as it lies here), exports/spz, exports/sog.
+exports/ply_z-up (as it lies here), exports/spz, exports/sog, exports/terrain, exports/ground.
 """
 
 
@@ -53,7 +53,7 @@ rule export_plys:
 
 
 rule convert_plys:
-    """The same patches as SPZ, or as SOG (files, and a set that is streamed), by splat-transform: Node.js, the network."""
+    """The same patches as SPZ, or as SOG (files, and a set that is streamed); SOG needs Node.js and the network."""
     input:
         plys="<results>/<bundle>/exports/ply",
     output:
@@ -66,6 +66,63 @@ rule convert_plys:
         mem_mb=per_attempt(2500),
         runtime=per_attempt("20m"),
     params:
+        spz_version=lambda wildcards: config["export"]["spz_version"] if wildcards.kind == "spz" else None,
         source=code_of("convert_plys"),
     script:
         "../scripts/convert_plys.py"
+
+
+rule export_terrain:
+    """Some cells of the endless terrain, with everything on them, as one file a format."""
+    input:
+        unpack(height_map),
+        unpack(class_pictures),
+        manifest="<results>/<bundle>/davgswt.json",
+        chunks="<results>/<bundle>/chunks",
+    output:
+        terrain=directory("<results>/<bundle>/exports/terrain"),
+    log:
+        "<logs>/<bundle>/export_terrain.log",
+    benchmark:
+        "<benchmarks>/<bundle>/export_terrain.tsv"
+    threads: 2
+    resources:
+        mem_mb=per_attempt(2500),
+        runtime=per_attempt("60m"),
+    params:
+        export=export_keys("export_terrain"),
+        heights=lookup(dpath="heights", within=config),
+        classes=lookup(dpath="classes", within=config),
+        schema=BUNDLE_SCHEMA,
+        source=code_of("export_terrain"),
+    script:
+        "../scripts/export_terrain.py"
+
+
+rule export_ground:
+    """The ground under the same cells: a collision mesh, height maps, a model for MuJoCo, hulls of the objects."""
+    input:
+        unpack(height_map),
+        unpack(class_pictures),
+        manifest="<results>/<bundle>/davgswt.json",
+        chunks="<results>/<bundle>/chunks",
+        seams="<results>/<tiles>/seams.json",
+        tiles="<results>/<tiles>/tiles",
+        frame="<results>/<photos>/ground.json",
+    output:
+        ground=directory("<results>/<bundle>/exports/ground"),
+    log:
+        "<logs>/<bundle>/export_ground.log",
+    benchmark:
+        "<benchmarks>/<bundle>/export_ground.tsv"
+    resources:
+        mem_mb=per_attempt(2500),
+        runtime=per_attempt("20m"),
+    params:
+        export=export_keys("export_ground"),
+        heights=lookup(dpath="heights", within=config),
+        classes=lookup(dpath="classes", within=config),
+        schema=BUNDLE_SCHEMA,
+        source=code_of("export_ground"),
+    script:
+        "../scripts/export_ground.py"

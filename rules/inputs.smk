@@ -26,6 +26,11 @@ def preset_keys(rule):
     return lambda wildcards: select_preset_keys(rule, config["presets"][wildcards.preset])
 
 
+def export_keys(rule):
+    """A params function: what a rule reads of `export`."""
+    return lambda wildcards: select_export_keys(rule, config["export"])
+
+
 def per_attempt(need):
     """A resources function: `need` at the first attempt, twice as much at the second; 2000, or "60m".
 

@@ -103,7 +103,8 @@ def test_a_round_may_use_the_uncertainty_of_a_prior(snakemake, tiny, tmp_path):
     best = np.argsort(-first.term("w2_sq"), kind="stable")[:2]
     assert chosen == [first.names[i] for i in best]
     shown = image_files.read_exr_parts(way / "poses.exr")
-    assert set(shown) == set(chosen) and all(set(channels) == {"opacity", "w2_sq"} for channels, _ in shown.values())
+    assert set(shown) == set(chosen)
+    assert all(set(channels) == {"uncertainty", "w2_sq"} for channels, _ in shown.values())
     later = scores.read_scores(way / "scores.csv")
     assert later.scales == first.scales and not set(later.names) & set(chosen)
     uncertainty, level = pose_maps.read_pose_maps(way / "maps.npz")[1], read_field(way / "levels/level0.ply")
@@ -186,6 +187,40 @@ def test_levels_leave_as_patches_for_other_viewers(tiny, snakemake, tmp_path):
         assert len(patch) == sum(tile["chunks"][level]["count"] for tile in bundle["tiles"])
         east, down, north = np.ptp(patch.means, axis=0)
         assert (east, north) == pytest.approx((4 * bundle["tile_side"],) * 2, rel=0.2) and down < 0.5 * north
+
+
+def test_a_finite_terrain_leaves_as_files_of_the_cells_asked_for(tiny, snakemake, tmp_path):
+    folder = shutil.copytree(tiny.folder, tmp_path / "exported")
+    target = tiny.bundle.relative_to(tiny.folder) / "exports/terrain"
+    asked = "export={columns: 3, rows: 2, level: by_distance, formats: [ply, glb]}"
+    snakemake(folder, str(target), "--cores", "2", "--config", asked, configs=CONFIGS)
+    facts = read_json(folder / target / "terrain.json")
+    assert facts["cells"] == {"west": -1, "south": -1, "columns": 3, "rows": 2}
+    assert facts["files"] == {"ply": "y-down", "glb": "y-up"}
+    assert len(read_field(folder / target / "terrain.ply")) == facts["gaussians"]
+    small = ("--cores", "2", "--config", "export={max_gb: 0.0001}")
+    refused = snakemake(folder, str(target), *small, configs=CONFIGS, check=False)
+    assert refused.returncode and "export: glb: 8 x 8 cells have up to" in refused.stdout
+    assert not list((folder / target).parent.glob(".terrain*"))
+
+
+def test_the_ground_leaves_as_a_mesh_images_and_a_model(tiny, snakemake, tmp_path):
+    folder = shutil.copytree(tiny.folder, tmp_path / "exported")
+    target = tiny.bundle.relative_to(tiny.folder) / "exports/ground"
+    asked = (
+        "--config",
+        "export={columns: 2, rows: 3, mesh_error: 0.5}",
+        "heights={kind: hills, height: 1, wavelength: 9}",
+    )
+    snakemake(folder, str(target), "--cores", "2", *asked, configs=CONFIGS)
+    facts = read_json(folder / target / "ground.json")
+    side = read_json(tiny.bundle / "davgswt.json")["tile_side"]
+    assert facts["cells"] == {"west": -1, "south": -1, "columns": 2, "rows": 3} and facts["map"] is None
+    assert facts["heights"]["step"] * (facts["heights"]["columns"] - 1) == pytest.approx(2 * side)
+    assert facts["heights"]["png"]["white"] > facts["heights"]["png"]["black"]
+    there = {path.name for path in (folder / target).iterdir() if not path.name.startswith(".")}
+    made = {f"ground.{kind}" for kind in ("glb", "json", "png", "tif", "hfield", "xml")}
+    assert there - {"objects.glb"} == made
 
 
 @pytest.mark.parametrize("made", ["tiny", "finished", "beach"])

@@ -9,14 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures.splat_files import read_spz
 from fixtures.splats import rough_ground
 from plyfile import PlyData
-from scipy.spatial import cKDTree
 
 from dav_gswt import field
 from dav_gswt.bundle import gswt
 from dav_gswt.errors import InputError
-from dav_gswt.export import splats
+from dav_gswt.export import sog, splats
 
 SIDE = 2.0
 
@@ -72,10 +72,10 @@ PLAIN += [*("scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3")
 
 
 def test_without_node_the_message_says_what_to_do(tmp_path, monkeypatch):
-    monkeypatch.setattr(splats.shutil, "which", lambda name: None)
+    monkeypatch.setattr(sog.shutil, "which", lambda name: None)
     (tmp_path / "ply").mkdir()
     (tmp_path / "ply/level0.ply").write_bytes(b"")
-    with pytest.raises(InputError, match=r"exports/sog: needs Node\.js 20 .* exports/ply needs neither"):
+    with pytest.raises(InputError, match=r"exports/sog: SOG needs Node\.js 20 .* PLY, SPZ and GLB do not"):
         splats.convert_plys(tmp_path / "ply", "sog", tmp_path / "sog")
     assert not (tmp_path / "sog").exists()
 
@@ -85,30 +85,28 @@ def test_a_folder_without_a_level_is_named(tmp_path):
         splats.convert_plys(tmp_path, "spz", tmp_path / "spz")
 
 
-@pytest.mark.parametrize("kind, calls", [("spz", 2), ("sog", 3)])
-def test_the_converter_is_asked_for_every_level(fields, tmp_path, monkeypatch, kind, calls):
+def test_the_converter_is_asked_for_every_level(fields, tmp_path, monkeypatch):
     asked = []
-    monkeypatch.setattr(splats.shutil, "which", lambda name: "/bin/npx")
-    monkeypatch.setattr(splats.subprocess, "run", lambda words, **_: asked.append(words) or Done(0, ""))
+    monkeypatch.setattr(sog.shutil, "which", lambda name: "/bin/npx")
+    monkeypatch.setattr(sog.subprocess, "run", lambda words, **_: asked.append(words) or Done(0, ""))
     (tmp_path / "ply").mkdir()
     for level in (0, 1):
         field.write_field(splats.assemble_patch(fields[level], SIDE), tmp_path / f"ply/level{level}.ply")
-    splats.convert_plys(tmp_path / "ply", kind, tmp_path / kind)
-    assert len(asked) == calls and all(words[2] == "@playcanvas/splat-transform@2.7.1" for words in asked)
+    splats.convert_plys(tmp_path / "ply", "sog", tmp_path / "sog")
+    assert len(asked) == 3 and all(words[2] == "@playcanvas/splat-transform@2.7.1" for words in asked)
     assert [name in words[5] for name, words in zip(("level0.", "level1."), asked, strict=False)] == [True, True]
-    if kind == "sog":
-        assert [words for words in asked[2] if words in ("0", "1")] == ["0", "1"] and asked[2].count("-l") == 2
-        assert asked[2][-1] == "2"  # chunks as wide as a tile
+    assert [words for words in asked[2] if words in ("0", "1")] == ["0", "1"] and asked[2].count("-l") == 2
+    assert asked[2][-1] == "2"  # chunks as wide as a tile
 
 
 def test_what_the_converter_complains_of_is_passed_on(tmp_path, monkeypatch):
-    monkeypatch.setattr(splats.shutil, "which", lambda name: "/bin/npx")
-    monkeypatch.setattr(splats.subprocess, "run", lambda words, **_: Done(1, "no such thing"))
+    monkeypatch.setattr(sog.shutil, "which", lambda name: "/bin/npx")
+    monkeypatch.setattr(sog.subprocess, "run", lambda words, **_: Done(1, "no such thing"))
     (tmp_path / "ply").mkdir()
     (tmp_path / "ply/level0.ply").write_bytes(b"")
     with pytest.raises(InputError, match="splat-transform@2.7.1 failed: no such thing"):
-        splats.convert_plys(tmp_path / "ply", "spz", tmp_path / "spz")
-    assert not (tmp_path / "spz").exists()
+        splats.convert_plys(tmp_path / "ply", "sog", tmp_path / "sog")
+    assert not (tmp_path / "sog").exists()
 
 
 class Done:
@@ -124,30 +122,27 @@ def converted(fields, tmp_path_factory):
     if shutil.which("npx") is None:
         pytest.skip("npx is not here")
     probe = subprocess.run(
-        ["npx", "--yes", splats.PACKAGE, "--version"], capture_output=True, text=True, check=False, timeout=120
+        ["npx", "--yes", sog.PACKAGE, "--version"], capture_output=True, text=True, check=False, timeout=120
     )
     if probe.returncode:
-        pytest.skip(f"{splats.PACKAGE} cannot be fetched: {probe.stderr.strip()[-100:]}")
+        pytest.skip(f"{sog.PACKAGE} cannot be fetched: {probe.stderr.strip()[-100:]}")
     folder = tmp_path_factory.mktemp("converted")
     gswt.write_gswt(fields, SIDE, folder / "gswt.zip")
     splats.write_plys(folder / "gswt.zip", SIDE, folder / "ply")
-    for kind in ("spz", "sog"):
-        splats.convert_plys(folder / "ply", kind, folder / kind)
+    splats.convert_plys(folder / "ply", "sog", folder / "sog")
     return folder
 
 
-def test_an_spz_is_of_the_stated_version_with_y_up_and_north_away(fields, converted):
-    """Read by the format's own description: 16 bytes of header, then positions of 24 bits an axis."""
+@pytest.mark.parametrize("version", [None, 2, 3])
+def test_an_spz_is_of_the_version_asked_for_with_y_up_and_north_away(fields, tmp_path, version):
+    gswt.write_gswt(fields, SIDE, tmp_path / "gswt.zip")
+    splats.write_plys(tmp_path / "gswt.zip", SIDE, tmp_path / "ply")
+    splats.convert_plys(tmp_path / "ply", "spz", tmp_path / "spz", version)
+    assert sorted(p.name for p in (tmp_path / "spz").iterdir()) == ["level0.spz", "level1.spz"]
     x, y, z = splats.assemble_patch(fields[0], SIDE).means.T
-    data = gzip.decompress((converted / "spz/level0.spz").read_bytes())
-    assert data[:4] == b"NGSP" and data[4] == splats.SPZ_VERSION == 3
-    n = int.from_bytes(data[8:12], "little")
-    digits = np.frombuffer(data[16 : 16 + 9 * n], np.uint8).reshape(n, 3, 3).astype(int) @ [1, 1 << 8, 1 << 16]
-    means = np.where(digits >= 1 << 23, digits - (1 << 24), digits) / 2.0 ** data[13]
-    expected = np.stack([x, z, -y], 1)  # right, up, back
-    assert n == len(x)
-    distance, _ = cKDTree(expected).query(means)
-    assert distance.max() < 1e-3
+    read = read_spz(tmp_path / "spz/level0.spz")
+    assert gzip.decompress((tmp_path / "spz/level0.spz").read_bytes())[4] == (version or 3)
+    np.testing.assert_allclose(read.means, np.stack([x, z, -y], 1), atol=1e-3)  # right, up, back
 
 
 def test_a_single_sog_lies_beside_the_streamed_set_and_both_hold_every_gaussian(fields, converted):

@@ -184,6 +184,35 @@ def test_exr_parts_keep_their_own_sizes_and_headers(tmp_path):
         assert np.array_equal(channels["u"], parts[name][0]["u"]) and header == parts[name][1]
 
 
+def test_a_map_has_colours_for_viewers_that_are_no_channels_of_ours(tmp_path):
+    """Read by OpenImageIO as a picture; the lowest value is dark, the highest bright, no number grey."""
+    values = np.linspace(-3, 7, 60).reshape(6, 10).astype(np.float32)
+    values[2, 3] = np.nan
+    image_files.write_exr(tmp_path / "a.exr", {"Z": values, "seen": np.ones((6, 10), np.float32)}, {"n": "1"})
+    channels, texts = image_files.read_exr(tmp_path / "a.exr")
+    assert set(channels) == {"Z", "seen"} and texts == {"n": "1"}
+    np.testing.assert_array_equal(channels["Z"], values)
+    picture = image_files.read_photo(tmp_path / "a.exr")
+    assert picture.shape == (6, 10, 3) and picture[0, 0].sum() < 0.5 < 1 < picture[-1, -1].sum()
+    assert len(set(picture[2, 3].tolist())) == 1
+
+
+def test_a_map_without_any_number_or_without_range_still_has_a_preview(tmp_path):
+    for value in (np.nan, 4.0):
+        image_files.write_exr(tmp_path / "a.exr", {"u": np.full((2, 2), value, np.float32)})
+        assert set(image_files.read_exr(tmp_path / "a.exr")[0]) == {"u"}
+
+
+def test_opencv_shows_the_preview(tmp_path, monkeypatch):
+    monkeypatch.setenv("OPENCV_IO_ENABLE_OPENEXR", "1")
+    cv2 = pytest.importorskip("cv2", reason="opencv is not installed")
+    image_files.write_exr(tmp_path / "a.exr", {"Z": np.linspace(0, 1, 60).reshape(6, 10).astype(np.float32)})
+    seen = cv2.imread(str(tmp_path / "a.exr"), cv2.IMREAD_UNCHANGED)
+    if seen is None:
+        pytest.skip("this OpenCV reads no EXR")
+    assert seen.shape == (6, 10, 3) and seen[-1, -1].sum() > 1.5 > 0.5 > seen[0, 0].sum() >= 0
+
+
 def test_a_damaged_exr_is_refused_by_name(tmp_path):
     image_files.write_exr(tmp_path / "a.exr", {"u": GENERATOR.random((64, 64))})
     (tmp_path / "a.exr").write_bytes((tmp_path / "a.exr").read_bytes()[:900])

@@ -208,7 +208,7 @@ def test_maps_are_read_as_written_and_stand_in_an_exr_with_their_poses(tmp_path)
     read = image_files.read_exr_parts(tmp_path / "u.exr")
     assert set(read) == {"above", "p0", "p1", "p2"}
     channels, header = read["p1"]
-    assert channels["opacity"].shape == channels["w2_sq"].shape == (96, 96)
+    assert channels["uncertainty"].shape == channels["w2_sq"].shape == (96, 96)
     assert float(header["w2_sq"]) == found.scores.terms["w2_sq"][1] and float(header["radius"]) == pool()[1][0].radius
 
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from dav_gswt.config.base import Auto, ConfigModel, Name, Seed, Share, Text, key
+from dav_gswt.config.exports import Export
 from dav_gswt.config.scenes import FieldScene, Scene
 from dav_gswt.config.settings import (
     ClassTerm,
@@ -79,6 +80,7 @@ class Config(ConfigModel):
     )
     stills: Stills = key("size of the stills", Stills())
     flight: Flight = key("a walk that is rendered frame by frame", Flight())
+    export: Export = key("a finite terrain for other programs, asked for by its path: docs/exports.md", Export())
     scenes: dict[Name, Scene] = key("what there is to make a terrain of", {})
     priors: dict[Name, PriorSettings] = key("diffusion priors", {})
     presets: dict[Name, Preset] = key("speed against accuracy", renamed="qualities", min_length=1)

@@ -96,6 +96,14 @@ PRESET_KEYS: dict[str, tuple[str, ...]] = {
 # of a prior, for the rules that read less than all of it
 PRIOR_KEYS = {"inpaint_field": ("model", "samples", "steps", "weights")}
 
+_AREA = ("columns", "rows", "centre", "corner")
+
+# of the table `export`, by rule
+EXPORT_KEYS: dict[str, tuple[str, ...]] = {
+    "export_terrain": (*_AREA, "level", "formats", "axes", "spz_version", "max_gb"),
+    "export_ground": (*_AREA, "surface", "mesh_error"),
+}
+
 
 def select_scene_keys(rule: str, scene: Mapping[str, Any]) -> EntryKeys:
     """What a rule reads of a scene's entry. Raises: InputError: the rule does not serve the scene's agent."""
@@ -111,3 +119,8 @@ def select_scene_keys(rule: str, scene: Mapping[str, Any]) -> EntryKeys:
 def select_preset_keys(rule: str, preset: Mapping[str, Any]) -> EntryKeys:
     """What a rule reads of a preset."""
     return EntryKeys(preset, PRESET_KEYS[rule])
+
+
+def select_export_keys(rule: str, export: Mapping[str, Any]) -> EntryKeys:
+    """What a rule reads of `export`."""
+    return EntryKeys(export, EXPORT_KEYS[rule])

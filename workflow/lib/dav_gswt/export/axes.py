@@ -15,6 +15,9 @@ Z_UP = np.eye(3)
 # Right, down, forward, as fields trained from COLMAP's cameras lie and as SuperSplat, PlayCanvas and splat-transform
 # take a PLY and a SOG: their scene shows y down as down.
 Y_DOWN = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
+# Right, up, back, as glTF and SPZ lie, and three.js takes them.
+Y_UP = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
+AXES = {"z-up": Z_UP, "y-up": Y_UP, "y-down": Y_DOWN}  # as the config calls them
 
 
 def turn_field(field: GaussianField, rotation: Float[Array, "3 3"]) -> GaussianField:
@@ -24,14 +27,25 @@ def turn_field(field: GaussianField, rotation: Float[Array, "3 3"]) -> GaussianF
     """
     if not np.allclose(rotation @ rotation.T, np.eye(3)) or np.linalg.det(rotation) < 0:
         raise ValueError("a frame is turned by a proper rotation")
-    quats = field.quats / np.abs(field.quats).max(1, keepdims=True)  # so that no length overflows when it is squared
-    turned = (Rotation.from_matrix(rotation) * Rotation.from_quat(quats[:, [1, 2, 3, 0]])).as_quat()
     return replace(
         field,
-        means=(field.means.astype(float) @ rotation.T).astype(np.float32),
-        quats=np.ascontiguousarray(turned[:, [3, 0, 1, 2]], np.float32),
+        means=turn_points(field.means, rotation),
+        quats=turn_quats(field.quats, rotation),
         sh=_turn_harmonics(field.sh, field.sh_degree, rotation),
     )
+
+
+def turn_points(points: Float[Array, "n 3"], rotation: Float[Array, "3 3"]) -> Float32[Array, "n 3"]:
+    """Points in a turned frame. Of a rotation that swaps axes every digit stays."""
+    return np.ascontiguousarray(points.astype(float) @ rotation.T, np.float32)
+
+
+def turn_quats(quats: Float32[Array, "n 4"], rotation: Float[Array, "3 3"]) -> Float32[Array, "n 4"]:
+    """Rotations w x y z in a turned frame, of length 1."""
+    a, b, c, d = Rotation.from_matrix(rotation).as_quat(scalar_first=True)
+    left = np.array([[a, -b, -c, -d], [b, a, -d, c], [c, d, a, -b], [d, -c, b, a]])
+    turned = (quats / np.abs(quats).max(1, keepdims=True)).astype(float) @ left.T
+    return np.ascontiguousarray(turned / np.linalg.norm(turned, axis=1, keepdims=True), np.float32)
 
 
 def _turn_harmonics(sh: Float32[Array, "n k 3"], degree: int, rotation: Float[Array, "3 3"]) -> Float32[Array, "n k 3"]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import OpenImageIO as oiio
-from jaxtyping import Float, Float32
+from jaxtyping import Float, Float16, Float32, UInt16
 from numpy import ndarray as Array
 from scipy.ndimage import map_coordinates
 from scipy.sparse import csr_array
@@ -19,6 +19,14 @@ from dav_gswt.files import atomic_file
 _log = logging.getLogger(__name__)
 
 MAX_PIXELS = 200_000_000  # of a photo: more is a broken header, or more than two cores should work on
+PREVIEW = "colours"  # in an EXR's header: its R, G and B are other channels in colours
+RAMP = (  # colours of a preview from low to high, linear light: as viridis of Matplotlib has them
+    (0.058, 0.000, 0.089),
+    (0.041, 0.084, 0.258),
+    (0.015, 0.276, 0.263),
+    (0.112, 0.584, 0.121),
+    (0.984, 0.799, 0.019),
+)
 SUFFIXES = {".jpg", ".jpeg", ".jpe", ".jfif", ".png", ".tif", ".tiff", ".webp", ".jp2", ".jxl", ".bmp", ".ppm", ".tga"}
 IF_FULL = "if the disk is full, free some space, then run the same again"
 UNSUPPORTED = {".heic", ".heif", ".avif", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".rw2", ".raf", ".raw"}
@@ -89,11 +97,21 @@ def write_png(path: Path | str, image: Float[Array, "h w c"]) -> None:
 
     A fourth channel is alpha, not premultiplied.
     """
-    oiio.attribute("threads", 1)
     pixels = np.ascontiguousarray(np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8))
     spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], oiio.UINT8)
     spec["oiio:UnassociatedAlpha"] = 1
     spec["oiio:ColorSpace"] = "srgb_rec709_scene"
+    _write_pixels(path, spec, pixels)
+
+
+def write_grey16(path: Path | str, values: UInt16[Array, "h w"]) -> None:
+    """Write a grey PNG of 16 bits whose values are no colours, atomically."""
+    spec = oiio.ImageSpec(values.shape[1], values.shape[0], 1, oiio.UINT16)
+    _write_pixels(path, spec, np.ascontiguousarray(values)[..., None])
+
+
+def _write_pixels(path: Path | str, spec: oiio.ImageSpec, pixels: Array) -> None:
+    oiio.attribute("threads", 1)
     spec["compression"] = "zip:4"
     with atomic_file(path) as part:
         file = oiio.ImageOutput.create(str(part))
@@ -142,6 +160,19 @@ def read_exr(path: Path | str) -> tuple[dict[str, Array], dict[str, str]]:
     return next(iter(read_exr_parts(path).values()))
 
 
+def colour_values(values: Float32[Array, "h w"]) -> tuple[Float16[Array, "h w 3"], float, float]:
+    """A map in colours, linear light, and the values of the darkest and the brightest one; grey where it is no number.
+
+    The range leaves out the outermost hundredths, so that one odd pixel does not hide the others.
+    """
+    known = np.isfinite(values)
+    low, high = np.percentile(values[known], [1, 99]).tolist() if known.any() else (0.0, 0.0)
+    share = np.clip((np.where(known, values, low) - low) / ((high - low) or 1.0), 0, 1)
+    stops = np.linspace(0, 1, len(RAMP))
+    shown = np.stack([np.interp(share, stops, channel) for channel in np.array(RAMP).T], -1)
+    return np.where(known[..., None], shown, 0.2).astype(np.float16), low, high
+
+
 def enlarge_map(values: Float32[Array, "h w"], width: int, height: int) -> Float32[Array, "h2 w2"]:
     """A map on a finer grid over the same area: linear between cell centres, constant beyond the outermost."""
     rows, columns = ((np.arange(n) + 0.5) * old / n - 0.5 for n, old in zip((height, width), values.shape, strict=True))
@@ -150,7 +181,11 @@ def enlarge_map(values: Float32[Array, "h w"], width: int, height: int) -> Float
 
 
 def write_exr_parts(path: Path | str, parts: dict[str, tuple[dict[str, Array], dict[str, str]]]) -> None:
-    """Write a file of several parts, each with its own channels, size and header, by name."""
+    """Write a file of several parts, each with its own channels, size and header, by name.
+
+    Viewers of pictures know channels of colours alone. A part without any gets R, G and B, its first channel in
+    colours, and a text `colours` in the header that says so; they are no data, and `read_exr_parts` leaves them out.
+    """
     written = []
     # Parts of one file must agree on the display window, whatever their own sizes are.
     shapes = [np.shape(values) for channels, _ in parts.values() for values in channels.values()]
@@ -160,6 +195,11 @@ def write_exr_parts(path: Path | str, parts: dict[str, tuple[dict[str, Array], d
         # The library fills the dicts it is given with its own objects, hence the copies.
         own = {k: np.array(v, np.float32) for k, v in channels.items()}
         texts = {k: str(v) for k, v in header.items()}
+        if not {"R", "G", "B", "Y"} & set(own):
+            first = next(iter(own))
+            shown, low, high = colour_values(own[first])
+            own |= {name: np.ascontiguousarray(shown[..., k]) for k, name in enumerate("RGB")}
+            texts |= {PREVIEW: f"R, G, B: {first} from {low:.6g}, dark, to {high:.6g}, bright; other channels are data"}
         fixed = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
         written.append(OpenEXR.Part(texts | fixed | window, own, name))
     with atomic_file(path) as part:
@@ -183,13 +223,16 @@ def read_exr_parts(path: Path | str) -> dict[str, tuple[dict[str, Array], dict[s
         with OpenEXR.File(str(path), separate_channels=True) as file:
             if len(file.parts) < announced:  # the library drops damaged parts with a mere warning
                 raise ValueError("damaged or cut short")
-            return {part.name(): (_channels(part), _texts(part)) for part in file.parts}
+            return {part.name(): _read_part(part) for part in file.parts}
     except (RuntimeError, ValueError, TypeError, OSError) as error:
         raise InputError(f"{path}: not readable as EXR ({_first_line(str(error))})") from error
 
 
-def _channels(part) -> dict[str, Array]:
-    return {name: np.array(channel.pixels) for name, channel in part.channels.items()}
+def _read_part(part) -> tuple[dict[str, Array], dict[str, str]]:
+    texts = _texts(part)
+    shown = ("R", "G", "B") if texts.pop(PREVIEW, None) is not None else ()
+    channels = {name: np.array(channel.pixels) for name, channel in part.channels.items() if name not in shown}
+    return channels, texts
 
 
 def _texts(part) -> dict[str, str]:

@@ -79,6 +79,7 @@ _TOP_LEVEL: dict[str, tuple[str, ...]] = {
     "classes": ("make_page", "render_terrain", "render_flight"),
     "stills": ("render_terrain", "render_flight"),
     "flight": ("render_flight",),
+    "export": (),
 }
 _TABLES = ("scene", "scenes", "priors", "presets", "tilings", "study")  # whose keys have rows of their own, or none
 
@@ -93,6 +94,8 @@ keys of `priors.<name>` also make the scores again (`score_coarse`, `score_round
 `lpips` what is chosen by them, and the levels follow from the scores. With `inpaint: true`, `inpaint_field` and
 `evaluate_inpainted` run after the last round; of the prior's keys they read `model`, `weights`, `samples` and `steps`.
 A key that stands in a path (`preset`, `tiling`, `seeds`, `policy`, `k`, ...) leaves the old files beside the new ones.
+Exports are asked for by their paths: `export_terrain`, `export_ground` and `convert_plys` run again with what they read
+of `export`, the first two also with `heights` and `classes`.
 `segmenter` is read where a scene has `materials: auto`: `find_materials` and what follows from it, and with `fetch`
 `fetch_mobilesam` before it. `render_flight` runs where the config has a `flight`. The tables are of one round: all
 rounds after one that runs again run again too.

@@ -1,18 +1,45 @@
-"""A finite piece of the endless terrain as one field: some cells at one level of detail, with everything on them."""
+"""A finite piece of the endless terrain as Gaussians of one file: some cells, with everything on them."""
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Int64
+from jaxtyping import Float, Int, Int64
 from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.materials.placing import turn_and_scale, turn_rows
+from dav_gswt.terrain import weights
 from dav_gswt.terrain.displacement import displace_field
 from dav_gswt.terrain.endless import EndlessTerrain
-from dav_gswt.terrain.placement import collect_tiles
-from dav_gswt.terrain.visibility import GridCells, choose_tiles
+from dav_gswt.terrain.placement import collect_tiles, fade_opacity
+from dav_gswt.terrain.scatter import Instances
+from dav_gswt.terrain.visibility import (
+    GridCells,
+    active_levels,
+    active_range,
+    choose_tiles,
+    count_gaussians,
+    measure_distances,
+)
+
+BLOCK = 65_536  # Gaussians that are placed at once, about
+
+Part = tuple[GaussianField, Int[Array, "n"]]  # Gaussians, and the level of each
+Placer = Callable[[], GaussianField]
+
+
+@dataclass(frozen=True)
+class Area:
+    """A rectangle of cells: its south-western cell, and how many there are to the east and to the north."""
+
+    west: int
+    south: int
+    columns: int
+    rows: int
+
+    def __len__(self) -> int:
+        return self.columns * self.rows
 
 
 def list_cells(
@@ -23,45 +50,105 @@ def list_cells(
     return i, j, *choose_tiles(terrain, i, j)
 
 
+def keep_level(terrain: EndlessTerrain, level: int) -> EndlessTerrain:
+    """The terrain that shows one level at any distance."""
+    count = len(terrain.switches)
+    return replace(terrain, switches=[-np.inf] * level + [np.inf] * (count - level), bands=[0.0] * count)
+
+
+def list_grid(terrain: EndlessTerrain, area: Area, eye: Float[Array, "3"]) -> GridCells:
+    """The cells of an area, row by row, with their distances from an eye."""
+    i, j, tile, materials = list_cells(terrain, area.west, area.south, area.columns, area.rows)
+    return GridCells(i, j, tile, materials, np.zeros(len(i), bool), *measure_distances(terrain, i, j, eye))
+
+
+def count_cells(terrain: EndlessTerrain, area: Area, eye: Float[Array, "3"]) -> Int64[Array, "n"]:
+    """Most Gaussians of each cell of an area, objects included. Where materials meet or levels fade there are fewer."""
+    return count_gaussians(terrain, list_grid(terrain, area, eye))
+
+
 def collect_cells(terrain: EndlessTerrain, west: int, south: int, columns: int, rows: int, level: int) -> GaussianField:
     """Gaussians of `columns` x `rows` cells and of the objects whose feet lie in them, on the surface.
 
     Positions count from the south-western corner of the cell (west, south), so float32 resolves them far out.
     """
     corner = np.array([west * terrain.side, south * terrain.side, 0.0])
-    parts = [*_place_tiles(terrain, (west, south, columns, rows), level)]
-    if (things := _place_objects(terrain, (west, south, columns, rows), level)) is not None:
-        parts.append(things)
-    return displace_field(concatenate_fields(parts), terrain.heights, corner, corner)
+    area, kept = Area(west, south, columns, rows), keep_level(terrain, level)
+    return place_block(kept, list_grid(kept, area, corner), corner, corner)()
 
 
-def _place_tiles(terrain: EndlessTerrain, area: tuple[int, int, int, int], level: int) -> Iterator[GaussianField]:
-    """Each cell's Gaussians, from the corner of the first one."""
-    i, j, tile, materials = list_cells(terrain, *area)
-    none = np.zeros(len(i))
-    cells = GridCells(i, j, tile, materials, none.astype(bool), none, none)
-    for k in range(len(i)):
-        field = collect_tiles(terrain, cells[k : k + 1], [level])[level]
-        yield _move(field, np.array([(i[k] - area[0]) * terrain.side, (j[k] - area[1]) * terrain.side, 0.0]))
+def list_blocks(terrain: EndlessTerrain, area: Area, eye: Float[Array, "3"]) -> list[GridCells]:
+    """The cells of an area in blocks of about BLOCK Gaussians, row by row. eye: see `place_block`."""
+    cells = list_grid(terrain, area, eye)
+    block = np.cumsum(count_gaussians(terrain, cells)) // BLOCK
+    return [cells[rows] for rows in np.split(np.arange(len(cells)), np.flatnonzero(np.diff(block)) + 1)]
 
 
-def _place_objects(terrain: EndlessTerrain, area: tuple[int, int, int, int], level: int) -> GaussianField | None:
-    """The Gaussians of all objects whose feet lie in cells; None where there are none."""
-    if terrain.scatter is None:
-        return None
-    i, j, _, _ = list_cells(terrain, *area)
-    found = terrain.scatter.instances_in(i, j)
-    if not len(found):
-        return None
-    ground = np.array([each.ground for each in terrain.object_entries])[found.number]
-    feet = np.stack(
-        [(found.i - area[0] + found.u) * terrain.side, (found.j - area[1] + found.v) * terrain.side, ground], 1
-    )
-    fields = [terrain.objects[number][level] for number in found.number.tolist()]
-    row = np.repeat(np.arange(len(found)), [len(field) for field in fields])
+def place_block(terrain: EndlessTerrain, cells: GridCells, eye: Float[Array, "3"], origin: Float[Array, "3"]) -> Placer:
+    """A function that puts the Gaussians of some cells on the surface. It may run in any thread; this one may not.
+
+    The Gaussians are found now, and what was remembered of these cells is given up: memory does not grow with an area.
+
+    Args:   eye: levels are chosen and faded by the distance from it. origin: world position that positions count from.
+    """
+    corner = np.array([cells.i[0] * terrain.side, cells.j[0] * terrain.side, 0.0])
+    parts = [*_place_tiles(terrain, cells, corner), *_place_objects(terrain, cells, corner, eye)]
+    field = concatenate_fields([field for field, _ in parts])
+    level = np.concatenate([level for _, level in parts])
+    terrain.kept.clear()
+
+    def place() -> GaussianField:
+        raised = displace_field(field, terrain.heights, corner, origin)
+        return _fade(terrain, raised, level, np.linalg.norm(raised.means + (origin - eye), axis=1))
+
+    return place
+
+
+def _fade(
+    terrain: EndlessTerrain, field: GaussianField, level: Int[Array, "n"], distance: Float[Array, "n"]
+) -> GaussianField:
+    """Gaussians with the opacities of their levels' weights, without those of weight 0."""
+    weight = weights.level_weights(distance, terrain.switches, terrain.bands, terrain.smooth)[
+        level, np.arange(len(level))
+    ]
+    if (weight == 1).all():
+        return field
+    active = weight > 0
+    return fade_opacity(field[active], weight[active])
+
+
+def _place_tiles(terrain: EndlessTerrain, cells: GridCells, corner: Float[Array, "3"]) -> Iterator[Part]:
+    """Each cell's Gaussians at its active levels, from a corner of the grid."""
+    active = active_levels(terrain, cells)
+    for k in range(len(cells)):
+        by = np.array([cells.i[k] * terrain.side, cells.j[k] * terrain.side, 0.0]) - corner
+        levels = np.flatnonzero(active[:, k]).tolist()
+        for level, field in collect_tiles(terrain, cells[k : k + 1], levels).items():
+            yield replace(field, means=(field.means + by).astype(np.float32)), np.full(len(field), level)
+
+
+def _place_objects(
+    terrain: EndlessTerrain, cells: GridCells, corner: Float[Array, "3"], eye: Float[Array, "3"]
+) -> Iterator[Part]:
+    """The Gaussians of all objects whose feet lie in cells, at their active levels."""
+    if terrain.scatter is None or not len(found := terrain.scatter.instances_in(cells.i, cells.j)):
+        return
+    feet = place_feet(terrain, found)
+    away = feet - eye
+    away[:, 2] += terrain.heights.at(feet[:, 0], feet[:, 1])[0]
+    distance = np.linalg.norm(away, axis=1)
+    reach = np.array(terrain.extents)[found.number] * found.size * (1 + terrain.heights.steepest)
+    active = active_range(terrain, distance - reach, distance + reach)
     way = turn_rows(np.radians(found.turn))
-    return turn_and_scale(concatenate_fields(fields), way[row], found.size[row], feet[row])
+    for level in np.flatnonzero(active.any(1)).tolist():
+        shown = np.flatnonzero(active[level])
+        fields = [terrain.objects[number][level] for number in found.number[shown].tolist()]
+        row = np.repeat(shown, [len(field) for field in fields])
+        placed = turn_and_scale(concatenate_fields(fields), way[row], found.size[row], (feet - corner)[row])
+        yield placed, np.full(len(placed), level)
 
 
-def _move(field: GaussianField, by: Array) -> GaussianField:
-    return replace(field, means=(field.means + by).astype(np.float32))
+def place_feet(terrain: EndlessTerrain, found: Instances) -> Float[Array, "n 3"]:
+    """World positions of objects' feet above the plane z = 0, before the surface lifts them."""
+    ground = np.array([each.ground for each in terrain.object_entries])[found.number]
+    return np.stack([(found.i + found.u) * terrain.side, (found.j + found.v) * terrain.side, ground], 1)

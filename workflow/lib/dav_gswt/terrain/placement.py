@@ -108,7 +108,7 @@ def displace_and_fade(
     shares = weights.level_weights(distance, terrain.switches, terrain.bands, terrain.smooth)
     weight = shares[level, np.arange(len(level))]
     active = weight > 0
-    return _fade_opacity(field[active], weight[active]), slope[active]
+    return fade_opacity(field[active], weight[active]), slope[active]
 
 
 def cell_direction(terrain: EndlessTerrain, i: int, j: int, tile: int, eye: Float[Array, "3"]) -> Float[Array, "3"]:
@@ -120,7 +120,7 @@ def cell_direction(terrain: EndlessTerrain, i: int, j: int, tile: int, eye: Floa
     return terrain.directions[orders[draw_order.nearest_order(terrain.directions, orders, to, slope[0])]]
 
 
-def _fade_opacity(field: GaussianField, weight: Float[Array, "n"]) -> GaussianField:
+def fade_opacity(field: GaussianField, weight: Float[Array, "n"]) -> GaussianField:
     """Opacities under these weights; a Gaussian of weight 1 keeps its bits."""
     partial = weight < 1
     if not partial.any():

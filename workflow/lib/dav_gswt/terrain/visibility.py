@@ -48,12 +48,8 @@ def visible_cells(terrain: EndlessTerrain, camera: Camera) -> GridCells:
     at = (int(np.floor(eye[0] / side)), int(np.floor(eye[1] / side)))
     steps = np.arange(-terrain.reach, terrain.reach + 1, dtype=np.int64)
     i, j = (v.ravel() for v in np.meshgrid(at[0] + steps, at[1] + steps))
-    x, y = (i + 0.5) * side, (j + 0.5) * side
-    low, high = terrain.height_range(x, y)
-    middle = np.stack([x, y, 0.5 * (low + high)], 1) - eye
-    half = np.stack([np.full(len(x), 0.5 * side), np.full(len(x), 0.5 * side), 0.5 * (high - low)], 1)
-    nearest = np.linalg.norm(np.maximum(np.abs(middle) - half, 0), axis=1)
-    farthest = np.linalg.norm(np.abs(middle) + half, axis=1)
+    middle, half = _bound_cells(terrain, i, j, eye)
+    nearest, farthest = _bound_distances(middle, half)
     wider = np.array([terrain.overhang, terrain.overhang, 0])
     seen = (nearest < terrain.reach * side) & ~_outside_frustum(camera, terrain.near, middle, half + wider)
     sequence, _ = draw_order.sort_cells(i, j, at)
@@ -62,6 +58,31 @@ def visible_cells(terrain: EndlessTerrain, camera: Camera) -> GridCells:
     tile, materials = choose_tiles(terrain, i, j)
     close = draw_order.in_near_block(i, j, at)
     return GridCells(i, j, tile, materials, close, nearest[sequence], farthest[sequence])
+
+
+def measure_distances(
+    terrain: EndlessTerrain, i: Int64[Array, "n"], j: Int64[Array, "n"], eye: Float[Array, "3"]
+) -> tuple[Float[Array, "n"], Float[Array, "n"]]:
+    """Bounds of the distances from an eye to the centres of cells' Gaussians."""
+    return _bound_distances(*_bound_cells(terrain, i, j, eye))
+
+
+def _bound_cells(
+    terrain: EndlessTerrain, i: Int64[Array, "n"], j: Int64[Array, "n"], eye: Float[Array, "3"]
+) -> tuple[Float[Array, "n 3"], Float[Array, "n 3"]]:
+    """Boxes of the centres of cells' Gaussians: their middles from an eye, and their half extents."""
+    side = terrain.side
+    x, y = (i + 0.5) * side, (j + 0.5) * side
+    low, high = terrain.height_range(x, y)
+    middle = np.stack([x, y, 0.5 * (low + high)], 1) - eye
+    return middle, np.stack([np.full(len(x), 0.5 * side), np.full(len(x), 0.5 * side), 0.5 * (high - low)], 1)
+
+
+def _bound_distances(
+    middle: Float[Array, "n 3"], half: Float[Array, "n 3"]
+) -> tuple[Float[Array, "n"], Float[Array, "n"]]:
+    nearest = np.linalg.norm(np.maximum(np.abs(middle) - half, 0), axis=1)
+    return nearest, np.linalg.norm(np.abs(middle) + half, axis=1)
 
 
 def choose_tiles(

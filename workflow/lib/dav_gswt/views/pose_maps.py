@@ -14,7 +14,7 @@ from dav_gswt.images.image_files import enlarge_map
 from dav_gswt.views.scores import Scores
 
 Part = tuple[dict[str, Array], dict[str, str]]  # of an EXR: channels and header
-EMPTY_PARTS: dict[str, Part] = {"none": ({"opacity": np.zeros((1, 1), np.float32)}, {"camera": "no pose was left"})}
+EMPTY_PARTS: dict[str, Part] = {"none": ({"uncertainty": np.zeros((1, 1), np.float32)}, {"camera": "no pose was left"})}
 
 
 @dataclass(frozen=True)
@@ -34,11 +34,11 @@ class PoseMaps:
     def exr_part(self, scores: Scores, name: str) -> Part:
         """Maps of a candidate on the pixels of its picture; header: pose and terms."""
         i, row = self.names.index(name), scores.names.index(name)
-        opacity = self.opacity[i]
-        opacity = opacity[: int((~np.isnan(opacity[:, 0])).sum())]
-        channels = {"opacity": opacity}
+        uncertainty = self.opacity[i]
+        uncertainty = uncertainty[: int((~np.isnan(uncertainty[:, 0])).sum())]
+        channels = {"uncertainty": uncertainty}
         if self.w2_sq is not None:
-            channels["w2_sq"] = _place_square(self.w2_sq[i], opacity.shape)
+            channels["w2_sq"] = _place_square(self.w2_sq[i], uncertainty.shape)
         header = {k: repr(getattr(scores.poses[row], k)) for k in ("elevation", "azimuth", "radius")}
         return channels, header | {k: repr(float(v[row])) for k, v in scores.terms.items()}
 

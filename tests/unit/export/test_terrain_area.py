@@ -1,0 +1,70 @@
+"""The cells of a finite terrain, and what is said before work starts."""
+
+import re
+
+import numpy as np
+import pytest
+
+from dav_gswt.errors import InputError
+from dav_gswt.export import terrain_area
+from dav_gswt.terrain.finite import Area
+
+
+@pytest.mark.parametrize(
+    "place, expected",
+    [
+        ({}, (Area(-1, -1, 3, 2), (0.0, 0.0))),
+        ({"centre": [10.5, -4.0]}, (Area(9, -5, 3, 2), (10.5, -4.0))),
+        ({"corner": [7, -3]}, (Area(7, -3, 3, 2), (8.5, -2.0))),
+    ],
+)
+def test_cells_lie_about_the_centre_or_from_the_corner(place, expected):
+    assert terrain_area.choose_area({"columns": 3, "rows": 2} | place) == expected
+
+
+@pytest.mark.parametrize("centre", [-0.5, 0.0, 0.3, 0.5, 3.9])
+@pytest.mark.parametrize("columns", [1, 2, 5])
+def test_the_centre_is_in_the_middle_of_the_area_to_half_a_cell(centre, columns):
+    area, _ = terrain_area.choose_area({"columns": columns, "rows": 1, "centre": [centre, 0.0]})
+    assert abs(area.west + columns / 2 - centre) <= 0.5
+
+
+def plan(terrain, settings, **changes):
+    return terrain_area.plan_export(terrain, settings | changes, 0.5)
+
+
+def test_the_eye_stands_on_the_surface_and_the_origin_is_the_middle(cover_terrain, export_settings):
+    wanted = plan(cover_terrain, export_settings, centre=[4.2, 3.0])
+    side = cover_terrain.side
+    ground = cover_terrain.heights.at(np.array([4.2 * side]), np.array([3.0 * side]))[0][0]
+    np.testing.assert_allclose(wanted.eye, [4.2 * side, 3 * side, ground + 0.5])
+    np.testing.assert_allclose(wanted.origin, [4.5 * side, 3 * side, 0])
+
+
+def test_a_level_that_is_not_there_is_named(cover_terrain, export_settings):
+    with pytest.raises(InputError, match=r"export\.level: there is no level 2; the last one is 1"):
+        plan(cover_terrain, export_settings, level=2)
+
+
+@pytest.mark.parametrize("level", [0, 1, "by_distance"])
+@pytest.mark.parametrize("name, limit", [("ply", None), ("glb", None), ("spz", 20_000)])
+def test_too_much_is_refused_with_the_area_that_fits(cover_terrain, export_settings, monkeypatch, level, name, limit):
+    given = export_settings | {"columns": 40, "rows": 20, "level": level}
+    if limit:
+        monkeypatch.setitem(terrain_area.LIMITS, name, terrain_area.FileLimit(1, limit))
+    max_gb = 1.0 if limit else 1e-9 * 20_000 * terrain_area.LIMITS[name].bytes
+    with pytest.raises(
+        InputError, match=rf"export: {name}: 40 x 20 cells have up to \d+ Gaussians, .* 20000; "
+    ) as told:
+        terrain_area.check_size(cover_terrain, plan(cover_terrain, given), [name], max_gb)
+    columns, rows = map(int, re.search(r"; (\d+) x (\d+) fit", str(told.value)).groups())
+    fits = plan(cover_terrain, given, columns=columns, rows=rows)
+    assert 0 < terrain_area.check_size(cover_terrain, fits, [name], max_gb) <= 20_000
+    wider = plan(cover_terrain, given, columns=columns + 4, rows=rows + 4)
+    with pytest.raises(InputError):
+        terrain_area.check_size(cover_terrain, wider, [name], max_gb)
+
+
+def test_where_not_one_cell_fits_the_message_says_so(cover_terrain, export_settings):
+    with pytest.raises(InputError, match="not one cell fits: set export.level to a coarser one, or raise"):
+        terrain_area.check_size(cover_terrain, plan(cover_terrain, export_settings), ["ply"], 1e-6)

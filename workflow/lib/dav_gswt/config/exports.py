@@ -1,0 +1,58 @@
+"""What leaves for other programs: the table `export` of the config. Nothing else depends on it."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from dav_gswt.config.base import ConfigModel, key
+
+Cell = Annotated[int, Field(ge=-(2**30), le=2**30)]
+Format = Literal["ply", "spz", "glb", "sog", "streamed_sog"]
+
+
+class Export(ConfigModel):
+    """A finite terrain for other programs: `exports/terrain`, and its ground, `exports/ground`. docs/exports.md."""
+
+    columns: int = key("cells from west to east", 8, unit="tiles", ge=1, le=1000)
+    rows: int = key("cells from south to north", 8, unit="tiles", ge=1, le=1000)
+    centre: list[float] | None = key(
+        "x and y of the point that the cells lie about; [0, 0] if left out",
+        None,
+        unit="tile sides",
+        min_length=2,
+        max_length=2,
+    )
+    corner: list[Cell] | None = key(
+        "column and row of the south-western cell, instead of `centre`", None, unit="tiles", min_length=2, max_length=2
+    )
+    level: Annotated[int, Field(ge=0, le=15)] | Literal["by_distance"] = key(
+        "level of detail, 0 the finest; `by_distance`: as seen from the centre, an eye floor above the surface", 0
+    )
+    formats: list[Format] = key(
+        "`streamed_sog`: all levels in chunks; `sog` and `streamed_sog` need Node.js",
+        ["glb"],
+        min_length=1,
+        max_length=5,
+    )
+    axes: Literal["own", "z-up", "y-up", "y-down"] = key("`own`: those of each format, docs/exports.md", "own")
+    spz_version: Literal[2, 3] = key("of SPZ files; 2 for older readers, whose rotations are coarser", 3)
+    max_gb: float = key(
+        "most that a file may take; what would be larger is refused before any work", 2, unit="GB", gt=0, le=64
+    )
+    surface: Literal["ground", "visible"] = key(
+        "what `exports/ground` takes for ground: the ground layer alone, or all but the objects, seen from above",
+        "ground",
+    )
+    mesh_error: float = key(
+        "of the collision mesh: most that it is off the ground's height field", 0.25, unit="ground cells", ge=0, le=100
+    )
+
+    @model_validator(mode="after")
+    def _require_one_place(self) -> "Export":
+        if self.centre is not None and self.corner is not None:
+            raise ValueError("centre and corner exclude one another; leave one out")
+        if self.centre is not None and not all(abs(at) <= 2**30 for at in self.centre):
+            raise ValueError(f"centre lies beyond {2**30} tile sides")
+        if len(set(self.formats)) < len(self.formats):
+            raise ValueError("formats has one twice")
+        return self

@@ -1,0 +1,168 @@
+"""The ground of a finite terrain as a height field: the tiles' ground layer seen from above, on the terrain's surface.
+
+Heights are sampled on a lattice that divides a tile's side into a power of two, with a point or more a ground cell, and
+smoothed by SMOOTHING: no photo measures how one disc of the ground layer lies against its neighbour.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float, Float32
+from numpy import ndarray as Array
+from scipy.ndimage import distance_transform_edt, gaussian_filter
+
+from dav_gswt.errors import InputError
+from dav_gswt.export.terrain_area import suggest_area
+from dav_gswt.field import GaussianField, concatenate_fields
+from dav_gswt.geometry import cameras
+from dav_gswt.logs import progress
+from dav_gswt.raster import render
+from dav_gswt.terrain.endless import EndlessTerrain
+from dav_gswt.terrain.finite import Area, list_cells
+from dav_gswt.tiles.build import TileSet
+from dav_gswt.tiles.layout import EDGES, arrange_torus
+
+MIN_ALPHA = 0.05  # of a lattice point whose height is known; others take their nearest neighbour's
+SMOOTHING = 1.0  # standard deviation of what heights are averaged over, in ground cells
+AROUND = 0.2  # of the neighbours that are seen beside a tile, as a share of its side
+MAX_STEPS = 1024  # of the lattice in a tile's side
+MAX_POINTS = 2**25  # of an area's height field
+
+
+@dataclass(frozen=True)
+class TileSurfaces:
+    """Heights of every tile's ground on a lattice of steps + 1 points a side, borders included.
+
+    Attributes:
+        spacing: width of a ground cell, in world units.
+        heights: [tile, y, x] from south to north and west to east; tiles as the manifest counts them.
+    """
+
+    steps: int
+    spacing: float
+    heights: Float32[Array, "tiles n n"]
+
+
+@dataclass(frozen=True)
+class GroundSurface:
+    """The ground of an area: heights at lattice points, from south to north and from west to east.
+
+    Attributes:
+        west, south: world position of the first point.
+        step: distance of lattice points, in world units.
+        block: lattice steps of a tile's side, a power of two.
+        cell: width of a ground cell, in world units.
+    """
+
+    west: float
+    south: float
+    step: float
+    block: int
+    cell: float
+    heights: Float32[Array, "rows columns"]
+
+
+def measure_tiles(sets: Sequence[TileSet], whole: bool = False) -> TileSurfaces:
+    """The ground surfaces of the tile sets of all materials: their discs of the ground layer, seen from above.
+
+    A tile without such discs, as those of fields of other programs, is taken whole. whole: so is every tile, with the
+    stones and plants that are no objects.
+    """
+    side, spacing = sets[0].side, min(each.spacing for each in sets)
+    steps = min(MAX_STEPS, 1 << max(1, int(np.ceil(np.log2(side / spacing - 1e-6)))))
+    heights = [
+        _look_down(_surround(each, tile, whole), side, steps)
+        for each in progress(sets, "measure the tiles' ground")
+        for tile in range(len(each.fields[0]))
+    ]
+    return TileSurfaces(steps, spacing, np.stack(heights))
+
+
+def _surround(tiles: TileSet, tile: int, whole: bool) -> GaussianField:
+    """The ground of a tile and of neighbours whose borders fit: what is seen at its own border is theirs, too."""
+    torus = arrange_torus(tile // EDGES)
+    (row,), (column,) = np.nonzero(torus[1:-1, 1:-1] == tile)
+    parts = []
+    for (north, east), number in np.ndenumerate(torus[row : row + 3, column : column + 3]):
+        field, by = tiles.fields[0][number], np.array([east - 1, north - 1, 0]) * tiles.side
+        shown = np.ones(len(field), bool) if whole or not field.ground.any() else field.ground
+        means = field.means + by
+        near = (np.abs(means[:, :2] - 0.5 * tiles.side) < (0.5 + AROUND) * tiles.side).all(1)
+        parts.append(replace(field, means=means.astype(np.float32))[shown & near])
+    return concatenate_fields(parts)
+
+
+def _look_down(field: GaussianField, side: float, steps: int) -> Float32[Array, "n n"]:
+    """Mean height of what covers each lattice point of a tile, weighted as it is drawn from above."""
+    pitch, top = side / steps, float(field.means[:, 2].max()) + side
+    camera = cameras.top_down(-0.5 * pitch, -0.5 * pitch, steps + 1, steps + 1, pitch, top)
+    seen = render(field, camera)
+    known = seen.alpha[::-1] > MIN_ALPHA
+    heights = top - seen.depth[::-1] / np.maximum(seen.alpha[::-1], MIN_ALPHA)
+    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    return heights[tuple(nearest)].astype(np.float32)
+
+
+def check_points(area: Area, steps: int) -> None:
+    """Raises: InputError: an area's height field would have more than MAX_POINTS points, with the area that fits."""
+
+    def count(part: Area) -> int:
+        return (part.columns * steps + 1) * (part.rows * steps + 1)
+
+    if count(area) > MAX_POINTS:
+        size = f"{area.columns} x {area.rows} cells have a height field of {count(area)} points"
+        fits = suggest_area(area, count, MAX_POINTS)
+        hint = f"{fits.columns} x {fits.rows} fit: set export.columns and export.rows" if fits else "not one cell fits"
+        raise InputError(f"export: ground: {size}, at most {MAX_POINTS} are written; {hint}")
+
+
+def collect_surface(terrain: EndlessTerrain, tiles: TileSurfaces, area: Area) -> GroundSurface:
+    """The ground of an area as the terrain draws it: in each cell that of the materials which lie there, displaced.
+
+    Where tiles meet, a point of their common border has the mean of their heights. What is smoothed are the tiles, not
+    the terrain's surface. Raises: InputError: `check_points`.
+    """
+    check_points(area, tiles.steps)
+    n, pitch = tiles.steps, terrain.side / tiles.steps
+    total = np.zeros((area.rows * n + 1, area.columns * n + 1), np.float32)
+    shared = np.zeros(total.shape, np.float32)
+    cells = zip(*(v.tolist() for v in list_cells(terrain, area.west, area.south, area.columns, area.rows)), strict=True)
+    for i, j, tile, materials in cells:
+        part = np.s_[
+            (j - area.south) * n : (j - area.south + 1) * n + 1, (i - area.west) * n : (i - area.west + 1) * n + 1
+        ]
+        total[part] += _choose_heights(terrain, tiles, i, j, tile, materials)
+        shared[part] += 1
+    heights = gaussian_filter(total / shared, SMOOTHING * tiles.spacing / pitch, mode="nearest", truncate=3)
+    x = area.west * terrain.side + np.arange(heights.shape[1]) * pitch
+    for row, line in enumerate(heights):  # a line at a time: the surface's own arrays are float64
+        y = area.south * terrain.side + row * pitch
+        line += terrain.heights.at(x, np.full(len(x), y))[0].astype(np.float32)
+    return GroundSurface(area.west * terrain.side, area.south * terrain.side, pitch, n, tiles.spacing, heights)
+
+
+def _choose_heights(
+    terrain: EndlessTerrain, tiles: TileSurfaces, i: int, j: int, tile: int, materials: int
+) -> Float32[Array, "n n"]:
+    """Heights of a cell's lattice points: of the material that lies at each."""
+    if terrain.classes is None or materials & (materials - 1) == 0:
+        return tiles.heights[tile]
+    numbers = [m for m in range(terrain.classes.materials) if materials >> m & 1]
+    each = np.stack([tiles.heights[m * terrain.tiles_each + tile % terrain.tiles_each] for m in numbers])
+    y, x = np.mgrid[: tiles.steps + 1, : tiles.steps + 1] * np.float32(terrain.side / tiles.steps)
+    points = np.concatenate([np.stack([x, y, z], -1).reshape(-1, 3) for z in each]).astype(np.float32)
+    owner = np.repeat(numbers, x.size)
+    kept = terrain.classes.keep(i, j, points, owner).reshape(each.shape)
+    chosen = np.argmax(kept, axis=0)  # two keep a point only where one rises; the first one is then as good
+    return np.take_along_axis(each, chosen[None], axis=0)[0]
+
+
+def sample_surface(surface: GroundSurface, x: Float[Array, "n"], y: Float[Array, "n"]) -> Float[Array, "n"]:
+    """Bilinear heights at places of the world within the area."""
+    rows, columns = surface.heights.shape
+    u, v = (x - surface.west) / surface.step, (y - surface.south) / surface.step
+    a, b = (np.clip(np.floor(p), 0, n - 2).astype(int) for p, n in ((u, columns), (v, rows)))
+    s, t, z = u - a, v - b, surface.heights
+    south, north = (z[b + k, a] * (1 - s) + z[b + k, a + 1] * s for k in (0, 1))
+    return south * (1 - t) + north * t

@@ -1,0 +1,125 @@
+"""Which cells a finite terrain has, and whether its files can be made: said before any work starts."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray as Array
+
+from dav_gswt.errors import InputError
+from dav_gswt.export import glb, glb_splats, ply, spool, spz
+from dav_gswt.terrain.endless import EndlessTerrain
+from dav_gswt.terrain.finite import Area, count_cells, keep_level
+
+BY_DISTANCE = "by_distance"
+
+
+@dataclass(frozen=True)
+class FileLimit:
+    """What a Gaussian takes in a file at most, in bytes, and how many Gaussians a file holds; None: any number."""
+
+    bytes: int
+    gaussians: int | None = None
+
+
+LIMITS = {
+    "ply": FileLimit(ply.BYTES),
+    "spz": FileLimit(max(spz.RAW_BYTES.values()), spz.MAX_GAUSSIANS),
+    "glb": FileLimit(glb_splats.BYTES, (glb.MAX_BYTES - glb_splats.HEADER_BYTES) // glb_splats.BYTES),
+    "sog": FileLimit(ply.BYTES),  # made from a PLY
+    "streamed_sog": FileLimit(2 * ply.BYTES),  # made from one of each level; coarser ones are smaller
+}
+
+
+@dataclass(frozen=True)
+class TerrainExport:
+    """What the config's `export` asks for: cells, their level (None: by the distance from the eye), and the eye.
+
+    Attributes:
+        origin: world position that the files' coordinates count from: the middle of the area on the plane z = 0.
+    """
+
+    area: Area
+    level: int | None
+    eye: Float[Array, "3"]
+    origin: Float[Array, "3"]
+
+    def select(self, terrain: EndlessTerrain) -> EndlessTerrain:
+        """The terrain that shows the level that is asked for."""
+        return terrain if self.level is None else keep_level(terrain, self.level)
+
+
+def choose_area(settings: Mapping[str, Any]) -> tuple[Area, tuple[float, float]]:
+    """The cells that the config's `export` names, and the point that they lie about, in tile sides."""
+    columns, rows = settings["columns"], settings["rows"]
+    if "corner" in settings:
+        west, south = settings["corner"]
+        return Area(west, south, columns, rows), (west + columns / 2, south + rows / 2)
+    x, y = settings.get("centre", (0.0, 0.0))
+    west, south = (int(np.floor(at - n / 2 + 0.5)) for at, n in ((x, columns), (y, rows)))
+    return Area(west, south, columns, rows), (x, y)
+
+
+def plan_export(terrain: EndlessTerrain, settings: Mapping[str, Any], eye_floor: float) -> TerrainExport:
+    """The export of the config's `export`. Raises: InputError: the set has no such level."""
+    area, centre = choose_area(settings)
+    level = None if settings["level"] == BY_DISTANCE else settings["level"]
+    if level is not None and level >= len(terrain.switches):
+        raise InputError(f"export.level: there is no level {level}; the last one is {len(terrain.switches) - 1}")
+    x, y = (at * terrain.side for at in centre)
+    ground = float(terrain.heights.at(np.array([x]), np.array([y]))[0][0])
+    return TerrainExport(area, level, np.array([x, y, ground + eye_floor]), find_origin(terrain, area))
+
+
+def find_origin(terrain: EndlessTerrain, area: Area) -> Float[Array, "3"]:
+    """The world position that the coordinates of an area's files count from: its middle, on the plane z = 0."""
+    return np.array([area.west + area.columns / 2, area.south + area.rows / 2, 0.0]) * terrain.side
+
+
+def check_size(terrain: EndlessTerrain, wanted: TerrainExport, formats: Sequence[str], max_gb: float) -> int:
+    """The number of Gaussians, at most. Raises: InputError: more than a file may have, with the area that fits."""
+    count = _count(terrain, wanted, wanted.area)
+    for name in formats:
+        most = int(max_gb * 1e9) // LIMITS[name].bytes
+        held = LIMITS[name].gaussians
+        bound = min(most, held or most)
+        if count > bound:
+            why = f"export.max_gb: {max_gb:g} allows" if bound == most else f"the format {name} holds"
+            size = f"{wanted.area.columns} x {wanted.area.rows} cells have up to {count} Gaussians, {why} {bound}"
+            raise InputError(f"export: {name}: {size}; {_suggest(terrain, wanted, bound)}")
+    return count
+
+
+def _suggest(terrain: EndlessTerrain, wanted: TerrainExport, bound: int) -> str:
+    fits = suggest_area(wanted.area, lambda area: _count(terrain, wanted, area), bound)
+    if fits is None:
+        return "not one cell fits: set export.level to a coarser one, or raise export.max_gb"
+    return f"{fits.columns} x {fits.rows} fit: set export.columns and export.rows, a coarser export.level, or max_gb"
+
+
+def suggest_area(area: Area, count: Callable[[Area], int], bound: int) -> Area | None:
+    """The largest area about the same middle, of the same shape, whose count is within a bound; None: not one cell."""
+    low, high = 0, max(area.columns, area.rows)
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if count(_shrink(area, middle)) <= bound else (low, middle)
+    return _shrink(area, low) if low else None
+
+
+def _shrink(area: Area, longer: int) -> Area:
+    """A smaller area about the middle of one, whose longer side has so many cells."""
+    share = longer / max(area.columns, area.rows)
+    columns, rows = (max(1, int(n * share)) for n in (area.columns, area.rows))
+    return Area(area.west + (area.columns - columns) // 2, area.south + (area.rows - rows) // 2, columns, rows)
+
+
+def _count(terrain: EndlessTerrain, wanted: TerrainExport, area: Area) -> int:
+    return int(count_cells(wanted.select(terrain), area, wanted.eye).sum())
+
+
+def describe_size(count: int, formats: Sequence[str]) -> str:
+    """What an export takes, for the log."""
+    files = ", ".join(f"{name} {count * LIMITS[name].bytes / 1e6:.0f} MB" for name in formats)
+    return f"up to {count} Gaussians; at most {files}; {count * spool.BYTES / 1e6:.0f} MB of disk on the way"

@@ -1,0 +1,133 @@
+"""A finite terrain as files of other programs: placed once, on disk, from where each file is made."""
+
+import logging
+import shutil
+from collections import deque
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from jaxtyping import Float
+from numpy import ndarray as Array
+
+from dav_gswt.bundle.manifest import Manifest
+from dav_gswt.export import glb_splats, ply, sog, spz
+from dav_gswt.export.axes import AXES
+from dav_gswt.export.spool import Spool
+from dav_gswt.export.terrain_area import TerrainExport, check_size, describe_size, plan_export
+from dav_gswt.field import GaussianField
+from dav_gswt.files import atomic_folder, write_json
+from dav_gswt.logs import progress
+from dav_gswt.terrain.endless import EndlessTerrain
+from dav_gswt.terrain.finite import list_blocks, place_block
+
+NAME = "terrain"
+OWN_AXES = {"ply": "y-down", "spz": "y-up", "glb": "y-up", "sog": "y-down", "streamed_sog": "y-down"}
+
+_log = logging.getLogger(__name__)
+
+
+def export_terrain(
+    terrain: EndlessTerrain, manifest: Manifest, settings: Mapping[str, Any], out: Path | str, threads: int = 1
+) -> None:
+    """Write terrain.{ply,spz,glb,sog}, terrain_sog/ and terrain.json, as the config's `export` asks, to a folder.
+
+    Raises: InputError: more than a file may have, no such level, or the converter of SOG is not here.
+    """
+    wanted, formats = plan_export(terrain, settings, manifest.eye_floor), settings["formats"]
+    count = check_size(terrain, wanted, formats, settings["max_gb"])
+    _log.info("%s", describe_size(count, formats))
+    if {"sog", "streamed_sog"} & set(formats):
+        sog.find_converter("terrain")
+    with atomic_folder(out) as folder:
+        with _placed(terrain, wanted, folder, threads) as placed:
+            facts = _describe(terrain, manifest, wanted, len(placed))
+            for name in formats:
+                axes = OWN_AXES[name] if settings["axes"] == "own" else settings["axes"]
+                facts["files"][name] = axes
+                _write_format(name, placed, folder, AXES[axes], settings, facts)
+        if "streamed_sog" in formats:
+            _write_streamed(terrain, wanted, folder, AXES[facts["files"]["streamed_sog"]], threads)
+        write_json(folder / f"{NAME}.json", facts)
+
+
+def _write_format(
+    name: str,
+    placed: Spool,
+    folder: Path,
+    rotation: Float[Array, "3 3"],
+    settings: Mapping[str, Any],
+    facts: dict[str, Any],
+) -> None:
+    path = folder / f"{NAME}.{name}"
+    if name == "ply":
+        ply.write_ply(placed, path, rotation)
+    elif name == "spz":
+        spz.write_spz(placed, path, settings["spz_version"], rotation)
+    elif name == "glb":
+        extras = {key: facts[key] for key in ("unit", "origin", "tile_side", "cells")}
+        glb_splats.write_glb_splats(placed, path, extras, rotation)
+    elif name == "sog":
+        source = folder / ".sog.ply"
+        ply.write_ply(placed, source, rotation)
+        sog.convert(source, path, "terrain")
+        source.unlink()
+
+
+def _write_streamed(
+    terrain: EndlessTerrain, wanted: TerrainExport, folder: Path, rotation: Float[Array, "3 3"], threads: int
+) -> None:
+    """Every level of the area in one set, whose chunks are about as large as a tile."""
+    sources = []
+    for level in range(len(terrain.switches)):
+        with _placed(terrain, replace(wanted, level=level), folder, threads) as placed:
+            sources.append(folder / f".level{level}.ply")
+            ply.write_ply(placed, sources[-1], rotation)
+    (folder / f"{NAME}_sog").mkdir()
+    sog.convert_streamed(sources, folder / f"{NAME}_sog/lod-meta.json", terrain.side, "terrain")
+    for source in sources:
+        source.unlink()
+
+
+def _describe(terrain: EndlessTerrain, manifest: Manifest, wanted: TerrainExport, count: int) -> dict[str, Any]:
+    """terrain.json. Lengths are in the bundle's unit, the origin is a place of the world, east, north and up."""
+    area = wanted.area
+    return {
+        "unit": manifest.unit,
+        "tile_side": terrain.side,
+        "cells": {"west": area.west, "south": area.south, "columns": area.columns, "rows": area.rows},
+        "origin": wanted.origin.tolist(),
+        "eye": (wanted.eye - wanted.origin).tolist(),
+        "level": "by_distance" if wanted.level is None else wanted.level,
+        "gaussians": count,
+        "files": {},
+    }
+
+
+@contextmanager
+def _placed(terrain: EndlessTerrain, wanted: TerrainExport, folder: Path, threads: int) -> Iterator[Spool]:
+    """The Gaussians of the area on disk, below a folder, while the block runs."""
+    place = folder / ".spool"
+    try:
+        with Spool(place) as spool:
+            for field in place_blocks(terrain, wanted, threads):
+                spool.append(field)
+        yield spool
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+
+
+def place_blocks(terrain: EndlessTerrain, wanted: TerrainExport, threads: int = 1) -> Iterator[GaussianField]:
+    """The Gaussians of an export, block by block; `threads` of them are put on the surface at once, in one order."""
+    shown = wanted.select(terrain)
+    waiting: deque[Future[GaussianField]] = deque()
+    with ThreadPoolExecutor(threads) as pool:
+        for cells in progress(list_blocks(shown, wanted.area, wanted.eye), "place cells"):
+            waiting.append(pool.submit(place_block(shown, cells, wanted.eye, wanted.origin)))
+            if len(waiting) > threads:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
