@@ -241,6 +241,7 @@ def story_of_field(wildcards):
         "model": "<results>/<photos>/sparse",
         "frame": "<results>/<photos>/ground.json",
         "captures": captures_until(wildcards),
+        "fits": fits_until(wildcards),
         "metrics": [f"{round_folder(t)}/metrics.json" for t in rounds],
     }
 

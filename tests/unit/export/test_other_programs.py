@@ -98,8 +98,8 @@ def test_splat_transform_makes_the_same_of_our_ply_as_we_do(exported, node_modul
     convert(node_modules, exported / "terrain.ply", tmp_path / "theirs.glb")
     ours, theirs = (read_glb_splats(path) for path in (exported / "terrain.glb", tmp_path / "theirs.glb"))
     wanted, seen = take_picture(ours, Y_UP.T), take_picture(theirs, Y_UP.T @ np.diag([-1.0, 1.0, -1.0]))
-    likeness = psnr(seen, wanted, np.ones((SIZE, SIZE)))
-    assert len(ours) == len(theirs) and (likeness is None or likeness > 60)
+    decibels = psnr(seen, wanted, np.ones((SIZE, SIZE)))
+    assert len(ours) == len(theirs) and (decibels is None or decibels > 60)
 
 
 def convert(node_modules, source, target):

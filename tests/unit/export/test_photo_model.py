@@ -16,6 +16,7 @@ from dav_gswt.images import image_files
 from dav_gswt.photos.capture_record import CapturedPhoto, write_capture_record
 from dav_gswt.photos.colmap_model import read_colmap_model
 from dav_gswt.photos.importers.nerfstudio import import_nerfstudio
+from dav_gswt.photos.taken_photos import list_taken_photos
 from dav_gswt.photos.view_split import ViewSplit
 
 HALF = 1.0
@@ -42,9 +43,7 @@ def taken(known, tmp_path):
         folder.mkdir()
         image_files.write_png(folder / name, synth.photograph(camera, ground, HALF))
         write_capture_record(folder, "replay", [CapturedPhoto(name, POSE, camera, camera, 0.0)])
-    return photo_model.list_taken_photos(
-        tmp_path / "images", known, SPLIT.start, [tmp_path / "capture1", tmp_path / "capture2"]
-    )
+    return list_taken_photos(tmp_path / "images", known, SPLIT.start, [tmp_path / "capture1", tmp_path / "capture2"])
 
 
 @pytest.fixture
@@ -125,7 +124,7 @@ def test_what_the_test_photos_see_leaves_no_trace(written, taken, known, tmp_pat
 
 def test_a_photo_that_the_fit_left_out_is_left_out(known, tmp_path, taken):
     captures = [tmp_path / "capture1", tmp_path / "capture2"]
-    kept = photo_model.list_taken_photos(tmp_path / "images", known, SPLIT.start, captures, {"002.png"})
+    kept = list_taken_photos(tmp_path / "images", known, SPLIT.start, captures, {"002.png"})
     assert [photo.name for photo in kept] == [*SPLIT.start, "iter2_001.png"]
 
 

@@ -35,6 +35,12 @@ def test_a_soft_border_counts_as_a_frayed_one():
     assert measure_fray(paint(share), away_from_middle() > 0, EVERY, TILE) == pytest.approx(4, rel=0.2)
 
 
+def test_texture_does_not_count():
+    own = away_from_middle() > 0
+    rough = paint(own.astype(float)) + np.random.default_rng(1).normal(0, 10, (CELLS, CELLS, 3))
+    assert measure_fray(rough, own, EVERY, TILE) < 1
+
+
 def test_slow_bends_do_not_count():
     bend = 15 * np.sin(np.arange(CELLS) / CELLS * 2 * np.pi)[:, None]
     own = away_from_middle() > bend

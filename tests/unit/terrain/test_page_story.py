@@ -1,14 +1,16 @@
 """The story of a page: which photos, where, and what tests said."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from dav_gswt.errors import InputError
+from dav_gswt.geometry import cameras
 from dav_gswt.images import image_files
+from dav_gswt.photos.taken_photos import TakenPhoto
 from dav_gswt.terrain import page_story
-from dav_gswt.terrain.page_story import Taken, draw_sheet, list_taken, make_small, spread, tell_story
+from dav_gswt.terrain.page_story import draw_sheet, make_small, spread, tell_story
 
 
 def test_a_finished_field_has_no_story():
@@ -33,7 +35,6 @@ def test_a_sheet_holds_each_photo_in_the_middle_of_its_square():
 @pytest.fixture
 def made(tmp_path, monkeypatch):
     """What a round of two photos at the start and one captured leaves, with the cameras given."""
-    from dav_gswt.geometry import cameras
     from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square, write_scene_frame
 
     images = tmp_path / "images"
@@ -42,10 +43,10 @@ def made(tmp_path, monkeypatch):
         image_files.write_png(images / name, np.full((30, 40, 3), 0.5))
     eyes = {"a.png": (1.0, 2.0, 3.0), "b.png": (-1.0, 0.0, 3.0), "c.png": (0.0, -4.0, 5.0)}
     taken = [
-        Taken(images / name, cameras.pinhole(np.array(eye), np.zeros(3), 40, 30, 60.0), int(name == "c.png"))
+        TakenPhoto(name, images / name, cameras.pinhole(np.array(eye), np.zeros(3), 40, 30, 60.0), int(name == "c.png"))
         for name, eye in eyes.items()
     ]
-    monkeypatch.setattr(page_story, "list_taken", lambda *_: taken)
+    monkeypatch.setattr(page_story, "list_photos", lambda given: taken)
     write_scene_frame(
         tmp_path / "ground.json",
         SceneFrame("synthetic", "metre", 3.0, Square(-2.0, -2.0, 4.0), Extent(-5.0, -5.0, 5.0, 5.0), images=3),
@@ -72,10 +73,27 @@ def test_places_rounds_and_pictures_are_told(made):
     assert story == tell_story(made)
 
 
-def test_views_that_are_none_are_named(tmp_path, monkeypatch):
+def test_photos_that_contradicted_the_others_are_not_told(tmp_path, monkeypatch):
     import dav_gswt.photos.colmap_model as colmap_model
+    import dav_gswt.photos.taken_photos as taken_photos
 
-    monkeypatch.setattr(colmap_model, "read_colmap_model", lambda path: None)
-    (tmp_path / "views.json").write_text("{}")
-    with pytest.raises(InputError, match=r"views\.json: no start views"):
-        list_taken(tmp_path / "views.json", tmp_path, tmp_path, [])
+    camera = cameras.pinhole(np.array([0.0, 0.0, 3.0]), np.zeros(3), 40, 30, 60.0)
+    shots = {"first": ["c.png"], "second": ["d.png", "e.png"]}
+    monkeypatch.setattr(colmap_model, "read_colmap_model", lambda path: SimpleNamespace(camera=lambda name: camera))
+    monkeypatch.setattr(
+        taken_photos, "read_capture_record", lambda path: [SimpleNamespace(name=n, camera=camera) for n in shots[path]]
+    )
+    (tmp_path / "views.json").write_text(json.dumps({"start": ["a.png"], "test": [], "pool": []}))
+    fits = []
+    for name, taken in zip(shots, (True, False), strict=True):
+        fits.append(tmp_path / f"{name}.json")
+        report = {"taken": taken, "views": [{"view": view} for view in shots[name]]}
+        fits[-1].write_text(json.dumps({"new_views": report}))
+    given = {
+        "views": tmp_path / "views.json",
+        "images": "images",
+        "model": "sparse",
+        "captures": list(shots),
+        "fits": fits,
+    }
+    assert [(photo.name, photo.round) for photo in page_story.list_photos(given)] == [("a.png", 0), ("c.png", 1)]

@@ -13,7 +13,7 @@ from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.export import height_images, mujoco
 from dav_gswt.export.axes import Y_UP, turn_points
 from dav_gswt.export.glb import ELEMENT_ARRAY_BUFFER, GlbWriter
-from dav_gswt.export.ground_surface import GroundSurface, check_points, collect_surface, measure_tiles
+from dav_gswt.export.ground_surface import GroundSurface, check_points, choose_steps, collect_surface, measure_tiles
 from dav_gswt.export.height_mesh import simplify_heights
 from dav_gswt.export.hulls import Hull, collect_hulls
 from dav_gswt.export.terrain_area import choose_area, find_origin
@@ -40,8 +40,8 @@ def export_ground(
     """
     area, _ = choose_area(settings)
     origin = find_origin(terrain, area)
+    check_points(area, choose_steps(sets))
     tiles = measure_tiles(sets, settings["surface"] == "visible")
-    check_points(area, tiles.steps)
     surface = collect_surface(terrain, tiles, area)
     points, triangles = simplify_heights(surface.heights, surface.block, settings["mesh_error"] * surface.cell)
     hulls = list(collect_hulls(terrain, area, origin))

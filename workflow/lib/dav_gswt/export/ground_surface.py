@@ -69,14 +69,22 @@ def measure_tiles(sets: Sequence[TileSet], whole: bool = False) -> TileSurfaces:
     A tile without such discs, as those of fields of other programs, is taken whole. whole: so is every tile, with the
     stones and plants that are no objects.
     """
-    side, spacing = sets[0].side, min(each.spacing for each in sets)
-    steps = min(MAX_STEPS, 1 << max(1, int(np.ceil(np.log2(side / spacing - 1e-6)))))
+    side, steps = sets[0].side, choose_steps(sets)
     heights = [
         _look_down(_surround(each, tile, whole), side, steps)
         for each in progress(sets, "measure the tiles' ground")
         for tile in range(len(each.fields[0]))
     ]
-    return TileSurfaces(steps, spacing, np.stack(heights))
+    return TileSurfaces(steps, _find_spacing(sets), np.stack(heights))
+
+
+def choose_steps(sets: Sequence[TileSet]) -> int:
+    """Steps of the lattice in a tile's side: a point or more a ground cell."""
+    return min(MAX_STEPS, 1 << max(1, int(np.ceil(np.log2(sets[0].side / _find_spacing(sets) - 1e-6)))))
+
+
+def _find_spacing(sets: Sequence[TileSet]) -> float:
+    return min(each.spacing for each in sets)
 
 
 def _surround(tiles: TileSet, tile: int, whole: bool) -> GaussianField:
@@ -121,9 +129,8 @@ def collect_surface(terrain: EndlessTerrain, tiles: TileSurfaces, area: Area) ->
     """The ground of an area as the terrain draws it: in each cell that of the materials which lie there, displaced.
 
     Where tiles meet, a point of their common border has the mean of their heights. What is smoothed are the tiles, not
-    the terrain's surface. Raises: InputError: `check_points`.
+    the terrain's surface. Ask `check_points` before.
     """
-    check_points(area, tiles.steps)
     n, pitch = tiles.steps, terrain.side / tiles.steps
     total = np.zeros((area.rows * n + 1, area.columns * n + 1), np.float32)
     shared = np.zeros(total.shape, np.float32)

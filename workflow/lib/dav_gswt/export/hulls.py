@@ -38,7 +38,7 @@ def collect_hulls(terrain: EndlessTerrain, area: Area, origin: Float[Array, "3"]
     found = terrain.scatter.instances_in(i, j)
     feet = place_feet(terrain, found)
     shapes = [find_outermost(levels[0]) for levels in terrain.objects]
-    names = [each.name for each in getattr(terrain.scatter, "objects", [])]
+    names = [each.name for each in terrain.object_entries]
     for k, number in enumerate(found.number.tolist()):
         angle = np.radians(found.turn[k])
         turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])

@@ -6,10 +6,8 @@ their own, `test`, of the same form: a program that is given the folder never se
 """
 
 import json
-import logging
 import shutil
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,45 +17,13 @@ from dav_gswt.errors import InputError
 from dav_gswt.files import atomic_folder, require_file_name
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
-from dav_gswt.photos.capture_record import read_capture_record
 from dav_gswt.photos.colmap_model import ColmapModel, colour_points, triangulate_model, write_colmap_model
+from dav_gswt.photos.taken_photos import TakenPhoto
 from dav_gswt.photos.view_split import ViewSplit
-
-_log = logging.getLogger(__name__)
 
 OPENGL = np.array([1.0, -1.0, -1.0])  # nerfstudio's camera looks along -z with y up
 TEST = "test"  # the folder of the photos that only test
 POINTS = "sparse_pc.ply"  # as nerfstudio calls it
-
-
-@dataclass(frozen=True)
-class TakenPhoto:
-    """A photo by the name that it leaves under. source: its file, undistorted. camera: the pinhole that took it."""
-
-    name: str
-    source: Path
-    camera: Camera
-
-
-def list_taken_photos(
-    images: Path | str, known: ColmapModel, start: Sequence[str], captures: Sequence, rejected: Collection[str] = ()
-) -> list[TakenPhoto]:
-    """The start views, then the photos of every capture folder, in their order, without the rejected ones.
-
-    A name that is taken already gets the number of its capture folder in front.
-    Raises: InputError: see `read_capture_record`, or a start view that the model does not have.
-    """
-    photos = [TakenPhoto(name, Path(images) / name, known.camera(name)) for name in start]
-    names = set(start)
-    for number, folder in enumerate(captures, 1):
-        for shot in read_capture_record(folder):
-            if shot.name in rejected:
-                _log.info("%s contradicted the other photos and is left out, as in the fit", shot.name)
-                continue
-            name = f"iter{number}_{shot.name}" if shot.name in names else shot.name
-            names.add(name)
-            photos.append(TakenPhoto(name, Path(folder) / shot.name, shot.camera))
-    return photos
 
 
 def write_photo_models(out: Path | str, images: Path | str, known: ColmapModel, split: ViewSplit, taken: list) -> None:
@@ -67,7 +33,7 @@ def write_photo_models(out: Path | str, images: Path | str, known: ColmapModel, 
     them. Raises: InputError: a picture that is missing or not of its camera's size, or a name that leads elsewhere.
     """
     model = _model_of(taken, known)
-    tests = [TakenPhoto(name, Path(images) / name, known.camera(name)) for name in split.test]
+    tests = [TakenPhoto(name, Path(images) / name, known.camera(name), 0) for name in split.test]
     blind = replace(model, point_of=model.point_of[:0], image_of=model.image_of[:0], pixels=model.pixels[:0])
     with atomic_folder(out) as folder:
         _write_model(folder, model, taken)

@@ -36,12 +36,12 @@ def measure_fray(
     if min(len(inside), len(outside)) < FEW:
         return None
     axis = inside.mean(0) - outside.mean(0)
-    share = np.clip((features - outside.mean(0)) @ axis / max(float(axis @ axis), 1e-12), 0, 1)
+    share = (features - outside.mean(0)) @ axis / max(float(axis @ axis), 1e-12)
     strayed = 0.0
     for distance in np.arange(-reach + 0.5, reach).tolist():
         here = band & (np.abs(away - distance) <= BAND)
         if here.sum() >= FEW:
-            strayed += abs((distance > 0) - float(share[here].mean()))
+            strayed += abs((distance > 0) - float(np.clip(share[here].mean(), 0, 1)))  # the mean: texture averages out
     return strayed
 
 

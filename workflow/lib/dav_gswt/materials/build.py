@@ -3,10 +3,11 @@
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 from scipy.ndimage import distance_transform_edt
 
@@ -88,6 +89,11 @@ class _Parts:
     classes: GroundClasses
     tile_side: float
     seed: int
+
+    @cached_property
+    def features(self) -> Float[Array, "m m k"]:
+        """Weighed CIELAB of all cells."""
+        return segmentation.describe_cells(self.maps.colour)[..., :3]
 
 
 def find_materials(
@@ -252,10 +258,10 @@ def _texture_scale(maps: GroundMaps, source: Bool[Array, "m m"]) -> float:
 
 def _measure_borders(parts: _Parts, number: int) -> tuple[float | None, float | None]:
     """Fray and bend of a material's borders, in world units."""
-    classes, features = parts.classes, segmentation.describe_cells(parts.maps.colour)[..., :3]
+    classes, spacing = parts.classes, parts.grid.spacing
     counted = parts.maps.known & ~classes.excluded & ~classes.occupied
-    own, spacing = classes.materials == number, parts.grid.spacing
-    fray = measure_fray(features, own, counted, parts.tile_side)
+    own = classes.materials == number
+    fray = measure_fray(parts.features, own, counted, parts.tile_side)
     bend = measure_bend(own, counted, parts.tile_side)
     return None if fray is None else fray * spacing, None if bend is None else bend * spacing
 
@@ -266,7 +272,7 @@ def _measure_patches(own: Bool[Array, "m m"]) -> float:
     Each piece has two ends; those that the exemplar's border cuts off are not counted, as the piece goes on there.
     """
     ends = sum(int(np.diff(own, axis=axis).sum()) for axis in (0, 1))
-    return 4 * float(own.sum()) / max(ends, 1) if ends else float(own.sum())
+    return 4 * float(own.sum()) / max(ends, 1)
 
 
 def _extract_objects(parts: _Parts, index: dict[int, int]) -> list[ExtractedObject]:

@@ -32,16 +32,20 @@ def fit_classes(content: BundleContent, salt: int) -> ClassesEntry:
 
     Where borders were seen, the noise has so many octaves that its borders bend as those do.
     """
-    number, side = len(content.materials), content.side
-    seen = [material.bend / side for material in content.materials if material.bend is not None]
+    seen = [material.bend / content.side for material in content.materials if material.bend is not None]
+    bend = float(np.mean(seen)) if seen else None
+    entry, steepness = _fit_noise(content, salt, MAX_OCTAVES) if bend is None else _fit_bends(content, salt, bend)
+    return replace(entry, jitter=_fit_jitter(content, steepness), rise=_fit_rise(content, steepness / content.side))
+
+
+def _fit_bends(content: BundleContent, salt: int, bend: float) -> tuple[ClassesEntry, float]:
+    """As `_fit_noise`, with so many octaves that borders bend the most nearly by so many tile sides."""
     choices = [_fit_noise(content, salt, 1)]
     while len(choices) < MAX_OCTAVES and (more := _fit_noise(content, salt, len(choices) + 1)) != choices[-1]:
         choices.append(more)  # as long as the lattice shows another octave
-    entry, steepness = choices[-1]
-    if seen:
-        bends = np.array([measure_bends(Classes(choice, number, side), salt) for choice, _ in choices])
-        entry, steepness = choices[int(np.abs(bends - np.mean(seen)).argmin())]
-    return replace(entry, jitter=_fit_jitter(content, steepness), rise=_fit_rise(content, steepness / side))
+    number = len(content.materials)
+    found = [measure_bends(Classes(entry, number, content.side), salt) for entry, _ in choices]
+    return choices[int(np.abs(np.array(found) - bend).argmin())]
 
 
 def measure_bends(classes: Classes, salt: int) -> float:

@@ -12,13 +12,12 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
-from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
-from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
 from dav_gswt.images.image_files import read_photo, shrink_image
 from dav_gswt.images.jpeg import encode_jpeg
-from dav_gswt.photos.capture_record import read_capture_record
+from dav_gswt.photos.taken_photos import TakenPhoto, list_taken_photos
+from dav_gswt.photos.view_split import read_view_split
 
 STORY, SHEET = "story.json", "photos.jpg"
 MOST = 64  # photos that are shown in small, spread over all
@@ -33,25 +32,17 @@ class Story:
     sheet: bytes
 
 
-@dataclass(frozen=True)
-class Taken:
-    """A photo that the field was made of. round: 0 is the start."""
-
-    path: Path
-    camera: Camera
-    round: int
-
-
 def tell_story(given: Mapping[str, Any]) -> Story | None:
     """The story of a round's field, or None for a finished field, which has no photos.
 
-    Args:   given: `views` (views.json), `images` and `model` of the scene, `frame` (ground.json), `captures` of the
-            rounds and `metrics` (metrics.json of the first fit and of each round); without `views`: a finished field.
+    Args:   given: `views` (views.json), `images` and `model` of the scene, `frame` (ground.json), `captures` and
+            `fits` (fit.json) of the rounds, `metrics` (metrics.json) of the first fit and of each round; without
+            `views`: a finished field.
     Raises: InputError: a file is missing or not of its kind.
     """
     if not given.get("views"):
         return None
-    taken = list_taken(given["views"], given["images"], given["model"], given["captures"])
+    taken = list_photos(given)
     shown = spread(len(taken), MOST)
     frame = read_scene_frame(given["frame"])
     photos = [_place(photo, frame) for photo in taken]
@@ -66,20 +57,17 @@ def tell_story(given: Mapping[str, Any]) -> Story | None:
         "unit": frame.unit, "half": half, "photos": photos, "rounds": rounds, "thumb": THUMB, "columns": COLUMNS,
         "pictures": len(shown), "grade": frame.verdict.grade if frame.verdict else None,
     }  # fmt: skip
-    return Story(value, encode_jpeg(draw_sheet([make_small(read_photo(taken[k].path)) for k in shown]), QUALITY))
+    return Story(value, encode_jpeg(draw_sheet([make_small(read_photo(taken[k].source)) for k in shown]), QUALITY))
 
 
-def list_taken(views: Path | str, images: Path | str, model: Path | str, captures: Sequence[Path | str]) -> list[Taken]:
+def list_photos(given: Mapping[str, Any]) -> list[TakenPhoto]:
     """All photos of a round's field in the order they were taken. Raises: as `tell_story`."""
-    from dav_gswt.photos.colmap_model import read_colmap_model  # not above: it loads pycolmap
+    from dav_gswt.photos.colmap_model import read_colmap_model  # here, not above: they load pycolmap and PyTorch
+    from dav_gswt.reconstruction.regression_guard import list_rejected_photos
 
-    known = read_colmap_model(model)
-    try:
-        start = [Taken(Path(images) / name, known.camera(name), 0) for name in read_json(views)["start"]]
-    except (KeyError, TypeError) as error:
-        raise InputError(f"{views}: no start views ({error}); make it again") from error
-    rounds = enumerate(map(Path, captures), start=1)
-    return start + [Taken(folder / p.name, p.camera, t) for t, folder in rounds for p in read_capture_record(folder)]
+    start = read_view_split(given["views"]).start
+    rejected = list_rejected_photos(map(read_json, given["fits"]))
+    return list_taken_photos(given["images"], read_colmap_model(given["model"]), start, given["captures"], rejected)
 
 
 def spread(count: int, most: int) -> list[int]:
@@ -105,7 +93,7 @@ def draw_sheet(smalls: Sequence[Float32[Array, "_ _ 3"]]) -> Float32[Array, "hei
     return sheet
 
 
-def _place(photo: Taken, frame: SceneFrame) -> dict[str, Any]:
+def _place(photo: TakenPhoto, frame: SceneFrame) -> dict[str, Any]:
     """Where a camera is, seen from the exemplar's centre, and where it looks, on the ground."""
     x, y, z = photo.camera.centre - frame.exemplar.centre
     ahead = photo.camera.rotation[2]
