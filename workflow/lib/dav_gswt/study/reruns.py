@@ -34,7 +34,7 @@ READERS: dict[str, list[str]] = {
     "request_views": _CAPTURE_READERS,
     "update_field": [
         *("evaluate_round", "score_round", "inpaint_field", "evaluate_inpainted"),
-        *("find_materials", "make_levels"),
+        *("find_materials", "make_levels", "make_page"),
     ],
     "evaluate_round": ["make_page"],
     "score_round": [],  # a later round follows from it
