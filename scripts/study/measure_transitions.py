@@ -18,6 +18,8 @@ with logging_to(snakemake.log[0]):
     seen = transitions.map_photographed(read_field(paths.field), grid, accuracy.read_found_labels(paths.materials))
     bundle = store.read_bundle(Path(paths.manifest).parent, params.schema)
     terrain = endless.terrain_from_bundle(bundle, {"kind": "flat"}, params.classes)
-    made = transitions.map_terrain(terrain, grid.spacing)
-    row = transitions.measure_transitions(seen, made, lpips_weights.read(paths.lpips), params.seed)
+    row = transitions.TransitionMeasures()  # where one material was found
+    if terrain.classes is not None:
+        made = transitions.map_terrain(terrain, grid.spacing)
+        row = transitions.measure_transitions(seen, made, lpips_weights.read(paths.lpips), params.seed)
     csv_tables.write_table(snakemake.output.table, [asdict(row)])

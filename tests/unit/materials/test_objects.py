@@ -60,6 +60,15 @@ def test_large_things_are_no_objects():
     assert not footprints and excluded[55, 55]
 
 
+@pytest.mark.parametrize(("rise", "found"), [(8.0, 1), (16.0, 0)])
+def test_things_that_are_taller_than_wide_are_no_objects(rise, found):
+    own = box(50, 60, 40, 50)
+    ground = around(own)
+    ground.rise[own] = rise
+    footprints, excluded = objects.find_footprints([own], own, ground)
+    assert len(footprints) == found and excluded[55, 45] == (not found)
+
+
 def test_small_pieces_of_another_material_are_no_objects():
     things = box(50, 60, 50, 60)
     footprints, excluded = find(things, pieces=things)

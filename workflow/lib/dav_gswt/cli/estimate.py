@@ -101,11 +101,11 @@ COSTS: dict[str, Callable[[Work], Cost]] = {
         1.2 + work.observation_seconds * work.mean_photos, work.step_seconds * work.steps_per_photo * work.new
     ),
     "inpaint_field": lambda work: Cost(15.0),
-    "find_materials": lambda work: Cost(2.0 + 8.0 * work.field_size),
+    "find_materials": lambda work: Cost(9.5 + 2.3 * work.field_size),
     "make_levels": lambda work: Cost(0.7, 1.4 * (0.5 + work.level_steps / 120) * (0.5 + 0.5 * work.field_size)),
     "cut_tiles": lambda work: Cost(1.2 + 2.3 * work.field_size),
-    "bundle_tiles": lambda work: Cost(0.5 + 1.3 * work.field_size),
-    "render_terrain": lambda work: Cost(10.5, 5e-7 * work.still_pixels),
+    "bundle_tiles": lambda work: Cost(6.0 + 1.5 * work.field_size),
+    "render_terrain": lambda work: Cost(26.0, 5e-7 * work.still_pixels),
 }
 
 

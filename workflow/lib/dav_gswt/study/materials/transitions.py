@@ -30,15 +30,16 @@ REPLICATES, LEVEL = 2000, 0.95
 
 @dataclass(frozen=True)
 class TransitionMeasures:
-    """terrain, photographed: mean distances. low, high: interval of their difference. crops: how many of each."""
+    """terrain, photographed: mean distances; None without a border. low, high: interval of their difference. crops: how
+    many of each."""
 
-    terrain: float
-    photographed: float
-    difference: float
-    low: float
-    high: float
-    terrain_crops: int
-    photographed_crops: int
+    terrain: float | None = None
+    photographed: float | None = None
+    difference: float | None = None
+    low: float | None = None
+    high: float | None = None
+    terrain_crops: int = 0
+    photographed_crops: int = 0
 
 
 @dataclass(frozen=True)
