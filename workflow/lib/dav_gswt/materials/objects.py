@@ -91,9 +91,9 @@ def find_footprints(
 ) -> tuple[list[Footprint], Bool[Array, "m m"]]:
     """Objects, and the cells of everything else that is no texture.
 
-    Things at the border of the exemplar are cut off, so they are no objects; nor are things that are long, frayed or
-    large or taller than wide, lie between two materials, are small pieces of another material, shade, or markers. On rough ground the
-    largest of many specks is texture.
+    Things at the border of the exemplar are cut off, so they are no objects; nor are things that are long, frayed,
+    large or taller than wide, lie between two materials, are small pieces of another material, shade, or markers. On
+    rough ground the largest of many specks is texture.
     Args: standing: cells of each thing that stands on the ground. candidates: cells that stand out by colour or height.
     Returns: footprints; cells to be filled beside them.
     """
