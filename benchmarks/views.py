@@ -25,8 +25,8 @@ CANDIDATES, PHOTOS, CHOSEN = 1000, 28, 20
 MORE_THAN_SCORES = {*NEEDS_FIELD, *ORACLES}
 REPEATS = 5
 CELLS = {  # the default policy first
-    "round_draft_seconds": ("scores_none_pdrop0", "active_farthest_none_pdrop0_lam0_k4"),
-    "round_draft_prior_seconds": ("scores_terrain_pdrop0.15", "active_w2-lpips-diverse_terrain_pdrop0.15_lam0.1_k4"),
+    "round_draft_seconds": ("scores_none_pdrop0", "active_coverage-error_none_pdrop0_lam0_k4"),
+    "round_draft_prior_seconds": ("scores_terrain_pdrop0.15", "active_coverage-w2_terrain_pdrop0.15_lam0_k4"),
 }
 TARGETS = {"select_1000_seconds": 0.2, "round_draft_seconds": 45}
 

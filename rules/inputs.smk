@@ -173,8 +173,10 @@ def earlier_decisions(wildcards):
     return fits_before(wildcards) | ({"last": f"{round_folder(t - 1)}/poses.json"} if t > 1 else {})
 
 
-def true_images(wildcards):
-    """What candidates truly show, for the policies that know it."""
+def pictures_that_tell(wildcards):
+    """The photos so far, for the policies that measure the field's error in them; for an oracle what candidates show."""
+    if wildcards.policy in NEEDS_PHOTOS:
+        return {"images": "<results>/<photos>/images"}
     if wildcards.policy not in ORACLES:
         return {}
     agent = config["scenes"][wildcards.scene].get("agent")

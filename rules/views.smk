@@ -68,7 +68,7 @@ rule select_poses:
     input:
         unpack(round_before),
         unpack(earlier_decisions),
-        unpack(true_images),
+        unpack(pictures_that_tell),
         captures=captures_before,
         views="<results>/<start>/views.json",
         model="<results>/<photos>/sparse",
@@ -89,7 +89,6 @@ rule select_poses:
         t=POSITIVE,
     params:
         scene=scene_keys("select_poses"),
-        size=lambda wildcards: config["presets"][wildcards.preset]["size"],
         policy=lambda wildcards: wildcards.policy,
         lam=real("lam"),
         k=integer("k"),

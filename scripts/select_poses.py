@@ -19,9 +19,10 @@ with logging_to(snakemake.log[0]):
     if not decided.stopped:
         remaining = candidates.list_remaining(params.scene, frame, paths.model, split, paths.captures)
         places, rng = candidates.camera_positions(taken, frame), np.random.default_rng([params.seed, params.t])
-        information = policy_inputs.build_information_gain(policy, scored, remaining, taken, paths.field)
-        errors = policy_inputs.measure_true_errors(policy, scored, remaining, paths, params.scene, params.size)
-        inputs = SelectionInput(places, decided.poses, rng, params.lam, information, errors)
+        information = policy_inputs.build_information_gain(
+            policy, scored, remaining, taken, split, paths, params.scene["agent"]
+        )
+        inputs = SelectionInput(places, decided.poses, rng, params.lam, information)
         chosen = selection.select_poses(policy, scored, inputs)
     result = selection.PoseSelection(policy, params.k, chosen, decided.stopped, decided.expected_gain())
     selection.write_pose_selection(snakemake.output.poses, result)

@@ -1,7 +1,7 @@
 """Pictures of docs/inspect.md: what `dav-gswt inspect` shows of a round of the config's scene.
 
 In: artifacts of the scene's last round. Out: docs/research/figures/inspect_{shown}.png. Needs the extra `inspect`.
-`snakemake --cores 2 --config policy=w2-lpips-diverse rounds=1 -- inspection`
+`snakemake --cores 2 --config policy=coverage-w2 rounds=1 -- inspection`
 """
 
 INSPECTED = {  # by the name of the picture: what is opened, and how

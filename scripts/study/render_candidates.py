@@ -7,7 +7,7 @@ from dav_gswt.views import candidates, oracle
 
 with logging_to(snakemake.log[0]):
     scene = snakemake.params.scene
-    listed = candidates.list_hemisphere(scene, read_scene_frame(snakemake.input.frame))
+    listed = candidates.list_rendered(scene, read_scene_frame(snakemake.input.frame))
     with atomic_folder(snakemake.output.truth) as folder:
         some = oracle.spread_candidates(listed, snakemake.params.poses)
         oracle.write_truth(folder, oracle.render_truth(scene, some, ""))

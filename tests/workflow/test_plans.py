@@ -103,7 +103,7 @@ def test_a_round_s_photos_leave_with_those_of_the_rounds_before(planned, tmp_pat
     assert plan["render_photos"] == plan["split_views"] == 1 and "make_levels" not in plan
 
 
-@pytest.mark.parametrize("policy", ["farthest", "fisher", "oracle", "w2-lpips", "single"])
+@pytest.mark.parametrize("policy", ["farthest", "coverage-error", "oracle", "w2-lpips", "single"])
 def test_the_default_target_takes_a_policy_of_every_kind(planned, tmp_path, policy):
     default = planned(tmp_path, "--config", f"policy={policy}", configs=(USUAL, TINY))
     assert default["make_page"] == 1 and default["select_poses"] == 1

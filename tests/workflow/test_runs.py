@@ -116,7 +116,7 @@ def test_a_round_may_use_the_uncertainty_of_a_prior(snakemake, tiny, tmp_path):
 
 def test_a_policy_that_reads_the_prior_makes_the_same_bytes_on_any_number_of_threads(snakemake, tiny, tmp_path):
     branch = Path("results/desert/seed0/draft")
-    way = branch / "active_w2-lpips-diverse_terrain_pdrop0.15_lam0.1_k2/iter1"
+    way = branch / "active_w2-lpips_terrain_pdrop0.15_lam0.1_k2/iter1"
     made = []
     for threads in ("1", "2"):
         folder = shutil.copytree(tiny.folder, tmp_path / threads, symlinks=True)

@@ -34,7 +34,7 @@ def few(folder, vary, fixed="{policy: w2, rounds: 1}", measure="{views: [0]}"):
         pytest.param("{k: [2, 3, 4]}", dict(score_coarse=1, select_poses=3, update_field=3), id="k shares the scores"),
         pytest.param("{rounds: [0, 1, 2]}", dict(evaluate_coarse=1, update_field=2, score_round=1), id="T is a prefix"),
         pytest.param(
-            "{policy: [w2, residual]}", dict(score_coarse=1, update_field=2), id="estimators share the scores"
+            "{policy: [w2, coverage-w2]}", dict(score_coarse=1, update_field=2), id="estimators share the scores"
         ),
         pytest.param("{policy: [random, all], rounds: [1, 2]}", dict(update_field=3), id="all photos are one round"),
     ],

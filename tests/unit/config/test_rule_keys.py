@@ -83,7 +83,8 @@ def test_what_renders_photos_reads_only_its_keys(synthetic_scene):
 
 @pytest.mark.parametrize("rule", ["score_coarse", "select_poses", "capture_views", "render_candidates"])
 def test_what_lists_rendered_candidates_reads_only_its_keys(synthetic_scene, rule):
-    assert len(synthetic.candidates(select_scene_keys(rule, synthetic_scene))) == 250
+    frame = synthetic.make_scene("desert", 0).frame
+    assert len(candidates.list_rendered(select_scene_keys(rule, synthetic_scene), frame)) == 250
 
 
 @pytest.mark.parametrize("agent", ["serial", "plan", "handheld"])
@@ -92,7 +93,7 @@ def test_what_lists_candidates_for_devices_reads_only_its_keys(agent, rule):
     frame = synthetic.make_scene("desert", 0).frame
     camera = Camera(np.eye(3), np.zeros(3), 100.0, 100.0, 64.0, 64.0, 128, 128)
     given = select_scene_keys(rule, photo_scene(agent))
-    assert given["agent"] == agent and len(candidates.list_orbit(given, frame, camera)) == 250
+    assert given["agent"] == agent and len(candidates.list_poses(given, frame, camera)) == 250
 
 
 def test_structure_from_motion_reads_only_its_keys():

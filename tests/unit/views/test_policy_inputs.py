@@ -1,5 +1,6 @@
-"""What the oracle sees: the true error at every candidate whose truth is known, from photos or from pictures drawn."""
+"""What policies of coverage know: the field's error in the photos so far, the prior's maps, or the truth."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,12 +11,17 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import write_field
 from dav_gswt.geometry.scene_frame import write_scene_frame
 from dav_gswt.images import image_files
+from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
 from dav_gswt.photos.training_views import TrainingView
+from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.raster import render
 from dav_gswt.reconstruction import ground
 from dav_gswt.views import oracle, policy_inputs
+from dav_gswt.views.pose_maps import PoseMaps, write_pose_maps
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.uncertainty.weighting import Scales
+
+SPLIT = ViewSplit(("p0.png", "p2.png"), (), ())
 
 
 def pool():
@@ -24,39 +30,70 @@ def pool():
 
 @pytest.fixture
 def files(tmp_path):
-    """A field that is darker than its photos, and more so in the last of them."""
+    """A field that is darker than its photos, and more so in the east."""
     true = patch.field()
-    write_field(replace(true, sh=true.sh - np.float32(0.1)), tmp_path / "field.ply")
+    east = np.where(true.means[:, 0] > 1.6, 0.6, 0.1).astype(np.float32)[:, None, None]
+    write_field(replace(true, sh=true.sh - east), tmp_path / "field.ply")
     ground.write_ground(patch.grid(), tmp_path / "ground.exr")
     write_scene_frame(tmp_path / "ground.json", replace(patch.FRAME, kind="synthetic"))
-    views = []
-    for i, (pose, camera) in enumerate(pool()):
-        picture = np.clip(render(true, camera).colour + np.float32(0.2 * (i == 2)), 0, 1)
+    views, names = [], [pose.name for pose, _ in pool()]
+    for pose, camera in pool():
+        picture = np.clip(render(true, camera).colour, 0, 1)
         image_files.write_png(tmp_path / pose.name, picture)
         views.append(TrainingView(pose.name, camera, picture, np.ones((96, 96), np.float32)))
+    none = np.zeros(0, int)
+    points = np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2))
+    (tmp_path / "sparse").mkdir()
+    write_colmap_model(ColmapModel(tuple(names), tuple(c for _, c in pool()), *points), tmp_path / "sparse")
     oracle.write_truth(tmp_path / "truth", iter(views[1:]))
-    given = {"field": tmp_path / "field.ply", "ground": tmp_path / "ground.exr", "frame": tmp_path / "ground.json"}
-    return given | {"images": tmp_path, "truth": tmp_path / "truth"}
+    known = np.where(true.means[:, 1] > 1.6, 0.8, 0.2).astype(np.float32)
+    write_pose_maps(tmp_path / "maps.npz", PoseMaps(names, np.zeros((3, 4, 4), np.float32), None), known)
+    given = {name: tmp_path / f"{name}.{end}" for name, end in (("field", "ply"), ("ground", "exr"), ("maps", "npz"))}
+    given |= {"frame": tmp_path / "ground.json", "images": tmp_path, "model": tmp_path / "sparse"}
+    return given | {"truth": tmp_path / "truth", "captures": [], "fits": []}
 
 
-def errors(files, agent, policy="oracle"):
+def build(policy, files, agent="render"):
     scores = Scores([pose for pose, _ in pool()][::-1], {}, Scales({}), np.zeros(3, int))
-    return policy_inputs.measure_true_errors(policy, scores, pool(), files, {"agent": agent}, 96)
+    return policy_inputs.build_information_gain(policy, scores, pool(), [], SPLIT, files, agent)
 
 
-def test_of_a_replayed_scene_every_photo_tells_in_the_order_of_the_scores(files):
-    found = errors(files, "replay")
-    assert np.isfinite(found).all() and found[0] > 2 * found[1:].max()
-    assert np.array_equal(found, errors(files, "replay", "oracle-diverse"))
+def sides(files, policy, axis, agent="render"):
+    """Mean importance of the cells that lie above the middle of an axis, and below."""
+    found, cells = build(policy, files, agent).importance, policy_inputs.GroundCells(patch.field(), patch.grid())
+    far = cells.middle[:, axis] > 1.6
+    return found[far].mean(), found[~far].mean()
 
 
-def test_of_a_rendered_scene_only_what_was_drawn_is_known(files):
-    found = errors(files, "render")
-    assert np.isnan(found).tolist() == [False, False, True] and found[0] > 2 * found[1]
+def test_without_a_weight_all_cells_count_alike(files):
+    assert (build("coverage", files).importance == 1).all()
 
 
-def test_other_policies_look_at_nothing_and_no_truth_is_refused(files, tmp_path):
-    assert errors({}, "replay", "farthest") is None
+def test_gains_are_in_the_order_of_the_scores(files):
+    found = build("coverage", files).gains()
+    alone = [build("coverage", files).gain(i) for i in range(3)]
+    assert found == alone and len(set(found)) == 3
+
+
+@pytest.mark.parametrize("policy, agent", [("coverage-error", "render"), ("oracle", "render"), ("oracle", "replay")])
+def test_ground_that_is_shown_wrong_matters_more(files, policy, agent):
+    east, west = sides(files, policy, 0, agent)
+    assert east > 5 * west > 0
+
+
+def test_photos_that_an_update_rejected_do_not_count(files, tmp_path):
+    rejected = {"new_views": {"taken": False, "views": [{"view": name} for name in SPLIT.start]}}
+    (tmp_path / "fit.json").write_text(json.dumps(rejected))
+    assert (build("coverage-error", files | {"fits": [tmp_path / "fit.json"]}).importance == 1).all()
+
+
+def test_the_prior_s_uncertainty_is_that_of_the_gaussians_over_a_cell(files):
+    north, south = sides(files, "coverage-w2", 1)
+    assert north / south == pytest.approx(4, rel=0.05)
+
+
+def test_other_policies_read_nothing_and_no_truth_is_refused(files, tmp_path):
+    assert build("farthest", {}) is None
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="shows no candidate that is left"):
-        errors(files | {"truth": tmp_path / "empty"}, "render")
+        build("oracle", files | {"truth": tmp_path / "empty"})

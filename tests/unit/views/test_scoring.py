@@ -146,17 +146,6 @@ def test_fisher_gain_is_the_squared_blend_weights_over_the_information_so_far():
     assert fisher.information_gain(seen, once) < fisher.information_gain(seen, none)
 
 
-def test_a_chosen_photo_lowers_the_gain_of_photos_that_overlap_it():
-    field, cameras_ = patch.field(), [scoring.scoring_camera(camera) for _, camera in pool()]
-    gathered = fisher.FisherInformation(field, [], cameras_)
-    before = [gathered.gain(i) for i in range(3)]
-    gathered.take(0)
-    after = [gathered.gain(i) for i in range(3)]
-    assert all(a < b for a, b in zip(after, before, strict=True)) and after[0] / before[0] < after[2] / before[2]
-    raster = Rasterizer()
-    np.testing.assert_allclose(gathered.known, fisher.accumulate_information(field, cameras_[:1], raster))
-
-
 def test_a_prior_sees_the_middle_square_and_the_nearest_photo():
     wide, square = pool([1.6, 1.6, 5.0], width=60)[0][1], pool([1.6, 1.6, 5.0])[0][1]
     cut = conditions.crop_camera(wide)

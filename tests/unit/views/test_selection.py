@@ -1,6 +1,5 @@
 import re
 import textwrap
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.poses import Pose, pose_of_camera, pose_offset, select_farthest_poses
 from dav_gswt.views import policies, scores, selection
 from dav_gswt.views.policies import POLICIES, SelectionInput
-from dav_gswt.views.policy_names import POLICY_NAMES, POLICY_SPECS, PolicySpec
+from dav_gswt.views.policy_names import NEEDS_FIELD, POLICY_NAMES, POLICY_SPECS, PolicySpec
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.uncertainty import Scales
 
@@ -27,20 +26,23 @@ class Sharing:
     """Information that fades for the neighbours of what was taken, as that of overlapping photos does."""
 
     def __init__(self, gains):
-        self.gains, self.looks = list(gains), 0
+        self.now, self.looks = list(gains), 0
+
+    def gains(self):
+        return list(self.now)
 
     def gain(self, i):
         self.looks += 1
-        return self.gains[i]
+        return self.now[i]
 
     def take(self, i):
         for j in (i - 1, i, i + 1):
-            if 0 <= j < len(self.gains):
-                self.gains[j] /= 10
+            if 0 <= j < len(self.now):
+                self.now[j] /= 10
 
 
-def chosen(policy, pool, k, captured=((1.0, 0, 0),), seed=0, lam=0.0, information=None, errors=None):
-    inputs = SelectionInput(np.array(captured).reshape(-1, 3), k, np.random.default_rng(seed), lam, information, errors)
+def chosen(policy, pool, k, captured=((1.0, 0, 0),), seed=0, lam=0.0, information=None):
+    inputs = SelectionInput(np.array(captured).reshape(-1, 3), k, np.random.default_rng(seed), lam, information)
     return [pose.name for pose in selection.select_poses(policy, pool, inputs)]
 
 
@@ -56,10 +58,6 @@ def test_farthest_breaks_ties_by_index():
 
 def test_farthest_does_not_take_a_pose_twice_when_all_coincide():
     assert sorted(chosen("farthest", scored(0, 0, 0), 3, captured=())) == ["p0", "p1", "p2"]
-
-
-def test_opacity_chooses_the_highest_scores_and_breaks_ties_by_index():
-    assert chosen("opacity", scored(0, 1, 2, 3, opacity=[0.1, 0.5, 0.5, 0.2]), 3) == ["p1", "p2", "p3"]
 
 
 def test_w2_lpips_weights_lpips_by_lam_and_breaks_ties_by_index():
@@ -81,62 +79,12 @@ def test_w2_ignores_lpips_and_grad_lpips_uses_the_gradient_in_place_of_w2():
     assert chosen("grad-lpips", pool, 1) == ["p2"] and chosen("grad-lpips", pool, 1, lam=1e6) == ["p0"]
 
 
-def test_residual_chooses_the_top_k_and_residual_diverse_spreads_them():
-    pool = scored(0, 3, 6, 120, 240, residual=[1.0, 1.1, 1.0, 0.5, 0.1])
-    assert chosen("residual", pool, 3, captured=()) == ["p1", "p0", "p2"]
-    assert chosen("residual-diverse", pool, 2, captured=()) == ["p1", "p3"]
-
-
-def test_w2_lpips_diverse_weighs_uncertainty_against_spread():
-    """The most uncertain candidates are neighbours: one photo covers all of them."""
-    pool = scored(0, 3, 6, 120, 240, w2_sq=[1.0, 1.1, 1.0, 0.5, 0.4], lpips=[0.0] * 5)
-    assert chosen("w2-lpips", pool, 3, captured=()) == ["p1", "p0", "p2"]
-    assert chosen("w2-lpips-diverse", pool, 3, captured=()) == ["p1", "p3", "p4"]
-    assert set(chosen("diverse", pool, 3, captured=())) == set(chosen("w2-lpips-diverse", pool, 3, captured=()))
-
-
-def test_w2_lpips_diverse_avoids_uncertain_poses_near_earlier_photos():
-    pool = scored(0, 3, 6, 120, 240, w2_sq=[1.0, 1.1, 1.0, 0.5, 0.4], lpips=[0.0] * 5)
-    assert chosen("w2-lpips-diverse", pool, 1, captured=((1.0, 0.05, 0),)) == ["p3"]
-
-
-def test_shuffled_permutes_uncertainty_by_its_generator():
-    pool = scored(*range(0, 360, 12), w2_sq=np.linspace(0, 1, 30) ** 4)
-    draws = [chosen("shuffled", pool, 3, captured=(), seed=s) for s in (1, 1, 2)]
-    assert draws[0] == draws[1] != draws[2] and draws[0] != chosen("w2-lpips-diverse", pool, 3, captured=())
-
-
-def test_ring_is_evenly_spaced_and_the_next_ring_is_turned():
-    found = [
-        Pose(f"p{i}", e, float(a), 1.0)
-        for i, (e, a) in enumerate((e, a) for e in (45.0, 80.0) for a in range(0, 360, 5))
-    ]
-    pool = Scores(found, {"opacity": np.zeros(144)}, Scales({"opacity": 0.0}), np.zeros(144, int))
-    at = {pose.name: pose for pose in found}
-    first, second = (sorted(at[n].azimuth for n in chosen("ring", pool, 4, captured=c)) for c in ((), ((1.0, 0, 0),)))
-    assert first == [0, 90, 180, 270] and all(at[n].elevation == 45 for n in chosen("ring", pool, 4))
-    assert np.ptp(np.diff(second)) <= 5 and not set(first) & set(second)
-
-
-def test_fisher_is_greedy_with_updates_and_evaluates_few_gains():
+@pytest.mark.parametrize("policy", NEEDS_FIELD)
+def test_coverage_is_greedy_with_updates_and_evaluates_few_gains(policy):
     gains = [5.0, 4.9, 4.8, 1.0, 3.0, *([0.5] * 40)]
     sharing = Sharing(gains)
-    assert chosen("fisher", scored(*range(45), fisher=gains), 3, information=sharing) == ["p0", "p2", "p4"]
+    assert chosen(policy, scored(*range(45)), 3, information=sharing) == ["p0", "p2", "p4"]
     assert sharing.looks <= 5  # p0, p1 (fell), p2, p4, not all 45 each time
-
-
-def test_oracle_chooses_the_largest_known_errors():
-    errors = np.array([0.1, np.nan, 0.5, 0.3])
-    assert chosen("oracle", scored(0, 1, 2, 3), 2, errors=errors) == ["p2", "p3"]
-
-
-def test_oracle_diverse_chooses_one_of_two_neighbours_of_equal_error():
-    errors = np.array([0.5, 0.5, 0.0, 0.3, np.nan])
-    near, far, away = Pose("p0", 45.0, 0.0, 1.0), Pose("p3", 45.0, 180.0, 1.0), Pose("p4", 45.0, 90.0, 1.0)
-    pool = [near, replace(near, name="p1", azimuth=1.0), replace(near, name="p2", azimuth=90.0), far, away]
-    table = Scores(pool, {"opacity": np.zeros(5)}, Scales({"opacity": 0.0}), np.zeros(5, int))
-    assert chosen("oracle", table, 2, errors=errors) == ["p0", "p1"]
-    assert sorted(chosen("oracle-diverse", table, 2, errors=errors, captured=())) in (["p0", "p3"], ["p1", "p3"])
 
 
 def test_all_chooses_every_candidate_whatever_k_is_within_the_budget():
@@ -157,8 +105,8 @@ def test_the_name_of_a_policy_has_small_letters_digits_and_hyphens_only(name):
 
 def test_a_policy_says_what_it_reads():
     reads = {spec.name: spec.describe_inputs() for spec in POLICY_SPECS}
-    assert (reads["farthest"], reads["opacity"], reads["oracle"]) == ("poses", "geometric scores", "true error")
-    assert (reads["fisher"], reads["w2-lpips"]) == ("geometric scores, field", "prior")
+    assert (reads["farthest"], reads["oracle"]) == ("poses", "field, true pictures")
+    assert (reads["coverage-error"], reads["w2-lpips"]) == ("field, photos", "prior")
     assert reads["single"] == "prior (not `p_drop`, `lam`)"
 
 
@@ -187,9 +135,8 @@ def test_random_depends_on_its_generator_only():
 
 @pytest.mark.parametrize("policy", POLICIES)
 def test_with_fewer_candidates_than_k_all_are_chosen_with_a_warning(policy, caplog):
-    terms = dict(w2_sq=[0.0, 1], gradient=[1.0, 2], fisher=[1.0, 2], lpips=[1.0, 1], single=[0.1, 0], residual=[0.1, 0])
-    more = dict(information=Sharing([1.0, 2]), errors=np.array([0.5, np.nan]))
-    assert sorted(chosen(policy, scored(0, 90, **terms), 5, **more)) == ["p0", "p1"]
+    terms = dict(w2_sq=[0.0, 1], gradient=[1.0, 2], lpips=[1.0, 1], single=[0.1, 0])
+    assert sorted(chosen(policy, scored(0, 90, **terms), 5, information=Sharing([1.0, 2.0]))) == ["p0", "p1"]
     assert "only 2 candidates" in caplog.text
     assert chosen(policy, scored(), 5) == []
     assert "no candidate pose is left" in caplog.text

@@ -145,9 +145,9 @@ def test_a_camera_that_mitsuba_cannot_hold_is_refused():
 
 
 def test_the_config_entry_tells_how_many_pictures_of_which_size():
-    start, tests, pool = synthetic.start_views(ENTRY), synthetic.test_views(ENTRY), synthetic.candidates(ENTRY)
-    assert (len(start), len(tests), len(pool)) == (8, 6, 20)
-    assert {(c.width, c.height) for c in start + tests + pool} == {(64, 64)}
+    start, tests = synthetic.start_views(ENTRY), synthetic.test_views(ENTRY)
+    assert (len(start), len(tests)) == (8, 6)
+    assert {(c.width, c.height) for c in start + tests} == {(64, 64)}
     moved = synthetic.start_views(ENTRY, (10.0, 0.0, 0.0))
     assert moved[3].centre - start[3].centre == pytest.approx([10, 0, 0])
 
@@ -178,7 +178,6 @@ def test_a_cap_is_photographed_and_tested_evenly_from_above_its_lowest_elevation
     for cameras, count in (
         (synthetic.start_views(HIGH), 24),
         (synthetic.test_views(HIGH)[:12], 12),
-        (synthetic.candidates(HIGH), 20),
     ):
         height = np.sort(np.sin(np.radians(elevations(cameras))))
         # equal steps of height are equal areas of the sphere
@@ -217,8 +216,8 @@ def test_walkers_are_a_group_of_their_own_and_look_over_the_exemplar_to_the_hori
 
 @pytest.mark.parametrize("rig", ["cap", "paper"])
 def test_no_view_is_another(rig):
-    entry = HIGH | {"layout": rig, "candidates": 24, "walkers": 6}
-    cameras = synthetic.start_views(entry) + synthetic.test_views(entry) + synthetic.candidates(entry)
+    entry = HIGH | {"layout": rig, "walkers": 6}
+    cameras = synthetic.start_views(entry) + synthetic.test_views(entry)
     at = np.array([c.centre for c in cameras])
     assert np.linalg.norm(at[:, None] - at, axis=-1)[~np.eye(len(at), dtype=bool)].min() > 0.1
 

@@ -17,9 +17,9 @@ def test_every_combination_comes_once_and_says_what_was_varied():
 
 def test_a_policy_may_bring_settings_of_its_own():
     (found,) = grid.list_combinations(
-        {"policy": [{"policy": "residual", "prior": "independent", "p_drop": 0}]}, {"p_drop": 0.3}
+        {"policy": [{"policy": "w2", "prior": "independent", "p_drop": 0}]}, {"p_drop": 0.3}
     )
-    assert found == {"policy": "residual", "prior": "independent", "p_drop": 0, "shown": {"policy": "residual"}}
+    assert found == {"policy": "w2", "prior": "independent", "p_drop": 0, "shown": {"policy": "w2"}}
 
 
 @pytest.mark.parametrize(

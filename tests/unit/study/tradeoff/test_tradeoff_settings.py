@@ -90,7 +90,7 @@ def test_each_knob_has_a_most_accurate_and_a_base_and_no_setting_comes_twice(con
         ("auto", "draft-steps-auto", False),
     ]
     assert [s.shown for s in found if s.knob == "levels"][0] == "auto"
-    assert {s.chosen["policy"] for s in found if s.knob == "denoising"} == {"w2-lpips-diverse"}
+    assert {s.chosen["policy"] for s in found if s.knob == "denoising"} == {"coverage-w2"}
     assert [s.chosen["tau"] for s in found if s.knob == "tau"] == [0, 0.6, 1]
 
 

@@ -44,16 +44,16 @@ class EntryKeys(dict):
             raise LookupError(f"the rule is not given the key {key!r}: name it in dav_gswt.config.rule_keys")
 
 
-_HEMISPHERE = ("candidates", "min_elevation", "size")  # poses of a scene that is rendered
-_ORBIT = ("candidates", "min_elevation")  # poses for devices and people
+_POSES = ("candidates", "min_elevation", "poses")  # for devices and people
+_RENDERED_POSES = (*_POSES, "size")
 _REACH = tuple(f"rig.{key}" for key in ("millimetres", "pan_zero", "tilt_zero", "limits", "no_go"))
-_CANDIDATES = {"render": _HEMISPHERE, "replay": (), "serial": _ORBIT, "plan": _ORBIT, "handheld": _ORBIT}
+_CANDIDATES = {"render": _RENDERED_POSES, "replay": (), "serial": _POSES, "plan": _POSES, "handheld": _POSES}
 _SCORED = {
-    "render": (*_HEMISPHERE, "feasibility"),
+    "render": (*_RENDERED_POSES, "feasibility"),
     "replay": (),
-    "serial": (*_ORBIT, "feasibility", *_REACH),
-    "plan": (*_ORBIT, "feasibility"),
-    "handheld": (*_ORBIT, "feasibility"),
+    "serial": (*_POSES, "feasibility", *_REACH),
+    "plan": (*_POSES, "feasibility"),
+    "handheld": (*_POSES, "feasibility"),
 }
 _DEVICES = {"render": ("family", "seed"), "replay": (), "serial": ("rig",), "plan": ("drone",), "handheld": ()}
 _SELECTED = {agent: (*keys, "burst") for agent, keys in _CANDIDATES.items()}
@@ -72,7 +72,7 @@ SCENE_KEYS: dict[str, tuple[str, ...] | dict[str, tuple[str, ...]]] = {
     "select_poses": _SELECTED,
     "capture_views": _CAPTURED,
     "request_views": _CAPTURED,
-    "render_candidates": {"render": (*_HEMISPHERE, "family", "seed")},
+    "render_candidates": {"render": (*_RENDERED_POSES, "family", "seed")},
     "calibrate_coarse": _CANDIDATES,
     "calibrate_round": _CANDIDATES,
 }

@@ -4,9 +4,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from dav_gswt.config.base import ConfigModel, Degrees, Name, Seed, Text, key
+from dav_gswt.config.base import ConfigModel, Degrees, Name, Seed, Share, Text, key
 
 Range = Annotated[tuple[float, float], Field(description="lowest and highest", strict=False)]
+Radius = Annotated[float, Field(ge=0.05, le=20)]
+Coordinate = Annotated[float, Field(ge=-100, le=100)]
+GroundPlace = Annotated[tuple[Coordinate, Coordinate], Field(strict=False)]
 
 
 class Axes(ConfigModel):
@@ -70,13 +73,55 @@ class Feasibility(ConfigModel):
     max_distance: float | None = key("from the exemplar's middle", None, unit="world units", renamed="farthest", gt=0)
 
 
+class OrbitPoses(ConfigModel):
+    """All at the flying height from the exemplar's middle, and looking there."""
+
+    kind: Literal["orbit"]
+
+
+class FreePoses(ConfigModel):
+    """Any direction, distance and aim point."""
+
+    kind: Literal["free"]
+    radii: tuple[Radius, Radius] = key(
+        "least and greatest distance from the aim point", (0.4, 1.5), unit="flying heights", strict=False
+    )
+    aims: Share = key("of the exemplar's side: the square about its middle that aim points lie in; 0: the middle", 1)
+
+    @model_validator(mode="after")
+    def _order_radii(self) -> "FreePoses":
+        if self.radii[0] > self.radii[1]:
+            raise ValueError(f"radii go from high ({self.radii[0]:g}) to low ({self.radii[1]:g}); give the least first")
+        return self
+
+
+class RoutePoses(ConfigModel):
+    """Stops along a path, as a walker or a drone in a corridor has them; four headings at each."""
+
+    kind: Literal["route"]
+    places: list[GroundPlace] = key(
+        "corners of the path, east and north of the exemplar's middle",
+        unit="sides of the exemplar",
+        min_length=2,
+        max_length=1000,
+    )
+    height: float = key("above the plane of the ground", unit="flying heights", ge=0.01, le=10)
+    down: float = key("how far below the horizon the camera looks", 35, unit="degrees", ge=1, le=89)
+
+
+CandidatePoses = Annotated[OrbitPoses | FreePoses | RoutePoses, Field(discriminator="kind")]
+
+
 class _Scene(ConfigModel):
     preset: Name = key("an entry of `presets`", renamed="quality")
     tiling: Name = key("an entry of `tilings`", renamed="seam")
 
 
 class _PhotographedScene(_Scene):
-    candidates: int = key("poses on the hemisphere that may be asked for", 250, ge=0, le=10_000)
+    candidates: int = key("poses that may be asked for", 250, ge=0, le=10_000)
+    poses: CandidatePoses | None = key(
+        "which poses these are; if left out `{kind: free}`, for a rig `{kind: orbit}`", None
+    )
     min_elevation: float = key(
         "lowest elevation of candidates and of test views", 30, unit="degrees", renamed="lowest", ge=5, le=85
     )
@@ -159,7 +204,7 @@ class PhotoScene(_PhotographedScene):
         "who takes further photos: `replay` takes the nearest unused photo of the folder; `serial` is a camera rig, "
         "`plan` a drone, `handheld` a person"
     )
-    candidates: int = key("poses on the hemisphere that a device may be asked for", 250, ge=1, le=10_000)
+    candidates: int = key("poses that a device may be asked for", 250, ge=1, le=10_000)
     rig: SerialRig | None = key("the camera rig of `agent: serial`", None)
     drone: Drone = key("how a drone flies, for `agent: plan`", Drone(), renamed="flight")
 

@@ -4,12 +4,15 @@ Elevation is measured from the ground up (90: straight above), azimuth from +x t
 """
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray as Array
 
 from dav_gswt.geometry.cameras import Camera, look_at, pinhole
 
 Place = tuple[float, float, float]  # elevation, azimuth, radius
 NEARER = 0.9  # radius of a test view, relative to other views
 GOLDEN = np.pi * (3.0 - 5.0**0.5)  # radians between neighbours of a Fibonacci lattice
+PLASTIC = 1.2207440846057596  # x^4 = x + 1: base of the quasirandom sequence in three dimensions
 CIRCLE = 36  # views on the circle of the rig `paper`, of 100 or of any number from 72
 EYE_LEVEL_PITCH = 12.0  # degrees below the horizon
 
@@ -54,6 +57,41 @@ def hemisphere(n: int, lowest_elevation: float, radius: float, turn: float = 0.0
     height = 1.0 - (np.arange(n) + 0.5) / max(n, 1) * (1.0 - low)
     azimuth = (np.degrees(np.arange(n) * GOLDEN) + turn) % 360.0
     return [(float(np.degrees(np.arcsin(h))), float(a), radius) for h, a in zip(height, azimuth, strict=True)]
+
+
+def spread_free(
+    n: int, lowest_elevation: float, radii: tuple[float, float], reach: float
+) -> list[tuple[Place, tuple[float, float]]]:
+    """n places, each about an aim point of its own on the ground: (place, (x, y)).
+
+    Directions are those of `hemisphere`; radii (uniform between the two) and aim points (uniform over a square of side
+    `reach` about the target) follow a sequence of low discrepancy.
+    Source: Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018 (R3).
+    """
+    spread = (0.5 + np.outer(np.arange(1, n + 1), PLASTIC ** -np.arange(1.0, 4.0))) % 1.0
+    radius = radii[0] + (radii[1] - radii[0]) * spread[:, 2]
+    aims = reach * (spread[:, :2] - 0.5)
+    return [
+        ((elevation, azimuth, float(r)), (float(x), float(y)))
+        for (elevation, azimuth, _), r, (x, y) in zip(hemisphere(n, lowest_elevation, 1.0), radius, aims, strict=True)
+    ]
+
+
+def spread_along(places: Float[Array, "m 2"], n: int) -> tuple[Float[Array, "n 2"], Float[Array, "n"]]:
+    """n points evenly along a polyline, ends included, and its azimuth there in degrees.
+
+    Raises: ValueError: fewer than two places, or a route without length.
+    """
+    steps = np.diff(places, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    if not lengths.sum() > 0:
+        raise ValueError("a route needs two places that are apart")
+    ends = np.concatenate([[0.0], np.cumsum(lengths)])
+    at = np.linspace(0.0, ends[-1], n)
+    leg = np.clip(np.searchsorted(ends, at, side="right") - 1, 0, len(steps) - 1)
+    share = (at - ends[leg]) / np.maximum(lengths[leg], 1e-300)
+    azimuth = np.degrees(np.arctan2(steps[leg, 1], steps[leg, 0]))
+    return places[leg] + share[:, None] * steps[leg], azimuth
 
 
 def paper(n: int, elevation: float, lowest_elevation: float, radius: float) -> list[Place]:

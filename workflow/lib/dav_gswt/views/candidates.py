@@ -1,4 +1,8 @@
-"""Candidate poses: on a hemisphere for scenes that can be photographed, at the photos of a replayed scene."""
+"""Candidate poses: where a camera may stand and look, or the photos of a replayed scene.
+
+Where photos can be taken, the scene's `poses` says which: `free` (any direction, distance and aim point over the
+exemplar), `orbit` (on a hemisphere, all looking at the middle) or `route` (along a path).
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -7,8 +11,9 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
+from dav_gswt.errors import InputError
 from dav_gswt.geometry import camera_layouts
-from dav_gswt.geometry.cameras import Camera
+from dav_gswt.geometry.cameras import Camera, pinhole
 from dav_gswt.geometry.poses import Pose, pose_of_camera
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.capture_record import read_capture_record
@@ -18,7 +23,10 @@ from dav_gswt.photos.view_split import ViewSplit
 
 Candidates = list[tuple[Pose, Camera]]
 
-ORBIT_POSES, LOWEST = 250, 30.0  # candidates for devices and people, and their least elevation in degrees
+FREE_RADII = (0.4, 1.5)  # flying heights
+ROUTE_DOWN = 35.0  # degrees below the horizon
+HEADINGS = 4  # at each stop of a route
+ANY_FIELD = 60.0  # degrees, of a camera that gets another lens
 
 
 def list_remaining(
@@ -29,36 +37,77 @@ def list_remaining(
     split: views.json. captures: folders of earlier rounds.
     """
     if scene["agent"] == "render":
-        listed = list_hemisphere(scene, frame)
+        listed = list_rendered(scene, frame)
     else:
         known = read_colmap_model(model_folder)
         at = dict(zip(known.names, known.cameras, strict=True))
         if scene["agent"] == "replay":
             listed = [(pose_of_camera(name, at[name], frame), at[name]) for name in split.pool]
         else:
-            listed = list_orbit(scene, frame, at[split.start[0]])
+            listed = list_poses(scene, frame, at[split.start[0]])
     used = {name for folder in captures for name in _used_names(folder)}
     return [(pose, camera) for pose, camera in listed if pose.name not in used]
 
 
-def list_hemisphere(scene: dict, frame: SceneFrame) -> Candidates:
-    """List poses spread evenly over the hemisphere of a synthetic scene."""
-    found = synthetic.candidates(scene, frame.exemplar.centre)
+def list_rendered(scene: dict, frame: SceneFrame) -> Candidates:
+    """List the poses at which a synthetic scene may be rendered."""
+    return list_poses(scene, frame, synthetic.lens(scene["size"]))
+
+
+def list_poses(scene: dict, frame: SceneFrame, lens: Camera) -> Candidates:
+    """List the poses that a scene's `poses` describes; free ones where it says nothing, for a rig an orbit.
+
+    scene: its keys `agent`, `candidates` (number), `min_elevation` (degrees) and `poses` are used. lens: a camera whose
+    lens and picture all have.
+    Raises: InputError: a route without length.
+    """
+    poses = scene.get("poses", {"kind": "orbit" if scene["agent"] == "serial" else "free"})
+    if poses["kind"] == "route":
+        found = _stand_along_route(scene["candidates"], poses, frame, lens)
+    else:
+        found = _stand_around(scene, poses, frame, lens)
     return [(pose_of_camera(f"pose_{i:04d}", camera, frame), camera) for i, camera in enumerate(found)]
 
 
-def list_orbit(scene: dict, frame: SceneFrame, like: Camera) -> Candidates:
-    """List poses spread evenly over the hemisphere at the flying height, for devices and people.
+def _stand_around(scene: dict, poses: dict, frame: SceneFrame, lens: Camera) -> list[Camera]:
+    """Cameras all around, each looking at its own aim point (free) or all at the middle (orbit)."""
+    count, lowest = scene["candidates"], scene["min_elevation"]
+    radii, aims = (1.0, 1.0), 0.0
+    if poses["kind"] == "free":
+        radii, aims = poses.get("radii", FREE_RADII), poses.get("aims", 1.0)
+    low, high = (frame.flying_height * radius for radius in radii)
+    placed = camera_layouts.spread_free(count, lowest, (low, high), aims * frame.exemplar.side)
+    return [
+        _with_lens(
+            camera_layouts.orbit(*place, frame.exemplar.centre + [*aim, 0.0], lens.width, lens.height, ANY_FIELD), lens
+        )
+        for place, aim in placed
+    ]
 
-    scene: its keys `candidates` (number) and `min_elevation` (least elevation, degrees) are used. like: a camera of
-    their lens.
+
+def _stand_along_route(count: int, poses: dict, frame: SceneFrame, lens: Camera) -> list[Camera]:
+    """Cameras at stops along a route, at each looking down to the ground ahead, to the left, back and to the right.
+
+    From stop to stop the headings turn by a quarter of a right angle, so that few photos see all directions.
     """
-    places = camera_layouts.hemisphere(
-        scene.get("candidates", ORBIT_POSES), scene.get("min_elevation", LOWEST), frame.flying_height
-    )
-    found = [camera_layouts.orbit(*place, frame.exemplar.centre, like.width, like.height, 60.0) for place in places]
-    lens = {name: getattr(like, name) for name in ("fx", "fy", "cx", "cy")}
-    return [(pose_of_camera(f"pose_{i:04d}", camera, frame), replace(camera, **lens)) for i, camera in enumerate(found)]
+    height, down = poses["height"] * frame.flying_height, np.radians(poses.get("down", ROUTE_DOWN))
+    places = frame.exemplar.side * np.asarray(poses["places"], float)
+    try:
+        stops, ahead = camera_layouts.spread_along(places, -(-count // HEADINGS))
+    except ValueError as error:
+        raise InputError(f"poses.places: {error}") from error
+    found = []
+    for i, (stop, azimuth) in enumerate(zip(stops, ahead, strict=True)):
+        eye = frame.exemplar.centre + [*stop, height]
+        for heading in range(HEADINGS):
+            turn = np.radians(azimuth + 360 / HEADINGS * (heading + (i % HEADINGS) / HEADINGS))
+            way = np.array([np.cos(down) * np.cos(turn), np.cos(down) * np.sin(turn), -np.sin(down)])
+            found.append(_with_lens(pinhole(eye, eye + way, lens.width, lens.height, ANY_FIELD), lens))
+    return found[:count]
+
+
+def _with_lens(camera: Camera, lens: Camera) -> Camera:
+    return replace(camera, **{name: getattr(lens, name) for name in ("fx", "fy", "cx", "cy")})
 
 
 def read_captured_cameras(model_folder: Path | str, split: ViewSplit, captures: list) -> list[Camera]:

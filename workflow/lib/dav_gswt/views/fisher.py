@@ -31,24 +31,3 @@ def information_gain(contributions: Contributions, known: Float64[Array, "n"]) -
     Source: Jiang et al., FisherRF, ECCV 2024, for colours only.
     """
     return float((contributions.squared / known).sum())
-
-
-class FisherInformation:
-    """Information gain of candidates, updated with every choice; implements `policies.InformationGain`."""
-
-    def __init__(self, field: GaussianField, taken: list[Camera], candidates: list[Camera]):
-        """taken, candidates: cameras at the scoring size."""
-        self.field, self.candidates, self.raster = field, candidates, Rasterizer()
-        self.known = accumulate_information(field, taken, self.raster)
-
-    def gain(self, i: int) -> float:
-        """Return the gain of a photo from candidate i over all photos so far."""
-        return information_gain(self._render_contributions(i), self.known)
-
-    def take(self, i: int) -> None:
-        """Add the photo from candidate i."""
-        self.known = self.known + self._render_contributions(i).squared
-
-    def _render_contributions(self, i: int) -> Contributions:
-        self.raster.forward(**to_raster_arrays(self.field), camera=self.candidates[i])
-        return self.raster.contributions()

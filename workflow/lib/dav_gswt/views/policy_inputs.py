@@ -1,59 +1,77 @@
 """Inputs of single policies beside the scores, computed only for the policies that need them."""
 
-from pathlib import Path
-
 import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.field import read_field
+from dav_gswt.files import read_json
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import read_scene_frame
-from dav_gswt.reconstruction import ground
-from dav_gswt.views import fisher, oracle
+from dav_gswt.photos.training_views import TrainingView, read_training_views
+from dav_gswt.photos.view_split import ViewSplit
+from dav_gswt.reconstruction import ground, regression_guard
+from dav_gswt.views import oracle, pose_maps
 from dav_gswt.views.candidates import Candidates
+from dav_gswt.views.coverage import ERROR_WIDTH, DirectionalCoverage, GroundCells, measure_cell_errors
 from dav_gswt.views.policies import InformationGain
-from dav_gswt.views.policy_names import NEEDS_FIELD, ORACLES
+from dav_gswt.views.policy_names import NEEDS_FIELD, NEEDS_PHOTOS, ORACLES, PRIOR_POLICIES
 from dav_gswt.views.scores import Scores
 from dav_gswt.views.scoring import scoring_camera
 
+Files = dict  # of the rule's inputs: a path, or for `captures` and `fits` a list of paths
+
 
 def build_information_gain(
-    policy: str, scores: Scores, candidates: Candidates, taken: list[Camera], file: Path | str
+    policy: str, scores: Scores, candidates: Candidates, taken: list[Camera], split: ViewSplit, files: Files, agent: str
 ) -> InformationGain | None:
     """Build the information gain for policies with `needs_field`; None for others.
 
-    taken: cameras of the photos so far. file: the field. Candidates are in the order of the scores.
+    taken: cameras of the photos so far. files: `field`, `ground` and `frame`; `images`, `model`, `captures` and `fits`
+    for policies with `needs_photos`; `maps` for those with `reads_prior`; `truth` (folder of true pictures of
+    candidates), for a replayed scene `images`, for those with `needs_truth`. Candidates are in the order of the scores.
+    Raises: InputError: no true picture of a candidate is left.
     """
     if policy not in NEEDS_FIELD:
         return None
     at = {pose.name: camera for pose, camera in candidates}
-    return fisher.FisherInformation(
-        read_field(file), [scoring_camera(c) for c in taken], [scoring_camera(at[name]) for name in scores.names]
+    cells = GroundCells(read_field(files["field"]), ground.read_ground(files["ground"]))
+    importance = _measure_importance(policy, cells, candidates, split, files, agent)
+    return DirectionalCoverage(
+        cells, [scoring_camera(c) for c in taken], [scoring_camera(at[name]) for name in scores.names], importance
     )
 
 
-def measure_true_errors(
-    policy: str, scores: Scores, candidates: Candidates, files: dict[str, Path | str], scene: dict, size: int
-) -> Float64[Array, "n"] | None:
-    """Measure the true error at each candidate for policies with `needs_truth`; None for others.
-
-    files: `field`, `ground`, `frame`, `truth` (folder of true pictures of candidates), and for a replayed scene
-    `images`. size: see `oracle.measure_errors`.
-    Returns: NaN where the true picture is unknown. Raises: InputError: it is unknown at every candidate.
-    """
-    if policy not in ORACLES:
-        return None
-    if scene["agent"] == "replay":
-        some, views = candidates, list(oracle.render_truth(scene, candidates, files["images"]))
-    else:
-        some, views = oracle.read_truth(candidates, files["truth"])
+def _measure_importance(
+    policy: str, cells: GroundCells, candidates: Candidates, split: ViewSplit, files: Files, agent: str
+) -> Float64[Array, "cells"] | None:
+    """How much each cell of the ground matters to a policy; None: all alike."""
     corrected = read_scene_frame(files["frame"]).kind == "photos"  # photos differ in exposure
-    found, _ = oracle.measure_errors(
-        read_field(files["field"]), ground.read_ground(files["ground"]), views, size, corrected
-    )
-    known = {pose.name: error for (pose, _), error in zip(some, found, strict=True)}
-    if not known:
+    if policy in NEEDS_PHOTOS:
+        return measure_cell_errors(cells, _read_photos(split, files), corrected)
+    if policy in PRIOR_POLICIES:
+        known = pose_maps.read_pose_maps(files["maps"])[1]
+        values = np.zeros(len(cells.field))
+        values[: len(known)] = known
+        return cells.average(values)
+    if policy in ORACLES:
+        return measure_cell_errors(cells, _read_truth(candidates, files, agent), corrected)
+    return None
+
+
+def _read_photos(split: ViewSplit, files: Files) -> list[TrainingView]:
+    """The photos so far, but for those that an update rejected."""
+    views = read_training_views(files["images"], files["model"], split.start, list(files["captures"]), ERROR_WIDTH)
+    aside = regression_guard.list_rejected_photos(map(read_json, files["fits"]))
+    return [view for view in views if view.name not in aside]
+
+
+def _read_truth(candidates: Candidates, files: Files, agent: str) -> list[TrainingView]:
+    """The true pictures of candidates, where they are known."""
+    if agent == "replay":
+        return list(oracle.render_truth({"agent": agent}, candidates, files["images"]))
+    found = oracle.read_truth(candidates, files["truth"])[1]
+    if not found:
         raise InputError(f"{files['truth']}: shows no candidate that is left; make it again with more of them")
-    return np.array([known.get(name, np.nan) for name in scores.names])
+    return found

@@ -15,19 +15,19 @@ class PolicySpec:
     """A policy: its name, which poses it chooses, and what it reads beside the places of the candidates.
 
     name: as in the config and in paths; small letters, digits and -. chooses: which poses, in words.
-    reads_geometry: the geometric scores `opacity` or `fisher`. reads_prior: scores by a prior.
-    needs_field: the field itself. The policy gets an `InformationGain` object (views/fisher.py) as
+    reads_prior: scores by a prior.
+    needs_field: the field itself. The policy gets an `InformationGain` object (views/coverage.py) as
     `SelectionInput.information`; for others that is None.
-    needs_truth: the true error at the candidates, as `SelectionInput.errors` (oracles).
+    needs_photos: the photos so far, for that object. needs_truth: true pictures of candidates, likewise (oracles).
     fixed_zero: of the prior's settings (p_drop, lam), those that have no effect and are 0 in paths.
     Raises: ValueError: another character in the name.
     """
 
     name: str
     chooses: str
-    reads_geometry: bool = False
     reads_prior: bool = False
     needs_field: bool = False
+    needs_photos: bool = False
     needs_truth: bool = False
     fixed_zero: tuple[str, ...] = ()
 
@@ -37,33 +37,44 @@ class PolicySpec:
 
     def describe_inputs(self) -> str:
         """What the policy reads, in words."""
-        if self.reads_prior:
-            return "prior" + (f" (not {', '.join(f'`{key}`' for key in self.fixed_zero)})" if self.fixed_zero else "")
-        flags = {"geometric scores": self.reads_geometry, "field": self.needs_field, "true error": self.needs_truth}
-        return ", ".join(name for name, read in flags.items() if read) or "poses"
+        prior = "prior" + (f" (not {', '.join(f'`{key}`' for key in self.fixed_zero)})" if self.fixed_zero else "")
+        reads = {
+            prior: self.reads_prior,
+            "field": self.needs_field,
+            "photos": self.needs_photos,
+            "true pictures": self.needs_truth,
+        }
+        return ", ".join(name for name, read in reads.items() if read) or "poses"
 
 
 POLICY_SPECS = (
     PolicySpec("random", "k drawn at random"),
-    PolicySpec(
-        "ring", "those nearest to k points spaced evenly on a ring at 45 degrees; the next round's ring is turned"
-    ),
     PolicySpec("farthest", "greedily, the one farthest from all photos so far: farthest point sampling"),
-    PolicySpec("diverse", "facility location with equal weights: every candidate is to have a photo nearby"),
     PolicySpec(
-        "opacity",
-        "the highest mean uncertainty of the render (1 - opacity, plus that of the Gaussians in view) over the pixels "
-        "that see ground",
-        reads_geometry=True,
-    ),
-    PolicySpec(
-        "fisher",
-        "greedily, the largest information gain on the Gaussians' colours over all photos so far and chosen",
-        reads_geometry=True,
+        "coverage",
+        "greedily, the largest gain in directional coverage: every cell of the ground is to be seen large, and from "
+        "many sides",
         needs_field=True,
     ),
-    PolicySpec("oracle", "the largest true error of the render: what a perfect score would choose", needs_truth=True),
-    PolicySpec("oracle-diverse", "facility location weighted by the true error", needs_truth=True),
+    PolicySpec(
+        "coverage-error",
+        "as `coverage`, each cell weighted by the error of the field in the photos so far",
+        needs_field=True,
+        needs_photos=True,
+    ),
+    PolicySpec(
+        "coverage-w2",
+        "as `coverage`, each cell weighted by W2 between the prior's samples",
+        reads_prior=True,
+        needs_field=True,
+        fixed_zero=("lam",),
+    ),
+    PolicySpec(
+        "oracle",
+        "as `coverage`, each cell weighted by the true error at the candidates: what a perfect score would choose",
+        needs_field=True,
+        needs_truth=True,
+    ),
     PolicySpec("all", "all candidates, whatever `k` is"),
     PolicySpec(
         "grad-lpips",
@@ -73,8 +84,6 @@ POLICY_SPECS = (
     PolicySpec(
         "w2-lpips", "the largest u = W2 + `lam` LPIPS, each over its frozen scale: the paper's top k", reads_prior=True
     ),
-    PolicySpec("w2-lpips-diverse", "facility location weighted by u", reads_prior=True),
-    PolicySpec("shuffled", "as `w2-lpips-diverse`, with u permuted at random (ablation)", reads_prior=True),
     PolicySpec("w2", "the largest W2 between the prior's samples, in latents", reads_prior=True, fixed_zero=("lam",)),
     PolicySpec(
         "single",
@@ -82,18 +91,12 @@ POLICY_SPECS = (
         reads_prior=True,
         fixed_zero=("p_drop", "lam"),
     ),
-    PolicySpec(
-        "residual",
-        "the largest distance of the samples' mean from the render, in latents",
-        reads_prior=True,
-        fixed_zero=("lam",),
-    ),
-    PolicySpec("residual-diverse", "facility location weighted by `residual`", reads_prior=True, fixed_zero=("lam",)),
 )
 
 POLICY_NAMES = tuple(spec.name for spec in POLICY_SPECS)
 GEOMETRIC = tuple(spec.name for spec in POLICY_SPECS if not spec.reads_prior)
 PRIOR_POLICIES = tuple(spec.name for spec in POLICY_SPECS if spec.reads_prior)
 ORACLES = tuple(spec.name for spec in POLICY_SPECS if spec.needs_truth)
+NEEDS_PHOTOS = tuple(spec.name for spec in POLICY_SPECS if spec.needs_photos)
 NEEDS_FIELD = tuple(spec.name for spec in POLICY_SPECS if spec.needs_field)
 ZERO_SETTINGS = {spec.name: spec.fixed_zero for spec in POLICY_SPECS if spec.fixed_zero}

@@ -119,9 +119,9 @@ def test_groups(entry: dict) -> dict[str, list[int]]:
     return found
 
 
-def candidates(entry: dict, middle=(0.0, 0.0, 0.0)) -> list[Camera]:
-    """The cameras of the candidate poses."""
-    return _orbit_cameras(camera_layouts.hemisphere(entry["candidates"], _lowest(entry), RADIUS), middle, entry["size"])
+def lens(size: int) -> Camera:
+    """A camera with the lens and picture of all photos, wherever it stands."""
+    return camera_layouts.orbit(90.0, 0.0, RADIUS, (0.0, 0.0, 0.0), size, size, FIELD_OF_VIEW)
 
 
 def _lowest(entry: dict) -> float:

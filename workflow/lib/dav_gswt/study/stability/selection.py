@@ -1,52 +1,42 @@
 """Checks of the selection of views, and of measures of how well scores predict errors."""
 
 import math
+from decimal import Context, Decimal, localcontext
 from fractions import Fraction
 
 import numpy as np
 from numpy import ndarray as Array
 
 from dav_gswt.study.stability.formula import FLOAT32, Case, Check
-from dav_gswt.views import facility_location
+from dav_gswt.views.coverage import compute_gain
 from dav_gswt.views.uncertainty import calibration
 
 SIZES = (1e-12, 1e-6, 1e-3, 1.0, 1e3, 1e6)
 
 
-def _pose_cases() -> list[Case]:
+def _coverage_cases() -> list[Case]:
     rng, cases = np.random.default_rng(0), []
-    at = rng.standard_normal((30, 3))
-    at /= np.linalg.norm(at, axis=1, keepdims=True)
-    at[15:] = at[:15] + 1e-6 * rng.standard_normal((15, 3))  # as good as duplicates
-    at[20] = at[5]
-    for size in SIZES:
-        u = np.abs(rng.standard_normal(30)) * size
-        cases.append(Case(f"poses {size:g} away, uncertainty of {size:g}", ((at * size).astype(np.float32), u)))
+    for known in (0.0, 1.0, 1e3, 1e9):
+        for size in SIZES:
+            added = rng.exponential(size, (40, 12)).astype(np.float32)
+            added[:5] = 0
+            cases.append(Case(f"{known:g} pixels known, {size:g} added", (np.full((40, 12), known), added)))
     return cases
 
 
-def _similarity(places: Array, u: Array) -> Array:
-    return facility_location.similarity(places, places, facility_location.kernel_width(places))
+def _gain(known: Array, added: Array) -> float:
+    return compute_gain(np.ones(len(known)), known, added)
 
 
-def _similarity_reference(places: Array, u: Array) -> Array:
-    at = places.astype(np.float64)
-    reach = 0.5 * np.median(np.sqrt((at**2).sum(1)))
-    return np.exp(-((at[:, None] - at[None]) ** 2).sum(-1) / (2 * reach**2))
+def _gain_reference(known: Array, added: Array) -> float:
+    with localcontext(Context(prec=60)):
+        pairs = [(Decimal(float(k)), Decimal(float(a))) for k, a in zip(known.flat, added.flat, strict=True)]
+        return float(sum(((1 + k + a) / (1 + k)).ln() for k, a in pairs))
 
 
-def _gains(places: Array, u: Array) -> Array:
-    """Gain of each pose over the first ten, divided by the sum of weights."""
-    near = _similarity(places, u)
-    return (
-        facility_location.coverage_gains(near.astype(np.float64), near[:, :10].max(1).astype(np.float64), u) / u.sum()
-    )
-
-
-def _gains_reference(places: Array, u: Array) -> Array:
-    near = _similarity_reference(places, u)
-    covered = near[:, :10].max(1)
-    return np.array([sum(u[v] * max(near[v, s] - covered[v], 0) for v in range(30)) for s in range(30)]) / u.sum()
+def _gain_printed(known: Array, added: Array) -> float:
+    """As a difference of logarithms."""
+    return float((np.log(1 + known + added) - np.log(1 + known)).sum())
 
 
 def _rank_cases() -> list[Case]:
@@ -108,9 +98,8 @@ def _spearman_reference(u: Array, error: Array) -> float:
 
 
 CHECKS = [
-    Check("similarity of two poses", _pose_cases, _similarity, _similarity_reference, relative=FLOAT32, absolute=1e-5),
     Check(
-        "what a pose adds, duplicates included", _pose_cases, _gains, _gains_reference, relative=FLOAT32, absolute=1e-5
+        "what a photo adds to coverage", _coverage_cases, _gain, _gain_reference, relative=1e-12, printed=_gain_printed
     ),
     Check("rank of a conformal interval", _rank_cases, _rank, _rank_reference, printed=_rank_printed),
     Check(

@@ -1,0 +1,140 @@
+"""Directional coverage: how well photos show each cell of the ground, from how many sides.
+
+A photo shows cell g in n_g pixels (sums of blend weights, so what hides a cell counts) from a direction d_g. Photos of
+a cell from one side say little of how it looks from another, so each counts for directions b near its own:
+
+    K_gb = sum over photos of n_g exp((cos(d_g, b) - 1) / w^2),  value of the photos = sum of a_g log(1 + K_gb).
+
+The logarithm is the information of repeated measurements: the first good look at a cell is worth most, a photo from
+half the distance as much as four. The sum is monotone and submodular, so greedy choice reaches 1 - 1/e of the best.
+a_g says how much a cell matters: equal for all, or how wrong the field still shows it.
+"""
+
+import numpy as np
+from jaxtyping import Float, Float32, Float64
+from numpy import ndarray as Array
+from scipy.special import expit
+
+from dav_gswt.field import GaussianField
+from dav_gswt.geometry.cameras import Camera
+from dav_gswt.images import metrics
+from dav_gswt.photos.training_views import TrainingView
+from dav_gswt.raster import Rasterizer, to_raster_arrays
+from dav_gswt.reconstruction.ground import Ground
+
+CELLS = 28  # along a side of the exemplar
+WIDTH = 18.0  # w, degrees: a photo counts for directions about as near as this
+BELTS = ((12.0, 8), (35.0, 6), (70.0, 3))  # directions b: elevation in degrees, and how many around; low: for walkers
+ERROR_WIDTH = 128  # pixels across a photo that is compared with its render: finer differences are noise
+LEAST_PIXELS = 1.0  # blend weight from which a cell counts as seen
+
+
+class GroundCells:
+    """The exemplar's ground in CELLS x CELLS cells, each with the Gaussians over it."""
+
+    def __init__(self, field: GaussianField, grid: Ground):
+        west, south, side = grid.exemplar
+        column, row = np.floor((field.means[:, :2] - [west, south]) / side * CELLS).astype(int).T
+        inside = (row >= 0) & (row < CELLS) & (column >= 0) & (column < CELLS)
+        self.field, self.members = field, np.flatnonzero(inside)
+        self.of = (row * CELLS + column)[inside]
+        count = np.maximum(self.sum(np.ones(len(field))), 1)
+        self.middle = np.stack([self.sum(axis) / count for axis in field.means.astype(float).T], 1)
+
+    def sum(self, values: Float[Array, "gaussians"]) -> Float64[Array, "cells"]:
+        """Sum a value of Gaussians over each cell."""
+        return np.bincount(self.of, values[self.members], CELLS**2)
+
+    def average(self, values: Float[Array, "gaussians"]) -> Float64[Array, "cells"]:
+        """Mean of a value of Gaussians over each cell, by opacity; 0 where a cell has none."""
+        weight = expit(self.field.opacity_logits.astype(float))
+        return self.sum(weight * values) / np.maximum(self.sum(weight), 1e-9)
+
+    def count_pixels(self, cameras: list[Camera]) -> Float64[Array, "n cells"]:
+        """Pixels that show each cell in each camera's picture."""
+        raster, arrays = Rasterizer(), to_raster_arrays(self.field)
+        out = np.zeros((len(cameras), CELLS**2))
+        for row, camera in zip(out, cameras, strict=True):
+            raster.forward(**arrays, camera=camera)
+            row[:] = self.sum(raster.contributions().total.astype(float))
+        return out
+
+
+def measure_cell_errors(
+    cells: GroundCells, views: list[TrainingView], corrected: bool = False
+) -> Float64[Array, "cells"]:
+    """Mean squared error of the field's renders of photos, in each cell; of cells in no photo the greatest of all.
+
+    The error of a pixel belongs to the Gaussians that make it, by their blend weights. Photos are compared ERROR_WIDTH
+    pixels wide. corrected: fit gain and offset of each channel to the photo first (photos differ in exposure).
+    """
+    raster, arrays = Rasterizer(), to_raster_arrays(cells.field)
+    wrong, pixels = np.zeros(CELLS**2), np.zeros(CELLS**2)
+    for view in views:
+        seen = np.clip(raster.forward(**arrays, camera=view.camera).colour, 0, 1)
+        if corrected and view.weight.any():
+            seen = np.clip(metrics.correct_colours(seen, view.image, view.weight), 0, 1)
+        squares = view.weight * ((seen - view.image) ** 2).mean(-1)
+        found = raster.contributions(np.ascontiguousarray(np.stack([squares, view.weight], -1), np.float32))
+        wrong += cells.sum(found.mapped[:, 0].astype(float))
+        pixels += cells.sum(found.mapped[:, 1].astype(float))
+    known = pixels > LEAST_PIXELS
+    error = np.where(known, wrong / np.maximum(pixels, LEAST_PIXELS), 0.0)
+    return np.where(known, error, error.max())
+
+
+def compute_gain(
+    importance: Float[Array, "cells"], known: Float[Array, "cells b"], added: Float[Array, "cells b"]
+) -> float:
+    """Sum of a_g log((1 + K_gb + more) / (1 + K_gb)): what a photo adds to K, exact where it adds little."""
+    return float(importance.astype(np.float64) @ np.log1p(added.astype(np.float64) / (1 + known)).sum(1))
+
+
+class DirectionalCoverage:
+    """Gain of candidates in directional coverage, updated with every choice; implements `policies.InformationGain`."""
+
+    def __init__(
+        self,
+        cells: GroundCells,
+        taken: list[Camera],
+        candidates: list[Camera],
+        importance: Float[Array, "cells"] | None = None,
+    ):
+        """taken, candidates: cameras at the scoring size. importance: a_g, of any scale; None, or 0 for all: equal."""
+        weight = np.ones(CELLS**2) if importance is None or not importance.any() else importance
+        if not (np.isfinite(weight).all() and (weight >= 0).all()):
+            raise ValueError("the importance of a cell must be a number of at least 0")
+        self.importance = weight / weight.mean()
+        self.known = _spread_over_directions(cells, taken).sum(0, dtype=np.float64)
+        self.added = _spread_over_directions(cells, candidates)
+
+    def gains(self) -> list[float]:
+        """Return the gain of every candidate."""
+        return [self.gain(i) for i in range(len(self.added))]
+
+    def gain(self, i: int) -> float:
+        """Return the gain of a photo from candidate i over all photos so far."""
+        return compute_gain(self.importance, self.known, self.added[i])
+
+    def take(self, i: int) -> None:
+        """Add the photo from candidate i."""
+        self.known = self.known + self.added[i]
+
+
+def list_directions() -> Float64[Array, "b 3"]:
+    """Unit vectors b, from the ground outwards."""
+    elevation = np.radians([e for e, count in BELTS for _ in range(count)])
+    azimuth = np.concatenate([2 * np.pi * np.arange(count) / count for _, count in BELTS])
+    level = np.cos(elevation)
+    return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)], 1)
+
+
+def _spread_over_directions(cells: GroundCells, cameras: list[Camera]) -> Float32[Array, "n cells b"]:
+    """Pixels of each camera's picture that show each cell, as they count for each direction."""
+    directions, width = list_directions(), np.radians(WIDTH)
+    out = np.zeros((len(cameras), CELLS**2, len(directions)), np.float32)
+    for part, camera, pixels in zip(out, cameras, cells.count_pixels(cameras), strict=True):
+        way = camera.centre - cells.middle
+        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-12)
+        part[:] = pixels[:, None] * np.exp((way @ directions.T - 1) / width**2)
+    return out
