@@ -83,14 +83,17 @@ class FreePoses(ConfigModel):
     """Any direction, distance and aim point."""
 
     kind: Literal["free"]
-    radii: tuple[Radius, Radius] = key(
-        "least and greatest distance from the aim point", (0.4, 1.5), unit="flying heights", strict=False
+    radii: Annotated[tuple[Radius, Radius], Field(strict=False)] | None = key(
+        "least and greatest distance from the aim point; if left out 0.4 to 1.5 for `agent: render`, else 0.4 to 1, "
+        "never higher than the first photos",
+        None,
+        unit="flying heights",
     )
     aims: Share = key("of the exemplar's side: the square about its middle that aim points lie in; 0: the middle", 1)
 
     @model_validator(mode="after")
     def _order_radii(self) -> "FreePoses":
-        if self.radii[0] > self.radii[1]:
+        if self.radii and self.radii[0] > self.radii[1]:
             raise ValueError(f"radii go from high ({self.radii[0]:g}) to low ({self.radii[1]:g}); give the least first")
         return self
 

@@ -24,6 +24,7 @@ from dav_gswt.photos.view_split import ViewSplit
 Candidates = list[tuple[Pose, Camera]]
 
 FREE_RADII = (0.4, 1.5)  # flying heights
+REACHED_RADII = (0.4, 1.0)  # flying heights, for devices and people: never higher than the first photos were taken
 ROUTE_DOWN = 35.0  # degrees below the horizon
 HEADINGS = 4  # at each stop of a route
 ANY_FIELD = 60.0  # degrees, of a camera that gets another lens
@@ -74,7 +75,8 @@ def _stand_around(scene: dict, poses: dict, frame: SceneFrame, lens: Camera) -> 
     count, lowest = scene["candidates"], scene["min_elevation"]
     radii, aims = (1.0, 1.0), 0.0
     if poses["kind"] == "free":
-        radii, aims = poses.get("radii", FREE_RADII), poses.get("aims", 1.0)
+        usual = FREE_RADII if scene["agent"] == "render" else REACHED_RADII
+        radii, aims = poses.get("radii", usual), poses.get("aims", 1.0)
     low, high = (frame.flying_height * radius for radius in radii)
     placed = camera_layouts.spread_free(count, lowest, (low, high), aims * frame.exemplar.side)
     return [
