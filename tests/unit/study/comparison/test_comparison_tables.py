@@ -24,6 +24,11 @@ def rounds(psnr, photos=(8, 12, 16), **cell):
 ALL = rounds([20, 26], (8, 48), policy="all")
 
 
+def compare(table, baseline, measure="psnr"):
+    """The comparison by one measure."""
+    return [row for row in tables.compare_to_baseline(table, baseline) if row["measure"] == measure]
+
+
 def fit(gap, photos=4):
     rows = [{"psnr_before": 20.0 - gap} for _ in range(photos)]
     new = {"photos": photos, "taken": True, "views": rows}
@@ -119,7 +124,7 @@ def test_all_photos_of_another_seed_are_no_goal():
 def test_policies_are_paired_with_the_baseline():
     both = [rounds([20, 21, 22], seed=s) + rounds([20, 21 + s, 22], seed=s, policy="w2") for s in range(3)]
     table = tables.summarise_cells([row for rows in both for row in rows])
-    every, alone = tables.compare_to_baseline(table, "farthest")
+    every, alone = compare(table, "farthest")
     assert every["scene"] == tables.EVERY and (alone["scene"], alone["k"]) == ("flowers", 4)
     assert every["units"] == 3 and every["mean"] == pytest.approx(0.5)
     assert (every["wins"], every["ties"], every["losses"]) == (2, 1, 0)
@@ -128,7 +133,7 @@ def test_policies_are_paired_with_the_baseline():
 
 def test_one_cell_alone_has_no_interval():
     table = tables.summarise_cells(rounds([20, 21, 22]) + rounds([20, 22, 22], policy="w2"))
-    for row in tables.compare_to_baseline(table, "farthest"):
+    for row in compare(table, "farthest"):
         assert row["mean"] == 0.5 and row["wins"] == 1
         assert row["low"] is row["high"] is row["p"] is row["holm"] is None
 
@@ -136,20 +141,37 @@ def test_one_cell_alone_has_no_interval():
 def test_cells_that_end_with_other_photos_or_start_elsewhere_are_not_paired():
     base = rounds([20, 21, 22])
     for other in (rounds([20, 21], (8, 12), policy="w2"), rounds([20, 21, 22], seed=1, policy="w2")):
-        assert tables.compare_to_baseline(tables.summarise_cells(base + other), "farthest") == []
-    assert tables.compare_to_baseline(tables.summarise_cells(rounds([20, 21, 22], policy="w2")), "farthest") == []
+        assert compare(tables.summarise_cells(base + other), "farthest") == []
+    assert compare(tables.summarise_cells(rounds([20, 21, 22], policy="w2")), "farthest") == []
 
 
 def test_settings_of_a_policy_are_policies_of_their_own():
     some = [rounds([20, 21, 22 + i], policy="w2-lpips", prior="terrain", lam=str(i)) for i in range(2)]
-    compared = tables.compare_to_baseline(tables.summarise_cells(rounds([20, 21, 22]) + some[0] + some[1]), "farthest")
+    compared = compare(tables.summarise_cells(rounds([20, 21, 22]) + some[0] + some[1]), "farthest")
     assert [(row["lam"], row["mean"]) for row in compared if row["scene"] == tables.EVERY] == [("0", 0), ("1", 0.25)]
 
 
 def test_the_figure_is_whole_and_the_same_twice(tmp_path):
     table = rounds([20, 22, 24]) + rounds([20, 21, 22], policy="random") + rounds([20, 23, 25], policy="oracle") + ALL
-    compared = tables.compare_to_baseline(tables.summarise_cells(table), "farthest")
+    compared = compare(tables.summarise_cells(table), "farthest")
     for name in ("a.png", "b.png"):
         plots.write_figure(tmp_path / name, table, compared, "farthest")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_every_measure_is_compared_and_better_is_above_zero():
+    both = rounds([20, 21, 22], seed=0) + rounds([20, 22, 22], seed=0, policy="w2")
+    for row in both:
+        better = row["policy"] == "w2" and row["round"] > 0
+        row |= {"lpips": 0.1 if better else 0.2, "walker_psnr": 15.0 if better else 14.0}
+    table = tables.summarise_cells(both)
+    assert [row["nauc_lpips"] for row in table] == pytest.approx([0.2, 0.125])
+    assert compare(table, "farthest", "lpips")[0]["mean"] == pytest.approx(0.075)
+    assert compare(table, "farthest", "walker_psnr")[0]["mean"] == pytest.approx(0.75)
+    assert compare(table, "farthest", "worst_psnr")[0]["mean"] == 0
+
+
+def test_a_measure_that_a_round_lacks_is_not_compared():
+    table = tables.summarise_cells(rounds([20, 21, 22]) + rounds([20, 22, 22], policy="w2"))
+    assert compare(table, "farthest", "walker_psnr") == [] and table[0]["nauc_walker_psnr"] is None

@@ -129,7 +129,7 @@ class Calibration(ConfigModel):
 class PolicySet(ConfigModel):
     """Scenes on which policies are compared."""
 
-    scenes: Names = key("with `start` and `agent: replay`")
+    scenes: Names = key("with `start`")
     k: list[Annotated[int, Field(ge=1, le=1000)]] = key("photos a round", min_length=1)
     photos: int = key("photos that each experiment ends with", ge=3, le=100_000)
     policies: Policies | None = key("instead of those above", None)

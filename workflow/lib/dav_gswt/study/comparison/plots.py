@@ -17,6 +17,7 @@ BASE, TRUTH = {"color": "black", "linewidth": 2.4}, {"color": "0.55", "linestyle
 
 def write_figure(path: Path | str, curves: list[dict], compared: list[dict], baseline: str) -> None:
     """Above a panel a scene (and k): PSNR against photos, means over seeds; below every policy less the baseline."""
+    compared = [row for row in compared if row["measure"] == "psnr"]
     panels = sorted({(row["scene"], row["k"]) for row in curves if row["policy"] == baseline})
     policies = [row["policy"] for row in _rank_policies(compared)]
     best = [p for p in policies if p not in ORACLES][: SHOWN - 2]

@@ -4,6 +4,8 @@ from dataclasses import asdict
 from itertools import pairwise
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray as Array
 
 from dav_gswt.study.comparison.curves import CELL
 from dav_gswt.study.comparison.stats import nauc, photos_to_reach
@@ -12,6 +14,7 @@ from dav_gswt.study.statistics import adjust_holm, bootstrap_paired
 EVERYTHING = "all"  # the policy that takes the whole pool: what there is to reach, and no curve
 EVERY = "every"  # scene, in the rows over all of them
 UNIT = ("scene", "preset", "seed", "k")
+JUDGED = {"psnr": 1, "worst_psnr": 1, "walker_psnr": 1, "lpips": -1}  # measures of curves: 1 where more is better
 
 
 def summarise_cells(curves: list[dict]) -> list[dict]:
@@ -28,6 +31,7 @@ def summarise_cells(curves: list[dict]) -> list[dict]:
         goal, last = best.get(unit[:3]), rounds[-1]
         row = {key: last[key] for key in CELL} | {"photos": last["photos"], "nauc": nauc(photos, psnr)}
         row |= {key: last[key] for key in ("psnr", "ssim", "lpips", "worst_psnr", "walker_psnr")}
+        row |= {f"nauc_{key}": _area(photos, rounds, key) for key in JUDGED if key != "psnr"}
         row |= {"gap": None if goal is None else goal - last["psnr"]}
         row |= {"to_reach": None if goal is None else photos_to_reach(photos, psnr, goal)}
         seconds = [r["seconds"] for r in rounds[1:]]
@@ -37,13 +41,27 @@ def summarise_cells(curves: list[dict]) -> list[dict]:
 
 
 def compare_to_baseline(table: list[dict], baseline: str) -> list[dict]:
-    """Every policy less the baseline, in dB of nAUC: over all scenes, and of each scene and k alone.
+    """Every policy less the baseline by the nAUC of each measure of JUDGED: over all scenes, and of each scene and k
+    alone. A difference above 0 is better, of LPIPS too.
 
     Cells are paired by scene, preset, seed, k and the photos that they end with. holm: p values over all scenes,
     raised by how many policies were compared. One cell alone has neither interval nor p.
     """
     units = [(*(row[key] for key in UNIT), row["photos"]) for row in table]
-    cells = {(unit, _policy_key(row)): row["nauc"] for unit, row in zip(units, table, strict=True)}
+    rows = []
+    for measure, sign in JUDGED.items():
+        column = "nauc" if measure == "psnr" else f"nauc_{measure}"
+        cells = {
+            (unit, _policy_key(row)): sign * row[column]
+            for unit, row in zip(units, table, strict=True)
+            if row[column] is not None
+        }
+        rows += [{"measure": measure} | row for row in _compare_cells(cells, baseline)]
+    return rows
+
+
+def _compare_cells(cells: dict[tuple, float], baseline: str) -> list[dict]:
+    """Every policy less the baseline, by one measure."""
     base = {unit: value for (unit, policy), value in cells.items() if policy[0] == baseline}
     rows = []
     for policy in sorted({policy for _, policy in cells if policy[0] != baseline}):
@@ -59,6 +77,12 @@ def compare_to_baseline(table: list[dict], baseline: str) -> list[dict]:
         {" ".join(_policy_key(row)): row["p"] for row in rows if row["scene"] == EVERY and row["p"] is not None}
     )
     return [row | {"holm": raised.get(" ".join(_policy_key(row))) if row["scene"] == EVERY else None} for row in rows]
+
+
+def _area(photos: Float[Array, "t"], rounds: list[dict], measure: str) -> float | None:
+    """The nAUC of a measure; None where a round lacks it."""
+    values = [row[measure] for row in rounds]
+    return None if None in values else nauc(photos, np.array(values, float))
 
 
 def check_predictions(curves: list[dict]) -> list[dict]:
