@@ -1,11 +1,15 @@
 """Which candidates remain, by agent: over flat ground, a pose above it and one below it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from fixtures.frames import scene_frame
 
 from dav_gswt.capture import attainable, serial_rig
+from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
+from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.reconstruction.ground import Ground
 
@@ -34,6 +38,20 @@ def test_the_clearance_is_a_share_of_the_flying_height():
     near = [*POOL, (Pose("near", 90.0, 0.0, 0.09), cameras.pinhole([0.5, 0.01, 0.09], [0, 0, 0], 64, 64, 100.0))]
     found = attainable.filter_attainable({"agent": "render"}, FRAME, GRID, near)
     assert [pose.name for pose, _ in found] == ["above"]
+
+
+def test_a_drone_is_sent_no_lower_than_it_may_fly():
+    place = replace(FRAME, georeference=Georeference(48.0, 11.0, 500.0, 0.0, metres_per_unit=4.0))
+    low = (Pose("low", 90.0, 0.0, 0.4), cameras.pinhole([0, 0.01, 0.4], [0, 0, 0], 64, 64, 100.0))
+
+    def kept(frame, **scene):
+        found = attainable.filter_attainable({"agent": "plan"} | scene, frame, GRID, [*POOL, low])
+        return [pose.name for pose, _ in found]
+
+    assert kept(FRAME) == ["above", "low"] == kept(place, drone={"min_altitude": 1.5})
+    assert kept(place) == ["above"] == kept(place, drone={"min_altitude": 2.0})
+    with pytest.raises(InputError, match="all 3 candidate poses are lower than 12 m"):
+        kept(place, drone={"min_altitude": 12.0})
 
 
 def test_only_a_rig_is_checked_for_reach(monkeypatch):

@@ -1,6 +1,6 @@
 """The candidate poses at which the agent of a scene can take a photo."""
 
-from dav_gswt.capture import serial_rig
+from dav_gswt.capture import drone, serial_rig
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.views import feasibility
@@ -8,7 +8,7 @@ from dav_gswt.views.candidates import Candidates
 
 
 def filter_attainable(scene: dict, frame: SceneFrame, grid: Ground, candidates: Candidates) -> Candidates:
-    """Keep the poses that a rig reaches and that are feasible over the ground.
+    """Keep the poses that a rig or a drone reaches and that are feasible over the ground.
 
     scene: its entry in the config. A replayed scene keeps all: its photos were taken, wherever they stand.
     Raises: InputError: no pose is left.
@@ -17,5 +17,7 @@ def filter_attainable(scene: dict, frame: SceneFrame, grid: Ground, candidates: 
         return candidates
     if scene["agent"] == "serial":
         candidates = serial_rig.filter_reachable(scene, frame, candidates)
+    elif scene["agent"] == "plan":
+        candidates = drone.filter_reachable(scene, frame, candidates)
     clearance = feasibility.CLEARANCE * frame.flying_height
     return feasibility.filter_feasible(candidates, grid, scene.get("feasibility"), clearance)

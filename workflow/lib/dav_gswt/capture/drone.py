@@ -10,6 +10,26 @@ from dav_gswt.capture.site import Site
 from dav_gswt.errors import InputError
 from dav_gswt.files import write_json
 from dav_gswt.geometry.georeference import Georeference
+from dav_gswt.geometry.scene_frame import SceneFrame
+from dav_gswt.views.candidates import Candidates
+
+
+def filter_reachable(scene: dict, frame: SceneFrame, candidates: Candidates) -> Candidates:
+    """Keep the poses that are not too low to fly to; all where the scene's unit in metres is not known.
+
+    Raises: InputError: no pose is left.
+    """
+    if frame.georeference is None or not candidates:
+        return candidates
+    least = scene.get("drone", {}).get("min_altitude", qgc_plan.FlightRules.min_altitude)
+    scale = frame.georeference.metres_per_unit
+    found = [(pose, camera) for pose, camera in candidates if scale * camera.centre[2] >= least]
+    if not found:
+        raise InputError(
+            f"all {len(candidates)} candidate poses are lower than {least:g} m (drone.min_altitude of the scene's "
+            "entry), too low for a drone; give `poses` larger radii or another height, or take agent: handheld"
+        )
+    return found
 
 
 def take_photos(site: Site, requested: list[RequestedPose]) -> None:

@@ -52,7 +52,7 @@ _SCORED = {
     "render": (*_RENDERED_POSES, "feasibility"),
     "replay": (),
     "serial": (*_POSES, "feasibility", *_REACH),
-    "plan": (*_POSES, "feasibility"),
+    "plan": (*_POSES, "feasibility", "drone.min_altitude"),
     "handheld": (*_POSES, "feasibility"),
 }
 _DEVICES = {"render": ("family", "seed"), "replay": (), "serial": ("rig",), "plan": ("drone",), "handheld": ()}
