@@ -8,6 +8,8 @@ import pytest
 from fixtures import ground as patch
 
 from dav_gswt.geometry import cameras
+from dav_gswt.geometry.scene_frame import Extent
+from dav_gswt.reconstruction import ground
 from dav_gswt.views import coverage
 from dav_gswt.views.greedy import lazy_greedy
 
@@ -84,6 +86,15 @@ def test_cells_that_matter_draw_photos(cells):
     assert gain(cells, [], east, matters) > 3 * gain(cells, [], west, matters)
     assert gain(cells, [], east, 1e-20 * matters) == pytest.approx(gain(cells, [], east, matters))
     assert gain(cells, [], east, 0 * matters) == pytest.approx(gain(cells, [], east))
+
+
+def test_where_far_more_ground_is_fitted_than_the_exemplar_all_of_it_counts():
+    whole = replace(patch.FRAME, extent=Extent(-3.2, 0.0, 6.4, 3.2))
+    grid = ground.fit_ground(whole, np.zeros((0, 3)), 0.1, max_cells=10**6, block=32, margin=ground.WHOLE)
+    cells = coverage.GroundCells(patch.field(replace(grid, seen=np.ones(grid.shape, bool))), grid)
+    west, south, east, north = grid.judged
+    assert east - west > 2 * (north - south) and cells.shape[1] == coverage.CELLS > 2 * cells.shape[0]
+    assert (cells.middle[:, 0].min(), cells.middle[:, 0].max()) == pytest.approx((west, east), abs=0.4)
 
 
 @pytest.mark.parametrize("bad", [-1.0, np.nan, np.inf])

@@ -22,7 +22,7 @@ from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import Rasterizer, to_raster_arrays
 from dav_gswt.reconstruction.ground import Ground
 
-CELLS = 28  # along a side of the exemplar
+CELLS = 28  # along the longer side of the ground that counts
 WIDTH = 18.0  # w, degrees: a photo counts for directions about as near as this
 BELTS = ((12.0, 8), (35.0, 6), (70.0, 3))  # directions b: elevation in degrees, and how many around; low: for walkers
 ERROR_WIDTH = 128  # pixels across a photo that is compared with its render: finer differences are noise
@@ -30,20 +30,25 @@ LEAST_PIXELS = 1.0  # blend weight from which a cell counts as seen
 
 
 class GroundCells:
-    """The exemplar's ground in CELLS x CELLS cells, each with the Gaussians over it."""
+    """The ground that counts (`Ground.judged`) in square cells, row by row, each with the Gaussians over it."""
 
     def __init__(self, field: GaussianField, grid: Ground):
-        west, south, side = grid.exemplar
-        column, row = np.floor((field.means[:, :2] - [west, south]) / side * CELLS).astype(int).T
-        inside = (row >= 0) & (row < CELLS) & (column >= 0) & (column < CELLS)
+        west, south, east, north = grid.judged
+        side = max(east - west, north - south) / CELLS
+        self.shape = max(1, round((north - south) / side)), max(1, round((east - west) / side))
+        column, row = np.floor((field.means[:, :2] - [west, south]) / side).astype(int).T
+        inside = (row >= 0) & (row < self.shape[0]) & (column >= 0) & (column < self.shape[1])
         self.field, self.members = field, np.flatnonzero(inside)
-        self.of = (row * CELLS + column)[inside]
+        self.of = (row * self.shape[1] + column)[inside]
         count = np.maximum(self.sum(np.ones(len(field))), 1)
         self.middle = np.stack([self.sum(axis) / count for axis in field.means.astype(float).T], 1)
 
+    def __len__(self) -> int:
+        return self.shape[0] * self.shape[1]
+
     def sum(self, values: Float[Array, "gaussians"]) -> Float64[Array, "cells"]:
         """Sum a value of Gaussians over each cell."""
-        return np.bincount(self.of, values[self.members], CELLS**2)
+        return np.bincount(self.of, values[self.members], len(self))
 
     def average(self, values: Float[Array, "gaussians"]) -> Float64[Array, "cells"]:
         """Mean of a value of Gaussians over each cell, by opacity; 0 where a cell has none."""
@@ -53,7 +58,7 @@ class GroundCells:
     def count_pixels(self, cameras: list[Camera]) -> Float64[Array, "n cells"]:
         """Pixels that show each cell in each camera's picture."""
         raster, arrays = Rasterizer(), to_raster_arrays(self.field)
-        out = np.zeros((len(cameras), CELLS**2))
+        out = np.zeros((len(cameras), len(self)))
         for row, camera in zip(out, cameras, strict=True):
             raster.forward(**arrays, camera=camera)
             row[:] = self.sum(raster.contributions().total.astype(float))
@@ -69,7 +74,7 @@ def measure_cell_errors(
     pixels wide. corrected: fit gain and offset of each channel to the photo first (photos differ in exposure).
     """
     raster, arrays = Rasterizer(), to_raster_arrays(cells.field)
-    wrong, pixels = np.zeros(CELLS**2), np.zeros(CELLS**2)
+    wrong, pixels = np.zeros((2, len(cells)))
     for view in views:
         seen = np.clip(raster.forward(**arrays, camera=view.camera).colour, 0, 1)
         if corrected and view.weight.any():
@@ -101,7 +106,7 @@ class DirectionalCoverage:
         importance: Float[Array, "cells"] | None = None,
     ):
         """taken, candidates: cameras at the scoring size. importance: a_g, of any scale; None, or 0 for all: equal."""
-        weight = np.ones(CELLS**2) if importance is None or not importance.any() else importance
+        weight = np.ones(len(cells)) if importance is None or not importance.any() else importance
         if not (np.isfinite(weight).all() and (weight >= 0).all()):
             raise ValueError("the importance of a cell must be a number of at least 0")
         self.importance = weight / weight.mean()
@@ -132,7 +137,7 @@ def list_directions() -> Float64[Array, "b 3"]:
 def _spread_over_directions(cells: GroundCells, cameras: list[Camera]) -> Float32[Array, "n cells b"]:
     """Pixels of each camera's picture that show each cell, as they count for each direction."""
     directions, width = list_directions(), np.radians(WIDTH)
-    out = np.zeros((len(cameras), CELLS**2, len(directions)), np.float32)
+    out = np.zeros((len(cameras), len(cells), len(directions)), np.float32)
     for part, camera, pixels in zip(out, cameras, cells.count_pixels(cameras), strict=True):
         way = camera.centre - cells.middle
         way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-12)
