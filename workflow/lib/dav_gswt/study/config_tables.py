@@ -27,8 +27,8 @@ How the next views are chosen: the config's `policy`. Made from the table in
 [architecture](../architecture.md#a-policy) says how to add one.
 
 Every policy knows where the candidates and the photos so far are; the column `reads` says what it reads besides:
-the geometric scores (`opacity`, `fisher`), the scores by a prior, the field itself, or the true error, which is known
-for `agent: render` and `replay` only. `prior`, `p_drop` and `lam` matter to policies that read a prior; settings
+the scores by a prior, the field itself, the photos so far, or what candidates truly show, which is known for
+`agent: render` and `replay` only. `prior`, `p_drop` and `lam` matter to policies that read a prior; settings
 after "not" have no effect. k is the config's `k`.
 """
 
