@@ -16,7 +16,7 @@ with logging_to(snakemake.log[0]):
     scene, frame, split = params.scene, read_scene_frame(paths.frame), read_view_split(paths.views)
     fitted, grid = read_field(paths.field), ground.read_ground(paths.ground)
     remaining = candidates.list_remaining(scene, frame, paths.model, split, captures)
-    remaining = filter_attainable(scene, frame, grid, remaining)
+    remaining = filter_attainable(scene, frame, grid, fitted, remaining)
     taken = read_training_views(paths.images, paths.model, split.start, captures, scoring.PHOTO_WIDTH)
     prior = prior_sampling.open_scoring_prior(params.prior, params.p_drop, params.seed, paths.get("lpips"))
     first = frozen_scales.read_frozen_scales(paths.frozen) if paths.get("frozen") else None

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixtures import ground as patch
 from fixtures.frames import scene_frame
 
 from dav_gswt.capture import attainable, serial_rig
@@ -15,6 +16,7 @@ from dav_gswt.reconstruction.ground import Ground
 
 FRAME = scene_frame(exemplar=(-1.0, -1.0, 2.0), flying_height=2.0)
 GRID = Ground(-3.0, -3.0, 6 / 48, 16, 16, 16, np.zeros((48, 48)), np.ones((48, 48), bool))
+EMPTY = patch.field()[:0]
 POOL = [
     (Pose("above", 90.0, 0.0, 2.5), cameras.pinhole([0, 0.01, 2.5], [0, 0, 0], 64, 64, 100.0)),
     (Pose("below", -90.0, 0.0, 0.2), cameras.pinhole([0, 0.01, -0.2], [0, 0, 0], 64, 64, 100.0)),
@@ -22,7 +24,7 @@ POOL = [
 
 
 def names(scene):
-    return [pose.name for pose, _ in attainable.filter_attainable(scene, FRAME, GRID, POOL)]
+    return [pose.name for pose, _ in attainable.filter_attainable(scene, FRAME, GRID, EMPTY, POOL)]
 
 
 def test_poses_of_a_replayed_scene_all_remain():
@@ -36,7 +38,7 @@ def test_infeasible_poses_are_left_out(agent):
 
 def test_the_clearance_is_a_share_of_the_flying_height():
     near = [*POOL, (Pose("near", 90.0, 0.0, 0.09), cameras.pinhole([0.5, 0.01, 0.09], [0, 0, 0], 64, 64, 100.0))]
-    found = attainable.filter_attainable({"agent": "render"}, FRAME, GRID, near)
+    found = attainable.filter_attainable({"agent": "render"}, FRAME, GRID, EMPTY, near)
     assert [pose.name for pose, _ in found] == ["above"]
 
 
@@ -45,7 +47,7 @@ def test_a_drone_is_sent_no_lower_than_it_may_fly():
     low = (Pose("low", 90.0, 0.0, 0.4), cameras.pinhole([0, 0.01, 0.4], [0, 0, 0], 64, 64, 100.0))
 
     def kept(frame, **scene):
-        found = attainable.filter_attainable({"agent": "plan"} | scene, frame, GRID, [*POOL, low])
+        found = attainable.filter_attainable({"agent": "plan"} | scene, frame, GRID, EMPTY, [*POOL, low])
         return [pose.name for pose, _ in found]
 
     assert kept(FRAME) == ["above", "low"] == kept(place, drone={"min_altitude": 1.5})

@@ -168,22 +168,25 @@ def test_a_prior_sees_the_middle_square_and_the_nearest_photo():
     assert square.width == 40
 
 
-@pytest.mark.parametrize(
-    ("eye", "said"),
-    [([1.6, 1.6, -0.5], "p0: below the ground"), ([1.6, 1.6, 2.0], "p0: inside an object")],
-    ids=["under", "inside"],
-)
-def test_a_pose_below_the_ground_or_inside_an_object_is_an_error_that_names_it(eye, said):
+def test_poses_below_the_ground_or_inside_an_object_are_left_out(caplog):
     block = replace(
         patch.field()[:1],
         means=np.float32([[1.6, 1.6, 2.0]]),
         log_scales=np.log(np.float32([[0.3, 0.3, 0.3]])),
         opacity_logits=np.float32([4.0]),
     )
-    camera = cameras.pinhole(eye, [1.6, 1.7, 5.0], 40, 40, 40.0)
-    with pytest.raises(InputError, match=said):
-        collision.require_free_positions([(pose_of_camera("p0", camera, patch.FRAME), camera)], block, patch.grid())
-    collision.require_free_positions(pool(), block, patch.grid())
+
+    def at(name, *eye):
+        camera = cameras.pinhole(eye, [1.6, 1.7, 5.0], 40, 40, 40.0)
+        return pose_of_camera(name, camera, patch.FRAME), camera
+
+    buried, inside = at("buried", 1.6, 1.6, -0.5), at("inside", 1.6, 1.6, 2.0)
+    with caplog.at_level("INFO"):
+        left = collision.drop_blocked([buried, *pool(), inside], block, patch.grid())
+    assert [pose.name for pose, _ in left] == [pose.name for pose, _ in pool()]
+    assert "1 candidate poses are below the ground, 1 inside an object" in caplog.text
+    with pytest.raises(InputError, match="pose buried, inside: all are below the ground or inside an object"):
+        collision.drop_blocked([buried, inside], block, patch.grid())
 
 
 def test_maps_are_read_as_written_and_stand_in_an_exr_with_their_poses(tmp_path):

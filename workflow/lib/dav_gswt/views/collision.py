@@ -1,5 +1,7 @@
 """Collision test of camera positions with the ground and with solid Gaussians."""
 
+import logging
+
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
@@ -12,26 +14,30 @@ from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.uncertainty.finite import format_names
 
+_log = logging.getLogger(__name__)
+
 SOLID = 0.5  # opacity from which a Gaussian counts as solid
 
 
-def require_free_positions(candidates: Candidates, field: GaussianField, grid: Ground) -> None:
-    """Raises: InputError: candidates below the ground, or within one standard deviation of a solid Gaussian, by
-    name."""
+def drop_blocked(candidates: Candidates, field: GaussianField, grid: Ground) -> Candidates:
+    """Keep the candidates that are above the ground and not within one standard deviation of a solid Gaussian.
+
+    Raises: InputError: none is left.
+    """
     if not candidates:
-        return
+        return candidates
     centres = np.stack([camera.centre for _, camera in candidates])
-    checks = {
-        "below the ground": find_below_ground(centres, grid),
-        "inside an object": find_inside_objects(centres, field),
-    }
-    for what, bad in checks.items():
-        if bad.any():
-            names = format_names(bad, [pose.name for pose, _ in candidates])
-            raise InputError(
-                f"pose {names}: {what}; no photo can be taken there. Set `feasibility` or `min_elevation` of the "
-                f"scene, or check its ground"
-            )
+    below, inside = find_below_ground(centres, grid), find_inside_objects(centres, field)
+    blocked = below | inside
+    if blocked.all():
+        names = format_names(blocked, [pose.name for pose, _ in candidates])
+        raise InputError(
+            f"pose {names}: all are below the ground or inside an object; no photo can be taken there. Set `poses`, "
+            "`feasibility` or `min_elevation` of the scene, or check its ground"
+        )
+    if blocked.any():
+        _log.info("%d candidate poses are below the ground, %d inside an object: left out", below.sum(), inside.sum())
+    return [candidate for candidate, out in zip(candidates, blocked, strict=True) if not out]
 
 
 def find_below_ground(centres: Float[Array, "n 3"], grid: Ground) -> Bool[Array, "n"]:

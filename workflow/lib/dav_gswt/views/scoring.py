@@ -18,7 +18,7 @@ from dav_gswt.raster import Rasterizer
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.opacity_uncertainty import render_uncertainty
 from dav_gswt.reconstruction.top_view import render_top_view
-from dav_gswt.views import collision, fisher, prior_sampling
+from dav_gswt.views import fisher, prior_sampling
 from dav_gswt.views.candidates import Candidates
 from dav_gswt.views.frozen_scales import FrozenScales
 from dav_gswt.views.pose_maps import Part, PoseMaps
@@ -74,9 +74,7 @@ def score_poses(
     """Score every candidate: opacity and Fisher gain, with a prior also its terms, and maps.
 
     taken: the photos so far. prior: None for geometric terms only. frozen: of the first round; None in the first round.
-    Raises: InputError: a candidate below the ground or inside an object, by name.
     """
-    collision.require_free_positions(candidates, field, grid)
     terms, opacity = _score_geometry(field, grid, candidates, [scoring_camera(view.camera) for view in taken])
     steps, w2_sq = np.zeros(len(candidates), int), None
     if prior is not None and candidates:
