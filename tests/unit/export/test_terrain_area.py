@@ -47,7 +47,7 @@ def test_a_level_that_is_not_there_is_named(cover_terrain, export_settings):
 
 
 @pytest.mark.parametrize("level", [0, 1, "by_distance"])
-@pytest.mark.parametrize("name, limit", [("ply", None), ("glb", None), ("spz", 20_000)])
+@pytest.mark.parametrize("name, limit", [("ply", None), ("glb", None), ("usd", None), ("spz", 20_000)])
 def test_too_much_is_refused_with_the_area_that_fits(cover_terrain, export_settings, monkeypatch, level, name, limit):
     given = export_settings | {"columns": 40, "rows": 20, "level": level}
     if limit:
@@ -68,3 +68,13 @@ def test_too_much_is_refused_with_the_area_that_fits(cover_terrain, export_setti
 def test_where_not_one_cell_fits_the_message_says_so(cover_terrain, export_settings):
     with pytest.raises(InputError, match="not one cell fits: set export.level to a coarser one, or raise"):
         terrain_area.check_size(cover_terrain, plan(cover_terrain, export_settings), ["ply"], 1e-6)
+
+
+@pytest.mark.parametrize("name", sorted(terrain_area.ALL_LEVELS))
+def test_a_set_of_all_levels_is_counted_by_the_finest(cover_terrain, export_settings, name):
+    fine, coarse = (plan(cover_terrain, export_settings, level=level) for level in (0, 1))
+    most = terrain_area.check_size(cover_terrain, fine, [name], 1.0)
+    bound = 1e-9 * (most - 1) * terrain_area.LIMITS[name].bytes
+    assert terrain_area.check_size(cover_terrain, coarse, ["ply"], bound) < most
+    with pytest.raises(InputError, match=rf"export: {name}: 3 x 2 cells have up to {most} Gaussians"):
+        terrain_area.check_size(cover_terrain, coarse, [name], bound)
