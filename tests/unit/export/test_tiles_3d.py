@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fixtures.random_field import random_field
-from fixtures.splat_files import read_glb_splats
+from fixtures.splat_files import read_glb_splats, read_glb_spz
 from pyproj import Transformer
 
 from dav_gswt.export import terrain_files, tiles_3d
@@ -44,7 +44,8 @@ def write(cover_bundle, cover_terrain, export_settings, tmp_path):
     """A function that exports 5 x 3 cells; the folder of tileset.json and what is in it."""
 
     def write(name="out", reference=None, threads=1, **changes):
-        settings = export_settings | {"columns": 5, "rows": 3, "formats": ["3dtiles"]} | changes
+        settings = export_settings | {"columns": 5, "rows": 3, "formats": ["3dtiles"], "tile_compression": "none"}
+        settings |= changes
         out = tmp_path / name
         terrain_files.export_terrain(cover_terrain, cover_bundle.manifest, settings, out, threads, reference)
         return out / "terrain_3dtiles", json.loads((out / "terrain_3dtiles/tileset.json").read_text())
@@ -88,6 +89,20 @@ def test_a_level_has_the_gaussians_of_the_terrain(write, cover_terrain, level):
     assert len(found) == len(wanted)
     assert np.sort(found.sh.ravel()).tolist() == np.sort(wanted.sh.ravel()).tolist()
     np.testing.assert_allclose(np.sort(found.means, 0), np.sort(means, 0), atol=2e-5)
+
+
+def test_compressed_contents_are_those_without_to_the_steps_of_spz(write):
+    (plain, _), (packed, tileset) = write("plain"), write("packed", tile_compression="spz")
+    names = sorted(path.relative_to(plain) for path in plain.rglob("*.glb"))
+    assert names == sorted(path.relative_to(packed) for path in packed.rglob("*.glb"))
+    for name in names:
+        wanted, read = read_glb_splats(plain / name), read_glb_spz(packed / name)
+        np.testing.assert_allclose(read.means, wanted.means, atol=1e-3)
+        np.testing.assert_allclose(read.log_scales, wanted.log_scales, atol=1 / 32 + 1e-4)
+        seen, same = (1 / (1 + np.exp(-f.opacity_logits.astype(float))) for f in (read, wanted))
+        np.testing.assert_allclose(seen, same, atol=0.5 / 255 + 1e-6)
+    extension = tileset["extensions"]["3DTILES_content_gltf"]
+    assert extension["extensionsRequired"] == ["KHR_gaussian_splatting", "KHR_gaussian_splatting_compression_spz_2"]
 
 
 def test_a_georeferenced_tileset_stands_where_pyproj_puts_it(write):
@@ -135,7 +150,8 @@ def test_blocks_hold_every_cell_once(columns, rows, edge):
     assert max(max(b.columns, b.rows) for b in blocks) <= edge
 
 
-def test_what_has_no_gaussian_has_no_tile(tmp_path):
+@pytest.mark.parametrize("spz", [False, True])
+def test_what_has_no_gaussian_has_no_tile(tmp_path, spz):
     """A cell without Gaussians at any level, and one that has them at the finest alone."""
 
     @contextmanager
@@ -144,7 +160,7 @@ def test_what_has_no_gaussian_has_no_tile(tmp_path):
             spool.append(random_field(0 if area.west == 0 or level else 5))
         yield spool
 
-    tiles_3d.write_tileset(tmp_path / "out", Area(0, 0, 4, 1), [0.0, 1.0], place, {"unit": "metre"}, None)
+    tiles_3d.write_tileset(tmp_path / "out", Area(0, 0, 4, 1), [0.0, 1.0], place, {"unit": "metre"}, None, spz)
     root = json.loads((tmp_path / "out/tileset.json").read_text())["root"]
     west, east = root["children"]
     assert "content" not in west and [tile["content"]["uri"] for tile in west["children"]] == ["0/1_0.glb"]

@@ -38,6 +38,9 @@ class Export(ConfigModel):
         "`own`: those of each format, docs/exports.md; `3dtiles` keeps its own, `usd` knows no `y-down`", "own"
     )
     spz_version: Literal[2, 3] = key("of SPZ files; 2 for older readers, whose rotations are coarser", 3)
+    tile_compression: Literal["spz", "none"] = key(
+        "of the files of `3dtiles`; CesiumJS draws `spz` alone, three.js `none` alone", "spz"
+    )
     max_gb: float = key(
         "most that a file may take; what would be larger is refused before any work", 2, unit="GB", gt=0, le=64
     )

@@ -17,7 +17,7 @@ from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.export import glb_splats, ply, sog, spz, tiles_3d, usd
 from dav_gswt.export.axes import AXES
 from dav_gswt.export.spool import Spool
-from dav_gswt.export.terrain_area import TerrainExport, check_size, describe_size, plan_export
+from dav_gswt.export.terrain_area import TerrainExport, check_size, choose_limits, describe_size, plan_export
 from dav_gswt.field import GaussianField
 from dav_gswt.files import atomic_folder, write_json
 from dav_gswt.geometry.georeference import Georeference
@@ -48,8 +48,9 @@ def export_terrain(
     Raises: InputError: more than a file may have, no such level, or the converter of SOG or USD's package is not here.
     """
     wanted, formats = plan_export(terrain, settings, manifest.eye_floor), settings["formats"]
-    count = check_size(terrain, wanted, formats, settings["max_gb"])
-    _log.info("%s", describe_size(count, formats))
+    limits = choose_limits(settings)
+    count = check_size(terrain, wanted, limits, settings["max_gb"])
+    _log.info("%s", describe_size(count, limits))
     if {"sog", "streamed_sog"} & set(formats):
         sog.find_converter("terrain")
     if "usd" in formats:
@@ -64,7 +65,8 @@ def export_terrain(
         if "streamed_sog" in formats:
             _write_streamed(terrain, wanted, folder, AXES[facts["files"]["streamed_sog"]], threads)
         if "3dtiles" in formats:
-            _write_tileset(terrain, wanted, folder, facts, reference, threads)
+            spz = settings["tile_compression"] == "spz"
+            _write_tileset(terrain, wanted, folder, facts, reference, spz, threads)
         write_json(folder / f"{NAME}.json", facts)
 
 
@@ -115,6 +117,7 @@ def _write_tileset(
     folder: Path,
     facts: Mapping[str, Any],
     reference: Georeference | None,
+    spz: bool,
     threads: int,
 ) -> None:
     """Every level of the area as 3D Tiles."""
@@ -125,7 +128,7 @@ def _write_tileset(
     errors = tiles_3d.measure_errors(terrain)
     transform = tiles_3d.place_on_globe(reference, wanted.origin) if reference else None
     kept = {key: facts[key] for key in KEPT}
-    tiles_3d.write_tileset(folder / f"{NAME}_3dtiles", wanted.area, errors, place, kept, transform)
+    tiles_3d.write_tileset(folder / f"{NAME}_3dtiles", wanted.area, errors, place, kept, transform, spz)
 
 
 def _describe(

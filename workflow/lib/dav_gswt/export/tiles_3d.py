@@ -1,8 +1,8 @@
 """A finite terrain as 3D Tiles 1.1: a tree of GLBs, a level of detail a row, which programs load as they come near.
 
-Source: https://docs.ogc.org/cs/22-025r4/22-025r4.html. A tile of level l covers 2^l by 2^l cells and gives way to (refine
-REPLACE) the four of level l - 1 under it; the root has no content. Axes are east, north and up; GLBs have y up, as the
-specification wants it.
+Source: https://docs.ogc.org/cs/22-025r4/22-025r4.html. A tile of level l covers 2^l by 2^l cells and gives way (refine:
+REPLACE) to the four of level l - 1 under it; the root has no content. Axes are east, north and up; GLBs have y up, as
+the specification wants it.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -16,9 +16,10 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 import dav_gswt
-from dav_gswt.export import glb_splats
 from dav_gswt.export.axes import Z_UP
 from dav_gswt.export.bounds import Box, find_box, unite_boxes
+from dav_gswt.export.glb_splats import EXTENSION, write_glb_splats
+from dav_gswt.export.glb_spz import COMPRESSION, write_glb_spz
 from dav_gswt.export.spool import Spool
 from dav_gswt.files import write_json
 from dav_gswt.geometry.georeference import Georeference
@@ -43,12 +44,14 @@ class TileWriter:
         errors: of each level, in units: what is lost where it is shown instead of a finer one; 0 of the finest.
         place: puts cells on the surface.
         extras: of the contents' nodes.
+        spz: whether contents are compressed.
     """
 
     folder: Path
     errors: Sequence[float]
     place: Placer
     extras: Mapping[str, Any]
+    spz: bool = False
 
     def write_tree(self, area: Area) -> dict[str, Any]:
         """The root of an area's tree, its contents written. Raises: ValueError: the area has no Gaussian."""
@@ -82,7 +85,8 @@ class TileWriter:
 
     def _write_content(self, placed: Spool, area: Area, level: int, box: Box) -> dict[str, Any]:
         uri = f"{level}/{area.west}_{area.south}.glb"
-        glb_splats.write_glb_splats(placed, self.folder / uri, dict(self.extras) | {"level": level})
+        write = write_glb_spz if self.spz else write_glb_splats
+        write(placed, self.folder / uri, dict(self.extras) | {"level": level})
         return {"uri": uri, "boundingVolume": {"box": to_volume(box)}}
 
 
@@ -93,18 +97,21 @@ def write_tileset(
     place: Placer,
     facts: Mapping[str, Any],
     transform: Float[Array, "4 4"] | None,
+    spz: bool = False,
 ) -> None:
     """Write tileset.json and {level}/{column}_{row}.glb, named by the south-western cells, to a new folder.
 
     Args:   errors: of each level, see `TileWriter`. facts: kept in the files' extras. transform: to metres from the
-            earth's centre; None: the tileset stays where it is, in the terrain's unit.
+            earth's centre; None: the tileset stays where it is, in the terrain's unit. spz: see `TileWriter`.
     """
     folder = Path(folder)
     folder.mkdir()
-    root = TileWriter(folder, errors, place, {"unit": facts["unit"]}).write_tree(area)
+    root = TileWriter(folder, errors, place, {"unit": facts["unit"]}, spz).write_tree(area)
     if transform is not None:
         root["transform"] = transform.T.ravel().tolist()  # column by column
-    extension = {"extensionsUsed": [glb_splats.EXTENSION]}  # told here so that a program knows before it loads a tile
+    # what GLBs use, so that a program knows before it loads one: CesiumJS draws Gaussians where it is told so here
+    extension = {"extensionsUsed": [EXTENSION, COMPRESSION]} if spz else {"extensionsUsed": [EXTENSION]}
+    extension |= {"extensionsRequired": [EXTENSION, COMPRESSION]} if spz else {}
     tileset = {
         "asset": {"version": "1.1", "extras": {"generator": f"DAV-GSWT {dav_gswt.__version__}"}},
         "extensionsUsed": [GLTF_EXTENSION],
