@@ -27,8 +27,15 @@ from dav_gswt.terrain.finite import Area, list_blocks, place_block
 
 NAME = "terrain"
 KEPT = ("unit", "origin", "tile_side", "cells")  # of terrain.json, in files that have a place for it
-OWN_AXES = {"ply": "y-down", "spz": "y-up", "glb": "y-up", "sog": "y-down", "streamed_sog": "y-down", "usd": "z-up"}
-OWN_AXES |= {"3dtiles": "z-up"}
+OWN_AXES = {
+    "ply": "y-down",
+    "spz": "y-up",
+    "glb": "y-up",
+    "sog": "y-down",
+    "streamed_sog": "y-down",
+    "usd": "z-up",
+    "3dtiles": "z-up",
+}
 FIXED_AXES = {"3dtiles"}  # by the specification
 
 _log = logging.getLogger(__name__)
