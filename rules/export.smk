@@ -73,12 +73,13 @@ rule convert_plys:
 
 
 rule export_terrain:
-    """Some cells of the endless terrain, with everything on them, as one file a format."""
+    """Some cells of the endless terrain, with everything on them, as one file or set a format."""
     input:
         unpack(height_map),
         unpack(class_pictures),
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
+        frame="<results>/<photos>/ground.json",
     output:
         terrain=directory("<results>/<bundle>/exports/terrain"),
     log:

@@ -192,11 +192,12 @@ def test_levels_leave_as_patches_for_other_viewers(tiny, snakemake, tmp_path):
 def test_a_finite_terrain_leaves_as_files_of_the_cells_asked_for(tiny, snakemake, tmp_path):
     folder = shutil.copytree(tiny.folder, tmp_path / "exported")
     target = tiny.bundle.relative_to(tiny.folder) / "exports/terrain"
-    asked = "export={columns: 3, rows: 2, level: by_distance, formats: [ply, glb]}"
+    asked = "export={columns: 3, rows: 2, level: by_distance, formats: [ply, glb, 3dtiles]}"
     snakemake(folder, str(target), "--cores", "2", "--config", asked, configs=CONFIGS)
     facts = read_json(folder / target / "terrain.json")
     assert facts["cells"] == {"west": -1, "south": -1, "columns": 3, "rows": 2}
-    assert facts["files"] == {"ply": "y-down", "glb": "y-up"}
+    assert facts["files"] == {"ply": "y-down", "glb": "y-up", "3dtiles": "z-up"}
+    assert read_json(folder / target / "terrain_3dtiles/tileset.json")["asset"]["version"] == "1.1"
     assert len(read_field(folder / target / "terrain.ply")) == facts["gaussians"]
     small = ("--cores", "2", "--config", "export={max_gb: 0.0001}")
     refused = snakemake(folder, str(target), *small, configs=CONFIGS, check=False)

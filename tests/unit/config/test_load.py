@@ -61,6 +61,9 @@ def test_a_checked_config_stays_the_same_when_it_is_checked_again(config):
         pytest.param(["scenes", "desert", "kind"], "video", "scenes.desert", id="an unknown kind"),
         pytest.param(["scenes", "Desert"], {}, "scenes.Desert: 'Desert' is no name", id="a scene in capitals"),
         pytest.param(["scenes", "logs"], {}, "scenes.logs: 'logs' is no name", id="a scene with a reserved name"),
+        pytest.param(
+            ["export"], {"axes": "y-down", "formats": ["usd"]}, "export: .*a USD stage has y or z up", id="down"
+        ),
         pytest.param(["presets", "draft", "spacing"], 0, "presets.draft.spacing", id="discs without a distance"),
         pytest.param(["stop", "photo"], 20, "stop: there is no key 'photo'; is 'photos' meant", id="a typo in a stop"),
         pytest.param(["stop", "photos"], 2, "stop.photos", id="fewer photos than any start"),

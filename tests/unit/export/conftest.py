@@ -19,6 +19,7 @@ SETTINGS = {
     "formats": ["glb"],
     "axes": "own",
     "spz_version": 3,
+    "tile_compression": "spz",
     "max_gb": 1.0,
     "surface": "ground",
     "mesh_error": 0.25,

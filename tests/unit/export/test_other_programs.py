@@ -71,6 +71,23 @@ def test_gltf_validator_knows_all_but_the_extension(exported, run_node):
     assert len(named) == 4 and all(name.startswith("KHR_gaussian_splatting:") for name in named)
 
 
+@pytest.mark.parametrize("how, names", [("spz", {"SCALE", "ROTATION"}), ("none", {"SCALE", "ROTATION", "OPACITY"})])
+def test_gltf_validator_knows_all_of_3d_tiles_but_the_extensions(
+    cover_bundle, cover_terrain, export_settings, run_node, tmp_path, how, names
+):
+    """Without the extension it sees that nothing it knows uses the view of the SPZ."""
+    settings = export_settings | {"formats": ["3dtiles"], "tile_compression": how}
+    terrain_files.export_terrain(cover_terrain, cover_bundle.manifest, settings, tmp_path / "out")
+    for path in sorted((tmp_path / "out/terrain_3dtiles").rglob("*.glb"))[:2]:
+        issues = json.loads(run_node(VALIDATE, path))["issues"]["messages"]
+        known = {"UNSUPPORTED_EXTENSION", "MESH_PRIMITIVE_INVALID_ATTRIBUTE"} | (
+            {"UNUSED_OBJECT"} if how == "spz" else set()
+        )
+        assert {issue["code"] for issue in issues} == known
+        named = {issue["pointer"].rpartition(":")[2] for issue in issues if issue["severity"] == 0}
+        assert named - {"SH_DEGREE_0_COEF_0"} == names
+
+
 def test_three_js_reads_splats_and_without_its_plugin_points(exported, run_node):
     count = len(read_glb_splats(exported / "terrain.glb"))
     (kind, unit, _), (fallback, _, attributes) = json.loads(run_node(THREE, exported / "terrain.glb"))

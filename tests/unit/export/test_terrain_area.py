@@ -29,6 +29,10 @@ def test_the_centre_is_in_the_middle_of_the_area_to_half_a_cell(centre, columns)
     assert abs(area.west + columns / 2 - centre) <= 0.5
 
 
+def limits(name):
+    return {name: terrain_area.LIMITS[name]}
+
+
 def plan(terrain, settings, **changes):
     return terrain_area.plan_export(terrain, settings | changes, 0.5)
 
@@ -47,7 +51,7 @@ def test_a_level_that_is_not_there_is_named(cover_terrain, export_settings):
 
 
 @pytest.mark.parametrize("level", [0, 1, "by_distance"])
-@pytest.mark.parametrize("name, limit", [("ply", None), ("glb", None), ("spz", 20_000)])
+@pytest.mark.parametrize("name, limit", [("ply", None), ("glb", None), ("usd", None), ("spz", 20_000)])
 def test_too_much_is_refused_with_the_area_that_fits(cover_terrain, export_settings, monkeypatch, level, name, limit):
     given = export_settings | {"columns": 40, "rows": 20, "level": level}
     if limit:
@@ -56,15 +60,33 @@ def test_too_much_is_refused_with_the_area_that_fits(cover_terrain, export_setti
     with pytest.raises(
         InputError, match=rf"export: {name}: 40 x 20 cells have up to \d+ Gaussians, .* 20000; "
     ) as told:
-        terrain_area.check_size(cover_terrain, plan(cover_terrain, given), [name], max_gb)
+        terrain_area.check_size(cover_terrain, plan(cover_terrain, given), limits(name), max_gb)
     columns, rows = map(int, re.search(r"; (\d+) x (\d+) fit", str(told.value)).groups())
     fits = plan(cover_terrain, given, columns=columns, rows=rows)
-    assert 0 < terrain_area.check_size(cover_terrain, fits, [name], max_gb) <= 20_000
+    assert 0 < terrain_area.check_size(cover_terrain, fits, limits(name), max_gb) <= 20_000
     wider = plan(cover_terrain, given, columns=columns + 4, rows=rows + 4)
     with pytest.raises(InputError):
-        terrain_area.check_size(cover_terrain, wider, [name], max_gb)
+        terrain_area.check_size(cover_terrain, wider, limits(name), max_gb)
 
 
 def test_where_not_one_cell_fits_the_message_says_so(cover_terrain, export_settings):
     with pytest.raises(InputError, match="not one cell fits: set export.level to a coarser one, or raise"):
-        terrain_area.check_size(cover_terrain, plan(cover_terrain, export_settings), ["ply"], 1e-6)
+        terrain_area.check_size(cover_terrain, plan(cover_terrain, export_settings), limits("ply"), 1e-6)
+
+
+@pytest.mark.parametrize("name", sorted(terrain_area.ALL_LEVELS))
+def test_a_set_of_all_levels_is_counted_by_the_finest(cover_terrain, export_settings, name):
+    fine, coarse = (plan(cover_terrain, export_settings, level=level) for level in (0, 1))
+    most = terrain_area.check_size(cover_terrain, fine, limits(name), 1.0)
+    bound = 1e-9 * (most - 1) * terrain_area.LIMITS[name].bytes
+    assert terrain_area.check_size(cover_terrain, coarse, limits("ply"), bound) < most
+    with pytest.raises(InputError, match=rf"export: {name}: 3 x 2 cells have up to {most} Gaussians"):
+        terrain_area.check_size(cover_terrain, coarse, limits(name), bound)
+
+
+def test_tiles_without_compression_are_larger(export_settings):
+    plain, packed = (
+        terrain_area.choose_limits(export_settings | {"formats": ["3dtiles", "ply"], "tile_compression": how})
+        for how in ("none", "spz")
+    )
+    assert plain["3dtiles"].bytes > packed["3dtiles"].bytes and plain["ply"] == packed["ply"]

@@ -1,11 +1,12 @@
 """A finite terrain as files: each shows what the terrain shows, whatever the threads; nothing is half-written."""
 
 import json
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from fixtures.splat_files import read_glb_splats, read_spz
+from fixtures.splat_files import read_glb_splats, read_spz, read_usd
 
 from dav_gswt.errors import InputError
 from dav_gswt.export import sog, terrain_files
@@ -18,7 +19,7 @@ from dav_gswt.images.metrics import psnr
 from dav_gswt.raster import render
 from dav_gswt.terrain import finite, stills
 
-READERS = {"ply": read_field, "spz": read_spz, "glb": read_glb_splats}
+READERS = {"ply": read_field, "spz": read_spz, "glb": read_glb_splats, "usd": read_usd}
 SIZE = 160
 
 
@@ -43,11 +44,13 @@ def view(cover_bundle, hills):
 @pytest.mark.parametrize("axes", ["own", "z-up"])
 def test_a_file_shows_what_the_terrain_shows(cover_bundle, cover_terrain, export_settings, view, tmp_path, name, axes):
     """With the objects, the hills and the border of the materials, in the axes that terrain.json states."""
+    if name == "usd":
+        pytest.importorskip("pxr", reason="needs the extra `usd`")
     settings = export_settings | {"columns": 8, "rows": 8, "formats": [name], "axes": axes}
     facts = export(cover_bundle, cover_terrain, settings, tmp_path / "out")
     stated = facts["files"][name]
     assert stated == (terrain_files.OWN_AXES[name] if axes == "own" else axes)
-    field = turn_field(READERS[name](tmp_path / f"out/terrain.{name}"), AXES[stated].T)
+    field = turn_field(READERS[name](tmp_path / f"out/terrain.{'usdc' if name == 'usd' else name}"), AXES[stated].T)
     assert len(field) == facts["gaussians"]
     camera, wanted = view
     eye = camera.centre - facts["origin"]
@@ -104,6 +107,15 @@ def test_without_node_nothing_is_begun(cover_bundle, cover_terrain, export_setti
     monkeypatch.setattr(sog.shutil, "which", lambda name: None)
     with pytest.raises(InputError, match=r"exports/terrain: SOG needs Node\.js 20"):
         export(cover_bundle, cover_terrain, export_settings | {"formats": ["ply", "sog"]}, tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_the_package_of_usd_nothing_is_begun(
+    cover_bundle, cover_terrain, export_settings, tmp_path, monkeypatch
+):
+    monkeypatch.setitem(sys.modules, "pxr.UsdVol", None)
+    with pytest.raises(InputError, match="exports/terrain: USD needs the extra `usd`"):
+        export(cover_bundle, cover_terrain, export_settings | {"formats": ["ply", "usd"]}, tmp_path / "out")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 from dav_gswt.config.base import ConfigModel, key
 
 Cell = Annotated[int, Field(ge=-(2**30), le=2**30)]
-Format = Literal["ply", "spz", "glb", "sog", "streamed_sog"]
+Format = Literal["ply", "spz", "glb", "sog", "streamed_sog", "usd", "3dtiles"]
 
 
 class Export(ConfigModel):
@@ -29,13 +29,18 @@ class Export(ConfigModel):
         "level of detail, 0 the finest; `by_distance`: as seen from the centre, an eye floor above the surface", 0
     )
     formats: list[Format] = key(
-        "`streamed_sog`: all levels in chunks; `sog` and `streamed_sog` need Node.js",
+        "`streamed_sog`, `3dtiles`: all levels in chunks; `sog` and `streamed_sog` need Node.js, `usd` the extra `usd`",
         ["glb"],
         min_length=1,
-        max_length=5,
+        max_length=7,
     )
-    axes: Literal["own", "z-up", "y-up", "y-down"] = key("`own`: those of each format, docs/exports.md", "own")
+    axes: Literal["own", "z-up", "y-up", "y-down"] = key(
+        "`own`: those of each format, docs/exports.md; `3dtiles` keeps its own, `usd` knows no `y-down`", "own"
+    )
     spz_version: Literal[2, 3] = key("of SPZ files; 2 for older readers, whose rotations are coarser", 3)
+    tile_compression: Literal["spz", "none"] = key(
+        "of the files of `3dtiles`; CesiumJS draws `spz` alone, three.js `none` alone", "spz"
+    )
     max_gb: float = key(
         "most that a file may take; what would be larger is refused before any work", 2, unit="GB", gt=0, le=64
     )
@@ -48,11 +53,13 @@ class Export(ConfigModel):
     )
 
     @model_validator(mode="after")
-    def _require_one_place(self) -> "Export":
+    def _require_sense(self) -> "Export":
         if self.centre is not None and self.corner is not None:
             raise ValueError("centre and corner exclude one another; leave one out")
         if self.centre is not None and not all(abs(at) <= 2**30 for at in self.centre):
             raise ValueError(f"centre lies beyond {2**30} tile sides")
         if len(set(self.formats)) < len(self.formats):
             raise ValueError("formats has one twice")
+        if self.axes == "y-down" and "usd" in self.formats:
+            raise ValueError("axes: a USD stage has y or z up, not down; leave axes out or take usd from formats")
         return self

@@ -100,7 +100,7 @@ _AREA = ("columns", "rows", "centre", "corner")
 
 # of the table `export`, by rule
 EXPORT_KEYS: dict[str, tuple[str, ...]] = {
-    "export_terrain": (*_AREA, "level", "formats", "axes", "spz_version", "max_gb"),
+    "export_terrain": (*_AREA, "level", "formats", "axes", "spz_version", "tile_compression", "max_gb"),
     "export_ground": (*_AREA, "surface", "mesh_error"),
 }
 

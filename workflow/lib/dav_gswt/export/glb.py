@@ -48,19 +48,37 @@ class GlbWriter:
         Args:   parts: arrays of `kind` that hold all rows in their order; read once, when the file is written.
                 bounds: the smallest and the largest value of each column; positions must have them.
         """
-        size = count * width * np.dtype(kind).itemsize
+        view = self.add_view(parts, count * width * np.dtype(kind).itemsize, target)
+        return self.add_accessor(count, width, kind, view, bounds=bounds, normalized=normalized)
+
+    def add_view(self, parts: Iterable[Array], size: int, target: int | None = None) -> int:
+        """A buffer view of `size` bytes; its number. parts: as of `add`."""
         if size % 4:
-            raise ValueError("an accessor's bytes must be a multiple of four here")
+            raise ValueError("the bytes of a buffer view must be a multiple of four here")
         offset = self._views[-1]["byteOffset"] + self._views[-1]["byteLength"] if self._views else 0
-        self._views.append({"buffer": 0, "byteOffset": offset, "byteLength": size, "target": target})
-        accessor: dict[str, Any] = {"bufferView": len(self._accessors), "componentType": _COMPONENTS[kind]}
-        accessor |= {"count": count, "type": TYPES[width]}
+        view = {"buffer": 0, "byteOffset": offset, "byteLength": size}
+        self._views.append(view | ({"target": target} if target else {}))
+        self._sources.append((size, parts))
+        return len(self._views) - 1
+
+    def add_accessor(
+        self,
+        count: int,
+        width: int,
+        kind: str = "<f4",
+        view: int | None = None,
+        *,
+        bounds: tuple[Sequence[float | int], Sequence[float | int]] | None = None,
+        normalized: bool = False,
+    ) -> int:
+        """An accessor of a buffer view; its number. view: None: an extension knows where its values are."""
+        accessor: dict[str, Any] = {} if view is None else {"bufferView": view}
+        accessor |= {"componentType": _COMPONENTS[kind], "count": count, "type": TYPES[width]}
         if normalized:
             accessor["normalized"] = True
         if bounds:
             accessor["min"], accessor["max"] = map(list, bounds)
         self._accessors.append(accessor)
-        self._sources.append((size, parts))
         return len(self._accessors) - 1
 
     def add_array(self, values: Array, *, target: int = ARRAY_BUFFER) -> int:

@@ -29,29 +29,9 @@ def write_glb_splats(
 ) -> None:
     """Write Gaussians as one primitive. extras: of its node. rotation: rows of `axes.AXES`."""
     attributes: dict[str, int] = {}
-    primitive = {
-        "mode": 0,
-        "attributes": attributes,
-        "extensions": {
-            EXTENSION: {
-                "kernel": "ellipse",
-                "colorSpace": COLOUR_SPACE,
-                "sortingMethod": "cameraDistance",
-                "projection": "perspective",
-            }
-        },
-    }
-    glb = GlbWriter(
-        {
-            "extensionsUsed": [EXTENSION],
-            "scene": 0,
-            "scenes": [{"nodes": [0]}],
-            "nodes": [{"mesh": 0, "name": "terrain", "extras": extras}],
-            "meshes": [{"name": "terrain", "primitives": [primitive]}],
-        }
-    )
+    glb = begin_glb(attributes, extras)
     n = len(spool)
-    bounds = _find_bounds(spool, rotation)
+    bounds = find_bounds(spool, rotation)
     attributes["POSITION"] = glb.add((turn_points(v, rotation) for v in spool.read("means")), n, 3, bounds=bounds)
     attributes["COLOR_0"] = glb.add(_read_fallback(spool), n, 4, "|u1", normalized=True)
     scales = (np.exp(v.astype(float)).astype(np.float32) for v in spool.read("log_scales"))
@@ -63,11 +43,36 @@ def write_glb_splats(
     glb.write(path)
 
 
+def begin_glb(
+    attributes: dict[str, int], extras: dict[str, Any], extensions: dict[str, Any] | None = None
+) -> GlbWriter:
+    """A GLB of one primitive of Gaussians. attributes: may be filled later. extensions: those of the extension."""
+    splats: dict[str, Any] = {
+        "kernel": "ellipse",
+        "colorSpace": COLOUR_SPACE,
+        "sortingMethod": "cameraDistance",
+        "projection": "perspective",
+    }
+    splats |= {"extensions": extensions} if extensions else {}
+    primitive = {"mode": 0, "attributes": attributes, "extensions": {EXTENSION: splats}}
+    document: dict[str, Any] = {"extensionsUsed": [EXTENSION, *(extensions or {})]}
+    document |= {"extensionsRequired": document["extensionsUsed"]} if extensions else {}
+    return GlbWriter(
+        document
+        | {
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": [{"mesh": 0, "name": "terrain", "extras": extras}],
+            "meshes": [{"name": "terrain", "primitives": [primitive]}],
+        }
+    )
+
+
 def _to_opacity(logits: Float32[Array, "n 1"]) -> Float32[Array, "n 1"]:
     return expit(logits.astype(float)).astype(np.float32)
 
 
-def _find_bounds(spool: Spool, rotation: Float[Array, "3 3"]) -> tuple[list[float], list[float]]:
+def find_bounds(spool: Spool, rotation: Float[Array, "3 3"]) -> tuple[list[float], list[float]]:
     """The smallest and the largest of each coordinate, as it is stored."""
     ends = [(p.min(0), p.max(0)) for p in (turn_points(v, rotation) for v in spool.read("means"))]
     low, high = np.min([e[0] for e in ends], 0), np.max([e[1] for e in ends], 0)

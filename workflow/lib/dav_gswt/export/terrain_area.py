@@ -1,7 +1,7 @@
 """Which cells a finite terrain has, and whether its files can be made: said before any work starts."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
-from dav_gswt.export import glb, glb_splats, ply, spool, spz
+from dav_gswt.export import glb, glb_splats, glb_spz, ply, spool, spz, usd
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.finite import Area, count_cells, keep_level
 
@@ -30,7 +30,11 @@ LIMITS = {
     "glb": FileLimit(glb_splats.BYTES, (glb.MAX_BYTES - glb_splats.HEADER_BYTES) // glb_splats.BYTES),
     "sog": FileLimit(ply.BYTES),  # made from a PLY
     "streamed_sog": FileLimit(2 * ply.BYTES),  # made from one of each level; coarser ones are smaller
+    "usd": FileLimit(usd.BYTES),
+    "3dtiles": FileLimit(2 * spz.RAW_BYTES[glb_spz.SPZ_VERSION]),  # all levels
 }
+PLAIN_TILES = FileLimit(2 * glb_splats.BYTES)  # of 3dtiles without compression
+ALL_LEVELS = {"streamed_sog", "3dtiles"}  # whatever level is asked for
 
 
 @dataclass(frozen=True)
@@ -78,18 +82,25 @@ def find_origin(terrain: EndlessTerrain, area: Area) -> Float[Array, "3"]:
     return np.array([area.west + area.columns / 2, area.south + area.rows / 2, 0.0]) * terrain.side
 
 
-def check_size(terrain: EndlessTerrain, wanted: TerrainExport, formats: Sequence[str], max_gb: float) -> int:
+def choose_limits(settings: Mapping[str, Any]) -> dict[str, FileLimit]:
+    """The limits of the formats that the config's `export` names."""
+    plain = {"3dtiles": PLAIN_TILES} if settings["tile_compression"] == "none" else {}
+    return {name: (LIMITS | plain)[name] for name in settings["formats"]}
+
+
+def check_size(terrain: EndlessTerrain, wanted: TerrainExport, limits: Mapping[str, FileLimit], max_gb: float) -> int:
     """The number of Gaussians, at most. Raises: InputError: more than a file may have, with the area that fits."""
-    count = _count(terrain, wanted, wanted.area)
-    for name in formats:
-        most = int(max_gb * 1e9) // LIMITS[name].bytes
-        held = LIMITS[name].gaussians
-        bound = min(most, held or most)
+    asked = _count(terrain, wanted, wanted.area)
+    for name, limit in limits.items():
+        limited = replace(wanted, level=0) if name in ALL_LEVELS else wanted
+        count = asked if limited is wanted else _count(terrain, limited, wanted.area)
+        most = int(max_gb * 1e9) // limit.bytes
+        bound = min(most, limit.gaussians or most)
         if count > bound:
             why = f"export.max_gb: {max_gb:g} allows" if bound == most else f"the format {name} holds"
             size = f"{wanted.area.columns} x {wanted.area.rows} cells have up to {count} Gaussians, {why} {bound}"
-            raise InputError(f"export: {name}: {size}; {_suggest(terrain, wanted, bound)}")
-    return count
+            raise InputError(f"export: {name}: {size}; {_suggest(terrain, limited, bound)}")
+    return asked
 
 
 def _suggest(terrain: EndlessTerrain, wanted: TerrainExport, bound: int) -> str:
@@ -119,7 +130,7 @@ def _count(terrain: EndlessTerrain, wanted: TerrainExport, area: Area) -> int:
     return int(count_cells(wanted.select(terrain), area, wanted.eye).sum())
 
 
-def describe_size(count: int, formats: Sequence[str]) -> str:
+def describe_size(count: int, limits: Mapping[str, FileLimit]) -> str:
     """What an export takes, for the log."""
-    files = ", ".join(f"{name} {count * LIMITS[name].bytes / 1e6:.0f} MB" for name in formats)
+    files = ", ".join(f"{name} {count * limit.bytes / 1e6:.0f} MB" for name, limit in limits.items())
     return f"up to {count} Gaussians; at most {files}; {count * spool.BYTES / 1e6:.0f} MB of disk on the way"

@@ -5,7 +5,7 @@ import shutil
 from collections import deque
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,43 +14,66 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.bundle.manifest import Manifest
-from dav_gswt.export import glb_splats, ply, sog, spz
+from dav_gswt.export import glb_splats, ply, sog, spz, tiles_3d, usd
 from dav_gswt.export.axes import AXES
 from dav_gswt.export.spool import Spool
-from dav_gswt.export.terrain_area import TerrainExport, check_size, describe_size, plan_export
+from dav_gswt.export.terrain_area import TerrainExport, check_size, choose_limits, describe_size, plan_export
 from dav_gswt.field import GaussianField
 from dav_gswt.files import atomic_folder, write_json
+from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.logs import progress
 from dav_gswt.terrain.endless import EndlessTerrain
-from dav_gswt.terrain.finite import list_blocks, place_block
+from dav_gswt.terrain.finite import Area, list_blocks, place_block
 
 NAME = "terrain"
-OWN_AXES = {"ply": "y-down", "spz": "y-up", "glb": "y-up", "sog": "y-down", "streamed_sog": "y-down"}
+KEPT = ("unit", "origin", "tile_side", "cells")  # of terrain.json, in files that have a place for it
+OWN_AXES = {
+    "ply": "y-down",
+    "spz": "y-up",
+    "glb": "y-up",
+    "sog": "y-down",
+    "streamed_sog": "y-down",
+    "usd": "z-up",
+    "3dtiles": "z-up",
+}
+FIXED_AXES = {"3dtiles"}  # by the specification
 
 _log = logging.getLogger(__name__)
 
 
 def export_terrain(
-    terrain: EndlessTerrain, manifest: Manifest, settings: Mapping[str, Any], out: Path | str, threads: int = 1
+    terrain: EndlessTerrain,
+    manifest: Manifest,
+    settings: Mapping[str, Any],
+    out: Path | str,
+    threads: int = 1,
+    reference: Georeference | None = None,
 ) -> None:
-    """Write terrain.{ply,spz,glb,sog}, terrain_sog/ and terrain.json, as the config's `export` asks, to a folder.
+    """Write terrain.{ply,spz,glb,sog,usdc}, terrain_{sog,3dtiles}/ and terrain.json, as `export` asks, to a folder.
 
-    Raises: InputError: more than a file may have, no such level, or the converter of SOG is not here.
+    Args:   reference: where the scene lies on earth, if it is known.
+    Raises: InputError: more than a file may have, no such level, or the converter of SOG or USD's package is not here.
     """
     wanted, formats = plan_export(terrain, settings, manifest.eye_floor), settings["formats"]
-    count = check_size(terrain, wanted, formats, settings["max_gb"])
-    _log.info("%s", describe_size(count, formats))
+    limits = choose_limits(settings)
+    count = check_size(terrain, wanted, limits, settings["max_gb"])
+    _log.info("%s", describe_size(count, limits))
     if {"sog", "streamed_sog"} & set(formats):
         sog.find_converter("terrain")
+    if "usd" in formats:
+        usd.find_package()
     with atomic_folder(out) as folder:
         with _placed(terrain, wanted, folder, threads) as placed:
-            facts = _describe(terrain, manifest, wanted, len(placed))
+            facts = _describe(terrain, manifest, wanted, len(placed), reference)
             for name in formats:
-                axes = OWN_AXES[name] if settings["axes"] == "own" else settings["axes"]
-                facts["files"][name] = axes
+                own = settings["axes"] == "own" or name in FIXED_AXES
+                facts["files"][name] = axes = OWN_AXES[name] if own else settings["axes"]
                 _write_format(name, placed, folder, AXES[axes], settings, facts)
         if "streamed_sog" in formats:
             _write_streamed(terrain, wanted, folder, AXES[facts["files"]["streamed_sog"]], threads)
+        if "3dtiles" in formats:
+            spz = settings["tile_compression"] == "spz"
+            _write_tileset(terrain, wanted, folder, facts, reference, spz, threads)
         write_json(folder / f"{NAME}.json", facts)
 
 
@@ -68,13 +91,16 @@ def _write_format(
     elif name == "spz":
         spz.write_spz(placed, path, settings["spz_version"], rotation)
     elif name == "glb":
-        extras = {key: facts[key] for key in ("unit", "origin", "tile_side", "cells")}
+        extras = {key: facts[key] for key in KEPT}
         glb_splats.write_glb_splats(placed, path, extras, rotation)
     elif name == "sog":
         source = folder / ".sog.ply"
         ply.write_ply(placed, source, rotation)
         sog.convert(source, path, "terrain")
         source.unlink()
+    elif name == "usd":
+        known = {key: facts[key] for key in KEPT}
+        usd.write_usd(placed, path.with_suffix(".usdc"), known, facts["metres_per_unit"] or 1.0, rotation)
 
 
 def _write_streamed(
@@ -92,11 +118,35 @@ def _write_streamed(
         source.unlink()
 
 
-def _describe(terrain: EndlessTerrain, manifest: Manifest, wanted: TerrainExport, count: int) -> dict[str, Any]:
+def _write_tileset(
+    terrain: EndlessTerrain,
+    wanted: TerrainExport,
+    folder: Path,
+    facts: Mapping[str, Any],
+    reference: Georeference | None,
+    spz: bool,
+    threads: int,
+) -> None:
+    """Every level of the area as 3D Tiles."""
+
+    def place(area: Area, level: int) -> AbstractContextManager[Spool]:
+        return _placed(terrain, replace(wanted, area=area, level=level), folder, threads)
+
+    errors = tiles_3d.measure_errors(terrain)
+    transform = tiles_3d.place_on_globe(reference, wanted.origin) if reference else None
+    kept = {key: facts[key] for key in KEPT}
+    tiles_3d.write_tileset(folder / f"{NAME}_3dtiles", wanted.area, errors, place, kept, transform, spz)
+
+
+def _describe(
+    terrain: EndlessTerrain, manifest: Manifest, wanted: TerrainExport, count: int, reference: Georeference | None
+) -> dict[str, Any]:
     """terrain.json. Lengths are in the bundle's unit, the origin is a place of the world, east, north and up."""
     area = wanted.area
+    metres = 1.0 if manifest.unit == "metre" else None
     return {
         "unit": manifest.unit,
+        "metres_per_unit": reference.metres_per_unit if reference else metres,
         "tile_side": terrain.side,
         "cells": {"west": area.west, "south": area.south, "columns": area.columns, "rows": area.rows},
         "origin": wanted.origin.tolist(),

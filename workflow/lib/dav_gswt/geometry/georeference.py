@@ -60,6 +60,20 @@ class Georeference:
         local = np.stack(self._to_local.transform(longitude, latitude, altitude), axis=1)
         return np.concatenate([local[:, :2] @ self.turn, local[:, 2:]], axis=1) / self.metres_per_unit
 
+    @property
+    def to_geocentric(self) -> Float[Array, "4 4"]:
+        """Takes the world's (x, y, z, 1) to metres from the earth's centre (EPSG:4978), and 1."""
+        a, b = np.radians([self.latitude, self.longitude])
+        east = np.array([-np.sin(b), np.cos(b), 0.0])
+        up = np.array([np.cos(a) * np.cos(b), np.cos(a) * np.sin(b), np.sin(a)])
+        local = np.stack([east, np.cross(up, east), up], axis=1)
+        local[:, :2] = local[:, :2] @ self.turn
+        cart = Transformer.from_pipeline("+proj=cart +ellps=WGS84")
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.metres_per_unit * local
+        matrix[:3, 3] = cart.transform(self.longitude, self.latitude, self.altitude)
+        return matrix
+
     @cached_property
     def _to_local(self) -> Transformer:
         """Longitude and latitude in degrees and altitude to metres east, north and up of the origin."""
