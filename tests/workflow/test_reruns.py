@@ -21,6 +21,7 @@ OTHER_PRESET = {
 }
 OTHER_TILING = {"tile": 0.4, "strip": 0.125, "candidates": 24, "variants": 1, "energy": "semantic"}
 PHOTOGRAPHED = {"candidates": 21, "min_elevation": 31, "burst": 2, "feasibility": {"max_distance": 900.0}}
+PHOTOGRAPHED |= {"poses": {"kind": "orbit"}}
 NAMED = {"preset": "other", "tiling": "other"}
 SYNTHETIC = {"family": "grass", "seed": 101, "photos": 6, "start": 4, "test": 3, "layout": "cap", "oblique": 1}
 SYNTHETIC |= {"walkers": 1, "size": 144, "materials": "auto", "agent": "replay"} | PHOTOGRAPHED | NAMED
