@@ -262,7 +262,7 @@ def test_lists_and_k_can_be_given_on_the_command_line(planned, snakemake, tmp_pa
     given = ("--config", "seeds=[1, 2]", "views_per_round=3", "stills={width: 320, height: 180}")
     assert planned(tmp_path, *given)["fit_coarse"] == 2
     done = snakemake(tmp_path, *given, "--dry-run")
-    assert "seed2/draft/active_farthest_none_pdrop0_lam0_k3/iter2/levels" in done.stdout
+    assert "seed2/draft/active_coverage-error_none_pdrop0_lam0_k3/iter2/levels" in done.stdout
 
 
 @pytest.mark.parametrize("policy", ["farthest", "w2-lpips"])

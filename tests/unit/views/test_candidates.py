@@ -32,11 +32,11 @@ def test_an_orbit_looks_at_the_middle_from_the_flying_height():
 
 
 def test_free_poses_spread_over_distances_aim_points_and_directions():
-    aims, away = zip(*(aim(camera) for _, camera in stand("render")), strict=True)
+    aims, away = zip(*(aim(camera) for _, camera in stand("render", kind="free")), strict=True)
     assert 2 <= min(away) < 2.2 and 7.2 < max(away) <= 7.5
     counts = np.histogram2d(*np.array(aims).T, bins=3, range=[[-2, 2], [-2, 2]])[0]
     assert counts.min() >= 10 and counts.sum() == 120  # 13.3 in each of nine parts of the exemplar
-    assert np.corrcoef(np.column_stack([aims, away, [c.forward[2] for _, c in stand("render")]]).T)[
+    assert np.corrcoef(np.column_stack([aims, away, [c.forward[2] for _, c in stand("render", kind="free")]]).T)[
         0, 1:
     ] == pytest.approx(0, abs=0.1)
 
@@ -48,13 +48,14 @@ def test_radii_and_aims_of_free_poses_are_those_asked_for():
 
 @pytest.mark.parametrize("agent", ["handheld", "plan"])
 def test_nobody_is_sent_higher_than_the_first_photos_were_taken(agent):
-    found = stand(agent)
+    found = stand(agent, kind="free")
     assert max(camera.centre[2] for _, camera in found) <= 5.0
     assert min(aim(camera)[1] for _, camera in found) >= 2 and max(aim(camera)[1] for _, camera in found) <= 5.0
 
 
-def test_a_rig_turns_on_an_orbit_unless_told_otherwise():
-    assert {round(aim(camera)[1], 6) for _, camera in stand("serial")} == {5.0}
+@pytest.mark.parametrize("agent", ["render", "serial", "plan", "handheld"])
+def test_photos_are_taken_on_an_orbit_unless_told_otherwise(agent):
+    assert {round(aim(camera)[1], 6) for _, camera in stand(agent)} == {5.0}
 
 
 def test_a_route_has_stops_along_it_with_headings_to_all_sides():

@@ -122,9 +122,7 @@ class _Scene(ConfigModel):
 
 class _PhotographedScene(_Scene):
     candidates: int = key("poses that may be asked for", 250, ge=0, le=10_000)
-    poses: CandidatePoses | None = key(
-        "which poses these are; if left out `{kind: free}`, for a rig `{kind: orbit}`", None
-    )
+    poses: CandidatePoses | None = key("which poses these are; if left out `{kind: orbit}`", None)
     min_elevation: float = key(
         "lowest elevation of candidates and of test views", 30, unit="degrees", renamed="lowest", ge=5, le=85
     )

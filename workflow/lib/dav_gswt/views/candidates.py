@@ -56,13 +56,13 @@ def list_rendered(scene: dict, frame: SceneFrame) -> Candidates:
 
 
 def list_poses(scene: dict, frame: SceneFrame, lens: Camera) -> Candidates:
-    """List the poses that a scene's `poses` describes; free ones where it says nothing, for a rig an orbit.
+    """List the poses that a scene's `poses` describes; an orbit where it says nothing.
 
     scene: its keys `agent`, `candidates` (number), `min_elevation` (degrees) and `poses` are used. lens: a camera whose
     lens and picture all have.
     Raises: InputError: a route without length.
     """
-    poses = scene.get("poses", {"kind": "orbit" if scene["agent"] == "serial" else "free"})
+    poses = scene.get("poses", {"kind": "orbit"})
     if poses["kind"] == "route":
         found = _stand_along_route(scene["candidates"], poses, frame, lens)
     else:
