@@ -5,8 +5,11 @@ import subprocess
 
 import pytest
 from fixtures.land_covers import write_cover_bundle
+from fixtures.random_field import random_field
 
 from dav_gswt.bundle import store
+from dav_gswt.export import spool
+from dav_gswt.export.spool import Spool
 from dav_gswt.terrain import endless
 
 HILLS = {"kind": "hills", "height": 0.4, "wavelength": 4}
@@ -24,6 +27,19 @@ SETTINGS = {
     "surface": "ground",
     "mesh_error": 0.25,
 }
+
+
+@pytest.fixture
+def field(monkeypatch):
+    monkeypatch.setattr(spool, "CHUNK", 64)  # several parts
+    return random_field(200, seed=1)
+
+
+@pytest.fixture
+def placed(field, tmp_path):
+    with Spool(tmp_path / "spool") as placed:
+        placed.append(field)
+    return placed
 
 
 @pytest.fixture(scope="session")

@@ -7,22 +7,14 @@ import pytest
 from fixtures.random_field import random_field
 from fixtures.splat_files import read_glb, read_glb_splats
 
-from dav_gswt.export import glb_splats, spool
+from dav_gswt.export import glb_splats
 from dav_gswt.export.axes import Y_UP, turn_field
 from dav_gswt.export.glb import GlbWriter
 from dav_gswt.export.spool import Spool
 
 
 @pytest.fixture
-def field(monkeypatch):
-    monkeypatch.setattr(spool, "CHUNK", 64)  # several parts
-    return random_field(200, seed=1)
-
-
-@pytest.fixture
-def file(field, tmp_path):
-    with Spool(tmp_path / "spool") as placed:
-        placed.append(field)
+def file(placed, tmp_path):
     glb_splats.write_glb_splats(placed, tmp_path / "a.glb", {"unit": "metre"})
     return tmp_path / "a.glb"
 

@@ -5,14 +5,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from fixtures.random_field import random_field
 from fixtures.splat_files import read_usd
 
 from dav_gswt.errors import InputError
-from dav_gswt.export import spool, usd
+from dav_gswt.export import usd
 from dav_gswt.export.axes import Y_DOWN, Y_UP, Z_UP, turn_field
 from dav_gswt.export.bounds import find_box
-from dav_gswt.export.spool import Spool
 from dav_gswt.field import read_field
 from dav_gswt.files import digest_files
 
@@ -22,19 +20,6 @@ FACTS = {"unit": "metre", "origin": [1.5, -2.0, 0.0], "tile_side": 2.0, "cells":
 @pytest.fixture
 def pxr():
     return pytest.importorskip("pxr", reason="needs the extra `usd`")
-
-
-@pytest.fixture
-def field(monkeypatch):
-    monkeypatch.setattr(spool, "CHUNK", 64)  # several parts
-    return random_field(200, seed=1)
-
-
-@pytest.fixture
-def placed(field, tmp_path):
-    with Spool(tmp_path / "spool") as placed:
-        placed.append(field)
-    return placed
 
 
 @pytest.mark.parametrize("up, rotation", list(usd.UPWARD.items()))

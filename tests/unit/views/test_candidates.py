@@ -14,6 +14,7 @@ LENS = cameras.pinhole([0.0, 0.0, 5.0], [0.0, 1.0, 0.0], 60, 40, 50.0)
 
 
 def stand(agent="handheld", count=120, **poses):
+    poses = ({"aims": 1.0, "down": 35.0} | poses) if poses else {}
     scene = {"agent": agent, "candidates": count, "min_elevation": 30.0} | ({"poses": poses} if poses else {})
     return candidates.list_poses(scene, FRAME, LENS)
 

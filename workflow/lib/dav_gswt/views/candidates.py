@@ -25,7 +25,6 @@ Candidates = list[tuple[Pose, Camera]]
 
 FREE_RADII = (0.4, 1.5)  # flying heights
 REACHED_RADII = (0.4, 1.0)  # flying heights, for devices and people: never higher than the first photos were taken
-ROUTE_DOWN = 35.0  # degrees below the horizon
 HEADINGS = 4  # at each stop of a route
 ANY_FIELD = 60.0  # degrees, of a camera that gets another lens
 
@@ -76,7 +75,7 @@ def _stand_around(scene: dict, poses: dict, frame: SceneFrame, lens: Camera) -> 
     radii, aims = (1.0, 1.0), 0.0
     if poses["kind"] == "free":
         usual = FREE_RADII if scene["agent"] == "render" else REACHED_RADII
-        radii, aims = poses.get("radii", usual), poses.get("aims", 1.0)
+        radii, aims = poses.get("radii", usual), poses["aims"]
     low, high = (frame.flying_height * radius for radius in radii)
     placed = camera_layouts.spread_free(count, lowest, (low, high), aims * frame.exemplar.side)
     return [
@@ -92,7 +91,7 @@ def _stand_along_route(count: int, poses: dict, frame: SceneFrame, lens: Camera)
 
     From stop to stop the headings turn by a quarter of a right angle, so that few photos see all directions.
     """
-    height, down = poses["height"] * frame.flying_height, np.radians(poses.get("down", ROUTE_DOWN))
+    height, down = poses["height"] * frame.flying_height, np.radians(poses["down"])
     places = frame.exemplar.side * np.asarray(poses["places"], float)
     try:
         stops, ahead = camera_layouts.spread_along(places, -(-count // HEADINGS))

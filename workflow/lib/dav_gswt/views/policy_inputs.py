@@ -1,6 +1,5 @@
 """Inputs of single policies beside the scores, computed only for the policies that need them."""
 
-import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray as Array
 
@@ -51,10 +50,8 @@ def _measure_importance(
     if policy in NEEDS_PHOTOS:
         return measure_cell_errors(cells, _read_photos(split, files), corrected)
     if policy in PRIOR_POLICIES:
-        known = pose_maps.read_pose_maps(files["maps"])[1]
-        values = np.zeros(len(cells.field))
-        values[: len(known)] = known
-        return cells.average(values)
+        gaussians = pose_maps.read_pose_maps(files["maps"])[1]
+        return cells.average(pose_maps.apply_uncertainty(cells.field, gaussians).uncertainty)
     if policy in ORACLES:
         return measure_cell_errors(cells, _read_truth(candidates, files, agent), corrected)
     return None
