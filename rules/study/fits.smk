@@ -1,7 +1,14 @@
-"""Fit profiles: PSNR of the test photos over the seconds of a fit, and what its field looks like from elsewhere.
+"""Fits by themselves: their quality over seconds, and rounds against one fit to the same photos.
 
-In: the photos of a scene of the config's `study.fit_profiles`. Out: docs/research/data/fit_{scene}.csv and figures.
+In: the photos of the scenes of the config's `study.fit_profiles` and `study.refits`. Out: docs/research/data/fit_{scene}.csv
+and figures, docs/research/data/refits_{scene}.csv.
 """
+
+
+def start_of_refits(wildcards):
+    seed = STUDY["refits"][wildcards.scene]["seeds"][0]
+    return str(paths.stage_folder("start", {"scene": wildcards.scene, "seed": seed}) / "views.json")
+
 
 CURVES = ["copr_dunes", "desert_high"]  # one real set, one synthetic
 
@@ -46,3 +53,41 @@ rule plot_fits:
         source=code_of("study/plot_fits"),
     script:
         "../../scripts/study/plot_fits.py"
+
+
+rule compare_refits:
+    """Fit photos in rounds of several sizes, and at once."""
+    input:
+        unpack(lpips_weights),
+        views=start_of_refits,
+        frame="<results>/<photos>/ground.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+    output:
+        table="docs/research/data/refits_{scene}.csv",
+    log:
+        "<logs>/figures/compare_refits_{scene}.log",
+    benchmark:
+        "<benchmarks>/figures/compare_refits_{scene}.tsv"
+    wildcard_constraints:
+        scene="|".join(STUDY["refits"]) or NEVER,
+    threads: 2
+    resources:
+        mem_mb=per_attempt(3000),
+        runtime=per_attempt("60m"),
+    params:
+        refits=lambda wildcards: STUDY["refits"][wildcards.scene],
+        whole=lambda wildcards: config["scenes"][wildcards.scene].get("whole", False),
+        source=code_of("study/compare_refits"),
+    script:
+        "../../scripts/study/compare_refits.py"
+
+
+rule refits:
+    """Compare rounds with one fit, on every scene of the config's `study.refits`."""
+    input:
+        expand("docs/research/data/refits_{scene}.csv", scene=STUDY["refits"]),
+
+
+localrules:
+    refits,

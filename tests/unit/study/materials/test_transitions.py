@@ -39,6 +39,12 @@ def test_ground_of_one_material_has_no_border():
     assert len(transitions.find_borders(np.zeros((SIDE, SIDE), int), 8)) == 0
 
 
+def test_squares_inside_a_material_show_no_other():
+    places = transitions.find_insides(halves(), 8, 0)
+    assert len(places) and (places[:, 1] + CELLS <= SIDE / 2 + 1).all()
+    assert len(transitions.find_insides(np.zeros((SIDE, SIDE), int), 8, 1)) == 0
+
+
 def test_excluded_ground_is_no_border():
     material = halves()
     material[:, SIDE // 2 - 12 : SIDE // 2 + 12] = -1
@@ -65,6 +71,21 @@ def test_like_borders_are_as_near_and_others_farther(random_weights):
     checks = (np.indices((SIDE, SIDE)).sum(0) // 3) % 2
     other = transitions.measure_transitions(photographed, stripes(checks, 1), random_weights, 0)
     assert other.low > 0 and other.terrain > 2 * like.terrain
+
+
+def test_materials_that_look_otherwise_everywhere_do_not_count_as_borders(random_weights):
+    photographed = stripes(halves())
+    rough = transitions.measure_transitions(photographed, stripes(halves(), 1, noise=0.3), random_weights, 0)
+    assert rough.low > 0 and rough.inside > 0
+    assert abs(rough.beyond) < 0.5 * rough.difference
+
+
+def test_borders_that_look_otherwise_count(random_weights):
+    fringe = stripes(halves(), 1)
+    middle = PIXELS * SIDE // 2
+    fringe.picture[:, middle - 8 : middle + 8] = [1, 0, 0]
+    found = transitions.measure_transitions(stripes(halves()), fringe, random_weights, 0)
+    assert found.beyond_low > 0 and abs(found.inside) < found.beyond
 
 
 def test_too_few_photographed_borders_are_refused(random_weights):

@@ -18,6 +18,7 @@ LONG = 600.0  # seconds: a run that takes longer is told of a faster preset
 PER_JOB = 1.6  # seconds to start a job: Snakemake, Python, imports
 PHOTO_SHAPE = 0.75  # height over width
 SH_COST = {0: 1.0, 1: 1.6, 2: 2.2, 3: 3.0, "auto": 1.15}  # of a step, by the degree of the spherical harmonics
+FAMILY_COST = {"oasis": 1.6}  # of rendering a photo: stones, plants and sand are one scene
 PER_PIXEL = 2.5  # Gaussians that a fit ends with, at most, for each pixel of a photo
 
 
@@ -37,6 +38,7 @@ class Work:
         still_pixels: of a still.
         features: relative cost of structure from motion, by the scene's `sfm`.
         rendered: whether captured photos are rendered.
+        scene_cost: of rendering a photo, relative, by the synthetic family.
     """
 
     start: int
@@ -56,6 +58,7 @@ class Work:
     still_pixels: float
     features: float
     rendered: bool
+    scene_cost: float
 
     @property
     def mean_photos(self) -> float:
@@ -88,23 +91,27 @@ class Cost:
 
 OTHER_RULE = Cost(0.8)
 COSTS: dict[str, Callable[[Work], Cost]] = {
-    "register_photos": lambda work: Cost(3 + 0.8 * work.features * work.total),
-    "render_photos": lambda work: Cost(10 + 1.9e-5 * work.photo_pixels * (work.total + work.tests)),
+    "register_photos": lambda work: Cost(3 + 1.9 * work.features * work.total),
+    "render_photos": lambda work: Cost(work.scene_cost * (10 + 1.9e-5 * work.photo_pixels * (work.total + work.tests))),
     "fit_coarse": lambda work: Cost(1.2 + work.observation_seconds * work.start, work.step_seconds * work.steps),
     "evaluate_coarse": lambda work: Cost(1.6 + 1e-6 * work.fit_pixels * work.tests),
     "evaluate_round": lambda work: Cost(1.6 + 1e-6 * work.fit_pixels * work.tests),
     "evaluate_inpainted": lambda work: Cost(1.6 + 2e-6 * work.fit_pixels * work.tests),
     "score_coarse": lambda work: Cost(1 + work.candidates * (0.018 + 0.012 * work.samples)),
     "score_round": lambda work: Cost(1 + work.candidates * (0.018 + 0.012 * work.samples)),
-    "capture_views": lambda work: Cost(7.2 + 1.3e-5 * work.photo_pixels * work.new if work.rendered else 1.5),
+    "capture_views": lambda work: Cost(
+        work.scene_cost * (7.2 + 1.3e-5 * work.photo_pixels * work.new) if work.rendered else 1.5
+    ),
     "update_field": lambda work: Cost(
         1.2 + work.observation_seconds * work.mean_photos, work.step_seconds * work.steps_per_photo * work.new
     ),
+    "select_poses": lambda work: Cost(0.8 + 0.006 * work.candidates + 0.4 * work.field_size),
+    "report_photos": lambda work: Cost(1.0 + 0.055 * work.total),
     "inpaint_field": lambda work: Cost(15.0),
-    "find_materials": lambda work: Cost(9.5 + 2.3 * work.field_size),
+    "find_materials": lambda work: Cost(8.0 + 2.3 * work.field_size),
     "make_levels": lambda work: Cost(0.7, 1.4 * (0.5 + work.level_steps / 120) * (0.5 + 0.5 * work.field_size)),
     "cut_tiles": lambda work: Cost(1.2 + 2.3 * work.field_size),
-    "bundle_tiles": lambda work: Cost(6.0 + 1.5 * work.field_size),
+    "bundle_tiles": lambda work: Cost(12.0 + 1.3 * work.field_size),
     "render_terrain": lambda work: Cost(26.0, 5e-7 * work.still_pixels),
 }
 
@@ -148,6 +155,7 @@ def describe_work(config: Mapping[str, Any], preset: str | None = None) -> Work:
         still_pixels=3.0 * config["stills"]["width"] * config["stills"]["height"],
         features=5.0 if scene.get("sfm") == "careful" else 1.0,
         rendered=scene.get("agent") == "render",
+        scene_cost=FAMILY_COST.get(scene.get("family"), 1.0),
     )
 
 

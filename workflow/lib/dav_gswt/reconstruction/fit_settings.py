@@ -58,18 +58,22 @@ class UpdateSettings(_FitSettings):
     """The keys of a preset that the update of a field reads."""
 
     steps_per_photo: Count  # for every new photo
+    first_rate: float = UPDATE_RATE
+
+    @property
+    def steps_per_new_photo(self) -> int:
+        return STEPS_PER_NEW_PHOTO if self.steps_per_photo == AUTO else int(self.steps_per_photo)
 
     def plan_update(self, field: GaussianField, earlier: int, new: int) -> FitPlan:
         """The plan of an update of a field from so many earlier photos with so many new ones.
 
         Steps: a number for each new photo. With "auto", the Gaussians per photo are at most those of the field, and the
-        spherical harmonics have the field's degree. Rates begin at UPDATE_RATE.
+        spherical harmonics have the field's degree. Rates begin at `first_rate` of a first fit's.
         """
-        steps = STEPS_PER_NEW_PHOTO if self.steps_per_photo == AUTO else int(self.steps_per_photo)
         limit = min(MAX_GAUSSIANS, len(field) * (earlier + new) // max(1, earlier))
         degree = field.sh_degree if self.sh_degree == AUTO else self.sh_degree
-        rates = {"pose_rate": self.pose_rate, "first_rate": UPDATE_RATE if earlier else 1.0}
-        return FitPlan(steps * new, self.max_gaussians, degree, limit=limit, **rates)
+        rates = {"pose_rate": self.pose_rate, "first_rate": self.first_rate if earlier else 1.0}
+        return FitPlan(self.steps_per_new_photo * new, self.max_gaussians, degree, limit=limit, **rates)
 
 
 Settings = TypeVar("Settings", CoarseSettings, UpdateSettings)

@@ -151,6 +151,17 @@ class FitProfile(Preset):
     margin: float = key("ground fitted around the exemplar, as a share of its side", ge=0, le=100)
 
 
+class Refits(Preset):
+    """`snakemake refits`: photos taken in rounds against one fit to all of them, with the same number of steps."""
+
+    photos: int = key("of the last round, the start included", ge=3, le=100_000)
+    photos_a_round: list[Annotated[int, Field(ge=1, le=1000)]] = key("sizes of rounds that are compared", min_length=1)
+    first_rates: list[Annotated[float, Field(gt=0, le=1)]] = key(
+        "learning rates at the first step of a refit, as shares of a first fit's", min_length=1
+    )
+    seeds: Seeds = key("of fits; the start is that of the first one")
+
+
 class Seams(ConfigModel):
     """`snakemake seams`: can anybody find the seams, and does the terrain repeat?"""
 
@@ -300,6 +311,7 @@ class StudyConfig(ConfigModel):
     frames: Frames | None = key("frame times", None)
     calibration: Calibration | None = key("scores against true errors", None)
     view_benchmark: ViewBenchmark | None = key("policies", None, renamed="benchmark")
+    refits: dict[Name, Refits] = key("by scene: photos in rounds against photos at once", {})
     fit_profiles: dict[Name, FitProfile] = key("by scene: fits that are measured while they run", {}, renamed="trials")
     seams: Seams | None = key("seams and repetition", None, renamed="seam_study")
     forced_choice: ForcedChoice | None = key("the study with people", None, renamed="perceptual_study")

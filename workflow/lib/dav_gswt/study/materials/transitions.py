@@ -2,9 +2,11 @@
 
 Each crop shows two materials. Its distance is the mean of its nearest few among crops of photographed borders, in all
 eight symmetries. That of a photographed crop, to those that do not overlap it, is the spread of photographed borders.
+Crops inside the materials, measured alike, say how much of the difference has nothing to do with borders.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
@@ -24,6 +26,7 @@ from dav_gswt.terrain.finite import collect_cells
 CELLS, PIXELS = 48, 2  # ground cells along a side of a crop, and pixels of a cell
 STEP = 8  # cells between photographed crops
 LEAST, CLEAR = 0.2, 0.7  # share of a crop that each of two materials has, and that is no object and not excluded
+MOST = 0.02  # share of a crop inside a material that is another one
 CROPS, TILES = 80, 8  # of the terrain at most, and sides of the piece of it that they are cut from
 REPLICATES, LEVEL = 2000, 0.95
 
@@ -31,7 +34,8 @@ REPLICATES, LEVEL = 2000, 0.95
 @dataclass(frozen=True)
 class TransitionMeasures:
     """terrain, photographed: mean distances; None without a border. low, high: interval of their difference. crops: how
-    many of each."""
+    many of each. inside: the difference inside the materials, the mean over those that were photographed on enough
+    ground. beyond: the difference at borders less that, and its interval."""
 
     terrain: float | None = None
     photographed: float | None = None
@@ -40,6 +44,10 @@ class TransitionMeasures:
     high: float | None = None
     terrain_crops: int = 0
     photographed_crops: int = 0
+    inside: float | None = None
+    beyond: float | None = None
+    beyond_low: float | None = None
+    beyond_high: float | None = None
 
 
 @dataclass(frozen=True)
@@ -79,13 +87,26 @@ def map_terrain(terrain: EndlessTerrain, spacing: float, tiles: int = TILES) -> 
 
 def find_borders(material: Int[Array, "rows columns"], step: int) -> Int[Array, "n 2"]:
     """First row and column, in cells, of squares in which two materials have enough room."""
+    return _find_squares(material, step, lambda shares: np.sort(shares)[-2] >= LEAST)
+
+
+def find_insides(material: Int[Array, "rows columns"], step: int, number: int) -> Int[Array, "n 2"]:
+    """First row and column, in cells, of squares that show one material and hardly any other."""
+    return _find_squares(material, step, lambda shares: shares.sum() - shares[number] <= MOST)
+
+
+def _find_squares(
+    material: Int[Array, "rows columns"], step: int, fits: Callable[[Float[Array, "m"]], bool]
+) -> Int[Array, "n 2"]:
+    """Squares of clear ground whose materials have shares that fit."""
     rows, columns = material.shape
+    least = max(2, int(material.max()) + 1)
     found = []
     for row in range(0, rows - CELLS + 1, step):
         for column in range(0, columns - CELLS + 1, step):
             inside = material[row : row + CELLS, column : column + CELLS]
-            shares = np.sort(np.bincount(inside[inside >= 0], minlength=2)) / CELLS**2
-            if (inside >= 0).mean() >= CLEAR and shares[-2] >= LEAST:
+            shares = np.bincount(inside[inside >= 0], minlength=least) / CELLS**2
+            if shares.sum() >= CLEAR and fits(shares):
                 found.append((row, column))
     return np.array(found, int).reshape(-1, 2)
 
@@ -98,20 +119,52 @@ def measure_transitions(
     if len(places) < NEIGHBOURS + 1 or not len(others):
         raise InputError("transitions: too few borders between two materials were photographed to compare others with")
     rng = np.random.default_rng(seed)
-    others = others[np.sort(rng.permutation(len(others))[:CROPS])]
+    away, spread = _compare(photographed, terrain, places, _choose(others, rng), weights)
+    if not len(spread):
+        raise InputError("transitions: all photographed borders overlap each other; take photos of a larger ground")
+    at_borders = _draw_differences(away, spread, rng)
+    inside = []
+    for number in range(int(photographed.material.max()) + 1):
+        places, others = (find_insides(each.material, STEP, number) for each in (photographed, terrain))
+        if len(places) > NEIGHBOURS and len(others):
+            pair = _compare(photographed, terrain, _choose(places, rng), _choose(others, rng), weights)
+            inside += [_draw_differences(*pair, rng)] if len(pair[1]) else []
+    found = TransitionMeasures(
+        float(away.mean()),
+        float(spread.mean()),
+        at_borders.mean,
+        *at_borders.interval(),
+        len(away),
+        len(spread),
+    )
+    if not inside:
+        return found
+    mean = float(np.mean([each.mean for each in inside]))
+    beyond = _Differences(at_borders.mean - mean, at_borders.drawn - np.mean([each.drawn for each in inside], 0))
+    low, high = beyond.interval()
+    return replace(found, inside=mean, beyond=beyond.mean, beyond_low=low, beyond_high=high)
+
+
+def _choose(places: Int[Array, "n 2"], rng: np.random.Generator) -> Int[Array, "k 2"]:
+    """At most CROPS of them."""
+    return places[np.sort(rng.permutation(len(places))[:CROPS])]
+
+
+def _compare(
+    photographed: MaterialMap,
+    terrain: MaterialMap,
+    places: Int[Array, "n 2"],
+    others: Int[Array, "m 2"],
+    weights: Weights,
+) -> tuple[Float[Array, "m"], Float[Array, "k"]]:
+    """Distances of the terrain's crops to photographed ones, and of those photographed ones that have some apart."""
     bank, _ = embed_images(turn_crops(cut_crops(photographed.picture, places)), weights)
     own, _ = embed_images(cut_crops(photographed.picture, places), weights)
     made, _ = embed_images(cut_crops(terrain.picture, others), weights)
     apart = np.abs(places[:, None] - places[None]).max(-1) >= CELLS
     everywhere = np.ones((len(others), len(places)), bool)
     spread = average_nearest(pairwise_distances(own, bank), apart)
-    away = average_nearest(pairwise_distances(made, bank), everywhere)
-    spread = spread[np.isfinite(spread)]
-    if not len(spread):
-        raise InputError("transitions: all photographed borders overlap each other; take photos of a larger ground")
-    low, high = bootstrap_difference(away, spread, rng)
-    difference = float(away.mean() - spread.mean())
-    return TransitionMeasures(float(away.mean()), float(spread.mean()), difference, low, high, len(away), len(spread))
+    return average_nearest(pairwise_distances(made, bank), everywhere), spread[np.isfinite(spread)]
 
 
 def cut_crops(picture: Float32[Array, "h w 3"], places: Int[Array, "n 2"]) -> Float32[Array, "n s s 3"]:
@@ -135,11 +188,22 @@ def average_nearest(apart: Float[Array, "n k"], allowed: Bool[Array, "n m"]) -> 
     return np.where(np.isfinite(nearest), nearest, np.nan)
 
 
-def bootstrap_difference(a: Float[Array, "n"], b: Float[Array, "m"], rng: np.random.Generator) -> tuple[float, float]:
-    """Interval of mean(a) - mean(b), each drawn anew."""
-    means = [
+@dataclass(frozen=True)
+class _Differences:
+    """A difference of means, and what it is when both are drawn anew."""
+
+    mean: float
+    drawn: Float[Array, "r"]
+
+    def interval(self) -> tuple[float, float]:
+        low, high = np.quantile(self.drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+        return float(low), float(high)
+
+
+def _draw_differences(a: Float[Array, "n"], b: Float[Array, "m"], rng: np.random.Generator) -> _Differences:
+    """mean(a) - mean(b), and REPLICATES of it."""
+    drawn = [
         a[rng.integers(len(a), size=len(a))].mean() - b[rng.integers(len(b), size=len(b))].mean()
         for _ in range(REPLICATES)
     ]
-    low, high = np.quantile(means, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    return float(low), float(high)
+    return _Differences(float(a.mean() - b.mean()), np.array(drawn))
