@@ -5,8 +5,9 @@ and figures, docs/research/data/refits_{scene}.csv.
 """
 
 
-def start_of_refits(wildcards):
-    seed = STUDY["refits"][wildcards.scene]["seeds"][0]
+def first_start(wildcards, table):
+    """The view split of a scene of a study's table, by the first of its seeds."""
+    seed = STUDY[table][wildcards.scene]["seeds"][0]
     return str(paths.stage_folder("start", {"scene": wildcards.scene, "seed": seed}) / "views.json")
 
 
@@ -59,7 +60,7 @@ rule compare_refits:
     """Fit photos in rounds of several sizes, and at once."""
     input:
         unpack(lpips_weights),
-        views=start_of_refits,
+        views=lambda wildcards: first_start(wildcards, "refits"),
         frame="<results>/<photos>/ground.json",
         images="<results>/<photos>/images",
         model="<results>/<photos>/sparse",

@@ -162,6 +162,14 @@ class Refits(Preset):
     seeds: Seeds = key("of fits; the start is that of the first one")
 
 
+class GainBound(Preset):
+    """`snakemake gain_bound`: policies beside the greedy choice of the photo whose refit truly gains most."""
+
+    k: int = key("photos a round", ge=1, le=1000)
+    rounds: int = key("rounds", ge=1, le=100)
+    seeds: Seeds = key("of fits; the start is that of the first one")
+
+
 class Seams(ConfigModel):
     """`snakemake seams`: can anybody find the seams, and does the terrain repeat?"""
 
@@ -312,6 +320,7 @@ class StudyConfig(ConfigModel):
     calibration: Calibration | None = key("scores against true errors", None)
     view_benchmark: ViewBenchmark | None = key("policies", None, renamed="benchmark")
     refits: dict[Name, Refits] = key("by scene: photos in rounds against photos at once", {})
+    gain_bound: dict[Name, GainBound] = key("by scene: policies beside the best choice there is", {})
     fit_profiles: dict[Name, FitProfile] = key("by scene: fits that are measured while they run", {}, renamed="trials")
     seams: Seams | None = key("seams and repetition", None, renamed="seam_study")
     forced_choice: ForcedChoice | None = key("the study with people", None, renamed="perceptual_study")
