@@ -101,6 +101,16 @@ def test_the_largest_of_many_specks_is_texture_on_rough_ground():
     assert len(find(things)[0]) == 1
 
 
+@pytest.mark.parametrize(("rough", "alike", "found"), [(True, 0.3, 0), (True, 0.05, 1), (False, 0.3, 1)])
+def test_a_stone_in_a_field_of_stones_is_texture(rough, alike, found):
+    own = box(50, 60, 40, 50)
+    ground = around(own, rough=(0,) if rough else ())
+    stones = np.random.default_rng(0).random((M, M)) < alike
+    ground.features[stones] = ground.features[55, 45]
+    footprints, excluded = objects.find_footprints([own], own, ground)
+    assert len(footprints) == found and not excluded.any()
+
+
 def test_things_that_touch_are_split():
     rows, columns = np.mgrid[:M, :M]
     middles = [(60, 45), (60, 56), (60, 67), (71, 67), (82, 67)]

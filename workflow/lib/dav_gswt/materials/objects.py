@@ -40,6 +40,8 @@ SLENDER = (
 )
 OPEN, WITHIN = 0.45, 0.7  # share of these that is plain ground, and share of that which is its material's
 MANY = 0.5  # area of smaller things of a thing's colour over its own, from which it is the largest of many
+COMMON, NEAR = 0.15, 0.6  # share of a material that looks like a thing, from which it is texture; and how near that is,
+# over the thing's difference from what is usual
 ALIKE = 0.85  # cosine of the angle between the differences of two things of one colour
 MARKER, LEAST_CONTRAST = 2.2, 0.12  # contrast of a marker over its material's, and the least that this counts as
 OTHER = 0.5  # of what stands out, that is ground of another material: then it is a piece of that, not a thing
@@ -93,7 +95,7 @@ def find_footprints(
 
     Things at the border of the exemplar are cut off, so they are no objects; nor are things that are long, frayed,
     large or taller than wide, lie between two materials, are small pieces of another material, shade, or markers. On
-    rough ground the largest of many specks is texture.
+    rough ground what has the colour of much of it, and the largest of many specks, is texture.
     Args: standing: cells of each thing that stands on the ground. candidates: cells that stand out by colour or height.
     Returns: footprints; cells to be filled beside them.
     """
@@ -103,6 +105,8 @@ def find_footprints(
     tall, flat = _join_rims(tall, candidates)
     for own in tall:
         material = around.material_of(own)
+        if material in around.rough and _is_texture(own, material, around):
+            continue
         if _is_single(own, material, around):
             footprints.append(Footprint(own, material))
         else:
@@ -113,7 +117,11 @@ def find_footprints(
         rough = material in around.rough
         if _measure_size(own) < (SMALLEST_STANDING if rough else SMALLEST) * m:
             continue
-        if rough and not piece and _is_one_of_many(own, material, small, around):
+        if (
+            rough
+            and not piece
+            and (_is_one_of_many(own, material, small, around) or _is_texture(own, material, around))
+        ):
             continue
         unwanted = piece or _is_shaded(own, material, around) or _is_marker(own, material, around)
         if not unwanted and _is_single(own, material, around):
@@ -212,6 +220,16 @@ def _is_one_of_many(
             length = max(float(np.linalg.norm(step) * np.linalg.norm(away)), 1e-9)
             area += int(other.sum()) if float(step @ away) > ALIKE * length else 0
     return bool(area >= MANY * own.sum())
+
+
+def _is_texture(own: Bool[Array, "m m"], material: int, around: Surroundings) -> bool:
+    """Whether much of its material has the colour of a thing, as among stones."""
+    plain = around.plain(material) & ~own
+    if not plain.any():
+        return False
+    colours, typical = around.features[plain], np.median(around.features[own], 0)
+    difference = float(np.linalg.norm(typical - np.median(colours, 0)))
+    return bool((np.linalg.norm(colours - typical, axis=1) < NEAR * difference).mean() > COMMON)
 
 
 def _measure_size(cells: Bool[Array, "m m"]) -> int:
