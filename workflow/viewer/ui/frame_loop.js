@@ -2,6 +2,7 @@
 
 import { BUDGET } from "../draw/frame_pacing.js";
 import { createGamepads } from "./gamepads.js";
+import { keepPace } from "./kept_pace.js";
 import { stepWalker } from "./walker.js";
 
 const MAX_STEP = 250; // milliseconds of walking that one frame makes up for
@@ -10,7 +11,7 @@ const MAX_STEP = 250; // milliseconds of walking that one frame makes up for
 export function runFrameLoop(viewer) {
   const { pacing, flyPath, resting } = viewer;
   const pads = createGamepads();
-  let last = performance.now(), drew = false, paced = false;
+  let last = performance.now(), drew = false, paced = keepPace(viewer.gl, pacing);
 
   /** May a frame be drawn? While chunks arrive, previews at most. @param {import("./viewer.js").Scene} scene @param {number} now */
   const mayDraw = ({ renderer, manifest, coarse }, now) => {
