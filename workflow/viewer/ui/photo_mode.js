@@ -52,7 +52,8 @@ export function createPhotoMode(viewer, jobs) {
     if (!scene) return;
     const longest = Math.min(gl.getParameter(gl.MAX_TEXTURE_SIZE), ...gl.getParameter(gl.MAX_VIEWPORT_DIMS));
     sizes = photoSizes(viewer.camera(scene), longest);
-    size.replaceChildren(...sizes.map(({ width, height }, k) => new Option(`${width} × ${height}${k ? "" : ", as shown"}`)));
+    size.replaceChildren(...sizes.map(({ width, height }) =>
+      new Option(`${width} × ${height} (${Number((width / sizes[0].width).toFixed(1))}×)`)));
     size.selectedIndex = Math.min(chosen, sizes.length - 1);
   }
 
