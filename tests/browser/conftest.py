@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from fixtures import bundles, paint_pages
+from fixtures import bundles, firefox_start, paint_pages
 from fixtures.land_covers import write_cover_bundle
 from fixtures.page_visit import VIEWER, Visit
 
@@ -57,6 +57,15 @@ def still(chromium):
     yield start
     for context in contexts:
         context.close()
+
+
+@pytest.fixture(scope="session")
+def firefox(playwright, tmp_path_factory):
+    """Debian's Firefox, which draws in software on a display in memory."""
+    if reason := firefox_start.missing():
+        pytest.skip(reason)
+    with firefox_start.started(playwright, tmp_path_factory.mktemp("firefox")) as browser:
+        yield browser
 
 
 @pytest.fixture

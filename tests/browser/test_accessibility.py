@@ -36,6 +36,14 @@ def test_nothing_is_wrong_in_any_state(visit, address, axe, width, height, touch
     for overlay in ("level", "uncertainty", "material"):
         seen.page.select_option("#overlay", overlay)
         found[overlay] = seen.page.evaluate(RUN)
+    seen.page.locator("#compare").click()
+    found["side by side"] = seen.page.evaluate(RUN)
+    seen.page.locator("#menuButton").click()
+    seen.page.locator("#photoButton").click()
+    seen.page.evaluate("job.hidden = false")
+    found["photo"] = seen.page.evaluate(RUN)
+    seen.page.evaluate("job.hidden = true")
+    seen.page.locator("#photoClose").click()
     for name in ("menu", "paint"):
         seen.page.locator(f"#{name}Button").click()
         found[name] = seen.page.evaluate(RUN)

@@ -15,6 +15,13 @@ Object.assign(window, {
     get flyPath() {
       return viewer.flyPath;
     },
+    /** Is the tour under way? */
+    get tour() {
+      return viewer.tour.on;
+    },
+    get walker() {
+      return viewer.scene?.walker;
+    },
     get painting() {
       return viewer.scene?.painting;
     },

@@ -17,7 +17,7 @@ LAYOUT = """() => {
   // boxes of what may be pressed, and of what shows text, with what is wrong with them
   const { innerWidth: wide, innerHeight: high } = window, faults = [], seen = [];
   const visible = element => element.checkVisibility({ checkOpacity: true, checkVisibilityCSS: true });
-  const all = "button, select, summary, input, #title, #hint, #legend, #toast, #map, .panel";
+  const all = "button, select, summary, input, #title, #hint, #legend, #toast, #map, #job, .panel";
   for (const element of document.querySelectorAll(all)) {
     if (!visible(element) || element.type === "file") continue;
     const box = element.getBoundingClientRect(), name = element.id || element.textContent;
@@ -31,7 +31,7 @@ LAYOUT = """() => {
   }
   for (const [a, one, first] of seen) for (const [b, two, second] of seen) {
     if (a >= b || first.contains(second) || second.contains(first)) continue;
-    if (first.matches(".panel") || second.matches(".panel")) continue; // panels cover
+    if (first.matches(".panel, #job") || second.matches(".panel, #job")) continue; // they cover
     const across = Math.min(one.right, two.right) - Math.max(one.left, two.left);
     const down = Math.min(one.bottom, two.bottom) - Math.max(one.top, two.top);
     if (across > 1 && down > 1) faults.push(`${a} covers ${b}`);
@@ -122,6 +122,16 @@ def test_nothing_is_cut_off_small_or_covered(visit, address, width, height, touc
     for overlay in ("level", "uncertainty", "material"):
         seen.page.select_option("#overlay", overlay)
         faults[overlay] = seen.page.evaluate(LAYOUT)
+    seen.page.locator("#compare").click()
+    faults["side by side"] = seen.page.evaluate(LAYOUT)
+    seen.page.locator("#compare").click()
+    seen.page.locator("#menuButton").click()
+    seen.page.locator("#photoButton").click()
+    faults["photo mode"] = seen.page.evaluate(LAYOUT)
+    seen.page.evaluate("job.hidden = false")
+    faults["photo under way"] = seen.page.evaluate(LAYOUT)
+    seen.page.evaluate("job.hidden = true")
+    seen.page.locator("#photoClose").click()
     seen.page.locator("#menuButton").click()
     faults["menu"] = seen.page.evaluate(LAYOUT)
     seen.page.locator("#mapButton").click()

@@ -5,20 +5,26 @@ import { webSource } from "./data/source.js";
 import { BUDGET } from "./draw/frame_pacing.js";
 import { createContext } from "./draw/gl.js";
 import { parsePaint, syncAddress } from "./ui/address.js";
+import { createCompare } from "./ui/compare.js";
 import { listenToControls } from "./ui/controls.js";
 import { element } from "./ui/dom.js";
 import { listenToDrops } from "./ui/drop.js";
 import { createFirstView } from "./ui/first_view.js";
 import { runFrameLoop } from "./ui/frame_loop.js";
 import { createHud } from "./ui/hud.js";
+import { createJobs } from "./ui/job.js";
 import { createMinimap } from "./ui/minimap.js";
 import { listenToModes } from "./ui/modes.js";
 import { createOrbit } from "./ui/orbit.js";
 import { createPaintPanel } from "./ui/paint_panel.js";
 import { createPanel } from "./ui/panel.js";
+import { createPhotoMode } from "./ui/photo_mode.js";
 import { createStoryPanel } from "./ui/story_panel.js";
 import { listenToTools } from "./ui/tools.js";
+import { listenToTour } from "./ui/tour_control.js";
+import { listenToVideo } from "./ui/video.js";
 import { explainError, Viewer } from "./ui/viewer.js";
+import { listenToXr } from "./ui/xr_session.js";
 
 document.documentElement.classList.add("running"); // hides the hint that nothing happens
 const hud = createHud(), menu = createPanel("menu");
@@ -32,6 +38,8 @@ export let paint;
 
 /** @type {ReturnType<typeof createMinimap> | null} */
 let map = null;
+/** @type {ReturnType<typeof createCompare> | null} */
+let compare = null;
 
 /** Resolves when the page's own bundle is loaded. */
 export const ready = start().catch((error) => {
@@ -61,6 +69,7 @@ async function start() {
       listenToTools(viewer, paint.keep);
       listenToModes(walker, (text) => hud.say(text));
       map = createMinimap(viewer);
+      compare = createCompare(viewer);
       if (still) return;
       runFrameLoop(viewer);
       syncAddress(walker, paint.keep, { onChange: redraw, onError: (error) => viewer.fail(error) });
@@ -78,12 +87,17 @@ async function start() {
     onPicture() {
       paint.brush.draw();
       map?.draw();
+      compare?.update();
       if (viewer.scene) firstView.note(viewer.scene.walker, viewer.overlay);
     },
     onWhole: firstView.showTerrain,
   });
   paint = createPaintPanel(viewer);
-  for (const id of ["paintButton", "storyButton"]) {
+  const jobs = createJobs({ say: hud.say, onError: (error) => viewer.fail(error) });
+  createPhotoMode(viewer, jobs);
+  listenToVideo(viewer, jobs);
+  listenToXr(viewer);
+  for (const id of ["paintButton", "storyButton", "photoButton"]) {
     element(id, HTMLButtonElement).addEventListener("click", () => menu.show(false));
   }
   listenToDrops({
@@ -95,5 +109,7 @@ async function start() {
     onError: (error) => viewer.fail(error),
   });
   await viewer.open(webSource(new URL(".", location.href)));
-  if (!still) firstView.showHint();
+  if (still) return;
+  firstView.showHint();
+  listenToTour(viewer, closePanels);
 }

@@ -22,6 +22,8 @@ export function createRenderer(gl, manifest, heights) {
     rest: createRest(),
     picture,
     preview: createPreview(gl),
+    /** A picture beside the shown one, of any size; to be ended. */
+    createPicture: () => createSlicedPicture(gl, sky, splats),
     /**
      * @param {import("../terrain/camera.js").Camera} camera
      * @param {import("./splats.js").DrawOptions} options

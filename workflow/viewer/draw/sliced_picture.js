@@ -92,6 +92,19 @@ export function createSlicedPicture(gl, sky, splats) {
       gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
       gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     },
+    /**
+     * Read rows of the last whole picture, RGBA, counted from below.
+     *
+     * @param {number} from
+     * @param {number} rows
+     * @param {Uint8Array} pixels
+     */
+    read(from, rows, pixels) {
+      if (!target) return;
+      gl.bindFramebuffer(gl.READ_FRAMEBUFFER, framebuffer);
+      gl.readPixels(0, from, target.width, rows, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+      gl.bindFramebuffer(gl.READ_FRAMEBUFFER, null);
+    },
     /** Give up the picture that is under way. */
     cancel() {
       forgetFence();

@@ -17,8 +17,9 @@ import { FRAGMENT, vertexShader } from "./shaders.js";
  * @typedef {import("../worker/frame_builder.js").FrameAnswer} FrameAnswer
  * @typedef {Record<string, WebGLUniformLocation | null>} Uniforms
  *
- * end: distance at which the last tiles are blended into the backdrop; low: sine of the angle below the horizon there.
- * @typedef {{ end: number, low: number, overlay: number }} DrawOptions
+ * end: distance at which the last tiles are blended into the backdrop; low: sine of the angle below the horizon there;
+ * split: share of the picture, from the left, that shows no overlay (default: 0).
+ * @typedef {{ end: number, low: number, overlay: number, split?: number }} DrawOptions
  * @typedef {ReturnType<typeof createSplats>} Splats
  */
 
@@ -129,7 +130,7 @@ export function createSplats(gl, manifest, heights) {
      * @param {number} [from] the first block
      * @param {number} [many] of them; all of a picture, in slices or at once, are drawn in order
      */
-    draw(camera, { end, low, overlay }, from = 0, many = far.length + close.length) {
+    draw(camera, { end, low, overlay, split = 0 }, from = 0, many = far.length + close.length) {
       if (!frame) return;
       use();
       setConstants(gl, uniforms, manifest);
@@ -137,7 +138,6 @@ export function createSplats(gl, manifest, heights) {
       setView(gl, uniforms, camera, frame, manifest.tile_side);
       gl.uniform1f(uniforms.end, end);
       gl.uniform1f(uniforms.low, low);
-      gl.uniform1i(uniforms.overlay, overlay);
       gl.enable(gl.BLEND);
       gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
       bind(HUES, hues);
@@ -150,10 +150,19 @@ export function createSplats(gl, manifest, heights) {
       bind(PLACES, places);
       bind(OWNERS, owners);
       if (relief) bind(RELIEF, relief);
-      bind(ENTRIES, entries);
-      far.draw(from, many);
-      bind(ENTRIES, nearEntries);
-      close.draw(from - far.length, many);
+      const edge = Math.round(split * camera.width);
+      for (const [left, right, shown] of edge ? [[0, edge, 0], [edge, camera.width, overlay]] : [[0, 0, overlay]]) {
+        gl.uniform1i(uniforms.overlay, shown);
+        if (edge) {
+          gl.enable(gl.SCISSOR_TEST);
+          gl.scissor(left, 0, right - left, camera.height);
+        }
+        bind(ENTRIES, entries);
+        far.draw(from, many);
+        bind(ENTRIES, nearEntries);
+        close.draw(from - far.length, many);
+      }
+      if (edge) gl.disable(gl.SCISSOR_TEST);
       gl.activeTexture(gl.TEXTURE0);
       gl.bindVertexArray(null);
     },

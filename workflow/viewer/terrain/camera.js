@@ -2,7 +2,8 @@
 
 /**
  * Angles in degrees: yaw from east, counter-clockwise; pitch above the horizon. eye: height above the surface.
- * @typedef {{ x: number, y: number, eye: number, yaw: number, pitch: number }} Place
+ * fieldOfView: of the picture's longer side (default: FIELD_OF_VIEW).
+ * @typedef {{ x: number, y: number, eye: number, yaw: number, pitch: number, fieldOfView?: number }} Place
  *
  * Position and axes in the world; size and focal length in pixels.
  * @typedef {{ eye: number[], right: number[], up: number[], ahead: number[], width: number, height: number,
@@ -22,10 +23,11 @@ export const FIELD_OF_VIEW = 60; // of the picture's longer side, degrees
  */
 export function cameraAt(place, width, height, heights) {
   const yaw = (place.yaw * Math.PI) / 180, pitch = (place.pitch * Math.PI) / 180;
+  const half = ((place.fieldOfView ?? FIELD_OF_VIEW) * Math.PI) / 360;
   const [c, s, p, q] = [Math.cos(yaw), Math.sin(yaw), Math.cos(pitch), Math.sin(pitch)];
   return {
     eye: [place.x, place.y, place.eye + (heights ? heights.at(place.x, place.y)[0] : 0)],
     right: [s, -c, 0], up: [-q * c, -q * s, p], ahead: [p * c, p * s, q],
-    width, height, focal: Math.max(width, height) / 2 / Math.tan((FIELD_OF_VIEW * Math.PI) / 360),
+    width, height, focal: Math.max(width, height) / 2 / Math.tan(half),
   };
 }

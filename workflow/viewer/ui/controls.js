@@ -92,7 +92,7 @@ function listenToPointers(walker, orbit, canvas, brush, onChange) {
     else if (walker.mode === "orbit") {
       orbit.turn((180 * (from[0] - to[0])) / size, (180 * (from[1] - to[1])) / size);
     } else {
-      const degrees = FIELD_OF_VIEW / size;
+      const degrees = (walker.fieldOfView ?? FIELD_OF_VIEW) / size;
       moveTo(walker, {
         yaw: walker.yaw + degrees * (to[0] - from[0]), pitch: walker.pitch + degrees * (to[1] - from[1]),
       });

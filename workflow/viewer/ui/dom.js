@@ -16,7 +16,7 @@ export function element(id, type) {
 
 /** Is this where keys enter or choose something? @param {EventTarget | null} target */
 export const isField = (target) => target instanceof HTMLInputElement || target instanceof HTMLSelectElement
-  || target instanceof HTMLButtonElement || (target instanceof HTMLElement && target.tagName === "SUMMARY");
+  || target instanceof HTMLButtonElement || (target instanceof HTMLElement && (target.tagName === "SUMMARY" || target.role === "slider"));
 
 /** Do letters mean something to this itself, so that they are no commands? @param {EventTarget | null} target */
 export const takesLetters = (target) => target instanceof HTMLSelectElement;

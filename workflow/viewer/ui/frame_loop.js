@@ -2,15 +2,16 @@
 
 import { BUDGET } from "../draw/frame_pacing.js";
 import { createGamepads } from "./gamepads.js";
+import { keepPace } from "./kept_pace.js";
 import { stepWalker } from "./walker.js";
 
 const MAX_STEP = 250; // milliseconds of walking that one frame makes up for
 
 /** @param {import("./viewer.js").Viewer} viewer */
 export function runFrameLoop(viewer) {
-  const { pacing, flyPath, resting } = viewer;
+  const { pacing, flyPath, resting, tour } = viewer;
   const pads = createGamepads();
-  let last = performance.now(), drew = false, paced = false;
+  let last = performance.now(), drew = false, paced = keepPace(viewer.gl, pacing);
 
   /** May a frame be drawn? While chunks arrive, previews at most. @param {import("./viewer.js").Scene} scene @param {number} now */
   const mayDraw = ({ renderer, manifest, coarse }, now) => {
@@ -35,11 +36,13 @@ export function runFrameLoop(viewer) {
     requestAnimationFrame(next);
     const { scene } = viewer, gap = now - last;
     last = now;
-    if (!scene) return;
+    if (!scene || viewer.suspended) return;
     const { walker, renderer } = scene;
     const flown = flyPath.step(walker, gap / 1000);
     const seconds = Math.min(gap, MAX_STEP) / 1000, stepped = stepWalker(walker, seconds), pushed = pads.step(walker, seconds);
-    if (stepped || pushed || flown) viewer.dirty = viewer.stale = true;
+    if (pushed && tour.on) dispatchEvent(new Event("gamepadinput"));
+    const toured = tour.step(walker, scene.heights, gap / 1000);
+    if (stepped || pushed || flown || toured) viewer.dirty = viewer.stale = true;
     const may = mayDraw(scene, now);
     ask(scene, now, may);
     // the frame of a picture at rest may take the GPU seconds: it is drawn in slices alone

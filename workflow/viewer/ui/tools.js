@@ -17,8 +17,8 @@ export function listenToTools(viewer, paint) {
   overlay.addEventListener("change", () => viewer.showOverlay(overlay.selectedIndex));
   tellValues(viewer);
   const update = () => {
-    record.textContent = flyPath.mode === "record" ? "Stop recording" : "Record a fly path";
-    play.textContent = flyPath.mode === "play" ? "Stop playing" : "Play it";
+    record.textContent = flyPath.mode === "record" ? "Stop recording" : "Record";
+    play.textContent = flyPath.mode === "play" ? "Stop playing" : "Play";
     play.disabled = save.disabled = !flyPath.path.length;
   };
   /** @param {"record" | "play"} mode */

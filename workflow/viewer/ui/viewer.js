@@ -16,6 +16,7 @@ import { element } from "./dom.js";
 import { createFlyPath } from "./fly_path.js";
 import { createPainting } from "./painting.js";
 import { createResting } from "./resting.js";
+import { createTour } from "./tour.js";
 import { createWalker, moveTo } from "./walker.js";
 
 /**
@@ -50,11 +51,14 @@ export class Viewer {
   /** @type {string | null} */
   error = null;
   overlay = 0;
+  split = 0; // share of the picture, from the left, without the overlay
   dirty = true; // the picture must be drawn again
   stale = true; // the worker must be asked again
+  suspended = false; // something else has the worker and the GPU: the frame loop rests
   pacing = createFramePacing();
   stats = createFrameStats();
   flyPath = createFlyPath();
+  tour = createTour();
   resting = createResting(this);
   /** @type {Walker | null} */
   #walker = null; // the one that the controls move, through all bundles
@@ -169,7 +173,7 @@ export class Viewer {
     const start = performance.now(), camera = this.camera(scene, scale);
     this.#fit(camera);
     this.gl.viewport(0, 0, camera.width, camera.height);
-    scene.renderer.draw(camera, this.#drawOptions(scene, camera));
+    scene.renderer.draw(camera, this.drawOptions(scene, camera));
     this.dirty = false;
     this.stats.addTime("render", performance.now() - start);
     this.stats.addFrame(this.#fresh);
@@ -182,7 +186,7 @@ export class Viewer {
     const { scene } = this;
     if (!scene) return;
     const camera = this.camera(scene);
-    picture.begin(camera, this.#drawOptions(scene, camera));
+    picture.begin(camera, this.drawOptions(scene, camera));
     this.dirty = false;
   }
 
@@ -202,10 +206,10 @@ export class Viewer {
   }
 
   /** @param {Scene} scene @param {import("../terrain/camera.js").Camera} camera */
-  #drawOptions({ manifest, heights, frame }, camera) {
+  drawOptions({ manifest, heights, frame }, camera) {
     const farthest = REACH * manifest.tile_side;
     const low = Math.max(MIN_LOW, (camera.eye[2] - heights.low) / farthest);
-    return { end: frame?.reach ?? farthest, low, overlay: this.overlay };
+    return { end: frame?.reach ?? farthest, low, overlay: this.overlay, split: this.split };
   }
 
   /** @param {Scene} scene @param {number} now */

@@ -21,8 +21,7 @@ const FARTHEST = 1e12; // coordinates beyond have no whole tiles left in double 
 /** @type {Mode[]} */
 export const MODES = ["walk", "fly", "orbit"];
 
-/** @type {(keyof Place)[]} */
-export const PLACE_KEYS = ["x", "y", "eye", "yaw", "pitch"];
+export const PLACE_KEYS = /** @type {const} */ (["x", "y", "eye", "yaw", "pitch"]);
 
 /**
  * @param {{ tile_side: number, eye_floor: number }} manifest

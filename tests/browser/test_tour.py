@@ -1,0 +1,93 @@
+"""The tour: a flight without anybody at the controls, smooth and above the ground, until somebody touches anything."""
+
+import numpy as np
+import pytest
+
+FLY = """async ([heights, rate, seconds]) => {
+  const { createTour } = await import("./ui/tour.js");
+  const { createHeights } = await import("./terrain/heights.js");
+  const { createWalker } = await import("./ui/walker.js");
+  const surface = createHeights(heights);
+  const walker = createWalker({ tile_side: 4, eye_floor: 0.5 }, { yaw: 200, pitch: 5 });
+  const tour = createTour(), seen = [];
+  tour.start(walker, surface);
+  for (let k = 0; k < seconds * rate; k++) {
+    tour.step(walker, surface, 1 / rate);
+    const ground = surface.at(walker.x, walker.y)[0];
+    seen.push([walker.x, walker.y, ground + walker.eye, walker.yaw, walker.pitch, ground]);
+  }
+  return seen;
+}"""
+HILLS = {"kind": "hills", "height": 2.0, "wavelength": 9.0, "octaves": 3, "salt": 5}
+
+
+@pytest.mark.parametrize("heights", [pytest.param({"kind": "flat"}, id="flat"), pytest.param(HILLS, id="hills")])
+def test_a_tour_is_smooth_and_above_the_ground(modules, heights):
+    rate = 60
+    x, y, z, yaw, pitch, ground = np.array(modules.evaluate(FLY, [heights, rate, 120])).T
+    assert (z - ground >= 0.5 - 1e-9).all(), "never below the eye's floor"
+    turned = np.unwrap(np.radians(yaw))
+    speed = np.hypot(np.diff(x), np.diff(y)) * rate
+    assert speed[0] < 0.01, "it begins at rest"
+    # units, radians and degrees a second each second: nothing jolts
+    assert np.abs(np.diff(speed)).max() * rate < 0.5
+    assert np.abs(np.diff(turned, 2)).max() * rate**2 < np.radians(6)
+    assert np.abs(np.diff(pitch, 2)).max() * rate**2 < 8
+    assert np.abs(np.diff(turned)).max() * rate < np.radians(12)
+    assert (np.abs(np.diff(z)) * rate < 1.5).all()
+    clear = (z - ground)[10 * rate :]
+    assert clear.max() > 2.5 * clear.min(), "it sinks and rises"
+    assert np.hypot(x - x[0], y - y[0]).max() > 10, "it goes somewhere"
+
+
+def test_a_tour_is_the_same_on_slow_devices(modules):
+    fast = np.array(modules.evaluate(FLY, [HILLS, 120, 30]))[-1]
+    slow = np.array(modules.evaluate(FLY, [HILLS, 10, 30]))[-1]
+    assert np.hypot(*(fast - slow)[:2]) < 0.3 and abs(fast[3] - slow[3]) < 3
+
+
+@pytest.fixture
+def touring(visit, plain):
+    seen = visit(480, 300).open(plain)
+    seen.page.keyboard.press("t")
+    seen.until("davgswt.tour && davgswt.state.x !== 2")
+    return seen
+
+
+INPUTS = {
+    "key": lambda page: page.keyboard.press("ArrowRight"),
+    "own key": lambda page: page.keyboard.press("t"),
+    "mouse": lambda page: page.mouse.click(240, 60),
+    "wheel": lambda page: page.mouse.wheel(0, 50),
+    "gamepad": lambda page: page.evaluate("dispatchEvent(new Event('gamepadinput'))"),
+}
+
+
+@pytest.mark.parametrize("name", INPUTS)
+def test_any_input_ends_the_tour(touring, name):
+    if name == "wheel":
+        touring.page.mouse.move(240, 60)
+    INPUTS[name](touring.page)
+    touring.until("!davgswt.tour")
+    place = touring.state
+    touring.page.wait_for_timeout(200)
+    assert touring.state["x"] == place["x"], "it stands"
+
+
+def test_the_menu_begins_a_tour_and_opening_it_again_ends_it(visit, plain):
+    seen = visit(480, 600).open(plain)
+    seen.page.locator("#menuButton").click()
+    seen.page.locator("#tour").click()
+    seen.until("davgswt.tour && davgswt.state.x !== 2")
+    assert not seen.page.locator("#menu").is_visible()
+    seen.page.locator("#menuButton").click()
+    assert not seen.page.evaluate("davgswt.tour") and seen.page.locator("#menu").is_visible()
+
+
+@pytest.mark.parametrize("motion", ["no-preference", "reduce"])
+def test_an_address_begins_a_tour_but_not_for_people_who_ask_for_less_motion(visit, plain, motion):
+    seen = visit(160, 100, reduced_motion=motion).open(f"{plain}?tour")
+    seen.until("!hint.hidden || davgswt.state.x !== 2")
+    assert seen.page.evaluate("davgswt.tour") == (motion != "reduce")
+    seen.page.keyboard.press("t")
+    assert seen.page.evaluate("davgswt.tour") == (motion == "reduce"), "who asks for it has it"
