@@ -65,7 +65,7 @@ rule evaluate_coarse:
 
 
 rule update_field:
-    """Refit the field with the photos of this round; without any it goes on as it is."""
+    """Refit the field with the photos of this round, or fit all photos anew; without any it goes on as it is."""
     input:
         unpack(round_before),
         unpack(fits_before),
@@ -90,6 +90,7 @@ rule update_field:
         mem_mb=per_attempt(2000),
         runtime=per_attempt("60m"),
     params:
+        scene=scene_keys("update_field"),
         preset=preset_keys("update_field"),
         seed=integer("seed"),
         t=integer("t"),

@@ -33,6 +33,7 @@ class Work:
         gaussians: of the field.
         step_cost: relative, by the degree of the spherical harmonics.
         steps, steps_per_photo, level_steps: of the optimiser.
+        scratch: whether each round fits all photos anew.
         candidates: poses that are scored.
         samples: denoising steps of all samples of a pose; 0 without a prior.
         still_pixels: of a still.
@@ -53,6 +54,7 @@ class Work:
     steps: int
     steps_per_photo: int
     level_steps: int
+    scratch: bool
     candidates: int
     samples: int
     still_pixels: float
@@ -64,6 +66,13 @@ class Work:
     def mean_photos(self) -> float:
         """Photos of a fit in a round, the mean over the rounds."""
         return self.start + self.new * (self.rounds + 1) / 2
+
+    @property
+    def update_steps(self) -> float:
+        """Steps of a fit in a round, the mean over the rounds."""
+        if not self.scratch:
+            return self.steps_per_photo * self.new
+        return self.steps + self.steps_per_photo * self.new * (self.rounds + 1) / 2
 
     @property
     def step_seconds(self) -> float:
@@ -103,7 +112,7 @@ COSTS: dict[str, Callable[[Work], Cost]] = {
         work.scene_cost * (7.2 + 1.3e-5 * work.photo_pixels * work.new) if work.rendered else 1.5
     ),
     "update_field": lambda work: Cost(
-        1.2 + work.observation_seconds * work.mean_photos, work.step_seconds * work.steps_per_photo * work.new
+        1.2 + work.observation_seconds * work.mean_photos, work.step_seconds * work.update_steps
     ),
     "select_poses": lambda work: Cost(0.8 + 0.006 * work.candidates + 0.4 * work.field_size),
     "report_photos": lambda work: Cost(1.0 + 0.055 * work.total),
@@ -150,6 +159,7 @@ def describe_work(config: Mapping[str, Any], preset: str | None = None) -> Work:
         steps=plan.STEPS_PER_PHOTO * start if entry["steps"] == "auto" else entry["steps"],
         steps_per_photo=plan.STEPS_PER_NEW_PHOTO if entry["steps_per_photo"] == "auto" else entry["steps_per_photo"],
         level_steps=entry["level_steps"],
+        scratch=entry["refit"] == "scratch",
         candidates=replayed if scene.get("agent") == "replay" else scene.get("candidates", 0),
         samples=settings["samples"] * settings["steps"] if settings else 0,
         still_pixels=3.0 * config["stills"]["width"] * config["stills"]["height"],

@@ -67,6 +67,7 @@ SCENE_KEYS: dict[str, tuple[str, ...] | dict[str, tuple[str, ...]]] = {
     "import_field": ("up",),
     "split_views": ("start", "photos", "whole"),
     "fit_coarse": ("whole",),
+    "update_field": ("whole",),
     "score_coarse": _SCORED,
     "score_round": _SCORED,
     "select_poses": _SELECTED,
@@ -78,15 +79,14 @@ SCENE_KEYS: dict[str, tuple[str, ...] | dict[str, tuple[str, ...]]] = {
 }
 
 _COARSE = ("size", "spacing", "max_gaussians", "steps", "sh_degree", "pose_rate")
-_UPDATE = ("size", "max_gaussians", "steps_per_photo", "sh_degree", "pose_rate")
-_ALL_FITS = (*_COARSE, "steps_per_photo")
+_ALL_FITS = (*_COARSE, "steps_per_photo", "refit")
 
 # of a preset, by rule; metrics.json records what its field was fitted with
 PRESET_KEYS: dict[str, tuple[str, ...]] = {
     "fit_coarse": _COARSE,
     "evaluate_coarse": _COARSE,
     "prepare_external_field": ("max_gaussians",),
-    "update_field": _UPDATE,
+    "update_field": _ALL_FITS,
     "evaluate_round": _ALL_FITS,
     "evaluate_at": _ALL_FITS,
     "evaluate_inpainted": _ALL_FITS,

@@ -138,6 +138,10 @@ class Preset(ConfigModel):
     steps_per_photo: Annotated[int, Field(ge=1, le=100_000)] | Auto = key(
         "optimiser steps for each new photo of a round"
     )
+    refit: Literal["continue", "scratch"] = key(
+        "how a round takes new photos: `continue`: the field is fitted on; `scratch`: all photos are fitted anew",
+        "continue",
+    )
     sh_degree: Annotated[int, Field(ge=0, le=3)] | Auto = key(
         "of the spherical harmonics of colour", 0, renamed="degree"
     )

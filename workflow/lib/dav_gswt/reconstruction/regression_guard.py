@@ -45,8 +45,9 @@ def fit_with_guard(
     new: list[TrainingView],
     plan: FitPlan,
     fit: Callable[[GaussianField, FitPlan], FitResult],
+    retries: int = RETRIES,
 ) -> GuardedUpdate:
-    """Fit, and go on fitting, RETRIES times at most, while the earlier photos have lost too much.
+    """Fit, and go on fitting, `retries` times at most, while the earlier photos have lost too much.
 
     field: from before the new photos; it is kept if the loss stays above the bound. start: what the fit starts from.
     fit: to all views. Where no earlier photo has a pixel that counts, nothing can be lost.
@@ -54,7 +55,7 @@ def fit_with_guard(
     before, fitted = measure_psnr(field, earlier), fit(start, plan)
     most = allowed_loss(len(earlier), len(new))
     fits, reached = [fitted.report], [measure_psnr(fitted.field, earlier)]
-    while mean_loss(before, reached[-1]) > most and len(fits) <= RETRIES:
+    while mean_loss(before, reached[-1]) > most and len(fits) <= retries:
         _log.info("the earlier photos lost %.2f dB: fitting on", mean_loss(before, reached[-1]))
         fitted = fit(fitted.field, replace(plan, steps=fits[0].steps))
         fits.append(fitted.report)
