@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from fixtures import ground as made
 
+from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
 from dav_gswt.reconstruction import ground, refit
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
@@ -75,6 +76,10 @@ def test_photos_that_structure_from_motion_does_not_know_bring_no_points(tmp_pat
     views, none = made.photos(3), np.zeros(0, int)
     cameras = tuple(view.camera for view in views[:2])
     model = ColmapModel(tuple(view.name for view in views[:2]), cameras, *NONE, none, none, np.zeros((0, 2)))
-    write_colmap_model(model, tmp_path)
-    matched = refit.match_points(views, refit.PhotoFiles(tmp_path, tmp_path, 2, whole))
+    (tmp_path / "sparse").mkdir()
+    write_colmap_model(model, tmp_path / "sparse")
+    for view in views[:2]:
+        image_files.write_png(tmp_path / f"{view.name}.png", view.image)
+        (tmp_path / f"{view.name}.png").rename(tmp_path / view.name)
+    matched = refit.match_points(views, refit.PhotoFiles(tmp_path / "sparse", tmp_path, 2, whole))
     assert matched.points.shape == (0, 3) and matched.margin == margin
