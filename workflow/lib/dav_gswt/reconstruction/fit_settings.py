@@ -1,7 +1,7 @@
 """The settings of fits, from an entry of the config's `presets`, which trade speed for accuracy."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar
 
 from dav_gswt.field import GaussianField
@@ -58,7 +58,7 @@ class UpdateSettings(_FitSettings):
     """The keys of a preset that the update of a field reads."""
 
     steps_per_photo: Count  # for every new photo
-    first_rate: float = UPDATE_RATE
+    first_rate: float = field(default=UPDATE_RATE, metadata={"of_preset": False})  # for comparisons
 
     @property
     def steps_per_new_photo(self) -> int:
@@ -81,7 +81,8 @@ Settings = TypeVar("Settings", CoarseSettings, UpdateSettings)
 
 def select_settings(kind: type[Settings], preset: Mapping[str, Any]) -> Settings:
     """The settings of one kind from a preset, which may have keys for other stages."""
-    return kind(**{field.name: preset[field.name] for field in fields(kind) if field.name in preset})
+    names = [each.name for each in fields(kind) if each.metadata.get("of_preset", True)]
+    return kind(**{name: preset[name] for name in names if name in preset})
 
 
 def limit_gaussians(max_gaussians: Count) -> int:
