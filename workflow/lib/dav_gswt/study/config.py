@@ -244,7 +244,9 @@ class Knob(ConfigModel):
 
     of: Literal["presets", "tilings", "priors"] | None = key("the table whose entries it changes", None)
     key_: str | None = Field(None, alias="key", description="the key; the knob's name if left out")
-    values: list[Auto | int | float] = key("its settings, the most accurate first", min_length=1)
+    values: list[Auto | Literal["scratch", "continue"] | int | float] = key(
+        "its settings, the most accurate first", min_length=1
+    )
     base: FixedSettings | None = key("settings of this knob alone", None)
     measure: Literal["views", "stills", "seams"] = key("what measures its accuracy")
 
