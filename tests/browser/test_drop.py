@@ -106,7 +106,7 @@ def bytes_of(field: GaussianField) -> list[int]:
 def test_a_folder_is_found_wherever_its_manifest_lies(modules):
     found = modules.evaluate(
         """async () => {
-          const { sourceOf } = await import("./ui/drop.js");
+          const { sourceOf } = await import("./data/open.js");
           const bytes = (size) => ({ size, open: async () => new ArrayBuffer(size) });
           const files = new Map([["a/b/davgswt.json", bytes(1)], ["a/b/chunks/x.bin", bytes(5)], ["c.txt", bytes(9)]]);
           const source = await sourceOf(files);

@@ -9,7 +9,7 @@ const load = (name) => import(new URL(name, viewer));
 const { initialChunks, readChunks, readHeightMap, readManifest, readPictures } = await load("data/bundle.js");
 const { PageError } = await load("data/errors.js");
 const { openZip } = await load("data/zip.js");
-const { sourceOf } = await load("ui/drop.js");
+const { sourceOf } = await load("data/open.js");
 const { cameraAt } = await load("terrain/camera.js");
 const { createHeights } = await load("terrain/heights.js");
 const { createFrameBuilder } = await load("worker/frame_builder.js");

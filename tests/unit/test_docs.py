@@ -62,6 +62,17 @@ def test_the_architecture_page_names_every_rule_with_its_script(root):
     assert scripts == {str(path.relative_to(root)) for path in (root / "scripts").glob("*.py")}
 
 
+def test_the_page_of_the_terrain_api_names_all_of_it(root):
+    types = (root / "workflow/viewer/terrain_api.d.ts").read_text("utf-8")
+    bodies = re.findall(
+        r"export interface (?:Terrain|Painter|LoadOptions|Update|Hit|Gaussians|Order) .*?\{(.*?)\n\}", types, re.S
+    )
+    members = set(re.findall(r"^  (\w+)[?:(]", "".join(bodies), re.M))
+    members |= set(re.findall(r"^export (?:function|class) (\w+)", types, re.M))
+    page = (root / "docs/terrain-api.md").read_text("utf-8")
+    assert len(members) > 30 and not {name for name in members if not re.search(rf"\b{name}\b", page)}
+
+
 def test_the_readme_is_short(root):
     assert len((root / "README.md").read_text(encoding="utf-8").splitlines()) <= 130
 

@@ -2,14 +2,12 @@
 // path or of painted materials.
 
 import { PageError } from "../data/errors.js";
-import { gswtSource, isGswt } from "../data/gswt.js";
 import { NAME } from "../data/manifest.js";
-import { fileSource, MAX_BYTES, MAX_FILES, tooLarge } from "../data/source.js";
-import { openZip } from "../data/zip.js";
+import { filesOf, openSource as openFiles, sourceOf } from "../data/open.js";
+import { MAX_BYTES, MAX_FILES, tooLarge } from "../data/source.js";
 
 /**
  * @typedef {import("../data/source.js").Source} Source
- * @typedef {import("../data/source.js").Files} Files
  * @typedef {{ openSource: (source: Source) => Promise<void>, loadJson: (json: unknown) => void,
  *   onError: (error: unknown) => void }} DropHandlers
  */
@@ -44,30 +42,8 @@ async function handleDrop(entries, loose, { openSource, loadJson }) {
   const files = entries.length ? await listFiles(entries) : new Map(loose.map((file) => [file.name, file]));
   const only = files.size === 1 ? [...files.values()][0] : null;
   if (only && /\.json$/i.test(only.name) && only.name !== NAME) return loadJson(await parseJson(only));
-  if (only && /\.zip$/i.test(only.name)) return openSource(await sourceOf(await openZip(only)));
-  /** @type {Files} */
-  const readers = new Map([...files].map(([name, file]) => [name, { size: file.size, open: () => file.arrayBuffer() }]));
-  return openSource(await sourceOf(readers));
-}
-
-/**
- * A bundle, wherever its manifest lies among the files, or a set of tiles for the public renderer.
- *
- * @param {Files} files
- * @returns {Promise<Source>}
- */
-export async function sourceOf(files) {
-  const manifest = [...files.keys()].filter((name) => name === NAME || name.endsWith(`/${NAME}`))
-    .sort((a, b) => a.length - b.length)[0];
-  if (manifest !== undefined) {
-    const above = manifest.slice(0, -NAME.length);
-    const inside = [...files].filter(([name]) => name.startsWith(above));
-    return fileSource(new Map(inside.map(([name, entry]) => [name.slice(above.length), entry])));
-  }
-  if (isGswt(files)) return gswtSource(files);
-  throw new PageError(
-    `There is no terrain in what was dropped: neither ${NAME} nor lod0_tile_00.ply. `
-    + "Drop a bundle's folder or its gswt.zip.");
+  if (only && /\.zip$/i.test(only.name)) return openSource(await openFiles(only));
+  return openSource(await sourceOf(filesOf(files)));
 }
 
 /** @param {File} file */

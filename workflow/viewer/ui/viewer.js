@@ -1,16 +1,15 @@
 // The viewer: an open bundle, the walker in it, and what the worker and the GPU make of both.
 
-import { initialChunks, readChunks, readHeightMap, readManifest, readPictures } from "../data/bundle.js";
 import { PageError } from "../data/errors.js";
-import { chunkKey, listChunks } from "../data/layout.js";
 import { BUDGET, createFramePacing } from "../draw/frame_pacing.js";
 import { createFrameStats } from "../draw/frame_stats.js";
 import { OVERLAYS } from "../draw/overlays.js";
 import { createRenderer } from "../draw/renderer.js";
+import { backdropOptions } from "../scene/backdrop_options.js";
+import { listDrawnCells } from "../scene/drawn_cells.js";
+import { openTerrain, readTerrain } from "../scene/open_terrain.js";
 import { cameraAt } from "../terrain/camera.js";
-import { REACH, tileUnder } from "../terrain/cells.js";
-import { createHeights } from "../terrain/heights.js";
-import { createWorkerClient } from "../worker/worker_client.js";
+import { tileUnder } from "../terrain/cells.js";
 import { formatAddress, parsePlace } from "./address.js";
 import { element } from "./dom.js";
 import { createFlyPath } from "./fly_path.js";
@@ -23,13 +22,12 @@ import { createWalker, moveTo } from "./walker.js";
  * @typedef {import("../data/source.js").Source} Source
  * @typedef {import("./walker.js").Walker} Walker
  *
- * An open bundle. lift: mean height of the ground of its tiles above the surface; renderer: null while the graphics context is lost; frame: the worker's last; coarse: chunks of the
- * coarsest level that have arrived; pending: keys of chunks that are being read again.
- * @typedef {{ manifest: import("../data/manifest.js").Manifest, source: Source, walker: Walker,
- *   heights: import("../terrain/heights.js").HeightField, client: import("../worker/worker_client.js").WorkerClient,
+ * An open bundle. renderer: null while the graphics context is lost; frame: the worker's last; coarse: chunks of the
+ * coarsest level that have arrived.
+ * @typedef {import("../scene/open_terrain.js").OpenTerrain & { walker: Walker,
  *   renderer: import("../draw/renderer.js").Renderer | null,
- *   frame: import("../worker/frame_builder.js").FrameAnswer | null, coarse: number, pending: Set<number>,
- *   painting: import("./painting.js").Painting, lift: number }} Scene
+ *   frame: import("../worker/frame_builder.js").FrameAnswer | null, coarse: number,
+ *   painting: import("./painting.js").Painting }} Scene
  *
  * still: draw only when asked, for tests and screenshots; firstBudget: of the first picture then; onFirstScene: called
  * when the first bundle's manifest is read; onScene: called, and awaited, when any is, `first` or not; onPaint: something
@@ -41,7 +39,6 @@ import { createWalker, moveTo } from "./walker.js";
 
 const MAX_PIXEL_RATIO = 1.5; // device pixels a CSS pixel: splats are soft, pixels cost
 const RETRY = 50; // milliseconds until a lost graphics context is asked for again
-const MIN_LOW = 1e-4; // sine of the angle below the horizon at which tiles end, at least
 
 export class Viewer {
   /** @type {Scene | null} */
@@ -63,7 +60,6 @@ export class Viewer {
   /** @type {Walker | null} */
   #walker = null; // the one that the controls move, through all bundles
   #fresh = false; // the worker has answered since the last picture
-  #stop = new AbortController(); // of the bundle that is being loaded
   #restored = Promise.resolve(); // pending while the graphics context is lost
 
   /**
@@ -86,18 +82,13 @@ export class Viewer {
    * @param {Source} source
    */
   async open(source) {
-    const manifest = await readManifest(source), pixels = await readHeightMap(manifest, source);
-    const pictures = await readPictures(manifest, source);
+    const files = await readTerrain(source), { manifest } = files;
     const before = this.scene;
-    this.#stop.abort();
-    before?.client.end();
+    before?.end();
     before?.renderer?.end();
     this.scene = null; // until the new one stands
-    const stop = new AbortController();
-    this.#stop = stop;
     const first = !this.#walker, begin = createWalker(manifest, first ? parsePlace(location.hash) : {});
-    const heights = createHeights(manifest.heights, pixels);
-    const client = createWorkerClient({ manifest, pixels, pictures }, {
+    const terrain = openTerrain(files, {
       onRecords: (records) => this.#addRecords(records),
       onFrame: (frame) => this.#setFrame(frame),
       onError: (error) => this.fail(error),
@@ -106,41 +97,30 @@ export class Viewer {
     this.error = null;
     let renderer;
     try {
-      renderer = createRenderer(this.gl, manifest, heights);
+      renderer = createRenderer(this.gl, manifest, terrain.heights);
     } catch (error) {
-      client.end();
+      terrain.end();
       throw error;
     }
     const walker = Object.assign(this.#walker ?? begin, begin, { mode: this.#walker?.mode ?? begin.mode });
     this.#walker = walker;
-    const painting = createPainting(manifest, client, () => {
+    const painting = createPainting(manifest, terrain.client, () => {
       this.options.onPaint();
       this.redraw();
     });
-    this.scene = {
-      manifest, source, heights, client, walker, renderer, frame: null, coarse: 0, pending: new Set(), painting,
-      lift: mean(manifest.classes?.rise.ground ?? [0]),
-    };
+    const scene = { ...terrain, walker, renderer, frame: null, coarse: 0, painting };
+    this.scene = scene;
     if (first) this.options.onFirstScene(walker);
     this.hud.showTools();
     this.#showLegend();
     this.drawFrame(); // sky and far ground at once
     await this.options.onScene(this.scene, first);
-    if (stop.signal.aborted) return;
-    try {
-      await readChunks(initialChunks(manifest), source, {
-        take: (chunk) => client.add(chunk), onProgress: (progress) => this.hud.showProgress(progress),
-        signal: stop.signal,
-      });
-    } catch (error) {
-      if (stop.signal.aborted) return; // another bundle was opened meanwhile
-      throw error;
-    }
+    if (this.scene !== scene || !await terrain.readAll((progress) => this.hud.showProgress(progress))) return; // another one was opened
     this.loaded = true;
     if (this.options.still) await this.settle(this.options.firstBudget);
     else {
       this.askWorker(this.pacing.budget, false);
-      await client.answered();
+      await terrain.client.answered();
     }
     this.opened += 1;
     this.hud.showLoaded();
@@ -206,10 +186,8 @@ export class Viewer {
   }
 
   /** @param {Scene} scene @param {import("../terrain/camera.js").Camera} camera */
-  drawOptions({ manifest, heights, frame }, camera) {
-    const farthest = REACH * manifest.tile_side;
-    const low = Math.max(MIN_LOW, (camera.eye[2] - heights.low) / farthest);
-    return { end: frame?.reach ?? farthest, low, overlay: this.overlay, split: this.split };
+  drawOptions(scene, camera) {
+    return { ...backdropOptions(scene, scene.frame, camera), overlay: this.overlay, split: this.split };
   }
 
   /** @param {Scene} scene @param {number} now */
@@ -312,24 +290,6 @@ export class Viewer {
     scene.frame = frame;
     this.dirty = this.#fresh = true;
     if (frame.incomplete) this.stale = true;
-    if (this.loaded) this.#readMissing(scene, frame.missing);
-  }
-
-  /**
-   * Read chunks that were evicted from the cache, in a set larger than it.
-   *
-   * @param {Scene} scene
-   * @param {number[]} missing
-   */
-  #readMissing({ manifest, source, client, pending }, missing) {
-    const keys = missing.filter((key) => !pending.has(key));
-    if (!keys.length) return;
-    for (const key of keys) pending.add(key);
-    const queue = listChunks(manifest)
-      .filter(({ tile, entry }) => keys.includes(chunkKey(tile, entry.level)));
-    readChunks(queue, source, { take: (chunk) => client.add(chunk) }).then(() => {
-      for (const key of keys) pending.delete(key);
-    }, (error) => this.fail(error)); // and its chunks stay pending: they are not asked for in every frame
   }
 
   #watchContext() {
@@ -353,16 +313,9 @@ export class Viewer {
   }
 }
 
-/** @param {number[]} values */
-const mean = (values) => values.reduce((sum, v) => sum + v, 0) / values.length;
-
 /** Place and picture of a scene, in plain values. @param {Scene} scene */
 function describeScene({ manifest, walker, frame }) {
-  const { x, y, eye, yaw, pitch } = walker, drawn = [];
-  for (let k = 0; frame && k < frame.drawn.length; k += 6) {
-    const [di, dj, tile, level, last, order] = frame.drawn.subarray(k, k + 6);
-    drawn.push({ i: frame.i0 + di, j: frame.j0 + dj, tile, level, last, order });
-  }
+  const { x, y, eye, yaw, pitch } = walker, drawn = frame ? listDrawnCells(frame) : [];
   const { count = 0, reach, shrink, bytes = 0 } = frame ?? {};
   return { x, y, eye, yaw, pitch, under: tileUnder(manifest, x, y), drawn, count, reach, shrink, bytes };
 }

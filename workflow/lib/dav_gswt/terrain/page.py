@@ -18,7 +18,7 @@ from dav_gswt.terrain.page_story import SHEET, STORY
 
 SURFACE = "heights.bin"
 INDEX = "index.html"
-OWN_SCRIPTS = ("early.js", "worker/")  # that are no modules of the page itself
+OWN_SCRIPTS = ("early.js", "worker/", "api/", "terrain_api.js")  # that are no modules of the page itself
 MAX_SIDE = 4096  # pixels along a side of a height map: every WebGL2 device in use takes textures of this size
 
 

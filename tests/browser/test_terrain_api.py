@@ -1,0 +1,202 @@
+"""The importable terrain (terrain_api.js) in somebody else's page: what it says, draws and refuses."""
+
+import io
+import json
+import zipfile
+from base64 import b64encode
+
+import numpy as np
+import pytest
+from fixtures.bundles import Ground, directions
+from fixtures.page_visit import Visit
+
+from dav_gswt.bundle.manifest import Manifest
+from dav_gswt.bundle.store import Bundle
+from dav_gswt.study.terrain.browser import served
+from dav_gswt.terrain.choice import tile_at
+from dav_gswt.terrain.heights import Hills
+
+GROUND = Ground(levels=3, speckle=40, things=4)
+HILLS = Hills(2.0 * GROUND.side, 12.0 * GROUND.side, 3, 5)
+PLACE = dict(x=3.0, y=5.0, eye=0.8, yaw=60.0, pitch=-12.0)
+OPEN = """async ([width, height]) => {
+  const { load } = await import("./terrain_api.js");
+  const canvas = Object.assign(document.createElement("canvas"), { width, height });
+  window.gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false });
+  window.terrain = await load(".");
+  await terrain.loaded;
+}"""
+GRAB = """async ([place, exact, late]) => {
+  const { width, height } = gl.canvas, camera = terrain.camera(place, width, height);
+  if (late) await terrain.update(camera);
+  window.painter?.end();
+  window.painter = terrain.createPainter(gl);
+  const update = await terrain.update(camera, { exact });
+  painter.draw(camera);
+  const bytes = new Uint8Array(4 * width * height);
+  gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+  return [update, [width, height, btoa(Array.from(bytes, (v) => String.fromCharCode(v)).join(""))]];
+}"""
+
+
+@pytest.fixture(scope="module")
+def hilly(page_of):
+    """The folder of a page of speckled discs on hills, and its address."""
+    folder = page_of(GROUND, surface=HILLS)
+    with served(folder) as address:
+        yield folder, address
+
+
+@pytest.fixture(scope="module")
+def other(chromium, hilly):
+    """A page that holds nothing but a canvas, and has loaded the terrain."""
+    with chromium.new_context() as context:
+        tab = context.new_page()
+        tab.route("**/blank.html", lambda route: route.fulfill(body="<!doctype html>", content_type="text/html"))
+        tab.goto(f"{hilly[1]}blank.html")
+        tab.evaluate(OPEN, [160, 100])
+        yield tab
+
+
+@pytest.mark.parametrize("late", [pytest.param(False, id="painter first"), pytest.param(True, id="update first")])
+def test_it_draws_what_the_page_draws_to_the_bit(still, hilly, other, late):
+    _, picture = other.evaluate(GRAB, [PLACE, True, late])
+    expected = still(hilly[1], 160, 100).at(**PLACE)
+    assert (Visit.decode(*picture) == expected).all() and expected.std() > 8
+
+
+def test_an_update_says_which_tiles_levels_and_orders_are_drawn(still, hilly, other):
+    update, _ = other.evaluate(GRAB, [PLACE, True, False])
+    seen = still(hilly[1], 160, 100)
+    seen.at(**PLACE)
+    state = seen.state
+    assert (update["gaussians"], update["reach"], update["complete"]) == (state["count"], state["reach"], True)
+    assert len(update["cells"]) == len(state["drawn"])
+    for cell, drawn in zip(update["cells"], state["drawn"], strict=True):
+        order = None if drawn["order"] == 255 else drawn["order"]
+        wanted = [drawn[key] for key in ("i", "j", "tile", "level", "last")] + [order]
+        assert [cell[key] for key in ("i", "j", "tile", "finest", "coarsest", "order")] == wanted
+        assert cell["tile"] == tile_at(cell["i"], cell["j"], GROUND.salt, 1)
+    assert {cell["order"] for cell in update["cells"]} > {None}
+
+
+def test_a_budget_is_kept(other):
+    told = other.evaluate("terrain.update(terrain.camera(" + str(PLACE) + ", 160, 100), { budget: 3000, exact: true })")
+    assert 0 < told["gaussians"] <= 3000
+
+
+def test_height_and_normal_are_those_of_the_library(other):
+    points = np.random.default_rng(0).uniform(-200, 200, (50, 2))
+    found = other.evaluate(
+        "points => points.map(([x, y]) => [terrain.height(x, y), terrain.normal(x, y)])", points.tolist()
+    )
+    heights, slopes = HILLS.at(*points.T)
+    normals = np.concatenate([-slopes, np.ones((50, 1))], 1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    assert np.allclose([h for h, _ in found], heights, atol=1e-9)
+    assert np.allclose([n for _, n in found], normals, atol=1e-9)
+
+
+def test_a_ray_meets_the_ground_where_it_lies(other):
+    hit = other.evaluate("terrain.pick([3, 5, 30], [0.2, -0.1, -2])")
+    x, y, z = hit["point"]
+    assert z == pytest.approx(float(HILLS.at(np.array([x]), np.array([y]))[0][0]), abs=1e-9)
+    way = np.array(hit["point"]) - [3, 5, 30]
+    # hitGround ends within 1e-4 of the distance
+    assert np.allclose(
+        way / np.linalg.norm(way), np.array([0.2, -0.1, -2]) / np.linalg.norm([0.2, -0.1, -2]), atol=2e-4
+    )
+    assert hit["distance"] == pytest.approx(np.linalg.norm(way))
+    assert (hit["i"], hit["j"]) == (x // GROUND.side, y // GROUND.side)
+    assert hit["normal"] == other.evaluate("([x, y]) => terrain.normal(x, y)", [x, y])
+    assert other.evaluate("terrain.pick([3, 5, 30], [0, 0, 1])") is None
+
+
+def test_gaussians_and_orders_are_those_of_the_bundle(hilly, other):
+    found = other.evaluate(
+        """async () => {
+          const list = (values) => Array.from(values), gaussians = await terrain.gaussians(5, 1);
+          for (const key of ["centres", "deviations", "turns", "colours"]) gaussians[key] = list(gaussians[key]);
+          const orders = await terrain.orders(5, 1);
+          return [gaussians, orders.map((order) => ({ ...order, indices: list(order.indices) }))];
+        }"""
+    )
+    gaussians, orders = found
+    manifest = Manifest.from_dict(json.loads((hilly[0] / "davgswt.json").read_text()))
+    field, indices = Bundle(hilly[0], manifest).chunk(5, 1)
+    kept = zip(manifest.tiles[5].chunks[1].orders, indices, strict=True)
+    assert np.allclose(np.reshape(gaussians["centres"], (-1, 3)), field.means, atol=1e-6)
+    assert np.allclose(np.reshape(gaussians["deviations"], (-1, 3)), np.exp(field.log_scales), rtol=1e-5)
+    ours, theirs = np.reshape(gaussians["turns"], (-1, 4)), field.quats
+    assert np.allclose(np.abs((ours * theirs).sum(1)), 1, atol=1e-5)
+    for order, (number, indices) in zip(orders, kept, strict=True):
+        assert order["number"] == number and order["indices"] == indices.tolist()
+        assert np.allclose(order["direction"], directions()[number])
+
+
+def test_a_zip_and_loose_files_are_the_same_terrain(hilly, other):
+    names = [path for path in sorted(hilly[0].rglob("*")) if path.suffix in (".bin", ".json")]
+    memory = io.BytesIO()
+    with zipfile.ZipFile(memory, "w") as archive:
+        for path in names:
+            archive.write(path, f"a/{path.relative_to(hilly[0])}")
+    files = [[f"b/{path.relative_to(hilly[0])}", b64encode(path.read_bytes()).decode()] for path in names]
+    heights = other.evaluate(
+        """async ([zip, files]) => {
+          const { load } = await import("./terrain_api.js");
+          const bytes = (text) => Uint8Array.from(atob(text), (one) => one.charCodeAt(0)), found = [];
+          const loose = files.map(([name, text]) => {
+            const file = new File([bytes(text)], name);
+            Object.defineProperty(file, "webkitRelativePath", { value: name });
+            return file;
+          });
+          for (const where of [new Blob([bytes(zip)]), loose]) {
+            const other = await load(where);
+            await other.loaded;
+            const camera = other.camera({ x: 1, y: 2, eye: 1, yaw: 0, pitch: -20 }, 160, 100);
+            found.push([other.height(7, 8), (await other.update(camera, { exact: true })).gaussians]);
+            other.end();
+          }
+          return found;
+        }""",
+        [b64encode(memory.getvalue()).decode(), files],
+    )
+    assert heights[0] == heights[1] and heights[0][1] > 0
+    assert heights[0][0] == other.evaluate("terrain.height(7, 8)")
+
+
+@pytest.mark.parametrize(
+    "call, said",
+    [
+        ("terrain.height(NaN, 0)", "x, y: not 2 finite numbers"),
+        ("terrain.pick([0, 0, 1], [0, 0, 0])", "direction has no length"),
+        ("terrain.pick([0, 0], [0, 0, -1])", "origin: not 3 finite numbers"),
+        (
+            "terrain.update({ ...terrain.camera({ x: 0, y: 0, eye: 1, yaw: 0, pitch: 0 }, 9, 9), focal: 0 })",
+            "not above 0",
+        ),
+        ("terrain.update(terrain.camera({ x: 0, y: 0, eye: 1, yaw: 0, pitch: 0 }, 9, 9), { budget: 0 })", "budget"),
+        ("terrain.camera({ x: 0, y: 0, eye: 1, yaw: 0 }, 9, 9)", "finite numbers"),
+        ("terrain.gaussians(99, 0)", "tile: 99 is not 0 to 15"),
+        ("terrain.orders(0, 3)", "level: 3 is not 0 to 2"),
+        ("import('./terrain_api.js').then(({ load }) => load('nowhere'))", "davgswt.json is not there"),
+        ("import('./terrain_api.js').then(({ load }) => load([]))", "There is no terrain"),
+        ("import('./terrain_api.js').then(({ load }) => load(new Blob(['x'])))", "The zip cannot be read"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_in_words(other, call, said):
+    message = other.evaluate(f"(async () => {call})().then(() => null, (error) => error.message)")
+    assert message is not None and said in message
+
+
+def test_after_its_end_nothing_is_left_running(other, hilly):
+    told = other.evaluate(
+        """async () => {
+          const { load } = await import("./terrain_api.js"), errors = [];
+          const other = await load(".", { onError: (error) => errors.push(error.message) });
+          other.end();
+          await other.loaded;
+          return errors;
+        }"""
+    )
+    assert told == []

@@ -1,0 +1,80 @@
+// The endless terrain in other pages: docs/terrain-api.md. Types: terrain_api.d.ts, which a test holds to this file.
+
+import { checkCamera } from "./api/arguments.js";
+import { createChunkReader } from "./api/chunks.js";
+import { createGround } from "./api/ground.js";
+import { createPainter } from "./api/painter.js";
+import { openSource } from "./data/open.js";
+import { listDrawnCells, NO_ORDER } from "./scene/drawn_cells.js";
+import { openTerrain, readTerrain } from "./scene/open_terrain.js";
+import { cameraAt } from "./terrain/camera.js";
+
+export { PageError as TerrainError } from "./data/errors.js";
+export { rayThrough } from "./terrain/ray.js";
+
+const BUDGET = 1_000_000; // Gaussians of an update
+
+/**
+ * Open a terrain: the address of a page folder or a bundle, its zip, or its files. Resolves when its manifest is read;
+ * `loaded` does when its chunks are too.
+ *
+ * @param {string | URL | Blob | Iterable<File>} where
+ * @param {{ onProgress?: (progress: import("./data/bundle.js").Progress) => void, onError?: (error: Error) => void }} [options]
+ */
+export async function load(where, { onProgress, onError = console.error } = {}) {
+  const files = await readTerrain(await openSource(where)), { manifest } = files;
+  /** @type {Set<ReturnType<typeof createPainter>>} */
+  const painters = new Set();
+  /** @type {import("./worker/frame_builder.js").FrameAnswer | null} */
+  let frame = null;
+  let arrived = 0; // chunks that were posted to painters
+  const open = openTerrain(files, {
+    onRecords(records) {
+      arrived += 1;
+      for (const { renderer } of painters) renderer.splats.addRecords(records);
+    },
+    onFrame(answer) {
+      frame = answer;
+      for (const painter of painters) painter.setFrame(answer);
+    },
+    onError,
+  });
+  const loaded = open.readAll(onProgress).then(() => {});
+  loaded.catch(onError); // whoever waits for it learns of it too
+  return {
+    unit: manifest.unit, tileSide: manifest.tile_side, eyeFloor: manifest.eye_floor, lift: open.lift,
+    levels: manifest.levels.length, tiles: manifest.tiles.length, directions: manifest.directions,
+    materials: manifest.materials.map(({ name }) => name), objects: (manifest.objects ?? []).map(({ name }) => name),
+    loaded,
+    ...createGround(open),
+    ...createChunkReader(open),
+    /** @param {import("./terrain/camera.js").Place} place @param {number} width @param {number} height */
+    camera: (place, width, height) => checkCamera(cameraAt(place, width, height, open.heights)),
+    /** @param {import("./terrain/camera.js").Camera} camera @param {{ budget?: number, exact?: boolean }} [options] */
+    async update(camera, { budget = BUDGET, exact = false } = {}) {
+      if (!(budget > 0)) throw new RangeError(`budget: ${budget} is not above 0`);
+      open.client.ask(checkCamera(camera), budget, exact);
+      await open.client.answered();
+      return describeUpdate(/** @type {NonNullable<typeof frame>} */ (frame));
+    },
+    /** @param {WebGL2RenderingContext} gl */
+    createPainter(gl) {
+      const made = createPainter(gl, open, () => painters.delete(made));
+      painters.add(made);
+      if (arrived) open.client.restore(); // posts what has arrived once more
+      return made.painter;
+    },
+    end() {
+      for (const { painter } of [...painters]) painter.end();
+      open.end();
+    },
+  };
+}
+
+/** @param {import("./worker/frame_builder.js").FrameAnswer} frame */
+function describeUpdate(frame) {
+  const { count, reach, switches, bands, missing, incomplete } = frame;
+  const cells = listDrawnCells(frame).map(({ i, j, tile, level, last, order }) => (
+    { i, j, tile, finest: level, coarsest: last, order: order === NO_ORDER ? null : order }));
+  return { cells, gaussians: count, reach, switches, bands, complete: !incomplete && !missing.length };
+}
