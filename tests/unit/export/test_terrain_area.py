@@ -7,7 +7,8 @@ import pytest
 
 from dav_gswt.errors import InputError
 from dav_gswt.export import terrain_area
-from dav_gswt.terrain.finite import Area
+from dav_gswt.terrain import finite
+from dav_gswt.terrain.finite import Area, Disc
 
 
 @pytest.mark.parametrize(
@@ -90,3 +91,49 @@ def test_tiles_without_compression_are_larger(export_settings):
         for how in ("none", "spz")
     )
     assert plain["3dtiles"].bytes > packed["3dtiles"].bytes and plain["ply"] == packed["ply"]
+
+
+def test_a_radius_takes_all_cells_that_it_touches(cover_terrain, export_settings):
+    wanted = plan(cover_terrain, export_settings, centre=[0.25, 3.0], radius=1.5)
+    assert wanted.area == Area(-2, 1, 4, 4, Disc(0.25, 3.0, 1.5))
+    i, j = (v.ravel() for v in np.meshgrid(np.arange(-5, 9), np.arange(-5, 9)))
+    x, y = np.random.default_rng(0).uniform(-1.5, 1.5, (2, 5000))
+    inside = np.hypot(x, y) < 1.5
+    found = set(zip(*(np.floor(v).astype(int).tolist() for v in (0.25 + x[inside], 3.0 + y[inside])), strict=True))
+    touched = wanted.area.disc.touches(i, j)
+    assert set(zip(i[touched].tolist(), j[touched].tolist(), strict=True)) == found
+    assert len(finite.list_grid(cover_terrain, wanted.area, wanted.eye)) == len(found)
+
+
+def test_a_radius_that_is_too_large_is_refused_with_the_one_that_fits(cover_terrain, export_settings):
+    given = export_settings | {"radius": 12.0}
+    max_gb = 1e-9 * 20_000 * terrain_area.LIMITS["ply"].bytes
+    with pytest.raises(InputError, match=r"ply: a radius of 12 tiles has up to \d+ Gaussians") as told:
+        terrain_area.check_size(cover_terrain, plan(cover_terrain, given), limits("ply"), max_gb)
+    fits = float(re.search(r"; ([\d.]+) tiles fit: set export\.radius", str(told.value))[1])
+    assert (
+        terrain_area.check_size(cover_terrain, plan(cover_terrain, given, radius=fits), limits("ply"), max_gb) <= 20_000
+    )
+    with pytest.raises(InputError):
+        terrain_area.check_size(cover_terrain, plan(cover_terrain, given, radius=fits + 1), limits("ply"), max_gb)
+
+
+def test_metres_become_tile_sides():
+    given = {"centre": ["-3m", 2.0], "radius": "6 m", "level": 0}
+    found = terrain_area.resolve_lengths(given, side=4.0, metres=0.5)
+    assert found == {"centre": [-1.5, 2.0], "radius": 3.0, "level": 0}
+
+
+@pytest.mark.parametrize(
+    "given, metres, said",
+    [
+        ({"radius": "6m"}, None, r"export\.radius: 6m: the scale of this terrain is not known"),
+        ({"centre": [0.0, "1m"]}, None, r"export\.centre: 1m: the scale of this terrain is not known"),
+        ({"radius": "6000m"}, 1.0, r"export\.radius: 1500 tile sides; more than 0 and at most 500"),
+        ({"radius": "0m"}, 1.0, r"export\.radius: 0 tile sides"),
+        ({"centre": ["99999999999m", 0.0]}, 1.0, r"export\.centre lies beyond"),
+    ],
+)
+def test_lengths_that_make_no_sense_are_refused(given, metres, said):
+    with pytest.raises(InputError, match=said):
+        terrain_area.resolve_lengths(given, 4.0, metres)

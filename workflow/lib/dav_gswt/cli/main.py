@@ -3,6 +3,7 @@
 import argparse
 import sys
 
+from dav_gswt.cli import export
 from dav_gswt.errors import InputError
 from dav_gswt.inspect import command as inspect
 
@@ -10,7 +11,9 @@ from dav_gswt.inspect import command as inspect
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; its exit status, 1 with a message where what was given cannot be used."""
     parser = argparse.ArgumentParser(prog="dav-gswt", description=__doc__)
-    inspect.add_command(parser.add_subparsers(title="commands", required=True, metavar="COMMAND"))
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    inspect.add_command(commands)
+    export.add_command(commands)
     options = parser.parse_args(arguments)
     try:
         return options.run(options)

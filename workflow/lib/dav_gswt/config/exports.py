@@ -7,6 +7,8 @@ from pydantic import Field, model_validator
 from dav_gswt.config.base import ConfigModel, key
 
 Cell = Annotated[int, Field(ge=-(2**30), le=2**30)]
+Length = Annotated[float, Field(gt=0, le=500)] | Annotated[str, Field(pattern=r"^\d{1,9}(\.\d{1,9})? ?m$")]
+Coordinate = float | Annotated[str, Field(pattern=r"^-?\d{1,12}(\.\d{1,9})? ?m$")]
 Format = Literal["ply", "spz", "glb", "sog", "streamed_sog", "usd", "3dtiles"]
 
 
@@ -15,8 +17,8 @@ class Export(ConfigModel):
 
     columns: int = key("cells from west to east", 8, unit="tiles", ge=1, le=1000)
     rows: int = key("cells from south to north", 8, unit="tiles", ge=1, le=1000)
-    centre: list[float] | None = key(
-        "x and y of the point that the cells lie about; [0, 0] if left out",
+    centre: list[Coordinate] | None = key(
+        "x and y of the point that the cells lie about, or metres, such as `12m`; [0, 0] if left out",
         None,
         unit="tile sides",
         min_length=2,
@@ -24,6 +26,11 @@ class Export(ConfigModel):
     )
     corner: list[Cell] | None = key(
         "column and row of the south-western cell, instead of `centre`", None, unit="tiles", min_length=2, max_length=2
+    )
+    radius: Length | None = key(
+        "instead of `columns` and `rows`: all cells within this distance of `centre`, or metres, such as `20m`",
+        None,
+        unit="tile sides",
     )
     level: Annotated[int, Field(ge=0, le=15)] | Literal["by_distance"] = key(
         "level of detail, 0 the finest; `by_distance`: as seen from the centre, an eye floor above the surface", 0
@@ -56,7 +63,9 @@ class Export(ConfigModel):
     def _require_sense(self) -> "Export":
         if self.centre is not None and self.corner is not None:
             raise ValueError("centre and corner exclude one another; leave one out")
-        if self.centre is not None and not all(abs(at) <= 2**30 for at in self.centre):
+        if self.radius is not None and self.corner is not None:
+            raise ValueError("radius and corner exclude one another; leave one out")
+        if self.centre is not None and not all(abs(at) <= 2**30 for at in self.centre if not isinstance(at, str)):
             raise ValueError(f"centre lies beyond {2**30} tile sides")
         if len(set(self.formats)) < len(self.formats):
             raise ValueError("formats has one twice")

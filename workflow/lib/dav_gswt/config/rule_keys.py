@@ -96,7 +96,7 @@ PRESET_KEYS: dict[str, tuple[str, ...]] = {
 # of a prior, for the rules that read less than all of it
 PRIOR_KEYS = {"inpaint_field": ("model", "samples", "steps", "weights")}
 
-_AREA = ("columns", "rows", "centre", "corner")
+_AREA = ("columns", "rows", "centre", "corner", "radius")
 
 # of the table `export`, by rule
 EXPORT_KEYS: dict[str, tuple[str, ...]] = {

@@ -16,7 +16,7 @@ from dav_gswt.export.glb import ELEMENT_ARRAY_BUFFER, GlbWriter
 from dav_gswt.export.ground_surface import GroundSurface, check_points, choose_steps, collect_surface, measure_tiles
 from dav_gswt.export.height_mesh import simplify_heights
 from dav_gswt.export.hulls import Hull, collect_hulls
-from dav_gswt.export.terrain_area import choose_area, find_origin
+from dav_gswt.export.terrain_area import choose_area, find_metres, find_origin, resolve_lengths
 from dav_gswt.files import atomic_folder, write_json
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.terrain.endless import EndlessTerrain
@@ -35,9 +35,12 @@ def export_ground(
 ) -> None:
     """Write ground.{glb,png,tif,hfield,xml,json} and objects.glb of the area of the config's `export` to a folder.
 
+    Of an area within a radius it is the rectangle about it: a height field has four corners.
+
     Args:   sets: the tiles of all materials. reference: where the scene lies on earth, if it is known.
-    Raises: InputError: an area whose height field has too many points.
+    Raises: InputError: an area whose height field has too many points, or metres of a terrain without a scale.
     """
+    settings = resolve_lengths(settings, terrain.side, find_metres(manifest, reference))
     area, _ = choose_area(settings)
     origin = find_origin(terrain, area)
     check_points(area, choose_steps(sets))

@@ -8,12 +8,16 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
+from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.errors import InputError
 from dav_gswt.export import glb, glb_splats, glb_spz, ply, spool, spz, usd
+from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.terrain.endless import EndlessTerrain
-from dav_gswt.terrain.finite import Area, count_cells, keep_level
+from dav_gswt.terrain.finite import Area, Disc, count_cells, keep_level
 
 BY_DISTANCE = "by_distance"
+MAX_CELLS = 1000  # along a side of an area
+FARTHEST = 2**30  # tile sides
 
 
 @dataclass(frozen=True)
@@ -57,13 +61,57 @@ class TerrainExport:
 
 def choose_area(settings: Mapping[str, Any]) -> tuple[Area, tuple[float, float]]:
     """The cells that the config's `export` names, and the point that they lie about, in tile sides."""
+    x, y = settings.get("centre", (0.0, 0.0))
+    if "radius" in settings:
+        return surround(Disc(x, y, settings["radius"])), (x, y)
     columns, rows = settings["columns"], settings["rows"]
     if "corner" in settings:
         west, south = settings["corner"]
         return Area(west, south, columns, rows), (west + columns / 2, south + rows / 2)
-    x, y = settings.get("centre", (0.0, 0.0))
     west, south = (int(np.floor(at - n / 2 + 0.5)) for at, n in ((x, columns), (y, rows)))
     return Area(west, south, columns, rows), (x, y)
+
+
+def surround(disc: Disc) -> Area:
+    """The cells that a disc touches."""
+    (west, east), (south, north) = (
+        (int(np.floor(at - disc.radius)), int(np.ceil(at + disc.radius))) for at in (disc.x, disc.y)
+    )
+    return Area(west, south, east - west, north - south, disc)
+
+
+def find_metres(manifest: Manifest, reference: Georeference | None) -> float | None:
+    """Metres of a unit, where they are known."""
+    if reference:
+        return reference.metres_per_unit
+    return 1.0 if manifest.unit == "metre" else None
+
+
+def resolve_lengths(settings: Mapping[str, Any], side: float, metres: float | None) -> dict[str, Any]:
+    """The config's `export` with `radius` and `centre` in tile sides.
+
+    Args:   side: of a tile, in units. metres: of a unit, if they are known.
+    Raises: InputError: metres of a terrain without a scale, or more cells than an area may have.
+    """
+
+    def resolve(name: str, value: float | str) -> float:
+        if not isinstance(value, str):
+            return float(value)
+        if metres is None:
+            why = "the scale of this terrain is not known (docs/photos.md): give tile sides, a number without m"
+            raise InputError(f"export.{name}: {value}: {why}")
+        return float(value.removesuffix("m")) / metres / side
+
+    found = dict(settings)
+    if "centre" in found:
+        found["centre"] = [resolve("centre", at) for at in found["centre"]]
+        if not all(abs(at) <= FARTHEST for at in found["centre"]):
+            raise InputError(f"export.centre lies beyond {FARTHEST} tile sides")
+    if "radius" in found:
+        found["radius"] = resolve("radius", found["radius"])
+        if not 0 < found["radius"] <= MAX_CELLS / 2:
+            raise InputError(f"export.radius: {found['radius']:g} tile sides; more than 0 and at most {MAX_CELLS // 2}")
+    return found
 
 
 def plan_export(terrain: EndlessTerrain, settings: Mapping[str, Any], eye_floor: float) -> TerrainExport:
@@ -98,7 +146,7 @@ def check_size(terrain: EndlessTerrain, wanted: TerrainExport, limits: Mapping[s
         bound = min(most, limit.gaussians or most)
         if count > bound:
             why = f"export.max_gb: {max_gb:g} allows" if bound == most else f"the format {name} holds"
-            size = f"{wanted.area.columns} x {wanted.area.rows} cells have up to {count} Gaussians, {why} {bound}"
+            size = f"{_describe(wanted.area)} up to {count} Gaussians, {why} {bound}"
             raise InputError(f"export: {name}: {size}; {_suggest(terrain, limited, bound)}")
     return asked
 
@@ -107,7 +155,13 @@ def _suggest(terrain: EndlessTerrain, wanted: TerrainExport, bound: int) -> str:
     fits = suggest_area(wanted.area, lambda area: _count(terrain, wanted, area), bound)
     if fits is None:
         return "not one cell fits: set export.level to a coarser one, or raise export.max_gb"
+    if fits.disc:
+        return f"{fits.disc.radius:g} tiles fit: set export.radius, a coarser export.level, or max_gb"
     return f"{fits.columns} x {fits.rows} fit: set export.columns and export.rows, a coarser export.level, or max_gb"
+
+
+def _describe(area: Area) -> str:
+    return f"a radius of {area.disc.radius:g} tiles has" if area.disc else f"{area.columns} x {area.rows} cells have"
 
 
 def suggest_area(area: Area, count: Callable[[Area], int], bound: int) -> Area | None:
@@ -120,7 +174,9 @@ def suggest_area(area: Area, count: Callable[[Area], int], bound: int) -> Area |
 
 
 def _shrink(area: Area, longer: int) -> Area:
-    """A smaller area about the middle of one, whose longer side has so many cells."""
+    """A smaller area about the middle of one, whose longer side has so many cells, or whose disc is about as wide."""
+    if area.disc:
+        return surround(replace(area.disc, radius=longer / 2))
     share = longer / max(area.columns, area.rows)
     columns, rows = (max(1, int(n * share)) for n in (area.columns, area.rows))
     return Area(area.west + (area.columns - columns) // 2, area.south + (area.rows - rows) // 2, columns, rows)

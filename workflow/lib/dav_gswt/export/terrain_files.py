@@ -17,7 +17,15 @@ from dav_gswt.bundle.manifest import Manifest
 from dav_gswt.export import glb_splats, ply, sog, spz, tiles_3d, usd
 from dav_gswt.export.axes import AXES
 from dav_gswt.export.spool import Spool
-from dav_gswt.export.terrain_area import TerrainExport, check_size, choose_limits, describe_size, plan_export
+from dav_gswt.export.terrain_area import (
+    TerrainExport,
+    check_size,
+    choose_limits,
+    describe_size,
+    find_metres,
+    plan_export,
+    resolve_lengths,
+)
 from dav_gswt.field import GaussianField
 from dav_gswt.files import atomic_folder, write_json
 from dav_gswt.geometry.georeference import Georeference
@@ -52,8 +60,10 @@ def export_terrain(
     """Write terrain.{ply,spz,glb,sog,usdc}, terrain_{sog,3dtiles}/ and terrain.json, as `export` asks, to a folder.
 
     Args:   reference: where the scene lies on earth, if it is known.
-    Raises: InputError: more than a file may have, no such level, or the converter of SOG or USD's package is not here.
+    Raises: InputError: more than a file may have, no such level, metres of a terrain without a scale, or the converter
+            of SOG or USD's package is not here.
     """
+    settings = resolve_lengths(settings, terrain.side, find_metres(manifest, reference))
     wanted, formats = plan_export(terrain, settings, manifest.eye_floor), settings["formats"]
     limits = choose_limits(settings)
     count = check_size(terrain, wanted, limits, settings["max_gb"])
@@ -143,12 +153,14 @@ def _describe(
 ) -> dict[str, Any]:
     """terrain.json. Lengths are in the bundle's unit, the origin is a place of the world, east, north and up."""
     area = wanted.area
-    metres = 1.0 if manifest.unit == "metre" else None
+    cells: dict[str, Any] = {"west": area.west, "south": area.south, "columns": area.columns, "rows": area.rows}
+    if area.disc:
+        cells |= {"centre": [area.disc.x, area.disc.y], "radius": area.disc.radius}
     return {
         "unit": manifest.unit,
-        "metres_per_unit": reference.metres_per_unit if reference else metres,
+        "metres_per_unit": find_metres(manifest, reference),
         "tile_side": terrain.side,
-        "cells": {"west": area.west, "south": area.south, "columns": area.columns, "rows": area.rows},
+        "cells": cells,
         "origin": wanted.origin.tolist(),
         "eye": (wanted.eye - wanted.origin).tolist(),
         "level": "by_distance" if wanted.level is None else wanted.level,

@@ -140,7 +140,7 @@ def measure_absence(box: Box, errors: Sequence[float]) -> float:
 def split_area(area: Area, edge: int) -> list[Area]:
     """Blocks of `edge` by `edge` cells from the south-western one on, row by row; the last ones may be smaller."""
     return [
-        Area(area.west + i, area.south + j, min(edge, area.columns - i), min(edge, area.rows - j))
+        Area(area.west + i, area.south + j, min(edge, area.columns - i), min(edge, area.rows - j), area.disc)
         for j in range(0, area.rows, edge)
         for i in range(0, area.columns, edge)
     ]

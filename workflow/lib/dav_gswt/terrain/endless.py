@@ -101,19 +101,19 @@ def terrain_from_bundle(
 def terrain_from_fields(
     tiles: list[list[GaussianField]],
     manifest: TileSetInfo,
-    surface: dict[str, Any],
+    surface: dict[str, Any] | HeightField,
     objects: Sequence[list[GaussianField]] = (),
     pictures: Mapping[str, Picture] | None = None,
 ) -> EndlessTerrain:
-    """tiles[level][tile] with the distances and classes of a manifest, on the surface that the config's `heights`
-    describes.
+    """tiles[level][tile] with the distances and classes of a manifest, on a surface.
 
-    Args:   objects: objects[number][level], about their feet. pictures: of the terms of classes, by file.
+    Args:   surface: or the config's `heights` that describes it. objects: objects[number][level], about their feet.
+            pictures: of the terms of classes, by file.
     Raises: InputError: as `heights.surface_from_config`.
     """
     levels, entries, side = manifest.levels, manifest.tiles, manifest.tile_side
     largest = max(float(np.exp(f.log_scales.max(initial=-np.inf))) for row in tiles for f in row)
-    heights = surface_from_config(surface, side)
+    heights = surface_from_config(surface, side) if isinstance(surface, dict) else surface
     classes = manifest.classes and Classes(manifest.classes, len(manifest.materials), side, heights, pictures or {})
     beyond = (RIM - 3) * largest  # the manifest's heights reach three deviations beyond the centres
     extents, things = [measure_extent(fields) for fields in objects], manifest.objects or []

@@ -1,0 +1,143 @@
+"""`dav-gswt export`: the files that Snakemake would make, messages in the command's own words, nothing in the way."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+from fixtures.land_covers import cover_content, write_cover_bundle
+
+from dav_gswt.bundle import store
+from dav_gswt.cli import export, main
+from dav_gswt.config.exports import Export
+from dav_gswt.export import terrain_area, terrain_files
+from dav_gswt.field import read_field
+from dav_gswt.terrain import endless
+from dav_gswt.terrain.heights import Hills
+from dav_gswt.terrain.page import write_page
+from dav_gswt.tiles.store import write_material_tiles
+
+HILLS = Hills(2.0, 30.0, 3, 5)
+
+
+@pytest.fixture(scope="module")
+def result(root, tmp_path_factory):
+    """A folder as results/ has it: a bundle with its page on hills, and the tiles."""
+    folder = tmp_path_factory.mktemp("results") / "scene"
+    bundle = folder / "tiles_auto/bundle_tau0.6"
+    bundle.parent.mkdir(parents=True)
+    write_cover_bundle(bundle, root / "workflow/schemas/davgswt.schema.json")
+    write_page(bundle, root / "workflow/viewer", bundle / "terrain/page", HILLS)
+    write_material_tiles(cover_content().tiles, bundle.parent / "tiles", bundle.parent / "seams.json", {})
+    return folder
+
+
+def run(*arguments):
+    return main.main(["export", *map(str, arguments)])
+
+
+def facts_of(folder):
+    return json.loads((folder / "terrain/terrain.json").read_text())
+
+
+def test_it_writes_what_the_rule_writes(result, tmp_path):
+    bundle = result / "tiles_auto/bundle_tau0.6"
+    assert run(bundle, "--columns", 2, "--rows", 3, "--format", "glb", "--format", "ply", "-o", tmp_path / "out") == 0
+    read = store.read_bundle(bundle, export._find_schema())
+    terrain = endless.terrain_from_fields(
+        read.fields(), read.manifest, HILLS, [[read.object_chunk(0, level)[0] for level in range(2)]]
+    )
+    settings = Export(columns=2, rows=3, formats=["glb", "ply"]).model_dump(mode="json", exclude_none=True)
+    terrain_files.export_terrain(terrain, read.manifest, settings, tmp_path / "wanted")
+    files = {path.name: path.read_bytes() for path in (tmp_path / "wanted").iterdir()}
+    assert {path.name: path.read_bytes() for path in (tmp_path / "out/terrain").iterdir()} == files
+    assert set(files) == {"terrain.glb", "terrain.ply", "terrain.json"}
+
+
+@pytest.mark.parametrize(
+    "below", ["", "tiles_auto", "tiles_auto/bundle_tau0.6", "tiles_auto/bundle_tau0.6/terrain/page"]
+)
+def test_a_folder_of_results_stands_for_its_newest_page(result, below):
+    assert export.find_terrain(result / below) == result / "tiles_auto/bundle_tau0.6/terrain/page"
+
+
+def test_a_radius_takes_the_cells_that_it_touches(result, tmp_path):
+    assert run(result, "--radius", 2, "--at", 0.5, 0.5, "--format", "ply", "--axes", "z-up", "-o", tmp_path) == 0
+    facts = facts_of(tmp_path)
+    assert facts["cells"] == {"west": -2, "south": -2, "columns": 5, "rows": 5, "centre": [0.5, 0.5], "radius": 2.0}
+    means = read_field(tmp_path / "terrain/terrain.ply").means + np.float32(facts["origin"])
+    cells = {tuple(cell) for cell in np.floor(means[:, :2] / facts["tile_side"]).astype(int).tolist()}
+    corners = {(i, j) for i in (-2, 2) for j in (-2, 2)}  # 1.5 tiles away in both ways, which is 2.1
+    assert {(i, j) for i in range(-2, 3) for j in range(-2, 3)} - corners <= cells
+    inside = np.abs(means[:, :2] - 0.5 * facts["tile_side"]).min(1) < 1.5 * facts["tile_side"]
+    assert inside.mean() > 0.99  # but for what hangs over the borders of cells
+
+
+def test_metres_are_metres(result, tmp_path):
+    assert run(result, "--radius", "8m", "--at", "2m", "2m", "--format", "ply", "-o", tmp_path) == 0  # 4 m a tile
+    assert facts_of(tmp_path)["cells"]["radius"] == 2.0 and facts_of(tmp_path)["cells"]["centre"] == [0.5, 0.5]
+
+
+def test_the_ground_comes_with_it(result, tmp_path):
+    assert run(result, "--columns", 2, "--rows", 2, "--format", "ground", "-o", tmp_path) == 0
+    assert (tmp_path / "ground/ground.xml").is_file() and not (tmp_path / "terrain").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments, said",
+    [
+        (["--level", "9"], "--level: there is no level 9; the last one is 1"),
+        (["--level", "x"], "--level: "),
+        (["--radius", "2", "--rows", "3"], "--radius excludes --columns and --rows"),
+        (["--radius", "2", "--corner", "0", "0"], "radius and corner exclude one another"),
+        (["--radius", "0"], "--radius: "),
+        (["--radius", "900000m"], "--radius: 225000 tile sides; more than 0 and at most 500"),
+        (["--columns", "0"], "--columns: "),
+        (["--max-gb", "0.001", "--columns", "90"], "fit: set --columns and --rows, a coarser --level, or max_gb"),
+        (["--max-gb", "0.001", "--radius", "40"], "tiles fit: set --radius"),
+        (["--axes", "y-down", "--format", "usd"], "a USD stage has y or z up"),
+        (["--threads", "0"], "--threads 0"),
+    ],
+)
+def test_what_makes_no_sense_is_one_line_and_writes_nothing(result, tmp_path, capsys, arguments, said):
+    assert run(result, *arguments, "-o", tmp_path / "out") == 1
+    told = capsys.readouterr().err
+    assert said in told and told.count("\n") == 1 and "export." not in told.replace("export: ", "")
+    assert not list(tmp_path.glob("out/*")) and not list(tmp_path.glob("out/.*"))
+
+
+def test_metres_of_a_terrain_without_a_scale_are_refused(result, root, tmp_path, capsys):
+    page = tmp_path / "page"
+    shutil.copytree(result / "tiles_auto/bundle_tau0.6/terrain/page", page)
+    manifest = json.loads((page / "davgswt.json").read_text()) | {"unit": "flying height"}
+    (page / "davgswt.json").write_text(json.dumps(manifest))
+    assert run(page, "--radius", "8m", "-o", tmp_path / "out") == 1
+    assert "--radius: 8m: the scale of this terrain is not known" in capsys.readouterr().err
+    assert not list(tmp_path.glob("out/*"))
+    assert run(page, "--format", "ground", "-o", tmp_path / "out") == 1
+    assert "needs the tiles" in capsys.readouterr().err
+
+
+def test_nothing_of_others_is_replaced(result, tmp_path, capsys):
+    (tmp_path / "terrain").mkdir()
+    (tmp_path / "terrain/mine.txt").write_text("kept")
+    assert run(result, "--columns", 1, "--rows", 1, "-o", tmp_path) == 1
+    assert "is in the way" in capsys.readouterr().err
+    assert (tmp_path / "terrain/mine.txt").read_text() == "kept"
+    shutil.rmtree(tmp_path / "terrain")
+    for _ in range(2):  # an earlier export is
+        assert run(result, "--columns", 1, "--rows", 1, "-o", tmp_path) == 0
+
+
+def test_a_missing_package_is_said_before_work_starts(result, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(
+        terrain_files.usd, "find_package", lambda: (_ for _ in ()).throw(terrain_area.InputError("usd"))
+    )
+    monkeypatch.setattr(terrain_files, "place_blocks", lambda *_: pytest.fail("work started"))
+    assert run(result, "--format", "glb", "--format", "usd", "-o", tmp_path / "out") == 1
+    assert not list(tmp_path.glob("out/*"))
+
+
+def test_where_there_is_no_terrain_the_path_is_named(tmp_path, capsys):
+    assert run(tmp_path / "nowhere", "-o", tmp_path / "out") == 1
+    assert "nowhere: no terrain here" in capsys.readouterr().err
