@@ -97,6 +97,10 @@ def test_the_ground_comes_with_it(result, tmp_path):
         (["--max-gb", "0.001", "--radius", "40"], "tiles fit: set --radius"),
         (["--axes", "y-down", "--format", "usd"], "a USD stage has y or z up"),
         (["--threads", "0"], "--threads 0"),
+        (
+            ["--columns", "400", "--rows", "400", "--max-gb", "60", "--format", "ground", "--format", "ply"],
+            "have a height field of",
+        ),
     ],
 )
 def test_what_makes_no_sense_is_one_line_and_writes_nothing(result, tmp_path, capsys, arguments, said):

@@ -110,13 +110,15 @@ def _export(options: argparse.Namespace, settings: dict[str, Any], ground: bool)
     bundle = store.read_bundle(source, _find_schema())
     reference = _find_reference(source)
     terrain = terrain_from_page(bundle)
+    sets = [] if result is None else _read_sets(result)
+    if sets:
+        ground_files.check_ground(terrain, bundle.manifest, sets, reference, settings)
     options.out.mkdir(parents=True, exist_ok=True)
     if settings["formats"]:
         terrain_files.export_terrain(
             terrain, bundle.manifest, settings, options.out / "terrain", options.threads, reference
         )
-    if result is not None:
-        sets = _read_sets(result)
+    if sets:
         ground_files.export_ground(terrain, bundle.manifest, sets, reference, settings, options.out / "ground")
     for name in wanted:
         print(options.out / name)

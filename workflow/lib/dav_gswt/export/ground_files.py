@@ -20,6 +20,7 @@ from dav_gswt.export.terrain_area import choose_area, find_metres, find_origin, 
 from dav_gswt.files import atomic_folder, write_json
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.terrain.endless import EndlessTerrain
+from dav_gswt.terrain.finite import Area
 from dav_gswt.tiles.build import TileSet
 
 Mesh = tuple[str, Array, Array, dict[str, Any]]  # name, vertices, triangles, extras
@@ -40,10 +41,8 @@ def export_ground(
     Args:   sets: the tiles of all materials. reference: where the scene lies on earth, if it is known.
     Raises: InputError: an area whose height field has too many points, or metres of a terrain without a scale.
     """
-    settings = resolve_lengths(settings, terrain.side, find_metres(manifest, reference))
-    area, _ = choose_area(settings)
+    area = check_ground(terrain, manifest, sets, reference, settings)
     origin = find_origin(terrain, area)
-    check_points(area, choose_steps(sets))
     tiles = measure_tiles(sets, settings["surface"] == "visible")
     surface = collect_surface(terrain, tiles, area)
     points, triangles = simplify_heights(surface.heights, surface.block, settings["mesh_error"] * surface.cell)
@@ -70,6 +69,19 @@ def export_ground(
         mujoco.write_hfield(surface, folder / "ground.hfield")
         mujoco.write_model(surface, hulls, origin, "ground.hfield", folder / "ground.xml")
         write_json(folder / "ground.json", facts)
+
+
+def check_ground(
+    terrain: EndlessTerrain,
+    manifest: Manifest,
+    sets: Sequence[TileSet],
+    reference: Georeference | None,
+    settings: Mapping[str, Any],
+) -> Area:
+    """The cells that `export_ground` takes, before any work. Raises: InputError: as there."""
+    area, _ = choose_area(resolve_lengths(settings, terrain.side, find_metres(manifest, reference)))
+    check_points(area, choose_steps(sets))
+    return area
 
 
 def place_vertices(surface: GroundSurface, points: Array, origin: Float[Array, "3"]) -> Float[Array, "v 3"]:
