@@ -22,7 +22,7 @@ PLACE = dict(x=3.0, y=5.0, eye=0.8, yaw=60.0, pitch=-12.0)
 OPEN = """async ([width, height]) => {
   const { load } = await import("./terrain_api.js");
   const canvas = Object.assign(document.createElement("canvas"), { width, height });
-  window.gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false });
+  window.gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: true });
   window.terrain = await load(".");
   await terrain.loaded;
 }"""
@@ -63,6 +63,23 @@ def test_it_draws_what_the_page_draws_to_the_bit(still, hilly, other, late):
     _, picture = other.evaluate(GRAB, [PLACE, True, late])
     expected = still(hilly[1], 160, 100).at(**PLACE)
     assert (Visit.decode(*picture) == expected).all() and expected.std() > 8
+
+
+def test_it_draws_alike_on_a_context_that_others_have_set_up(still, hilly, other):
+    other.evaluate(
+        """() => {
+          for (const test of [gl.DEPTH_TEST, gl.CULL_FACE, gl.SCISSOR_TEST, gl.STENCIL_TEST]) gl.enable(test);
+          gl.cullFace(gl.FRONT_AND_BACK);
+          gl.scissor(0, 0, 3, 3);
+          gl.pixelStorei(gl.UNPACK_FLIP_Y_WEBGL, true);
+          gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, true);
+          gl.pixelStorei(gl.UNPACK_ROW_LENGTH, 4096);
+          gl.blendEquation(gl.FUNC_SUBTRACT);
+          gl.colorMask(false, true, false, true);
+        }"""
+    )
+    _, picture = other.evaluate(GRAB, [PLACE, True, False])
+    assert (Visit.decode(*picture) == still(hilly[1], 160, 100).at(**PLACE)).all()
 
 
 def test_an_update_says_which_tiles_levels_and_orders_are_drawn(still, hilly, other):

@@ -31,7 +31,7 @@ export async function load(where, { onProgress, onError = console.error } = {}) 
   const open = openTerrain(files, {
     onRecords(records) {
       arrived += 1;
-      for (const { renderer } of painters) renderer.splats.addRecords(records);
+      for (const painter of painters) painter.addRecords(records);
     },
     onFrame(answer) {
       frame = answer;
