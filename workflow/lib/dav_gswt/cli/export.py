@@ -113,7 +113,6 @@ def _export(options: argparse.Namespace, settings: dict[str, Any], ground: bool)
     sets = [] if result is None else _read_sets(result)
     if sets:
         ground_files.check_ground(terrain, bundle.manifest, sets, reference, settings)
-    options.out.mkdir(parents=True, exist_ok=True)
     if settings["formats"]:
         terrain_files.export_terrain(
             terrain, bundle.manifest, settings, options.out / "terrain", options.threads, reference
@@ -125,7 +124,9 @@ def _export(options: argparse.Namespace, settings: dict[str, Any], ground: bool)
 
 
 def check_target(folder: Path, mark: str) -> None:
-    """Raises: InputError: a folder that this command did not write is in the way, and would be replaced."""
+    """Raises: InputError: a folder that this command did not write is in the way, and would be replaced; or a file."""
+    if folder.parent.exists() and not folder.parent.is_dir():
+        raise InputError(f"-o {folder.parent}: a file is in the way; name a folder")
     if folder.is_symlink() or (folder.exists() and not (folder / mark).is_file()):
         raise InputError(f"{folder} is in the way, and is no export (it has no {mark}): name another folder with -o")
 
