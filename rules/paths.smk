@@ -17,7 +17,9 @@ from dav_gswt.workflow import NamedEntries, lift_job_rate_limit, list_command_li
 
 BASE = Path(workflow.basedir)
 BUNDLE_SCHEMA = str(BASE / "workflow/schemas/davgswt.schema.json")
-VIEWER = sorted(str(path) for path in (BASE / "workflow/viewer").rglob("*") if path.suffix in (".js", ".ts", ".html", ".css"))
+VIEWER = sorted(
+    str(path) for path in (BASE / "workflow/viewer").rglob("*") if path.suffix in (".js", ".ts", ".html", ".css")
+)
 NEVER = r"(?!)"  # a constraint that nothing meets
 PLAIN_TILING = r"[a-z][a-z0-9_-]*(?<!-refined)(?<!-expansion)"  # an entry of `tilings`
 CHOOSING = "|".join(map(paths.policy_pattern, POLICY_NAMES))  # policies, as a constraint

@@ -12,6 +12,7 @@ def alone(checkout, root, tmp_path_factory):
     """A copy of the repository, in a folder of its own."""
     folder = checkout(tmp_path_factory.mktemp("alone") / "repository")
     shutil.copytree(root / "resources", folder / "resources")
+    shutil.copytree(root / "examples", folder / "examples", ignore=shutil.ignore_patterns("node_modules", "exports"))
     return folder
 
 

@@ -1,0 +1,154 @@
+"""The examples as a browser runs them, beside our own pictures of the same places."""
+
+import importlib.util
+import io
+import json
+import shutil
+import subprocess
+import threading
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fixtures.bundles import SKY, Ground
+from fixtures.land_covers import cover_content, write_cover_bundle
+from fixtures.page_visit import VIEWER, camera_at
+from PIL import Image
+
+from dav_gswt.bundle import store
+from dav_gswt.bundle.manifest import Manifest, Sky
+from dav_gswt.config.exports import Export
+from dav_gswt.export import ground_files, terrain_files
+from dav_gswt.export.axes import Y_DOWN, turn_field
+from dav_gswt.field import read_field
+from dav_gswt.images.metrics import psnr
+from dav_gswt.raster import render
+from dav_gswt.study.terrain import exits
+from dav_gswt.terrain import stills
+from dav_gswt.terrain.finished import terrain_from_page
+from dav_gswt.terrain.heights import Hills
+from dav_gswt.terrain.page import write_page
+
+HILLS = Hills(2.0, 30.0, 3, 5)
+PLACE = dict(x=1.0, y=2.0, eye=1.6, yaw=60.0, pitch=-20.0)
+SIZE = {"width": 160, "height": 100}
+FRAMES = 20  # by then Spark's sorter has answered
+
+
+@pytest.fixture(scope="module")
+def serve(root):
+    """The examples' own server, as a module."""
+    found = importlib.util.spec_from_file_location("serve", root / "examples/serve.py")
+    module = importlib.util.module_from_spec(found)
+    found.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def node_modules(root):
+    """examples/node_modules, which `npm ci` fetches on the first run."""
+    folder = root / "examples"
+    if not (folder / "node_modules/@sparkjsdev/spark").is_dir():
+        if not (npm := shutil.which("npm")):
+            pytest.skip("needs npm (Node.js 20 or newer) for three.js and Spark")
+        try:
+            command = [npm, "ci", "--no-audit", "--no-fund", "--ignore-scripts"]
+            done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=300)
+        except subprocess.TimeoutExpired:
+            pytest.skip("npm cannot be reached")
+        if done.returncode:
+            pytest.skip(f"npm ci --prefix examples does not work here: {done.stderr[-300:]}")
+    return folder / "node_modules"
+
+
+@contextmanager
+def running(serve, page, exports):
+    with serve.create_server(page, exports, 0) as http:
+        thread = threading.Thread(target=http.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
+        thread.start()
+        yield f"http://127.0.0.1:{http.server_address[1]}/"
+        http.shutdown()
+        thread.join()
+
+
+def picture_of(chromium, address, condition):
+    """The canvas of an example at PLACE, once a condition on what it tells holds."""
+    query = "&".join(f"{key}={value}" for key, value in PLACE.items())
+    with chromium.new_context(viewport=SIZE) as context:
+        tab, errors = context.new_page(), []
+        tab.on("pageerror", lambda error: errors.append(str(error)))
+        tab.goto(f"{address}?{query}")
+        tab.wait_for_function(condition, timeout=120_000)
+        tab.add_style_tag(content="p { display: none }")
+        image = tab.screenshot()
+        assert not errors
+    return np.asarray(Image.open(io.BytesIO(image)).convert("RGB")).astype(int)
+
+
+def test_plain_webgl2_draws_what_the_library_draws(chromium, serve, page_of, root, tmp_path):
+    """As close as the page itself (test_against_library): it fades on each pixel's alpha and blends in 8 bits."""
+    page = page_of(Ground(levels=3, speckle=40, things=4), surface=HILLS)
+    done = "document.querySelector('p').textContent.match(/Gaussians in [0-9]+ cells$/)"
+    with running(serve, page, tmp_path) as address:
+        seen = picture_of(chromium, f"{address}webgl2/", done)
+    manifest = Manifest.from_dict(json.loads((page / "davgswt.json").read_text()))
+    terrain = terrain_from_page(store.Bundle(page, manifest))
+    wanted = 255 * stills.render_view(terrain, camera_at(terrain, PLACE), Sky(**SKY), manifest.ground_colour)
+    difference = np.abs(seen - np.rint(wanted))
+    assert difference.mean() < 1 and difference.max() <= 32 and wanted.std() > 8
+
+
+def test_the_example_of_webgl2_is_short(root):
+    assert len((root / "examples/webgl2/main.js").read_text(encoding="utf-8").splitlines()) <= 60
+
+
+@pytest.fixture(scope="module")
+def walked(tmp_path_factory, root):
+    """A page of two materials with shrubs on hills, and its terrain."""
+    folder, schema = tmp_path_factory.mktemp("walked"), root / "workflow/schemas/davgswt.schema.json"
+    write_cover_bundle(folder / "bundle", schema)
+    write_page(folder / "bundle", VIEWER, folder / "page", HILLS)
+    bundle = store.read_bundle(folder / "page", schema)
+    return folder / "page", bundle.manifest, terrain_from_page(bundle)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_spark_draws_our_spz_as_we_draw_it(chromium, serve, node_modules, walked, tmp_path, version):
+    """The walker of three.js stands where ours does and sees what ours sees.
+
+    Spark keeps a splat in 16 bytes: centres as half floats (here 4 mm off at most, a twentieth of a disc's deviation),
+    sizes, colours and opacities of 8 bits, rotations of 24. It blends in 8 bits, so each of the ten splats or so that
+    cover a pixel rounds by half a step: 0.5 sqrt(10) / sqrt(3) = 0.9 of 255, or 49 dB. Measured: 48; a picture that is
+    off by a pixel, or mirrored, has 30 at most.
+    """
+    page, manifest, terrain = walked
+    settings = Export(radius=3.0, centre=[1.0, 1.0], formats=["spz", "ply"], spz_version=version)
+    settings = settings.model_dump(mode="json", exclude_none=True)
+    terrain_files.export_terrain(terrain, manifest, settings, tmp_path / "terrain")
+    done = f"+document.querySelector('p').textContent.split('frame ')[1] > {FRAMES}"
+    with running(serve, page, tmp_path) as address:
+        seen = picture_of(chromium, f"{address}three_spark/", done) / 255
+    origin = json.loads((tmp_path / "terrain/terrain.json").read_text())["origin"]
+    field = turn_field(read_field(tmp_path / "terrain/terrain.ply"), Y_DOWN.T)
+    field = replace(field, means=field.means + np.float32(origin))
+    wanted = render(field, camera_at(terrain, PLACE), 0.5).colour
+    decibels = psnr(seen.astype(np.float32), wanted, np.ones(wanted.shape[:2], np.float32))
+    assert decibels is not None and decibels > 42
+
+
+def test_exits_lie_alike_in_other_programs(chromium, serve, node_modules, walked, tmp_path):
+    """The files of the table in the docs, each in its own axes: SPZ and PLY give the same picture, all are upright."""
+    page, manifest, terrain = walked
+    settings = Export(radius=2.0, formats=["spz", "ply", "glb"]).model_dump(mode="json", exclude_none=True)
+    terrain_files.export_terrain(terrain, manifest, settings, tmp_path / "terrain")
+    ground_files.export_ground(terrain, manifest, cover_content().tiles, None, settings, tmp_path / "ground")
+    with running(serve, page, tmp_path) as address:
+        seen = {name: exits.visit(chromium, f"{address}exits/?show={name}") for name in ("spz", "ply", "glb", "ground")}
+    spz, ply = (seen[name].astype(np.float32) / 255 for name in ("spz", "ply"))
+    decibels = psnr(spz, ply, np.ones(spz.shape[:2], np.float32))
+    assert decibels is None or decibels > 35
+    for name, picture in seen.items():
+        sky = (np.abs(picture.astype(int) - [0xB8, 0xCB, 0xDC]).max(-1) < 4).mean(1)
+        most = 0.9 if name == "glb" else 0.5  # the sky shines through between points
+        assert sky[:8].mean() > 0.95 and sky[-40:].mean() < most, "sky above, ground below"
