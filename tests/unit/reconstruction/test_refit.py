@@ -61,6 +61,24 @@ def test_photos_that_contradict_the_earlier_ones_change_nothing():
     assert same.field is first.field and same.grid is first.grid
 
 
+@pytest.mark.parametrize("taken", [True, False])
+def test_where_earlier_photos_lose_much_an_update_tells_whether_the_new_ones_are_right(monkeypatch, taken):
+    photos = made.photos(5)
+    monkeypatch.setattr(refit.regression_guard, "allowed_loss", lambda *_: -100.0 if len(asked) == 0 else 100.0)
+    asked = []
+    refine = refit.refine_field
+
+    def update(*given):
+        asked.append(given)
+        found = refine(*given)
+        return replace(found, report=replace(found.report, new_views=replace(found.report.new_views, taken=taken)))
+
+    monkeypatch.setattr(refit, "refine_field", update)
+    first, after = refit_with(photos[3:], photos[:3])
+    assert len(asked) == 1 and after.report.new_views.taken == taken
+    assert (after.field is first.field) == (not taken)
+
+
 @pytest.mark.parametrize(("how", "steps"), [("continue", 40), ("scratch", 100)])
 def test_the_preset_says_how(monkeypatch, how, steps):
     monkeypatch.setattr(refit, "match_points", lambda *_: MATCHED)

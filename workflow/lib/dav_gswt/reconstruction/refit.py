@@ -19,7 +19,7 @@ from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import ground, regression_guard
 from dav_gswt.reconstruction.coarse import Reconstruction, StartViews, fit_coarse_field
 from dav_gswt.reconstruction.fit_settings import CoarseSettings, UpdateSettings, select_settings
-from dav_gswt.reconstruction.fitting.plan import FitPlan
+from dav_gswt.reconstruction.fitting.plan import FitPlan, UpdateReport
 from dav_gswt.reconstruction.fitting.trainer import FitOptions, FitResult
 from dav_gswt.reconstruction.observation import mask_for_fit, observe
 from dav_gswt.reconstruction.refinement import RefinementInput, refine_field
@@ -90,8 +90,9 @@ def refit_from_scratch(
 ) -> Reconstruction:
     """Fit a field to the earlier and the new photos.
 
-    New photos that contradict the earlier ones change nothing, as in `refine_field`; without new photos the field is
-    returned as it is.
+    New photos that contradict the earlier ones change nothing; without new photos the field is returned as it is.
+    A fit from scratch shows earlier photos worse than a fit to them alone did, on rich ground by more than the guard's
+    bound: whether photos contradict each other is then told by an update, as `refine_field` makes it.
     """
     field, grid, count = given.field, given.grid, len(given.earlier)
     if not given.new:
@@ -105,9 +106,13 @@ def refit_from_scratch(
         made.append(fit_coarse_field(start, coarse, rng, FitOptions(snapshots=snapshots)))
         return FitResult(made[-1].field, made[-1].report)
 
+    def is_update_accepted() -> bool:
+        report = refine_field(given, settings.update, rng.spawn(1)[0]).report
+        return isinstance(report, UpdateReport) and bool(report.new_views and report.new_views.taken)
+
     seen = mask_for_fit(observe(given.frame, grid, photos).views, grid)
     plan = coarse.plan_coarse_fit(len(photos))
-    update = regression_guard.fit_with_guard(field, field, seen[:count], seen[count:], plan, fit, retries=0)
+    update = regression_guard.fit_with_guard(field, field, seen[:count], seen[count:], plan, fit, 0, is_update_accepted)
     if not update.accepted:
         return Reconstruction(field, grid, update.report)
     return replace(made[-1], report=update.report)

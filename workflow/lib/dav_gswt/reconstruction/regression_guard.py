@@ -46,8 +46,11 @@ def fit_with_guard(
     plan: FitPlan,
     fit: Callable[[GaussianField, FitPlan], FitResult],
     retries: int = RETRIES,
+    second_opinion: Callable[[], bool] | None = None,
 ) -> GuardedUpdate:
     """Fit, and go on fitting, `retries` times at most, while the earlier photos have lost too much.
+
+    second_opinion: asked where they have; whether the new photos are right all the same.
 
     field: from before the new photos; it is kept if the loss stays above the bound. start: what the fit starts from.
     fit: to all views. Where no earlier photo has a pixel that counts, nothing can be lost.
@@ -61,7 +64,7 @@ def fit_with_guard(
         fits.append(fitted.report)
         reached.append(measure_psnr(fitted.field, earlier))
     loss = mean_loss(before, reached[-1])
-    accepted = loss <= most
+    accepted = loss <= most or (second_opinion is not None and second_opinion())
     if not accepted:
         _log.warning(
             "the new photos contradict the earlier ones: with %s the field shows those %.2f dB worse (bound: %.2g dB). "
