@@ -19,6 +19,9 @@ Object.assign(window, {
     get tour() {
       return viewer.tour.on;
     },
+    get pacing() {
+      return viewer.pacing;
+    },
     get walker() {
       return viewer.scene?.walker;
     },

@@ -56,7 +56,7 @@ def seen(request, fronted):
 
 def saved(seen, name: str) -> bytes:
     """The file that the page hands over."""
-    seen.until(f"saved.some(one => one.name === {json.dumps(name)} && blobs?.[one.href])", seconds=60)
+    seen.until(f"saved.some(one => one.name === {json.dumps(name)} && window.blobs?.[one.href])", seconds=60)
     return base64.b64decode(seen.page.evaluate("blobs[saved.at(-1).href]"))
 
 

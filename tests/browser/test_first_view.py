@@ -31,7 +31,7 @@ LAYOUT = """() => {
   }
   for (const [a, one, first] of seen) for (const [b, two, second] of seen) {
     if (a >= b || first.contains(second) || second.contains(first)) continue;
-    if (first.matches(".panel, #job") || second.matches(".panel, #job")) continue; // they cover
+    if ([first, second].some(one => one.matches(".panel") || one.closest("#job"))) continue; // they cover
     const across = Math.min(one.right, two.right) - Math.max(one.left, two.left);
     const down = Math.min(one.bottom, two.bottom) - Math.max(one.top, two.top);
     if (across > 1 && down > 1) faults.push(`${a} covers ${b}`);

@@ -72,7 +72,6 @@ def test_a_wider_field_of_view_shows_more_and_ends_with_the_mode(visit, plain):
     seen = open_photo(visit(320, 200).open(plain))
     normal = take(seen)
     seen.page.locator("#photoView").fill("30")
-    seen.page.locator("#photoView").dispatch_event("input")
     assert seen.page.locator("#photoViewText").inner_text() == "30°"
     narrow = take(seen)
     # tangents of 30 and 15 degrees: the narrow one is the middle 0.464 of the normal one
@@ -100,6 +99,28 @@ def test_a_photo_tells_how_far_it_is_and_is_given_up_when_asked(visit, page_of):
             seen.until("job.hidden && toast.textContent.includes('given up')")
             assert seen.page.locator("#photo").is_visible()
         assert seen.state["error"] is None
+
+
+@pytest.mark.parametrize(
+    "seconds, share, text",
+    [
+        (3, 0.1, ""),
+        (10, 0, ""),
+        (10, 0.9, ""),
+        (10, 0.5, ", 10 s left"),
+        (60, 0.1, ", 9 min left"),
+        (60, 0.001, ", 17 h left"),
+    ],
+)
+def test_who_waits_is_told_how_long(modules, seconds, share, text):
+    said = modules.evaluate(
+        """async ([seconds, share]) => {
+          const { describeLeft } = await import("./ui/job.js");
+          return describeLeft(seconds, share);
+        }""",
+        [seconds, share],
+    )
+    assert said == text
 
 
 def test_a_photo_that_does_not_fit_is_refused_in_one_sentence(visit, plain):

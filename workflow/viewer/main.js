@@ -94,8 +94,8 @@ async function start() {
   });
   paint = createPaintPanel(viewer);
   const jobs = createJobs({ say: hud.say, onError: (error) => viewer.fail(error) });
-  createPhotoMode(viewer, jobs);
-  listenToVideo(viewer, jobs);
+  createPhotoMode(viewer, jobs, firstView.showTerrain);
+  listenToVideo(viewer, jobs, closePanels);
   listenToXr(viewer);
   for (const id of ["paintButton", "storyButton", "photoButton"]) {
     element(id, HTMLButtonElement).addEventListener("click", () => menu.show(false));

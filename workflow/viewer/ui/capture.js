@@ -28,7 +28,7 @@ const FULL = "A picture of this size does not fit into this device's graphics me
  */
 export async function capturing(viewer, { width, height, signal }, work) {
   const { scene } = viewer, renderer = scene?.renderer;
-  if (!scene || !renderer) return;
+  if (!scene || !renderer || viewer.suspended) return;
   const picture = renderer.createPicture(), canvas = document.createElement("canvas");
   const pen = canvas.getContext("2d");
   if (!pen) throw new PageError(FULL);

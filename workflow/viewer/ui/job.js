@@ -8,6 +8,21 @@ import { element } from "./dom.js";
  * @typedef {ReturnType<typeof createJobs>} Jobs
  */
 
+const SOON = 5; // seconds after which, and of which, one is told
+
+/**
+ * How long work takes on, in words; nothing where that is not known yet, or soon over.
+ *
+ * @param {number} seconds that it took so far
+ * @param {number} share that is done
+ */
+export function describeLeft(seconds, share) {
+  const left = (seconds / share) * (1 - share);
+  if (seconds < SOON || !(left > SOON) || left === Infinity) return "";
+  if (left < 90) return `, ${SOON * Math.ceil(left / SOON)} s left`;
+  return left < 5400 ? `, ${Math.round(left / 60)} min left` : `, ${Math.round(left / 3600)} h left`;
+}
+
 /** @param {{ say: (text: string) => void, onError: (error: unknown) => void }} handlers */
 export function createJobs({ say, onError }) {
   const box = element("job", HTMLElement), text = element("jobText", HTMLElement);
@@ -32,11 +47,12 @@ export function createJobs({ say, onError }) {
     async run(name, work) {
       if (running) return;
       running = new AbortController();
+      const start = performance.now();
       const before = document.activeElement;
       /** @param {number} share */
       const tell = (share) => {
         bar.value = share;
-        text.textContent = `${name}: ${Math.round(100 * share)} %`;
+        text.textContent = `${name}: ${Math.round(100 * share)} %${describeLeft((performance.now() - start) / 1000, share)}`;
       };
       tell(0);
       box.hidden = false;

@@ -29,8 +29,9 @@ export function photoSizes({ width, height }, longest) {
 /**
  * @param {import("./viewer.js").Viewer} viewer
  * @param {import("./job.js").Jobs} jobs
+ * @param {() => void} onView called when another field of view is shown
  */
-export function createPhotoMode(viewer, jobs) {
+export function createPhotoMode(viewer, jobs, onView) {
   const size = element("photoSize", HTMLSelectElement), view = element("photoView", HTMLInputElement);
   const said = element("photoViewText", HTMLOutputElement), take = element("photoTake", HTMLButtonElement);
   const panel = createPanel("photo", { onShow: (on) => (on ? begin() : setView(FIELD_OF_VIEW)) });
@@ -44,6 +45,7 @@ export function createPhotoMode(viewer, jobs) {
     const { scene } = viewer;
     if (!scene || (scene.walker.fieldOfView ?? FIELD_OF_VIEW) === degrees) return;
     scene.walker.fieldOfView = degrees;
+    onView();
     viewer.redraw();
   }
 

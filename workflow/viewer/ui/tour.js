@@ -13,7 +13,7 @@ const LOW = 1.3, HIGH = 5; // heights over the ground ahead, in lowest eyes
 const BREATH = 41; // seconds from one low pass to the next
 const WIND = [[7, 29], [4, 67]]; // turns to and fro: degrees a second at most, and seconds of one
 const SPEED = 0.45; // heights a second
-const PITCH = [-11, -19]; // degrees above the horizon, low and high
+const PITCH = [-8, -14]; // degrees above the horizon, low and high
 const EASE = 5; // seconds until the tour has its own height, pitch and speed
 const AHEAD = [0, 1.5, 3, 4.5, 6]; // seconds of the way ahead whose ground the height minds
 const SETTLE = 1.2; // seconds in which the height comes nearly all the way to where it belongs

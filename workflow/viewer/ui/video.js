@@ -24,8 +24,9 @@ export function videoSize({ width, height }) {
 /**
  * @param {import("./viewer.js").Viewer} viewer
  * @param {import("./job.js").Jobs} jobs
+ * @param {() => void} closePanels
  */
-export function listenToVideo(viewer, jobs) {
+export function listenToVideo(viewer, jobs, closePanels) {
   const button = element("video", HTMLButtonElement), quality = element("videoQuality", HTMLSelectElement);
   const note = element("videoNote", HTMLElement), { flyPath } = viewer;
   const kind = findRecording(viewer.canvas);
@@ -53,6 +54,7 @@ export function listenToVideo(viewer, jobs) {
 
   button.addEventListener("click", () => jobs.run("Making the video", async (signal, tell) => {
     flyPath.stop();
+    closePanels();
     if (flyPath.path[flyPath.path.length - 1].seconds > MOST_SECONDS) return viewer.hud.say(TOO_LONG);
     const blob = await make(signal, tell);
     if (!blob) return viewer.hud.say("This browser makes no videos.");
