@@ -97,7 +97,7 @@ def test_no_gradients_at_the_corners_make_the_noise_steeper_than_its_bound(monke
                 return np.where(mine, bits, 0x7FFF7FFF)
 
             monkeypatch.setattr(heights, "hash_cell", one)
-            most += np.abs(turns @ heights._gradient_noise(u, v, 3, 0)[1].T)
+            most += np.abs(turns @ heights.gradient_noise(u, v, 3, 0)[1].T)
     # 0x7fff is -1.5e-5 and not 0, in up to 8 terms
     assert most.max() < STEEPEST + 1e-3
     assert most.max() > 0.98 * STEEPEST  # and the bound is hardly larger than it must be

@@ -11,12 +11,12 @@ from dav_gswt.config.settings import (
     ClassTerm,
     Flat,
     Flight,
-    Heights,
     NoiseClasses,
     Preset,
     PriorSettings,
     Stills,
     Stop,
+    Surface,
     TerrainPriorSettings,
     Tiling,
 )
@@ -71,7 +71,7 @@ class Config(ConfigModel):
         "need the extra `mobilesam`",
         "none",
     )
-    heights: Heights = key("the surface that the tiles are placed on", Flat(kind="flat"))
+    heights: Surface = key("the surface that the tiles are placed on", Flat(kind="flat"))
     classes: list[ClassTerm] = key(
         "which material lies where, on a terrain of several: terms whose scores are added",
         [NoiseClasses(kind="noise")],

@@ -46,7 +46,15 @@ class HeightMap(ConfigModel):
     beyond: Literal["mirror", "clamp"] = key("what comes after the image's edge", "mirror")
 
 
+class Sphere(ConfigModel):
+    """A planet: the tiles cover a sphere."""
+
+    kind: Literal["sphere"]
+    radius: float = key("of the ground", unit="tile sides", ge=4, le=1e7)
+
+
 Heights = Annotated[Flat | Hills | HeightMap, Field(discriminator="kind")]
+Surface = Annotated[Flat | Hills | HeightMap | Sphere, Field(discriminator="kind")]
 
 
 Weight = Annotated[float, Field(ge=0, le=1000)]
@@ -202,4 +210,4 @@ class Tiling(ConfigModel):
     sam2: Text | None = key("a folder with a checkpoint of SAM 2, whose masks separate objects", None)
 
 
-__all__ = ["ClassTerm", "Flight", "Heights", "Preset", "PriorSettings", "Share", "Stills", "Stop", "Tiling"]
+__all__ = ["ClassTerm", "Flight", "Heights", "Preset", "PriorSettings", "Share", "Stills", "Stop", "Surface", "Tiling"]

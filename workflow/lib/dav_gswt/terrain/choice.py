@@ -48,9 +48,11 @@ def tile_at(i: int, j: int, salt: int, variants: int) -> int:
     return int(_choose_tile(int(i), int(j), salt, variants))
 
 
-def tiles_at(i: Int64[Array, "*cells"], j: Int64[Array, "*cells"], salt: int, variants: int) -> Int64[Array, "*cells"]:
-    """`tile_at` of many cells."""
-    return _choose_tile(i, j, salt, variants)
+def tiles_at(
+    i: Int64[Array, "*cells"], j: Int64[Array, "*cells"], salt: int, variants: int, period: int = 0
+) -> Int64[Array, "*cells"]:
+    """`tile_at` of many cells. period: (i + period, j + period) is the same cell as (i, j); 0: none."""
+    return _choose_tile(i, j, salt, variants, period)
 
 
 def tiles_in(west: int, south: int, shape: tuple[int, int], salt: int, variants: int) -> Int64[Array, "h w"]:
@@ -60,12 +62,12 @@ def tiles_in(west: int, south: int, shape: tuple[int, int], salt: int, variants:
     return tiles_at(i, j, salt, variants)
 
 
-def _choose_tile(i, j, salt: int, variants: int):
-    edges, centre = _hash_edges(i, j, salt), _hash_centre(i, j, salt, variants)
+def _choose_tile(i, j, salt: int, variants: int, period: int = 0):
+    edges, centre = _hash_edges(i, j, salt, period), _hash_centre(i, j, salt, variants, period)
     taken = 0  # a bit for each centre that a neighbour with the same edges has
     for east, north in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-        same = _hash_edges(i + east, j + north, salt) == edges
-        taken = taken | np.where(same, 1, 0) << _hash_centre(i + east, j + north, salt, variants)
+        same = _hash_edges(i + east, j + north, salt, period) == edges
+        taken = taken | np.where(same, 1, 0) << _hash_centre(i + east, j + north, salt, variants, period)
     free = centre
     for step in reversed(range(variants)):
         other = (centre + step) % variants
@@ -73,11 +75,17 @@ def _choose_tile(i, j, salt: int, variants: int):
     return 16 * np.where((i + j) % 2 == 1, free, centre) + edges
 
 
-def _hash_edges(i, j, salt: int):
-    west, east = (hash_cell(i + step, j, WEST, salt) & 1 for step in (0, 1))
-    south, north = (hash_cell(i, j + step, SOUTH, salt) & 1 for step in (0, 1))
+def _hash_edges(i, j, salt: int, period: int):
+    west, east = (hash_cell(*_first_lap(i + step, j, period), WEST, salt) & 1 for step in (0, 1))
+    south, north = (hash_cell(*_first_lap(i, j + step, period), SOUTH, salt) & 1 for step in (0, 1))
     return 8 * west + 4 * north + 2 * east + south
 
 
-def _hash_centre(i, j, salt: int, variants: int):
-    return (hash_cell(i, j, CENTRE, salt) >> 1) % variants
+def _hash_centre(i, j, salt: int, variants: int, period: int):
+    return (hash_cell(*_first_lap(i, j, period), CENTRE, salt) >> 1) % variants
+
+
+def _first_lap(i, j, period: int):
+    """The cell with 0 <= j < period that is the same as (i, j)."""
+    back = j // period * period if period else 0
+    return i - back, j - back

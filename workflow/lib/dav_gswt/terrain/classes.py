@@ -191,7 +191,7 @@ class Classes:
         for octave in range(octaves):
             x, y = TURN[0] * x - TURN[1] * y, TURN[1] * x + TURN[0] * y
             axis, place = NOISE + MAX_OCTAVES * material + octave, (x + octave * SHIFT[0], y + octave * SHIFT[1])
-            noise += GAIN**octave * _gradient_noise(*place, axis, self.entry.salt)
+            noise += GAIN**octave * gradient_noise(*place, axis, self.entry.salt)
             x, y = 2 * x, 2 * y
         return noise / sum(GAIN**k for k in range(octaves)) + term.biases[material]
 
@@ -271,7 +271,7 @@ def _over_corners(best, values: Float[Array, "n y x m"]) -> Float[Array, "n b a 
     return best(rows[:, :, 1:], rows[:, :, :-1])
 
 
-def _gradient_noise(x: Float[Array, "n"], y: Float[Array, "n"], axis: int, salt: int) -> Float[Array, "n"]:
+def gradient_noise(x: Float[Array, "n"], y: Float[Array, "n"], axis: int, salt: int) -> Float[Array, "n"]:
     """The noise of `heights.Hills`, without its slope; x and y in cells."""
     i, j = np.floor(x), np.floor(y)
     u, v = x - i, y - j

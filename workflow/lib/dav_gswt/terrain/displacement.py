@@ -31,15 +31,20 @@ def displace_means(
     return replace(field, means=means.astype(np.float32)), slope
 
 
-def displaced_axes(field: GaussianField, slope: Float[Array, "n 2"]) -> Float[Array, "n 3 3"]:
+Slope = Float[Array, "n 2"] | Float[Array, "n 3 3"]  # of a height field; on a sphere J itself
+
+
+def displaced_axes(field: GaussianField, slope: Slope) -> Float[Array, "n 3 3"]:
     """A = J R S of every Gaussian on a surface of these slopes; its covariance is A A^T = J Sigma J^T.
 
     J = [[1, 0, 0], [0, 1, 0], [h_x, h_y, 1]] is the derivative of `displace_means`; its determinant is 1. The columns
     of R S are the Gaussian's axes, scaled by their standard deviations. Discs on a slope are stretched along it, so
-    they stay as dense as on level ground.
+    they stay as dense as on level ground. On a sphere J is given (see `sphere.bend`).
     """
     rotation = Rotation.from_quat(field.quats.astype(float), scalar_first=True).as_matrix()
     axes = rotation * np.exp(field.log_scales.astype(float))[:, None]
+    if slope.ndim == 3:
+        return slope @ axes
     axes[:, 2] += slope[:, 0, None] * axes[:, 0] + slope[:, 1, None] * axes[:, 1]
     return axes
 

@@ -17,6 +17,7 @@ from dav_gswt.terrain.class_rules import NOISE, Picture, apply_rule, warn_of_mis
 from dav_gswt.terrain.classes import Classes
 from dav_gswt.terrain.heights import FlatSurface, HeightField, surface_from_config
 from dav_gswt.terrain.scatter import Scatter
+from dav_gswt.terrain.sphere import Sphere, require_plain_cover
 from dav_gswt.tiles.layout import EDGES
 
 NEAR = 0.1  # near plane, as a share of the eye floor
@@ -109,11 +110,13 @@ def terrain_from_fields(
 
     Args:   surface: or the config's `heights` that describes it. objects: objects[number][level], about their feet.
             pictures: of the terms of classes, by file.
-    Raises: InputError: as `heights.surface_from_config`.
+    Raises: InputError: as `heights.surface_from_config`, `sphere.require_plain_cover`.
     """
     levels, entries, side = manifest.levels, manifest.tiles, manifest.tile_side
     largest = max(float(np.exp(f.log_scales.max(initial=-np.inf))) for row in tiles for f in row)
     heights = surface_from_config(surface, side) if isinstance(surface, dict) else surface
+    if isinstance(heights, Sphere):
+        require_plain_cover("sphere", manifest.classes, manifest.objects)
     classes = manifest.classes and Classes(manifest.classes, len(manifest.materials), side, heights, pictures or {})
     beyond = (RIM - 3) * largest  # the manifest's heights reach three deviations beyond the centres
     extents, things = [measure_extent(fields) for fields in objects], manifest.objects or []

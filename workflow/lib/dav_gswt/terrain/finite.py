@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, Int64
 from numpy import ndarray as Array
 
+from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField, concatenate_fields
 from dav_gswt.materials.placing import turn_and_scale, turn_rows
 from dav_gswt.terrain import weights
@@ -14,6 +15,7 @@ from dav_gswt.terrain.displacement import displace_field
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.placement import collect_tiles, fade_opacity
 from dav_gswt.terrain.scatter import Instances
+from dav_gswt.terrain.sphere import Sphere
 from dav_gswt.terrain.visibility import (
     GridCells,
     active_levels,
@@ -64,7 +66,12 @@ class Area:
 def list_cells(
     terrain: EndlessTerrain, west: int, south: int, columns: int, rows: int
 ) -> tuple[Int64[Array, "n"], Int64[Array, "n"], Int64[Array, "n"], Int64[Array, "n"]]:
-    """Column, row, tile number and materials (bit m for material m) of cells, row by row from the south-western one."""
+    """Column, row, tile number and materials (bit m for material m) of cells, row by row from the south-western one.
+
+    Raises: InputError: the terrain is a sphere.
+    """
+    if isinstance(terrain.heights, Sphere):
+        raise InputError("heights: a rectangle of cells is cut from a plane: choose another surface than `sphere`")
     i, j = (v.ravel() for v in np.meshgrid(west + np.arange(columns), south + np.arange(rows)))
     return i, j, *choose_tiles(terrain, i, j)
 

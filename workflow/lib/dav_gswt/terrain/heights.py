@@ -15,6 +15,7 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 from dav_gswt.terrain.choice import hash_cell
+from dav_gswt.terrain.sphere import make_sphere
 
 HILLS = 3  # axis of the hash of octave 0, after west, south and centre; octave k uses HILLS + k
 GAIN = 0.4  # height of an octave over that of the one twice as wide
@@ -87,7 +88,7 @@ class Hills:
         height, slope = np.zeros(len(x)), np.zeros((len(x), 2))
         for octave, amplitude in enumerate(self._amplitudes()):
             cells = 2.0**octave / self.wavelength
-            noise = _gradient_noise(
+            noise = gradient_noise(
                 x * cells + octave * SHIFT[0], y * cells + octave * SHIFT[1], HILLS + octave, self.salt
             )
             height += amplitude * noise[0]
@@ -152,12 +153,14 @@ def wrap_index(index: Int64[Array, "*n"], n: int, beyond: str) -> Int64[Array, "
 
 
 def surface_from_config(entry: dict, side: float) -> HeightField:
-    """The surface that the config's `heights` describes; side: of a tile, the unit of hills.
+    """The surface that the config's `heights` describes; side: of a tile, the unit of hills and of the sphere.
 
     Raises: InputError: the image cannot be read, is not an image, is too large, or has pixels that are not finite.
     """
     if entry["kind"] == "flat":
         return FlatSurface()
+    if entry["kind"] == "sphere":
+        return make_sphere(entry["radius"], side)
     if entry["kind"] == "hills":
         return Hills(entry["height"] * side, entry["wavelength"] * side, entry.get("octaves", 4), entry.get("seed", 0))
     pixels = read_height_map(entry["file"]) * np.float32(entry["height"])
@@ -188,8 +191,8 @@ def _spline_weights(u: Float[Array, "n"]):
     return pixel.astype(np.int64), weights, (-before, -2 * t, after)
 
 
-def _gradient_noise(x: Float[Array, "n"], y: Float[Array, "n"], axis: int, salt: int):
-    """Gradient noise and its gradient; x and y in cells."""
+def gradient_noise(x: Float[Array, "n"], y: Float[Array, "n"], axis: int, salt: int):
+    """Gradient noise and its gradient; x and y in cells, axis of their hash."""
     i, j = np.floor(x), np.floor(y)
     u, v = x - i, y - j
     i, j = i.astype(np.int64), j.astype(np.int64)

@@ -15,6 +15,7 @@ from dav_gswt.terrain.class_rules import NOISE, Picture, apply_rule, warn_of_rul
 from dav_gswt.terrain.heights import FlatSurface, HeightField, HeightMap, Hills
 from dav_gswt.terrain.page_front import FRONT, STILL, Front, fill_front
 from dav_gswt.terrain.page_story import SHEET, STORY
+from dav_gswt.terrain.sphere import Sphere, require_plain_cover
 
 SURFACE = "heights.bin"
 INDEX = "index.html"
@@ -40,7 +41,7 @@ def write_page(
             about it, first still and story (default: the viewer's own texts, no still, no story).
     Raises: InputError: the manifest is missing or of another version, a chunk is missing, has another size than the
             manifest says, or lies outside of the bundle; the viewer is incomplete; see also `describe_surface`,
-            `class_rules.apply_rule`.
+            `class_rules.apply_rule`, `sphere.require_plain_cover`.
     """
     bundle, viewer, out = Path(bundle_dir), Path(viewer_dir), Path(out_dir)
     if not (viewer / INDEX).is_file():
@@ -49,6 +50,7 @@ def write_page(
     copies += [(bundle / name, name) for name in list_chunks(bundle)]
     heights, pixels = describe_surface(surface or FlatSurface())
     value, pictures = replace_classes(read_json(bundle / MANIFEST), rule)
+    require_plain_cover(heights["kind"], value.get("classes"), value.get("objects"))
     with atomic_folder(out) as part:
         for source, name in copies:
             _copy_file(source, part / name)
@@ -88,6 +90,8 @@ def describe_surface(surface: HeightField) -> tuple[dict, bytes]:
     if isinstance(surface, Hills):
         names = ("height", "wavelength", "octaves", "salt")
         return {"kind": "hills"} | {name: getattr(surface, name) for name in names}, b""
+    if isinstance(surface, Sphere):
+        return {"kind": "sphere", "radius": surface.radius, "cells": surface.cells}, b""
     if not isinstance(surface, HeightMap):
         return {"kind": "flat"}, b""
     rows, columns = surface.pixels.shape

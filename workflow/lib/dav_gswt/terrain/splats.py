@@ -13,7 +13,7 @@ from numpy import ndarray as Array
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import Rasterizer, Rendering, harmonics
-from dav_gswt.terrain.displacement import displaced_axes
+from dav_gswt.terrain.displacement import Slope, displaced_axes
 
 DILATION = 0.3  # square pixels, added to variances by the rasterizer
 MARGIN = 0.15  # of the picture's side: beyond it the projection is linearised at this margin
@@ -58,14 +58,12 @@ def depth_order(splats: Splats) -> Int[Array, "n"]:
     return np.argsort(splats.depths, kind="stable")[::-1]
 
 
-def project(field: GaussianField, slope: Float[Array, "n 2"], camera: Camera, near: float) -> Splats:
+def project(field: GaussianField, slope: Slope, camera: Camera, near: float) -> Splats:
     """Project Gaussians on a surface of these slopes, in their order; those outside the picture are culled."""
     return project_indexed(field, slope, camera, near)[0]
 
 
-def project_indexed(
-    field: GaussianField, slope: Float[Array, "n 2"], camera: Camera, near: float
-) -> tuple[Splats, Int[Array, "k"]]:
+def project_indexed(field: GaussianField, slope: Slope, camera: Camera, near: float) -> tuple[Splats, Int[Array, "k"]]:
     """`project`, and the index of each splat in the field.
 
     S = (J W A)(J W A)^T with A of `displaced_axes` (EWA); its determinant by Lagrange's identity |p x q|^2. A Gaussian

@@ -11,17 +11,16 @@ from dav_gswt.bundle.manifest import Manifest, Sky
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.terrain import splats
-from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.endless import EndlessTerrain
+from dav_gswt.terrain.ground_mapping import camera_on, mapping_of
 from dav_gswt.terrain.object_placement import group_by_cell
-from dav_gswt.terrain.placement import place_cell
+from dav_gswt.terrain.sphere import Sphere
 from dav_gswt.terrain.timing import FrameTiming
 from dav_gswt.terrain.visibility import (
     MAX_GAUSSIANS,
     coarsen_to_budget,
     count_gaussians,
     drop_far_cells,
-    visible_cells,
 )
 
 
@@ -43,6 +42,17 @@ SHOTS = (
 )
 
 
+ORBIT = 2.5  # height of `above` over a planet, in its radii: all of it is in view
+
+
+def list_shots(terrain: EndlessTerrain, floor: float) -> list[Shot]:
+    """The stills of a terrain; on a sphere `above` is the view from an orbit. floor: lowest height of the eye."""
+    if not isinstance(terrain.heights, Sphere):
+        return list(SHOTS)
+    high = ORBIT * terrain.heights.radius / floor
+    return [replace(shot, height=high) if shot.pitch == 90 else shot for shot in SHOTS]
+
+
 def walk_shots(frames: int, length: float, height: float) -> list[Shot]:
     """Shots of a straight walk from the walker's place: `length` in tiles, `height` in eye floors above the surface."""
     walker = SHOTS[0]
@@ -53,6 +63,9 @@ def walk_shots(frames: int, length: float, height: float) -> list[Shot]:
 
 def shot_camera(shot: Shot, terrain: EndlessTerrain, floor: float, width: int, height: int) -> Camera:
     """The camera of a shot, with a horizontal field of view of 60 degrees. floor: lowest height of the eye."""
+    if isinstance(terrain.heights, Sphere):
+        eye, axes = mapping_of(terrain).stand(np.array(shot.at) * terrain.side, shot.height * floor)
+        return camera_on(eye, axes, shot.yaw, -min(shot.pitch, 89.99), width, height)
     x, y = (v * terrain.side for v in shot.at)
     ground, _ = terrain.heights.at(np.array([x]), np.array([y]))
     eye = np.array([x, y, ground[0] + shot.height * floor])
@@ -91,16 +104,17 @@ def render_view(
     timing = timing or FrameTiming()
     eye, here = camera.centre, replace(camera, translation=np.zeros(3))
     with timing.measure("update"):
-        cells = visible_cells(terrain, camera)
+        ground = mapping_of(terrain)
+        cells = ground.find_cells(camera)
         if count_gaussians(terrain, cells).sum() > MAX_GAUSSIANS:  # coarser levels first, then fewer cells
-            terrain = coarsen_to_budget(terrain, camera, MAX_GAUSSIANS)
+            terrain = coarsen_to_budget(terrain, camera, MAX_GAUSSIANS, cells)
             cells = drop_far_cells(terrain, cells)
         things = group_by_cell(terrain, cells, eye)
-    backdrop = Backdrop.for_eye(terrain, eye, sky, ground_colour)
+    backdrop = ground.make_backdrop(eye, sky, ground_colour)
     far, close = [splats.EMPTY], [splats.EMPTY]
     for k in range(len(cells)):
         with timing.measure("update"):
-            field, slope = place_cell(terrain, cells[k : k + 1], eye, things.get(k))
+            field, slope = ground.place_cell(terrain, cells[k : k + 1], eye, things.get(k))
         with timing.measure("render"):
             part = splats.project(backdrop.blend_far(field), slope, here, terrain.near)
         (close if exact or cells.close[k] else far).append(part)

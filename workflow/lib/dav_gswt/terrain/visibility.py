@@ -51,7 +51,7 @@ def visible_cells(terrain: EndlessTerrain, camera: Camera) -> GridCells:
     middle, half = _bound_cells(terrain, i, j, eye)
     nearest, farthest = _bound_distances(middle, half)
     wider = np.array([terrain.overhang, terrain.overhang, 0])
-    seen = (nearest < terrain.reach * side) & ~_outside_frustum(camera, terrain.near, middle, half + wider)
+    seen = (nearest < terrain.reach * side) & ~outside_frustum(camera, terrain.near, middle, half + wider)
     sequence, _ = draw_order.sort_cells(i, j, at)
     sequence = sequence[seen[sequence]]
     i, j = i[sequence], j[sequence]
@@ -101,7 +101,7 @@ def _first_bit(bits: Int64[Array, "n"]) -> Int64[Array, "n"]:
     return np.argmax(bits[:, None] >> np.arange(8) & 1, axis=1)
 
 
-def _outside_frustum(
+def outside_frustum(
     camera: Camera, near: float, middle: Float[Array, "n 3"], half: Float[Array, "n 3"]
 ) -> Bool[Array, "n"]:
     """Which boxes (centre from the eye, half extents) lie wholly outside one plane of the frustum."""
@@ -161,13 +161,15 @@ def drop_far_cells(terrain: EndlessTerrain, cells: GridCells, budget: int = MAX_
     return cells[np.sort(nearest_first[count <= budget])]
 
 
-def coarsen_to_budget(terrain: EndlessTerrain, camera: Camera, budget: int) -> EndlessTerrain:
+def coarsen_to_budget(
+    terrain: EndlessTerrain, camera: Camera, budget: int, cells: GridCells | None = None
+) -> EndlessTerrain:
     """Multiply all level distances by one factor, the largest with which a picture has at most `budget` Gaussians.
 
     The viewer does the same and also moves the end of the ground nearer. Where the coarsest level alone exceeds the
-    budget, that level is used.
+    budget, that level is used. cells: those that the camera sees, if they are known.
     """
-    cells, low, high = visible_cells(terrain, camera), MIN_FACTOR, 1.0
+    cells, low, high = visible_cells(terrain, camera) if cells is None else cells, MIN_FACTOR, 1.0
 
     def scale_distances(factor: float) -> EndlessTerrain:
         return replace(

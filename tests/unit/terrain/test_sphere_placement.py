@@ -1,0 +1,135 @@
+"""Pictures of planets: no holes, also at edges, corners and far out; the plane as the limit; sky and shots."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fixtures.terrains import MAGENTA, SIDE, SKY, manifest_of, two_level_terrain
+
+from dav_gswt.bundle.manifest import Sky
+from dav_gswt.errors import InputError
+from dav_gswt.terrain import finite, sphere_backdrop, stills
+from dav_gswt.terrain.backdrop import Backdrop
+from dav_gswt.terrain.ground_mapping import camera_on, mapping_of
+from dav_gswt.terrain.sphere import frame_at, make_sphere
+from dav_gswt.terrain.sphere_placement import place_on_sphere
+
+PINK = Sky(MAGENTA, MAGENTA)
+SIDEWAYS = {
+    "corner": (1, 1, 1),
+    "turned edge": (1, 0.2, 1),
+    "edge": (1, 1, 0.2),
+    "face": (1, 0.1, 0.2),
+    "pole": (0, 0, 1),
+}
+
+
+@pytest.fixture(scope="module")
+def tiles():
+    return replace(two_level_terrain(), reach=48)
+
+
+def camera_over(terrain, point, height, pitch, yaw=20.0):
+    up = np.array(point) / np.linalg.norm(point)
+    axes = frame_at(*np.degrees([np.arctan2(up[1], up[0]), np.arcsin(up[2])]))
+    return camera_on((terrain.heights.radius + height) * axes[2], axes, yaw, pitch, 64, 36)
+
+
+def through(picture):
+    """How much magenta shows: green is a half in tiles and 0 behind them."""
+    return np.clip(1 - picture[..., 1] / 0.5, 0, 1)
+
+
+@pytest.mark.parametrize("radius", [8.0, 300.0, 1e6])
+@pytest.mark.parametrize("point", SIDEWAYS.values(), ids=SIDEWAYS)
+def test_the_ground_has_no_holes(tiles, point, radius):
+    planet = replace(tiles, heights=make_sphere(radius, SIDE))
+    for height, pitch in ((1.0, -60.0), (6.0, -89.0)):
+        picture = stills.render_view(planet, camera_over(planet, point, height, pitch), PINK, MAGENTA)
+        assert (
+            through(picture).max() < 0.1
+        )  # of opaque discs whose deviation is 0.7 of their spacing, stretched to 1.26
+
+
+def test_from_an_orbit_the_planet_is_round_and_whole(tiles):
+    planet = replace(tiles, heights=make_sphere(8.0, SIDE))
+    camera = camera_over(planet, (1, 1, 1), 80.0, -89.99)
+    picture = stills.render_view(planet, camera, PINK, MAGENTA)
+    rays = camera.rays()[1]
+    way = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+    off = np.linalg.norm(np.cross(way, camera.centre), axis=-1)  # distance of rays from the planet's middle
+    radius = planet.heights.radius
+    assert through(picture)[off < 0.97 * radius].max() < 0.1
+    assert through(picture)[off > 1.15 * radius].min() > 0.9
+
+
+def test_a_large_sphere_is_the_plane(tiles):
+    """Over the middle of a face, with sides as wide as the plane's: radius 1e6 tiles bends 4 tiles by 1e-5 of one."""
+    ball = make_sphere(1e6, SIDE)
+    odd = replace(ball, cells=2 * (ball.cells // 2) + 1, radius=(2 * (ball.cells // 2) + 1) * SIDE * 2 / np.pi)
+    planet = replace(tiles, heights=odd)
+    axes = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
+    eye = np.array([odd.radius + 2.0, 0, 0])
+    cells = mapping_of(planet).find_cells(camera_on(eye, axes, 90.0, -89.9, 64, 36))
+    middle = np.flatnonzero(cells.close & (cells.nearest < 1))[:1]
+    field, jacobian = place_on_sphere(planet, odd, cells[middle], eye)
+    np.testing.assert_allclose(jacobian, np.broadcast_to(axes.T, jacobian.shape), atol=1e-5)
+    flat = planet.tiles[0, int(cells.tile[middle][0])]
+    seen = field.means.astype(float) @ axes.T + [0, 0, 2.0]
+    seen[:, :2] -= np.round((seen - [0, 0, 0])[:, :2].mean(0) / SIDE) * SIDE - 0.5 * SIDE
+    first, second = (np.sort(values[:, 0] + 7 * values[:, 1]) for values in (seen, flat.means.astype(float)))
+    np.testing.assert_allclose(first, second, atol=1e-3)
+
+
+def test_far_out_the_sky_is_that_of_the_plane(tiles):
+    ball = make_sphere(1e7, SIDE)
+    planet, eye = replace(tiles, heights=ball), np.array([0.0, 0.0, ball.radius + 2.0])
+    way = np.random.default_rng(2).normal(size=(50, 3))
+    round_, flat = (
+        made.colours_along(way)
+        for made in (
+            mapping_of(planet).make_backdrop(eye, SKY, [0.4, 0.3, 0.2]),
+            Backdrop.for_eye(tiles, np.array([0.0, 0.0, 2.0]), SKY, [0.4, 0.3, 0.2]),
+        )
+    )
+    # the horizon lies 3e-4 lower
+    np.testing.assert_allclose(round_, flat, atol=0.02)
+
+
+@pytest.mark.parametrize("height", [1e-3, 1.0, 1e3, 1e9])
+def test_the_backdrop_is_finite_and_dark_far_away(tiles, height):
+    planet = replace(tiles, heights=make_sphere(8.0, SIDE))
+    eye = np.array([0.0, 0.0, planet.heights.radius + height])
+    colours = (
+        mapping_of(planet)
+        .make_backdrop(eye, SKY, [0.4, 0.3, 0.2])
+        .colours_along(np.random.default_rng(1).normal(size=(200, 3)))
+    )
+    assert np.isfinite(colours).all() and colours.min() >= 0 and colours.max() <= 1
+    up = mapping_of(planet).make_backdrop(eye, SKY, [0.4, 0.3, 0.2]).colours_along(np.array([[0.0, 0.0, 1.0]]))
+    assert (up.max() < 1e-3) == (height > 100)
+
+
+def test_the_last_tiles_end_at_the_horizon_or_before_it():
+    end, low, dip = sphere_backdrop.find_end(100.0, 101.0, 1000.0)
+    assert end == sphere_backdrop.NO_END and dip == pytest.approx(np.sqrt(1 - (100 / 101) ** 2))
+    end, low, dip = sphere_backdrop.find_end(1e9, 1e9 + 2, 100.0)
+    assert end == 100 and low == pytest.approx(2 / 100, rel=0.01), "as in the plane: height over distance"
+
+
+def test_the_stills_of_a_planet_are_a_walker_a_hill_and_an_orbit(tiles):
+    planet = replace(tiles, heights=make_sphere(8.0, SIDE))
+    assert [shot.name for shot in stills.list_shots(planet, 0.5)] == [shot.name for shot in stills.SHOTS]
+    assert stills.list_shots(tiles, 0.5) == list(stills.SHOTS)
+    manifest = manifest_of(0.5, MAGENTA)
+    for shot in stills.list_shots(planet, 0.5):
+        camera = stills.shot_camera(shot, planet, 0.5, 64, 36)
+        height = np.linalg.norm(camera.centre) - planet.heights.radius
+        assert height == pytest.approx(shot.height * 0.5)
+        assert stills.render_shot(planet, shot, manifest, 64, 36).std() > 0.03
+
+
+def test_no_rectangle_is_cut_from_a_sphere(tiles):
+    planet = replace(tiles, heights=make_sphere(8.0, SIDE))
+    with pytest.raises(InputError, match="plane"):
+        finite.list_cells(planet, 0, 0, 2, 2)
