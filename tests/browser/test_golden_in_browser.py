@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from dav_gswt.terrain import sphere
+
 FOLDER = Path(__file__).parents[1] / "golden"
 
 WEIGHTS = """async ({ levels, opacities }) => {
@@ -180,3 +182,76 @@ def test_objects_stand_where_they_do_in_the_library(modules):
             for name in ("u", "v", "turn", "size"):
                 values = [[one[name] for one in ones] for ones in (found, expected["instances"])]
                 np.testing.assert_allclose(*values, rtol=0, atol=1e-12)
+
+
+def test_spheres_bend_tiles_choose_them_and_fray_as_in_the_library(modules):
+    spheres = golden("sphere")["spheres"]
+    computed = modules.evaluate(
+        """async spheres => {
+          const { bend, rateOf, tangentAt } = await import("./terrain/sphere.js");
+          const { createFraying, isCovered, isFrayed, tileOn } = await import("./terrain/sphere_edges.js");
+          return spheres.map(({ radius, side, cells, salt, variants, bends, tiles, kept }) => {
+            const sphere = { cells }, fraying = createFraying(sphere, side, salt);
+            return {
+              bends: bends.map(({ i, j, local: [x, y, z] }) => (
+                bend(x, y, z, tangentAt(i + 0.5, cells), tangentAt(j + 0.5, cells), radius, rateOf(sphere, side), []))),
+              tiles: tiles.map(({ face, i, j }) => [
+                tileOn(sphere, face, i, j, salt, variants), isCovered(sphere, face, i, j),
+                isFrayed(sphere, face, i, j)]),
+              kept: kept.map(({ face, place }) => fraying.stays(face, ...place)),
+            };
+          });
+        }""",
+        spheres,
+    )
+    for entry, found in zip(spheres, computed, strict=True):
+        for expected, bent in zip(entry["bends"], found["bends"], strict=True):
+            np.testing.assert_allclose(bent[:3], expected["point"], atol=1e-9)
+            np.testing.assert_allclose(np.reshape(bent[3:], (3, 3)).T, expected["jacobian"], atol=1e-12)
+        assert found["tiles"] == [[one["tile"], one["covered"], one["frayed"]] for one in entry["tiles"]]
+        assert found["kept"] == [one["stays"] for one in entry["kept"]]
+
+
+def test_cells_of_a_sphere_stand_as_they_do_in_the_library(modules):
+    values = golden("sphere")["orders"]
+    views = modules.evaluate(
+        """async ({ cells, views }) => {
+          const { aimFaces, compareCells, isClose } = await import("./terrain/sphere_cells.js");
+          return views.map(({ eye, order }) => {
+            const own = aimFaces({ cells }, eye), all = order.map(([face, i, j]) => ({ face, i, j }));
+            all.sort((a, b) => a.face - b.face || a.i - b.i || a.j - b.j);
+            all.sort((a, b) => compareCells(own, a, b));
+            return { eye, order: all.map(({ face, i, j }) => [face, i, j]), close: all.map(
+              ({ face, i, j }) => isClose(own[face], i, j)) };
+          });
+        }""",
+        values,
+    )
+    assert views == values["views"]
+
+
+def test_a_walk_over_a_planet_is_that_of_the_library(modules):
+    rng, walks = np.random.default_rng(4), []
+    for _ in range(40):
+        longitude, yaw = rng.uniform(-180, 180, 2).tolist()
+        latitude, (east, north) = float(rng.uniform(-90, 90)), rng.normal(size=2).tolist()
+        walks.append([{"x": longitude, "y": latitude, "yaw": yaw}, east, north])
+    walks.append([{"x": 33.0, "y": 90.0, "yaw": 20.0}, 0.5, -0.25])
+    found = modules.evaluate(
+        """async walks => {
+          const { frameAt, walkOn } = await import("./terrain/sphere.js");
+          return walks.map(([place, east, north]) => {
+            const there = walkOn(place, east, north, 1.5);
+            return { ...there, frame: frameAt(there.x, there.y) };
+          });
+        }""",
+        walks,
+    )
+    for (place, east, north), there in zip(walks, found, strict=True):
+        frame = sphere.walk_from(sphere.frame_at(place["x"], place["y"]), np.array([east, north]), 1.5)
+        np.testing.assert_allclose(there["frame"][2], frame[2], atol=1e-12)
+        looks = [
+            np.cos(np.radians(yaw)) * axes[0] + np.sin(np.radians(yaw)) * axes[1]
+            for yaw, axes in ((there["yaw"], np.array(there["frame"])), (place["yaw"], frame))
+        ]
+        np.testing.assert_allclose(*looks, atol=1e-12)

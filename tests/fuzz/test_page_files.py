@@ -71,6 +71,27 @@ def test_the_bundle_itself_is_read(page, files):
     assert found["read"]["count"] > 100
 
 
+@pytest.mark.parametrize(
+    "radius, cells, objects, read",
+    [
+        pytest.param(24.0, 9, [], True, id="a planet"),
+        pytest.param(4e7, 14_472_025, [], True, id="a large one"),
+        pytest.param(24.0, 16_000_000, [], False, id="more cells than fit"),
+        pytest.param(4e-9, 1, [], False, id="a point"),
+        pytest.param(24.0, 9.5, [], False, id="half a cell"),
+        pytest.param(24.0, 9, [1], False, id="objects on it"),
+    ],
+)
+def test_a_planet_is_read_if_its_cells_are_tiles(page, files, radius, cells, objects, read):
+    data, manifest = files
+    manifest = manifest | {"heights": {"kind": "sphere", "radius": radius, "cells": cells}}
+    manifest |= {"objects": objects} if objects else {}
+    named = {name: encode(content) for name, content in data.items()}
+    found = page("page: planets", 20_000, files=named | {"davgswt.json": encode(json.dumps(manifest).encode())})
+    assert ("read" in found) == read
+    assert not read or found["read"]["count"] > 100
+
+
 @fuzz
 @given(random=randoms)
 def test_manifests(page, files, random):

@@ -75,6 +75,8 @@ def test_a_checked_config_stays_the_same_when_it_is_checked_again(config):
         pytest.param(["heights", "height"], 2, "heights: there is no key 'height'", id="a plain with a height"),
         pytest.param(["heights"], {"kind": "hills", "height": 1}, "heights.wavelength: is missing", id="no width"),
         pytest.param(["heights"], {"kind": "hills", "height": 1, "wavelength": 0.5}, "wavelength", id="spikes"),
+        pytest.param(["heights"], {"kind": "sphere", "radius": 3.9}, "heights.radius", id="a pebble"),
+        pytest.param(["heights"], {"kind": "sphere", "radius": 2e7}, "heights.radius", id="a sun"),
         pytest.param(["heights"], {"kind": "image", "file": "a.exr", "width": 0, "height": 1}, "width", id="a point"),
         pytest.param(["flight"], {"frames": 1, "length": 1, "height": 1}, "flight.frames", id="one frame"),
         pytest.param(["flight"], {"frames": 8, "length": 1}, "flight: height is missing", id="no height"),

@@ -9,6 +9,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.terrain import page
 from dav_gswt.terrain.heights import HeightMap, Hills
 from dav_gswt.terrain.page import write_page
+from dav_gswt.terrain.sphere import make_sphere
 
 
 @pytest.fixture
@@ -132,6 +133,16 @@ def test_the_page_knows_the_surface_and_the_bundle_does_not(tmp_path, viewer, bu
     hills = {"kind": "hills", "height": 0.5, "wavelength": 3.0, "octaves": 2, "salt": 9}
     assert surface_of(tmp_path / "hilly") == hills
     assert "heights" not in json.loads((bundle / "davgswt.json").read_text())
+
+
+def test_the_page_of_a_planet_knows_its_radius_and_cells_and_takes_no_objects(tmp_path, viewer, bundle):
+    write_page(bundle, viewer, tmp_path / "round", make_sphere(10.0, 2.0))
+    assert surface_of(tmp_path / "round") == {"kind": "sphere", "radius": 20.0, "cells": 14}
+    manifest = json.loads((bundle / "davgswt.json").read_text())
+    (bundle / "davgswt.json").write_text(json.dumps(manifest | {"objects": [{"chunks": []}]}))
+    with pytest.raises(InputError, match="materials: one"):
+        write_page(bundle, viewer, tmp_path / "page", make_sphere(10.0, 2.0))
+    assert not (tmp_path / "page").exists()
 
 
 def test_a_height_map_comes_with_its_pixels(tmp_path, viewer, bundle):

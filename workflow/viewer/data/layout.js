@@ -15,7 +15,8 @@ export const SLOTS = MAX_LEVELS; // codes below are levels; from here on MAX_LEV
 export const PLACES = SLOTS + 9 * MAX_LEVELS; // codes from here on are places of objects in the near block
 export const MAX_NEAR_PLACES = (1 << (32 - CODE_SHIFT)) - PLACES;
 export const PLACE = 8; // words of an object's place: cells east and north of the eye's, cosine and sine times size,
-// z of the foot, size; tile, direction, uncertainty and whole as of a block; level
+// z of the foot, size; tile, direction, uncertainty and whole as of a block; level. Of a sphere's cell: its middle from
+// the eye, two tangents, face; tile, direction, uncertainty and whole
 export const PLACES_A_ROW = 512; // of the texture of places, two texels each
 export const MAX_ORDERS = 255; // directions
 export const NO_ORDER = 255; // direction of cells that are sorted by depth

@@ -3,7 +3,7 @@
 import { MAX_OCTAVES } from "../terrain/heights.js";
 import {
   brief, isColour, isCoordinate, isDigest, isDirection, isFilled, isInside, isLength, isNatural, isRange, isSalt,
-  isShare, isVector,
+  isShare, isVector, isWhole,
 } from "./checks.js";
 import { REMAKE } from "./errors.js";
 import { findCoverFault, findCrowd, pickClasses } from "./land_cover.js";
@@ -27,6 +27,7 @@ import { chunkBytes, deviationOf, isEncoding, OLDEST, VERSION } from "./records.
 export const NAME = "davgswt.json";
 export const MAX_TILES = 256; // of a material
 const FORMAT = "davgswt", MAX_SIDE = 4096; // pixels along a side of a height map
+const MAX_CELLS = 1 << 24; // along the side of a planet's face
 const WIDEST = 8; // of deviations, in tile sides
 
 /**
@@ -61,7 +62,8 @@ export function findFault(m) {
   if (uncovered) return broken(uncovered);
   const crowd = m.version === VERSION ? findCrowd(m) : null;
   if (crowd) return crowd;
-  if (m.heights !== undefined && !isSurface(m.heights)) return broken("heights");
+  if (m.heights !== undefined && !isSurface(m.heights, m.tile_side)) return broken("heights");
+  if (m.heights?.kind === "sphere" && (m.classes || m.objects?.length)) return broken("heights");
   for (let t = 0; t < m.tiles.length; t++) {
     const fault = findTileFault(m, m.tiles[t], t);
     if (fault) return fault;
@@ -163,6 +165,7 @@ function pickHeights(entry) {
     const { kind, height, wavelength, octaves, salt } = entry;
     return { kind, height, wavelength, octaves, salt };
   }
+  if (entry.kind === "sphere") return { kind: "sphere", radius: entry.radius, cells: entry.cells };
   const { kind, file, bytes, sha256, rows, columns, width, beyond } = entry;
   return { kind, file, bytes, sha256, rows, columns, width, beyond };
 }
@@ -185,9 +188,11 @@ function rises(levels, l) {
  * Is this a surface that terrain/heights.js knows?
  *
  * @param {any} h
+ * @param {number} side of a tile
  */
-function isSurface(h) {
+function isSurface(h, side) {
   if (h?.kind === "flat") return true;
+  if (h?.kind === "sphere") return isPlanet(h, side);
   if (h?.kind === "hills") {
     return isCoordinate(h.height) && isLength(h.wavelength) && isSalt(h.salt) && isNatural(h.octaves)
       && h.octaves > 0 && h.octaves <= MAX_OCTAVES;
@@ -196,6 +201,10 @@ function isSurface(h) {
     && h.rows > 0 && h.columns > 0 && Math.max(h.rows, h.columns) <= MAX_SIDE && h.bytes === 4 * h.rows * h.columns
     && isDigest(h.sha256);
 }
+
+/** A planet whose cells are about as large as its tiles: more would be in view than can be drawn. @param {any} h @param {number} side */
+const isPlanet = (h, side) => isLength(h.radius) && h.radius >= side && isWhole(h.cells, 1, MAX_CELLS)
+  && Math.abs(h.cells - (h.radius / side) * Math.sqrt((2 * Math.PI) / 3)) <= 1;
 
 /** @param {any} sky */
 const isSky = (sky) => isColour(sky?.zenith) && isColour(sky.horizon) && (sky.sun === undefined

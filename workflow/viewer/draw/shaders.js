@@ -5,8 +5,10 @@ import {
 } from "../data/layout.js";
 import { MAX_TURN, TURN_STEPS } from "../data/records.js";
 import { MAX_OCTAVES } from "../terrain/heights.js";
+import { FACES } from "../terrain/sphere.js";
 import { OBJECTS, OVERLAYS } from "./overlays.js";
 
+const AIR = 0.12; // height at which the sky of a planet is 1/e as bright, in radii
 const UNCERTAINTY = OVERLAYS.indexOf("uncertainty");
 
 /** A record as a Gaussian; the other end of data/records.js. */
@@ -122,6 +124,83 @@ float crossfadeOpacity(float alpha, float weight) {
 
 const SURFACES = { flat: FLAT, hills: HILLS, image: IMAGE };
 
+// What differs between a plane and a sphere: which cell or object an entry belongs to, where its Gaussian is seen from the
+// eye, and how its axes follow the ground.
+const PLANE_CODE = `  if (code >= ${PLACES}u) {
+    place = code - ${PLACES - 1}u;
+  } else if (code >= ${SLOTS}u) {
+    uint slot = (code - ${SLOTS}u) / ${MAX_LEVELS}u;
+    cell = vec2(int(slot % 3u) - 1, int(slot / 3u) - 1);
+    mark = marks[slot];
+  }`;
+
+const PLACE_ON_PLANE = `  vec2 way = vec2(1.0, 0.0); // cosine and sine of an object's turn
+  if (place > 0u) { // turned and scaled about the foot, which is the middle of a tile in the records
+    ivec2 first = ivec2(2 * int((place - 1u) % ${PLACES_A_ROW}u), int((place - 1u) / ${PLACES_A_ROW}u));
+    uvec4 where = texelFetch(places, first, 0), what = texelFetch(places, first + ivec2(1, 0), 0);
+    cell = uintBitsToFloat(where.xy);
+    vec2 large = uintBitsToFloat(where.zw), from = one.centre.xy - 0.5 * side;
+    float size = uintBitsToFloat(what.y);
+    way = large / size;
+    one.centre = vec3(large.x * from.x - large.y * from.y, large.y * from.x + large.x * from.y,
+      size * one.centre.z + uintBitsToFloat(what.x));
+    one.deviation *= size;
+    mark = what.z;
+    if (code >= ${PLACES}u) level = int(what.w);
+  }
+  vec3 seen = one.centre + vec3(cell * side, 0.0) + corner;
+  vec3 rise = surface(seen.xy);
+  seen.z += rise.x;`;
+
+const SHEAR = `    if (place > 0u) axes[k].xy = vec2(way.x * axes[k].x - way.y * axes[k].y, way.y * axes[k].x + way.x * axes[k].y);
+    axes[k].z += dot(rise.yz, axes[k].xy); // the surface shears shapes along its slope`;
+
+/** Sky that thins out with height, and far ground, as dav_gswt/terrain/sphere_backdrop.py has them. */
+export const SPHERE_BACKDROP = `
+uniform vec3 zenith, horizon, ground;
+uniform vec3 upward;       // from the planet's middle to the eye, of length 1
+uniform float low;         // sine of the angle below the horizon at which tiles end
+uniform float dip, height; // sine of the angle of the horizon below the level; of the eye over the ground, in radii
+float thinned(float above) {
+  float far = max(above, 0.0) / ${AIR.toFixed(3)};
+  return exp(-far * far);
+}
+vec3 backdrop(vec3 way) {
+  float rise = dot(way, upward), above = rise + dip;
+  float passing = rise > 0.0 ? height : (1.0 + height) * sqrt(max(1.0 - rise * rise, 0.0)) - 1.0;
+  vec3 sky = thinned(passing) * mix(horizon, zenith, sqrt(clamp(above / (1.0 + dip), 0.0, 1.0)));
+  vec3 below = mix(ground, horizon, thinned(height) * exp(min(above, 0.0) / (0.3 * low)));
+  return above > 0.0 ? sky : below;
+}`;
+
+const SPHERE = `
+uniform vec3 moved;                   // from the eye to that of the frame, whose places count from there
+uniform float radius, rate, stretch; // rate: angle of a unit on a tile; stretch: radius times that
+const mat3 FACES[6] = mat3[6](${FACES.map((axes) => `mat3(${axes.flat().map((v) => v.toFixed(1)).join(", ")})`).join(",\n  ")});
+vec2 tangent(vec2 a) { // of small angles, to single precision; the tan of graphics cards loses them
+  vec2 s = a * a;
+  return a * (1.0 + s * (1.0 / 3.0 + s * (2.0 / 15.0 + s * (17.0 / 315.0 + s * (62.0 / 2835.0)))));
+}`;
+
+const SPHERE_CODE = `  if (code >= ${SLOTS}u) place = (code - ${SLOTS}u) / ${MAX_LEVELS}u + 1u;`;
+
+/** As terrain/sphere.js bends a tile. */
+const PLACE_ON_SPHERE = `
+  ivec2 spot = ivec2(2 * int((place - 1u) % ${PLACES_A_ROW}u), int((place - 1u) / ${PLACES_A_ROW}u));
+  uvec4 where = texelFetch(places, spot, 0), what = texelFetch(places, spot + ivec2(1, 0), 0);
+  vec2 middle = vec2(uintBitsToFloat(where.w), uintBitsToFloat(what.x));
+  mat3 face = FACES[what.y];
+  mark = what.z;
+  vec2 arc = tangent((one.centre.xy - 0.5 * side) * rate);
+  vec2 change = (1.0 + middle * middle) * arc / (1.0 - middle * arc), there = middle + change;
+  float long0 = sqrt(1.0 + dot(middle, middle)), whole = sqrt(1.0 + dot(there, there));
+  float longer = dot(change, 2.0 * middle + change) / (whole + long0);
+  vec3 outward = vec3(there, 1.0) / whole, shift = vec3(change, 0.0) - vec3(middle, 1.0) * (longer / long0);
+  vec3 seen = uintBitsToFloat(where.xyz) + moved + face * (shift * (radius / whole) + one.centre.z * outward);
+  vec2 grow = (stretch + rate * one.centre.z) * (1.0 + there * there) / whole;
+  mat3 bent = face * mat3(
+    grow.x * (vec3(1.0, 0.0, 0.0) - outward * outward.x), grow.y * (vec3(0.0, 1.0, 0.0) - outward * outward.y), outward);`;
+
 /** @param {import("../terrain/heights.js").HeightField["kind"]} kind */
 export const vertexShader = (kind) => `#version 300 es
 precision highp float;
@@ -141,8 +220,8 @@ flat out vec4 colour;
 flat out float weight;          // of the Gaussian's level
 out vec2 at;                    // in standard deviations from the centre
 ${DECODE}
-${BACKDROP}
-${SURFACES[kind]}
+${kind === "sphere" ? SPHERE_BACKDROP : BACKDROP}
+${kind === "sphere" ? SPHERE : SURFACES[kind]}
 mat3 rotation(vec4 q) { // of length 1
   float w = q.x, x = q.y, y = q.z, z = q.w;
   return mat3(
@@ -162,32 +241,10 @@ void main() {
   uint entry = texelFetch(entries, texel, 0).x, code = entry >> ${CODE_SHIFT}u, mark = block.z, place = block.w;
   int level = int(code & ${MAX_LEVELS - 1}u);
   vec2 cell = vec2(int(block.y & 255u) - 128, int(block.y >> 8u & 255u) - 128);
-  if (code >= ${PLACES}u) {
-    place = code - ${PLACES - 1}u;
-  } else if (code >= ${SLOTS}u) {
-    uint slot = (code - ${SLOTS}u) / ${MAX_LEVELS}u;
-    cell = vec2(int(slot % 3u) - 1, int(slot / 3u) - 1);
-    mark = marks[slot];
-  }
+${kind === "sphere" ? SPHERE_CODE : PLANE_CODE}
   uint row = entry & ${(1 << CODE_SHIFT) - 1}u;
   Gaussian one = decodeRecord(texelFetch(records, ivec2(int(row & ${ROW - 1}u), int(row / ${ROW}u)), 0));
-  vec2 way = vec2(1.0, 0.0); // cosine and sine of an object's turn
-  if (place > 0u) { // turned and scaled about the foot, which is the middle of a tile in the records
-    ivec2 first = ivec2(2 * int((place - 1u) % ${PLACES_A_ROW}u), int((place - 1u) / ${PLACES_A_ROW}u));
-    uvec4 where = texelFetch(places, first, 0), what = texelFetch(places, first + ivec2(1, 0), 0);
-    cell = uintBitsToFloat(where.xy);
-    vec2 large = uintBitsToFloat(where.zw), from = one.centre.xy - 0.5 * side;
-    float size = uintBitsToFloat(what.y);
-    way = large / size;
-    one.centre = vec3(large.x * from.x - large.y * from.y, large.y * from.x + large.x * from.y,
-      size * one.centre.z + uintBitsToFloat(what.x));
-    one.deviation *= size;
-    mark = what.z;
-    if (code >= ${PLACES}u) level = int(what.w);
-  }
-  vec3 seen = one.centre + vec3(cell * side, 0.0) + corner;
-  vec3 rise = surface(seen.xy);
-  seen.z += rise.x;
+${kind === "sphere" ? PLACE_ON_SPHERE : PLACE_ON_PLANE}
   vec3 p = vec3(dot(right, seen), dot(up, seen), dot(ahead, seen));
   if (!(p.z > near)) return;
   float distance = length(seen), opacity = one.paint.a;
@@ -199,8 +256,7 @@ void main() {
   mat3 axes = rotation(one.turn);
   for (int k = 0; k < 3; k++) {
     axes[k] *= one.deviation[k];
-    if (place > 0u) axes[k].xy = vec2(way.x * axes[k].x - way.y * axes[k].y, way.y * axes[k].x + way.x * axes[k].y);
-    axes[k].z += dot(rise.yz, axes[k].xy); // the surface shears shapes along its slope
+${kind === "sphere" ? "    axes[k] = bent * axes[k];" : SHEAR}
   }
   mat3 shape = transpose(mat3(right, up, ahead)) * axes;
   vec2 slope = clamp(p.xy / p.z, -1.3 * halfSize / focal, 1.3 * halfSize / focal);
@@ -221,7 +277,7 @@ void main() {
   at = (vec2(gl_VertexID & 1, gl_VertexID >> 1 & 1) * 2.0 - 1.0) * reach;
   vec2 pixel = focal * p.xy / p.z + at.x * lengths.x * major + at.y * lengths.y * vec2(-major.y, major.x);
   float going = 1.0 - clamp(2.0 - 2.0 * distance / end, 0.0, 1.0); // smoothstep from half the reach to its end
-  vec3 paint = mix(one.paint.rgb, backdrop(seen.z / distance), going * going * (3.0 - 2.0 * going));
+  vec3 paint = mix(one.paint.rgb, backdrop(${kind === "sphere" ? "seen / distance" : "seen.z / distance"}), going * going * (3.0 - 2.0 * going));
   if (overlay > 0) {
     uint owner = texelFetch(owners, ivec2(0, int(row / ${ROW}u)), 0).x;
     uint numbers[5] = uint[5](mark & 255u, uint(level) * 32u, mark >> 8u & 255u, mark >> 16u & 255u, owner);

@@ -2,7 +2,8 @@
 // colours as dav_gswt/terrain/backdrop.py.
 
 import { createProgram, setAxes } from "./gl.js";
-import { BACKDROP } from "./shaders.js";
+import { setHorizon } from "./horizon.js";
+import { BACKDROP, SPHERE_BACKDROP } from "./shaders.js";
 
 /**
  * @typedef {import("../terrain/camera.js").Camera} Camera
@@ -16,18 +17,19 @@ void main() {
   gl_Position = vec4(at, 0.0, 1.0);
 }`;
 
-const FRAGMENT = `#version 300 es
+/** @param {boolean} round is the ground a sphere? */
+const fragmentShader = (round) => `#version 300 es
 precision highp float;
 in vec2 at;
 out vec4 colour;
 uniform vec3 right, up, ahead, sun, sunColour; // sun: its direction; of length 0: none
 uniform vec2 halfTangent; // tangents of half the field of view
-${BACKDROP}
+${round ? SPHERE_BACKDROP : BACKDROP}
 void main() {
   vec3 ray = normalize(ahead + at.x * halfTangent.x * right + at.y * halfTangent.y * up);
-  vec3 seen = backdrop(ray.z);
+  vec3 seen = backdrop(${round ? "ray" : "ray.z"});
   float close = dot(ray, sun);
-  float disc = ray.z > 0.0 ? smoothstep(0.99988, 0.99996, close) + 0.25 * pow(max(close, 0.0), 350.0) : 0.0;
+  float disc = ${round ? "dot(ray, upward) + dip" : "ray.z"} > 0.0 ? smoothstep(0.99988, 0.99996, close) + 0.25 * pow(max(close, 0.0), 350.0) : 0.0;
   colour = vec4(mix(seen, sunColour, clamp(disc, 0.0, 1.0)), 1.0);
 }`;
 
@@ -35,8 +37,9 @@ void main() {
  * @param {import("./gl.js").GL} gl
  * @param {import("../data/manifest.js").Manifest} manifest
  */
-export function createSky(gl, { sky, ground_colour: ground }) {
-  const { use, uniforms } = createProgram(gl, VERTEX, FRAGMENT), empty = gl.createVertexArray();
+export function createSky(gl, { sky, ground_colour: ground, heights }) {
+  const sphere = heights?.kind === "sphere" ? heights : null, empty = gl.createVertexArray();
+  const { use, uniforms } = createProgram(gl, VERTEX, fragmentShader(sphere !== null));
   const long = sky.sun ? Math.hypot(...sky.sun.direction) : 1;
   return {
     /**
@@ -57,6 +60,7 @@ export function createSky(gl, { sky, ground_colour: ground }) {
       gl.uniform3fv(uniforms.sunColour, sky.sun?.colour ?? [1, 1, 1]);
       gl.uniform2f(uniforms.halfTangent, camera.width / 2 / camera.focal, camera.height / 2 / camera.focal);
       gl.uniform1f(uniforms.low, low);
+      if (sphere) setHorizon(gl, uniforms, sphere, camera.eye);
       gl.drawArrays(gl.TRIANGLES, 0, 3);
       gl.bindVertexArray(null);
     },

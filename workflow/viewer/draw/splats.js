@@ -6,7 +6,9 @@ import {
   BLOCK, MAX_LEVELS, NEAR, orderPages, PAGE, PAGES_A_ROW, PLACE, PLACES_A_ROW, recordRows, ROW,
 } from "../data/layout.js";
 import { MAX_OCTAVES } from "../terrain/heights.js";
+import { rateOf } from "../terrain/sphere.js";
 import { createProgram, createTexture, setAxes } from "./gl.js";
+import { setHorizon } from "./horizon.js";
 import { OBJECTS, overlayColours } from "./overlays.js";
 import { FRAGMENT, vertexShader } from "./shaders.js";
 
@@ -136,6 +138,10 @@ export function createSplats(gl, manifest, heights) {
       setConstants(gl, uniforms, manifest);
       setSurface(gl, uniforms, heights, camera);
       setView(gl, uniforms, camera, frame, manifest.tile_side);
+      if (heights.kind === "sphere") {
+        setHorizon(gl, uniforms, heights, camera.eye);
+        setSphere(gl, uniforms, heights, manifest.tile_side, frame.eye.map((v, k) => v - camera.eye[k]));
+      }
       gl.uniform1f(uniforms.end, end);
       gl.uniform1f(uniforms.low, low);
       gl.enable(gl.BLEND);
@@ -200,7 +206,7 @@ function setConstants(gl, uniforms, manifest) {
  * @param {import("../terrain/camera.js").Camera} camera
  */
 function setSurface(gl, uniforms, heights, { eye: [x, y] }) {
-  if (heights.kind === "flat") return;
+  if (heights.kind === "flat" || heights.kind === "sphere") return;
   if (heights.kind === "hills") {
     gl.uniform1i(uniforms.octaves, heights.amplitudes.length);
     gl.uniform1ui(uniforms.salt, heights.salt);
@@ -232,6 +238,15 @@ function setView(gl, uniforms, camera, { i0, j0, switches, bands, marks }, side)
   gl.uniform1fv(uniforms["switches[0]"], padded(switches.slice(0, -1), MAX_LEVELS));
   gl.uniform1fv(uniforms["bands[0]"], padded(bands, MAX_LEVELS));
   gl.uniform1uiv(uniforms["marks[0]"], marks);
+}
+
+/** @param {GL} gl @param {Uniforms} uniforms @param {import("../terrain/sphere.js").Sphere} sphere @param {number} side @param {number[]} moved */
+function setSphere(gl, uniforms, sphere, side, moved) {
+  const rate = rateOf(sphere, side);
+  gl.uniform3fv(uniforms.moved, moved);
+  gl.uniform1f(uniforms.radius, sphere.radius);
+  gl.uniform1f(uniforms.rate, rate);
+  gl.uniform1f(uniforms.stretch, sphere.radius * rate);
 }
 
 /** @param {number[]} list @param {number} length */

@@ -1,6 +1,7 @@
 // Where the tiles of a picture end and its backdrop begins.
 
 import { REACH } from "../terrain/cells.js";
+import { findEnd, findReach } from "../terrain/sphere_cells.js";
 
 const MIN_LOW = 1e-4; // sine of the angle below the horizon at which tiles end, at least
 
@@ -13,5 +14,8 @@ const MIN_LOW = 1e-4; // sine of the angle below the horizon at which tiles end,
  */
 export function backdropOptions({ manifest, heights }, frame, camera) {
   const farthest = REACH * manifest.tile_side;
+  if (heights.kind === "sphere") {
+    return findEnd(heights, camera.eye, frame?.reach ?? findReach({ side: manifest.tile_side }, heights, camera.eye));
+  }
   return { end: frame?.reach ?? farthest, low: Math.max(MIN_LOW, (camera.eye[2] - heights.low) / farthest) };
 }

@@ -6,6 +6,7 @@
 
 import { REACH } from "./cells.js";
 import { cellsInFrustum } from "./frustum.js";
+import { findReach } from "./sphere_cells.js";
 
 /**
  * @typedef {import("./frustum.js").Cell} Cell
@@ -32,20 +33,22 @@ const NEVER = -1; // switch distance of a level that is not used
  * @returns {Selection}
  */
 export function selectCells(terrain, camera, budget) {
-  const cells = cellsInFrustum(terrain, camera, REACH * terrain.side), above = eyeHeight(terrain, camera);
+  const { sphere, sphereCells, side } = terrain, above = eyeHeight(terrain, camera);
+  const reach = sphere ? findReach(terrain, sphere, camera.eye) : REACH * side;
+  const cells = sphereCells ? sphereCells(camera, reach) : cellsInFrustum(terrain, camera, reach);
   for (const cell of cells) cell.arrived = arrivedLevels(terrain, cell.tiles);
   /** @param {Distances} distances */
   const cost = (distances) =>
     cells.reduce((sum, cell) => (chooseLevels(terrain, cell, distances) ? sum + cell.count : sum), 0);
-  let distances = distancesAt(terrain, above, 1);
+  let distances = distancesAt(terrain, above, reach, 1);
   if (cost(distances) > budget) {
     let low = Math.log(leastShrink(terrain, above)), high = 0;
     for (let k = 0; k < BISECTIONS; k++) {
       const middle = (low + high) / 2;
-      if (cost(distancesAt(terrain, above, Math.exp(middle))) <= budget) low = middle;
+      if (cost(distancesAt(terrain, above, reach, Math.exp(middle))) <= budget) low = middle;
       else high = middle;
     }
-    distances = distancesAt(terrain, above, Math.exp(low));
+    distances = distancesAt(terrain, above, reach, Math.exp(low));
   }
   const kept = cells.filter((cell) => chooseLevels(terrain, cell, distances));
   return { ...distances, ...nearestCells(kept, budget, distances.reach), missing: missingChunks(terrain, kept) };
@@ -54,16 +57,17 @@ export function selectCells(terrain, camera, budget) {
 /**
  * @param {TerrainTables} terrain
  * @param {number} above height of the eye over the ground
+ * @param {number} reach
  * @param {number} shrink
  * @returns {Distances}
  */
-function distancesAt({ switches, bands, side }, above, shrink) {
+function distancesAt({ switches, bands }, above, reach, shrink) {
   const used = switches.map((distance, l) => shrink === 1 || shrink * (distance + bands[l]) >= above);
   return {
     shrink,
     switches: switches.map((distance, l) => (used[l] ? shrink * distance : NEVER)),
     bands: bands.map((band, l) => (used[l] ? shrink * band : 0)),
-    reach: REACH * side * shrink ** REACH_EXPONENT,
+    reach: reach * shrink ** REACH_EXPONENT,
   };
 }
 
@@ -84,7 +88,8 @@ function leastShrink({ switches, bands }, above) {
  * @param {TerrainTables} terrain
  * @param {Camera} camera
  */
-function eyeHeight({ heights, near }, { eye: [x, y, z] }) {
+function eyeHeight({ heights, near, sphere }, { eye: [x, y, z] }) {
+  if (sphere) return Math.max(near, Math.hypot(x, y, z) - sphere.radius);
   return Math.max(near, z - heights.at(x, y)[0]);
 }
 

@@ -2,6 +2,8 @@
 
 import { RING } from "./cell_ring.js";
 import { tileAt } from "./choice.js";
+import { frameAt, locate } from "./sphere.js";
+import { columnOf, tileOn } from "./sphere_edges.js";
 import { createThing } from "./things.js";
 
 /** @typedef {import("../worker/terrain_tables.js").TerrainTables} TerrainTables */
@@ -12,15 +14,21 @@ const PARTS = 8; // heights within a cell are sampled at (PARTS + 1)^2 points
 const NONE = [];
 
 /**
- * The tile under a point of the ground.
+ * The tile under a point of the ground; on a sphere x and y are longitude and latitude, i is a column of all faces.
  *
  * @param {import("../data/manifest.js").Manifest} manifest
+ * @param {import("./heights.js").HeightField} heights
  * @param {number} x
  * @param {number} y
  */
-export function tileUnder({ tile_side: side, salt, tiles, materials }, x, y) {
+export function tileUnder({ tile_side: side, salt, tiles, materials }, heights, x, y) {
+  const variants = tiles.length / (16 * materials.length);
+  if (heights.kind === "sphere") {
+    const { face, a, b } = locate(heights, frameAt(x, y)[2]), [i, j] = [Math.floor(a), Math.floor(b)];
+    return { face, i: columnOf(heights, face, i), j, tile: tileOn(heights, face, i, j, salt, variants) };
+  }
   const i = Math.floor(x / side), j = Math.floor(y / side);
-  return { i, j, tile: tileAt(i, j, salt, tiles.length / (16 * materials.length)) };
+  return { i, j, tile: tileAt(i, j, salt, variants) };
 }
 
 /**

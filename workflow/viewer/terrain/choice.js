@@ -33,15 +33,16 @@ function mix(h) {
  * @param {number} j
  * @param {number} salt
  * @param {number} variants number of centres
+ * @param {number} [period] (i + period, j + period) is the same cell as (i, j); 0: none
  */
-export function tileAt(i, j, salt, variants) {
-  const edges = edgesOf(i, j, salt), centre = centreOf(i, j, salt, variants);
+export function tileAt(i, j, salt, variants, period = 0) {
+  const edges = edgesOf(i, j, salt, period), centre = centreOf(i, j, salt, variants, period);
   if (variants === 1 || (i + j) % 2 === 0) return 16 * centre + edges;
   let taken = 0; // one bit for each centre of a neighbour with the same edges
   const across = edges >> 3 === ((edges >> 1) & 1), along = ((edges >> 2) & 1) === (edges & 1);
   for (const step of [-1, 1]) { // only a tile with equal opposite edges can be its own neighbour
-    if (across && edgesOf(i + step, j, salt) === edges) taken |= 1 << centreOf(i + step, j, salt, variants);
-    if (along && edgesOf(i, j + step, salt) === edges) taken |= 1 << centreOf(i, j + step, salt, variants);
+    if (across && edgesOf(i + step, j, salt, period) === edges) taken |= 1 << centreOf(i + step, j, salt, variants, period);
+    if (along && edgesOf(i, j + step, salt, period) === edges) taken |= 1 << centreOf(i, j + step, salt, variants, period);
   }
   for (let step = 0; step < variants; step++) {
     const other = (centre + step) % variants;
@@ -50,14 +51,28 @@ export function tileAt(i, j, salt, variants) {
   return 16 * centre + edges;
 }
 
-/** @param {number} i @param {number} j @param {number} salt */
-function edgesOf(i, j, salt) {
-  const west = hashCell(i, j, WEST, salt) & 1, east = hashCell(i + 1, j, WEST, salt) & 1;
-  const south = hashCell(i, j, SOUTH, salt) & 1, north = hashCell(i, j + 1, SOUTH, salt) & 1;
+/** @param {number} i @param {number} j @param {number} salt @param {number} period */
+function edgesOf(i, j, salt, period) {
+  const west = hashFirst(i, j, WEST, salt, period) & 1, east = hashFirst(i + 1, j, WEST, salt, period) & 1;
+  const south = hashFirst(i, j, SOUTH, salt, period) & 1, north = hashFirst(i, j + 1, SOUTH, salt, period) & 1;
   return 8 * west + 4 * north + 2 * east + south;
 }
 
-/** @param {number} i @param {number} j @param {number} salt @param {number} variants */
-function centreOf(i, j, salt, variants) {
-  return (hashCell(i, j, CENTRE, salt) >>> 1) % variants;
+/** @param {number} i @param {number} j @param {number} salt @param {number} variants @param {number} period */
+function centreOf(i, j, salt, variants, period) {
+  return (hashFirst(i, j, CENTRE, salt, period) >>> 1) % variants;
+}
+
+/**
+ * The hash of the cell with 0 <= j < period that is the same as (i, j).
+ *
+ * @param {number} i
+ * @param {number} j
+ * @param {number} axis
+ * @param {number} salt
+ * @param {number} period
+ */
+function hashFirst(i, j, axis, salt, period) {
+  const back = period ? Math.floor(j / period) * period : 0;
+  return hashCell(i - back, j - back, axis, salt);
 }

@@ -9,11 +9,11 @@ import { inNearBlock, visitBackToFront } from "./draw_order.js";
  * of its Gaussians; tile: of the first material; tiles: of all that may show; border: where several materials meet;
  * things: objects whose feet are in it; arrived: bits of the levels at hand; lo to hi: its levels; whole: one level stands
  * in for missing ones and does not fade; missing: bits of the levels that have not arrived; count: of its Gaussians;
- * direction: of its pre-sorted order.
+ * direction: of its pre-sorted order; spot: where it lies on a sphere, of which di and dj are the column and the row then.
  * @typedef {{ di: number, dj: number, at: number, tile: number, tiles: number[],
  *   border: import("./cells.js").Border | null, things: import("./things.js").Thing[], close: boolean,
  *   nearest: number, farthest: number, arrived: number, lo: number, hi: number, whole: boolean, missing: number,
- *   count: number, direction: number }} Cell
+ *   count: number, direction: number, spot: import("./sphere_cells.js").Spot | null }} Cell
  *
  * @typedef {import("./camera.js").Camera} Camera
  * @typedef {import("../worker/terrain_tables.js").TerrainTables} TerrainTables
@@ -91,8 +91,8 @@ function spanOf({ z: [low, high], objects, most }) {
 /** @param {number} x @param {number} y @param {number} z */
 const length = (x, y, z) => Math.sqrt(x * x + y * y + z * z);
 /** @returns {Cell} */
-const blankCell = () => ({
-  di: 0, dj: 0, at: 0, tile: 0, tiles: [], border: null, things: [], close: false,
+export const blankCell = () => ({
+  di: 0, dj: 0, spot: null, at: 0, tile: 0, tiles: [], border: null, things: [], close: false,
   nearest: 0.5, farthest: 0.5, arrived: 0,
   lo: 0, hi: 0, whole: false, missing: 0, count: 0, direction: 0,
 });
@@ -146,7 +146,7 @@ export function frustumPlanes({ right, up, ahead, width, height, focal }, near) 
  * @param {number} wide
  * @param {number} tall
  */
-function isOutside(planes, east, north, up, wide, tall) {
+export function isOutside(planes, east, north, up, wide, tall) {
   for (let k = 0; k < 5; k++) {
     const [a, b, c, d] = planes[k];
     if (a * east + b * north + c * up + d + (Math.abs(a) + Math.abs(b)) * wide + Math.abs(c) * tall < 0) return true;

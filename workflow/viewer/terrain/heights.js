@@ -2,6 +2,7 @@
 // The same numbers as dav_gswt/terrain/heights.py; tests/golden/heights.json holds both to it.
 
 import { hashCell } from "./choice.js";
+import { createSphere } from "./sphere.js";
 
 const HILLS = 3; // axis of the hash of octave 0, after west, south and centre; octave k uses HILLS + k
 const GAIN = 0.4; // height of an octave over that of the one twice as wide
@@ -16,7 +17,7 @@ export const MAX_OCTAVES = 12;
  * @typedef {{ kind: "hills", height: number, wavelength: number, octaves: number, salt: number }} HillsEntry
  * @typedef {{ kind: "image", file: string, bytes: number, sha256?: string, rows: number, columns: number,
  *   width: number, beyond?: string }} ImageEntry
- * @typedef {FlatEntry | HillsEntry | ImageEntry} HeightsEntry
+ * @typedef {FlatEntry | HillsEntry | ImageEntry | import("./sphere.js").SphereEntry} HeightsEntry
  *
  * What all height fields have: `at` gives [height, slope by x, slope by y]; `low`, `high` and `steepest` are bounds.
  * @typedef {{ low: number, high: number, steepest: number,
@@ -28,7 +29,7 @@ export const MAX_OCTAVES = 12;
  * @typedef {Bounds & { kind: "hills", amplitudes: number[], scales: number[], salt: number, under: Under }} Hills
  * @typedef {Bounds & { kind: "image", rows: number, columns: number, perUnit: number, mirrored: boolean,
  *   pixels: Float32Array, under: Under }} HeightMap
- * @typedef {FlatSurface | Hills | HeightMap} HeightField
+ * @typedef {FlatSurface | Hills | HeightMap | import("./sphere.js").Sphere} HeightField
  */
 
 /**
@@ -40,6 +41,7 @@ export const MAX_OCTAVES = 12;
  */
 export function createHeights(entry = { kind: "flat" }, pixels = null) {
   if (entry.kind === "hills") return createHills(entry);
+  if (entry.kind === "sphere") return createSphere(entry);
   if (entry.kind === "image") {
     if (!pixels) throw new TypeError("a height map needs its pixels");
     return createHeightMap(entry, pixels);

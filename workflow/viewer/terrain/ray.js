@@ -1,5 +1,7 @@
 // Where a ray from the eye meets the ground.
 
+import { dot, frameAt } from "./sphere.js";
+
 const MOST = 400; // steps
 const NEAREST = 1e-6; // depth of what is before the eye
 const CLOSE = 1e-4; // of the distance: near enough to the ground
@@ -17,7 +19,7 @@ export function rayThrough({ right, up, ahead, width, height, focal }, across, d
 }
 
 /**
- * The place where a ray first comes down to the ground; null: it does not within `farthest`.
+ * The place (longitude and latitude on a sphere) where a ray first comes down to the ground; null: it does not within `farthest`.
  *
  * Each step goes as far as no slope of the surface could reach it.
  *
@@ -28,6 +30,7 @@ export function rayThrough({ right, up, ahead, width, height, focal }, across, d
  * @returns {[number, number] | null}
  */
 export function hitGround(eye, way, heights, { lift, farthest }) {
+  if (heights.kind === "sphere") return hitSphere(eye, way, heights.radius + lift);
   const fall = Math.max(heights.steepest * Math.hypot(way[0], way[1]) - way[2], 1e-6); // the gap closes no faster
   for (let step = 0, far = 0; step < MOST && far < farthest; step++) {
     const x = eye[0] + far * way[0], y = eye[1] + far * way[1];
@@ -36,6 +39,33 @@ export function hitGround(eye, way, heights, { lift, farthest }) {
     far += gap / fall;
   }
   return null;
+}
+
+/**
+ * Longitude and latitude of the place where a ray meets a sphere.
+ *
+ * @param {number[]} eye
+ * @param {number[]} way of length 1
+ * @param {number} radius
+ * @returns {[number, number] | null}
+ */
+function hitSphere(eye, way, radius) {
+  const back = -dot(eye, way), far = Math.hypot(...eye), beside = radius * radius - (far * far - back * back);
+  if (back <= 0 || beside < 0) return null;
+  const [x, y, z] = eye.map((v, k) => v + (back - Math.sqrt(beside)) * way[k]);
+  return [(Math.atan2(y, x) * 180) / Math.PI, (Math.atan2(z, Math.hypot(x, y)) * 180) / Math.PI];
+}
+
+/**
+ * A place of the ground as a point of the world.
+ *
+ * @param {import("./heights.js").HeightField} heights
+ * @param {number} x
+ * @param {number} y
+ */
+export function pointAt(heights, x, y) {
+  if (heights.kind === "sphere") return frameAt(x, y)[2].map((v) => v * heights.radius);
+  return [x, y, heights.at(x, y)[0]];
 }
 
 /**

@@ -16,9 +16,11 @@ const PAINT = "&paint=";
  * @param {Walker} walker
  */
 export function formatPlace(walker) {
-  const digits = Math.min(12, Math.max(0, Math.ceil(3 - Math.log10(walker.floor))));
-  const lengths = [walker.x, walker.y, walker.eye].map((v) => v.toFixed(digits));
-  return `#${[...lengths, walker.yaw.toFixed(3), walker.pitch.toFixed(3)].join(",")}`;
+  /** @param {number} unit */
+  const digits = (unit) => Math.min(15, Math.max(0, Math.ceil(3 - Math.log10(unit))));
+  const fine = Math.min(12, digits(walker.floor)), degrees = (180 * walker.floor) / (Math.PI * walker.radius);
+  const place = [walker.x, walker.y].map((v) => v.toFixed(walker.radius ? digits(degrees) : fine));
+  return `#${[...place, walker.eye.toFixed(fine), walker.yaw.toFixed(3), walker.pitch.toFixed(3)].join(",")}`;
 }
 
 /**

@@ -2,7 +2,7 @@
 
 import { FIELD_OF_VIEW } from "../terrain/camera.js";
 import { isField } from "./dom.js";
-import { moveTo } from "./walker.js";
+import { goBy, moveTo } from "./walker.js";
 
 /**
  * @typedef {import("./walker.js").Walker} Walker
@@ -113,9 +113,6 @@ function moveByTwoFingers(walker, from, to, other, size) {
   const apart = (a) => Math.max(20, Math.hypot(a[0] - other[0], a[1] - other[1]));
   const yaw = (walker.yaw * Math.PI) / 180, scale = (4 * walker.eye) / size;
   const forward = scale * (to[1] - from[1]), left = scale * (to[0] - from[0]);
-  moveTo(walker, {
-    x: walker.x + forward * Math.cos(yaw) - left * Math.sin(yaw),
-    y: walker.y + forward * Math.sin(yaw) + left * Math.cos(yaw),
-    eye: (walker.eye * apart(from)) / apart(to),
-  });
+  goBy(walker, forward * Math.cos(yaw) - left * Math.sin(yaw), forward * Math.sin(yaw) + left * Math.cos(yaw));
+  moveTo(walker, { eye: (walker.eye * apart(from)) / apart(to) });
 }

@@ -10,7 +10,7 @@ const STEP = 0.02; // of the eye's height; a turn by degrees counts alike
 /** @param {{ onStep: () => void }} handlers called when somebody moves */
 export function createFirstView({ onStep }) {
   const title = element("title", HTMLElement), hint = element("hint", HTMLElement);
-  /** @type {import("../terrain/camera.js").Place | null} */
+  /** @type {import("./walker.js").Walker | null} */
   let begin = null;
   const showTerrain = () => {
     const still = document.getElementById("first");
@@ -24,7 +24,7 @@ export function createFirstView({ onStep }) {
 
   return {
     showTerrain,
-    /** A terrain was opened. @param {import("../terrain/camera.js").Place} place @param {boolean} own the page's own */
+    /** A terrain was opened. @param {import("./walker.js").Walker} place @param {boolean} own the page's own */
     showScene(place, own) {
       begin = { ...place };
       title.classList.remove("leaving");
@@ -37,7 +37,7 @@ export function createFirstView({ onStep }) {
     showHint() {
       hint.hidden = begin === null;
     },
-    /** A picture was drawn. @param {import("../terrain/camera.js").Place} place @param {number} overlay */
+    /** A picture was drawn. @param {import("./walker.js").Walker} place @param {number} overlay */
     note(place, overlay) {
       if (overlay) showTerrain();
       if (!begin || !isStep(begin, place)) return;
@@ -50,6 +50,9 @@ export function createFirstView({ onStep }) {
   };
 }
 
-/** @param {import("../terrain/camera.js").Place} a @param {import("../terrain/camera.js").Place} b */
-const isStep = (a, b) => Math.hypot(a.x - b.x, a.y - b.y, a.eye - b.eye) > STEP * a.eye
+/** @param {import("./walker.js").Walker} a @param {import("./walker.js").Walker} b */
+const isStep = (a, b) => Math.hypot(unitsOf(b, a.x - b.x), unitsOf(b, a.y - b.y), a.eye - b.eye) > STEP * a.eye
   || Math.abs(a.yaw - b.yaw) + Math.abs(a.pitch - b.pitch) > 100 * STEP;
+
+/** World units of a change of x or y, which are degrees on a planet. @param {import("./walker.js").Walker} walker @param {number} change */
+const unitsOf = ({ radius }, change) => (radius ? (change * radius * Math.PI) / 180 : change);

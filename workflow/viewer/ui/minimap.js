@@ -18,8 +18,10 @@ export function createMinimap(viewer) {
 
   function draw() {
     const { scene } = viewer;
+    button.hidden = Boolean(scene?.walker.radius); // no map of a planet
+    if (button.hidden) map.hidden = true;
     if (map.hidden || !scene || !pen) return;
-    const { manifest, walker } = scene, side = manifest.tile_side, [west, south] = corner(walker, side);
+    const { manifest, walker, heights } = scene, side = manifest.tile_side, [west, south] = corner(walker, side);
     pen.fillStyle = PAPER;
     pen.fillRect(0, 0, map.width, map.height);
     pen.font = "11px system-ui, sans-serif";
@@ -27,7 +29,7 @@ export function createMinimap(viewer) {
     pen.textBaseline = "middle";
     for (let j = Math.floor(south); j < south + CELLS; j++) {
       for (let i = Math.floor(west); i < west + CELLS; i++) {
-        const { tile } = tileUnder(manifest, (i + 0.5) * side, (j + 0.5) * side);
+        const { tile } = tileUnder(manifest, heights, (i + 0.5) * side, (j + 0.5) * side);
         const left = (i - west) * unit, top = map.height - (j + 1 - south) * unit;
         pen.fillStyle = `rgb(${tileColour(tile).map((v) => Math.round(140 * v)).join(" ")})`;
         pen.fillRect(left + 0.5, top + 0.5, unit - 1, unit - 1);

@@ -3,7 +3,7 @@
 import { element } from "./dom.js";
 
 /**
- * @typedef {{ x: number, y: number, eye: number, under: { i: number, j: number, tile: number }, count: number,
+ * @typedef {{ x: number, y: number, eye: number, under: { face?: number, i: number, j: number, tile: number }, count: number,
  *   drawn: unknown[] }} NumbersState
  * @typedef {{ now: number, state: () => NumbersState, stats: () => import("../draw/frame_stats.js").Summary,
  *   fps: number, unit: string, force: boolean }} Numbers
@@ -22,8 +22,9 @@ export function createNumbers() {
   function write() {
     if (!last || box.hidden) return;
     const { state, stats, fps, unit } = last, { x, y, eye, under, count, drawn } = state(), summary = stats();
-    const where = `${length(x)} E, ${length(y)} N, eye ${length(eye)} ${unitName(unit)}`;
-    place.textContent = `tile ${under.tile} at (${under.i}, ${under.j}) · ${where}`;
+    const round = under.face !== undefined, [east, north] = round ? [`${x.toFixed(2)}°`, `${y.toFixed(2)}°`] : [length(x), length(y)];
+    const where = `${east} E, ${north} N, eye ${length(eye)} ${unitName(unit)}`, face = round ? ` of face ${under.face}` : "";
+    place.textContent = `tile ${under.tile} at (${under.i}, ${under.j})${face} · ${where}`;
     const rate = fps ? `${Math.round(fps)} fps, ` : "";
     speed.textContent = `${rate}${count.toLocaleString("en")} splats in ${drawn.length} tiles`;
     const parts = STAGES.flatMap((stage) => {

@@ -1,7 +1,7 @@
 // Orbiting: the eye turns about the place that the middle of the picture shows, and comes nearer to it.
 
 import { hitGround } from "../terrain/ray.js";
-import { moveTo } from "./walker.js";
+import { goBy, moveTo } from "./walker.js";
 
 /** @typedef {ReturnType<typeof createOrbit>} Orbit */
 
@@ -31,15 +31,32 @@ export function createOrbit(viewer) {
   return {
     /** Turn by degrees. @param {number} turn @param {number} tilt */
     turn(turn, tilt) {
-      const pivot = findPivot(), walker = viewer.scene?.walker;
+      const walker = viewer.scene?.walker;
+      if (walker?.radius) return rollPlanet(walker, turn, tilt);
+      const pivot = findPivot();
       if (!pivot || !walker) return;
       const pitch = Math.min(Math.max(walker.pitch + tilt, STEEPEST), Math.max(FLATTEST, walker.pitch));
       look(pivot.place, pivot.far, walker.yaw + turn, pitch);
     },
     /** Change the distance. @param {number} factor */
     zoom(factor) {
-      const pivot = findPivot(), walker = viewer.scene?.walker;
+      const walker = viewer.scene?.walker;
+      if (walker?.radius) return moveTo(walker, { eye: walker.eye * factor });
+      const pivot = findPivot();
       if (pivot && walker) look(pivot.place, pivot.far * factor, walker.yaw, walker.pitch);
     },
   };
+}
+
+/**
+ * Turn a planet under the eye, as if the ground were held: slowly near it, at most once around for 180 degrees.
+ *
+ * @param {import("./walker.js").Walker} walker
+ * @param {number} turn degrees
+ * @param {number} tilt
+ */
+function rollPlanet(walker, turn, tilt) {
+  const yaw = (walker.yaw * Math.PI) / 180, unit = (Math.min(walker.eye, 2 * walker.radius) * Math.PI) / 180;
+  const ahead = -tilt * unit, right = turn * unit;
+  goBy(walker, ahead * Math.cos(yaw) + right * Math.sin(yaw), ahead * Math.sin(yaw) - right * Math.cos(yaw));
 }

@@ -2,7 +2,7 @@
 
 import { NO_ORDER } from "../data/layout.js";
 import { REACH, tileUnder } from "../terrain/cells.js";
-import { hitGround, rayThrough } from "../terrain/ray.js";
+import { hitGround, pointAt, rayThrough } from "../terrain/ray.js";
 
 /** @param {import("./viewer.js").Viewer} viewer */
 export function tellValues(viewer) {
@@ -28,8 +28,8 @@ export function valuesAt({ manifest, heights, lift, frame }, camera, across, dow
   const side = manifest.tile_side;
   const place = hitGround(camera.eye, rayThrough(camera, across, down), heights, { lift, farthest: REACH * side });
   if (!place) return null;
-  const { i, j, tile } = tileUnder(manifest, place[0], place[1]), distance = Math.hypot(
-    place[0] - camera.eye[0], place[1] - camera.eye[1], heights.at(place[0], place[1])[0] - camera.eye[2]);
+  const { i, j, tile } = tileUnder(manifest, heights, place[0], place[1]), point = pointAt(heights, place[0], place[1]);
+  const distance = Math.hypot(...point.map((v, k) => v - camera.eye[k]));
   for (let k = 0; frame && k < frame.drawn.length; k += 6) {
     const [di, dj, , lo, hi, order] = frame.drawn.subarray(k, k + 6);
     if (frame.i0 + di !== i || frame.j0 + dj !== j) continue;

@@ -314,10 +314,10 @@ export class Viewer {
 }
 
 /** Place and picture of a scene, in plain values. @param {Scene} scene */
-function describeScene({ manifest, walker, frame }) {
+function describeScene({ manifest, walker, frame, heights }) {
   const { x, y, eye, yaw, pitch } = walker, drawn = frame ? listDrawnCells(frame) : [];
   const { count = 0, reach, shrink, bytes = 0 } = frame ?? {};
-  return { x, y, eye, yaw, pitch, under: tileUnder(manifest, x, y), drawn, count, reach, shrink, bytes };
+  return { x, y, eye, yaw, pitch, under: tileUnder(manifest, heights, x, y), drawn, count, reach, shrink, bytes };
 }
 
 /** One sentence for the person at the screen. @param {unknown} error */

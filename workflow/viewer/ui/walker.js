@@ -1,10 +1,14 @@
 // The walker: where the eye is, and how held keys move it. Angles in degrees.
 
+import { walkOn } from "../terrain/sphere.js";
+
 const SPEED = 1.2; // eye heights a second
 const RUN = 4; // with Shift
 const TURN = 70; // degrees a second with the arrow keys
 const RISE = 1.2; // powers of e a second with Q and E
 const CEILING = 16; // highest eye, in tile sides
+const ORBIT = 4; // highest eye over a planet, in radii
+const START = [20, 30]; // longitude and latitude on a planet
 const FARTHEST = 1e12; // coordinates beyond have no whole tiles left in double precision
 
 /**
@@ -14,8 +18,9 @@ const FARTHEST = 1e12; // coordinates beyond have no whole tiles left in double 
  * walk: over the ground, at one height; fly: where one looks; orbit: dragging turns about what one looks at.
  * @typedef {"walk" | "fly" | "orbit"} Mode
  *
- * A place, the bounds of the eye's height above the surface, and the actions of held keys.
- * @typedef {Place & { floor: number, ceiling: number, held: Set<Action>, mode: Mode }} Walker
+ * A place, the bounds of the eye's height above the surface, and the actions of held keys; radius: of the planet, 0 on a
+ * plane.
+ * @typedef {Place & { floor: number, ceiling: number, held: Set<Action>, mode: Mode, radius: number }} Walker
  */
 
 /** @type {Mode[]} */
@@ -24,14 +29,15 @@ export const MODES = ["walk", "fly", "orbit"];
 export const PLACE_KEYS = /** @type {const} */ (["x", "y", "eye", "yaw", "pitch"]);
 
 /**
- * @param {{ tile_side: number, eye_floor: number }} manifest
+ * @param {Pick<import("../data/manifest.js").Manifest, "tile_side" | "eye_floor" | "heights">} manifest
  * @param {Partial<Place>} [place]
  * @returns {Walker}
  */
-export function createWalker({ tile_side: side, eye_floor: floor }, place = {}) {
+export function createWalker({ tile_side: side, eye_floor: floor, heights }, place = {}) {
+  const radius = heights?.kind === "sphere" ? heights.radius : 0, [x, y] = radius ? START : [side / 2, side / 2];
   const walker = {
-    x: side / 2, y: side / 2, eye: floor, yaw: 60, pitch: -12,
-    floor, ceiling: Math.max(CEILING * side, 4 * floor), held: new Set(),
+    x, y, eye: floor, yaw: 60, pitch: -12, radius,
+    floor, ceiling: Math.max(CEILING * side, 4 * floor, ORBIT * radius), held: new Set(),
     mode: /** @type {Mode} */ ("walk"),
   };
   moveTo(walker, place);
@@ -51,6 +57,7 @@ export function moveTo(walker, place) {
   }
   walker.eye = Math.min(Math.max(walker.eye, walker.floor), walker.ceiling);
   walker.pitch = Math.min(Math.max(walker.pitch, -90), 90);
+  if (walker.radius) walker.y = Math.min(Math.max(walker.y, -90), 90);
   walker.yaw = ((walker.yaw % 360) + 360) % 360;
 }
 
@@ -81,12 +88,23 @@ export function moveBy(walker, { forward, right, turn, tilt, rise, run }, second
   const yaw = (walker.yaw * Math.PI) / 180, pitch = walker.mode === "fly" ? (walker.pitch * Math.PI) / 180 : 0;
   const stride = (SPEED * walker.eye * seconds * (1 + (RUN - 1) * run)) / Math.max(1, Math.hypot(forward, right));
   const along = forward * Math.cos(pitch);
+  goBy(walker, stride * (along * Math.cos(yaw) + right * Math.sin(yaw)), stride * (along * Math.sin(yaw) - right * Math.cos(yaw)));
   moveTo(walker, {
-    x: walker.x + stride * (along * Math.cos(yaw) + right * Math.sin(yaw)),
-    y: walker.y + stride * (along * Math.sin(yaw) - right * Math.cos(yaw)),
     yaw: walker.yaw + turn * TURN * seconds,
     pitch: walker.pitch + tilt * TURN * seconds,
     eye: walker.eye * Math.exp(rise * RISE * seconds) + stride * forward * Math.sin(pitch),
   });
   return true;
+}
+
+/**
+ * Go straight on; over a planet along a great circle, on which where one looks turns with the meridians.
+ *
+ * @param {Walker} walker
+ * @param {number} east world units
+ * @param {number} north
+ */
+export function goBy(walker, east, north) {
+  if (walker.radius) moveTo(walker, walkOn(walker, east, north, walker.radius));
+  else moveTo(walker, { x: walker.x + east, y: walker.y + north });
 }

@@ -94,6 +94,21 @@ export function createPlaceList({ objects }) {
       words[at + 7] = level;
       return at / PLACE;
     },
+    /**
+     * Add a cell of a sphere; returns the number of its place.
+     *
+     * @param {import("../terrain/sphere_cells.js").Spot} spot
+     * @param {number} mark see `cellMark`
+     */
+    addSpot({ face, s, t, centre }, mark) {
+      const at = list.extend(1), { words, floats } = list;
+      floats.set(centre, at);
+      floats[at + 3] = s;
+      floats[at + 4] = t;
+      words[at + 5] = face;
+      words[at + 6] = mark;
+      return at / PLACE;
+    },
   };
 }
 

@@ -11,11 +11,11 @@ const MOST_BYTES = 64e6; // of indices, of all cells
  */
 
 /**
- * @param {Pick<import("./terrain_tables.js").TerrainTables, "classes" | "each">} terrain
+ * @param {Pick<import("./terrain_tables.js").TerrainTables, "keeper" | "each">} terrain
  * @param {{ get: (tile: number, level: number) => { centres: Float32Array, count: number } }} store
  * @param {number} [most] bytes
  */
-export function createBorders({ classes, each }, store, most = MOST_BYTES) {
+export function createBorders({ keeper, each }, store, most = MOST_BYTES) {
   /** @type {Map<Border, number>} */
   const known = new Map(); // bytes of each, the latest last
   let bytes = 0, tested = 0;
@@ -42,8 +42,8 @@ export function createBorders({ classes, each }, store, most = MOST_BYTES) {
      */
     keep(border, tile, level) {
       const key = chunkKey(tile, level), old = border.kept.get(key);
-      if (old || !classes) return old ?? null;
-      const chunk = store.get(tile, level), kept = classes.keep(border.i, border.j, chunk, Math.floor(tile / each));
+      if (old || !keeper) return old ?? null;
+      const chunk = store.get(tile, level), kept = keeper.keep(border.i, border.j, chunk, Math.floor(tile / each));
       const own = (known.get(border) ?? 0) + kept.byteLength;
       border.kept.set(key, kept);
       known.delete(border);

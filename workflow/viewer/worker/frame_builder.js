@@ -5,6 +5,7 @@ import { selectCells } from "../terrain/budget.js";
 import { lookUpCell, REACH } from "../terrain/cells.js";
 import { nearestOrder } from "../terrain/draw_order.js";
 import { placeObjects } from "../terrain/object_placement.js";
+import { bend, dot, FACES, rateOf } from "../terrain/sphere.js";
 import { cellMark, createBlockList, createPlaceList } from "./block_list.js";
 import { createBorders } from "./borders.js";
 import { createChunkStore } from "./chunk_store.js";
@@ -20,10 +21,10 @@ import { createTerrainTables } from "./terrain_tables.js";
  * @typedef {import("./terrain_tables.js").TerrainTables} TerrainTables
  * @typedef {ReturnType<typeof placeObjects>} Groups
  *
- * What the GPU draws. i0, j0: the eye's cell; near: entries of the near block; marks: of its 9 cells; uploads: new
+ * What the GPU draws. i0, j0: the eye's cell (0 on a sphere); eye: its place; near: entries of the near block; marks: of its 9 cells; uploads: new
  * pages of orders; blocks: of far cells and objects; places: of objects; incomplete: batches were left out for lack of
  * time.
- * @typedef {{ i0: number, j0: number, near: Uint32Array, marks: Uint32Array, blocks: Uint32Array, places: Uint32Array,
+ * @typedef {{ i0: number, j0: number, eye: number[], near: Uint32Array, marks: Uint32Array, blocks: Uint32Array, places: Uint32Array,
  *   uploads: { numbers: Uint32Array, data: Uint32Array }, incomplete: boolean,
  *   milliseconds: { update: number, sort: number } }} FrameArrays
  * @typedef {import("../terrain/budget.js").Selection & FrameArrays} Frame
@@ -83,7 +84,8 @@ export function createFrameBuilder(manifest, heights, pictures) {
       const cell = cells[k];
       if (!cell.close) continue;
       cell.direction = NO_ORDER;
-      marks[(cell.dj + 1) * 3 + cell.di + 1] = cellMark(cell, terrain);
+      if (cell.spot) places.addSpot(cell.spot, cellMark(cell, terrain)); // place k is that of the k-th close cell
+      else marks[(cell.dj + 1) * 3 + cell.di + 1] = cellMark(cell, terrain);
       close.push(cell);
       things.push(...groups[k] ?? NONE);
     }
@@ -137,7 +139,7 @@ export function createFrameBuilder(manifest, heights, pictures) {
   /** Cover the next row of the window about the eye. Returns: was there one? */
   function coverAhead() {
     const { i0, j0, row } = ahead;
-    if (row > REACH) return false;
+    if (row > REACH || terrain.sphere) return false;
     for (let di = -REACH; di <= REACH; di++) lookUpCell(terrain, i0 + di, j0 + row);
     ahead.row += 1;
     return true;
@@ -200,14 +202,16 @@ export function createFrameBuilder(manifest, heights, pictures) {
       for (let k = 0; k < cells.length; k++) {
         const cell = cells[k], batch = made[k];
         if (cell.close) continue;
-        if (batch) blocks.add(cell, cellMark(cell, terrain), batch);
+        const mark = cellMark(cell, terrain);
+        if (batch && cell.spot) blocks.add(MIDDLE, mark, batch, 1 + places.addSpot(cell.spot, mark));
+        else if (batch) blocks.add(cell, mark, batch);
         addThings(groups[k] ?? NONE, isLate);
       }
       addThings(rest, isLate);
       const uploads = batches.takeUploads(), updated = performance.now();
       const near = sortNear(close, camera, selection, things);
       return {
-        ...selection, i0, j0, near, marks, uploads, incomplete, blocks: blocks.copy(), places: places.copy(),
+        ...selection, i0: terrain.sphere ? 0 : i0, j0: terrain.sphere ? 0 : j0, eye, near, marks, uploads, incomplete, blocks: blocks.copy(), places: places.copy(),
         milliseconds: { update: updated - start, sort: performance.now() - updated },
       };
     },
@@ -223,11 +227,29 @@ export function createFrameBuilder(manifest, heights, pictures) {
  * @param {number} i0
  * @param {number} j0
  */
-function orderOf(cell, { side, cache, z, directions, tiles }, eye, i0, j0) {
+function orderOf(cell, { side, cache, z, directions, tiles, sphere }, eye, i0, j0) {
   const { at } = cell;
+  if (sphere && cell.spot) {
+    return nearestOrder(directions, tiles[cell.tile].orders[cell.lo], lookAlong(sphere, side, cell.spot, z), 0, 0);
+  }
   const to = [
     (i0 + cell.di + 0.5) * side - eye[0], (j0 + cell.dj + 0.5) * side - eye[1],
     cache.h[at] + 0.5 * (z[0] + z[1]) - eye[2],
   ];
   return nearestOrder(directions, tiles[cell.tile].orders[cell.lo], to, cache.east[at], cache.north[at]);
+}
+
+/**
+ * The direction to a cell of a sphere as its own Gaussians have it, before they are bent: depths along it rise as those
+ * along the direction from the eye to the tile's middle do.
+ *
+ * @param {import("../terrain/sphere.js").Sphere} sphere
+ * @param {number} side
+ * @param {import("../terrain/sphere_cells.js").Spot} spot
+ * @param {number[]} z range of heights
+ */
+function lookAlong(sphere, side, { face, s, t, centre }, z) {
+  const middle = 0.5 * (z[0] + z[1]), made = bend(0, 0, middle, s, t, sphere.radius, rateOf(sphere, side), []);
+  const to = FACES[face].map((axis, k) => dot(axis, centre) + made[k]);
+  return [3, 6, 9].map((at) => dot(made.slice(at, at + 3), to));
 }

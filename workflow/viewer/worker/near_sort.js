@@ -4,13 +4,15 @@
 import { CODE_SHIFT, MAX_LEVELS, SLOTS } from "../data/layout.js";
 import { createDepthSorter } from "../terrain/depth_sort.js";
 import { frustumPlanes, RIM } from "../terrain/frustum.js";
+import { bend, FACES, rateOf } from "../terrain/sphere.js";
+import { STRETCH } from "../terrain/sphere_cells.js";
 
 /**
  * @typedef {import("../terrain/frustum.js").Cell} Cell
  * @typedef {import("../terrain/things.js").Thing} Thing
  * @typedef {import("../terrain/cells.js").Border} Border
  * @typedef {import("../terrain/camera.js").Camera} Camera
- * @typedef {Pick<import("./terrain_tables.js").TerrainTables, "side" | "near" | "deviations" | "heights">} Tables
+ * @typedef {Pick<import("./terrain_tables.js").TerrainTables, "side" | "near" | "deviations" | "heights" | "sphere">} Tables
  * @typedef {{ centres: Float32Array, sizes: Uint8Array, entries: Uint32Array, count: number }} NearChunk
  *
  * An object in the block, and the codes of its levels from lo on.
@@ -36,7 +38,7 @@ const INDEX = (1 << CODE_SHIFT) - 1; // bits of an entry
  */
 export function createNearSorter(store, terrain, borders) {
   const sort = createDepthSorter(), findLift = createLiftCache(terrain), findTurned = createTurnCache(terrain);
-  const findKept = createKeptCache(borders);
+  const findKept = createKeptCache(borders), findBent = createBendCache(terrain);
   let depths = new Float32Array(0), candidates = new Uint32Array(0);
 
   /**
@@ -58,6 +60,26 @@ export function createNearSorter(store, terrain, borders) {
         const lift = findLift(key, i, j, chunk), code = SLOTS + MAX_LEVELS * slot + level;
         if (chunk.count) parts.push({ chunk, lift, ...place, code, begin: range.begin, end: range.end });
       }
+    }
+    return parts;
+  }
+
+  /**
+   * The parts of a cell of a sphere.
+   *
+   * @param {Cell} cell
+   * @param {import("../terrain/sphere_cells.js").Spot} spot
+   * @param {number} place
+   * @param {{ switches: number[], bands: number[] }} distances
+   * @returns {Part[]}
+   */
+  function partsOnSphere({ di, dj, tile, border, lo, hi, whole }, spot, place, distances) {
+    const [x, y, z] = spot.centre, parts = [];
+    for (let level = lo; level <= hi; level++) {
+      const all = store.get(tile, level), key = `${di},${dj},${level},${tile},${border?.serial ?? 0}`;
+      const chunk = findBent(key, spot, border ? findKept(key, border, tile, level, all) : all);
+      const code = SLOTS + MAX_LEVELS * place + level;
+      if (chunk.count) parts.push({ chunk, lift: null, x, y, z, size: 1, code, ...rangeOf(level, whole, distances) });
     }
     return parts;
   }
@@ -87,7 +109,8 @@ export function createNearSorter(store, terrain, borders) {
   return function sortNear(cells, camera, distances, things = []) {
     const { near, deviations } = terrain, { eye, ahead } = camera;
     const [a0, b0, c0, across, a1, b1, c1, , a2, b2, c2, along, a3, b3, c3] = sidePlanes(camera, terrain);
-    const parts = cells.flatMap((cell) => partsOfCell(cell, eye, distances));
+    const parts = cells.flatMap((cell, k) => (
+      cell.spot ? partsOnSphere(cell, cell.spot, k, distances) : partsOfCell(cell, eye, distances)));
     parts.push(...things.flatMap((one) => partsOfThing(one, distances)));
     const most = parts.reduce((sum, { chunk }) => sum + chunk.count, 0);
     if (depths.length < most) [depths, candidates] = [new Float32Array(2 * most), new Uint32Array(2 * most)];
@@ -184,6 +207,25 @@ function createLiftCache({ heights, side }) {
 }
 
 /**
+ * A function that gives the chunk of a cell on a sphere, from the place of the cell's middle on the ground.
+ *
+ * @param {Tables} terrain
+ */
+function createBendCache({ sphere, side }) {
+  const recall = /** @type {ReturnType<typeof createRecentCache<string, NearChunk>>} */ (createRecentCache());
+  const rate = sphere ? rateOf(sphere, side) : 0, half = 0.5 * side;
+  /** @param {string} key @param {import("../terrain/sphere_cells.js").Spot} spot @param {NearChunk} chunk */
+  return (key, { face, s, t }, chunk) => recall(key, chunk, () => {
+    const { centres, count } = chunk, out = new Float32Array(3 * count), made = [0, 0, 0], axes = FACES[face];
+    for (let k = 0; k < 3 * count; k += 3) {
+      bend(centres[k] - half, centres[k + 1] - half, centres[k + 2], s, t, sphere?.radius ?? 0, rate, made);
+      for (let c = 0; c < 3; c++) out[k + c] = made[0] * axes[0][c] + made[1] * axes[1][c] + made[2] * axes[2][c];
+    }
+    return { ...chunk, centres: out };
+  });
+}
+
+/**
  * A function that gives the chunk of an object with its Gaussians on the surface, from the foot.
  *
  * @param {Tables} terrain
@@ -222,9 +264,10 @@ function createTurnCache({ heights, side }) {
  * @param {Camera} camera
  * @param {Tables} terrain
  */
-function sidePlanes(camera, { heights: { steepest } }) {
+function sidePlanes(camera, { heights: { steepest }, sphere }) {
+  const stretch = sphere ? STRETCH : 1 + steepest;
   const { focal, width, height } = camera, sizes = [width, width, height, height];
   return frustumPlanes(camera, 0).slice(1).flatMap(([a, b, c], k) => {
-    return [a, b, c, focal * RIM * (1 + steepest) * Math.hypot(1, (MARGIN * sizes[k]) / focal)];
+    return [a, b, c, focal * RIM * stretch * Math.hypot(1, (MARGIN * sizes[k]) / focal)];
   });
 }

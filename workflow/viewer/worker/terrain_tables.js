@@ -8,6 +8,8 @@ import { createCellCache } from "../terrain/cells.js";
 import { createClasses } from "../terrain/classes.js";
 import { RIM } from "../terrain/frustum.js";
 import { createScatter } from "../terrain/scatter.js";
+import { createSphereCells } from "../terrain/sphere_cells.js";
+import { createFraying } from "../terrain/sphere_edges.js";
 
 /**
  * A tile, or an object: these are numbered after the tiles. uncertainty: in 255ths of the set's range; counts, orders:
@@ -18,7 +20,11 @@ import { createScatter } from "../terrain/scatter.js";
  * An object. ground: z of the foot; extent: largest distance of a Gaussian's rim from the foot, as far as is known.
  * @typedef {{ ground: number, extent: number }} ObjectTable
  *
- * variants: centres of a material's tiles; each: tiles of a material; z: range of heights of tiles, rims included;
+ * What tells which Gaussians stay in a cell where materials, or faces of a sphere, meet.
+ * @typedef {{ keep: (i: number, j: number, chunk: { centres: Float32Array, count: number },
+ *   material: number) => Uint32Array }} Keeper
+ *
+ * sphere, sphereCells: null on a plane. variants: centres of a material's tiles; each: tiles of a material; z: range of heights of tiles, rims included;
  * most: largest size of an object; cells, window: arrays that each view uses again; deviations: standard deviation by
  * byte.
  * @typedef {{ side: number, salt: number, directions: number[][], variants: number, each: number, levels: number,
@@ -26,7 +32,8 @@ import { createScatter } from "../terrain/scatter.js";
  *   scatter: import("../terrain/scatter.js").Scatter | null, most: number,
  *   heights: import("../terrain/heights.js").HeightField, largest: number, deviations: ArrayLike<number>,
  *   switches: number[], bands: number[], z: number[], near: number, cache: import("../terrain/cells.js").CellCache,
- *   cells: import("../terrain/frustum.js").Cell[], window: Int32Array }} TerrainTables
+ *   cells: import("../terrain/frustum.js").Cell[], window: Int32Array, sphere: import("../terrain/sphere.js").Sphere | null,
+ *   sphereCells: ReturnType<typeof createSphereCells> | null, keeper: Keeper | null }} TerrainTables
  */
 
 /**
@@ -50,7 +57,10 @@ export function createTerrainTables(manifest, heights, pictures) {
   const beyond = (RIM - 3) * largest; // the manifest's heights reach three deviations beyond the centres
   const classes = manifest.classes
     ? createClasses(manifest.classes, materials.length, side, heights, pictures) : null;
-  return {
+  const sphere = heights.kind === "sphere" ? heights : null;
+  /** @type {TerrainTables} */
+  const tables = {
+    sphere, sphereCells: null, keeper: sphere ? createFraying(sphere, side, salt) : classes,
     side, salt, directions, heights, tiles, variants: each / 16, each, levels: levels.length, largest, classes,
     objects: objects.map(({ ground }) => ({ ground, extent: 0 })), most: 1 + (scatter?.size ?? 0),
     scatter: scatter ? createScatter(scatter, objects, side, classes) : null,
@@ -62,4 +72,6 @@ export function createTerrainTables(manifest, heights, pictures) {
     ],
     near: NEAR * manifest.eye_floor, cache: createCellCache(levels.length), cells: [], window: new Int32Array(RING * RING),
   };
+  if (sphere) tables.sphereCells = createSphereCells(tables, sphere);
+  return tables;
 }
