@@ -146,7 +146,7 @@ export function frustumPlanes({ right, up, ahead, width, height, focal }, near) 
  * @param {number} wide
  * @param {number} tall
  */
-export function isOutside(planes, east, north, up, wide, tall) {
+function isOutside(planes, east, north, up, wide, tall) {
   for (let k = 0; k < 5; k++) {
     const [a, b, c, d] = planes[k];
     if (a * east + b * north + c * up + d + (Math.abs(a) + Math.abs(b)) * wide + Math.abs(c) * tall < 0) return true;

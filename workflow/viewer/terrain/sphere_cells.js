@@ -2,7 +2,7 @@
 
 import { RING } from "./cell_ring.js";
 import { REACH } from "./cells.js";
-import { blankCell, frustumPlanes, isOutside, RIM } from "./frustum.js";
+import { blankCell, frustumPlanes, RIM } from "./frustum.js";
 import { directionOf, dot, FACES, QUARTER, rateOf, tangentAt } from "./sphere.js";
 import { columnOf, isCovered, isFrayed, tileOn } from "./sphere_edges.js";
 
@@ -130,9 +130,18 @@ export function createSphereCells(terrain, sphere) {
     const planes = frustumPlanes(camera, terrain.near), overhang = RIM * terrain.largest;
     const sky = acos((radius + low) / far) + acos((radius + low) / (radius + high)) + overhang / radius;
     const tall = Math.max(Math.abs(low), Math.abs(high)), up = eye.map((v) => v / far);
-    const middle = [0, 0, 0], away = [0, 0, 0];
+    const middle = [0, 0, 0], away = [0, 0, 0], norms = planes.map(([a, b, c]) => Math.hypot(a, b, c));
     /** @type {{ face: number, i: number, j: number, nearest: number, farthest: number, spot: Spot }[]} */
     const found = [];
+
+    /** Is a ball wholly outside one plane? @param {number[]} centre @param {number} wide */
+    function isOutside([x, y, z], wide) {
+      for (let k = 0; k < 5; k++) {
+        const plane = planes[k];
+        if (plane[0] * x + plane[1] * y + plane[2] * z + plane[3] + wide * norms[k] < 0) return true;
+      }
+      return false;
+    }
 
     /** @param {number} face @param {number} i @param {number} j @param {number} size */
     function visit(face, i, j, size) {
@@ -142,7 +151,7 @@ export function createSphereCells(terrain, sphere) {
       for (let k = 0; k < 3; k++) away[k] = radius * middle[k] - eye[k];
       const chord = Math.min(STRETCH * Math.SQRT1_2 * size * side * rate, 2), ball = radius * chord + tall;
       const distance = Math.hypot(away[0], away[1], away[2]), wide = ball + overhang;
-      if (distance - ball >= reach || isOutside(planes, away[0], away[1], away[2], wide, wide)) return;
+      if (distance - ball >= reach || isOutside(away, wide)) return;
       const apart = Math.hypot(middle[0] - up[0], middle[1] - up[1], middle[2] - up[2]);
       if (angleOf(apart) - angleOf(chord) > sky) return;
       if (size === 1) {

@@ -8,7 +8,8 @@ const TURN = 70; // degrees a second with the arrow keys
 const RISE = 1.2; // powers of e a second with Q and E
 const CEILING = 16; // highest eye, in tile sides
 const ORBIT = 4; // highest eye over a planet, in radii
-const START = [20, 30]; // longitude and latitude on a planet
+const START = { x: 20, y: 30 }; // longitude and latitude that places on a planet count from
+const YAW = 60;
 const FARTHEST = 1e12; // coordinates beyond have no whole tiles left in double precision
 
 /**
@@ -34,9 +35,10 @@ export const PLACE_KEYS = /** @type {const} */ (["x", "y", "eye", "yaw", "pitch"
  * @returns {Walker}
  */
 export function createWalker({ tile_side: side, eye_floor: floor, heights }, place = {}) {
-  const radius = heights?.kind === "sphere" ? heights.radius : 0, [x, y] = radius ? START : [side / 2, side / 2];
+  const radius = heights?.kind === "sphere" ? heights.radius : 0, half = side / 2;
   const walker = {
-    x, y, eye: floor, yaw: 60, pitch: -12, radius,
+    x: half, y: half, yaw: YAW, ...(radius ? walkOn({ ...START, yaw: YAW }, half, half, radius) : {}), // the stills' walker
+    eye: floor, pitch: -12, radius,
     floor, ceiling: Math.max(CEILING * side, 4 * floor, ORBIT * radius), held: new Set(),
     mode: /** @type {Mode} */ ("walk"),
   };

@@ -13,7 +13,7 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.sphere import FACES, QUARTER, Sphere, directions
 from dav_gswt.terrain.sphere_edges import is_covered, tiles_on
-from dav_gswt.terrain.visibility import GridCells, outside_frustum
+from dav_gswt.terrain.visibility import GridCells, outside_by_ball
 
 CLIMB = 3.0  # times the reach on the ground by which the reach grows with the eye's height, at most
 
@@ -88,12 +88,11 @@ def _find_seen(
     away = radius * middle - eye
     distance = np.linalg.norm(away, axis=1)
     nearest, farthest = np.maximum(distance - ball, 0), distance + ball
-    half = np.repeat((ball + terrain.overhang)[:, None], 3, 1)
     far = float(np.linalg.norm(eye))
     dip, rise = (np.arccos(np.clip((radius + low) / top, -1, 1)) for top in (far, radius + high))
     apart = _angle(np.linalg.norm(middle - eye / far, axis=1)) - _angle(chord) - terrain.overhang / radius
     seen = (nearest < find_reach(terrain, sphere, eye)) & (apart <= dip + rise)
-    return seen & ~outside_frustum(camera, terrain.near, away, half), nearest, farthest
+    return seen & ~outside_by_ball(camera, terrain.near, away, ball + terrain.overhang), nearest, farthest
 
 
 def _angle(chord: Float[Array, "n"]) -> Float[Array, "n"]:

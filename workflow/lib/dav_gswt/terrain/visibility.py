@@ -51,7 +51,7 @@ def visible_cells(terrain: EndlessTerrain, camera: Camera) -> GridCells:
     middle, half = _bound_cells(terrain, i, j, eye)
     nearest, farthest = _bound_distances(middle, half)
     wider = np.array([terrain.overhang, terrain.overhang, 0])
-    seen = (nearest < terrain.reach * side) & ~outside_frustum(camera, terrain.near, middle, half + wider)
+    seen = (nearest < terrain.reach * side) & ~_outside_frustum(camera, terrain.near, middle, half + wider)
     sequence, _ = draw_order.sort_cells(i, j, at)
     sequence = sequence[seen[sequence]]
     i, j = i[sequence], j[sequence]
@@ -101,12 +101,28 @@ def _first_bit(bits: Int64[Array, "n"]) -> Int64[Array, "n"]:
     return np.argmax(bits[:, None] >> np.arange(8) & 1, axis=1)
 
 
-def outside_frustum(
+def _outside_frustum(
     camera: Camera, near: float, middle: Float[Array, "n 3"], half: Float[Array, "n 3"]
 ) -> Bool[Array, "n"]:
     """Which boxes (centre from the eye, half extents) lie wholly outside one plane of the frustum."""
+    planes = _frustum_planes(camera, near)
+    most = middle @ planes[:, :3].T + half @ np.abs(planes[:, :3]).T + planes[:, 3]
+    return np.any(most < 0, axis=1)
+
+
+def outside_by_ball(
+    camera: Camera, near: float, middle: Float[Array, "n 3"], radius: Float[Array, "n"]
+) -> Bool[Array, "n"]:
+    """Which balls (centre from the eye) lie wholly outside one plane of the frustum."""
+    planes = _frustum_planes(camera, near)
+    reach = radius[:, None] * np.linalg.norm(planes[:, :3], axis=1)
+    return np.any(middle @ planes[:, :3].T + reach + planes[:, 3] < 0, axis=1)
+
+
+def _frustum_planes(camera: Camera, near: float) -> Float[Array, "5 4"]:
+    """Near, left, right, upper and lower plane: inward normal and distance."""
     right, down, ahead = camera.rotation
-    planes = np.array(
+    return np.array(
         [
             [*ahead, -near],
             [*(camera.fx * right + (camera.cx + PAD) * ahead), 0],
@@ -115,8 +131,6 @@ def outside_frustum(
             [*((camera.height - camera.cy + PAD) * ahead - camera.fy * down), 0],
         ]
     )
-    most = middle @ planes[:, :3].T + half @ np.abs(planes[:, :3]).T + planes[:, 3]
-    return np.any(most < 0, axis=1)
 
 
 def active_levels(terrain: EndlessTerrain, cells: GridCells) -> Bool[Array, "levels n"]:
