@@ -1,7 +1,7 @@
 // The tour: a flight over the terrain without anybody at the controls. It winds, sinks and rises slowly, stays above what
 // lies ahead, and goes on until somebody touches anything.
 
-import { moveTo } from "./walker.js";
+import { goBy, moveTo } from "./walker.js";
 
 /**
  * @typedef {import("./walker.js").Walker} Walker
@@ -52,10 +52,11 @@ export function createTour() {
       const way = AHEAD.map((later) => surface.at(
         walker.x + later * speed * Math.cos(yaw), walker.y + later * speed * Math.sin(yaw))[0]);
       rise(Math.max(...way) + above, step);
-      const x = walker.x + step * speed * Math.cos(yaw), y = walker.y + step * speed * Math.sin(yaw);
-      z = Math.max(z, surface.at(x, y)[0] + walker.floor);
+      goBy(walker, step * speed * Math.cos(yaw), step * speed * Math.sin(yaw));
+      const [ground] = surface.at(walker.x, walker.y);
+      z = Math.max(z, ground + walker.floor);
       moveTo(walker, {
-        x, y, eye: z - surface.at(x, y)[0], yaw: walker.yaw + turn * share * step,
+        eye: z - ground, yaw: walker.yaw + turn * share * step,
         pitch: begin.pitch + share * (PITCH[0] + height * (PITCH[1] - PITCH[0]) - begin.pitch),
       });
       return true;

@@ -42,6 +42,7 @@ export function listenToXr(viewer) {
 
   async function enter() {
     if (!xr || !viewer.scene || viewer.suspended) return;
+    if (viewer.scene.walker.radius) return hud.say("Virtual reality is not for planets yet.");
     const entered = await xr.requestSession(MODE, { optionalFeatures: ["local-floor"] });
     session = entered;
     viewer.tour.stop();
