@@ -55,7 +55,7 @@ def test_no_ray_meets_a_cell_before_one_that_is_drawn_after_it(longitude, latitu
     points = points[np.linalg.norm(points, axis=1) >= ball.radius - 0.3]
     faces, places = locate(ball, points)
     met = np.concatenate([faces[:, None], np.floor(places).astype(int)], 1)
-    entered = [tuple(int(v) for v in cell) for cell in met[np.r_[True, (np.diff(met, axis=0) != 0).any(1)]]]
+    entered = [(int(f), int(a), int(b)) for f, a, b in met[np.r_[True, (np.diff(met, axis=0) != 0).any(1)]]]
     drawn = [place[cell] for cell in entered if cell not in near]  # those are sorted by depth
     assert drawn == sorted(drawn, reverse=True)
 

@@ -14,7 +14,8 @@ GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "sphere.json").read_
 
 
 def tile(ball, face, i, j, salt=7, variants=2):
-    return int(sphere_edges.tiles_on(ball, *(np.array([v]) for v in (face, i, j)), salt, variants)[0])
+    cell = [np.array([v]) for v in (face, i, j)]
+    return int(sphere_edges.tiles_on(ball, cell[0], cell[1], cell[2], salt, variants)[0])
 
 
 @pytest.mark.parametrize("salt", [0, 7, 2**32 - 1])

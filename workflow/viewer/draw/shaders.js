@@ -175,12 +175,16 @@ vec3 backdrop(vec3 way) {
 
 const SPHERE = `
 uniform vec3 moved;                   // from the eye to that of the frame, whose places count from there
-uniform float radius, rate, stretch; // rate: angle of a unit on a tile; stretch: radius times that
+uniform float radius, rate, stretch, begin; // rate: angle of a unit on a tile; stretch: radius times that
 const mat3 FACES[6] = mat3[6](${FACES.map((axes) => `mat3(${axes.flat().map((v) => v.toFixed(1)).join(", ")})`).join(",\n  ")});
 vec2 tangent(vec2 a) { // of small angles, to single precision; the tan of graphics cards loses them
   vec2 s = a * a;
   return a * (1.0 + s * (1.0 / 3.0 + s * (2.0 / 15.0 + s * (17.0 / 315.0 + s * (62.0 / 2835.0)))));
 }`;
+
+// How far a Gaussian is in the transition of the last tiles into the backdrop.
+const PLANE_GOING = `float going = 1.0 - clamp(2.0 - 2.0 * distance / end, 0.0, 1.0); // smoothstep from half the reach to its end`;
+const SPHERE_GOING = "float going = clamp((distance - begin) / (end - begin), 0.0, 1.0); // from half-way past the ground below";
 
 const SPHERE_CODE = `  if (code >= ${SLOTS}u) place = (code - ${SLOTS}u) / ${MAX_LEVELS}u + 1u;`;
 
@@ -276,7 +280,7 @@ ${kind === "sphere" ? "    axes[k] = bent * axes[k];" : SHEAR}
   float reach = sqrt(2.0 * log(255.0 * opacity)); // beyond it the Gaussian is fainter than 1/255
   at = (vec2(gl_VertexID & 1, gl_VertexID >> 1 & 1) * 2.0 - 1.0) * reach;
   vec2 pixel = focal * p.xy / p.z + at.x * lengths.x * major + at.y * lengths.y * vec2(-major.y, major.x);
-  float going = 1.0 - clamp(2.0 - 2.0 * distance / end, 0.0, 1.0); // smoothstep from half the reach to its end
+  ${kind === "sphere" ? SPHERE_GOING : PLANE_GOING}
   vec3 paint = mix(one.paint.rgb, backdrop(${kind === "sphere" ? "seen / distance" : "seen.z / distance"}), going * going * (3.0 - 2.0 * going));
   if (overlay > 0) {
     uint owner = texelFetch(owners, ivec2(0, int(row / ${ROW}u)), 0).x;

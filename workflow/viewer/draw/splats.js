@@ -141,6 +141,7 @@ export function createSplats(gl, manifest, heights) {
       if (heights.kind === "sphere") {
         setHorizon(gl, uniforms, heights, camera.eye);
         setSphere(gl, uniforms, heights, manifest.tile_side, frame.eye.map((v, k) => v - camera.eye[k]));
+        gl.uniform1f(uniforms.begin, 0.5 * (Math.max(Math.hypot(...camera.eye) - heights.radius, 0) + end));
       }
       gl.uniform1f(uniforms.end, end);
       gl.uniform1f(uniforms.low, low);

@@ -34,21 +34,21 @@ const NEVER = -1; // switch distance of a level that is not used
  */
 export function selectCells(terrain, camera, budget) {
   const { sphere, sphereCells, side } = terrain, above = eyeHeight(terrain, camera);
-  const reach = sphere ? findReach(terrain, sphere, camera.eye) : REACH * side;
+  const least = sphere ? above : 0, reach = sphere ? findReach(terrain, sphere, camera.eye) : REACH * side;
   const cells = sphereCells ? sphereCells(camera, reach) : cellsInFrustum(terrain, camera, reach);
   for (const cell of cells) cell.arrived = arrivedLevels(terrain, cell.tiles);
   /** @param {Distances} distances */
   const cost = (distances) =>
     cells.reduce((sum, cell) => (chooseLevels(terrain, cell, distances) ? sum + cell.count : sum), 0);
-  let distances = distancesAt(terrain, above, reach, 1);
+  let distances = distancesAt(terrain, above, [least, reach], 1);
   if (cost(distances) > budget) {
     let low = Math.log(leastShrink(terrain, above)), high = 0;
     for (let k = 0; k < BISECTIONS; k++) {
       const middle = (low + high) / 2;
-      if (cost(distancesAt(terrain, above, reach, Math.exp(middle))) <= budget) low = middle;
+      if (cost(distancesAt(terrain, above, [least, reach], Math.exp(middle))) <= budget) low = middle;
       else high = middle;
     }
-    distances = distancesAt(terrain, above, reach, Math.exp(low));
+    distances = distancesAt(terrain, above, [least, reach], Math.exp(low));
   }
   const kept = cells.filter((cell) => chooseLevels(terrain, cell, distances));
   return { ...distances, ...nearestCells(kept, budget, distances.reach), missing: missingChunks(terrain, kept) };
@@ -57,17 +57,17 @@ export function selectCells(terrain, camera, budget) {
 /**
  * @param {TerrainTables} terrain
  * @param {number} above height of the eye over the ground
- * @param {number} reach
+ * @param {number[]} reaches under the smallest and under a factor of 1
  * @param {number} shrink
  * @returns {Distances}
  */
-function distancesAt({ switches, bands }, above, reach, shrink) {
+function distancesAt({ switches, bands }, above, [least, reach], shrink) {
   const used = switches.map((distance, l) => shrink === 1 || shrink * (distance + bands[l]) >= above);
   return {
     shrink,
     switches: switches.map((distance, l) => (used[l] ? shrink * distance : NEVER)),
     bands: bands.map((band, l) => (used[l] ? shrink * band : 0)),
-    reach: reach * shrink ** REACH_EXPONENT,
+    reach: least + (reach - least) * shrink ** REACH_EXPONENT,
   };
 }
 

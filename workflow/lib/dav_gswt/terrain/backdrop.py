@@ -28,6 +28,11 @@ class Backdrop:
     end: float
     low: float
 
+    @property
+    def begin(self) -> float:
+        """Distance at which the transition begins."""
+        return FADE * self.end
+
     @staticmethod
     def for_eye(
         terrain: EndlessTerrain, eye: Float[Array, "3"], sky: Sky, ground_colour: Sequence[float] | Array
@@ -50,7 +55,7 @@ class Backdrop:
         """
         to = field.means.astype(float)
         distance = np.linalg.norm(to, axis=1)
-        share = 1 - finer_share(distance, 0.5 * (1 + FADE) * self.end, 0.5 * (1 - FADE) * self.end, True)
+        share = 1 - finer_share(distance, 0.5 * (self.end + self.begin), 0.5 * (self.end - self.begin), True)
         if not share.any():
             return field
         sh = field.sh.copy()

@@ -25,6 +25,11 @@ class SphereBackdrop(Backdrop):
     dip: float
     radius: float
 
+    @property
+    def begin(self) -> float:
+        """Half-way from the ground below to the last tiles."""
+        return 0.5 * (max(float(np.linalg.norm(self.eye)) - self.radius, 0.0) + self.end)
+
     @staticmethod
     def for_eye(
         terrain: EndlessTerrain, eye: Float[Array, "3"], sky: Sky, ground_colour: Sequence[float] | Array
