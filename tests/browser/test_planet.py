@@ -9,6 +9,7 @@ import pytest
 from fixtures.bundles import SKY, Ground
 from fixtures.page_visit import camera_at
 from fixtures.terrains import two_level_terrain
+from playwright.sync_api import Error
 
 from dav_gswt.bundle.manifest import Manifest, Sky
 from dav_gswt.bundle.store import Bundle
@@ -161,3 +162,10 @@ def test_keys_walk_over_the_pole(visit, small):
     state = seen.state
     assert abs((state["x"] - 10) % 360 - 180) < 1e-6 and state["y"] < 90
     assert abs((state["yaw"] + 90) % 360) % 360 == pytest.approx(0, abs=1e-6)
+
+
+def test_other_pages_are_told_that_it_is_a_planet(still, small):
+    with pytest.raises(Error, match="is a planet"):
+        still(small, 160, 100).page.evaluate(
+            "address => import('./terrain_api.js').then(({ load }) => load(address))", small
+        )

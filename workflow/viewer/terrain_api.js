@@ -4,6 +4,7 @@ import { checkCamera } from "./api/arguments.js";
 import { createChunkReader } from "./api/chunks.js";
 import { createGround } from "./api/ground.js";
 import { createPainter } from "./api/painter.js";
+import { PageError } from "./data/errors.js";
 import { openSource } from "./data/open.js";
 import { listDrawnCells, NO_ORDER } from "./scene/drawn_cells.js";
 import { openTerrain, readTerrain } from "./scene/open_terrain.js";
@@ -23,6 +24,7 @@ const BUDGET = 1_000_000; // Gaussians of an update
  */
 export async function load(where, { onProgress, onError = console.error } = {}) {
   const files = await readTerrain(await openSource(where)), { manifest } = files;
+  if (manifest.heights?.kind === "sphere") throw new PageError("This terrain is a planet, which other pages cannot show yet.");
   /** @type {Set<ReturnType<typeof createPainter>>} */
   const painters = new Set();
   /** @type {import("./worker/frame_builder.js").FrameAnswer | null} */

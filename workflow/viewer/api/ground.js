@@ -25,7 +25,7 @@ export function createGround({ manifest, heights, lift }) {
     /** @param {number} x @param {number} y */
     cellAt(x, y) {
       checkNumbers("x, y", [x, y], 2);
-      return tileUnder(manifest, x, y);
+      return tileUnder(manifest, heights, x, y);
     },
     /**
      * @param {ArrayLike<number>} origin
@@ -40,7 +40,7 @@ export function createGround({ manifest, heights, lift }) {
       if (!hit) return null;
       const [x, y] = hit, point = /** @type {[number, number, number]} */ ([x, y, height(x, y)]);
       const distance = Math.hypot(...point.map((v, k) => v - from[k]));
-      return { point, normal: normal(x, y), distance, ...tileUnder(manifest, x, y) };
+      return { point, normal: normal(x, y), distance, ...tileUnder(manifest, heights, x, y) };
     },
   };
 }
