@@ -10,8 +10,9 @@ from pydantic import Field, model_validator
 from dav_gswt.config.base import Auto, ConfigModel, Name, Seed, Share, Text, key
 from dav_gswt.config.load import check_config, check_model
 from dav_gswt.config.model import Policy
-from dav_gswt.config.settings import Flight, Heights, Preset
+from dav_gswt.config.settings import Flight, Heights
 from dav_gswt.errors import InputError
+from dav_gswt.study.config_fits import FitProfile, GainBound, Refits, Seeds
 from dav_gswt.study.seams import replicates
 from dav_gswt.study.sweeps import grid
 from dav_gswt.study.tables import checks
@@ -19,7 +20,6 @@ from dav_gswt.study.tradeoff import settings
 
 FLOOR = "floor"  # in a pair of the forced-choice study: the same place without a seam
 
-Seeds = Annotated[list[Seed], Field(min_length=1)]
 Names = Annotated[list[Name], Field(min_length=1)]
 
 
@@ -143,31 +143,6 @@ class ViewBenchmark(ConfigModel):
     policies: Policies = key("those compared")
     seeds: Seeds = key("which photos start: one start a seed")
     sets: list[PolicySet] = key("scenes, photos a round and photos in all", min_length=1)
-
-
-class FitProfile(Preset):
-    """A fit whose test photos are measured while it runs."""
-
-    margin: float = key("ground fitted around the exemplar, as a share of its side", ge=0, le=100)
-
-
-class Refits(Preset):
-    """`snakemake refits`: photos taken in rounds against one fit to all of them, with the same number of steps."""
-
-    photos: int = key("of the last round, the start included", ge=3, le=100_000)
-    photos_a_round: list[Annotated[int, Field(ge=1, le=1000)]] = key("sizes of rounds that are compared", min_length=1)
-    first_rates: list[Annotated[float, Field(gt=0, le=1)]] = key(
-        "learning rates at the first step of a refit, as shares of a first fit's", min_length=1
-    )
-    seeds: Seeds = key("of fits; the start is that of the first one")
-
-
-class GainBound(Preset):
-    """`snakemake gain_bound`: policies beside the greedy choice of the photo whose refit truly gains most."""
-
-    k: int = key("photos a round", ge=1, le=1000)
-    rounds: int = key("rounds", ge=1, le=100)
-    seeds: Seeds = key("of fits; the start is that of the first one")
 
 
 class Seams(ConfigModel):

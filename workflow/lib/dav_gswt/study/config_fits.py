@@ -1,0 +1,35 @@
+"""Entries of the study's config for fits that are measured by themselves."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from dav_gswt.config.base import Seed, key
+from dav_gswt.config.settings import Preset
+
+Seeds = Annotated[list[Seed], Field(min_length=1)]
+
+
+class FitProfile(Preset):
+    """A fit whose test photos are measured while it runs."""
+
+    margin: float = key("ground fitted around the exemplar, as a share of its side", ge=0, le=100)
+
+
+class Refits(Preset):
+    """`snakemake refits`: photos taken in rounds against one fit to all of them, with the same number of steps."""
+
+    photos: int = key("of the last round, the start included", ge=3, le=100_000)
+    photos_a_round: list[Annotated[int, Field(ge=1, le=1000)]] = key("sizes of rounds that are compared", min_length=1)
+    first_rates: list[Annotated[float, Field(gt=0, le=1)]] = key(
+        "learning rates at the first step of a refit, as shares of a first fit's", min_length=1
+    )
+    seeds: Seeds = key("of fits; the start is that of the first one")
+
+
+class GainBound(Preset):
+    """`snakemake gain_bound`: policies beside the greedy choice of the photo whose refit truly gains most."""
+
+    k: int = key("photos a round", ge=1, le=1000)
+    rounds: int = key("rounds", ge=1, le=100)
+    seeds: Seeds = key("of fits; the start is that of the first one")
