@@ -4,13 +4,6 @@ In: the photos of the scenes of the config's `study.fit_profiles` and `study.ref
 and figures, docs/research/data/refits_{scene}.csv.
 """
 
-
-def first_start(wildcards, table):
-    """The view split of a scene of a study's table, by the first of its seeds."""
-    seed = STUDY[table][wildcards.scene]["seeds"][0]
-    return str(paths.stage_folder("start", {"scene": wildcards.scene, "seed": seed}) / "views.json")
-
-
 CURVES = ["copr_dunes", "desert_high"]  # one real set, one synthetic
 
 

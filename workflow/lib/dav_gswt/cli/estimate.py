@@ -71,7 +71,7 @@ class Work:
     def update_steps(self) -> float:
         """Steps of a fit in a round, the mean over the rounds."""
         if not self.scratch:
-            return self.steps_per_photo * self.new
+            return float(self.steps_per_photo * self.new)
         return self.steps + self.steps_per_photo * self.new * (self.rounds + 1) / 2
 
     @property
