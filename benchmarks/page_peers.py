@@ -26,6 +26,7 @@ from dav_gswt.field import concatenate_fields, write_field
 from dav_gswt.images.metrics import mse_to_psnr
 from dav_gswt.raster import render
 from dav_gswt.study.terrain.browser import FLAGS, chromium_path, served
+from dav_gswt.study.terrain.frames import VISIT
 from dav_gswt.terrain import endless, stills, visibility
 from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.object_placement import group_by_cell
@@ -71,22 +72,6 @@ READ_PEER = """async ({ ahead }) => {
   gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
   return { width, height, pixels: Array.from(pixels) };
 }"""
-TIME_PAGE = """async ({ places, before, budget }) => {
-  const { viewer } = await import("./main.js"), times = [];
-  const gl = document.getElementById("picture").getContext("webgl2"), pixel = new Uint8Array(4);
-  viewer.setPlace(places[0]);
-  await viewer.settle(budget);
-  for (let k = -before; k < places.length; k++) {
-    viewer.setPlace(places[Math.max(k, 0)]);
-    if (viewer.scene.client.idle) viewer.askWorker(budget, false);
-    await new Promise((done) => requestAnimationFrame(done));
-    const start = performance.now();
-    viewer.drawFrame();
-    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
-    if (k >= 0) times.push(performance.now() - start);
-  }
-  return { times, count: viewer.scene.frame.count };
-}"""
 
 
 def main() -> int:
@@ -121,13 +106,13 @@ def compare(bundle: store.Bundle, folder: Path, budget: int) -> None:
         with served(own) as page, serve_plainly(others) as elsewhere:
             for _ in range(ROUNDS):
                 found = time_page(browser, page, place, budget)
-                times["page"] += found["times"]
+                times["page"] += found["render"]
                 for name in OTHERS:
                     times[name] += time_peer(browser, elsewhere, name, place)
             pictures = {name: compare_pictures(read_picture(browser, elsewhere, name, place), still) for name in OTHERS}
         browser.close()
     # of two levels that are cross-faded the page draws all, the others only those that have a weight
-    print(f"{len(field):,} Gaussians by the others, {found['count']:,} by the page, {WIDTH} x {HEIGHT}")
+    print(f"{len(field):,} Gaussians by the others, {found['counts'][-1]:,} by the page, {WIDTH} x {HEIGHT}")
     medians = {name: statistics.median(values) for name, values in times.items()}
     for name, value in medians.items():
         quality = f", {pictures[name]:.1f} dB from the library's picture" if name in pictures else ""
@@ -142,7 +127,8 @@ def time_page(browser, address: str, place: dict, budget: int) -> dict:
     tab.goto(f"{address}?still={budget}#{place['x']},{place['y']},{place['eye']},{place['yaw']},{place['pitch']}")
     tab.evaluate("import('./main.js').then(({ ready }) => ready)")
     places = [place | {"yaw": place["yaw"] + turn} for turn in TURNS]
-    found = tab.evaluate(TIME_PAGE, {"places": places, "before": WARM_UP, "budget": budget})
+    tab.evaluate("budget => import('./main.js').then(({ viewer }) => viewer.settle(budget))", budget)
+    found = tab.evaluate(VISIT, {"places": places, "before": WARM_UP, "budget": budget})
     tab.close()
     return found
 

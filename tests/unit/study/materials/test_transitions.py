@@ -73,19 +73,19 @@ def test_like_borders_are_as_near_and_others_farther(random_weights):
     assert other.low > 0 and other.terrain > 2 * like.terrain
 
 
-def test_materials_that_look_otherwise_everywhere_do_not_count_as_borders(random_weights):
+def test_materials_that_look_otherwise_everywhere_do_so_inside_too(random_weights):
     photographed = stripes(halves())
+    like = transitions.measure_transitions(photographed, stripes(halves(), 1), random_weights, 0)
     rough = transitions.measure_transitions(photographed, stripes(halves(), 1, noise=0.3), random_weights, 0)
-    assert rough.low > 0 and rough.inside > 0
-    assert abs(rough.beyond) < 0.5 * rough.difference
+    assert rough.low > 0 and rough.inside > 0.5 * rough.difference > like.inside
 
 
-def test_borders_that_look_otherwise_count(random_weights):
+def test_borders_that_look_otherwise_are_not_seen_inside(random_weights):
     fringe = stripes(halves(), 1)
     middle = PIXELS * SIDE // 2
     fringe.picture[:, middle - 8 : middle + 8] = [1, 0, 0]
     found = transitions.measure_transitions(stripes(halves()), fringe, random_weights, 0)
-    assert found.beyond_low > 0 and abs(found.inside) < found.beyond
+    assert found.low > 0 and abs(found.inside) < 0.5 * found.difference
 
 
 def test_too_few_photographed_borders_are_refused(random_weights):

@@ -21,7 +21,7 @@ from dav_gswt.reconstruction.coarse import Reconstruction, StartViews, fit_coars
 from dav_gswt.reconstruction.fit_settings import CoarseSettings, UpdateSettings, select_settings
 from dav_gswt.reconstruction.fitting.plan import FitPlan, UpdateReport
 from dav_gswt.reconstruction.fitting.trainer import FitOptions, FitResult
-from dav_gswt.reconstruction.observation import mask_for_fit, observe
+from dav_gswt.reconstruction.observation import mask_for_fit
 from dav_gswt.reconstruction.refinement import RefinementInput, refine_field
 
 
@@ -110,7 +110,7 @@ def refit_from_scratch(
         report = refine_field(given, settings.update, rng.spawn(1)[0]).report
         return isinstance(report, UpdateReport) and bool(report.new_views and report.new_views.taken)
 
-    seen = mask_for_fit(observe(given.frame, grid, photos).views, grid)
+    seen = mask_for_fit(photos, grid)
     plan = coarse.plan_coarse_fit(len(photos))
     update = regression_guard.fit_with_guard(field, field, seen[:count], seen[count:], plan, fit, 0, is_update_accepted)
     if not update.accepted:

@@ -6,7 +6,7 @@ Crops inside the materials, measured alike, say how much of the difference has n
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
@@ -35,7 +35,7 @@ REPLICATES, LEVEL = 2000, 0.95
 class TransitionMeasures:
     """terrain, photographed: mean distances; None without a border. low, high: interval of their difference. crops: how
     many of each. inside: the difference inside the materials, the mean over those that were photographed on enough
-    ground. beyond: the difference at borders less that, and its interval."""
+    ground."""
 
     terrain: float | None = None
     photographed: float | None = None
@@ -45,9 +45,6 @@ class TransitionMeasures:
     terrain_crops: int = 0
     photographed_crops: int = 0
     inside: float | None = None
-    beyond: float | None = None
-    beyond_low: float | None = None
-    beyond_high: float | None = None
 
 
 @dataclass(frozen=True)
@@ -122,27 +119,17 @@ def measure_transitions(
     away, spread = _compare(photographed, terrain, places, _choose(others, rng), weights)
     if not len(spread):
         raise InputError("transitions: all photographed borders overlap each other; take photos of a larger ground")
-    at_borders = _draw_differences(away, spread, rng)
+    difference = float(away.mean() - spread.mean())
+    low, high = bootstrap_difference(away, spread, rng)
     inside = []
     for number in range(int(photographed.material.max()) + 1):
         places, others = (find_insides(each.material, STEP, number) for each in (photographed, terrain))
         if len(places) > NEIGHBOURS and len(others):
-            pair = _compare(photographed, terrain, _choose(places, rng), _choose(others, rng), weights)
-            inside += [_draw_differences(*pair, rng)] if len(pair[1]) else []
-    found = TransitionMeasures(
-        float(away.mean()),
-        float(spread.mean()),
-        at_borders.mean,
-        *at_borders.interval(),
-        len(away),
-        len(spread),
-    )
-    if not inside:
-        return found
-    mean = float(np.mean([each.mean for each in inside]))
-    beyond = _Differences(at_borders.mean - mean, at_borders.drawn - np.mean([each.drawn for each in inside], 0))
-    low, high = beyond.interval()
-    return replace(found, inside=mean, beyond=beyond.mean, beyond_low=low, beyond_high=high)
+            made, own = _compare(photographed, terrain, _choose(places, rng), _choose(others, rng), weights)
+            inside += [made.mean() - own.mean()] if len(own) else []
+    means = float(away.mean()), float(spread.mean())
+    sizes = len(away), len(spread)
+    return TransitionMeasures(*means, difference, low, high, *sizes, float(np.mean(inside)) if inside else None)
 
 
 def _choose(places: Int[Array, "n 2"], rng: np.random.Generator) -> Int[Array, "k 2"]:
@@ -188,22 +175,11 @@ def average_nearest(apart: Float[Array, "n k"], allowed: Bool[Array, "n m"]) -> 
     return np.where(np.isfinite(nearest), nearest, np.nan)
 
 
-@dataclass(frozen=True)
-class _Differences:
-    """A difference of means, and what it is when both are drawn anew."""
-
-    mean: float
-    drawn: Float[Array, "r"]
-
-    def interval(self) -> tuple[float, float]:
-        low, high = np.quantile(self.drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-        return float(low), float(high)
-
-
-def _draw_differences(a: Float[Array, "n"], b: Float[Array, "m"], rng: np.random.Generator) -> _Differences:
-    """mean(a) - mean(b), and REPLICATES of it."""
-    drawn = [
+def bootstrap_difference(a: Float[Array, "n"], b: Float[Array, "m"], rng: np.random.Generator) -> tuple[float, float]:
+    """Interval of mean(a) - mean(b), each drawn anew."""
+    means = [
         a[rng.integers(len(a), size=len(a))].mean() - b[rng.integers(len(b), size=len(b))].mean()
         for _ in range(REPLICATES)
     ]
-    return _Differences(float(a.mean() - b.mean()), np.array(drawn))
+    low, high = np.quantile(means, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    return float(low), float(high)

@@ -5,13 +5,14 @@ differs is the choice alone. `gain` refits the field with each of some candidate
 mean squared error of the test views most: nobody who photographs can do that, and no score can choose better by itself.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
 from numpy import ndarray as Array
 
-from dav_gswt.geometry.poses import pose_of_camera, select_farthest_poses
+from dav_gswt.geometry.poses import Pose, pose_of_camera, select_farthest_poses
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images.lpips_weights import Weights
 from dav_gswt.logs import progress
@@ -22,10 +23,17 @@ from dav_gswt.reconstruction.coarse import Reconstruction, StartViews, fit_coars
 from dav_gswt.reconstruction.fit_settings import CoarseSettings, UpdateSettings
 from dav_gswt.reconstruction.observation import mask_to_ground
 from dav_gswt.reconstruction.refinement import RefinementInput, refine_field
+from dav_gswt.views import policies
+from dav_gswt.views.candidates import camera_positions
 from dav_gswt.views.coverage import DirectionalCoverage, GroundCells, measure_cell_errors
-from dav_gswt.views.greedy import lazy_greedy
+from dav_gswt.views.policies import SelectionInput
+from dav_gswt.views.policy_names import NEEDS_FIELD
+from dav_gswt.views.scores import Scores
 from dav_gswt.views.scoring import scoring_camera
+from dav_gswt.views.uncertainty.weighting import Scales
 
+GAIN = "gain"  # in place of a policy: the choice by true gain
+COMPARED = ("farthest", "random", "coverage-error", GAIN)
 COLUMNS = ("policy", "seed", "round", "photos", *evaluation.MEASURES)
 TRIED = 16  # candidates that `gain` refits with for each photo, spread over the pool
 
@@ -73,28 +81,14 @@ class State:
         return refine_field(given, self.settings.update, np.random.default_rng([*self.seed, earlier]))
 
 
-Chooser = Callable[[State], list[TrainingView]]
-
-
-def choose_farthest(state: State) -> list[TrainingView]:
-    """Each photo the farthest from all before."""
-    return _spread(state, state.taken, state.settings.k)
-
-
-def choose_at_random(state: State) -> list[TrainingView]:
-    """k of the photos that are left."""
-    order = np.random.default_rng([*state.seed, 1]).permutation(len(state.left))
-    return [state.left[i] for i in order[: state.settings.k]]
-
-
-def choose_by_coverage_error(state: State) -> list[TrainingView]:
-    """The default policy: directional coverage, each cell by the field's error in the photos so far."""
-    cells = GroundCells(state.made.field, state.made.grid)
-    corrected = state.pool.frame.kind == "photos"  # photos differ in exposure
-    importance = measure_cell_errors(cells, state.taken, corrected)
-    taken, left = ([scoring_camera(view.camera) for view in views] for views in (state.taken, state.left))
-    gain = DirectionalCoverage(cells, taken, left, importance)
-    return [state.left[i] for i in lazy_greedy(gain.gains(), gain.gain, gain.take, state.settings.k)]
+def choose_by_policy(policy: str, state: State) -> list[TrainingView]:
+    """The k photos that a policy of the rounds chooses."""
+    poses = _describe_poses(state.left, state.pool.frame)
+    scores = Scores(poses, {}, Scales({}), np.zeros(len(poses), int))
+    information = _measure_coverage(state) if policy in NEEDS_FIELD else None
+    places = _list_places(state.taken, state.pool.frame)
+    inputs = SelectionInput(places, state.settings.k, np.random.default_rng([*state.seed, 1]), information=information)
+    return [state.left[i] for i in policies.POLICIES[policy](scores, inputs)]
 
 
 def choose_by_gain(state: State) -> list[TrainingView]:
@@ -112,14 +106,6 @@ def choose_by_gain(state: State) -> list[TrainingView]:
     return chosen
 
 
-POLICIES: dict[str, Chooser] = {
-    "farthest": choose_farthest,
-    "random": choose_at_random,
-    "coverage-error": choose_by_coverage_error,
-    "gain": choose_by_gain,
-}
-
-
 def measure_error(made: Reconstruction, tests: list[TrainingView]) -> float:
     """Mean squared error of the test views over the ground that counts."""
     errors, pixels = 0.0, 0.0
@@ -131,7 +117,7 @@ def measure_error(made: Reconstruction, tests: list[TrainingView]) -> float:
 
 
 def compare_choices(
-    pool: Pool, settings: BoundSettings, seeds: Sequence[int], policies: Sequence[str] = tuple(POLICIES)
+    pool: Pool, settings: BoundSettings, seeds: Sequence[int], compared: Sequence[str] = COMPARED
 ) -> list[dict]:
     """A row of COLUMNS for the first fit, and for every policy and round; the first fit has no policy."""
     rows = []
@@ -139,11 +125,11 @@ def compare_choices(
         start = StartViews(pool.frame, pool.start, pool.points, pool.colours, pool.margin)
         first = fit_coarse_field(start, settings.coarse, np.random.default_rng(seed))
         rows.append(_describe(pool, settings, first, {"seed": seed, "round": 0, "photos": len(pool.start)}))
-        for policy in policies:
+        for policy in compared:
             made, taken, left = first, list(pool.start), list(pool.photos)
             for t in range(1, settings.rounds + 1):
                 state = State(pool, settings, made, taken, left, (seed, t))
-                new = POLICIES[policy](state)
+                new = choose_by_gain(state) if policy == GAIN else choose_by_policy(policy, state)
                 made = state.refit(new)
                 taken, left = taken + new, [view for view in left if all(view is not other for other in new)]
                 case = {"policy": policy, "seed": seed, "round": t, "photos": len(taken)}
@@ -151,12 +137,28 @@ def compare_choices(
     return rows
 
 
+def _measure_coverage(state: State) -> DirectionalCoverage:
+    """What `coverage-error` reads."""
+    cells = GroundCells(state.made.field, state.made.grid)
+    corrected = state.pool.frame.kind == "photos"  # photos differ in exposure
+    taken, left = ([scoring_camera(view.camera) for view in views] for views in (state.taken, state.left))
+    return DirectionalCoverage(cells, taken, left, measure_cell_errors(cells, state.taken, corrected))
+
+
 def _spread(state: State, taken: list[TrainingView], count: int) -> list[TrainingView]:
     """Photos that are left, each the farthest from all before."""
     frame = state.pool.frame
-    poses = [pose_of_camera(view.name, view.camera, frame) for view in state.left]
-    places = np.array([view.camera.centre - frame.exemplar.centre for view in taken])
-    return [state.left[i] for i in select_farthest_poses(poses, count, places)]
+    chosen = select_farthest_poses(_describe_poses(state.left, frame), count, _list_places(taken, frame))
+    return [state.left[i] for i in chosen]
+
+
+def _describe_poses(views: list[TrainingView], frame: SceneFrame) -> list[Pose]:
+    return [pose_of_camera(view.name, view.camera, frame) for view in views]
+
+
+def _list_places(views: list[TrainingView], frame: SceneFrame) -> Float[Array, "n 3"]:
+    """Relative to the exemplar's middle."""
+    return camera_positions([view.camera for view in views], frame)
 
 
 def _describe(pool: Pool, settings: BoundSettings, made: Reconstruction, case: dict) -> dict:
