@@ -5,6 +5,7 @@ import shutil
 
 import numpy as np
 import pytest
+from fixtures import bundles
 from fixtures.land_covers import cover_content, write_cover_bundle
 
 from dav_gswt.bundle import store
@@ -15,6 +16,7 @@ from dav_gswt.field import read_field
 from dav_gswt.terrain import endless
 from dav_gswt.terrain.heights import Hills
 from dav_gswt.terrain.page import write_page
+from dav_gswt.terrain.sphere import make_sphere
 from dav_gswt.tiles.store import write_material_tiles
 
 HILLS = Hills(2.0, 30.0, 3, 5)
@@ -107,6 +109,18 @@ def test_what_makes_no_sense_is_one_line_and_writes_nothing(result, tmp_path, ca
     assert run(result, *arguments, "-o", tmp_path / "out") == 1
     told = capsys.readouterr().err
     assert said in told and told.count("\n") == 1 and "export." not in told.replace("export: ", "")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["glb", "ground"])
+def test_a_planet_is_refused_and_not_written_as_level_ground(result, root, tmp_path, capsys, name):
+    bundle = tmp_path / "scene/tiles_auto/bundle_tau0.6"
+    bundles.write_bundle(bundle, bundles.Ground())
+    for part in ("tiles", "seams.json"):
+        (bundle.parent / part).symlink_to(result / "tiles_auto" / part)
+    write_page(bundle, root / "workflow/viewer", bundle / "terrain/page", make_sphere(10.0, bundles.Ground().side))
+    assert run(tmp_path / "scene", "--format", name, "-o", tmp_path / "out") == 1
+    assert "choose another surface than `sphere`" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 

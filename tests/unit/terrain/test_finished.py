@@ -71,6 +71,7 @@ def test_a_picture_of_materials_comes_from_the_page(page_of, tmp_path):
         ({"file": "nowhere.bin"}, "missing"),
         ({"sha256": "0" * 64}, "damaged"),
         ({"kind": "hills"}, "make no sense"),
+        ({"kind": "torus"}, "is not one of"),
     ],
 )
 def test_what_is_damaged_is_named(page_of, changes, said):

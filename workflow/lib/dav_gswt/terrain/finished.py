@@ -15,6 +15,7 @@ from dav_gswt.terrain.class_rules import Picture
 from dav_gswt.terrain.endless import EndlessTerrain, terrain_from_fields
 from dav_gswt.terrain.heights import FlatSurface, HeightField, HeightMap, Hills
 from dav_gswt.terrain.page import MAX_SIDE
+from dav_gswt.terrain.sphere import Sphere
 
 
 def terrain_from_page(bundle: Bundle) -> EndlessTerrain:
@@ -24,18 +25,23 @@ def terrain_from_page(bundle: Bundle) -> EndlessTerrain:
     """
     manifest, levels = bundle.manifest, range(len(bundle.manifest.levels))
     objects = [[bundle.object_chunk(k, level)[0] for level in levels] for k in range(len(manifest.objects or []))]
-    surface = read_surface(bundle.folder, manifest.heights or {"kind": "flat"})
+    surface = read_surface(bundle.folder, manifest.heights or {"kind": "flat"}, manifest.tile_side)
     return terrain_from_fields(bundle.fields(), manifest, surface, objects, read_pictures(bundle))
 
 
-def read_surface(folder: Path, entry: Mapping[str, Any]) -> HeightField:
-    """The other end of `page.describe_surface`. Raises: InputError: as `terrain_from_page`, or the entry is unknown."""
+def read_surface(folder: Path, entry: Mapping[str, Any], side: float) -> HeightField:
+    """The other end of `page.describe_surface`. side: of a tile.
+
+    Raises: InputError: as `terrain_from_page`, or the entry is unknown.
+    """
     try:
         if entry["kind"] == "hills":
             size = float(entry["height"]), float(entry["wavelength"])
             return Hills(*size, int(entry["octaves"]), int(entry["salt"]))
         if entry["kind"] == "image":
             return _read_height_map(folder, entry, int(entry["rows"]), int(entry["columns"]), float(entry["width"]))
+        if entry["kind"] == "sphere":
+            return Sphere(float(entry["radius"]), side, int(entry["cells"]))
     except (KeyError, TypeError, ValueError) as error:
         why = summarize_error(error)
         raise InputError(f"{folder / NAME}: heights make no sense ({why}); make the page again") from error
