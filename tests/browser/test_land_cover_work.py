@@ -74,8 +74,8 @@ COUNT = """async () => {
 FORGET = """async () => {
   const { createBorders } = await import("./worker/borders.js");
   const centres = new Float32Array(300), store = { get: () => ({ centres, count: 100 }) };
-  const classes = { keep: () => new Uint32Array(50) };
-  const borders = createBorders({ classes, each: 16 }, store, 1000); // bytes: room for five lists
+  const keeper = { keep: () => new Uint32Array(50) };
+  const borders = createBorders({ keeper, each: 16 }, store, 1000); // bytes: room for five lists
   const cells = Array.from({ length: 8 }, (_, i) => ({ i, j: 0, serial: i, kept: new Map(), last: null, batch: null }));
   const held = () => cells.map(({ kept }) => kept.size);
   for (const cell of cells) borders.keep(cell, 0, 0);
