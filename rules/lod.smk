@@ -18,7 +18,7 @@ rule make_levels:
         "<logs>/<levels>/make_levels.log",
     benchmark:
         "<benchmarks>/<levels>/make_levels.tsv"
-    threads: 2
+    threads: 1  # it has little work for a second one
     resources:
         mem_mb=per_attempt(2000),
         runtime=per_attempt("30m"),

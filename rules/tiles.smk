@@ -20,7 +20,7 @@ rule cut_tiles:
         "<benchmarks>/<tiles>/cut_tiles.tsv"
     wildcard_constraints:
         tiling=PLAIN_TILING,
-    threads: 2
+    threads: 1  # it has little work for a second one
     resources:
         mem_mb=per_attempt(2000),
         runtime=per_attempt("20m"),

@@ -25,7 +25,7 @@ rule score_coarse:
         "<logs>/<scored>/score_coarse.log",
     benchmark:
         "<benchmarks>/<scored>/score_coarse.tsv"
-    threads: 2
+    threads: lambda wildcards: 1 if wildcards.prior == "none" else 2  # a prior works in parallel
     resources:
         mem_mb=lambda wildcards, attempt: (1000 if wildcards.prior == "none" else 3000) * attempt,
         runtime=per_attempt("60m"),

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+import torch
 from fixtures.backend_scenes import SCENES, answers, blend_weights
 from fixtures.raster_scenes import CAMERAS, NAMES, gaussians, image_gradients, oracle_answers, relative
 
-from dav_gswt.raster import cpu, harmonics
+from dav_gswt.raster import cpu, harmonics, oracle
 
 
 @pytest.mark.parametrize("view", CAMERAS)
@@ -169,3 +170,18 @@ def test_splats_that_reach_in_from_outside_are_not_left_out(isa, view, antialias
     found = raster.backward(*gradients)
     for name in NAMES:
         assert relative(getattr(found, name), wanted[name]) < 2e-5, name
+
+
+def test_no_pixel_of_a_thin_or_tilted_splat_is_left_out(raster):
+    """Blocks of pixels that a splat's ellipse does not meet are skipped: none with a pixel inside may be."""
+    arrays, camera = gaussians(400), CAMERAS["pinhole"]
+    rng = np.random.default_rng(11)
+    arrays["log_scales"] = rng.uniform(np.log(1e-3), np.log(2.0), (400, 3)).astype(np.float32)
+    arrays["opacity_logits"] = rng.uniform(-5, -3, 400).astype(np.float32)  # so faint that no pixel is ever full
+    tensors = {name: torch.tensor(values, dtype=torch.float64) for name, values in arrays.items()}
+    view = oracle.move_camera(camera, None, tensors["means"])
+    splats = oracle.project(**tensors, camera=camera, view=view)
+    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
+    wanted = int((oracle.weights(splats, torch.as_tensor(np.stack([x.ravel(), y.ravel()], 1))) > 0).sum())
+    raster.forward(**arrays, camera=camera)
+    assert wanted > 10_000 and abs(raster.count_pairs() - wanted) <= 1e-4 * wanted

@@ -60,15 +60,16 @@ def _find_kept(
     known, classes = terrain.kept, terrain.classes
     assert classes is not None
     if len(known) > KEPT:
-        known.clear()
-    missing = [place for place in fields if (*cell, *place) not in known]
+        known.clear()  # other threads hold what they have found
+    found = {place: rows for place in fields if (rows := known.get((*cell, *place))) is not None}
+    missing = [place for place in fields if place not in found]
     if missing:
         sizes = [len(fields[place]) for place in missing]
         means = np.concatenate([fields[place].means for place in missing])
         stays = classes.keep(*cell, means, np.repeat([material for _, material in missing], sizes))
         for place, part in zip(missing, np.split(stays, np.cumsum(sizes)[:-1]), strict=True):
-            known[(*cell, *place)] = np.flatnonzero(part)
-    return {place: known[(*cell, *place)] for place in fields}
+            found[place] = known[(*cell, *place)] = np.flatnonzero(part)
+    return found
 
 
 def place_gaussians(

@@ -1,6 +1,7 @@
 """Stills of the endless terrain: rendered tile by tile as the viewer does, over a sky and a far ground."""
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,9 +9,11 @@ from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.bundle.manifest import Manifest, Sky
+from dav_gswt.field import GaussianField
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.terrain import splats
+from dav_gswt.terrain.displacement import Slope
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.ground_mapping import camera_on, mapping_of
 from dav_gswt.terrain.object_placement import group_by_cell
@@ -22,6 +25,9 @@ from dav_gswt.terrain.visibility import (
     count_gaussians,
     drop_far_cells,
 )
+from dav_gswt.threads import default_threads
+
+TOGETHER = 64  # cells that are placed, then projected: what lies between the two is held
 
 
 @dataclass(frozen=True)
@@ -112,13 +118,23 @@ def render_view(
         things = group_by_cell(terrain, cells, eye)
     backdrop = ground.make_backdrop(eye, sky, ground_colour)
     far, close = [splats.EMPTY], [splats.EMPTY]
-    for k in range(len(cells)):
-        with timing.measure("update"):
-            field, slope = ground.place_cell(terrain, cells[k : k + 1], eye, things.get(k))
-        with timing.measure("render"):
-            part = splats.project(backdrop.blend_far(field), slope, here, terrain.near)
-        (close if exact or cells.close[k] else far).append(part)
-        timing.gaussians += len(field)
+
+    def place(k: int) -> tuple[GaussianField, Slope]:
+        return ground.place_cell(terrain, cells[k : k + 1], eye, things.get(k))
+
+    def project(placed: tuple[GaussianField, Slope]) -> splats.Splats:
+        return splats.project(backdrop.blend_far(placed[0]), placed[1], here, terrain.near)
+
+    with ThreadPoolExecutor(default_threads()) as pool:  # NumPy works beside itself; each cell is on its own
+        for first in range(0, len(cells), TOGETHER):
+            numbers = range(first, min(first + TOGETHER, len(cells)))
+            with timing.measure("update"):
+                placed = list(pool.map(place, numbers))
+            with timing.measure("render"):
+                parts = list(pool.map(project, placed))
+            for k, part in zip(numbers, parts, strict=True):
+                (close if exact or cells.close[k] else far).append(part)
+            timing.gaussians += sum(len(field) for field, _ in placed)
     with timing.measure("sort"):
         ordered = splats.concatenate_splats([*far, splats.sort_by_depth(splats.concatenate_splats(close))])
     with timing.measure("render"):

@@ -5,6 +5,7 @@ import logging
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 from scipy.special import expit
 
@@ -47,7 +48,11 @@ def find_below_ground(centres: Float[Array, "n 3"], grid: Ground) -> Bool[Array,
 
 def find_inside_objects(centres: Float[Array, "n 3"], field: GaussianField) -> Bool[Array, "n"]:
     """Which positions are within one standard deviation of a solid Gaussian's centre."""
-    solid = expit(field.opacity_logits) >= SOLID
+    solid = np.flatnonzero(expit(field.opacity_logits) >= SOLID)
+    reach = np.exp(field.log_scales[solid].max(1).astype(float))
+    # most Gaussians reach no position at all: they are left out before each position looks at the others
+    apart, _ = cKDTree(centres).query(field.means[solid], distance_upper_bound=2 * reach.max(initial=1e-30))
+    solid = solid[np.asarray(apart) <= 1.01 * reach]
     means, scales = field.means[solid].astype(float), np.exp(field.log_scales[solid].astype(float))
     found = np.zeros(len(centres), bool)
     for i, centre in enumerate(centres):

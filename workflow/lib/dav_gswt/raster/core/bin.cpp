@@ -123,6 +123,7 @@ void Binning::distribute(const Splat* splats, int threads) {
   tile_of_slot_.resize(total);
   splat_.resize(total);
   slot_.resize(total);
+  blocks_.resize(total);
   first_.resize(tiles + 1);
 #pragma omp parallel for num_threads(threads) schedule(static)
   for (ptrdiff_t i = 0; i < ptrdiff_t(n); i++)

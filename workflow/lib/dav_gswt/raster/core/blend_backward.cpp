@@ -39,35 +39,43 @@ static void backward_tile(const Splat* splats, const Tiles& tiles, const Images&
     behind[b][lane] = sum;
   });
 
-  auto blend_back = [&](uint32_t place, const Splat& s, Blocks blocks) {
-    const TileSplat tile_splat(frame, s);
-    Lanes record[SIZE] = {};
-    for (; blocks; blocks &= blocks - 1) {
-      const int b = __builtin_ctzll(blocks);
-      const Lanes clear = transmittance[b];
-      BlendSample sample;
-      blend_block(frame, tile_splat, b, transmittance[b], sample);
+  Lanes weight[BATCH * BLOCKS], by_alpha[BATCH * BLOCKS];  // by pair: blend weight, and v = dL / d ln alpha
+  auto blend_back = [&](uint32_t place, const Batch& batch) {
+    for (int pair = 0; pair < batch.pairs[batch.count]; pair++) {
+      const int b = batch.block[pair];
+      const Splat& s = splats[tiles.splat[place + batch.splat[pair]]];
+      const Lanes alpha = batch.alpha[pair], clear = transmittance[b];
+      weight[pair] = take(alpha, transmittance[b]);
       Lanes share = C ? colour[0][b] * s.colour[0] : all(0);
       for (int c = 1; c < C; c++) share += colour[c][b] * s.colour[c];
       if (DEPTH) share += depth[b] * s.depth;
-      const Lanes rest = behind[b] - sample.weight * share;
+      const Lanes rest = behind[b] - weight[pair] * share;
       behind[b] = rest;
-      const Lanes v =
-          where(sample.on & sample.unclamped, sample.alpha * (clear * share - rest * reciprocal(1.f - sample.alpha)));
-      const Lanes vx = v * sample.dx, vy = v * sample.dy;
-      record[0] += v;
-      record[1] += vx;
-      record[2] += vy;
-      record[3] += vx * sample.dx;
-      record[4] += vx * sample.dy;
-      record[5] += vy * sample.dy;
-      for (int c = 0; c < C; c++) record[MOMENTS + c] += sample.weight * colour[c][b];
-      if (DEPTH) record[MOMENTS + C] += sample.weight * depth[b];
+      const Mask moves = below(all(0), weight[pair]) & below(alpha, all(ALPHA_MAX));
+      by_alpha[pair] = where(moves, alpha * (clear * share - rest * reciprocal(1.f - alpha)));
     }
-    store_sums<SIZE>(records + (size_t)tiles.slot[place] * SIZE, record);
+    for (int k = 0; k < batch.count; k++) {
+      const TileSplat s = batch.splats[k];
+      Lanes record[SIZE] = {};
+      for (int pair = batch.pairs[k]; pair < batch.pairs[k + 1]; pair++) {
+        const int b = batch.block[pair];
+        const Lanes dx = offset_x(frame, s, b), dy = offset_y(frame, s, b);
+        const Lanes v = by_alpha[pair], vx = v * dx, vy = v * dy;
+        record[0] += v;
+        record[1] += vx;
+        record[2] += vy;
+        record[3] += vx * dx;
+        record[4] += vx * dy;
+        record[5] += vy * dy;
+        for (int c = 0; c < C; c++) record[MOMENTS + c] += weight[pair] * colour[c][b];
+        if (DEPTH) record[MOMENTS + C] += weight[pair] * depth[b];
+      }
+      store_sums<SIZE>(records + (size_t)tiles.slot[place + k] * SIZE, record);
+    }
   };
-  auto skip = [&](uint32_t place) { memset(records + (size_t)tiles.slot[place] * SIZE, 0, 4 * SIZE); };
-  for_each_splat(frame, splats, tiles, tile, transmittance, blend_back, skip);
+  const uint32_t end = tiles.first[tile + 1];
+  for (uint32_t place = for_each_batch(frame, splats, tiles, tile, transmittance, blend_back); place < end; place++)
+    memset(records + (size_t)tiles.slot[place] * SIZE, 0, 4 * SIZE);
 }
 
 template <int C>

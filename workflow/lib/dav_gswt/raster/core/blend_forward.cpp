@@ -17,15 +17,14 @@ static void blend_tile(const Splat* splats, const Tiles& tiles, const Images& im
 
   auto blend = [&](uint32_t, const Splat& s, Blocks blocks) {
     const TileSplat tile_splat(frame, s);
-    BlendSample sample;
     for (; blocks; blocks &= blocks - 1) {
       const int b = __builtin_ctzll(blocks);
-      blend_block(frame, tile_splat, b, transmittance[b], sample);
-      for (int c = 0; c < C; c++) colour[c][b] += sample.weight * s.colour[c];
-      depth[b] += sample.weight * s.depth;
+      const Lanes weight = take(alpha_of(frame, tile_splat, b), transmittance[b]);
+      for (int c = 0; c < C; c++) colour[c][b] += weight * s.colour[c];
+      depth[b] += weight * s.depth;
     }
   };
-  for_each_splat(frame, splats, tiles, tile, transmittance, blend, [](uint32_t) {});
+  for_each_splat(splats, tiles, tile, transmittance, blend);
 
   frame.each_pixel([&](int b, int lane, size_t pixel) {
     float* to = images.colour + pixel * images.channels + images.channel;

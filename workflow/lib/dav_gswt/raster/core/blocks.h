@@ -13,8 +13,10 @@ constexpr int BLOCK_HEIGHT = LANES / BLOCK_WIDTH;
 constexpr int BLOCKS_ACROSS = TILE / BLOCK_WIDTH;
 constexpr int BLOCKS_DOWN = TILE / BLOCK_HEIGHT;
 constexpr int BLOCKS = BLOCKS_ACROSS * BLOCKS_DOWN;
+constexpr int ROWS_AT_ONCE = LANES < BLOCKS_DOWN ? LANES : BLOCKS_DOWN;  // of blocks: their bits fill at most 32
+constexpr int BATCH = 16;  // splats between two checks which blocks are still alive
 constexpr int PREFETCH_AHEAD = 6;  // splats between the blended one and the prefetched one
-constexpr int CHECK_EVERY = 16;  // splats between two checks which blocks are still alive
+constexpr float LARGEST = 1e4f;  // half side of a box in pixels beyond which rounding is more than a pixel's part
 
 typedef uint64_t Blocks;  // a bit for each
 static_assert(BLOCKS <= 64, "a bit for each");
@@ -23,6 +25,8 @@ struct TileFrame {
   int left, top;  // pixels
   const Images& images;
   Lanes x[BLOCKS_ACROSS], y[BLOCKS_DOWN];  // pixel centres from the tile's corner
+  Lanes first_row[BLOCKS_DOWN / ROWS_AT_ONCE], last_row[BLOCKS_DOWN / ROWS_AT_ONCE];  // y of each row of blocks, as lanes
+  Whole row_shift;  // where a row's bits begin
 
   TileFrame(int tile, const Tiles& tiles, const Images& of)
       : left(tile % tiles.columns * TILE), top(tile / tiles.columns * TILE), images(of) {
@@ -30,6 +34,13 @@ struct TileFrame {
       for (int l = 0; l < LANES; l++) x[c][l] = c * BLOCK_WIDTH + l % BLOCK_WIDTH + 0.5f;
     for (int r = 0; r < BLOCKS_DOWN; r++)
       for (int l = 0; l < LANES; l++) y[r][l] = r * BLOCK_HEIGHT + l / BLOCK_WIDTH + 0.5f;
+    for (int l = 0; l < LANES; l++) {
+      row_shift[l] = l < ROWS_AT_ONCE ? l * BLOCKS_ACROSS : 0;
+      for (int w = 0; w < BLOCKS_DOWN / ROWS_AT_ONCE; w++) {
+        first_row[w][l] = l < ROWS_AT_ONCE ? (w * ROWS_AT_ONCE + l) * BLOCK_HEIGHT + 0.5f : 1e9f;  // met by none
+        last_row[w][l] = first_row[w][l] + (BLOCK_HEIGHT - 1);
+      }
+    }
   }
 
   // Calls f(block, lane, pixel) for every pixel of the tile that lies in the image.
@@ -64,7 +75,7 @@ static inline Blocks lowest(int count) { return count >= 64 ? ~Blocks(0) : (Bloc
 static inline int clamp_to_tile(int pixel) { return pixel < 0 ? 0 : pixel > TILE - 1 ? TILE - 1 : pixel; }
 
 // The blocks that the splat's box meets. The box meets the tile, else the splat were not in its list.
-static inline Blocks blocks_met(const TileFrame& frame, const Splat& s) {
+static inline Blocks blocks_in_box(const TileFrame& frame, const Splat& s) {
   const int left = clamp_to_tile(s.left - frame.left) / BLOCK_WIDTH;
   const int right = clamp_to_tile(s.right - frame.left) / BLOCK_WIDTH;
   const int top = clamp_to_tile(s.top - frame.top) / BLOCK_HEIGHT;
@@ -74,54 +85,137 @@ static inline Blocks blocks_met(const TileFrame& frame, const Splat& s) {
   return columns & lowest((bottom + 1) * BLOCKS_ACROSS) & ~lowest(top * BLOCKS_ACROSS);
 }
 
-// A splat relative to one tile, its values in all lanes.
-struct TileSplat {
-  Lanes x, y, xx, xy, yy, log2_opacity;
-  TileSplat(const TileFrame& frame, const Splat& s)
-      : x(all(s.x - frame.left)), y(all(s.y - frame.top)), xx(all(s.xx)), xy(all(s.xy)), yy(all(s.yy)),
-        log2_opacity(all(s.log2_opacity)) {}
-};
-
-// A splat blended over one block: the pixels that take it (`on`), its alpha there, its blend weight (0 elsewhere).
-struct BlendSample {
-  Lanes dx, dy, alpha, weight;
-  Mask on, unclamped;
-};
-
-// Blends a splat over a block. A fifth of the blocks are not reached (a corner of the splat's box), but a branch that
-// skips them is mispredicted too often to pay.
-static inline void blend_block(const TileFrame& frame, const TileSplat& s, int block, Lanes& transmittance,
-                               BlendSample& t) {
-  t.dx = frame.x[block % BLOCKS_ACROSS] - s.x;
-  t.dy = frame.y[block / BLOCKS_ACROSS] - s.y;
-  const Lanes log2_alpha = (s.xx * t.dx + s.xy * t.dy) * t.dx + (s.yy * t.dy * t.dy + s.log2_opacity);
-  const Mask reached = at_least(log2_alpha, all(-LOG2_255));
-  const Lanes clear = transmittance;
-  const Lanes alpha = exp2(clamp(log2_alpha, -8, 0));  // above 0 only by cancellation, far out along a needle
-  t.unclamped = below(alpha, all(ALPHA_MAX));
-  t.alpha = min(alpha, all(ALPHA_MAX));
-  const Lanes weight = t.alpha * clear, rest = clear - weight;
-  t.on = reached & at_least(rest, all(CLEAR_MIN));  // never a saturated pixel: its rest is negative
-  t.weight = where(t.on, weight);
-  transmittance = select(t.on, rest, select(reached, negative(clear), clear));
+// The bits of all lanes together.
+static inline uint32_t any_bits(Whole lanes) {
+  uint64_t pairs[LANES / 2], bits = 0;
+  memcpy(pairs, &lanes, sizeof lanes);
+  for (int l = 0; l < LANES / 2; l++) bits |= pairs[l];
+  return uint32_t(bits | bits >> 32);
 }
 
-// Goes over a tile's splats from front to back: at(place, splat, blocks) for each, with the blocks that it meets, then
-// skip(place) for the rest once all pixels are saturated.
-template <class At, class Skip>
-static inline void for_each_splat(const TileFrame& frame, const Splat* splats, const Tiles& tiles, int tile,
-                                  const Lanes* transmittance, At at, Skip skip) {
+// The blocks with a pixel centre within the splat's ellipse alpha >= ALPHA_MIN, and now and then one more: never one too
+// few. In half sides of its box the ellipse's x at height t is r t +- sqrt((1 - r^2)(1 - t^2)), r: `correlation`; over
+// an interval of t the extremes lie at its ends, or are +-1 where it holds +-r. A lane is a row of blocks.
+static inline Blocks blocks_in_ellipse(const TileFrame& frame, const Splat& s) {
+  constexpr float SLACK = 1e-6f, MARGIN = 1e-3f;  // for rounding: of squares, and in blocks
+  const float r = s.correlation, per_y = 1 / s.half_y, wide = s.half_x * (1.f / BLOCK_WIDTH), y = s.y - frame.top;
+  const Lanes narrow = all((1 - r) * (1 + r) + SLACK), middle = all((s.x - frame.left - 0.5f) * (1.f / BLOCK_WIDTH));
+  Blocks found = 0;
+  for (int word = 0; word < BLOCKS_DOWN / ROWS_AT_ONCE; word++) {
+    const Lanes from = max((frame.first_row[word] - y) * per_y, all(-1));
+    const Lanes to = min((frame.last_row[word] - y) * per_y, all(1));
+    const Lanes wide_from = sqrt(max(narrow * (1.f - from * from) + SLACK, all(0)));
+    const Lanes wide_to = sqrt(max(narrow * (1.f - to * to) + SLACK, all(0)));
+    Lanes high = max(r * from + wide_from, r * to + wide_to), low = min(r * from - wide_from, r * to - wide_to);
+    high = select(at_least(all(r), from) & at_least(to, all(r)), all(1), high);
+    low = select(at_least(all(-r), from) & at_least(to, all(-r)), all(-1), low);
+    // truncated: the first block with a pixel centre right of the low end, and the first one beyond the high end
+    const Lanes first = clamp(middle + (wide * low + (1.f / BLOCK_WIDTH - MARGIN)), 0, BLOCKS_ACROSS);
+    const Lanes beyond = clamp(middle + (wide * high + (1 + MARGIN)), 0, BLOCKS_ACROSS);
+    const Whole one = Whole{} + 1;
+    const Whole bits = (one << __builtin_convertvector(beyond, Whole)) - (one << __builtin_convertvector(first, Whole));
+    const Whole rows = (bits & (Whole)(from <= to)) << frame.row_shift;
+    found |= Blocks(any_bits(rows)) << (32 * word);
+  }
+  return found;
+}
+
+static inline Blocks blocks_met(const TileFrame& frame, const Splat& s) {
+  return s.half_x < LARGEST && s.half_y < LARGEST ? blocks_in_ellipse(frame, s) : blocks_in_box(frame, s);
+}
+
+// A splat relative to one tile.
+struct TileSplat {
+  float x, y, xx, xy, yy, log2_opacity;
+  TileSplat() = default;
+  TileSplat(const TileFrame& frame, const Splat& s)
+      : x(s.x - frame.left), y(s.y - frame.top), xx(s.xx), xy(s.xy), yy(s.yy), log2_opacity(s.log2_opacity) {}
+};
+
+// A batch of a tile's splats, and a pair for each block that one of them meets, splat by splat. The backward pass goes over
+// the pairs once for each of its steps: in one loop their results would wait for each other, and sums leave registers.
+struct Batch {
+  int count, pairs[BATCH + 1];  // splats, and where the pairs of each begin
+  TileSplat splats[BATCH];
+  uint8_t block[BATCH * BLOCKS], splat[BATCH * BLOCKS];
+  Lanes alpha[BATCH * BLOCKS];  // 0 where it is below ALPHA_MIN
+};
+
+// Pixel centres of a block from a splat's centre.
+static inline Lanes offset_x(const TileFrame& frame, const TileSplat& s, int block) {
+  return frame.x[block % BLOCKS_ACROSS] - s.x;
+}
+static inline Lanes offset_y(const TileFrame& frame, const TileSplat& s, int block) {
+  return frame.y[block / BLOCKS_ACROSS] - s.y;
+}
+
+// A splat's alpha at a block's pixels; 0 where it is below ALPHA_MIN.
+static inline Lanes alpha_of(const TileFrame& frame, const TileSplat& s, int block) {
+  const Lanes dx = offset_x(frame, s, block), dy = offset_y(frame, s, block);
+  const Lanes log2_alpha = (s.xx * dx + s.xy * dy) * dx + (s.yy * dy * dy + s.log2_opacity);
+  // above 0 only by cancellation, far out along a needle
+  const Lanes alpha = min(exp2(clamp(log2_alpha, -8, 0)), all(ALPHA_MAX));
+  return where(at_least(log2_alpha, all(-LOG2_255)), alpha);
+}
+
+// The pairs of a batch's splat number k with `blocks`.
+static inline void add_pairs(const TileFrame& frame, Batch& batch, int k, Blocks blocks) {
+  const TileSplat s = batch.splats[k];
+  int pair = batch.pairs[k];
+  for (; blocks; blocks &= blocks - 1, pair++) {
+    const int b = __builtin_ctzll(blocks);
+    batch.alpha[pair] = alpha_of(frame, s, b);
+    batch.block[pair] = b;
+    batch.splat[pair] = k;
+  }
+  batch.pairs[k + 1] = pair;
+}
+
+// Blends over a block: its blend weight, 0 for pixels that do not take it; transmittance becomes what is left.
+static inline Lanes take(Lanes alpha, Lanes& transmittance) {
+  const Lanes clear = transmittance, weight = alpha * clear, rest = clear - weight;
+  const Mask on = at_least(rest, all(CLEAR_MIN));  // never a saturated pixel: its rest is negative
+  transmittance = select(on, rest, negative(clear));
+  return where(on, weight);
+}
+
+// Goes over a tile's splats from front to back: at(place, splat, blocks) with the alive blocks that each meets, until all
+// pixels are saturated.
+template <class At>
+static inline void for_each_splat(const Splat* splats, const Tiles& tiles, int tile, const Lanes* transmittance, At at) {
   const uint32_t end = tiles.first[tile + 1];
   uint32_t place = tiles.first[tile];
   Blocks alive = alive_blocks(transmittance, lowest(BLOCKS));
   for (int count = 1; place < end && alive; place++, count++) {
     const uint32_t ahead = place + PREFETCH_AHEAD < end ? place + PREFETCH_AHEAD : end - 1;
     __builtin_prefetch(&splats[tiles.splat[ahead]]);
-    const Splat& s = splats[tiles.splat[place]];
-    at(place, s, blocks_met(frame, s) & alive);
-    if (count % CHECK_EVERY == 0) alive = alive_blocks(transmittance, alive);
+    at(place, splats[tiles.splat[place]], tiles.blocks[place] & alive);
+    if (count % BATCH == 0) alive = alive_blocks(transmittance, alive);
   }
-  for (; place < end; place++) skip(place);
+}
+
+// The same a batch at a time: at(place, batch). Returns the place after the last splat.
+template <class At>
+static inline uint32_t for_each_batch(const TileFrame& frame, const Splat* splats, const Tiles& tiles, int tile,
+                                      const Lanes* transmittance, At at) {
+  const uint32_t end = tiles.first[tile + 1];
+  uint32_t place = tiles.first[tile];
+  Blocks alive = alive_blocks(transmittance, lowest(BLOCKS));
+  Batch batch;
+  batch.pairs[0] = 0;
+  while (place < end && alive) {
+    batch.count = end - place < (uint32_t)BATCH ? end - place : BATCH;
+    for (int k = 0; k < batch.count; k++) {
+      const uint32_t ahead = place + k + BATCH < end ? place + k + BATCH : end - 1;
+      __builtin_prefetch(&splats[tiles.splat[ahead]]);
+      batch.splats[k] = TileSplat(frame, splats[tiles.splat[place + k]]);
+      add_pairs(frame, batch, k, tiles.blocks[place + k] & alive);
+    }
+    at(place, batch);
+    place += batch.count;
+    alive = alive_blocks(transmittance, alive);
+  }
+  return place;
 }
 
 }  // namespace ISA

@@ -123,6 +123,7 @@ bool Context::forward(const Scene& scene, const View& view, const Pictures& pict
   if (!kernels_.project(scene, view, candidates(), splats_.data(), sh_colours_.data(), threads)) return false;
   binning_.sort(splats_.data(), rows_.size(), view.width, view.height, threads);
   const Images images{view.width, view.height, 0, 0, 0, pictures.colour, pictures.alpha, pictures.depth};
+  kernels_.find_blocks(splats_.data(), binning_.tiles(), images, threads);
   if (!draw(colours(scene), images, false, threads)) return false;
   if (!features_seen(scene)) return true;
   Images second = images;
@@ -187,7 +188,7 @@ void Context::contributions(const Scene& scene, const Images& map, const Contrib
 
 void Context::visible(size_t n, bool* out) const {
   std::memset(out, 0, n);
-  const uint32_t* slots = binning_.tiles().slots;
+  const uint32_t* slots = binning_.slots();
   for (size_t i = 0; i < rows_.size(); i++) out[rows_[i]] = slots[i + 1] > slots[i];
 }
 

@@ -22,24 +22,25 @@ static void contribute_tile(const Splat* splats, const Tiles& tiles, const Image
     for (int c = 0; c < C; c++) values[c][b][lane] = map.colour[pixel * map.channels + map.channel + c];
   });
 
-  auto add = [&](uint32_t place, const Splat& s, Blocks blocks) {
-    const TileSplat tile_splat(frame, s);
-    Lanes sums[2 + C] = {}, maximum = {};
-    BlendSample sample;
-    for (; blocks; blocks &= blocks - 1) {
-      const int b = __builtin_ctzll(blocks);
-      blend_block(frame, tile_splat, b, transmittance[b], sample);
-      sums[0] += sample.weight;
-      sums[1] += sample.weight * sample.weight;
-      maximum = max(maximum, sample.weight);
-      for (int c = 0; c < C; c++) sums[2 + c] += sample.weight * values[c][b];
+  auto add = [&](uint32_t place, const Batch& batch) {
+    for (int k = 0; k < batch.count; k++) {
+      Lanes sums[2 + C] = {}, maximum = {};
+      for (int pair = batch.pairs[k]; pair < batch.pairs[k + 1]; pair++) {
+        const int b = batch.block[pair];
+        const Lanes weight = take(batch.alpha[pair], transmittance[b]);
+        sums[0] += weight;
+        sums[1] += weight * weight;
+        maximum = max(maximum, weight);
+        for (int c = 0; c < C; c++) sums[2 + c] += weight * values[c][b];
+      }
+      float* record = records + (size_t)tiles.slot[place + k] * SIZE;
+      record[0] = largest(maximum);
+      store_sums<2 + C>(record + 1, sums);
     }
-    float* record = records + (size_t)tiles.slot[place] * SIZE;
-    record[0] = largest(maximum);
-    store_sums<2 + C>(record + 1, sums);
   };
-  auto skip = [&](uint32_t place) { memset(records + (size_t)tiles.slot[place] * SIZE, 0, 4 * SIZE); };
-  for_each_splat(frame, splats, tiles, tile, transmittance, add, skip);
+  const uint32_t end = tiles.first[tile + 1];
+  for (uint32_t place = for_each_batch(frame, splats, tiles, tile, transmittance, add); place < end; place++)
+    memset(records + (size_t)tiles.slot[place] * SIZE, 0, 4 * SIZE);
 }
 
 template <int C>
@@ -84,18 +85,13 @@ void count_pairs(const Splat* splats, const Tiles& tiles, const Images& images, 
     Lanes transmittance[BLOCKS];
     frame.clear(transmittance);
     double pairs = 0;
-    auto count = [&](uint32_t, const Splat& s, Blocks blocks) {
-      const TileSplat tile_splat(frame, s);
+    auto count = [&](uint32_t, const Batch& batch) {
       Lanes taken = all(0);
-      BlendSample sample;
-      for (; blocks; blocks &= blocks - 1) {
-        const int b = __builtin_ctzll(blocks);
-        blend_block(frame, tile_splat, b, transmittance[b], sample);
-        taken += where(sample.on, all(1));
-      }
+      for (int pair = 0; pair < batch.pairs[batch.count]; pair++)
+        taken += where(below(all(0), take(batch.alpha[pair], transmittance[batch.block[pair]])), all(1));
       for (int l = 0; l < LANES; l++) pairs += taken[l];
     };
-    for_each_splat(frame, splats, tiles, tile, transmittance, count, [](uint32_t) {});
+    for_each_batch(frame, splats, tiles, tile, transmittance, count);
     by_tile[tile] = pairs;
   }
 }

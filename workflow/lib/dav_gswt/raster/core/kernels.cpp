@@ -6,7 +6,7 @@ namespace ISA {
 
 extern const Kernels table = {ISA_NAME,      cull,
                               project,       load_values,
-                              blend_forward, blend_backward,
+                              find_blocks,   blend_forward, blend_backward,
                               collect,       project_backward,
                               contribute,    collect_contributions,
                               count_pairs,   loss,

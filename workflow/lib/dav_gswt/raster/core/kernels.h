@@ -8,6 +8,7 @@ namespace ISA {
 void cull(const Scene&, const View&, uint32_t* rows, uint32_t* counts, int threads);
 bool project(const Scene&, const View&, const Candidates&, Splat*, float* sh_colours, int threads);
 bool load_values(const Values&, size_t splats, int channel, int group, Splat*, int threads);
+void find_blocks(const Splat*, const Tiles&, const Images&, int threads);
 void blend_forward(const Splat*, const Tiles&, const Images&, bool only_colour, int threads);
 void blend_backward(const Splat*, const Tiles&, const Images&, const ImageGradients&, float* records, int threads);
 void collect(const Tiles&, size_t splats, const Values&, int channel, int group, bool depth, bool add,

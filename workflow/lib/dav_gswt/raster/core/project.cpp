@@ -33,10 +33,11 @@ static inline Mask store_splats(const Projection& c, const View& view, Splat* sp
                           log2_opacity,
                           half_x,
                           half_y,
+                          c.sxy / (sqrt(c.sxx) * sqrt(c.syy)),
                           c.z};
-  float buffer[9][LANES];
+  float buffer[10][LANES];
   int box[4][LANES];
-  for (int f = 0; f < 9; f++) store(buffer[f], fields[f]);
+  for (int f = 0; f < 10; f++) store(buffer[f], fields[f]);
   memcpy(box, boxes, sizeof box);
   Whole has_pixel = {};
   for (int l = 0; l < count; l++) {
@@ -45,7 +46,8 @@ static inline Mask store_splats(const Projection& c, const View& view, Splat* sp
     s.xx = buffer[2][l], s.xy = buffer[3][l], s.yy = buffer[4][l];
     s.log2_opacity = buffer[5][l];
     s.half_x = buffer[6][l], s.half_y = buffer[7][l];
-    s.depth = buffer[8][l];
+    s.correlation = buffer[8][l];
+    s.depth = buffer[9][l];
     const bool any_pixel = box[0][l] < box[2][l] && box[1][l] < box[3][l];
     has_pixel[l] = -(int)any_pixel;
     s.left = box[0][l], s.top = box[1][l];

@@ -14,6 +14,7 @@ constexpr int GROUP = 4;  // channels that one pass over the tiles blends
 constexpr int CHUNK = 256;  // Gaussians that are culled together
 constexpr float ALPHA_MIN = 1.f / 255;  // a splat ends where its alpha falls below this
 constexpr float ALPHA_MAX = 0.99f;  // keeps 1 / (1 - alpha) finite
+constexpr float LOG2_ALPHA_MAX = -0.014499569695f;
 constexpr float CLEAR_MIN = 1e-4f;  // a pixel takes no splat that would leave it less transmittance than this
 constexpr float LOG2_255 = 7.994353437f;
 constexpr float LOG2_E = 1.442695041f;
@@ -68,6 +69,7 @@ struct alignas(64) Splat {
   float xx, xy, yy;  // log2(e) times the conic: negative definite
   float log2_opacity;  // of the peak
   float half_x, half_y;  // half sides of the box around alpha >= ALPHA_MIN
+  float correlation;  // of x and y, which tilts the ellipse
   float depth;
   float colour[GROUP];
   int16_t left, top, right, bottom;  // pixels of the picture in that box, the last ones included; none: right = -1
@@ -83,6 +85,7 @@ struct Tiles {
   const uint32_t* first;  // tiles + 1: where a tile's list begins
   const uint32_t* splat;  // by place
   const uint32_t* slot;  // by place
+  uint64_t* blocks;  // by place: the blocks of pixels of its tile that the splat meets, a bit for each
   const uint32_t* slots;  // splats + 1: where a splat's slots begin
 };
 
@@ -154,6 +157,8 @@ struct Kernels {
   bool (*project)(const Scene&, const View&, const Candidates&, Splat*, float* sh_colours, int threads);
   // Returns false where a value is not finite.
   bool (*load_values)(const Values&, size_t splats, int channel, int group, Splat*, int threads);
+  // Fills `blocks`.
+  void (*find_blocks)(const Splat*, const Tiles&, const Images&, int threads);
   void (*blend_forward)(const Splat*, const Tiles&, const Images&, bool only_colour, int threads);
   void (*blend_backward)(const Splat*, const Tiles&, const Images&, const ImageGradients&, float* records, int threads);
   // Sums records into `sums` (MOMENTS + 1 a splat, added to if `add`) and gradients by values (as Values has rows).
