@@ -270,14 +270,16 @@ ${kind === "sphere" ? "    axes[k] = bent * axes[k];" : SHEAR}
   // Where the extent in depth is large against the depth, the linearised splat would cover the picture up to the
   // horizon as haze, so it fades out.
   opacity *= smoothstep(1.8, 3.2, p.z / max(length(depth), 1e-9));
-  if (opacity * 255.0 <= 1.0) return;
+  // what its weight leaves fainter than 1/255; see crossfadeOpacity
+  float faintest = weight < 1.0 ? 1.0 - pow(254.0 / 255.0, 1.0 / weight) : 1.0 / 255.0;
+  if (opacity <= faintest) return;
   float a = dot(across, across) + 0.3, b = dot(across, along), c = dot(along, along) + 0.3;
 
   float mean = 0.5 * (a + c), lean = 0.5 * (a - c), spread = length(vec2(lean, b));
   vec2 major = lean > 0.0 ? vec2(lean + spread, b) : vec2(b, spread - lean);
   major = spread < 1e-6 * mean ? vec2(1.0, 0.0) : normalize(major);
   vec2 lengths = sqrt(vec2(mean + spread, max((a * c - b * b) / (mean + spread), 0.3)));
-  float reach = sqrt(2.0 * log(255.0 * opacity)); // beyond it the Gaussian is fainter than 1/255
+  float reach = sqrt(2.0 * log(opacity / faintest));
   at = (vec2(gl_VertexID & 1, gl_VertexID >> 1 & 1) * 2.0 - 1.0) * reach;
   vec2 pixel = focal * p.xy / p.z + at.x * lengths.x * major + at.y * lengths.y * vec2(-major.y, major.x);
   ${kind === "sphere" ? SPHERE_GOING : PLANE_GOING}
