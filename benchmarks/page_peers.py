@@ -4,7 +4,8 @@ The Gaussians that the page shows of a view are written as a PLY around the eye,
 eye back and forth by some thousandths of a degree and is timed until a pixel can be read. In headless Chromium with
 software rendering; ratios carry over, milliseconds do not. Prints a table, asserts nothing.
 
-`python benchmarks/page_peers.py BUNDLE`; the others come by `npm ci` in benchmarks/peers.
+`python benchmarks/page_peers.py BUNDLE [RENDERER ...]`, by default all others; they come by `npm ci` in benchmarks/peers.
+In software Spark takes seconds for a frame, so a quarter of an hour for all; without it two minutes.
 """
 
 import functools
@@ -78,13 +79,17 @@ def main() -> int:
     if len(sys.argv) < 2 or not (PEERS / "node_modules").is_dir() or chromium_path() is None:
         print("page_peers: needs the folder of a bundle, Chromium, and `npm ci` in benchmarks/peers; nothing measured")
         return 0
+    others = tuple(sys.argv[2:]) or OTHERS
+    if unknown := set(others) - set(OTHERS):
+        print(f"page_peers: no renderer {', '.join(sorted(unknown))}; choose from {', '.join(OTHERS)}")
+        return 1
     bundle = store.read_bundle(Path(sys.argv[1]), SCHEMA)
     for budget in BUDGETS:
-        compare(bundle, Path(sys.argv[1]), budget)
+        compare(bundle, Path(sys.argv[1]), budget, others)
     return 0
 
 
-def compare(bundle: store.Bundle, folder: Path, budget: int) -> None:
+def compare(bundle: store.Bundle, folder: Path, budget: int, names: tuple[str, ...]) -> None:
     """Print and record the milliseconds of each renderer, and how near its picture is to the library's."""
     from playwright.sync_api import sync_playwright
 
@@ -94,7 +99,7 @@ def compare(bundle: store.Bundle, folder: Path, budget: int) -> None:
     still = np.clip(render(field, replace(camera, translation=np.zeros(3))).colour, 0, 1)
     x, y = (v * terrain.side for v in SHOT.at)
     place = {"x": x, "y": y, "eye": SHOT.height * floor, "yaw": SHOT.yaw, "pitch": -SHOT.pitch}
-    times: dict[str, list[float]] = {"page": [], **{name: [] for name in OTHERS}}
+    times: dict[str, list[float]] = {"page": [], **{name: [] for name in names}}
     with tempfile.TemporaryDirectory() as temporary, sync_playwright() as playwright:
         own, others = Path(temporary, "page"), Path(temporary, "peers")
         write_page(folder, VIEWER, own)
@@ -104,12 +109,13 @@ def compare(bundle: store.Bundle, folder: Path, budget: int) -> None:
         write_field(field, others / "splats.ply", plain=True)
         browser = playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS)
         with served(own) as page, serve_plainly(others) as elsewhere:
-            for _ in range(ROUNDS):
+            for number in range(ROUNDS):
+                print(f"round {number + 1} of {ROUNDS}", file=sys.stderr, flush=True)
                 found = time_page(browser, page, place, budget)
                 times["page"] += found["render"]
-                for name in OTHERS:
+                for name in names:
                     times[name] += time_peer(browser, elsewhere, name, place)
-            pictures = {name: compare_pictures(read_picture(browser, elsewhere, name, place), still) for name in OTHERS}
+            pictures = {name: compare_pictures(read_picture(browser, elsewhere, name, place), still) for name in names}
         browser.close()
     # of two levels that are cross-faded the page draws all, the others only those that have a weight
     print(f"{len(field):,} Gaussians by the others, {found['counts'][-1]:,} by the page, {WIDTH} x {HEIGHT}")
@@ -118,7 +124,7 @@ def compare(bundle: store.Bundle, folder: Path, budget: int) -> None:
         quality = f", {pictures[name]:.1f} dB from the library's picture" if name in pictures else ""
         print(f"  {name}: {value:.0f} ms (median of {len(times[name])}){quality}")
     figure = f"page_over_best_peer_{budget // 1000}k"
-    report_figures({figure: medians["page"] / min(medians[name] for name in OTHERS)}, {figure: 0.5})
+    report_figures({figure: medians["page"] / min(medians[name] for name in names)}, {figure: 0.5})
 
 
 def time_page(browser, address: str, place: dict, budget: int) -> dict:
