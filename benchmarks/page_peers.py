@@ -4,7 +4,7 @@ The Gaussians that the page shows of a view are written as a PLY around the eye,
 eye back and forth by some thousandths of a degree and is timed until a pixel can be read. In headless Chromium with
 software rendering; ratios carry over, milliseconds do not. Prints a table, asserts nothing.
 
-`python benchmarks/page_peers.py BUNDLE [RENDERER ...]`, by default all others; they come by `npm ci` in benchmarks/peers.
+`python benchmarks/page_peers.py BUNDLE [RENDERER ...]`: by default all; they come by `npm ci` in benchmarks/peers.
 In software Spark takes seconds for a frame, so a quarter of an hour for all; without it two minutes.
 """
 
