@@ -10,9 +10,7 @@ class Binning {
  public:
   // Lists the splats of every tile of a width x height picture. Throws std::length_error beyond 2^31 intersections.
   void sort(const Splat* splats, size_t n, int width, int height, int threads);
-  Tiles tiles() {
-    return {columns_, rows_, first_.data(), splat_.data(), slot_.data(), blocks_.data(), slots_.data()};
-  }
+  Tiles tiles() { return {columns_, rows_, first_.data(), splat_.data(), slot_.data(), blocks_.data(), slots_.data()}; }
   const uint32_t* slots() const { return slots_.data(); }
   size_t intersections() const { return splat_.size(); }
 

@@ -14,9 +14,10 @@ constexpr int BLOCKS_ACROSS = TILE / BLOCK_WIDTH;
 constexpr int BLOCKS_DOWN = TILE / BLOCK_HEIGHT;
 constexpr int BLOCKS = BLOCKS_ACROSS * BLOCKS_DOWN;
 constexpr int ROWS_AT_ONCE = LANES < BLOCKS_DOWN ? LANES : BLOCKS_DOWN;  // of blocks: their bits fill at most 32
+constexpr int WORDS = BLOCKS_DOWN / ROWS_AT_ONCE;
 constexpr int BATCH = 16;  // splats between two checks which blocks are still alive
 constexpr int PREFETCH_AHEAD = 6;  // splats between the blended one and the prefetched one
-constexpr float LARGEST = 1e4f;  // half side of a box in pixels beyond which rounding is more than a pixel's part
+constexpr float LARGEST = 1e4f;  // half side of a box, in pixels: beyond it float32 loses the ellipse's pixels
 
 typedef uint64_t Blocks;  // a bit for each
 static_assert(BLOCKS <= 64, "a bit for each");
@@ -25,7 +26,7 @@ struct TileFrame {
   int left, top;  // pixels
   const Images& images;
   Lanes x[BLOCKS_ACROSS], y[BLOCKS_DOWN];  // pixel centres from the tile's corner
-  Lanes first_row[BLOCKS_DOWN / ROWS_AT_ONCE], last_row[BLOCKS_DOWN / ROWS_AT_ONCE];  // y of each row of blocks, as lanes
+  Lanes first_row[WORDS], last_row[WORDS];  // y of the first and last pixels of each row of blocks, a row a lane
   Whole row_shift;  // where a row's bits begin
 
   TileFrame(int tile, const Tiles& tiles, const Images& of)
@@ -36,7 +37,7 @@ struct TileFrame {
       for (int l = 0; l < LANES; l++) y[r][l] = r * BLOCK_HEIGHT + l / BLOCK_WIDTH + 0.5f;
     for (int l = 0; l < LANES; l++) {
       row_shift[l] = l < ROWS_AT_ONCE ? l * BLOCKS_ACROSS : 0;
-      for (int w = 0; w < BLOCKS_DOWN / ROWS_AT_ONCE; w++) {
+      for (int w = 0; w < WORDS; w++) {
         first_row[w][l] = l < ROWS_AT_ONCE ? (w * ROWS_AT_ONCE + l) * BLOCK_HEIGHT + 0.5f : 1e9f;  // met by none
         last_row[w][l] = first_row[w][l] + (BLOCK_HEIGHT - 1);
       }
@@ -93,15 +94,15 @@ static inline uint32_t any_bits(Whole lanes) {
   return uint32_t(bits | bits >> 32);
 }
 
-// The blocks with a pixel centre within the splat's ellipse alpha >= ALPHA_MIN, and now and then one more: never one too
-// few. In half sides of its box the ellipse's x at height t is r t +- sqrt((1 - r^2)(1 - t^2)), r: `correlation`; over
-// an interval of t the extremes lie at its ends, or are +-1 where it holds +-r. A lane is a row of blocks.
+// The blocks with a pixel centre within the splat's ellipse alpha >= ALPHA_MIN, and now and then one more: never one
+// too few. In half sides of its box the ellipse's x at height t is r t +- sqrt((1 - r^2)(1 - t^2)), r: `correlation`;
+// over an interval of t the extremes lie at its ends, or are +-1 where it holds +-r. A lane is a row of blocks.
 static inline Blocks blocks_in_ellipse(const TileFrame& frame, const Splat& s) {
   constexpr float SLACK = 1e-6f, MARGIN = 1e-3f;  // for rounding: of squares, and in blocks
   const float r = s.correlation, per_y = 1 / s.half_y, wide = s.half_x * (1.f / BLOCK_WIDTH), y = s.y - frame.top;
   const Lanes narrow = all((1 - r) * (1 + r) + SLACK), middle = all((s.x - frame.left - 0.5f) * (1.f / BLOCK_WIDTH));
   Blocks found = 0;
-  for (int word = 0; word < BLOCKS_DOWN / ROWS_AT_ONCE; word++) {
+  for (int word = 0; word < WORDS; word++) {
     const Lanes from = max((frame.first_row[word] - y) * per_y, all(-1));
     const Lanes to = min((frame.last_row[word] - y) * per_y, all(1));
     const Lanes wide_from = sqrt(max(narrow * (1.f - from * from) + SLACK, all(0)));
@@ -132,8 +133,8 @@ struct TileSplat {
       : x(s.x - frame.left), y(s.y - frame.top), xx(s.xx), xy(s.xy), yy(s.yy), log2_opacity(s.log2_opacity) {}
 };
 
-// A batch of a tile's splats, and a pair for each block that one of them meets, splat by splat. The backward pass goes over
-// the pairs once for each of its steps: in one loop their results would wait for each other, and sums leave registers.
+// A batch of a tile's splats, and a pair for each block that one of them meets, splat by splat. The backward pass goes
+// over the pairs once for each of its steps: in one loop they wait for each other, and its sums do not fit registers.
 struct Batch {
   int count, pairs[BATCH + 1];  // splats, and where the pairs of each begin
   TileSplat splats[BATCH];
@@ -179,10 +180,11 @@ static inline Lanes take(Lanes alpha, Lanes& transmittance) {
   return where(on, weight);
 }
 
-// Goes over a tile's splats from front to back: at(place, splat, blocks) with the alive blocks that each meets, until all
-// pixels are saturated.
+// Goes over a tile's splats from front to back: at(place, splat, blocks) with the alive blocks that each meets, until
+// all pixels are saturated.
 template <class At>
-static inline void for_each_splat(const Splat* splats, const Tiles& tiles, int tile, const Lanes* transmittance, At at) {
+static inline void for_each_splat(const Splat* splats, const Tiles& tiles, int tile, const Lanes* transmittance,
+                                  At at) {
   const uint32_t end = tiles.first[tile + 1];
   uint32_t place = tiles.first[tile];
   Blocks alive = alive_blocks(transmittance, lowest(BLOCKS));

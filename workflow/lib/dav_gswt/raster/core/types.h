@@ -14,7 +14,6 @@ constexpr int GROUP = 4;  // channels that one pass over the tiles blends
 constexpr int CHUNK = 256;  // Gaussians that are culled together
 constexpr float ALPHA_MIN = 1.f / 255;  // a splat ends where its alpha falls below this
 constexpr float ALPHA_MAX = 0.99f;  // keeps 1 / (1 - alpha) finite
-constexpr float LOG2_ALPHA_MAX = -0.014499569695f;
 constexpr float CLEAR_MIN = 1e-4f;  // a pixel takes no splat that would leave it less transmittance than this
 constexpr float LOG2_255 = 7.994353437f;
 constexpr float LOG2_E = 1.442695041f;
@@ -157,7 +156,7 @@ struct Kernels {
   bool (*project)(const Scene&, const View&, const Candidates&, Splat*, float* sh_colours, int threads);
   // Returns false where a value is not finite.
   bool (*load_values)(const Values&, size_t splats, int channel, int group, Splat*, int threads);
-  // Fills `blocks`.
+  // Fills `blocks` of the tiles.
   void (*find_blocks)(const Splat*, const Tiles&, const Images&, int threads);
   void (*blend_forward)(const Splat*, const Tiles&, const Images&, bool only_colour, int threads);
   void (*blend_backward)(const Splat*, const Tiles&, const Images&, const ImageGradients&, float* records, int threads);

@@ -68,7 +68,7 @@ class FrameSettings:
 
 
 def time_library(bundle: Bundle, settings: FrameSettings) -> list[dict]:
-    """A row for each budget, of the library: every frame is updated, sorted and rendered.
+    """A row for each budget, of the library on all processors: every frame is updated, sorted and rendered.
 
     update holds the orders, too, which the library makes again for every frame; the page reads them from the bundle.
     """
