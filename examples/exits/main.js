@@ -3,18 +3,24 @@ import { SparkRenderer, SplatMesh } from "@sparkjsdev/spark";
 import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 
-const LAST = 12; // frames: nothing moves, and by then Spark's sorter has answered
+const LAST = 12; // frames after Spark's sorter has answered: nothing moves
 const show = new URLSearchParams(location.search).get("show") ?? "spz", told = document.querySelector("p");
 const renderer = new THREE.WebGLRenderer({ antialias: true }), scene = new THREE.Scene();
 const read = async (file) => (await new GLTFLoader().loadAsync(`/exports/${file}`)).scene;
+
+let spark = null;
 
 /** Files with y down, as fields of COLMAP's cameras have it, are turned about x. */
 async function openSplats(url, down) {
   const mesh = new SplatMesh({ url });
   await mesh.initialized;
   if (down) mesh.quaternion.set(1, 0, 0, 0);
-  scene.add(new SparkRenderer({ renderer, preBlurAmount: 0.3, blurAmount: 0 }), mesh);
+  spark = new SparkRenderer({ renderer, preBlurAmount: 0.3, blurAmount: 0 });
+  scene.add(spark, mesh);
 }
+
+/** Whether the picture is whole: Spark sorts in a worker, which takes as long as the machine is busy. */
+const isSorted = () => !spark || (spark.activeSplats > 0 && !spark.sorting && !spark.sortDirty);
 
 /** Without the plugin for KHR_gaussian_splatting, which needs WebGPU, three.js shows points. */
 async function openPoints() {
@@ -47,6 +53,7 @@ document.body.append(renderer.domElement);
 let frames = 0;
 renderer.setAnimationLoop(() => {
   renderer.render(scene, camera);
-  told.textContent = `terrain.${show}, frame ${++frames}`;
+  frames = isSorted() ? frames + 1 : 0;
+  told.textContent = `terrain.${show}, frame ${frames}`;
   if (frames === LAST) renderer.setAnimationLoop(null);
 });

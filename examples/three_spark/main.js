@@ -73,5 +73,6 @@ renderer.setAnimationLoop((now) => {
   last = now;
   stand();
   renderer.render(scene, camera);
-  told.textContent = `${facts.gaussians} Gaussians, ${place.x.toFixed(1)} east, ${place.y.toFixed(1)} north, frame ${++frames}`;
+  const sorting = !spark.activeSplats || spark.sorting || spark.sortDirty ? ", sorting" : "";
+  told.textContent = `${facts.gaussians} Gaussians, ${place.x.toFixed(1)} east, ${place.y.toFixed(1)} north${sorting}, frame ${++frames}`;
 });
