@@ -24,13 +24,21 @@ def look(x, y, z, at=(1.6, 1.6, 0.0), size=64):
 
 
 def gain(cells, taken, one, importance=None):
-    return coverage.DirectionalCoverage(cells, taken, [one], importance).gain(0)
+    return cover(cells, taken, [one], importance).gain(0)
+
+
+def cover(cells, taken, candidates, importance=None):
+    return coverage.DirectionalCoverage(cells, cells.view(taken), cells.view(candidates), importance)
+
+
+def count_pixels(cells, camera):
+    return cells.view([camera]).pixels[0]
 
 
 def test_pixels_of_a_picture_are_shared_among_the_cells_it_shows(cells):
-    inside = cells.count_pixels([look(1.6, 1.7, 3.0)])[0]
+    inside = count_pixels(cells, look(1.6, 1.7, 3.0))
     assert inside.sum() == pytest.approx(64 * 64, rel=0.03)
-    corner = cells.count_pixels([look(0.4, 0.5, 1.0, (0.4, 0.4, 0.0))])[0].reshape(coverage.CELLS, -1)
+    corner = count_pixels(cells, look(0.4, 0.5, 1.0, (0.4, 0.4, 0.0))).reshape(coverage.CELLS, -1)
     assert corner[:14, :14].sum() > 0.99 * corner.sum()
 
 
@@ -41,8 +49,8 @@ def test_the_middle_of_a_cell_is_where_its_gaussians_are(cells):
 
 
 def test_half_the_distance_shows_a_cell_in_four_times_the_pixels(cells):
-    at = np.argmax(cells.count_pixels([look(1.6, 1.61, 1.5)])[0])
-    near, far = cells.count_pixels([look(1.6, 1.61, 1.5), look(1.6, 1.61, 3.0)])[:, at]
+    at = np.argmax(count_pixels(cells, look(1.6, 1.61, 1.5)))
+    near, far = cells.view([look(1.6, 1.61, 1.5), look(1.6, 1.61, 3.0)]).pixels[:, at]
     assert near / far == pytest.approx(4, rel=0.1)
 
 
@@ -54,7 +62,7 @@ def test_a_photo_from_another_side_adds_more_than_one_from_the_same(cells):
 def test_gains_only_fall_and_a_photo_that_shows_nothing_gains_nothing(cells):
     away = cameras.pinhole([0.0, 0.0, 2.0], [0.0, 0.0, 9.0], 64, 64, 40.0)
     pool = [look(3.6, 1.6, 2.0), look(0.0, 0.0, 2.0), look(1.6, 3.0, 1.0), away]
-    covered = coverage.DirectionalCoverage(cells, [], pool)
+    covered = cover(cells, [], pool)
     before = covered.gains()
     covered.take(0)
     after = covered.gains()
@@ -66,13 +74,13 @@ def test_greedy_reaches_its_bound_of_the_best_set(cells):
     pool = [camera.resized(32, 32) for _, camera in patch.pool(8, 0.7)]
 
     def value(chosen):
-        covered, total = coverage.DirectionalCoverage(cells, [], pool), 0.0
+        covered, total = cover(cells, [], pool), 0.0
         for i in chosen:
             total += covered.gain(i)
             covered.take(i)
         return total
 
-    covered = coverage.DirectionalCoverage(cells, [], pool)
+    covered = cover(cells, [], pool)
     greedy = lazy_greedy(covered.gains(), covered.gain, covered.take, 3)
     best = max(value(chosen) for chosen in combinations(range(8), 3))
     assert (1 - 1 / np.e) * best <= value(greedy) <= best * (1 + 1e-9)
@@ -100,7 +108,7 @@ def test_where_far_more_ground_is_fitted_than_the_exemplar_all_of_it_counts():
 @pytest.mark.parametrize("bad", [-1.0, np.nan, np.inf])
 def test_an_importance_that_is_no_weight_is_refused(cells, bad):
     with pytest.raises(ValueError, match="importance"):
-        coverage.DirectionalCoverage(cells, [], [], np.full(coverage.CELLS**2, bad))
+        cover(cells, [], [], np.full(coverage.CELLS**2, bad))
 
 
 def test_the_error_of_a_cell_is_that_of_the_pixels_that_show_it(cells):

@@ -17,8 +17,10 @@ from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.raster import render
 from dav_gswt.reconstruction import ground
 from dav_gswt.views import oracle, policy_inputs
+from dav_gswt.views.coverage import DirectionalCoverage, GroundCells
 from dav_gswt.views.pose_maps import PoseMaps, write_pose_maps
 from dav_gswt.views.scores import Scores
+from dav_gswt.views.scoring import scoring_camera
 from dav_gswt.views.uncertainty.weighting import Scales
 
 SPLIT = ViewSplit(("p0.png", "p2.png"), (), ())
@@ -47,7 +49,8 @@ def files(tmp_path):
     write_colmap_model(ColmapModel(tuple(names), tuple(c for _, c in pool()), *points), tmp_path / "sparse")
     oracle.write_truth(tmp_path / "truth", iter(views[1:]))
     known = np.where(true.means[:, 1] > 1.6, 0.8, 0.2).astype(np.float32)
-    write_pose_maps(tmp_path / "maps.npz", PoseMaps(names, np.zeros((3, 4, 4), np.float32), None), known)
+    cells = GroundCells(true, patch.grid()).view([scoring_camera(camera) for _, camera in pool()]).pixels
+    write_pose_maps(tmp_path / "maps.npz", PoseMaps(names, np.zeros((3, 4, 4), np.float32), None, cells), known)
     given = {name: tmp_path / f"{name}.{end}" for name, end in (("field", "ply"), ("ground", "exr"), ("maps", "npz"))}
     given |= {"frame": tmp_path / "ground.json", "images": tmp_path, "model": tmp_path / "sparse"}
     return given | {"truth": tmp_path / "truth", "captures": [], "fits": []}
@@ -70,9 +73,10 @@ def test_without_a_weight_all_cells_count_alike(files):
 
 
 def test_gains_are_in_the_order_of_the_scores(files):
-    found = build("coverage", files).gains()
-    alone = [build("coverage", files).gain(i) for i in range(3)]
-    assert found == alone and len(set(found)) == 3
+    cells, cameras = GroundCells(patch.field(), patch.grid()), [scoring_camera(camera) for _, camera in pool()][::-1]
+    known = cells.view([])
+    alone = [DirectionalCoverage(cells, known, cells.view([camera])).gain(0) for camera in cameras]
+    assert build("coverage", files).gains() == alone and len(set(alone)) == 3
 
 
 @pytest.mark.parametrize("policy, agent", [("coverage-error", "render"), ("oracle", "render"), ("oracle", "replay")])

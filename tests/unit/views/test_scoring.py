@@ -12,8 +12,7 @@ from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.images import image_files
 from dav_gswt.prior import conditions
 from dav_gswt.prior.interface import DecodedViews
-from dav_gswt.raster import Rasterizer
-from dav_gswt.views import collision, fisher, frozen_scales, pose_maps, scores, scoring
+from dav_gswt.views import collision, coverage, frozen_scales, pose_maps, scores, scoring
 from dav_gswt.views.frozen_scales import FrozenScales
 from dav_gswt.views.prior_sampling import PriorConfig
 from dav_gswt.views.uncertainty import Quantiles, Scales
@@ -57,9 +56,9 @@ def scored(prior=None, **more):
 
 def test_without_a_prior_only_geometric_terms_are_computed():
     found = scored()
-    assert set(found.scores.terms) == {"opacity", "fisher"} and found.maps.w2_sq is None
+    assert set(found.scores.terms) == {"opacity", "coverage"} and found.maps.w2_sq is None
     assert np.array_equal(found.gaussians, patch.field().uncertainty) and not found.scores.steps.any()
-    assert (found.scores.terms["fisher"] > 0).all() and found.frozen.pixels is None
+    assert (found.scores.terms["coverage"] > 0).all() and found.frozen.pixels is None
 
 
 def test_w2_is_the_disagreement_of_the_samples_and_0_without_dropout():
@@ -133,17 +132,16 @@ def test_gaussians_that_no_candidate_sees_keep_their_geometric_uncertainty():
     assert (found.gaussians[far] == np.float32(0.3)).all() and (found.gaussians[~far] != np.float32(0.3)).any()
 
 
-def test_fisher_gain_is_the_squared_blend_weights_over_the_information_so_far():
-    field, raster, camera = patch.field(), Rasterizer(), pool()[0][1]
-    raster.forward(field.means, field.log_scales, field.quats, field.opacity_logits, field.sh, camera)
-    seen = raster.contributions()
-    none, once = (
-        fisher.accumulate_information(field, [], raster),
-        fisher.accumulate_information(field, [camera], raster),
+def test_coverage_is_the_gain_over_the_photos_so_far_and_the_maps_keep_what_it_is_made_of():
+    found, cells = scored(), coverage.GroundCells(patch.field(), patch.grid())
+    taken, wanted = (
+        cells.view([scoring.scoring_camera(camera) for camera in seen])
+        for seen in ([view.camera for view in patch.photos()], [camera for _, camera in pool()])
     )
-    assert fisher.information_gain(seen, none) == pytest.approx(float(seen.squared.sum()) / fisher.PRIOR)
-    np.testing.assert_allclose(once - fisher.PRIOR, seen.squared, rtol=1e-6)
-    assert fisher.information_gain(seen, once) < fisher.information_gain(seen, none)
+    assert np.array_equal(found.maps.cells, wanted.pixels) and wanted.pixels.any(1).all()
+    assert np.array_equal(found.scores.terms["coverage"], coverage.DirectionalCoverage(cells, taken, wanted).gains())
+    unseen = scoring.score_poses(patch.field(), patch.grid(), pool(), [], patch.FRAME)
+    assert (unseen.scores.terms["coverage"] > found.scores.terms["coverage"]).all()
 
 
 def test_a_prior_sees_the_middle_square_and_the_nearest_photo():
@@ -205,7 +203,9 @@ def test_maps_are_read_as_written_and_stand_in_an_exr_with_their_poses(tmp_path)
 
 
 def test_the_prior_map_of_a_wide_picture_is_nan_outside_its_middle_square():
-    found = pose_maps.PoseMaps(["p0"], np.zeros((1, 64, 96), np.float32), np.ones((1, 16, 16), np.float32))
+    found = pose_maps.PoseMaps(
+        ["p0"], np.zeros((1, 64, 96), np.float32), np.ones((1, 16, 16), np.float32), np.ones((1, 9), np.float32)
+    )
     table = scores.Scores([pool()[0][0]], {"w2_sq": np.ones(1)}, Scales({"w2_sq": 1.0}), np.ones(1, int))
     shown = found.exr_part(table, "p0")[0]["w2_sq"]
     assert (shown[:, 16:80] == 1).all() and np.isnan(shown[:, :16]).all() and np.isnan(shown[:, 80:]).all()
@@ -218,7 +218,7 @@ def test_a_file_without_maps_is_refused(tmp_path):
 
 
 def test_frozen_scales_are_read_as_written_and_other_files_are_refused(tmp_path):
-    first = FrozenScales(Scales({"w2_sq": 1 / 3, "fisher": 0.0}), Quantiles(0.1, 2 / 3))
+    first = FrozenScales(Scales({"w2_sq": 1 / 3, "coverage": 0.0}), Quantiles(0.1, 2 / 3))
     frozen_scales.write_frozen_scales(tmp_path / "scores.json", first, {"candidates": 3}, {}, {})
     assert frozen_scales.read_frozen_scales(tmp_path / "scores.json") == first
     frozen_scales.write_frozen_scales(tmp_path / "scores.json", replace(first, pixels=None), {}, {}, {})

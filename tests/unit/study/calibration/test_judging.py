@@ -63,7 +63,7 @@ def judge(replayed, prior=None, regressors=(), count=12):
 
 def test_a_score_that_knows_where_the_field_is_wrong_ranks_well(replayed):
     found, table = judge(replayed)
-    assert found["poses"] == 12 and set(found["scores"]) == {"opacity", "fisher", "low", "far"}
+    assert found["poses"] == 12 and set(found["scores"]) == {"opacity", "coverage", "low", "far"}
     assert found["scores"]["opacity"]["pixel_spearman"] > 0.2
     assert found["scores"]["opacity"]["pixel_ause"] < 0.75 * found["scores"]["opacity"]["pixel_ause_chance"]
     assert [row["pose"] for row in table][0] == "p0.png" and len({row["pose"] for row in table}) == 12
@@ -75,7 +75,7 @@ def test_with_a_prior_its_terms_and_its_controls_are_judged_too(replayed, files)
     regressors = controls.open_regressors([files["regressor0"], files["regressor1"]])
     found, table = judge(replayed, prior, regressors, count=9)
     others = {"spread", "residual", "regressor_dropout", "regressor_residual", "ensemble"}
-    assert set(found["scores"]) == {"opacity", "fisher", "w2_sq", "gradient", "u", "low", "far"} | others
+    assert set(found["scores"]) == {"opacity", "coverage", "w2_sq", "gradient", "u", "low", "far"} | others
     assert set(table[0]) == {"pose", "error"} | set(found["scores"]) and len(table) == found["poses"] == 9
     assert all(found["scores"][name]["pixel_spearman"] is not None for name in others)
     u, w2 = ([row[name] for row in table] for name in ("u", "w2_sq"))

@@ -19,7 +19,7 @@ MIDDLE = np.array([2.0, 3.0, 0.0])
 
 def scored(count=60, high=1.0, **terms):
     poses = [Pose(f"p{i}", *place) for i, place in enumerate(camera_layouts.hemisphere(count, 30.0, 5.0))]
-    terms = {"opacity": np.linspace(0.0, high, count)} | terms
+    terms = {"coverage": np.linspace(0.0, high, count)} | terms
     return Scores(poses, terms, Scales({name: 0.5 for name in terms}), np.zeros(count, int))
 
 

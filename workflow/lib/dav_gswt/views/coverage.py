@@ -10,6 +10,8 @@ half the distance as much as four. The sum is monotone and submodular, so greedy
 a_g says how much a cell matters: equal for all, or how wrong the field still shows it.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Float, Float32, Float64
 from numpy import ndarray as Array
@@ -27,6 +29,14 @@ WIDTH = 18.0  # w, degrees: a photo counts for directions about as near as this
 BELTS = ((12.0, 8), (35.0, 6), (70.0, 3))  # directions b: elevation in degrees, and how many around; low: for walkers
 ERROR_WIDTH = 128  # pixels across a photo that is compared with its render: finer differences are noise
 LEAST_PIXELS = 1.0  # blend weight from which a cell counts as seen
+
+
+@dataclass(frozen=True)
+class CellViews:
+    """What n cameras see of the cells. centres: of the cameras. pixels: in which each cell is shown."""
+
+    centres: Float64[Array, "n 3"]
+    pixels: Float32[Array, "n cells"]
 
 
 class GroundCells:
@@ -55,14 +65,25 @@ class GroundCells:
         weight = expit(self.field.opacity_logits.astype(float))
         return self.sum(weight * values) / np.maximum(self.sum(weight), 1e-9)
 
-    def count_pixels(self, cameras: list[Camera]) -> Float64[Array, "n cells"]:
-        """Pixels that show each cell in each camera's picture."""
-        raster, arrays = Rasterizer(), to_raster_arrays(self.field)
-        out = np.zeros((len(cameras), len(self)))
-        for row, camera in zip(out, cameras, strict=True):
+    def view(self, cameras: list[Camera]) -> CellViews:
+        """Render the field for each camera and count the pixels that show each cell."""
+        raster, arrays, pixels = Rasterizer(), to_raster_arrays(self.field), []
+        for camera in cameras:
             raster.forward(**arrays, camera=camera)
-            row[:] = self.sum(raster.contributions().total.astype(float))
-        return out
+            pixels.append(self.count_pixels(raster))
+        return self.gather_views(cameras, pixels)
+
+    def count_pixels(self, raster: Rasterizer) -> Float32[Array, "cells"]:
+        """Pixels that show each cell in the picture that a rasterizer made last."""
+        return self.sum(raster.contributions().total.astype(float)).astype(np.float32)
+
+    def gather_views(self, cameras: list[Camera], pixels: list[Float32[Array, "cells"]]) -> CellViews:
+        """What cameras see, from the pixels of each."""
+        shown = np.zeros((len(cameras), len(self)), np.float32)
+        centres = np.zeros((len(cameras), 3))
+        for i, camera in enumerate(cameras):
+            shown[i], centres[i] = pixels[i], camera.centre
+        return CellViews(centres, shown)
 
 
 def measure_cell_errors(
@@ -101,29 +122,37 @@ class DirectionalCoverage:
     def __init__(
         self,
         cells: GroundCells,
-        taken: list[Camera],
-        candidates: list[Camera],
+        taken: CellViews,
+        candidates: CellViews,
         importance: Float[Array, "cells"] | None = None,
     ):
-        """taken, candidates: cameras at the scoring size. importance: a_g, of any scale; None, or 0 for all: equal."""
+        """taken, candidates: at the scoring size. importance: a_g, of any scale; None, or 0 for all: equal."""
         weight = np.ones(len(cells)) if importance is None or not importance.any() else importance
         if not (np.isfinite(weight).all() and (weight >= 0).all()):
             raise ValueError("the importance of a cell must be a number of at least 0")
         self.importance = weight / weight.mean()
-        self.known = _spread_over_directions(cells, taken).sum(0, dtype=np.float64)
-        self.added = _spread_over_directions(cells, candidates)
+        self.candidates, self._middle, self._directions = candidates, cells.middle, list_directions()
+        self.known = np.zeros((len(cells), len(self._directions)))
+        for i in range(len(taken.pixels)):
+            self.known += self._spread_over_directions(taken, i)
 
     def gains(self) -> list[float]:
         """Return the gain of every candidate."""
-        return [self.gain(i) for i in range(len(self.added))]
+        return [self.gain(i) for i in range(len(self.candidates.pixels))]
 
     def gain(self, i: int) -> float:
         """Return the gain of a photo from candidate i over all photos so far."""
-        return compute_gain(self.importance, self.known, self.added[i])
+        return compute_gain(self.importance, self.known, self._spread_over_directions(self.candidates, i))
 
     def take(self, i: int) -> None:
         """Add the photo from candidate i."""
-        self.known = self.known + self.added[i]
+        self.known = self.known + self._spread_over_directions(self.candidates, i)
+
+    def _spread_over_directions(self, views: CellViews, i: int) -> Float64[Array, "cells b"]:
+        """Pixels of one picture that show each cell, as they count for each direction."""
+        way = views.centres[i] - self._middle
+        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-12)
+        return views.pixels[i][:, None] * np.exp((way @ self._directions.T - 1) / np.radians(WIDTH) ** 2)
 
 
 def list_directions() -> Float64[Array, "b 3"]:
@@ -132,14 +161,3 @@ def list_directions() -> Float64[Array, "b 3"]:
     azimuth = np.concatenate([2 * np.pi * np.arange(count) / count for _, count in BELTS])
     level = np.cos(elevation)
     return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)], 1)
-
-
-def _spread_over_directions(cells: GroundCells, cameras: list[Camera]) -> Float32[Array, "n cells b"]:
-    """Pixels of each camera's picture that show each cell, as they count for each direction."""
-    directions, width = list_directions(), np.radians(WIDTH)
-    out = np.zeros((len(cameras), len(cells), len(directions)), np.float32)
-    for part, camera, pixels in zip(out, cameras, cells.count_pixels(cameras), strict=True):
-        way = camera.centre - cells.middle
-        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-12)
-        part[:] = pixels[:, None] * np.exp((way @ directions.T - 1) / width**2)
-    return out

@@ -1,5 +1,6 @@
 """Inputs of single policies beside the scores, computed only for the policies that need them."""
 
+import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray as Array
 
@@ -13,7 +14,7 @@ from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.reconstruction import ground, regression_guard
 from dav_gswt.views import oracle, pose_maps
 from dav_gswt.views.candidates import Candidates
-from dav_gswt.views.coverage import ERROR_WIDTH, DirectionalCoverage, GroundCells, measure_cell_errors
+from dav_gswt.views.coverage import ERROR_WIDTH, CellViews, DirectionalCoverage, GroundCells, measure_cell_errors
 from dav_gswt.views.policies import InformationGain
 from dav_gswt.views.policy_names import NEEDS_FIELD, NEEDS_PHOTOS, ORACLES, PRIOR_POLICIES
 from dav_gswt.views.scores import Scores
@@ -27,19 +28,20 @@ def build_information_gain(
 ) -> InformationGain | None:
     """Build the information gain for policies with `needs_field`; None for others.
 
-    taken: cameras of the photos so far. files: `field`, `ground` and `frame`; `images`, `model`, `captures` and `fits`
-    for policies with `needs_photos`; `maps` for those with `reads_prior`; `truth` (folder of true pictures of
-    candidates), for a replayed scene `images`, for those with `needs_truth`. Candidates are in the order of the scores.
+    taken: cameras of the photos so far. files: `field`, `ground`, `maps` and `frame`; `images`, `model`, `captures` and
+    `fits` for policies with `needs_photos`; `truth` (folder of true pictures of candidates), for a replayed scene
+    `images`, for those with `needs_truth`. Candidates are in the order of the scores.
     Raises: InputError: no true picture of a candidate is left.
     """
     if policy not in NEEDS_FIELD:
         return None
-    at = {pose.name: camera for pose, camera in candidates}
     cells = GroundCells(read_field(files["field"]), ground.read_ground(files["ground"]))
     importance = _measure_importance(policy, cells, candidates, split, files, agent)
-    return DirectionalCoverage(
-        cells, [scoring_camera(c) for c in taken], [scoring_camera(at[name]) for name in scores.names], importance
-    )
+    seen, at = pose_maps.read_pose_maps(files["maps"])[0], {pose.name: camera for pose, camera in candidates}
+    rows = [seen.names.index(name) for name in scores.names]
+    centres = np.array([at[name].centre for name in scores.names]).reshape(-1, 3)
+    shown = cells.view([scoring_camera(camera) for camera in taken])
+    return DirectionalCoverage(cells, shown, CellViews(centres, seen.cells[rows]), importance)
 
 
 def _measure_importance(

@@ -21,11 +21,12 @@ EMPTY_PARTS: dict[str, Part] = {"none": ({"uncertainty": np.zeros((1, 1), np.flo
 class PoseMaps:
     """Maps of n candidates. opacity: rendered uncertainty (1 - opacity, plus that of the Gaussians in view) of the
     whole picture, NaN below a picture of less height. w2_sq: disagreement of the prior's samples in the picture's
-    middle square; None without a prior."""
+    middle square; None without a prior. cells: pixels that show each cell of the ground (`coverage.CellViews`)."""
 
     names: list[str]
     opacity: Float32[Array, "n h w"]
     w2_sq: Float32[Array, "n hz wz"] | None
+    cells: Float32[Array, "n cells"]
 
     def exr_parts(self, scores: Scores, names: list[str]) -> dict[str, Part]:
         """Maps of some candidates, as parts of an EXR."""
@@ -62,8 +63,9 @@ def apply_uncertainty(field: GaussianField, gaussians: Float32[Array, "g"]) -> G
 
 
 def write_pose_maps(path: Path | str, maps: PoseMaps, gaussians: Float32[Array, "g"]) -> None:
-    """Write maps in half precision (w2_sq in single) and the uncertainty of each Gaussian of the field."""
+    """Write maps (opacity in half precision) and the uncertainty of each Gaussian of the field."""
     values = {"names": np.array(maps.names, str), "opacity": maps.opacity.astype(np.float16), "gaussians": gaussians}
+    values["cells"] = maps.cells
     if maps.w2_sq is not None:
         values["w2_sq"] = maps.w2_sq
     with atomic_file(path) as part, part.open("wb") as file:
@@ -76,6 +78,7 @@ def read_pose_maps(path: Path | str) -> tuple[PoseMaps, Float32[Array, "g"]]:
         with np.load(path, allow_pickle=False) as stored:
             w2_sq = stored.get("w2_sq")
             names = [str(name) for name in stored["names"]]
-            return PoseMaps(names, stored["opacity"].astype(np.float32), w2_sq), stored["gaussians"]
+            maps = PoseMaps(names, stored["opacity"].astype(np.float32), w2_sq, stored["cells"])
+            return maps, stored["gaussians"]
     except UNREADABLE as error:
         raise InputError(f"{path}: not readable as maps of poses ({error}); make it again") from error

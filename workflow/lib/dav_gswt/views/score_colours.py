@@ -11,11 +11,11 @@ HIGHEST = 0.98  # quantile of all values at which colours end
 
 
 def candidate_values(scores: Scores, lam: float) -> tuple[str, Float64[Array, "n"]]:
-    """Label and values by which candidates are coloured: the uncertainty u, or opacity without a prior or without
-    dropout, where all samples agree."""
+    """Label and values by which candidates are coloured: the uncertainty u, or the gain in coverage without a prior or
+    without dropout, where all samples agree."""
     if scores.scales.by_term.get("w2_sq", 0.0) > 0:
         lpips = f" + {lam:g} LPIPS" if lam and "lpips" in scores.terms else ""
         return f"uncertainty u = W2{lpips}, in units of the scale frozen at round 1", uncertainty(scores, lam)
-    scale, values = scores.scales.by_term["opacity"], scores.term("opacity")
+    scale, values = scores.scales.by_term["coverage"], scores.term("coverage")
     values = values / scale if scale > 0 else np.zeros(len(scores))
-    return "not known to be opaque, in units of the scale frozen at round 1", values
+    return "gain in coverage of the ground, in units of the scale frozen at round 1", values

@@ -16,7 +16,7 @@ from dav_gswt.files import atomic_file
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.views.uncertainty.weighting import Scales
 
-TERMS = ("opacity", "fisher", "w2_sq", "lpips", "gradient", "single", "residual")
+TERMS = ("opacity", "coverage", "w2_sq", "lpips", "gradient", "single", "residual")
 FIELDS = ("pose", "elevation", "azimuth", "radius", *TERMS, "steps", *(f"{term}_scale" for term in TERMS))
 
 

@@ -18,8 +18,9 @@ from dav_gswt.raster import Rasterizer
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.opacity_uncertainty import render_uncertainty
 from dav_gswt.reconstruction.top_view import render_top_view
-from dav_gswt.views import fisher, prior_sampling
+from dav_gswt.views import prior_sampling
 from dav_gswt.views.candidates import Candidates
+from dav_gswt.views.coverage import DirectionalCoverage, GroundCells
 from dav_gswt.views.frozen_scales import FrozenScales
 from dav_gswt.views.pose_maps import Part, PoseMaps
 from dav_gswt.views.prior_sampling import PriorConfig
@@ -71,11 +72,11 @@ def score_poses(
     prior: PriorConfig | None = None,
     frozen: FrozenScales | None = None,
 ) -> ScoringResult:
-    """Score every candidate: opacity and Fisher gain, with a prior also its terms, and maps.
+    """Score every candidate: opacity and gain in coverage, with a prior also its terms, and maps.
 
     taken: the photos so far. prior: None for geometric terms only. frozen: of the first round; None in the first round.
     """
-    terms, opacity = _score_geometry(field, grid, candidates, [scoring_camera(view.camera) for view in taken])
+    terms, opacity, cells = _score_geometry(field, grid, candidates, [scoring_camera(v.camera) for v in taken])
     steps, w2_sq = np.zeros(len(candidates), int), None
     if prior is not None and candidates:
         condition, masks = build_conditions(field, grid, candidates, taken, frame, prior.model.size)
@@ -84,7 +85,7 @@ def score_poses(
         w2_sq = sampled.maps
     poses, names = [pose for pose, _ in candidates], [pose.name for pose, _ in candidates]
     frozen = frozen or _freeze_scales(terms, w2_sq, names)
-    scores, maps = Scores(poses, terms, frozen.scales, steps), PoseMaps(names, opacity, w2_sq)
+    scores, maps = Scores(poses, terms, frozen.scales, steps), PoseMaps(names, opacity, w2_sq, cells)
     return ScoringResult(scores, maps, frozen, _gaussian_uncertainty(field, candidates, w2_sq, frozen))
 
 
@@ -100,22 +101,31 @@ def build_conditions(
 
 def _score_geometry(
     field: GaussianField, grid: Ground, candidates: Candidates, taken: list[Camera]
-) -> tuple[dict[str, Float64[Array, "n"]], Float32[Array, "n h w"]]:
-    """Geometric terms and opacity maps. opacity: mean of the map over pixels on the modelled ground; 0 if there are
-    none."""
-    raster = Rasterizer()
-    known = fisher.accumulate_information(field, taken, raster)
-    terms, maps = {"opacity": np.zeros(len(candidates)), "fisher": np.zeros(len(candidates))}, []
-    for i, (_, camera) in enumerate(progress(candidates, "score poses")):
-        maps.append(render_uncertainty(field, scoring_camera(camera), raster))
-        terms["fisher"][i] = fisher.information_gain(raster.contributions(), known)
-        weight = ground_mask(grid, scoring_camera(camera))
-        terms["opacity"][i] = float((maps[-1] * weight).sum() / max(1.0, weight.sum()))
+) -> tuple[dict[str, Float64[Array, "n"]], Float32[Array, "n h w"], Float32[Array, "n cells"]]:
+    """Geometric terms, opacity maps, and the pixels that show each cell of the ground: all from one render a candidate.
+
+    opacity: mean of the map over pixels on the modelled ground; 0 if there are none.
+    """
+    raster, cells = Rasterizer(), GroundCells(field, grid)
+    cameras, opacity = [scoring_camera(camera) for _, camera in candidates], np.zeros(len(candidates))
+    maps, pixels = [], []
+    for i, camera in enumerate(progress(cameras, "score poses")):
+        maps.append(render_uncertainty(field, camera, raster))
+        pixels.append(cells.count_pixels(raster))
+        weight = ground_mask(grid, camera)
+        opacity[i] = float((maps[-1] * weight).sum() / max(1.0, weight.sum()))
+    seen = cells.gather_views(cameras, pixels)
+    coverage = np.array(DirectionalCoverage(cells, cells.view(taken), seen).gains())
+    return {"opacity": opacity, "coverage": coverage}, _stack_maps(maps), seen.pixels
+
+
+def _stack_maps(maps: list[Float32[Array, "_ _"]]) -> Float32[Array, "n h w"]:
+    """Maps as one array, with NaN below those of less height."""
     shape = (0, 1, 1) if not maps else (len(maps), *np.max([m.shape for m in maps], axis=0))
     out = np.full(shape, np.nan, np.float32)  # cameras of the candidates may differ in their height
     for i, m in enumerate(maps):
         out[i, : m.shape[0], : m.shape[1]] = m
-    return terms, out
+    return out
 
 
 def ground_mask(grid: Ground, camera: Camera) -> Float32[Array, "h w"]:

@@ -83,7 +83,9 @@ def _opacity_cases() -> list[Case]:
 def _round_trip_maps(values: Array) -> Array:
     with TemporaryDirectory() as folder:
         path = Path(folder, "maps.npz")
-        pose_maps.write_pose_maps(path, PoseMaps(["c0000"], values.reshape(1, 1, -1), None), values)
+        pose_maps.write_pose_maps(
+            path, PoseMaps(["c0000"], values.reshape(1, 1, -1), None, np.ones((1, 1), np.float32)), values
+        )
         return pose_maps.read_pose_maps(path)[0].opacity.ravel()
 
 

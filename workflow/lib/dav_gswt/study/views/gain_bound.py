@@ -142,7 +142,8 @@ def _measure_coverage(state: State) -> DirectionalCoverage:
     cells = GroundCells(state.made.field, state.made.grid)
     corrected = state.pool.frame.kind == "photos"  # photos differ in exposure
     taken, left = ([scoring_camera(view.camera) for view in views] for views in (state.taken, state.left))
-    return DirectionalCoverage(cells, taken, left, measure_cell_errors(cells, state.taken, corrected))
+    errors = measure_cell_errors(cells, state.taken, corrected)
+    return DirectionalCoverage(cells, cells.view(taken), cells.view(left), errors)
 
 
 def _spread(state: State, taken: list[TrainingView], count: int) -> list[TrainingView]:
