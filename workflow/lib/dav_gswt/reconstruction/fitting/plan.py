@@ -6,8 +6,8 @@ from typing import Any, Literal
 AUTO = "auto"
 Count = int | Literal["auto"]  # a number, or as many as the photos ask for
 
-STEPS_PER_PHOTO = 75  # of a first fit with "auto"
-STEPS_PER_NEW_PHOTO = 80  # of an update with "auto"; the paper takes 5000 steps
+STEPS_PER_PHOTO = 38  # of a first fit with "auto"
+STEPS_PER_NEW_PHOTO = 40  # of an update with "auto"; the paper takes 5000 steps
 MAX_GAUSSIANS = 2_000_000  # of a fit that finds its own number
 MAX_SH_DEGREE = 3  # that a PLY can hold
 TRIED_SH_DEGREE = 1  # by a fit that finds its own

@@ -38,7 +38,7 @@ from dav_gswt.reconstruction.fitting.state import State
 _log = logging.getLogger(__name__)
 
 STRUCTURE = 0.2  # weight of D-SSIM against L1
-RATES = {"log_scales": 2e-2, "quats": 4e-3, "opacity_logits": 0.1}  # a step, at the start
+RATES = {"log_scales": 6e-2, "quats": 1.2e-2, "opacity_logits": 0.1}  # a step, at the start
 COLOUR = 6e-3 / SH0  # rate of the constant harmonic: steps of 0.006 in colour
 DIRECTED = 0.1  # of that: rate of the view-dependent harmonics
 DRIFT = 0.3  # `constraints.detail` a step, at the start
