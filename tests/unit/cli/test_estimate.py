@@ -73,7 +73,7 @@ def test_a_finished_field_has_an_estimate_too(config):
 
 
 def test_a_short_run_is_told_no_preset(config):
-    assert describe_estimate(config, {"fit_coarse": 1}, SAME) == "It will take about 20 seconds on this machine"
+    assert describe_estimate(config, {"fit_coarse": 1}, SAME) == "It will take about 10 seconds on this machine"
 
 
 def test_a_long_run_is_told_the_best_preset_that_is_short_enough(config):

@@ -114,7 +114,7 @@ COSTS: dict[str, Callable[[Work], Cost]] = {
     "update_field": lambda work: Cost(
         1.2 + work.observation_seconds * work.mean_photos, work.step_seconds * work.update_steps
     ),
-    "select_poses": lambda work: Cost(0.8 + 0.006 * work.candidates + 0.4 * work.field_size),
+    "select_poses": lambda work: Cost(1.2 + 0.0005 * work.candidates + 0.8 * work.field_size),
     "report_photos": lambda work: Cost(1.0 + 0.055 * work.total),
     "inpaint_field": lambda work: Cost(15.0),
     "find_materials": lambda work: Cost(8.0 + 2.3 * work.field_size),
