@@ -85,8 +85,8 @@ def test_each_knob_has_a_most_accurate_and_a_base_and_no_setting_comes_twice(con
         assert len({s.shown for s in mine}) == len(mine)
     assert [(s.shown, s.chosen["preset"], s.base) for s in found if s.knob == "steps"] == [
         ("1000", "draft-steps-1000", False),
-        ("300", "draft", True),
-        ("150", "draft-steps-150", False),
+        ("360", "draft", True),
+        ("180", "draft-steps-180", False),
         ("auto", "draft-steps-auto", False),
     ]
     assert [s.shown for s in found if s.knob == "levels"][0] == "auto"
@@ -97,7 +97,7 @@ def test_each_knob_has_a_most_accurate_and_a_base_and_no_setting_comes_twice(con
 def test_the_base_of_a_knob_that_does_not_name_it_is_its_last(config):
     config["tradeoff"]["knobs"]["steps"]["values"] = [1000, 200]
     found = [(s.shown, s.most, s.base) for s in settings.list_settings(config) if s.knob == "steps"]
-    assert found == [("1000", True, False), ("200", False, False), ("300", False, True)]
+    assert found == [("1000", True, False), ("200", False, False), ("360", False, True)]
 
 
 def test_all_are_tested_on_photos_of_the_largest_size(config):
