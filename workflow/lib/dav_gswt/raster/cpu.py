@@ -94,10 +94,10 @@ class Rasterizer(interface.Rasterizer):
 
     def _contribute(self, last: Forward, weights: Float32[Array, "h w c"]) -> Contributions:
         n = len(last.gaussians.means)
-        total, squared, maximum = (np.empty(n, np.float32) for _ in range(3))
+        total, maximum = (np.empty(n, np.float32) for _ in range(2))
         mapped = np.empty((n, weights.shape[2]), np.float32)
-        self._core.contributions(weights, total, squared, maximum, mapped, last.state)
-        return Contributions(total, squared, maximum, mapped)
+        self._core.contributions(weights, total, maximum, mapped, last.state)
+        return Contributions(total, maximum, mapped)
 
     def _visible(self, last: Forward) -> Bool[Array, "n"]:
         found = np.empty(len(last.gaussians.means), bool)

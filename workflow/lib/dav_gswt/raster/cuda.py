@@ -94,11 +94,11 @@ class Rasterizer(interface.Rasterizer):
             maps = torch.as_tensor(weights, device=self.device).reshape(h * w, -1)
             n = len(state.leaves["means"])
             zero = torch.zeros(n, device=self.device)
-            total, squared = (zero.index_add(0, gaussians, value) for value in (blend, blend * blend))
+            total = zero.index_add(0, gaussians, blend)
             maximum = zero.scatter_reduce(0, gaussians, blend, "amax")
             mapped = [zero.index_add(0, gaussians, blend * m[pixels]) for m in maps.T]
         table = torch.stack(mapped, 1) if mapped else zero[:, None][:, :0]
-        return Contributions(*(a.cpu().numpy() for a in (total, squared, maximum, table)))
+        return Contributions(*(a.cpu().numpy() for a in (total, maximum, table)))
 
     def _visible(self, last: Forward) -> Bool[Array, "n"]:
         return (last.state.meta["radii"][0] > 0).all(-1).cpu().numpy()

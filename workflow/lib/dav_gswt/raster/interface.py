@@ -62,11 +62,9 @@ class Gradients:
 
 @dataclass(frozen=True)
 class Contributions:
-    """Per Gaussian, over the pixels of a picture: sum of its blend weight w, sum of w^2, maximum of w, sum of w m for a
-    map m."""
+    """Per Gaussian, over the pixels of a picture: sum of its blend weight w, maximum of w, sum of w m for a map m."""
 
     total: Float32[Array, "n"]
-    squared: Float32[Array, "n"]
     maximum: Float32[Array, "n"]
     mapped: Float32[Array, "n c"]
 

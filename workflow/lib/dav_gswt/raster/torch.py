@@ -98,16 +98,15 @@ class Rasterizer(interface.Rasterizer):
         with torch.no_grad():
             _, shapes, _ = self._project(to_leaves(last.gaussians), camera, None)
             sums = torch.zeros(len(shapes), maps.shape[2])
-            squared, maximum = torch.zeros(2, len(shapes))
+            maximum = torch.zeros(len(shapes))
             for group in binned.groups:
                 at, w = group.rows.flatten(), _blend_weights(shapes[group.rows], group.corners)
                 w = w * _take_squares(maps[..., :1], group.corners)  # the padding beyond the picture counts for nothing
                 sums.index_add_(0, at, (w.mT @ _take_squares(maps, group.corners)).flatten(0, 1))
-                squared.index_add_(0, at, (w * w).sum(1).flatten())
                 maximum.scatter_reduce_(0, at, w.amax(1).flatten(), "amax")
-        found = torch.zeros(len(last.gaussians.means), maps.shape[2] + 2)
-        found[binned.index] = torch.cat([sums, squared[:, None], maximum[:, None]], 1)[:-1]
-        return Contributions(*(np.ascontiguousarray(found[:, i]) for i in (0, -2, -1, slice(1, -2))))
+        found = torch.zeros(len(last.gaussians.means), maps.shape[2] + 1)
+        found[binned.index] = torch.cat([sums, maximum[:, None]], 1)[:-1]
+        return Contributions(*(np.ascontiguousarray(found[:, i]) for i in (0, -1, slice(1, -1))))
 
     def _visible(self, last: Forward) -> Bool[Array, "n"]:
         visible = np.zeros(len(last.gaussians.means) + 1, bool)

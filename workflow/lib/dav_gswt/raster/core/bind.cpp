@@ -80,12 +80,12 @@ void backward(Context& context, In means, In log_scales, In quats, In logits, In
   context.backward(scene, pictures, given, out, threads);
 }
 
-void contributions(Context& context, In map, Out total, Out squared, Out maximum, Out mapped, int threads) {
+void contributions(Context& context, In map, Out total, Out maximum, Out mapped, int threads) {
   Scene scene{};
   scene.n = total.shape(0);
   const Images images{int(map.shape(1)), int(map.shape(0)), int(map.shape(2)), 0, 0, unread(map), nullptr, nullptr};
   nb::gil_scoped_release release;
-  context.contributions(scene, images, {total.data(), squared.data(), maximum.data(), mapped.data()}, threads);
+  context.contributions(scene, images, {total.data(), maximum.data(), mapped.data()}, threads);
 }
 
 double loss(const std::string& isa, In image, In target, MaybeIn weight, float structure, Out gradient, int threads) {

@@ -176,10 +176,10 @@ void Context::backward(const Scene& scene, const Pictures& pictures, const Pictu
 }
 
 void Context::contributions(const Scene& scene, const Images& map, const ContributionSums& out, int threads) {
-  for (float* each : {out.total, out.squared, out.maximum}) clear(each, 1, scene.n, counts_, threads);
+  for (float* each : {out.total, out.maximum}) clear(each, 1, scene.n, counts_, threads);
   clear(out.mapped, map.channels, scene.n, counts_, threads);
   each_pass(map.channels, [&](int channel, int group) {
-    records_.resize(binning_.intersections() * (3 + group));
+    records_.resize(binning_.intersections() * (2 + group));
     kernels_.contribute(splats_.data(), binning_.tiles(), pass_of(map, channel, group), records_.data(), threads);
     kernels_.collect_contributions(binning_.tiles(), candidates(), map.channels, channel, group, records_.data(), out,
                                    threads);

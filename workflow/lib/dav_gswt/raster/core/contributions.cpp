@@ -1,5 +1,5 @@
-// The contribution of each Gaussian to the picture: sum, sum of squares and maximum of its blend weights, and sums of a
-// map weighted by them.
+// The contribution of each Gaussian to the picture: sum and maximum of its blend weights, and sums of a map weighted by
+// them.
 #include "blocks.h"
 #include "kernels.h"
 
@@ -14,7 +14,7 @@ static inline float largest(Lanes v) {
 
 template <int C>
 static void contribute_tile(const Splat* splats, const Tiles& tiles, const Images& map, float* records, int tile) {
-  constexpr int SIZE = 3 + C;
+  constexpr int SIZE = 2 + C;
   const TileFrame frame(tile, tiles, map);
   Lanes transmittance[BLOCKS], values[C ? C : 1][BLOCKS] = {};
   frame.clear(transmittance);
@@ -24,18 +24,17 @@ static void contribute_tile(const Splat* splats, const Tiles& tiles, const Image
 
   auto add = [&](uint32_t place, const Batch& batch) {
     for (int k = 0; k < batch.count; k++) {
-      Lanes sums[2 + C] = {}, maximum = {};
+      Lanes sums[1 + C] = {}, maximum = {};
       for (int pair = batch.pairs[k]; pair < batch.pairs[k + 1]; pair++) {
         const int b = batch.block[pair];
         const Lanes weight = take(batch.alpha[pair], transmittance[b]);
         sums[0] += weight;
-        sums[1] += weight * weight;
         maximum = max(maximum, weight);
-        for (int c = 0; c < C; c++) sums[2 + c] += weight * values[c][b];
+        for (int c = 0; c < C; c++) sums[1 + c] += weight * values[c][b];
       }
       float* record = records + (size_t)tiles.slot[place + k] * SIZE;
       record[0] = largest(maximum);
-      store_sums<2 + C>(record + 1, sums);
+      store_sums<1 + C>(record + 1, sums);
     }
   };
   const uint32_t end = tiles.first[tile + 1];
@@ -61,20 +60,19 @@ void contribute(const Splat* splats, const Tiles& tiles, const Images& map, floa
 
 void collect_contributions(const Tiles& tiles, const Candidates& candidates, int channels, int channel, int group,
                            const float* records, const ContributionSums& out, int threads) {
-  const int size = 3 + group;
+  const int size = 2 + group;
 #pragma omp parallel for num_threads(threads) schedule(static)
   for (ptrdiff_t i = 0; i < (ptrdiff_t)candidates.count; i++) {
-    float most = 0, sums[2 + GROUP] = {};
+    float most = 0, sums[1 + GROUP] = {};
     for (size_t slot = tiles.slots[i]; slot < tiles.slots[i + 1]; slot++) {
       const float* record = records + slot * size;
       most = record[0] > most ? record[0] : most;
-      for (int k = 0; k < 2 + group; k++) sums[k] += record[1 + k];
+      for (int k = 0; k < 1 + group; k++) sums[k] += record[1 + k];
     }
     const size_t row = candidates.row[i];
     out.maximum[row] = most;
     out.total[row] = sums[0];
-    out.squared[row] = sums[1];
-    for (int c = 0; c < group; c++) out.mapped[row * channels + channel + c] = sums[2 + c];
+    for (int c = 0; c < group; c++) out.mapped[row * channels + channel + c] = sums[1 + c];
   }
 }
 

@@ -114,7 +114,7 @@ constexpr int MOMENTS = 6;
 
 // The contribution of each Gaussian of the scene to a picture, summed over its pixels.
 struct ContributionSums {
-  float *total, *squared, *maximum, *mapped;
+  float *total, *maximum, *mapped;
 };
 
 struct LossTask {
