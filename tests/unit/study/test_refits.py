@@ -12,7 +12,7 @@ from dav_gswt.reconstruction.fit_settings import CoarseSettings, UpdateSettings
 from dav_gswt.study import refits
 
 COARSE = CoarseSettings(size=48, spacing=1.0, max_gaussians=5000, steps=8)
-UPDATE = UpdateSettings(size=48, max_gaussians=5000, steps_per_photo=2)
+UPDATE = UpdateSettings(size=48, max_gaussians=5000, steps_per_photo=8)
 SETTINGS = refits.RefitSettings(COARSE, UPDATE, start=3, weights=None)
 NONE = np.zeros((0, 3)), np.zeros((0, 3), np.float32)
 
@@ -29,7 +29,7 @@ def rows(photos):
 
 
 def test_all_ways_to_the_same_photos_take_the_same_steps(rows):
-    assert [row["steps"] for row in rows if row["photos"] == 7] == [8 + 4 * 2] * 5
+    assert [row["steps"] for row in rows if row["photos"] == 7] == [8 + 4 * 8] * 5
     assert [(row["photos_a_round"], row["first_rate"]) for row in rows[2:]] == [(2, 1.0), (2, 0.3), (4, 1.0), (4, 0.3)]
 
 
