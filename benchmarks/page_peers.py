@@ -124,7 +124,8 @@ def compare(bundle: store.Bundle, folder: Path, budget: int, names: tuple[str, .
         quality = f", {pictures[name]:.1f} dB from the library's picture" if name in pictures else ""
         print(f"  {name}: {value:.0f} ms (median of {len(times[name])}){quality}")
     figure = f"page_over_best_peer_{budget // 1000}k"
-    report_figures({figure: medians["page"] / min(medians[name] for name in names)}, {figure: 0.5})
+    if names == OTHERS:  # of some alone it is not the best that is compared with
+        report_figures({figure: medians["page"] / min(medians[name] for name in names)}, {figure: 0.5})
 
 
 def time_page(browser, address: str, place: dict, budget: int) -> dict:

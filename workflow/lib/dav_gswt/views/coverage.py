@@ -79,11 +79,8 @@ class GroundCells:
 
     def gather_views(self, cameras: list[Camera], pixels: list[Float32[Array, "cells"]]) -> CellViews:
         """What cameras see, from the pixels of each."""
-        shown = np.zeros((len(cameras), len(self)), np.float32)
-        centres = np.zeros((len(cameras), 3))
-        for i, camera in enumerate(cameras):
-            shown[i], centres[i] = pixels[i], camera.centre
-        return CellViews(centres, shown)
+        centres = np.array([camera.centre for camera in cameras], float)
+        return CellViews(centres.reshape(-1, 3), np.array(pixels, np.float32).reshape(-1, len(self)))
 
 
 def measure_cell_errors(

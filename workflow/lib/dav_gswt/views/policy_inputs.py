@@ -1,6 +1,5 @@
 """Inputs of single policies beside the scores, computed only for the policies that need them."""
 
-import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray as Array
 
@@ -14,7 +13,7 @@ from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.reconstruction import ground, regression_guard
 from dav_gswt.views import oracle, pose_maps
 from dav_gswt.views.candidates import Candidates
-from dav_gswt.views.coverage import ERROR_WIDTH, CellViews, DirectionalCoverage, GroundCells, measure_cell_errors
+from dav_gswt.views.coverage import ERROR_WIDTH, DirectionalCoverage, GroundCells, measure_cell_errors
 from dav_gswt.views.policies import InformationGain
 from dav_gswt.views.policy_names import NEEDS_FIELD, NEEDS_PHOTOS, ORACLES, PRIOR_POLICIES
 from dav_gswt.views.scores import Scores
@@ -38,10 +37,9 @@ def build_information_gain(
     cells = GroundCells(read_field(files["field"]), ground.read_ground(files["ground"]))
     importance = _measure_importance(policy, cells, candidates, split, files, agent)
     seen, at = pose_maps.read_pose_maps(files["maps"])[0], {pose.name: camera for pose, camera in candidates}
-    rows = [seen.names.index(name) for name in scores.names]
-    centres = np.array([at[name].centre for name in scores.names]).reshape(-1, 3)
-    shown = cells.view([scoring_camera(camera) for camera in taken])
-    return DirectionalCoverage(cells, shown, CellViews(centres, seen.cells[rows]), importance)
+    pixels = dict(zip(seen.names, seen.cells, strict=True))
+    offered = cells.gather_views([at[name] for name in scores.names], [pixels[name] for name in scores.names])
+    return DirectionalCoverage(cells, cells.view([scoring_camera(c) for c in taken]), offered, importance)
 
 
 def _measure_importance(
