@@ -7,6 +7,11 @@ import sys
 
 import pytest
 
+SCRIPTS_WITHOUT_TORCH = {
+    *("bundle_tiles", "capture_views", "find_materials", "fit_coarse", "make_levels", "make_page", "render_photos"),
+    *("render_terrain", "report_photos", "select_poses", "split_views", "update_field"),
+}
+
 
 def test_the_library_and_the_scripts_are_typed(root):
     """pyright in standard mode, as pyproject.toml sets it up."""
@@ -54,3 +59,13 @@ def test_nothing_outside_the_study_reads_it(root, folder):
     """Scripts and rules; import-linter holds the library to it."""
     files = [path for path in (root / folder).iterdir() if path.suffix in (".py", ".smk")]
     assert files and not [path.name for path in files if "dav_gswt.study" in path.read_text()]
+
+
+@pytest.mark.parametrize("script", sorted(SCRIPTS_WITHOUT_TORCH))
+def test_a_job_without_networks_does_not_load_torch(root, script):
+    """Loading it takes longer than many jobs work."""
+    lines = (root / f"scripts/{script}.py").read_text(encoding="utf-8").splitlines()
+    imports = [line for line in lines if line.startswith(("import ", "from "))]
+    code = "\n".join([*imports, "import sys", "print('torch' in sys.modules)"])
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stdout == "False\n", done.stderr[-1000:]

@@ -1,3 +1,5 @@
+from itertools import combinations
+
 import numpy as np
 from fixtures import mixed_ground as made
 from scipy.ndimage import gaussian_filter
@@ -73,3 +75,17 @@ def test_a_path_is_a_strip_of_its_own():
 
 def test_even_ground_has_no_strip():
     assert segmentation.segment_ground(made.maps(mixed=False, shrubs=False).colour)[1] == []
+
+
+def test_each_merger_is_the_cheapest_of_all_that_are_allowed():
+    features = segmentation.describe_cells(made.maps(shrubs=False).colour[:96, :96])
+    trace = segmentation.merge_clusters(features, np.arange(96 * 96).reshape(96, 96) // 1024)
+    assert len(trace) > 3
+    for before, after in zip(trace, trace[1:], strict=False):
+        pairs = [
+            segmentation.compare_classes(features, before, a, b) for a, b in combinations(range(before.max() + 1), 2)
+        ]
+        alike = [each for each in pairs if each.is_small] or [each for each in pairs if each.is_gradual]
+        best = min(alike, key=lambda each: each.cost)
+        merged = np.where(before == best.second, best.first, before)
+        assert np.array_equal(after, merged - (merged > best.second))

@@ -64,3 +64,23 @@ def test_a_raster_is_sampled_at_texel_centres_between_them_and_across_its_edge()
     x = np.array([0.5, 1.5, 0.5, 1.0, 2.0, -1.5, 2.5])
     y = np.array([0.5, 0.5, 1.5, 1.0, 0.5, 0.5, 4.5])
     assert noise.sample_raster(raster, 2.0, x, y) == pytest.approx(np.array([0, 1, 2, 1.5, 0.5, 0, 0]))
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda rng: noise.make_noise(rng, 64, 4.0, 1.0, 0.2, 1.0),
+        lambda rng: np.stack(noise.make_ripples(rng, 64, 4.0, 0.3, 0.5)),
+    ],
+)
+def test_a_raster_is_the_same_on_any_number_of_threads(monkeypatch, draw):
+    found = []
+    for threads in ("1", "3"):
+        monkeypatch.setenv("DAV_GSWT_THREADS", threads)
+        found.append(draw(np.random.default_rng(3)))
+    assert np.array_equal(*found)
+
+
+def test_rows_are_mapped_in_their_order():
+    one, other = np.arange(600.0).reshape(300, 2), np.ones((300, 2))
+    assert np.array_equal(noise.map_rows(np.add, one, other), one + other)

@@ -10,10 +10,8 @@ from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-import torch
 from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
-from torch.nn import functional
 
 from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.materials.mobilesam_package import ELSE, EXTRA
@@ -143,6 +141,9 @@ def _open_session(path: Path, threads: int) -> Session:
 
 def prepare_picture(picture: Float[Array, "h w 3"]) -> Float32[Array, "1 3 s s"]:
     """The encoder's input: the longest side scaled to SIDE pixels, normalized, zeros below and to the right."""
+    import torch  # deferred: it takes a second to load, and few runs have a segmenter
+    from torch.nn import functional
+
     longest = max(picture.shape[:2])
     height, width = (max(1, round(side * SIDE / longest)) for side in picture.shape[:2])
     planes = torch.from_numpy(np.ascontiguousarray(picture.transpose(2, 0, 1), np.float32))[None]

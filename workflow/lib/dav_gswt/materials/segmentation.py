@@ -10,6 +10,7 @@ import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -107,17 +108,21 @@ def merge_clusters(features: Float[Array, "m m k"], labels: Int[Array, "m m"]) -
 
     Returns: the labels before the first merger, after it, and so on.
     """
-    trace = [labels]
+    kept, trace = list(range(int(labels.max()) + 1)), [labels]
+    found = {(a, b): compare_classes(features, labels, a, b) for a, b in combinations(kept, 2)}
     while True:
-        number = int(labels.max()) + 1
-        found = [compare_classes(features, labels, a, b) for a in range(number) for b in range(a + 1, number)]
-        alike = [each for each in found if each.is_small] or [each for each in found if each.is_gradual]
+        pairs = [found[pair] for pair in sorted(found)]
+        alike = [each for each in pairs if each.is_small] or [each for each in pairs if each.is_gradual]
         if not alike:
             return trace
         best = min(alike, key=lambda each: each.cost)
         labels = np.where(labels == best.second, best.first, labels)
-        labels = labels - (labels > best.second)
-        trace.append(labels)
+        kept.remove(best.second)
+        found = {pair: each for pair, each in found.items() if not {best.first, best.second} & {*pair}}
+        for pair in combinations(kept, 2):
+            if best.first in pair:
+                found[pair] = compare_classes(features, labels, *pair)
+        trace.append(np.searchsorted(kept, labels))
 
 
 def compare_classes(features: Float[Array, "m m k"], labels: Int[Array, "m m"], first: int, second: int) -> Difference:

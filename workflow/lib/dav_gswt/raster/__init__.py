@@ -9,6 +9,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
+from dav_gswt.images.channels import composite
 from dav_gswt.raster import backends
 from dav_gswt.raster.adapter import to_raster_arrays
 from dav_gswt.raster.interface import Adam, Contributions, Gradients, Loss, Rasterizer, Rendering
@@ -42,7 +43,8 @@ def render(
     behind, channels = np.asarray(background, np.float32), seen.colour.shape[2]
     if behind.shape not in ((), (channels,)):
         raise ValueError(f"background must have one value or {channels}, one a channel, not {behind.size}")
-    return Rendering(seen.colour + (1 - seen.alpha)[..., None] * behind, seen.alpha, seen.depth)
+    behind = np.broadcast_to(behind, channels)
+    return Rendering(composite(seen.colour, seen.alpha, behind), seen.alpha, seen.depth)
 
 
 loss = Loss(lambda *inputs: backends.load_backend().loss.compute(*inputs))

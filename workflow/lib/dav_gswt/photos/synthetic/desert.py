@@ -75,27 +75,29 @@ def draw_sand(rng, o: Options, n: int, gravel: float = 1.0) -> tuple[Float32[Arr
     bare = gravel * smoothstep(0.75, 1.5, noise.make_noise(rng, n, p, 3.5, 0.25, 1.0))
     calm = smoothstep(-0.4, 1.0, noise.make_noise(rng, n, p, 5.0, 1.5, 1.0))
     strength = strength * (1 - bare) * (0.35 + 0.65 * calm)
-    profile = noise.ripple_profile(phase) * strength
+    profile = noise.map_rows(lambda phase, strength: noise.ripple_profile(phase) * strength, phase, strength)
     mottle = noise.make_noise(rng, n, p, 1.2, 0.08, 0.7)
     grain = noise.make_noise(rng, n, p, 0.06, 0.012, 0.5)
     speck = noise.make_noise(rng, n, p, 0.12, 0.03, 0.3)
     rough = noise.make_noise(rng, n, p, 0.30, 0.04, 1.0)
     heights = 0.5 * o.ripple_height * profile + (0.0016 + 0.002 * bare) * rough
     silt = smoothstep(0.2, 1.6, noise.make_noise(rng, n, p, 4.5, 0.5, 1.0))
-    mix = (0.62 * bare * (0.75 + 0.25 * np.tanh(grain)))[..., None]
-    colour = SAND + 0.55 * silt[..., None] * (SILT - SAND)
-    colour = colour * (1 - mix) + GRAVEL * mix
+    return noise.map_rows(_colour_sand, bare, silt, profile, mottle, grain, speck), heights
+
+
+def _colour_sand(bare, silt, profile, mottle, grain, speck) -> Float32[Array, "*n 3"]:
+    mix = 0.62 * bare * (0.75 + 0.25 * np.tanh(grain))
     tone = 0.10 * profile + 0.055 * mottle + (0.085 + 0.16 * bare) * grain + 0.05 * speck
-    shade = np.exp(tone)[..., None] ** np.array([0.9, 1.0, 1.15])  # what is darker is redder
-    return np.clip(colour * shade, 0.02, 0.9).astype(np.float32), heights
+    out = np.empty((*bare.shape, 3), np.float32)
+    for c, redder in enumerate((0.9, 1.0, 1.15)):  # what is darker is redder
+        colour = SAND[c] + 0.55 * silt * (SILT[c] - SAND[c])
+        colour = colour * (1 - mix) + GRAVEL[c] * mix
+        out[..., c] = np.clip(colour * np.exp(redder * tone), 0.02, 0.9)
+    return out
 
 
 def _height(x, y, large, small, mounds, o: Options):
     """Ground height before levelling: undulation, ripples near the middle, far dunes, and sand blown to plants."""
     z = land.fade_raster(large, PERIOD, x, y, 12.0, 30.0) + land.fade_raster(small, PERIOD, x, y, 7.0, 8.5)
     z = z + land.sum_hills(x, y, (14.0, 70.0), (o.undulation, 9.0), DUNES)
-    for px, py, size in mounds:
-        near = np.abs(x - px) + np.abs(y - py) < 4 * size
-        square = (x[near] - px) ** 2 + (y[near] - py) ** 2
-        z[near] += 0.14 * size * np.exp(-square / (0.9 * size) ** 2)
-    return z
+    return land.add_mounds(z, x, y, mounds, height=0.14, width=0.9, end=4.0)

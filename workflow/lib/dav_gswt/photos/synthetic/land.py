@@ -97,6 +97,23 @@ def sum_hills(x: Array, y: Array, rise: tuple[float, float], amplitudes: tuple[f
     return far * sum(weight * np.sin(kx * x + ky * y + phase) for kx, ky, phase, weight in waves)
 
 
+def add_mounds(
+    z: Array, x: Array, y: Array, plants: Float[Array, "m 3"], height: float, width: float, end: float
+) -> Array:
+    """Heights with a mound of earth at every plant x, y, size: height exp(-r^2 / width^2).
+
+    height, width, end: in sizes of the plant; end: distance, summed along x and y, from which there is none.
+    """
+    order = np.argsort(x, axis=None)
+    sorted_x, at_x, at_y, out = x.ravel()[order], x.ravel(), y.ravel(), z.ravel().copy()
+    for px, py, size in plants:
+        some = order[slice(*np.searchsorted(sorted_x, [px - end * size, px + end * size]))]
+        near = some[np.abs(at_x[some] - px) + np.abs(at_y[some] - py) < end * size]
+        square = (at_x[near] - px) ** 2 + (at_y[near] - py) ** 2
+        out[near] += height * size * np.exp(-square / (width * size) ** 2)
+    return out.reshape(z.shape)
+
+
 def level_ground(height: Height, exemplar: float) -> Height:
     """The ground moved in height so that its mean over the exemplar is 0."""
     grid = np.linspace(-exemplar / 2, exemplar / 2, 256)

@@ -7,7 +7,6 @@ their centre at the origin. Colours are linear reflectances.
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 from jaxtyping import Float, Float32, Int
 from numpy import ndarray as Array
 
@@ -55,6 +54,8 @@ def make_stone(rng: np.random.Generator, subdivisions: int, palette: Colours = D
     With unit normals n_k at distances d_k the radius along v is (sum_k max(n_k.v, 0)^p / d_k^p)^(-1/p): the inner hull
     of the planes for p -> inf, rounded for the p = 14 used here.
     """
+    import trimesh  # deferred: it takes long to load, and what only poses cameras makes no stone
+
     icosphere = trimesh.creation.icosphere(subdivisions=subdivisions)
     sphere, faces = np.array(icosphere.vertices), np.array(icosphere.faces)
     normals = rng.standard_normal((16, 3))

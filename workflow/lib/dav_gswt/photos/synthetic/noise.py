@@ -4,9 +4,18 @@ Every field lives on an n x n raster over a square of side `period` and is smoot
 from the spectrum. Rows grow with y, columns with x.
 """
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+
 import numpy as np
-from jaxtyping import Float
+import scipy.fft
+from jaxtyping import Complex, Float
 from numpy import ndarray as Array
+
+from dav_gswt.threads import default_threads
+
+ROWS = 128  # of a raster that a thread takes at a time
 
 
 def make_noise(
@@ -20,14 +29,12 @@ def make_noise(
     Args:    longest, shortest: in the unit of `period`.
     Raises:  ValueError: no wave of the raster lies between the limits.
     """
-    k = _wave_numbers(n, period, half=True)[2]
-    k[0, 0] = 1.0
-    length = 1.0 / k
-    above = np.maximum(np.log2(length / longest), 0)
-    below = np.maximum(np.log2(shortest / length), 0)
-    gain = np.minimum(length, longest) ** slope * np.exp(-4.0 * (above**2 + below**2))
+    length = _log_wavelengths(n, period)
+    most, least = np.log2(longest), np.log2(shortest)
+    outside = np.maximum(length - most, 0) ** 2 + np.maximum(least - length, 0) ** 2
+    gain = np.exp2(slope * np.minimum(length, most) - 4.0 * np.log2(np.e) * outside)
     gain[0, 0] = 0.0
-    noise = np.fft.irfft2(gain * _white(rng, gain.shape), s=(n, n))
+    noise = scipy.fft.irfft2(gain * _white(rng, gain.shape), s=(n, n), workers=default_threads(), overwrite_x=True)
     spread = noise.std()
     if not spread > 0:
         raise ValueError(f"no wavelength between {shortest} and {longest} fits a raster of {n} over {period}")
@@ -51,13 +58,19 @@ def make_ripples(
     whose crests meander and fork as those of real ripples do, and its modulus is 0 exactly where the phase is
     undefined, at a fork's tip.
     """
-    kx, ky, _ = _wave_numbers(n, period)
+    frequencies = np.fft.fftfreq(n, period / n)
+    white = _white(rng, (n, n))
+    reached = np.flatnonzero(np.abs(frequencies) < 3 / length)  # beyond it the lobe is below exp(-60)
+    kx, ky = np.meshgrid(frequencies[reached], frequencies[reached])
     along = length * (kx * np.cos(wind) + ky * np.sin(wind))
     across = length * (ky * np.cos(wind) - kx * np.sin(wind))
     lobe = np.exp(-0.5 * ((along - 1.0) / 0.11) ** 2 - 0.5 * (across / 0.17) ** 2)
-    signal = np.fft.ifft2(lobe * _white(rng, lobe.shape))
-    modulus = np.abs(signal)
-    return np.angle(signal), np.tanh(1.8 * modulus / (modulus.mean() + 1e-300))
+    spectrum, some = np.zeros_like(white), np.ix_(reached, reached)
+    spectrum[some] = lobe * white[some]
+    signal = scipy.fft.ifft2(spectrum, workers=default_threads(), overwrite_x=True)
+    modulus = map_rows(np.abs, signal)
+    mean = modulus.mean() + 1e-300
+    return map_rows(np.angle, signal), map_rows(lambda rows: np.tanh(1.8 * rows / mean), modulus)
 
 
 def ripple_profile(phase: Float[Array, "..."]) -> Float[Array, "..."]:
@@ -66,16 +79,29 @@ def ripple_profile(phase: Float[Array, "..."]) -> Float[Array, "..."]:
     return (np.cos(skewed) + 0.22 * np.cos(2.0 * skewed)) / 1.22
 
 
-def _white(rng: np.random.Generator, shape: tuple[int, int]) -> Array:
+def map_rows(function: Callable[..., Array], *rasters: Array) -> Array:
+    """A function that takes each texel by itself, of bands of rows on several threads."""
+    bands = [tuple(raster[i : i + ROWS] for raster in rasters) for i in range(0, len(rasters[0]), ROWS)]
+    with ThreadPoolExecutor(default_threads()) as pool:
+        return np.concatenate(list(pool.map(lambda band: function(*band), bands)))
+
+
+def _white(rng: np.random.Generator, shape: tuple[int, int]) -> Complex[Array, "n m"]:
     """The spectrum of white noise: independent complex normal numbers."""
-    return rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+    out = np.empty(shape, complex)
+    out.real, out.imag = rng.standard_normal(shape), rng.standard_normal(shape)
+    return out
 
 
-def _wave_numbers(n: int, period: float, half: bool = False) -> tuple[Array, Array, Array]:
-    """Cycles per unit of length along x, along y, and in all; half: of a real field, whose other half follows."""
-    kx = (np.fft.rfftfreq if half else np.fft.fftfreq)(n, period / n)
-    kx, ky = np.meshgrid(kx, np.fft.fftfreq(n, period / n))
-    return kx, ky, np.hypot(kx, ky)
+@lru_cache(maxsize=2)
+def _log_wavelengths(n: int, period: float) -> Float[Array, "n m"]:
+    """log2 of the wavelengths of a real field's spectrum; 0 for the constant."""
+    kx, ky = np.meshgrid(np.fft.rfftfreq(n, period / n), np.fft.fftfreq(n, period / n))
+    k = np.hypot(kx, ky)
+    k[0, 0] = 1.0
+    length = -np.log2(k)
+    length.flags.writeable = False
+    return length
 
 
 def sample_raster(

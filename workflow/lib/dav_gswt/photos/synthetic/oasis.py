@@ -138,11 +138,7 @@ def _height(x, y, large, small, shrubs, o: Options):
     """Ground height before levelling: undulation, small heights near the middle, far hills, and soil about shrubs."""
     z = land.fade_raster(large, PERIOD, x, y, 13.0, 34.0) + land.fade_raster(small, PERIOD, x, y, 7.0, 8.5)
     z = z + land.sum_hills(x, y, (14.0, 90.0), (o.undulation, 10.0), HILLS)
-    for px, py, radius in shrubs:
-        near = np.abs(x - px) + np.abs(y - py) < 6 * radius
-        square = (x[near] - px) ** 2 + (y[near] - py) ** 2
-        z[near] += 0.16 * radius * np.exp(-square / (1.1 * radius) ** 2)
-    return z
+    return land.add_mounds(z, x, y, shrubs, height=0.16, width=1.1, end=6.0)
 
 
 def _scatter_objects(rng, layout: Layout, taken, density: float, radii, exemplar: float) -> Float[Array, "n 3"]:

@@ -2,7 +2,6 @@
 one colour, as the instances of `mitsuba_scene` need it."""
 
 import numpy as np
-import trimesh
 from jaxtyping import Float
 from numpy import ndarray as Array
 
@@ -18,6 +17,8 @@ def make_rock(rng: np.random.Generator, subdivisions: int, palette: Colours) -> 
 
     Compared with `meshes.make_stone`, the amplitude of the roughness falls with its wavelength.
     """
+    import trimesh  # deferred, as in `meshes.make_stone`
+
     icosphere = trimesh.creation.icosphere(subdivisions=subdivisions)
     sphere, faces = np.array(icosphere.vertices), np.array(icosphere.faces)
     radius = _hull(rng, sphere) * (1 + _roughness(rng, sphere)) - _pits(rng, sphere)

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
+from dav_gswt.images import channels
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction.fitting.photo_colours import median_colours, sample_colours
 
@@ -108,7 +109,7 @@ def update_gain_and_offset(
     counts = weight > 0
     if not counts.any():
         return before
-    apart = np.abs(picture * before[0] + before[1] - image).max(-1)
+    apart = channels.largest_difference(channels.scale_channels(picture, *before), image)
     agrees = counts & (apart <= TRIM * np.median(apart[counts]))
     w = weight[agrees][:, None].astype(float)
     u, v, total = picture[agrees].astype(float), image[agrees].astype(float), float(w.sum()) + 1e-9

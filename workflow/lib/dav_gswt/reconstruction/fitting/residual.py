@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
+from dav_gswt.images import channels
 from dav_gswt.raster import Rasterizer
 
 
@@ -18,7 +19,7 @@ class Residual:
 
     def add(self, rasterizer: Rasterizer, difference: Float32[Array, "h w 3"], weight: Float32[Array, "h w"]) -> None:
         """Add the last picture of the rasterizer. difference: picture less photo. weight: pixels that count."""
-        squared = np.ascontiguousarray(((difference**2).mean(-1) * weight)[..., None], np.float32)
+        squared = (channels.mean_squares(difference) * weight)[..., None]
         found = rasterizer.contributions(squared).mapped[:, 0]
         if not len(self.errors):
             self.errors, self.photos = np.zeros_like(found), np.zeros(len(found), np.int32)

@@ -17,7 +17,7 @@ from numpy import ndarray as Array
 
 from dav_gswt import raster
 from dav_gswt.field import SH0, GaussianField
-from dav_gswt.images import image_files
+from dav_gswt.images import channels, image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos.training_views import TrainingView, make_training_view
 from dav_gswt.reconstruction.fitting import (
@@ -206,31 +206,25 @@ def _descend(run: TrainingState, task: TrainingTask, index: int) -> None:
     if ahead is not None and ahead < min(ERROR_PHOTOS, len(task.views)):
         run.residual.add(task.raster, exposed - view.image, weight)
     _, gradient = raster.loss(exposed, view.image, weight, STRUCTURE)
-    gradient = np.ascontiguousarray(gradient * gain)
-    gradients = task.raster.backward(gradient, -BACKDROP * np.einsum("hwc,hwc->hw", gradient, behind))
+    gradient = channels.scale_channels(gradient, gain)
+    gradients = task.raster.backward(gradient, -BACKDROP * channels.sum_products(gradient, behind))
     task.constraints.adjust_gradients(gradients)
     _step_adam(run, task, gradients)
     if task.plan.pose_rate:
         run.poses.descend(index, gradients.camera, task.plan.pose_rate * task.schedule.rate(run.step), camera)
 
 
-def _background(view: TrainingView, colour: Float32[Array, "3"]) -> Float32[Array, "h w 3"]:
-    """A colour, and the sky where the photo shows it."""
-    if view.behind is None:
-        return np.broadcast_to(colour, view.image.shape)
-    return np.where(np.isnan(view.behind), colour, view.behind)
+def _background(view: TrainingView, colour: Float32[Array, "3"]) -> Float32[Array, "*hw 3"]:
+    """A colour, and in each pixel the sky where the photo shows it."""
+    return colour if view.behind is None else channels.fill_unknown(view.behind, colour)
 
 
-def _composite(seen: raster.Rendering, behind: Float32[Array, "h w 3"]) -> Float32[Array, "h w 3"]:
-    return seen.colour + (1 - seen.alpha)[..., None] * behind
-
-
-def _apply_exposure(run: TrainingState, index: int, seen, behind: Float32[Array, "h w 3"], view: TrainingView):
+def _apply_exposure(run: TrainingState, index: int, seen, behind: Float32[Array, "*hw 3"], view: TrainingView):
     """The picture over its background at the photo's exposure, and the gain."""
-    image = _composite(seen, behind)
+    image = channels.composite(seen.colour, seen.alpha, behind)
     run.exposures.update(index, image, view)
     a, b = run.exposures.gain_and_offset(index)
-    return np.ascontiguousarray(image * a + b), a
+    return channels.scale_channels(image, a, b), a
 
 
 def _step_adam(run: TrainingState, task: TrainingTask, gradients) -> None:
@@ -275,7 +269,8 @@ def _score(run: TrainingState, task: TrainingTask, now: State) -> float:
     for index, view in enumerate(task.views):
         seen = task.raster.forward(**now.values, camera=run.poses.correct(index, view.camera))
         a, b = run.exposures.gain_and_offset(index)
-        picture = _composite(seen, _background(view, np.full(3, 0.5, np.float32))) * a + b
+        behind = _background(view, np.full(3, 0.5, np.float32))
+        picture = channels.scale_channels(channels.composite(seen.colour, seen.alpha, behind), a, b)
         tally.add(picture, view.image, view.weight * task.held[index])
     return tally.psnr
 
