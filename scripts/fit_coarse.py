@@ -19,7 +19,7 @@ with logging_to(snakemake.log[0]):
     settings = select_settings(CoarseSettings, params.preset)
     margin = ground.WHOLE if params.scene.get("whole", False) else ground.MARGIN
     names = list(read_view_split(paths.views).start)
-    photos = read_training_views(paths.images, paths.model, names, [], settings.size)
+    photos = read_training_views(paths.images, paths.model, names, [], settings.size, params.keep)
     points, colours = triangulate_points(read_colmap_model(paths.model), names, paths.images)
     rng = np.random.default_rng(params.seed)
     start = StartViews(read_scene_frame(paths.frame), photos, points, colours, margin)

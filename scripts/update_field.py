@@ -6,7 +6,8 @@ from dav_gswt.field import read_field, write_field
 from dav_gswt.files import read_json, write_json
 from dav_gswt.geometry.scene_frame import read_scene_frame
 from dav_gswt.logs import logging_to
-from dav_gswt.photos.training_views import read_captured_views, read_training_views
+from dav_gswt.photos.capture_record import read_capture_record
+from dav_gswt.photos.training_views import read_training_views
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.reconstruction import ground, refit, regression_guard
 from dav_gswt.reconstruction.refinement import RefinementInput
@@ -15,9 +16,9 @@ with logging_to(snakemake.log[0]):
     paths, params, size = snakemake.input, snakemake.params, snakemake.params.preset["size"]
     captures, names = list(paths.captures), list(read_view_split(paths.views).start)
     aside = regression_guard.list_rejected_photos(map(read_json, paths.fits))
-    before = read_training_views(paths.images, paths.model, names, captures[:-1], size)
-    known = [view for view in before if view.name not in aside]
-    new = read_captured_views(captures[-1], size)
+    views = read_training_views(paths.images, paths.model, names, captures, size, params.keep)
+    count = len(views) - len(read_capture_record(captures[-1]))
+    known, new = [view for view in views[:count] if view.name not in aside], views[count:]
     rng = np.random.default_rng([params.seed, params.t])
     last = read_field(paths.field), ground.read_ground(paths.ground), read_scene_frame(paths.frame)
     files = refit.PhotoFiles(paths.model, paths.images, len(names), params.scene.get("whole", False))

@@ -1,5 +1,6 @@
 """Rule profile_fit: quality of a fit over time, and stills of its field away from the photos."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from dav_gswt.files import write_json
@@ -12,7 +13,7 @@ from dav_gswt.study import csv_tables, fit_profile
 with logging_to(snakemake.log[0]):
     out, settings = snakemake.output, dict(snakemake.params.profile)
     margin = settings.pop("margin")
-    preset = select_settings(CoarseSettings, settings)
+    preset = replace(select_settings(CoarseSettings, settings), steps_per_photo=0)  # `steps` are of the whole fit
     photos = fit_profile.read_photo_set(Path(snakemake.input.frame).parent, preset.size, margin)
     found = fit_profile.profile_fit(photos, preset)
     csv_tables.write_table(out.curve, found.curve)

@@ -156,7 +156,7 @@ def describe_work(config: Mapping[str, Any], preset: str | None = None) -> Work:
         fit_pixels=shape * float(seen) ** 2,
         gaussians=float(min(most, PER_PIXEL * seen**2) if photographed else most / 2),
         step_cost=SH_COST[entry["sh_degree"]],
-        steps=plan.STEPS_PER_PHOTO * start if entry["steps"] == "auto" else entry["steps"],
+        steps=plan.count_first_steps(entry["steps"], entry["steps_per_photo"], start),
         steps_per_photo=plan.STEPS_PER_NEW_PHOTO if entry["steps_per_photo"] == "auto" else entry["steps_per_photo"],
         level_steps=entry["level_steps"],
         scratch=entry["refit"] == "scratch",

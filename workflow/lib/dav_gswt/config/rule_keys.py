@@ -78,8 +78,8 @@ SCENE_KEYS: dict[str, tuple[str, ...] | dict[str, tuple[str, ...]]] = {
     "calibrate_round": _CANDIDATES,
 }
 
-_COARSE = ("size", "spacing", "max_gaussians", "steps", "sh_degree", "pose_rate")
-_ALL_FITS = (*_COARSE, "steps_per_photo", "refit")
+_COARSE = ("size", "spacing", "max_gaussians", "steps", "steps_per_photo", "sh_degree", "pose_rate")
+_ALL_FITS = (*_COARSE, "refit")
 
 # of a preset, by rule; metrics.json records what its field was fitted with
 PRESET_KEYS: dict[str, tuple[str, ...]] = {

@@ -142,9 +142,11 @@ class Preset(ConfigModel):
     max_gaussians: Annotated[int, Field(ge=1000, le=8_000_000)] | Auto = key(
         "most Gaussians in the field", renamed="cap"
     )
-    steps: Annotated[int, Field(ge=1, le=100_000)] | Auto = key("optimiser steps of the coarse fit")
+    steps: Annotated[int, Field(ge=1, le=100_000)] | Auto = key(
+        "optimiser steps of the coarse fit, to 8 photos or fewer"
+    )
     steps_per_photo: Annotated[int, Field(ge=1, le=100_000)] | Auto = key(
-        "optimiser steps for each new photo of a round"
+        "optimiser steps for each photo more: beyond 8 of the coarse fit, and each new one of a round"
     )
     refit: Literal["continue", "scratch"] = key(
         "how a round takes new photos: `continue`: the field is fitted on; `scratch`: all photos are fitted anew",

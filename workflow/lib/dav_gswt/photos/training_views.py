@@ -1,6 +1,6 @@
 """Training views: a photo with its camera at the size of a preset, and a weight per pixel for the fit."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,9 +11,11 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
+from dav_gswt.photos.array_file import ArrayFile, release_pages
 from dav_gswt.photos.capture_record import read_capture_record
 
 WHOLE = 0.99  # of a shrunk pixel that must not be masked for it to count
+IN_MEMORY = 300e6  # bytes of all photos, beyond which they lie in files (a fit holds them about four times)
 
 
 @dataclass(frozen=True)
@@ -21,7 +23,7 @@ class TrainingView:
     """A photo and its camera on the same pixel grid.
 
     weight: 1 where the photo counts, 0 where it is not fitted. behind: the colour behind all that can be modelled, NaN
-    where that is not known; None: nowhere.
+    where that is not known; None: nowhere. arrays: where they lie, if not in memory.
     """
 
     name: str
@@ -29,6 +31,33 @@ class TrainingView:
     image: Float32[Array, "h w 3"]
     weight: Float32[Array, "h w"]
     behind: Float32[Array, "h w 3"] | None = None
+    arrays: ArrayFile | None = None
+
+    def with_pixels(self, **changed: Array) -> "TrainingView":
+        """The view with another image, weight or behind, which lies where its arrays do."""
+        if self.arrays is not None:
+            changed = {name: self.arrays.store(array) for name, array in changed.items()}
+        return replace(self, **changed)
+
+    def release(self) -> None:
+        """Give back the memory that reading the arrays took; nothing for arrays in memory."""
+        for array in (self.image, self.weight, self.behind):
+            if self.arrays is not None and array is not None:
+                release_pages(array)
+
+
+def one_by_one(views: Iterable[TrainingView]) -> Iterator[TrainingView]:
+    """The views, each released when the next one is asked for."""
+    for view in views:
+        yield view
+        view.release()
+
+
+def open_array_file(cameras: Iterable[Camera], size: int, folder: Path | str) -> ArrayFile | None:
+    """Where photos of these cameras, at most `size` pixels wide or high, lie; None: in memory, as they take little."""
+    shares = [(camera, min(1.0, size / max(camera.width, camera.height))) for camera in cameras]
+    total = sum(12 * camera.width * camera.height * share**2 for camera, share in shares)
+    return ArrayFile(folder) if total > IN_MEMORY else None
 
 
 def make_training_view(
@@ -48,8 +77,10 @@ def make_training_view(
     return TrainingView(name, camera, image, weight.astype(np.float32))
 
 
-def read_training_view(name: str, camera: Camera, path: Path | str, size: int) -> TrainingView:
-    """The view of a picture file; what its alpha masks does not count.
+def read_training_view(
+    name: str, camera: Camera, path: Path | str, size: int, arrays: ArrayFile | None = None
+) -> TrainingView:
+    """The view of a picture file; what its alpha masks does not count. arrays: where it lies; None: in memory.
 
     Raises: InputError: not readable as an image, or smaller than the camera's picture.
     """
@@ -59,16 +90,17 @@ def read_training_view(name: str, camera: Camera, path: Path | str, size: int) -
             f"{path}: {image.shape[1]} x {image.shape[0]} pixels, its camera takes {camera.width} x {camera.height}; "
             "make the photos again"
         )
-    return make_training_view(name, camera, image, size, cover)
+    view = replace(make_training_view(name, camera, image, size, cover), arrays=arrays)
+    return view.with_pixels(image=view.image, weight=view.weight)
 
 
-def read_captured_views(folder: Path | str, size: int) -> list[TrainingView]:
+def read_captured_views(folder: Path | str, size: int, arrays: ArrayFile | None = None) -> list[TrainingView]:
     """The photos that one round's capture/ folder holds, in the order they were taken.
 
     Raises: InputError: see `read_capture_record`.
     """
     folder = Path(folder)
-    return [read_training_view(p.name, p.camera, folder / p.name, size) for p in read_capture_record(folder)]
+    return [read_training_view(p.name, p.camera, folder / p.name, size, arrays) for p in read_capture_record(folder)]
 
 
 def mask_outside_ground(view: TrainingView, west: float, south: float, east: float, north: float) -> TrainingView:
@@ -78,15 +110,29 @@ def mask_outside_ground(view: TrainingView, west: float, south: float, east: flo
         t = -origin[..., 2] / step[..., 2]
         x, y = origin[..., 0] + t * step[..., 0], origin[..., 1] + t * step[..., 1]
     hit = (t > 0) & (x > west) & (x < east) & (y > south) & (y < north)
-    return replace(view, weight=view.weight * hit.astype(np.float32))
+    return view.with_pixels(weight=view.weight * hit.astype(np.float32))
 
 
 def read_training_views(
-    images_folder: Path | str, model: Path | str, names: Sequence[str], captures: list, size: int
+    images_folder: Path | str,
+    model: Path | str,
+    names: Sequence[str],
+    captures: Sequence[Path | str],
+    size: int,
+    files: Path | str | None = None,
 ) -> list[TrainingView]:
-    """The photos captured so far: those named in the model, then every capture folder's, in their order."""
+    """The photos captured so far: those named in the model, then every capture folder's, in their order.
+
+    files: a folder in which they lie, without a name, if they are too many for memory; None: in memory.
+    """
     from dav_gswt.photos.colmap_model import read_colmap_model  # not above: it loads pycolmap
 
     known = read_colmap_model(model)
-    start = [read_training_view(name, known.camera(name), Path(images_folder) / name, size) for name in names]
-    return start + [view for folder in captures for view in read_captured_views(folder, size)]
+    cameras = [known.camera(name) for name in names]
+    taken = [photo.camera for folder in captures for photo in read_capture_record(folder)]
+    arrays = None if files is None else open_array_file([*cameras, *taken], size, files)
+    start = [
+        read_training_view(name, camera, Path(images_folder) / name, size, arrays)
+        for name, camera in zip(names, cameras, strict=True)
+    ]
+    return start + [view for folder in captures for view in read_captured_views(folder, size, arrays)]

@@ -10,9 +10,9 @@ from dav_gswt.reconstruction.fitting.plan import (
     AUTO,
     MAX_GAUSSIANS,
     STEPS_PER_NEW_PHOTO,
-    STEPS_PER_PHOTO,
     Count,
     FitPlan,
+    count_first_steps,
 )
 
 # Learning rates of an update at its first step, as a share of a first fit's: the field is nearly right, and rates as at
@@ -41,6 +41,7 @@ class CoarseSettings(_FitSettings):
 
     spacing: float  # of the discs, in sizes of a photo's pixel on the ground
     steps: Count
+    steps_per_photo: Count = 0  # for each photo beyond `plan.FEW_PHOTOS`
 
     @property
     def max_discs(self) -> int:
@@ -49,7 +50,7 @@ class CoarseSettings(_FitSettings):
 
     def plan_coarse_fit(self, photos: int, half_share: float = 0.0) -> FitPlan:
         """The plan of the first fit, to so many photos."""
-        steps = STEPS_PER_PHOTO * photos if self.steps == AUTO else int(self.steps)
+        steps = count_first_steps(self.steps, self.steps_per_photo, photos)
         return FitPlan(steps, self.max_gaussians, self.sh_degree, half_share, self.pose_rate)
 
 

@@ -1,6 +1,6 @@
 """What the photos show of a scene before any fit: exposure, moving objects, relief, colours of the ground, and sky."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -9,7 +9,7 @@ from numpy import ndarray as Array
 from dav_gswt import raster
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.scene_frame import SceneFrame
-from dav_gswt.photos.training_views import TrainingView, mask_outside_ground
+from dav_gswt.photos.training_views import TrainingView, mask_outside_ground, one_by_one
 from dav_gswt.reconstruction import distractors, objects, sky
 from dav_gswt.reconstruction.fitting import exposure
 from dav_gswt.reconstruction.fitting.photo_colours import median_colours
@@ -53,8 +53,8 @@ def ground_colours(
     if len(occluders):
         rasterizer = raster.Rasterizer()
         arrays = raster.to_raster_arrays(occluders)
-        clear = [rasterizer.forward(**arrays, camera=v.camera).alpha < 0.5 for v in views]
-        views = [replace(v, weight=v.weight * c) for v, c in zip(views, clear, strict=True)]
+        clear = (rasterizer.forward(**arrays, camera=view.camera).alpha < 0.5 for view in views)
+        views = [view.with_pixels(weight=view.weight * c) for view, c in zip(one_by_one(views), clear, strict=True)]
     colour, known = median_colours(grid.centres, views)
     return colour, known.reshape(grid.shape)
 
@@ -70,7 +70,10 @@ def mask_to_ground(views: list[TrainingView], grid: Ground) -> list[TrainingView
     rows, columns = grid.shape
     inset = 2 * grid.spacing
     east, north = grid.west + columns * grid.spacing, grid.south + rows * grid.spacing
-    return [mask_outside_ground(v, grid.west + inset, grid.south + inset, east - inset, north - inset) for v in views]
+    return [
+        mask_outside_ground(v, grid.west + inset, grid.south + inset, east - inset, north - inset)
+        for v in one_by_one(views)
+    ]
 
 
 def mask_for_fit(views: list[TrainingView], grid: Ground) -> list[TrainingView]:

@@ -12,7 +12,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.cameras import Camera
-from dav_gswt.photos.training_views import TrainingView
+from dav_gswt.photos.training_views import TrainingView, one_by_one
 from dav_gswt.raster import Rasterizer, to_raster_arrays
 
 MIN_WEIGHT = 0.05  # pixels of blend weight from which a photo counts as seeing a Gaussian
@@ -22,7 +22,7 @@ def estimate_uncertainty(field: GaussianField, views: list[TrainingView]) -> Gau
     """The field with uncertainty u_i = 1 - max over views of (sum of w_i alpha / sum of w_i), 1 where none sees it."""
     known = np.zeros(len(field), np.float32)
     raster = Rasterizer()
-    for view in views:
+    for view in one_by_one(views):
         seen = raster.forward(**to_raster_arrays(field), camera=view.camera)
         maps = np.stack([view.weight * seen.alpha, view.weight], -1).astype(np.float32)
         opaque, weight = raster.contributions(maps).mapped.T

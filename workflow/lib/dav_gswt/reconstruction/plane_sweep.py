@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 from scipy.ndimage import gaussian_filter, label, map_coordinates
 
-from dav_gswt.photos.training_views import TrainingView
+from dav_gswt.photos.training_views import TrainingView, one_by_one
 from dav_gswt.reconstruction import visibility
 from dav_gswt.reconstruction.ground import Ground
 
@@ -176,7 +176,7 @@ def _colour_deviation(
 ) -> tuple[Float32[Array, "n"], Float32[Array, "n"]]:
     n = len(starts[0])
     total, squares, count = np.zeros((n, 3), np.float32), np.zeros(n, np.float32), np.zeros(n, np.float32)
-    for view, start in zip(views, starts, strict=True):
+    for view, start in zip(one_by_one(views), starts, strict=True):
         rows, colours = _sample_bilinear(view, start + height * view.camera.rotation[:, 2].astype(np.float32))
         total[rows] += colours
         squares[rows] += np.einsum("nc,nc->n", colours, colours)

@@ -36,7 +36,8 @@ class ScratchSettings:
     def for_photos(self, count: int) -> CoarseSettings:
         """The settings of a fit to so many photos."""
         steps = self.coarse.plan_coarse_fit(self.start).steps
-        return replace(self.coarse, steps=steps + self.update.steps_per_new_photo * max(0, count - self.start))
+        more = self.update.steps_per_new_photo * max(0, count - self.start)
+        return replace(self.coarse, steps=steps + more, steps_per_photo=0)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 from dav_gswt import raster
 from dav_gswt.field import GaussianField
 from dav_gswt.images import metrics
-from dav_gswt.photos.training_views import TrainingView
+from dav_gswt.photos.training_views import TrainingView, one_by_one
 from dav_gswt.raster import to_raster_arrays
 from dav_gswt.reconstruction.fitting.plan import EarlierViews, FitPlan, FitReport, NewViews, UpdateReport
 from dav_gswt.reconstruction.fitting.trainer import FitResult
@@ -127,7 +127,7 @@ def list_rejected_photos(reports: Iterable[dict]) -> set[str]:
 def measure_psnr(field: GaussianField, views: list[TrainingView]) -> list[float | None]:
     """PSNR of each photo in dB over the pixels that count, after a gain and offset per channel; None without any."""
     rasterizer = raster.Rasterizer()
-    return [_psnr(rasterizer, field, view) if view.weight.any() else None for view in views]
+    return [_psnr(rasterizer, field, view) if view.weight.any() else None for view in one_by_one(views)]
 
 
 def _psnr(rasterizer: raster.Rasterizer, field: GaussianField, view: TrainingView) -> float:

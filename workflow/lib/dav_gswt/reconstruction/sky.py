@@ -7,14 +7,13 @@ modelled: they do not count.
 """
 
 import logging
-from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 from scipy.ndimage import binary_dilation
 
-from dav_gswt.photos.training_views import TrainingView
+from dav_gswt.photos.training_views import TrainingView, one_by_one
 from dav_gswt.raster import harmonics
 
 _log = logging.getLogger(__name__)
@@ -35,22 +34,34 @@ def add_sky(views: list[TrainingView], modelled: list[TrainingView]) -> list[Tra
     views: the photos, counting wherever they are valid. modelled: the same, counting only over the ground.
     Without enough sky, or without a smooth one, the modelled views are returned.
     """
-    rising = [_rays_above_horizon(view) for view in views]
-    total = sum(int(mask.sum()) for _, mask in rising)
+    counts = [int(_rays_above_horizon(view)[1].sum()) for view in one_by_one(views)]
+    total = sum(counts)
     if total < MIN_PIXELS:
         return modelled
-    stride = max(1, total // MAX_PIXELS)
-    directions = np.concatenate([d[mask] for d, mask in rising])[::stride]
-    colours = np.concatenate([view.image[mask] for view, (_, mask) in zip(views, rising, strict=True)])[::stride]
-    coefficients, deviation = fit_sky(directions, colours)
+    coefficients, deviation = fit_sky(*_sample_sky(views, counts, max(1, total // MAX_PIXELS)))
     if deviation > MAX_DEVIATION:
         _log.info("sky: none that is smooth (its pixels differ by %.2f), it counts for nothing", deviation)
         return modelled
     bound = TRIM * 1.4826 * deviation + SLACK
-    found = [_mask_sky(m, v, *r, coefficients, bound) for m, v, r in zip(modelled, views, rising, strict=True)]
-    seen = sum(int((~np.isnan(v.behind[..., 0])).sum()) for v in found if v.behind is not None)
+    pairs = zip(one_by_one(modelled), views, strict=True)
+    found = [_mask_sky(m, view, *_rays_above_horizon(view), coefficients, bound) for m, view in pairs]
+    seen = sum(int((~np.isnan(v.behind[..., 0])).sum()) for v in one_by_one(found) if v.behind is not None)
     _log.info("sky: %.0f %% of what lies above the horizon", 100 * seen / total)
     return found
+
+
+def _sample_sky(
+    views: list[TrainingView], counts: list[int], stride: int
+) -> tuple[Float[Array, "n 3"], Float32[Array, "n 3"]]:
+    """Directions and colours of every `stride`-th of the pixels above the horizon, of all photos in their order."""
+    directions, colours, before = [], [], 0
+    for view, count in zip(one_by_one(views), counts, strict=True):
+        towards, rising = _rays_above_horizon(view)
+        some = np.s_[-before % stride :: stride]
+        directions.append(towards[rising][some])
+        colours.append(view.image[rising][some])
+        before += count
+    return np.concatenate(directions), np.concatenate(colours)
 
 
 def fit_sky(directions: Float[Array, "n 3"], colours: Float32[Array, "n 3"]) -> tuple[Float[Array, "16 3"], float]:
@@ -84,4 +95,4 @@ def _mask_sky(
     other = rising & ~agrees
     sees = agrees & ~binary_dilation(other, iterations=EDGE) if other.any() else agrees
     sky[~sees] = np.nan
-    return replace(modelled, behind=sky, weight=np.where(sees, view.weight, modelled.weight))
+    return modelled.with_pixels(behind=sky, weight=np.where(sees, view.weight, modelled.weight))

@@ -8,10 +8,11 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray as Array
 
-from dav_gswt.photos.training_views import TrainingView
+from dav_gswt.photos.training_views import TrainingView, one_by_one
 from dav_gswt.reconstruction.ground import Ground
 
 ITERATIONS = 3  # of the intersection of a ray with the ground
+CHUNK = 4_000_000  # points times photos at a time
 
 
 def median_behind(
@@ -25,8 +26,16 @@ def median_behind(
 
     values: NaN where unknown. The result is NaN where fewer than `least` photos see ground with a value.
     """
+    size = max(1, CHUNK // len(views))
+    parts = [places[start : start + size] for start in range(0, len(places), size)]
+    return np.concatenate(
+        [np.zeros(0, np.float32), *(_median_behind(grid, values, part, views, least) for part in parts)]
+    )
+
+
+def _median_behind(grid: Ground, values: Array, places: Array, views: list[TrainingView], least: int) -> Array:
     found = np.full((len(views), len(places)), np.nan, np.float32)
-    for row, view in zip(found, views, strict=True):
+    for row, view in zip(found, one_by_one(views), strict=True):
         rotation, translation = (np.asarray(a, np.float32) for a in (view.camera.rotation, view.camera.translation))
         sees = project_visible(view, places @ rotation.T + translation)[0]
         cells, hit = _intersect_ground(grid, -rotation.T @ translation, places[sees])

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from dav_gswt.config.base import Seed, key
+from dav_gswt.config.base import ConfigModel, Name, Seed, key
 from dav_gswt.config.settings import Preset
 
 Seeds = Annotated[list[Seed], Field(min_length=1)]
@@ -33,3 +33,20 @@ class GainBound(Preset):
     k: int = key("photos a round", ge=1, le=1000)
     rounds: int = key("rounds", ge=1, le=100)
     seeds: Seeds = key("of fits; the start is that of the first one")
+
+
+Amounts = Annotated[list[Annotated[int, Field(ge=1, le=100_000_000)]], Field(min_length=3)]
+
+
+class Scale(ConfigModel):
+    """`snakemake scale`: how seconds and memory grow."""
+
+    scene: Name = key("whose first field photos are rendered from")
+    field: Name = key("an entry of `presets`, of that field")
+    preset: Name = key("an entry of `presets`, of the fits that are measured")
+    photos: Amounts = key("numbers of photos of a fit")
+    size: int = key("of these photos", unit="pixels a side", ge=32, le=16384)
+    pixels: Amounts = key("sizes of photos of a fit, pixels a side")
+    photos_of_pixels: int = key("number of these photos", ge=3, le=1000)
+    gaussians: Amounts = key("numbers of Gaussians that are rendered")
+    candidates: Amounts = key("numbers of candidates that are scored")

@@ -78,7 +78,7 @@ def compare_refits(
     for seed in seeds:
         first = _fit(photos, settings.coarse, settings.start, seed)
         rows.append(_describe(photos, settings, first, {"photos": settings.start, "seed": seed}))
-        once = _fit(photos, replace(settings.coarse, steps=steps), everything, seed)
+        once = _fit(photos, replace(settings.coarse, steps=steps, steps_per_photo=0), everything, seed)
         rows.append(_describe(photos, settings, once, {"photos": everything, "seed": seed}))
         for size, rate in itertools.product(photos_a_round, first_rates):
             update = replace(settings.update, first_rate=rate)

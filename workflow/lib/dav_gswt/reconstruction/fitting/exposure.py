@@ -4,14 +4,12 @@ Fitted before the fit, between the photos' colours of the same points, and at ev
 photos get none.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.images import channels
-from dav_gswt.photos.training_views import TrainingView
+from dav_gswt.photos.training_views import TrainingView, one_by_one
 from dav_gswt.reconstruction.fitting.photo_colours import median_colours, sample_colours
 
 MAX_GAIN = 1.6  # of a photo against the set
@@ -59,7 +57,7 @@ def equalize_exposure(views: list[TrainingView], points: Float[Array, "n 3"]) ->
             back = fit_gain_and_offset(median, anchor)
             median = median * back[0] + back[1]
         anchor = median if anchor is None else anchor
-        views = [match_exposure(view, points, median) for view in views]
+        views = [match_exposure(view, points, median) for view in one_by_one(views)]
     return views
 
 
@@ -67,7 +65,7 @@ def match_exposure(view: TrainingView, points: Float[Array, "n 3"], colours: Flo
     """A photo with the gain and offset that fit it to known colours of points."""
     seen, _ = sample_colours(points, view)
     a, b = fit_gain_and_offset(seen, colours)
-    return replace(view, image=(view.image * a + b).astype(np.float32))
+    return view.with_pixels(image=(view.image * a + b).astype(np.float32))
 
 
 class ExposureTracker:

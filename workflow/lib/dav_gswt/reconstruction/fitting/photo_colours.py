@@ -1,12 +1,15 @@
 """Colours of world points in the photos."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.photos.training_views import TrainingView
+from dav_gswt.photos.training_views import TrainingView, one_by_one
 
-CHUNK = 50_000  # points at a time, so that they stay in the cache
+CHUNK = 1_200_000  # colours of points at a time, over all photos
+LARGEST = 50_000  # points at a time, so that they stay in the cache
 
 
 def sample_colours(points: Float[Array, "n 3"], view: TrainingView) -> tuple[Float32[Array, "n 3"], Bool[Array, "n"]]:
@@ -23,17 +26,21 @@ def sample_colours(points: Float[Array, "n 3"], view: TrainingView) -> tuple[Flo
 
 def sample_all_views(points: Float[Array, "n 3"], views: list[TrainingView]) -> Float32[Array, "v n 3"]:
     """Every photo's colours of the points; NaN where it does not see them."""
-    return np.stack([sample_colours(points, view)[0] for view in views])
+    return np.stack([sample_colours(points, view)[0] for view in one_by_one(views)])
+
+
+def chunk_points(points: Float[Array, "n 3"], views: list[TrainingView]) -> Iterator[Float[Array, "m 3"]]:
+    """The points in parts, the smaller the more photos there are."""
+    size = max(1, min(LARGEST, CHUNK // max(1, len(views))))
+    return (points[start : start + size] for start in range(0, len(points), size))
 
 
 def median_colours(
     points: Float[Array, "n 3"], views: list[TrainingView]
 ) -> tuple[Float32[Array, "n 3"], Bool[Array, "n"]]:
     """Median colour of each point over the photos that see it (NaN without any), and which points a photo sees."""
-    colours = np.full((len(points), 3), np.nan, np.float32)
-    for start in range(0, len(points), CHUNK):
-        part = np.s_[start : start + CHUNK]
-        colours[part] = nan_median(sample_all_views(points[part], views))
+    found = [nan_median(sample_all_views(part, views)) for part in chunk_points(points, views)]
+    colours = np.concatenate([np.zeros((0, 3), np.float32), *found])
     return colours, np.isfinite(colours[:, 0])
 
 

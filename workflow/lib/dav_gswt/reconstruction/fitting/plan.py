@@ -8,9 +8,19 @@ Count = int | Literal["auto"]  # a number, or as many as the photos ask for
 
 STEPS_PER_PHOTO = 38  # of a first fit with "auto"
 STEPS_PER_NEW_PHOTO = 40  # of an update with "auto"; the paper takes 5000 steps
+FEW_PHOTOS = 8  # that the steps of a preset are for; each further photo has steps of its own
 MAX_GAUSSIANS = 2_000_000  # of a fit that finds its own number
 MAX_SH_DEGREE = 3  # that a PLY can hold
 TRIED_SH_DEGREE = 1  # by a fit that finds its own
+
+
+def count_first_steps(steps: Count, steps_per_photo: Count, photos: int) -> int:
+    """Steps of a first fit to so many photos, by the keys of a preset: as many as if those beyond FEW_PHOTOS came in
+    rounds."""
+    if steps == AUTO:
+        return STEPS_PER_PHOTO * photos
+    further = STEPS_PER_NEW_PHOTO if steps_per_photo == AUTO else int(steps_per_photo)
+    return int(steps) + further * max(0, photos - FEW_PHOTOS)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from numpy import ndarray as Array
 
 import dav_gswt.reconstruction.fitting
 from dav_gswt.files import UNREADABLE, atomic_file
+from dav_gswt.photos.array_file import release_pages
 
 _log = logging.getLogger(__name__)
 
@@ -29,7 +30,8 @@ def digest_inputs(*parts) -> str:
     for part in parts:
         if isinstance(part, np.ndarray):
             state.update(f"{part.dtype}{part.shape}".encode())
-            state.update(np.ascontiguousarray(part).tobytes())
+            state.update(np.ascontiguousarray(part))
+            release_pages(part)
         else:
             state.update(repr(part).encode())
     return state.hexdigest()[:32]

@@ -19,7 +19,7 @@ from dav_gswt import raster
 from dav_gswt.field import SH0, GaussianField
 from dav_gswt.images import channels, image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos.training_views import TrainingView, make_training_view
+from dav_gswt.photos.training_views import TrainingView, make_training_view, one_by_one
 from dav_gswt.reconstruction.fitting import (
     densification,
     exposure,
@@ -152,7 +152,7 @@ def _make_task(
     held = (
         [held_out.draw_mask(v.image.shape[0], v.image.shape[1], rng) for v in views] if plan.sh_degree == AUTO else None
     )
-    halves = [_halve(v) for v in views] if plan.half_share else []
+    halves = [_halve(v) for v in one_by_one(views)] if plan.half_share else []
     return TrainingTask(views, halves, held, plan, Schedule(plan, start), constraints, raster.Rasterizer())
 
 
@@ -163,7 +163,9 @@ def _halve(view: TrainingView) -> TrainingView:
     weight = image_files.shrink_image(view.weight[..., None], width, height)[..., 0]
     rows, columns = ((np.arange(n) + 0.5) * of // n for n, of in zip((height, width), view.weight.shape, strict=True))
     behind = None if view.behind is None else view.behind[rows.astype(int)][:, columns.astype(int)]
-    return replace(half, weight=np.ascontiguousarray(weight, np.float32), behind=behind)
+    half = replace(half, arrays=view.arrays)
+    half = half.with_pixels(image=half.image, weight=np.ascontiguousarray(weight, np.float32))
+    return half if behind is None else half.with_pixels(behind=behind)
 
 
 def _advance(run: TrainingState, task: TrainingTask) -> None:
@@ -210,6 +212,7 @@ def _descend(run: TrainingState, task: TrainingTask, index: int) -> None:
     gradients = task.raster.backward(gradient, -BACKDROP * channels.sum_products(gradient, behind))
     task.constraints.adjust_gradients(gradients)
     _step_adam(run, task, gradients)
+    view.release()
     if task.plan.pose_rate:
         run.poses.descend(index, gradients.camera, task.plan.pose_rate * task.schedule.rate(run.step), camera)
 
@@ -266,7 +269,7 @@ def _score(run: TrainingState, task: TrainingTask, now: State) -> float:
     """PSNR of the held-out pixels of all photos."""
     assert task.held is not None
     tally = held_out.ErrorSum()
-    for index, view in enumerate(task.views):
+    for index, view in enumerate(one_by_one(task.views)):
         seen = task.raster.forward(**now.values, camera=run.poses.correct(index, view.camera))
         a, b = run.exposures.gain_and_offset(index)
         behind = _background(view, np.full(3, 0.5, np.float32))

@@ -1,0 +1,110 @@
+"""How costs grow: fits over photos and pixels, renders over Gaussians, scores over candidates.
+
+In: the first field of the scene of the config's `study.scale`. Out: results/scale/{kind}_{size}.json, each by a process
+of its own on an otherwise idle machine; docs/research/data/scale.csv and .md, figures/scale.png.
+"""
+
+
+def scale_field(wildcards):
+    """The field that photos are rendered from, its ground and its frame."""
+    asked = STUDY["scale"]
+    place = {"scene": asked["scene"], "seed": 0, "preset": asked["field"]}
+    photos, coarse = (paths.stage_folder(stage, place) for stage in ("photos", "coarse"))
+    return {
+        "field": str(coarse / "field.ply"),
+        "ground": str(coarse / "ground.exr"),
+        "frame": str(photos / "ground.json"),
+    }
+
+
+def scale_photos(what, amount):
+    """How many photos of how many pixels a side a cell fits; None: it fits none."""
+    asked = STUDY["scale"]
+    cells = {"photos": (amount, asked["size"]), "pixels": (asked["photos_of_pixels"], amount)}
+    return cells.get(what)
+
+
+def scale_cells():
+    """All cells as (what, amount)."""
+    return [(what, amount) for what in ("photos", "pixels", "gaussians", "candidates") for amount in STUDY["scale"][what]]
+
+
+rule render_scale_photos:
+    """Photos of a field, in any number and size."""
+    input:
+        unpack(scale_field),
+    output:
+        images=directory("results/scale/photos/{amount}x{pixels}"),
+    log:
+        "<logs>/scale/render_photos_{amount}x{pixels}.log",
+    benchmark:
+        "<benchmarks>/scale/render_photos_{amount}x{pixels}.tsv"
+    wildcard_constraints:
+        amount=POSITIVE,
+        pixels=POSITIVE,
+    threads: 2
+    resources:
+        mem_mb=per_attempt(3000),
+        runtime=per_attempt("60m"),
+    params:
+        source=code_of("study/render_scale_photos"),
+    script:
+        "../../scripts/study/render_scale_photos.py"
+
+
+rule measure_scale:
+    """Seconds and memory of one fit, render or scoring."""
+    input:
+        unpack(scale_field),
+        images=lambda wildcards: expand(
+            "results/scale/photos/{cell[0]}x{cell[1]}",
+            cell=[found] if (found := scale_photos(wildcards.what, int(wildcards.amount))) else [],
+        ),
+    output:
+        cost="results/scale/{what}_{amount}.json",
+    log:
+        "<logs>/scale/{what}_{amount}.log",
+    benchmark:
+        "<benchmarks>/scale/{what}_{amount}.tsv"
+    wildcard_constraints:
+        what="photos|pixels|gaussians|candidates",
+        amount=POSITIVE,
+    threads: 2
+    resources:
+        mem_mb=per_attempt(8000),
+        runtime=per_attempt("120m"),
+    params:
+        photos=lambda wildcards: scale_photos(wildcards.what, int(wildcards.amount)),
+        preset=lambda wildcards: config["presets"][STUDY["scale"]["preset"]],
+        keep=SNAPSHOTS,
+        source=code_of("study/measure_scale"),
+    script:
+        "../../scripts/study/measure_scale.py"
+
+
+rule gather_scale:
+    """The curves of all cells, their exponents and a figure."""
+    input:
+        cells=[f"results/scale/{what}_{amount}.json" for what, amount in scale_cells()],
+    output:
+        table="docs/research/data/scale.csv",
+        text="docs/research/data/scale.md",
+        plot="docs/research/figures/scale.png",
+    log:
+        "<logs>/scale/gather.log",
+    benchmark:
+        "<benchmarks>/scale/gather.tsv"
+    params:
+        source=code_of("study/gather_scale"),
+    script:
+        "../../scripts/study/gather_scale.py"
+
+
+rule scale:
+    """How costs grow with photos, pixels, Gaussians and candidates."""
+    input:
+        rules.gather_scale.output,
+
+
+localrules:
+    scale,
