@@ -1,7 +1,7 @@
 """How costs grow: fits over photos and pixels, renders over Gaussians, scores over candidates.
 
 In: the first field of the scene of the config's `study.scale`. Out: results/scale/{kind}_{size}.json, each by a process
-of its own on an otherwise idle machine; docs/research/data/scale.csv and .md, figures/scale.png.
+of its own on an otherwise idle machine; docs/research/data/scale.csv, results/scale.md, figures/scale.png.
 """
 
 
@@ -20,13 +20,15 @@ def scale_field(wildcards):
 def scale_photos(what, amount):
     """How many photos of how many pixels a side a cell fits; None: it fits none."""
     asked = STUDY["scale"]
-    cells = {"photos": (amount, asked["size"]), "pixels": (asked["photos_of_pixels"], amount)}
+    least = min(asked["photos"]), asked["size"]
+    cells = {"photos": (amount, asked["size"]), "pixels": (asked["photos_of_pixels"], amount), "threads": least}
     return cells.get(what)
 
 
 def scale_cells():
     """All cells as (what, amount)."""
-    return [(what, amount) for what in ("photos", "pixels", "gaussians", "candidates") for amount in STUDY["scale"][what]]
+    asked = STUDY["scale"] | {"threads": [1, 2]}
+    return [(what, n) for what in ("photos", "pixels", "gaussians", "candidates", "threads") for n in asked[what]]
 
 
 rule render_scale_photos:
@@ -67,7 +69,7 @@ rule measure_scale:
     benchmark:
         "<benchmarks>/scale/{what}_{amount}.tsv"
     wildcard_constraints:
-        what="photos|pixels|gaussians|candidates",
+        what="photos|pixels|gaussians|candidates|threads",
         amount=POSITIVE,
     threads: 2
     resources:
@@ -85,16 +87,19 @@ rule measure_scale:
 rule gather_scale:
     """The curves of all cells, their exponents and a figure."""
     input:
+        template=str(BASE / "workflow/report/scale.md"),
         cells=[f"results/scale/{what}_{amount}.json" for what, amount in scale_cells()],
     output:
         table="docs/research/data/scale.csv",
-        text="docs/research/data/scale.md",
+        page="docs/research/results/scale.md",
         plot="docs/research/figures/scale.png",
     log:
         "<logs>/scale/gather.log",
     benchmark:
         "<benchmarks>/scale/gather.tsv"
     params:
+        asked=STUDY["scale"],
+        preset=lambda wildcards: config["presets"][STUDY["scale"]["preset"]],
         source=code_of("study/gather_scale"),
     script:
         "../../scripts/study/gather_scale.py"

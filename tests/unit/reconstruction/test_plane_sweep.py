@@ -146,3 +146,29 @@ def test_points_in_the_air_become_things_only_together_and_where_the_sweep_saw_n
     np.testing.assert_allclose(field.means, crowd, atol=1e-6)
     taken = replace(flat, stands=inner(grid, 0.8, 1.3))
     assert not len(objects.make_isolated_points(grid, taken, points, np.full((7, 3), 0.5), band=1.0))
+
+
+def test_photos_of_ground_that_many_see_are_left_out(monkeypatch):
+    monkeypatch.setattr(plane_sweep, "ENOUGH_PHOTOS", 4)
+    shown = photo([1.6, 1.6, 4.0], 24)
+    from_above = [
+        replace(shown, name=str(i), camera=cameras.pinhole([1.6 + 0.01 * i, 1.6, 4.0], [1.6, 1.6, 0], 24, 24, 50.0))
+        for i in range(12)
+    ]
+    kept = plane_sweep.leave_out_photos(made.grid(0.1), from_above)
+    assert len(kept) == 4
+    assert [view.name for view in kept][::3] == ["0", "11"]  # those farthest apart, in their order
+
+
+def test_photos_that_alone_see_their_ground_are_kept(monkeypatch):
+    monkeypatch.setattr(plane_sweep, "ENOUGH_PHOTOS", 1)
+    shown = photo([1.6, 1.6, 4.0], 24)
+    apart = [
+        replace(shown, camera=cameras.pinhole([x, 1.6, 0.8], [x, 1.6, 0], 24, 24, 30.0)) for x in (0.4, 1.2, 2.0, 2.8)
+    ]
+    assert plane_sweep.leave_out_photos(made.grid(0.1), apart) == apart
+
+
+def test_few_photos_are_all_kept():
+    views = [photo([1.6, 1.6, 4.0], 24)] * 9
+    assert plane_sweep.leave_out_photos(made.grid(0.1), views) == views

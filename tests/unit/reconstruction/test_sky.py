@@ -93,3 +93,10 @@ def test_what_the_photos_show_to_be_sky_is_hardly_modelled():
         thing = fitted[len(made.field()) :]
         left.append((to_opacity(thing.opacity_logits) * np.exp(thing.log_scales[:, :2].sum(1))).sum())
     assert left[0] < 0.5 * left[1]
+
+
+def test_pixels_above_the_horizon_are_those_whose_rays_rise():
+    camera = cameras.pinhole([0.3, -2.0, 1.0], [0.1, 4.0, 1.3], 64, 48, 70.0)
+    view = TrainingView("low", camera, np.zeros((48, 64, 3), np.float32), np.ones((48, 64), np.float32))
+    direction, rising = sky._rays_above_horizon(view)
+    assert np.array_equal(rising, direction[..., 2] > 0) and 0.2 < rising.mean() < 0.9

@@ -3,7 +3,8 @@
 import pytest
 
 from dav_gswt.images import image_files
-from dav_gswt.study.scale import growth
+from dav_gswt.study import markdown
+from dav_gswt.study.scale import growth, page
 
 
 def cell(kind, size, **costs):
@@ -21,6 +22,10 @@ CELLS = [
         cell("pixels", n, photos=12, gaussians=500, steps=9, prepare_seconds=n, step_seconds=n**0.5, seconds=n)
         for n in (0.25, 1.0, 4.0)
     ),
+    *(
+        {"kind": "threads", "threads": n, "seconds": 10.0 - 4 * (n - 1), "step_seconds": 0.1, "peak_mb": 1.0}
+        for n in (1, 2)
+    ),
 ]
 
 
@@ -35,7 +40,7 @@ def test_an_exponent_is_of_the_largest_sizes():
 
 def test_rows_are_sorted_by_kind_and_size():
     rows = growth.gather_rows(CELLS)
-    assert [row["kind"] for row in rows[::3]] == list(growth.KINDS)
+    assert [row["kind"] for row in rows[:12:3]] == list(growth.KINDS)
     assert [row["gaussians"] for row in rows if row["kind"] == "gaussians"] == [100, 1000, 10_000]
 
 
@@ -45,12 +50,29 @@ def test_exponents_are_by_kind_and_cost():
     assert found["pixels"]["step_seconds"] == pytest.approx(0.5)
 
 
-def test_the_page_has_a_table_of_each_kind_that_ends_with_its_exponents():
-    text = growth.describe_growth(growth.gather_rows(CELLS))
-    tables = text.strip().split("\n\n")
-    assert len(tables) == 4
-    assert all(table.splitlines()[-1].startswith("| exponent") for table in tables)
-    assert "2.00" in tables[3]
+def test_a_table_ends_with_its_exponents():
+    rows = growth.gather_rows(CELLS)
+    assert growth.describe_kind(rows, "candidates").splitlines()[-1].split()[1::2] == ["exponent", "2.00", "0.00"]
+    assert growth.describe_kind(rows, "pixels").splitlines()[2].split()[1] == "0.25"
+
+
+def test_the_share_that_runs_beside_itself_follows_from_one_and_two_threads():
+    assert growth.find_parallel_share(growth.gather_rows(CELLS)) == pytest.approx(0.8)
+
+
+def test_costs_are_extrapolated_by_photos_pixels_and_cores():
+    lines = growth.extrapolate(growth.gather_rows(CELLS), 1000, cores=(2, 4)).splitlines()
+    # 41 s with 32 photos; four megapixels take four times as long as one; .6 of the time on two threads, .4 on four
+    assert [line.split()[1::2] for line in lines[2:]] == [["2", "1", "3"], ["4", "0", "2"]]
+
+
+def test_the_page_is_filled(root):
+    made = {"renderer": {"name": "cpu"}, "version": "1.0", "processor": "a processor", "cores": 2}
+    rows, cells = growth.gather_rows(CELLS), [cell | {"made": made} for cell in CELLS]
+    asked = {"scene": "desert", "preset": "standard", "size": 1000, "photos_of_pixels": 12, "photos": [8, 16, 32]}
+    values = page.describe(rows, cells, asked, {"max_gaussians": 500, "steps_per_photo": 20})
+    text = markdown.render_template(root / "workflow/report/scale.md", values)
+    assert "2 cores of a processor" in text and "80 % of the work" in text
 
 
 def test_a_figure_is_drawn(tmp_path):

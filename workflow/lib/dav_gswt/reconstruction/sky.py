@@ -34,7 +34,7 @@ def add_sky(views: list[TrainingView], modelled: list[TrainingView]) -> list[Tra
     views: the photos, counting wherever they are valid. modelled: the same, counting only over the ground.
     Without enough sky, or without a smooth one, the modelled views are returned.
     """
-    counts = [int(_rays_above_horizon(view)[1].sum()) for view in one_by_one(views)]
+    counts = [int(_pixels_above_horizon(view).sum()) for view in one_by_one(views)]
     total = sum(counts)
     if total < MIN_PIXELS:
         return modelled
@@ -81,8 +81,16 @@ def fit_sky(directions: Float[Array, "n 3"], colours: Float32[Array, "n 3"]) -> 
 def _rays_above_horizon(view: TrainingView) -> tuple[Float[Array, "h w 3"], Bool[Array, "h w"]]:
     """Unit directions of a view's rays, and which of them are above the horizon and count."""
     _, step = view.camera.rays()
-    direction = step / np.linalg.norm(step, axis=-1, keepdims=True)
-    return direction, (direction[..., 2] > 0) & (view.weight > 0)
+    return step / np.linalg.norm(step, axis=-1, keepdims=True), _pixels_above_horizon(view)
+
+
+def _pixels_above_horizon(view: TrainingView) -> Bool[Array, "h w"]:
+    """Which pixels count and look upwards, by the height of the rays alone: most photos have none."""
+    camera = view.camera
+    across = (np.arange(camera.width) + 0.5 - camera.cx) / camera.fx
+    down = (np.arange(camera.height) + 0.5 - camera.cy) / camera.fy
+    x, y, z = camera.rotation[:, 2]  # the world's up, as the camera sees it
+    return (across * x + (down * y)[:, None] + z > 0) & (view.weight > 0)
 
 
 def _mask_sky(

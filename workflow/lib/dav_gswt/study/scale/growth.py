@@ -14,22 +14,34 @@ KINDS = {  # of cells: what grows, its unit, and the cost beside the seconds
     "gaussians": ("gaussians", "Gaussians"),
     "candidates": ("candidates", "candidates"),
 }
+TITLES = {"seconds": "s", "prepare_seconds": "s before the first step", "step_seconds": "s a step", "peak_mb": "MB"}
 LAST = 3  # points that an exponent is fitted to: small cells are mostly fixed costs
-COLUMNS = ("kind", "photos", "megapixels", "gaussians", "candidates", "steps", "read_seconds", "prepare_seconds")
+COLUMNS = (
+    "kind",
+    "photos",
+    "megapixels",
+    "gaussians",
+    "candidates",
+    "threads",
+    "steps",
+    "read_seconds",
+    "prepare_seconds",
+)
 COLUMNS += ("step_seconds", "seconds", "peak_mb")
 
 
 def fit_exponent(sizes: Sequence[float | int], costs: Sequence[float | int]) -> float:
     """The exponent p of cost = c size^p, by least squares of the logarithms over the LAST largest sizes."""
     order = np.argsort(sizes)[-LAST:]
-    return float(np.polyfit(np.log(np.array(sizes)[order]), np.log(np.array(costs)[order]), 1)[0])
+    found = float(np.polyfit(np.log(np.array(sizes)[order]), np.log(np.array(costs)[order]), 1)[0])
+    return round(found, 4) + 0.0  # no negative zero
 
 
 def gather_rows(cells: list[dict]) -> list[dict]:
     """Rows of a table, by kind and size. cells: of `costs`, with their `kind`."""
     ordered = [
         cell
-        for kind, (name, _) in KINDS.items()
+        for kind, (name, _) in (KINDS | {"threads": ("threads", "threads")}).items()
         for cell in sorted((each for each in cells if each["kind"] == kind), key=lambda each: each[name])
     ]
     return [{column: cell.get(column) for column in COLUMNS} for cell in ordered]
@@ -45,29 +57,44 @@ def fit_exponents(rows: list[dict]) -> dict[str, dict[str, float]]:
     return found
 
 
-def describe_growth(rows: list[dict]) -> str:
-    """The table in Markdown, and the exponents below it."""
-    parts = []
-    for kind, (name, unit) in KINDS.items():
-        own, exponents = [row for row in rows if row["kind"] == kind], fit_exponents(rows)[kind]
-        costs = list(exponents)
-        head = [unit, *(["Gaussians", "steps"] if own[0]["steps"] else []), *(_title(cost) for cost in costs)]
-        body = [
-            [
-                f"{row[name]:g}",
-                *([row["gaussians"], row["steps"]] if row["steps"] else []),
-                *(f"{row[cost]:.3g}" if cost != "peak_mb" else f"{row[cost]:.0f}" for cost in costs),
-            ]
-            for row in own
-        ]
-        last = ["exponent", *([""] * (len(head) - len(costs) - 1)), *(f"{exponents[cost]:.2f}" for cost in costs)]
-        parts.append(markdown.format_table(head, [*body, last]))
-    return "\n".join(parts)
+def describe_kind(rows: list[dict], kind: str) -> str:
+    """The table of a kind in Markdown, with the exponents in its last row."""
+    name, unit = KINDS[kind]
+    own, exponents = [row for row in rows if row["kind"] == kind], fit_exponents(rows)[kind]
+    counts = ["gaussians", "steps"] if own[0]["steps"] else []
+    head = [unit, *(["Gaussians", "steps"] if counts else []), *(TITLES[cost] for cost in exponents)]
+    body = [
+        [f"{row[name]:.3g}" if kind == "pixels" else f"{row[name]:.0f}", *(f"{row[count]:.0f}" for count in counts)]
+        + [f"{row[cost]:.0f}" if cost == "peak_mb" else f"{row[cost]:.3g}" for cost in exponents]
+        for row in own
+    ]
+    last = ["exponent", *[""] * len(counts), *(f"{exponent:.2f}" for exponent in exponents.values())]
+    return markdown.format_table(head, [*body, last])
 
 
-def _title(cost: str) -> str:
-    titles = {"seconds": "s", "prepare_seconds": "s before the first step", "step_seconds": "s a step", "peak_mb": "MB"}
-    return titles[cost]
+def find_parallel_share(rows: list[dict]) -> float:
+    """Share of a fit's work on one thread that runs beside itself, by Amdahl's law from one and two threads."""
+    one, two = (row["seconds"] for row in rows if row["kind"] == "threads")
+    return float(np.clip(2 * (1 - two / one), 0, 1))
+
+
+def describe_threads(rows: list[dict]) -> str:
+    """The fits on one thread and on two, in Markdown."""
+    own = [row for row in rows if row["kind"] == "threads"]
+    body = [[f"{row['threads']:.0f}", f"{row['seconds']:.3g}", f"{row['step_seconds']:.3g}"] for row in own]
+    return markdown.format_table(["threads", "s", "s a step"], body)
+
+
+def extrapolate(rows: list[dict], size: int, cores: Sequence[int] = (2, 16, 64)) -> str:
+    """Minutes of the fit with most photos, as it is and with the largest photos, on so many cores, in Markdown."""
+    last = max((row for row in rows if row["kind"] == "photos"), key=lambda row: row["photos"])
+    own = [row for row in rows if row["kind"] == "pixels"]
+    sizes, seconds = (np.log([row[name] for row in own]) for name in ("megapixels", "seconds"))
+    larger = float(np.exp(seconds[-1] - np.interp(np.log(size**2 / 1e6), sizes, seconds)))
+    share, most = find_parallel_share(rows), round(1000 * own[-1]["megapixels"] ** 0.5)
+    speed = {count: (1 - share / 2) / (1 - share + share / count) for count in cores}
+    body = [[str(count), *(f"{last['seconds'] * by / speed[count] / 60:.0f}" for by in (1, larger))] for count in cores]
+    return markdown.format_table(["cores", f"minutes at {size} pixels", f"minutes at {most} pixels"], body)
 
 
 def plot_growth(rows: list[dict], path: Path | str) -> None:
