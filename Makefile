@@ -10,7 +10,7 @@ PYTHON ?= python3
 export OMP_WAIT_POLICY ?= PASSIVE
 BIN := .venv/bin
 
-.PHONY: reference run view gallery test bench docs prior compiler sanitize faults fuzz
+.PHONY: reference run view gallery test compare bench docs prior compiler sanitize faults fuzz
 .DELETE_ON_ERROR:
 
 run: .venv/installed
@@ -40,6 +40,10 @@ fuzz: .venv/installed-test
 	@mkdir -p results
 	@FUZZ_EXAMPLES=$(EXAMPLES) FUZZ_SEED=$(SEED) FUZZ_TABLE=results/fuzz.md \
 	  $(BIN)/python -m pytest tests/fuzz --hypothesis-seed=$(SEED) -q && cat results/fuzz.md
+
+# OpenSplat's fit beside ours, of the same photos; OPENSPLAT: the program, which you build yourself
+compare: .venv/installed
+	@$(BIN)/snakemake --cores $(CORES) --config 'study={compare: {opensplat: "$(OPENSPLAT)"}}' -- compare
 
 bench: .venv/installed-test
 	@for bench in benchmarks/*.py; do PYTHONPATH=tests:tests/browser $(BIN)/python $$bench || exit 1; done

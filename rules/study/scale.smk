@@ -25,6 +25,13 @@ def scale_photos(what, amount):
     return cells.get(what)
 
 
+def changed_preset(what, amount):
+    """The keys of the preset that a cell's fit has otherwise."""
+    asked = STUDY["scale"]
+    few = {"steps": asked["steps_of_pixels"], "steps_per_photo": 0} if what == "pixels" else {}
+    return few | {"size": amount if what == "pixels" else asked["size"]}
+
+
 def scale_cells():
     """All cells as (what, amount)."""
     asked = STUDY["scale"] | {"threads": [1, 2]}
@@ -78,6 +85,7 @@ rule measure_scale:
     params:
         photos=lambda wildcards: scale_photos(wildcards.what, int(wildcards.amount)),
         preset=lambda wildcards: config["presets"][STUDY["scale"]["preset"]],
+        changed=lambda wildcards: changed_preset(wildcards.what, int(wildcards.amount)),
         keep=SNAPSHOTS,
         source=code_of("study/measure_scale"),
     script:

@@ -16,9 +16,10 @@ with logging_to(snakemake.log[0]):
     paths, params, what = snakemake.input, snakemake.params, snakemake.wildcards.what
     amount, field, frame = int(snakemake.wildcards.amount), read_field(paths.field), read_scene_frame(paths.frame)
     threads = {"threads": amount} if what == "threads" else {}
-    os.environ |= {"DAV_GSWT_THREADS": str(n) for n in threads.values()}
+    if threads:
+        os.environ["DAV_GSWT_THREADS"] = str(amount)
     if params.photos:
-        settings = select_settings(CoarseSettings, params.preset | {"size": params.photos[1]})
+        settings = select_settings(CoarseSettings, params.preset | params.changed)
         found = costs.measure_fit(field, frame, paths.images[0], params.photos[0], settings, Path(params.keep))
     elif what == "gaussians":
         found = costs.measure_render(field, amount)

@@ -69,7 +69,14 @@ def test_costs_are_extrapolated_by_photos_pixels_and_cores():
 def test_the_page_is_filled(root):
     made = {"renderer": {"name": "cpu"}, "version": "1.0", "processor": "a processor", "cores": 2}
     rows, cells = growth.gather_rows(CELLS), [cell | {"made": made} for cell in CELLS]
-    asked = {"scene": "desert", "preset": "standard", "size": 1000, "photos_of_pixels": 12, "photos": [8, 16, 32]}
+    asked = {
+        "scene": "desert",
+        "preset": "standard",
+        "size": 1000,
+        "photos_of_pixels": 12,
+        "steps_of_pixels": 9,
+        "photos": [8, 16, 32],
+    }
     values = page.describe(rows, cells, asked, {"max_gaussians": 500, "steps_per_photo": 20})
     text = markdown.render_template(root / "workflow/report/scale.md", values)
     assert "2 cores of a processor" in text and "80 % of the work" in text

@@ -12,7 +12,7 @@ from dav_gswt.config.load import check_config, check_model
 from dav_gswt.config.model import Policy
 from dav_gswt.config.settings import Flight, Heights
 from dav_gswt.errors import InputError
-from dav_gswt.study.config_fits import FitProfile, GainBound, Refits, Scale, Seeds
+from dav_gswt.study.config_fits import Comparison, FitProfile, GainBound, Refits, Scale, Seeds
 from dav_gswt.study.seams import replicates
 from dav_gswt.study.sweeps import grid
 from dav_gswt.study.tables import checks
@@ -299,6 +299,7 @@ class StudyConfig(ConfigModel):
     refits: dict[Name, Refits] = key("by scene: photos in rounds against photos at once", {})
     gain_bound: dict[Name, GainBound] = key("by scene: policies beside the best choice there is", {})
     fit_profiles: dict[Name, FitProfile] = key("by scene: fits that are measured while they run", {}, renamed="trials")
+    compare: Comparison | None = key("another program's fit beside ours", None)
     scale: Scale | None = key("how costs grow", None)
     seams: Seams | None = key("seams and repetition", None, renamed="seam_study")
     forced_choice: ForcedChoice | None = key("the study with people", None, renamed="perceptual_study")
@@ -318,6 +319,8 @@ def expand_study(config: dict) -> dict:
     flat = config | study
     for table in ("lod", "materials", "lattice", "transitions", "frames", "seams", "forced_choice"):
         _require_names(f"study.{table}.scenes", study.get(table, {}).get("scenes", []), config["scenes"], "scenes")
+    if "compare" in study:
+        _require_names("study.compare.scene", [study["compare"]["scene"]], config["scenes"], "scenes")
     if "scale" in study:
         _require_names("study.scale.scene", [study["scale"]["scene"]], config["scenes"], "scenes")
         for name in ("field", "preset"):

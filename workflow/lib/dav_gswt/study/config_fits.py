@@ -48,5 +48,15 @@ class Scale(ConfigModel):
     size: int = key("of these photos", unit="pixels a side", ge=32, le=16384)
     pixels: Amounts = key("sizes of photos of a fit, pixels a side")
     photos_of_pixels: int = key("number of these photos", ge=3, le=1000)
+    steps_of_pixels: int = key("optimiser steps of their fits: a preset's would take long", ge=1, le=100_000)
     gaussians: Amounts = key("numbers of Gaussians that are rendered")
     candidates: Amounts = key("numbers of candidates that are scored")
+
+
+class Comparison(FitProfile):
+    """`make compare OPENSPLAT=<program>`: OpenSplat's fit beside ours, of the same photos."""
+
+    scene: Name = key("whose photos are fitted")
+    opensplat: str = key("the program, as one calls it", "opensplat")
+    seconds: float = key("that it may take", gt=0, le=100_000)
+    every: int = key("steps after which a field is compared with the test photos", ge=1, le=100_000)

@@ -1,0 +1,45 @@
+"""Another program's fit beside ours, on the same photos and machine.
+
+In: the photos of the scene of the config's `study.compare`, and OpenSplat, a program of the user's. Out:
+docs/research/data/fitters.csv, figures/fitters.png, results/fitters.md. `make compare OPENSPLAT=/path/to/opensplat` makes them.
+"""
+
+
+def compared_photos(wildcards):
+    """The photo set that all programs fit."""
+    folder = paths.stage_folder("photos", {"scene": STUDY["compare"]["scene"]})
+    return {"frame": str(folder / "ground.json"), "images": str(folder / "images"), "model": str(folder / "sparse")}
+
+
+rule compare_fitters:
+    """Fit the same photos by each program, one after the other, and look at the test photos meanwhile."""
+    input:
+        unpack(compared_photos),
+        template=str(BASE / "workflow/report/fitters.md"),
+    output:
+        table="docs/research/data/fitters.csv",
+        plot="docs/research/figures/fitters.png",
+        page="docs/research/results/fitters.md",
+    log:
+        "<logs>/figures/compare_fitters.log",
+    benchmark:
+        "<benchmarks>/figures/compare_fitters.tsv"
+    threads: 2
+    resources:
+        mem_mb=per_attempt(8000),
+        runtime=per_attempt("60m"),
+    params:
+        asked=STUDY["compare"],
+        source=code_of("study/compare_fitters"),
+    script:
+        "../../scripts/study/compare_fitters.py"
+
+
+rule compare:
+    """Our fit beside OpenSplat's."""
+    input:
+        rules.compare_fitters.output,
+
+
+localrules:
+    compare,

@@ -1,0 +1,25 @@
+"""Rule compare_fitters: OpenSplat's fit and ours, of the same photos."""
+
+import tempfile
+from pathlib import Path
+
+from dav_gswt.logs import logging_to
+from dav_gswt.provenance import describe_machine, record_provenance
+from dav_gswt.reconstruction.fit_settings import CoarseSettings, select_settings
+from dav_gswt.study import csv_tables, fit_profile, markdown, peers
+
+with logging_to(snakemake.log[0]):
+    out, asked = snakemake.output, dict(snakemake.params.asked)
+    settings = select_settings(CoarseSettings, asked)
+    photos = fit_profile.read_photo_set(Path(snakemake.input.frame).parent, settings.size, asked["margin"])
+    curves = {peers.OURS: fit_profile.profile_fit(photos, settings, every=asked["every"]).curve}
+    with tempfile.TemporaryDirectory(dir=Path(out.table).parent) as folder:
+        peers.write_project(photos, folder)
+        saved = peers.run_opensplat(asked["opensplat"], Path(folder), asked["seconds"], asked["every"])
+        curves[peers.OPENSPLAT] = peers.judge_saved(saved, photos)
+    rows = [{"program": program} | row for program, curve in curves.items() for row in curve]
+    csv_tables.write_table(out.table, rows)
+    peers.plot_programs(rows, out.plot)
+    made = record_provenance({"frame": snakemake.input.frame}, asked) | describe_machine()
+    values = peers.describe(rows, photos, asked, made)
+    markdown.write_page(out.page, markdown.render_template(snakemake.input.template, values))

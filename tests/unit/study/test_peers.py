@@ -1,0 +1,106 @@
+"""Another program's fit beside ours: the program is a stand-in that saves the field it is told."""
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fixtures import ground as made
+
+from dav_gswt.errors import InputError
+from dav_gswt.field import write_field
+from dav_gswt.images import image_files
+from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
+from dav_gswt.reconstruction.objects import make_blobs
+from dav_gswt.study import fit_profile, markdown, peers
+
+POINTS = np.random.default_rng(0).uniform(0, 3, (50, 3))
+COLOURS = np.full((50, 3), 0.5, np.float32)
+STAND_IN = """#!{python}
+import pathlib, shutil, sys, time
+out = pathlib.Path(sys.argv[sys.argv.index("-o") + 1])
+every = int(sys.argv[sys.argv.index("--save-every") + 1])
+print("Using CPU")
+for step in (every, 2 * every):
+    shutil.copyfile("{field}", out.with_name(f"splat_{{step}}.ply"))
+time.sleep({rest})
+"""
+
+
+@pytest.fixture
+def photos():
+    none = np.zeros(0, int)
+    model = ColmapModel((), (), POINTS, COLOURS, none, none, np.zeros((0, 2)))
+    frame = replace(made.FRAME, kind="synthetic")
+    return fit_profile.PhotoSet(frame, model, made.photos(4), {"test": made.photos(5)[4:]})
+
+
+@pytest.fixture
+def program(tmp_path):
+    """Make a program that saves two fields and then rests."""
+    write_field(make_blobs(POINTS, COLOURS, np.full(50, 0.3), logit=2.0), tmp_path / "field.ply")
+
+    def make(rest=0.0):
+        path = tmp_path / "program"
+        path.write_text(STAND_IN.format(python=sys.executable, field=tmp_path / "field.ply", rest=rest))
+        path.chmod(0o755)
+        return str(path)
+
+    return make
+
+
+def test_a_project_has_the_training_photos_their_cameras_and_all_points(photos, tmp_path):
+    peers.write_project(photos, tmp_path)
+    model = read_colmap_model(tmp_path / "sparse/0")
+    assert len(model.names) == 4 and len(model.points) == 50
+    for name, camera, view in zip(model.names, model.cameras, photos.train, strict=True):
+        shown = image_files.read_photo(tmp_path / "images" / name)
+        assert np.abs(shown - view.image).max() < 1 / 254 + 1e-6
+        assert np.allclose(camera.centre, view.camera.centre)
+
+
+@pytest.mark.parametrize("rest", [0.0, 60.0])
+def test_saved_fields_are_listed_when_the_program_ends_and_when_its_time_is_over(photos, program, tmp_path, rest):
+    saved = peers.run_opensplat(program(rest), tmp_path, 6.0, 10)
+    assert [step for _, step, _ in saved] == [10, 20]
+    assert all(-0.1 < seconds < 6 for seconds, _, _ in saved)
+    rows = peers.judge_saved(saved, photos)
+    assert [row["gaussians"] for row in rows] == [50, 50] and all(row["psnr"] > 3 for row in rows)
+
+
+def test_a_program_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"compare: opensplat: /nowhere/opensplat cannot be run"):
+        peers.run_opensplat("/nowhere/opensplat", tmp_path, 1.0, 10)
+
+
+def test_a_program_that_saves_nothing_is_quoted(tmp_path):
+    path = tmp_path / "program"
+    path.write_text("#!/bin/sh\necho no such option\nexit 1\n")
+    path.chmod(0o755)
+    with pytest.raises(InputError, match="saved no field in 2 s: no such option"):
+        peers.run_opensplat(str(path), tmp_path, 2.0, 10)
+
+
+def test_the_page_and_the_figure_show_both_programs(photos, tmp_path, root):
+    rows = [
+        {
+            "program": program,
+            "seconds": s * step,
+            "step": step,
+            "gaussians": 9,
+            "psnr": 25.0,
+            "psnr_colour_corrected": 27.0 + step,
+        }
+        for program, s in ((peers.OURS, 0.1), (peers.OPENSPLAT, 2.0))
+        for step in (1, 2, 3, 4)
+    ]
+    peers.plot_programs(rows, tmp_path / "fitters.png")
+    assert image_files.read_photo(tmp_path / "fitters.png").std() > 0.01
+    renderer = {"name": "cpu"}
+    facts = {"version": "1.0", "renderer": renderer, "processor": "a processor", "cores": 2}
+    values = peers.describe(rows, photos, {"scene": "dunes", "size": 48, "seconds": 9.0}, facts)
+    text = markdown.render_template(root / "workflow/report/fitters.md", values)
+    ours, other = (line.split("|") for line in text.splitlines() if line.startswith(("| dav-gswt", "| opensplat")))
+    assert [cell.strip() for cell in ours[2:5]] == ["0.1", "0.4", "never"]
+    assert [cell.strip() for cell in other[2:5]] == ["2.0", "8.0", "never"]
+    assert "2 cores of a processor" in text
