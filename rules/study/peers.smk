@@ -1,7 +1,7 @@
 """Another program's fit beside ours, on the same photos and machine.
 
 In: the photos of the scene of the config's `study.compare`, and OpenSplat, a program of the user's. Out:
-docs/research/data/fitters.csv, figures/fitters.png, results/fitters.md. `make compare OPENSPLAT=/path/to/opensplat` makes them.
+results/compare/fitters.csv, fitters.png, fitters.md. `make compare OPENSPLAT=/path/to/opensplat` makes them.
 """
 
 
@@ -11,9 +11,9 @@ rule compare_fitters:
         unpack(compared_photos),
         template=str(BASE / "workflow/report/fitters.md"),
     output:
-        table="docs/research/data/fitters.csv",
-        plot="docs/research/figures/fitters.png",
-        page="docs/research/results/fitters.md",
+        table="results/compare/fitters.csv",
+        plot="results/compare/fitters.png",
+        page="results/compare/fitters.md",
     log:
         "<logs>/figures/compare_fitters.log",
     benchmark:

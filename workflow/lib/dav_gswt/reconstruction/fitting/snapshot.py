@@ -30,7 +30,7 @@ def digest_inputs(*parts) -> str:
     for part in parts:
         if isinstance(part, np.ndarray):
             state.update(f"{part.dtype}{part.shape}".encode())
-            state.update(np.ascontiguousarray(part))
+            state.update(np.ascontiguousarray(part).data)
             release_pages(part)
         else:
             state.update(repr(part).encode())
