@@ -100,7 +100,11 @@ def test_a_stopped_run_says_how_to_go_on(story, way):
 def test_a_stopped_run_leaves_what_is_whole_and_nothing_half_made(story, way):
     ended = getattr(story, way)
     assert f"{BRANCH.rsplit('/', 1)[0]}/views.json" in ended.left
-    assert not [name for name in ended.left if name.startswith(f"{BRANCH}/coarse")]
+    left = {name.removeprefix(f"{BRANCH}/coarse/") for name in ended.left if name.startswith(f"{BRANCH}/coarse")}
+    assert left in (
+        set(),
+        {"field.ply", "ground.exr", "fit.json"},
+    )  # on a busy machine the fit may have ended meanwhile
 
 
 def test_a_stopped_run_goes_on_where_it_was(story):
