@@ -5,6 +5,7 @@ PORT ?= 8000
 WORKERS ?= 2
 EXAMPLES ?= 2000
 SEED ?= 0
+OPENSPLAT ?= opensplat
 PYTHON ?= python3
 # Threads that wait sleep: other jobs use the processors too.
 export OMP_WAIT_POLICY ?= PASSIVE

@@ -10,12 +10,13 @@ from dav_gswt.study import csv_tables, fit_profile, markdown, peers
 
 with logging_to(snakemake.log[0]):
     out, asked = snakemake.output, dict(snakemake.params.asked)
+    program = peers.find_program(asked["opensplat"])  # before any work
     settings = select_settings(CoarseSettings, asked)
     photos = fit_profile.read_photo_set(Path(snakemake.input.frame).parent, settings.size, asked["margin"])
     curves = {peers.OURS: fit_profile.profile_fit(photos, settings, every=asked["every"]).curve}
     with tempfile.TemporaryDirectory(dir=Path(out.table).parent) as folder:
         peers.write_project(photos, folder)
-        saved = peers.run_opensplat(asked["opensplat"], Path(folder), asked["seconds"], asked["every"])
+        saved = peers.run_opensplat(program, Path(folder), asked["seconds"], asked["every"])
         curves[peers.OPENSPLAT] = peers.judge_saved(saved, photos)
     rows = [{"program": program} | row for program, curve in curves.items() for row in curve]
     csv_tables.write_table(out.table, rows)

@@ -68,9 +68,13 @@ def test_saved_fields_are_listed_when_the_program_ends_and_when_its_time_is_over
     assert [row["gaussians"] for row in rows] == [50, 50] and all(row["psnr"] > 3 for row in rows)
 
 
-def test_a_program_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(InputError, match=r"compare: opensplat: /nowhere/opensplat cannot be run"):
-        peers.run_opensplat("/nowhere/opensplat", tmp_path, 1.0, 10)
+def test_a_program_that_is_not_there_is_named():
+    with pytest.raises(InputError, match=r"compare: opensplat: there is no program '/nowhere/opensplat'; build"):
+        peers.find_program("/nowhere/opensplat")
+
+
+def test_a_program_is_found_by_its_path(program):
+    assert peers.find_program(path := program()) == path
 
 
 def test_a_program_that_saves_nothing_is_quoted(tmp_path):

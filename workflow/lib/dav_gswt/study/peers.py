@@ -5,6 +5,7 @@ as a COLMAP project, with the same points to start from, and saves its field eve
 our rasterizer. gsplat's fits need CUDA, its reference in PyTorch included: they cannot be compared on a CPU.
 """
 
+import shutil
 import subprocess
 import time
 from pathlib import Path
@@ -40,20 +41,27 @@ def write_project(photos: PhotoSet, folder: Path | str) -> None:
     write_colmap_model(ColmapModel(names, cameras, *points, none, none, np.zeros((0, 2))), folder / "sparse/0")
 
 
+def find_program(name: str) -> str:
+    """The path of a program. Raises: InputError: there is none."""
+    if (path := shutil.which(name)) is None:
+        raise InputError(
+            f"study: compare: opensplat: there is no program {name!r}; build OpenSplat and call "
+            "make compare OPENSPLAT=<its path>"
+        )
+    return path
+
+
 def run_opensplat(program: str, project: Path, seconds: float, every: int) -> list[tuple[float, int, Path]]:
     """Run OpenSplat for some seconds, and list seconds, step and file of each field that it saved.
 
     At full size from the start (`--num-downscales 0`): its schedule would see small photos for 3000 steps.
-    Raises: InputError: it cannot be run, or saved nothing.
+    Raises: InputError: it saved nothing.
     """
     asked = ["--cpu", "--keep-crs", "--num-downscales", "0", "--save-every", str(every), "--num-iters", "1000000"]
     command = [program, str(project), *asked, "-o", str(project / "splat.ply")]
     begin = time.time()
     with (project / "opensplat.log").open("wb") as log:
-        try:
-            process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
-        except OSError as error:
-            raise InputError(f"study: compare: opensplat: {program} cannot be run ({error.strerror})") from error
+        process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
         while process.poll() is None and time.time() - begin < seconds:
             time.sleep(OFTEN)
         ended = process.poll()

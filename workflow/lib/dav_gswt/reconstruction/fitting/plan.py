@@ -15,8 +15,10 @@ TRIED_SH_DEGREE = 1  # by a fit that finds its own
 
 
 def count_first_steps(steps: Count, steps_per_photo: Count, photos: int) -> int:
-    """Steps of a first fit to so many photos, by the keys of a preset: as many as if those beyond FEW_PHOTOS came in
-    rounds."""
+    """Steps of a first fit to so many photos, by a preset's `steps` and `steps_per_photo`.
+
+    `steps` are for FEW_PHOTOS; each photo more adds as many steps as a new photo of a round.
+    """
     if steps == AUTO:
         return STEPS_PER_PHOTO * photos
     further = STEPS_PER_NEW_PHOTO if steps_per_photo == AUTO else int(steps_per_photo)
