@@ -1,11 +1,12 @@
 """Time of a frame by the page beside Spark and PlayCanvas, which draw the same splats in the same browser.
 
 The Gaussians that the page shows of a view are written as a PLY around the eye, for the others. Each renderer turns the
-eye back and forth by some thousandths of a degree and is timed until a pixel can be read. In headless Chromium with
-software rendering; ratios carry over, milliseconds do not. Prints a table, asserts nothing.
+eye back and forth by some thousandths of a degree and is timed until a pixel can be read. In headless Chromium; in
+software, where ratios carry over and milliseconds do not, or with `--gpu` on a graphics card, at 1920 x 1080. Prints a
+table, asserts nothing.
 
-`python benchmarks/page_peers.py BUNDLE [RENDERER ...]`: by default all; they come by `npm ci` in benchmarks/peers.
-In software Spark takes seconds for a frame, so a quarter of an hour for all; without it two minutes.
+`python benchmarks/page_peers.py BUNDLE [--gpu] [RENDERER ...]`: by default all; they come by `npm ci` in
+benchmarks/peers. In software Spark takes seconds for a frame, so a quarter of an hour for all; without it two minutes.
 """
 
 import functools
@@ -34,10 +35,21 @@ from dav_gswt.terrain.object_placement import group_by_cell
 from dav_gswt.terrain.page import write_page
 from dav_gswt.terrain.placement import place_cell
 
+GPU = "--gpu" in sys.argv
+GPU_FLAGS = [  # Chromium's way to a graphics card without a screen
+    "--headless",
+    "--no-sandbox",
+    "--use-angle=gl-egl",  # by Vulkan it wants extensions that need a screen
+    "--ignore-gpu-blocklist",
+    "--disable-gpu-watchdog",
+    "--no-first-run",
+]
 PEERS = Path(__file__).parent / "peers"
 SCHEMA = Path(__file__).parents[1] / "workflow/schemas/davgswt.schema.json"
-WIDTH, HEIGHT, FIELD = 640, 360, 60.0  # pixels, and degrees across
-BUDGETS = (400_000,)  # Gaussians in view: more than the views need, so that all renderers show the same ones
+WIDTH, HEIGHT = (1920, 1080) if GPU else (640, 360)  # pixels
+FIELD = 60.0  # degrees across
+# Gaussians in view; the most is more than the views need, so that all renderers show the same ones
+BUDGETS = (50_000, 100_000, 200_000, 400_000) if GPU else (400_000,)
 SHOT = stills.Shot("walker", (0.5, 0.5), 1.0, 12.0, 60.0)
 ROUNDS, FRAMES, WARM_UP = 3, 9, 4
 TURNS = [0.002 * (-1) ** k for k in range(FRAMES)]  # degrees: the same Gaussians stay in view
@@ -61,6 +73,10 @@ TIME_PEER = """async ({ ahead, before }) => {
   }
   return times;
 }"""
+RENDERER = """() => {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  return gl.getParameter(gl.getExtension("WEBGL_debug_renderer_info").UNMASKED_RENDERER_WEBGL);
+}"""
 READ_PEER = """async ({ ahead }) => {
   const { gl, draw } = window.peer, { drawingBufferWidth: width, drawingBufferHeight: height } = gl;
   for (let k = 0; k < 10; k++) {
@@ -79,7 +95,7 @@ def main() -> int:
     if len(sys.argv) < 2 or not (PEERS / "node_modules").is_dir() or chromium_path() is None:
         print("page_peers: needs the folder of a bundle, Chromium, and `npm ci` in benchmarks/peers; nothing measured")
         return 0
-    others = tuple(sys.argv[2:]) or OTHERS
+    others = tuple(name for name in sys.argv[2:] if name != "--gpu") or OTHERS
     if unknown := set(others) - set(OTHERS):
         print(f"page_peers: no renderer {', '.join(sorted(unknown))}; choose from {', '.join(OTHERS)}")
         return 1
@@ -107,8 +123,10 @@ def compare(bundle: store.Bundle, folder: Path, budget: int, names: tuple[str, .
         for file in PEERS.iterdir():
             (others / file.name).symlink_to(file)
         write_field(field, others / "splats.ply", plain=True)
-        browser = playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS)
+        browser = playwright.chromium.launch(executable_path=chromium_path(), args=GPU_FLAGS if GPU else FLAGS)
         with served(own) as page, serve_plainly(others) as elsewhere:
+            if GPU:
+                print(read_renderer(browser, elsewhere))
             for number in range(ROUNDS):
                 print(f"round {number + 1} of {ROUNDS}", file=sys.stderr, flush=True)
                 found = time_page(browser, page, place, budget)
@@ -122,10 +140,19 @@ def compare(bundle: store.Bundle, folder: Path, budget: int, names: tuple[str, .
     medians = {name: statistics.median(values) for name, values in times.items()}
     for name, value in medians.items():
         quality = f", {pictures[name]:.1f} dB from the library's picture" if name in pictures else ""
-        print(f"  {name}: {value:.0f} ms (median of {len(times[name])}){quality}")
-    figure = f"page_over_best_peer_{budget // 1000}k"
+        print(f"  {name}: {value:.3g} ms (median of {len(times[name])}){quality}")
+    figure = f"page_over_best_peer_{budget // 1000}k" + GPU * "_gpu"
     if names == OTHERS:  # of some alone it is not the best that is compared with
         report_figures({figure: medians["page"] / min(medians[name] for name in names)}, {figure: 0.5})
+
+
+def read_renderer(browser, address: str) -> str:
+    """What draws, as WebGL names it."""
+    tab = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
+    tab.goto(f"{address}index.html")
+    name = tab.evaluate(RENDERER)
+    tab.close()
+    return name
 
 
 def time_page(browser, address: str, place: dict, budget: int) -> dict:

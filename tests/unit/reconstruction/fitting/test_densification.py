@@ -69,7 +69,7 @@ def test_only_the_nearly_transparent_are_shaken():
     now = some()
     now.values["opacity_logits"][:10] = -9
     before = now.values["means"].copy()
-    densification.perturb(now, 0, 0.5, np.random.default_rng(0))
+    densification.perturb(now.values, 0, 0.5, np.random.default_rng(0))
     moved = np.linalg.norm(now.values["means"] - before, axis=1)
     assert moved[:10].min() > 0 and moved[10:].max() == 0
     assert moved.max() < 5 * 0.5 * 0.2

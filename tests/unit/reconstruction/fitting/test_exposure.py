@@ -53,7 +53,7 @@ def test_a_pictures_exposure_is_found_beside_what_moves():
     image = (1.1 * picture - 0.03).astype(np.float32)
     image[:6] = 1.0  # something else
     none = np.ones(3, np.float32), np.zeros(3, np.float32)
-    a, b = exposure.update_gain_and_offset(picture, replace(photo([0, 0, 0]), image=image), none)
+    a, b = exposure.update_gain_and_offset(picture, exposure.sample_photo(image, np.ones((40, 40), np.float32)), none)
     # the prior's share: 1e-3 against the variance of the picture, 0.03
     np.testing.assert_allclose(a, 1.1, atol=0.01)
     np.testing.assert_allclose(b, -0.03, atol=0.01)
@@ -62,10 +62,11 @@ def test_a_pictures_exposure_is_found_beside_what_moves():
 def test_pixels_without_weight_and_flat_pictures_give_no_gain():
     none = np.ones(3, np.float32), np.zeros(3, np.float32)
     picture = np.full((40, 40, 3), 0.4, np.float32)
-    a, b = exposure.update_gain_and_offset(picture, photo([0.5, 0.5, 0.5]), none)
+    flat = photo([0.5, 0.5, 0.5])
+    a, b = exposure.update_gain_and_offset(picture, exposure.sample_photo(flat.image, flat.weight), none)
     np.testing.assert_allclose(a, 1, atol=1e-6)
     np.testing.assert_allclose(b, 0.1, atol=1e-6)
-    blind = replace(photo([0.5, 0.5, 0.5]), weight=np.zeros((40, 40), np.float32))
+    blind = exposure.sample_photo(flat.image, np.zeros((40, 40), np.float32))
     assert exposure.update_gain_and_offset(picture, blind, none) is none
 
 

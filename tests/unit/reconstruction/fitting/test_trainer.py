@@ -7,8 +7,10 @@ from fixtures import ground as made
 from dav_gswt.field import concatenate_fields, rgb_to_sh
 from dav_gswt.reconstruction import top_view
 from dav_gswt.reconstruction.evaluation import evaluate_field
-from dav_gswt.reconstruction.fitting import snapshot, trainer
+from dav_gswt.reconstruction.fitting import descent, snapshot, trainer
+from dav_gswt.reconstruction.fitting.descent import HostDescent
 from dav_gswt.reconstruction.fitting.plan import FitPlan
+from dav_gswt.reconstruction.fitting.residual import Residual
 from dav_gswt.reconstruction.ground_constraints import GroundConstraints
 from dav_gswt.reconstruction.objects import make_blobs
 
@@ -96,11 +98,11 @@ def test_a_killed_fit_goes_on_from_its_snapshot_and_ends_with_the_same_field(pla
     monkeypatch.setattr(snapshot, "EVERY", 0.0)  # after every step
     advance, count = trainer._advance, [0]
 
-    def until(run, task):
+    def until(run, task, descent):
         if count[0] == 17:
             raise Killed
         count[0] += 1
-        advance(run, task)
+        advance(run, task, descent)
 
     monkeypatch.setattr(trainer, "_advance", until)
     with pytest.raises(Killed):
@@ -181,16 +183,16 @@ def test_a_long_fit_of_a_field_that_is_not_sharp_keeps_its_brightness():
 
 def test_errors_are_noted_in_the_last_steps_before_each_growth_alone(monkeypatch):
     noted, grown = [], []
-    descend, grow = trainer._descend, trainer._grow
-    monkeypatch.setattr(trainer, "ERROR_PHOTOS", 2)
-    monkeypatch.setattr(trainer.Residual, "add", lambda *_: noted.append(now[0]))
+    descend, grow = HostDescent.descend, trainer._grow
+    monkeypatch.setattr(descent, "ERROR_PHOTOS", 2)
+    monkeypatch.setattr(Residual, "add", lambda *_: noted.append(now[0]))
     now = [0]
 
-    def counting(run, task, index):
+    def counting(self, run, task, index):
         now[0] = run.step
-        descend(run, task, index)
+        descend(self, run, task, index)
 
-    monkeypatch.setattr(trainer, "_descend", counting)
+    monkeypatch.setattr(HostDescent, "descend", counting)
     monkeypatch.setattr(trainer, "_grow", lambda run, task: grown.append(run.step) or grow(run, task))
     monkeypatch.setattr(trainer.densification, "grow", lambda *_: 0)
     fitted(plan=FitPlan(60, 10**4))

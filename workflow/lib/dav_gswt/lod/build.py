@@ -18,7 +18,7 @@ from dav_gswt.images import image_files
 from dav_gswt.lod.levels import AUTO, MAX_LEVELS, Levels
 from dav_gswt.lod.merge import crop_to_blocks, halve_resolution
 from dav_gswt.photos.training_views import TrainingView
-from dav_gswt.raster import Gradients, to_raster_arrays
+from dav_gswt.raster import to_raster_arrays
 from dav_gswt.reconstruction.fitting import trainer
 from dav_gswt.reconstruction.fitting.plan import FitPlan
 from dav_gswt.reconstruction.ground import Ground
@@ -33,14 +33,6 @@ ELEVATIONS = (90.0, 50.0, 20.0, 6.0)  # degrees: pictures the coarser level is f
 AZIMUTHS = 6  # azimuths of each elevation but the zenith's
 CLEARANCE = 2.0  # discs that an object may rise above its highest start
 PIXELS_PER_DISC = 2.0  # of a coarse disc: where a level is used, a disc is about a pixel wide
-
-
-class FixedHeights(GroundConstraints):
-    """Ground constraints under which the discs also keep their heights."""
-
-    def adjust_gradients(self, gradients: Gradients) -> None:
-        super().adjust_gradients(gradients)
-        gradients.means[: self.discs, 2] = 0
 
 
 def build_levels(
@@ -93,7 +85,8 @@ def fit_coarser_level(
     top = CLEARANCE * coarse.spacing
     if len(objects):
         top += float((objects.means[:, 2] - coarse.height_at(objects.means)).max())
-    constraints, plan = FixedHeights(coarse, np.full(coarse.shape, top)), FitPlan(steps, len(start))
+    constraints = GroundConstraints(coarse, np.full(coarse.shape, top), smoothing=None)
+    plan = FitPlan(steps, len(start))
     options = trainer.FitOptions(f"fit level of {len(start)} Gaussians", keep)
     level = trainer.fit_field(start, views, plan, constraints, rng, options).field
     scales = mean_scale([field]), mean_scale([level])

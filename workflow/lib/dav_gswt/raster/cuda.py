@@ -1,14 +1,17 @@
 """The rasterizer on an NVIDIA GPU, by gsplat (the extra `cuda`; written for version 1.5).
 
-Tests run on the CPU, with a stand-in for gsplat. gsplat shares this library's conventions (pixel centres at half
-integers, covariance plus dilation, 1/255, 1e-4, the rim at which the projection is linearised, harmonics), but for:
+Tests run on a GPU where there is one, and elsewhere with a stand-in for gsplat. gsplat shares this library's
+conventions (pixel centres at half integers, covariance plus dilation, 1/255, 1e-4, the rim at which the projection is
+linearised, harmonics), but for:
 - alpha is clamped at .999, not .99: a weight may differ by .009 where opacities exceed .99, else by float32 roundings.
-- covariances are inverted by differences of large numbers in float32: a splat a thousand times as long as wide keeps
-  about three digits, and standard deviations beyond 1e18 pixels or units none.
+- covariances are inverted by differences of large numbers in float32: of splats a thousand times as long as wide many
+  are drawn wrong or not at all (fits allow a factor of 10); standard deviations beyond 1e18 pixels or units are lost.
 - sums are atomic: two runs differ in the last bits.
-Each call copies arrays to the GPU and back; `adam` runs on the CPU.
+Each call of the interface copies arrays to the GPU and back, and `adam` runs on the CPU. A fit keeps its arrays on the
+GPU (`reconstruction.fitting.device_descent`): it calls `draw`, `differentiate` and `contribute`.
 """
 
+import warnings
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -23,7 +26,7 @@ from torch import Tensor
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import interface, oracle
 from dav_gswt.raster.interface import Contributions, Forward, GaussianArrays, Gradients, PictureGradients, Rendering
-from dav_gswt.raster.torch import adam, compute_loss, join_gradients, split_channels, to_gradients
+from dav_gswt.raster.torch import adam, compute_loss, join_gradients
 
 __all__ = ["Rasterizer", "adam", "loss"]
 
@@ -56,52 +59,73 @@ class Rasterizer(interface.Rasterizer):
         super().__init__(near, dilation, antialiased, threads)
         self.device = torch.device(device)
 
-    @torch.enable_grad()
-    def _render(self, gaussians: GaussianArrays, camera: Camera) -> tuple[Rendering, Any]:
-        interface.find_invalid(gaussians)
-        given = gaussians.by_name()
-        given["means"] = (given["means"].astype(float) - camera.centre).astype(np.float32)  # R m + t cancels far out
-        leaves = {name: torch.tensor(array, device=self.device).requires_grad_() for name, array in given.items()}
+    def draw(self, given: dict[str, Tensor], camera: Camera) -> GsplatForward:
+        """The forward pass of Gaussians on the device; given: `GaussianArrays` by name, world coordinates."""
+        centre = torch.as_tensor(np.asarray(camera.centre)).to(self.device)
+        given = given | {"means": (given["means"].double() - centre).float()}  # R m + t cancels far out
         view = torch.eye(4, device=self.device)
         view[:3, :3] = torch.as_tensor(np.asarray(camera.rotation))
-        view.requires_grad_()
-        picture, alpha, meta = self._call_gsplat(leaves, view, camera)
-        c = gaussians.colours.shape[-1]
-        channels = torch.cat([picture[0, ..., :c], alpha[0], picture[0, ..., -1:], picture[0, ..., c:-1]], 2)
-        rendering = split_channels(channels, c, gaussians.features is not None)
-        return rendering, GsplatForward(leaves, view, picture, alpha, meta)
+        with torch.enable_grad():
+            leaves = {name: tensor.detach().requires_grad_() for name, tensor in given.items()}
+            picture, alpha, meta = self._call_gsplat(leaves, view.requires_grad_(), camera)
+        return GsplatForward(leaves, view, picture, alpha, meta)
 
-    def _differentiate(self, last: Forward, given: PictureGradients) -> Gradients:
-        state = last.state
-        by_channel = join_gradients(last.rendering, given).to(self.device)
-        c = last.rendering.colour.shape[2]
-        by_picture = torch.cat([by_channel[..., :c], by_channel[..., c + 2 :], by_channel[..., c + 1 : c + 2]], 2)
+    def differentiate(
+        self, last: GsplatForward, by_picture: Float[Tensor, "h w c"], by_alpha: Float[Tensor, "h w"]
+    ) -> dict[str, Tensor]:
+        """Gradients by the parameters, by name, and by the camera's motion, from those by gsplat's picture and alpha.
+
+        by_picture: of the picture's first channels; of the others they are zero.
+        """
+        missing = last.picture.shape[-1] - by_picture.shape[-1]
         found = torch.autograd.grad(
-            (state.picture, state.alpha),
-            (*state.leaves.values(), state.view),
-            (by_picture[None], by_channel[None, ..., c : c + 1]),
+            (last.picture, last.alpha),
+            (*last.leaves.values(), last.view),
+            (torch.nn.functional.pad(by_picture, (0, missing))[None], by_alpha[None, ..., None]),
             retain_graph=True,
             materialize_grads=True,
         )
-        by_camera = motion_gradient(state.view.detach(), found[-1])
-        return to_gradients(dict(zip(state.leaves, found[:-1], strict=True)) | {"camera": by_camera})
+        by_camera = motion_gradient(last.view.detach(), found[-1]).float()
+        return dict(zip(last.leaves, found[:-1], strict=True)) | {"camera": by_camera}
 
-    def _contribute(self, last: Forward, weights: Float32[Array, "h w c"]) -> Contributions:
-        state = last.state
-        h, w = last.camera.height, last.camera.width
+    def contribute(
+        self, last: GsplatForward, maps: Float32[Tensor, "h w c"]
+    ) -> tuple[Float32[Tensor, "n"], Float32[Tensor, "n"], Float32[Tensor, "n c"]]:
+        """The tensors of `Contributions`."""
+        h, w = maps.shape[:2]
         with torch.no_grad():
-            gaussians, pixels, blend = list_pairs(state.meta, w, h)
-            maps = torch.as_tensor(weights, device=self.device).reshape(h * w, -1)
-            n = len(state.leaves["means"])
-            zero = torch.zeros(n, device=self.device)
+            gaussians, pixels, blend = list_pairs(last.meta, w, h)
+            by_pixel = maps.reshape(h * w, -1)
+            zero = torch.zeros(len(last.leaves["means"]), device=self.device)
             total = zero.index_add(0, gaussians, blend)
             maximum = zero.scatter_reduce(0, gaussians, blend, "amax")
-            mapped = [zero.index_add(0, gaussians, blend * m[pixels]) for m in maps.T]
-        table = torch.stack(mapped, 1) if mapped else zero[:, None][:, :0]
-        return Contributions(*(a.cpu().numpy() for a in (total, maximum, table)))
+            mapped = [zero.index_add(0, gaussians, blend * m[pixels]) for m in by_pixel.T]
+        return total, maximum, torch.stack(mapped, 1) if mapped else zero[:, None][:, :0]
+
+    def _render(self, gaussians: GaussianArrays, camera: Camera) -> tuple[Rendering, Any]:
+        given = {name: upload(array, self.device) for name, array in gaussians.by_name().items()}
+        if not all(bool(tensor.isfinite().all()) for tensor in given.values()) or _has_zero(given["quats"]):
+            interface.find_invalid(gaussians)
+        last = self.draw(given, camera)
+        c, picture = gaussians.colours.shape[-1], last.picture.detach()[0]
+        images = [picture[..., :c], last.alpha.detach()[0, ..., 0], picture[..., -1]]
+        if gaussians.features is not None:
+            images.append(picture[..., c:-1])
+        return Rendering(*(download(image) for image in images)), last
+
+    def _differentiate(self, last: Forward, given: PictureGradients) -> Gradients:
+        by_channel = join_gradients(last.rendering, given).to(self.device)
+        c = last.rendering.colour.shape[2]
+        by_picture = torch.cat([by_channel[..., :c], by_channel[..., c + 2 :], by_channel[..., c + 1 : c + 2]], 2)
+        found = self.differentiate(last.state, by_picture, by_channel[..., c])
+        arrays = {name: download(gradient) for name, gradient in found.items()}
+        return Gradients(features=arrays.pop("features", None), **arrays)
+
+    def _contribute(self, last: Forward, weights: Float32[Array, "h w c"]) -> Contributions:
+        return Contributions(*(download(t) for t in self.contribute(last.state, upload(weights, self.device))))
 
     def _visible(self, last: Forward) -> Bool[Array, "n"]:
-        return (last.state.meta["radii"][0] > 0).all(-1).cpu().numpy()
+        return download(find_visible(last.state))
 
     def _call_gsplat(self, leaves: dict[str, Tensor], view: Float32[Tensor, "4 4"], camera: Camera):
         """gsplat's picture (colours, features, depth), alpha and intermediate results."""
@@ -122,7 +146,7 @@ class Rasterizer(interface.Rasterizer):
             torch.sigmoid(leaves["opacity_logits"]),
             values,
             view[None],
-            torch.tensor(inner, device=view.device)[None],
+            torch.tensor(inner, dtype=torch.float32, device=view.device)[None],  # NumPy's numbers would make doubles
             camera.width,
             camera.height,
             near_plane=near if camera.orthographic else self.near,
@@ -134,6 +158,28 @@ class Rasterizer(interface.Rasterizer):
             rasterize_mode="antialiased" if self.antialiased else "classic",
             camera_model="ortho" if camera.orthographic else "pinhole",
         )
+
+
+def find_visible(last: GsplatForward) -> Bool[Tensor, "n"]:
+    """Which Gaussians may have a pixel."""
+    return (last.meta["radii"][0] > 0).all(-1)
+
+
+def upload(array: Array, device: torch.device) -> Tensor:
+    """An array on the device."""
+    with warnings.catch_warnings():  # of arrays that cannot be written to: nobody does
+        warnings.simplefilter("ignore")
+        return torch.as_tensor(array).to(device)
+
+
+def download(tensor: Tensor) -> Array:
+    """A tensor as an array, through memory that the device writes to by itself."""
+    on_host = torch.empty(tensor.shape, dtype=tensor.dtype, pin_memory=tensor.is_cuda)
+    return on_host.copy_(tensor.detach()).numpy()
+
+
+def _has_zero(quats: Float32[Tensor, "n 4"]) -> bool:
+    return len(quats) > 0 and bool((quats.abs().amax(1) < interface.TINY).any())
 
 
 def motion_gradient(view: Float[Tensor, "4 4"], by_view: Float[Tensor, "4 4"]) -> Float[Tensor, "6"]:
@@ -173,4 +219,4 @@ def list_pairs(
     return gaussians, pixels, (alpha * torch.exp(before - before[first])).float()
 
 
-loss = interface.Loss(partial(compute_loss, torch.device("cuda")))
+loss = interface.Loss(partial(compute_loss, torch.device("cuda"), torch.float32))

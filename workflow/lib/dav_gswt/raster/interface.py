@@ -14,6 +14,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.geometry.cameras import Camera
 
+TINY = 1e-36  # a quaternion all of whose parts are smaller is zero
 RIM = 3.33  # standard deviations at which an opaque Gaussian ends: exp(-RIM^2 / 2) = 1/255
 
 
@@ -347,7 +348,7 @@ def find_invalid(gaussians: GaussianArrays) -> None:
         if not np.isfinite(array).all():
             bad = np.flatnonzero(~np.isfinite(array.reshape(len(array), -1)).all(1))
             raise ValueError(f"{name} of Gaussian {bad[0]} is not finite ({len(bad)} such)")
-    zero = np.flatnonzero(np.abs(gaussians.quats).max(1, initial=0) < 1e-36)
+    zero = np.flatnonzero(np.abs(gaussians.quats).max(1, initial=0) < TINY)
     if len(zero):
         raise ValueError(f"the quaternion of Gaussian {zero[0]} is zero")
 

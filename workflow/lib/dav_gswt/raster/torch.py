@@ -244,29 +244,37 @@ def _bound_boxes(splats: Splats, camera: Camera) -> tuple[Int[Tensor, "m 2"], In
     return low.long(), high.long()
 
 
-@torch.enable_grad()
 def compute_loss(
     device: torch.device,
+    dtype: torch.dtype,
     image: Float32[Array, "h w c"],
     target: Float32[Array, "h w c"],
     weight: Float32[Array, "h w"] | None,
     structure: float,
     threads: int | None = None,
 ) -> tuple[float, Float32[Array, "h w c"]]:
-    """See `interface.Loss`: on a device, in float64, by autograd. threads: not used."""
-    if weight is None:
-        weight = np.ones(image.shape[:2], np.float32)
-    x, y, w = (torch.as_tensor(a).to(device, torch.float64) for a in (image, target, weight[..., None]))
-    x.requires_grad_()
+    """See `interface.Loss`: on a device. threads: not used."""
+    weight = np.ones(image.shape[:2], np.float32) if weight is None else weight
+    x, y, w = (torch.tensor(a, dtype=dtype, device=device) for a in (image, target, weight))
+    value, gradient = differentiate_loss(x, y, w, structure)
+    return value.item(), np.ascontiguousarray(gradient.cpu().numpy(), np.float32)
+
+
+@torch.enable_grad()
+def differentiate_loss(
+    image: Float[Tensor, "h w c"], target: Float[Tensor, "h w c"], weight: Float[Tensor, "h w"], structure: float
+) -> tuple[Float[Tensor, ""], Float[Tensor, "h w c"]]:
+    """The loss of `interface.Loss` and its gradient by the image, by autograd."""
+    x, y, w = image.detach().requires_grad_(), target, weight[..., None]
     n = _window_sums(w)
-    mean = torch.stack([_window_sums(w * f) / torch.where(n > 0, n, 1) for f in (x, y, x * x, y * y, x * y)])
-    a, b = mean[0], mean[1]
-    vaa, vbb, vab = mean[2] - a * a, mean[3] - b * b, mean[4] - a * b
+    sums = _window_sums(w * torch.cat([x, y, x * x, y * y, x * y], 2)) / torch.where(n > 0, n, 1)
+    a, b, aa, bb, ab = sums.chunk(5, 2)
+    vaa, vbb, vab = aa - a * a, bb - b * b, ab - a * b
     c1, c2 = 0.01**2, 0.03**2
     ssim = (2 * a * b + c1) * (2 * vab + c2) / ((a * a + b * b + c1) * (vaa + vbb + c2))
     value = (w * ((1 - structure) * (x - y).abs() + structure * (1 - ssim))).mean()
     (gradient,) = torch.autograd.grad(value, x)
-    return value.item(), np.ascontiguousarray(gradient.cpu().numpy(), np.float32)
+    return value.detach(), gradient
 
 
 def _window_sums(values: Float[Tensor, "h w c"]) -> Float[Tensor, "h w c"]:
@@ -290,5 +298,5 @@ def _step_adam(s: AdamStep) -> None:
         array.reshape(len(array), -1)[which] = new
 
 
-loss = interface.Loss(partial(compute_loss, torch.device("cpu")))
+loss = interface.Loss(partial(compute_loss, torch.device("cpu"), torch.float64))
 adam = interface.Adam(_step_adam)

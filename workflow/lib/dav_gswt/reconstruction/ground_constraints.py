@@ -11,11 +11,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 
-from dav_gswt.raster import Gradients
 from dav_gswt.reconstruction import underlay
 from dav_gswt.reconstruction.discs import THICKNESS, slopes_to_quaternions
 from dav_gswt.reconstruction.fitting.constraints import LOGITS, clip_sizes
-from dav_gswt.reconstruction.ground import Ground, smooth
+from dav_gswt.reconstruction.ground import Ground
 
 SMOOTHING = 0.5  # cells: blur of the gradients of heights
 MAX_OFFSET = 0.49  # spacings between a disc and its cell's centre
@@ -27,23 +26,16 @@ DISC_LOGITS = 2.5, 6.0
 class GroundConstraints:
     """Constraints of a field whose first Gaussians are the discs of `grid`, row by row, and then their underlay.
 
-    ceiling: the largest height of objects above the surface, by cell.
+    ceiling: the largest height of objects above the surface, by cell. smoothing: None: the discs keep their heights.
     """
 
-    def __init__(self, grid: Ground, ceiling: Float[Array, "rows columns"]):
+    def __init__(self, grid: Ground, ceiling: Float[Array, "rows columns"], smoothing: float | None = SMOOTHING):
         self.discs, self.detail = grid.heights.size, grid.spacing
         self.fixed = self.discs + underlay.count_gaussians(grid)
+        self.shape: tuple[int, int] = grid.shape
+        self.smoothing = smoothing
         self.grid, self.ceiling = grid, replace(grid, heights=ceiling)
         self.centres = grid.centres[:, :2].astype(np.float32)
-
-    def adjust_gradients(self, gradients: Gradients) -> None:
-        """Heights move together; discs turn with the surface (see `project_parameters`)."""
-        up = gradients.means[: self.discs, 2].reshape(self.grid.shape)
-        gradients.means[: self.discs, 2] = smooth(up, SMOOTHING).ravel()
-        gradients.quats[: self.discs] = 0
-        for part in vars(gradients).values():
-            if part is not None and len(part) > self.discs:
-                part[self.discs : self.fixed] = 0
 
     def project_parameters(self, values: dict[str, Array]) -> None:
         """Discs onto their cells, tangents and sizes; the underlay below them; objects onto their sizes."""

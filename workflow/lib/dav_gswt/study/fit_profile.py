@@ -87,8 +87,6 @@ def profile_fit(photos: PhotoSet, settings: CoarseSettings, seed: int = 0, every
 
     def watch(step: int, state) -> None:
         nonlocal measuring
-        if step % every:
-            return
         begun = time.perf_counter()
         row = {"seconds": begun - start - measuring, "step": step, "gaussians": len(state)}
         curve.append(row | measure_quality(lambda v: drawn.forward(**state.values, camera=v.camera).colour, watched))
@@ -96,7 +94,7 @@ def profile_fit(photos: PhotoSet, settings: CoarseSettings, seed: int = 0, every
 
     rng = np.random.default_rng(seed)
     given = StartViews(photos.frame, photos.train, photos.model.points, photos.model.colours, photos.margin)
-    made = fit_coarse_field(given, settings, rng, FitOptions(callback=watch))
+    made = fit_coarse_field(given, settings, rng, FitOptions(callback=watch, every=every))
     seconds = time.perf_counter() - start - measuring
     last = measure_quality(lambda v: raster.render(made.field, v.camera).colour, watched)
     curve.append({"seconds": seconds, "step": made.report.steps, "gaussians": len(made.field)} | last)

@@ -6,8 +6,6 @@ import numpy as np
 from jaxtyping import Bool
 from numpy import ndarray as Array
 
-from dav_gswt.raster import Gradients
-
 NEEDLE = np.log(3.0)  # the longest axis over the middle one: flat Gaussians are allowed, needles are not
 FLAT = np.log(10.0)  # the longest axis over the shortest
 LOGITS = (-8.0, 6.0)
@@ -20,10 +18,8 @@ class Constraints(Protocol):
     fixed: int
     discs: int
     detail: float  # typical size of a detail, in world units
-
-    def adjust_gradients(self, gradients: Gradients) -> None:
-        """Change gradients in place before the optimiser's step."""
-        ...
+    shape: tuple[int, int]  # rows and columns of the discs
+    smoothing: float | None  # cells over which the gradients of their heights are blurred; None: heights stay
 
     def project_parameters(self, values: dict[str, Array]) -> None:
         """Project parameters onto what is allowed, in place."""
@@ -42,9 +38,8 @@ class FreeConstraints:
 
     def __init__(self, detail: float, extent: float):
         self.fixed, self.discs, self.detail, self.extent = 0, 0, detail, extent
-
-    def adjust_gradients(self, gradients: Gradients) -> None:
-        """Changes nothing."""
+        self.shape: tuple[int, int] = (0, 0)
+        self.smoothing: float | None = None
 
     def project_parameters(self, values: dict[str, Array]) -> None:
         """Allows neither needles nor Gaussians as large as the scene."""

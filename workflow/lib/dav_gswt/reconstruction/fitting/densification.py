@@ -18,6 +18,7 @@ MAX_COPIES = 8  # of one source in one event
 DETAIL_SIZE = np.log(0.5)  # of a detail on the ground, over its disc's size
 PERTURBATION = 0.3  # standard deviations a step, of a transparent Gaussian at the start
 MAX_PERTURBED = DEAD + np.log(99) / 100  # opacity above which the perturbation's share would be under .01
+LOOSE_LOGIT = float(np.log(MAX_PERTURBED / (1 - MAX_PERTURBED)))
 
 
 def to_opacity(logits: Float[Array, "n"]) -> Float[Array, "n"]:
@@ -55,10 +56,9 @@ def grow(
     return count
 
 
-def perturb(state: State, fixed: int, strength: float, rng: np.random.Generator) -> None:
+def perturb(values: dict[str, Array], fixed: int, strength: float, rng: np.random.Generator) -> None:
     """Move nearly transparent free Gaussians by random steps within their size; opaque ones stay."""
-    values = state.values
-    rows = fixed + np.flatnonzero(values["opacity_logits"][fixed:] < np.log(MAX_PERTURBED / (1 - MAX_PERTURBED)))
+    rows = fixed + np.flatnonzero(values["opacity_logits"][fixed:] < LOOSE_LOGIT)
     if not len(rows):
         return
     loose = 1 / (1 + np.exp(100 * (to_opacity(values["opacity_logits"][rows]) - DEAD)))

@@ -4,6 +4,9 @@ Fitted before the fit, between the photos' colours of the same points, and at ev
 photos get none.
 """
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 from jaxtyping import Float, Float32
 from numpy import ndarray as Array
@@ -68,6 +71,25 @@ def match_exposure(view: TrainingView, points: Float[Array, "n 3"], colours: Flo
     return view.with_pixels(image=(view.image * a + b).astype(np.float32))
 
 
+@dataclass(frozen=True)
+class Sample:
+    """The pixels of a photo that tell its exposure."""
+
+    image: Float32[Array, "r c 3"]
+    weight: Float32[Array, "r c"]
+
+
+def thin(picture: Any, size: int) -> Any:
+    """At most about MAX_PIXELS of a picture's `size` pixels, evenly; of an array or a tensor."""
+    stride = max(1, int(np.sqrt(size / MAX_PIXELS)))
+    return picture[::stride, ::stride]
+
+
+def sample_photo(image: Float32[Array, "h w 3"], weight: Float32[Array, "h w"]) -> Sample:
+    """The pixels of a photo that `thin` leaves."""
+    return Sample(thin(image, weight.size), thin(weight, weight.size))
+
+
 class ExposureTracker:
     """Gain and offset of each photo against the field's pictures, estimated step by step.
 
@@ -82,7 +104,11 @@ class ExposureTracker:
 
     def update(self, index: int, picture: Float32[Array, "h w 3"], view: TrainingView) -> None:
         """Update a photo's values from the field's picture at its pose."""
-        a, b = update_gain_and_offset(picture, view, (self.gains[index], self.offsets[index]))
+        self.learn(index, thin(picture, view.weight.size), sample_photo(view.image, view.weight))
+
+    def learn(self, index: int, picture: Float32[Array, "r c 3"], photo: Sample) -> None:
+        """Update a photo's values from the thinned picture of the field (`thin`)."""
+        a, b = update_gain_and_offset(picture, photo, (self.gains[index], self.offsets[index]))
         self.gains[index] += LEARNING_RATE * (a - self.gains[index])
         self.offsets[index] += LEARNING_RATE * (b - self.offsets[index])
 
@@ -93,7 +119,7 @@ class ExposureTracker:
 
 
 def update_gain_and_offset(
-    picture: Float32[Array, "h w 3"], view: TrainingView, before: tuple[Float32[Array, "3"], Float32[Array, "3"]]
+    picture: Float32[Array, "r c 3"], photo: Sample, before: tuple[Float32[Array, "3"], Float32[Array, "3"]]
 ) -> tuple[Float32[Array, "3"], Float32[Array, "3"]]:
     """Gain a and offset b that bring a picture to its photo, least squares over the pixels that count and agree.
 
@@ -101,9 +127,7 @@ def update_gain_and_offset(
     objects, objects that the field lacks) are ignored. a is held within 1 / MAX_STEP_GAIN .. MAX_STEP_GAIN by a prior
     and by clipping. If no pixel counts they stay unchanged.
     """
-    stride = max(1, int(np.sqrt(view.weight.size / MAX_PIXELS)))
-    some = np.s_[::stride, ::stride]
-    picture, image, weight = picture[some], view.image[some], view.weight[some]
+    image, weight = photo.image, photo.weight
     counts = weight > 0
     if not counts.any():
         return before

@@ -20,7 +20,10 @@ class Residual:
     def add(self, rasterizer: Rasterizer, difference: Float32[Array, "h w 3"], weight: Float32[Array, "h w"]) -> None:
         """Add the last picture of the rasterizer. difference: picture less photo. weight: pixels that count."""
         squared = (channels.mean_squares(difference) * weight)[..., None]
-        found = rasterizer.contributions(squared).mapped[:, 0]
+        self.add_found(rasterizer.contributions(squared).mapped[:, 0])
+
+    def add_found(self, found: Float32[Array, "n"]) -> None:
+        """Add the errors that a photo projects back."""
         if not len(self.errors):
             self.errors, self.photos = np.zeros_like(found), np.zeros(len(found), np.int32)
         self.errors += found

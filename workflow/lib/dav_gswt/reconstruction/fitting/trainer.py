@@ -9,17 +9,17 @@ import logging
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
-from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt import raster
-from dav_gswt.field import SH0, GaussianField
+from dav_gswt.field import GaussianField
 from dav_gswt.images import channels, image_files
 from dav_gswt.logs import progress
 from dav_gswt.photos.training_views import TrainingView, make_training_view, one_by_one
+from dav_gswt.raster import backends
 from dav_gswt.reconstruction.fitting import (
     densification,
     exposure,
@@ -30,6 +30,14 @@ from dav_gswt.reconstruction.fitting import (
     state,
 )
 from dav_gswt.reconstruction.fitting.constraints import Constraints
+from dav_gswt.reconstruction.fitting.descent import (
+    Descent,
+    HostDescent,
+    TrainingState,
+    TrainingTask,
+    background,
+    on_host,
+)
 from dav_gswt.reconstruction.fitting.plan import AUTO, FitPlan, FitReport
 from dav_gswt.reconstruction.fitting.residual import Residual
 from dav_gswt.reconstruction.fitting.schedule import VISIBLE, Schedule
@@ -37,15 +45,7 @@ from dav_gswt.reconstruction.fitting.state import State
 
 _log = logging.getLogger(__name__)
 
-STRUCTURE = 0.2  # weight of D-SSIM against L1
-RATES = {"log_scales": 6e-2, "quats": 1.2e-2, "opacity_logits": 0.1}  # a step, at the start
-COLOUR = 6e-3 / SH0  # rate of the constant harmonic: steps of 0.006 in colour
-DIRECTED = 0.1  # of that: rate of the view-dependent harmonics
-DRIFT = 0.3  # `constraints.detail` a step, at the start
-BETAS = 0.8, 0.98  # of Adam: short memories, since a Gaussian is in few photos
 PROJECT_EVERY = 10  # steps: the constraints' projection of the parameters
-BACKDROP = 0.5  # strength of the random background's pull to opacity
-ERROR_PHOTOS = 12  # whose errors say where to grow
 MIN_OPACITY = 0.02  # of a free Gaussian at the end of the fit
 MIN_PEAK = 0.03  # largest blend weight in any photo, below which a Gaussian is pruned
 
@@ -63,42 +63,16 @@ class FitOptions:
     """How a fit runs, which does not change its result.
 
     name: in the log. snapshots: a folder; a fit that was killed and is called again with the same arguments continues
-    from there. callback: called with the step and the state after every step.
+    from there. callback: called with the step and the state after every `every` steps.
     """
 
     name: str = "fit"
     snapshots: Path | str | None = None
     callback: Callable[[int, State], None] | None = None
+    every: int = 1
 
 
 DEFAULT_OPTIONS = FitOptions()
-
-
-@dataclass
-class TrainingState:
-    """All that changes from step to step; a snapshot stores it."""
-
-    state: State
-    report: FitReport
-    rng: np.random.Generator
-    exposures: exposure.ExposureTracker
-    poses: pose_refinement.PoseCorrections
-    residual: Residual
-    turn: list[int]
-    step: int = 0
-
-
-@dataclass(frozen=True)
-class TrainingTask:
-    """All that stays the same."""
-
-    views: list[TrainingView]
-    halves: list[TrainingView]
-    held: list[Array] | None
-    plan: FitPlan
-    schedule: Schedule
-    constraints: Constraints
-    raster: raster.Rasterizer
 
 
 def fit_field(
@@ -124,14 +98,28 @@ def fit_field(
     if stored := store.load():
         _resume(run, *stored)
         _log.info("%s: goes on from step %d", what, run.step)
+    descent = _choose_descent(task)
+    descent.push(run)
     for _ in progress(range(run.step, plan.steps), what):
-        _advance(run, task)
-        if options.callback:
+        _advance(run, task, descent)
+        if options.callback and run.step % options.every == 0:
+            descent.pull(run)
             options.callback(run.step, run.state)
         if store.due():
+            descent.pull(run)
             store.save(*_to_snapshot(run))
+    descent.pull(run)
     store.clear()
     return _finish(run, task, what)
+
+
+def _choose_descent(task: TrainingTask) -> Descent:
+    """Steps on the GPU with the backend `cuda`."""
+    if backends.select_backend() != "cuda":
+        return HostDescent()
+    from dav_gswt.reconstruction.fitting.device_descent import DeviceDescent  # deferred: it needs gsplat
+
+    return DeviceDescent(cast(Any, task.raster))
 
 
 def _start_training(
@@ -168,82 +156,32 @@ def _halve(view: TrainingView) -> TrainingView:
     return half if behind is None else half.with_pixels(behind=behind)
 
 
-def _advance(run: TrainingState, task: TrainingTask) -> None:
+def _advance(run: TrainingState, task: TrainingTask, descent: Descent) -> None:
     """One step, and what is due after it."""
     if not run.turn:
         run.turn = list(map(int, run.rng.permutation(len(task.views))))
-    _raise_sh_degree(run, task)
-    _descend(run, task, run.turn.pop())
+    _raise_sh_degree(run, task, descent)
+    descent.descend(run, task, run.turn.pop())
     run.step += 1
     if run.step % PROJECT_EVERY == 0 or run.step == task.plan.steps:
-        task.constraints.project_parameters(run.state.values)
-    strength = densification.PERTURBATION * task.schedule.rate(run.step)
-    densification.perturb(run.state, task.constraints.fixed, strength, run.rng)
-    if task.schedule.to_growth(run.step) == 0:
-        _grow(run, task)
-    if task.schedule.prunes(run.step):
-        _prune(run, task)
+        with on_host(descent, run, ("values",)):
+            task.constraints.project_parameters(run.state.values)
+    descent.perturb(run, task)
+    grows, prunes = task.schedule.to_growth(run.step) == 0, task.schedule.prunes(run.step)
+    if grows or prunes:
+        with on_host(descent, run):
+            if grows:
+                _grow(run, task)
+            if prunes:
+                _prune(run, task)
 
 
-def _raise_sh_degree(run: TrainingState, task: TrainingTask) -> None:
+def _raise_sh_degree(run: TrainingState, task: TrainingTask, descent: Descent) -> None:
     """The spherical harmonics come one degree after the other, in the first half."""
     due = int(task.plan.max_sh_degree * min(1.0, 2 * run.step / max(1, task.plan.steps)))
     if due > run.state.sh_degree:
-        run.state.resize_sh(due)
-
-
-def _descend(run: TrainingState, task: TrainingTask, index: int) -> None:
-    """Forward, loss, backward and one step of Adam on one photo."""
-    early = run.step < task.plan.half_share * task.plan.steps
-    view = (task.halves if early else task.views)[index]
-    weight = view.weight
-    if task.held is not None and not early:
-        weight = np.where(task.held[index], np.float32(0), weight)
-        view = replace(view, weight=weight)
-    camera = run.poses.correct(index, view.camera)
-    seen = task.raster.forward(**run.state.values, camera=camera)
-    behind = _background(view, run.rng.uniform(0, 1, 3).astype(np.float32))
-    exposed, gain = _apply_exposure(run, index, seen, behind, view)
-    ahead = task.schedule.to_growth(run.step + 1)  # steps after this one
-    if ahead is not None and ahead < min(ERROR_PHOTOS, len(task.views)):
-        run.residual.add(task.raster, exposed - view.image, weight)
-    _, gradient = raster.loss(exposed, view.image, weight, STRUCTURE)
-    gradient = channels.scale_channels(gradient, gain)
-    gradients = task.raster.backward(gradient, -BACKDROP * channels.sum_products(gradient, behind))
-    task.constraints.adjust_gradients(gradients)
-    _step_adam(run, task, gradients)
-    view.release()
-    if task.plan.pose_rate:
-        run.poses.descend(index, gradients.camera, task.plan.pose_rate * task.schedule.rate(run.step), camera)
-
-
-def _background(view: TrainingView, colour: Float32[Array, "3"]) -> Float32[Array, "*hw 3"]:
-    """A colour, and in each pixel the sky where the photo shows it."""
-    return colour if view.behind is None else channels.fill_unknown(view.behind, colour)
-
-
-def _apply_exposure(run: TrainingState, index: int, seen, behind: Float32[Array, "*hw 3"], view: TrainingView):
-    """The picture over its background at the photo's exposure, and the gain."""
-    image = channels.composite(seen.colour, seen.alpha, behind)
-    run.exposures.update(index, image, view)
-    a, b = run.exposures.gain_and_offset(index)
-    return channels.scale_channels(image, a, b), a
-
-
-def _step_adam(run: TrainingState, task: TrainingTask, gradients) -> None:
-    """One step of Adam for the visible Gaussians; the others keep their values and moments."""
-    falling = task.schedule.rate(run.step)
-    k = run.state.values["colours"].shape[1]
-    directed = np.repeat([1.0] + [DIRECTED] * (k - 1), 3).astype(np.float32)
-    rates = {name: rate * falling**0.5 for name, rate in RATES.items()}
-    rates["means"] = DRIFT * task.constraints.detail * falling
-    rates["colours"] = COLOUR * falling**0.5 * (directed if k > 1 else 1.0)
-    visible = task.raster.visible
-    for name, value in run.state.values.items():
-        moments = run.state.first[name], run.state.second[name]
-        raster.adam(
-            value, getattr(gradients, name), *moments, rate=rates[name], step=run.step + 1, betas=BETAS, rows=visible
-        )
+        with on_host(descent, run):
+            run.state.resize_sh(due)
 
 
 def _grow(run: TrainingState, task: TrainingTask) -> None:
@@ -272,7 +210,7 @@ def _score(run: TrainingState, task: TrainingTask, now: State) -> float:
     for index, view in enumerate(one_by_one(task.views)):
         seen = task.raster.forward(**now.values, camera=run.poses.correct(index, view.camera))
         a, b = run.exposures.gain_and_offset(index)
-        behind = _background(view, np.full(3, 0.5, np.float32))
+        behind = background(view, np.full(3, 0.5, np.float32))
         picture = channels.scale_channels(channels.composite(seen.colour, seen.alpha, behind), a, b)
         tally.add(picture, view.image, view.weight * task.held[index])
     return tally.psnr

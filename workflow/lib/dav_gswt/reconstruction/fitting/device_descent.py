@@ -1,0 +1,161 @@
+"""The steps of a fit on a GPU, where parameters, Adam's moments and photos stay: the backend `cuda`.
+
+Only what rarely happens (growth, projection, pruning) and what is small (heights of the ground, pixels that tell the
+exposure) is done by the same functions as without a GPU, on copies. Two runs differ in the last bits: see raster/cuda.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float32
+from torch import Tensor
+from torch.nn import functional
+
+from dav_gswt.photos.training_views import TrainingView
+from dav_gswt.raster import cuda
+from dav_gswt.raster.torch import differentiate_loss
+from dav_gswt.reconstruction.fitting import densification, exposure
+from dav_gswt.reconstruction.fitting.constraints import Constraints
+from dav_gswt.reconstruction.fitting.descent import (
+    BACKDROP,
+    BETAS,
+    PARTS,
+    STRUCTURE,
+    Parts,
+    TrainingState,
+    TrainingTask,
+    perturbation,
+)
+
+EPSILON = 1e-15  # of Adam, as in `interface.Adam`
+CACHE = 4e9  # bytes of photos kept on the device; others are copied at every step
+USED_BY_PERTURB = "means", "log_scales", "quats", "opacity_logits"
+
+
+@dataclass(frozen=True)
+class Photo:
+    """A view's arrays on the device, and the pixels of it that tell the exposure."""
+
+    image: Float32[Tensor, "h w 3"]
+    weight: Float32[Tensor, "h w"]
+    behind: Float32[Tensor, "h w 3"] | None
+    sample: exposure.Sample
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        parts = self.image, self.weight, self.behind
+        return sum(part.nelement() * part.element_size() for part in parts if part is not None)
+
+
+class DeviceDescent:
+    """See `Descent`. Between `push` and `pull` the parameters are on the device."""
+
+    def __init__(self, rasterizer: cuda.Rasterizer):
+        self.raster, self.device = rasterizer, rasterizer.device
+        self.values: dict[str, Tensor] = {}
+        self.first: dict[str, Tensor] = {}
+        self.second: dict[str, Tensor] = {}
+        self._photos: dict[tuple[bool, int], Photo] = {}
+        self._cached = 0
+
+    def pull(self, run: TrainingState, parts: Parts = PARTS) -> None:
+        """See `Descent.pull`."""
+        for part in parts:
+            getattr(run.state, part).update({k: cuda.download(t) for k, t in getattr(self, part).items()})
+
+    def push(self, run: TrainingState, parts: Parts = PARTS) -> None:
+        """See `Descent.push`."""
+        for part in parts:
+            tensors = {k: cuda.upload(a, self.device).clone() for k, a in getattr(run.state, part).items()}
+            setattr(self, part, tensors)
+
+    def descend(self, run: TrainingState, task: TrainingTask, index: int) -> None:
+        """See `Descent.descend`."""
+        early = task.is_early(run.step)
+        view, photo = (task.halves if early else task.views)[index], self._find_photo(task, early, index)
+        camera = run.poses.correct(index, view.camera)
+        last = self.raster.draw(self.values, camera)
+        picture, alpha = last.picture.detach()[0, ..., :3], last.alpha.detach()[0]
+        colour = torch.tensor(run.rng.uniform(0, 1, 3).astype(np.float32), device=self.device)
+        behind = colour if photo.behind is None else torch.where(photo.behind.isnan(), colour, photo.behind)
+        image = picture + (1 - alpha) * behind
+        run.exposures.learn(index, cuda.download(exposure.thin(image, view.weight.size)), photo.sample)
+        gain, offset = (torch.tensor(v, device=self.device) for v in run.exposures.gain_and_offset(index))
+        exposed = gain * image + offset
+        if task.collects_errors(run.step):
+            squared = (exposed - photo.image).square().mean(2) * photo.weight
+            run.residual.add_found(cuda.download(self.raster.contribute(last, squared[..., None])[2][:, 0]))
+        _, gradient = differentiate_loss(exposed, photo.image, photo.weight, STRUCTURE)
+        gradient = gain * gradient
+        gradients = self.raster.differentiate(last, gradient, -BACKDROP * (gradient * behind).sum(2))
+        hold_ground(gradients, task.constraints)
+        self._step_adam(run, task, gradients, cuda.find_visible(last))
+        view.release()
+        if task.plan.pose_rate:
+            rate = task.plan.pose_rate * task.schedule.rate(run.step)
+            run.poses.descend(index, cuda.download(gradients["camera"]), rate, camera)
+
+    def perturb(self, run: TrainingState, task: TrainingTask) -> None:
+        """See `Descent.perturb`: of the few that are nearly transparent, on a copy."""
+        fixed = task.constraints.fixed
+        rows = fixed + torch.nonzero(self.values["opacity_logits"][fixed:] < densification.LOOSE_LOGIT)[:, 0]
+        loose = {name: cuda.download(self.values[name][rows]) for name in USED_BY_PERTURB}
+        densification.perturb(loose, 0, perturbation(run, task), run.rng)
+        self.values["means"][rows] = cuda.upload(loose["means"], self.device)
+
+    def _step_adam(
+        self, run: TrainingState, task: TrainingTask, gradients: dict[str, Tensor], rows: Bool[Tensor, "n"]
+    ) -> None:
+        """As `HostDescent._step_adam`."""
+        rates = task.rates(run.step, self.values["colours"].shape[1])
+        unbiased = [1 - beta ** (run.step + 1) for beta in BETAS]
+        for name, value in self.values.items():
+            value, g, m, v = (t.flatten(1) if t.ndim > 1 else t[:, None] for t in self._columns(name, gradients))
+            which = rows[:, None]
+            m.copy_(torch.where(which, m.lerp(g, 1 - BETAS[0]), m))
+            v.copy_(torch.where(which, v.lerp(g * g, 1 - BETAS[1]), v))
+            move = m / unbiased[0] / ((v / unbiased[1]).sqrt() + EPSILON)
+            rate = torch.tensor(np.asarray(rates[name], np.float32), device=self.device)
+            value.sub_(torch.where(which, rate * move, 0))
+
+    def _columns(self, name: str, gradients: dict[str, Tensor]) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        return self.values[name], gradients[name], self.first[name], self.second[name]
+
+    def _find_photo(self, task: TrainingTask, early: bool, index: int) -> Photo:
+        """A view on the device, less what is held out; kept there while there is room."""
+        if (photo := self._photos.get((early, index))) is None:
+            held = None if early or task.held is None else task.held[index]
+            photo = self._copy_photo((task.halves if early else task.views)[index], held)
+            if self._cached + photo.size <= CACHE:
+                self._photos[early, index] = photo
+                self._cached += photo.size
+        return photo
+
+    def _copy_photo(self, view: TrainingView, held: Bool[np.ndarray, "h w"] | None) -> Photo:
+        weight = view.weight if held is None else np.where(held, np.float32(0), view.weight)
+        image, thick = (cuda.upload(np.ascontiguousarray(a), self.device) for a in (view.image, weight))
+        behind = None if view.behind is None else cuda.upload(np.ascontiguousarray(view.behind), self.device)
+        return Photo(image, thick, behind, exposure.sample_photo(view.image, weight))
+
+
+def hold_ground(gradients: dict[str, Tensor], constraints: Constraints) -> None:
+    """As `descent.hold_ground`."""
+    n, held = constraints.discs, slice(constraints.discs, constraints.fixed)
+    up = gradients["means"][:n, 2].reshape(constraints.shape)
+    up = torch.zeros_like(up) if constraints.smoothing is None else smooth(up, constraints.smoothing)
+    gradients["means"][:n, 2] = up.flatten()
+    gradients["quats"][:n] = 0
+    for name, part in gradients.items():
+        if name != "camera":
+            part[held] = 0
+
+
+def smooth(values: Float32[Tensor, "rows columns"], cells: float) -> Float32[Tensor, "rows columns"]:
+    """As `ground.smooth`: Gaussian blur over the grid; borders repeat."""
+    reach = int(4 * cells + 0.5)  # as SciPy's
+    taps = torch.exp(-0.5 * (torch.arange(-reach, reach + 1, device=values.device) / cells) ** 2)
+    taps = taps / taps.sum()
+    image = functional.pad(values[None, None], (reach,) * 4, mode="replicate")
+    return functional.conv2d(functional.conv2d(image, taps.reshape(1, 1, -1, 1)), taps.reshape(1, 1, 1, -1))[0, 0]
