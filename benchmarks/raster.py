@@ -12,16 +12,12 @@ from record import merge_figures
 
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.raster import _core, cpu
+from dav_gswt.study.raster_profile import FLOPS_OF_A_PAIR
 from dav_gswt.threads import default_threads
 
 REPEATS = 15
 THREADS = 2  # of the figures; the table has one thread too
 SH1 = 4  # coefficients of spherical harmonics of degree 1
-
-# Floating-point operations for one pixel that takes one splat; a fused multiply-add counts as two.
-# alpha and transmittance: offset 2, quadratic form 8, power of two 13, weight and rest 2; both passes need them.
-# forward: three channels and depth, 8. backward: share and remainder 7, v 8, moments 11, three channels 6.
-FLOPS_OF_A_PAIR = (25 + 8) + (25 + 7 + 8 + 11 + 6)
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,9 @@ def changed_preset(what, amount):
 def scale_cells():
     """All cells as (what, amount)."""
     asked = STUDY["scale"] | {"threads": [1, 2]}
-    return [(what, n) for what in ("photos", "pixels", "gaussians", "candidates", "threads") for n in asked[what]]
+    return [
+        (what, n) for what in ("photos", "pixels", "gaussians", "candidates", "tiles", "threads") for n in asked[what]
+    ]
 
 
 def compared_photos(wildcards):

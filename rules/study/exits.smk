@@ -1,14 +1,14 @@
 """Pictures of docs/exports.md: what other programs draw of each export of the config's scene.
 
-In: the page and the tiles. Out: docs/figures/exit_{name}.jpg. Needs Chromium, Node.js (`npm ci --prefix examples`), and mujoco
-with EGL. `snakemake --cores 2 docs/figures/exit_spz.jpg`
+In: the page and the tiles. Out: docs/figures/exit_{name}.jpg. Needs Chromium, Node.js (`npm ci --prefix examples`), mujoco
+with EGL, usd-core and rasterio. `snakemake --cores 2 docs/figures/exit_spz.jpg`
 """
 
-EXITS = ["spz", "ply", "sog", "glb", "ground", "mujoco"]
+EXITS = ["spz", "ply", "sog", "streamed_sog", "glb", "usd", "3dtiles", "ground", "heights", "mujoco"]
 
 
 rule draw_exits:
-    """Export the terrain about the origin, and have Spark, three.js and MuJoCo draw it."""
+    """Export the terrain about the origin, and have other programs draw it."""
     input:
         lambda wildcards: expand(
             [rules.cut_tiles.output.seams, rules.cut_tiles.output.tiles],
@@ -18,7 +18,7 @@ rule draw_exits:
             rules.make_page.output.page, **(branch(config["scene"]) | {"seed": config["seeds"][0]})
         ),
         server=str(BASE / "examples/serve.py"),
-        viewer=[str(BASE / "examples" / name) for name in ("exits/index.html", "exits/main.js", "package-lock.json")],
+        viewer=[str(BASE / "examples" / name) for name in ("exits", "package-lock.json")],
     output:
         pictures=expand("docs/figures/exit_{name}.jpg", name=EXITS),
     log:

@@ -1,7 +1,8 @@
 """Another program's fit beside ours, on the same photos and machine.
 
-In: the photos of the scene of the config's `study.compare`, and OpenSplat, a program of the user's. Out:
-results/compare/fitters.csv, fitters.png, fitters.md. `make compare OPENSPLAT=/path/to/opensplat` makes them.
+In: the photos of the scene of the config's `study.compare`, and OpenSplat, a program of the user's, or gsplat and a
+GPU. Out: docs/research/data/fitters.csv, figures/fitters.png, results/fitters.md. `make compare
+OPENSPLAT=/path/to/opensplat` makes them.
 """
 
 
@@ -11,9 +12,9 @@ rule compare_fitters:
         unpack(compared_photos),
         template=str(BASE / "workflow/report/fitters.md"),
     output:
-        table="results/compare/fitters.csv",
-        plot="results/compare/fitters.png",
-        page="results/compare/fitters.md",
+        table="docs/research/data/fitters.csv",
+        plot="docs/research/figures/fitters.png",
+        page="docs/research/results/fitters.md",
     log:
         "<logs>/figures/compare_fitters.log",
     benchmark:
@@ -30,7 +31,7 @@ rule compare_fitters:
 
 
 rule compare:
-    """Our fit beside OpenSplat's."""
+    """Our fit beside other programs'."""
     input:
         rules.compare_fitters.output,
 

@@ -1,4 +1,4 @@
-"""How costs grow: fits over photos and pixels, renders over Gaussians, scores over candidates.
+"""How costs grow: fits over photos and pixels, renders over Gaussians, scores over candidates, views over tiles.
 
 In: the first field of the scene of the config's `study.scale`. Out: results/scale/{kind}_{size}.json, each by a process
 of its own on an otherwise idle machine; docs/research/data/scale.csv, results/scale.md, figures/scale.png.
@@ -29,7 +29,7 @@ rule render_scale_photos:
 
 
 rule measure_scale:
-    """Seconds and memory of one fit, render or scoring."""
+    """Seconds and memory of one fit, render, scoring or view."""
     input:
         unpack(scale_field),
         images=lambda wildcards: expand(
@@ -43,7 +43,7 @@ rule measure_scale:
     benchmark:
         "<benchmarks>/scale/{what}_{amount}.tsv"
     wildcard_constraints:
-        what="photos|pixels|gaussians|candidates|threads",
+        what="photos|pixels|gaussians|candidates|tiles|threads",
         amount=POSITIVE,
     threads: 2
     resources:
@@ -81,7 +81,7 @@ rule gather_scale:
 
 
 rule scale:
-    """How costs grow with photos, pixels, Gaussians and candidates."""
+    """How costs grow with photos, pixels, Gaussians, candidates and tiles."""
     input:
         rules.gather_scale.output,
 

@@ -1,6 +1,5 @@
-"""Rule compare_fitters: OpenSplat's fit and ours, of the same photos."""
+"""Rule compare_fitters: other programs' fits and ours, of the same photos."""
 
-import tempfile
 from pathlib import Path
 
 from dav_gswt.logs import logging_to
@@ -12,12 +11,10 @@ with logging_to(snakemake.log[0]):
     out, asked = snakemake.output, dict(snakemake.params.asked)
     program = peers.find_program(asked["opensplat"])  # before any work
     settings = select_settings(CoarseSettings, asked)
-    photos = fit_profile.read_photo_set(Path(snakemake.input.frame).parent, settings.size, asked["margin"])
+    folder = Path(snakemake.input.frame).parent
+    photos = peers.select_photos(fit_profile.read_photo_set(folder, settings.size, asked["margin"]))
     curves = {peers.OURS: fit_profile.profile_fit(photos, settings, every=asked["every"]).curve}
-    with tempfile.TemporaryDirectory(dir=Path(out.table).parent) as folder:
-        peers.write_project(photos, folder)
-        saved = peers.run_opensplat(program, Path(folder), asked["seconds"], asked["every"])
-        curves[peers.OPENSPLAT] = peers.judge_saved(saved, photos)
+    curves |= peers.profile_others(program, photos, asked, Path(out.table).parent)
     rows = [{"program": program} | row for program, curve in curves.items() for row in curve]
     csv_tables.write_table(out.table, rows)
     peers.plot_programs(rows, out.plot)

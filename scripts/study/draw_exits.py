@@ -7,7 +7,8 @@ from dav_gswt.cli import main
 from dav_gswt.logs import logging_to
 from dav_gswt.study.terrain import exits
 
-FORMATS = [word for name in ("spz", "ply", "sog", "glb", "ground") for word in ("--format", name)]
+NAMES = "spz", "ply", "sog", "glb", "usd", "3dtiles", "streamed_sog", "ground"
+FORMATS = [word for name in NAMES for word in ("--format", name)] + ["--tile-compression", "none"]
 
 with logging_to(snakemake.log[0]), TemporaryDirectory() as place:
     page = Path(str(snakemake.input.page))

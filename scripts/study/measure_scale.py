@@ -21,8 +21,8 @@ with logging_to(snakemake.log[0]):
     if params.photos:
         settings = select_settings(CoarseSettings, params.preset | params.changed)
         found = costs.measure_fit(field, frame, paths.images[0], params.photos[0], settings, Path(params.keep))
-    elif what == "gaussians":
-        found = costs.measure_render(field, amount)
+    elif what in ("gaussians", "tiles"):
+        found = (costs.measure_render if what == "gaussians" else costs.measure_view)(field, amount)
     else:
         found = costs.measure_scores(field, ground.read_ground(paths.ground), frame, amount)
     made = record_provenance({"field": paths.field}, params.preset) | describe_machine()

@@ -15,6 +15,7 @@ from dav_gswt.field import read_field
 from dav_gswt.files import digest_files
 
 FACTS = {"unit": "metre", "origin": [1.5, -2.0, 0.0], "tile_side": 2.0, "cells": {"west": -2, "columns": 4}}
+AROUND = FACTS | {"cells": FACTS["cells"] | {"centre": [0, 0.5], "radius": 2.0}}
 
 
 @pytest.fixture
@@ -41,10 +42,11 @@ def test_every_gaussian_is_there_with_the_axis_up_that_the_stage_states(pxr, fie
 def test_the_stage_knows_where_it_lies_and_how_far_it_reaches(pxr, placed, tmp_path):
     from pxr import Usd, UsdGeom
 
-    usd.write_usd(placed, tmp_path / "a.usdc", FACTS, 1.0)
+    usd.write_usd(placed, tmp_path / "a.usdc", AROUND, 1.0)
     stage = Usd.Stage.Open(str(tmp_path / "a.usdc"))
     kept = stage.GetRootLayer().customLayerData
-    assert list(kept["origin"]) == FACTS["origin"] and kept["cells"] == FACTS["cells"] and kept["unit"] == "metre"
+    assert list(kept["origin"]) == FACTS["origin"] and kept["unit"] == "metre"
+    assert list(kept["cells"].pop("centre")) == [0, 0.5] and kept["cells"] == FACTS["cells"] | {"radius": 2.0}
     bound = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_]).ComputeWorldBound(
         stage.GetDefaultPrim()
     )

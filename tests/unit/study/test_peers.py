@@ -1,4 +1,4 @@
-"""Another program's fit beside ours: the program is a stand-in that saves the field it is told."""
+"""Another program's fit beside ours: the program is a stand-in that draws the photo it is told to leave out."""
 
 import sys
 from dataclasses import replace
@@ -8,21 +8,20 @@ import pytest
 from fixtures import ground as made
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import write_field
 from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
-from dav_gswt.reconstruction.objects import make_blobs
 from dav_gswt.study import fit_profile, markdown, peers
 
 POINTS = np.random.default_rng(0).uniform(0, 3, (50, 3))
 COLOURS = np.full((50, 3), 0.5, np.float32)
 STAND_IN = """#!{python}
 import pathlib, shutil, sys, time
-out = pathlib.Path(sys.argv[sys.argv.index("-o") + 1])
-every = int(sys.argv[sys.argv.index("--save-every") + 1])
+given = sys.argv
+photo = pathlib.Path(given[1]) / "images" / given[given.index("--val-image") + 1]
+out = pathlib.Path(given[given.index("--val-render") + 1])
 print("Using CPU")
-for step in (every, 2 * every):
-    shutil.copyfile("{field}", out.with_name(f"splat_{{step}}.ply"))
+for step in (10, 20):
+    shutil.copyfile(photo, out / f"{{step}}.png")
 time.sleep({rest})
 """
 
@@ -37,35 +36,40 @@ def photos():
 
 @pytest.fixture
 def program(tmp_path):
-    """Make a program that saves two fields and then rests."""
-    write_field(make_blobs(POINTS, COLOURS, np.full(50, 0.3), logit=2.0), tmp_path / "field.ply")
+    """Make a program that draws the photo it is to leave out, twice, and then rests."""
 
     def make(rest=0.0):
         path = tmp_path / "program"
-        path.write_text(STAND_IN.format(python=sys.executable, field=tmp_path / "field.ply", rest=rest))
+        path.write_text(STAND_IN.format(python=sys.executable, rest=rest))
         path.chmod(0o755)
         return str(path)
 
     return make
 
 
-def test_a_project_has_the_training_photos_their_cameras_and_all_points(photos, tmp_path):
+def test_the_middle_test_photo_is_kept(photos):
+    more = replace(photos, tests={"test": made.photos(5)})
+    assert peers.test_photo(peers.select_photos(more)).name == "photo_2"
+
+
+def test_a_project_has_all_photos_their_cameras_and_all_points(photos, tmp_path):
     peers.write_project(photos, tmp_path)
     model = read_colmap_model(tmp_path / "sparse/0")
-    assert len(model.names) == 4 and len(model.points) == 50
-    for name, camera, view in zip(model.names, model.cameras, photos.train, strict=True):
+    assert len(model.names) == 5 and len(model.points) == 50
+    for name, camera, view in zip(model.names, model.cameras, [*photos.train, *photos.tests["test"]], strict=True):
         shown = image_files.read_photo(tmp_path / "images" / name)
         assert np.abs(shown - view.image).max() < 1 / 254 + 1e-6
         assert np.allclose(camera.centre, view.camera.centre)
 
 
 @pytest.mark.parametrize("rest", [0.0, 60.0])
-def test_saved_fields_are_listed_when_the_program_ends_and_when_its_time_is_over(photos, program, tmp_path, rest):
-    saved = peers.run_opensplat(program(rest), tmp_path, 6.0, 10)
-    assert [step for _, step, _ in saved] == [10, 20]
-    assert all(-0.1 < seconds < 6 for seconds, _, _ in saved)
-    rows = peers.judge_saved(saved, photos)
-    assert [row["gaussians"] for row in rows] == [50, 50] and all(row["psnr"] > 3 for row in rows)
+def test_pictures_are_listed_when_the_program_ends_and_when_its_time_is_over(photos, program, tmp_path, rest):
+    peers.write_project(photos, tmp_path)
+    drawn = peers.run_opensplat(program(rest), tmp_path, "photo_4.png", 6.0)
+    assert [step for _, step, _ in drawn] == [10, 20]
+    assert all(-0.1 < seconds < 6 for seconds, _, _ in drawn)
+    rows = peers.judge_drawn(drawn, photos)
+    assert all(row["psnr"] > 45 for row in rows), "it is the photo"
 
 
 def test_a_program_that_is_not_there_is_named():
@@ -77,12 +81,12 @@ def test_a_program_is_found_by_its_path(program):
     assert peers.find_program(path := program()) == path
 
 
-def test_a_program_that_saves_nothing_is_quoted(tmp_path):
+def test_a_program_that_draws_nothing_is_quoted(photos, tmp_path):
     path = tmp_path / "program"
     path.write_text("#!/bin/sh\necho no such option\nexit 1\n")
     path.chmod(0o755)
-    with pytest.raises(InputError, match="saved no field in 2 s: no such option"):
-        peers.run_opensplat(str(path), tmp_path, 2.0, 10)
+    with pytest.raises(InputError, match="drew nothing in 2 s: no such option"):
+        peers.run_opensplat(str(path), tmp_path, "photo_4.png", 2.0)
 
 
 def test_the_page_and_the_figure_show_both_programs(photos, tmp_path, root):

@@ -46,3 +46,8 @@ def test_a_render_of_more_gaussians_than_the_field_has_is_measured(fitted):
 def test_scores_are_measured(fitted):
     found = costs.measure_scores(fitted.field, fitted.grid, FRAME, 3)
     assert found["candidates"] == 3 and found["seconds"] > 0
+
+
+def test_a_view_of_about_as_many_tiles_as_asked_for_is_measured(fitted):
+    found = costs.measure_view(fitted.field, 400)
+    assert found["tiles"] == pytest.approx(400, rel=0.25) and found["seconds"] > 0

@@ -14,6 +14,7 @@ def cell(kind, size, **costs):
 CELLS = [
     *(cell("gaussians", n, seconds=2e-7 * n) for n in (1000, 100, 10_000)),
     *(cell("candidates", n, seconds=n**2 / 1e4) for n in (10, 100, 1000)),
+    *(cell("tiles", n, seconds=n / 1e6) for n in (100, 1000, 10_000)),
     *(
         cell("photos", n, megapixels=0.25, gaussians=500, steps=9, prepare_seconds=n, step_seconds=0.1, seconds=n + 9.0)
         for n in (8, 16, 32)
@@ -40,7 +41,7 @@ def test_an_exponent_is_of_the_largest_sizes():
 
 def test_rows_are_sorted_by_kind_and_size():
     rows = growth.gather_rows(CELLS)
-    assert [row["kind"] for row in rows[:12:3]] == list(growth.KINDS)
+    assert [row["kind"] for row in rows[:15:3]] == list(growth.KINDS)
     assert [row["gaussians"] for row in rows if row["kind"] == "gaussians"] == [100, 1000, 10_000]
 
 

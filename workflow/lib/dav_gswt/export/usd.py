@@ -86,7 +86,9 @@ def _describe_stage(
 
 
 def _to_usd(pxr: SimpleNamespace, value: Any) -> Any:
-    """Lists as arrays of doubles; USD keeps no list."""
+    """Lists as arrays of doubles, in dictionaries, too; USD keeps no list."""
+    if isinstance(value, Mapping):
+        return {key: _to_usd(pxr, inner) for key, inner in value.items()}
     return pxr.Vt.DoubleArray([float(v) for v in value]) if isinstance(value, list) else value
 
 

@@ -108,6 +108,11 @@ class Rasterizer(interface.Rasterizer):
         """Pairs of a pixel and a splat that is blended into it, of the last forward pass."""
         return int(self._core.pairs(self._require_forward().state))
 
+    @property
+    def stage_seconds(self) -> dict[str, float]:
+        """Seconds of each stage of the last forward and the last backward pass."""
+        return self._core.seconds
+
 
 class _MemoryPool:
     """Arrays whose memory is reused once nothing refers to them or to a view of them.
@@ -147,6 +152,33 @@ def _step_adam(s: AdamStep) -> None:
     threads = 1 if s.values.size < MIN_PARALLEL else s.threads or default_threads()
     arrays = s.values, s.gradient, s.first, s.second, s.rows
     _core.adam(default_instruction_set(), *arrays, s.step, s.rates, *s.betas, s.epsilon, threads)
+
+
+def add_colours(
+    image: Float32[Array, "h w 3"],
+    weight: Float32[Array, "h w"],
+    camera: Camera,
+    points: Float32[Array, "n 3"],
+    heights: Float32[Array, "m"],
+    sums: tuple[Float32[Array, "m n 3"], Float32[Array, "m n"], Float32[Array, "m n"]],
+    threads: int | None = None,
+) -> None:
+    """Add a photo's bilinear colours at points of the world moved up by each height, where it counts.
+
+    sums: of colours, of their squares over the channels, and how many were added, in place.
+    Raises: ValueError: an array's type, shape or layout.
+    """
+    n, m, size = len(points), len(heights), (camera.height, camera.width)
+    shapes = (m, n, 3), (m, n), (m, n)
+    wanted = {"image": (image, (*size, 3)), "weight": (weight, size), "points": (points, (n, 3))}
+    wanted |= {"heights": (heights, (m,))}
+    wanted |= {f"sums {k}": pair for k, pair in enumerate(zip(sums, shapes, strict=True))}
+    for name, (array, shape) in wanted.items():
+        interface.check(array, name, shape)
+    threads = 1 if m * n < MIN_PARALLEL else threads or default_threads()
+    inner = [camera.fx, camera.fy, camera.cx, camera.cy]
+    numbers = np.concatenate([np.ravel(camera.rotation), np.ravel(camera.translation), inner]).astype(np.float32)
+    _core.add_colours(image, weight, numbers, points, heights, *sums, threads)
 
 
 loss = interface.Loss(_compute_loss)

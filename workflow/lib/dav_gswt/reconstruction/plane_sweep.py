@@ -16,8 +16,8 @@ from numpy import ndarray as Array
 from scipy.ndimage import gaussian_filter, label, map_coordinates
 
 from dav_gswt.geometry.poses import select_farthest
-from dav_gswt.photos.training_views import TrainingView, one_by_one
-from dav_gswt.reconstruction import visibility
+from dav_gswt.photos.training_views import TrainingView
+from dav_gswt.reconstruction import colour_sums, visibility
 from dav_gswt.reconstruction.ground import Ground
 
 MAX_CELLS = 60_000  # of the sweep's own grid
@@ -35,6 +35,7 @@ MIN_PHOTOS = 3  # that must agree on an object: two agree anywhere along a strip
 SLANT = 2.0  # run over fall of a ray: how far beyond the grid (half of it at most) the ground is compared too
 MAX_SLENDERNESS = 4.0  # height over width of an object: more is a wrong match
 THREADS = 4  # at most; changes no result
+AT_ONCE = 32  # heights, so that their sums stay below 40 MB
 OBJECT_STEPS = 2.0  # steps above the surface, beyond which a height belongs to an object
 
 
@@ -143,23 +144,21 @@ def measure_disagreement(
 
     A height that far fewer photos see than the surface below it costs UNKNOWN_COST: few photos agree by chance.
     """
-    places = grid.centres.astype(np.float32)
-    starts = [
-        (places @ v.camera.rotation.T.astype(np.float32) + v.camera.translation.astype(np.float32)) for v in views
-    ]
-
-    number = _colour_deviation(views, starts, np.float32(0))[1]
+    places, levels = grid.centres.astype(np.float32), heights.astype(np.float32)
+    number = colour_sums.sum_colours(views, places, np.zeros(1, np.float32)).count[0]
     least = np.maximum(2, SUPPORT * number)
 
-    def at(height: float) -> Array:
-        spread, count = _colour_deviation(views, starts, np.float32(height))
+    def average(spread: Float32[Array, "n"], count: Float32[Array, "n"]) -> Array:
         spread, seen = (a.reshape(grid.shape) for a in (spread, count >= least))
         weight = gaussian_filter(seen.astype(np.float32), WINDOW, mode="nearest")
         mean = gaussian_filter(np.where(seen, spread, 0), WINDOW, mode="nearest") / np.maximum(weight, 1e-6)
         return np.where(seen, mean, np.float32(UNKNOWN_COST))
 
-    with ThreadPoolExecutor(THREADS) as pool:  # NumPy works beside itself; each height is on its own
-        costs = list(pool.map(at, heights))
+    costs = []
+    with ThreadPoolExecutor(THREADS) as pool:  # SciPy works beside itself; each height is on its own
+        for start in range(0, len(levels), AT_ONCE):
+            sums = colour_sums.sum_colours(views, places, levels[start : start + AT_ONCE])
+            costs += pool.map(average, sums.deviations(), sums.count)
     return np.stack(costs).astype(np.float32, copy=False), number.reshape(grid.shape)
 
 
@@ -191,33 +190,6 @@ def reject_seen_through(
     over = np.flatnonzero(heights > lowest)
     with ThreadPoolExecutor(THREADS) as pool:
         list(pool.map(at, heights[over].tolist(), costs[over[0] :] if len(over) else []))
-
-
-def _colour_deviation(
-    views: list[TrainingView], starts: list[Array], height: np.float32
-) -> tuple[Float32[Array, "n"], Float32[Array, "n"]]:
-    n = len(starts[0])
-    total, squares, count = np.zeros((n, 3), np.float32), np.zeros(n, np.float32), np.zeros(n, np.float32)
-    for view, start in zip(one_by_one(views), starts, strict=True):
-        rows, colours = _sample_bilinear(view, start + height * view.camera.rotation[:, 2].astype(np.float32))
-        total[rows] += colours
-        squares[rows] += np.einsum("nc,nc->n", colours, colours)
-        count[rows] += 1
-    number = np.maximum(count, 2)
-    variance = (squares - np.einsum("nc,nc->n", total, total) / number) / (number - 1)
-    return np.sqrt(np.maximum(variance, 0)), count
-
-
-def _sample_bilinear(view: TrainingView, q: Float32[Array, "n 3"]) -> tuple[Array, Float32[Array, "m 3"]]:
-    """Rows of the points (in the camera's frame) that the photo sees, and its colours there."""
-    camera = view.camera
-    rows, x, y = visibility.project_visible(view, q)
-    column, row = x.astype(np.int32), y.astype(np.int32)
-    right, down = ((at - cell).astype(np.float32)[:, None] for at, cell in ((x, column), (y, row)))
-    flat, at = view.image.reshape(-1, 3), row * camera.width + column
-    top = flat[at] * (1 - right) + flat[at + 1] * right
-    bottom = flat[at + camera.width] * (1 - right) + flat[at + camera.width + 1] * right
-    return rows, top * (1 - down) + bottom * down
 
 
 def aggregate_costs(

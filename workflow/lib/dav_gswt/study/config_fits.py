@@ -51,12 +51,14 @@ class Scale(ConfigModel):
     steps_of_pixels: int = key("optimiser steps of their fits: a preset's would take long", ge=1, le=100_000)
     gaussians: Amounts = key("numbers of Gaussians that are rendered")
     candidates: Amounts = key("numbers of candidates that are scored")
+    tiles: Amounts = key("numbers of tiles in view")
 
 
 class Comparison(FitProfile):
-    """`make compare OPENSPLAT=<program>`: OpenSplat's fit beside ours, of the same photos."""
+    """`make compare OPENSPLAT=<program>`: other programs' fits beside ours, of the same photos."""
 
     scene: Name = key("whose photos are fitted")
     opensplat: str = key("the program, as one calls it", "opensplat")
+    gsplat_steps: int = key("steps of gsplat's trainer, on a GPU", ge=1, le=100_000)
     seconds: float = key("that it may take", gt=0, le=100_000)
     every: int = key("steps after which a field is compared with the test photos", ge=1, le=100_000)

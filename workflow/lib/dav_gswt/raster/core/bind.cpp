@@ -1,5 +1,7 @@
 // The Python module. Shapes and types are checked in cpu.py; here arrays become pointers, without copies.
 #include "context.h"
+#include "sample.h"
+#include "thread_affinity.h"
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -121,6 +123,18 @@ void adam(const std::string& isa, Out values, In gradient, Out first, Out second
       threads);
 }
 
+// camera: rotation (9), translation (3), fx, fy, cx, cy
+void add_photo(In image, In weight, In camera, In points, In heights, Out total, Out squares, Out count, int threads) {
+  const float *from = camera.data(), *lens = from + 12;
+  const Photo photo{
+      image.data(), weight.data(), int(image.shape(1)), int(image.shape(0)), lens[0], lens[1], lens[2], lens[3],
+      from,         from + 9};
+  nb::gil_scoped_release release;
+  const ThreadAffinity affinity(threads);
+  raster::add_colours(photo, points.data(), points.shape(0), heights.data(), heights.shape(0),
+                      {total.data(), squares.data(), count.data()}, threads);
+}
+
 // Fused multiply-adds a second that threads do together, for about `seconds`; the best of some tries.
 double peak(const std::string& isa, double seconds, int threads) {
   const Kernels& kernels = kernels_of(isa);
@@ -154,8 +168,14 @@ NB_MODULE(_core, m) {
       .def("backward", &backward)
       .def("contributions", &contributions)
       .def("drawn", [](const Context& context, Flags out) { context.visible(out.size(), out.data()); })
-      .def("pairs", &Context::pairs);
+      .def("pairs", &Context::pairs)
+      .def_prop_ro("seconds", [](const Context& context) {
+        nb::dict found;
+        for (int stage = 0; stage < STAGES; stage++) found[STAGE_NAMES[stage]] = context.seconds()[stage];
+        return found;
+      });
   m.def("loss", &loss);
   m.def("adam", &adam);
   m.def("peak", &peak);
+  m.def("add_colours", &add_photo);
 }

@@ -40,6 +40,20 @@ const Kernels& kernels_of(const std::string& name) {
   throw std::invalid_argument("no instruction set '" + name + "' on this processor; it has " + names);
 }
 
+const std::array<const char*, STAGES> STAGE_NAMES = {"cull",  "project",        "sort",    "find blocks",     "blend",
+                                                     "clear", "blend backward", "collect", "project backward"};
+
+void StageClock::start(Stage first, Stage end) {
+  std::fill(&seconds_[first], seconds_.data() + end, 0.0);
+  last_ = std::chrono::steady_clock::now();
+}
+
+void StageClock::stop(Stage stage) {
+  const auto now = std::chrono::steady_clock::now();
+  seconds_[stage] += std::chrono::duration<double>(now - last_).count();
+  last_ = now;
+}
+
 SplatStore::~SplatStore() { ::operator delete[](data_, std::align_val_t(alignof(Splat))); }
 
 void SplatStore::resize(size_t n) {
@@ -111,19 +125,25 @@ bool Context::draw(const Values& values, Images images, bool only_colour, int th
     kernels_.blend_forward(splats_.data(), binning_.tiles(), pass_of(images, channel, group),
                            only_colour || channel > 0, threads);
   });
+  clock_.stop(BLEND);
   return valid;
 }
 
 bool Context::forward(const Scene& scene, const View& view, const Pictures& pictures, int threads) {
   const ThreadAffinity affinity(threads);
   view_ = view;
+  clock_.start(CULL, CLEAR);
   cull(scene, threads);
+  clock_.stop(CULL);
   splats_.resize(rows_.size());
   if (scene.coefficients) sh_colours_.resize(3 * rows_.size());
   if (!kernels_.project(scene, view, candidates(), splats_.data(), sh_colours_.data(), threads)) return false;
+  clock_.stop(PROJECT);
   binning_.sort(splats_.data(), rows_.size(), view.width, view.height, threads);
+  clock_.stop(SORT);
   const Images images{view.width, view.height, 0, 0, 0, pictures.colour, pictures.alpha, pictures.depth};
   kernels_.find_blocks(splats_.data(), binning_.tiles(), images, threads);
+  clock_.stop(FIND_BLOCKS);
   if (!draw(colours(scene), images, false, threads)) return false;
   if (!features_seen(scene)) return true;
   Images second = images;
@@ -141,8 +161,10 @@ void Context::backward_pass(const Values& values, Images images, ImageGradients 
     if (reload) kernels_.load_values(values, rows_.size(), channel, group, splats_.data(), threads);
     kernels_.blend_backward(splats_.data(), binning_.tiles(), pass_of(images, channel, group), given, records_.data(),
                             threads);
+    clock_.stop(BLEND_BACKWARD);
     kernels_.collect(binning_.tiles(), rows_.size(), values, channel, group, depth, !first || channel > 0,
                      records_.data(), sums_.data(), gradients, threads);
+    clock_.stop(COLLECT);
   });
 }
 
@@ -150,6 +172,7 @@ void Context::backward(const Scene& scene, const Pictures& pictures, const Pictu
                        const SceneGradients& out, int threads) {
   const ThreadAffinity affinity(threads);
   const size_t width = scene.coefficients ? 3 * scene.coefficients : scene.channels;
+  clock_.start(CLEAR, STAGES);
   clear(out.means, 3, scene.n, counts_, threads);
   clear(out.log_scales, 3, scene.n, counts_, threads);
   clear(out.quats, 4, scene.n, counts_, threads);
@@ -158,6 +181,7 @@ void Context::backward(const Scene& scene, const Pictures& pictures, const Pictu
   sums_.resize(rows_.size() * (MOMENTS + 1));
   motions_.resize((rows_.size() + 3) / 4 * 6);
   if (scene.coefficients) by_sh_colours_.resize(3 * rows_.size());
+  clock_.stop(CLEAR);
 
   const bool reload = scene.channels > GROUP || features_seen(scene);  // the splats hold what was drawn last
   const Images images{view_.width, view_.height, 0, 0, 0, pictures.colour, pictures.alpha, pictures.depth};
@@ -173,6 +197,7 @@ void Context::backward(const Scene& scene, const Pictures& pictures, const Pictu
   }
   kernels_.project_backward(scene, view_, candidates(), splats_.data(), sums_.data(), sh_colours_.data(),
                             by_sh_colours_.data(), motions_.data(), out, threads);
+  clock_.stop(PROJECT_BACKWARD);
 }
 
 void Context::contributions(const Scene& scene, const Images& map, const ContributionSums& out, int threads) {

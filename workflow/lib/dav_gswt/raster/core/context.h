@@ -2,6 +2,8 @@
 #pragma once
 #include "bin.h"
 #include "types.h"
+#include <array>
+#include <chrono>
 #include <string>
 #include <vector>
 
@@ -12,6 +14,24 @@ std::vector<const Kernels*> available_kernels();
 
 // The kernels of that name. Throws std::invalid_argument if this processor lacks them.
 const Kernels& kernels_of(const std::string& name);
+
+// What a call does, in this order; `clear` is the first of the backward pass.
+enum Stage { CULL, PROJECT, SORT, FIND_BLOCKS, BLEND, CLEAR, BLEND_BACKWARD, COLLECT, PROJECT_BACKWARD, STAGES };
+extern const std::array<const char*, STAGES> STAGE_NAMES;
+
+// Seconds of each stage.
+class StageClock {
+ public:
+  // Begins a pass: its stages, those from `first` on to before `end`, start at zero.
+  void start(Stage first, Stage end);
+  // The time since the last stop was spent on a stage.
+  void stop(Stage stage);
+  const std::array<double, STAGES>& seconds() const { return seconds_; }
+
+ private:
+  std::array<double, STAGES> seconds_{};
+  std::chrono::steady_clock::time_point last_;
+};
 
 // Memory for the splats: a vector aligns only as far as operator new does.
 class SplatStore {
@@ -42,6 +62,8 @@ class Context {
   // Pairs of a pixel and a splat blended into it, of the last forward.
   double pairs(int threads);
   size_t intersections() const { return binning_.intersections(); }
+  // Of the last forward and the last backward.
+  const std::array<double, STAGES>& seconds() const { return clock_.seconds(); }
 
  private:
   Candidates candidates() const { return {rows_.size(), rows_.data()}; }
@@ -59,6 +81,7 @@ class Context {
   Binning binning_;
   std::vector<float> records_, sums_, sh_colours_, by_sh_colours_, motions_;
   std::vector<double> by_tile_;
+  StageClock clock_;
 };
 
 }  // namespace raster

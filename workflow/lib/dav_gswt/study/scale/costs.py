@@ -1,4 +1,5 @@
-"""What one cell costs: a fit, a render with its gradients, or the scores of candidates. Each has its own process."""
+"""What one cell costs: a fit, a render with its gradients, scores of candidates, or a choice of tiles. Each has its own
+process."""
 
 import resource
 import time
@@ -8,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from dav_gswt.field import GaussianField, concatenate_fields
-from dav_gswt.geometry import camera_layouts
+from dav_gswt.geometry import camera_layouts, cameras
 from dav_gswt.geometry.poses import pose_of_camera
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos import training_views
@@ -20,11 +21,17 @@ from dav_gswt.reconstruction.fit_settings import CoarseSettings
 from dav_gswt.reconstruction.fitting.trainer import FitOptions
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.study.scale.photos import photo_name, place_cameras
+from dav_gswt.terrain import visibility
+from dav_gswt.terrain.endless import EndlessTerrain
+from dav_gswt.tiles.layout import EDGES
 from dav_gswt.views import scoring
 
 POINTS = 20_000  # of the ground, given to a fit in place of structure from motion's
 SIDE = 1024  # pixels of a picture whose Gaussians are counted
 REPEATS = 5  # of a render
+TILE = 1000, 250, 60, 15  # Gaussians of a tile, level by level
+SWITCHES = 4.0, 12.0, 40.0, np.inf  # tile sides at which a level gives way to the next
+BUDGET = 400_000  # Gaussians in view, to which level distances are moved
 ABOVE = 1.2  # of a field's side: height of the camera that sees all of it
 
 
@@ -94,6 +101,40 @@ def measure_scores(field: GaussianField, grid: Ground, frame: SceneFrame, count:
     begin = time.perf_counter()
     scoring.score_poses(field, grid, candidates, [taken], frame)
     return {"candidates": count, "seconds": time.perf_counter() - begin, "peak_mb": peak_memory()}
+
+
+def measure_view(field: GaussianField, tiles: int) -> dict[str, float | int]:
+    """Seconds in which the library chooses tiles and levels of a view of so many tiles, at eye level, 90 degrees wide.
+
+    Terrain of small tiles; what lies in them is not drawn.
+    """
+    terrain = make_terrain(field, int(np.ceil(np.sqrt(4 * tiles / np.pi))))
+    camera = cameras.pinhole((0.3, 0.3, 1.0), (1.3, 1.3, 1.0), 1920, 1080, 90.0)
+    spent = []
+    for _ in range(REPEATS):
+        begin = time.perf_counter()
+        cells = visibility.visible_cells(terrain, camera)
+        visibility.coarsen_to_budget(terrain, camera, BUDGET, cells)
+        spent.append(time.perf_counter() - begin)
+    return {"tiles": len(cells), "seconds": float(np.median(spent)), "peak_mb": peak_memory()}
+
+
+def make_terrain(field: GaussianField, reach: int) -> EndlessTerrain:
+    """A terrain of tiles of side 1 with a few Gaussians of the field, up to so many tiles away."""
+    return EndlessTerrain(
+        tiles={(level, tile): field[:count] for level, count in enumerate(TILE) for tile in range(EDGES)},
+        side=1.0,
+        switches=list(SWITCHES),
+        bands=[0.1 * s for s in SWITCHES[:-1]] + [0.0],
+        directions=np.zeros((1, 3)),
+        tile_orders=[[0]] * EDGES,
+        z=(0.0, 0.1),
+        overhang=0.1,
+        variants=1,
+        salt=1,
+        near=0.01,
+        reach=reach,
+    )
 
 
 def peak_memory() -> float:

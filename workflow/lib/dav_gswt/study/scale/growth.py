@@ -13,6 +13,7 @@ KINDS = {  # of cells: what grows, its unit, and the cost beside the seconds
     "pixels": ("megapixels", "megapixels a photo"),
     "gaussians": ("gaussians", "Gaussians"),
     "candidates": ("candidates", "candidates"),
+    "tiles": ("tiles", "tiles in view"),
 }
 TITLES = {"seconds": "s", "prepare_seconds": "s before the first step", "step_seconds": "s a step", "peak_mb": "MB"}
 LAST = 3  # points that an exponent is fitted to: small cells are mostly fixed costs
@@ -22,6 +23,7 @@ COLUMNS = (
     "megapixels",
     "gaussians",
     "candidates",
+    "tiles",
     "threads",
     "steps",
     "read_seconds",
@@ -99,7 +101,7 @@ def extrapolate(rows: list[dict], size: int, cores: Sequence[int] = (2, 16, 64))
 
 def plot_growth(rows: list[dict], path: Path | str) -> None:
     """Seconds and memory over each size, on logarithmic axes, with lines of exponent 1."""
-    figure = make_figure(11.0, 5.2)
+    figure = make_figure(13.5, 5.2)
     axes = figure.subplots(2, len(KINDS), squeeze=False)
     for column, (kind, (name, unit)) in enumerate(KINDS.items()):
         own = [row for row in rows if row["kind"] == kind]
