@@ -7,8 +7,8 @@ from dav_gswt.cli import main
 from dav_gswt.logs import logging_to
 from dav_gswt.study.terrain import exits
 
-NAMES = "spz", "ply", "sog", "glb", "usd", "3dtiles", "streamed_sog", "ground"
-FORMATS = [word for name in NAMES for word in ("--format", name)] + ["--tile-compression", "none"]
+NAMES = "spz", "ply", "sog", "glb", "usd", "streamed_sog", "ground"
+FORMATS = [word for name in NAMES for word in ("--format", name)]
 
 with logging_to(snakemake.log[0]), TemporaryDirectory() as place:
     page = Path(str(snakemake.input.page))
