@@ -1,4 +1,4 @@
-"""The code of the extra `cuda` beside the real gsplat, which `.ci/run` brings: what it calls is there, without a GPU."""
+"""The code of the extra `cuda` beside the real gsplat, which `.ci/run` brings: what it calls is there, with no GPU."""
 
 import inspect
 from importlib import import_module
