@@ -37,6 +37,11 @@ def basis(directions: Float[Array, "n 3"], degree: int) -> Float[Array, "n k"]:
     return np.stack(rows, 1)
 
 
+def seen_colours(sh: Float[Array, "n k 3"], means: Float[Array, "n 3"], camera: Camera) -> Float32[Array, "n 3"]:
+    """`colours` in the directions in which the camera sees the Gaussians, which a constant colour does not need."""
+    return colours(sh, means if sh.shape[1] == 1 else directions(means, camera))
+
+
 def colours(sh: Float[Array, "n k 3"], directions: Float[Array, "n 3"]) -> Float32[Array, "n 3"]:
     """max(0, 0.5 + sum over k of basis_k sh_k). Raises: ValueError: k is not 1, 4, 9 or 16."""
     k = sh.shape[1]

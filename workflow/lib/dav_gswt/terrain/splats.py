@@ -70,33 +70,43 @@ def project_indexed(field: GaussianField, slope: Slope, camera: Camera, near: fl
     whose depth is small against its extent in depth fades out: its linearised splat would cover the picture up to the
     horizon. The viewer does the same.
     """
-    q = field.means.astype(float) @ camera.rotation.T + camera.translation
-    ahead = np.flatnonzero(q[:, 2] > near)
-    field, q = field[ahead], q[ahead]
-    axes = camera.rotation @ displaced_axes(field, slope[ahead])
-    x, y = q[:, 0] / q[:, 2], q[:, 1] / q[:, 2]
+    q = np.ascontiguousarray((field.means.astype(float) @ camera.rotation.T + camera.translation).T)
+    ahead = np.flatnonzero(q[2] > near)
+    field, q = field[ahead], q[:, ahead]
+    axes = _turn_axes(camera.rotation, displaced_axes(field, slope[ahead]))
+    x, y = q[0] / q[2], q[1] / q[2]
     bound_x, bound_y = (
         np.clip(slope, -(c + MARGIN * size) / f, (size - c + MARGIN * size) / f)
         for slope, c, f, size in ((x, camera.cx, camera.fx, camera.width), (y, camera.cy, camera.fy, camera.height))
     )
-    per_z = 1 / q[:, 2, None]
-    across = (axes[:, 0] - bound_x[:, None] * axes[:, 2]) * (camera.fx * per_z)
-    along = (axes[:, 1] - bound_y[:, None] * axes[:, 2]) * (camera.fy * per_z)
-    centres = np.stack([camera.fx * x + camera.cx, camera.fy * y + camera.cy], 1)
-    extents = np.sqrt(RIM2 * (np.stack([(across**2).sum(1), (along**2).sum(1)], 1) + DILATION))
-    share = _fade_in(q[:, 2] / np.maximum(np.linalg.norm(axes[:, 2], axis=1), 1e-300))
-    visible = ((centres + extents > 0) & (centres - extents < [camera.width, camera.height])).all(1) & (share > 0)
-    log_scales, angles = _ellipses(across[visible], along[visible])
-    towards = harmonics.directions(field.means[visible].astype(float), camera)
+    across = (axes[0] - bound_x * axes[2]) * (camera.fx / q[2])
+    along = (axes[1] - bound_y * axes[2]) * (camera.fy / q[2])
+    share = _fade_in(q[2] / np.maximum(np.sqrt(_dot(axes[2], axes[2])), 1e-300))
+    visible = share > 0
+    centres = camera.fx * x + camera.cx, camera.fy * y + camera.cy
+    for at, axis, size in zip(centres, (across, along), (camera.width, camera.height), strict=True):
+        extent = np.sqrt(RIM2 * (_dot(axis, axis) + DILATION))
+        visible &= (at + extent > 0) & (at - extent < size)
+    log_scales, angles = _ellipses(across[:, visible], along[:, visible])
     splats = Splats(
-        centres[visible].astype(np.float32),
+        np.stack([at[visible] for at in centres], 1).astype(np.float32),
         log_scales,
         angles,
         _scale_opacity(field.opacity_logits[visible], share[visible]),
-        harmonics.colours(field.sh[visible], towards),
-        q[visible, 2].astype(np.float32),
+        harmonics.seen_colours(field.sh[visible], field.means[visible].astype(float), camera),
+        q[2, visible].astype(np.float32),
     )
     return splats, ahead[visible]
+
+
+def _turn_axes(rotation: Float[Array, "3 3"], axes: Float[Array, "n 3 3"]) -> Float[Array, "3 3 n"]:
+    """The axes in the camera's frame. Gaussians come last: NumPy is slow along axes of 3."""
+    columns = np.ascontiguousarray(axes.transpose(1, 2, 0))
+    return (rotation @ columns.reshape(3, -1)).reshape(columns.shape)
+
+
+def _dot(one: Float[Array, "3 n"], other: Float[Array, "3 n"]) -> Float[Array, "n"]:
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
 
 
 def blend(splats: Splats, camera: Camera) -> Rendering:
@@ -114,11 +124,12 @@ def blend(splats: Splats, camera: Camera) -> Rendering:
     )
 
 
-def _ellipses(across: Float[Array, "n 3"], along: Float[Array, "n 3"]):
+def _ellipses(across: Float[Array, "3 n"], along: Float[Array, "3 n"]):
     """Log standard deviations along the two axes of S, and the angle of the first."""
-    a, b, c = (across**2).sum(1), (across * along).sum(1), (along**2).sum(1)
+    a, b, c = _dot(across, across), _dot(across, along), _dot(along, along)
     major = 0.5 * (a + c) + np.hypot(0.5 * (a - c), b)
-    area = (np.cross(across, along) ** 2).sum(1)
+    (p, q, r), (u, v, w) = across, along
+    area = (q * w - r * v) ** 2 + (r * u - p * w) ** 2 + (p * v - q * u) ** 2
     minor = area / np.maximum(major, THINNEST**2)
     variances = np.maximum(np.stack([major, minor], 1), THINNEST**2)
     return (0.5 * np.log(variances)).astype(np.float32), (0.5 * np.arctan2(2 * b, a - c)).astype(np.float32)
