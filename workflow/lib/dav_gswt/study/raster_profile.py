@@ -95,8 +95,8 @@ def plot_stages(rows: list[dict], path: Path | str) -> None:
     for number, column in enumerate(stage_columns(rows)):
         spent = np.array([row[column] for row in rows])
         again, hue = divmod(number, len(figures.OKABE_ITO))
-        name, style = column.removesuffix("_ms").replace("_", " "), {"color": figures.OKABE_ITO[hue]}
-        axes.barh(labels, spent, left=left, label=name, edgecolor="white", hatch="///" * again, **style)
+        name, colour = column.removesuffix("_ms").replace("_", " "), figures.OKABE_ITO[hue]
+        axes.barh(labels, spent, left=left, label=name, edgecolor="white", hatch="///" * again, color=colour)
         left += spent
     axes.set_xlabel("milliseconds of a forward and a backward pass (instruction set, threads)")
     axes.invert_yaxis()
