@@ -92,16 +92,17 @@ READ_PEER = """async ({ ahead }) => {
 
 
 def main() -> int:
-    if len(sys.argv) < 2 or not (PEERS / "node_modules").is_dir() or chromium_path() is None:
+    given = [word for word in sys.argv[1:] if word != "--gpu"]
+    if not given or not (PEERS / "node_modules").is_dir() or chromium_path() is None:
         print("page_peers: needs the folder of a bundle, Chromium, and `npm ci` in benchmarks/peers; nothing measured")
         return 0
-    others = tuple(name for name in sys.argv[2:] if name != "--gpu") or OTHERS
+    folder, others = Path(given[0]), tuple(given[1:]) or OTHERS
     if unknown := set(others) - set(OTHERS):
         print(f"page_peers: no renderer {', '.join(sorted(unknown))}; choose from {', '.join(OTHERS)}")
         return 1
-    bundle = store.read_bundle(Path(sys.argv[1]), SCHEMA)
+    bundle = store.read_bundle(folder, SCHEMA)
     for budget in BUDGETS:
-        compare(bundle, Path(sys.argv[1]), budget, others)
+        compare(bundle, folder, budget, others)
     return 0
 
 
@@ -141,7 +142,7 @@ def compare(bundle: store.Bundle, folder: Path, budget: int, names: tuple[str, .
     for name, value in medians.items():
         quality = f", {pictures[name]:.1f} dB from the library's picture" if name in pictures else ""
         print(f"  {name}: {value:.3g} ms (median of {len(times[name])}){quality}")
-    figure = f"page_over_best_peer_{budget // 1000}k" + GPU * "_gpu"
+    figure = f"page_over_best_peer_{budget // 1000}k" + ("_gpu" if GPU else "")
     if names == OTHERS:  # of some alone it is not the best that is compared with
         report_figures({figure: medians["page"] / min(medians[name] for name in names)}, {figure: 0.5})
 

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -122,13 +122,20 @@ class Experiment:
         os.killpg(job.pid, signal.SIGKILL)
         return Ended(job.wait(), self.out.read_text())
 
+    def watch(self, job: subprocess.Popen) -> Iterator[None]:
+        """A turn every now and then until a run ends. Raises: TimeoutError: it hangs, and was killed."""
+        end = time.monotonic() + PATIENCE
+        while job.poll() is None:
+            if time.monotonic() > end:
+                raise TimeoutError(self.kill(job).describe())
+            yield
+            time.sleep(POLL)
+
     def wait_for_stage(self, job: subprocess.Popen, stages: set[str]) -> None:
         """Wait until a run begins one of the stages, or ends. Raises: TimeoutError: it does neither."""
-        end = time.monotonic() + PATIENCE
-        while job.poll() is None and not stages & {START, *list_rules(self.out.read_text())}:
-            if time.monotonic() > end:
-                raise TimeoutError(f"no {stages}: {self.kill(job).describe()}")
-            time.sleep(POLL)
+        for _ in self.watch(job):
+            if stages & {START, *list_rules(self.out.read_text())}:
+                return
 
     def find_script(self, rule: str) -> psutil.Process | None:
         """The process of a job of this run."""
@@ -172,10 +179,9 @@ class Experiment:
         """Run undisturbed, and measure how long each stage takes."""
         begun = {START: time.monotonic()}
         job = self.start()
-        while job.poll() is None:
+        for _ in self.watch(job):
             for rule in list_rules(self.out.read_text()):
                 begun.setdefault(rule, time.monotonic())
-            time.sleep(POLL)
         ended = Ended(job.wait(), self.out.read_text())
         if ended.status:
             raise RuntimeError(f"the undisturbed run failed: {ended.said}")

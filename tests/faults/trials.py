@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import psutil
-from faults.experiment import POLL, START, Ended, Experiment, Limit, Reference
+from faults.experiment import START, Ended, Experiment, Limit, Reference
 
 FULL, KILLED = "free some space", "was killed by SIGKILL: was there too little memory?"
 LATENCY, TOO_LATE = 3, 8  # seconds that Snakemake waits for files; seconds after which they appear
@@ -87,11 +87,9 @@ def kill_jobs(trial: Trial) -> list[Strike]:
         run.wait_for_stage(job, trial.list_from(rule))
         with suppress(subprocess.TimeoutExpired):
             job.wait(trial.draw_moment(rule) / 2)
-        process = None
-        while job.poll() is None and not (process := run.find_script(Ended(0, run.out.read_text()).stage)):
-            time.sleep(POLL)
+        found = (run.find_script(Ended(0, run.out.read_text()).stage) for _ in run.watch(job))
         with suppress(psutil.Error):
-            if process:
+            if process := next(filter(None, found), None):
                 process.kill()
         if (ended := run.wait(job)).status:
             strikes.append(trial.judge(ended, run, KILLED))
@@ -174,8 +172,9 @@ def run_twice(trial: Trial) -> list[Strike]:
     runs.append(copy(runs[0]))
     runs[1].out = runs[0].out.with_name("second.txt")
     jobs = [run.start() for run in runs]
-    while all(job.poll() is None for job in jobs):
-        time.sleep(POLL)
+    for _ in runs[0].watch(jobs[0]):
+        if jobs[1].poll() is not None:
+            break
     loser = int(jobs[0].poll() is None)
     first, second, job = runs[1 - loser], runs[loser], jobs[1 - loser]
     strikes = [trial.judge_refused(second.wait(jobs[loser]), START)]

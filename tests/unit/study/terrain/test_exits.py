@@ -4,10 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from fixtures.random_field import random_field
 
-from dav_gswt.export import usd
-from dav_gswt.export.spool import Spool
 from dav_gswt.study.terrain import exits
 
 
@@ -19,21 +16,6 @@ def test_supersplat_is_told_the_eye_of_the_other_pictures_turned_about_z(tmp_pat
     east, north, up = (2 * v for v in exits.EYE)
     assert pose["position"] == pytest.approx([-east, up, north])  # a file with y down has x east, y down, z north
     assert pose["fov"] == pytest.approx(63.7, abs=0.1)
-
-
-def test_a_stage_is_read_as_it_was_written(tmp_path):
-    pytest.importorskip("pxr", reason="needs the extra `usd`")
-    field = random_field(50, seed=1)
-    with Spool(tmp_path / "spool") as placed:
-        placed.append(field)
-    facts = {"unit": "metre", "origin": [0.0, 0.0, 0.0], "tile_side": 1.0, "cells": {"west": 0}}
-    usd.write_usd(placed, tmp_path / "a.usdc", facts, 1.0)
-    found = exits.read_usd(tmp_path / "a.usdc")
-    np.testing.assert_array_equal(found.means, field.means)
-    np.testing.assert_allclose(found.log_scales, field.log_scales, atol=1e-5)
-    np.testing.assert_allclose(found.opacity_logits, field.opacity_logits, atol=1e-4)
-    unit = field.quats / np.linalg.norm(field.quats, axis=1, keepdims=True)
-    np.testing.assert_allclose(np.abs((found.quats * unit).sum(1)), 1, atol=1e-5)  # q and -q are one turn
 
 
 def test_higher_ground_is_brighter_and_slopes_to_the_light_brighter_still():

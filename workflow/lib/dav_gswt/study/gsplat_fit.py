@@ -26,7 +26,7 @@ RATES = {"means": 1.6e-4, "scales": 5e-3, "quats": 1e-3, "opacities": 5e-2, "sh0
 SH_DEGREE, SH_EVERY = 3, 1000  # steps
 OPACITY = 0.1  # at the start
 STRUCTURE = 0.2  # weight of 1 - SSIM
-WINDOW = 11  # of SSIM, uniform sigma 1.5
+WINDOW = 11  # pixels of SSIM's window, a Gaussian of sigma 1.5
 
 
 def profile_gsplat(photos: PhotoSet, steps: int, every: int, seed: int = 0, device: str = "cuda") -> list[dict]:

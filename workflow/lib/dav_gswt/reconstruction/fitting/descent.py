@@ -172,8 +172,8 @@ def hold_ground(gradients: Gradients, constraints: Constraints) -> None:
     up = gradients.means[:n, 2].reshape(constraints.shape)
     gradients.means[:n, 2] = 0 if constraints.smoothing is None else smooth(up, constraints.smoothing).ravel()
     gradients.quats[:n] = 0
-    for part in vars(gradients).values():
-        if part is not None and len(part) > n:
+    for name, part in vars(gradients).items():
+        if part is not None and name != "camera":
             part[held] = 0
 
 
