@@ -43,8 +43,10 @@ def pytest_xdist_make_scheduler(config, log):
 
 
 def pytest_collection_modifyitems(items):
-    """Whole runs come first, as they take longest."""
-    items.sort(key=lambda item: "workflow" not in item.path.parts)  # stable: else the order stays
+    """Whole runs come first, as they take longest, then the check of types, which else one worker ends with."""
+    folders = [ROOT / "tests/workflow", ROOT / "tests/unit"]
+    rank = {folder: k for k, folder in enumerate(folders)}
+    items.sort(key=lambda item: rank.get(item.path.parent, len(rank)))  # stable: else the order stays
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-// One export after the other in one view: `?show=spz`, `ply` or `sog` by Spark, `glb` and `ground` by three.js alone.
+// One export after the other in one view: `?show=spz`, `ply` or `sog` by Spark, `glb_points` and `ground` by three.js alone.
 import { SparkRenderer, SplatMesh } from "@sparkjsdev/spark";
 import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
@@ -40,7 +40,7 @@ async function openGround() {
 }
 
 const side = (await (await fetch("/exports/terrain/terrain.json")).json()).tile_side;
-if (show === "glb") await openPoints();
+if (show === "glb_points") await openPoints();
 else if (show === "ground") await openGround();
 else await openSplats(`/exports/terrain/terrain.${show}`, show !== "spz");
 

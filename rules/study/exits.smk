@@ -4,7 +4,7 @@ In: the page and the tiles. Out: docs/figures/exit_{name}.jpg. Needs Chromium, N
 with EGL, usd-core and rasterio. `snakemake --cores 2 docs/figures/exit_spz.jpg`
 """
 
-EXITS = ["spz", "ply", "sog", "streamed_sog", "glb", "usd", "ground", "heights", "mujoco"]
+EXITS = ["spz", "ply", "sog", "streamed_sog", "glb", "glb_points", "3dtiles", "usd", "ground", "heights", "mujoco"]
 
 
 rule draw_exits:

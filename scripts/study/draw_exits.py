@@ -7,7 +7,7 @@ from dav_gswt.cli import main
 from dav_gswt.logs import logging_to
 from dav_gswt.study.terrain import exits
 
-NAMES = "spz", "ply", "sog", "glb", "usd", "streamed_sog", "ground"
+NAMES = "spz", "ply", "sog", "glb", "usd", "streamed_sog", "3dtiles", "ground"
 FORMATS = [word for name in NAMES for word in ("--format", name)]
 
 with logging_to(snakemake.log[0]), TemporaryDirectory() as place:

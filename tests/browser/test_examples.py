@@ -138,18 +138,25 @@ def test_spark_draws_our_spz_as_we_draw_it(chromium, serve, node_modules, walked
     assert decibels is not None and decibels > 42
 
 
+EXITS = "spz", "ply", "glb", "3dtiles", "glb_points", "ground"
+
+
 def test_exits_lie_alike_in_other_programs(chromium, serve, node_modules, walked, tmp_path):
-    """The files of the table in the docs, each in its own axes: SPZ and PLY give the same picture, all are upright."""
+    """The files of the table in the docs, each in its own axes: splats give the same picture, all are upright.
+
+    Spark draws SPZ and PLY, PlayCanvas the GLB, CesiumJS the 3D Tiles. Measured: 49, 36 and 36 dB; programs widen small
+    Gaussians each in its way, and a picture that is off by a pixel, or mirrored, has 30 at most.
+    """
     page, manifest, terrain = walked
-    settings = Export(radius=2.0, formats=["spz", "ply", "glb"]).model_dump(mode="json", exclude_none=True)
+    settings = Export(radius=2.0, formats=["spz", "ply", "glb", "3dtiles"]).model_dump(mode="json", exclude_none=True)
     terrain_files.export_terrain(terrain, manifest, settings, tmp_path / "terrain")
     ground_files.export_ground(terrain, manifest, cover_content().tiles, None, settings, tmp_path / "ground")
     with running(serve, page, tmp_path) as address:
-        seen = {name: exits.visit(chromium, address, name) for name in ("spz", "ply", "glb", "ground")}
-    spz, ply = (seen[name].astype(np.float32) / 255 for name in ("spz", "ply"))
-    decibels = psnr(spz, ply, np.ones(spz.shape[:2], np.float32))
-    assert decibels is None or decibels > 35
+        seen = {name: exits.visit(chromium, address, name) for name in EXITS}
+    spz, *others = (seen[name].astype(np.float32) / 255 for name in ("spz", "ply", "glb", "3dtiles"))
+    decibels = [psnr(spz, other, np.ones(spz.shape[:2], np.float32)) for other in others]
+    assert all(each is None or each > 33 for each in decibels)
     for name, picture in seen.items():
         sky = (np.abs(picture.astype(int) - [0xB8, 0xCB, 0xDC]).max(-1) < 4).mean(1)
-        most = 0.9 if name == "glb" else 0.5  # the sky shines through between points
+        most = 0.9 if name == "glb_points" else 0.5  # the sky shines through between points
         assert sky[:8].mean() > 0.95 and sky[-40:].mean() < most, "sky above, ground below"

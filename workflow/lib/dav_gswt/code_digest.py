@@ -9,10 +9,12 @@ LIBRARY = Path(__file__).parent
 _IMPORT = re.compile(r"^[ \t]*(?:from (dav_gswt[\w.]*) import (\([^)]*\)|[^\n]*)|import (dav_gswt[\w.]*))", re.M)
 
 
+@cache
 def digest_code(script: Path) -> str:
     """Digest of every library file that a script imports, directly or through other library files.
 
-    Imports inside functions count. The C++ sources count where the rasterizer is imported.
+    Imports inside functions count. The C++ sources count where the rasterizer is imported. Files are read once a
+    process: a plan asks for each script's digest many times.
     """
     files: dict[str, Path] = {}
     found = list(_imported_modules(script))

@@ -41,7 +41,7 @@ class Config(ConfigModel):
     policy: Policy = key("how the next views are chosen: docs/reference/policies.md", "coverage-error")
     prior: Name = key("the entry of `priors` that policies sample", "terrain")
     p_drop: float = key("share of its attention that a prior drops in each sample", 0.15, ge=0, lt=1)
-    lam: float = key("weight of LPIPS beside W2 in a pose's score (the paper's lambda)", 0.1, ge=0, le=1e6)
+    lam: float = key("weight of LPIPS beside squared W2 in what selects poses (the paper's lambda)", 0.1, ge=0, le=1e6)
     rounds: int = key("rounds of view selection (the paper's T)", 2, ge=0, le=100)
     k: int = key(
         "views chosen in a round; where fewer are left, all; `--config views_per_round=3` on the command line, where "

@@ -110,7 +110,7 @@ def single(scores: Scores, inputs: SelectionInput) -> list[int]:
 
 @policy("w2-lpips")
 def w2_lpips(scores: Scores, inputs: SelectionInput) -> list[int]:
-    """The k candidates of greatest u = W2 + lam LPIPS, each over its frozen scale: the paper's Algorithm 1."""
+    """The k candidates of greatest u = W2² + lam LPIPS, each over its frozen scale: the paper's Algorithm 1."""
     return top(uncertainty(scores, inputs.lam), inputs.k)
 
 
@@ -121,7 +121,7 @@ def everything(scores: Scores, inputs: SelectionInput) -> list[int]:
 
 
 def uncertainty(scores: Scores, lam: float) -> Float64[Array, "n"]:
-    """Return u = W2 + lam LPIPS of every candidate."""
+    """Return u = W2² + lam LPIPS of every candidate."""
     return combine_terms(scores.term("w2_sq"), scores.terms.get("lpips"), lam, scores.scales, scores.names)
 
 

@@ -82,9 +82,11 @@ POLICY_SPECS = (
         reads_prior=True,
     ),
     PolicySpec(
-        "w2-lpips", "the largest u = W2 + `lam` LPIPS, each over its frozen scale: the paper's top k", reads_prior=True
+        "w2-lpips", "the largest u = W2² + `lam` LPIPS, each over its frozen scale: the paper's top k", reads_prior=True
     ),
-    PolicySpec("w2", "the largest W2 between the prior's samples, in latents", reads_prior=True, fixed_zero=("lam",)),
+    PolicySpec(
+        "w2", "the largest squared W2 of the prior's samples, in latents", reads_prior=True, fixed_zero=("lam",)
+    ),
     PolicySpec(
         "single",
         "the largest LPIPS between one sample without dropout and the render (ablation)",

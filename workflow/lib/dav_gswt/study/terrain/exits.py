@@ -1,7 +1,7 @@
 """What other programs draw of exports, and what those read that draw nothing.
 
-Spark, three.js and SuperSplat's viewer draw in headless Chromium, MuJoCo by EGL; usd-core and GDAL
-read.
+Spark, three.js, SuperSplat's viewer, PlayCanvas and CesiumJS draw in headless Chromium, MuJoCo by EGL;
+usd-core and GDAL read.
 """
 
 import importlib
@@ -34,6 +34,7 @@ FIELD_OF_VIEW = 45.0  # degrees, of the picture's height
 WIDE = float(np.degrees(2 * np.arctan(np.tan(np.radians(FIELD_OF_VIEW / 2)) * WIDTH / HEIGHT)))  # of its width
 EYE, TARGET = (-1.1, -1.7, 0.8), (0.2, 0.2, 0.0)  # tile sides east, north and up of the origin, as in examples/exits
 SKY = 0xB8, 0xCB, 0xDC
+PAGES = {"glb": "exits/playcanvas.html", "3dtiles": "exits/cesium.html"}  # below examples/
 STREAMED = "streamed_sog"
 SUPERSPLAT = "node_modules/@playcanvas/supersplat-viewer/public/index.html"
 STILL, PATIENCE = 3000, 40  # milliseconds between looks at a page that does not say when it is done, and most looks
@@ -76,6 +77,9 @@ def visit(browser, address: str, name: str) -> UInt8[Array, "h w 3"]:
         if name == STREAMED:
             asked = {"settings": "/exports/supersplat.json", "content": "/exports/terrain/terrain_sog/lod-meta.json"}
             tab.goto(f"{address}{SUPERSPLAT}?{urlencode(asked)}&noui&webgl&noanim&fullload")
+            return _wait_until_still(tab)
+        if name in PAGES:
+            tab.goto(address + PAGES[name])
             return _wait_until_still(tab)
         tab.goto(f"{address}exits/?show={name}")
         told = "document.querySelector('p').textContent.split('frame ')[1]"

@@ -1,4 +1,4 @@
-"""Combination of uncertainty terms: each is divided by a scale fixed in the first round, the sum is mapped to [0, 1].
+"""Combination of uncertainty terms, each divided by a scale fixed in the first round; Quantiles map a sum to [0, 1].
 
 Only raw terms are stored; lam enters when poses are selected, so that a sweep over lam shares the scoring.
 """
@@ -77,7 +77,7 @@ def combine_terms(
     scales: Scales,
     names: Sequence[str] | None = None,
 ) -> Float64[Array, "n"]:
-    """u = W2 + lam LPIPS, each over its frozen scale (`w2_sq`, `lpips`). lpips: None where its weights are missing.
+    """u = W2² + lam LPIPS, each over its frozen scale (`w2_sq`, `lpips`). lpips: None where its weights are missing.
 
     lam = 0 ranks by W2, a large lam by LPIPS; the units of the latent space do not matter. Without LPIPS its term is
     left out, with a warning if lam > 0.
