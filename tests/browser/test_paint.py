@@ -178,6 +178,19 @@ def test_sliders_set_densities_and_shares_and_are_undone(visit, address):
     assert seen.page.locator("#densities output").text_content() == "1.00×"
 
 
+def test_escape_drops_the_brush_and_then_closes_the_panel(visit, address):
+    seen = visit(900, 700).open(f"{address}?still")
+    for key, painting, shown in (
+        ("m", False, True),
+        ("2", True, True),
+        ("Escape", False, True),
+        ("Escape", False, False),
+    ):
+        seen.page.keyboard.press(key)
+        assert seen.page.evaluate("document.documentElement.classList.contains('painting')") == painting
+        assert seen.page.locator("#paint").is_visible() == shown
+
+
 def test_arrow_keys_on_a_slider_move_it_and_not_the_walker(visit, address):
     seen = visit(900, 700).open(f"{address}?still")
     seen.page.keyboard.press("m")

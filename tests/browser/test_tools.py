@@ -111,3 +111,20 @@ def test_the_page_says_how_long_render_sort_and_update_take(visit, plain):
     seen.page.keyboard.press("i")
     text = seen.page.locator("#times").inner_text()
     assert all(word in text for word in ("render", "sort", "update", "±", "% of frames"))
+
+
+def test_letters_are_commands_again_after_a_choice_by_the_pointer(still, uncertain):
+    seen = still(uncertain, 160, 100)
+    for opened_by, focused in (("pointerdown", "BODY"), ("keydown", "SELECT")):
+        seen.page.locator("#overlay").focus()
+        seen.page.locator("#overlay").dispatch_event(opened_by)
+        seen.page.select_option("#overlay", "level")
+        assert seen.page.evaluate("document.activeElement.tagName") == focused
+
+
+def test_values_under_a_pointer_at_rest_follow_the_overlay(still, uncertain):
+    seen = still(uncertain, 640, 400)
+    seen.at(**OBLIQUE)
+    seen.page.mouse.move(320, 200)
+    seen.page.evaluate("davgswt.overlay('tile')")
+    seen.until("document.getElementById('legend').textContent.includes('Here: tile')")

@@ -93,3 +93,19 @@ def test_the_menu_says_which_way_one_goes(moving):
     moving.page.keyboard.press("v")  # a button has no use for letters
     assert moving.page.evaluate("davgswt.state.mode") == "orbit"
     assert moving.page.locator("#modes input:checked").get_attribute("value") == "orbit"
+
+
+def test_who_walks_again_stands_on_the_ground(moving):
+    moving.page.keyboard.press("v")
+    moving.page.evaluate("davgswt.set({ eye: 6 })")
+    assert moving.state["eye"] == 6
+    for _ in range(2):
+        moving.page.keyboard.press("v")
+    assert (moving.state["mode"], moving.state["eye"]) == ("walk", moving.page.evaluate("davgswt.walker.floor"))
+
+
+def test_escape_closes_the_map(moving):
+    moving.page.keyboard.press("n")
+    assert moving.page.locator("#map").is_visible()
+    moving.page.keyboard.press("Escape")
+    assert not moving.page.locator("#map").is_visible()

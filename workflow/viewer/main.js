@@ -67,7 +67,7 @@ async function start() {
       listenToControls(walker, createOrbit(viewer), canvas, element("pad", HTMLElement), paint.brush, redraw);
       new ResizeObserver(redraw).observe(canvas);
       listenToTools(viewer, paint.keep);
-      listenToModes(walker, (text) => hud.say(text));
+      listenToModes(walker, (text) => hud.say(text), redraw);
       map = createMinimap(viewer);
       compare = createCompare(viewer);
       if (still) return;

@@ -47,6 +47,7 @@ export function createMinimap(viewer) {
   };
   button.addEventListener("click", toggle);
   addEventListener("keydown", (event) => {
+    if (event.code === "Escape" && !map.hidden && !event.defaultPrevented) return toggle();
     if (event.code === "KeyN" && !event.ctrlKey && !event.metaKey && !event.altKey && !takesLetters(event.target)) toggle();
   });
   map.addEventListener("click", ({ offsetX, offsetY }) => {

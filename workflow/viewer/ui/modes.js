@@ -1,18 +1,25 @@
 // Ways to go: walk, fly, orbit.
 
 import { element, takesLetters } from "./dom.js";
-import { MODES } from "./walker.js";
+import { MODES, moveTo } from "./walker.js";
 
 const SAYS = { walk: "Walking", fly: "Flying: forward is where you look", orbit: "Orbiting: drag to turn about what you look at" };
 
 /**
+ * Let a person choose; who walks again stands on the ground, wherever he flew.
+ *
  * @param {import("./walker.js").Walker} walker
  * @param {(text: string) => void} say
+ * @param {() => void} onChange a picture is due
  */
-export function listenToModes(walker, say) {
+export function listenToModes(walker, say, onChange) {
   const radios = [...element("modes", HTMLElement).querySelectorAll("input")];
   /** @param {import("./walker.js").Mode} mode */
   const choose = (mode) => {
+    if (mode === "walk" && walker.mode !== "walk") {
+      moveTo(walker, { eye: walker.floor });
+      onChange();
+    }
     walker.mode = mode;
     for (const radio of radios) radio.checked = radio.value === mode;
     say(SAYS[mode]);

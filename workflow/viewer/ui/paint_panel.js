@@ -98,8 +98,12 @@ export function createPaintPanel(viewer) {
     }
     if (event.code === "KeyM" && event.target !== element("overlay", HTMLSelectElement)) panel.show(!panel.open);
     if (!panel.open || (isField(event.target) && event.code !== "Escape")) return;
-    if (event.code === "Escape") choose(LOOK);
-    else if (event.code === "KeyX") choose(String(ERASER));
+    if (event.code === "Escape") {
+      if (event.defaultPrevented) return;
+      event.preventDefault();
+      if (brush.material === null) panel.show(false);
+      else choose(LOOK);
+    } else if (event.code === "KeyX") choose(String(ERASER));
     else if (/^Digit[1-8]$/.test(event.code)) choose(String(Number(event.code[5]) - 1));
     else if (event.code === "BracketLeft" || event.code === "BracketRight") {
       if (event.code === "BracketLeft") size.stepDown(2);

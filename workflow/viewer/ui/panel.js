@@ -23,7 +23,9 @@ export function createPanel(id, { onShow = () => {}, closesOnEscape = true } = {
   button.addEventListener("click", () => show(Boolean(panel.hidden)));
   element(`${id}Close`, HTMLButtonElement).addEventListener("click", () => show(false));
   panel.addEventListener("keydown", (event) => {
-    if (closesOnEscape && event.code === "Escape") show(false);
+    if (!closesOnEscape || event.code !== "Escape") return;
+    event.preventDefault(); // one thing at a time
+    show(false);
   });
   return {
     show,

@@ -7,13 +7,21 @@ import { hitGround, pointAt, rayThrough } from "../terrain/ray.js";
 /** @param {import("./viewer.js").Viewer} viewer */
 export function tellValues(viewer) {
   const { canvas } = viewer;
-  /** @param {PointerEvent} event */
-  const tell = ({ clientX, clientY }) => {
-    if (viewer.overlay === 0 || !viewer.scene) return;
+  /** @type {{ clientX: number, clientY: number } | null} */
+  let pointer = null;
+  const tell = () => {
+    if (viewer.overlay === 0 || !viewer.scene || !pointer) return;
+    const { clientX, clientY } = pointer;
     viewer.hud.legend.tell(valuesAt(viewer.scene, viewer.camera(viewer.scene), clientX / canvas.clientWidth, clientY / canvas.clientHeight));
   };
-  canvas.addEventListener("pointermove", tell);
-  canvas.addEventListener("pointerdown", tell);
+  for (const name of /** @type {const} */ (["pointermove", "pointerdown"])) {
+    canvas.addEventListener(name, (event) => {
+      pointer = event;
+      tell();
+    });
+  }
+  canvas.addEventListener("pointerleave", () => (pointer = null));
+  setInterval(tell, 250); // the ground moves on and is refined under a pointer at rest
 }
 
 /**

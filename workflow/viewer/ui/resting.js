@@ -34,7 +34,7 @@ export function createResting(viewer) {
       const { budget: drawn, scale } = viewer.pacing;
       renderer?.picture.cancel();
       renderer?.rest.restart(now, scale < 1 ? 0 : drawn);
-      [since, done] = [now, 0];
+      [budget, since, done] = [0, now, 0];
       viewer.hud.showRefining(null);
     },
     /** Go on with the picture that is under way, or with the next. @param {Scene} scene @param {number} now */
@@ -44,8 +44,9 @@ export function createResting(viewer) {
       const { picture, rest } = renderer;
       if (picture.share !== null) {
         if (picture.advance(now)) finish(renderer, scene);
+      } else if (!client.idle) { // the frame at hand is of what was asked before
       } else if (viewer.dirty && frame?.patient) viewer.begin(picture);
-      else if (!viewer.dirty && client.idle) {
+      else if (!viewer.dirty) {
         const next = rest.next(now);
         if (next) {
           budget = next;

@@ -14,7 +14,13 @@ export function listenToTools(viewer, paint) {
   const { flyPath, hud } = viewer, overlay = element("overlay", HTMLSelectElement);
   const [record, play, save] = ["record", "play", "save"].map((id) => element(id, HTMLButtonElement));
   for (const [k, name] of OVERLAYS.entries()) overlay.add(new Option(TITLES[k], name));
-  overlay.addEventListener("change", () => viewer.showOverlay(overlay.selectedIndex));
+  let pointed = false; // the list was opened by a pointer: letters are commands again after the choice
+  overlay.addEventListener("pointerdown", () => (pointed = true));
+  overlay.addEventListener("keydown", () => (pointed = false));
+  overlay.addEventListener("change", () => {
+    viewer.showOverlay(overlay.selectedIndex);
+    if (pointed) overlay.blur();
+  });
   tellValues(viewer);
   const update = () => {
     record.textContent = flyPath.mode === "record" ? "Stop recording" : "Record";
