@@ -44,9 +44,8 @@ export function createResting(viewer) {
       const { picture, rest } = renderer;
       if (picture.share !== null) {
         if (picture.advance(now)) finish(renderer, scene);
-      } else if (!client.idle) { // the frame at hand is of what was asked before
-      } else if (viewer.dirty && frame?.patient) viewer.begin(picture);
-      else if (!viewer.dirty) {
+      } else if (client.idle && viewer.dirty && frame?.patient) viewer.begin(picture); // not idle: the frame is of an earlier view
+      else if (client.idle && !viewer.dirty) {
         const next = rest.next(now);
         if (next) {
           budget = next;

@@ -46,8 +46,8 @@ def draw_exits(server: Path | str, page: Path, exports: Path, pictures: list[Pat
     Args:   server: examples/serve.py. page: of the terrain.
     Raises: InputError: Chromium, node_modules or a package is not here.
     """
-    if not (Path(server).parent / "node_modules").is_dir():
-        raise InputError("examples/node_modules is missing: npm ci --prefix examples")
+    if not (Path(server).parent / "node_modules/cesium").is_dir():
+        raise InputError("examples/node_modules is missing or lacks cesium: npm ci --prefix examples")
     drawn = {path: path.stem.removeprefix("exit_") for path in pictures}
     here: dict[str, Callable[[Path], UInt8[Array, "h w 3"]]] = {
         "mujoco": draw_ground,
