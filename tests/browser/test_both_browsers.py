@@ -110,7 +110,7 @@ def test_a_place_is_shared(seen):
 def test_the_picture_is_saved(seen):
     expected = seen.at(**OBLIQUE)
     seen.page.locator("#keep").click()
-    assert (pixels(saved(seen, "terrain.png")) == expected).all()
+    assert (pixels(saved(seen, "my-meadow.png")) == expected).all()
 
 
 def test_a_photo_is_larger(seen):
@@ -119,7 +119,7 @@ def test_a_photo_is_larger(seen):
     seen.page.locator("#photoButton").click()
     seen.page.select_option("#photoSize", index=1)
     seen.page.locator("#photoTake").click()
-    assert pixels(saved(seen, "terrain.png")).shape == (640, 960, 3)
+    assert pixels(saved(seen, "my-meadow.png")).shape == (640, 960, 3)
 
 
 def test_a_video_is_made(seen):
@@ -130,7 +130,7 @@ def test_a_video_is_made(seen):
     seen.page.locator("#menuButton").click()
     seen.until("!video.disabled")
     seen.page.locator("#video").click()
-    assert saved(seen, "flight.webm")[:4] == b"\x1a\x45\xdf\xa3"
+    assert saved(seen, "my-meadow-flight.webm")[:4] == b"\x1a\x45\xdf\xa3"
 
 
 def test_both_browsers_show_the_same(chromium, firefox, fronted):

@@ -189,7 +189,7 @@ def test_saving_a_picture_says_how_far_it_is_and_is_of_the_finest(visit, fronted
     with seen.page.expect_download(timeout=60_000) as download:
         seen.page.locator("#keep").click()
         seen.until("keep.getAttribute('aria-busy') === 'true' && /Saving the picture: \\d+ %/.test(toast.textContent)")
-    assert download.value.suggested_filename == "terrain.png"
+    assert download.value.suggested_filename == "my-meadow.png"
     assert seen.state["whole"]
     seen.until("keep.getAttribute('aria-busy') === null && toast.textContent === 'The picture is saved.'")
 

@@ -20,7 +20,7 @@ WebGL2RenderingContext.prototype.getSyncParameter = function (sync, name) { // a
 def take(seen) -> np.ndarray:
     with seen.page.expect_download(timeout=60_000) as download:
         seen.page.locator("#photoTake").click()
-    assert download.value.suggested_filename == "terrain.png"
+    assert download.value.suggested_filename == "endless-terrain.png"
     return np.asarray(Image.open(io.BytesIO(download.value.path().read_bytes())).convert("RGB")).astype(int)
 
 

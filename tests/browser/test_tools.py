@@ -97,7 +97,7 @@ def test_a_picture_is_kept_as_a_file(visit, plain):
     seen = visit(160, 100).open(f"{plain}?still")
     with seen.page.expect_download() as download:
         seen.page.keyboard.press("c")
-    assert download.value.suggested_filename == "terrain.png"
+    assert download.value.suggested_filename == "endless-terrain.png"
     assert download.value.path().read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 

@@ -59,7 +59,7 @@ def save(seen) -> bytes:
     with seen.page.expect_download(timeout=120_000) as download:
         seen.page.locator("#video").click()
     seen.until("job.hidden")
-    assert download.value.suggested_filename == "flight.webm"
+    assert download.value.suggested_filename == "endless-terrain-flight.webm"
     return download.value.path().read_bytes()
 
 

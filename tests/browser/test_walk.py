@@ -89,6 +89,22 @@ def test_the_address_follows_the_walk_and_a_pasted_one_is_followed(visit, plain)
     seen.until("davgswt.state.x === -7 && davgswt.state.yaw === 90")
 
 
+def test_the_address_names_the_overlay_and_a_pasted_one_shows_it(visit, plain):
+    seen = visit(160, 100).open(f"{plain}#3,5,2,20,-30&show=level")
+    assert seen.state["overlay"] == "level"
+    seen.page.keyboard.press("o")
+    seen.until("location.hash.endsWith('&show=order')")
+    seen.page.evaluate("location.hash = '#-7,1.5,1,90,-10&show=tile&paint='")
+    seen.until("davgswt.state.x === -7 && davgswt.state.overlay === 'tile'")
+    seen.page.evaluate("location.hash = '#3,5,2,20,-30'")
+    seen.until("davgswt.state.x === 3 && davgswt.state.overlay === 'picture'")
+
+
+@pytest.mark.parametrize("name", ["picture", "nothing", "%", ""])
+def test_an_address_of_no_overlay_shows_the_terrain(visit, plain, name):
+    assert visit(160, 100).open(f"{plain}?still#3,5,2,20,-30&show={name}").state["overlay"] == "picture"
+
+
 def test_a_link_with_nonsense_starts_at_the_usual_place(visit, plain):
     usual = visit(160, 100).open(f"{plain}?still").state
     state = visit(160, 100).open(f"{plain}?still#one,,NaN,Infinity").state

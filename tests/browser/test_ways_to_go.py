@@ -104,6 +104,12 @@ def test_who_walks_again_stands_on_the_ground(moving):
     assert (moving.state["mode"], moving.state["eye"]) == ("walk", moving.page.evaluate("davgswt.walker.floor"))
 
 
+def test_the_map_says_what_it_shows_and_its_scale_when_it_opens(visit, plain):
+    seen = visit(640, 400).open(plain)
+    seen.page.keyboard.press("n")
+    assert "a place of a tile, 4 m wide" in seen.page.locator("#toast").inner_text()
+
+
 def test_escape_closes_the_map(moving):
     moving.page.keyboard.press("n")
     assert moving.page.locator("#map").is_visible()

@@ -72,7 +72,7 @@ async function start() {
       compare = createCompare(viewer);
       if (still) return;
       runFrameLoop(viewer);
-      syncAddress(walker, paint.keep, { onChange: redraw, onError: (error) => viewer.fail(error) });
+      syncAddress(viewer, paint.keep);
     },
     async onScene(scene, first) {
       paint.showScene(scene);

@@ -3,7 +3,7 @@
 import { NO_ORDER } from "../data/layout.js";
 
 export const OVERLAYS = ["picture", "tile", "level", "order", "uncertainty", "material"];
-export const TITLES = ["Terrain", "Tiles", "Levels of detail", "Orders", "Uncertainty", "Materials"];
+export const TITLES = ["Terrain", "Tiles", "Levels of detail", "Drawing orders", "Uncertainty", "Materials"];
 export const OBJECTS = 255; // number of objects in the overlay of materials
 
 const COOL = [0.23, 0.3, 0.75], LIGHT = [0.87, 0.86, 0.85], WARM = [0.71, 0.02, 0.15]; // uncertainty, low to high

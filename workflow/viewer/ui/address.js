@@ -1,6 +1,7 @@
-// The place in the page's address, and what is painted: `#x,y,eye,yaw,pitch&paint=...`.
+// The page's address: the place, the overlay and what is painted: `#x,y,eye,yaw,pitch&show=level&paint=...`.
 
-import { moveTo, PLACE_KEYS } from "./walker.js";
+import { OVERLAYS } from "../draw/overlays.js";
+import { PLACE_KEYS } from "./walker.js";
 
 /**
  * @typedef {import("../terrain/camera.js").Place} Place
@@ -8,7 +9,6 @@ import { moveTo, PLACE_KEYS } from "./walker.js";
  */
 
 const EVERY = 500; // milliseconds between updates of the address
-const PAINT = "&paint=";
 
 /**
  * The address's part for a walker's place, to a thousandth of the eye floor and of a degree.
@@ -30,7 +30,7 @@ export function formatPlace(walker) {
  * @returns {Partial<Place>}
  */
 export function parsePlace(hash) {
-  const values = decode(hash.replace(/^#/, "")).split(PAINT)[0].split(",").map((v) => (v.trim() === "" ? NaN : Number(v)));
+  const values = decode(hash.replace(/^#/, "")).split("&")[0].split(",").map((v) => (v.trim() === "" ? NaN : Number(v)));
   /** @type {Partial<Place>} */
   const place = {};
   PLACE_KEYS.forEach((key, k) => {
@@ -40,15 +40,23 @@ export function parsePlace(hash) {
 }
 
 /** The painted part of an address; "": none. @param {string} hash */
-export const parsePaint = (hash) => hash.split(PAINT)[1] ?? "";
+export const parsePaint = (hash) => partOf(hash, "paint");
+
+/** The overlay of an address; 0, the terrain as it is, where it names none. @param {string} hash */
+export const parseOverlay = (hash) => Math.max(0, OVERLAYS.indexOf(decode(partOf(hash, "show"))));
+
+/** @param {string} hash @param {string} name */
+const partOf = (hash, name) => hash.split(`&${name}=`)[1]?.split("&")[0] ?? "";
 
 /**
- * The address's part for a place and what is painted.
+ * The address's part for a place, what is shown there and what is painted.
  *
  * @param {Walker} walker
+ * @param {number} overlay 0: the terrain as it is
  * @param {string} paint "": nothing
  */
-export const formatAddress = (walker, paint) => formatPlace(walker) + (paint && PAINT + paint);
+export const formatAddress = (walker, overlay, paint) =>
+  `${formatPlace(walker)}${overlay ? `&show=${OVERLAYS[overlay]}` : ""}${paint && `&paint=${paint}`}`;
 
 /** @param {string} text */
 function decode(text) {
@@ -62,15 +70,14 @@ function decode(text) {
 /**
  * Keep the address at the walker's place, and follow an address that a person enters.
  *
- * @param {Walker} walker
+ * @param {import("./viewer.js").Viewer} viewer
  * @param {Pick<import("./paint_keep.js").PaintKeep, "link" | "follow">} paint
- * @param {{ onChange: () => void, onError: (error: unknown) => void }} handlers
  */
-export function syncAddress(walker, paint, { onChange, onError }) {
+export function syncAddress(viewer, paint) {
   let last = location.hash;
   const write = () => {
-    const hash = formatAddress(walker, paint.link);
-    if (hash === last) return;
+    const hash = viewer.address(paint.link);
+    if (hash === "" || hash === last) return;
     last = hash;
     history.replaceState(null, "", hash);
   };
@@ -79,8 +86,8 @@ export function syncAddress(walker, paint, { onChange, onError }) {
   addEventListener("hashchange", () => {
     if (location.hash === last) return;
     last = location.hash;
-    moveTo(walker, parsePlace(last));
-    paint.follow(parsePaint(last)).catch(onError);
-    onChange();
+    viewer.setPlace(parsePlace(last));
+    viewer.showOverlay(parseOverlay(last));
+    paint.follow(parsePaint(last)).catch((error) => viewer.fail(error));
   });
 }

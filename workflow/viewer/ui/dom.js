@@ -30,15 +30,15 @@ export function swatch(colour) {
 }
 
 /**
- * Let a person keep a blob as a file.
+ * Let a person keep a blob as a file that has the scene's name.
  *
  * @param {Blob} blob
- * @param {string} name
+ * @param {string} ending of the file's name
  */
-export function saveFile(blob, name) {
-  const link = document.createElement("a");
+export function saveFile(blob, ending) {
+  const link = document.createElement("a"), title = element("name", HTMLElement).textContent ?? "";
   link.href = URL.createObjectURL(blob);
-  link.download = name;
+  link.download = `${title.toLowerCase().replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-|-$/g, "") || "terrain"}${ending}`;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
 }

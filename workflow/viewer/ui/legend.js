@@ -3,6 +3,7 @@
 import { uncertaintyRange } from "../data/uncertainty.js";
 import { levelColour, materialColour, OBJECTS, OVERLAYS, SORTED, uncertaintyColour } from "../draw/overlays.js";
 import { element, swatch } from "./dom.js";
+import { unitName } from "./numbers.js";
 
 /**
  * @typedef {import("../data/manifest.js").Manifest} Manifest
@@ -61,7 +62,7 @@ function entriesOf(name, manifest) {
   if (name === "tile") return [[null, `A colour for each of ${manifest.tiles.length} tiles`]];
   if (name === "level") return manifest.levels.map(({ level, distance }) => [levelColour(level), levelText(manifest, level, distance)]);
   if (name === "order") {
-    return [[SORTED, "sorted by depth, about the eye"], [null, `else a colour for each of ${manifest.directions.length} orders`]];
+    return [[SORTED, "sorted as seen from here"], [null, `else one of ${manifest.directions.length} orders that were sorted beforehand, a colour each`]];
   }
   if (name === "uncertainty") {
     const [low, high] = uncertaintyRange(manifest.tiles);
@@ -78,7 +79,6 @@ function entriesOf(name, manifest) {
 
 /** @param {Manifest} manifest @param {number} level @param {number | null} distance */
 function levelText({ levels, unit }, level, distance) {
-  const short = unit === "metre" ? "m" : `${unit}s`;
-  if (distance !== null) return `level ${level}${level ? "" : ", finest"}: up to ${Number(distance.toPrecision(2))} ${short}`;
+  if (distance !== null) return `level ${level}${level ? "" : ", finest"}: up to ${Number(distance.toPrecision(2))} ${unitName(unit)}`;
   return `level ${level}${levels.length > 1 ? ": beyond" : ""}`;
 }

@@ -3,6 +3,7 @@
 import { tileColour } from "../draw/overlays.js";
 import { tileUnder } from "../terrain/cells.js";
 import { element, takesLetters } from "./dom.js";
+import { unitName } from "./numbers.js";
 import { moveTo } from "./walker.js";
 
 const CELLS = 9; // along a side
@@ -40,9 +41,13 @@ export function createMinimap(viewer) {
     drawWalker(pen, map.width / 2, (walker.yaw * Math.PI) / 180);
   }
 
+  /** @param {import("../data/manifest.js").Manifest} manifest */
+  const explain = ({ tile_side: side, unit }) => viewer.hud.say(
+    `Each square is a place of a tile, ${Number(side.toPrecision(2))} ${unitName(unit)} wide; equal numbers are the same tile. North is up.`);
   const toggle = () => {
     map.hidden = !map.hidden;
     button.setAttribute("aria-pressed", String(!map.hidden));
+    if (!map.hidden && viewer.scene) explain(viewer.scene.manifest);
     draw();
   };
   button.addEventListener("click", toggle);

@@ -53,5 +53,5 @@ export function createNumbers() {
 
 /** @param {number} v */
 const length = (v) => (Math.abs(v) >= 1000 ? v.toFixed(0) : v.toPrecision(3));
-/** @param {string} unit */
-const unitName = (unit) => (unit === "metre" ? "m" : `${unit}s`);
+/** A unit after a number. @param {string} unit */
+export const unitName = (unit) => (unit === "metre" ? "m" : `${unit}s`);

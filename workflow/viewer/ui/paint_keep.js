@@ -70,7 +70,7 @@ export function createPaintKeep(viewer, onLink) {
       const { scene } = viewer;
       if (!scene) return;
       const text = JSON.stringify(describePaint(scene.painting.paint, scene.manifest));
-      saveFile(new Blob([text], { type: "application/json" }), "painted.json");
+      saveFile(new Blob([text], { type: "application/json" }), "-painted.json");
     },
     /** Take a file's JSON. Throws a PageError. @param {unknown} value */
     load(value) {

@@ -72,7 +72,7 @@ export function createPhotoMode(viewer, jobs, onView) {
       /** @type {Blob | null} */
       const blob = await new Promise((done) => canvas.toBlob(done));
       if (!blob) throw new Error("the photo cannot be saved");
-      saveFile(blob, "terrain.png");
+      saveFile(blob, ".png");
       viewer.hud.say("The photo is saved.");
     }));
 

@@ -19,7 +19,7 @@ export function createSaving(viewer) {
       viewer.hud.say(`Saving the picture: ${Math.round(100 * bar.value)} %. It is taken where you stand still.`);
     }, EVERY);
     try {
-      saveFile(await viewer.takePicture(), "terrain.png");
+      saveFile(await viewer.takePicture(), ".png");
       viewer.hud.say("The picture is saved.");
     } catch (error) {
       viewer.fail(error);

@@ -32,7 +32,7 @@ function describe(story) {
   const text = document.createElement("p");
   text.textContent = `${photos.length} photos became a field of Gaussians, the field tiles, and the tiles this terrain. `
     + `${rounds.length > 1 ? `After the first, ${rounds.length - 1} times further photos were asked for. ` : ""}`
-    + `${tested.length ? "PSNR says how well photos that were not used are predicted; more is better." : ""}`;
+    + `${tested.length ? "PSNR, in decibels, says how well photos that were not used are predicted: more is better." : ""}`;
   return [drawPlan(story), listRounds(story), text, showPhotos(story)];
 }
 

@@ -36,7 +36,7 @@ export function listenToTools(viewer, paint) {
     if (flyPath.mode === "record") hud.say("Recording: walk, and press R to stop.");
   };
   const savePath = () =>
-    saveFile(new Blob([JSON.stringify(flyPath, null, 1)], { type: "application/json" }), "flight.json");
+    saveFile(new Blob([JSON.stringify(flyPath, null, 1)], { type: "application/json" }), "-flight.json");
   const savePicture = createSaving(viewer), share = () => sharePlace(viewer, paint);
   record.addEventListener("click", () => toggle("record"));
   play.addEventListener("click", () => toggle("play"));

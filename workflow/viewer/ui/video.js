@@ -58,7 +58,7 @@ export function listenToVideo(viewer, jobs, closePanels) {
     if (flyPath.path[flyPath.path.length - 1].seconds > MOST_SECONDS) return viewer.hud.say(TOO_LONG);
     const blob = await make(signal, tell);
     if (!blob) return viewer.hud.say("This browser makes no videos.");
-    saveFile(blob, blob.type === "video/mp4" ? "flight.mp4" : "flight.webm");
+    saveFile(blob, blob.type === "video/mp4" ? "-flight.mp4" : "-flight.webm");
     viewer.hud.say("The video is saved.");
   }));
   setInterval(() => (button.disabled = !flyPath.path.length || !(canEncode || kind)), EVERY);

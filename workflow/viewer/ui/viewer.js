@@ -10,7 +10,7 @@ import { listDrawnCells } from "../scene/drawn_cells.js";
 import { openTerrain, readTerrain } from "../scene/open_terrain.js";
 import { cameraAt } from "../terrain/camera.js";
 import { tileUnder } from "../terrain/cells.js";
-import { formatAddress, parsePlace } from "./address.js";
+import { formatAddress, parseOverlay, parsePlace } from "./address.js";
 import { element } from "./dom.js";
 import { createFlyPath } from "./fly_path.js";
 import { createPainting } from "./painting.js";
@@ -110,7 +110,10 @@ export class Viewer {
     });
     const scene = { ...terrain, walker, renderer, frame: null, coarse: 0, painting };
     this.scene = scene;
-    if (first) this.options.onFirstScene(walker);
+    if (first) {
+      this.overlay = parseOverlay(location.hash);
+      this.options.onFirstScene(walker);
+    }
     this.hud.showTools();
     this.#showLegend();
     this.drawFrame(); // sky and far ground at once
@@ -244,7 +247,7 @@ export class Viewer {
 
   /** The address of this place. @param {string} paint of what is painted */
   address(paint) {
-    return this.scene ? formatAddress(this.scene.walker, paint) : "";
+    return this.scene ? formatAddress(this.scene.walker, this.overlay, paint) : "";
   }
 
   /** The finest picture of this place as a PNG file, when it is drawn. @returns {Promise<Blob>} */
