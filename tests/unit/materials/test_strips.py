@@ -22,6 +22,13 @@ def test_a_fork_of_roads_is_found():
     assert len(strips.find_strips(clusters(road))) == 1
 
 
+def test_a_road_with_something_lying_across_is_found_whole():
+    road = (np.abs(ROWS - 150) < 7) | ((np.abs(COLUMNS - 90) < 7) & (ROWS < 150))
+    across = (np.abs(COLUMNS - 60) < 4) | (np.abs(ROWS - 80) < 4)
+    (found,) = strips.find_strips(clusters(road & ~across))
+    assert (found & road).sum() > 0.9 * road.sum()
+
+
 @pytest.mark.parametrize(
     "cells",
     [
@@ -30,6 +37,7 @@ def test_a_fork_of_roads_is_found():
         (np.abs(COLUMNS - 100) < 8) & (np.abs(ROWS - 100) < 50),  # short
         np.abs(COLUMNS - 100) < 2,  # a thread
         (COLUMNS // 25) % 2 == 0,  # one of many
+        COLUMNS % 50 < 8,  # the same, far apart
         ((ROWS % 24 < 9) | (COLUMNS % 24 < 9)) & (ROWS > 60),  # a net
         np.zeros((K, K), bool),
     ],

@@ -16,6 +16,7 @@ WIDEST = 0.13  # of the side: wider ground has room for patches
 WIDEST_CLOSED = 0.2  # the same of a strip with its gaps closed: a net, as between stones, fills a wide field
 MOST_VARIATION = 0.32  # standard deviation of the width over its mean
 LEAST_SHARE = 0.5  # of the cells that look like it, that lie in the strip
+LEAST_PIECE = 0.1  # of the cells that look like it, of a piece of a strip that something lies across
 FORK_LENGTH, FORK_VARIATION, FORK_SHARE = 1.5, 0.5, 0.9  # the same of strips that fork: they are wider there
 LEAST_DIFFERENCE = 4.0  # weighed CIELAB units between a strip and what is beside it
 SIDE = 0.25  # of what is beside a strip, that a class has at least if it lies on a side of it
@@ -59,19 +60,30 @@ def _measure_distance(point: Float[Array, "c"], one: Float[Array, "c"], two: Flo
 
 
 def _measure_strip(cluster: Bool[Array, "k k"]) -> list[tuple[float, Bool[Array, "k k"]]]:
-    """The largest piece of a cluster and its share of that, if it is a strip."""
-    from skimage.morphology import skeletonize  # here, not above: it takes half a second to load
-
-    k = len(cluster)
+    """The larger pieces of a cluster, if together they are a strip that something lies across; else the largest, if it
+    is one. With its share of the cluster."""
     own = binary_opening(cluster, np.ones((3, 3), bool))
     pieces, number = label(own)
     if not number:
         return []
-    sizes = np.bincount(pieces.ravel())[1:]
-    piece = pieces == 1 + sizes.argmax()
-    share = float(sizes.max() / own.sum())
-    if share < LEAST_SHARE or sizes.max() < LEAST_LENGTH * LEAST_WIDTH * k * k:
-        return []
+    sizes = np.bincount(pieces.ravel())
+    sizes[0] = 0
+    largest = pieces == sizes.argmax()
+    together = np.isin(pieces, np.flatnonzero(sizes >= LEAST_PIECE * own.sum()))
+    for piece in (together, largest):
+        share = float(piece.sum() / own.sum())
+        if _is_strip(piece, share):
+            return [(share, binary_dilation(piece, iterations=MARGIN))]
+    return []
+
+
+def _is_strip(piece: Bool[Array, "k k"], share: float) -> bool:
+    """Whether cells are long and of constant width. share: of their cluster."""
+    from skimage.morphology import skeletonize  # here, not above: it takes half a second to load
+
+    k = len(piece)
+    if share < LEAST_SHARE or piece.sum() < LEAST_LENGTH * LEAST_WIDTH * k * k:
+        return False
     line = skeletonize(piece)
     inner = distance_transform_edt(np.pad(piece, 1))[1:-1, 1:-1]
     widths = 2 * inner[line]
@@ -79,9 +91,8 @@ def _measure_strip(cluster: Bool[Array, "k k"]) -> list[tuple[float, Bool[Array,
     variation = widths.std() / widths.mean()
     straight = length >= LEAST_LENGTH and variation <= MOST_VARIATION
     forked = length >= FORK_LENGTH and variation <= FORK_VARIATION and share >= FORK_SHARE
-    if not (straight or forked) or width < LEAST_WIDTH or 2 * inner.max() > WIDEST * k:
-        return []
+    if not (straight or forked) or width < LEAST_WIDTH or 2 * float(inner.max()) > WIDEST * k:
+        return False
     closed = binary_closing(np.pad(piece, k), iterations=1 + round(width * k))
-    if 2 * distance_transform_edt(closed).max() > WIDEST_CLOSED * k:
-        return []
-    return [(share, binary_dilation(piece, iterations=MARGIN))]
+    one = label(closed)[1] == 1  # pieces that are farther apart than a strip is wide are not parts of one
+    return one and 2 * float(distance_transform_edt(closed).max()) <= WIDEST_CLOSED * k
