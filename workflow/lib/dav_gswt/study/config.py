@@ -12,15 +12,13 @@ from dav_gswt.config.load import check_config, check_model
 from dav_gswt.config.model import Policy
 from dav_gswt.config.settings import Flight, Heights
 from dav_gswt.errors import InputError
-from dav_gswt.study.config_fits import Comparison, FitProfile, GainBound, Refits, Scale, Seeds
+from dav_gswt.study.config_fits import Comparison, FitProfile, GainBound, Names, PresetCosts, Refits, Scale, Seeds
 from dav_gswt.study.seams import replicates
 from dav_gswt.study.sweeps import grid
 from dav_gswt.study.tables import checks
 from dav_gswt.study.tradeoff import settings
 
 FLOOR = "floor"  # in a pair of the forced-choice study: the same place without a seam
-
-Names = Annotated[list[Name], Field(min_length=1)]
 
 
 class PolicySettings(ConfigModel):
@@ -306,6 +304,7 @@ class StudyConfig(ConfigModel):
     sweeps: dict[Name, Sweep] = key("by name", {})
     tradeoff: Tradeoff | None = key("speed against accuracy", None)
     auto: AutoStudy | None = key("what `auto` is worth", None)
+    preset_costs: PresetCosts | None = key("what presets cost and are worth", None)
     tables: Tables | None = key("the paper's tables and figures", None)
 
 
@@ -325,6 +324,9 @@ def expand_study(config: dict) -> dict:
         _require_names("study.scale.scene", [study["scale"]["scene"]], config["scenes"], "scenes")
         for name in ("field", "preset"):
             _require_names(f"study.scale.{name}", [study["scale"][name]], config["presets"], "presets")
+    if "preset_costs" in study:
+        _require_names("study.preset_costs.scenes", study["preset_costs"]["scenes"], config["scenes"], "scenes")
+        _require_names("study.preset_costs.presets", study["preset_costs"]["presets"], config["presets"], "presets")
     if "refine" in study:
         _check_refinement(study["refine"], config["priors"])
     if "view_benchmark" in study:

@@ -17,8 +17,8 @@ HEAD = """# Config reference
 Made from the models in `workflow/lib/dav_gswt/config/` by `make reference`. The config is closed: a misspelt,
 renamed or out-of-range key stops before the first job with one message. `config/config.yaml` is the experiment,
 `config/scenes/<name>.yaml` one scene each, `config/study.yaml` what the study compares. Lay single keys over them
-on the command line (`snakemake --cores 2 --config rounds=3`), or a file (`--configfile mine.yaml`). A key without a
-default must be given.
+on the command line (`snakemake --cores 2 --config rounds=3`), or a file (`--configfile mine.yaml`). A key whose default
+is *required* must be given; one without any may be left out.
 """
 POLICIES_HEAD = """# Policies
 
@@ -61,6 +61,7 @@ def _describe_key(key: str, field: FieldInfo) -> str:
     values = _describe_type(field.annotation, [*field.metadata])
     unit = f", {extra['unit']}" if "unit" in extra else ""
     default = "" if field.default in (PydanticUndefined, None) else f"`{_plain(field.default)}`"
+    default = "*required*" if field.is_required() else default
     return f"| `{key}` | {field.description or ''} | {values}{unit} | {default} |"
 
 

@@ -56,7 +56,7 @@ def read_sweep(path: Path | str) -> list[dict]:
 
 def sum_times(jobs: dict[str, list[str]]) -> dict:
     """Seconds by job and the largest memory, of benchmarks; None where one of them is not there."""
-    runs = {job: [_read_benchmark(path) for path in paths] for job, paths in jobs.items() if paths}
+    runs = {job: [read_benchmark(path) for path in paths] for job, paths in jobs.items() if paths}
     seconds = {job: sum_or_none(one and one[0] for one in found) for job, found in runs.items()}
     out: dict[str, float | None] = dict.fromkeys(TIMES) | {f"{job}_s": seconds.get(job) for job in ONCE}
     for job in ROUNDS:
@@ -68,7 +68,7 @@ def sum_times(jobs: dict[str, list[str]]) -> dict:
     return out | {"peak_mb": max(memory, default=None)}
 
 
-def _read_benchmark(path: str) -> tuple[float, float | None] | None:
+def read_benchmark(path: str) -> tuple[float, float | None] | None:
     """Seconds and megabytes of a job; memory is None for a job that was over at once."""
     if not Path(path).is_file():
         return None
@@ -83,7 +83,7 @@ def _read_views(path: str, corrected: bool) -> dict:
     about = metrics["provenance"]
     found = {key: metrics[key] for key in ("photos", "gaussians")}
     found |= curves.select_metrics(metrics, "psnr_colour_corrected" if corrected else "psnr")
-    return found | _describe_origin(about) | {"field": about["inputs"]["field"][:12]}
+    return found | describe_origin(about) | {"field": about["inputs"]["field"][:12]}
 
 
 def _read_tiles(path: str) -> dict:
@@ -98,7 +98,7 @@ def _read_tiles(path: str) -> dict:
         "splats": sum(chunk["count"] for chunk in chunks),
         "orders": sum(len(chunk["orders"]) for chunk in chunks),
         "bundle_mb": sum(chunk["bytes"] for chunk in chunks) / MEGA,
-    } | _describe_origin(manifest["provenance"])
+    } | describe_origin(manifest["provenance"])
 
 
 def _read_seams(cell: dict) -> dict:
@@ -107,9 +107,10 @@ def _read_seams(cell: dict) -> dict:
     named = {"seam_lpips": "cut", "seam_lpips_low": "cut_low", "seam_lpips_high": "cut_high"}
     found = {key: row[name] for key, name in (named | {"seam_psnr": "cut_psnr", "seam_jump": "cut_jump"}).items()}
     facts = read_json(cell["facts"])
-    return found | {"seam_density": facts["dense"], "tiles": row["tiles"]} | _describe_origin(facts["provenance"])
+    return found | {"seam_density": facts["dense"], "tiles": row["tiles"]} | describe_origin(facts["provenance"])
 
 
-def _describe_origin(provenance: dict) -> dict:
+def describe_origin(provenance: dict) -> dict:
+    """Version and renderer, as tables write them."""
     renderer = " ".join(str(value) for value in provenance["renderer"].values())
     return {"version": provenance["version"], "renderer": renderer}

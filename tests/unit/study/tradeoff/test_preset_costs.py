@@ -1,0 +1,72 @@
+"""What presets cost and lose, worked by hand, and the page that says so."""
+
+import json
+
+import pytest
+from fixtures.markdown import collapse_spaces
+
+from dav_gswt.study import csv_tables
+from dav_gswt.study.tradeoff import preset_costs
+
+ORIGIN = {"version": "1", "renderer": {"backend": "cpu"}}
+MEASURED = {  # PSNR, LPIPS, seconds of each job, megabytes of the bundle
+    ("sand", "standard"): (30.0, 0.10, 10.0, 20.0),
+    ("sand", "draft"): (29.0, 0.15, 5.0, 8.0),
+    ("rock", "standard"): (26.0, 0.30, 10.0, 30.0),
+    ("rock", "draft"): (26.5, 0.34, 20.0, 10.0),
+}
+
+
+def cell(folder, scene, preset, corrected=False):
+    psnr, lpips, seconds, megabytes = MEASURED[scene, preset]
+    (place := folder / f"{scene}-{preset}").mkdir()
+    mean = {"psnr": psnr, "psnr_colour_corrected": psnr + 1, "ssim": 0.5, "lpips": lpips, "groups": {}}
+    metrics = mean | {"worst_decile": {"psnr": 1.0, "psnr_colour_corrected": 1.0}, "photos": 16, "gaussians": 900}
+    (place / "metrics.json").write_text(json.dumps(metrics | {"provenance": ORIGIN}))
+    chunk = {"bytes": int(megabytes / 2 * 1e6)}
+    (place / "davgswt.json").write_text(json.dumps({"tiles": [{"chunks": [chunk]}], "objects": [{"chunks": [chunk]}]}))
+    times = {}
+    for number, part in enumerate(preset_costs.PARTS):
+        (place / f"{part}.tsv").write_text(f"s\tmax_rss\n{seconds}\t{800.0 + number}\n")
+        times[part] = [str(place / f"{part}.tsv")] * 2
+    files = {"metrics": str(place / "metrics.json"), "manifest": str(place / "davgswt.json")}
+    return {"scene": scene, "preset": preset, "corrected": corrected, "times": times} | files
+
+
+@pytest.fixture
+def rows(tmp_path):
+    return preset_costs.tabulate_presets([cell(tmp_path, *which) for which in MEASURED])
+
+
+def test_a_row_has_the_sum_of_all_jobs_and_chunks(rows):
+    row = rows[0]
+    assert (row["fits_s"], row["views_s"], row["tiles_s"], row["seconds"]) == (20.0, 20.0, 20.0, 60.0)
+    assert (row["bundle_mb"], row["peak_mb"], row["photos"]) == (20.0, 802.0, 16)
+
+
+def test_real_photos_are_compared_after_their_exposure_is_fitted(tmp_path):
+    (row,) = preset_costs.tabulate_presets([cell(tmp_path, "sand", "standard", corrected=True)])
+    assert row["psnr"] == 31.0
+
+
+def test_a_job_that_was_not_timed_leaves_the_sum_unknown(tmp_path):
+    made = cell(tmp_path, "sand", "standard")
+    made["times"]["tiles"] = ["missing.tsv"]
+    (row,) = preset_costs.tabulate_presets([made])
+    assert row["seconds"] is None and row["fits_s"] == 20.0
+
+
+def test_losses_are_to_the_best_preset_of_each_scene(rows):
+    mean = preset_costs.summarise_preset(rows, "draft")
+    # half and twice as long; 1 dB lost and none, .05 and .04 of LPIPS
+    expected = {"share": 1.0, "db": 0.5, "most_db": 1.0, "lpips": 0.045, "most_lpips": 0.05}
+    assert mean == pytest.approx(expected)
+
+
+def test_the_page_has_every_scene_and_survives_the_table(rows, tmp_path):
+    csv_tables.write_table(tmp_path / "t.csv", rows)
+    read = csv_tables.read_table(tmp_path / "t.csv", numbers=preset_costs.NUMBERS)
+    page = collapse_spaces(preset_costs.format_presets(read, 768))
+    assert "| `draft` | 1.00 | 0.50 | 1.00 | 0.045 | 0.050 |" in page
+    assert "## sand" in page and "## rock" in page
+    assert "| `draft` | 120 | 40 | 40 | 40 | 26.50 | 0.500 | 0.340 | 16 | 900 | 802 | 10.0 |" in page

@@ -1,0 +1,103 @@
+"""What presets cost and what they are worth: docs/research/data/preset_costs.csv and docs/research/results/presets.md.
+
+All else is as the config has it: policy, rounds, tiling, materials.
+"""
+
+from itertools import chain
+
+import numpy as np
+
+from dav_gswt.files import read_json
+from dav_gswt.provenance import describe_machine
+from dav_gswt.study.comparison.curves import select_metrics
+from dav_gswt.study.markdown import format_number, format_table
+from dav_gswt.study.statistics import sum_or_none
+from dav_gswt.study.sweeps.tables import MEGA, describe_origin, read_benchmark
+
+PARTS = {"fits": "fits", "views": "scores and choice of views", "tiles": "materials, levels, tiles, bundle"}
+NUMBERS = ("photos", "gaussians", "psnr", "ssim", "lpips", *(f"{part}_s" for part in PARTS), "seconds", "peak_mb")
+NUMBERS += ("bundle_mb", "cores")
+
+
+def tabulate_presets(cells: list[dict]) -> list[dict]:
+    """A row for each scene and preset.
+
+    psnr: of test photos, after their exposure is fitted where they are real. fits_s, views_s, tiles_s: seconds of whole
+    jobs, from the start photos to the bundle; seconds: their sum. peak_mb: the largest memory of any of these jobs.
+    bundle_mb: of all chunks, in megabytes. cells: `scene`, `preset`, `corrected`, the paths `metrics` and `manifest`,
+    and `times`, benchmarks by PARTS.
+    """
+    return [_tabulate_cell(cell) for cell in cells]
+
+
+def _tabulate_cell(cell: dict) -> dict:
+    metrics, manifest = read_json(cell["metrics"]), read_json(cell["manifest"])
+    found = select_metrics(metrics, "psnr_colour_corrected" if cell["corrected"] else "psnr")
+    row = {"scene": cell["scene"], "preset": cell["preset"], "photos": metrics["photos"]}
+    row |= {"gaussians": metrics["gaussians"]} | {key: found[key] for key in ("psnr", "ssim", "lpips")}
+    runs = {part: [read_benchmark(path) for path in cell["times"][part]] for part in PARTS}
+    seconds = {part: sum_or_none(one and one[0] for one in found) for part, found in runs.items()}
+    memory = [one[1] for one in chain.from_iterable(runs.values()) if one and one[1] is not None]
+    chunks = [chunk for piece in manifest["tiles"] + manifest.get("objects", []) for chunk in piece["chunks"]]
+    row |= {f"{part}_s": value for part, value in seconds.items()} | {"seconds": sum_or_none(seconds.values())}
+    row |= {"peak_mb": max(memory, default=None), "bundle_mb": sum(chunk["bytes"] for chunk in chunks) / MEGA}
+    return row | describe_origin(metrics["provenance"]) | describe_machine()
+
+
+def format_presets(rows: list[dict], size: int) -> str:
+    """The page. rows: as `tabulate_presets` has them, NUMBERS as floats. size: of the test photos, pixels."""
+    first, presets = rows[0], list(dict.fromkeys(row["preset"] for row in rows))
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    parts = [
+        "# What presets cost and are worth",
+        "Made by `snakemake preset_costs` from `docs/research/data/preset_costs.csv`; do not edit. "
+        f"Version {first['version']}, renderer {first['renderer']}, on {first['cores']:.0f} cores of "
+        f"{first['processor']}. All else is as the config has it: two rounds of four photos, materials, tiles. PSNR, "
+        f"SSIM and LPIPS are of test photos of {size} pixels (of their own size where that is less), whatever size a "
+        "preset fits; real photos after their exposure is fitted. Seconds are of whole jobs, from the start photos to "
+        "the bundle: placing or rendering photos and the stills are not in them. One seed.",
+        "## All scenes",
+        "Seconds as a share of those of `standard`, the geometric mean; losses to the scene's best preset, the mean "
+        "and the largest.",
+        format_table(*_tabulate_means(rows, presets)),
+    ]
+    for scene in scenes:
+        parts += [f"## {scene}", format_table(*_tabulate_scene([row for row in rows if row["scene"] == scene]))]
+    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+
+
+def summarise_preset(rows: list[dict], preset: str) -> dict:
+    """Seconds of a preset as a share of those of `standard`, and what it loses: means over the scenes, and the most."""
+    share, db, lpips = [], [], []
+    for own in (row for row in rows if row["preset"] == preset):
+        mine = {row["preset"]: row for row in rows if row["scene"] == own["scene"]}
+        share.append(own["seconds"] / mine["standard"]["seconds"])
+        db.append(max(row["psnr"] for row in mine.values()) - own["psnr"])
+        lpips.append(own["lpips"] - min(row["lpips"] for row in mine.values()))
+    return {
+        "share": float(np.exp(np.log(share).mean())),
+        "db": float(np.mean(db)),
+        "most_db": max(db),
+        "lpips": float(np.mean(lpips)),
+        "most_lpips": max(lpips),
+    }
+
+
+def _tabulate_means(rows: list[dict], presets: list[str]) -> tuple[list[str], list[list[str]]]:
+    head = ["preset", "seconds", "loss of PSNR (dB)", "at most", "of LPIPS", "at most"]
+    found = []
+    for preset in presets:
+        mean = summarise_preset(rows, preset)
+        losses = [(mean[key], 2) for key in ("db", "most_db")] + [(mean[key], 3) for key in ("lpips", "most_lpips")]
+        found.append([f"`{preset}`", f"{mean['share']:.2f}", *(format_number(*loss) for loss in losses)])
+    return head, found
+
+
+def _tabulate_scene(rows: list[dict]) -> tuple[list[str], list[list[str]]]:
+    form = {"seconds": 0, **{f"{part}_s": 0 for part in PARTS}, "psnr": 2, "ssim": 3, "lpips": 3, "photos": 0}
+    form |= {"gaussians": 0, "peak_mb": 0, "bundle_mb": 1}
+    head = ["preset", "seconds", *PARTS.values(), "PSNR (dB)", "SSIM", "LPIPS", "photos", "Gaussians"]
+    head += ["memory (MB)", "bundle (MB)"]
+    return head, [
+        [f"`{row['preset']}`", *(format_number(row[key], digits) for key, digits in form.items())] for row in rows
+    ]
