@@ -1,11 +1,17 @@
 """How visibly a terrain repeats, from pictures whose repetition is known."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from fixtures import land_covers
 from scipy.ndimage import gaussian_filter
 
+from dav_gswt.bundle import store
 from dav_gswt.study.terrain import lattice
+from dav_gswt.terrain import endless
 
+SCHEMA = Path(__file__).parents[4] / "workflow/schemas/davgswt.schema.json"
 PIXELS, TILES = 32, 12
 
 
@@ -55,3 +61,13 @@ def test_patches_wider_than_tiles_are_no_lattice():
 def test_a_picture_of_one_colour_has_none(value):
     found = lattice.measure_lattice(np.full((TILES * PIXELS, TILES * PIXELS, 3), value), PIXELS)
     assert found == lattice.LatticeMeasures(0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def test_a_material_alone_lies_everywhere_without_objects(tmp_path):
+    land_covers.write_cover_bundle(tmp_path / "cover", SCHEMA)
+    terrain = endless.terrain_from_bundle(store.read_bundle(tmp_path / "cover", SCHEMA), {"kind": "flat"})
+    for number, colour in enumerate((land_covers.SAND, land_covers.GRASS)):
+        alone = lattice.take_material(terrain, number)
+        picture = lattice.render_from_above(alone, 0, tiles=6, pixels=16)
+        assert np.abs(picture.mean((0, 1)) - colour).max() < 0.05
+        assert (alone.tiles_each, len(alone.tile_orders), alone.scatter) == (16, 16, None)

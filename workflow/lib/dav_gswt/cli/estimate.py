@@ -18,7 +18,7 @@ LONG = 600.0  # seconds: a run that takes longer is told of a faster preset
 PER_JOB = 1.6  # seconds to start a job: Snakemake, Python, imports
 PHOTO_SHAPE = 0.75  # height over width
 SH_COST = {0: 1.0, 1: 1.6, 2: 2.2, 3: 3.0, "auto": 1.15}  # of a step, by the degree of the spherical harmonics
-FAMILY_COST = {"oasis": 1.6}  # of rendering a photo: stones, plants and sand are one scene
+FAMILY_COST = {"flowers": 3.5, "grass": 4.0, "oasis": 1.8}  # of rendering a photo: of many plants
 PER_PIXEL = 2.5  # Gaussians that a fit ends with, at most, for each pixel of a photo
 
 
@@ -114,14 +114,14 @@ COSTS: dict[str, Callable[[Work], Cost]] = {
     "update_field": lambda work: Cost(
         1.2 + work.observation_seconds * work.mean_photos, work.step_seconds * work.update_steps
     ),
-    "select_poses": lambda work: Cost(1.2 + 0.0005 * work.candidates + 0.8 * work.field_size),
+    "select_poses": lambda work: Cost(0.6 + 0.0005 * work.candidates + 0.3 * work.field_size),
     "report_photos": lambda work: Cost(1.0 + 0.055 * work.total),
     "inpaint_field": lambda work: Cost(15.0),
-    "find_materials": lambda work: Cost(8.0 + 2.3 * work.field_size),
-    "make_levels": lambda work: Cost(0.7, 1.4 * (0.5 + work.level_steps / 120) * (0.5 + 0.5 * work.field_size)),
-    "cut_tiles": lambda work: Cost(1.2 + 2.3 * work.field_size),
-    "bundle_tiles": lambda work: Cost(12.0 + 1.3 * work.field_size),
-    "render_terrain": lambda work: Cost(26.0, 5e-7 * work.still_pixels),
+    "find_materials": lambda work: Cost(2.0 + 8.0 * work.field_size),
+    "make_levels": lambda work: Cost(0.7, 3.2 * (0.5 + work.level_steps / 120) * work.field_size),
+    "cut_tiles": lambda work: Cost(3.0 + 6.0 * work.field_size),
+    "bundle_tiles": lambda work: Cost(4.0 + 3.5 * work.field_size),
+    "render_terrain": lambda work: Cost(21.0, 5e-7 * work.still_pixels),
 }
 
 

@@ -9,7 +9,7 @@
 Brightness is that of the picture without what is wider than the lattice: patches of materials are no repetition.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32
@@ -57,6 +57,16 @@ def render_from_above(
         camera = cameras.top_down(terrain.side, terrain.side, tiles * pixels, rows * pixels, step, top)
         strips.append(render(field, camera).colour)
     return np.concatenate(strips[::-1])
+
+
+def take_material(terrain: EndlessTerrain, number: int) -> EndlessTerrain:
+    """A terrain of one material's tiles alone, everywhere and without objects: borders and patches of several hide a
+    lattice from the measures."""
+    each = terrain.tiles_each
+    first, last = number * each, (number + 1) * each
+    tiles = {(level, tile - first): field for (level, tile), field in terrain.tiles.items() if first <= tile < last}
+    orders = terrain.tile_orders[first:last]
+    return replace(terrain, tiles=tiles, tile_orders=orders, classes=None, objects=[], extents=[], scatter=None)
 
 
 def choose_level(terrain: EndlessTerrain, pixels: int = PIXELS) -> int:
