@@ -18,7 +18,7 @@ LONG = 600.0  # seconds: a run that takes longer is told of a faster preset
 PER_JOB = 1.6  # seconds to start a job: Snakemake, Python, imports
 PHOTO_SHAPE = 0.75  # height over width
 SH_COST = {0: 1.0, 1: 1.6, 2: 2.2, 3: 3.0, "auto": 1.15}  # of a step, by the degree of the spherical harmonics
-FAMILY_COST = {"flowers": 3.5, "grass": 4.0, "oasis": 1.8}  # of rendering a photo: of many plants
+FAMILY_COST = {"flowers": 3.5, "grass": 4.0, "meadow": 1.5, "oasis": 1.8}  # of rendering a photo: of many plants
 PER_PIXEL = 2.5  # Gaussians that a fit ends with, at most, for each pixel of a photo
 
 
