@@ -114,14 +114,14 @@ COSTS: dict[str, Callable[[Work], Cost]] = {
     "update_field": lambda work: Cost(
         1.2 + work.observation_seconds * work.mean_photos, work.step_seconds * work.update_steps
     ),
-    "select_poses": lambda work: Cost(0.6 + 0.0005 * work.candidates + 0.3 * work.field_size),
+    "select_poses": lambda work: Cost(1.2 + 0.0005 * work.candidates + 0.8 * work.field_size),
     "report_photos": lambda work: Cost(1.0 + 0.055 * work.total),
     "inpaint_field": lambda work: Cost(15.0),
-    "find_materials": lambda work: Cost(3.0 + 4.5 * work.field_size),
+    "find_materials": lambda work: Cost(8.0 + 2.3 * work.field_size),
     "make_levels": lambda work: Cost(0.7, 1.4 * (0.5 + work.level_steps / 120) * (0.5 + 0.5 * work.field_size)),
-    "cut_tiles": lambda work: Cost(2.5 + 4.0 * work.field_size),
-    "bundle_tiles": lambda work: Cost(1.5 + 4.2 * work.field_size),
-    "render_terrain": lambda work: Cost(19.0, 5e-7 * work.still_pixels),
+    "cut_tiles": lambda work: Cost(1.2 + 2.3 * work.field_size),
+    "bundle_tiles": lambda work: Cost(12.0 + 1.3 * work.field_size),
+    "render_terrain": lambda work: Cost(26.0, 5e-7 * work.still_pixels),
 }
 
 
