@@ -61,7 +61,7 @@ def benchmark_experiments():
     asked, cells = STUDY["view_benchmark"], []
     for group in asked["sets"]:
         for scene, policy, seed, k in product(
-            group["scenes"], group.get("policies", asked["policies"]), asked["seeds"], group["k"]
+            group["scenes"], group.get("policies", asked["policies"]), group.get("seeds", asked["seeds"]), group["k"]
         ):
             policy = {"policy": policy} if isinstance(policy, str) else policy
             if policy["policy"] != "all" or k == group["k"][0]:  # all of the pool is one round, whatever k is

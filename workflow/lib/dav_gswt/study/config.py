@@ -131,6 +131,7 @@ class PolicySet(ConfigModel):
     k: list[Annotated[int, Field(ge=1, le=1000)]] = key("photos a round", min_length=1)
     photos: int = key("photos that each experiment ends with", ge=3, le=100_000)
     policies: Policies | None = key("instead of those above", None)
+    seeds: Seeds | None = key("instead of those above", None)
 
 
 class ViewBenchmark(ConfigModel):
