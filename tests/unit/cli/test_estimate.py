@@ -3,12 +3,15 @@
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from fixtures.configs import ROOT, checked_config
 
 from dav_gswt.cli import estimate
 from dav_gswt.cli.estimate import COSTS, PER_JOB, describe_estimate, describe_work, estimate_seconds, format_duration
 from dav_gswt.cli.machine_speed import MachineSpeed, measure_speed, share_cores
+from dav_gswt.config.base import LARGEST_SIDE
+from dav_gswt.images.image_files import write_png
 
 SAME = MachineSpeed()
 JOBS = {"render_photos": 1, "fit_coarse": 1, "update_field": 2, "score_coarse": 1, "score_round": 2, "capture_views": 2}
@@ -63,6 +66,19 @@ def test_photos_of_a_folder_are_counted(config, tmp_path):
     work = describe_work(config | {"scene": "mine"})
     assert (work.total, work.start, work.tests, work.rendered) == (2, 2, 1, False)
     assert describe_work(config | {"scene": "mine", "policy": "w2-lpips"}).samples == 5 * 8
+
+
+def test_photos_are_no_larger_than_they_are(config, tmp_path):
+    write_png(tmp_path / "a.png", np.zeros((48, 64, 3)))
+    config["scenes"]["mine"] = config["scenes"]["copr_dunes"] | {"folder": str(tmp_path), "size": LARGEST_SIDE}
+    config["presets"]["native"] = config["presets"]["draft"] | {"size": LARGEST_SIDE}
+    work = describe_work(config | {"scene": "mine"}, "native")
+    assert work.photo_pixels == work.fit_pixels == 48 * 64
+
+
+def test_a_photo_that_cannot_be_read_stops_no_estimate(config, tmp_path):
+    (tmp_path / "a.jpg").touch()
+    assert estimate.measure_photos({"kind": "photos", "folder": str(tmp_path)}) == LARGEST_SIDE
 
 
 def test_a_finished_field_has_an_estimate_too(config):

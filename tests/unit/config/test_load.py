@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from dav_gswt.config.base import LARGEST_SIDE
 from dav_gswt.config.load import add_scene_files, check_config, parse_command_line, read_config
 from dav_gswt.errors import InputError
 
@@ -47,6 +48,12 @@ def test_a_checked_config_stays_the_same_when_it_is_checked_again(config):
     assert check_config(checked) == checked
 
 
+def test_native_photos_are_those_of_any_size(config):
+    native = changed(changed(config, ["scenes", "copr_dunes", "size"], "native"), ["presets", "draft", "size"], "native")
+    checked = check_config(native)
+    assert checked["scenes"]["copr_dunes"]["size"] == checked["presets"]["draft"]["size"] == LARGEST_SIDE
+
+
 @pytest.mark.parametrize(
     "keys, value, message",
     [
@@ -65,6 +72,8 @@ def test_a_checked_config_stays_the_same_when_it_is_checked_again(config):
             ["export"], {"axes": "y-down", "formats": ["usd"]}, "export: .*a USD stage has y or z up", id="down"
         ),
         pytest.param(["presets", "draft", "spacing"], 0, "presets.draft.spacing", id="discs without a distance"),
+        pytest.param(["presets", "draft", "size"], "own", "presets.draft.size: .*or input should be 'native'", id="a word"),
+        pytest.param(["scenes", "copr_dunes", "size"], 20_000, "less than or equal to 16384", id="too large a photo"),
         pytest.param(["stop", "photo"], 20, "stop: there is no key 'photo'; is 'photos' meant", id="a typo in a stop"),
         pytest.param(["stop", "photos"], 2, "stop.photos", id="fewer photos than any start"),
         pytest.param(["stop", "photos"], 20.5, "stop.photos", id="half a photo"),

@@ -11,6 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from dav_gswt.cli.machine_speed import MachineSpeed
+from dav_gswt.config.base import LARGEST_SIDE
+from dav_gswt.errors import InputError
+from dav_gswt.images.image_files import read_size
 from dav_gswt.reconstruction.fitting import plan
 from dav_gswt.views.policy_names import PRIOR_POLICIES
 
@@ -139,7 +142,7 @@ def describe_work(config: Mapping[str, Any], preset: str | None = None) -> Work:
     scene, chosen = config["scenes"][config["scene"]], config["presets"]
     entry = chosen[preset or scene.get("preset")]
     photographed = scene["kind"] != "field"
-    photos, size = count_photos(scene), scene.get("size", entry["size"])
+    photos, size = count_photos(scene), min(scene.get("size", entry["size"]), measure_photos(scene))
     shape = PHOTO_SHAPE if scene["kind"] == "photos" else 1.0
     seen = min(size, entry["size"])
     most = plan.MAX_GAUSSIANS if entry["max_gaussians"] == "auto" else entry["max_gaussians"]
@@ -173,10 +176,24 @@ def count_photos(scene: Mapping[str, Any]) -> int:
     """Photos of a scene: those that are rendered, or the files in its folder (0 where it is missing)."""
     if scene["kind"] == "synthetic":
         return scene["photos"]
+    return len(_list_files(scene))
+
+
+def measure_photos(scene: Mapping[str, Any]) -> int:
+    """The longer side of a folder's first photo, pixels; LARGEST_SIDE where there is none that can be read."""
+    for path in _list_files(scene)[:1]:
+        try:
+            return max(read_size(path))
+        except InputError:  # the run itself tells of it
+            break
+    return LARGEST_SIDE
+
+
+def _list_files(scene: Mapping[str, Any]) -> list[Path]:
     folder = Path(scene.get("folder", ""))
-    if scene["kind"] == "field" or not folder.is_dir():
-        return 0
-    return sum(path.is_file() and not path.name.startswith(".") for path in folder.iterdir())
+    if scene["kind"] != "photos" or not folder.is_dir():
+        return []
+    return sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
 
 
 def describe_estimate(config: Mapping[str, Any], jobs: Mapping[str, int], speed: MachineSpeed) -> str:

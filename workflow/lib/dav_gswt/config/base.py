@@ -30,6 +30,18 @@ Degrees = Annotated[float, Field(ge=-360, le=360)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Auto = Literal["auto"]
 
+LARGEST_SIDE = 16_384  # pixels of a photo
+
+
+def _replace_native(size: int | str) -> int:
+    return LARGEST_SIDE if isinstance(size, str) else size
+
+
+# the longer side of photos, which are never enlarged; `native`: as they are
+PhotoSize = Annotated[
+    Annotated[int, Field(ge=32, le=LARGEST_SIDE)] | Literal["native"], AfterValidator(_replace_native)
+]
+
 
 def key(description: str, default: Any = ..., *, unit: str = "", renamed: str = "", **bounds) -> Any:
     """A key of a table: meaning, default, unit and bounds; `renamed`: its name in old config files."""

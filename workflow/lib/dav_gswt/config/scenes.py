@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from dav_gswt.config.base import ConfigModel, Degrees, Name, Seed, Share, Text, key
+from dav_gswt.config.base import ConfigModel, Degrees, Name, PhotoSize, Seed, Share, Text, key
 
 Range = Annotated[tuple[float, float], Field(description="lowest and highest", strict=False)]
 Radius = Annotated[float, Field(ge=0.05, le=20)]
@@ -176,7 +176,7 @@ class PhotoScene(_PhotographedScene):
         "known cameras: a COLMAP folder, `transforms.json` (nerfstudio) or `reconstruction.json` (OpenSfM)",
         None,
     )
-    size: int = key("longer side of the undistorted photos; never enlarged", unit="pixels", ge=64, le=16_384)
+    size: PhotoSize = key("longer side of undistorted photos, or `native`: their own; none is enlarged", unit="pixels")
     start: int = key(
         "photos to start from, or all that are left: test photos are set aside first, one in ten of all and at least "
         "two (none of fewer than six). With `agent: replay` the remaining photos are the pool that rounds choose from",
@@ -202,8 +202,8 @@ class PhotoScene(_PhotographedScene):
     materials: Materials = _materials("auto")
     masks: Text | None = key("a folder of masks named as the photos: black pixels are not ground", None)
     agent: Literal["replay", "serial", "plan", "handheld"] = key(
-        "who takes further photos: `replay` takes the nearest unused photo of the folder; `serial` is a camera rig, "
-        "`plan` a drone, `handheld` a person"
+        "who takes further photos: `replay` takes them from the photos of the folder that are left; `serial` is a "
+        "camera rig, `plan` a drone, `handheld` a person"
     )
     candidates: int = key("poses that a device may be asked for", 250, ge=1, le=10_000)
     rig: SerialRig | None = key("the camera rig of `agent: serial`", None)

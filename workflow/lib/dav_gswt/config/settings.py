@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, StringConstraints, model_validator
 
-from dav_gswt.config.base import Auto, ConfigModel, Seed, Share, Text, key
+from dav_gswt.config.base import Auto, ConfigModel, PhotoSize, Seed, Share, Text, key
 
 Colour = Annotated[str, StringConstraints(pattern="^#[0-9a-fA-F]{6}$")]
 
@@ -137,7 +137,7 @@ class Flight(ConfigModel):
 class Preset(ConfigModel):
     """How much a fit may spend. `auto` asks the scene; fit.json says what was chosen and why."""
 
-    size: int = key("longer side of the photos that the fit sees", unit="pixels", ge=32, le=4096)
+    size: PhotoSize = key("longer side of the photos that the fit sees, or `native`: the scene's", unit="pixels")
     spacing: float = key("of the ground's discs, in sizes of a photo's pixel on the ground", ge=0.5, le=16)
     max_gaussians: Annotated[int, Field(ge=1000, le=8_000_000)] | Auto = key(
         "most Gaussians in the field", renamed="cap"

@@ -16,8 +16,8 @@ class PolicySpec:
 
     name: as in the config and in paths; small letters, digits and -. chooses: which poses, in words.
     reads_prior: scores by a prior.
-    needs_field: the field itself. The policy gets an `InformationGain` object (views/coverage.py) as
-    `SelectionInput.information`; for others that is None.
+    needs_field: the field itself. The policy gets an `InformationGain` (views/policies.py; directional coverage is one)
+    as `SelectionInput.information`; for others that is None.
     needs_photos: the photos so far, for that object. needs_truth: true pictures of candidates, likewise (oracles).
     fixed_zero: of the prior's settings (p_drop, lam), those that have no effect and are 0 in paths.
     Raises: ValueError: another character in the name.

@@ -1,0 +1,84 @@
+"""What counts as a change of the code that a script runs."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from dav_gswt import code_digest
+from dav_gswt.code_digest import LIBRARY, digest_code, remove_prose
+
+DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+
+
+def dump_without_docstrings(source: str) -> str:
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+            node.body.pop(0)
+    return ast.dump(tree)
+
+
+def test_nothing_but_prose_is_removed():
+    sources = {file: file.read_text(encoding="utf-8") for file in sorted(LIBRARY.rglob("*.py"))}
+    kept = {file: remove_prose(source) for file, source in sources.items()}
+    assert not [f for f in sources if dump_without_docstrings(kept[f]) != dump_without_docstrings(sources[f])]
+    assert not [
+        file
+        for file in kept
+        for n in ast.walk(ast.parse(kept[file]))
+        if isinstance(n, DOCUMENTED) and ast.get_docstring(n)
+    ]
+
+
+@pytest.mark.parametrize(
+    "one, other, same",
+    [
+        pytest.param(
+            '"""a"""\nx = 1\n', '"""b\n\nc"""\n\n\nx = 1  # d\n', True, id="a module's docstring and a comment"
+        ),
+        pytest.param('def f():\n    """a"""\n', 'def f():\n    """b"""\n', True, id="a function's docstring"),
+        pytest.param("x = 1\n", "x = 2\n", False, id="a number"),
+        pytest.param('x = "#a"\n', 'x = "#b"\n', False, id="a string with the sign of a comment"),
+        pytest.param('x = """a"""\n', 'x = """b"""\n', False, id="a long string"),
+        pytest.param('x = """\n"""\ny = 1\n', 'x = """\n"""\ny = 2\n', False, id="code after a long string"),
+        pytest.param('f("""a""",\n"""b""")\n', 'f("""a""",\n"""c""")\n', False, id="an argument on a line of its own"),
+        pytest.param('x = "\\""  # a\n', 'x = "\\""  # b\n', True, id="a comment after an escaped quote"),
+        pytest.param("x = '''a\n\nb'''\n", "x = '''a\nb'''\n", False, id="blank lines in a string"),
+        pytest.param("if a:\n    b()\n", "if a:\n  pass\nb()\n", False, id="indentation"),
+    ],
+)
+def test_what_a_program_does_counts_and_what_it_says_does_not(one, other, same):
+    assert (remove_prose(one) == remove_prose(other)) == same
+
+
+@pytest.fixture
+def library(tmp_path, monkeypatch) -> Path:
+    """A library of two modules, of which a script imports one, which imports the other."""
+    (tmp_path / "__init__.py").write_text("")
+    (tmp_path / "near.py").write_text("from dav_gswt.far import f\n")
+    (tmp_path / "far.py").write_text('def f():\n    """Before."""\n    return 1\n')
+    (tmp_path / "script.py").write_text("from dav_gswt.near import f\n")
+    monkeypatch.setattr(code_digest, "LIBRARY", tmp_path)
+    return tmp_path
+
+
+def digest_afresh(script: Path) -> str:
+    for cached in (digest_code, code_digest._imported_modules, code_digest._read_code, code_digest._file_of):
+        cached.cache_clear()
+    return digest_code(script)
+
+
+def test_a_change_of_what_an_import_imports_counts(library):
+    before = digest_afresh(library / "script.py")
+    (library / "far.py").write_text('def f():\n    """After."""\n    return 1  # one\n')
+    assert digest_afresh(library / "script.py") == before
+    (library / "far.py").write_text("def f():\n    return 2\n")
+    assert digest_afresh(library / "script.py") != before
+
+
+@pytest.fixture(autouse=True)
+def forget():
+    """Digests of made-up libraries are no other test's."""
+    yield
+    digest_afresh(Path(__file__))
