@@ -8,7 +8,9 @@ docs/research/results/presets.md. Seconds differ from machine to machine: one th
 rule gather_preset_costs:
     """A row for each scene and preset, and the page."""
     input:
-        measured=lambda wildcards: [cell[key] for cell in preset_experiments() for key in ("metrics", "manifest")],
+        measured=lambda wildcards: [
+            cell[key] for cell in preset_experiments() for key in ("metrics", "manifest", "images")
+        ],
     output:
         table="docs/research/data/preset_costs.csv",
         page="docs/research/results/presets.md",

@@ -49,7 +49,9 @@ def test_a_checked_config_stays_the_same_when_it_is_checked_again(config):
 
 
 def test_native_photos_are_those_of_any_size(config):
-    native = changed(changed(config, ["scenes", "copr_dunes", "size"], "native"), ["presets", "draft", "size"], "native")
+    native = changed(
+        changed(config, ["scenes", "copr_dunes", "size"], "native"), ["presets", "draft", "size"], "native"
+    )
     checked = check_config(native)
     assert checked["scenes"]["copr_dunes"]["size"] == checked["presets"]["draft"]["size"] == LARGEST_SIDE
 
@@ -72,7 +74,9 @@ def test_native_photos_are_those_of_any_size(config):
             ["export"], {"axes": "y-down", "formats": ["usd"]}, "export: .*a USD stage has y or z up", id="down"
         ),
         pytest.param(["presets", "draft", "spacing"], 0, "presets.draft.spacing", id="discs without a distance"),
-        pytest.param(["presets", "draft", "size"], "own", "presets.draft.size: .*or input should be 'native'", id="a word"),
+        pytest.param(
+            ["presets", "draft", "size"], "own", "presets.draft.size: .*or input should be 'native'", id="a word"
+        ),
         pytest.param(["scenes", "copr_dunes", "size"], 20_000, "less than or equal to 16384", id="too large a photo"),
         pytest.param(["stop", "photo"], 20, "stop: there is no key 'photo'; is 'photos' meant", id="a typo in a stop"),
         pytest.param(["stop", "photos"], 2, "stop.photos", id="fewer photos than any start"),

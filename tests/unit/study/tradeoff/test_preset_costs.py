@@ -2,9 +2,12 @@
 
 import json
 
+import numpy as np
 import pytest
 from fixtures.markdown import collapse_spaces
 
+from dav_gswt.cli import forecast
+from dav_gswt.images.image_files import write_png
 from dav_gswt.study import csv_tables
 from dav_gswt.study.tradeoff import preset_costs
 
@@ -25,17 +28,20 @@ def cell(folder, scene, preset, corrected=False):
     (place / "metrics.json").write_text(json.dumps(metrics | {"provenance": ORIGIN}))
     chunk = {"bytes": int(megabytes / 2 * 1e6)}
     (place / "davgswt.json").write_text(json.dumps({"tiles": [{"chunks": [chunk]}], "objects": [{"chunks": [chunk]}]}))
+    (place / "images").mkdir()
+    write_png(place / "images/a.png", np.indices((64, 64)).sum(0)[..., None] % 2 * np.ones(3))
     times = {}
     for number, part in enumerate(preset_costs.PARTS):
         (place / f"{part}.tsv").write_text(f"s\tmax_rss\n{seconds}\t{800.0 + number}\n")
         times[part] = [str(place / f"{part}.tsv")] * 2
     files = {"metrics": str(place / "metrics.json"), "manifest": str(place / "davgswt.json")}
+    files |= {"images": str(place / "images"), "fitted": 32 if preset == "draft" else 64, "estimated": 50.0}
     return {"scene": scene, "preset": preset, "corrected": corrected, "times": times} | files
 
 
 @pytest.fixture
 def rows(tmp_path):
-    return preset_costs.tabulate_presets([cell(tmp_path, *which) for which in MEASURED])
+    return preset_costs.tabulate_presets([cell(tmp_path, *which) for which in MEASURED], 768)
 
 
 def test_a_row_has_the_sum_of_all_jobs_and_chunks(rows):
@@ -45,15 +51,19 @@ def test_a_row_has_the_sum_of_all_jobs_and_chunks(rows):
 
 
 def test_real_photos_are_compared_after_their_exposure_is_fitted(tmp_path):
-    (row,) = preset_costs.tabulate_presets([cell(tmp_path, "sand", "standard", corrected=True)])
+    (row,) = preset_costs.tabulate_presets([cell(tmp_path, "sand", "standard", corrected=True)], 768)
     assert row["psnr"] == 31.0
 
 
 def test_a_job_that_was_not_timed_leaves_the_sum_unknown(tmp_path):
     made = cell(tmp_path, "sand", "standard")
     made["times"]["tiles"] = ["missing.tsv"]
-    (row,) = preset_costs.tabulate_presets([made])
+    (row,) = preset_costs.tabulate_presets([made], 768)
     assert row["seconds"] is None and row["fits_s"] == 20.0
+
+
+def test_what_photos_lose_by_the_size_of_a_preset_is_in_the_table(rows):
+    assert {row["preset"]: row["shrinking"] for row in rows} == {"standard": 0.0, "draft": pytest.approx(0.25)}
 
 
 def test_losses_are_to_the_best_preset_of_each_scene(rows):
@@ -66,7 +76,12 @@ def test_losses_are_to_the_best_preset_of_each_scene(rows):
 def test_the_page_has_every_scene_and_survives_the_table(rows, tmp_path):
     csv_tables.write_table(tmp_path / "t.csv", rows)
     read = csv_tables.read_table(tmp_path / "t.csv", numbers=preset_costs.NUMBERS)
-    page = collapse_spaces(preset_costs.format_presets(read, 768))
+    page = collapse_spaces(preset_costs.format_presets(read, 768, tmp_path / "t.csv"))
     assert "| `draft` | 1.00 | 0.50 | 1.00 | 0.045 | 0.050 |" in page
     assert "## sand" in page and "## rock" in page
+    losses = {
+        (each.scene, each.preset): each.loss for each in forecast.leave_one_out(forecast.read_front(tmp_path / "t.csv"))
+    }
+    assert f"| sand | `draft` | {losses['sand', 'draft']:.2f} (1.00) |" in page
+    assert "| 0.040 (0.050) | 50 (30) |" in page
     assert "| `draft` | 120 | 40 | 40 | 40 | 26.50 | 0.500 | 0.340 | 16 | 900 | 802 | 10.0 |" in page

@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from dav_gswt.cli import export
+from dav_gswt.cli import advise, export
 from dav_gswt.errors import InputError
 from dav_gswt.inspect import command as inspect
 
@@ -14,6 +14,7 @@ def main(arguments: list[str] | None = None) -> int:
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     inspect.add_command(commands)
     export.add_command(commands)
+    advise.add_command(commands)
     options = parser.parse_args(arguments)
     try:
         return options.run(options)

@@ -4,10 +4,13 @@ All else is as the config has it: policy, rounds, tiling, materials.
 """
 
 from itertools import chain
+from pathlib import Path
 
 import numpy as np
 
+from dav_gswt.cli.forecast import Measured, leave_one_out, measure_shrinking, read_front
 from dav_gswt.files import read_json
+from dav_gswt.images.image_files import list_photos
 from dav_gswt.provenance import describe_machine
 from dav_gswt.study.comparison.curves import select_metrics
 from dav_gswt.study.markdown import format_number, format_table
@@ -16,21 +19,23 @@ from dav_gswt.study.sweeps.tables import MEGA, describe_origin, read_benchmark
 
 PARTS = {"fits": "fits", "views": "scores and choice of views", "tiles": "materials, levels, tiles, bundle"}
 NUMBERS = ("photos", "gaussians", "psnr", "ssim", "lpips", *(f"{part}_s" for part in PARTS), "seconds", "peak_mb")
-NUMBERS += ("bundle_mb", "cores")
+NUMBERS += ("bundle_mb", "cores", "size", "shrinking", "estimated")
 
 
-def tabulate_presets(cells: list[dict]) -> list[dict]:
+def tabulate_presets(cells: list[dict], size: int) -> list[dict]:
     """A row for each scene and preset.
 
     psnr: of test photos, after their exposure is fitted where they are real. fits_s, views_s, tiles_s: seconds of whole
     jobs, from the start photos to the bundle; seconds: their sum. peak_mb: the largest memory of any of these jobs.
-    bundle_mb: of all chunks, in megabytes. cells: `scene`, `preset`, `corrected`, the paths `metrics` and `manifest`,
-    and `times`, benchmarks by PARTS.
+    bundle_mb: of all chunks, in megabytes. size: of the test photos, at most. shrinking: what photos lose by the
+    preset's size (`cli.forecast`). estimated: seconds that `make run` expects of these jobs.
+    cells: `scene`, `preset`, `corrected`, `fitted` (the preset's size), `estimated`, the paths `metrics`, `manifest`
+    and `images`, and `times`, benchmarks by PARTS.
     """
-    return [_tabulate_cell(cell) for cell in cells]
+    return [_tabulate_cell(cell, size) for cell in cells]
 
 
-def _tabulate_cell(cell: dict) -> dict:
+def _tabulate_cell(cell: dict, size: int) -> dict:
     metrics, manifest = read_json(cell["metrics"]), read_json(cell["manifest"])
     found = select_metrics(metrics, "psnr_colour_corrected" if cell["corrected"] else "psnr")
     row = {"scene": cell["scene"], "preset": cell["preset"], "photos": metrics["photos"]}
@@ -41,11 +46,13 @@ def _tabulate_cell(cell: dict) -> dict:
     chunks = [chunk for piece in manifest["tiles"] + manifest.get("objects", []) for chunk in piece["chunks"]]
     row |= {f"{part}_s": value for part, value in seconds.items()} | {"seconds": sum_or_none(seconds.values())}
     row |= {"peak_mb": max(memory, default=None), "bundle_mb": sum(chunk["bytes"] for chunk in chunks) / MEGA}
+    lost = measure_shrinking(list_photos(cell["images"]), [cell["fitted"]], size)[cell["fitted"]]
+    row |= {"size": size, "shrinking": lost, "estimated": cell["estimated"]}
     return row | describe_origin(metrics["provenance"]) | describe_machine()
 
 
-def format_presets(rows: list[dict], size: int) -> str:
-    """The page. rows: as `tabulate_presets` has them, NUMBERS as floats. size: of the test photos, pixels."""
+def format_presets(rows: list[dict], size: int, table: Path) -> str:
+    """The page. rows: as `tabulate_presets` has them, NUMBERS as floats. size: of the test photos. table: the file."""
     first, presets = rows[0], list(dict.fromkeys(row["preset"] for row in rows))
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     parts = [
@@ -61,6 +68,14 @@ def format_presets(rows: list[dict], size: int) -> str:
         "and the largest.",
         format_table(*_tabulate_means(rows, presets)),
     ]
+    if len(scenes) > 1:
+        parts += [
+            "## Forecasts, each scene left out",
+            "What `dav-gswt advise` says of a scene from the others, before a run of it and after one with `draft`: dB "
+            "under its best preset, and LPIPS over it, with what was measured in brackets. Seconds: what `make run` "
+            "expects of these jobs on the reference machine, and what they took.",
+            format_table(*_tabulate_forecasts(rows, read_front(table))),
+        ]
     for scene in scenes:
         parts += [f"## {scene}", format_table(*_tabulate_scene([row for row in rows if row["scene"] == scene]))]
     return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
@@ -90,6 +105,23 @@ def _tabulate_means(rows: list[dict], presets: list[str]) -> tuple[list[str], li
         mean = summarise_preset(rows, preset)
         losses = [(mean[key], 2) for key in ("db", "most_db")] + [(mean[key], 3) for key in ("lpips", "most_lpips")]
         found.append([f"`{preset}`", f"{mean['share']:.2f}", *(format_number(*loss) for loss in losses)])
+    return head, found
+
+
+def _tabulate_forecasts(rows: list[dict], front: list[Measured]) -> tuple[list[str], list[list[str]]]:
+    head = ["scene", "preset", "dB before a run", "after one with `draft`", "LPIPS", "seconds"]
+    before, after = (
+        {(each.scene, each.preset): each for each in leave_one_out(front, known)} for known in (None, "draft")
+    )
+    found = []
+    for row in rows:
+        place = row["scene"], row["preset"]
+        if place in before:
+            one, other = before[place], after[place]
+            losses = [f"{one.loss:.2f} ({one.measured_loss:.2f})", f"{other.loss:.2f}"]
+            sharpness = f"{one.lpips:.3f} ({one.measured_lpips:.3f})"
+            seconds = f"{row['estimated']:.0f} ({format_number(row['seconds'], 0)})"
+            found.append([place[0], f"`{place[1]}`", *losses, sharpness, seconds])
     return head, found
 
 

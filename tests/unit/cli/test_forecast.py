@@ -1,0 +1,104 @@
+"""What presets will be worth: made-up tables that follow the law, what shrinking costs, tables that cannot be read."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dav_gswt.cli.forecast import (
+    LACKING,
+    Measured,
+    forecast_presets,
+    leave_one_out,
+    measure_shrinking,
+    mse_to_psnr,
+    read_front,
+)
+from dav_gswt.errors import InputError
+from dav_gswt.images.image_files import write_png
+
+FITS = {"standard": 1.0, "draft": 1.2, "fine": 0.9}  # error of a fit against the baseline's
+BASES = {"sand": 1e-4, "rock": 1e-3, "leaves": 5e-3}  # error of the baseline's fit
+LOST = {"sand": 2e-4, "rock": 1e-3, "leaves": 0.0}  # what photos lose by the size of `draft`
+
+
+def row(scene, preset, **changes):
+    lost = LOST[scene] if preset == "draft" else 0.0
+    psnr = mse_to_psnr(BASES[scene] * FITS[preset] + LACKING * lost)
+    lpips = 0.1 + (0.05 if lost else 0.02) * (preset == "draft")
+    made = Measured(scene, preset, 768, psnr, lpips, lost, gaussians=1e5, bundle_mb=10, seconds=60, estimated=60)
+    return replace(made, **changes)
+
+
+@pytest.fixture
+def front():
+    return [row(scene, preset) for scene in BASES for preset in FITS]
+
+
+def test_a_scene_with_a_known_run_is_forecast_exactly_where_the_law_holds(front):
+    off = leave_one_out(front, "draft")
+    assert len(off) == len(front)
+    assert max(abs(each.off) for each in off) < 1e-9
+
+
+def test_without_a_run_what_shrinking_costs_tells_the_level(front):
+    found = forecast_presets(front, {"standard": 0.0, "draft": 2e-4})
+    # the geometric mean of 1e-4 / 2e-4 and 1e-3 / 1e-3 times 2e-4
+    assert found["standard"].psnr == pytest.approx(mse_to_psnr(np.sqrt(0.5) * 2e-4))
+
+
+def test_where_no_photo_is_shrunk_losses_are_those_of_the_fits(front):
+    found = forecast_presets(front, dict.fromkeys(FITS, 0.0))
+    assert found["fine"].loss == 0
+    assert found["draft"].loss == pytest.approx(10 * np.log10(1.2 / 0.9))
+
+
+def test_lpips_is_that_of_scenes_whose_photos_are_shrunk_alike(front):
+    assert forecast_presets(front, dict.fromkeys(FITS, 0.0))["draft"].lpips == pytest.approx(0.02)
+    assert forecast_presets(front, dict.fromkeys(FITS, 0.0) | {"draft": 1e-4})["draft"].lpips == pytest.approx(0.05)
+
+
+def test_the_fit_keeps_a_share_of_the_error(front):
+    made = row("sand", "draft", shrinking=1.0)
+    assert 0 < made.fit_error < 10 ** (-made.psnr / 10)
+
+
+def test_presets_that_are_not_in_both_are_left_out(front):
+    assert set(forecast_presets(front, {"standard": 0.0, "mine": 0.0})) == {"standard"}
+
+
+def test_a_table_without_the_baseline_says_nothing(front):
+    assert forecast_presets([each for each in front if each.preset != "standard"], dict.fromkeys(FITS, 0.0)) == {}
+
+
+def test_one_scene_alone_has_nothing_to_be_forecast_from(front):
+    assert leave_one_out([each for each in front if each.scene == "sand"]) == []
+
+
+def test_shrinking_costs_what_the_photos_show(tmp_path):
+    write_png(tmp_path / "grey.png", np.full((64, 64, 3), 0.5))
+    checks = np.indices((64, 64)).sum(0)[..., None] % 2 * np.ones(3)
+    write_png(tmp_path / "checks.png", checks)
+    assert measure_shrinking([tmp_path / "grey.png"], [32], 64) == {32: 0.0}
+    assert measure_shrinking([tmp_path / "checks.png"], [32, 64, 128], 64) == {
+        32: pytest.approx(0.25, abs=1e-4),
+        64: 0,
+        128: 0,
+    }
+
+
+def test_photos_count_at_the_size_of_the_table(tmp_path):
+    blocks = np.kron(np.indices((16, 16)).sum(0) % 2, np.ones((4, 4)))[..., None] * np.ones(3)
+    write_png(tmp_path / "a.png", blocks)  # at 16 pixels a checkerboard, of which 8 pixels keep nothing
+    assert measure_shrinking([tmp_path / "a.png"], [8], 16) == {8: pytest.approx(0.25, abs=1e-4)}
+
+
+@pytest.mark.parametrize("text", [None, "", "scene,preset\na,b\n", "scene,preset,size\na,b,large\n"])
+def test_a_table_that_cannot_be_read_is_named(tmp_path, text):
+    if text is not None:
+        (tmp_path / "t.csv").write_text(text)
+    if text == "":
+        assert read_front(tmp_path / "t.csv") == []
+        return
+    with pytest.raises(InputError, match=r"t\.csv: not the table of presets; `snakemake preset_costs` makes it"):
+        read_front(tmp_path / "t.csv")
