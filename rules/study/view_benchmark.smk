@@ -2,19 +2,20 @@
 
 In: the experiments of the config's `study.view_benchmark`, each a scene, a seed, a policy and k. Out:
 docs/research/data/{table}_curves.csv, a row for each round of an experiment; {table}_benchmark.csv, a row for each experiment;
-{table}_comparison.csv and .md, every policy less the baseline; {table}_worth.csv, what rounds gained against what was
-expected of them; figures/{table}_budget.png, PSNR against photos. `snakemake view_benchmark` makes them.
+{table}_comparison.csv, every policy less the baseline; {table}_worth.csv, what rounds gained against what was expected of
+them; figures/{table}_budget.png, PSNR against photos; the page results/{table}-selection.md.
+`snakemake view_benchmark` makes them.
 """
 
 
 rule gather_curves:
-    """Collect what every round of every cell measured, and what it cost, beside what earlier runs found."""
+    """Collect what every round of every cell measured, and what it cost."""
     input:
         measured=lambda wildcards: [
             path for cell in benchmark_experiments() for path in (*cell["metrics"], *cell["facts"])
         ],
     output:
-        curves=update("docs/research/data/{table}_curves.csv"),
+        curves="docs/research/data/{table}_curves.csv",
     log:
         "<logs>/benchmark/gather_{table}.log",
     benchmark:
@@ -32,11 +33,11 @@ rule compare_policies:
     """Area under each curve, and every policy less the baseline with its interval."""
     input:
         curves="docs/research/data/{table}_curves.csv",
+        template=str(BASE / "workflow/report/view_selection.md"),
     output:
-        results="results/tables/{table}_benchmark.csv",
-        kept="docs/research/data/{table}_benchmark.csv",
+        results="docs/research/data/{table}_benchmark.csv",
         compared="docs/research/data/{table}_comparison.csv",
-        text="docs/research/data/{table}_comparison.md",
+        page="docs/research/results/{table}-selection.md",
         worth="docs/research/data/{table}_worth.csv",
         plot="docs/research/figures/{table}_budget.png",
     log:
@@ -47,6 +48,9 @@ rule compare_policies:
         table="view|development",
     params:
         baseline=lambda wildcards: STUDY["view_benchmark"]["baseline"],
+        groups=lambda wildcards: {
+            scene: group["title"] for group in STUDY["view_benchmark"]["sets"] for scene in group["scenes"]
+        },
         source=code_of("study/compare_policies"),
     script:
         "../../scripts/study/compare_policies.py"

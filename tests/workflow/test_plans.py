@@ -73,8 +73,8 @@ def test_scores_are_judged_by_truth_that_is_drawn_once_a_scene(planned, tmp_path
 def test_policies_share_what_they_start_from(planned, tmp_path):
     """Two scenes of three seeds; all photos are one round, whatever k is."""
     (tmp_path / "few.yaml").write_text(
-        "study: {view_benchmark: {policies: [farthest, random, all], sets: "
-        "[{scenes: [desert_pool, grass_pool], k: [4, 6], photos: 20}]}}"
+        "study: {view_benchmark: {policies: [farthest, random, all], seeds: [0, 1, 2], sets: "
+        "[{title: pools, scenes: [desert_pool, grass_pool], k: [4, 6], photos: 20}]}}"
     )
     plan = planned(tmp_path, "view_benchmark", configs=(USUAL, tmp_path / "few.yaml"))
     assert plan["render_photos"] == 2 and plan["fit_coarse"] == plan["score_coarse"] == 6

@@ -37,7 +37,7 @@ def test_settings_of_knobs_become_presets(config):
         pytest.param("view_benchmark", {"baseline": "w2"}, "baseline: w2 is not among", id="baseline not run"),
         pytest.param(
             "view_benchmark",
-            {"sets": [{"scenes": ["desert"], "k": [4], "photos": 20}]},
+            {"sets": [{"title": "a", "scenes": ["desert"], "k": [4], "photos": 20}]},
             "desert is no scene with",
             id="no pool",
         ),
@@ -46,13 +46,13 @@ def test_settings_of_knobs_become_presets(config):
         ),
         pytest.param(
             "view_benchmark",
-            {"sets": [{"scenes": ["moon"], "k": [4], "photos": 20}]},
+            {"sets": [{"title": "a", "scenes": ["moon"], "k": [4], "photos": 20}]},
             "moon is no scene",
             id="no scene",
         ),
         pytest.param(
             "view_benchmark",
-            {"sets": [{"scenes": ["desert_pool"], "k": [4], "photos": 11}]},
+            {"sets": [{"title": "a", "scenes": ["desert_pool"], "k": [4], "photos": 11}]},
             "leave no round of 4",
             id="no room",
         ),

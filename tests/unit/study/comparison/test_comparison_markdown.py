@@ -1,42 +1,68 @@
-"""The comparison as a table to read, and the copy of it in the page about view selection."""
+"""The page about view selection: its tables, and that they are those of the data beside it."""
 
 from pathlib import Path
 
+import pytest
 from fixtures.markdown import collapse_spaces
 
-from dav_gswt.study.comparison import markdown
+from dav_gswt.study import csv_tables
+from dav_gswt.study.comparison import curves, markdown, tables
 
 ROOT = Path(__file__).parents[4]
+COUNTS = ("wins", "ties", "losses")
 
 
 def row(policy, scene, k, mean, low=None, high=None, counts=(1, 0, 2)):
-    about = {"measure": "psnr", "policy": policy, "scene": scene, "k": k}
-    return about | {"mean": mean, "low": low, "high": high} | dict(zip(("wins", "ties", "losses"), counts, strict=True))
+    about = {"measure": "psnr", "policy": policy, "scene": scene, "k": k, "units": sum(counts)}
+    return about | {"mean": mean, "low": low, "high": high} | dict(zip(COUNTS, counts, strict=True))
 
 
-def test_best_first_with_intervals_where_there_are_some():
-    compared = [
-        row("random", "every", "", -0.123, -0.2, 0.01),
-        row("random", "sand_pool", 4, -0.123, -0.2, 0.01),
-        row("diverse", "every", "", 0.051, -0.0, 0.1, (2, 1, 0)),
-        row("diverse", "grass_pool", 2, 0.049),
-        row("diverse", "every", "", 0.0123, 0.001, 0.02) | {"measure": "lpips"},
-    ]
-    text = markdown.format_comparison(compared, "farthest")
-    by_scene, by_measure = text.split("\n\n")
-    assert collapse_spaces(by_measure).splitlines()[2:] == [
-        "| `diverse` | +0.05 (-0.00, +0.10) | | | +0.0123 (+0.0010, +0.0200) |",
-        "| `random` | -0.12 (-0.20, +0.01) | | | |",
-    ]
-    head, rule, *rows = collapse_spaces(by_scene).splitlines()
+COMPARED = [
+    row("random", "every", "", -0.123, -0.2, 0.01),
+    row("random", "sand_pool", 4, -0.123, -0.2, 0.01),
+    row("diverse", "every", "", 0.051, -0.0, 0.1, (2, 1, 0)),
+    row("diverse", "grass_pool", 2, 0.049),
+    row("diverse", "every", "", 0.0123, 0.001, 0.02) | {"measure": "lpips"},
+]
+
+
+def test_scenes_are_rows_and_the_best_policy_comes_first():
+    head, rule, *rows = collapse_spaces(markdown.format_scenes(COMPARED, "farthest")).splitlines()
     assert set(rule) == set("|-")
     assert [head, *rows] == [
-        "| less `farthest`, dB | grass, 2 a round | sand, 4 a round | wins, ties, losses |",
-        "| `diverse` | +0.05 | | 2, 1, 0 |",
-        "| `random` | | -0.12 (-0.20, +0.01) | 1, 0, 2 |",
+        "| less `farthest`, dB | `diverse` | `random` |",
+        "| grass_pool, 2 a round | +0.05 | |",
+        "| sand_pool, 4 a round | | -0.12 (-0.20, +0.01) |",
     ]
 
 
-def test_the_page_shows_the_table_that_the_rule_made():
-    made = (ROOT / "docs/research/data/view_comparison.md").read_text(encoding="utf-8")
-    assert made in (ROOT / "docs/research/results/view-selection.md").read_text(encoding="utf-8")
+def test_groups_have_a_row_a_policy_and_intervals_where_there_are_some():
+    grouped = [each | {"group": "paths"} for each in COMPARED if each["scene"] == "every"]
+    _, _, *rows = collapse_spaces(markdown.format_groups(grouped)).splitlines()
+    assert rows == [
+        "| paths | `random` | 3 | -0.12 (-0.20, +0.01) | | | | 1, 0, 2 |",
+        "| paths | `diverse` | 3 | +0.05 (-0.00, +0.10) | | | +0.0123 (+0.0010, +0.0200) | 2, 1, 0 |",
+    ]
+
+
+def test_ends_are_means_over_starts():
+    about = {"scene": "sand", "policy": "random", "k": 4, "photos": 20, "walker_psnr": None}
+    results = [about | {"psnr": psnr, "lpips": 0.25, "gap": gap} for psnr, gap in ((20.0, 1.0), (21.0, None))]
+    (line,) = collapse_spaces(markdown.format_ends(results)).splitlines()[2:]
+    assert line == "| sand | `random` | 2 | 20 | 20.50 | | 0.250 | 1.00 |"
+
+
+@pytest.fixture(scope="module")
+def page():
+    return (ROOT / "docs/research/results/view-selection.md").read_text(encoding="utf-8")
+
+
+def test_the_page_shows_the_data_beside_it(page):
+    results = tables.summarise_cells(curves.read_curves(ROOT / "docs/research/data/view_curves.csv"))
+    assert markdown.format_scenes(tables.compare_to_baseline(results, "farthest"), "farthest") in page
+    assert markdown.format_ends(results) in page
+
+
+def test_the_page_names_the_version_of_every_cell(page):
+    versions = {each["version"] for each in csv_tables.read_table(ROOT / "docs/research/data/view_curves.csv")}
+    assert all(f"version {version}," in page for version in versions)

@@ -96,14 +96,20 @@ def test_a_job_without_a_benchmark_leaves_no_time(tmp_path):
     assert curves.read_cell(cell(tmp_path, times=[[str(tmp_path / "none.tsv")]]))[1]["seconds"] is None
 
 
-def test_rows_survive_the_file_and_runs_add_up(tmp_path):
-    path = tmp_path / "curves.csv"
-    assert curves.read_curves(path) == []
-    old, other = rounds([20, 21, 22]), rounds([19, 20, 21], seed=1)
-    csv_tables.write_table(path, curves.merge_rows(old, other))
-    assert curves.read_curves(path) == old + other
-    again = curves.merge_rows(curves.read_curves(path), rounds([20, 23], (8, 12)))
-    assert [row["psnr"] for row in again if row["seed"] == 0] == [20, 23, 22] and len(again) == 6
+def test_rows_survive_the_file(tmp_path):
+    rows = rounds([20, 21, 22]) + rounds([19, 20, 21], seed=1)
+    csv_tables.write_table(tmp_path / "curves.csv", rows)
+    assert curves.read_curves(tmp_path / "curves.csv") == rows
+
+
+def test_groups_of_scenes_are_compared_each_by_itself():
+    some = [("oasis", 21, "mixed"), ("flowers", 23, "plants"), ("grass", 25, "plants")]
+    cells = [rounds([20, 21, 22], scene=scene) for scene, _, _ in some]
+    cells += [rounds([20, middle, 22], scene=scene, policy="w2") for scene, middle, _ in some]
+    table = tables.summarise_cells([row for rows in cells for row in rows])
+    found = tables.compare_groups(table, "farthest", {scene: group for scene, _, group in some} | {"moon": "empty"})
+    psnr = {row["group"]: (row["mean"], row["units"]) for row in found if row["measure"] == "psnr"}
+    assert psnr == {"mixed": (0.0, 1), "plants": (1.5, 2)}
 
 
 def test_results_by_hand():

@@ -127,6 +127,7 @@ class Calibration(ConfigModel):
 class PolicySet(ConfigModel):
     """Scenes on which policies are compared."""
 
+    title: Text = key("what its scenes have in common: they are a row of the page together")
     scenes: Names = key("with `start`")
     k: list[Annotated[int, Field(ge=1, le=1000)]] = key("photos a round", min_length=1)
     photos: int = key("photos that each experiment ends with", ge=3, le=100_000)

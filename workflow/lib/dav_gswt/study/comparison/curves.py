@@ -1,7 +1,6 @@
-"""Curves of policies: a table with a row per round of each cell, accumulated over runs.
+"""Curves of policies: a table with a row per round of each cell.
 
-A cell is a scene, a seed (of the start photos), a policy with its parameters, and k. A round that is measured again
-replaces its row.
+A cell is a scene, a seed (of the start photos), a policy with its parameters, and k.
 """
 
 import csv
@@ -43,20 +42,10 @@ def read_cell(cell: dict) -> list[dict]:
     return found
 
 
-def merge_rows(before: list[dict], new: list[dict]) -> list[dict]:
-    """Rows of both, sorted; of a round that both hold the new one. Rounds beyond those of a new cell stay."""
-    at = {_key(row): row for row in before} | {_key(row): row for row in new}
-    return [at[key] for key in sorted(at)]
-
-
 def read_curves(path: Path | str) -> list[dict]:
-    """Read the table of curves; no rows where there is no file yet."""
+    """Read the table of curves."""
     integers = ("seed", "k", "round", "photos", "evaluations")
-    return csv_tables.read_table(path, numbers=(*MEASURES, *EXPECTED, "seconds"), integers=integers, missing_ok=True)
-
-
-def _key(row: dict) -> tuple:
-    return tuple(row[key] for key in CELL) + (row["round"],)
+    return csv_tables.read_table(path, numbers=(*MEASURES, *EXPECTED, "seconds"), integers=integers)
 
 
 def select_metrics(metrics: dict, psnr: str) -> dict:

@@ -1,10 +1,7 @@
-"""A comparison as a table to read, for docs/research/results/view-selection.md."""
+"""The page about view selection: policies compared over groups of scenes, scene by scene, and with all photos."""
 
-from pathlib import Path
-
-from dav_gswt.files import atomic_file
 from dav_gswt.study.comparison.tables import EVERY
-from dav_gswt.study.markdown import format_table
+from dav_gswt.study.markdown import format_number, format_table
 
 NAMED = {  # measures, and decimals
     "psnr": ("PSNR, dB", 2),
@@ -12,41 +9,80 @@ NAMED = {  # measures, and decimals
     "walker_psnr": ("views at eye level, dB", 2),
     "lpips": ("LPIPS, fewer", 4),
 }
+ALL_SCENES = "all scenes"
 
 
-def write_comparison(path: Path | str, compared: list[dict], baseline: str) -> None:
-    """Write the table of `format_comparison`."""
-    with atomic_file(path) as part:
-        part.write_text(format_comparison(compared, baseline), encoding="utf-8")
+def describe_comparison(
+    curves: list[dict], results: list[dict], compared: list[dict], grouped: list[dict], worth: list[dict], baseline: str
+) -> dict:
+    """Values of the page's template.
 
-
-def format_comparison(compared: list[dict], baseline: str) -> str:
-    """nAUC less the baseline's: a table of PSNR with a column a scene and k, and one of all measures over all scenes.
-
-    A row a policy, best by PSNR over all scenes first; in brackets the 95 % interval, where there is more than one
-    start. LPIPS is turned over: above 0 is better everywhere.
+    curves, results, compared, grouped, worth: rows of `read_curves`, `summarise_cells`, `compare_to_baseline`,
+    `compare_groups` and `check_predictions`. difference(group, policy, measure): a mean with its interval as the tables
+    have it, for sentences.
     """
-    psnr = [row for row in compared if row["measure"] == "psnr"]
-    columns = sorted({(row["scene"], row["k"]) for row in psnr} - {(EVERY, "")})
-    named = [f"{scene.removesuffix('_pool')}, {k} a round" for scene, k in columns]
-    found = {(row["policy"], row["scene"], row["k"]): row for row in psnr}
-    best = sorted((row for row in psnr if row["scene"] == EVERY), key=lambda row: -row["mean"])
+    overall = [row | {"group": ALL_SCENES} for row in compared if row["scene"] == EVERY]
+    rows = grouped + overall
+    at = {(row["group"], row["policy"], row["measure"]): row for row in rows}
+    every = next((row for row in worth if row["scene"] == EVERY), None)
+    return {
+        "baseline": baseline,
+        "version": curves[0]["version"],
+        "renderer": curves[0]["renderer"],
+        "groups": format_groups(rows),
+        "scenes": format_scenes(compared, baseline),
+        "ends": format_ends(results),
+        "worth": every,
+        "difference": lambda group, policy, measure="psnr": _format_cell(
+            at.get((group, policy, measure)), NAMED[measure][1]
+        ),
+    }
+
+
+def format_groups(rows: list[dict]) -> str:
+    """nAUC less the baseline's, a row a group and policy, a column a measure.
+
+    In brackets the 95 % interval, where there is more than one cell. LPIPS is turned over: above 0 is always better.
+    """
+    found = {(row["group"], row["policy"], row["measure"]): row for row in rows}
     lines = []
-    for row in best:
-        cells = [_format_cell(found.get((row["policy"], *column))) for column in columns]
-        lines.append([f"`{row['policy']}`", *cells, f"{row['wins']}, {row['ties']}, {row['losses']}"])
-    by_scene = format_table(["less `" + baseline + "`, dB", *named, "wins, ties, losses"], lines)
-    return by_scene + "\n" + _format_measures(compared, [row["policy"] for row in best])
+    for group, policy in dict.fromkeys((row["group"], row["policy"]) for row in rows):
+        psnr = found[group, policy, "psnr"]
+        cells = [_format_cell(found.get((group, policy, measure)), places) for measure, (_, places) in NAMED.items()]
+        lines.append([group, f"`{policy}`", psnr["units"], *cells, f"{psnr['wins']}, {psnr['ties']}, {psnr['losses']}"])
+    heads = ["", "policy", "pairs", *(name for name, _ in NAMED.values()), "wins, ties, losses"]
+    return format_table(heads, lines)
 
 
-def _format_measures(compared: list[dict], policies: list[str]) -> str:
-    """Over all scenes: a row a policy, a column a measure."""
-    found = {(row["policy"], row["measure"]): row for row in compared if row["scene"] == EVERY}
+def format_scenes(compared: list[dict], baseline: str) -> str:
+    """PSNR less the baseline's, a row a scene and k, a column a policy, the best over all scenes first."""
+    psnr = [row for row in compared if row["measure"] == "psnr"]
+    best = sorted((row for row in psnr if row["scene"] == EVERY), key=lambda row: -row["mean"])
+    found = {(row["policy"], row["scene"], row["k"]): row for row in psnr}
+    places = sorted({(row["scene"], row["k"]) for row in psnr} - {(EVERY, "")})
     lines = [
-        [f"`{policy}`", *(_format_cell(found.get((policy, measure)), places) for measure, (_, places) in NAMED.items())]
-        for policy in policies
+        [f"{scene}, {k} a round", *(_format_cell(found.get((row["policy"], scene, k))) for row in best)]
+        for scene, k in places
     ]
-    return format_table(["over all scenes", *(name for name, _ in NAMED.values())], lines)
+    return format_table([f"less `{baseline}`, dB", *(f"`{row['policy']}`" for row in best)], lines)
+
+
+def format_ends(results: list[dict]) -> str:
+    """Where each policy ends, means over starts: PSNR, LPIPS, dB under all photos where these were fitted."""
+    lines = []
+    for scene, policy, k in dict.fromkeys((row["scene"], row["policy"], row["k"]) for row in results):
+        mine = [row for row in results if (row["scene"], row["policy"], row["k"]) == (scene, policy, k)]
+        means = [
+            _average(mine, key, digits) for key, digits in (("psnr", 2), ("walker_psnr", 2), ("lpips", 3), ("gap", 2))
+        ]
+        lines.append([scene, f"`{policy}`", len(mine), mine[0]["photos"], *means])
+    heads = ["scene", "policy", "starts", "photos", "PSNR, dB", "at eye level", "LPIPS", "under all photos, dB"]
+    return format_table(heads, lines)
+
+
+def _average(rows: list[dict], key: str, digits: int) -> str:
+    values = [row[key] for row in rows if row[key] is not None]
+    return format_number(sum(values) / len(values), digits) if values else ""
 
 
 def _format_cell(row: dict | None, places: int = 2) -> str:

@@ -60,6 +60,19 @@ def compare_to_baseline(table: list[dict], baseline: str) -> list[dict]:
     return rows
 
 
+def compare_groups(table: list[dict], baseline: str, groups: dict[str, str]) -> list[dict]:
+    """Every policy less the baseline over the scenes of each group. groups: the group of each scene; others have none.
+
+    A row as of `compare_to_baseline`, with `group` for the scene; groups in the order of `groups`.
+    """
+    found = []
+    for group in dict.fromkeys(groups.values()):
+        mine = [row for row in table if groups.get(row["scene"]) == group]
+        rows = compare_to_baseline(mine, baseline) if any(row["policy"] == baseline for row in mine) else []
+        found += [row | {"group": group} for row in rows if row["scene"] == EVERY]
+    return found
+
+
 def _compare_cells(cells: dict[tuple, float], baseline: str) -> list[dict]:
     """Every policy less the baseline, by one measure."""
     base = {unit: value for (unit, policy), value in cells.items() if policy[0] == baseline}
