@@ -18,21 +18,26 @@ def scale_photos(what, amount):
     asked = STUDY["scale"]
     least = min(asked["photos"]), asked["size"]
     cells = {"photos": (amount, asked["size"]), "pixels": (asked["photos_of_pixels"], amount), "threads": least}
+    cells |= {"limits": (asked["photos_of_pixels"], asked["pixels_of_limits"])}
     return cells.get(what)
 
 
 def changed_preset(what, amount):
     """The keys of the preset that a cell's fit has otherwise."""
     asked = STUDY["scale"]
-    few = {"steps": asked["steps_of_pixels"], "steps_per_photo": 0} if what == "pixels" else {}
-    return few | {"size": amount if what == "pixels" else asked["size"]}
+    few = {"steps": asked["steps_of_pixels"], "steps_per_photo": 0}
+    if what == "limits":
+        return few | {"size": asked["pixels_of_limits"], "max_gaussians": amount}
+    return few | {"size": amount} if what == "pixels" else {"size": asked["size"]}
 
 
 def scale_cells():
     """All cells as (what, amount)."""
     asked = STUDY["scale"] | {"threads": [1, 2]}
     return [
-        (what, n) for what in ("photos", "pixels", "gaussians", "candidates", "tiles", "threads") for n in asked[what]
+        (what, n)
+        for what in ("photos", "pixels", "limits", "gaussians", "candidates", "tiles", "threads")
+        for n in asked[what]
     ]
 
 

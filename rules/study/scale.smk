@@ -43,7 +43,7 @@ rule measure_scale:
     benchmark:
         "<benchmarks>/scale/{what}_{amount}.tsv"
     wildcard_constraints:
-        what="photos|pixels|gaussians|candidates|tiles|threads",
+        what="photos|pixels|limits|gaussians|candidates|tiles|threads",
         amount=POSITIVE,
     threads: 2
     resources:

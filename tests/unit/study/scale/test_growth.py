@@ -24,6 +24,10 @@ CELLS = [
         for n in (0.25, 1.0, 4.0)
     ),
     *(
+        cell("limits", n, photos=12, megapixels=3, steps=9, prepare_seconds=n / 1e3, step_seconds=n / 1e4, seconds=n)
+        for n in (500, 1000, 2000)
+    ),
+    *(
         {"kind": "threads", "threads": n, "seconds": 10.0 - 4 * (n - 1), "step_seconds": 0.1, "peak_mb": 1.0}
         for n in (1, 2)
     ),
@@ -41,7 +45,7 @@ def test_an_exponent_is_of_the_largest_sizes():
 
 def test_rows_are_sorted_by_kind_and_size():
     rows = growth.gather_rows(CELLS)
-    assert [row["kind"] for row in rows[:15:3]] == list(growth.KINDS)
+    assert [row["kind"] for row in rows[:18:3]] == list(growth.KINDS)
     assert [row["gaussians"] for row in rows if row["kind"] == "gaussians"] == [100, 1000, 10_000]
 
 
@@ -55,6 +59,11 @@ def test_a_table_ends_with_its_exponents():
     rows = growth.gather_rows(CELLS)
     assert growth.describe_kind(rows, "candidates").splitlines()[-1].split()[1::2] == ["exponent", "2.00", "0.00"]
     assert growth.describe_kind(rows, "pixels").splitlines()[2].split()[1] == "0.25"
+
+
+def test_what_grows_is_counted_once_in_a_table():
+    head = growth.describe_kind(growth.gather_rows(CELLS), "limits").splitlines()[0]
+    assert [part.strip() for part in head.split("|")[1:4]] == ["Gaussians of the fit", "steps", "s"]
 
 
 def test_the_share_that_runs_beside_itself_follows_from_one_and_two_threads():
@@ -74,6 +83,7 @@ def test_the_page_is_filled(root):
         "scene": "desert",
         "preset": "standard",
         "size": 1000,
+        "pixels_of_limits": 64,
         "photos_of_pixels": 12,
         "steps_of_pixels": 9,
         "photos": [8, 16, 32],

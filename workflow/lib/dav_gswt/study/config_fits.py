@@ -50,6 +50,8 @@ class Scale(ConfigModel):
     pixels: Amounts = key("sizes of photos of a fit, pixels a side")
     photos_of_pixels: int = key("number of these photos", ge=3, le=1000)
     steps_of_pixels: int = key("optimiser steps of their fits: a preset's would take long", ge=1, le=100_000)
+    limits: Amounts = key("most Gaussians of a fit, by as many photos and steps")
+    pixels_of_limits: int = key("size of the photos of these fits", unit="pixels a side", ge=32, le=16384)
     gaussians: Amounts = key("numbers of Gaussians that are rendered")
     candidates: Amounts = key("numbers of candidates that are scored")
     tiles: Amounts = key("numbers of tiles in view")

@@ -11,11 +11,13 @@ from dav_gswt.study import markdown
 KINDS = {  # of cells: what grows, its unit, and the cost beside the seconds
     "photos": ("photos", "photos"),
     "pixels": ("megapixels", "megapixels a photo"),
+    "limits": ("gaussians", "Gaussians of the fit"),
     "gaussians": ("gaussians", "Gaussians"),
     "candidates": ("candidates", "candidates"),
     "tiles": ("tiles", "tiles in view"),
 }
 TITLES = {"seconds": "s", "prepare_seconds": "s before the first step", "step_seconds": "s a step", "peak_mb": "MB"}
+COUNTS = {"gaussians": "Gaussians", "steps": "steps"}  # of a fit
 LAST = 3  # points that an exponent is fitted to: small cells are mostly fixed costs
 COLUMNS = (
     "kind",
@@ -50,7 +52,7 @@ def gather_rows(cells: list[dict]) -> list[dict]:
 
 
 def fit_exponents(rows: list[dict]) -> dict[str, dict[str, float]]:
-    """By kind: the exponents of seconds and of memory; of photos and pixels also those of a step."""
+    """By kind: the exponents of seconds and of memory; of fits also those of a step."""
     found = {}
     for kind, (name, _) in KINDS.items():
         own = [row for row in rows if row["kind"] == kind]
@@ -63,8 +65,8 @@ def describe_kind(rows: list[dict], kind: str) -> str:
     """The table of a kind in Markdown, with the exponents in its last row."""
     name, unit = KINDS[kind]
     own, exponents = [row for row in rows if row["kind"] == kind], fit_exponents(rows)[kind]
-    counts = ["gaussians", "steps"] if own[0]["steps"] else []
-    head = [unit, *(["Gaussians", "steps"] if counts else []), *(TITLES[cost] for cost in exponents)]
+    counts = [count for count in COUNTS if count != name] if own[0]["steps"] else []
+    head = [unit, *(COUNTS[count] for count in counts), *(TITLES[cost] for cost in exponents)]
     body = [
         [f"{row[name]:.3g}" if kind == "pixels" else f"{row[name]:.0f}", *(f"{row[count]:.0f}" for count in counts)]
         + [f"{row[cost]:.0f}" if cost == "peak_mb" else f"{row[cost]:.3g}" for cost in exponents]
@@ -101,7 +103,7 @@ def extrapolate(rows: list[dict], size: int, cores: Sequence[int] = (2, 16, 64))
 
 def plot_growth(rows: list[dict], path: Path | str) -> None:
     """Seconds and memory over each size, on logarithmic axes, with lines of exponent 1."""
-    figure = make_figure(13.5, 5.2)
+    figure = make_figure(16, 5.2)
     axes = figure.subplots(2, len(KINDS), squeeze=False)
     for column, (kind, (name, unit)) in enumerate(KINDS.items()):
         own = [row for row in rows if row["kind"] == kind]

@@ -16,6 +16,7 @@ def describe(rows: list[dict], cells: list[dict], asked: dict, preset: dict) -> 
         "size": asked["size"],
         "count": asked["photos_of_pixels"],
         "steps": asked["steps_of_pixels"],
+        "limited": asked["pixels_of_limits"],
         "least": min(asked["photos"]),
         "most": preset["max_gaussians"],
         "steps_per_photo": preset["steps_per_photo"],
