@@ -93,6 +93,8 @@ def test_the_first_step_takes_name_hint_and_still_away(visit, fronted):
     seen.until("hint.hidden && !document.getElementById('first')")
     seen.page.keyboard.up("w")
     seen.page.locator("#title").wait_for(state="hidden")
+    seen.page.locator("#menuButton").click()  # where it is said again
+    assert seen.page.locator("#about").inner_text() == "My meadow: From 7 photos"
 
 
 def test_walking_closes_the_menu(visit, fronted):

@@ -28,10 +28,12 @@ export function createFirstView({ onStep }) {
     showScene(place, own) {
       begin = { ...place };
       title.classList.remove("leaving");
-      if (own) return;
-      showTerrain();
-      element("name", HTMLElement).textContent = "Your terrain";
-      element("line", HTMLElement).textContent = "Dropped onto this page";
+      const name = element("name", HTMLElement), line = element("line", HTMLElement);
+      if (!own) {
+        showTerrain();
+        [name.textContent, line.textContent] = ["Your terrain", "Dropped onto this page"];
+      }
+      element("about", HTMLElement).textContent = `${name.textContent}: ${line.textContent}`; // the title itself leaves
     },
     /** There is something to walk on. */
     showHint() {
