@@ -26,7 +26,7 @@ def row(scene, preset, **changes):
     lost = LOST[scene] if preset == "draft" else 0.0
     psnr = mse_to_psnr(BASES[scene] * FITS[preset] + LACKING * lost)
     lpips = 0.1 + (0.05 if lost else 0.02) * (preset == "draft")
-    made = Measured(scene, preset, 768, psnr, lpips, lost, gaussians=1e5, bundle_mb=10, seconds=60, estimated=60)
+    made = Measured(scene, preset, 768, psnr, lpips, lost, gaussians=1e5, bundle_mb=10.0, seconds=60.0, estimated=60.0)
     return replace(made, **changes)
 
 

@@ -103,7 +103,7 @@ def extrapolate(rows: list[dict], size: int, cores: Sequence[int] = (2, 16, 64))
 
 def plot_growth(rows: list[dict], path: Path | str) -> None:
     """Seconds and memory over each size, on logarithmic axes, with lines of exponent 1."""
-    figure = make_figure(16, 5.2)
+    figure = make_figure(16.0, 5.2)
     axes = figure.subplots(2, len(KINDS), squeeze=False)
     for column, (kind, (name, unit)) in enumerate(KINDS.items()):
         own = [row for row in rows if row["kind"] == kind]
