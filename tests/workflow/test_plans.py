@@ -8,7 +8,10 @@ import time
 from collections import Counter
 
 import pytest
+from fixtures.configs import checked_config
 from fixtures.runs import TINY, USUAL
+
+from dav_gswt.cli.estimate import count_jobs
 
 from dav_gswt.views.policy_names import ORACLES, POLICY_NAMES, PRIOR_POLICIES, ZERO_SETTINGS
 
@@ -68,6 +71,15 @@ def test_scores_are_judged_by_truth_that_is_drawn_once_a_scene(planned, tmp_path
     plan = planned(tmp_path, "docs/research/figures/calibration.png", configs=(USUAL, tmp_path / "few.yaml"))
     assert plan["render_candidates"] == plan["calibrate_coarse"] == 2 and plan["calibrate_round"] == 4
     assert plan["train_regressor"] == plan["plot_calibration"] == 1
+
+
+SHORT = {"all", "convert_lpips_weights", "make_contact_sheet"}  # jobs that no estimate counts
+
+
+def test_the_estimate_counts_the_jobs_of_a_run(planned, tmp_path):
+    plan, counted = planned(tmp_path), count_jobs(checked_config())
+    assert {rule: plan[rule] for rule in counted} == counted
+    assert set(plan) - set(counted) == SHORT
 
 
 def test_policies_share_what_they_start_from(planned, tmp_path):

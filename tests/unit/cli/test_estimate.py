@@ -145,3 +145,15 @@ def test_work_is_that_of_the_config(config):
 )
 def test_jobs_share_the_cores_with_others(threads, others, cores, longer):
     assert share_cores(threads, float(others), cores) == longer
+
+
+def test_jobs_are_those_of_a_whole_run(config):
+    jobs = estimate.count_jobs(config)
+    assert jobs["update_field"] == config["rounds"] and jobs["render_photos"] == jobs["find_materials"] == 1
+    assert "register_photos" in estimate.count_jobs(config | {"scene": "copr_dunes"})
+
+
+def test_a_finished_field_is_not_fitted(config):
+    config["scenes"]["given"] = {"kind": "field", "field": "a.ply", "up": [0, 0, 1], "preset": "standard"}
+    jobs = estimate.count_jobs(config | {"scene": "given"})
+    assert jobs["prepare_external_field"] == 1 and "fit_coarse" not in jobs

@@ -139,16 +139,16 @@ def estimate_seconds(jobs: Mapping[str, int], work: Work, speed: MachineSpeed) -
 
 def count_jobs(config: Mapping[str, Any]) -> dict[str, int]:
     """Jobs of each rule that `make run` has for the config's scene, if nothing of it is made yet."""
-    scene, rounds = config["scenes"][config["scene"]], config["rounds"]
-    ends = dict.fromkeys(("make_levels", "cut_tiles", "bundle_tiles", "render_terrain", "make_page"), 1)
-    if scene.get("materials", "one") != "one":
-        ends |= {"find_materials": 1}
+    scene = config["scenes"][config["scene"]]
+    once = ["make_levels", "cut_tiles", "bundle_tiles", "render_terrain", "make_page"]
+    once += ["find_materials"] if scene.get("materials", "one") != "one" else []
     if scene["kind"] == "field":
-        return ends | {"prepare_external_field": 1}
-    first = "register_photos" if scene["kind"] == "photos" else "render_photos"
-    jobs = dict.fromkeys((first, "report_photos", "split_views", "fit_coarse", "evaluate_coarse", "score_coarse"), 1)
-    each = ("select_poses", "capture_views", "update_field", "evaluate_round", "score_round")
-    return jobs | dict.fromkeys(each, rounds) | ends
+        return dict.fromkeys([*once, "prepare_external_field"], 1)
+    once += ["register_photos" if scene["kind"] == "photos" else "render_photos", "report_photos", "split_views"]
+    jobs: dict[str, int] = dict.fromkeys([*once, "fit_coarse", "evaluate_coarse", "score_coarse"], 1)
+    for rule in ("select_poses", "capture_views", "update_field", "evaluate_round", "score_round"):
+        jobs[rule] = config["rounds"]
+    return jobs
 
 
 def describe_work(config: Mapping[str, Any], preset: str | None = None) -> Work:
