@@ -12,7 +12,6 @@ from fixtures.configs import checked_config
 from fixtures.runs import TINY, USUAL
 
 from dav_gswt.cli.estimate import count_jobs
-
 from dav_gswt.views.policy_names import ORACLES, POLICY_NAMES, PRIOR_POLICIES, ZERO_SETTINGS
 
 ROUND = "results/desert/seed0/draft/active_{policy}_none_pdrop0_lam0_k{k}/iter{t}"
