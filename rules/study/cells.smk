@@ -26,9 +26,11 @@ def changed_preset(what, amount):
     """The keys of the preset that a cell's fit has otherwise."""
     asked = STUDY["scale"]
     few = {"steps": asked["steps_of_pixels"], "steps_per_photo": 0}
-    if what == "limits":
-        return few | {"size": asked["pixels_of_limits"], "max_gaussians": amount}
-    return few | {"size": amount} if what == "pixels" else {"size": asked["size"]}
+    changes = {
+        "pixels": few | {"size": amount},
+        "limits": few | {"size": asked["pixels_of_limits"], "max_gaussians": amount},
+    }
+    return changes.get(what, {"size": asked["size"]})
 
 
 def scale_cells():

@@ -17,4 +17,4 @@ with logging_to(snakemake.log[0]):
     plots.write_figure(out.plot, rounds, compared, params.baseline)
     grouped = tables.compare_groups(results, params.baseline, params.groups)
     values = markdown.describe_comparison(rounds, results, compared, grouped, worth, params.baseline)
-    write_page(out.page, render_template(snakemake.input.template, values))
+    write_page(out.page, render_template(snakemake.input.template, values | {"table": snakemake.wildcards.table}))

@@ -8,4 +8,4 @@ with logging_to(snakemake.log[0]):
     out = snakemake.output
     csv_tables.write_table(out.table, preset_costs.tabulate_presets(snakemake.params.cells, snakemake.params.size))
     rows = csv_tables.read_table(out.table, numbers=preset_costs.NUMBERS)
-    markdown.write_page(out.page, preset_costs.format_presets(rows, snakemake.params.size, out.table))
+    markdown.write_page(out.page, preset_costs.format_presets(rows, snakemake.params.size))

@@ -2,8 +2,6 @@
 
 import os
 import re
-import subprocess
-import sys
 import time
 from collections import Counter
 
@@ -361,26 +359,6 @@ def test_a_missing_height_map_is_named(snakemake, tmp_path):
     (tmp_path / "map.yaml").write_text("heights: {kind: image, file: no.exr, width: 10, height: 1}\n")
     done = snakemake(tmp_path, "--dry-run", configs=(USUAL, tmp_path / "map.yaml"), check=False)
     assert done.returncode != 0 and "config: heights.file: there is no no.exr" in done.stdout
-
-
-def test_the_workflow_is_lint_clean_but_for_its_environment(snakemake, tmp_path):
-    """One pip environment serves all rules, so lint's wish for a conda or container directive a rule is not met."""
-    done = snakemake(tmp_path, "--lint", check=False)
-    wishes = [line.strip() for line in done.stdout.splitlines() if line.strip().startswith("* ")]
-    assert not [wish for wish in wishes if "No conda/container" not in wish and "environment" not in wish], done.stdout
-
-
-@pytest.mark.parametrize(
-    "tool",
-    [
-        pytest.param(["ruff", "check", "."], id="ruff check"),
-        pytest.param(["ruff", "format", "--check", "."], id="ruff format"),
-        pytest.param(["snakefmt", "--check", "Snakefile", "rules"], id="snakefmt"),
-    ],
-)
-def test_the_code_is_formatted(root, tool):
-    done = subprocess.run([sys.executable, "-m", *tool], cwd=root, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_seams_are_measured_by_cells_that_share_the_levels(planned, tmp_path):

@@ -113,3 +113,13 @@ def test_a_missing_table_is_named(project, capsys):
 def test_a_scene_that_is_not_there_is_named(project, capsys):
     assert main.main(["advise", "--scene", "moon"]) == 1
     assert "there is no 'moon'" in capsys.readouterr().err
+
+
+def test_a_finished_field_has_no_photos_to_shrink(project, capsys):
+    (project / "config/scenes/given.yaml").write_text(
+        "{kind: field, field: a.ply, up: [0, 0, 1], preset: standard, tiling: auto}"
+    )
+    (project / "results/given/photos/images").mkdir(parents=True)
+    write_png(project / "results/given/photos/images/a.png", np.zeros((48, 64, 3)))
+    assert main.main(["advise", "--scene", "given"]) == 0
+    assert "Advice: `preset: " in capsys.readouterr().out

@@ -17,6 +17,8 @@ SAME = MachineSpeed()
 JOBS = {"render_photos": 1, "fit_coarse": 1, "update_field": 2, "score_coarse": 1, "score_round": 2, "capture_views": 2}
 JOBS |= {"select_poses": 2, "make_levels": 1, "cut_tiles": 1, "bundle_tiles": 1, "render_terrain": 1}
 
+PRESETS = ("draft", "standard", "reference", "auto")
+
 
 @pytest.fixture
 def config(monkeypatch) -> dict:
@@ -89,26 +91,34 @@ def test_a_finished_field_has_an_estimate_too(config):
 
 
 def test_a_short_run_is_told_no_preset(config):
-    assert describe_estimate(config, {"fit_coarse": 1}, SAME) == "It will take about 10 seconds on this machine"
+    assert (
+        describe_estimate(config, {"fit_coarse": 1}, SAME, PRESETS) == "It will take about 10 seconds on this machine"
+    )
 
 
 def test_a_long_run_is_told_the_best_preset_that_is_short_enough(config):
     config["scenes"]["desert"] |= {"preset": "reference"}
     speed = MachineSpeed(6.0, 1.0)
-    times = {name: estimate_seconds(JOBS, describe_work(config, name), speed) for name in config["presets"]}
+    times = {name: estimate_seconds(JOBS, describe_work(config, name), speed) for name in PRESETS}
     assert times["reference"] > estimate.LONG
     name = max((n for n in times if times[n] <= estimate.LONG and times[n] < 0.8 * times["reference"]), key=times.get)
-    told = describe_estimate(config, JOBS, speed)
+    told = describe_estimate(config, JOBS, speed, PRESETS)
     assert f"with preset: {name} {format_duration(times[name])}" in told
 
 
 def test_a_run_that_is_long_with_every_preset_is_told_the_fastest(config):
     config["scenes"]["desert"] |= {"preset": "reference"}
-    assert "with preset: draft" in describe_estimate(config, JOBS, MachineSpeed(500.0, 1.0))
+    assert "with preset: draft" in describe_estimate(config, JOBS, MachineSpeed(500.0, 1.0), PRESETS)
+
+
+def test_a_preset_of_the_study_is_no_advice(config):
+    config["scenes"]["desert"] |= {"preset": "reference"}
+    config["presets"]["tiny"] = config["presets"]["draft"] | {"size": 64, "steps": 1, "steps_per_photo": 1}
+    assert "with preset: draft" in describe_estimate(config, JOBS, MachineSpeed(500.0, 1.0), PRESETS)
 
 
 def test_a_run_that_is_beyond_its_fits_is_told_no_preset(config):
-    assert "preset" not in describe_estimate(config, {"make_levels": 1}, MachineSpeed(1e4, 1e4))
+    assert "preset" not in describe_estimate(config, {"make_levels": 1}, MachineSpeed(1e4, 1e4), PRESETS)
 
 
 @pytest.mark.parametrize(

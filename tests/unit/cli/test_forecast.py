@@ -8,10 +8,10 @@ import pytest
 from dav_gswt.cli.forecast import (
     LACKING,
     Measured,
+    error_to_psnr,
     forecast_presets,
     leave_one_out,
     measure_shrinking,
-    mse_to_psnr,
     read_front,
 )
 from dav_gswt.errors import InputError
@@ -24,7 +24,7 @@ LOST = {"sand": 2e-4, "rock": 1e-3, "leaves": 0.0}  # what photos lose by the si
 
 def row(scene, preset, **changes):
     lost = LOST[scene] if preset == "draft" else 0.0
-    psnr = mse_to_psnr(BASES[scene] * FITS[preset] + LACKING * lost)
+    psnr = error_to_psnr(BASES[scene] * FITS[preset] + LACKING * lost)
     lpips = 0.1 + (0.05 if lost else 0.02) * (preset == "draft")
     made = Measured(scene, preset, 768, psnr, lpips, lost, gaussians=1e5, bundle_mb=10.0, seconds=60.0, estimated=60.0)
     return replace(made, **changes)
@@ -44,7 +44,7 @@ def test_a_scene_with_a_known_run_is_forecast_exactly_where_the_law_holds(front)
 def test_without_a_run_what_shrinking_costs_tells_the_level(front):
     found = forecast_presets(front, {"standard": 0.0, "draft": 2e-4})
     # the geometric mean of 1e-4 / 2e-4 and 1e-3 / 1e-3 times 2e-4
-    assert found["standard"].psnr == pytest.approx(mse_to_psnr(np.sqrt(0.5) * 2e-4))
+    assert found["standard"].psnr == pytest.approx(error_to_psnr(np.sqrt(0.5) * 2e-4))
 
 
 def test_where_no_photo_is_shrunk_losses_are_those_of_the_fits(front):

@@ -41,3 +41,9 @@ def test_the_smaller_config_is_valid_and_smaller_for_every_preset(root, monkeypa
                 assert small["presets"][name][key] < preset[key], (name, key)
             assert isinstance(small["presets"][name][key], int)
     assert small["scenes"] == usual["scenes"] and small["scene"] == usual["scene"]
+
+
+def test_presets_for_terrains_are_those_of_the_config_alone(root, monkeypatch):
+    monkeypatch.chdir(root)
+    assert run.list_presets([]) == ["draft", "standard", "reference", "auto"]
+    assert "compared" in run.load_config([])["presets"]

@@ -7,6 +7,7 @@ from fixtures.markdown import collapse_spaces
 
 from dav_gswt.study import csv_tables
 from dav_gswt.study.comparison import curves, markdown, tables
+from dav_gswt.study.markdown import render_template
 
 ROOT = Path(__file__).parents[4]
 COUNTS = ("wins", "ties", "losses")
@@ -50,6 +51,16 @@ def test_ends_are_means_over_starts():
     results = [about | {"psnr": psnr, "lpips": 0.25, "gap": gap} for psnr, gap in ((20.0, 1.0), (21.0, None))]
     (line,) = collapse_spaces(markdown.format_ends(results)).splitlines()[2:]
     assert line == "| sand | `random` | 2 | 20 | 20.50 | | 0.250 | 1.00 |"
+
+
+@pytest.mark.parametrize(("table", "claims"), [("view", True), ("development", False)])
+def test_only_what_was_not_developed_on_is_said_to_be_so(table, claims):
+    grouped = [each | {"group": "paths"} for each in COMPARED if each["scene"] == "every"]
+    rounds = [{"version": "1", "renderer": "cpu"}]
+    values = markdown.describe_comparison(rounds, [], COMPARED, grouped, [], "farthest")
+    text = render_template(ROOT / "workflow/report/view_selection.md", values | {"table": table})
+    assert f"{table}_curves.csv" in text and f"{table}_budget.png" in text
+    assert ("Nothing was chosen on these scenes." in text) == ("copr_dunes" in text) == claims
 
 
 @pytest.fixture(scope="module")

@@ -76,7 +76,7 @@ def test_losses_are_to_the_best_preset_of_each_scene(rows):
 def test_the_page_has_every_scene_and_survives_the_table(rows, tmp_path):
     csv_tables.write_table(tmp_path / "t.csv", rows)
     read = csv_tables.read_table(tmp_path / "t.csv", numbers=preset_costs.NUMBERS)
-    page = collapse_spaces(preset_costs.format_presets(read, 768, tmp_path / "t.csv"))
+    page = collapse_spaces(preset_costs.format_presets(read, 768))
     assert "| `draft` | 1.00 | 0.50 | 1.00 | 0.045 | 0.050 |" in page
     assert "## sand" in page and "## rock" in page
     losses = {

@@ -112,7 +112,7 @@ def measure_scene(config: Mapping[str, Any], sizes: set[int], size: int) -> dict
     folder = placed if placed.is_dir() else Path(scene.get("folder", ""))
     if not (placed.is_dir() or "folder" in scene):
         return dict.fromkeys(sizes, 0.0)
-    return forecast.measure_shrinking(list_photos(folder), sizes, min(size, scene["size"]))
+    return forecast.measure_shrinking(list_photos(folder), sizes, min(size, scene.get("size", size)))
 
 
 def find_known_psnr(config: Mapping[str, Any]) -> tuple[str, float] | None:

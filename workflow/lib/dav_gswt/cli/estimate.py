@@ -5,7 +5,7 @@ settings of docs/research/data/tradeoff.csv: docs/research/lab-notes.md. Work is
 photos; the aim is a factor of 1.5.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -210,19 +210,20 @@ def _list_files(scene: Mapping[str, Any]) -> list[Path]:
     return sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
 
 
-def describe_estimate(config: Mapping[str, Any], jobs: Mapping[str, int], speed: MachineSpeed) -> str:
+def describe_estimate(
+    config: Mapping[str, Any], jobs: Mapping[str, int], speed: MachineSpeed, presets: Collection[str]
+) -> str:
     """One line: how long the run takes, and, where that is long, a preset that takes less.
 
-    The preset that is named is the slowest of those that stay below LONG, or else the fastest of all.
+    presets: those that may be named; the study's are no user's. It is the slowest of those that stay below LONG, or
+    else the fastest of all.
     """
     own = config["scenes"][config["scene"]]["preset"]
     seconds = estimate_seconds(jobs, describe_work(config), speed)
     text = f"It will take {format_duration(seconds)} on this machine"
     if seconds <= LONG or not {"fit_coarse", "prepare_external_field"} & set(jobs):
         return text
-    others = {
-        name: estimate_seconds(jobs, describe_work(config, name), speed) for name in config["presets"] if name != own
-    }
+    others = {name: estimate_seconds(jobs, describe_work(config, name), speed) for name in presets if name != own}
     faster = {name: other for name, other in others.items() if other < 0.8 * seconds}
     if not faster:
         return text

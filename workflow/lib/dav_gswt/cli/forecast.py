@@ -11,8 +11,8 @@ it (the geometric mean over the scenes of the table), and a what shrinking takes
 import csv
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from math import log10
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float32
@@ -20,6 +20,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
 from dav_gswt.images.image_files import enlarge_map, read_photo, shrink_image
+from dav_gswt.images.metrics import mse_to_psnr
 
 FRONT = Path("docs/research/data/preset_costs.csv")  # of a checkout: rule gather_preset_costs
 BASELINE = "standard"  # preset that the others are compared with; it fits photos of the table's size
@@ -68,19 +69,20 @@ def read_front(path: Path | str = FRONT) -> list[Measured]:
     """Read the table of presets. Raises: InputError: it is not there, or lacks a column."""
     try:
         with Path(path).open(newline="", encoding="utf-8") as text:
-            rows = list(csv.DictReader(text))
-        numbers = [name for name in Measured.__annotations__ if name not in ("scene", "preset", "size")]
-        return [
-            Measured(
-                scene=row["scene"],
-                preset=row["preset"],
-                size=int(row["size"]),
-                **{name: float(row[name] or "nan") for name in numbers},
-            )
-            for row in rows
-        ]
+            return [read_row(row) for row in csv.DictReader(text)]
     except (OSError, KeyError, ValueError, TypeError) as error:
         raise InputError(f"{path}: not the table of presets; `snakemake preset_costs` makes it ({error!r})") from error
+
+
+def read_row(row: Mapping[str, Any]) -> Measured:
+    """A row of the table, its numbers as text or numbers; NaN where one is missing. Raises: KeyError, ValueError."""
+    texts = {name: str(row[name]) for name in ("scene", "preset")}
+    numbers = {name: _read_number(row[name]) for name in Measured.__annotations__ if name not in (*texts, "size")}
+    return Measured(**texts, size=int(row["size"]), **numbers)
+
+
+def _read_number(value: Any) -> float:
+    return np.nan if value in (None, "") else float(value)
 
 
 def forecast_presets(
@@ -106,7 +108,7 @@ def forecast_presets(
     if not presets:
         return {}
     base = psnr_to_mse(known[1]) / fits[known[0]] if known and known[0] in fits else _guess_error(front, shrinking)
-    psnr = {p: mse_to_psnr(base * fits[p] + LACKING * shrinking[p]) for p in presets}
+    psnr = {p: error_to_psnr(base * fits[p] + LACKING * shrinking[p]) for p in presets}
     lpips = {p: _average_lpips(at, scenes, p, shrinking[p] > 0) for p in presets}
     best, sharpest = max(psnr.values()), min(lpips.values())
     return {p: Forecast(p, psnr[p], best - psnr[p], lpips[p] - sharpest) for p in presets}
@@ -134,7 +136,7 @@ def leave_one_out(front: list[Measured], known: str | None = None) -> list[LeftO
     found = []
     for scene in dict.fromkeys(row.scene for row in front):
         own = {row.preset: row for row in front if row.scene == scene}
-        level = (known, mse_to_psnr(own[known].fit_error)) if known in own else None
+        level = (known, error_to_psnr(own[known].fit_error)) if known in own else None
         others = [row for row in front if row.scene != scene]
         made = forecast_presets(others, {preset: row.shrinking for preset, row in own.items()}, level)
         best = max((own[preset].psnr for preset in made), default=0.0)
@@ -200,6 +202,7 @@ def psnr_to_mse(psnr: float) -> float:
     return 10 ** (-psnr / 10)
 
 
-def mse_to_psnr(mse: float) -> float:
-    """The PSNR of a mean squared error above 0, of values in [0, 1]."""
-    return -10 * log10(mse)
+def error_to_psnr(mse: float) -> float:
+    """The PSNR of a mean squared error; infinite where that is 0."""
+    psnr = mse_to_psnr(mse)
+    return np.inf if psnr is None else psnr

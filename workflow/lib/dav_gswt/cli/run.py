@@ -59,6 +59,11 @@ def load_config(overlays: list[Path], changes: dict | None = None) -> dict:
     return check_config(add_scene_files(read_config([CONFIG, STUDY, *overlays], changes), SCENES))
 
 
+def list_presets(overlays: list[Path]) -> list[str]:
+    """Presets for terrains: those of the config, without the study's own."""
+    return list(read_config([CONFIG, *overlays])["presets"])
+
+
 def select_overlays(quietly: bool) -> list[Path]:
     """Config files to read before the user's own: a smaller size where PyTorch renders; printed unless quietly."""
     if backends.select_backend() != "torch":
@@ -89,7 +94,7 @@ def run(given: dict, cores: int, overlays: list[Path]) -> int:
     start = time.monotonic()
     code, jobs = follow(
         [*snakemake, "--cores", str(cores), "--logger", "davgswt"],
-        lambda planned: describe_estimate(given, planned, speed),
+        lambda planned: describe_estimate(given, planned, speed, list_presets(overlays)),
     )
     if code < 0 or code == 130:
         print("\nStopped. The same command goes on where this ended.", file=sys.stderr)

@@ -18,24 +18,18 @@ def describe_comparison(
     """Values of the page's template.
 
     curves, results, compared, grouped, worth: rows of `read_curves`, `summarise_cells`, `compare_to_baseline`,
-    `compare_groups` and `check_predictions`. difference(group, policy, measure): a mean with its interval as the tables
-    have it, for sentences.
+    `compare_groups` and `check_predictions`.
     """
     overall = [row | {"group": ALL_SCENES} for row in compared if row["scene"] == EVERY]
-    rows = grouped + overall
-    at = {(row["group"], row["policy"], row["measure"]): row for row in rows}
     every = next((row for row in worth if row["scene"] == EVERY), None)
     return {
         "baseline": baseline,
         "version": curves[0]["version"],
         "renderer": curves[0]["renderer"],
-        "groups": format_groups(rows),
+        "groups": format_groups(grouped + overall),
         "scenes": format_scenes(compared, baseline),
         "ends": format_ends(results),
         "worth": every,
-        "difference": lambda group, policy, measure="psnr": _format_cell(
-            at.get((group, policy, measure)), NAMED[measure][1]
-        ),
     }
 
 

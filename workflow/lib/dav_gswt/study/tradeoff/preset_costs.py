@@ -4,11 +4,10 @@ All else is as the config has it: policy, rounds, tiling, materials.
 """
 
 from itertools import chain
-from pathlib import Path
 
 import numpy as np
 
-from dav_gswt.cli.forecast import Measured, leave_one_out, measure_shrinking, read_front
+from dav_gswt.cli.forecast import leave_one_out, measure_shrinking, read_row
 from dav_gswt.files import read_json
 from dav_gswt.images.image_files import list_photos
 from dav_gswt.provenance import describe_machine
@@ -51,8 +50,8 @@ def _tabulate_cell(cell: dict, size: int) -> dict:
     return row | describe_origin(metrics["provenance"]) | describe_machine()
 
 
-def format_presets(rows: list[dict], size: int, table: Path) -> str:
-    """The page. rows: as `tabulate_presets` has them, NUMBERS as floats. size: of the test photos. table: the file."""
+def format_presets(rows: list[dict], size: int) -> str:
+    """The page. rows: as `tabulate_presets` has them, NUMBERS as floats. size: of the test photos, pixels."""
     first, presets = rows[0], list(dict.fromkeys(row["preset"] for row in rows))
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     parts = [
@@ -74,7 +73,7 @@ def format_presets(rows: list[dict], size: int, table: Path) -> str:
             "What `dav-gswt advise` says of a scene from the others, before a run of it and after one with `draft`: dB "
             "under its best preset, and LPIPS over it, with what was measured in brackets. Seconds: what `make run` "
             "expects of these jobs on the reference machine, and what they took.",
-            format_table(*_tabulate_forecasts(rows, read_front(table))),
+            format_table(*_tabulate_forecasts(rows)),
         ]
     for scene in scenes:
         parts += [f"## {scene}", format_table(*_tabulate_scene([row for row in rows if row["scene"] == scene]))]
@@ -108,8 +107,9 @@ def _tabulate_means(rows: list[dict], presets: list[str]) -> tuple[list[str], li
     return head, found
 
 
-def _tabulate_forecasts(rows: list[dict], front: list[Measured]) -> tuple[list[str], list[list[str]]]:
+def _tabulate_forecasts(rows: list[dict]) -> tuple[list[str], list[list[str]]]:
     head = ["scene", "preset", "dB before a run", "after one with `draft`", "LPIPS", "seconds"]
+    front = [read_row(row) for row in rows]
     before, after = (
         {(each.scene, each.preset): each for each in leave_one_out(front, known)} for known in (None, "draft")
     )
