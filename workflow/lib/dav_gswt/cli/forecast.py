@@ -76,9 +76,9 @@ def read_front(path: Path | str = FRONT) -> list[Measured]:
 
 def read_row(row: Mapping[str, Any]) -> Measured:
     """A row of the table, its numbers as text or numbers; NaN where one is missing. Raises: KeyError, ValueError."""
-    texts = {name: str(row[name]) for name in ("scene", "preset")}
-    numbers = {name: _read_number(row[name]) for name in Measured.__annotations__ if name not in (*texts, "size")}
-    return Measured(**texts, size=int(row["size"]), **numbers)
+    about = ("scene", "preset", "size")
+    numbers = {name: _read_number(row[name]) for name in Measured.__annotations__ if name not in about}
+    return Measured(scene=str(row["scene"]), preset=str(row["preset"]), size=int(row["size"]), **numbers)
 
 
 def _read_number(value: Any) -> float:
