@@ -176,6 +176,11 @@ def test_the_verdict_follows_the_photographed_area(areas, grade):
     assert judged.reason.startswith(f"sand was photographed on {areas:.1f} tile areas")
 
 
+@pytest.mark.parametrize(("areas", "times"), [(3.99, "1.1"), (3.2, "1.3"), (2.0, "2.0"), (0.5, "8.0")])
+def test_the_verdict_never_asks_for_as_much_again_as_there_is(areas, times):
+    assert f"photograph {times} times as much" in verdict.judge_material("sand", areas, 0.3).reason
+
+
 def test_a_window_is_filled_by_its_material_where_it_can_be():
     own = np.zeros((128, 128), bool)
     own[32:120, 20:120] = True

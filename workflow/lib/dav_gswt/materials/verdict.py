@@ -1,5 +1,6 @@
 """Verdict on each material and on the set: is there enough of it for a terrain, and what would help."""
 
+import math
 from dataclasses import dataclass
 
 GOOD, MARGINAL = 4.0, 2.0  # tile areas that were photographed
@@ -21,7 +22,8 @@ def judge_material(name: str, areas: float, filled: float) -> MaterialVerdict:
     seen = f"{name} was photographed on {areas:.1f} tile areas"
     if areas >= GOOD:
         return MaterialVerdict("good", seen)
-    more = f"photograph {GOOD / max(areas, 0.1):.1f} times as much of it"
+    times = math.ceil(10 * GOOD / max(areas, 0.1)) / 10  # up, for "1.0 times" asks for nothing
+    more = f"photograph {times:.1f} times as much of it"
     if areas >= MARGINAL:
         return MaterialVerdict("marginal", f"{seen}: repeats may be seen; {more}")
     made = f", and {filled:.0%} of what its tiles are cut from is made of patches" if filled > 0.05 else ""
