@@ -1,0 +1,160 @@
+"""What the paper claims and what holds here, as one page; its figures are those of tables in docs/research/data."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dav_gswt.study.csv_tables import read_table
+from dav_gswt.study.markdown import render_template, write_page
+
+PAGE = "docs/research/results/claims.md"
+TEMPLATE = "workflow/report/claims.md"
+DATA = "docs/research/data"
+Row = dict
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A mean difference with the ends of its interval, None where there is none."""
+
+    mean: float
+    low: float | None = None
+    high: float | None = None
+
+    def reverse(self) -> "Difference":
+        """The second less the first instead."""
+        ends = [None if end is None else -end for end in (self.high, self.low)]
+        return Difference(-self.mean, *ends)
+
+    def judge(self) -> str:
+        """Whether the claim that the difference is above 0 holds, is not shown or is contradicted."""
+        low, high = self._ends()
+        return "holds" if low > 0 else "contradicted" if high < 0 else "not shown"
+
+    def format(self, unit: str = "") -> str:
+        """Mean, interval and unit; without a unit with four digits, as differences of LPIPS need."""
+        digits = 2 if unit else 4
+        ends = "" if self.low is None else f" ({self._ends()[0]:+.{digits}f}, {self._ends()[1]:+.{digits}f})"
+        return f"{self.mean:+.{digits}f}{ends} {unit}".strip()
+
+    def _ends(self) -> tuple[float, float]:
+        return self.mean if self.low is None else self.low, self.mean if self.high is None else self.high
+
+
+def write_claims(root: Path) -> str:
+    """The page's text from the tables below a folder of the repository's shape.
+
+    Raises: KeyError: a table lacks a row or column that a claim is judged by.
+    """
+
+    def rows(name: str) -> list[Row]:
+        return read_table(root / DATA / f"{name}.csv")
+
+    tables = (_describe_views, _describe_scores, _describe_settings, _describe_seams, _describe_frames)
+    values = {key: value for describe in tables for key, value in describe(rows).items()}
+    return render_template(root / TEMPLATE, values)
+
+
+Reader = Callable[[str], list[Row]]
+
+
+def _compare(row: Row, measure: str) -> Difference:
+    """A measure's difference from the baseline, in a row of the ablation."""
+    return _read_difference(row, f"{measure}_difference", measure)
+
+
+def _read_difference(row: Row, mean: str, ends: str) -> Difference:
+    low, high = (row[f"{ends}_{end}"] for end in ("low", "high"))
+    return Difference(float(row[mean]), *(float(end) if end else None for end in (low, high)))
+
+
+def _describe_views(rows: Reader) -> dict:
+    """Estimators and policies of the ablation, and the default of the view benchmark."""
+    table = rows("ablation")
+    budget = {row["variant"]: row for row in table if row["sweep"] == "budget"}
+    compared = {row["variant"]: row for row in table if row["sweep"] == "estimators"}
+    paired = [row for row in rows("view_comparison") if row["policy"] == "coverage-error" and row["scene"] == "every"]
+    default = {row["measure"]: Difference(*(float(row[part]) for part in ("mean", "low", "high"))) for row in paired}
+
+    psnr = {variant: float(row["psnr"]) for variant, row in budget.items()}
+    return {
+        "chosen": {variant: _compare(compared[variant], "psnr") for variant in ("w2", "grad-lpips", "single")},
+        "photos": int(float(budget["w2-lpips"]["photos"])),
+        "all_photos": int(float(budget["all"]["photos"])),
+        "under_all": psnr["w2-lpips"] - psnr["all"],
+        "random": Difference(psnr["w2-lpips"] - psnr["random"]),
+        "spread_out": _compare(budget["w2-lpips"], "psnr"),
+        "default": default["psnr"],
+        "default_worst": default["worst_psnr"],
+    }
+
+
+def _describe_scores(rows: Reader) -> dict:
+    """How well the paper's u predicts errors."""
+    table = [row for row in rows("calibration") if row["score"] == "u"]
+    real = {row["scene"] for row in table if row["scene"].startswith("copr_dunes")}
+    synthetic = [float(row["spearman"]) for row in table if row["scene"] not in real]
+    covered = [100 * float(row["coverage"]) for row in table if row["coverage"]]
+    return {
+        "u_synthetic": _range(synthetic),
+        "u_real": _range([float(row["spearman"]) for row in table if row["scene"] in real]),
+        "u_scenes": len({row["scene"] for row in table} - real),
+        "covered": _range(covered),
+    }
+
+
+def _describe_settings(rows: Reader) -> dict:
+    """How much the paper's four settings change."""
+    of: dict[str, dict[float, Row]] = {}
+    for row in rows("sensitivity"):
+        of.setdefault(row["setting"], {})[float(row["value"])] = row
+    psnr = {name: [float(of[name][value]["psnr"]) for value in sorted(of[name])] for name in of}
+    orders = [float(of["tau"][value]["orders"]) for value in sorted(of["tau"])]
+    k_values = sorted(of["k"])[-2:]
+    return {
+        "k_values": [int(value) for value in k_values],
+        "k_gain": psnr["k"][-1] - psnr["k"][-2],
+        "spread": [max(psnr[name]) - min(psnr[name]) for name in ("p_drop", "lam", "tau")],
+        "tau_values": [min(of["tau"]), max(of["tau"])],
+        "tau_orders": round(max(orders) / min(orders), 1),
+    }
+
+
+def _describe_seams(rows: Reader) -> dict:
+    """Ways to cut, less cuts by colour, and the ablation of gamma."""
+
+    def read(name: str) -> dict[str, Difference]:
+        chosen = [row for row in rows(name) if row["measure"] == "seam_lpips" and row["scene"] == "every"]
+        return {row["variant"]: _read_difference(row, "difference", "difference") for row in chosen}
+
+    [ablated] = [r for r in rows("ablation") if (r["sweep"], r["variant"]) == ("seams", "semantic-nogamma")]
+    gamma = _compare(ablated, "seam_lpips")
+    return {"cuts": read("seam_ablation"), "mixed": read("seam_ablation_mixed"), "gamma": gamma}
+
+
+def _describe_frames(rows: Reader) -> dict:
+    """Levels of detail, and the page's times at the first budget of Gaussians."""
+    of: dict[str, dict[int, list[float]]] = {}
+    for row in rows("lod"):
+        of.setdefault(row["scene"], {}).setdefault(int(row["level"]), []).append(float(row["count"]))
+    counts = [[np.mean(levels[level]) for level in sorted(levels)] for levels in of.values()]
+    ratios = [before / after for each in counts for before, after in zip(each[:-1], each[1:], strict=True)]
+    page = [row for row in rows("frames") if row["renderer"] == "page"]
+    page = [row for row in page if row["budget"] == page[0]["budget"]]
+    times = {name: _range([float(row[name]) for row in page]) for name in ("render_ms", "sort_ms", "update_ms")}
+    return {
+        "levels": [len(each) for each in counts],
+        "ratio": float(np.exp(np.mean(np.log(ratios)))),
+        "size": f"{page[0]['width']} x {page[0]['height']}",
+        **times,
+    }
+
+
+def _range(values: list[float]) -> tuple[float, float]:
+    return min(values), max(values)
+
+
+if __name__ == "__main__":
+    write_page(PAGE, write_claims(Path()))
