@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from dav_gswt.photos.importers.splat import fit_field_frame
 from dav_gswt.photos.lenses import Lens, pinhole_parameters
 from dav_gswt.photos.masks import undistort_masks
 from dav_gswt.photos.sfm.registration import Registration, SfmOptions, register_photos, undistort_image
+from dav_gswt.threads import map_ahead
 
 
 def prepare_photos(
@@ -46,7 +48,7 @@ def prepare_photos(
         verdict=found.verdict,
     )
     numbers = progress(range(len(model.names)), "undistort photos")
-    pictures = ((model.names[i], undistort_image(found, i)) for i in numbers)
+    pictures = zip(model.names, map_ahead(partial(undistort_image, found), numbers, options.threads), strict=True)
     covers = undistort_masks(found, masks) if masks else {}
     write_photo_folder(out, model, pictures, frame, list_lenses(found), covers)
     return frame

@@ -39,6 +39,7 @@ from dav_gswt.photos.sfm.mapping import (
     write_pose_priors,
 )
 from dav_gswt.photos.sfm.verdict import COVERAGE, LEAST_INLIERS, SfmEvidence, find_groups, judge_model, require_trust
+from dav_gswt.threads import map_ahead
 
 _log = logging.getLogger(__name__)
 
@@ -134,7 +135,7 @@ def register_photos(folder: Path | str, options: SfmOptions) -> Registration:
     positions = read_gps_positions(paths)
     with tempfile.TemporaryDirectory(prefix="sfm-") as scratch:
         database = Path(scratch) / "database.db"
-        _write_shrunk_photos(photos, Path(scratch))
+        _write_shrunk_photos(photos, Path(scratch), options.threads)
         with closing(pycolmap.Database.open(database)) as store:
             held = _enter_images(photos, store, options)
         extract_features(Path(scratch), database, options.size, options.features, options.threads)
@@ -209,12 +210,16 @@ def _enter_images(photos: list[_Photo], store: pycolmap.Database, options: SfmOp
     return held
 
 
-def _write_shrunk_photos(photos: list[_Photo], folder: Path) -> None:
+def _write_shrunk_photos(photos: list[_Photo], folder: Path, threads: int) -> None:
     """Write what features are looked for in: the photos shrunk by area means, grey by Rec. 601."""
-    for photo in progress(photos, "read photos"):
+
+    def write(photo: _Photo) -> None:
         image = image_files.shrink_image(image_files.read_photo(photo.path), photo.width, photo.height)
         grey = image @ np.array([0.299, 0.587, 0.114], np.float32)
         image_files.write_png(folder / photo.key, np.repeat(grey[..., None], 3, axis=2))
+
+    for _ in map_ahead(write, progress(photos, "read photos"), threads):
+        pass
 
 
 @dataclass(frozen=True)
