@@ -2,7 +2,7 @@
 
 from itertools import product
 
-from dav_gswt.paths import encode_number, encode_stop
+from dav_gswt.paths import encode_number
 from dav_gswt.study.seams import replicates
 from dav_gswt.study.sweeps import grid
 from dav_gswt.study.tables.checks import sweeps_of
@@ -224,45 +224,22 @@ def tradeoff_experiments():
     ]
 
 
-def auto_experiments():
-    """Of each scene of `auto`: the base, then with each of what is chosen by itself alone, then with all of them."""
-    asked = STUDY["auto"]
-    chosen, base = asked["auto"], asked["base"]["preset"]
-    size = config["presets"][settings.name_sized_preset(FLAT, base)]["size"]
-    parts = {
-        "base": {"preset": settings.name_sized_preset(FLAT, base)},
-        "fit": {"preset": settings.name_sized_preset(FLAT, chosen["preset"])},
-        "rounds": {"stop": {"marginal_gain": chosen["marginal_gain"]}},
-        "orders": {"tau": chosen["tau"]},
-    }
-    parts["all"] = {key: value for part in parts.values() for key, value in part.items()}
-    return [
-        {"part": part} | tradeoff_experiment(scene, asked["seed"], asked["base"] | parts["base"] | own, size, "stills")
-        for scene in asked["scenes"]
-        for part, own in parts.items()
-    ]
-
-
 def tradeoff_experiment(scene, seed, chosen, size, measure):
     """One of them. size: of the photos that all are tested on, whatever they were fitted to."""
-    stop = chosen.get("stop", {})
-    others = {key: value for key, value in chosen.items() if key != "stop"}
-    values = experiment_branch(scene, others) | {"seed": seed, "stop": encode_stop(stop)}
+    values = experiment_branch(scene, chosen) | {"seed": seed}
     cell = sweep_experiment(values, ["views", "tiles", measure])
     (metrics,) = expand(rules.evaluate_at.output.metrics, size=size, **values)
-    rounds = expand(rules.update_field.output.fit, **(values | {"t": range(1, values["t"] + 1)}))
     return cell | {
         "sweep": "tradeoff",
         "varied": {},
         "files": cell["files"] | {"metrics": metrics},
-        "fits": expand(rules.fit_coarse.output.fit, **values) + rounds,
         "stills": expand(rules.render_terrain.output.stills, **values) if measure == "stills" else [],
     }
 
 
 def files_of(cells):
     """Everything that cells are read from, but for benchmarks."""
-    return [path for cell in cells for path in [*cell["files"].values(), *cell["fits"], *cell["stills"]]]
+    return [path for cell in cells for path in [*cell["files"].values(), *cell["stills"]]]
 
 
 def walk_settings(wildcards):

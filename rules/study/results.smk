@@ -32,7 +32,7 @@ rule study:
         lambda wildcards: expand("results/sweeps/{name}.png", name=sweeps_of(STUDY["tables"])),
         lambda wildcards: list(figure_files().values()) + terrain_sheets(),
         lambda wildcards: [rules.write_results.output.page, rules.write_stability.output.page],
-        lambda wildcards: [rules.write_tradeoff.output.page, rules.gather_auto.output.page],
+        lambda wildcards: rules.write_tradeoff.output.page,
 
 
 localrules:

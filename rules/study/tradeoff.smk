@@ -1,8 +1,8 @@
-"""Speed against accuracy: each setting of the config's `study.tradeoff` turned by itself, and what `auto` chose.
+"""Speed against accuracy: each setting of the config's `study.tradeoff` turned by itself.
 
-In: what each experiment left, and its jobs' benchmarks. Out: results/tradeoff/{tradeoff,pareto,auto}.csv, {pareto,knobs}.png;
-docs/research/data/tradeoff.csv and auto.csv, where runs add up; docs/research/results/tradeoff.md and auto.md. Seconds differ from
-machine to machine: one that is otherwise idle is to run all of it. `snakemake tradeoff`.
+In: what each experiment left, and its jobs' benchmarks. Out: results/tradeoff/{tradeoff,pareto}.csv, {pareto,knobs}.png;
+docs/research/data/tradeoff.csv, where runs add up; docs/research/results/tradeoff.md. Seconds differ from machine to machine:
+one that is otherwise idle is to run all of it. `snakemake tradeoff`.
 """
 
 
@@ -95,30 +95,10 @@ rule write_tradeoff:
         "../../scripts/study/write_tradeoff.py"
 
 
-rule gather_auto:
-    """What `auto` chose for each scene, what fixed settings cost instead, and what was lost."""
-    input:
-        measured=lambda wildcards: files_of(auto_experiments()),
-    output:
-        table="results/tradeoff/auto.csv",
-        kept=update("docs/research/data/auto.csv"),
-        page="docs/research/results/auto.md",
-    log:
-        "<logs>/tradeoff/gather_auto.log",
-    benchmark:
-        "<benchmarks>/tradeoff/gather_auto.tsv"
-    params:
-        cells=lambda wildcards: auto_experiments(),
-        source=code_of("study/gather_auto"),
-    script:
-        "../../scripts/study/gather_auto.py"
-
-
 rule tradeoff:
     """Speed against accuracy: tables, figures and pages."""
     input:
         rules.write_tradeoff.output,
-        rules.gather_auto.output,
 
 
 localrules:

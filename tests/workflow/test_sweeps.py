@@ -83,11 +83,11 @@ def test_the_page_of_results_plans(planned, root, tmp_path, size):
 
 def test_the_study_makes_every_page_and_each_photo_set_once(planned, root, tmp_path):
     plan = plan_of(planned, root, tmp_path, "study", "config/study.yaml")
-    pages = ("write_results", "write_stability", "write_tradeoff", "gather_auto")
+    pages = ("write_results", "write_stability", "write_tradeoff")
     assert all(plan[page] == 1 for page in (*pages, "study"))
     assert plan["gather_sweep"] == plan["plot_sweep"] == 9
     asked = yaml.safe_load((root / "config/study.yaml").read_text())["study"]
-    scenes = {*asked["sweeps"]["k"]["scenes"], asked["tradeoff"]["scene"], *asked["auto"]["scenes"]}
+    scenes = {*asked["sweeps"]["k"]["scenes"], asked["tradeoff"]["scene"]}
     assert plan["render_photos"] + plan["register_photos"] == len(scenes)
 
 

@@ -18,11 +18,6 @@ study:
       max_gaussians: {values: [20000, 10000]}
       candidates: {values: [24, 6]}
       level_steps: {values: [10, 5]}
-  auto:
-    scenes: [desert]
-    base: {preset: draft, rounds: 1, prior: terrain}
-presets:
-  auto: {size: 128, spacing: 1.5, max_gaussians: auto, steps: 60, steps_per_photo: 10, sh_degree: 0, level_steps: 10}
 """
 
 
@@ -47,12 +42,6 @@ def test_settings_share_what_they_have_in_common(planned, tmp_path):
         evaluate_round=0,
     )
     assert {rule: plan[rule] for rule in wanted} == wanted
-
-
-def test_what_auto_chose_needs_no_more_than_its_own_cells(planned, tmp_path):
-    plan = planned(tmp_path, "docs/research/results/auto.md", configs=small(tmp_path, "tau"))
-    # fixed, stopping, with other orders; the coarse field of the fixed settings serves all three
-    assert (plan["fit_coarse"], plan["update_field"], plan["bundle_tiles"], plan["gather_auto"]) == (2, 4, 5, 1)
 
 
 def test_a_finished_run_is_measured_drawn_and_told(snakemake, tiny, tmp_path):

@@ -33,13 +33,7 @@ def test_a_setting_has_one_name(value, spelled):
 def test_every_setting_is_an_entry_that_differs_in_one_key(config):
     made = settings.add_entries(config)
     new = set(made["presets"]) - set(config["presets"])
-    assert {
-        "draft-size-192",
-        "draft-spacing-1_75",
-        "draft-max_gaussians-auto",
-        "reference-size-384",
-        "auto-size-384",
-    } < new
+    assert {"draft-size-192", "draft-spacing-1_75", "draft-max_gaussians-auto"} < new
     for entry in new:
         below = made["presets"][entry.split("-")[0]]
         differing = {key for key, value in made["presets"][entry].items() if value != below.get(key)}
@@ -62,16 +56,8 @@ def test_the_entries_are_valid_and_making_them_again_changes_nothing(config):
 
 
 def test_a_config_that_compares_nothing_stays_as_it_is(config):
-    del config["tradeoff"], config["auto"]
+    del config["tradeoff"]
     assert settings.add_entries(config) == config and settings.list_settings(config) == []
-
-
-def test_what_auto_compares_is_fitted_to_photos_of_one_size(config):
-    assert settings.name_sized_preset(config, "reference") == "reference-size-384"
-    assert settings.name_sized_preset(config, "draft") == "draft"  # its own size
-    del config["auto"]["size"]
-    assert settings.name_sized_preset(config, "reference") == "reference"
-    assert "reference-size-384" not in settings.add_entries(config)["presets"]
 
 
 def test_each_knob_has_a_most_accurate_and_a_base_and_no_setting_comes_twice(config):
@@ -127,13 +113,11 @@ def changed(config, path, value):
     "path, value, said",
     [
         pytest.param("tradeoff.scene", "moon", "tradeoff: moon is no scene", id="no such scene"),
-        pytest.param("auto.scenes", ["moon"], "auto: moon is no scene", id="no such scene of auto"),
         pytest.param("tradeoff.knob", {}, "tradeoff: there is no key 'knob'; is 'knobs' meant", id="a typo"),
         pytest.param("tradeoff.base.preset", "best", "tradeoff.base: there is no preset 'best'", id="no such base"),
         pytest.param("tradeoff.base.rounds", 0, "tradeoff.base.rounds: .*greater", id="no round"),
         pytest.param("tradeoff.presets", ["best"], "tradeoff.presets: there is no preset 'best'", id="no such preset"),
         pytest.param("tradeoff.only", ["caps"], "tradeoff.only: there is no knob 'caps'", id="no such knob"),
-        pytest.param("auto.auto.preset", "best", "auto.auto: there is no preset 'best'", id="no such auto"),
         pytest.param("tradeoff.knobs.max_gaussians.values", [5], "draft-max_gaussians-5.*greater", id="out of range"),
         pytest.param("tradeoff.knobs.sh_degree.values", [9], "draft-sh_degree-9", id="a degree too many"),
         pytest.param("tradeoff.knobs.max_gaussians.key", "cup", "no key 'cup'", id="no such key"),

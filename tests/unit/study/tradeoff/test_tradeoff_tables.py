@@ -8,7 +8,7 @@ from fixtures.markdown import collapse_spaces
 
 from dav_gswt.images import figures, image_files
 from dav_gswt.study import csv_tables
-from dav_gswt.study.tradeoff import auto, page, plots, tables
+from dav_gswt.study.tradeoff import page, plots, tables
 
 SECONDS = dict(coarse=40.0, score=0.0, select=1.0, update=19.0, levels=5.0, cut=3.0, bundle=2.0)  # 70 in all
 ORIGIN = {"version": "1", "renderer": {"backend": "cpu"}, "inputs": {"field": "f" * 64}}
@@ -175,33 +175,3 @@ def test_figures_are_drawn_of_what_is_known(table, tmp_path):
     assert (
         image_files.read_size(tmp_path / "one.png")[0] < image_files.read_size(tmp_path / "pareto.png")[0]
     )  # a panel less
-
-
-@pytest.mark.parametrize(
-    "saved, db, lpips, reached",
-    [
-        (0.5, 0.05, 0.001, 1),
-        (1 / 3, 0.1, 0.002, 1),
-        (0.3, 0.0, 0.0, 0),
-        (0.5, 0.11, 0.0, 0),
-        (0.5, 0.0, 0.0021, 0),
-        (0.5, 0.0, None, None),
-    ],
-)
-def test_the_target_is_a_third_of_the_time_for_little(saved, db, lpips, reached):
-    assert auto.check_target(saved, db, lpips) == reached
-
-
-def test_what_auto_chose_stands_beside_what_it_cost(tmp_path):
-    base = cell(tmp_path, "b", 30.0, knob="auto", measure="stills", part="base")
-    parts = {"fit": 2.0, "rounds": 1.25, "orders": 1.0, "all": 4.0}
-    cells = [cell(tmp_path, p, 29.95, f, knob="auto", measure="stills", part=p) for p, f in parts.items()]
-    rows = auto.tabulate_auto([base, *cells])
-    assert [row["part"] for row in rows] == list(parts)
-    assert [row["saved"] for row in rows] == pytest.approx([0.5, 0.2, 0.0, 0.75])
-    assert [row["target"] for row in rows] == [1, 0, 0, 1] and rows[0]["loss_db"] == pytest.approx(0.05)
-    assert rows[0]["chosen"] == "9 Gaussians, degree 1, 300 steps, then 300" and rows[1]["chosen"] == "12 photos"
-    csv_tables.write_table(tmp_path / "auto.csv", rows)
-    text = collapse_spaces(auto.format_auto(tables.read_tradeoff(tmp_path / "auto.csv")))
-    assert "1 of 1 scenes reach that with all three." in text
-    assert "| Gaussians, degree and steps | 9 Gaussians, degree 1, 300 steps, then 300 | 35 | 70 | 50% | 0.05 |" in text

@@ -245,24 +245,6 @@ class Tradeoff(ConfigModel):
         return self
 
 
-class AutoSettings(ConfigModel):
-    """What is chosen by the scene itself."""
-
-    preset: Name = key("an entry of `presets` with `auto`", renamed="quality")
-    marginal_gain: float = key("below which rounds stop", unit="dB a photo", renamed="worth", ge=0.0001, le=100)
-    tau: Share = key("mean uncertainty from which a tile keeps all orders")
-
-
-class AutoStudy(ConfigModel):
-    """What `auto` chose, and what fixed settings cost instead."""
-
-    scenes: Names = key("scenes with photos")
-    seed: Seed = key("of all experiments")
-    size: int | None = key("of the photos that both are fitted to", None, unit="pixels", ge=32, le=4096)
-    base: BaseSettings = key("the fixed settings")
-    auto: AutoSettings = key("what replaces them")
-
-
 class TableFigures(ConfigModel):
     """What the paper's figures show."""
 
@@ -305,7 +287,6 @@ class StudyConfig(ConfigModel):
     forced_choice: ForcedChoice | None = key("the study with people", None, renamed="perceptual_study")
     sweeps: dict[Name, Sweep] = key("by name", {})
     tradeoff: Tradeoff | None = key("speed against accuracy", None)
-    auto: AutoStudy | None = key("what `auto` is worth", None)
     preset_costs: PresetCosts | None = key("what presets cost and are worth", None)
     tables: Tables | None = key("the paper's tables and figures", None)
 

@@ -52,14 +52,8 @@ def find_test_size(config: dict) -> int:
     return max(config["presets"][setting.chosen["preset"]]["size"] for setting in list_settings(config))
 
 
-def name_sized_preset(config: dict, preset: str) -> str:
-    """The entry that is this preset at the size of the config's `auto`."""
-    size = config["auto"].get("size", config["presets"][preset]["size"])
-    return preset if config["presets"][preset]["size"] == size else name_entry(preset, "size", size)
-
-
 def add_entries(config: dict) -> dict:
-    """The config with the entries that its `tradeoff` and `auto` name; what it holds already stays as it is.
+    """The config with the entries that its `tradeoff` names; what it holds already stays as it is.
 
     Raises: InputError: the config has another entry of such a name.
     """
@@ -67,26 +61,21 @@ def add_entries(config: dict) -> dict:
     for table, entry, below, key, value in _list_entries(config):
         found = config[table][below] | {key: value}
         if made[table].setdefault(entry, found) != found:
-            raise InputError(
-                f"config: {table}.{entry}: `tradeoff` or `auto` makes an entry of this name; give yours another"
-            )
+            raise InputError(f"config: {table}.{entry}: `tradeoff` makes an entry of this name; give yours another")
     return config | made
 
 
 def check_tradeoff(config: dict) -> None:
-    """Check `tradeoff` and `auto` against the rest of the config.
+    """Check `tradeoff` against the rest of the config.
 
     Raises: InputError: the key, what is wrong with it, and what it may be.
     """
-    for section in ("tradeoff", "auto"):
-        asked = config.get(section, {})
-        for scene in [asked["scene"]] if "scene" in asked else asked.get("scenes", []):
-            if config["scenes"].get(scene, {"kind": "field"})["kind"] == "field":
-                able = ", ".join(n for n, s in config["scenes"].items() if s["kind"] != "field")
-                raise InputError(f"config: {section}: {scene} is no scene with photos; they are {able}")
-        for part in ("base", "auto"):
-            _check_names(f"{section}.{part}", asked.get(part, {}), config)
-    asked = config.get("tradeoff", {"knobs": {}, "presets": []})
+    if not (asked := config.get("tradeoff")):
+        return
+    if config["scenes"].get(asked["scene"], {"kind": "field"})["kind"] == "field":
+        able = ", ".join(n for n, s in config["scenes"].items() if s["kind"] != "field")
+        raise InputError(f"config: tradeoff: {asked['scene']} is no scene with photos; they are {able}")
+    _check_names("tradeoff.base", asked["base"], config)
     for preset in asked["presets"]:
         _check_names("tradeoff.presets", {"preset": preset}, config)
     for knob in asked.get("only", []):
@@ -147,16 +136,6 @@ def _list_entries(config: dict) -> Iterator[tuple[str, str, str, str, int | floa
             usual = _encode_value(_own_value(config, knob, turned))
             for value in (value for value in turned["values"] if _encode_value(value) != usual):
                 yield table, name_entry(base[called], key, value), base[called], key, value
-    for preset in _list_auto_presets(config):
-        if (made := name_sized_preset(config, preset)) != preset:
-            yield "presets", made, preset, "size", config["auto"]["size"]
-
-
-def _list_auto_presets(config: dict) -> list[str]:
-    """The qualities that `auto` compares; one that does not exist is `check`'s to tell."""
-    asked = config.get("auto")
-    named = [asked[part]["preset"] for part in ("base", "auto")] if asked else []
-    return [preset for preset in named if preset in config["presets"]]
 
 
 def _encode_value(value: int | float | str) -> str:
