@@ -23,7 +23,7 @@ from dav_gswt.images.image_files import enlarge_map, read_photo, shrink_image
 from dav_gswt.images.metrics import mse_to_psnr
 
 FRONT = Path("docs/research/data/preset_costs.csv")  # of a checkout: rule gather_preset_costs
-BASELINE = "standard"  # preset that the others are compared with; it fits photos of the table's size
+BASELINE = "standard"  # preset that the others are compared with
 LACKING = 0.7  # share of what shrinking takes that a field lacks: photos that overlap give some of it back
 LEAST_SHARE = 0.1  # of an error, that is left to the fit whatever shrinking costs
 LOOKED_AT = 6  # photos whose shrinking is measured
