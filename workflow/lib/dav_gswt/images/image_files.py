@@ -112,7 +112,7 @@ def write_grey16(path: Path | str, values: UInt16[Array, "h w"]) -> None:
 
 def _write_pixels(path: Path | str, spec: oiio.ImageSpec, pixels: Array) -> None:
     oiio.attribute("threads", 1)
-    spec["png:compressionLevel"] = 2  # a third of the time of the default, 6, for files 4 % larger
+    spec["png:compressionLevel"] = 2  # a third of the time of the default, 6; files are 3 % smaller to 4 % larger
     with atomic_file(path) as part:
         file = oiio.ImageOutput.create(str(part))
         if file is None:
