@@ -21,8 +21,18 @@ def test_the_second_less_the_first_turns_the_interval_round():
     assert Difference(0.2, -0.1, 0.5).reverse() == Difference(-0.2, -0.5, 0.1)
 
 
-def test_a_difference_without_an_interval_is_judged_by_itself():
-    assert Difference(-0.2).judge() == "contradicted"
+def test_a_difference_without_an_interval_is_judged_by_the_means_and_says_so():
+    assert Difference(-0.2).judge() == "by the means, no"
+
+
+@pytest.mark.parametrize(("low", "high", "word"), [(0.1, 0.3, "both"), (-0.1, 0.3, "one"), (-0.3, -0.1, "neither")])
+def test_of_two_scenes_it_is_said_in_how_many_a_claim_holds(low, high, word):
+    assert Difference(0.1, low, high, pairs=2).judge() == f"in {word} of 2 scenes"
+
+
+@pytest.mark.parametrize(("p", "word"), [(0.35, "not shown"), (0.01, "holds")])
+def test_a_test_that_shows_nothing_outweighs_the_interval(p, word):
+    assert Difference(0.4, 0.1, 0.9, pairs=6, p=p).judge() == word
 
 
 @pytest.mark.parametrize(("unit", "text"), [("dB", "+0.20 (-0.10, +0.50) dB"), ("", "+0.2000 (-0.1000, +0.5000)")])

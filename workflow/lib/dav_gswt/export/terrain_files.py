@@ -2,9 +2,7 @@
 
 import logging
 import shutil
-from collections import deque
 from collections.abc import Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -32,6 +30,7 @@ from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.logs import progress
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.finite import Area, list_blocks, place_block
+from dav_gswt.threads import map_ahead
 
 NAME = "terrain"
 KEPT = ("unit", "origin", "tile_side", "cells")  # of terrain.json, in files that have a place for it
@@ -185,11 +184,6 @@ def _placed(terrain: EndlessTerrain, wanted: TerrainExport, folder: Path, thread
 def place_blocks(terrain: EndlessTerrain, wanted: TerrainExport, threads: int = 1) -> Iterator[GaussianField]:
     """The Gaussians of an export, block by block; `threads` of them are put on the surface at once, in one order."""
     shown = wanted.select(terrain)
-    waiting: deque[Future[GaussianField]] = deque()
-    with ThreadPoolExecutor(threads) as pool:
-        for cells in progress(list_blocks(shown, wanted.area, wanted.eye), "place cells"):
-            waiting.append(pool.submit(place_block(shown, cells, wanted.eye, wanted.origin)))
-            if len(waiting) > threads:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
+    blocks = progress(list_blocks(shown, wanted.area, wanted.eye), "place cells")
+    jobs = (place_block(shown, cells, wanted.eye, wanted.origin) for cells in blocks)
+    yield from map_ahead(lambda place: place(), jobs, threads)

@@ -1,7 +1,7 @@
 """What the paper claims and what holds here, as one page; its figures are those of tables in docs/research/data."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,34 +13,44 @@ PAGE = "docs/research/results/claims.md"
 TEMPLATE = "workflow/report/claims.md"
 DATA = "docs/research/data"
 Row = dict
+Reader = Callable[[str], list[Row]]
+FEW = 2  # pairs, of which an interval is no more than their range
+LEVEL = 0.05
 
 
 @dataclass(frozen=True)
 class Difference:
-    """A mean difference with the ends of its interval, None where there is none."""
+    """A mean difference. low, high: its interval, of FEW pairs and less their range; None where only means are known.
+
+    p: of a paired t-test, corrected for how many were made (Holm); None where there was none.
+    """
 
     mean: float
     low: float | None = None
     high: float | None = None
+    pairs: int | None = None
+    p: float | None = None
 
     def reverse(self) -> "Difference":
         """The second less the first instead."""
-        ends = [None if end is None else -end for end in (self.high, self.low)]
-        return Difference(-self.mean, *ends)
+        low, high = (None if end is None else -end for end in (self.high, self.low))
+        return replace(self, mean=-self.mean, low=low, high=high)
 
     def judge(self) -> str:
         """Whether the claim that the difference is above 0 holds, is not shown or is contradicted."""
-        low, high = self._ends()
-        return "holds" if low > 0 else "contradicted" if high < 0 else "not shown"
+        if self.low is None or self.high is None:
+            return "by the means, " + ("yes" if self.mean > 0 else "no")
+        if self.pairs is not None and self.pairs <= FEW:
+            return f"in {'both' if self.low > 0 else 'neither' if self.high < 0 else 'one'} of {self.pairs} scenes"
+        shown = self.p is None or self.p < LEVEL
+        return "holds" if self.low > 0 and shown else "contradicted" if self.high < 0 and shown else "not shown"
 
     def format(self, unit: str = "") -> str:
         """Mean, interval and unit; without a unit with four digits, as differences of LPIPS need."""
         digits = 2 if unit else 4
-        ends = "" if self.low is None else f" ({self._ends()[0]:+.{digits}f}, {self._ends()[1]:+.{digits}f})"
-        return f"{self.mean:+.{digits}f}{ends} {unit}".strip()
-
-    def _ends(self) -> tuple[float, float]:
-        return self.mean if self.low is None else self.low, self.mean if self.high is None else self.high
+        ends = "" if self.low is None else f" ({self.low:+.{digits}f}, {self.high:+.{digits}f})"
+        test = "" if self.p is None else f", p = {self.p:.2f}"
+        return f"{self.mean:+.{digits}f}{ends} {unit}".strip() + test
 
 
 def write_claims(root: Path) -> str:
@@ -57,17 +67,16 @@ def write_claims(root: Path) -> str:
     return render_template(root / TEMPLATE, values)
 
 
-Reader = Callable[[str], list[Row]]
-
-
 def _compare(row: Row, measure: str) -> Difference:
     """A measure's difference from the baseline, in a row of the ablation."""
-    return _read_difference(row, f"{measure}_difference", measure)
+    found = _read_difference(row, f"{measure}_difference", measure)
+    p = row[f"{measure}_holm"]
+    return replace(found, pairs=int(float(row[f"{measure}_units"])), p=float(p) if p else None)
 
 
 def _read_difference(row: Row, mean: str, ends: str) -> Difference:
     low, high = (row[f"{ends}_{end}"] for end in ("low", "high"))
-    return Difference(float(row[mean]), *(float(end) if end else None for end in (low, high)))
+    return Difference(float(row[mean]), float(low) if low else None, float(high) if high else None)
 
 
 def _describe_views(rows: Reader) -> dict:
@@ -76,8 +85,7 @@ def _describe_views(rows: Reader) -> dict:
     budget = {row["variant"]: row for row in table if row["sweep"] == "budget"}
     compared = {row["variant"]: row for row in table if row["sweep"] == "estimators"}
     paired = [row for row in rows("view_comparison") if row["policy"] == "coverage-error" and row["scene"] == "every"]
-    default = {row["measure"]: Difference(*(float(row[part]) for part in ("mean", "low", "high"))) for row in paired}
-
+    default = {r["measure"]: Difference(float(r["mean"]), float(r["low"]), float(r["high"])) for r in paired}
     psnr = {variant: float(row["psnr"]) for variant, row in budget.items()}
     return {
         "chosen": {variant: _compare(compared[variant], "psnr") for variant in ("w2", "grad-lpips", "single")},
