@@ -2,6 +2,7 @@
 
 In: poses.json. Out: capture/, the photos with their cameras. `render` and `replay` take them at once; `serial` drives a
 camera rig, `plan` writes a drone mission, `handheld` a shot list: these run on this machine and never take a photo twice.
+Where another preset chooses (`choose_with`), its photos are copied with what says why they were chosen.
 """
 
 
@@ -22,6 +23,7 @@ rule capture_views:
         "<benchmarks>/<round>/capture_views.tsv"
     wildcard_constraints:
         scene=scenes_by("render", "replay"),
+        preset=FITS_ROUNDS,
         t=POSITIVE,
     threads: 2
     resources:
@@ -51,9 +53,36 @@ use rule capture_views as request_views with:
         "<benchmarks>/<round>/request_views.tsv"
     wildcard_constraints:
         scene=scenes_by("serial", "plan", "handheld"),
+        preset=FITS_ROUNDS,
         t=POSITIVE,
     retries: 0  # whatever a profile says: nothing is taken twice
 
 
+rule copy_chosen_photos:
+    """Take over the photos of a round of the preset that chooses them."""
+    input:
+        poses=lambda wildcards: f"{chosen_round(wildcards, wildcards.t)}/poses.json",
+        shown=lambda wildcards: f"{chosen_round(wildcards, wildcards.t)}/poses.exr",
+        capture=lambda wildcards: f"{chosen_round(wildcards, wildcards.t)}/capture",
+    output:
+        poses="<results>/<round>/poses.json",
+        shown="<results>/<round>/poses.exr",
+        capture=directory("<results>/<round>/capture"),
+    log:
+        "<logs>/<round>/copy_chosen_photos.log",
+    benchmark:
+        "<benchmarks>/<round>/copy_chosen_photos.tsv"
+    wildcard_constraints:
+        policy=CHOOSING,
+        preset=FITS_ONCE,
+        t=POSITIVE,
+    params:
+        chooser=lambda wildcards: chooser_of(wildcards.preset),
+        source=code_of("copy_chosen_photos"),
+    script:
+        "../scripts/copy_chosen_photos.py"
+
+
 localrules:
+    copy_chosen_photos,  # copies files
     request_views,  # the device, or the folder that people drop photos into, is here

@@ -106,6 +106,22 @@ def round_folder(t):
     return f"<results>/<active>/iter{t}" if t else "<results>/<coarse>"
 
 
+def chooser_of(preset):
+    """The preset whose rounds choose the photos of a preset's fit: its own, or another's."""
+    return config["presets"][preset].get("choose_with") or preset
+
+
+def chosen_folder(stage, wildcards, t=""):
+    """The folder of a stage of the preset that chooses the photos: `coarse`, `scored`, or `round` t."""
+    template = paths.stage_template(stage).replace("{preset}", chooser_of(wildcards.preset))
+    return f"<results>/{template.replace('{t}', str(t))}"
+
+
+def chosen_round(wildcards, t):
+    """The folder that round t of that preset left; round 0 is its coarse field."""
+    return chosen_folder("round" if t else "coarse", wildcards, t)
+
+
 def captures_until(wildcards):
     """The photos that rounds 1 to t took."""
     return [f"{round_folder(t)}/capture" for t in range(1, int(wildcards.t) + 1)]
@@ -147,8 +163,8 @@ def source_field(wildcards):
 
 
 def fits_until(wildcards):
-    """The reports of the updates of rounds 1 to t."""
-    return [f"{round_folder(t)}/fit.json" for t in range(1, int(wildcards.t) + 1)]
+    """The reports of the updates of rounds 1 to t, by the preset that chose their photos."""
+    return [f"{chosen_round(wildcards, t)}/fit.json" for t in range(1, int(wildcards.t) + 1)]
 
 
 def fits_before(wildcards):
@@ -232,11 +248,16 @@ def photos_of_field(wildcards):
     return {"photos": ["<results>/<photos>/images", *captures_until(wildcards)]}
 
 
+def metrics_before(wildcards):
+    """What tests said of the first fit and of rounds 1 to t - 1, by the preset that chose their photos."""
+    return [f"{chosen_round(wildcards, t)}/metrics.json" for t in range(int(wildcards.t))]
+
+
 def story_of_field(wildcards):
     """The photos that a round's field was made of, and what tests said of each; nothing for a finished field."""
     if config["scenes"][wildcards.scene]["kind"] == "field":
         return {}
-    rounds = range(int(wildcards.t) + 1)
+    t = int(wildcards.t)
     return {
         "views": "<results>/<start>/views.json",
         "images": "<results>/<photos>/images",
@@ -244,7 +265,7 @@ def story_of_field(wildcards):
         "frame": "<results>/<photos>/ground.json",
         "captures": captures_until(wildcards),
         "fits": fits_until(wildcards),
-        "metrics": [f"{round_folder(t)}/metrics.json" for t in rounds],
+        "metrics": [*metrics_before(wildcards), f"{round_folder(t)}/metrics.json"],
     }
 
 
@@ -267,15 +288,17 @@ def terrain_targets(scene):
 
 
 def photo_targets(scene):
-    """The photo report, the metrics of each round, and the scores of the last."""
+    """The photo report, the metrics of each round, those before the last of the preset that chose, and its scores."""
     if config["scenes"][scene]["kind"] == "field":
         return []
     values, rounds = branch(scene), config["rounds"]
+    chosen = values | ({"preset": chooser_of(values["preset"])} if rounds else {})
     scored = rules.score_round.output if rounds else rules.score_coarse.output
     return (
         expand(rules.report_photos.output.page, scene=scene)
-        + expand(rules.evaluate_coarse.output.metrics, **values)
-        + expand([rules.evaluate_round.output.metrics] * bool(rounds), **(values | {"t": range(1, rounds + 1)}))
+        + expand(rules.evaluate_coarse.output.metrics, **chosen)
+        + expand([rules.evaluate_round.output.metrics] * (rounds > 1), **(chosen | {"t": range(1, rounds)}))
+        + expand([rules.evaluate_round.output.metrics] * bool(rounds), **values)
         + expand(list(scored), **values)
         + expand([rules.evaluate_inpainted.output.metrics] * config["inpaint"], **values)
     )

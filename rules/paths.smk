@@ -32,6 +32,12 @@ except InputError as error:
 config.clear()
 config.update(given)
 
+# presets whose photos another one chooses, those that the study makes of them included, and all others
+CHOOSERS = "|".join(name for name, preset in config["presets"].items() if not preset.get("choose_with")) or NEVER
+FITS_ONCE = "|".join(name for name, preset in config["presets"].items() if preset.get("choose_with")) or NEVER
+FITS_ONCE = rf"(?!(?:{CHOOSERS})/)(?:{FITS_ONCE})(?:-[^/]+)?"
+FITS_ROUNDS = rf"(?!{FITS_ONCE}/){paths.NAME}"
+
 
 pathvars:
     **paths.TREE,

@@ -2,7 +2,8 @@
 
 In: photos, their model, views.json; of round t the photos captured so far. Out: field.ply (standard 3DGS), ground.exr
 (height, seen or not), fit.json (what the fit chose and why), metrics.json (the test photos, which nothing else sees).
-Round t starts from round t - 1, so T is only which round is asked for.
+Round t starts from round t - 1, so T is only which round is asked for. With `choose_with` in the preset its rounds are
+another preset's, and fit_chosen_photos fits all of their photos at once.
 """
 
 
@@ -84,6 +85,7 @@ rule update_field:
         "<benchmarks>/<round>/update_field.tsv"
     wildcard_constraints:
         policy=CHOOSING,
+        preset=FITS_ROUNDS,
         t=POSITIVE,
     threads: 2
     resources:
@@ -98,6 +100,42 @@ rule update_field:
         source=code_of("update_field"),
     script:
         "../scripts/update_field.py"
+
+
+rule fit_chosen_photos:
+    """Fit the field to the photos that another preset's rounds chose, all at once."""
+    input:
+        captures=captures_until,
+        fits=fits_until,
+        views="<results>/<start>/views.json",
+        images="<results>/<photos>/images",
+        model="<results>/<photos>/sparse",
+        frame="<results>/<photos>/ground.json",
+    output:
+        field="<results>/<round>/field.ply",
+        ground="<results>/<round>/ground.exr",
+        fit="<results>/<round>/fit.json",
+    log:
+        "<logs>/<round>/fit_chosen_photos.log",
+    benchmark:
+        "<benchmarks>/<round>/fit_chosen_photos.tsv"
+    wildcard_constraints:
+        policy=CHOOSING,
+        preset=FITS_ONCE,
+        t=POSITIVE,
+    threads: 2
+    resources:
+        mem_mb=per_attempt(2000),
+        runtime=per_attempt("60m"),
+    params:
+        scene=scene_keys("fit_chosen_photos"),
+        preset=preset_keys("fit_chosen_photos"),
+        seed=integer("seed"),
+        t=integer("t"),
+        keep=SNAPSHOTS,
+        source=code_of("fit_chosen_photos"),
+    script:
+        "../scripts/fit_chosen_photos.py"
 
 
 use rule evaluate_coarse as evaluate_round with:

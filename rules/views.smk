@@ -44,7 +44,7 @@ use rule score_coarse as score_round with:
         unpack(prior_weights),
         field="<results>/<round>/field.ply",
         ground="<results>/<round>/ground.exr",
-        frozen="<results>/<scored>/scores.json",
+        frozen=lambda wildcards: f"{chosen_folder('scored', wildcards)}/scores.json",
         views="<results>/<start>/views.json",
         images="<results>/<photos>/images",
         model="<results>/<photos>/sparse",
@@ -86,6 +86,7 @@ rule select_poses:
     benchmark:
         "<benchmarks>/<round>/select_poses.tsv"
     wildcard_constraints:
+        preset=FITS_ROUNDS,
         t=POSITIVE,
     params:
         scene=scene_keys("select_poses"),

@@ -79,13 +79,15 @@ def benchmark_experiment(scene, asked, seed, k, photos):
         if key in asked
     }
     values = branch(scene, policy) | own | {"seed": seed, "k": k, "stop": ""}
-    before, after = range(1, rounds), range(1, rounds + 1)
+    chosen, before, after = values_of_choice(values), range(1, rounds), range(1, rounds + 1)
 
-    def of(first, later, ts):
-        return expand(first, **values) + expand(later, **(values | {"t": ts}))
+    def of(first, later, ts, wildcards=values):
+        return expand(first, **wildcards) + expand(later, **(wildcards | {"t": ts}))
 
-    jobs = [of(rules.score_coarse.benchmark, rules.score_round.benchmark, before)]
-    jobs += [of([], job.benchmark, after) for job in (rules.select_poses, rules.capture_views, rules.update_field)]
+    jobs = [of(rules.score_coarse.benchmark, rules.score_round.benchmark, before, chosen)]
+    of_round = (rules.select_poses, rules.capture_views, rules.update_field)
+    jobs += [of([], job.benchmark, after, chosen) for job in of_round]
+    jobs += [of([], rules.fit_chosen_photos.benchmark, after)] * (chosen != values)
     prior = config["priors"].get(values["prior"], {"samples": 0})
     return {key: values[key] for key in ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k")} | {
         "corrected": entry["kind"] == "photos",
@@ -178,6 +180,18 @@ def experiment_branch(scene, chosen):
     return branch(scene, changes=over | {"rounds": rounds}) | {"stop": "", "inpainted": ""}
 
 
+def values_of_choice(values):
+    """The wildcards of the rounds that choose a field's photos, which may be those of another preset."""
+    return values | ({"preset": chooser_of(values["preset"])} if values["t"] else {})
+
+
+def benchmark_fits(values):
+    """The benchmarks of the refits of all rounds; where these are another preset's, that of the fit to all photos, too."""
+    chosen = values_of_choice(values)
+    refits = expand(rules.update_field.benchmark, **(chosen | {"t": range(1, values["t"] + 1)}))
+    return refits + (expand(rules.fit_chosen_photos.benchmark, **values) if chosen != values else [])
+
+
 def sweep_experiment(values, measured):
     """One of them. measured: keys of `measure` that hold for it."""
     rounds, scene = values["t"], config["scenes"][values["scene"]]
@@ -192,13 +206,16 @@ def sweep_experiment(values, measured):
         "seams": {"crops": rules.measure_seams.output.crops, "facts": rules.measure_seams.output.facts},
         "stills": {"still": rules.render_terrain.output.stills[0]},
     }
-    rounds_before, after = range(1, rounds), range(1, rounds + 1)
-    times = {"coarse": of(rules.fit_coarse.benchmark)}
-    times["score"] = (of(rules.score_coarse.benchmark) if rounds else []) + of(
-        rules.score_round.benchmark, rounds_before
-    )
-    for key, job in (("select", rules.select_poses), ("capture", rules.capture_views), ("update", rules.update_field)):
-        times[key] = of(job.benchmark, after)
+    chosen = values_of_choice(values)
+
+    def of_choice(job, ts):
+        return expand(job.benchmark, **(chosen | {"t": list(ts)}))
+
+    times = {"coarse": of_choice(rules.fit_coarse, [rounds]), "update": benchmark_fits(values)}
+    times["score"] = of_choice(rules.score_coarse, [rounds]) if rounds else []
+    times["score"] += of_choice(rules.score_round, range(1, rounds))
+    for key, job in (("select", rules.select_poses), ("capture", rules.capture_views)):
+        times[key] = of_choice(job, range(1, rounds + 1))
     if {"tiles", "seams", "stills"} & set(measured):
         times |= {"levels": of(rules.make_levels.benchmark), "cut": of(rules.cut_tiles.benchmark)}
     times |= {"bundle": of(rules.bundle_tiles.benchmark)} if {"tiles", "stills"} & set(measured) else {}

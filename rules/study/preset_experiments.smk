@@ -5,7 +5,7 @@ from dav_gswt.cli.machine_speed import MachineSpeed
 
 # jobs of a run before the start photos are there, beside its products, and after the bundle
 UNCOUNTED = ("render_photos", "register_photos", "report_photos", "split_views", "capture_views")
-UNCOUNTED += ("evaluate_coarse", "evaluate_round", "render_terrain", "make_page")
+UNCOUNTED += ("copy_chosen_photos", "evaluate_coarse", "evaluate_round", "render_terrain", "make_page")
 
 
 def preset_experiments():
@@ -18,10 +18,11 @@ def preset_experiment(scene, preset):
     """One of them."""
     asked, entry = STUDY["preset_costs"], config["scenes"][scene]
     values = branch(scene, changes={"preset": preset}) | {"seed": asked["seed"], "stop": "", "inpainted": ""}
+    chosen = values_of_choice(values)
     after, before = {"t": range(1, values["t"] + 1)}, {"t": range(1, values["t"])}
 
-    def of(path, **ts):
-        return expand(path, **(values | ts))
+    def of(path, wildcards=values, **ts):
+        return expand(path, **(wildcards | ts))
 
     told = [] if entry.get("materials", "one") == "one" else of(rules.find_materials.benchmark)
     tiles = [of(job.benchmark) for job in (rules.make_levels, rules.cut_tiles, rules.bundle_tiles)]
@@ -35,10 +36,10 @@ def preset_experiment(scene, preset):
         "metrics": of(rules.evaluate_at.output.metrics, size=asked["size"])[0],
         "manifest": of(rules.bundle_tiles.output.manifest)[0],
         "times": {
-            "fits": of(rules.fit_coarse.benchmark) + of(rules.update_field.benchmark, **after),
-            "views": of(rules.score_coarse.benchmark)
-            + of(rules.score_round.benchmark, **before)
-            + of(rules.select_poses.benchmark, **after),
+            "fits": of(rules.fit_coarse.benchmark, chosen) + benchmark_fits(values),
+            "views": of(rules.score_coarse.benchmark, chosen)
+            + of(rules.score_round.benchmark, chosen, **before)
+            + of(rules.select_poses.benchmark, chosen, **after),
             "tiles": told + [path for job in tiles for path in job],
         },
     }
@@ -46,7 +47,7 @@ def preset_experiment(scene, preset):
 
 def estimate_tiles(scene, preset):
     """Seconds that `make run` expects of the jobs whose times count, on the reference machine."""
-    jobs = estimate.count_jobs(config | {"scene": scene})
+    jobs = estimate.count_jobs(config | {"scene": scene}, preset)
     counted = {rule: count for rule, count in jobs.items() if rule not in UNCOUNTED}
     counted |= {"score_round": config["rounds"] - 1}  # that after the last round chooses no photo
     work = estimate.describe_work(config | {"scene": scene}, preset)

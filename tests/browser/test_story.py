@@ -14,7 +14,7 @@ from dav_gswt.terrain.page_front import Front
 from dav_gswt.terrain.page_story import Story
 
 PHOTOS = [{"round": int(k > 2), "at": [k - 2.0, 1.0, 3.0], "look": [0.5, -0.5], "picture": k} for k in range(5)]
-ROUNDS = [{"photos": 3, "psnr": 27.1}, {"photos": 2, "psnr": None}]
+ROUNDS = [{"photos": 3, "psnr": 27.1, "preset": "draft"}, {"photos": 2, "psnr": None}]
 VALUE = {
     "unit": "metre",
     "half": 2.0,
@@ -45,7 +45,7 @@ def test_the_panel_shows_places_rounds_and_photos(visit, folder, width, height):
         panel.locator("svg").wait_for()
         assert panel.locator("circle").count() == 5 and panel.locator(".photos div").count() == 5
         assert [text.strip() for text in panel.locator("tbody tr").all_inner_texts()] == [
-            "start\t3\t27.1 dB",
+            "start\t3\t27.1 dB (draft)",
             "round 1\t+ 2\tnone",
         ]
         assert panel.evaluate("panel => panel.scrollWidth <= panel.clientWidth")
@@ -65,6 +65,7 @@ def test_a_page_without_a_story_offers_none(visit, plain):
         {"photos": 3},
         {"thumb": 0},
         {"rounds": [{"photos": -1, "psnr": 1}]},
+        {"rounds": [{"photos": 1, "psnr": 1, "preset": 3}]},
         {"photos": [{"round": 0, "at": ["1", 2, 3], "look": [0, 0]}]},
         {"photos": [PHOTOS[0] | {"picture": 7}]},
     ],

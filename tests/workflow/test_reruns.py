@@ -31,7 +31,7 @@ PHOTOS |= {"mapper": "global", "cameras": "one", "focal": 28, "masks": "other", 
 PHOTOS |= {"verdict": "warn", "materials": "one", "rig": RIG, "drone": {"speed": 4}} | PHOTOGRAPHED | NAMED
 FIELD = {"field": "other/other.ply", "up": [0, 1, 1]} | NAMED
 PRESET = {"size": 112, "spacing": 1.6, "max_gaussians": 21000, "steps": 61, "steps_per_photo": 11, "sh_degree": 1}
-PRESET |= {"pose_rate": 0.001, "level_steps": 11, "levels": 1, "refit": "scratch"}
+PRESET |= {"pose_rate": 0.001, "level_steps": 11, "levels": 1, "refit": "scratch", "choose_with": "other"}
 TILING = {"tile": 0.45, "strip": 0.1, "candidates": 25, "variants": 2, "energy": "colour", "slope": 3, "replicate": 1}
 TILING |= {"sam2": "other"}
 PRIOR = {"samples": 3, "steps": 3, "staged": False, "posterior": True, "independent_noise": True, "lpips": True}
@@ -72,6 +72,12 @@ def changed_entry(made, key, value, other):
     return {"scenes": {made.scene: {key: places.get(key, value)}}}
 
 
+def changed_preset(values):
+    """The draft with other values; what it no longer chooses photos for has another to choose."""
+    others = dict.fromkeys(("standard", "reference", "auto"), {"choose_with": "other"})
+    return {"presets": {"draft": values} | (others if "choose_with" in values else {})}
+
+
 @pytest.mark.parametrize("key", SYNTHETIC)
 def test_a_key_of_a_synthetic_scene_makes_again_what_reads_it(tiny, replanned, key):
     change = changed_entry(tiny, key, SYNTHETIC[key], replanned.other)
@@ -93,13 +99,15 @@ def test_a_key_of_a_photo_scene_makes_again_what_reads_it(beach, replanned, key)
 
 @pytest.mark.parametrize("key", PRESET)
 def test_a_key_of_a_preset_makes_again_what_reads_it(tiny, replanned, key):
-    change = {"presets": {"draft": {key: PRESET[key]}}}
-    assert replanned(tiny, change) == reruns.list_preset_reruns("synthetic", key)
+    assert replanned(tiny, changed_preset({key: PRESET[key]})) == reruns.list_preset_reruns("synthetic", key)
 
 
 def test_a_key_of_a_preset_reaches_a_finished_field_where_it_is_read(finished, replanned):
     few = {key: PRESET[key] for key in PRESET if not reruns.list_preset_reruns("field", key)}
-    assert {"size", "spacing", "steps"} <= set(few) and not replanned(finished, {"presets": {"draft": few}})
+    assert {"size", "spacing", "steps", "refit", "choose_with"} <= set(few)
+    for either in ("refit", "choose_with"):  # not both
+        values = {key: value for key, value in few.items() if key != either}
+        assert not replanned(finished, changed_preset(values))
     for key in set(PRESET) - set(few):
         found = replanned(finished, {"presets": {"draft": {key: PRESET[key]}}})
         assert found == reruns.list_preset_reruns("field", key), key

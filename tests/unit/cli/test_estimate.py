@@ -56,7 +56,8 @@ def test_more_work_takes_longer(config, key):
 
 def test_presets_are_ordered_by_their_time(config):
     draft, standard, reference = (
-        estimate_seconds(JOBS, describe_work(config, name), SAME) for name in ("draft", "standard", "reference")
+        estimate_seconds(estimate.count_jobs(config, name), describe_work(config, name), SAME)
+        for name in ("draft", "standard", "reference")
     )
     assert draft < standard < reference
 
@@ -99,22 +100,27 @@ def test_a_short_run_is_told_no_preset(config):
 def test_a_long_run_is_told_the_best_preset_that_is_short_enough(config):
     config["scenes"]["desert"] |= {"preset": "reference"}
     speed = MachineSpeed(6.0, 1.0)
-    times = {name: estimate_seconds(JOBS, describe_work(config, name), speed) for name in PRESETS}
+    jobs = {name: estimate.count_jobs(config, name) for name in PRESETS}
+    times = {name: estimate_seconds(jobs[name], describe_work(config, name), speed) for name in PRESETS}
     assert times["reference"] > estimate.LONG
     name = max((n for n in times if times[n] <= estimate.LONG and times[n] < 0.8 * times["reference"]), key=times.get)
-    told = describe_estimate(config, JOBS, speed, PRESETS)
+    told = describe_estimate(config, jobs["reference"], speed, PRESETS)
     assert f"with preset: {name} {format_duration(times[name])}" in told
 
 
 def test_a_run_that_is_long_with_every_preset_is_told_the_fastest(config):
     config["scenes"]["desert"] |= {"preset": "reference"}
-    assert "with preset: draft" in describe_estimate(config, JOBS, MachineSpeed(500.0, 1.0), PRESETS)
+    assert "with preset: draft" in describe_estimate(
+        config, estimate.count_jobs(config), MachineSpeed(500.0, 1.0), PRESETS
+    )
 
 
 def test_a_preset_of_the_study_is_no_advice(config):
     config["scenes"]["desert"] |= {"preset": "reference"}
     config["presets"]["tiny"] = config["presets"]["draft"] | {"size": 64, "steps": 1, "steps_per_photo": 1}
-    assert "with preset: draft" in describe_estimate(config, JOBS, MachineSpeed(500.0, 1.0), PRESETS)
+    assert "with preset: draft" in describe_estimate(
+        config, estimate.count_jobs(config), MachineSpeed(500.0, 1.0), PRESETS
+    )
 
 
 def test_a_run_that_is_beyond_its_fits_is_told_no_preset(config):
@@ -161,6 +167,22 @@ def test_jobs_are_those_of_a_whole_run(config):
     jobs = estimate.count_jobs(config)
     assert jobs["update_field"] == config["rounds"] and jobs["render_photos"] == jobs["find_materials"] == 1
     assert "register_photos" in estimate.count_jobs(config | {"scene": "copr_dunes"})
+
+
+def test_photos_are_chosen_with_the_fits_of_another_preset(config):
+    """Then only the fit to all photos is the preset's own."""
+    jobs = estimate.count_jobs(config, "standard")
+    assert jobs["update_field"] == jobs["copy_chosen_photos"] == config["rounds"] and jobs["fit_chosen_photos"] == 1
+    assert not set(estimate.CHOSEN) & set(estimate.count_jobs(config, "draft"))
+    work, draft = describe_work(config, "standard"), describe_work(config, "draft")
+    for rule in estimate.CHOOSING:
+        assert estimate_seconds({rule: 1}, work, SAME) == estimate_seconds({rule: 1}, draft, SAME)
+    assert (work.all_photos, work.all_steps) == (16, 300 + 20 * 8)
+
+
+def test_without_rounds_a_preset_s_own_fit_is_the_only_one(config):
+    work = describe_work(config | {"rounds": 0}, "standard")
+    assert work.choosing is None and not set(estimate.CHOSEN) & set(estimate.replace_chosen({"fit_coarse": 1}, work))
 
 
 def test_a_finished_field_is_not_fitted(config):

@@ -74,6 +74,16 @@ def test_native_photos_are_those_of_any_size(config):
             ["export"], {"axes": "y-down", "formats": ["usd"]}, "export: .*a USD stage has y or z up", id="down"
         ),
         pytest.param(["presets", "draft", "spacing"], 0, "presets.draft.spacing", id="discs without a distance"),
+        pytest.param(["presets", "draft", "choose_with"], "best", "there is no 'best'", id="an unknown chooser"),
+        pytest.param(
+            ["presets", "draft", "choose_with"], "draft", "draft chooses no photos itself", id="its own chooser"
+        ),
+        pytest.param(
+            ["presets", "auto", "choose_with"],
+            "standard",
+            "name one that does .draft",
+            id="a chooser that chooses nothing",
+        ),
         pytest.param(
             ["presets", "draft", "size"], "own", "presets.draft.size: .*or input should be 'native'", id="a word"
         ),

@@ -89,6 +89,18 @@ def test_the_preset_says_how(monkeypatch, how, steps):
     assert refit.update_field(given, preset, files, np.random.default_rng(0)).report.steps == steps
 
 
+def test_chosen_photos_are_fitted_as_a_round_from_scratch_fits_them(monkeypatch):
+    monkeypatch.setattr(refit, "match_points", lambda *_: MATCHED)
+    photos = made.photos(5)
+    preset = {"size": 48, "spacing": 1.0, "max_gaussians": 5000, "steps": 60, "steps_per_photo": 20}
+    files = refit.PhotoFiles("model", "images", 3, False)
+    once = refit.fit_chosen_photos(photos, FRAME, preset, files, np.random.default_rng(0))
+    _, again = refit_with(photos[3:], photos[:3])
+    np.testing.assert_array_equal(once.field.means, again.field.means)
+    np.testing.assert_array_equal(once.grid.heights, again.grid.heights)
+    assert once.report.steps == 100
+
+
 @pytest.mark.parametrize(("whole", "margin"), [(True, ground.WHOLE), (False, ground.MARGIN)])
 def test_photos_that_structure_from_motion_does_not_know_bring_no_points(tmp_path, whole, margin):
     views, none = made.photos(3), np.zeros(0, int)

@@ -1,5 +1,7 @@
+import json
 import re
 import textwrap
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -151,6 +153,14 @@ def test_a_selection_of_poses_is_read_as_written(tmp_path):
     chosen = selection.PoseSelection("farthest", 4, scored(0, 90).poses, None, {"gain": 0.1})
     selection.write_pose_selection(tmp_path / "poses.json", chosen)
     assert selection.read_pose_selection(tmp_path / "poses.json") == chosen
+
+
+def test_only_a_copy_says_who_chose(tmp_path):
+    own = selection.PoseSelection("farthest", 4, [])
+    for chosen in (own, replace(own, chosen_with="draft")):
+        selection.write_pose_selection(tmp_path / "poses.json", chosen)
+        assert selection.read_pose_selection(tmp_path / "poses.json") == chosen
+        assert ("chosen_with" in json.loads((tmp_path / "poses.json").read_text())) == bool(chosen.chosen_with)
 
 
 @pytest.mark.parametrize("content", ["[]", "{}", '{"policy": "all", "k": 1, "poses": 3}', '{"poses": [{}]}'])

@@ -7,8 +7,11 @@ import { PageError } from "./errors.js";
  * at: place seen from the middle of the ground; look: direction on the ground; picture: number in the sheet.
  * @typedef {{ round: number, at: number[], look: number[], picture?: number }} StoryPhoto
  *
+ * preset: whose fit was tested, where it is not the terrain's own.
+ * @typedef {{ photos: number, psnr: number | null, preset?: string }} StoryRound
+ *
  * half: half the side of the ground that tiles are cut from; thumb: pixels along a side of a photo in the sheet.
- * @typedef {{ unit: string, half: number, photos: StoryPhoto[], rounds: { photos: number, psnr: number | null }[],
+ * @typedef {{ unit: string, half: number, photos: StoryPhoto[], rounds: StoryRound[],
  *   thumb: number, columns: number, pictures: number }} Story
  */
 
@@ -29,7 +32,8 @@ export function readStory(value) {
     && Array.isArray(photos) && photos.length <= MOST && Array.isArray(rounds) && rounds.length <= MOST
     && photos.every((one) => isNatural(one?.round) && finite(one.at) && one.at.length === 3 && finite(one.look)
       && one.look.length === 2 && (one.picture === undefined || (isNatural(one.picture) && one.picture < pictures)))
-    && rounds.every((one) => isNatural(one?.photos) && (one.psnr === null || Number.isFinite(one.psnr)));
+    && rounds.every((one) => isNatural(one?.photos) && (one.psnr === null || Number.isFinite(one.psnr))
+      && (one.preset === undefined || (typeof one.preset === "string" && one.preset.length <= 40)));
   if (!sound) throw new PageError(`${STORY} is not as the workflow writes it. Make the page again.`);
   return { unit, half, photos, rounds, thumb, columns, pictures };
 }

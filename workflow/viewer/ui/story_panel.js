@@ -67,13 +67,13 @@ function listRounds({ rounds }) {
     head.append(cell);
   }
   const rows = table.createTBody();
-  for (const [k, { photos, psnr }] of rounds.entries()) {
+  for (const [k, { photos, psnr, preset }] of rounds.entries()) {
     const row = rows.insertRow(), mark = document.createElement("i");
     mark.className = "swatch";
     mark.style.backgroundColor = ROUNDS[k % ROUNDS.length];
     row.insertCell().append(mark, k ? ` round ${k}` : " start");
     row.insertCell().append(k ? `+ ${photos}` : String(photos));
-    row.insertCell().append(psnr === null ? "none" : `${psnr.toFixed(1)} dB`);
+    row.insertCell().append(psnr === null ? "none" : `${psnr.toFixed(1)} dB${preset ? ` (${preset})` : ""}`);
   }
   return table;
 }

@@ -97,9 +97,8 @@ def list_choices(
     found = forecast.forecast_presets(front, {name: lost[size] for name, size in sizes.items()}, known)
     if not found:
         raise InputError(f"{forecast.FRONT}: none of the config's presets is in the table ({', '.join(sizes)})")
-    jobs = count_jobs(config)
     choices = [
-        Choice(each, estimate_seconds(jobs, describe_work(config, name), speed), _estimate_mb(config, front, name))
+        Choice(each, _estimate_run(config, name, speed), _estimate_mb(config, front, name))
         for name, each in found.items()
     ]
     return sorted(choices, key=lambda choice: choice.seconds)
@@ -134,6 +133,11 @@ def _parse_positive(text: str) -> float:
     if not 0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is no number above 0")
     return value
+
+
+def _estimate_run(config: Mapping[str, Any], preset: str, speed: MachineSpeed) -> float:
+    """Seconds of a whole run."""
+    return estimate_seconds(count_jobs(config, preset), describe_work(config, preset), speed)
 
 
 def _estimate_mb(config: Mapping[str, Any], front: list[Measured], preset: str) -> float:

@@ -43,6 +43,7 @@ class Work:
         features: relative cost of structure from motion, by the scene's `sfm`.
         rendered: whether captured photos are rendered.
         scene_cost: of rendering a photo, relative, by the synthetic family.
+        choosing: the work of the preset that chooses the photos, where it is another one.
     """
 
     start: int
@@ -64,6 +65,17 @@ class Work:
     features: float
     rendered: bool
     scene_cost: float
+    choosing: "Work | None" = None
+
+    @property
+    def all_photos(self) -> int:
+        """Photos of the last round."""
+        return self.start + self.new * self.rounds
+
+    @property
+    def all_steps(self) -> int:
+        """Steps of a fit to all of them."""
+        return self.steps + self.steps_per_photo * self.new * self.rounds
 
     @property
     def mean_photos(self) -> float:
@@ -102,6 +114,9 @@ class Cost:
 
 
 OTHER_RULE = Cost(0.8)
+# with `choose_with`: rules whose jobs are those of the preset that chooses, and those that there are besides
+CHOOSING = ("fit_coarse", "evaluate_coarse", "score_coarse", "select_poses", "update_field")
+CHOSEN = ("copy_chosen_photos", "fit_chosen_photos")
 COSTS: dict[str, Callable[[Work], Cost]] = {
     "register_photos": lambda work: Cost(3 + 1.9 * work.features * work.total),
     "render_photos": lambda work: Cost(work.scene_cost * (10 + 1.9e-5 * work.photo_pixels * (work.total + work.tests))),
@@ -116,6 +131,9 @@ COSTS: dict[str, Callable[[Work], Cost]] = {
     ),
     "update_field": lambda work: Cost(
         1.2 + work.observation_seconds * work.mean_photos, work.step_seconds * work.update_steps
+    ),
+    "fit_chosen_photos": lambda work: Cost(
+        1.2 + work.observation_seconds * work.all_photos, work.step_seconds * work.all_steps
     ),
     "select_poses": lambda work: Cost(1.2 + 0.0005 * work.candidates + 0.8 * work.field_size),
     "report_photos": lambda work: Cost(1.0 + 0.055 * work.total),
@@ -132,13 +150,17 @@ def estimate_seconds(jobs: Mapping[str, int], work: Work, speed: MachineSpeed) -
     """Seconds of a run. jobs: how many of each rule."""
     total = 0.0
     for rule, count in jobs.items():
-        cost = COSTS[rule](work) if rule in COSTS else OTHER_RULE
+        done = work.choosing if work.choosing and rule in CHOOSING else work
+        cost = COSTS[rule](done) if rule in COSTS else OTHER_RULE
         total += count * ((PER_JOB + cost.general) * speed.general + cost.raster * speed.raster)
     return total
 
 
-def count_jobs(config: Mapping[str, Any]) -> dict[str, int]:
-    """Jobs of each rule that `make run` has for the config's scene, if nothing of it is made yet."""
+def count_jobs(config: Mapping[str, Any], preset: str | None = None) -> dict[str, int]:
+    """Jobs of each rule that `make run` has for the config's scene, if nothing of it is made yet.
+
+    preset: instead of the scene's own.
+    """
     scene = config["scenes"][config["scene"]]
     once = ["make_levels", "cut_tiles", "bundle_tiles", "render_terrain", "make_page"]
     once += ["find_materials"] if scene.get("materials", "one") != "one" else []
@@ -148,14 +170,20 @@ def count_jobs(config: Mapping[str, Any]) -> dict[str, int]:
     jobs: dict[str, int] = dict.fromkeys([*once, "fit_coarse", "evaluate_coarse", "score_coarse"], 1)
     for rule in ("select_poses", "capture_views", "update_field", "evaluate_round", "score_round"):
         jobs[rule] = config["rounds"]
-    return jobs
+    return replace_chosen(jobs, describe_work(config, preset))
+
+
+def replace_chosen(jobs: Mapping[str, int], work: Work) -> dict[str, int]:
+    """Jobs with those of CHOSEN as a preset's work has them."""
+    once = dict(zip(CHOSEN, (work.rounds, 1), strict=True)) if work.choosing else {}
+    return {rule: count for rule, count in jobs.items() if rule not in CHOSEN} | once
 
 
 def describe_work(config: Mapping[str, Any], preset: str | None = None) -> Work:
     """The work of the config's scene. preset: instead of the scene's own."""
     scene, chosen = config["scenes"][config["scene"]], config["presets"]
     entry = chosen[preset or scene.get("preset")]
-    photographed = scene["kind"] != "field"
+    photographed, chooser = scene["kind"] != "field", entry.get("choose_with")
     photos, size = count_photos(scene), min(scene.get("size", entry["size"]), measure_photos(scene))
     shape = PHOTO_SHAPE if scene["kind"] == "photos" else 1.0
     seen = min(size, entry["size"])
@@ -183,6 +211,7 @@ def describe_work(config: Mapping[str, Any], preset: str | None = None) -> Work:
         features=5.0 if scene.get("sfm") == "careful" else 1.0,
         rendered=scene.get("agent") == "render",
         scene_cost=FAMILY_COST.get(scene.get("family"), 1.0),
+        choosing=describe_work(config, chooser) if chooser and photographed and config["rounds"] else None,
     )
 
 
@@ -221,9 +250,10 @@ def describe_estimate(
     own = config["scenes"][config["scene"]]["preset"]
     seconds = estimate_seconds(jobs, describe_work(config), speed)
     text = f"It will take {format_duration(seconds)} on this machine"
-    if seconds <= LONG or not {"fit_coarse", "prepare_external_field"} & set(jobs):
+    if seconds <= LONG or not {"fit_coarse", "fit_chosen_photos", "prepare_external_field"} & set(jobs):
         return text
-    others = {name: estimate_seconds(jobs, describe_work(config, name), speed) for name in presets if name != own}
+    works = {name: describe_work(config, name) for name in presets if name != own}
+    others = {name: estimate_seconds(replace_chosen(jobs, work), work, speed) for name, work in works.items()}
     faster = {name: other for name, other in others.items() if other < 0.8 * seconds}
     if not faster:
         return text

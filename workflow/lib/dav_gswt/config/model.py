@@ -94,6 +94,8 @@ class Config(ConfigModel):
         for name, scene in self.scenes.items():
             _require(f"scenes.{name}.preset", scene.preset, self.presets, "presets")
             _require(f"scenes.{name}.tiling", scene.tiling, self.tilings, "tilings")
+        for name, preset in self.presets.items():
+            _require_chooser(name, preset, self.presets)
         if "none" in self.priors:
             raise ValueError("priors.none: is the name of no prior; give yours another")
         return self
@@ -115,6 +117,19 @@ class Config(ConfigModel):
                 f"({', '.join(able) or 'none is'} in priors), or inpaint: false"
             )
         return self
+
+
+def _require_chooser(name: str, preset: Preset, presets: dict[str, Preset]) -> None:
+    """A preset that leaves the choice of photos to another names one that chooses them itself."""
+    if not preset.choose_with:
+        return
+    where = f"presets.{name}.choose_with"
+    _require(where, preset.choose_with, presets, "presets")
+    if presets[preset.choose_with].choose_with:
+        able = ", ".join(each for each, entry in presets.items() if not entry.choose_with)
+        raise ValueError(
+            f"{where}: {preset.choose_with} chooses no photos itself; name one that does ({able or 'none'})"
+        )
 
 
 def _require(where: str, name: str, table: dict, called: str) -> None:

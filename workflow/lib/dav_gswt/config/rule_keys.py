@@ -68,6 +68,7 @@ SCENE_KEYS: dict[str, tuple[str, ...] | dict[str, tuple[str, ...]]] = {
     "split_views": ("start", "photos", "whole"),
     "fit_coarse": ("whole",),
     "update_field": ("whole",),
+    "fit_chosen_photos": ("whole",),
     "score_coarse": _SCORED,
     "score_round": _SCORED,
     "select_poses": _SELECTED,
@@ -79,14 +80,15 @@ SCENE_KEYS: dict[str, tuple[str, ...] | dict[str, tuple[str, ...]]] = {
 }
 
 _COARSE = ("size", "spacing", "max_gaussians", "steps", "steps_per_photo", "sh_degree", "pose_rate")
-_ALL_FITS = (*_COARSE, "refit")
+_ALL_FITS = (*_COARSE, "refit", "choose_with")
 
 # of a preset, by rule; metrics.json records what its field was fitted with
 PRESET_KEYS: dict[str, tuple[str, ...]] = {
     "fit_coarse": _COARSE,
     "evaluate_coarse": _COARSE,
     "prepare_external_field": ("max_gaussians",),
-    "update_field": _ALL_FITS,
+    "update_field": (*_COARSE, "refit"),
+    "fit_chosen_photos": _COARSE,
     "evaluate_round": _ALL_FITS,
     "evaluate_at": _ALL_FITS,
     "evaluate_inpainted": _ALL_FITS,

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, StringConstraints, model_validator
 
-from dav_gswt.config.base import Auto, ConfigModel, PhotoSize, Seed, Share, Text, key
+from dav_gswt.config.base import Auto, ConfigModel, Name, PhotoSize, Seed, Share, Text, key
 
 Colour = Annotated[str, StringConstraints(pattern="^#[0-9a-fA-F]{6}$")]
 
@@ -149,8 +149,11 @@ class Preset(ConfigModel):
         "optimiser steps for each photo more: beyond 8 of the coarse fit, and each new one of a round"
     )
     refit: Literal["continue", "scratch"] = key(
-        "how a round takes new photos: `continue`: the field is fitted on; `scratch`: all photos are fitted anew",
+        "how a round takes new photos: `continue`: the field is fitted on; `scratch`: all photos are fitted anew. Not read with `choose_with`",
         "continue",
+    )
+    choose_with: Name | None = key(
+        "preset whose rounds choose the photos; this one then fits all of them at once. Left out: its own", None
     )
     sh_degree: Annotated[int, Field(ge=0, le=3)] | Auto = key(
         "of the spherical harmonics of colour", 0, renamed="degree"

@@ -7,6 +7,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.files import read_json
 from dav_gswt.geometry.cameras import Camera, camera_from_json
 from dav_gswt.paths import decode_path, related_folder
+from dav_gswt.views.selection import read_pose_selection
 
 
 @contextmanager
@@ -76,12 +77,19 @@ def find_poses(scores: Path) -> list[Path]:
 
 
 def find_scores(poses: Path) -> Path:
-    """The scores that a round's poses were chosen by. Raises: InputError: not where the workflow puts them."""
+    """The scores that a round's poses were chosen by, of another preset where that chose them.
+
+    Raises: InputError: not where the workflow puts them.
+    """
     poses = poses.resolve()
     number = decode_round(poses)
     if not number:
         raise InputError(f"{poses}: lies in no round of the result tree; give scores.csv and --poses {poses}")
-    folder = related_folder(poses, "scored") if number == 1 else related_folder(poses, "round", t=number - 1)
+    by = read_pose_selection(poses).chosen_with
+    of = {"preset": by} if by else {}
+    folder = (
+        related_folder(poses, "scored", **of) if number == 1 else related_folder(poses, "round", t=number - 1, **of)
+    )
     scores = folder / "scores.csv"
     if not scores.is_file():
         raise InputError(f"{poses}: the scores that it was chosen by are not there ({scores}); make them again")

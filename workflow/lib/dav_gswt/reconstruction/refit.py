@@ -1,7 +1,8 @@
 """A round's field from scratch: one fit to all photos so far, with as many steps as the rounds have together.
 
 It depends on the photos alone, not on the rounds that they came in: nothing that a fit to fewer photos got wrong is
-kept, as an update keeps it. It costs a whole fit a round.
+kept, as an update keeps it. With `refit: scratch` it costs a whole fit a round; with `choose_with` one in all, as the
+rounds are another preset's.
 """
 
 from collections.abc import Mapping
@@ -14,6 +15,7 @@ from jaxtyping import Float
 from numpy import ndarray as Array
 
 from dav_gswt.field import GaussianField
+from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.colmap_model import read_colmap_model, triangulate_points
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.reconstruction import ground, regression_guard
@@ -72,6 +74,23 @@ def update_field(
         return refine_field(given, update, rng, snapshots)
     settings = ScratchSettings(select_settings(CoarseSettings, preset), update, files.start)
     return refit_from_scratch(given, match_points(given.earlier + given.new, files), settings, rng, snapshots)
+
+
+def fit_chosen_photos(
+    photos: list[TrainingView],
+    frame: SceneFrame,
+    preset: Mapping[str, Any],
+    files: PhotoFiles,
+    rng: np.random.Generator,
+    snapshots: Path | str | None = None,
+) -> Reconstruction:
+    """The field of photos that another preset's rounds chose: one fit to all of them."""
+    settings = ScratchSettings(
+        select_settings(CoarseSettings, preset), select_settings(UpdateSettings, preset), files.start
+    )
+    matched = match_points(photos, files)
+    start = StartViews(frame, photos, matched.points, matched.colours, matched.margin)
+    return fit_coarse_field(start, settings.for_photos(len(photos)), rng, FitOptions(snapshots=snapshots))
 
 
 def match_points(views: list[TrainingView], files: PhotoFiles) -> MatchedPoints:

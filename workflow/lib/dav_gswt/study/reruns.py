@@ -13,10 +13,13 @@ from dav_gswt.config.scenes import FieldScene, PhotoScene, SerialRig, SyntheticS
 from dav_gswt.config.settings import Preset, Tiling
 
 _SPLIT_READERS = ["fit_coarse", "evaluate_coarse", "score_coarse", "select_poses", "capture_views", "request_views"]
-_SPLIT_READERS += ["update_field", "evaluate_round", "score_round", "inpaint_field", "evaluate_inpainted"]
+_SPLIT_READERS += ["update_field", "fit_chosen_photos", "evaluate_round", "score_round", "inpaint_field"]
+_SPLIT_READERS += ["evaluate_inpainted"]
 _PHOTO_READERS = ["report_photos", "split_views", *_SPLIT_READERS, "bundle_tiles", "make_page"]
-_CAPTURE_READERS = ["update_field", "evaluate_round", "score_round", "inpaint_field", "bundle_tiles"]
-_CAPTURE_READERS += ["make_page"]
+_CAPTURE_READERS = ["update_field", "copy_chosen_photos", "fit_chosen_photos", "evaluate_round", "score_round"]
+_CAPTURE_READERS += ["inpaint_field", "bundle_tiles", "make_page"]
+_FIELD_READERS = ["evaluate_round", "score_round", "inpaint_field", "evaluate_inpainted"]
+_FIELD_READERS += ["find_materials", "make_levels", "make_page"]
 
 # the rules of the product in their order; of each those that read what it makes
 READERS: dict[str, list[str]] = {
@@ -32,10 +35,9 @@ READERS: dict[str, list[str]] = {
     "select_poses": ["capture_views", "request_views", "evaluate_round"],
     "capture_views": _CAPTURE_READERS,
     "request_views": _CAPTURE_READERS,
-    "update_field": [
-        *("evaluate_round", "score_round", "inpaint_field", "evaluate_inpainted"),
-        *("find_materials", "make_levels", "make_page"),
-    ],
+    "copy_chosen_photos": ["fit_chosen_photos"],
+    "update_field": [*_FIELD_READERS, "fit_chosen_photos"],
+    "fit_chosen_photos": _FIELD_READERS,
     "evaluate_round": ["make_page"],
     "score_round": [],  # a later round follows from it
     "prepare_external_field": ["make_levels"],
@@ -51,6 +53,7 @@ READERS: dict[str, list[str]] = {
     "make_contact_sheet": [],
     "render_flight": [],
 }
+_CHOSEN = ("copy_chosen_photos", "fit_chosen_photos")  # with `choose_with` in the preset
 _DEVICES = ("serial", "plan", "handheld")
 _AGENTS: dict[str, tuple[str, ...]] = {
     "synthetic": ("render", "replay"),
@@ -96,6 +99,9 @@ keys of `priors.<name>` also make the scores again (`score_coarse`, `score_round
 A key that stands in a path (`preset`, `tiling`, `seeds`, `policy`, `k`, ...) leaves the old files beside the new ones.
 Exports are asked for by their paths: `export_terrain`, `export_ground` and `convert_plys` run again with what they read
 of `export`, the first two also with `heights` and `classes`.
+With `choose_with` in the scene's preset the rules to `update_field` are those of the preset that it names.
+`copy_chosen_photos` and `fit_chosen_photos` follow from these; of the scene's own preset they read what `fit_coarse`
+reads of another.
 `segmenter` is read where a scene has `materials: auto`: `find_materials` and what follows from it, and with `fetch`
 `fetch_mobilesam` before it. `render_flight` runs where the config has a `flight`. The tables are of one round: all
 rounds after one that runs again run again too.
@@ -121,6 +127,7 @@ def list_rules(kind: str, agent: str) -> list[str]:
         "inpaint_field",
         "evaluate_inpainted",
         "render_flight",
+        *_CHOSEN,
     }
     if kind == "photos":
         optional.remove("find_materials")
@@ -155,6 +162,8 @@ def list_scene_reruns(kind: str, agent: str, key: str) -> list[str]:
 def list_preset_reruns(kind: str, key: str) -> list[str]:
     """The rules that run again when a key of the preset changes."""
     scope = list_rules(kind, _AGENTS[kind][0])
+    if key == "choose_with" and kind != "field":  # another preset's rounds
+        return follow_rules(["fit_coarse"], [*scope, *_CHOSEN])
     return follow_rules([rule for rule, keys in PRESET_KEYS.items() if key in keys], scope)
 
 

@@ -16,6 +16,7 @@ from dav_gswt.files import read_json
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
 from dav_gswt.images.image_files import read_photo, shrink_image
 from dav_gswt.images.jpeg import encode_jpeg
+from dav_gswt.paths import decode_path
 from dav_gswt.photos.taken_photos import TakenPhoto, list_taken_photos
 from dav_gswt.photos.view_split import read_view_split
 
@@ -36,8 +37,8 @@ def tell_story(given: Mapping[str, Any]) -> Story | None:
     """The story of a round's field, or None for a finished field, which has no photos.
 
     Args:   given: `views` (views.json), `images` and `model` of the scene, `frame` (ground.json), `captures` and
-            `fits` (fit.json) of the rounds, `metrics` (metrics.json) of the first fit and of each round; without
-            `views`: a finished field.
+            `fits` (fit.json) of the rounds, `metrics` (metrics.json) of the first fit and of each round, which may
+            be another preset's before the last; without `views`: a finished field.
     Raises: InputError: a file is missing or not of its kind.
     """
     if not given.get("views"):
@@ -48,9 +49,11 @@ def tell_story(given: Mapping[str, Any]) -> Story | None:
     photos = [_place(photo, frame) for photo in taken]
     for number, k in enumerate(shown):
         photos[k]["picture"] = number
+    presets = [decode_path(Path(path)).get("preset") for path in given["metrics"]]
     rounds = [
         {"photos": sum(photo.round == t for photo in taken), "psnr": _psnr(path)}
-        for t, path in enumerate(given["metrics"])
+        | ({"preset": preset} if preset != presets[-1] else {})
+        for t, (path, preset) in enumerate(zip(given["metrics"], presets, strict=True))
     ]
     half = frame.exemplar.side / 2
     value = {

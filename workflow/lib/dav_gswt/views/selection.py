@@ -17,7 +17,7 @@ class PoseSelection:
     """The poses that a round requests, in the order of choice.
 
     k: poses of a full round. stopped: reason why no pose is requested, else None. expected: predicted gain as a JSON
-    value, see `stopping.Decision.expected_gain`.
+    value, see `stopping.Decision.expected_gain`. chosen_with: the preset whose round it was, where this is a copy.
     """
 
     policy: str
@@ -25,6 +25,7 @@ class PoseSelection:
     poses: list[Pose]
     stopped: str | None = None
     expected: dict | None = None
+    chosen_with: str | None = None
 
     def describe_outcome(self) -> dict:
         """Why no pose is requested and the predicted gain, as metrics.json holds them."""
@@ -49,7 +50,8 @@ def select_poses(policy: str, scores: Scores, inputs: SelectionInput) -> list[Po
 
 def write_pose_selection(path: Path | str, selection: PoseSelection) -> None:
     """Write poses.json."""
-    write_json(path, asdict(selection))
+    values = asdict(selection)
+    write_json(path, {key: value for key, value in values.items() if key != "chosen_with" or value})
 
 
 def read_pose_selection(path: Path | str) -> PoseSelection:
