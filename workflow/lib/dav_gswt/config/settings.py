@@ -149,7 +149,8 @@ class Preset(ConfigModel):
         "optimiser steps for each photo more: beyond 8 of the coarse fit, and each new one of a round"
     )
     refit: Literal["continue", "scratch"] = key(
-        "how a round takes new photos: `continue`: the field is fitted on; `scratch`: all photos are fitted anew. Not read with `choose_with`",
+        "how a round takes new photos: `continue`: the field is fitted on; `scratch`: all photos are fitted anew. "
+        "Not read with `choose_with`",
         "continue",
     )
     choose_with: Name | None = key(

@@ -63,7 +63,8 @@ def format_presets(rows: list[dict], size: int) -> str:
         f"{first['processor']}. All else is as the config has it: two rounds of four photos, materials, tiles. PSNR, "
         f"SSIM and LPIPS are of test photos of {size} pixels (of their own size where that is less), whatever size a "
         "preset fits; real photos after their exposure is fitted. Seconds are of whole jobs, from the start photos to "
-        "the bundle: placing or rendering photos and the stills are not in them. One seed.",
+        "the bundle: placing or rendering photos and the stills are not in them. Where another preset chooses the "
+        "photos (`choose_with`), its rounds are among them. One seed.",
         "## All scenes",
         "Seconds as a share of those of `standard`, the geometric mean; losses to the scene's best preset, the mean "
         "and the largest.",
