@@ -17,7 +17,7 @@ SAME = MachineSpeed()
 JOBS = {"render_photos": 1, "fit_coarse": 1, "update_field": 2, "score_coarse": 1, "score_round": 2, "capture_views": 2}
 JOBS |= {"select_poses": 2, "make_levels": 1, "cut_tiles": 1, "bundle_tiles": 1, "render_terrain": 1}
 
-PRESETS = ("draft", "standard", "reference", "auto")
+PRESETS = ("draft", "standard", "reference")
 
 
 @pytest.fixture

@@ -45,5 +45,5 @@ def test_the_smaller_config_is_valid_and_smaller_for_every_preset(root, monkeypa
 
 def test_presets_for_terrains_are_those_of_the_config_alone(root, monkeypatch):
     monkeypatch.chdir(root)
-    assert run.list_presets([]) == ["draft", "standard", "reference", "auto"]
+    assert run.list_presets([]) == ["draft", "standard", "reference"]
     assert "compared" in run.load_config([])["presets"]

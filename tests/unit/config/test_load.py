@@ -79,7 +79,7 @@ def test_native_photos_are_those_of_any_size(config):
             ["presets", "draft", "choose_with"], "draft", "draft chooses no photos itself", id="its own chooser"
         ),
         pytest.param(
-            ["presets", "auto", "choose_with"],
+            ["presets", "reference", "choose_with"],
             "standard",
             "name one that does .draft",
             id="a chooser that chooses nothing",

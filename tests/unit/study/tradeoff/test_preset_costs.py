@@ -73,33 +73,6 @@ def test_losses_are_to_the_best_preset_of_each_scene(rows):
     assert mean == pytest.approx(expected)
 
 
-@pytest.mark.parametrize(
-    ("saved", "db", "lpips", "reached"),
-    [
-        (0.5, 0.05, 0.001, True),
-        (1 / 3, 0.1, 0.002, True),
-        (0.3, 0.0, 0.0, False),
-        (0.5, 0.11, 0.0, False),
-        (0.5, 0.0, 0.0021, False),
-    ],
-)
-def test_the_target_of_auto_is_a_third_of_the_time_for_little(saved, db, lpips, reached):
-    assert preset_costs.check_target(saved, db, lpips) == reached
-
-
-def test_auto_is_compared_with_the_fixed_settings_of_each_scene(rows):
-    named = [row | {"preset": {"standard": "reference", "draft": "auto"}[row["preset"]]} for row in rows]
-    assert preset_costs.compare_auto(named, "sand") == pytest.approx((0.5, 1.0, 0.05))
-    assert preset_costs.compare_auto(named, "rock") == pytest.approx((-1.0, -0.5, 0.04))
-
-
-def test_a_page_with_both_says_on_how_many_scenes_auto_pays(rows, tmp_path):
-    names = {"standard": "reference", "draft": "auto"}
-    csv_tables.write_table(tmp_path / "t.csv", [*rows, *(row | {"preset": names[row["preset"]]} for row in rows)])
-    page = collapse_spaces(preset_costs.format_presets(_read(tmp_path / "t.csv"), 768))
-    assert "reached on 0 of 2 scenes" in page and "| sand | 50% | 1.00 | 0.0500 | no |" in page
-
-
 def _read(path):
     return csv_tables.read_table(path, numbers=preset_costs.NUMBERS)
 

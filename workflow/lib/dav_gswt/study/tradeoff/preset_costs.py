@@ -19,8 +19,6 @@ from dav_gswt.study.sweeps.tables import MEGA, describe_origin, read_benchmark
 PARTS = {"fits": "fits", "views": "scores and choice of views", "tiles": "materials, levels, tiles, bundle"}
 NUMBERS = ("photos", "gaussians", "psnr", "ssim", "lpips", *(f"{part}_s" for part in PARTS), "seconds", "peak_mb")
 NUMBERS += ("bundle_mb", "cores", "size", "shrinking", "estimated")
-FEWER = 1 / 3  # of the time at least `auto` is to save
-MOST_DB, MOST_LPIPS = 0.1, 0.002  # that it may lose for that
 
 
 def tabulate_presets(cells: list[dict], size: int) -> list[dict]:
@@ -70,17 +68,6 @@ def format_presets(rows: list[dict], size: int) -> str:
         "and the largest.",
         format_table(*_tabulate_means(rows, presets)),
     ]
-    if {"auto", "reference"} <= set(presets):
-        found = [(row["scene"], *compare_auto(rows, row["scene"])) for row in rows if row["preset"] == "auto"]
-        reached = sum(check_target(*gain) for _, *gain in found)
-        parts += [
-            "## Only what the scene requires",
-            "`auto`, which chooses Gaussians, steps and degree by the scene, against the fixed settings of "
-            "`reference`. "
-            f"Wanted is at least a third less time for at most {MOST_DB:g} dB and {MOST_LPIPS:g} of LPIPS: reached on "
-            f"{reached} of {len(found)} scenes.",
-            format_table(*_tabulate_auto(found)),
-        ]
     if len(scenes) > 1:
         parts += [
             "## Forecasts, each scene left out",
@@ -109,26 +96,6 @@ def summarise_preset(rows: list[dict], preset: str) -> dict:
         "lpips": float(np.mean(lpips)),
         "most_lpips": max(lpips),
     }
-
-
-def compare_auto(rows: list[dict], scene: str) -> tuple[float, float, float]:
-    """Share of the seconds of `reference` that `auto` saves, dB and LPIPS that it loses, on a scene."""
-    mine = {row["preset"]: row for row in rows if row["scene"] == scene}
-    auto, fixed = mine["auto"], mine["reference"]
-    return 1 - auto["seconds"] / fixed["seconds"], fixed["psnr"] - auto["psnr"], auto["lpips"] - fixed["lpips"]
-
-
-def check_target(saved: float, loss_db: float, loss_lpips: float) -> bool:
-    """Whether enough time was saved for little enough loss."""
-    return saved >= FEWER and loss_db <= MOST_DB and loss_lpips <= MOST_LPIPS
-
-
-def _tabulate_auto(found: list[tuple]) -> tuple[list[str], list[list[str]]]:
-    rows = [
-        [scene, f"{saved:.0%}", f"{db:.2f}", f"{lpips:.4f}", "yes" if check_target(saved, db, lpips) else "no"]
-        for scene, saved, db, lpips in found
-    ]
-    return ["scene", "time saved", "lost (dB)", "lost (LPIPS)", "reached"], rows
 
 
 def _tabulate_means(rows: list[dict], presets: list[str]) -> tuple[list[str], list[list[str]]]:
