@@ -44,6 +44,16 @@ def test_settings_share_what_they_have_in_common(planned, tmp_path):
     assert {rule: plan[rule] for rule in wanted} == wanted
 
 
+def test_settings_of_a_preset_share_the_rounds_of_the_one_that_chooses_for_it(planned, tmp_path):
+    (path := tmp_path / "small.yaml").write_text(SMALL.replace("preset: draft", "preset: standard") % "max_gaussians")
+    plan = planned(tmp_path, "results/tradeoff/tradeoff.csv", configs=(USUAL, TINY, path))
+    # the base, two numbers of Gaussians, and the draft, whose fits the others' rounds are
+    wanted = dict(
+        fit_coarse=1, update_field=1, select_poses=1, fit_chosen_photos=3, copy_chosen_photos=3, evaluate_at=4
+    )
+    assert {rule: plan[rule] for rule in wanted} == wanted
+
+
 def test_a_finished_run_is_measured_drawn_and_told(snakemake, tiny, tmp_path):
     """What the tiny run made is there already: the settings are tau 0, 0.6 (the base) and 1 of its tiles."""
     folder = shutil.copytree(tiny.folder, tmp_path / "run", symlinks=True)

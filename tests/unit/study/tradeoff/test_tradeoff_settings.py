@@ -115,7 +115,6 @@ def changed(config, path, value):
         pytest.param("tradeoff.scene", "moon", "tradeoff: moon is no scene", id="no such scene"),
         pytest.param("tradeoff.knob", {}, "tradeoff: there is no key 'knob'; is 'knobs' meant", id="a typo"),
         pytest.param("tradeoff.base.preset", "best", "tradeoff.base: there is no preset 'best'", id="no such base"),
-        pytest.param(),
         pytest.param("tradeoff.base.rounds", 0, "tradeoff.base.rounds: .*greater", id="no round"),
         pytest.param("tradeoff.presets", ["best"], "tradeoff.presets: there is no preset 'best'", id="no such preset"),
         pytest.param("tradeoff.only", ["caps"], "tradeoff.only: there is no knob 'caps'", id="no such knob"),
