@@ -111,6 +111,11 @@ def chooser_of(preset):
     return config["presets"][preset].get("choose_with") or preset
 
 
+def values_of_choice(values):
+    """The wildcards of the rounds that choose a field's photos, which may be those of another preset."""
+    return values | ({"preset": chooser_of(values["preset"])} if values["t"] else {})
+
+
 def chosen_folder(stage, wildcards, t=""):
     """The folder of a stage of the preset that chooses the photos: `coarse`, `scored`, or `round` t."""
     template = paths.stage_template(stage).replace("{preset}", chooser_of(wildcards.preset))
@@ -292,7 +297,7 @@ def photo_targets(scene):
     if config["scenes"][scene]["kind"] == "field":
         return []
     values, rounds = branch(scene), config["rounds"]
-    chosen = values | ({"preset": chooser_of(values["preset"])} if rounds else {})
+    chosen = values_of_choice(values)
     scored = rules.score_round.output if rounds else rules.score_coarse.output
     return (
         expand(rules.report_photos.output.page, scene=scene)

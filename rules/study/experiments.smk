@@ -180,11 +180,6 @@ def experiment_branch(scene, chosen):
     return branch(scene, changes=over | {"rounds": rounds}) | {"stop": "", "inpainted": ""}
 
 
-def values_of_choice(values):
-    """The wildcards of the rounds that choose a field's photos, which may be those of another preset."""
-    return values | ({"preset": chooser_of(values["preset"])} if values["t"] else {})
-
-
 def benchmark_fits(values):
     """The benchmarks of the refits of all rounds; where these are another preset's, that of the fit to all photos, too."""
     chosen = values_of_choice(values)

@@ -1,6 +1,5 @@
 """What a sweep recomputes: the stages below the parameter it varies, and no others."""
 
-import json
 import os
 import re
 import time
@@ -45,30 +44,6 @@ def test_the_default_target_makes_every_stage_once(planned, tmp_path):
     assert all(plan[rule] == 1 for rule in [*once, "make_page", "render_terrain"])
     assert plan["update_field"] == plan["capture_views"] == 2
     assert plan["evaluate_coarse"] == 1 and plan["evaluate_round"] == 2
-
-
-def test_presets_share_the_rounds_of_the_one_that_chooses_for_them(planned, tmp_path):
-    """And each round may be the last: its photos are fitted at once."""
-    chosen = [BUNDLE.replace("/draft/", f"/{name}/") for name in ("standard", "reference")]
-    plan = planned(tmp_path, *(path.format(**DEFAULT) for path in (BUNDLE, *chosen)))
-    assert plan["fit_coarse"] == plan["score_coarse"] == 1 and plan["select_poses"] == plan["update_field"] == 2
-    assert plan["fit_chosen_photos"] == 2 and plan["copy_chosen_photos"] == 4 and plan["make_levels"] == 3
-    earlier = chosen[0].format(**(DEFAULT | {"t": 1}))
-    assert planned(tmp_path, earlier)["fit_chosen_photos"] == 1
-    unasked = chosen[0].format(**(DEFAULT | {"t": 0}))
-    plan = planned(tmp_path, unasked)
-    assert plan["fit_coarse"] == plan["copy_coarse_field"] == 1 and not plan["fit_chosen_photos"]
-
-
-def test_a_whole_run_fits_the_chosen_photos_once(planned, tmp_path):
-    changed = {"scenes": {"desert": {"preset": "standard"}}}
-    (tmp_path / "standard.json").write_text(json.dumps(changed))
-    plan, counted = (
-        planned(tmp_path, configs=(USUAL, tmp_path / "standard.json")),
-        count_jobs(checked_config(), "standard"),
-    )
-    assert {rule: plan[rule] for rule in counted} == counted
-    assert set(plan) - set(counted) == SHORT
 
 
 ASKED = "results/desert/seed0/draft/active_w2-lpips_terrain_pdrop{p_drop}_lam{lam}_k4/iter2/metrics.json"

@@ -15,7 +15,6 @@ from jsonschema import Draft202012Validator
 from dav_gswt.field import read_field
 from dav_gswt.files import digest_files, read_json
 from dav_gswt.images import image_files
-from dav_gswt.inspect.result_files import find_scores
 from dav_gswt.photos.colmap_model import read_colmap_model
 from dav_gswt.reconstruction import ground
 from dav_gswt.study.tables import spread
@@ -23,7 +22,6 @@ from dav_gswt.terrain.stills import SHOTS
 from dav_gswt.views import pose_maps, scores
 
 CONFIGS = (USUAL, TINY)
-SCORES = "scores_none_pdrop0/scores.csv"
 RULES = {
     "photos": ["render_photos", "report_photos", "split_views"],
     "coarse": ["fit_coarse", "evaluate_coarse", "score_coarse"],
@@ -380,33 +378,3 @@ def test_every_level_of_every_tile_is_measured(tiny, snakemake, tmp_path):
     for tile in range(16):
         own = [r for r in rows if int(r["tile"]) == tile]
         assert [float(r["mean_scale"]) for r in own] == sorted(float(r["mean_scale"]) for r in own)
-
-
-def test_another_preset_fits_the_photos_that_the_first_one_chose(tiny, snakemake, planned, tmp_path):
-    """The tiny run's rounds are its own: one fit to their photos, of another size, and what follows from it."""
-    folder, config = tmp_path / "chosen", tmp_path / "finer.yaml"
-    shutil.copytree(tiny.folder, folder)
-    preset = {"size": 96, "spacing": 2.0, "max_gaussians": 9000, "steps": 40, "steps_per_photo": 10, "level_steps": 10}
-    entries = {"presets": {"finer": preset | {"choose_with": "draft"}}, "scenes": {"desert": {"preset": "finer"}}}
-    config.write_text(yaml.safe_dump(entries))
-    configs = (*CONFIGS, config)
-    plan = planned(folder, configs=configs)
-    assert plan["copy_chosen_photos"] == plan["fit_chosen_photos"] == plan["evaluate_round"] == plan["score_round"] == 1
-    assert not {"fit_coarse", "select_poses", "capture_views", "update_field", "evaluate_coarse"} & set(plan)
-
-    own = tiny.round.relative_to(tiny.folder)
-    made = Path(str(own).replace("/draft/", "/finer/"))
-    page = made / tiny.terrain.relative_to(tiny.round) / "page"
-    snakemake(folder, "--cores", "2", made / "metrics.json", made / "scores.csv", page, configs=configs)
-    asked, chosen = (read_json(folder / path / "poses.json") for path in (own, made))
-    assert chosen == asked | {"chosen_with": "draft"}
-    taken = [digest_files(*sorted((folder / path / "capture").glob("[!.]*"))) for path in (own, made)]
-    assert taken[0] == taken[1]
-    found = read_json(folder / made / "metrics.json")
-    assert (
-        found["photos"] == 7 and 20 < found["psnr"] < 60 and found["provenance"]["parameters"]["choose_with"] == "draft"
-    )
-    assert find_scores(folder / made / "poses.json") == folder / tiny.coarse.relative_to(tiny.folder) / SCORES
-    assert scores.read_scores(folder / made / "scores.csv").scales == scores.read_scores(tiny.coarse / SCORES).scales
-    rounds = read_json(folder / page / "story.json")["rounds"]
-    assert [one.get("preset") for one in rounds] == ["draft", None] and rounds[1]["psnr"] == round(found["psnr"], 2)

@@ -72,7 +72,7 @@ def update_field(
     update = select_settings(UpdateSettings, preset)
     if preset["refit"] == "continue":
         return refine_field(given, update, rng, snapshots)
-    settings = ScratchSettings(select_settings(CoarseSettings, preset), update, files.start)
+    settings = select_scratch_settings(preset, files.start)
     return refit_from_scratch(given, match_points(given.earlier + given.new, files), settings, rng, snapshots)
 
 
@@ -85,12 +85,14 @@ def fit_chosen_photos(
     snapshots: Path | str | None = None,
 ) -> Reconstruction:
     """The field of photos that another preset's rounds chose: one fit to all of them."""
-    settings = ScratchSettings(
-        select_settings(CoarseSettings, preset), select_settings(UpdateSettings, preset), files.start
-    )
-    matched = match_points(photos, files)
-    start = StartViews(frame, photos, matched.points, matched.colours, matched.margin)
+    settings = select_scratch_settings(preset, files.start)
+    start = _start_from(photos, frame, match_points(photos, files))
     return fit_coarse_field(start, settings.for_photos(len(photos)), rng, FitOptions(snapshots=snapshots))
+
+
+def select_scratch_settings(preset: Mapping[str, Any], start: int) -> ScratchSettings:
+    """The settings of fits from scratch from a preset. start: photos of the first fit."""
+    return ScratchSettings(select_settings(CoarseSettings, preset), select_settings(UpdateSettings, preset), start)
 
 
 def match_points(views: list[TrainingView], files: PhotoFiles) -> MatchedPoints:
@@ -119,7 +121,7 @@ def refit_from_scratch(
         return Reconstruction(field, grid, regression_guard.report_unchanged(field))
     photos = given.earlier + given.new
     coarse = settings.for_photos(len(photos))
-    start = StartViews(given.frame, photos, matched.points, matched.colours, matched.margin)
+    start = _start_from(photos, given.frame, matched)
     made: list[Reconstruction] = []
 
     def fit(begin: GaussianField, plan: FitPlan) -> FitResult:
@@ -136,3 +138,7 @@ def refit_from_scratch(
     if not update.accepted:
         return Reconstruction(field, grid, update.report)
     return replace(made[-1], report=update.report)
+
+
+def _start_from(photos: list[TrainingView], frame: SceneFrame, matched: MatchedPoints) -> StartViews:
+    return StartViews(frame, photos, matched.points, matched.colours, matched.margin)
