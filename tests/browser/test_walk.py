@@ -100,6 +100,20 @@ def test_the_address_names_the_overlay_and_a_pasted_one_shows_it(visit, plain):
     seen.until("davgswt.state.x === 3 && davgswt.state.overlay === 'picture'")
 
 
+def test_an_address_that_is_entered_as_the_page_writes_its_own_is_followed(visit, plain):
+    seen = visit(160, 100)
+    seen.page.add_init_script("""window.ticks = [];
+        const start = window.setInterval;
+        window.setInterval = (tick, ...rest) => { ticks.push(tick); return start(tick, ...rest); };""")
+    seen.open(plain)
+    seen.page.evaluate("""() => {
+        davgswt.set({ x: 3, y: 5 });
+        location.hash = "#-7,1.5,1,90,-10";
+        for (const tick of ticks) tick();
+    }""")
+    seen.until("davgswt.state.x === -7", 5.0)
+
+
 @pytest.mark.parametrize("name", ["picture", "nothing", "%", ""])
 def test_an_address_of_no_overlay_shows_the_terrain(visit, plain, name):
     assert visit(160, 100).open(f"{plain}?still#3,5,2,20,-30&show={name}").state["overlay"] == "picture"

@@ -67,6 +67,14 @@ function decode(text) {
   }
 }
 
+let ours = ""; // the address as the page last wrote or followed it
+
+/** Write the page's address without following it. @param {string} hash */
+export function replaceAddress(hash) {
+  history.replaceState(null, "", hash);
+  ours = location.hash;
+}
+
 /**
  * Keep the address at the walker's place, and follow an address that a person enters.
  *
@@ -74,20 +82,19 @@ function decode(text) {
  * @param {Pick<import("./paint_keep.js").PaintKeep, "link" | "follow">} paint
  */
 export function syncAddress(viewer, paint) {
-  let last = location.hash;
+  ours = location.hash;
   const write = () => {
     const hash = viewer.address(paint.link);
-    if (hash === "" || hash === last) return;
-    last = hash;
-    history.replaceState(null, "", hash);
+    // An address that was just entered differs from ours until its event comes: it must not be overwritten.
+    if (hash !== "" && hash !== ours && location.hash === ours) replaceAddress(hash);
   };
   setInterval(write, EVERY);
   addEventListener("pagehide", write);
   addEventListener("hashchange", () => {
-    if (location.hash === last) return;
-    last = location.hash;
-    viewer.setPlace(parsePlace(last));
-    viewer.showOverlay(parseOverlay(last));
-    paint.follow(parsePaint(last)).catch((error) => viewer.fail(error));
+    if (location.hash === ours) return;
+    ours = location.hash;
+    viewer.setPlace(parsePlace(ours));
+    viewer.showOverlay(parseOverlay(ours));
+    paint.follow(parsePaint(ours)).catch((error) => viewer.fail(error));
   });
 }

@@ -1,5 +1,7 @@
 // Sharing a place: its address, by the device's own way where there is one, else on the clipboard.
 
+import { replaceAddress } from "./address.js";
+
 const TOO_LONG = "What is painted is too much for a link. Save it as a file.";
 
 /**
@@ -11,7 +13,7 @@ export async function sharePlace(viewer, paint) {
   if (link === null) return viewer.hud.say(TOO_LONG);
   const address = new URL(location.href);
   address.hash = viewer.address(link);
-  history.replaceState(null, "", address.hash);
+  replaceAddress(address.hash);
   try {
     if (document.documentElement.classList.contains("touch") && navigator.share) {
       await navigator.share({ title: document.title, url: address.href });
