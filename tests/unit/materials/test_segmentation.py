@@ -73,6 +73,19 @@ def test_a_path_is_a_strip_of_its_own():
     assert strips[0].sum() < 1.7 * path.sum()
 
 
+def test_a_strip_that_one_start_of_many_sets_apart_is_found(monkeypatch):
+    rng = np.random.default_rng(3)
+    colour = np.array([0.5, 0.45, 0.4]) + 0.02 * rng.normal(size=(128, 128, 1))
+    path = np.abs(np.arange(128) - 60) < 4
+    colour[:, path] += np.array([0.15, 0.02, -0.1])
+    apart = np.broadcast_to(path.astype(int), (128, 128))
+    halves = np.broadcast_to((np.arange(128) > 60).astype(int), (128, 128))
+    monkeypatch.setattr(segmentation, "_cluster", lambda _, start: apart if start == 1 else halves)
+    monkeypatch.setattr(segmentation, "_explained_variance", lambda _, labels: float(not np.array_equal(labels, apart)))
+    (found,) = segmentation.segment_ground(colour)[1]
+    assert found[:, path].mean() > 0.9 and found.mean() < 1.7 * path.mean()
+
+
 def test_even_ground_has_no_strip():
     assert segmentation.segment_ground(made.maps(mixed=False, shrubs=False).colour)[1] == []
 

@@ -59,3 +59,11 @@ def test_a_mixture_of_both_sides_is_a_transition(own, transition):
     colours = np.where(labels[..., None] == 1, two, one)
     colours[strip] = other if own == "other" else one + own * (two - one)
     assert strips.is_transition(strip, colours, labels) == transition
+
+
+def test_a_few_bright_things_make_no_strip_of_the_ground_between_them():
+    ground, bright = np.array([30.0, 0, 10]), np.array([40.0, -3, -5])
+    colours = np.broadcast_to(ground, (K, K, 3)).copy()
+    strip = np.abs(COLUMNS - 100) < 8
+    colours[strip & (ROWS % 10 < 4)] = bright
+    assert strips.is_transition(strip, colours, np.zeros((K, K), int))

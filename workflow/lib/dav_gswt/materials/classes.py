@@ -15,6 +15,7 @@ from dav_gswt.materials.shade import find_shade, is_shade, linear_light
 from dav_gswt.materials.surroundings import Surroundings
 
 MAX_MATERIALS = 4
+NO_CLASS = -1
 LEAST_SHARE = 0.05  # of the exemplar, of a material
 LEAST_WIDTH = 0.13  # of its side: a disc so wide lies in a material
 FINE = 0.1  # of its side: classes that are nowhere wider are growth or things; where they are dense, they are texture
@@ -77,7 +78,7 @@ def classify_ground(maps: GroundMaps, masks: GroundMasks | None = None) -> Groun
     """
     features = segmentation.describe_cells(maps.colour)
     ground = _name_ground(maps, masks) if masks and masks.materials else _segment_ground(maps, features[..., -1])
-    known = maps.known & (ground.classes >= 0)
+    known = maps.known & (ground.classes != NO_CLASS)
     maps = replace(maps, known=known & ~masks.excluded if masks else known)
     around = _describe_surroundings(maps, features[..., :3], ground)
     tall = standing.find_standing_things(around, maps)
@@ -97,7 +98,7 @@ def classify_ground(maps: GroundMaps, masks: GroundMasks | None = None) -> Groun
 
 @dataclass(frozen=True)
 class _LabelledGround:
-    """Classes of all cells, -1 for none; those that are materials; small pieces of these within others; strips."""
+    """Classes of all cells, NO_CLASS for none; those that are materials; small pieces of these within others; strips."""
 
     classes: Int[Array, "m m"]
     chosen: list[int]
@@ -115,15 +116,21 @@ def _name_ground(maps: GroundMaps, masks: GroundMasks) -> _LabelledGround:
 def _segment_ground(maps: GroundMaps, contrast: Float[Array, "m m"]) -> _LabelledGround:
     """Ground by its looks. contrast: of the grain around each cell."""
     classes, strips = segmentation.segment_ground(maps.colour)
-    chosen = choose_materials(classes, maps.colour, contrast)
+    crossing = _unite(strips, classes.shape)
+    chosen = choose_materials(np.where(crossing, NO_CLASS, classes), maps.colour, contrast)
     names = [f"material{k}" for k in range(len(chosen))]
     return _LabelledGround(classes, chosen, names, find_scattered(classes, chosen), strips)
+
+
+def _unite(strips: list[Bool[Array, "m m"]], shape: tuple[int, ...]) -> Bool[Array, "m m"]:
+    """Cells of any strip."""
+    return np.any([np.zeros(shape, bool), *strips], axis=0)
 
 
 def _describe_surroundings(maps: GroundMaps, features: Float[Array, "m m 3"], ground: _LabelledGround) -> Surroundings:
     """What things are judged by."""
     classes, chosen = ground.classes, ground.chosen
-    crossing = np.any([np.zeros(classes.shape, bool), *ground.strips], axis=0)
+    crossing = _unite(ground.strips, classes.shape)
     wide = np.isin(classes, chosen) & maps.known & ~ground.pieces & ~crossing
     nearest = tuple(distance_transform_edt(~wide, return_distances=False, return_indices=True))
     materials = np.searchsorted(chosen, classes[nearest])
@@ -189,7 +196,7 @@ def choose_materials(
 ) -> list[int]:
     """Numbers of the classes that are materials, ascending; classes are numbered by descending share.
 
-    contrast: of the grain around each cell.
+    classes: NO_CLASS: cells that are judged apart, of strips. contrast: of the grain around each cell.
     """
     m, chosen = len(classes), []
     for number in range(int(classes.max()) + 1):

@@ -60,13 +60,15 @@ class Difference:
 def segment_ground(colour: Float[Array, "m m 3"]) -> tuple[Int[Array, "m m"], list[Bool[Array, "m m"]]]:
     """Classes of an exemplar by descending share, from 0, and the strips that cross it. colour: sRGB in [0, 1].
 
-    Strips may be of any class: they are found in clusters before these are merged.
+    Strips may be of any class: they are found in clusters before these are merged, from every start of k-means, since
+    few starts happen to set a strip apart.
     """
     features = describe_cells(_shrink(colour))
     traces = [merge_clusters(features, _cluster(features, start)) for start in range(STARTS)]
     trace = max(traces, key=lambda trace: _explained_variance(features, trace[-1]))
     labels = smooth_labels(features, trace[-1])
-    found = [each for each in strips.find_strips(trace) if not strips.is_transition(each, features[..., :3], labels)]
+    candidates = strips.find_strips([clusters for each in traces for clusters in each])
+    found = [each for each in candidates if not strips.is_transition(each, features[..., :3], labels)]
     labels, crossing = _enlarge(labels, len(colour)), [_enlarge(each, len(colour)) for each in found]
     order = np.argsort(-np.bincount(labels.ravel()), kind="stable")
     return np.argsort(order)[labels], crossing

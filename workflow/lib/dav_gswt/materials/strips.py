@@ -18,7 +18,7 @@ MOST_VARIATION = 0.32  # standard deviation of the width over its mean
 LEAST_SHARE = 0.5  # of the cells that look like it, that lie in the strip
 LEAST_PIECE = 0.1  # of the cells that look like it, of a piece of a strip that something lies across
 FORK_LENGTH, FORK_VARIATION, FORK_SHARE = 1.5, 0.5, 0.9  # the same of strips that fork: they are wider there
-LEAST_DIFFERENCE = 4.0  # weighed CIELAB units between a strip and what is beside it
+LEAST_DIFFERENCE = 5.5  # weighed CIELAB units between a strip and what is beside it
 SIDE = 0.25  # of what is beside a strip, that a class has at least if it lies on a side of it
 BESIDE = 0.06  # of the side: so near to a strip its blurred rim may look like another
 MOST_OVERLAP = 0.1  # of a second strip with the first one and what is beside it
@@ -26,10 +26,11 @@ MOST_OVERLAP = 0.1  # of a second strip with the first one and what is beside it
 
 def find_strips(clusterings: Sequence[Int[Array, "k k"]]) -> list[Bool[Array, "k k"]]:
     """Strips among the clusters of any of these clusterings, those first that most of their cluster belongs to."""
-    candidates: list[tuple[float, Bool[Array, "k k"]]] = []
+    clusters = {}  # each once: a merger changes one cluster and leaves the others
     for labels in clusterings:
         for number in range(int(labels.max()) + 1):
-            candidates += _measure_strip(labels == number)
+            clusters.setdefault(np.packbits(labels == number).tobytes(), labels == number)
+    candidates = [each for cluster in clusters.values() for each in _measure_strip(cluster)]
     found: list[Bool[Array, "k k"]] = []
     for _, cells in sorted(candidates, key=lambda each: -each[0]):
         reach = max(1, round(BESIDE * len(cells)))
@@ -43,13 +44,14 @@ def find_strips(clusterings: Sequence[Int[Array, "k k"]]) -> list[Bool[Array, "k
 def is_transition(strip: Bool[Array, "k k"], colours: Float[Array, "k k c"], labels: Int[Array, "k k"]) -> bool:
     """Whether a strip's colour is that beside it, or a mixture of what lies on its two sides, as on a border.
 
-    colours: weighed CIELAB. labels: classes of the ground.
+    Colours are medians, which a few things on the ground do not change. colours: weighed CIELAB. labels: classes of
+    the ground.
     """
     ring = binary_dilation(strip, iterations=max(2, round(BESIDE * len(strip)))) & ~strip
     count = np.bincount(labels[ring])
-    means = [colours[ring & (labels == k)].mean(0) for k in np.flatnonzero(count >= SIDE * ring.sum())]
-    own = colours[strip].mean(0)
-    return any(_measure_distance(own, one, two) < LEAST_DIFFERENCE for one in means for two in means)
+    sides = [np.median(colours[ring & (labels == k)], 0) for k in np.flatnonzero(count >= SIDE * ring.sum())]
+    own = np.median(colours[strip], 0)
+    return any(_measure_distance(own, one, two) < LEAST_DIFFERENCE for one in sides for two in sides)
 
 
 def _measure_distance(point: Float[Array, "c"], one: Float[Array, "c"], two: Float[Array, "c"]) -> float:
