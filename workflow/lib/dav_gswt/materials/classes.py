@@ -98,7 +98,7 @@ def classify_ground(maps: GroundMaps, masks: GroundMasks | None = None) -> Groun
 
 @dataclass(frozen=True)
 class _LabelledGround:
-    """Classes of all cells, NO_CLASS for none; those that are materials; small pieces of these within others; strips."""
+    """Classes of all cells, NO_CLASS: none; those that are materials; small pieces of these within others; strips."""
 
     classes: Int[Array, "m m"]
     chosen: list[int]
