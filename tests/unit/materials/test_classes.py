@@ -6,7 +6,7 @@ from fixtures import mixed_ground as made
 from scipy.ndimage import gaussian_filter
 
 from dav_gswt.materials import classes
-from dav_gswt.materials.mask_images import GroundMasks
+from dav_gswt.materials.mask_images import NO_CLASS, GroundMasks
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +66,7 @@ def test_a_class_of_which_a_strip_is_the_wide_part_is_no_material():
     colour = np.where((road | rests)[..., None], (0.7, 0.6, 0.5), (0.3, 0.4, 0.2))
     labels = (road | rests).astype(int)
     assert classes.choose_materials(labels, colour, np.ones((128, 128))) == [0, 1]
-    apart = np.where(road, classes.NO_CLASS, labels)
+    apart = np.where(road, NO_CLASS, labels)
     assert classes.choose_materials(apart, colour, np.ones((128, 128))) == [0]
 
 

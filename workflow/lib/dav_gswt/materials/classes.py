@@ -9,13 +9,12 @@ from scipy.ndimage import binary_dilation, distance_transform_edt, label
 
 from dav_gswt.materials import objects, segmentation, standing
 from dav_gswt.materials.maps import GroundMaps
-from dav_gswt.materials.mask_images import GroundMasks
+from dav_gswt.materials.mask_images import NO_CLASS, GroundMasks
 from dav_gswt.materials.objects import Footprint
 from dav_gswt.materials.shade import find_shade, is_shade, linear_light
 from dav_gswt.materials.surroundings import Surroundings
 
 MAX_MATERIALS = 4
-NO_CLASS = -1
 LEAST_SHARE = 0.05  # of the exemplar, of a material
 LEAST_WIDTH = 0.13  # of its side: a disc so wide lies in a material
 FINE = 0.1  # of its side: classes that are nowhere wider are growth or things; where they are dense, they are texture

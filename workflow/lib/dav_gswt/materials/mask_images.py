@@ -12,6 +12,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.images import image_files
 
 EXCLUDE = "exclude"  # name of the mask of ground that is shown nowhere
+NO_CLASS = -1  # of cells that are of no material
 HALF = 0.5  # brightness from which a pixel counts
 ASPECT = 0.01  # a mask that is less square is not of the exemplar
 
@@ -28,15 +29,15 @@ class GroundMasks:
     excluded: Bool[Array, "m m"]
 
     def label(self) -> tuple[Int[Array, "m m"], list[str]]:
-        """Number of each cell's material, by descending share, -1 where there is none; and the materials' names."""
-        labels = np.full(self.excluded.shape, -1)
+        """Number of each cell's material, by descending share, or NO_CLASS; and the materials' names."""
+        labels = np.full(self.excluded.shape, NO_CLASS)
         names = list(self.materials)
         for number in reversed(range(len(names))):
             labels[self.materials[names[number]]] = number
-        labels[self.excluded] = -1
+        labels[self.excluded] = NO_CLASS
         counts = [int((labels == number).sum()) for number in range(len(names))]
         order = sorted((k for k in range(len(names)) if counts[k]), key=lambda k: -counts[k])
-        place = np.full(len(names) + 1, -1)
+        place = np.full(len(names) + 1, NO_CLASS)  # the last is of cells without one
         place[order] = np.arange(len(order))
         return place[labels], [names[k] for k in order]
 

@@ -29,7 +29,8 @@ def find_strips(clusterings: Sequence[Int[Array, "k k"]]) -> list[Bool[Array, "k
     clusters = {}  # each once: a merger changes one cluster and leaves the others
     for labels in clusterings:
         for number in range(int(labels.max()) + 1):
-            clusters.setdefault(np.packbits(labels == number).tobytes(), labels == number)
+            cluster = labels == number
+            clusters[np.packbits(cluster).tobytes()] = cluster
     candidates = [each for cluster in clusters.values() for each in _measure_strip(cluster)]
     found: list[Bool[Array, "k k"]] = []
     for _, cells in sorted(candidates, key=lambda each: -each[0]):
