@@ -182,16 +182,19 @@ def _hash(i: Array, j: Array, salt: int) -> Array:
 
 
 def _hash_reference(i: Array, j: Array, salt: int) -> Array:
-    """In integers of any size."""
+    return np.array([hash_exactly(a, b, 2, salt) for a, b in zip(i.tolist(), j.tolist(), strict=True)], np.float64)
+
+
+def hash_exactly(i: int, j: int, axis: int, salt: int) -> int:
+    """`choice.hash_cell` in integers of any size."""
 
     def mix(h: int) -> int:
         h = (h ^ h >> 16) * 0x85EBCA6B % 2**32
         h = (h ^ h >> 13) * 0xC2B2AE35 % 2**32
         return h ^ h >> 16
 
-    pairs = zip(i.tolist(), j.tolist(), strict=True)
-    cases = [mix((mix((a * 0x8DA6B343 ^ 2 * 0xCB1AB31F ^ salt) % 2**32) + b * 0xD8163841) % 2**32) for a, b in pairs]
-    return np.array(cases, np.float64)
+    first = mix((i * 0x8DA6B343 ^ axis * 0xCB1AB31F ^ salt) % 2**32)
+    return mix((first + j * 0xD8163841) % 2**32)
 
 
 CHECKS = [

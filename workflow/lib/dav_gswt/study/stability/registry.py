@@ -3,15 +3,14 @@
 from pathlib import Path
 
 from dav_gswt.study import csv_tables
-from dav_gswt.study.stability import cuts, image_metrics, levels, rasterizer, selection, storage, view_scores
+from dav_gswt.study.stability import cuts, image_metrics, levels, rasterizer, selection, storage, surfaces, view_scores
 from dav_gswt.study.stability.formula import Check, measure_error
 
 DESCRIPTIONS = Path(__file__).with_name("formulas.csv")  # group, item, formula, source, range, type, tolerance_from
-MODULES = (view_scores, selection, image_metrics, cuts, levels, rasterizer, storage)
+MODULES = (view_scores, selection, image_metrics, cuts, levels, surfaces, rasterizer, storage)
 CHECKS: dict[str, Check] = {check.name: check for module in MODULES for check in module.CHECKS}
 WITHOUT = {
     "Algorithm 1": "counts of photos: whole numbers, which the runs at k = pool try",
-    "a tile on a sphere": "held against 80 bits at radii of 1 to 1e7 by the unit tests of terrain/sphere",
 }  # items of docs/research/numerics.md without a formula, and why
 
 
