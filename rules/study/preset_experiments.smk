@@ -1,7 +1,6 @@
 """Experiments of presets: what `preset_costs` gathers, each with its files and its jobs' benchmarks."""
 
 from dav_gswt.cli import estimate
-from dav_gswt.cli.machine_speed import MachineSpeed
 
 # jobs of a run before the start photos are there, beside its products, and after the bundle
 UNCOUNTED = ("render_photos", "register_photos", "report_photos", "split_views", "capture_views")
@@ -31,7 +30,7 @@ def preset_experiment(scene, preset):
         "preset": preset,
         "corrected": entry["kind"] == "photos",
         "fitted": config["presets"][preset]["size"],
-        "estimated": estimate_tiles(scene, preset),
+        "cost": estimate_tiles(scene, preset),
         "images": of(rules.register_photos.output.images)[0],
         "metrics": of(rules.evaluate_at.output.metrics, size=asked["size"])[0],
         "manifest": of(rules.bundle_tiles.output.manifest)[0],
@@ -46,9 +45,10 @@ def preset_experiment(scene, preset):
 
 
 def estimate_tiles(scene, preset):
-    """Seconds that `make run` expects of the jobs whose times count, on the reference machine."""
+    """Seconds that `make run` expects of the jobs whose times count on the reference machine: general, rasterizer."""
     jobs = estimate.count_jobs(config | {"scene": scene}, preset)
     counted = {rule: count for rule, count in jobs.items() if rule not in UNCOUNTED}
     counted |= {"score_round": config["rounds"] - 1}  # that after the last round chooses no photo
     work = estimate.describe_work(config | {"scene": scene}, preset)
-    return round(estimate.estimate_seconds(counted, work, MachineSpeed()), 1)
+    cost = estimate.add_costs(counted, work)
+    return [round(cost.general, 1), round(cost.raster, 1)]

@@ -10,6 +10,8 @@ from fixtures.configs import ROOT
 
 from dav_gswt.cli import advise, main
 from dav_gswt.cli.advise import Choice, Limits, choose
+from dav_gswt.cli.estimate import describe_work, estimate_seconds
+from dav_gswt.cli.finished_run import find_finished_run
 from dav_gswt.cli.forecast import FRONT, Forecast, Measured
 from dav_gswt.cli.machine_speed import MachineSpeed
 from dav_gswt.images.image_files import write_png
@@ -76,7 +78,10 @@ def test_presets_are_listed_and_one_is_advised(project, capsys):
     said = capsys.readouterr().out
     assert "Advice: `preset: standard` of the scene 'mine'" in said and "loses 0.4 dB to the best" in said
     assert [line.split()[0] for line in said.splitlines()[1:4]] == ["draft", "standard", "reference"]
-    assert "forecast from 2 scenes" in said and "off by 0.0 dB in the mean, 0.0 at most" in said
+    assert (
+        "forecast from 2 scenes" in said
+        and "off by 0.0 dB in the mean, 0.0 at most, and seconds by 0%, 0% at most" in said
+    )
 
 
 def test_limits_that_nothing_meets_end_with_an_error_and_the_nearest(project, capsys):
@@ -96,6 +101,26 @@ def test_a_finished_run_tells_the_level(project, capsys):
     assert run("--psnr", "21") == 0
     said = capsys.readouterr().out
     assert "known: draft, 20.00 dB" in said and "22.0 dB" in said and "Advice: `preset: standard`" in said
+
+
+def test_a_finished_run_tells_how_slow_the_others_will_be(project):
+    config = advise.load_config([], {"scene": "mine"})
+    branch = "mine/seed0/draft/active_coverage-error_none_pdrop0_lam0_k4"
+    (round_ := project / "results" / branch / "iter2").mkdir(parents=True)
+    (round_ / "metrics.json").write_text(json.dumps({"psnr_colour_corrected": 20.0}))
+    before = advise.list_choices(config, advise.forecast.read_front(), *found(config))
+    (timed := project / "results/benchmarks" / branch / "iter2/levels").mkdir(parents=True)
+    work, speed = describe_work(config, "draft"), MachineSpeed()
+    taken = 3 * estimate_seconds({"make_levels": 1}, work, speed)
+    (timed / "make_levels.tsv").write_text(f"s\tmax_rss\n{taken}\t800\n")
+    (timed / "evaluate_at_64.tsv").write_text("s\n1000\n")  # no job of a run
+    (timed / "cut_tiles.tsv").write_text("")  # broken off
+    after = advise.list_choices(config, advise.forecast.read_front(), *found(config))
+    assert [each.seconds for each in after] == pytest.approx([3 * each.seconds for each in before])
+
+
+def found(config):
+    return find_finished_run(config, MachineSpeed()), MachineSpeed()
 
 
 @pytest.mark.parametrize("value", ["0", "-1", "nan", "inf", "soon"])

@@ -72,16 +72,17 @@ def test_photos_of_a_folder_are_counted(config, tmp_path):
 
 
 def test_photos_are_no_larger_than_they_are(config, tmp_path):
-    write_png(tmp_path / "a.png", np.zeros((48, 64, 3)))
+    write_png(tmp_path / "a.png", np.zeros((64, 40, 3)))
     config["scenes"]["mine"] = config["scenes"]["copr_dunes"] | {"folder": str(tmp_path), "size": LARGEST_SIDE}
     config["presets"]["native"] = config["presets"]["draft"] | {"size": LARGEST_SIDE}
     work = describe_work(config | {"scene": "mine"}, "native")
-    assert work.photo_pixels == work.fit_pixels == 48 * 64
+    assert work.photo_pixels == work.fit_pixels == 40 * 64
 
 
 def test_a_photo_that_cannot_be_read_stops_no_estimate(config, tmp_path):
     (tmp_path / "a.jpg").touch()
-    assert estimate.measure_photos({"kind": "photos", "folder": str(tmp_path)}) == LARGEST_SIDE
+    found = estimate.measure_photos({"kind": "photos", "folder": str(tmp_path)})
+    assert found == (LARGEST_SIDE, estimate.PHOTO_SHAPE)
 
 
 def test_a_finished_field_has_an_estimate_too(config):

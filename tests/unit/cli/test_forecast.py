@@ -10,6 +10,7 @@ from dav_gswt.cli.forecast import (
     Measured,
     error_to_psnr,
     forecast_presets,
+    forecast_slowness,
     leave_one_out,
     measure_shrinking,
     read_front,
@@ -73,6 +74,29 @@ def test_a_table_without_the_baseline_says_nothing(front):
 
 def test_one_scene_alone_has_nothing_to_be_forecast_from(front):
     assert leave_one_out([each for each in front if each.scene == "sand"]) == []
+
+
+def test_a_preset_takes_longer_by_the_geometric_mean_of_its_scenes(front):
+    times = {"sand": 60.0, "rock": 240.0, "leaves": np.nan}
+    made = [replace(each, seconds=times[each.scene] if each.preset == "draft" else 60.0) for each in front]
+    assert forecast_slowness(made) == pytest.approx({"standard": 1, "draft": 2, "fine": 1})
+
+
+def test_a_run_that_took_longer_than_others_of_its_preset_makes_all_take_longer(front):
+    made = [replace(each, seconds=120.0) for each in front]
+    assert forecast_slowness(made, ("draft", 3.0)) == pytest.approx(dict.fromkeys(FITS, 3.0))
+    for known in (None, ("draft", None), ("mine", 3.0)):
+        assert forecast_slowness(made, known) == pytest.approx(dict.fromkeys(FITS, 2.0))
+
+
+def test_seconds_are_forecast_from_the_other_scenes(front):
+    slow = [replace(each, seconds=120.0) if each.scene == "sand" else each for each in front]
+    before, after = ({(e.scene, e.preset): e.late for e in leave_one_out(slow, k)} for k in (None, "draft"))
+    assert before["sand", "fine"] == pytest.approx(-0.5)
+    assert before["rock", "fine"] == pytest.approx(np.sqrt(2) - 1)
+    assert after["sand", "fine"] == pytest.approx(0) and after["rock", "fine"] == pytest.approx(0)
+    untimed = [replace(each, seconds=np.nan) for each in front]
+    assert {each.late for each in leave_one_out(untimed)} == {None}
 
 
 def test_shrinking_costs_what_the_photos_show(tmp_path):

@@ -7,6 +7,7 @@ import pytest
 from fixtures.markdown import collapse_spaces
 
 from dav_gswt.cli import forecast
+from dav_gswt.cli.machine_speed import MachineSpeed
 from dav_gswt.images.image_files import write_png
 from dav_gswt.study import csv_tables
 from dav_gswt.study.tradeoff import preset_costs
@@ -18,6 +19,9 @@ MEASURED = {  # PSNR, LPIPS, seconds of each job, megabytes of the bundle
     ("rock", "standard"): (26.0, 0.30, 10.0, 30.0),
     ("rock", "draft"): (26.5, 0.34, 20.0, 10.0),
 }
+
+
+SPEED = MachineSpeed(raster=2.0, general=1.0)
 
 
 def cell(folder, scene, preset, corrected=False):
@@ -35,30 +39,31 @@ def cell(folder, scene, preset, corrected=False):
         (place / f"{part}.tsv").write_text(f"s\tmax_rss\n{seconds}\t{800.0 + number}\n")
         times[part] = [str(place / f"{part}.tsv")] * 2
     files = {"metrics": str(place / "metrics.json"), "manifest": str(place / "davgswt.json")}
-    files |= {"images": str(place / "images"), "fitted": 32 if preset == "draft" else 64, "estimated": 50.0}
+    files |= {"images": str(place / "images"), "fitted": 32 if preset == "draft" else 64, "cost": (30.0, 10.0)}
     return {"scene": scene, "preset": preset, "corrected": corrected, "times": times} | files
 
 
 @pytest.fixture
 def rows(tmp_path):
-    return preset_costs.tabulate_presets([cell(tmp_path, *which) for which in MEASURED], 768)
+    return preset_costs.tabulate_presets([cell(tmp_path, *which) for which in MEASURED], 768, SPEED)
 
 
 def test_a_row_has_the_sum_of_all_jobs_and_chunks(rows):
     row = rows[0]
     assert (row["fits_s"], row["views_s"], row["tiles_s"], row["seconds"]) == (20.0, 20.0, 20.0, 60.0)
     assert (row["bundle_mb"], row["peak_mb"], row["photos"]) == (20.0, 802.0, 16)
+    assert row["estimated"] == 50.0
 
 
 def test_real_photos_are_compared_after_their_exposure_is_fitted(tmp_path):
-    (row,) = preset_costs.tabulate_presets([cell(tmp_path, "sand", "standard", corrected=True)], 768)
+    (row,) = preset_costs.tabulate_presets([cell(tmp_path, "sand", "standard", corrected=True)], 768, SPEED)
     assert row["psnr"] == 31.0
 
 
 def test_a_job_that_was_not_timed_leaves_the_sum_unknown(tmp_path):
     made = cell(tmp_path, "sand", "standard")
     made["times"]["tiles"] = ["missing.tsv"]
-    (row,) = preset_costs.tabulate_presets([made], 768)
+    (row,) = preset_costs.tabulate_presets([made], 768, SPEED)
     assert row["seconds"] is None and row["fits_s"] == 20.0
 
 
@@ -86,5 +91,7 @@ def test_the_page_has_every_scene_and_survives_the_table(rows, tmp_path):
         (each.scene, each.preset): each.loss for each in forecast.leave_one_out(forecast.read_front(tmp_path / "t.csv"))
     }
     assert f"| sand | `draft` | {losses['sand', 'draft']:.2f} (1.00) |" in page
-    assert "| 0.040 (0.050) | 50 (30) |" in page
+    # of an estimate of 50: rock's draft takes 120, its standard 60; sand's draft 30
+    assert "| 0.040 (0.050) | 120 (30) | 30 |" in page and "| 60 (60) | 15 |" in page
+    assert "and seconds by 94%, 300% at most; after one with `draft`" in page
     assert "| `draft` | 120 | 40 | 40 | 40 | 26.50 | 0.500 | 0.340 | 16 | 900 | 802 | 10.0 |" in page

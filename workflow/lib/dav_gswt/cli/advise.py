@@ -11,13 +11,13 @@ from typing import Any
 
 from dav_gswt.cli import forecast
 from dav_gswt.cli.estimate import count_jobs, describe_work, estimate_seconds, format_duration
+from dav_gswt.cli.finished_run import FinishedRun, find_finished_run
 from dav_gswt.cli.forecast import Forecast, Measured
 from dav_gswt.cli.machine_speed import MachineSpeed, measure_speed
 from dav_gswt.cli.run import load_config
 from dav_gswt.errors import InputError
-from dav_gswt.files import read_json
 from dav_gswt.images.image_files import list_photos
-from dav_gswt.paths import encode_branch, stage_folder
+from dav_gswt.paths import stage_folder
 
 
 @dataclass(frozen=True)
@@ -73,32 +73,34 @@ def run_advise(options: argparse.Namespace) -> int:
     Raises: InputError: no such scene, no table of presets, or a PSNR is wanted and no run of the scene is finished.
     """
     config = load_config(options.configfile, {"scene": options.scene} if options.scene else {})
-    front, known = forecast.read_front(), find_known_psnr(config)
+    front, speed = forecast.read_front(), measure_speed(options.cores)
+    known = find_finished_run(config, speed)
     if options.psnr is not None and known is None:
         raise InputError(
             f"{config['scene']}: no run of it is finished, so its PSNR is not known beforehand; make one (`draft` is "
             "the fastest), or ask by --loss"
         )
-    choices = list_choices(config, front, known, measure_speed(options.cores))
+    choices = list_choices(config, front, known, speed)
     limits = Limits(options.seconds, options.psnr, options.loss, options.mb)
     best = choose(choices, limits)
-    print(
-        "\n".join([*format_choices(choices, known), "", describe_choice(config, best, limits), describe_trust(front)])
-    )
+    lines = [*format_choices(choices, known), "", describe_choice(config, best, limits)]
+    print("\n".join([*lines, describe_trust(front, known and known.preset)]))
     return int(limits.excess(best) > 0)
 
 
 def list_choices(
-    config: Mapping[str, Any], front: list[Measured], known: tuple[str, float] | None, speed: MachineSpeed
+    config: Mapping[str, Any], front: list[Measured], known: FinishedRun | None, speed: MachineSpeed
 ) -> list[Choice]:
     """The presets of both config and table, fastest first. Raises: InputError: there is none."""
     sizes = {name: entry["size"] for name, entry in config["presets"].items()}
     lost = measure_scene(config, set(sizes.values()), front[0].size if front else 1)
-    found = forecast.forecast_presets(front, {name: lost[size] for name, size in sizes.items()}, known)
+    level, times = (known.preset, known.psnr) if known else None, (known.preset, known.slowness) if known else None
+    found = forecast.forecast_presets(front, {name: lost[size] for name, size in sizes.items()}, level)
+    slowness = forecast.forecast_slowness(front, times)
     if not found:
         raise InputError(f"{forecast.FRONT}: none of the config's presets is in the table ({', '.join(sizes)})")
     choices = [
-        Choice(each, _estimate_run(config, name, speed), _estimate_mb(config, front, name))
+        Choice(each, slowness[name] * _estimate_run(config, name, speed), _estimate_mb(config, front, name))
         for name, each in found.items()
     ]
     return sorted(choices, key=lambda choice: choice.seconds)
@@ -114,20 +116,6 @@ def measure_scene(config: Mapping[str, Any], sizes: set[int], size: int) -> dict
     return forecast.measure_shrinking(list_photos(folder), sizes, min(size, scene.get("size", size)))
 
 
-def find_known_psnr(config: Mapping[str, Any]) -> tuple[str, float] | None:
-    """A preset and the PSNR of the scene's finished run with it: the baseline's, else any other."""
-    names = sorted(config["presets"], key=lambda name: name != forecast.BASELINE)
-    scene = config["scenes"][config["scene"]]
-    for name in names:
-        values = encode_branch(config, config["scene"], changes={"preset": name}) | {"seed": config["seeds"][0]}
-        path = stage_folder("round", values) / "metrics.json"
-        if scene["kind"] != "field" and path.is_file():
-            psnr = read_json(path)["psnr_colour_corrected" if scene["kind"] == "photos" else "psnr"]
-            if psnr is not None:
-                return name, float(psnr)
-    return None
-
-
 def _parse_positive(text: str) -> float:
     value = float(text)
     if not 0 < value < float("inf"):
@@ -136,7 +124,7 @@ def _parse_positive(text: str) -> float:
 
 
 def _estimate_run(config: Mapping[str, Any], preset: str, speed: MachineSpeed) -> float:
-    """Seconds of a whole run."""
+    """Seconds of a whole run, before the table's scenes are asked how much longer runs take than that."""
     return estimate_seconds(count_jobs(config, preset), describe_work(config, preset), speed)
 
 
@@ -158,9 +146,9 @@ def choose(choices: list[Choice], limits: Limits) -> Choice:
     return min(within, key=lambda choice: (choice.forecast.loss, choice.seconds) if timed else (choice.seconds, 0.0))
 
 
-def format_choices(choices: list[Choice], known: tuple[str, float] | None) -> list[str]:
+def format_choices(choices: list[Choice], known: FinishedRun | None) -> list[str]:
     """Lines of a table."""
-    level = f", expected (known: {known[0]}, {known[1]:.2f} dB)" if known else ""
+    level = f", expected (known: {known.preset}, {known.psnr:.2f} dB)" if known else ""
     lines = [f"{'preset':<12}{'a whole run':<20}{'under the best':<17}{'LPIPS over it':<16}{'bundle':<10}PSNR{level}"]
     for c in choices:
         psnr = f"{c.forecast.psnr:.1f} dB" if known else "unknown"
@@ -184,9 +172,10 @@ def describe_choice(config: Mapping[str, Any], best: Choice, limits: Limits) -> 
     return f"Advice: {where}. It takes {format_duration(best.seconds)} and {lost}."
 
 
-def describe_trust(front: list[Measured]) -> str:
-    """How far off forecasts were on the table's own scenes, each left out in turn."""
-    off = [abs(row.off) for row in forecast.leave_one_out(front)]
+def describe_trust(front: list[Measured], known: str | None = None) -> str:
+    """How far off forecasts were on the table's own scenes, each left out in turn. known: preset of a finished run."""
+    left_out = forecast.leave_one_out(front, known)
+    off, late = [abs(row.off) for row in left_out], [abs(row.late) for row in left_out if row.late is not None]
     scenes = len({row.scene for row in front})
     if not off:
         return (
@@ -194,5 +183,6 @@ def describe_trust(front: list[Measured]) -> str:
         )
     return (
         f"Losses are forecast from {scenes} scenes (docs/research/results/presets.md); on each of them, left out, they "
-        f"were off by {sum(off) / len(off):.1f} dB in the mean, {max(off):.1f} at most."
+        f"were off by {sum(off) / len(off):.1f} dB in the mean, {max(off):.1f} at most"
+        + (f", and seconds by {sum(late) / len(late):.0%}, {max(late):.0%} at most." if late else ".")
     )

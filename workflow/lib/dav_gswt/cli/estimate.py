@@ -19,7 +19,7 @@ from dav_gswt.views.policy_names import PRIOR_POLICIES
 
 LONG = 600.0  # seconds: a run that takes longer is told of a faster preset
 PER_JOB = 1.6  # seconds to start a job: Snakemake, Python, imports
-PHOTO_SHAPE = 0.75  # height over width
+PHOTO_SHAPE = 0.75  # shorter over longer side, of photos that cannot be read
 SH_COST = {0: 1.0, 1: 1.6, 2: 2.2, 3: 3.0, "auto": 1.15}  # of a step, by the degree of the spherical harmonics
 FAMILY_COST = {"flowers": 3.5, "grass": 4.0, "meadow": 1.5, "oasis": 1.8}  # of rendering a photo: of many plants
 PER_PIXEL = 2.5  # Gaussians that a fit ends with, at most, for each pixel of a photo
@@ -148,12 +148,19 @@ COSTS: dict[str, Callable[[Work], Cost]] = {
 
 def estimate_seconds(jobs: Mapping[str, int], work: Work, speed: MachineSpeed) -> float:
     """Seconds of a run. jobs: how many of each rule."""
-    total = 0.0
+    cost = add_costs(jobs, work)
+    return cost.general * speed.general + cost.raster * speed.raster
+
+
+def add_costs(jobs: Mapping[str, int], work: Work) -> Cost:
+    """The cost of all jobs, their starts included. jobs: how many of each rule."""
+    general = raster = 0.0
     for rule, count in jobs.items():
         done = work.choosing if work.choosing and rule in CHOOSING else work
         cost = COSTS[rule](done) if rule in COSTS else OTHER_RULE
-        total += count * ((PER_JOB + cost.general) * speed.general + cost.raster * speed.raster)
-    return total
+        general += count * (PER_JOB + cost.general)
+        raster += count * cost.raster
+    return Cost(general, raster)
 
 
 def count_jobs(config: Mapping[str, Any], preset: str | None = None) -> dict[str, int]:
@@ -184,8 +191,8 @@ def describe_work(config: Mapping[str, Any], preset: str | None = None) -> Work:
     scene, chosen = config["scenes"][config["scene"]], config["presets"]
     entry = chosen[preset or scene.get("preset")]
     photographed, chooser = scene["kind"] != "field", entry.get("choose_with")
-    photos, size = count_photos(scene), min(scene.get("size", entry["size"]), measure_photos(scene))
-    shape = PHOTO_SHAPE if scene["kind"] == "photos" else 1.0
+    photos, (longest, shape) = count_photos(scene), measure_photos(scene)
+    size = min(scene.get("size", entry["size"]), longest)
     seen = min(size, entry["size"])
     most = plan.MAX_GAUSSIANS if entry["max_gaussians"] == "auto" else entry["max_gaussians"]
     start, new = scene.get("start") or photos, config["k"] * scene.get("burst", 1)
@@ -222,14 +229,17 @@ def count_photos(scene: Mapping[str, Any]) -> int:
     return len(_list_files(scene))
 
 
-def measure_photos(scene: Mapping[str, Any]) -> int:
-    """The longer side of a folder's first photo, pixels; LARGEST_SIDE where there is none that can be read."""
+def measure_photos(scene: Mapping[str, Any]) -> tuple[int, float]:
+    """The longer side of a folder's first photo, pixels, and the shorter one over it; LARGEST_SIDE and PHOTO_SHAPE
+    where there is none that can be read. Rendered photos are square.
+    """
     for path in _list_files(scene)[:1]:
         try:
-            return max(read_size(path))
+            size = read_size(path)
         except InputError:  # the run itself tells of it
             break
-    return LARGEST_SIDE
+        return max(size), min(size) / max(size)
+    return LARGEST_SIDE, PHOTO_SHAPE if scene["kind"] == "photos" else 1.0
 
 
 def _list_files(scene: Mapping[str, Any]) -> list[Path]:

@@ -34,7 +34,7 @@ class Measured:
     """A row of the table: a scene with a preset, tested at `size` pixels.
 
     shrinking: mean squared error of test photos shrunk to the preset's size and enlarged again; 0 where none is shrunk.
-    estimated: seconds by `estimate` on the reference machine, beside `seconds`.
+    estimated: seconds by `estimate` on the machine that the table was made on, beside `seconds`.
     """
 
     scene: str
@@ -114,9 +114,24 @@ def forecast_presets(
     return {p: Forecast(p, psnr[p], best - psnr[p], lpips[p] - sharpest) for p in presets}
 
 
+def forecast_slowness(front: list[Measured], known: tuple[str, float | None] | None = None) -> dict[str, float]:
+    """How many times as long as estimated each preset of the table takes: the geometric mean over its scenes.
+
+    known: a preset and how many times as long as estimated the scene's run with it took; then all of them take longer
+    by what that one did beyond the table's scenes. A preset without times takes as long as estimated.
+    """
+    found = {}
+    for preset in dict.fromkeys(row.preset for row in front):
+        logs = [np.log(row.seconds / row.estimated) for row in front if row.preset == preset]
+        some = [value for value in logs if np.isfinite(value)]
+        found[preset] = float(np.exp(np.mean(some))) if some else 1.0
+    longer = known[1] / found[known[0]] if known and known[1] and known[0] in found else 1.0
+    return {preset: longer * slowness for preset, slowness in found.items()}
+
+
 @dataclass(frozen=True)
 class LeftOut:
-    """A scene of the table, forecast from the others: dB under its best preset, and LPIPS over its best one."""
+    """A scene of the table, forecast from the others: dB under its best preset, LPIPS over its best one, seconds."""
 
     scene: str
     preset: str
@@ -124,6 +139,14 @@ class LeftOut:
     measured_loss: float
     lpips: float
     measured_lpips: float
+    seconds: float
+    measured_seconds: float
+
+    @property
+    def late(self) -> float | None:
+        """By how much too many seconds were forecast, as a share of the measured ones; None: they are not known."""
+        share = self.seconds / self.measured_seconds - 1
+        return share if np.isfinite(share) else None
 
     @property
     def off(self) -> float:
@@ -139,10 +162,15 @@ def leave_one_out(front: list[Measured], known: str | None = None) -> list[LeftO
         level = (known, error_to_psnr(own[known].fit_error)) if known in own else None
         others = [row for row in front if row.scene != scene]
         made = forecast_presets(others, {preset: row.shrinking for preset, row in own.items()}, level)
+        times = (known, own[known].seconds / own[known].estimated) if known in own else None
+        slowness = forecast_slowness(others, times)
         best = max((own[preset].psnr for preset in made), default=0.0)
         sharpest = min((own[preset].lpips for preset in made), default=0.0)
         found += [
-            LeftOut(scene, p, each.loss, best - own[p].psnr, each.lpips, own[p].lpips - sharpest)
+            LeftOut(
+                *(scene, p, each.loss, best - own[p].psnr, each.lpips, own[p].lpips - sharpest),
+                *(slowness[p] * own[p].estimated, own[p].seconds),
+            )
             for p, each in made.items()
         ]
     return found
