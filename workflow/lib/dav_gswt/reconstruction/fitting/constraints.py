@@ -53,12 +53,14 @@ class FreeConstraints:
 
 def clip_sizes(log_scales: Array, least: float, most: float) -> None:
     """Clip sizes in place and thicken needles: no axis is shorter than the longest by more than the factor of FLAT, the
-    middle one by no more than that of NEEDLE."""
+    middle one (of equal ones the later) by no more than that of NEEDLE."""
     np.clip(log_scales, np.log(least), np.log(most), out=log_scales)
-    if not len(log_scales):
-        return
-    longest = log_scales.max(1, keepdims=True)
-    np.maximum(log_scales, longest - FLAT, out=log_scales)
-    middle = np.argsort(log_scales, axis=1)[:, 1:2]
-    raised = np.maximum(np.take_along_axis(log_scales, middle, 1), longest - NEEDLE)
-    np.put_along_axis(log_scales, middle, raised, 1)
+    a, b, c = (np.ascontiguousarray(log_scales[:, k]) for k in range(3))  # far faster than along an axis of 3
+    longest = np.maximum(np.maximum(a, b), c)
+    for axis in (a, b, c):
+        np.maximum(axis, (longest - FLAT).astype(axis.dtype), out=axis)
+    middle = np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c))
+    raised = np.maximum(middle, (longest - NEEDLE).astype(middle.dtype))
+    b_a, c_a, c_b = b < a, c < a, c < b
+    for k, (axis, is_middle) in enumerate(((a, b_a != c_a), (b, b_a == c_b), (c, c_a != c_b))):
+        log_scales[:, k] = np.where(is_middle, raised, axis)
