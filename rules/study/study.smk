@@ -1,7 +1,7 @@
 """The study: what the config's `study` compares, and the paper's tables and figures. Not part of `all`.
 
 `snakemake study` makes all of it (with `--max-threads 1` a core to each experiment); `view_benchmark`, `seams`, `tradeoff`,
-`stability`, `frame_times`, `presort_table`, `perceptual_kit` and `results/sweeps/<name>.png` make parts. Tables and figures are
+`stability`, `frame_times`, `presort_table`, `gallery_page`, `perceptual_kit` and `results/sweeps/<name>.png` make parts. Tables and figures are
 also kept in docs/research, where runs add up.
 """
 
@@ -26,6 +26,8 @@ include: "expansion.smk"
 include: "refine.smk"
 include: "levels.smk"
 include: "materials.smk"
+include: "gallery_cells.smk"
+include: "gallery.smk"
 include: "presort.smk"
 include: "frames.smk"
 include: "fits.smk"

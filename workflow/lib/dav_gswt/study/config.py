@@ -101,6 +101,17 @@ class Transitions(Levels):
     """Seam-LPIPS of borders between materials against photographed ones (`snakemake materials_pages`)."""
 
 
+class GalleryPage(ConfigModel):
+    """`snakemake gallery_page`: scenes as photographed and as terrain, with verdicts and numbers, and a walk."""
+
+    scenes: Names = key("whose terrains are shown")
+    walk: Name = key("the scene of the walk")
+    flight: Flight = key("the walk")
+    width: int = key("of a frame", unit="pixels", ge=16, le=1920)
+    height: int = key("of a frame", unit="pixels", ge=16, le=1080)
+    rate: int = key("frames a second", ge=1, le=60)
+
+
 class Frames(Levels):
     """`snakemake frame_times`: milliseconds of a frame on a walk, by the library and by the page in a browser."""
 
@@ -275,6 +286,7 @@ class StudyConfig(ConfigModel):
     lattice: Lattice | None = key("how visibly terrains repeat", None)
     transitions: Transitions | None = key("borders of materials against photographed ones", None)
     cover: Name | None = key("the scene of the README's picture", None)
+    gallery: GalleryPage | None = key("terrains and a walk, as pictures", None)
     frames: Frames | None = key("frame times", None)
     calibration: Calibration | None = key("scores against true errors", None)
     view_benchmark: ViewBenchmark | None = key("policies", None, renamed="benchmark")
@@ -299,8 +311,10 @@ def expand_study(config: dict) -> dict:
     model = check_model(StudyConfig, config["study"], "study")
     study = model.model_dump(mode="json", exclude_none=True, by_alias=True)
     flat = config | study
-    for table in ("lod", "materials", "lattice", "transitions", "frames", "seams", "forced_choice"):
+    for table in ("lod", "materials", "lattice", "transitions", "gallery", "frames", "seams", "forced_choice"):
         _require_names(f"study.{table}.scenes", study.get(table, {}).get("scenes", []), config["scenes"], "scenes")
+    if "gallery" in study:
+        _require_names("study.gallery.walk", [study["gallery"]["walk"]], config["scenes"], "scenes")
     if "compare" in study:
         _require_names("study.compare.scene", [study["compare"]["scene"]], config["scenes"], "scenes")
     if "scale" in study:
