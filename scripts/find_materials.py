@@ -5,7 +5,6 @@ from dav_gswt.logs import logging_to
 from dav_gswt.materials import build, mobilesam, store
 from dav_gswt.provenance import record_provenance
 from dav_gswt.reconstruction import ground
-from dav_gswt.threads import one_thread
 from dav_gswt.views import pose_maps
 
 with logging_to(snakemake.log[0]):
@@ -15,8 +14,7 @@ with logging_to(snakemake.log[0]):
         field = pose_maps.apply_uncertainty(field, pose_maps.read_pose_maps(paths.maps)[1])
     masks = {name.removeprefix("mask_"): path for name, path in paths.items() if name.startswith("mask_")}
     segmenter = mobilesam.load_segmenter(paths.encoder, paths.decoder) if paths.get("encoder") else None
-    with one_thread():
-        found = build.find_materials(field, ground.read_ground(paths.ground), seed, masks, segmenter)
+    found = build.find_materials(field, ground.read_ground(paths.ground), seed, masks, segmenter)
     inputs = {name: paths[name] for name in ("field", "ground", "encoder", "decoder") if paths.get(name)}
     provenance = record_provenance(inputs, {"seed": seed})
     store.write_materials(found, snakemake.output.materials, provenance)

@@ -43,7 +43,7 @@ class BundleOptions:
         band: half the width of that cross-fade, as a share of the distance.
         floor_pixels: width in pixels of a finest disc in the nearest ground that the lowest eye sees.
         decibels: PSNR from which drawing in a neighbour's order counts as invisible.
-        threads: that sort tiles; they change no byte.
+        threads: that sort tiles; they change no byte. From two on archives are written beside them.
         sky: behind everything.
     """
 
@@ -85,27 +85,14 @@ def write_bundle(
     shutil.rmtree(part, ignore_errors=True)
     (part / "chunks").mkdir(parents=True)
     try:
-        for material in range(len(content.materials)):
-            fields = baking.bake_objects(content, material, options.salt)
-            gswt.write_gswt(fields, content.side, part / archive_name(material))
-        found = direction_search.search_directions(content.sample_tiles(), content.side, options.decibels)
-        info = describe_tiles(content, options, found.rings)
-        pixel = content.spacing / options.floor_pixels
-        encoding = Encoding.fit(list(content.iterate_fields()), content.side, pixel)
-        entries, errors = _write_chunks(content, encoding, info, options, part)
-        known: dict[str, Any] = vars(info) | entries
-        rounding: dict[str, Any] = asdict(errors) | _measure_rounding(content, encoding, pixel)
-        made = Manifest(
-            **known,
-            format=manifest.FORMAT,
-            version=manifest.VERSION,
-            unit=options.unit,
-            sky=options.sky,
-            encoding=encoding,
-            error=RoundingErrors(**rounding),
-            orders=_describe_orders(found, options),
-            provenance=provenance,
-        )
+        with ThreadPoolExecutor(1) as beside:
+            archives = beside.submit(_write_archives, content, options.salt, part)
+            if options.threads == 1:
+                archives.result()
+            try:
+                made = _write_content(content, options, provenance, part)
+            finally:
+                archives.result()  # what it raises says more of the tiles than what else they made fail
         value = made.to_dict()
         manifest.check_manifest(value, schema)
         write_json(part / manifest.NAME, value)
@@ -113,6 +100,35 @@ def write_bundle(
     finally:
         shutil.rmtree(part, ignore_errors=True)
     return made
+
+
+def _write_archives(content: BundleContent, salt: int, part: Path) -> None:
+    """Write the archive of each material."""
+    for material in range(len(content.materials)):
+        fields = baking.bake_objects(content, material, salt)
+        gswt.write_gswt(fields, content.side, part / archive_name(material))
+
+
+def _write_content(content: BundleContent, options: BundleOptions, provenance: dict[str, Any], part: Path) -> Manifest:
+    """Write the chunks; returns the manifest."""
+    found = direction_search.search_directions(content.sample_tiles(), content.side, options.decibels)
+    info = describe_tiles(content, options, found.rings)
+    pixel = content.spacing / options.floor_pixels
+    encoding = Encoding.fit(list(content.iterate_fields()), content.side, pixel)
+    entries, errors = _write_chunks(content, encoding, info, options, part)
+    known: dict[str, Any] = vars(info) | entries
+    rounding: dict[str, Any] = asdict(errors) | _measure_rounding(content, encoding, pixel)
+    return Manifest(
+        **known,
+        format=manifest.FORMAT,
+        version=manifest.VERSION,
+        unit=options.unit,
+        sky=options.sky,
+        encoding=encoding,
+        error=RoundingErrors(**rounding),
+        orders=_describe_orders(found, options),
+        provenance=provenance,
+    )
 
 
 def archive_name(material: int) -> str:

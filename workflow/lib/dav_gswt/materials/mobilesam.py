@@ -15,6 +15,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.materials.mobilesam_package import ELSE, EXTRA
+from dav_gswt.threads import one_thread
 
 SIDE = 1024  # pixels along the longest side of a picture, for the encoder
 MEAN, DEVIATION = (123.675, 116.28, 103.53), (58.395, 57.12, 57.375)  # of the 8-bit pictures it was trained on
@@ -147,7 +148,8 @@ def prepare_picture(picture: Float[Array, "h w 3"]) -> Float32[Array, "1 3 s s"]
     longest = max(picture.shape[:2])
     height, width = (max(1, round(side * SIDE / longest)) for side in picture.shape[:2])
     planes = torch.from_numpy(np.ascontiguousarray(picture.transpose(2, 0, 1), np.float32))[None]
-    scaled = functional.interpolate(planes, (height, width), mode="bilinear", antialias=True, align_corners=False)
+    with one_thread():
+        scaled = functional.interpolate(planes, (height, width), mode="bilinear", antialias=True, align_corners=False)
     mean, deviation = (np.array(values, np.float32)[:, None, None] for values in (MEAN, DEVIATION))
     padded = np.zeros((1, *ENCODER_INPUT), np.float32)
     padded[0, :, :height, :width] = (255 * scaled[0].numpy() - mean) / deviation
