@@ -41,8 +41,8 @@ def _range_cases() -> list[Case]:
 
 def _score_range(height: Array, soft: float) -> Array:
     """The score of a material that is found between heights of 0 and 1000."""
-    rule = [RangeTerm("height", 1.0, 0, 0.0, 1000.0, soft)]
-    entry = ClassesEntry(0, rule, JitterEntry(1, 1, 0.0), RiseEntry(0.0, 0.0, [0.0, 0.0], [0.0, 0.0]))
+    term, rise = RangeTerm("height", 1.0, 0, 0.0, 1000.0, soft), RiseEntry(0.0, 0.0, [0.0, 0.0], [0.0, 0.0])
+    entry = ClassesEntry(0, [term], JitterEntry(1, 1, 0.0), rise)
     made = classes.Classes(entry, 2, float(classes.LATTICE), Ramp())
     return made.lattice_scores(height, np.zeros_like(height))[:, 0]
 
