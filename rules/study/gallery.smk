@@ -46,9 +46,9 @@ rule render_walk:
         classes=lookup(dpath="classes", within=config),
         flight=GALLERY.get("flight"),
         schema=BUNDLE_SCHEMA,
-        source=code_of("render_flight"),
+        source=code_of("study/render_walk"),
     script:
-        "../../scripts/render_flight.py"
+        "../../scripts/study/render_walk.py"
 
 
 rule draw_walk:

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from fixtures.markdown import collapse_spaces
+from fixtures.terrains import two_level_terrain
 from PIL import Image
 
 from dav_gswt.images import image_files
@@ -38,6 +39,14 @@ def test_a_walk_plays_its_frames_in_their_order_for_ever(pictures, tmp_path):
             walk.seek(number)
             assert np.asarray(walk.convert("RGB"))[40, 80].argmax() == number
             assert walk.info["duration"] == 100
+
+
+@pytest.mark.parametrize("width, factor", [(480, 0.25), (1920, 1.0), (3840, 1.0)])
+def test_levels_begin_nearer_in_smaller_pictures(width, factor):
+    terrain = two_level_terrain()
+    made = gallery.suit_width(terrain, width)
+    assert made.switches == [factor * value for value in terrain.switches]
+    assert made.bands == [factor * value for value in terrain.bands]
 
 
 def test_a_walk_without_frames_is_refused(tmp_path):

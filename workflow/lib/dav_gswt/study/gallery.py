@@ -1,12 +1,14 @@
 """The page docs/gallery.md: each scene as photographed and as terrain, its verdict and numbers, and a walk."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
 
+from dav_gswt.bundle import level_distances
 from dav_gswt.files import atomic_file, read_json
 from dav_gswt.images import image_files
 from dav_gswt.images.jpeg import encode_jpeg
@@ -15,6 +17,7 @@ from dav_gswt.study.comparison.curves import select_metrics
 from dav_gswt.study.cover import crop_and_shrink
 from dav_gswt.study.markdown import format_number, format_table
 from dav_gswt.study.sweeps.tables import MEGA
+from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.page_front import name_of_scene
 
 HEIGHT, GAP = 300, 4  # pixels: of a row of pictures, and between two of them
@@ -31,6 +34,13 @@ def draw_scene(photo: Path | str, above: Path | str, walker: Path | str, out: Pa
         parts += [crop_and_shrink(image, round(HEIGHT * aspect), HEIGHT), np.ones((HEIGHT, GAP, 3))]
     with atomic_file(out) as part:
         part.write_bytes(encode_jpeg(np.concatenate(parts[:-1], 1), QUALITY))
+
+
+def suit_width(terrain: EndlessTerrain, width: int) -> EndlessTerrain:
+    """The terrain with levels that begin where they do in pictures of the reference's width: nearer in smaller ones."""
+    factor = min(1.0, width / level_distances.WIDTH)
+    scaled = ([factor * value for value in values] for values in (terrain.switches, terrain.bands))
+    return replace(terrain, **dict(zip(("switches", "bands"), scaled, strict=True)))
 
 
 def animate_frames(frames: Sequence[Path | str], rate: int, out: Path | str) -> None:
