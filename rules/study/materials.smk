@@ -208,12 +208,29 @@ rule draw_cover:
         "../../scripts/study/draw_cover.py"
 
 
-rule materials_pages:
-    """Tables and pictures of docs/research/results/materials.md, and the README's picture."""
+rule write_materials_page:
+    """The page about materials, from its template and its tables."""
     input:
-        rules.gather_materials.output.kept,
-        rules.gather_lattice.output.kept,
-        rules.gather_transitions.output.kept,
-        rules.gather_verdicts.output.kept,
+        materials=rules.gather_materials.output.kept,
+        lattice=rules.gather_lattice.output.kept,
+        transitions=rules.gather_transitions.output.kept,
+        verdicts=rules.gather_verdicts.output.kept,
+        template=str(BASE / "workflow/report/materials_page.md"),
+    output:
+        page="docs/research/results/materials.md",
+    log:
+        "<logs>/tables/write_materials_page.log",
+    benchmark:
+        "<benchmarks>/tables/write_materials_page.tsv"
+    params:
+        source=code_of("study/write_materials_page"),
+    script:
+        "../../scripts/study/write_materials_page.py"
+
+
+rule materials_pages:
+    """docs/research/results/materials.md with its tables and pictures, and the README's picture."""
+    input:
+        rules.write_materials_page.output.page,
         rules.draw_cover.output.picture,
         expand(rules.draw_materials_sheet.output, shown=STUDY.get("lattice", {}).get("scenes", [])),
