@@ -174,7 +174,7 @@ def describe_choice(config: Mapping[str, Any], best: Choice, limits: Limits) -> 
 
 def describe_trust(front: list[Measured], known: str | None = None) -> str:
     """How far off forecasts were on the table's own scenes, each left out in turn. known: preset of a finished run."""
-    left_out = forecast.leave_one_out(front, known)
+    left_out = [row for row in forecast.leave_one_out(front, known) if row.preset != known]  # that one is no forecast
     off, late = [abs(row.off) for row in left_out], [abs(row.late) for row in left_out if row.late is not None]
     scenes = len({row.scene for row in front})
     if not off:
