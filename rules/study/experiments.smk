@@ -65,20 +65,21 @@ def benchmark_experiments():
         ):
             policy = {"policy": policy} if isinstance(policy, str) else policy
             if policy["policy"] != "all" or k == group["k"][0]:  # all of the pool is one round, whatever k is
-                cells.append(benchmark_experiment(scene, policy, seed, k, group["photos"]))
+                cells.append(benchmark_experiment(scene, policy, seed, k, group))
     return cells
 
 
-def benchmark_experiment(scene, asked, seed, k, photos):
-    """One of them: rounds of k from the scene's start until there are so many photos."""
+def benchmark_experiment(scene, asked, seed, k, group):
+    """One of them: rounds of k from the scene's start until there are as many photos as the set asks for."""
     entry, policy = config["scenes"][scene], asked["policy"]
-    rounds = 1 if policy == "all" else (photos - entry["start"]) // k
+    rounds = 1 if policy == "all" else (group["photos"] - entry["start"]) // k
     own = {
         key: asked[key] if key == "prior" else encode_number(asked[key])
         for key in ("prior", "p_drop", "lam")
         if key in asked
     }
-    values = branch(scene, policy) | own | {"seed": seed, "k": k, "stop": ""}
+    preset = {key: group[key] for key in ("preset",) if key in group}
+    values = branch(scene, policy, preset) | own | {"seed": seed, "k": k, "stop": ""}
     chosen, before, after = values_of_choice(values), range(1, rounds), range(1, rounds + 1)
 
     def of(first, later, ts, wildcards=values):

@@ -21,7 +21,7 @@ rule gather_curves:
     benchmark:
         "<benchmarks>/benchmark/gather_{table}.tsv"
     wildcard_constraints:
-        table="view|development",
+        table="view|hundred|development",
     params:
         cells=lambda wildcards: benchmark_experiments(),
         source=code_of("study/gather_curves"),
@@ -45,7 +45,7 @@ rule compare_policies:
     benchmark:
         "<benchmarks>/benchmark/compare_{table}.tsv"
     wildcard_constraints:
-        table="view|development",
+        table="view|hundred|development",
     params:
         baseline=lambda wildcards: STUDY["view_benchmark"]["baseline"],
         groups=lambda wildcards: {

@@ -11,7 +11,11 @@ from dav_gswt.config.load import add_scene_files, check_config, parse_command_li
 from dav_gswt.errors import InputError
 
 FILES = {"usual": [], "smallest": ["config/test/config.yaml"], "paper": ["config/paper.yaml"]}
-FILES |= {"development": ["config/development.yaml"], "without a compiler": ["config/without_compiler.yaml"]}
+FILES |= {
+    "hundred views": ["config/hundred_views.yaml"],
+    "development": ["config/development.yaml"],
+    "without a compiler": ["config/without_compiler.yaml"],
+}
 
 
 def read(root: Path, *more: str) -> dict:

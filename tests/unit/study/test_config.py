@@ -20,7 +20,16 @@ def expand(config: dict, table: str, change: dict) -> dict:
     return expand_study(config | {"study": study | {table: study[table] | change}})
 
 
-@pytest.mark.parametrize("more", [[], ["config/paper.yaml"], ["config/development.yaml"], ["config/test/config.yaml"]])
+@pytest.mark.parametrize(
+    "more",
+    [
+        [],
+        ["config/paper.yaml"],
+        ["config/development.yaml"],
+        ["config/hundred_views.yaml"],
+        ["config/test/config.yaml"],
+    ],
+)
 def test_the_studies_that_come_with_the_project_are_valid(root: Path, more):
     files = [root / file for file in ("config/config.yaml", "config/study.yaml", *more)]
     assert expand_study(check_config(add_scene_files(read_config(files), root / "config/scenes")))["study"]["tables"]
@@ -55,6 +64,12 @@ def test_settings_of_knobs_become_presets(config):
             {"sets": [{"title": "a", "scenes": ["desert_pool"], "k": [4], "photos": 11}]},
             "leave no round of 4",
             id="no room",
+        ),
+        pytest.param(
+            "view_benchmark",
+            {"sets": [{"title": "a", "scenes": ["desert_pool"], "k": [4], "photos": 20, "preset": "x"}]},
+            "sets.0.preset: there is no 'x'",
+            id="no such preset",
         ),
         pytest.param("seams", {"scenes": ["moon"]}, "study.seams.scenes: there is no 'moon'", id="no such scene"),
         pytest.param("seams", {"tilings": ["glue", "colour"]}, "there is no 'glue'", id="no such tiling"),

@@ -144,12 +144,13 @@ class PolicySet(ConfigModel):
     photos: int = key("photos that each experiment ends with", ge=3, le=100_000)
     policies: Policies | None = key("instead of those above", None)
     seeds: Seeds | None = key("instead of those above", None)
+    preset: Name | None = key("of the fits, instead of the scenes' own", None)
 
 
 class ViewBenchmark(ConfigModel):
     """`snakemake view_benchmark`: policies compared photo by photo, from the same photos and pools."""
 
-    table: Literal["view", "development"] = key("where results are kept: reported, or for choosing parameters")
+    table: Literal["view", "hundred", "development"] = key("where results are kept: those for parameters apart")
     baseline: Policy = key("the policy that the others are compared with")
     policies: Policies = key("those compared")
     seeds: Seeds = key("which photos start: one start a seed")
@@ -327,7 +328,7 @@ def expand_study(config: dict) -> dict:
     if "refine" in study:
         _check_refinement(study["refine"], config["priors"])
     if "view_benchmark" in study:
-        _check_view_benchmark(study["view_benchmark"], config["scenes"], config["priors"])
+        _check_view_benchmark(study["view_benchmark"], config)
     if "seams" in study:
         _check_seams(study["seams"], config["tilings"])
     if "forced_choice" in study:
@@ -372,15 +373,17 @@ def _check_forced_choice(study: dict, tilings: dict) -> None:
     _require_names("study.forced_choice.pairs", names, tilings, f"{FLOOR} is allowed second; tilings")
 
 
-def _check_view_benchmark(benchmark: dict, scenes: dict, priors: dict) -> None:
+def _check_view_benchmark(benchmark: dict, config: dict) -> None:
     """Policies can be compared where every scene starts from some of its photos and each experiment takes a round."""
-    where = "config: study.view_benchmark"
+    scenes, where = config["scenes"], "config: study.view_benchmark"
     if benchmark["baseline"] not in benchmark["policies"]:
         raise InputError(f"{where}.baseline: {benchmark['baseline']} is not among view_benchmark.policies")
     for i, group in enumerate(benchmark["sets"]):
+        if "preset" in group:
+            _require_names(f"study.view_benchmark.sets.{i}.preset", [group["preset"]], config["presets"], "presets")
         for policy in group.get("policies", benchmark["policies"]):
             if isinstance(policy, dict) and "prior" in policy:
-                _require_names("study.view_benchmark.policies", [policy["prior"]], priors, "priors")
+                _require_names("study.view_benchmark.policies", [policy["prior"]], config["priors"], "priors")
         for name in group["scenes"]:
             if "start" not in scenes.get(name, {}):
                 raise InputError(f"{where}.sets.{i}.scenes: {name} is no scene with `start`, photos to start from")
