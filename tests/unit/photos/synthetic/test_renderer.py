@@ -7,8 +7,10 @@ import sys
 
 import numpy as np
 import pytest
+from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
+from dav_gswt.geometry.scene_frame import read_scene_frame, write_scene_frame
 from dav_gswt.photos.synthetic import renderer
 from dav_gswt.photos.synthetic.renderer import Variant
 
@@ -58,7 +60,15 @@ def test_the_choice_is_logged_once_and_kept(variant, caplog):
     assert [r.message for r in caplog.records] == [
         "synthetic scenes are rendered by mitsuba's llvm_ad_rgb with LLVM 19"
     ]
-    assert renderer.describe_renderer() | {"mitsuba": ""} == {"mitsuba": "", "variant": "llvm_ad_rgb", "llvm": 19}
+    assert renderer.describe_renderer() | {"mitsuba": ""} == {"mitsuba": "", "variant": "llvm_ad_rgb", "llvm": "19"}
+
+
+@pytest.mark.parametrize("word", ["scalar", "llvm"])
+def test_a_frame_that_names_the_renderer_can_be_read_again(variant, word, tmp_path):
+    variant(word, (NEW,))
+    frame = scene_frame(kind="synthetic", renderer=renderer.describe_renderer())
+    write_scene_frame(tmp_path / "ground.json", frame)
+    assert read_scene_frame(tmp_path / "ground.json") == frame
 
 
 @pytest.mark.parametrize(

@@ -84,6 +84,7 @@ def triangulate_points(folder: Path, shots: list[tuple[str, Camera]], seed: int)
     with tempfile.TemporaryDirectory(prefix="points-") as scratch:
         database, sparse = Path(scratch) / "database.db", Path(scratch) / "sparse"
         sparse.mkdir()
+        _log.info("find features of %d views", len(names))
         pycolmap.extract_features(
             database,
             folder,

@@ -75,10 +75,11 @@ def load_mitsuba():
     return mi
 
 
-def describe_renderer() -> dict[str, str | int | None]:
+def describe_renderer() -> dict[str, str | None]:
     """The versions of the renderer, for ground.json."""
     choice = choose_variant()
-    return {"mitsuba": metadata.version("mitsuba"), "variant": choice.name, "llvm": choice.llvm}
+    llvm = None if choice.llvm is None else str(choice.llvm)
+    return {"mitsuba": metadata.version("mitsuba"), "variant": choice.name, "llvm": llvm}
 
 
 @cache
