@@ -63,17 +63,22 @@ def test_only_what_was_not_developed_on_is_said_to_be_so(table, claims):
     assert ("Nothing was chosen on these scenes." in text) == ("copr_dunes" in text) == claims
 
 
-@pytest.fixture(scope="module")
-def page():
-    return (ROOT / "docs/research/results/view-selection.md").read_text(encoding="utf-8")
+@pytest.fixture(params=["view", "hundred"])
+def published(request):
+    return request.param
 
 
-def test_the_page_shows_the_data_beside_it(page):
-    results = tables.summarise_cells(curves.read_curves(ROOT / "docs/research/data/view_curves.csv"))
+@pytest.fixture
+def page(published):
+    return (ROOT / f"docs/research/results/{published}-selection.md").read_text(encoding="utf-8")
+
+
+def test_the_page_shows_the_data_beside_it(page, published):
+    results = tables.summarise_cells(curves.read_curves(ROOT / f"docs/research/data/{published}_curves.csv"))
     assert markdown.format_scenes(tables.compare_to_baseline(results, "farthest"), "farthest") in page
     assert markdown.format_ends(results) in page
 
 
-def test_the_page_names_the_version_of_every_cell(page):
-    versions = {each["version"] for each in csv_tables.read_table(ROOT / "docs/research/data/view_curves.csv")}
+def test_the_page_names_the_version_of_every_cell(page, published):
+    versions = {each["version"] for each in csv_tables.read_table(ROOT / f"docs/research/data/{published}_curves.csv")}
     assert all(f"version {version}," in page for version in versions)

@@ -87,11 +87,14 @@ def _describe_views(rows: Reader) -> dict:
     paired = [row for row in rows("view_comparison") if row["policy"] == "coverage-error" and row["scene"] == "every"]
     default = {r["measure"]: Difference(float(r["mean"]), float(r["low"]), float(r["high"])) for r in paired}
     psnr = {variant: float(row["psnr"]) for variant, row in budget.items()}
+    hundred = {row["policy"]: -float(row["gap"]) for row in rows("hundred_benchmark")}
     return {
         "chosen": {variant: _compare(compared[variant], "psnr") for variant in ("w2", "grad-lpips", "single")},
         "photos": int(float(budget["w2-lpips"]["photos"])),
         "all_photos": int(float(budget["all"]["photos"])),
         "under_all": psnr["w2-lpips"] - psnr["all"],
+        "hundred": hundred["w2-lpips"],
+        "hundred_spread_out": hundred["farthest"],
         "random": Difference(psnr["w2-lpips"] - psnr["random"]),
         "spread_out": _compare(budget["w2-lpips"], "psnr"),
         "default": default["psnr"],
