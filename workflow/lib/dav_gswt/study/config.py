@@ -150,7 +150,9 @@ class PolicySet(ConfigModel):
 class ViewBenchmark(ConfigModel):
     """`snakemake view_benchmark`: policies compared photo by photo, from the same photos and pools."""
 
-    table: Literal["view", "hundred", "development"] = key("where results are kept: those for parameters apart")
+    table: Literal["view", "hundred", "development"] = key(
+        "whose tables and page; `development` for choosing parameters"
+    )
     baseline: Policy = key("the policy that the others are compared with")
     policies: Policies = key("those compared")
     seeds: Seeds = key("which photos start: one start a seed")
