@@ -98,6 +98,13 @@ def test_settings_that_a_policy_does_not_read_have_one_spelling(policy, spelled)
     assert (branch["prior"], branch["p_drop"], branch["lam"]) == spelled
 
 
+@pytest.mark.parametrize("agent, policy", [("replay", "farthest"), ("render", "coverage-error"), ("plan", "coverage-error")])
+def test_auto_is_a_policy_by_where_photos_come_from(agent, policy):
+    scenes = {"sand": CONFIG["scenes"]["sand"] | {"agent": agent}}
+    assert encode_branch(CONFIG | {"policy": "auto", "scenes": scenes}, "sand")["policy"] == policy
+    assert encode_branch(CONFIG | {"scenes": scenes}, "sand")["policy"] == "w2-lpips"
+
+
 def test_settings_can_replace_those_of_the_config():
     branch = encode_branch(CONFIG, "sand", changes={"k": 8, "tiling": "colour"})
     assert (branch["k"], branch["tiling"]) == (8, "colour")

@@ -95,7 +95,7 @@ def test_a_level_wants_a_finished_run(project, capsys):
 
 
 def test_a_finished_run_tells_the_level(project, capsys):
-    folder = project / "results/mine/seed0/draft/active_coverage-error_none_pdrop0_lam0_k4/iter2"
+    folder = project / "results/mine/seed0/draft/active_farthest_none_pdrop0_lam0_k4/iter2"
     folder.mkdir(parents=True)
     (folder / "metrics.json").write_text(json.dumps({"psnr_colour_corrected": 20.0}))
     assert run("--psnr", "21") == 0
@@ -105,7 +105,7 @@ def test_a_finished_run_tells_the_level(project, capsys):
 
 def test_a_finished_run_tells_how_slow_the_others_will_be(project):
     config = advise.load_config([], {"scene": "mine"})
-    branch = "mine/seed0/draft/active_coverage-error_none_pdrop0_lam0_k4"
+    branch = "mine/seed0/draft/active_farthest_none_pdrop0_lam0_k4"
     (round_ := project / "results" / branch / "iter2").mkdir(parents=True)
     (round_ / "metrics.json").write_text(json.dumps({"psnr_colour_corrected": 20.0}))
     before = advise.list_choices(config, advise.forecast.read_front(), *found(config))

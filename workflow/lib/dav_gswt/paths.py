@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from decimal import Decimal
 from pathlib import Path
 
-from dav_gswt.views.policy_names import POLICY_NAME, PRIOR_POLICIES, ZERO_SETTINGS
+from dav_gswt.views.policy_names import POLICY_NAME, PRIOR_POLICIES, ZERO_SETTINGS, resolve_policy
 
 RESULTS = "results"
 # Directories beside the scenes' own; no scene may have such a name.
@@ -129,7 +129,7 @@ def encode_branch(config: Mapping, scene: str, policy: str | None = None, change
     }
     if entry["kind"] == "field":
         return fit | _EXTERNAL | tiles
-    policy = policy or settings["policy"]
+    policy = resolve_policy(policy or settings["policy"], entry.get("agent"))
     unread = ZERO_SETTINGS.get(policy, ()) if policy in PRIOR_POLICIES else ("p_drop", "lam")
     numbers = {key: "0" if key in unread else encode_number(settings[key]) for key in ("p_drop", "lam")}
     return (

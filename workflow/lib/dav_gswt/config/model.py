@@ -38,7 +38,11 @@ class Config(ConfigModel):
         "the scene that `snakemake` and `make run` make: a file of config/scenes, or an entry of `scenes`"
     )
     seeds: list[Seed] = key("each is a run of its own: start views, noise of the fit", [0], min_length=1)
-    policy: Policy = key("how the next views are chosen: docs/reference/policies.md", "coverage-error")
+    policy: Policy | Auto = key(
+        "how the next views are chosen: docs/reference/policies.md; `auto`: of given photos (`agent: replay`) by "
+        "`farthest`, else by `coverage-error`",
+        "auto",
+    )
     prior: Name = key("the entry of `priors` that policies sample", "terrain")
     p_drop: float = key("share of its attention that a prior drops in each sample", 0.15, ge=0, lt=1)
     lam: float = key("weight of LPIPS beside squared W2 in what selects poses (the paper's lambda)", 0.1, ge=0, le=1e6)

@@ -7,7 +7,7 @@ from itertools import product
 
 from dav_gswt.errors import InputError
 from dav_gswt.study.seams.replicates import split_tiling
-from dav_gswt.views.policy_names import GEOMETRIC, ZERO_SETTINGS
+from dav_gswt.views.policy_names import PRIOR_POLICIES, ZERO_SETTINGS
 
 CELL = ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k", "rounds", "tiling", "tau")  # its wildcards
 ASKING = ("prior", "p_drop", "lam")  # what only a prior that is asked depends on
@@ -90,7 +90,7 @@ def _check_names(where: str, asked: dict, config: dict) -> None:
 def _check_effect(where: str, vary: dict, policy: str) -> None:
     """What is varied must matter: two cells of one path would be one."""
     for key in ASKING:
-        if key in vary and len(vary) == 1 and (policy in GEOMETRIC or key in ZERO_SETTINGS.get(policy, ())):
+        if key in vary and len(vary) == 1 and (policy not in PRIOR_POLICIES or key in ZERO_SETTINGS.get(policy, ())):
             raise InputError(
                 f"{where}.vary.{key}: makes no difference to the policy {policy}; fix a policy that reads it, as "
                 "fixed: {policy: w2-lpips}"
