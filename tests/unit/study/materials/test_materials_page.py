@@ -14,7 +14,7 @@ ROWS = {
     "lattice": "scene,of,materials,objects,brightness,landmarks,busyness,mean_tile,next\n"
     "dune,all,2,8,-0.036,-0.0004,0.367,10.05,0.1\ndune,material1,1,0,0,0,0,0,0\n",
     "transitions": "scene,terrain,photographed,difference,low,high,terrain_crops,photographed_crops,inside\n"
-    "dune,0.277,0.252,0.025,-0.01,0.039,80,62,-0.0424\n",
+    "dune,0.277,0.252,0.025,-0.01,0.039,80,62,-0.0424\nsand,,,,,,0,0,\n",
     "verdicts": 'scene,of,share,objects,grade,reason\ndune,all,0.954,11,good,"1 material, 5% is shown nowhere"\n',
 }
 
@@ -27,6 +27,7 @@ def test_tables_have_the_numbers_of_their_files(tmp_path):
     assert "| dune | 2 | 8 | -.036 | -.000 | .367 | 10.050 | .100 |" in made["lattice"]
     assert "| dune, material1 alone | 1 | 0 | .000 |" in made["lattice"]
     assert "| dune | .277 | .252 | .025 | (-.010, .039) | -.042 | 80, 62 |" in made["transitions"]
+    assert "| sand | no border | no border | no border | | | 0, 0 |" in made["transitions"]
     assert "| dune | all | .95 | 11 | good: 1 material, 5% is shown nowhere |" in made["verdicts"]
 
 

@@ -40,6 +40,8 @@ def _describe_repetition(row: dict[str, str]) -> Sequence[str]:
 
 
 def _describe_borders(row: dict[str, str]) -> Sequence[str]:
+    if not row["difference"]:  # one material: no border
+        return [row["scene"], *["no border"] * 3, "", "", "0, 0"]
     low, high = _round(row, ("low", "high"))
     crops = f"{row['terrain_crops']}, {row['photographed_crops']}"
     found = _round(row, ("terrain", "photographed", "difference"))
