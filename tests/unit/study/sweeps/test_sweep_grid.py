@@ -55,9 +55,7 @@ ROW = {"scenes": ["desert_pool"], "vary": {"k": [2, 4]}, "measure": {"views": [0
         pytest.param({"vary": {"tiling": ["glue"]}}, "there is no tiling 'glue'", id="no such tiling"),
         pytest.param({"vary": {"prior": ["zero"]}}, "there is no prior 'zero'", id="no such prior"),
         pytest.param({"fixed": {"preset": "best"}}, "there is no preset 'best'", id="no such preset"),
-        pytest.param(
-            {"vary": {"lam": [0, 1]}}, "lam: makes no difference to the policy auto", id="no prior asked"
-        ),
+        pytest.param({"vary": {"lam": [0, 1]}}, "lam: makes no difference to the policy auto", id="no prior asked"),
         pytest.param({"fixed": {"photos": 10}}, "photos: 10 leave no round of 4", id="no round"),
         pytest.param({"fixed": {"photos": 20, "rounds": 2}}, "photos and rounds", id="photos and rounds"),
     ],
