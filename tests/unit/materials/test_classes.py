@@ -37,6 +37,13 @@ def test_shares_sum_to_one(found):
     assert found.shares[0] == pytest.approx(np.mean(made.true_materials() == 0), abs=0.04)
 
 
+def test_materials_that_one_start_of_many_tells_apart_are_apart(monkeypatch):
+    one, apart = np.zeros(made.true_materials().shape, int), made.true_materials()
+    for order in ([one, apart], [apart, one]):
+        monkeypatch.setattr(classes.segmentation, "list_segmentations", lambda _, order=order: [(c, []) for c in order])
+        assert classes.classify_ground(made.maps()).number == 2
+
+
 def test_even_ground_is_one_material_without_objects():
     found = classes.classify_ground(made.maps(mixed=False, shrubs=False))
     assert (found.number, found.footprints, found.excluded.any()) == (1, [], False)

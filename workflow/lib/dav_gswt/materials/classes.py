@@ -113,12 +113,22 @@ def _name_ground(maps: GroundMaps, masks: GroundMasks) -> _LabelledGround:
 
 
 def _segment_ground(maps: GroundMaps, contrast: Float[Array, "m m"]) -> _LabelledGround:
-    """Ground by its looks. contrast: of the grain around each cell."""
-    classes, strips = segmentation.segment_ground(maps.colour)
-    crossing = _unite(strips, classes.shape)
-    chosen = choose_materials(np.where(crossing, NO_CLASS, classes), maps.colour, contrast)
+    """Ground by its looks. contrast: of the grain around each cell.
+
+    Of the segmentations that which tells most materials apart, since a start of k-means may hide one in another.
+    """
+    found = [(*each, _choose_apart(*each, maps, contrast)) for each in segmentation.list_segmentations(maps.colour)]
+    classes, strips, chosen = max(found, key=lambda each: len(each[-1]))  # of several the first: it explains most
     names = [f"material{k}" for k in range(len(chosen))]
     return _LabelledGround(classes, chosen, names, find_scattered(classes, chosen), strips)
+
+
+def _choose_apart(
+    classes: Int[Array, "m m"], strips: list[Bool[Array, "m m"]], maps: GroundMaps, contrast: Float[Array, "m m"]
+) -> list[int]:
+    """The materials of a segmentation, its strips left out."""
+    apart = np.where(_unite(strips, classes.shape), NO_CLASS, classes)
+    return choose_materials(apart, maps.colour, contrast)
 
 
 def _unite(strips: list[Bool[Array, "m m"]], shape: tuple[int, ...]) -> Bool[Array, "m m"]:

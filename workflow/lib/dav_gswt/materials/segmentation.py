@@ -21,7 +21,7 @@ from scipy.ndimage import gaussian_filter
 from dav_gswt.materials import strips
 
 CLUSTERS = 12  # before merging
-STARTS = 5  # of k-means: the segmentation that explains most of the variance is taken
+STARTS = 5  # of k-means
 WORKING_SIZE = 256  # cells along a side that are clustered; larger exemplars are averaged
 BRIGHTEST, QUANTILE = 0.9, 0.95  # exposure: this quantile of the brightest channel becomes so bright
 SOFT, GRAIN = 1 / 150, 1 / 30  # of the side: blur of colours, window of the grain's contrast
@@ -57,21 +57,30 @@ class Difference:
         return self.separation < LEAST_SEPARATION or self.sharpness < LEAST_SHARPNESS
 
 
-def segment_ground(colour: Float[Array, "m m 3"]) -> tuple[Int[Array, "m m"], list[Bool[Array, "m m"]]]:
-    """Classes of an exemplar by descending share, from 0, and the strips that cross it. colour: sRGB in [0, 1].
+Segmentation = tuple[Int[Array, "m m"], list[Bool[Array, "m m"]]]
 
-    Strips may be of any class: they are found in clusters before these are merged, from every start of k-means, since
-    few starts happen to set a strip apart.
+
+def segment_ground(colour: Float[Array, "m m 3"]) -> Segmentation:
+    """The segmentation of an exemplar that explains most of its variance: see `list_segmentations`."""
+    return next(list_segmentations(colour))
+
+
+def list_segmentations(colour: Float[Array, "m m 3"]) -> Iterator[Segmentation]:
+    """Segmentations from every start of k-means, the one that explains most of the variance first.
+
+    Each: classes of the exemplar by descending share, from 0, and the strips that cross it. Strips may be of any
+    class: they are found in clusters before these are merged, from every start, since few starts happen to set a strip
+    apart. colour: sRGB in [0, 1].
     """
     features = describe_cells(_shrink(colour))
     traces = [merge_clusters(features, _cluster(features, start)) for start in range(STARTS)]
-    trace = max(traces, key=lambda trace: _explained_variance(features, trace[-1]))
-    labels = smooth_labels(features, trace[-1])
     candidates = strips.find_strips([clusters for each in traces for clusters in each])
-    found = [each for each in candidates if not strips.is_transition(each, features[..., :3], labels)]
-    labels, crossing = _enlarge(labels, len(colour)), [_enlarge(each, len(colour)) for each in found]
-    order = np.argsort(-np.bincount(labels.ravel()), kind="stable")
-    return np.argsort(order)[labels], crossing
+    for trace in sorted(traces, key=lambda trace: -_explained_variance(features, trace[-1])):
+        labels = smooth_labels(features, trace[-1])
+        found = [each for each in candidates if not strips.is_transition(each, features[..., :3], labels)]
+        labels, crossing = _enlarge(labels, len(colour)), [_enlarge(each, len(colour)) for each in found]
+        order = np.argsort(-np.bincount(labels.ravel()), kind="stable")
+        yield np.argsort(order)[labels], crossing
 
 
 def describe_cells(colour: Float[Array, "m m 3"]) -> Float[Array, "m m 4"]:
