@@ -72,7 +72,7 @@ def test_a_finished_run_is_measured_drawn_and_told(snakemake, tiny, tmp_path):
     ]
     assert all(float(row[key]) > 0 for row in rows for key in ("seconds", "own_seconds", "psnr", "bundle_mb"))
     assert all(float(row["loss"]) == 0 for row in rows if row["most"] == "1")
-    assert "`draft` lies on the front" in (folder / "docs/research/results/tradeoff.md").read_text()
+    assert "`draft` is the best for its time" in (folder / "docs/research/results/tradeoff.md").read_text()
     assert (folder / "docs/research/data/tradeoff.csv").read_text().count("\n") == len(rows) + 1
     for path in (
         "results/tradeoff/pareto.png",

@@ -181,6 +181,20 @@ def test_the_verdict_never_asks_for_as_much_again_as_there_is(areas, times):
     assert f"photograph {times} times as much" in verdict.judge_material("sand", areas, 0.3).reason
 
 
+@pytest.mark.parametrize(("areas", "said"), [(1.96, "1.9"), (3.98, "3.9"), (3.96, "3.9"), (1.94, "1.9"), (2.04, "2.0")])
+def test_an_area_is_never_rounded_up_to_a_bound_that_it_misses(areas, said):
+    assert f"on {said} tile areas" in verdict.judge_material("sand", areas, 0.0).reason
+
+
+def test_the_verdict_on_a_set_names_materials_of_which_there_is_too_little():
+    judged = {name: verdict.judge_material(name, areas, 0.3) for name, areas in (("sand", 8.0), ("rock", 0.5))}
+    whole = verdict.judge_set(judged, 0.2, 1)
+    assert whole.grade == "good" and whole.reason.endswith(
+        "a path, road or the like among it; of rock there is too little"
+    )
+    assert "too little" not in verdict.judge_set({"sand": judged["sand"]}, 0.2, 0).reason
+
+
 def test_a_window_is_filled_by_its_material_where_it_can_be():
     own = np.zeros((128, 128), bool)
     own[32:120, 20:120] = True

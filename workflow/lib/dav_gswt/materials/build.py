@@ -131,7 +131,8 @@ def find_materials(
     materials = _rescale_shares(list(kept.values()))
     objects = _extract_objects(parts, {k: place for place, k in enumerate(kept)})
     strips = int(classes.kinds.max()) + 1 - classes.number
-    judged = verdict.judge_set([each.verdict for each in materials], float(classes.excluded.mean()), max(strips, 0))
+    verdicts = {each.info.name: each.verdict for each in materials}
+    judged = verdict.judge_set(verdicts, float(classes.excluded.mean()), max(strips, 0))
     return _report(FoundMaterials(maps, classes, parts.tile_side, materials, objects, judged))
 
 
@@ -153,7 +154,7 @@ def _keep_whole(field: GaussianField, grid: Ground, maps: GroundMaps) -> FoundMa
         np.zeros(maps.known.shape, int), np.zeros(maps.known.shape, int), [], nothing, ["material0"]
     )
     material = Material(info, field, grid, 0.0, judged)
-    return _report(FoundMaterials(maps, classes, None, [material], [], verdict.judge_set([judged], 0.0, 0)))
+    return _report(FoundMaterials(maps, classes, None, [material], [], verdict.judge_set({info.name: judged}, 0.0, 0)))
 
 
 def _report(found: FoundMaterials) -> FoundMaterials:

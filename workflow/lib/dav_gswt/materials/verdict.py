@@ -19,7 +19,7 @@ def judge_material(name: str, areas: float, filled: float) -> MaterialVerdict:
 
     Args: areas: how many tiles' areas of it were photographed. filled: share of its exemplar that is made of patches.
     """
-    seen = f"{name} was photographed on {areas:.1f} tile areas"
+    seen = f"{name} was photographed on {_format_areas(areas)} tile areas"
     if areas >= GOOD:
         return MaterialVerdict("good", seen)
     times = math.ceil(10 * GOOD / max(areas, 0.1)) / 10  # up, for "1.0 times" asks for nothing
@@ -30,16 +30,27 @@ def judge_material(name: str, areas: float, filled: float) -> MaterialVerdict:
     return MaterialVerdict("no", f"{seen}{made}: repeats will be seen; {more}, or leave it out")
 
 
-def judge_set(verdicts: list[MaterialVerdict], excluded: float, strips: int) -> MaterialVerdict:
-    """The verdict on all: that of the largest material, which is the first.
+def _format_areas(areas: float) -> str:
+    """To a tenth, but never up to a bound that is not reached."""
+    near = round(areas, 1)
+    return f"{near - 0.1 if any(areas < bound <= near for bound in (GOOD, MARGINAL)) else near:.1f}"
 
-    Args: excluded: share of ground that is shown nowhere. strips: paths, roads and the like, among it.
+
+def judge_set(verdicts: dict[str, MaterialVerdict], excluded: float, strips: int) -> MaterialVerdict:
+    """The verdict on all: that of the largest material, the first. Those of which there is too little are named.
+
+    Args:
+        verdicts: by the materials' names.
+        excluded: share of ground that is shown nowhere.
+        strips: paths, roads and the like, among it.
     """
-    grades = [verdict.grade for verdict in verdicts]
+    grades = [verdict.grade for verdict in verdicts.values()]
     if excluded > 0.5 and grades[0] == "good":
         reason = f"{excluded:.0%} of the ground is shade, rare or cut off, and shown nowhere"
         return MaterialVerdict("marginal", reason)
     several = "a path, road or the like" if strips == 1 else f"{strips} paths, roads or the like"
     crossing = f", {several} among it" if strips else ""
     many = "1 material" if len(verdicts) == 1 else f"{len(verdicts)} materials"
-    return MaterialVerdict(grades[0], f"{many}, {excluded:.0%} of the ground is shown nowhere{crossing}")
+    scarce = [name for name, verdict in verdicts.items() if verdict.grade == "no"]
+    lacking = f"; of {' and '.join(scarce)} there is too little" if scarce else ""
+    return MaterialVerdict(grades[0], f"{many}, {excluded:.0%} of the ground is shown nowhere{crossing}{lacking}")

@@ -81,8 +81,8 @@ def format_gallery(rows: list[dict], walk: str, seconds: float) -> str:
     parts = [
         "# Gallery",
         f"Made by `snakemake gallery_page` with version {rows[0]['version']}; do not edit. Every scene as the config "
-        "has it: start photos, two rounds of further ones, materials, tiles. Left a photo, in the middle the terrain "
-        "from above, right as one who walks sees it.",
+        "has it: start photos, two rounds of further ones, materials, tiles. Left: a photo. Middle: the terrain from "
+        "above. Right: as a walker sees it.",
         f"![A walk of {seconds:.0f} seconds over the terrain of {walk}]({_link(WALK)})",
         f"*{seconds:.0f} seconds over {name_of_scene(walk)}, rendered by the library.*",
     ]

@@ -7,7 +7,7 @@ NAMED = {  # measures, and decimals
     "psnr": ("PSNR, dB", 2),
     "worst_psnr": ("worst tenth of views, dB", 2),
     "walker_psnr": ("views at eye level, dB", 2),
-    "lpips": ("LPIPS, fewer", 4),
+    "lpips": ("LPIPS, lower by", 4),
 }
 ALL_SCENES = "all scenes"
 

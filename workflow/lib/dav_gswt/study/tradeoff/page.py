@@ -24,14 +24,14 @@ def format_tradeoff(rows: list[dict], pareto: list[dict]) -> str:
         f"Scene `{first['scene']}`, seed {first['seed']:.0f}, on {first['cores']:.0f} cores of {first['processor']}. "
         f"Each knob is turned by itself from the base, which has the preset `{base['preset']}`, the tiling "
         f"`{base['tiling']}` and tau {base['tau']:g}; its own settings are bold. Losses are counted from each knob's "
-        "first setting, taken for the most accurate. Seconds are those of whole jobs from the start views to the "
-        "bundle, without the taking of photos; what settings share counts for each. Memory is the largest that was "
-        "sampled of any job: of those up to the bundle and, where stills tell the loss, of rendering these. One scene "
+        "first setting, meant as the most accurate; a loss below 0 is a gain. Seconds are those of whole jobs from the "
+        "start photos to the bundle, without the taking of photos; what settings share counts for each. Memory is the "
+        "largest that was sampled of any job: of those up to the bundle and, where stills tell the loss, of rendering these. One scene "
         "and one seed: differences of a few hundredths of a decibel are within what another seed changes.",
         "## Presets",
         format_table(*_tabulate_presets(pareto)),
-        "On the front is what no other setting here is as fast as and better than: in PSNR, and beside it in LPIPS, as "
-        "what is ahead in PSNR can be the less sharp picture.",
+        "*Best for its time*: no other setting here is as fast and better; in PSNR, and in LPIPS, as what is ahead in "
+        "PSNR can be the less sharp picture.",
         "\n".join(f"- {describe_preset(row)}" for row in pareto if row["knob"] == PRESET),
         "![PSNR and LPIPS over seconds](../figures/tradeoff_pareto.png)",
         "## Knobs",
@@ -42,15 +42,13 @@ def format_tradeoff(rows: list[dict], pareto: list[dict]) -> str:
 
 
 def describe_preset(row: dict) -> str:
-    """Whether a preset lies on the front, and if not, by how much it does not. row: of pareto.csv."""
+    """Whether no setting is as fast and better than a preset, and else by how much one is. row: of pareto.csv."""
     if row["front"]:
-        return f"`{row['setting']}` lies on the front: no other setting is as fast and better."
+        return f"`{row['setting']}` is the best for its time: no other setting is as fast and better in PSNR."
     if row["behind"] > 0:
         rival = f"{row['rival_knob']} {row['rival_setting']}"
-        return (
-            f"`{row['setting']}` lies {row['behind']:.2f} dB behind the front: {rival} is as fast and better by that."
-        )
-    return f"`{row['setting']}` lies behind the front: another setting is as good and faster."
+        return f"`{row['setting']}` is not the best for its time: {rival} is as fast and {row['behind']:.2f} dB better."
+    return f"`{row['setting']}` is not the best for its time: another setting is as good and faster."
 
 
 def describe_change(row: dict, best: dict) -> str:
@@ -82,7 +80,7 @@ def _describe_pace(share: float) -> str:
 def _tabulate_presets(pareto: list[dict]) -> tuple[list[str], list[list[str]]]:
     form = {"seconds": 0, "psnr": 2, "ssim": 3, "lpips": 3, "peak_mb": 0, "bundle_mb": 1}
     head = ["preset", "seconds", "PSNR (dB)", "SSIM", "LPIPS", "memory (MB)", "bundle (MB)"]
-    head += ["on the front", "on that of LPIPS"]
+    head += ["best for its time", "in LPIPS"]
     said = {1: "yes", 0: "no", None: ""}
     found = []
     for row in (row for row in pareto if row["knob"] == PRESET):
