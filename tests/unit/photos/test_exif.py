@@ -57,6 +57,14 @@ def test_the_pixel_pitch_counts_before_the_equivalent(tmp_path, order, pitch):
     assert read_focal_length(with_block(tmp_path / "a.jpg", entries, order)) == pytest.approx(1000)
 
 
+def test_the_tagged_width_of_an_upright_photo_may_be_its_shorter_side(tmp_path):
+    """Programs that turn photos write the new width and length into the tags; the pitch is that of the longer side."""
+    tags = {0x920A: (5, "II", (254, 100)), 0xA20E: (5, "II", (20000, 2)), 0xA210: (3, "H", (2,))}
+    whole = with_block(tmp_path / "a.jpg", tags | {0xA002: (4, "I", (400,)), 0xA003: (4, "I", (300,))})
+    turned = with_block(tmp_path / "b.jpg", tags | {0xA002: (4, "I", (300,)), 0xA003: (4, "I", (400,))})
+    assert read_focal_length(whole) == read_focal_length(turned) == pytest.approx(1000)
+
+
 def test_a_photo_that_was_shrunk_after_it_was_tagged(tmp_path):
     entries = {0x920A: (5, "II", (254, 100)), 0xA20E: (5, "II", (10000, 1)), 0xA002: (4, "I", (800,))}
     assert read_focal_length(with_block(tmp_path / "a.jpg", entries)) == pytest.approx(500)

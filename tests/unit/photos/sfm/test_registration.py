@@ -1,7 +1,6 @@
 """Structure from motion, end to end on small made-up photos, and what it says about photos it cannot use."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
@@ -11,12 +10,11 @@ from fixtures import photos as synth
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.georeference import Georeference
-from dav_gswt.geometry.scene_frame import FocalLength, SfmSign, SfmVerdict, read_scene_frame
+from dav_gswt.geometry.scene_frame import SfmSign, SfmVerdict, read_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import read_colmap_model, reprojection_errors
 from dav_gswt.photos.photo_set import prepare_photos
-from dav_gswt.photos.sfm import registration
-from dav_gswt.photos.sfm.mapping import Approach
+from dav_gswt.photos.sfm import solution
 from dav_gswt.photos.sfm.registration import Registration, SfmOptions, register_photos, undistort_image
 
 HALF = 1.0  # of the made-up ground
@@ -173,68 +171,8 @@ def verdict(grade: str, *names: str) -> SfmVerdict:
     return SfmVerdict(grade, tuple(SfmSign(name, grade, f"{name} is odd") for name in names))
 
 
-class Placed(pycolmap.Reconstruction):
-    """A model of which only the number of its images is known."""
-
-    def __init__(self, count: int):
-        super().__init__()
-        self.count = count
-
-    def num_reg_images(self) -> int:
-        return self.count
-
-
-@pytest.fixture
-def solutions(monkeypatch):
-    """Ways of mapping that give what a test says, and no others; the ways that were asked for."""
-    asked = []
-
-    def give(*verdicts, placed=(8, 8, 8), unsure=0):
-        def solve(approach, scene, options):
-            asked.append(approach)
-            focal = FocalLength(300.0, 330.0, 330.0, 30.0, "freed")
-            return registration._Solution(Placed(placed[len(asked) - 1]), (), focal, verdicts[len(asked) - 1], unsure)
-
-        monkeypatch.setattr(registration, "_solve", solve)
-        scene = registration._Scene("folder", [], {1: 300.0}, None, Path("database.db"))
-        return registration._find_solution(scene, OPTIONS), asked
-
-    return give
-
-
-def test_the_best_of_several_ways_is_taken_and_all_are_named(solutions):
-    found, asked = solutions(verdict("refused", "tilt", "GPS"), verdict("good"), verdict("doubtful", "tilt"))
-    assert asked[1:] == [Approach("incremental", hold_focal=True), Approach("global", hold_focal=True)]
-    assert found.verdict.grade == "good" and len(found.verdict.tried) == 3
-    assert found.verdict.tried[0] == "incremental mapping: refused (tilt is odd; GPS is odd)"
-
-
-def test_a_model_of_few_photos_does_not_win(solutions):
-    found, _ = solutions(verdict("doubtful", "tilt"), verdict("good"), verdict("refused", "tilt"), placed=(8, 3, 8))
-    assert found.verdict.grade == "doubtful"
-
-
-def test_of_equal_models_the_first_stays(solutions):
-    found, _ = solutions(*[verdict("doubtful", "tilt")] * 3)
-    assert found.verdict.tried[0].startswith("incremental mapping: doubtful")
-
-
-def test_photos_left_out_though_they_match_are_tried_with_the_other_mapper(solutions):
-    found, asked = solutions(verdict("good"), verdict("good"), placed=(14, 19), unsure=5)
-    assert asked == [Approach("incremental"), Approach("global")] and found.best.num_reg_images() == 19
-
-
-def test_the_other_mapper_does_not_win_with_a_worse_model(solutions):
-    found, _ = solutions(verdict("good"), verdict("doubtful", "tilt"), placed=(14, 19), unsure=5)
-    assert found.best.num_reg_images() == 14
-
-
-def test_photos_left_out_alone_ask_for_no_other_way(solutions):
-    assert len(solutions(verdict("doubtful", "placed", "groups"))[1]) == 1
-
-
 def test_a_refused_model_stops_before_anything_is_written_unless_it_may_go_on(photos, tmp_path, monkeypatch):
-    monkeypatch.setattr(registration, "judge_model", lambda *_: verdict("refused", "placed"))  # maps once
+    monkeypatch.setattr(solution, "judge_model", lambda *_: verdict("refused", "placed"))  # maps once
     with pytest.raises(InputError, match="do not fit together to one scene: placed is odd"):
         prepare_photos(photos, tmp_path / "out", OPTIONS)
     assert not (tmp_path / "out").exists()
@@ -297,6 +235,17 @@ def test_photos_of_two_sizes_get_a_camera_each(tmp_path, ground):
     assert apart(found.model.cameras, flight()) < 0.03
 
 
+def test_photos_of_two_sizes_and_one_focal_length_keep_their_own_resolution(tmp_path, ground):
+    """Features are looked for at one size, at which both kinds of photos are equal."""
+    for i, camera in enumerate(flight()):
+        if i % 2:
+            camera = camera.resized(160, 120)
+        as_jpeg(tmp_path / f"{i:03d}.jpg", synth.photograph(camera, ground, HALF))
+    found = register_photos(tmp_path, replace(OPTIONS, size=160))
+    assert [lens.width for lens in found.lenses] == [160 if int(name[:3]) % 2 else 320 for name in found.model.names]
+    assert len(found.model.names) >= 6
+
+
 def test_a_photo_of_something_else_is_left_out_with_the_reason(photos, tmp_path):
     for path in photos.iterdir():
         (tmp_path / path.name).symlink_to(path)
@@ -342,9 +291,13 @@ def test_observations_lie_where_the_pictures_show_their_points(registered, photo
     assert spread < 0.5 * np.abs(colour - colour[np.random.default_rng(0).permutation(len(colour))]).mean()
 
 
-def test_pictures_of_equal_stem_keep_apart(tmp_path):
-    paths = [tmp_path / name for name in ("a.jpg", "a.png", "b.jpg")]
-    assert registration._name_pictures(paths) == ["a_jpg.png", "a_png.png", "b.png"]
+def test_photos_may_have_any_name(photos, registered, tmp_path):
+    """COLMAP's own lists end a name at a blank and skip lines that begin with #."""
+    for i, path in enumerate(sorted(photos.iterdir())):
+        (tmp_path / f"# photo {i} (1).jpg").symlink_to(path)
+    found = register_photos(tmp_path, OPTIONS)
+    assert found.model.names == tuple(f"_photo_{i}_(1).png" for i in range(8))
+    assert np.array_equal(found.model.points, registered.model.points)
 
 
 def test_two_photos_are_refused_by_name(tmp_path, ground):

@@ -172,3 +172,9 @@ def test_a_refused_model_stops_with_its_reasons_and_what_was_tried():
     with pytest.raises(InputError, match=r"a reason \(tried: incremental; global\).*verdict: warn"):
         require_trust(verdict)
     require_trust(replace(verdict, grade="doubtful"))
+
+
+def test_positions_within_their_own_error_are_no_sign(model):
+    at = np.random.default_rng(0).normal(0, 0.5, (len(model.names), 3))
+    for positions in (at, np.zeros_like(at)):
+        assert "GPS" not in grades(judge(model, positions=positions))

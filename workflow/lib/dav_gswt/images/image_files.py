@@ -55,9 +55,15 @@ def list_photos(folder: Path | str) -> list[Path]:
 
 def read_size(path: Path | str) -> tuple[int, int]:
     """Width and height with the EXIF orientation applied, from the header alone."""
+    width, height, orientation = read_stored_size(path)
+    return (height, width) if orientation >= 5 else (width, height)
+
+
+def read_stored_size(path: Path | str) -> tuple[int, int, int]:
+    """Width and height as stored, and EXIF's orientation, from the header alone."""
     file, spec = _open_image(path)
     file.close()
-    return (spec.height, spec.width) if _read_orientation(spec) >= 5 else (spec.width, spec.height)
+    return spec.width, spec.height, _read_orientation(spec)
 
 
 def read_photo(path: Path | str) -> Float32[Array, "h w 3"]:

@@ -21,9 +21,9 @@ UNITS = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}  # FocalPlaneResolutionUnit in mill
 def read_focal_length(path: Path | str) -> float | None:
     """Focal length in pixels of the stored picture, or None where EXIF does not say.
 
-    From the focal length and the sensor's pixel pitch where both are there, else from the 35 mm equivalent f by the
-    diagonal: f / 43.27 mm * sqrt(w^2 + h^2), with the height of the 4:3 sensor where the picture is wider than 3:2.
-    Where the tagged width differs from the real one, the pitch is scaled with it: the photo was resized, the tag not.
+    From the focal length and the sensor's pixel pitch where both are there, else from the 35 mm equivalent
+    (`convert_equivalent`). Where the tagged width differs from the real one, the pitch is scaled with it: the photo was
+    resized, the tag not.
     """
     width, height = sorted(image_files.read_size(path), reverse=True)
     tags = _read_jpeg_tags(Path(path))
@@ -32,17 +32,27 @@ def read_focal_length(path: Path | str) -> float | None:
     film = tags.get("EXIF FocalLengthIn35mmFilm") or _number(spec.getattribute("Exif:FocalLengthIn35mmFilm"))
     pitch, unit = tags.get("EXIF FocalPlaneXResolution"), UNITS.get(int(tags.get("EXIF FocalPlaneResolutionUnit", 2)))
     if focal > 0 and pitch and unit:
-        pixels = focal / unit * pitch * width / max(tags.get("EXIF ExifImageWidth", width), 1)
+        tagged = max(
+            tags.get(f"EXIF ExifImage{side}", 0) for side in ("Width", "Length")
+        )  # some programs exchange them
+        pixels = focal / unit * pitch * width / (tagged if tagged >= 1 else width)
     elif film > 0:
-        pixels = (
-            film
-            / FILM_DIAGONAL
-            * (width**2 + (max(height, 0.75 * width) if width > WIDEST * height else height) ** 2) ** 0.5
-        )
+        pixels = convert_equivalent(film, width, height)
     else:
         return None
     # Beyond these the tag is a default or garbage: from a fisheye's 150 degrees to a long telescope.
     return pixels if 0.13 * width < pixels < 100 * width else None
+
+
+def convert_equivalent(film: float, width: int, height: int) -> float:
+    """Focal length in pixels of a picture of this size from its 35 mm equivalent, by the diagonal.
+
+    film / 43.27 mm * sqrt(w^2 + h^2), w the longer side; with the height of the 4:3 sensor where the picture is wider
+    than 3:2.
+    """
+    longer, shorter = max(width, height), min(width, height)
+    across = max(shorter, 0.75 * longer) if longer > WIDEST * shorter else shorter
+    return film / FILM_DIAGONAL * (longer**2 + across**2) ** 0.5
 
 
 def read_gps_position(path: Path | str) -> tuple[float, float, float] | None:

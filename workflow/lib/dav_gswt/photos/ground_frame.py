@@ -13,6 +13,7 @@ from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square
 from dav_gswt.photos.colmap_model import ColmapModel, transform_model
+from dav_gswt.photos.planes import fit_plane, make_upright_rotation
 from dav_gswt.photos.sfm.gps import GpsPositions
 
 _log = logging.getLogger(__name__)
@@ -20,7 +21,6 @@ _log = logging.getLogger(__name__)
 REACH = 3.0  # flying heights from the camera, beyond which a photo tells nothing useful about the ground
 CELLS = 256  # of the coverage grid along its longer side
 COARSE_CELLS = 160  # while directions of the x axis are tried
-TRIALS = 500  # planes through three random points; at half outliers one in eight has none
 TURN = 5  # degrees between the directions tried for the x axis
 INSET = 0.02  # kept from the border of the well-seen ground, as a share of the exemplar's side
 NEAR = 0.25  # flying heights: ground farther than this from every point has no texture that photos agree on (water)
@@ -91,54 +91,6 @@ def _georeference(east_north_up: ColmapModel, flat: ColmapModel, positions: GpsP
         slope=float(np.degrees(np.arccos(np.clip(turn[2, 2], -1, 1)))),
         metres_per_unit=1.0,
     )
-
-
-def fit_plane(
-    points: Float[Array, "n 3"], rng: np.random.Generator, up: Float[Array, "3"] | None = None
-) -> tuple[Float[Array, "3"], float, float]:
-    """A robust plane through points: unit normal n and offset d of n . p = d, and the points' spread about it.
-
-    Least median of |n . p - d| over TRIALS planes through three points, then ten rounds of least squares under
-    Geman-McClure weights (1 + (r / s)^2)^-2. The scale s is 1.4826 times the median residual of the first plane, which
-    is the standard deviation where residuals are normal; so hills and trees may be up to half of the points.
-    up: a direction roughly upwards, where one is known: then only planes within 45 degrees of level are tried, and n
-    points upwards.
-    Raises: InputError: fewer than three points, all on one line, or none in such a plane.
-    """
-    if len(points) < 3:
-        raise InputError("fewer than three points of the ground are known; take more photos that overlap")
-    middle = np.median(points, axis=0)
-    centred = points - middle
-    sample = centred[rng.choice(len(points), min(len(points), 2000), replace=False)]
-    a, b, c = (sample[rng.integers(len(sample), size=TRIALS)] for _ in range(3))
-    normals = np.cross(b - a, c - a)
-    lengths = np.linalg.norm(normals, axis=1)
-    proper = lengths > 1e-9 * np.abs(sample).max() ** 2
-    if up is not None:
-        proper &= np.abs(normals @ up) > np.sqrt(0.5) * np.linalg.norm(up) * lengths
-    if not proper.any():
-        raise InputError("the points lie in no level plane, or all on one line: they do not determine the ground")
-    normals = normals[proper] / lengths[proper, None]
-    offsets = np.einsum("ti,ti->t", normals, a[proper])
-    medians = np.median(np.abs(sample @ normals.T - offsets), axis=0)
-    normal, offset = normals[medians.argmin()], offsets[medians.argmin()]
-    scale = 1.4826 * medians.min() + 1e-12 * np.abs(sample).max()
-    for _ in range(10):
-        weight = (1 + ((centred @ normal - offset) / scale) ** 2) ** -2
-        centre = weight @ centred / weight.sum()
-        spread = (centred - centre) * weight[:, None]
-        normal = np.linalg.eigh(spread.T @ (centred - centre))[1][:, 0]
-        offset = normal @ centre
-    if up is not None and normal @ up < 0:
-        normal, offset = -normal, -offset
-    return normal, float(offset + normal @ middle), float(scale)
-
-
-def make_upright_rotation(normal: Float[Array, "3"], east: Float[Array, "3"]) -> Float[Array, "3 3"]:
-    """The rotation into a frame with z along `normal` and x along the part of `east` that lies in the plane."""
-    x = east - (east @ normal) * normal
-    x = x / np.linalg.norm(x)
-    return np.stack([x, np.cross(normal, x), normal])
 
 
 def count_coverage(cameras: tuple[Camera, ...], points: Float[Array, "n 3"], cells: int = CELLS) -> Coverage:

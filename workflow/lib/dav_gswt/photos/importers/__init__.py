@@ -31,7 +31,8 @@ from dav_gswt.photos.importers.points import (
     triangulate_features,
 )
 from dav_gswt.photos.sfm.gps import GpsPositions
-from dav_gswt.photos.sfm.registration import LEAST_PHOTOS, Registration, SfmOptions
+from dav_gswt.photos.sfm.registration import Registration, SfmOptions
+from dav_gswt.photos.sfm.solution import LEAST_PHOTOS
 
 __all__ = ["import_model"]
 

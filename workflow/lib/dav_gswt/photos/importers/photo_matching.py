@@ -2,13 +2,12 @@
 
 import logging
 import os
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 import numpy as np
-import OpenImageIO as oiio
 import pycolmap
 from jaxtyping import Float
 from numpy import ndarray as Array
@@ -18,6 +17,7 @@ from dav_gswt.images import image_files
 from dav_gswt.photos.importers import lens_models
 from dav_gswt.photos.importers.imported_model import ImportedImage, ImportedModel
 from dav_gswt.photos.importers.lens_models import fit_camera_to_photo
+from dav_gswt.photos.picture_names import name_pictures, split_name
 
 _log = logging.getLogger(__name__)
 
@@ -62,14 +62,14 @@ class PhotoFolder:
             raise InputError(f"{folder}: no photos in this folder; put .jpg, .png or .tif files into it")
         self._tables: list[Mapping[str, list[str]]] = [defaultdict(list) for _ in range(3)]
         for name in self.photos:
-            for table, label in zip(self._tables, _split_name(name), strict=True):
+            for table, label in zip(self._tables, split_name(name), strict=True):
                 table[label].append(name)
 
     def find(self, name: str) -> str | None:
         """The photo of that name: the same path, else without suffix, else the one of this file name, or stem."""
         if name in self.photos:
             return name
-        for table, label in zip(self._tables, _split_name(name), strict=True):
+        for table, label in zip(self._tables, split_name(name), strict=True):
             if len(found := table.get(label, [])) == 1:
                 return found[0]
         return None
@@ -77,7 +77,7 @@ class PhotoFolder:
     def stored_size(self, name: str) -> tuple[int, int] | None:
         """Width and height of a photo as stored, without EXIF's orientation; None where there is no such photo."""
         found = self.find(name)
-        return None if found is None else _read_size(self.photos[found])[:2]
+        return None if found is None else image_files.read_stored_size(self.photos[found])[:2]
 
 
 def match_photos_to_images(
@@ -103,9 +103,10 @@ def match_photos_to_images(
     for name in folder.photos:
         if name not in owners and PurePosixPath(name).parent in homes:
             left_out.append((name, reasons.get(name, "the model has no camera for it")))
+    names = sorted(owners)
     out = [
         _match_photo(given.shots[owners[name]], owners[name], folder.photos[name], key, source)
-        for name, key in _name_pictures(sorted(owners)).items()
+        for name, key in zip(names, name_pictures(names), strict=True)
     ]
     if scaled := [p for p in out if _scaled_pinhole(given.shots[p.index].lens, p.lens)]:
         _log.warning(
@@ -115,43 +116,12 @@ def match_photos_to_images(
     return sorted(out, key=lambda p: p.key), tuple(left_out)
 
 
-def _split_name(name: str) -> tuple[str, str, str]:
-    """Path without suffix, file name, stem. A suffix is that of a picture: a name may have other points in it."""
-    path = PurePosixPath(name)
-    bare = path.with_suffix("") if path.suffix.lower() in image_files.SUFFIXES and path.stem else path
-    return str(bare), path.name, bare.name
-
-
-def _name_pictures(names: list[str]) -> dict[str, str]:
-    """Names of the pictures made of photos: the stem; where two are equal the whole path, and a number if need be."""
-    stems = Counter(_split_name(n)[2] for n in names)
-    keys, used = {}, set()
-    for name in names:
-        stem = _split_name(name)[2]
-        plain = stem if stems[stem] == 1 else name.replace("/", "_").replace(".", "_")
-        number, free = 1, plain
-        while free in used:
-            number, free = number + 1, f"{plain}_{number + 1}"
-        used.add(free)
-        keys[name] = f"{free}.png"
-    return keys
-
-
 def _match_photo(shot: ImportedImage, index: int, path: Path, key: str, source: Path) -> MatchedPhoto:
-    width, height, orientation = _read_size(path)
+    width, height, orientation = image_files.read_stored_size(path)
     assert shot.lens is not None  # its photo is there, so its size is known
     lens, turns = fit_camera_to_photo(shot.lens, (width, height), orientation, f"{source}: {shot.name}")
     turn = np.linalg.matrix_power(lens_models.QUARTER, turns)
     return MatchedPhoto(path, key, index, lens, turns, turn @ shot.rotation, turn @ shot.translation)
-
-
-def _read_size(path: Path) -> tuple[int, int, int]:
-    """Width, height as stored, and EXIF's orientation."""
-    width, height = image_files.read_size(path)
-    file = oiio.ImageInput.open(str(path))
-    value = file.spec().getattribute("Orientation") if file else None
-    orientation = value if isinstance(value, int) and 1 <= value <= 8 else 1
-    return (height, width, orientation) if orientation >= 5 else (width, height, orientation)
 
 
 def _scaled_pinhole(model: pycolmap.Camera | None, photo: pycolmap.Camera) -> bool:

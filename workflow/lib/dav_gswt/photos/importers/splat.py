@@ -15,7 +15,8 @@ from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square
 from dav_gswt.photos import ground_frame
-from dav_gswt.photos.ground_frame import find_largest_square, fit_plane, make_upright_rotation
+from dav_gswt.photos.ground_frame import find_largest_square
+from dav_gswt.photos.planes import fit_plane, make_upright_rotation
 
 _log = logging.getLogger(__name__)
 

@@ -13,7 +13,7 @@ from numpy import ndarray as Array
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.scene_frame import FocalLength
 from dav_gswt.photos.colmap_model import bundle_adjust
-from dav_gswt.photos.ground_frame import fit_plane
+from dav_gswt.photos.planes import fit_plane
 
 OBLIQUE = 20.0  # degrees off the vertical from which a view helps to fix the focal length
 LEAST_OBLIQUE = 3  # such views, and

@@ -16,12 +16,14 @@ from numpy import ndarray as Array
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.photos.colmap_model import bundle_adjust_with_priors
 from dav_gswt.photos.exif import read_gps_position
+from dav_gswt.photos.planes import make_upright_rotation
 
 _log = logging.getLogger(__name__)
 
 ACROSS, UP = 3.0, 6.0  # metres: standard deviation of a receiver's position, along the ground and in height
 LEAST_SHARE = 0.8  # of the photos that must have a position, or none counts
 LEAST_SPREAD = 4.0  # positions must spread this many ACROSS, or they say neither scale nor north
+LEAST_WIDTH = 3.0  # and this many across their own line, or they do not say where up is
 WORST = 2.0  # ACROSS: median distance from the cameras at which the positions contradict the photos
 ROUNDS = 50  # of reweighting
 
@@ -49,46 +51,80 @@ def read_gps_positions(paths: list[Path]) -> GpsPositions | None:
     about = Georeference(*map(float, np.median(found[known], axis=0)), north=0.0, metres_per_unit=1.0)
     at = np.full(found.shape, np.nan)
     at[known] = about.to_world(found[known])
-    spread = float(np.sqrt(np.nanvar(at[:, :2], axis=0).sum()))
+    spread, _ = measure_spread(at[known])
     if spread < LEAST_SPREAD * ACROSS:
         _log.warning("the photos' GPS positions lie within %.0f m, which is within their error: none is used", spread)
         return None
     return GpsPositions(about, at)
 
 
-def align_to_gps(best: pycolmap.Reconstruction, at: dict[str, Float[Array, "3"]]) -> bool:
+def measure_spread(at: Float[Array, "n 3"]) -> tuple[float, bool]:
+    """Metres: the standard deviation of positions along the ground; and whether they say where up is.
+
+    They do not along a straight line: the rotation about it is then that of the receivers' errors.
+    """
+    centred = (at - at.mean(0)) / np.sqrt(len(at))
+    across = np.linalg.svd(centred, compute_uv=False)[1]
+    return float(np.linalg.norm(centred[:, :2])), bool(across >= LEAST_WIDTH * ACROSS)
+
+
+def align_to_gps(best: pycolmap.Reconstruction, at: dict[str, Float[Array, "3"]], up: Float[Array, "3"]) -> bool:
     """Bring a reconstruction into the frame of the positions, in place, and adjust it with them as priors.
 
-    at: the positions by the images' names. Returns whether they agree with the photos; if not, nothing is changed.
+    Positions on one line do not say where up is: then the ground is taken as level, and nothing is adjusted.
+    at: the positions by the images' names. up: the ground's normal on the cameras' side, in the frame of `best`.
+    Returns whether the positions agree with the photos; if not, or where those that found a place lie within the error
+    of receivers, nothing is changed.
     """
     numbers = [i for i in best.reg_image_ids() if np.isfinite(at[best.images[i].name]).all()]
     if len(numbers) < 3:
         return False
     centres = np.stack([best.images[i].projection_center() for i in numbers])
     positions = np.stack([at[best.images[i].name] for i in numbers])
-    scale, turn, shift, off = fit_similarity(centres, positions)
+    spread, says_up = measure_spread(positions)
+    if spread < LEAST_SPREAD * ACROSS:
+        _log.warning("the GPS positions of the photos that found a place lie within %.0f m: unused", spread)
+        return False
+    scale, turn, shift, off = fit_similarity(centres, positions) if says_up else _fit_level(centres, positions, up)
     if off > WORST * ACROSS:
         _log.warning("the photos' GPS positions are %.0f m off where the photos themselves place them: unused", off)
         return False
     best.transform(pycolmap.Sim3d(scale, pycolmap.Rotation3d(turn), shift))
-    bundle_adjust_with_priors(best, [make_pose_prior(best.images[i], at[best.images[i].name]) for i in numbers])
+    if says_up:
+        bundle_adjust_with_priors(best, [make_pose_prior(best.images[i], at[best.images[i].name]) for i in numbers])
+    else:
+        _log.info("GPS: the photos were taken along a line, or nearly; so the ground is taken as level")
     _log.info("GPS: the photos lie in metres, %.1f m from their positions (median)", off)
     return True
 
 
-def fit_similarity(
-    a: Float[Array, "n 3"], b: Float[Array, "n 3"]
+def _fit_level(
+    a: Float[Array, "n 3"], b: Float[Array, "n 3"], up: Float[Array, "3"]
 ) -> tuple[float, Float[Array, "3 3"], Float[Array, "3"], float]:
-    """Scale s, rotation R and shift t of b = s R a + t, and the median distance that is left.
+    """As `fit_similarity`, with `up` turned to z; the distance is that along the ground."""
+    upright = make_upright_rotation(up, np.eye(3)[np.abs(up).argmin()])
+    level = a @ upright.T
+    scale, yaw, shift, off = fit_similarity(level[:, :2], b[:, :2])
+    turn = np.eye(3)
+    turn[:2, :2] = yaw
+    rise = float(np.median(b[:, 2] - scale * level[:, 2]))
+    return scale, turn @ upright, np.array([*shift, rise]), off
+
+
+def fit_similarity(
+    a: Float[Array, "n d"], b: Float[Array, "n d"]
+) -> tuple[float, Float[Array, "d d"], Float[Array, "d"], float]:
+    """Scale s, rotation R and shift t of b = s R a + t, in two or three dimensions, and the median distance left.
 
     Umeyama's closed form under Geman-McClure weights at the scale of a receiver's error: lone outliers have no say.
     """
-    weight, scale, turn, shift, off = np.ones(len(a)), 1.0, np.eye(3), np.zeros(3), np.zeros(len(a))
+    count, size = a.shape
+    weight, scale, turn, shift, off = np.ones(count), 1.0, np.eye(size), np.zeros(size), np.zeros(count)
     for _ in range(ROUNDS):
         w = weight / weight.sum()
         ma, mb = w @ a, w @ b
         u, s, vt = np.linalg.svd(((b - mb) * w[:, None]).T @ (a - ma))
-        sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
+        sign = np.array([*np.ones(size - 1), np.sign(np.linalg.det(u @ vt))])
         turn = u * sign @ vt
         scale = float((s * sign).sum() / max(w @ ((a - ma) ** 2).sum(1), 1e-300))
         shift = mb - scale * turn @ ma

@@ -49,10 +49,11 @@ def _localize_photos(
 ) -> list[Camera | None]:
     pinhole = _find_main_camera(known, photos)
     new = [_write_undistorted(path, photos, pinhole, scratch / f"new_{i:04d}.png") for i, path in enumerate(paths)]
-    for name in progress(known.names, "read pictures"):
-        image_files.write_png(scratch / f"old_{name}", image_files.read_photo(photos / "images" / name))
+    old = [f"old_{i:05d}.png" for i in range(len(known.names))]  # without blanks, as COLMAP's lists want them
+    for name, copy in zip(progress(known.names, "read pictures"), old, strict=True):
+        image_files.write_png(scratch / copy, image_files.read_photo(photos / "images" / name))
     database = scratch / "database.db"
-    names = [f"old_{name}" for name in known.names] + [name for name in new if name]
+    names = old + [name for name in new if name]
     size = max(pinhole.width, pinhole.height)
     with closing(pycolmap.Database.open(database)) as store:
         _enter_images(names, [*known.cameras, *[pinhole] * (len(names) - len(known.names))], store)

@@ -17,8 +17,8 @@ from scipy.spatial import cKDTree
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.scene_frame import Grade, SfmSign, SfmVerdict
 from dav_gswt.photos.colmap_model import ColmapModel
-from dav_gswt.photos.ground_frame import fit_plane, make_upright_rotation
-from dav_gswt.photos.sfm.gps import ACROSS, WORST, fit_similarity
+from dav_gswt.photos.planes import fit_plane, make_upright_rotation
+from dav_gswt.photos.sfm.gps import ACROSS, LEAST_SPREAD, WORST, fit_similarity, measure_spread
 
 
 @dataclass(frozen=True)
@@ -134,17 +134,20 @@ def _judge_gps(
 ) -> tuple[Float[Array, "3 3"] | None, SfmSign | None]:
     """The rotation into the frame of the GPS positions, where they agree with the model, and the sign.
 
+    Positions on one line say no rotation, and within the error of receivers nothing.
     The sign looks at distances along the ground: altitudes drift by tens of metres in flights that are else right.
     """
     known = np.isfinite(positions).all(1) if positions is not None else np.zeros(0, bool)
     if positions is None or known.sum() < 4:
         return None, None
     centres, at = np.stack([camera.centre for camera in model.cameras])[known], positions[known]
+    extent, says_up = measure_spread(at)
+    if extent < LEAST_SPREAD * ACROSS:
+        return None, None
     _, turn, _, off = fit_similarity(centres, at)
     flat = np.array([1.0, 1.0, 0.0])
     east = np.eye(3)[np.abs(normal).argmin()]
     _, _, _, across = fit_similarity(centres @ make_upright_rotation(normal, east).T * flat, at * flat)
-    extent = float(np.sqrt(at[:, :2].var(axis=0).sum()))
     reason = (
         f"cameras lie {across:.1f} m from their GPS positions (median), {across / extent:.0%} of the flight's extent"
     )
@@ -154,7 +157,7 @@ def _judge_gps(
         sign = _grade("GPS", across / extent, reason)
         if sign.grade == "good" and across > FAR:
             sign = SfmSign("GPS", "doubtful", reason)
-    return (turn if off <= WORST * ACROSS else None), sign
+    return (turn if off <= WORST * ACROSS and says_up else None), sign
 
 
 def _judge_directions(

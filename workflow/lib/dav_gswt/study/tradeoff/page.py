@@ -26,8 +26,9 @@ def format_tradeoff(rows: list[dict], pareto: list[dict]) -> str:
         f"`{base['tiling']}` and tau {base['tau']:g}; its own settings are bold. Losses are counted from each knob's "
         "first setting, meant as the most accurate; a loss below 0 is a gain. Seconds are those of whole jobs from the "
         "start photos to the bundle, without the taking of photos; what settings share counts for each. Memory is the "
-        "largest that was sampled of any job: of those up to the bundle and, where stills tell the loss, of rendering these. One scene "
-        "and one seed: differences of a few hundredths of a decibel are within what another seed changes.",
+        "largest that was sampled of any job: of those up to the bundle and, where stills tell the loss, of rendering "
+        "these. One scene and one seed: differences of a few hundredths of a decibel are within what another seed "
+        "changes.",
         "## Presets",
         format_table(*_tabulate_presets(pareto)),
         "*Best for its time*: no other setting here is as fast and better; in PSNR, and in LPIPS, as what is ahead in "
