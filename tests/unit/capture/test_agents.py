@@ -2,11 +2,13 @@
 
 import json
 import os
+import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from fixtures.frames import scene_frame
+from fixtures.photo_store import read_records
 
 from dav_gswt.capture import agents, drop_folder
 from dav_gswt.capture.agents import AGENTS, StoreAgent
@@ -107,7 +109,7 @@ def test_the_store_gives_a_poses_photos_back_and_no_others(tmp_path):
     found = store.photos_of(one[1])
     assert [round(float(image_files.read_photo(s.photo)[0, 0, 0]), 1) for s in found] == [0.2, 0.4]
     assert found[0].camera.centre[0] == pytest.approx(0.1) and found[0].taken == WHEN
-    assert store.photos_of(two[1]) == [] and len(store.records()) == 2
+    assert store.photos_of(two[1]) == [] and len(read_records(store)) == 2
 
 
 def test_a_photo_that_cannot_be_kept_whole_is_not_kept(tmp_path):
@@ -123,6 +125,23 @@ def test_a_stored_photo_that_was_changed_is_refused_by_name(tmp_path):
     picture(kept.photo, 0.9)
     with pytest.raises(InputError, match=r"photo\.png.*put it back"):
         store.photos_of(one[1])
+
+
+def test_a_photo_that_was_removed_is_taken_again_beside_later_ones(tmp_path):
+    store, (one,) = PhotoStore(tmp_path / "captures"), requested(0.0)
+    first, second = (store.add(picture(tmp_path / "in.png", v), "serial", one, one[1], WHEN) for v in (0.2, 0.4))
+    shutil.rmtree(first.photo.parent)
+    again = store.add(picture(tmp_path / "in.png", 0.6), "serial", one, one[1], WHEN)
+    assert again.photo.parent == first.photo.parent and second.photo.is_file()
+    assert len(store.photos_of(one[1])) == 2
+
+
+def test_a_damaged_record_is_named_whoever_reads_it(tmp_path):
+    store, (one,) = PhotoStore(tmp_path / "captures"), requested(0.0)
+    record = store.add(picture(tmp_path / "in.png"), "serial", one, one[1], WHEN).photo.with_name("shot.json")
+    record.write_text('{"photo": "photo.png"}')
+    with pytest.raises(InputError, match=r"shot\.json: not the record of a photo"):
+        store.list_digests()
 
 
 def test_poses_differ_but_not_by_rounding():
@@ -200,7 +219,7 @@ def test_dropped_photos_go_to_the_poses_that_they_were_taken_for(site, monkeypat
     missing = drop_folder.import_dropped_photos(site, both, "handheld")
     assert [pose.name for pose, _ in missing] == ["a2"]
     assert site.store.photos_of(at(0.0))[0].camera.centre[0] == pytest.approx(0.05)
-    assert [r["source"] for r in site.store.records()] and site.store.photos_of(at(1.0))[0].taken.startswith(
+    assert [r["source"] for r in read_records(site.store)] and site.store.photos_of(at(1.0))[0].taken.startswith(
         "1970-01-01"
     )
     assert "lost.png: it could not be localised" in caplog.text
@@ -212,7 +231,7 @@ def test_a_photo_is_taken_over_once(site, monkeypatch):
     drop(site, {"x.png": 0.1, "y.png": 0.2}, monkeypatch)
     for _ in range(2):
         assert drop_folder.import_dropped_photos(site, requested(0.0), "handheld") == []
-    assert len(site.store.records()) == 1
+    assert len(read_records(site.store)) == 1
 
 
 def test_an_empty_drop_folder_leaves_all_poses_missing(site):

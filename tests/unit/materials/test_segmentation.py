@@ -102,3 +102,8 @@ def test_each_merger_is_the_cheapest_of_all_that_are_allowed():
         best = min(alike, key=lambda each: each.cost)
         merged = np.where(before == best.second, best.first, before)
         assert np.array_equal(after, merged - (merged > best.second))
+
+
+def test_a_class_of_one_cell_has_finite_costs():
+    features = np.random.default_rng(0).normal(size=(6, 6, 3))
+    assert np.isfinite(segmentation._negative_log_likelihood(features, features[:1, 0])).all()

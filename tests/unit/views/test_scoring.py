@@ -54,6 +54,15 @@ def scored(prior=None, **more):
     return scoring.score_poses(patch.field(), patch.grid(), pool(), patch.photos(), patch.FRAME, prior, **more)
 
 
+def test_a_photo_counts_alike_upright_or_across():
+    pose = cameras.look_at((0.0, 0.0, 1.0), (0.3, 0.0, 0.0))
+    across = cameras.Camera(*pose, 400.0, 400.0, 200.0, 150.0, 400, 300)
+    upright = cameras.Camera(*pose, 400.0, 400.0, 150.0, 200.0, 300, 400)
+    small, turned = (scoring.scoring_camera(camera) for camera in (across, upright))
+    assert (small.width, small.height) == (turned.height, turned.width) == (96, 72)
+    assert small.fx == turned.fx
+
+
 def test_without_a_prior_only_geometric_terms_are_computed():
     found = scored()
     assert set(found.scores.terms) == {"opacity", "coverage"} and found.maps.w2_sq is None

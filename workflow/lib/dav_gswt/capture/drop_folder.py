@@ -29,7 +29,7 @@ def make_drop_folder(site: Site) -> Path:
 
 def import_dropped_photos(site: Site, requested: list[RequestedPose], agent: str) -> list[RequestedPose]:
     """Copy dropped photos into the store, nearest first. Returns the poses that still lack photos."""
-    known = {record["sha256"] for record in site.store.records()}
+    known = site.store.list_digests()
     folder = make_drop_folder(site)
     here = image_files.list_photos(folder) if any(not p.name.startswith(".") for p in folder.iterdir()) else []
     paths = [p for p in here if digest_files(p) not in known]  # cameras use names again

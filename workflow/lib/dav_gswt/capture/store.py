@@ -6,6 +6,7 @@ an earlier stage was computed anew or a run was killed, the stored photos are us
 
 import fcntl
 import hashlib
+import itertools
 import shutil
 import tempfile
 from contextlib import contextmanager
@@ -58,13 +59,13 @@ class PhotoStore:
                 "sha256": digest_files(made / name),
             }
             write_json(made / "shot.json", record)
-            place = home / f"{len(list(home.glob('[0-9]*'))):03d}"
+            place = next(place for n in itertools.count() if not (place := home / f"{n:03d}").exists())
             made.rename(place)
         return _read_photo(place)
 
-    def records(self) -> list[dict]:
-        """Read shot.json of every photo."""
-        return [read_json(path) for path in sorted(self.folder.glob("*/[0-9]*/shot.json"))]
+    def list_digests(self) -> set[str]:
+        """The digests of all stored photos. Raises: InputError: a damaged record, by name."""
+        return {_read_record(path.parent)["sha256"] for path in sorted(self.folder.glob("*/[0-9]*/shot.json"))}
 
     @contextmanager
     def locked(self):
@@ -87,15 +88,25 @@ def pose_key(camera: Camera) -> str:
 
 
 def _read_photo(place: Path) -> StoredPhoto:
+    record = _read_record(place)
+    photo = place / record["photo"]
+    if not photo.is_file() or digest_files(photo) != record["sha256"]:
+        raise InputError(f"{photo}: is not the photo that was stored; put it back, or remove {place} to take it again")
+    return StoredPhoto(photo, record["got"], record["taken"])
+
+
+def _read_record(place: Path) -> dict:
+    """What is used of a shot.json: `photo` (file name), `got` (camera), `sha256`, `taken`."""
     record = read_json(place / "shot.json")
     try:
-        photo, camera = place / require_file_name(record["photo"]), camera_from_json(record["got"])
-        digest, taken = record["sha256"], str(record["taken"])
+        return {
+            "photo": require_file_name(record["photo"]),
+            "got": camera_from_json(record["got"]),
+            "sha256": str(record["sha256"]),
+            "taken": str(record["taken"]),
+        }
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(
             f"{place / 'shot.json'}: not the record of a photo ({summarize_error(error)}); put it back, or remove "
             f"{place} to take the photo again"
         ) from error
-    if not photo.is_file() or digest_files(photo) != digest:
-        raise InputError(f"{photo}: is not the photo that was stored; put it back, or remove {place} to take it again")
-    return StoredPhoto(photo, camera, taken)

@@ -20,7 +20,6 @@ from dav_gswt.config.settings import (
     TerrainPriorSettings,
     Tiling,
 )
-from dav_gswt.paths import STUDY_TABLES
 from dav_gswt.views.policy_names import POLICY_NAMES
 
 if TYPE_CHECKING:
@@ -139,6 +138,3 @@ def _require_chooser(name: str, preset: Preset, presets: dict[str, Preset]) -> N
 def _require(where: str, name: str, table: dict, called: str) -> None:
     if name not in table:
         raise ValueError(f"{where}: there is no {name!r}; {called} has {', '.join(table) or 'nothing'}")
-
-
-MOVED_TO_STUDY = STUDY_TABLES  # old top-level keys: new place

@@ -142,6 +142,17 @@ def _is_whole_png(path: Path) -> bool:
     return False
 
 
+def fit_size(width: int, height: int, longest: int) -> tuple[int, int]:
+    """Width and height of a picture shrunk to at most `longest` pixels along its longer side, never enlarged."""
+    share = min(1.0, longest / max(width, height))
+    return max(1, round(width * share)), max(1, round(height * share))
+
+
+def shrink_to(image: Float32[Array, "h w c"], longest: int) -> Float32[Array, "height width c"]:
+    """The image shrunk as `fit_size` says."""
+    return shrink_image(image, *fit_size(image.shape[1], image.shape[0], longest))
+
+
 def shrink_image(image: Float32[Array, "h w c"], width: int, height: int) -> Float32[Array, "height width c"]:
     """The image on a coarser grid: each pixel is the exact mean over its area, of the encoded values.
 

@@ -96,8 +96,6 @@ def make_frustum(camera: Camera, depth: float, colour: tuple[int, int, int], pho
     edges = np.array([[0, 1], [0, 2], [0, 3], [0, 4], [1, 2], [2, 3], [3, 4], [4, 1]])
     layers = [Layer("lines", points, edges, colour)]
     if photo is not None and photo.is_file():
-        picture = image_files.read_photo(photo)
-        share = min(1.0, MAX_SIDE / max(picture.shape[:2]))
-        small = image_files.shrink_image(picture, *(max(1, round(n * share)) for n in picture.shape[1::-1]))
+        small = image_files.shrink_to(image_files.read_photo(photo), MAX_SIDE)
         layers.append(make_picture(to_bytes(small), corners[0], corners[1] - corners[0], corners[3] - corners[0]))
     return layers

@@ -188,7 +188,8 @@ def _without_messages(name: str) -> Iterator[None]:
 
 
 def _negative_log_likelihood(features: Float[Array, "m m k"], members: Float[Array, "n k"]) -> Float[Array, "m m"]:
-    covariance = np.cov(members.T) + np.eye(members.shape[1])  # a just noticeable difference of each
+    spread = np.cov(members.T) if len(members) > 1 else 0.0
+    covariance = spread + np.eye(members.shape[1])  # a just noticeable difference of each
     away = features - members.mean(0)
     square = np.einsum("...i,ij,...j->...", away, np.linalg.inv(covariance), away)
     return 0.5 * (square + np.linalg.slogdet(covariance)[1])

@@ -68,8 +68,7 @@ def make_training_view(
     cover: Float32[Array, "h w"] | None = None,
 ) -> TrainingView:
     """A view at most `size` pixels wide or high; photos are never enlarged. cover: 0 where the photo is masked."""
-    share = min(1.0, size / max(camera.width, camera.height))
-    width, height = max(1, round(camera.width * share)), max(1, round(camera.height * share))
+    width, height = image_files.fit_size(camera.width, camera.height, size)
     if (width, height) != (camera.width, camera.height):
         image, camera = image_files.shrink_image(image, width, height), camera.resized(width, height)
         cover = cover if cover is None else image_files.shrink_image(cover[..., None], width, height)[..., 0]

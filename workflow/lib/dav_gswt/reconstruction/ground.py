@@ -88,11 +88,11 @@ class Ground:
         column = (points[:, 0] - self.west) / self.spacing - 0.5
         return map_coordinates(self.heights, [row, column], order=1, mode="nearest")
 
-    def contains(self, points: Float[Array, "n d"], inset: float = 0.0) -> Bool[Array, "n"]:
-        """Which points lie over the grid, at least `inset` world units from its border."""
+    def contains(self, points: Float[Array, "n d"]) -> Bool[Array, "n"]:
+        """Which points lie over the grid."""
         rows, columns = self.shape
         x, y = points[:, 0] - self.west, points[:, 1] - self.south
-        return (x >= inset) & (y >= inset) & (x <= columns * self.spacing - inset) & (y <= rows * self.spacing - inset)
+        return (x >= 0) & (y >= 0) & (x <= columns * self.spacing) & (y <= rows * self.spacing)
 
 
 def fit_ground(

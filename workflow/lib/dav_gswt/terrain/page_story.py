@@ -14,7 +14,7 @@ from numpy import ndarray as Array
 
 from dav_gswt.files import read_json
 from dav_gswt.geometry.scene_frame import SceneFrame, read_scene_frame
-from dav_gswt.images.image_files import read_photo, shrink_image
+from dav_gswt.images.image_files import read_photo, shrink_to
 from dav_gswt.images.jpeg import encode_jpeg
 from dav_gswt.paths import decode_path
 from dav_gswt.photos.taken_photos import TakenPhoto, list_taken_photos
@@ -80,9 +80,7 @@ def spread(count: int, most: int) -> list[int]:
 
 def make_small(photo: Float32[Array, "h w 3"]) -> Float32[Array, "height width 3"]:
     """A photo at most THUMB pixels wide or high."""
-    share = min(1.0, THUMB / max(photo.shape[:2]))
-    height, width = (max(1, round(share * side)) for side in photo.shape[:2])
-    return shrink_image(photo, width, height)
+    return shrink_to(photo, THUMB)
 
 
 def draw_sheet(smalls: Sequence[Float32[Array, "_ _ 3"]]) -> Float32[Array, "height width 3"]:

@@ -16,7 +16,7 @@ from safetensors import SafetensorError
 from torch import Tensor, nn
 from torch.nn import functional
 
-from dav_gswt.errors import InputError
+from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.files import read_json
 
 EXTRA = "transformers==5.23.0"
@@ -59,7 +59,7 @@ def load_model(folder: Path | str) -> nn.Module:
         )
         model, found = cast("tuple[nn.Module, dict[str, Any]]", loaded)  # a pair, as output_loading_info is set
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RuntimeError, SafetensorError) as error:
-        raise InputError(f"{folder}: SAM 2 cannot be read from it ({str(error).splitlines()[0]}); {HELP}") from error
+        raise InputError(f"{folder}: SAM 2 cannot be read from it ({summarize_error(error)}); {HELP}") from error
     if missing := sorted(found["missing_keys"]):
         raise InputError(f"{file}: {missing[0]} is missing (of {len(missing)}); copy it again")
     if bad := [name for name, values in model.named_parameters() if not values.isfinite().all()]:

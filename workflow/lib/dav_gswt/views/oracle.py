@@ -27,7 +27,7 @@ FINE = 4  # supersampling: photos are clipped and encoded before they are shrunk
 
 
 def render_truth(scene: dict, candidates: Candidates, images_folder: Path | str) -> Iterator[TrainingView]:
-    """Yield the photo of each candidate, WIDTH pixels across, named by its pose; weight 0 where it is masked.
+    """Yield the photo of each candidate at the scoring size, named by its pose; weight 0 where it is masked.
 
     scene: its entry in the config. Agent `render`: the photo is rendered, at most FINE times as wide, then shrunk.
     Agent `replay`: the photo is read from `images_folder`.

@@ -7,7 +7,6 @@ import re
 from dataclasses import dataclass
 
 AUTO = "auto"  # in the config: what `resolve_policy` says
-EXTERNAL = "external"  # stands in paths in place of a policy: a finished field, refined by no photo
 POLICY_NAME = r"[a-z0-9-]+"  # what a policy's name is made of: it stands in paths between underscores
 
 

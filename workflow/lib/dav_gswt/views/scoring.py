@@ -28,7 +28,7 @@ from dav_gswt.views.scores import Scores
 from dav_gswt.views.uncertainty.backprojection import backproject_maps
 from dav_gswt.views.uncertainty.weighting import Quantiles, Scales, normalise
 
-WIDTH = 96  # pixels across a picture for scoring
+WIDTH = 96  # pixels along the longer side of a picture for scoring
 PHOTO_WIDTH = 384  # pixels across a captured photo that conditions a prior, before cropping and shrinking
 SHOWN = 16  # candidates whose maps are written for display
 
@@ -59,8 +59,9 @@ def make_exr_parts(result: ScoringResult, field: GaussianField, grid: Ground) ->
 
 
 def scoring_camera(camera: Camera) -> Camera:
-    """A candidate's camera at the scoring size."""
-    return camera.resized(WIDTH, max(1, round(WIDTH * camera.height / camera.width)))
+    """A candidate's camera at the scoring size: its longer side has WIDTH pixels."""
+    longer = max(camera.width, camera.height)
+    return camera.resized(*(max(1, round(WIDTH * side / longer)) for side in (camera.width, camera.height)))
 
 
 def score_poses(

@@ -102,8 +102,7 @@ def undistort_camera(camera: pycolmap.Camera, side: int, where: str) -> tuple[py
 
 def shrink_camera(camera: pycolmap.Camera, side: int) -> pycolmap.Camera:
     """The lens of the picture shrunk to at most `side` pixels; pictures are never enlarged."""
-    share = min(1.0, side / max(camera.width, camera.height))
-    return _scale_camera(camera, max(1, round(camera.width * share)), max(1, round(camera.height * share)))
+    return _scale_camera(camera, *image_files.fit_size(camera.width, camera.height, side))
 
 
 def unproject_pixels(camera: pycolmap.Camera, pixels: Float[Array, "m 2"]) -> Float[Array, "m 2"]:

@@ -177,12 +177,7 @@ def draw_points(model: ColmapModel, colour: Float32[Array, "n 3"], on: MapSheet)
 def make_thumbnail(path: Path, longer: int) -> Thumbnail:
     """A picture at most `longer` pixels wide or high."""
     image, cover = image_files.read_photo_and_alpha(path)
-    share = min(1.0, longer / max(image.shape[:2]))
-    width, height = (max(1, round(share * side)) for side in (image.shape[1], image.shape[0]))
-    small, counts = (
-        image_files.shrink_image(image, width, height),
-        image_files.shrink_image(cover[..., None], width, height),
-    )
+    small, counts = (image_files.shrink_to(part, longer) for part in (image, cover[..., None]))
     shown = counts * small + (1 - counts) * (0.5 * small + 0.5 * MASKED)
     return Thumbnail(small, encode_data_uri(shown, "jpeg"), float(1 - cover.mean()))
 

@@ -86,11 +86,8 @@ def sample_photo(
     image: Float[Array, "h w 3"], cover: Float[Array, "h w"], camera: Camera, places: Float[Array, "n 3"]
 ) -> tuple[Float[Array, "n 3"], Bool[Array, "n"]]:
     """The photo's colours of places, and which of them it shows unmasked. cover: 0 where it is masked."""
-    height, width = image.shape[:2]
-    share = min(1.0, LONGEST / max(height, width))
-    width, height = max(1, round(share * width)), max(1, round(share * height))
-    small = image_files.shrink_image(image, width, height)
-    unmasked = image_files.shrink_image(cover[..., None], width, height)[..., 0]
+    small, unmasked = image_files.shrink_to(image, LONGEST), image_files.shrink_to(cover[..., None], LONGEST)[..., 0]
+    height, width = unmasked.shape
     pixels, depth = camera.resized(width, height).project(places)
     inside = (depth > 0) & (pixels >= 0).all(1) & (pixels[:, 0] < width) & (pixels[:, 1] < height)
     column, row = np.where(inside[:, None], pixels, 0).astype(int).T

@@ -165,14 +165,9 @@ def undistort_image(registered: Registration, index: int) -> Float32[Array, "h w
     return undistort_photo(photo, lens, camera)
 
 
-def _fit_size(width: int, height: int, longest: int) -> tuple[int, int]:
-    share = min(1.0, longest / max(width, height))
-    return max(1, round(width * share)), max(1, round(height * share))
-
-
 def _describe_photo(path: Path, key: str, options: SfmOptions) -> SfmPhoto:
     full = image_files.read_size(path)
-    width, height = _fit_size(*full, options.size)
+    width, height = image_files.fit_size(*full, options.size)
     pixels = convert_equivalent(options.focal, *full) if options.focal else read_focal_length(path)
     return SfmPhoto(path, key, full, width, height, pixels and pixels * width / full[0])
 
@@ -219,7 +214,7 @@ def _finish_registration(
         number = image.camera_id
         if number not in found:
             lens = pycolmap.Camera(best.cameras[number].todict())
-            lens.rescale(*_fit_size(*by_key[image.name].full, options.side))
+            lens.rescale(*image_files.fit_size(*by_key[image.name].full, options.side))
             found[number], pinholes[number] = lens, pycolmap.undistort_camera(limits, lens)
     sparse = model_from_reconstruction(best, pinholes=pinholes)
     numbers = {best.images[i].name: best.images[i].camera_id for i in best.reg_image_ids()}

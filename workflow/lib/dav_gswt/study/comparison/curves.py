@@ -14,7 +14,6 @@ CELL = ("scene", "seed", "preset", "policy", "prior", "p_drop", "lam", "k")
 MEASURES = ("psnr", "ssim", "lpips", "worst_psnr", "walker_psnr")
 ASIDE = ("oblique", "walker")  # groups of test views away from where photos may be taken
 EXPECTED = ("closes", "expected", "expected_low", "expected_high")  # predicted before a round: `marginal_gain`
-WORK = ("score", "select", "capture", "update")  # a round's jobs whose time counts; measuring does not
 
 
 def read_cell(cell: dict) -> list[dict]:

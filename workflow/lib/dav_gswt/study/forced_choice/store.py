@@ -22,10 +22,6 @@ class StoredPair:
     def check(self) -> bool:
         return self.about["b"] == CHECK
 
-    @property
-    def comparison(self) -> tuple[str, str]:
-        return self.about["a"], self.about["b"]
-
 
 def write_pairs(folder: Path | str, items: list[Item], origin: dict) -> None:
     """Write a scene's pairs; the folder appears whole or not at all. origin: its provenance."""
