@@ -8,6 +8,7 @@ import numpy as np
 import pycolmap
 from jaxtyping import Bool, Float, Float32, Int
 from numpy import ndarray as Array
+from scipy.sparse import csr_array
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
@@ -97,9 +98,10 @@ def reprojection_errors(model: ColmapModel) -> Float[Array, "m"]:
 
 def count_shared_points(model: ColmapModel) -> Int[Array, "images images"]:
     """How many points each pair of images sees in common; on the diagonal, how many each sees."""
-    sees = np.zeros((len(model.names), len(model.points)), np.float32)  # sums of ones: exact below 2^24
-    sees[model.image_of, model.point_of] = 1
-    return np.rint(sees @ sees.T).astype(int)
+    shape = len(model.names), len(model.points)
+    sees = csr_array((np.ones(len(model.image_of), np.int64), (model.image_of, model.point_of)), shape=shape)
+    sees.data[:] = 1  # a point may be seen twice in one image
+    return (sees @ sees.T).toarray()
 
 
 def triangulate_points(
@@ -230,17 +232,15 @@ def read_colmap_model(folder: Path | str) -> ColmapModel:
 
 def model_from_reconstruction(
     stored: pycolmap.Reconstruction,
-    names: Mapping[str, str] | None = None,
     pinholes: Mapping[int, pycolmap.Camera] | None = None,
 ) -> ColmapModel:
     """Arrays of a reconstruction, its images ordered by name.
 
-    names: what images are called from here on. pinholes: by the number of a camera the undistorted one that takes its
+    pinholes: by the number of a camera the undistorted one that takes its
     place; observations move with it.
     """
     ids = np.array(sorted(stored.points3D), np.int64)
-    registered = [(stored.images[i].name, i) for i in stored.reg_image_ids()]
-    found = sorted((names[name] if names else name, i) for name, i in registered)
+    found = sorted((stored.images[i].name, i) for i in stored.reg_image_ids())
     cameras, numbers, owners, pixels = [], [], [], []
     for i, (_, key) in enumerate(found):
         image = stored.images[key]
