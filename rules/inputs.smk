@@ -56,26 +56,38 @@ def scenes_by(*agents):
 
 
 def existing(path, where, hint=""):
-    """A path that the config names: as it stands, or below the repository. Raises: WorkflowError: it is not there."""
-    found = next((place for place in (Path(path), BASE / path) if place.exists()), None)
+    """A path that the config names (`locate`).
+
+    Raises: WorkflowError: it is not there, or is a file from the future, so that each result would be older than it.
+    """
+    found = locate(path)
     if found is None:
         raise WorkflowError(f"config: {where}: there is no {path}{hint}")
+    if found.is_file() and is_from_future(found):
+        raise WorkflowError(
+            f"config: {where}: {found} is dated in the future: correct this machine's clock, or touch it"
+        )
     return str(found)
 
 
-def files_in(folder):
-    """The files of a folder, as inputs: one that is added or removed is noticed."""
-    return sorted(str(path) for path in Path(folder).iterdir() if path.is_file() and not path.name.startswith("."))
+def files_in(folder, where):
+    """The files of a folder, as inputs: one that is added, removed or changed is noticed.
+
+    Raises: WorkflowError: it is no folder, cannot be read, or a file in it is from the future.
+    """
+    try:
+        names = [name for name in os.listdir(existing(folder, where)) if not name.startswith(".")]
+    except OSError as error:
+        raise WorkflowError(f"config: {where}: {folder} is no folder that can be read ({error.strerror})") from None
+    paths_in = (Path(existing(folder, where)) / name for name in sorted(names))
+    return [existing(path, where) for path in paths_in if path.is_file()]
 
 
-def dated(files, where):
-    """Files of the user. Raises: WorkflowError: one is from the future, so that each result would be older than it."""
-    ahead = next(filter(is_from_future, files), None)
-    if ahead is not None:
-        raise WorkflowError(
-            f"config: {where}: {ahead} is dated in the future: correct this machine's clock, or touch it"
-        )
-    return files
+def files_of_model(path, where):
+    """The files of another program's model, as inputs: of a folder its own and those of the folders in it."""
+    found = Path(existing(path, where))
+    nested = [folder for folder in [found, *found.glob("*/"), *found.glob("*/*/")] if folder.is_dir()]
+    return [file for folder in nested for file in files_in(folder, where)] if found.is_dir() else [str(found)]
 
 
 def lpips_weights(wildcards=None):
@@ -157,9 +169,12 @@ def branch(scene, policy=None, changes=None):
 def source_photos(wildcards):
     """A scene's photos and what its entry names beside them: masks, a model of another program."""
     scene, where = config["scenes"][wildcards.scene], f"scenes.{wildcards.scene}"
-    beside = {key: existing(scene[key], f"{where}.{key}") for key in ("masks", "model") if key in scene}
-    photos = files_in(existing(scene["folder"], f"{where}.folder"))
-    return {"photos": dated(photos, f"{where}.folder")} | beside
+    found = {"photos": files_in(scene["folder"], f"{where}.folder")}
+    if "masks" in scene:
+        found["masks"] = files_in(scene["masks"], f"{where}.masks")
+    if "model" in scene:
+        found["model"] = files_of_model(scene["model"], f"{where}.model")
+    return found
 
 
 def source_field(wildcards):
@@ -277,7 +292,16 @@ def story_of_field(wildcards):
 def height_map(wildcards):
     """The image that the terrain's surface is read from, where the config names one."""
     file = config["heights"].get("file")
-    return {"map": existing(file, "heights.file")} if file else {}
+    if not file:
+        return {}
+    from dav_gswt.terrain.heights import check_height_map  # here, not above: most plans need none
+
+    found = existing(file, "heights.file")
+    try:
+        check_height_map(found)
+    except InputError as error:
+        raise WorkflowError(f"config: heights.file: {error}") from None
+    return {"map": found}
 
 
 def class_pictures(wildcards):

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from dav_gswt.files import locate
 from dav_gswt.logs import logging_to
 from dav_gswt.photos.photo_set import prepare_photos
 from dav_gswt.photos.sfm.registration import choose_sfm_options
@@ -9,5 +10,5 @@ from dav_gswt.photos.sfm.registration import choose_sfm_options
 with logging_to(snakemake.log[0]):
     scene = snakemake.params.scene
     options = choose_sfm_options(scene, snakemake.threads)
-    out = Path(snakemake.output.frame).parent
-    prepare_photos(scene["folder"], out, options, scene.get("model"), scene.get("masks"))
+    folder, model, masks = (locate(scene[key]) if key in scene else None for key in ("folder", "model", "masks"))
+    prepare_photos(folder, Path(snakemake.output.frame).parent, options, model, masks)

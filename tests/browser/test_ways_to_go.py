@@ -6,7 +6,7 @@ import pytest
 
 OBLIQUE = dict(x=3.0, y=5.0, eye=2.0, yaw=20.0, pitch=-30.0)
 PAD = """window.pad = {
-  connected: true, axes: [0, 0, 0, 0], buttons: Array.from({ length: 17 }, () => ({ value: 0 })),
+  connected: true, mapping: "standard", axes: [0, 0, 0, 0], buttons: Array.from({ length: 17 }, () => ({ value: 0 })),
 };
 navigator.getGamepads = () => [null, window.pad];"""
 
@@ -69,6 +69,10 @@ def test_a_gamepad_walks_looks_and_rises(visit, plain):
     seen.until("davgswt.state.yaw < 15 && davgswt.state.pitch < -33")
     seen.page.evaluate("pad.axes = [0, 0, 0, 0]; pad.buttons[7].value = 1")
     seen.until("davgswt.state.eye > 2.3")
+    seen.page.evaluate("pad.buttons[7].value = 0; pad.mapping = ''; pad.axes = [0, 0, -1, 1]")
+    before = seen.state
+    seen.page.wait_for_timeout(100)
+    assert seen.state["yaw"] == before["yaw"], "triggers of an unknown layout may rest at -1"
 
 
 def test_the_map_shows_where_one_is_and_takes_one_elsewhere(moving):

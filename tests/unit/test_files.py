@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import pytest
 
 from dav_gswt import files
@@ -58,3 +60,23 @@ def test_a_folder_that_a_killed_run_had_moved_away_is_not_lost(tmp_path):
     with pytest.raises(RuntimeError), atomic_folder(tmp_path / "set"):
         raise RuntimeError
     assert (tmp_path / "set" / "a").read_text() == "old"
+
+
+def test_a_link_stays_a_link_to_the_folder_that_is_replaced(tmp_path):
+    (tmp_path / "far").mkdir()
+    (tmp_path / "near").symlink_to(tmp_path / "far")
+    for text in ("one", "two"):
+        with atomic_folder(tmp_path / "near") as part:
+            (part / "a").write_text(text)
+    assert (tmp_path / "near").is_symlink() and (tmp_path / "far/a").read_text() == "two"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["far", "near"]
+
+
+def test_a_path_of_the_config_may_lie_below_the_home_or_the_repository(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "photos").mkdir()
+    assert files.locate("~/photos") == tmp_path / "photos"
+    monkeypatch.chdir(tmp_path)
+    assert files.locate("photos") == Path("photos")
+    assert files.locate("config/config.yaml") == files.REPOSITORY / "config/config.yaml"
+    assert files.locate("nowhere") is None

@@ -257,7 +257,8 @@ def test_real_photos_find_their_places(beach, photo_sets):
     frame = read_json(beach.photos / "ground.json")
     given = len(list((photo_sets / "brighton_beach/images").glob("*.[jJ]*")))
     assert frame["kind"] == "photos" and frame["images"] == given
-    assert frame["registered"] >= 0.9 * given and not [x for x in frame["left_out"] if not x["reason"]]
+    assert frame["registered"] == given and not frame["left_out"]
+    assert frame["verdict"]["grade"] == "good" and frame["focal"]["used"] == pytest.approx(frame["focal"]["exif"])
 
 
 def test_a_replayed_round_takes_photos_of_the_pool(beach):

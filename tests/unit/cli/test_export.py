@@ -76,8 +76,8 @@ def test_a_radius_takes_the_cells_that_it_touches(result, tmp_path):
 
 
 def test_metres_are_metres(result, tmp_path):
-    assert run(result, "--radius", "8m", "--at", "2m", "2m", "--format", "ply", "-o", tmp_path) == 0  # 4 m a tile
-    assert facts_of(tmp_path)["cells"]["radius"] == 2.0 and facts_of(tmp_path)["cells"]["centre"] == [0.5, 0.5]
+    assert run(result, "--radius", "8m", "--at", "-2m", "2m", "--format", "ply", "-o", tmp_path) == 0  # 4 m a tile
+    assert facts_of(tmp_path)["cells"]["radius"] == 2.0 and facts_of(tmp_path)["cells"]["centre"] == [-0.5, 0.5]
 
 
 def test_the_ground_comes_with_it(result, tmp_path):

@@ -182,6 +182,22 @@ def test_a_scene_of_the_config_replaces_keys_of_its_file(tmp_path):
     assert scenes == {"sand": {"kind": "synthetic", "size": 64}, "other": {"kind": "field"}}
 
 
+def test_files_of_editors_and_file_systems_are_no_scenes(tmp_path):
+    (tmp_path / "sand.yml").write_text("{kind: synthetic}")
+    (tmp_path / "._sand.yaml").write_bytes(b"\0\5\x16\7")
+    (tmp_path / ".#sand.yaml").symlink_to(tmp_path / "gone")
+    assert add_scene_files({}, tmp_path)["scenes"] == {"sand": {"kind": "synthetic"}}
+
+
+def test_two_scenes_of_one_name_are_named(tmp_path):
+    (tmp_path / "sand.yaml").write_text("{kind: photos}")
+    with pytest.raises(InputError, match=r"sand\.yaml: the config has a scene sand of kind synthetic, too"):
+        add_scene_files({"scenes": {"sand": {"kind": "synthetic"}}}, tmp_path)
+    (tmp_path / "sand.yml").write_text("{kind: photos}")
+    with pytest.raises(InputError, match=r"sand\.yml: there is a scene of this name in sand\.yaml"):
+        add_scene_files({}, tmp_path)
+
+
 def test_the_commented_scenes_of_the_config_can_be_uncommented(root, tmp_path):
     text = (root / "config/config.yaml").read_text()
     (tmp_path / "config.yaml").write_text(re.sub(r"^# (?=scenes:|  my_)", "", text, flags=re.M))

@@ -37,6 +37,16 @@ def test_every_terrain_has_its_still_verdict_size_and_page(tmp_path, page):
     assert (tmp_path / "gallery/desert/index.html").is_file() and (tmp_path / "gallery/gallery.css").is_file()
 
 
+def test_a_gallery_is_replaced_and_nothing_else(tmp_path, page):
+    pages, out = [page("a", "Desert")], tmp_path / "gallery"
+    for _ in range(2):
+        write_gallery(pages, TEMPLATES, out)
+    (out / "CNAME").write_text("example.org")
+    with pytest.raises(InputError, match=r"CNAME is no part of a gallery, and would be deleted"):
+        write_gallery(pages, TEMPLATES, out)
+    assert (out / "CNAME").read_text() == "example.org" and (out / "desert/index.html").is_file()
+
+
 def test_terrains_of_one_name_have_folders_of_their_own(page):
     entries = list_entries([page("a", "Desert"), page("b", "desert"), page("c", "…")])
     assert [entry.folder for entry in entries] == ["desert", "desert-2", "terrain"]

@@ -202,9 +202,9 @@ def test_hills_are_measured_in_tile_sides():
 
 def test_an_image_too_large_is_refused_before_it_is_read(tmp_path, monkeypatch):
     image_files.write_png(tmp_path / "map.png", np.zeros((4, 5, 1)))
-    monkeypatch.setattr(heights, "MAX_PIXELS", 19)
+    monkeypatch.setattr(heights, "MAX_SIDE", 4)
     monkeypatch.setattr(image_files, "read_channel", None)
-    with pytest.raises(InputError, match=r"map\.png: 5 x 4 heights; at most 19"):
+    with pytest.raises(InputError, match=r"map\.png: 5 x 4 pixels; at most 4 a side"):
         heights.read_height_map(tmp_path / "map.png")
 
 

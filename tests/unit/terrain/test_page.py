@@ -152,10 +152,3 @@ def test_a_height_map_comes_with_its_pixels(tmp_path, viewer, bundle):
     stored = np.frombuffer((tmp_path / "page" / entry["file"]).read_bytes(), "<f4").reshape(2, 3)
     assert (stored == pixels).all() and entry["bytes"] == 24
     assert (entry["rows"], entry["columns"], entry["width"], entry["beyond"]) == (2, 3, 7.5, "clamp")
-
-
-def test_a_height_map_that_graphics_cards_refuse_is_named(tmp_path, viewer, bundle, monkeypatch):
-    monkeypatch.setattr(page, "MAX_SIDE", 2)
-    with pytest.raises(InputError, match="heights: 3 x 2 pixels; the page takes 2 a side"):
-        write_page(bundle, viewer, tmp_path / "page", HeightMap(np.zeros((2, 3), np.float32), 7.5))
-    assert not (tmp_path / "page").exists()

@@ -21,6 +21,8 @@ from dav_gswt.errors import InputError, summarize_error
 
 Record = TypeVar("Record")
 
+REPOSITORY = Path(__file__).parents[3]
+
 UNREADABLE = (  # what reading a damaged archive, or arrays in one, may end in
     OSError,
     ValueError,
@@ -69,9 +71,10 @@ def copy_file(source: Path | str, target: Path | str) -> None:
 def atomic_folder(path: Path | str):
     """A folder beside `path` to fill; it takes `path`'s place when the block ends well, and goes when it does not.
 
-    What stood at `path` stays until then, also if the last step fails.
+    What stood at `path` stays until then, also if the last step fails. A link stays one: the folder it leads to is
+    replaced.
     """
-    path = Path(path)
+    path = Path(path).resolve() if Path(path).is_symlink() else Path(path)
     part, old = path.with_name(f".{path.name}.part"), path.with_name(f".{path.name}.old")
     _restore_folder(path, part, old)  # after a run that was killed
     part.mkdir(parents=True)
@@ -90,6 +93,8 @@ def _restore_folder(path: Path, part: Path, old: Path) -> None:
     if old.exists() and not path.exists():
         old.rename(path)
     for rest in (part, old):
+        if rest.is_symlink():
+            rest.unlink()
         shutil.rmtree(rest, ignore_errors=True)
 
 
@@ -162,6 +167,12 @@ def require_file_name(name) -> str:
     if not plain or {"/", "\\"} & set(name):
         raise ValueError(f"{str(name)[:80]!r} is no name of a file")
     return name
+
+
+def locate(path: Path | str) -> Path | None:
+    """Where a path of the config is: as it stands (~ is the home), or below the repository; None: it is not there."""
+    given = Path(path).expanduser()
+    return next((place for place in (given, REPOSITORY / given) if place.exists()), None)
 
 
 def is_from_future(path: Path | str) -> bool:

@@ -22,7 +22,7 @@ export function createGamepads() {
       if (!any) return false;
       let moved = false;
       for (const pad of navigator.getGamepads()) {
-        if (!pad?.connected) continue;
+        if (!pad?.connected || pad.mapping !== "standard") continue; // of others nobody knows which axes rest at 0
         const [x, y, turn, tilt] = pad.axes, value = (/** @type {number} */ k) => pad.buttons[k]?.value ?? 0;
         const wish = {
           forward: -push(y), right: push(x), turn: -push(turn), tilt: -push(tilt),

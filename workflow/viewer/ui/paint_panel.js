@@ -91,8 +91,9 @@ export function createPaintPanel(viewer) {
   addEventListener("keydown", (event) => {
     if (toggle.hidden || event.altKey) return;
     if (event.ctrlKey || event.metaKey) {
-      const redoes = event.code === "KeyY" || (event.code === "KeyZ" && event.shiftKey);
-      if (!redoes && event.code !== "KeyZ") return;
+      const letter = /^[a-z]$/i.test(event.key) ? event.key.toLowerCase() : event.code.slice(3).toLowerCase(); // layouts exchange Z and Y
+      const redoes = letter === "y" || (letter === "z" && event.shiftKey);
+      if (!redoes && letter !== "z") return;
       event.preventDefault();
       return redoes ? again() : take();
     }

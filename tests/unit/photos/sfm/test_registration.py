@@ -342,10 +342,3 @@ def test_the_photos_folder_is_whole(photos, tmp_path):
     for name, camera in zip(stored.names, stored.cameras, strict=True):
         assert image_files.read_size(tmp_path / "out" / "images" / name) == (camera.width, camera.height)
     assert np.median([c.centre[2] for c in stored.cameras]) == pytest.approx(1, abs=1e-9)
-
-
-def test_brighton_beach_registers_at_half_size(photo_sets):
-    found = register_photos(photo_sets / "brighton_beach/images", SfmOptions(512, 2048, side=512))
-    assert len(found.model.names) == 18 and not found.left_out
-    assert found.focal_ratio == pytest.approx(1, abs=1e-12) and found.error < 0.5
-    assert found.verdict.grade == "good"

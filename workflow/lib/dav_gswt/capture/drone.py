@@ -73,6 +73,6 @@ def _check_level(
     if off > rules.clearance / 2:
         raise InputError(
             f"scenes.{site.name}: the ground slopes by {place.slope:.1f} degrees, so that altitudes of a mission over "
-            f"level ground would be wrong by up to {off:.1f} m; set flight.clearance above {2 * off:.0f} if there is "
-            "room to spare everywhere, or take agent: handheld"
+            f"level ground would be wrong by up to {off:.1f} m; set scenes.{site.name}.drone.clearance "
+            f"above {2 * off:.0f} if there is room to spare everywhere, or take agent: handheld"
         )

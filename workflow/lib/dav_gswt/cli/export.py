@@ -22,6 +22,7 @@ def add_command(commands) -> None:
     parser = commands.add_parser("export", help=about, description=__doc__)
     parser.add_argument("path", type=Path, help="a page folder, a bundle, or a folder of results/: its newest page")
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="FOLDER", help="gets terrain/ and ground/")
+    parser._negative_number_matcher = re.compile(r"^-(\d+\.?\d*|\.\d+) ?m?$")  # -12m is a length, no option
     names = (*get_args(Format), GROUND)
     parser.add_argument(
         "--format", action="append", choices=names, dest="formats", metavar="NAME", help=f"any of {', '.join(names)}"

@@ -56,7 +56,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def load_config(overlays: list[Path], changes: dict | None = None) -> dict:
     """The config of this folder with all defaults, as the workflow reads it."""
-    return check_config(add_scene_files(read_config([CONFIG, STUDY, *overlays], changes), SCENES))
+    return check_config(add_scene_files(read_config([STUDY, CONFIG, *overlays], changes), SCENES))
 
 
 def list_presets(overlays: list[Path]) -> list[str]:

@@ -40,9 +40,21 @@ def merge_tables(below: dict, above: dict) -> dict:
 
 
 def add_scene_files(config: dict, folder: Path) -> dict:
-    """The config with the scenes of config/scenes/*.yaml; keys of `scenes` replace those of a file."""
-    files = {path.stem: _read_yaml(path) for path in sorted(folder.glob("*.yaml"))}
-    return config | {"scenes": merge_tables(files, config.get("scenes") or {})}
+    """The config with the scenes of config/scenes/*.yaml (or .yml); keys of `scenes` replace those of a file.
+
+    Raises: InputError: a file is no YAML, two have one name, or the config has a scene of that name of another kind.
+    """
+    scenes, own = {}, config.get("scenes") or {}
+    for path in sorted([*folder.glob("*.yaml"), *folder.glob("*.yml")]):
+        if path.name.startswith("."):  # of an editor or a file system
+            continue
+        if path.stem in scenes:
+            raise InputError(f"{path}: there is a scene of this name in {path.stem}.yaml, too; remove one of them")
+        scenes[path.stem] = scene = _read_yaml(path)
+        kinds = [table.get("kind") for table in (scene, own.get(path.stem) or {}) if isinstance(table, dict)]
+        if len(kinds) == 2 and all(kinds) and kinds[0] != kinds[1]:
+            raise InputError(f"{path}: the config has a scene {path.stem} of kind {kinds[1]}, too; rename this file")
+    return config | {"scenes": merge_tables(scenes, own)}
 
 
 def parse_command_line(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -220,7 +220,7 @@ class FieldScene(_Scene):
     """A finished 3D Gaussian splatting file instead of photos."""
 
     kind: Literal["field"]
-    field: Annotated[str, Field(pattern=r"\.ply$")] = key("a finished 3D Gaussian splatting `.ply`")
+    field: Annotated[str, Field(pattern=r"\.[pP][lL][yY]$")] = key("a finished 3D Gaussian splatting `.ply`")
     up: tuple[float, float, float] = key(
         "a direction that points roughly up in the file", (0.0, -1.0, 0.0), strict=False
     )

@@ -13,8 +13,7 @@ from dav_gswt.bundle.store import Bundle
 from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.terrain.class_rules import Picture
 from dav_gswt.terrain.endless import EndlessTerrain, terrain_from_fields
-from dav_gswt.terrain.heights import FlatSurface, HeightField, HeightMap, Hills
-from dav_gswt.terrain.page import MAX_SIDE
+from dav_gswt.terrain.heights import MAX_SIDE, FlatSurface, HeightField, HeightMap, Hills
 from dav_gswt.terrain.sphere import Sphere
 
 

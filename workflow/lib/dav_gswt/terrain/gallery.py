@@ -32,11 +32,12 @@ def write_gallery(pages: Sequence[Path | str], template_dir: Path | str, out_dir
     """Copy pages into `out_dir`, a folder each, with a page over all of them; whole or not at all.
 
     pages: folders as `write_page` makes them with a front, in the order in which they are shown.
-    Raises: InputError: there is no page, or a folder is none with a front.
+    Raises: InputError: there is no page, a folder is none with a front, or `out_dir` holds what is of no gallery.
     """
     if not pages:
         raise InputError("there is no page yet that a gallery could show: type `make run` first")
     entries = list_entries(pages)
+    _keep_foreign_files(Path(out_dir))
     with atomic_folder(out_dir) as part:
         for entry in entries:
             shutil.copytree(entry.page, part / entry.folder, ignore=shutil.ignore_patterns(".*"))
@@ -44,6 +45,16 @@ def write_gallery(pages: Sequence[Path | str], template_dir: Path | str, out_dir
         (part / TEMPLATE).write_text(html, encoding="utf-8")
         shutil.copyfile(Path(template_dir) / STYLE, part / STYLE)
     return entries
+
+
+def _keep_foreign_files(folder: Path) -> None:
+    """Raises: InputError: the folder, which is replaced as a whole, holds what no gallery put there."""
+    for path in sorted(folder.iterdir()) if folder.is_dir() else []:
+        if path.name not in (TEMPLATE, STYLE) and not (path / FRONT).is_file():
+            raise InputError(
+                f"{path} is no part of a gallery, and would be deleted with the old one: move it, or name another "
+                "folder with --out"
+            )
 
 
 def list_entries(pages: Sequence[Path | str]) -> list[Entry]:

@@ -13,6 +13,7 @@ from jaxtyping import Float, Float32, Int64
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
+from dav_gswt.files import locate
 from dav_gswt.images import image_files
 from dav_gswt.terrain.choice import hash_cell
 from dav_gswt.terrain.sphere import make_sphere
@@ -21,7 +22,7 @@ HILLS = 3  # axis of the hash of octave 0, after west, south and centre; octave 
 GAIN = 0.4  # height of an octave over that of the one twice as wide
 SHIFT = (0.37, 0.71)  # of each octave against the last, in its own cells; else all are 0 at the corners of the first
 STEEPEST = 2.75  # upper bound of the slope of the noise, per cell, over all gradients at the corners
-MAX_PIXELS = 67_108_864  # of a height map: 8192 x 8192
+MAX_SIDE = 4096  # pixels along a side of a height map: every WebGL2 device in use takes textures of this size
 
 
 @runtime_checkable
@@ -163,23 +164,29 @@ def surface_from_config(entry: dict, side: float) -> HeightField:
         return make_sphere(entry["radius"], side)
     if entry["kind"] == "hills":
         return Hills(entry["height"] * side, entry["wavelength"] * side, entry.get("octaves", 4), entry.get("seed", 0))
-    pixels = read_height_map(entry["file"]) * np.float32(entry["height"])
+    pixels = read_height_map(locate(entry["file"]) or entry["file"]) * np.float32(entry["height"])
     return HeightMap(pixels, float(entry["width"]), entry.get("beyond", "mirror"))
 
 
 def read_height_map(path: Path | str) -> Float32[Array, "rows columns"]:
     """The first channel of a height map: integers scaled to [0, 1], floats unchanged.
 
-    Raises: InputError: not readable, more than MAX_PIXELS (checked before allocation), or a pixel is not finite.
+    Raises: InputError: not readable, more than MAX_SIDE pixels along a side (checked before allocation), or a pixel is
+    not finite.
     """
-    width, height = image_files.read_size(path)
-    if width * height > MAX_PIXELS:
-        raise InputError(f"{path}: {width} x {height} heights; at most {MAX_PIXELS} are read: shrink the image")
+    check_height_map(path)
     pixels = image_files.read_channel(path)
     if len(bad := np.argwhere(~np.isfinite(pixels))):
         row, column = bad[0]
         raise InputError(f"{path}: the height in row {row}, column {column} is not finite ({len(bad)} such); fill it")
     return pixels
+
+
+def check_height_map(path: Path | str) -> None:
+    """Raises: InputError: not readable as an image, or more than MAX_SIDE pixels along a side."""
+    width, height = image_files.read_size(path)
+    if max(width, height) > MAX_SIDE:
+        raise InputError(f"{path}: {width} x {height} pixels; at most {MAX_SIDE} a side are read: shrink the image")
 
 
 def _spline_weights(u: Float[Array, "n"]):

@@ -20,7 +20,6 @@ from dav_gswt.terrain.sphere import Sphere, require_plain_cover
 SURFACE = "heights.bin"
 INDEX = "index.html"
 OWN_SCRIPTS = ("early.js", "worker/", "api/", "terrain_api.js")  # that are no modules of the page itself
-MAX_SIDE = 4096  # pixels along a side of a height map: every WebGL2 device in use takes textures of this size
 
 
 def write_page(
@@ -83,10 +82,7 @@ def find_viewer(paths: Iterable[Path | str]) -> Path:
 
 
 def describe_surface(surface: HeightField) -> tuple[dict, bytes]:
-    """The `heights` entry of the page's manifest, and the bytes of the height map's pixels (empty without one).
-
-    Raises: InputError: more than MAX_SIDE pixels along a side.
-    """
+    """The `heights` entry of the page's manifest, and the bytes of the height map's pixels (empty without one)."""
     if isinstance(surface, Hills):
         names = ("height", "wavelength", "octaves", "salt")
         return {"kind": "hills"} | {name: getattr(surface, name) for name in names}, b""
@@ -95,8 +91,6 @@ def describe_surface(surface: HeightField) -> tuple[dict, bytes]:
     if not isinstance(surface, HeightMap):
         return {"kind": "flat"}, b""
     rows, columns = surface.pixels.shape
-    if max(rows, columns) > MAX_SIDE:
-        raise InputError(f"heights: {columns} x {rows} pixels; the page takes {MAX_SIDE} a side: shrink the image")
     data = surface.pixels.astype("<f4").tobytes()
     entry = {"kind": "image", "file": SURFACE, "rows": rows, "columns": columns}
     entry |= {"width": surface.width, "beyond": surface.beyond, "bytes": len(data)}
