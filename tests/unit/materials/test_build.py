@@ -112,10 +112,12 @@ def test_the_same_seed_gives_the_same_gaussians(found):
         np.testing.assert_array_equal(one.field.sh, two.field.sh)
 
 
-def test_a_field_without_ground_is_refused():
-    field = made.field()
-    with pytest.raises(InputError, match="no ground layer.*materials: one"):
-        build.find_materials(replace(field, ground=np.zeros(len(field), bool)), made.grid(), 0)
+def test_a_field_without_a_ground_layer_is_tiled_as_one(caplog):
+    """Of ground so rough that no height field explains it, or imported."""
+    field = replace(made.field(), ground=np.zeros(len(made.field()), bool))
+    found = build.find_materials(field, made.grid(), 0)
+    assert found.materials[0].field is field and len(found.materials) == 1 and not found.objects
+    assert "no ground layer: all of the ground is tiled as one" in caplog.text
 
 
 def test_ground_of_which_nothing_is_left_is_tiled_as_one(monkeypatch, caplog):

@@ -9,7 +9,7 @@ from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
 from dav_gswt.photos import splitting
-from dav_gswt.photos.splitting import find_aim_point, ground_bounds, measure_visible_share, split_views
+from dav_gswt.photos.splitting import find_aim_point, ground_bounds, measure_visible_share, shows_enough, split_views
 
 FRAME = scene_frame(exemplar=(-0.6, -0.6, 1.2))
 
@@ -129,3 +129,19 @@ def test_photos_of_all_ground_take_part_where_all_of_it_is_in_question(flown):
     assert sum(len(part) for part in astuple(parts)) == 30
     aims = np.array([find_aim_point(flown.camera(name)) for name in parts.test])
     assert np.ptp(aims[:, 0]) > 0.6
+
+
+def test_a_picture_that_shows_little_else_takes_part_however_wide_the_ground_is():
+    camera = synth.camera((0.0, 0.0, 1.0), (0.0, 1e-3, 0.0))
+    wide, narrow = (-9.0, -9.0, 9.0, 9.0), (0.4, 0.4, 9.0, 9.0)
+    assert measure_visible_share(camera, wide) < splitting.MIN_VISIBLE_SHARE
+    assert shows_enough(camera, wide) and not shows_enough(camera, narrow)
+    assert not shows_enough(synth.camera((0.0, 0.0, 1.0), (0.0, 1e-3, 2.0)), wide), "it looks at the sky"
+
+
+def test_with_many_to_start_from_photos_of_other_ground_stay_out():
+    """A road that is longer than the exemplar, and a start of more photos than there are."""
+    cameras = synth.flight(2, 5, step=0.2) + [synth.camera((5.0 + i, 0, 1), (5.0 + i, 1e-3, 0)) for i in range(20)]
+    model = synth.model(cameras, synth.plain(500, 0.6, np.random.default_rng(1)))
+    parts = split(model, start=1000, frame=scene_frame(exemplar=(-0.5, -0.5, 1.0)))
+    assert len(parts.start) + len(parts.test) == 10 and not parts.pool

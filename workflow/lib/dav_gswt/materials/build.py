@@ -11,7 +11,6 @@ from jaxtyping import Bool, Float
 from numpy import ndarray as Array
 from scipy.ndimage import distance_transform_edt
 
-from dav_gswt.errors import InputError
 from dav_gswt.field import GaussianField
 from dav_gswt.logs import progress
 from dav_gswt.materials import extraction, mask_images, outlines, segmentation, verdict
@@ -108,13 +107,13 @@ def find_materials(
     mask_files: by material, or `exclude`; see `mask_images`. segmenter: of the outlines of objects; None: they are cut
     by colour and height.
 
-    Ground of one material without objects is given back as it is. So is, with a warning, ground of which nothing would
-    be left to tile.
-    Raises: InputError: the field has no ground layer (one that was imported).
+    Ground of one material without objects is given back as it is. So are, with a warning, ground of which nothing would
+    be left to tile, and a field without a ground layer (one that was imported, or of ground too rough for a layer).
     """
-    if not field.ground.any():
-        raise InputError("materials: this field has no ground layer; use `materials: one` in its scene")
     maps = measure_ground(field, grid)
+    if not field.ground.any():
+        _log.warning("materials: this field has no ground layer: all of the ground is tiled as one")
+        return _keep_whole(field, grid, maps)
     masks = mask_images.read_masks(mask_files, maps.cells) if mask_files else None
     classes = _refine_objects(maps, classify_ground(maps, masks), segmenter)
     sources = [_ignore_scarce(classes, k) for k in range(classes.number)]

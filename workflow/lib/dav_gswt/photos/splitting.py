@@ -17,7 +17,8 @@ _log = logging.getLogger(__name__)
 TEST_SHARE = 0.1
 LEAST_TEST = 2
 LEAST_WITH_TEST = 6  # photos, below which none can be spared for testing
-MIN_VISIBLE_SHARE = 0.05  # of the ground in question that an image must see
+MIN_VISIBLE_SHARE = 0.05  # of the ground in question that an image must see,
+MIN_PICTURE_SHARE = 0.5  # or so much of its picture must show that ground, which may be wider than many pictures
 LINK = 30  # points that a start view shares with one chosen before: enough to fix its place among them
 
 
@@ -30,16 +31,17 @@ def split_views(
     """Names of the start views, the pool and the test views.
 
     whole: all ground that the photos see is in question, not the exemplar alone.
-    Only images that see at least MIN_VISIBLE_SHARE of it take part: others show ground that no tile is made of. Where
-    too few would remain, all take part.
+    Only images that see at least MIN_VISIBLE_SHARE of it, or little else, take part: others show ground that no tile is
+    made of. Where too few would remain, all take part.
     Test views are those that ground.json names; where it names none, about one photo in ten, at least two, spread over
     the ground in question: the same whatever the seed. Start views are `start` others, or as many as there are.
     Raises: InputError: ground.json names a test view that is no image, or no view is left to start from.
     """
     given = _read_test_names(model, frame)
     ground = ground_bounds(frame, whole)
-    sees = [i for i, camera in enumerate(model.cameras) if measure_visible_share(camera, ground) >= MIN_VISIBLE_SHARE]
-    among = sees if len(sees) >= start + LEAST_TEST else list(range(len(model.names)))
+    sees = [i for i, camera in enumerate(model.cameras) if shows_enough(camera, ground)]
+    enough = len(sees) >= min(start, LEAST_WITH_TEST) + LEAST_TEST
+    among = sees if enough else list(range(len(model.names)))
     test = given if given is not None else choose_test_views(model, ground, among)
     others = [i for i in among if i not in test]
     if not others:
@@ -101,6 +103,25 @@ def ground_bounds(frame: SceneFrame, whole: bool) -> Bounds:
         return extent.west, extent.south, extent.east, extent.north
     square = frame.exemplar
     return square.west, square.south, square.east, square.north
+
+
+def shows_enough(camera: Camera, ground: Bounds) -> bool:
+    """Whether a picture shows enough of the ground, or the ground fills enough of the picture."""
+    if measure_visible_share(camera, ground) >= MIN_VISIBLE_SHARE:
+        return True
+    return measure_picture_share(camera, ground) >= MIN_PICTURE_SHARE
+
+
+def measure_picture_share(camera: Camera, ground: Bounds, grid: int = 16) -> float:
+    """The share of a picture that shows the plane z = 0 between these bounds."""
+    west, south, east, north = ground
+    at = (np.arange(grid) + 0.5) / grid
+    x, y = np.meshgrid((at * camera.width - camera.cx) / camera.fx, (at * camera.height - camera.cy) / camera.fy)
+    rays = np.stack([x.ravel(), y.ravel(), np.ones(x.size)], 1) @ camera.rotation
+    falls = rays[:, 2] * camera.centre[2] < 0
+    hits = camera.centre[:2] - rays[:, :2] * (camera.centre[2] / np.where(falls, rays[:, 2], 1.0))[:, None]
+    inside = (hits > [west, south]).all(1) & (hits < [east, north]).all(1)
+    return float((inside & falls).mean())
 
 
 def measure_visible_share(camera: Camera, ground: Bounds, grid: int = 16) -> float:

@@ -15,6 +15,7 @@ from dav_gswt.reconstruction import discs, ground, objects, underlay
 from dav_gswt.reconstruction.fit_settings import CoarseSettings
 from dav_gswt.reconstruction.fitting import trainer
 from dav_gswt.reconstruction.fitting.constraints import FreeConstraints
+from dav_gswt.reconstruction.fitting.exposure import equalize_exposure
 from dav_gswt.reconstruction.fitting.plan import AUTO, FitReport
 from dav_gswt.reconstruction.fitting.trainer import DEFAULT_OPTIONS, FitOptions
 from dav_gswt.reconstruction.ground import Ground
@@ -102,8 +103,10 @@ def _fit_free_field(
     """Fit Gaussians that no ground holds, for a scene without a ground."""
     plan = settings.plan_coarse_fit(len(given.views), HALF_SHARE)
     start, constraints = _start_from_points(given.points, given.colours, settings)
-    fit = trainer.fit_field(start, given.views, plan, constraints, rng, replace(options, name="fit free field"))
-    return Reconstruction(*finish_field(fit.field, grid, given.views), fit.report)
+    real = given.frame.kind == "photos"
+    views = equalize_exposure(given.views, given.points) if real else given.views
+    fit = trainer.fit_field(start, views, plan, constraints, rng, replace(options, name="fit free field"))
+    return Reconstruction(*finish_field(fit.field, grid, views), fit.report)
 
 
 def finish_field(fitted: GaussianField, grid: Ground, views: list[TrainingView]) -> tuple[GaussianField, Ground]:

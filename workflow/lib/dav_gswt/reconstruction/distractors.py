@@ -19,25 +19,31 @@ _log = logging.getLogger(__name__)
 MIN_PHOTOS = 4  # that see a point
 MAX_DEVIATIONS = 6.0  # median deviations from the median
 MIN_DIFFERENCE = 0.12  # of the range of colours
-MAX_SHARE = 0.2  # of a photo's pixels: more is not a distractor, but a photo that fits nowhere
+NOTABLE_SHARE = 0.2  # of a photo's pixels, beyond which the log warns: a large shadow, or a wrong place
 
 
-def mask_distractors(views: list[TrainingView], points: Float[Array, "n 3"]) -> list[TrainingView]:
-    """The views with weight 0 where they disagree with the others on the surface's points."""
+def mask_distractors(views: list[TrainingView], points: Float[Array, "n 3"], spacing: float) -> list[TrainingView]:
+    """The views with weight 0 where they disagree with the others on the surface's points, `spacing` apart."""
     masks = [np.zeros(v.image.shape[:2], bool) for v in views]
+    reach = [1] * len(views)  # pixels around a point that are its own
     for part in chunk_points(points, views):
         seen = sample_all_views(part, views)
-        for view, mask, odd in zip(views, masks, find_disagreeing(seen), strict=True):
-            pixel, _ = view.camera.project(part[odd])
-            mask[pixel[:, 1].astype(int), pixel[:, 0].astype(int)] = True
+        for i, odd in enumerate(find_disagreeing(seen)):
+            if odd.any():
+                pixel, depth = views[i].camera.project(part[odd])
+                masks[i][pixel[:, 1].astype(int), pixel[:, 0].astype(int)] = True
+                wide = spacing * views[i].camera.fx / float(np.median(depth))
+                reach[i] = max(reach[i], int(np.ceil(wide / 2)))
     out = []
-    for view, mask in zip(one_by_one(views), masks, strict=True):
-        mask = binary_dilation(mask, np.ones((3, 3), bool)) if mask.any() else mask
+    for view, mask, own in zip(one_by_one(views), masks, reach, strict=True):
+        mask = binary_dilation(mask, np.ones((2 * own + 1, 2 * own + 1), bool)) if mask.any() else mask
         share = float(mask.mean())
-        if share > MAX_SHARE:
-            _log.warning("%s differs from the other photos over %.0f %% of its pixels", view.name, 100 * share)
+        if share > NOTABLE_SHARE:
+            said = "%s differs from the other photos over %.0f %% of its pixels, which do not count"
+            _log.warning(said, view.name, 100 * share)
         elif share > 0:
             _log.info("%s: %.2f %% of its pixels show what no other photo shows", view.name, 100 * share)
+        if share > 0:
             view = view.with_pixels(weight=view.weight * ~mask)
         out.append(view)
     return out

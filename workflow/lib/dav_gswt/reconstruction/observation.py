@@ -42,7 +42,7 @@ def observe(frame: SceneFrame, grid: Ground, views: list[TrainingView]) -> Obser
     relief = sweep_heights(grid, views, frame.flying_height, pixel_size(frame, views))
     if frame.kind == "photos":
         open_ground = ~(relief.onto(grid, relief.stands.astype(float)) > 0.1)
-        views = distractors.mask_distractors(views, grid.centres[open_ground.ravel()])
+        views = distractors.mask_distractors(views, grid.centres[open_ground.ravel()], grid.spacing)
     return Observation(views, relief)
 
 
