@@ -11,6 +11,7 @@ from dav_gswt.geometry import cameras
 from dav_gswt.lod import build, merge, store
 from dav_gswt.lod.levels import AUTO, Levels
 from dav_gswt.raster import render
+from dav_gswt.reconstruction.observation import mask_to_ground
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +39,18 @@ def test_discs_keep_the_mean_heights_of_what_they_cover():
     rows, columns = coarse.shape
     four = grid.heights.reshape(rows, 2, columns, 2).mean((1, 3))
     np.testing.assert_allclose(level.means[: four.size, 2].reshape(four.shape), four, atol=1e-6)
+
+
+def test_low_ground_has_no_dark_rim_in_what_coarser_levels_are_fitted_to():
+    """Below z = 0, rays that meet that plane inside the grid pass beside the field."""
+    field, grid = merge.crop_to_blocks(made.field(), made.grid(), 4)
+    low = np.float32(0.06 * grid.cells * grid.spacing)
+    sunk = replace(field, means=field.means - np.float32([0, 0, low])), replace(grid, heights=grid.heights - low)
+    views = mask_to_ground(build.render_neighbour_views(*sunk), sunk[1])
+    counted = np.concatenate([view.image[view.weight > 0] for view in views])
+    # a splat's rim of opacity .9 is divided by it, so nothing that counts is darker than the ground itself
+    assert counted.mean(1).min() > 0.7 * field.base_colours.mean(1).min()
+    assert len(counted) > 0.5 * sum((view.weight >= 0).sum() for view in views) / len(views)
 
 
 def test_levels_are_fitted_while_the_exemplar_has_room():

@@ -28,6 +28,7 @@ from dav_gswt.reconstruction.observation import mask_to_ground
 _log = logging.getLogger(__name__)
 
 MIN_CELLS = 32  # cells that the exemplar is wide at least at a level that is fitted: coarser ones are made tile by tile
+COVERED = 0.9  # opacity of a pixel that a coarser level is fitted to
 MAX_SHARE = 0.5  # of a level's Gaussians that the next one may have at most
 ELEVATIONS = (90.0, 50.0, 20.0, 6.0)  # degrees: pictures the coarser level is fitted to, down to eye level
 AZIMUTHS = 6  # azimuths of each elevation but the zenith's
@@ -97,15 +98,18 @@ def fit_coarser_level(
 def render_neighbour_views(field: GaussianField, coarse: Ground) -> list[TrainingView]:
     """Render the pictures that a coarser level is fitted to: PIXELS_PER_DISC pixels a coarse disc.
 
-    They are rendered at twice the size and averaged, so that splats finer than a pixel do not alias.
+    They are rendered at twice the size and averaged, so that splats finer than a pixel do not alias. Pixels that the
+    field hardly covers do not count: over low ground rays pass the field's border before they are below z = 0.
     """
     rasterizer, views = raster.Rasterizer(), []
     for number, camera in enumerate(_neighbour_cameras(coarse)):
         fine = camera.resized(2 * camera.width, 2 * camera.height)
         render = rasterizer.forward(**to_raster_arrays(field), camera=fine)
         colour = render.colour / np.maximum(render.alpha, 0.5)[..., None]  # without the background
-        image = image_files.shrink_image(np.clip(colour, 0, 1).astype(np.float32), camera.width, camera.height)
-        views.append(TrainingView(f"neighbour_{number}", camera, image, np.ones(image.shape[:2], np.float32)))
+        size = camera.width, camera.height
+        image = image_files.shrink_image(np.clip(colour, 0, 1).astype(np.float32), *size)
+        covered = image_files.shrink_image(render.alpha[..., None], *size)[..., 0] > COVERED
+        views.append(TrainingView(f"neighbour_{number}", camera, image, covered.astype(np.float32)))
     return views
 
 
