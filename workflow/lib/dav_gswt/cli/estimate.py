@@ -13,6 +13,7 @@ from typing import Any
 from dav_gswt.cli.machine_speed import MachineSpeed
 from dav_gswt.config.base import LARGEST_SIDE
 from dav_gswt.errors import InputError
+from dav_gswt.files import locate
 from dav_gswt.images.image_files import read_size
 from dav_gswt.reconstruction.fitting import plan
 from dav_gswt.views.policy_names import PRIOR_POLICIES
@@ -243,7 +244,7 @@ def measure_photos(scene: Mapping[str, Any]) -> tuple[int, float]:
 
 
 def _list_files(scene: Mapping[str, Any]) -> list[Path]:
-    folder = Path(scene.get("folder", ""))
+    folder = locate(scene.get("folder", ""))
     if scene["kind"] != "photos" or not folder.is_dir():
         return []
     return sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))

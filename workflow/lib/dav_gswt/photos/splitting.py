@@ -40,7 +40,7 @@ def split_views(
     given = _read_test_names(model, frame)
     ground = ground_bounds(frame, whole)
     sees = [i for i, camera in enumerate(model.cameras) if shows_enough(camera, ground)]
-    enough = len(sees) >= min(start, LEAST_WITH_TEST) + LEAST_TEST
+    enough = len(sees) >= min(start, LEAST_WITH_TEST + LEAST_TEST) + LEAST_TEST
     among = sees if enough else list(range(len(model.names)))
     test = given if given is not None else choose_test_views(model, ground, among)
     others = [i for i in among if i not in test]
