@@ -11,8 +11,11 @@ PYTHON ?= python3
 export OMP_WAIT_POLICY ?= PASSIVE
 BIN := .venv/bin
 
-.PHONY: reference run view gallery test compare bench docs prior compiler sanitize faults fuzz
+.PHONY: setup reference run view gallery test compare bench docs prior compiler sanitize faults fuzz
 .DELETE_ON_ERROR:
+
+# .venv alone
+setup: .venv/installed
 
 run: .venv/installed
 	@$(BIN)/python -m dav_gswt.cli.run --cores $(CORES) $(if $(SCENE),--scene $(SCENE))

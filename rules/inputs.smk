@@ -58,16 +58,21 @@ def scenes_by(*agents):
 def existing(path, where, hint=""):
     """A path that the config names (`locate`).
 
-    Raises: WorkflowError: it is not there, or is a file from the future, so that each result would be older than it.
+    Raises: WorkflowError: it is not there, or is a file from the future.
     """
-    found = locate(path)
-    if found is None:
+    found = locate(path, BASE)
+    if not found.exists():
         raise WorkflowError(f"config: {where}: there is no {path}{hint}")
-    if found.is_file() and is_from_future(found):
+    return dated(found, where)
+
+
+def dated(path, where):
+    """A path, as text. Raises: WorkflowError: a file from the future, so that each result would be older than it."""
+    if path.is_file() and is_from_future(path):
         raise WorkflowError(
-            f"config: {where}: {found} is dated in the future: correct this machine's clock, or touch it"
+            f"config: {where}: {path} is dated in the future: correct this machine's clock, or touch it"
         )
-    return str(found)
+    return str(path)
 
 
 def files_in(folder, where):
@@ -75,19 +80,21 @@ def files_in(folder, where):
 
     Raises: WorkflowError: it is no folder, cannot be read, or a file in it is from the future.
     """
+    found = Path(existing(folder, where))
     try:
-        names = [name for name in os.listdir(existing(folder, where)) if not name.startswith(".")]
+        files = [found / name for name in sorted(os.listdir(found)) if not name.startswith(".")]
     except OSError as error:
         raise WorkflowError(f"config: {where}: {folder} is no folder that can be read ({error.strerror})") from None
-    paths_in = (Path(existing(folder, where)) / name for name in sorted(names))
-    return [existing(path, where) for path in paths_in if path.is_file()]
+    return [dated(path, where) for path in files if path.is_file()]
 
 
 def files_of_model(path, where):
     """The files of another program's model, as inputs: of a folder its own and those of the folders in it."""
     found = Path(existing(path, where))
-    nested = [folder for folder in [found, *found.glob("*/"), *found.glob("*/*/")] if folder.is_dir()]
-    return [file for folder in nested for file in files_in(folder, where)] if found.is_dir() else [str(found)]
+    if not found.is_dir():
+        return [str(found)]
+    folders = [found, *found.glob("[!.]*"), *found.glob("[!.]*/[!.]*")]
+    return [file for folder in folders if folder.is_dir() for file in files_in(folder, where)]
 
 
 def lpips_weights(wildcards=None):

@@ -10,5 +10,5 @@ from dav_gswt.photos.sfm.registration import choose_sfm_options
 with logging_to(snakemake.log[0]):
     scene = snakemake.params.scene
     options = choose_sfm_options(scene, snakemake.threads)
-    folder, model, masks = (locate(scene[key]) if key in scene else None for key in ("folder", "model", "masks"))
-    prepare_photos(folder, Path(snakemake.output.frame).parent, options, model, masks)
+    model, masks = (locate(scene[key]) if key in scene else None for key in ("model", "masks"))
+    prepare_photos(locate(scene["folder"]), Path(snakemake.output.frame).parent, options, model, masks)

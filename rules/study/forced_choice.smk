@@ -5,7 +5,7 @@ forced_choice/{scene}/pairs; forced_choice/kit/page, a page that works offline a
 kit/key.json, which does; results/tables/forced_choice.csv and its figure. `snakemake perceptual_kit`, `perceptual_results`.
 """
 
-PAGE_PARTS = files_in(BASE / "workflow/forced_choice", "forced_choice")
+PAGE_PARTS = sorted(str(path) for path in (BASE / "workflow/forced_choice").iterdir() if path.is_file())
 ANSWERS_SCHEMA = str(BASE / "workflow/schemas/answers.schema.json")
 
 

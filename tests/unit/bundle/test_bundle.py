@@ -233,9 +233,18 @@ def test_a_tile_without_splats_is_refused_and_nothing_is_left(tiles, tmp_path):
 
 
 def test_more_splats_than_the_renderer_takes_are_refused(tiles, tmp_path, monkeypatch):
-    monkeypatch.setattr(gswt, "MAX_SPLATS", 100)
-    with pytest.raises(InputError, match="the renderer takes 100"):
+    monkeypatch.setattr(gswt, "MAX_SPLATS", 10)
+    with pytest.raises(InputError, match="the renderer takes 10"):
         gswt.write_gswt(tiles.fields, SIDE, tmp_path / "gswt.zip")
+
+
+def test_the_archive_lacks_levels_that_its_renderer_could_not_take(tiles, monkeypatch, caplog):
+    levels = list(tiles.fields)
+    sizes = [sum(len(field) for field in level) for level in levels]
+    monkeypatch.setattr(gswt, "MAX_SPLATS", sum(sizes[1:]))
+    assert gswt.fit_to_renderer(levels) == levels[1:] and "lacks the finest 1 of" in caplog.text
+    monkeypatch.setattr(gswt, "MAX_SPLATS", sum(sizes))
+    assert gswt.fit_to_renderer(levels) == levels
 
 
 def test_a_new_bundle_replaces_the_old_one_and_leaves_its_neighbours(tiles, tmp_path):

@@ -62,12 +62,28 @@ def test_presets_are_ordered_by_their_time(config):
     assert draft < standard < reference
 
 
+def test_no_more_photos_count_than_there_are(config, tmp_path):
+    """`start: 1000` fits all photos of a folder; rounds take what is left."""
+    for number in range(20):
+        (tmp_path / f"{number}.jpg").touch()
+    (tmp_path / "LICENSE").touch()
+
+    def describe(**keys):
+        config["scenes"]["mine"] = config["scenes"]["copr_dunes"] | {"folder": str(tmp_path)} | keys
+        return describe_work(config | {"scene": "mine", "k": 6, "rounds": 2})
+
+    every, eight = describe(start=1000), describe(start=8)
+    assert (every.total, every.start, every.tests, every.new) == (20, 18, 2, 0)
+    assert (eight.start, eight.tests, eight.new) == (8, 2, 5) and eight.all_photos == 18
+    assert every.all_steps == describe(start=18).all_steps
+
+
 def test_photos_of_a_folder_are_counted(config, tmp_path):
     for name in ("a.jpg", "b.jpg", ".hidden"):
         (tmp_path / name).touch()
     config["scenes"]["mine"] = config["scenes"]["copr_dunes"] | {"folder": str(tmp_path), "start": 2}
     work = describe_work(config | {"scene": "mine"})
-    assert (work.total, work.start, work.tests, work.rendered) == (2, 2, 1, False)
+    assert (work.total, work.start, work.tests, work.rendered) == (2, 2, 0, False)
     assert describe_work(config | {"scene": "mine", "policy": "w2-lpips"}).samples == 5 * 8
 
 

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -62,6 +63,18 @@ def test_objects_stand_around_their_foot(found):
 def test_density_counts_objects_on_the_area_of_their_material(found):
     area = found.classes.shares[0] * (~found.classes.excluded).sum() * made.SPACING**2
     assert sum(each.density for each in found.objects) == pytest.approx(len(made.SHRUBS) / area)
+
+
+def test_an_object_of_a_material_that_is_left_out_counts_on_the_ground_that_it_is_placed_on(monkeypatch):
+    """A shrub on a speck of ground that has no tiles would else stand as densely as on that speck."""
+    field, grid = made.field(), made.grid()
+    classes = build.classify_ground(build.measure_ground(field, grid))
+    first, *others = classes.footprints
+    moved = replace(classes, footprints=[replace(first, material=1), *others])
+    parts = SimpleNamespace(field=field, grid=grid, maps=build.measure_ground(field, grid), classes=moved)
+    kept = {0: 0}
+    dense = build._extract_objects(parts, kept)
+    assert {each.material for each in dense} == {0} and dense[0].density == dense[1].density
 
 
 def test_an_object_on_a_slope_stands_on_level_ground():

@@ -1,12 +1,14 @@
 """The story of a page: which photos, where, and what tests said."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from dav_gswt.geometry import cameras
+from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square, read_scene_frame, write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.photos.taken_photos import TakenPhoto
 from dav_gswt.terrain import page_story
@@ -35,7 +37,7 @@ def test_a_sheet_holds_each_photo_in_the_middle_of_its_square():
 @pytest.fixture
 def made(tmp_path, monkeypatch):
     """What a round of two photos at the start and one captured leaves, with the cameras given."""
-    from dav_gswt.geometry.scene_frame import Extent, SceneFrame, Square, write_scene_frame
+    from dav_gswt.geometry.scene_frame import write_scene_frame
 
     images = tmp_path / "images"
     images.mkdir()
@@ -61,6 +63,13 @@ def made(tmp_path, monkeypatch):
         "captures": ["capture"],
         "metrics": [tmp_path / "0.json", tmp_path / "1.json"],
     }
+
+
+def test_of_real_photos_the_psnr_after_their_exposure_is_fitted_is_told(made):
+    frame = read_scene_frame(made["frame"])
+    write_scene_frame(made["frame"], replace(frame, kind="photos"))
+    made["metrics"][0].write_text(json.dumps({"psnr": 20.0, "psnr_colour_corrected": 27.5}))
+    assert [each["psnr"] for each in tell_story(made).value["rounds"]] == [27.5, None]
 
 
 def test_places_rounds_and_pictures_are_told(made):

@@ -169,10 +169,16 @@ def require_file_name(name) -> str:
     return name
 
 
-def locate(path: Path | str) -> Path | None:
-    """Where a path of the config is: as it stands (~ is the home), or below the repository; None: it is not there."""
-    given = Path(path).expanduser()
-    return next((place for place in (given, REPOSITORY / given) if place.exists()), None)
+def locate(path: Path | str, repository: Path = REPOSITORY) -> Path:
+    """Where a path of the config is: as it stands (~ is the home), or below the repository.
+
+    Where it is in neither, the path as it stands, for the reader to say so.
+    """
+    try:
+        given = Path(path).expanduser()
+    except RuntimeError:  # no user of that name: a file that begins with ~
+        given = Path(path)
+    return next((place for place in (given, repository / given) if place.exists()), given)
 
 
 def is_from_future(path: Path | str) -> bool:

@@ -38,6 +38,15 @@ def test_a_reference_makes_the_world_metric(photos, tmp_path):
     assert found.positions.at == pytest.approx(np.array([c.centre for c in found.model.cameras]))
 
 
+def test_a_reference_of_zeros_is_no_place(photos, tmp_path, caplog):
+    """OpenSfM counts photos without GPS from 0, 0."""
+    values = made.reconstruction()
+    values[0]["reference_lla"] = {"latitude": 0.0, "longitude": 0.0, "altitude": 0.0}
+    caplog.set_level("INFO")
+    assert import_model(made.write_json(tmp_path / "r.json", values), photos, made.OPTIONS).positions is None
+    assert "no place is known" in caplog.text
+
+
 def test_frames_may_have_intrinsics_of_their_own_and_a_field_of_view_instead(photos, tmp_path):
     values = made.transforms()
     angle = 2 * np.arctan(0.5 * made.WIDTH / 310.0)

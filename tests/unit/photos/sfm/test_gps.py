@@ -32,6 +32,13 @@ def place(model, rng, noise):
     return dict(zip(model.names, true + rng.normal(0, noise, true.shape), strict=True))
 
 
+def test_heights_that_drift_along_a_line_do_not_say_where_up_is():
+    along = np.linspace(0, 200, 12)
+    drifting = np.c_[along, np.zeros(12), 60 + 12 * np.sin(along / 60)]
+    assert not gps.measure_spread(drifting)[1]
+    assert gps.measure_spread(np.c_[along, 30 * np.cos(along), np.full(12, 60.0)])[1]
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_photos_along_a_line_leave_the_ground_level(seed):
     """Ten photos on 90 metres, receivers 2 metres off: about the line the positions say nothing."""

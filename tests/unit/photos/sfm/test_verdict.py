@@ -110,7 +110,7 @@ def test_gps_as_far_off_as_receivers_are_is_good_over_a_small_flight(model):
 
 
 def test_a_slope_is_level_ground_by_gps_and_a_wall_is_not(model):
-    lean = positions(model, 0.0)
+    lean = 2 * positions(model, 0.0)
     for degrees, grade in ((20, "good"), (80, "refused")):
         c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
         turned = lean @ np.array([[1, 0, 0], [0, c, s], [0, -s, c]])

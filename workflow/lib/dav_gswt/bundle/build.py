@@ -106,7 +106,7 @@ def _write_archives(content: BundleContent, salt: int, part: Path) -> None:
     """Write the archive of each material."""
     for material in range(len(content.materials)):
         fields = baking.bake_objects(content, material, salt)
-        gswt.write_gswt(fields, content.side, part / archive_name(material))
+        gswt.write_gswt(gswt.fit_to_renderer(fields), content.side, part / archive_name(material))
 
 
 def _write_content(content: BundleContent, options: BundleOptions, provenance: dict[str, Any], part: Path) -> Manifest:

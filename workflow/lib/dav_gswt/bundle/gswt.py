@@ -3,6 +3,7 @@
 Its loader never reads property names and crashes on one header line too many, so nothing here is optional.
 """
 
+import logging
 import re
 import zipfile
 from itertools import product
@@ -16,6 +17,8 @@ from dav_gswt.errors import InputError, summarize_error
 from dav_gswt.field import GaussianField
 from dav_gswt.files import UNREADABLE
 from dav_gswt.logs import progress
+
+_log = logging.getLogger(__name__)
 
 TILE_WIDTH = 4.0
 MAX_SPLATS = 8_388_608
@@ -50,6 +53,17 @@ def format_ply(values: Float32[Array, "n 62"]) -> bytes:
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(values)}"]
     lines += [f"property float {name}" for name in PROPERTIES]
     return "\n".join([*lines, "end_header\n"]).encode("ascii") + values.astype("<f4").tobytes()
+
+
+def fit_to_renderer(fields: list[list[GaussianField]]) -> list[list[GaussianField]]:
+    """Fields by level and tile without the finest levels, as far as the renderer could not take them all."""
+    levels = list(fields)
+    while len(levels) > 1 and sum(len(field) for level in levels for field in level) > MAX_SPLATS:
+        levels.pop(0)
+    if len(levels) < len(fields):
+        said = "gswt.zip lacks the finest %d of %d levels: its renderer takes %d splats"
+        _log.warning(said, len(fields) - len(levels), len(fields), MAX_SPLATS)
+    return levels
 
 
 def write_gswt(fields: list[list[GaussianField]], side: float, path: Path) -> None:

@@ -6,7 +6,6 @@ an earlier stage was computed anew or a run was killed, the stored photos are us
 
 import fcntl
 import hashlib
-import itertools
 import shutil
 import tempfile
 from contextlib import contextmanager
@@ -59,7 +58,8 @@ class PhotoStore:
                 "sha256": digest_files(made / name),
             }
             write_json(made / "shot.json", record)
-            place = next(place for n in itertools.count() if not (place := home / f"{n:03d}").exists())
+            numbers = [int(path.name) for path in home.glob("[0-9]*") if path.name.isdecimal()]
+            place = home / f"{max(numbers, default=-1) + 1:03d}"  # never one that was removed: the oldest come first
             made.rename(place)
         return _read_photo(place)
 

@@ -13,7 +13,9 @@ from typing import Any
 from dav_gswt.cli.machine_speed import MachineSpeed
 from dav_gswt.config.base import LARGEST_SIDE
 from dav_gswt.errors import InputError
-from dav_gswt.images.image_files import read_size
+from dav_gswt.files import locate
+from dav_gswt.images.image_files import SUFFIXES, read_size
+from dav_gswt.photos.view_split import LEAST_TEST, LEAST_WITH_TEST, TEST_SHARE
 from dav_gswt.reconstruction.fitting import plan
 from dav_gswt.views.policy_names import PRIOR_POLICIES
 
@@ -47,7 +49,7 @@ class Work:
     """
 
     start: int
-    new: int
+    new: float
     tests: int
     total: int
     rounds: int
@@ -195,13 +197,13 @@ def describe_work(config: Mapping[str, Any], preset: str | None = None) -> Work:
     size = min(scene.get("size", entry["size"]), longest)
     seen = min(size, entry["size"])
     most = plan.MAX_GAUSSIANS if entry["max_gaussians"] == "auto" else entry["max_gaussians"]
-    start, new = scene.get("start") or photos, config["k"] * scene.get("burst", 1)
+    tests, start, new = _count_parts(config, scene, photos)
     settings = config["priors"][config["prior"]] if config["policy"] in PRIOR_POLICIES else None
     replayed = max(0, photos - start)
     return Work(
         start=start,
         new=new,
-        tests=scene.get("test", max(1, photos // 10)) + scene.get("oblique", 0) + scene.get("walkers", 0),
+        tests=tests,
         total=photos,
         rounds=config["rounds"],
         photo_pixels=shape * float(size) ** 2,
@@ -220,6 +222,19 @@ def describe_work(config: Mapping[str, Any], preset: str | None = None) -> Work:
         scene_cost=FAMILY_COST.get(scene.get("family"), 1.0),
         choosing=describe_work(config, chooser) if chooser and photographed and config["rounds"] else None,
     )
+
+
+def _count_parts(config: Mapping[str, Any], scene: Mapping[str, Any], photos: int) -> tuple[int, int, float]:
+    """Photos that test, that start, and that a round takes on the average: of a folder no more than it has."""
+    new = float(config["k"] * scene.get("burst", 1))
+    if scene["kind"] != "photos" or not photos:
+        tests = scene.get("test", max(1, photos // 10)) + scene.get("oblique", 0) + scene.get("walkers", 0)
+        return tests, scene.get("start") or photos, new
+    tests = 0 if photos < LEAST_WITH_TEST else max(LEAST_TEST, round(TEST_SHARE * photos))
+    start = min(scene.get("start") or photos, photos - tests)
+    if scene.get("agent") == "replay":
+        new = min(new, (photos - tests - start) / max(1, config["rounds"]))
+    return tests, start, new
 
 
 def count_photos(scene: Mapping[str, Any]) -> int:
@@ -243,10 +258,11 @@ def measure_photos(scene: Mapping[str, Any]) -> tuple[int, float]:
 
 
 def _list_files(scene: Mapping[str, Any]) -> list[Path]:
-    folder = Path(scene.get("folder", ""))
+    folder = locate(scene.get("folder", ""))
     if scene["kind"] != "photos" or not folder.is_dir():
         return []
-    return sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
+    photos = (path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES and path.is_file())
+    return sorted(path for path in photos if not path.name.startswith("."))
 
 
 def describe_estimate(

@@ -72,21 +72,30 @@ def read_photo(path: Path | str) -> Float32[Array, "h w 3"]:
     Any bit depth. Grey becomes three equal channels; alpha is dropped, and the colours stay as they are stored.
     Raises: InputError: missing, not an image, cut short (a decoder's warning counts), or too large.
     """
-    return read_photo_and_alpha(path)[0]
+    return _read_colours(path)[0]
 
 
 def read_photo_and_alpha(path: Path | str) -> tuple[Float32[Array, "h w 3"], Float32[Array, "h w"]]:
     """A photo as `read_photo` returns it, and its alpha: 0 where it is masked; 1 where the file has none."""
+    pixels, alpha = _read_colours(path)
+    return pixels, np.ones(pixels.shape[:2], np.float32) if alpha is None else alpha
+
+
+def _read_colours(path: Path | str) -> tuple[Float32[Array, "h w 3"], Float32[Array, "h w"] | None]:
+    """Colours, and alpha where the file has one. Photos may have 50 million pixels: what can be done in place is."""
     file, spec = _open_image(path)
     # alpha is read along: reading only some of the channels is slower in many formats
     pixels = _read_pixels(file, path, min(spec.nchannels, 4))
     alpha = pixels[..., spec.alpha_channel] if 0 <= spec.alpha_channel < pixels.shape[2] else None
     pixels = pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
-    alpha = np.ones(pixels.shape[:2], np.float32) if alpha is None else alpha
     if not np.isfinite(pixels).all():
         raise InputError(f"{path}: has pixels that are not finite; export it as 8 or 16 bit")
-    pixels, alpha = (_apply_orientation(np.clip(part, 0, 1), _read_orientation(spec)) for part in (pixels, alpha))
-    return np.ascontiguousarray(pixels), np.ascontiguousarray(alpha)
+    for part in (pixels, alpha):
+        if part is not None:
+            np.clip(part, 0, 1, out=part)
+    turn = _read_orientation(spec)
+    upright = np.ascontiguousarray(_apply_orientation(pixels, turn))
+    return upright, None if alpha is None else np.ascontiguousarray(_apply_orientation(alpha, turn))
 
 
 def read_channel(path: Path | str) -> Float32[Array, "h w"]:

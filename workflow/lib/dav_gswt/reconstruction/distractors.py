@@ -9,7 +9,7 @@ import logging
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray as Array
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import maximum_filter
 
 from dav_gswt.photos.training_views import TrainingView, one_by_one
 from dav_gswt.reconstruction.fitting.photo_colours import chunk_points, nan_median, sample_all_views
@@ -36,7 +36,7 @@ def mask_distractors(views: list[TrainingView], points: Float[Array, "n 3"], spa
                 reach[i] = max(reach[i], int(np.ceil(wide / 2)))
     out = []
     for view, mask, own in zip(one_by_one(views), masks, reach, strict=True):
-        mask = binary_dilation(mask, np.ones((2 * own + 1, 2 * own + 1), bool)) if mask.any() else mask
+        mask = maximum_filter(mask, 2 * own + 1, mode="constant") if mask.any() else mask
         share = float(mask.mean())
         if share > NOTABLE_SHARE:
             said = "%s differs from the other photos over %.0f %% of its pixels, which do not count"

@@ -4,7 +4,6 @@ Rows run from south to north and columns from west to east, in memory; on disk (
 as in any image of a map. The exemplar is a square block of whole cells, so that tiles cut from it stay on the grid.
 """
 
-import logging
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
@@ -21,13 +20,10 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.images import image_files
 
-_log = logging.getLogger(__name__)
-
 NODES = 96  # knots of the height surface along the longer side: what sparse points can carry
 MARGIN = 0.15  # ground modelled around what tiles are cut from, as a share of the exemplar's side
 FAR = 0.5  # beyond this share of it, ground is modelled for its own sake
 WHOLE = 10.0  # such a margin, where all ground that the photos see is modelled
-MUCH_WIDER = 2.0  # than photos resolve, from which on the log says so
 STIFFNESS = 0.05  # weight of the bending energy against one point a knot
 
 
@@ -119,14 +115,7 @@ def fit_ground(
         min(extent.north, south + side + reach),
     )
     area = (around[2] - around[0]) * (around[3] - around[1])
-    wanted, spacing = spacing, max(spacing, float(np.sqrt(area / max_cells)))
-    if spacing > MUCH_WIDER * wanted:
-        _log.warning(
-            "the discs are %.1f times as wide as photos resolve, since the ground is that large: for a sharp terrain "
-            "give the preset %.1f times as many Gaussians (max_gaussians), or photos of less ground",
-            spacing / wanted,
-            (spacing / wanted) ** 2,
-        )
+    spacing = max(spacing, float(np.sqrt(area / max_cells)))
     cells = int(side / spacing) // block * block
     if cells < block:
         raise InputError(

@@ -37,13 +37,17 @@ def pixel_size(frame: SceneFrame, views: list[TrainingView]) -> float:
 def observe(frame: SceneFrame, grid: Ground, views: list[TrainingView]) -> Observation:
     """Equalize the photos' exposure, sweep the relief, and mask what moves; synthetic photos need only the sweep."""
     if frame.kind == "photos":
-        centres = grid.centres
-        views = exposure.equalize_exposure(views, centres[:: max(1, len(centres) // EXPOSURE_POINTS)])
+        views = exposure.equalize_exposure(views, thin_places(grid.centres))
     relief = sweep_heights(grid, views, frame.flying_height, pixel_size(frame, views))
     if frame.kind == "photos":
         open_ground = ~(relief.onto(grid, relief.stands.astype(float)) > 0.1)
         views = distractors.mask_distractors(views, grid.centres[open_ground.ravel()], grid.spacing)
     return Observation(views, relief)
+
+
+def thin_places(places: Float[Array, "n 3"]) -> Float[Array, "m 3"]:
+    """Some EXPOSURE_POINTS of the places at most, evenly, which exposures are compared at."""
+    return places[:: max(1, len(places) // EXPOSURE_POINTS)]
 
 
 def ground_colours(

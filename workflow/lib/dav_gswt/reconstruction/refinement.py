@@ -16,6 +16,7 @@ from dav_gswt.reconstruction.coarse import Reconstruction, finish_field
 from dav_gswt.reconstruction.fit_settings import UpdateSettings
 from dav_gswt.reconstruction.fitting import trainer
 from dav_gswt.reconstruction.fitting.constraints import Constraints, FreeConstraints
+from dav_gswt.reconstruction.fitting.exposure import equalize_exposure
 from dav_gswt.reconstruction.fitting.plan import FitPlan
 from dav_gswt.reconstruction.fitting.trainer import FitOptions
 from dav_gswt.reconstruction.ground import Ground
@@ -26,6 +27,7 @@ from dav_gswt.reconstruction.observation import (
     mask_for_fit,
     observe,
     thin_at_random,
+    thin_places,
 )
 
 _log = logging.getLogger(__name__)
@@ -83,6 +85,8 @@ def _prepare_start(given: RefinementInput, settings: UpdateSettings, rng: np.ran
     field, grid, frame, views = given.field, given.grid, given.frame, given.earlier + given.new
     if not field.ground.any():
         constraints = FreeConstraints(float(np.exp(np.median(field.log_scales))), extent_of(field.means))
+        if frame.kind == "photos":
+            views = equalize_exposure(views, thin_places(field.means.astype(float)))
         return _Start(field, grid, views, constraints)
     scene = observe(frame, grid, views)
     occluders = field[grid.heights.size + underlay.count_gaussians(grid) :]

@@ -12,6 +12,7 @@ from dav_gswt.templates import render_template
 from dav_gswt.terrain.page_front import FRONT, STILL
 
 TEMPLATE, STYLE = "index.html", "gallery.css"
+BY_SYSTEMS = ".DS_Store", "Thumbs.db"  # that file browsers leave
 TEXTS = ("name", "line", "verdict")
 LONGEST = 400  # letters of a text
 
@@ -50,7 +51,7 @@ def write_gallery(pages: Sequence[Path | str], template_dir: Path | str, out_dir
 def _keep_foreign_files(folder: Path) -> None:
     """Raises: InputError: the folder, which is replaced as a whole, holds what no gallery put there."""
     for path in sorted(folder.iterdir()) if folder.is_dir() else []:
-        if path.name not in (TEMPLATE, STYLE) and not (path / FRONT).is_file():
+        if path.name not in (TEMPLATE, STYLE, *BY_SYSTEMS) and not (path / FRONT).is_file():
             raise InputError(
                 f"{path} is no part of a gallery, and would be deleted with the old one: move it, or name another "
                 "folder with --out"

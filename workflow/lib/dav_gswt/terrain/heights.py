@@ -164,7 +164,7 @@ def surface_from_config(entry: dict, side: float) -> HeightField:
         return make_sphere(entry["radius"], side)
     if entry["kind"] == "hills":
         return Hills(entry["height"] * side, entry["wavelength"] * side, entry.get("octaves", 4), entry.get("seed", 0))
-    pixels = read_height_map(locate(entry["file"]) or entry["file"]) * np.float32(entry["height"])
+    pixels = read_height_map(locate(entry["file"])) * np.float32(entry["height"])
     return HeightMap(pixels, float(entry["width"]), entry.get("beyond", "mirror"))
 
 

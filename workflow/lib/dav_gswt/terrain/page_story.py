@@ -51,7 +51,7 @@ def tell_story(given: Mapping[str, Any]) -> Story | None:
         photos[k]["picture"] = number
     presets = [decode_path(Path(path)).get("preset") for path in given["metrics"]]
     rounds = [
-        {"photos": sum(photo.round == t for photo in taken), "psnr": _psnr(path)}
+        {"photos": sum(photo.round == t for photo in taken), "psnr": _psnr(path, frame.kind)}
         | ({"preset": preset} if preset != presets[-1] else {})
         for t, (path, preset) in enumerate(zip(given["metrics"], presets, strict=True))
     ]
@@ -102,7 +102,7 @@ def _place(photo: TakenPhoto, frame: SceneFrame) -> dict[str, Any]:
     return {"round": photo.round, "at": at, "look": [round(float(v), 3) for v in ahead[:2]]}
 
 
-def _psnr(path: Path | str) -> float | None:
-    """PSNR of the test photos in metrics.json; None: none could be spared."""
-    value = read_json(path).get("psnr")
+def _psnr(path: Path | str, kind: str) -> float | None:
+    """PSNR of the test photos in metrics.json, of real ones after their exposure is fitted; None: none was spared."""
+    value = read_json(path).get("psnr_colour_corrected" if kind == "photos" else "psnr")
     return round(value, 2) if isinstance(value, int | float) and np.isfinite(value) else None

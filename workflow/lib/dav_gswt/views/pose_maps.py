@@ -20,7 +20,7 @@ EMPTY_PARTS: dict[str, Part] = {"none": ({"uncertainty": np.zeros((1, 1), np.flo
 @dataclass(frozen=True)
 class PoseMaps:
     """Maps of n candidates. opacity: rendered uncertainty (1 - opacity, plus that of the Gaussians in view) of the
-    whole picture, NaN below a picture of less height. w2_sq: disagreement of the prior's samples in the picture's
+    whole picture, NaN below and beside a smaller picture. w2_sq: disagreement of the prior's samples in the picture's
     middle square; None without a prior. cells: pixels that show each cell of the ground (`coverage.CellViews`)."""
 
     names: list[str]
@@ -36,7 +36,8 @@ class PoseMaps:
         """Maps of a candidate on the pixels of its picture; header: pose and terms."""
         i, row = self.names.index(name), scores.names.index(name)
         uncertainty = self.opacity[i]
-        uncertainty = uncertainty[: int((~np.isnan(uncertainty[:, 0])).sum())]
+        known = ~np.isnan(uncertainty)
+        uncertainty = uncertainty[: int(known[:, 0].sum()), : int(known[0].sum())]
         channels = {"uncertainty": uncertainty}
         if self.w2_sq is not None:
             channels["w2_sq"] = _place_square(self.w2_sq[i], uncertainty.shape)

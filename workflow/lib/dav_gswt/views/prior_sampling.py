@@ -78,14 +78,10 @@ def load_prior(entry: dict) -> Prior:
         from dav_gswt.prior.terrain import TerrainPrior  # not above: diffusers takes seconds to load
         from dav_gswt.prior.weights import TERRAIN_WEIGHTS
 
-        return TerrainPrior.open(_locate(entry.get("weights", TERRAIN_WEIGHTS)))
+        return TerrainPrior.open(locate(entry.get("weights", TERRAIN_WEIGHTS)))
     from dav_gswt.prior.zero123 import GUIDANCE, Zero123
 
-    return Zero123.open(_locate(entry["folder"]), entry.get("guidance", GUIDANCE))
-
-
-def _locate(path: Path | str) -> Path | str:
-    return locate(path) or path
+    return Zero123.open(locate(entry["folder"]), entry.get("guidance", GUIDANCE))
 
 
 def sample_terms(

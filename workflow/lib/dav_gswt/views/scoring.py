@@ -121,9 +121,9 @@ def _score_geometry(
 
 
 def _stack_maps(maps: list[Float32[Array, "_ _"]]) -> Float32[Array, "n h w"]:
-    """Maps as one array, with NaN below those of less height."""
+    """Maps as one array, with NaN below and beside smaller ones."""
     shape = (0, 1, 1) if not maps else (len(maps), *np.max([m.shape for m in maps], axis=0))
-    out = np.full(shape, np.nan, np.float32)  # cameras of the candidates may differ in their height
+    out = np.full(shape, np.nan, np.float32)  # cameras of the candidates may differ in their size
     for i, m in enumerate(maps):
         out[i, : m.shape[0], : m.shape[1]] = m
     return out

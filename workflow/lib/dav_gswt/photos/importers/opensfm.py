@@ -73,6 +73,9 @@ def _read_georeference(chosen: dict, path: Path) -> Georeference | None:
     )
     if not (abs(latitude) < 89.9 and abs(longitude) <= 360 and abs(altitude) < 1e5):
         raise InputError(f"{where}: {latitude:g}, {longitude:g}, {altitude:g} is no place on earth; correct it")
+    if latitude == longitude == 0:
+        _log.info("%s: 0, 0 is what OpenSfM writes of photos without GPS: no place is known", where)
+        return None
     return Georeference(latitude, longitude, altitude, north=0.0, metres_per_unit=1.0)
 
 

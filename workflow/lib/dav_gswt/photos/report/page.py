@@ -25,7 +25,7 @@ from dav_gswt.photos.report.facts import (
 )
 from dav_gswt.photos.report.figures import Thumbnail, bin_coverage, draw_coverage, draw_plan, make_thumbnails
 from dav_gswt.photos.report.mosaic import GroundKinds, Segment, find_kinds
-from dav_gswt.photos.splitting import ground_bounds, measure_visible_share
+from dav_gswt.photos.splitting import ground_bounds, measure_visible_share, shows_enough
 from dav_gswt.templates import render_template
 
 
@@ -141,7 +141,8 @@ def list_registration_facts(found: ReportFacts) -> list[Fact]:
     shares = [
         measure_visible_share(camera, ground_bounds(frame, whole=False)) for photo, camera in pairs if not photo.tests
     ]
-    count = sum(share >= splitting.MIN_VISIBLE_SHARE for share in shares)
+    pairs = zip(found.photos, found.model.cameras, strict=True)
+    count = sum(shows_enough(camera, ground_bounds(frame, whole=False)) for photo, camera in pairs if not photo.tests)
     others = "all of them" if count == len(shares) else "the others show too little of it to take part"
     if frame.kind == "synthetic":
         first = Fact("Photos", f"{len(found.placed)} and {len(found.photos) - len(found.placed)} tests", "rendered")

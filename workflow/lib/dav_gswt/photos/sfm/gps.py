@@ -61,10 +61,11 @@ def read_gps_positions(paths: list[Path]) -> GpsPositions | None:
 def measure_spread(at: Float[Array, "n 3"]) -> tuple[float, bool]:
     """Metres: the standard deviation of positions along the ground; and whether they say where up is.
 
-    They do not along a straight line: the rotation about it is then that of the receivers' errors.
+    They do not along a straight line: the rotation about it is then that of the receivers' errors. Heights count by as
+    much less as they are less exact.
     """
     centred = (at - at.mean(0)) / np.sqrt(len(at))
-    across = np.linalg.svd(centred, compute_uv=False)[1]
+    across = np.linalg.svd(centred * [1, 1, ACROSS / UP], compute_uv=False)[1]
     return float(np.linalg.norm(centred[:, :2])), bool(across >= LEAST_WIDTH * ACROSS)
 
 
