@@ -79,5 +79,5 @@ def test_a_path_of_the_config_may_lie_below_the_home_or_the_repository(tmp_path,
     monkeypatch.chdir(tmp_path)
     assert files.locate("photos") == Path("photos")
     assert files.locate("config/config.yaml") == files.REPOSITORY / "config/config.yaml"
-    assert files.locate("nowhere") == Path("nowhere") and files.locate("~nobody/x") == Path("~nobody/x")
+    assert files.locate("nowhere") == Path("nowhere") and files.locate("~no-such-user/x") == Path("~no-such-user/x")
     assert files.locate("photos", tmp_path) == Path("photos") and files.locate("config", tmp_path) == Path("config")

@@ -1,5 +1,4 @@
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -71,7 +70,7 @@ def test_an_object_of_a_material_that_is_left_out_counts_on_the_ground_that_it_i
     classes = build.classify_ground(build.measure_ground(field, grid))
     first, *others = classes.footprints
     moved = replace(classes, footprints=[replace(first, material=1), *others])
-    parts = SimpleNamespace(field=field, grid=grid, maps=build.measure_ground(field, grid), classes=moved)
+    parts = build._Parts(field, grid, build.measure_ground(field, grid), moved, 4.0, 0)
     kept = {0: 0}
     dense = build._extract_objects(parts, kept)
     assert {each.material for each in dense} == {0} and dense[0].density == dense[1].density

@@ -72,12 +72,12 @@ class Work:
     @property
     def all_photos(self) -> int:
         """Photos of the last round."""
-        return self.start + self.new * self.rounds
+        return self.start + round(self.new * self.rounds)
 
     @property
     def all_steps(self) -> int:
         """Steps of a fit to all of them."""
-        return self.steps + self.steps_per_photo * self.new * self.rounds
+        return self.steps + round(self.steps_per_photo * self.new * self.rounds)
 
     @property
     def mean_photos(self) -> float:
