@@ -18,6 +18,7 @@ from dav_gswt.files import atomic_file
 
 _log = logging.getLogger(__name__)
 
+AT_ONCE = 2_000_000  # values that are averaged at a time
 MAX_PIXELS = 200_000_000  # of a photo: more is a broken header, or more than two cores should work on
 PREVIEW = "colours"  # in an EXR's header: its R, G and B are other channels in colours
 RAMP = (  # colours of a preview from low to high, linear light: as viridis of Matplotlib has them
@@ -323,7 +324,11 @@ def _average_axis(values: Array, n: int, axis: int) -> Array:
     interval = np.minimum(np.searchsorted(edges, cuts[:-1], side="right") - 1, n - 1)
     shares = csr_array((np.diff(cuts) * (n / m), (interval, cuts[:-1].astype(int))), shape=(n, m))
     lines = np.moveaxis(values, axis, 0)
-    return np.moveaxis((shares @ lines.reshape(m, -1)).reshape(n, *lines.shape[1:]), 0, axis)
+    flat, out = lines.reshape(m, -1), np.empty((n, lines[0].size))
+    step = max(1, AT_ONCE // m)
+    for start in range(0, flat.shape[1], step):  # the product makes doubles of all that it is given
+        out[:, start : start + step] = shares @ flat[:, start : start + step]
+    return np.moveaxis(out.reshape(n, *lines.shape[1:]), 0, axis)
 
 
 def _first_line(text: str) -> str:
