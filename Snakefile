@@ -10,8 +10,8 @@ from snakemake.utils import min_version
 min_version("9.13")  # the release that brought pathvars
 
 
-configfile: f"{workflow.basedir}/config/study.yaml"
 configfile: f"{workflow.basedir}/config/config.yaml"
+configfile: f"{workflow.basedir}/config/study.yaml"
 
 
 report: "workflow/report/workflow.rst"

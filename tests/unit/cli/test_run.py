@@ -1,9 +1,12 @@
 """What `make run` lays over the config where PyTorch has to draw."""
 
+import re
+
 import pytest
 
 from dav_gswt.cli import run
 from dav_gswt.config.load import read_config
+from dav_gswt.errors import InputError
 from dav_gswt.raster import backends
 
 
@@ -41,6 +44,17 @@ def test_the_smaller_config_is_valid_and_smaller_for_every_preset(root, monkeypa
                 assert small["presets"][name][key] < preset[key], (name, key)
             assert isinstance(small["presets"][name][key], int)
     assert small["scenes"] == usual["scenes"] and small["scene"] == usual["scene"]
+
+
+def test_an_entry_with_a_name_of_the_study_is_refused(root, tmp_path, monkeypatch):
+    """The study's would go before it, and nothing would say so."""
+    (tmp_path / "config").symlink_to(root / "config")
+    monkeypatch.chdir(tmp_path)
+    text = re.sub(r"(?m)^(tilings:.*)$", r"\1\n  semantic: {tile: 0.3}", (root / "config/config.yaml").read_text())
+    (tmp_path / "own.yaml").write_text(text)
+    monkeypatch.setattr(run, "CONFIG", tmp_path / "own.yaml")
+    with pytest.raises(InputError, match=r"own\.yaml: tilings\.semantic: config/study\.yaml has an entry of this name"):
+        run.load_config([])
 
 
 def test_presets_for_terrains_are_those_of_the_config_alone(root, monkeypatch):

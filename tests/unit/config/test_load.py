@@ -19,7 +19,7 @@ FILES |= {
 
 
 def read(root: Path, *more: str) -> dict:
-    files = [root / "config/study.yaml", root / "config/config.yaml", *(root / file for file in more)]
+    files = [root / "config/config.yaml", root / "config/study.yaml", *(root / file for file in more)]
     return add_scene_files(read_config(files), root / "config/scenes")
 
 

@@ -11,7 +11,7 @@ from dav_gswt.study.config import expand_study
 
 @pytest.fixture(scope="module")
 def config(root):
-    files = [root / "config/study.yaml", root / "config/config.yaml"]
+    files = [root / "config/config.yaml", root / "config/study.yaml"]
     return check_config(add_scene_files(read_config(files), root / "config/scenes"))
 
 
@@ -31,7 +31,7 @@ def expand(config: dict, table: str, change: dict) -> dict:
     ],
 )
 def test_the_studies_that_come_with_the_project_are_valid(root: Path, more):
-    files = [root / file for file in ("config/study.yaml", "config/config.yaml", *more)]
+    files = [root / file for file in ("config/config.yaml", "config/study.yaml", *more)]
     assert expand_study(check_config(add_scene_files(read_config(files), root / "config/scenes")))["study"]["tables"]
 
 

@@ -56,7 +56,16 @@ def main(arguments: list[str] | None = None) -> int:
 
 def load_config(overlays: list[Path], changes: dict | None = None) -> dict:
     """The config of this folder with all defaults, as the workflow reads it."""
-    return check_config(add_scene_files(read_config([STUDY, CONFIG, *overlays], changes), SCENES))
+    _refuse_names_of_the_study(read_config([CONFIG]), read_config([STUDY]))
+    return check_config(add_scene_files(read_config([CONFIG, STUDY, *overlays], changes), SCENES))
+
+
+def _refuse_names_of_the_study(own: dict, study: dict) -> None:
+    """Raises: InputError: an entry of the config has the name of one of the study, which would go before it."""
+    for table, entries in study.items():
+        if isinstance(entries, dict) and isinstance(own.get(table), dict):
+            for name in sorted(entries.keys() & own[table].keys()):
+                raise InputError(f"{CONFIG}: {table}.{name}: {STUDY} has an entry of this name; give yours another")
 
 
 def list_presets(overlays: list[Path]) -> list[str]:
