@@ -325,9 +325,11 @@ def _average_axis(values: Array, n: int, axis: int) -> Array:
     shares = csr_array((np.diff(cuts) * (n / m), (interval, cuts[:-1].astype(int))), shape=(n, m))
     lines = np.moveaxis(values, axis, 0)
     flat, out = lines.reshape(m, -1), np.empty((n, lines[0].size))
-    step = max(1, AT_ONCE // m)
-    for start in range(0, flat.shape[1], step):  # the product makes doubles of all that it is given
-        out[:, start : start + step] = shares @ flat[:, start : start + step]
+    step = max(1, int(AT_ONCE * n / flat.size))
+    for start in range(0, n, step):  # the product makes doubles of all that it is given
+        some = shares[start : start + step]
+        first, last = int(some.indices.min()), int(some.indices.max()) + 1
+        out[start : start + step] = some[:, first:last] @ flat[first:last]
     return np.moveaxis(out.reshape(n, *lines.shape[1:]), 0, axis)
 
 
