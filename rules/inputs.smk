@@ -56,11 +56,11 @@ def scenes_by(*agents):
 
 
 def existing(path, where, hint=""):
-    """A path that the config names (`locate`).
+    """A path that the config names (`locate_path`).
 
     Raises: WorkflowError: it is not there, or is a file from the future.
     """
-    found = locate(path, BASE)
+    found = locate_path(path, BASE)
     if not found.exists():
         raise WorkflowError(f"config: {where}: there is no {path}{hint}")
     return dated(found, where)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dav_gswt.files import locate
+from dav_gswt.files import locate_path
 from dav_gswt.images import lpips_weights
 from dav_gswt.lod import store as levels
 from dav_gswt.logs import logging_to
@@ -14,7 +14,7 @@ with logging_to(snakemake.log[0]):
     paths, tiling = snakemake.input, snakemake.params.tiling
     sets = levels.read_material_levels(paths.levels)
     alexnet = lpips_weights.read(paths.lpips) if paths.get("lpips") else None
-    source = semantics.SemanticSource(alexnet, locate(tiling["sam2"]) if "sam2" in tiling else None)
+    source = semantics.SemanticSource(alexnet, locate_path(tiling["sam2"]) if "sam2" in tiling else None)
     options = build.TilingOptions.from_config(tiling, source, sets[0].wanted)
     side = read_report(paths.materials).tile_side if paths.get("materials") else None
     tiles = build.cut_materials(sets, options, side, lambda k: build.make_generator(snakemake.params.seed, tiling, k))

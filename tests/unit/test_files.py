@@ -75,9 +75,10 @@ def test_a_link_stays_a_link_to_the_folder_that_is_replaced(tmp_path):
 def test_a_path_of_the_config_may_lie_below_the_home_or_the_repository(tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path))
     (tmp_path / "photos").mkdir()
-    assert files.locate("~/photos") == tmp_path / "photos"
+    assert files.locate_path("~/photos") == tmp_path / "photos"
     monkeypatch.chdir(tmp_path)
-    assert files.locate("photos") == Path("photos")
-    assert files.locate("config/config.yaml") == files.REPOSITORY / "config/config.yaml"
-    assert files.locate("nowhere") == Path("nowhere") and files.locate("~no-such-user/x") == Path("~no-such-user/x")
-    assert files.locate("photos", tmp_path) == Path("photos") and files.locate("config", tmp_path) == Path("config")
+    assert files.locate_path("photos") == Path("photos")
+    assert files.locate_path("config/config.yaml") == files.REPOSITORY / "config/config.yaml"
+    for same in ("nowhere", "~no-such-user/x"):
+        assert files.locate_path(same) == Path(same)
+    assert [files.locate_path(name, tmp_path) for name in ("photos", "config")] == [Path("photos"), Path("config")]

@@ -169,7 +169,7 @@ def require_file_name(name) -> str:
     return name
 
 
-def locate(path: Path | str, repository: Path = REPOSITORY) -> Path:
+def locate_path(path: Path | str, repository: Path = REPOSITORY) -> Path:
     """Where a path of the config is: as it stands (~ is the home), or below the repository.
 
     Where it is in neither, the path as it stands, for the reader to say so.

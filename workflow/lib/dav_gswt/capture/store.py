@@ -59,7 +59,7 @@ class PhotoStore:
             }
             write_json(made / "shot.json", record)
             numbers = [int(path.name) for path in home.glob("[0-9]*") if path.name.isdecimal()]
-            place = home / f"{max(numbers, default=-1) + 1:03d}"  # never one that was removed: the oldest come first
+            place = home / f"{max(numbers, default=-1) + 1:03d}"  # after all that are there: the oldest come first
             made.rename(place)
         return _read_photo(place)
 

@@ -16,7 +16,7 @@ from dav_gswt.cli.forecast import Forecast, Measured
 from dav_gswt.cli.machine_speed import MachineSpeed, measure_speed
 from dav_gswt.cli.run import load_config
 from dav_gswt.errors import InputError
-from dav_gswt.files import locate
+from dav_gswt.files import locate_path
 from dav_gswt.images.image_files import list_photos
 from dav_gswt.paths import stage_folder
 
@@ -111,7 +111,7 @@ def measure_scene(config: Mapping[str, Any], sizes: set[int], size: int) -> dict
     """What the scene's photos lose by shrinking to each size: 0 for those that are not yet rendered."""
     scene = config["scenes"][config["scene"]]
     placed = stage_folder("photos", {"scene": config["scene"]}) / "images"
-    folder = placed if placed.is_dir() else locate(scene.get("folder", ""))
+    folder = placed if placed.is_dir() else locate_path(scene.get("folder", ""))
     if not (placed.is_dir() or "folder" in scene):
         return dict.fromkeys(sizes, 0.0)
     return forecast.measure_shrinking(list_photos(folder), sizes, min(size, scene.get("size", size)))

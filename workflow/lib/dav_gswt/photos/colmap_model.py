@@ -236,8 +236,7 @@ def model_from_reconstruction(
 ) -> ColmapModel:
     """Arrays of a reconstruction, its images ordered by name.
 
-    pinholes: by the number of a camera the undistorted one that takes its
-    place; observations move with it.
+    pinholes: by the number of a camera the undistorted one that takes its place; observations move with it.
     """
     ids = np.array(sorted(stored.points3D), np.int64)
     found = sorted((stored.images[i].name, i) for i in stored.reg_image_ids())

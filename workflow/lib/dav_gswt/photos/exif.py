@@ -32,9 +32,8 @@ def read_focal_length(path: Path | str) -> float | None:
     film = tags.get("EXIF FocalLengthIn35mmFilm") or _number(spec.getattribute("Exif:FocalLengthIn35mmFilm"))
     pitch, unit = tags.get("EXIF FocalPlaneXResolution"), UNITS.get(int(tags.get("EXIF FocalPlaneResolutionUnit", 2)))
     if focal > 0 and pitch and unit:
-        tagged = max(
-            tags.get(f"EXIF ExifImage{side}", 0) for side in ("Width", "Length")
-        )  # some programs exchange them
+        # some programs exchange width and length
+        tagged = max(tags.get(f"EXIF ExifImage{side}", 0) for side in ("Width", "Length"))
         pixels = focal / unit * pitch * width / (tagged if tagged >= 1 else width)
     elif film > 0:
         pixels = convert_equivalent(film, width, height)

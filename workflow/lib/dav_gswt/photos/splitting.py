@@ -10,7 +10,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.colmap_model import ColmapModel, count_shared_points
-from dav_gswt.photos.view_split import LEAST_TEST, LEAST_WITH_TEST, TEST_SHARE, ViewSplit
+from dav_gswt.photos.view_split import LEAST_TEST, LEAST_WITH_TEST, ViewSplit, count_tests
 
 _log = logging.getLogger(__name__)
 
@@ -57,9 +57,8 @@ def choose_test_views(model: ColmapModel, ground: Bounds, among: list[int]) -> l
     few others see the same ground, and what a test there measures is the border. The first is the one that looks
     nearest to the middle, each next one the farthest from those before.
     """
-    if len(among) < LEAST_WITH_TEST:
+    if not (count := count_tests(len(among))):
         return []
-    count = max(LEAST_TEST, round(TEST_SHARE * len(among)))
     low, high = np.reshape(ground, (2, 2))
     aims = np.stack([find_aim_point(camera) for camera in model.cameras])
     off = (np.abs(aims - (low + high) / 2) / (high - low)).max(1)

@@ -10,6 +10,11 @@ LEAST_TEST = 2
 LEAST_WITH_TEST = 6  # photos, below which none can be spared for testing
 
 
+def count_tests(photos: int) -> int:
+    """How many of so many photos test: about one in ten, at least two, none of few."""
+    return 0 if photos < LEAST_WITH_TEST else max(LEAST_TEST, round(TEST_SHARE * photos))
+
+
 @dataclass(frozen=True)
 class ViewSplit:
     """Names of images. start: of the first fit. pool: those that a replay may capture. test: for evaluation alone."""

@@ -13,7 +13,7 @@ from numpy import ndarray as Array
 from dav_gswt.bundle.land_cover import ImageTerm, NoiseTerm, RangeTerm
 from dav_gswt.bundle.manifest import TileSetInfo
 from dav_gswt.errors import InputError
-from dav_gswt.files import locate
+from dav_gswt.files import locate_path
 from dav_gswt.images import image_files
 from dav_gswt.terrain.classes import LATTICE, Classes
 from dav_gswt.terrain.paint_file import PaintFile, read_paint, scale_objects
@@ -70,7 +70,7 @@ def _read_painted(manifest: M, rule: Sequence[dict[str, Any]]) -> tuple[M, Paint
         return manifest, None
     if len(files) > 1 or len(rule) == 1:
         raise InputError("classes: `painted` takes one file, beside other terms such as {kind: noise}")
-    paint = read_paint(locate(files[0]), [material.name for material in manifest.materials])
+    paint = read_paint(locate_path(files[0]), [material.name for material in manifest.materials])
     if manifest.objects and manifest.scatter:
         objects = scale_objects(manifest.objects, manifest.scatter.cells, paint)
         manifest = replace(manifest, objects=objects)
@@ -109,7 +109,7 @@ def _find_material(name: str, names: Mapping[str, int]) -> int:
 
 def _read_picture(entry: dict[str, Any], names: Mapping[str, int], file: str) -> tuple[ImageTerm, Picture]:
     """A picture's pixels as numbers of materials: the nearest of the given colours; UNKNOWN if none is near."""
-    path = locate(entry["file"])
+    path = locate_path(entry["file"])
     columns, rows = image_files.read_size(path)
     if max(rows, columns) > MAX_SIDE:
         raise InputError(f"{path}: {columns} x {rows} pixels; at most {MAX_SIDE} a side: shrink the picture")

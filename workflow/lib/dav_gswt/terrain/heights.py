@@ -13,7 +13,7 @@ from jaxtyping import Float, Float32, Int64
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import locate
+from dav_gswt.files import locate_path
 from dav_gswt.images import image_files
 from dav_gswt.terrain.choice import hash_cell
 from dav_gswt.terrain.sphere import make_sphere
@@ -164,7 +164,7 @@ def surface_from_config(entry: dict, side: float) -> HeightField:
         return make_sphere(entry["radius"], side)
     if entry["kind"] == "hills":
         return Hills(entry["height"] * side, entry["wavelength"] * side, entry.get("octaves", 4), entry.get("seed", 0))
-    pixels = read_height_map(locate(entry["file"])) * np.float32(entry["height"])
+    pixels = read_height_map(locate_path(entry["file"])) * np.float32(entry["height"])
     return HeightMap(pixels, float(entry["width"]), entry.get("beyond", "mirror"))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float32, Float64, Int
 from numpy import ndarray as Array
 
-from dav_gswt.files import locate
+from dav_gswt.files import locate_path
 from dav_gswt.images.lpips_weights import Weights, read
 from dav_gswt.logs import progress
 from dav_gswt.prior.interface import Condition, CopyablePrior, Prior
@@ -78,10 +78,10 @@ def load_prior(entry: dict) -> Prior:
         from dav_gswt.prior.terrain import TerrainPrior  # not above: diffusers takes seconds to load
         from dav_gswt.prior.weights import TERRAIN_WEIGHTS
 
-        return TerrainPrior.open(locate(entry.get("weights", TERRAIN_WEIGHTS)))
+        return TerrainPrior.open(locate_path(entry.get("weights", TERRAIN_WEIGHTS)))
     from dav_gswt.prior.zero123 import GUIDANCE, Zero123
 
-    return Zero123.open(locate(entry["folder"]), entry.get("guidance", GUIDANCE))
+    return Zero123.open(locate_path(entry["folder"]), entry.get("guidance", GUIDANCE))
 
 
 def sample_terms(

@@ -137,12 +137,10 @@ def list_registration_facts(found: ReportFacts) -> list[Fact]:
     frame, error = found.frame, mean_reprojection_error(found)
     counts = crop_to_exemplar(found)
     low, usual, high = min_median_max(counts.ravel()) if counts.size else (0, 0, 0)
-    pairs = zip(found.photos, found.model.cameras, strict=True)
-    shares = [
-        measure_visible_share(camera, ground_bounds(frame, whole=False)) for photo, camera in pairs if not photo.tests
-    ]
-    pairs = zip(found.photos, found.model.cameras, strict=True)
-    count = sum(shows_enough(camera, ground_bounds(frame, whole=False)) for photo, camera in pairs if not photo.tests)
+    pairs, bounds = zip(found.photos, found.model.cameras, strict=True), ground_bounds(frame, whole=False)
+    cameras = [camera for photo, camera in pairs if not photo.tests]
+    shares = [measure_visible_share(camera, bounds) for camera in cameras]
+    count = sum(shows_enough(camera, bounds) for camera in cameras)
     others = "all of them" if count == len(shares) else "the others show too little of it to take part"
     if frame.kind == "synthetic":
         first = Fact("Photos", f"{len(found.placed)} and {len(found.photos) - len(found.placed)} tests", "rendered")

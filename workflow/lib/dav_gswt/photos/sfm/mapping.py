@@ -36,7 +36,7 @@ class Approach:
 
 
 def list_alternatives(first: Approach, freed: bool, gps: bool) -> list[Approach]:
-    """Other ways for photos whose model is in doubt. freed: EXIF's focal length was given up. gps: with positions."""
+    """Other ways for photos whose model may be wrong. freed: EXIF's focal length was given up. gps: with positions."""
     out = [Approach(first.mapper, hold_focal=True)] if freed else []
     out += [Approach("incremental", hold_focal=True, use_gps=True)] if gps else []
     return [*out, Approach(other_mapper(first.mapper), hold_focal=True)]

@@ -119,7 +119,7 @@ def _list_other_ways(first: Approach, solution: SfmSolution, scene: SfmScene) ->
     """Other ways of mapping that may give a better model than the first did."""
     against = [sign.reason for sign in solution.verdict.objections if sign.name not in COVERAGE]
     if against:
-        _log.info("the model is in doubt: %s", against[0])
+        _log.info("the model may be wrong: %s", against[0])
         ratio = solution.focal.ratio
         freed = ratio is not None and not np.isclose(ratio, 1, rtol=1e-9)
         return list_alternatives(first, freed, scene.positions is not None)
