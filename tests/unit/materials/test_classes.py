@@ -95,6 +95,21 @@ def test_dense_growth_of_several_colours_is_texture():
     assert (found.number, found.excluded.mean() < 0.02) == (1, True)
 
 
+@pytest.mark.parametrize("rows", [slice(0, 24), slice(50, 78)])
+def test_a_wood_of_many_colours_is_no_texture_of_the_ground_beside_it(rows):
+    """Crowns and the dark between them, in classes of which none is wide, over a fifth of the ground and more."""
+    labels, rng = np.zeros((128, 128), int), np.random.default_rng(3)
+    wood = np.zeros(labels.shape, bool)
+    wood[rows] = True
+    labels[wood] = rng.integers(1, 6, (32, 32)).repeat(4, 0).repeat(4, 1)[wood]
+    meadow = ~wood & (np.arange(128) > 40)
+    labels[(rng.random(labels.shape) < 0.15) & meadow] = 1
+    assert not classes.find_growth(labels, [0]).any()
+    labels[(rng.random(labels.shape) < 0.45) & meadow] = 2
+    growth = classes.find_growth(labels, [0])
+    assert not growth[wood].any() and growth[meadow].mean() > 0.4
+
+
 def test_named_materials_are_taken_as_they_are():
     maps = made.maps(mixed=False, shrubs=False)
     left = np.zeros(maps.known.shape, bool)

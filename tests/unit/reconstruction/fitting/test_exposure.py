@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fixtures.frames import scene_frame
+from scipy.ndimage import zoom
 
 from dav_gswt.geometry import cameras
 from dav_gswt.photos.training_views import TrainingView
@@ -45,6 +46,39 @@ def test_exposures_are_levelled_without_drift(grid):
     levelled = exposure.equalize_exposure(photos, grid.centres)
     for view in levelled:
         np.testing.assert_allclose(view.image.mean((0, 1)), texture.mean((0, 1)), rtol=0.02)
+
+
+@pytest.mark.parametrize("away", [0.7, 2.0])
+def test_grain_that_lies_beside_its_place_takes_no_contrast_from_the_photos(grid, away):
+    """Six photos of fine grain and coarse patches, each some pixels off: poses and relief leave as much."""
+    rng = np.random.default_rng(0)
+    texture = np.repeat(rng.uniform(0.3, 0.6, (420, 420, 1)), 3, 2) + np.repeat(
+        zoom(rng.uniform(-0.1, 0.1, (6, 6)), 70, order=1)[..., None], 3, 2
+    )
+    gains = [0.9, 1.0, 1.0, 1.0, 1.0, 1.1]
+    photos = []
+    for gain in gains:
+        x, y = np.rint(10 + away * rng.normal(size=2)).astype(int)
+        photos.append(large_photo((gain * texture[y : y + 400, x : x + 400]).astype(np.float32)))
+    spread = [view.image.std() / view.image.mean() for view in photos]
+    levelled = exposure.equalize_exposure(photos, grid.centres)
+    for view, before in zip(levelled, spread, strict=True):
+        assert view.image.std() / view.image.mean() == pytest.approx(before, rel=0.05)
+        np.testing.assert_allclose(view.image.mean((0, 1)), texture.mean((0, 1)), rtol=0.02)
+
+
+def test_photos_that_see_no_ground_keep_their_exposure(grid):
+    near = [photo(np.full(3, 0.4)), photo(np.full(3, 0.4)), photo(np.full(3, 0.6))]
+    far = [photo([0.2, 0.2, 0.2], eye=(400.0, 400.0, 6.0)) for _ in range(5)]
+    levelled = exposure.equalize_exposure(near + far, grid.centres)
+    np.testing.assert_allclose([view.image.mean() for view in levelled], [0.4] * 3 + [0.2] * 5, atol=1e-3)
+    assert exposure.equalize_exposure(far, grid.centres) == far
+
+
+def large_photo(image):
+    """A photo from above of as many pixels as the image."""
+    camera = cameras.pinhole((2.0, 2, 6), [2, 2, 0], len(image), len(image), 60.0)
+    return TrainingView("photo", camera, image, np.ones(image.shape[:2], np.float32))
 
 
 def test_a_pictures_exposure_is_found_beside_what_moves():

@@ -18,6 +18,10 @@ MAX_MATERIALS = 4
 LEAST_SHARE = 0.05  # of the exemplar, of a material
 LEAST_WIDTH = 0.13  # of its side: a disc so wide lies in a material
 FINE = 0.1  # of its side: classes that are nowhere wider are growth or things; where they are dense, they are texture
+WOOD, WOODED = (
+    0.16,
+    1 / 3,
+)  # width, of the side, of growth without plain ground; its share of all, from which it is none
 RIM = 1 / 128  # of the side: width of the blurred rim of shade and of other excluded ground
 LITTLE = 0.02  # of the exemplar: so little that stands out of one rough material is left in it
 ROUGH = 0.5  # cells that blobs usually rise by, from which ground is dense with growth or stones
@@ -188,11 +192,24 @@ def find_scattered(classes: Int[Array, "m m"], chosen: list[int]) -> Bool[Array,
 
 
 def find_growth(classes: Int[Array, "m m"], chosen: list[int]) -> Bool[Array, "m m"]:
-    """Cells of classes that are nowhere wide and together dense, as the flowers of a meadow: texture of a material."""
-    others = [number for number in range(int(classes.max()) + 1) if number not in chosen]
-    fine = [number for number in others if _measure_width(classes == number) < FINE * len(classes)]
-    growth = np.isin(classes, fine)
+    """Cells of classes that are nowhere wide and together dense, as the flowers of a meadow: texture of a material.
+
+    Where much of them lies together without plain ground between, as the crowns of a wood do, that is no texture; but
+    ground on which not even a material is wide has classes of texture alone.
+    """
+    m = len(classes)
+    widths = {number: _measure_width(classes == number) for number in range(int(classes.max()) + 1)}
+    growth = np.isin(classes, [number for number, width in widths.items() if width < FINE * m and number not in chosen])
+    wood = _find_wide_parts(growth, WOOD * m)
+    if wood.sum() > WOODED * growth.sum() and max(widths[number] for number in chosen) >= LEAST_WIDTH * m:
+        growth &= ~wood
     return growth if growth.mean() > objects.DENSE else np.zeros_like(growth)
+
+
+def _find_wide_parts(cells: Bool[Array, "m m"], width: float) -> Bool[Array, "m m"]:
+    """Cells of a region that lie in a disc of some diameter within it (its opening); it goes on beyond the border."""
+    inner = distance_transform_edt(cells) >= width / 2
+    return cells & (distance_transform_edt(~inner) < width / 2) if inner.any() else inner
 
 
 def _measure_width(cells: Bool[Array, "m m"]) -> float:

@@ -4,7 +4,7 @@ Fitted before the fit, between the photos' colours of the same points, and at ev
 photos get none.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from jaxtyping import Float, Float32
 from numpy import ndarray as Array
 
 from dav_gswt.images import channels
-from dav_gswt.photos.training_views import TrainingView, one_by_one
+from dav_gswt.photos.training_views import TrainingView, make_training_view, one_by_one
 from dav_gswt.reconstruction.fitting.photo_colours import median_colours, sample_colours
 
 MAX_GAIN = 1.6  # of a photo against the set
@@ -21,25 +21,28 @@ LEARNING_RATE = np.float32(0.25)  # share of a step's estimate
 PRIOR = 1e-3  # variance of pseudo-pixels of gain 1: a picture without contrast keeps its gain
 TRIM = 3.0  # medians of the difference, beyond which a pixel is ignored
 ROUNDS = 3
+COARSE = 96  # pixels along the longer side of the photos that exposures are compared in
+LEAST_PAIRS = 10  # colours that tell a photo's exposure
 MAX_PIXELS = 8000  # evenly over the picture
 
 
 def fit_gain_and_offset(
     x: Float[Array, "n 3"], y: Float[Array, "n 3"]
 ) -> tuple[Float32[Array, "3"], Float32[Array, "3"]]:
-    """Per channel the robust least-squares a, b of y = a x + b; a within 1 / MAX_GAIN .. MAX_GAIN.
+    """Per channel the robust a, b of y = a x + b; a within 1 / MAX_GAIN .. MAX_GAIN.
 
-    Pairs far off the first fit (three median deviations: moving things, blur) are left out of the second.
+    a is the ratio of the standard deviations (the reduced major axis): both sides have errors, and a least-squares
+    slope is the smaller the more x has. Pairs far off the first fit (three median deviations: moving things, blur) are
+    left out of the second. Fewer than LEAST_PAIRS: 1 and 0.
     """
     a, b = np.ones(3, np.float32), np.zeros(3, np.float32)
     for c in range(3):
         keep = np.isfinite(x[:, c]) & np.isfinite(y[:, c])
         for _ in range(2):
             u, v = x[keep, c].astype(float), y[keep, c].astype(float)
-            if len(u) < 10:
+            if len(u) < LEAST_PAIRS:
                 break
-            spread = u.var() + 1e-6
-            a[c] = np.clip(((u - u.mean()) * (v - v.mean())).mean() / spread, 1 / MAX_GAIN, MAX_GAIN)
+            a[c] = np.clip(np.sqrt((v.var() + 1e-6) / (u.var() + 1e-6)), 1 / MAX_GAIN, MAX_GAIN)
             b[c] = v.mean() - a[c] * u.mean()
             residual = np.abs(a[c] * x[:, c] + b[c] - y[:, c])
             with np.errstate(invalid="ignore"):
@@ -50,25 +53,29 @@ def fit_gain_and_offset(
 def equalize_exposure(views: list[TrainingView], points: Float[Array, "n 3"]) -> list[TrainingView]:
     """The photos at the exposure of the set.
 
-    Each photo is fitted to the set's median colours of the ground points that it sees, in ROUNDS rounds. The anchor is
-    the first median, so that gains multiply to about 1 and colours stay those of the typical photo.
+    Each photo is fitted to the set's median colours of the ground points that it sees, in ROUNDS rounds. Colours are
+    compared in photos of COARSE pixels: grain, and ground that lies a pixel beside its place, would look like less
+    contrast. Gains and offsets count relative to their median over the photos, so that the set keeps the colours and
+    the contrast of its typical photo.
     """
-    anchor = None
+    small = [make_training_view(v.name, v.camera, v.image, COARSE, v.weight) for v in one_by_one(views)]
+    seen = [sample_colours(points, view)[0] for view in small]
+    compared = [int(np.isfinite(each[:, 0]).sum()) >= LEAST_PAIRS for each in seen]
+    if not any(compared):
+        return views
+    gains, offsets = np.ones((len(views), 3), np.float32), np.zeros((len(views), 3), np.float32)
     for _ in range(ROUNDS):
-        median, _ = median_colours(points, views)
-        if anchor is not None:  # without this the common gain random-walks from round to round
-            back = fit_gain_and_offset(median, anchor)
-            median = median * back[0] + back[1]
-        anchor = median if anchor is None else anchor
-        views = [match_exposure(view, points, median) for view in one_by_one(views)]
-    return views
-
-
-def match_exposure(view: TrainingView, points: Float[Array, "n 3"], colours: Float[Array, "n 3"]) -> TrainingView:
-    """A photo with the gain and offset that fit it to known colours of points."""
-    seen, _ = sample_colours(points, view)
-    a, b = fit_gain_and_offset(seen, colours)
-    return view.with_pixels(image=(view.image * a + b).astype(np.float32))
+        equal = [replace(v, image=v.image * a + b) for v, a, b in zip(small, gains, offsets, strict=True)]
+        median, _ = median_colours(points, equal)
+        for i in np.flatnonzero(compared):
+            gains[i], offsets[i] = fit_gain_and_offset(seen[i], median)
+        gain, offset = np.median(gains[compared], 0), np.median(offsets[compared], 0)
+        gains[compared] = gains[compared] / gain
+        offsets[compared] = (offsets[compared] - offset) / gain
+    return [
+        view.with_pixels(image=(view.image * a + b).astype(np.float32))
+        for view, a, b in zip(one_by_one(views), gains, offsets, strict=True)
+    ]
 
 
 @dataclass(frozen=True)
