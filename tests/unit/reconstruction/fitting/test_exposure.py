@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fixtures.frames import scene_frame
-from scipy.ndimage import zoom
+from scipy.ndimage import gaussian_filter, map_coordinates, zoom
 
 from dav_gswt.geometry import cameras
 from dav_gswt.photos.training_views import TrainingView
@@ -65,6 +65,46 @@ def test_grain_that_lies_beside_its_place_takes_no_contrast_from_the_photos(grid
     for view, before in zip(levelled, spread, strict=True):
         assert view.image.std() / view.image.mean() == pytest.approx(before, rel=0.05)
         np.testing.assert_allclose(view.image.mean((0, 1)), texture.mean((0, 1)), rtol=0.02)
+
+
+def test_photos_from_afar_and_at_a_slant_keep_their_contrast(grid):
+    """Coarse pixels of theirs would hold more ground, so less of the texture's contrast."""
+    rng = np.random.default_rng(1)
+    noise = rng.normal(size=(200, 200))
+    waves = np.hypot(*np.meshgrid(np.fft.fftfreq(200), np.fft.fftfreq(200)))
+    waves[0, 0] = 1
+    pink = np.fft.ifft2(np.fft.fft2(noise) / waves).real
+    texture = 0.45 + 0.1 * (pink - pink.mean()) / pink.std()
+    near = [((x, y, 1.5), (x, y, 0)) for x in (1.0, 2, 3) for y in (1.0, 2, 3)]
+    far = [((2.0, 2.2, z), (2, 2.2, 0)) for z in (4.0, 9)] + [((x, 2.0, 1.5), (2, 2, 0)) for x in (-2.0, 6)]
+    photos = [look_at_texture(texture, eye, target) for eye, target in near + far]
+    levelled = exposure.equalize_exposure(photos, grid.centres)
+    for view, before in zip(levelled, photos, strict=True):
+        assert view.image.std() / before.image.std() == pytest.approx(1, abs=0.06)
+
+
+def look_at_texture(texture, eye, target):
+    """A photo of a texture over the plane, 4 wide, each pixel the mean of what it covers; grey beyond."""
+    camera = cameras.pinhole(eye, target, 96, 96, 60.0)
+    origin, step = camera.rays()
+    ground_at = (origin - origin[..., 2:] / step[..., 2:] * step)[..., :2] * 50
+    footprint = float(np.linalg.norm(np.subtract(eye, target))) / camera.fx * 50
+    x, y = np.clip(ground_at, 0, 199).transpose(2, 0, 1)
+    image = map_coordinates(gaussian_filter(texture, 0.4 * footprint), [y, x], order=1)
+    beyond = (np.abs(ground_at - 100) > 100).any(-1) | (step[..., 2] >= 0)
+    image = np.repeat(np.where(beyond, 0.45, image)[..., None], 3, 2).astype(np.float32)
+    return TrainingView("photo", camera, image, np.ones(image.shape[:2], np.float32))
+
+
+def test_a_photo_of_another_level_keeps_its_colours_above_zero(grid):
+    """A brighter photo of the same contrast, with something dark in it that no other photo shows."""
+    rng = np.random.default_rng(4)
+    texture = np.repeat(zoom(rng.uniform(0.05, 0.5, (10, 10, 1)), (40, 40, 1), order=0), 3, 2)
+    photos = [large_photo(texture.astype(np.float32)) for _ in range(4)]
+    bright = (0.25 + 0.88 * texture).astype(np.float32)
+    bright[:80, :100] = 0.15
+    for view in exposure.equalize_exposure([*photos, large_photo(bright)], grid.centres):
+        assert view.image.min() > 0
 
 
 def test_photos_that_see_no_ground_keep_their_exposure(grid):

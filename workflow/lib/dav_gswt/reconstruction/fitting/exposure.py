@@ -4,16 +4,16 @@ Fitted before the fit, between the photos' colours of the same points, and at ev
 photos get none.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float, Float32, Int
 from numpy import ndarray as Array
 
 from dav_gswt.images import channels
-from dav_gswt.photos.training_views import TrainingView, make_training_view, one_by_one
-from dav_gswt.reconstruction.fitting.photo_colours import median_colours, sample_colours
+from dav_gswt.photos.training_views import TrainingView, one_by_one
+from dav_gswt.reconstruction.fitting.photo_colours import nan_median, sample_colours
 
 MAX_GAIN = 1.6  # of a photo against the set
 MAX_STEP_GAIN = 1.25  # during the fit
@@ -21,7 +21,9 @@ LEARNING_RATE = np.float32(0.25)  # share of a step's estimate
 PRIOR = 1e-3  # variance of pseudo-pixels of gain 1: a picture without contrast keeps its gain
 TRIM = 3.0  # medians of the difference, beyond which a pixel is ignored
 ROUNDS = 3
-COARSE = 96  # pixels along the longer side of the photos that exposures are compared in
+CELL = 1 / 40  # of what is compared, of a cell whose mean colours are
+WHOLE = 0.9  # of a cell's points, that a photo shows at least
+LEVEL = 0.2  # weight of the square of the mean beside the variance
 LEAST_PAIRS = 10  # colours that tell a photo's exposure
 MAX_PIXELS = 8000  # evenly over the picture
 
@@ -32,8 +34,9 @@ def fit_gain_and_offset(
     """Per channel the robust a, b of y = a x + b; a within 1 / MAX_GAIN .. MAX_GAIN.
 
     a is the ratio of the standard deviations (the reduced major axis): both sides have errors, and a least-squares
-    slope is the smaller the more x has. Pairs far off the first fit (three median deviations: moving things, blur) are
-    left out of the second. Fewer than LEAST_PAIRS: 1 and 0.
+    slope is the smaller the more x has. As exposure takes black to black, the means count in it as LEVEL of their
+    squares: ground without contrast has no other ratio, and colours stay above 0. Pairs far off the first fit (three
+    median deviations: moving things, blur) are left out of the second. Fewer than LEAST_PAIRS: 1 and 0.
     """
     a, b = np.ones(3, np.float32), np.zeros(3, np.float32)
     for c in range(3):
@@ -42,7 +45,8 @@ def fit_gain_and_offset(
             u, v = x[keep, c].astype(float), y[keep, c].astype(float)
             if len(u) < LEAST_PAIRS:
                 break
-            a[c] = np.clip(np.sqrt((v.var() + 1e-6) / (u.var() + 1e-6)), 1 / MAX_GAIN, MAX_GAIN)
+            power = [each.var() + LEVEL * each.mean() ** 2 + 1e-6 for each in (u, v)]
+            a[c] = np.clip(np.sqrt(power[1] / power[0]), 1 / MAX_GAIN, MAX_GAIN)
             b[c] = v.mean() - a[c] * u.mean()
             residual = np.abs(a[c] * x[:, c] + b[c] - y[:, c])
             with np.errstate(invalid="ignore"):
@@ -53,20 +57,20 @@ def fit_gain_and_offset(
 def equalize_exposure(views: list[TrainingView], points: Float[Array, "n 3"]) -> list[TrainingView]:
     """The photos at the exposure of the set.
 
-    Each photo is fitted to the set's median colours of the ground points that it sees, in ROUNDS rounds. Colours are
-    compared in photos of COARSE pixels: grain, and ground that lies a pixel beside its place, would look like less
-    contrast. Gains and offsets count relative to their median over the photos, so that the set keeps the colours and
-    the contrast of its typical photo.
+    Each photo is fitted to the set's median colours of the ground that it sees, in ROUNDS rounds. Colours are means
+    over cells of the ground that are the same for all photos: grain a pixel beside its place would look like less
+    contrast, and so would ground that is far away or seen at a slant, if each photo were averaged over its own pixels.
+    Gains and offsets count relative to their median over the photos, so that the set keeps the colours and the contrast
+    of its typical photo. Photos that see too little of the ground stay as they are.
     """
-    small = [make_training_view(v.name, v.camera, v.image, COARSE, v.weight) for v in one_by_one(views)]
-    seen = [sample_colours(points, view)[0] for view in small]
-    compared = [int(np.isfinite(each[:, 0]).sum()) >= LEAST_PAIRS for each in seen]
-    if not any(compared):
+    cell_of, sizes = _divide_ground(points)
+    seen = np.stack([_average_cells(points, view, cell_of, sizes) for view in one_by_one(views)])
+    compared = np.isfinite(seen[..., 0]).sum(1) >= LEAST_PAIRS
+    if not compared.any():
         return views
     gains, offsets = np.ones((len(views), 3), np.float32), np.zeros((len(views), 3), np.float32)
     for _ in range(ROUNDS):
-        equal = [replace(v, image=v.image * a + b) for v, a, b in zip(small, gains, offsets, strict=True)]
-        median, _ = median_colours(points, equal)
+        median = nan_median(seen[compared] * gains[compared, None] + offsets[compared, None])
         for i in np.flatnonzero(compared):
             gains[i], offsets[i] = fit_gain_and_offset(seen[i], median)
         gain, offset = np.median(gains[compared], 0), np.median(offsets[compared], 0)
@@ -76,6 +80,28 @@ def equalize_exposure(views: list[TrainingView], points: Float[Array, "n 3"]) ->
         view.with_pixels(image=(view.image * a + b).astype(np.float32))
         for view, a, b in zip(one_by_one(views), gains, offsets, strict=True)
     ]
+
+
+def _divide_ground(points: Float[Array, "n 3"]) -> tuple[Int[Array, "n"], Int[Array, "cells"]]:
+    """The cell of the map that each point lies in, CELL of what most points span; and how many points each cell has."""
+    low, high = np.quantile(points[:, :2], [0.05, 0.95], axis=0)
+    side = CELL * max(float((high - low).max()), 1e-9)
+    index = np.floor((points[:, :2] - low) / side).astype(np.int64)
+    _, cell_of = np.unique(index, axis=0, return_inverse=True)
+    return cell_of.ravel(), np.bincount(cell_of.ravel())
+
+
+def _average_cells(
+    points: Float[Array, "n 3"], view: TrainingView, cell_of: Int[Array, "n"], sizes: Int[Array, "cells"]
+) -> Float32[Array, "cells 3"]:
+    """A photo's mean colours of cells; NaN where it does not see nearly all of their points."""
+    colours, inside = sample_colours(points, view)
+    own = cell_of[inside]
+    total = np.stack([np.bincount(own, colours[inside, c].astype(float), len(sizes)) for c in range(3)], 1)
+    count = np.bincount(own, minlength=len(sizes))
+    mean = (total / np.maximum(count, 1)[:, None]).astype(np.float32)
+    mean[count < WHOLE * sizes] = np.nan
+    return mean
 
 
 @dataclass(frozen=True)
