@@ -202,11 +202,11 @@ def test_an_area_is_never_rounded_up_to_a_bound_that_it_misses(areas, said):
 
 def test_the_verdict_on_a_set_names_materials_of_which_there_is_too_little():
     judged = {name: verdict.judge_material(name, areas, 0.3) for name, areas in (("sand", 8.0), ("rock", 0.5))}
-    whole = verdict.judge_set(judged, 0.2, 1)
+    whole = verdict.judge_set(judged, {"sand": 0.7, "rock": 0.3}, 0.2, 1)
     assert whole.grade == "good" and whole.reason.endswith(
         "a path, road or the like among it; of rock there is too little"
     )
-    assert "too little" not in verdict.judge_set({"sand": judged["sand"]}, 0.2, 0).reason
+    assert "too little" not in verdict.judge_set({"sand": judged["sand"]}, {"sand": 1.0}, 0.2, 0).reason
 
 
 def test_a_window_is_filled_by_its_material_where_it_can_be():

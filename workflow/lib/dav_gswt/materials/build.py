@@ -131,7 +131,8 @@ def find_materials(
     objects = _extract_objects(parts, {k: place for place, k in enumerate(kept)})
     strips = int(classes.kinds.max()) + 1 - classes.number
     verdicts = {each.info.name: each.verdict for each in materials}
-    judged = verdict.judge_set(verdicts, float(classes.excluded.mean()), max(strips, 0))
+    shares = {each.info.name: each.info.share for each in materials}
+    judged = verdict.judge_set(verdicts, shares, float(classes.excluded.mean()), max(strips, 0))
     return _report(FoundMaterials(maps, classes, parts.tile_side, materials, objects, judged))
 
 
@@ -153,7 +154,8 @@ def _keep_whole(field: GaussianField, grid: Ground, maps: GroundMaps) -> FoundMa
         np.zeros(maps.known.shape, int), np.zeros(maps.known.shape, int), [], nothing, ["material0"]
     )
     material = Material(info, field, grid, 0.0, judged)
-    return _report(FoundMaterials(maps, classes, None, [material], [], verdict.judge_set({info.name: judged}, 0.0, 0)))
+    judged_set = verdict.judge_set({info.name: judged}, {info.name: 1.0}, 0.0, 0)
+    return _report(FoundMaterials(maps, classes, None, [material], [], judged_set))
 
 
 def _report(found: FoundMaterials) -> FoundMaterials:
@@ -166,12 +168,14 @@ def _report(found: FoundMaterials) -> FoundMaterials:
 def choose_tile_side(maps: GroundMaps, sources: list[Bool[Array, "m m"]]) -> float:
     """Side of a tile in cells: by the texture of the first material; the area of the scarcest holds AREAS tiles of it.
 
-    At least SMALLEST_TILE of the exemplar's side.
+    At least SMALLEST_TILE of the exemplar's side. A material too scarce for AREAS even of these has no say: it would
+    make the others' tiles small for nothing.
     """
     first = sources[0] if sources[0].any() else np.ones_like(sources[0])
     by_texture, _ = texture.choose_sizes(_texture_scale(maps, first) / maps.cells)
-    by_area = min([1.0, *(float(np.sqrt(source.mean() / AREAS)) for source in sources if source.any())])
-    return max(SMALLEST_TILE, min(by_texture, by_area)) * maps.cells
+    shares = [float(source.mean()) for source in sources]
+    by_area = min([1.0, *(np.sqrt(share / AREAS) for share in shares if share >= AREAS * SMALLEST_TILE**2)])
+    return float(max(SMALLEST_TILE, min(by_texture, by_area))) * maps.cells
 
 
 def _ignore_scarce(classes: GroundClasses, number: int) -> Bool[Array, "m m"]:

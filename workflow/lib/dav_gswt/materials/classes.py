@@ -17,12 +17,12 @@ from dav_gswt.materials.surroundings import Surroundings
 MAX_MATERIALS = 4
 LEAST_SHARE = 0.05  # of the exemplar, of a material
 LEAST_WIDTH = 0.13  # of its side: a disc so wide lies in a material
-FINE = 0.1  # of its side: classes that are nowhere wider are growth or things; where they are dense, they are texture
 WOOD, WOODED = (
     0.16,
     1 / 3,
 )  # width, of the side, of growth without plain ground; its share of all, from which it is none
 RIM = 1 / 128  # of the side: width of the blurred rim of shade and of other excluded ground
+HALO = 2 * segmentation.GRAIN  # of the side, from the ground: so far reaches the grain's contrast of a thing
 LITTLE = 0.02  # of the exemplar: so little that stands out of one rough material is left in it
 ROUGH = 0.5  # cells that blobs usually rise by, from which ground is dense with growth or stones
 MORE_GRAIN = 1.6  # times a material's contrast: rougher ground is no shade of it (that under trees is dappled)
@@ -147,12 +147,28 @@ def _describe_surroundings(maps: GroundMaps, features: Float[Array, "m m 3"], gr
     wide = np.isin(classes, chosen) & maps.known & ~ground.pieces & ~crossing
     nearest = tuple(distance_transform_edt(~wide, return_distances=False, return_indices=True))
     materials = np.searchsorted(chosen, classes[nearest])
-    wide |= find_growth(classes, chosen) & maps.known & ~crossing
+    wide |= find_growth(np.where(crossing, NO_CLASS, classes), chosen) & maps.known
+    wide |= _find_halos(features, wide, materials) & maps.known & ~ground.pieces & ~crossing
     rise = standing.measure_rise(maps)
     rough = frozenset(
         k for k in range(len(chosen)) if standing.measure_roughness(rise, wide & (materials == k)) > ROUGH
     )
     return Surroundings(maps.colour, features, rise, materials, wide, ground.pieces, crossing, maps.known, rough)
+
+
+def _find_halos(
+    features: Float[Array, "m m 3"], ground: Bool[Array, "m m"], materials: Int[Array, "m m"]
+) -> Bool[Array, "m m"]:
+    """Cells beside the ground of a material and of its colour, that are of another class by their grain.
+
+    Around a thing the contrast of the grain is that of the thing.
+    """
+    near = distance_transform_edt(~ground) <= HALO * len(ground)
+    found = np.zeros_like(ground)
+    for number in np.unique(materials[ground]):
+        own = materials == number
+        found |= own & near & ~ground & (objects.measure_deviation(features, own & ground) < objects.LIKELY)
+    return found
 
 
 def _widen(excluded: Bool[Array, "m m"], footprints: list[Footprint]) -> Bool[Array, "m m"]:
@@ -199,7 +215,9 @@ def find_growth(classes: Int[Array, "m m"], chosen: list[int]) -> Bool[Array, "m
     """
     m = len(classes)
     widths = {number: _measure_width(classes == number) for number in range(int(classes.max()) + 1)}
-    growth = np.isin(classes, [number for number, width in widths.items() if width < FINE * m and number not in chosen])
+    growth = np.isin(
+        classes, [number for number, width in widths.items() if width < LEAST_WIDTH * m and number not in chosen]
+    )
     wood = _find_wide_parts(growth, WOOD * m)
     if wood.sum() > WOODED * growth.sum() and max(widths[number] for number in chosen) >= LEAST_WIDTH * m:
         growth &= ~wood

@@ -69,23 +69,30 @@ def find_outliers(features: Float[Array, "m m k"], maps: GroundMaps, ground: Boo
     """
     from skimage.filters import apply_hysteresis_threshold  # here, not above: it takes half a second to load
 
-    m, spacing = maps.cells, maps.exemplar.spacing
-    relief = maps.height / spacing  # cells
+    relief = maps.height / maps.exemplar.spacing  # cells
     values = np.concatenate([features, relief[..., None]], -1)
-    least = np.array([NOTICEABLE] * features.shape[-1] + [1.0]) / SURE
     plain = ground & maps.known
     score = np.zeros(ground.shape)
     for _ in range(ROUNDS):
         if plain.sum() < 0.1 * ground.sum():
             break
-        weight = gaussian_filter(plain.astype(float), AROUND * m, mode="nearest")
-        layers = [np.where(plain, layer, 0) for layer in np.moveaxis(values, -1, 0)]
-        mean = np.stack([gaussian_filter(layer, AROUND * m, mode="nearest") for layer in layers], -1)
-        away = values - mean / np.maximum(weight, 1e-6)[..., None]
-        spread = np.maximum(1.4826 * np.median(np.abs(away[plain]), 0), least)
-        score = np.abs(away / spread).max(-1)
+        score = measure_deviation(values, plain)
         plain = ground & maps.known & (score < LIKELY)
     return apply_hysteresis_threshold(np.where(ground, score, 0), LIKELY, SURE)
+
+
+def measure_deviation(values: Float[Array, "m m k"], plain: Bool[Array, "m m"]) -> Float[Array, "m m"]:
+    """How far each cell is from plain ground around it: the most robust standard deviations in any of its values.
+
+    values: three of colour, then, if any, relief in cells. plain: the ground to compare with, not empty.
+    """
+    m, least = len(values), np.array([NOTICEABLE] * 3 + [1.0]) / SURE
+    weight = gaussian_filter(plain.astype(float), AROUND * m, mode="nearest")
+    layers = [np.where(plain, layer, 0) for layer in np.moveaxis(values, -1, 0)]
+    mean = np.stack([gaussian_filter(layer, AROUND * m, mode="nearest") for layer in layers], -1)
+    away = values - mean / np.maximum(weight, 1e-6)[..., None]
+    spread = np.maximum(1.4826 * np.median(np.abs(away[plain]), 0), least[: values.shape[-1]])
+    return np.abs(away / spread).max(-1)
 
 
 def find_footprints(
@@ -141,7 +148,7 @@ def _join_rims(
     while True:
         taken = np.any([np.zeros_like(candidates), *(binary_dilation(own) for own in tall)], axis=0)
         rest, grown = [], list(tall)
-        for rim in split_things(_clean(candidates & ~taken)):
+        for rim in split_things(_clean(candidates & ~taken) & ~taken):  # an annulus is not filled with its core
             around = binary_dilation(rim, iterations=2)
             touched = [k for k, own in enumerate(grown) if (around & own).any()]
             if len(touched) == 1 and rim.sum() < grown[touched[0]].sum():
@@ -162,11 +169,16 @@ def _is_shaded(own: Bool[Array, "m m"], material: int, around: Surroundings) -> 
 
 
 def _is_marker(own: Bool[Array, "m m"], material: int, around: Surroundings) -> bool:
-    """Whether a thing is far richer in contrast than its material, as a survey's marker in black and white."""
+    """Whether a thing is far richer in contrast than its material, as a survey's marker in black and white.
+
+    Cells that hardly differ from the ground do not count: the rim of a thing shows ground.
+    """
     plain, bright = around.plain(material), around.colour.mean(-1)
     if not plain.any():
         return False
-    inside, outside = np.ptp(np.quantile(bright[own], [0.05, 0.95])), np.ptp(np.quantile(bright[plain], [0.01, 0.99]))
+    away = np.abs(bright[own] - np.median(bright[plain]))
+    core = bright[own][away >= 0.5 * np.quantile(away, 0.95)]
+    inside, outside = np.ptp(np.quantile(core, [0.05, 0.95])), np.ptp(np.quantile(bright[plain], [0.01, 0.99]))
     return bool(inside > MARKER * max(float(outside), LEAST_CONTRAST))
 
 
@@ -255,8 +267,13 @@ def _is_compact(own: Bool[Array, "m m"]) -> bool:
 
 
 def _clean(cells: Bool[Array, "m m"]) -> Bool[Array, "m m"]:
-    """Without threads and specks, and without holes."""
-    return binary_fill_holes(binary_closing(binary_opening(cells, np.ones((2, 2), bool)), np.ones((3, 3), bool)))
+    """Without threads and specks, and without holes; what is wider than a thing is no hole but ground in a ring."""
+    whole = binary_closing(binary_opening(cells, np.ones((2, 2), bool)), np.ones((3, 3), bool))
+    holes, number = label(binary_fill_holes(whole) & ~whole)
+    widest = np.zeros(number + 1)
+    np.maximum.at(widest, holes.ravel(), 2 * distance_transform_edt(~whole).ravel())
+    widest[0] = np.inf  # what is no hole
+    return whole | (widest <= LARGEST * len(cells))[holes]
 
 
 def is_dense(things: Bool[Array, "m m"], ground: Bool[Array, "m m"]) -> bool:

@@ -24,6 +24,7 @@ CLUSTERS = 12  # before merging
 STARTS = 5  # of k-means
 WORKING_SIZE = 256  # cells along a side that are clustered; larger exemplars are averaged
 BRIGHTEST, QUANTILE = 0.9, 0.95  # exposure: this quantile of the brightest channel becomes so bright
+HIGHLIGHT = 1.7  # times the median, that this quantile counts as at most: a few white stones are no measure of all
 SOFT, GRAIN = 1 / 150, 1 / 30  # of the side: blur of colours, window of the grain's contrast
 WEIGHTS = (0.5, 1.0, 1.0, 1.5)  # of lightness (shade changes it), a, b, contrast
 LEAST_DIFFERENCE = 13.0  # of two classes' means, in weighed CIELAB units: 2.3 is just noticeable between flat patches
@@ -88,7 +89,8 @@ def describe_cells(colour: Float[Array, "m m 3"]) -> Float[Array, "m m 4"]:
     from skimage.color import rgb2lab  # here, not above: it takes half a second to load
 
     m = len(colour)
-    bright = float(np.quantile(colour.max(-1), QUANTILE))
+    median, bright = np.quantile(colour.max(-1), [0.5, QUANTILE])
+    bright = min(float(bright), HIGHLIGHT * float(median))
     lab = rgb2lab(np.clip(colour * (BRIGHTEST / max(bright, 1e-3)), 0, 1))
     soft = np.stack([gaussian_filter(lab[..., c], SOFT * m, mode="nearest") for c in range(3)], -1)
     grain = lab[..., 0] - gaussian_filter(lab[..., 0], GRAIN * m / 2, mode="nearest")

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 GOOD, MARGINAL = 4.0, 2.0  # tile areas that were photographed
+ROUNDING = 1e-6  # of areas: tiles are made so large that the scarcest material has MARGINAL of them
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,7 @@ def judge_material(name: str, areas: float, filled: float) -> MaterialVerdict:
     Args: areas: how many tiles' areas of it were photographed. filled: share of its exemplar that is made of patches.
     """
     seen = f"{name} was photographed on {_format_areas(areas)} tile areas"
+    areas *= 1 + ROUNDING
     if areas >= GOOD:
         return MaterialVerdict("good", seen)
     times = math.ceil(10 * GOOD / max(areas, 0.1)) / 10  # up, for "1.0 times" asks for nothing
@@ -36,16 +38,18 @@ def _format_areas(areas: float) -> str:
     return f"{near - 0.1 if any(areas < bound <= near for bound in (GOOD, MARGINAL)) else near:.1f}"
 
 
-def judge_set(verdicts: dict[str, MaterialVerdict], excluded: float, strips: int) -> MaterialVerdict:
-    """The verdict on all: that of the largest material, the first. Those of which there is too little are named.
+def judge_set(
+    verdicts: dict[str, MaterialVerdict], shares: dict[str, float], excluded: float, strips: int
+) -> MaterialVerdict:
+    """The verdict on all: that of the material that covers most. Those of which there is too little are named.
 
     Args:
-        verdicts: by the materials' names.
+        verdicts, shares: by the materials' names.
         excluded: share of ground that is shown nowhere.
         strips: paths, roads and the like, among it.
     """
-    grades = [verdict.grade for verdict in verdicts.values()]
-    if excluded > 0.5 and grades[0] == "good":
+    grade = verdicts[max(shares, key=lambda name: shares[name])].grade
+    if excluded > 0.5 and grade == "good":
         reason = f"{excluded:.0%} of the ground is shade, rare or cut off, and shown nowhere"
         return MaterialVerdict("marginal", reason)
     several = "a path, road or the like" if strips == 1 else f"{strips} paths, roads or the like"
@@ -53,4 +57,4 @@ def judge_set(verdicts: dict[str, MaterialVerdict], excluded: float, strips: int
     many = "1 material" if len(verdicts) == 1 else f"{len(verdicts)} materials"
     scarce = [name for name, verdict in verdicts.items() if verdict.grade == "no"]
     lacking = f"; of {' and '.join(scarce)} there is too little" if scarce else ""
-    return MaterialVerdict(grades[0], f"{many}, {excluded:.0%} of the ground is shown nowhere{crossing}{lacking}")
+    return MaterialVerdict(grade, f"{many}, {excluded:.0%} of the ground is shown nowhere{crossing}{lacking}")
