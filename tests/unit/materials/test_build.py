@@ -209,6 +209,29 @@ def test_the_verdict_on_a_set_names_materials_of_which_there_is_too_little():
     assert "too little" not in verdict.judge_set({"sand": judged["sand"]}, {"sand": 1.0}, 0.2, 0).reason
 
 
+def test_the_verdict_on_a_set_is_that_of_the_material_that_covers_most():
+    judged = {name: verdict.judge_material(name, areas, 0.3) for name, areas in (("sand", 0.5), ("rock", 8.0))}
+    assert verdict.judge_set(judged, {"sand": 0.4, "rock": 0.6}, 0.2, 0).grade == "good"
+    assert verdict.judge_set(judged, {"sand": 0.6, "rock": 0.4}, 0.2, 0).grade == "no"
+
+
+def test_tiles_made_for_two_areas_of_a_material_have_two():
+    maps = made.maps()
+    for rows in range(26, 60):
+        own = np.zeros(maps.known.shape, bool)
+        own[:rows] = True
+        side = build.choose_tile_side(maps, [~own, own])
+        if np.isclose(side, np.sqrt(own.sum() / 2)):  # not smaller already, by texture
+            assert verdict.judge_material("rock", float(own.sum()) / side**2, 0.0).grade == "marginal"
+
+
+def test_a_material_too_scarce_for_the_smallest_tiles_makes_no_others_small():
+    maps = made.maps()
+    own = np.zeros(maps.known.shape, bool)
+    own[:8] = True
+    assert build.choose_tile_side(maps, [~own, own]) == build.choose_tile_side(maps, [~own])
+
+
 def test_a_window_is_filled_by_its_material_where_it_can_be():
     own = np.zeros((128, 128), bool)
     own[32:120, 20:120] = True

@@ -6,7 +6,9 @@ from fixtures import mixed_ground as made
 from scipy.ndimage import gaussian_filter
 
 from dav_gswt.materials import classes
+from dav_gswt.materials.maps import GroundMaps
 from dav_gswt.materials.mask_images import NO_CLASS, GroundMasks
+from dav_gswt.tiles.layout import Exemplar
 
 
 @pytest.fixture(scope="module")
@@ -108,6 +110,61 @@ def test_a_wood_of_many_colours_is_no_texture_of_the_ground_beside_it(rows):
     labels[(rng.random(labels.shape) < 0.45) & meadow] = 2
     growth = classes.find_growth(labels, [0])
     assert not growth[wood].any() and growth[meadow].mean() > 0.4
+
+
+def things_on(ground, thing, size=128, number=8):
+    """Even ground with round things on it, flat, and the share that these cover."""
+    rng = np.random.default_rng(3)
+    rows, columns = np.mgrid[:size, :size] * 128 / size
+    colour = np.array(ground) * (1.0 + rng.normal(0, 0.02, (size, size, 1)))
+    cells = np.zeros((size, size), bool)
+    for k in range(number):
+        cells |= np.hypot(rows - 25 - 40 * (k % 3), columns - 25 - 40 * (k // 3)) < 5
+    colour[cells] = thing
+    flat = np.zeros((size, size))
+    exemplar = Exemplar(0.0, 0.0, 0.1 * 128 / size, size)
+    return GroundMaps(np.clip(colour, 0, 1), flat, flat, flat, flat == 0, exemplar), cells.mean()
+
+
+@pytest.mark.parametrize(
+    ("ground", "thing"),
+    [
+        ((0.92, 0.93, 0.95), (0.2, 0.19, 0.18)),
+        ((0.26, 0.2, 0.15), (0.92, 0.91, 0.88)),
+        ((0.4, 0.32, 0.24), (0.66, 0.64, 0.6)),
+    ],
+    ids=["dark on snow", "white on soil", "grey on soil"],
+)
+def test_things_of_strong_contrast_are_objects_and_keep_no_ground_around_them(ground, thing):
+    maps, covered = things_on(ground, thing)
+    found = classes.classify_ground(maps)
+    assert found.number == 1 and len(found.footprints) == 8
+    assert (found.excluded | found.occupied).mean() < 2 * covered
+
+
+@pytest.mark.parametrize("size", [128, 384])
+def test_things_are_found_at_any_resolution(size):
+    maps, _ = things_on(made.SAND, (0.2, 0.27, 0.12), size)
+    assert len(classes.classify_ground(maps).footprints) == 8
+
+
+def test_ground_within_a_kerb_is_a_material():
+    """A lawn in tarmac, with a pale kerb around it."""
+    maps, _ = things_on((0.55, 0.54, 0.53), made.SAND, number=0)
+    rows, columns = np.mgrid[:128, :128]
+    away, colour, rng = np.hypot(rows - 64, columns - 64), maps.colour.copy(), np.random.default_rng(1)
+    colour[away < 44] = (np.array(made.GRASS) * (1 + rng.normal(0, 0.08, (128, 128, 1))))[away < 44]
+    colour[np.abs(away - 44) < 2] = (0.85, 0.85, 0.82)
+    found = classes.classify_ground(replace(maps, colour=np.clip(colour, 0, 1)))
+    assert found.number == 2 and found.source(1).mean() > 0.2
+
+
+@pytest.mark.parametrize("period", [28, 31, 38, 44])
+def test_wide_rows_are_texture_or_materials_but_not_left_out(period):
+    maps, _ = things_on((0.35, 0.27, 0.2), made.GRASS, number=0)
+    colour = maps.colour.copy()
+    colour[:, np.arange(128) % period < period / 2] = made.GRASS
+    assert classes.classify_ground(replace(maps, colour=colour)).excluded.mean() < 0.2
 
 
 def test_named_materials_are_taken_as_they_are():

@@ -40,6 +40,16 @@ def test_exposure_changes_no_label():
     np.testing.assert_array_equal(segment(colour), segment(0.5 * colour))
 
 
+def test_a_few_white_stones_change_no_other_feature():
+    rng = np.random.default_rng(0)
+    dark = rng.uniform(0.15, 0.25, (96, 96, 3))
+    stony = dark.copy()
+    stony[:24, :24] = 0.95  # 6 % of all
+    plain, beside = segmentation.describe_cells(dark), segmentation.describe_cells(stony)
+    # before, the stones' brightness was taken for that of all: dark ground had .35 of its contrast
+    assert beside[48:, 48:, 3].mean() > 0.6 * plain[48:, 48:, 3].mean()
+
+
 def test_classes_are_numbered_by_their_share():
     labels = segment(made.maps().colour)
     counts = np.bincount(labels.ravel())
