@@ -36,6 +36,7 @@ export function createGround({ manifest, heights, lift }) {
       const from = checkNumbers("origin", origin, 3), way = checkNumbers("direction", direction, 3);
       const long = Math.hypot(...way);
       if (!(long > 0)) throw new TypeError("direction has no length");
+      if (!Number.isFinite(farthest)) throw new TypeError("farthest: not a finite number");
       const hit = hitGround(from, way.map((v) => v / long), heights, { lift, farthest });
       if (!hit) return null;
       const [x, y] = hit, point = /** @type {[number, number, number]} */ ([x, y, height(x, y)]);

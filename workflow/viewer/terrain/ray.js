@@ -2,9 +2,10 @@
 
 import { dot, frameAt } from "./sphere.js";
 
-const MOST = 400; // steps
 const NEAREST = 1e-6; // depth of what is before the eye
-const CLOSE = 1e-4; // of the distance: near enough to the ground
+const LEAST = 1e-3; // of the distance so far: a shorter step would take too many
+const FIRST = 1e-5; // of the whole way: the same where the ray begins
+const HALVINGS = 40; // of the step in which the ray comes down
 
 /**
  * The direction of a ray through a point of the picture.
@@ -21,24 +22,38 @@ export function rayThrough({ right, up, ahead, width, height, focal }, across, d
 /**
  * The place (longitude and latitude on a sphere) where a ray first comes down to the ground; null: it does not within `farthest`.
  *
- * Each step goes as far as no slope of the surface could reach it.
+ * Each step goes as far as no slope of the surface could reach it, but no less than a thousandth of the distance, so that
+ * one steep place elsewhere does not stop the ray; the step that ends below the ground is halved. A crest that the ray
+ * passes through in less than such a step may be missed.
  *
  * @param {number[]} eye
  * @param {number[]} way of length 1
  * @param {import("./heights.js").HeightField} heights
- * @param {{ lift: number, farthest: number }} ground lift: height of the ground of tiles above the surface
+ * @param {{ lift: number, farthest: number }} ground lift: height of the ground of tiles above the surface; farthest: finite
  * @returns {[number, number] | null}
  */
 export function hitGround(eye, way, heights, { lift, farthest }) {
   if (heights.kind === "sphere") return hitSphere(eye, way, heights.radius + lift);
   const fall = Math.max(heights.steepest * Math.hypot(way[0], way[1]) - way[2], 1e-6); // the gap closes no faster
-  for (let step = 0, far = 0; step < MOST && far < farthest; step++) {
-    const x = eye[0] + far * way[0], y = eye[1] + far * way[1];
-    const gap = eye[2] + far * way[2] - lift - heights.at(x, y)[0];
-    if (gap <= CLOSE * Math.max(far, 1e-3)) return [x, y];
-    far += gap / fall;
+  /** @param {number} far @returns {[number, number]} */
+  const placeAt = (far) => [eye[0] + far * way[0], eye[1] + far * way[1]];
+  /** @param {number} far */
+  const gapAt = (far) => eye[2] + far * way[2] - lift - heights.at(...placeAt(far))[0];
+  const above = eye[2] - lift - heights.high; // of all ground: nothing is met before the ray is down there
+  if (above > 0 && way[2] >= 0) return null;
+  let far = above > 0 ? above / -way[2] : 0, before = far;
+  if (!(far < farthest)) return null;
+  for (let gap = gapAt(far); gap > 0; gap = gapAt(far)) {
+    if (far >= farthest || (way[2] >= 0 && eye[2] + far * way[2] - lift > heights.high)) return null;
+    before = far;
+    far = Math.min(far + Math.max(gap / fall, LEAST * far, FIRST * farthest), farthest);
   }
-  return null;
+  for (let k = 0; k < HALVINGS && before < far; k++) {
+    const middle = 0.5 * (before + far);
+    if (gapAt(middle) > 0) before = middle;
+    else far = middle;
+  }
+  return placeAt(far);
 }
 
 /**
