@@ -112,13 +112,16 @@ export interface Terrain {
   materials: string[];
   /** Object k is number `tiles` + k for `gaussians` and `orders`. */
   objects: string[];
-  /** Resolves when all chunks are read. */
+  /** Height of each object's foot above the surface. */
+  feet: number[];
+  /** Resolves when all chunks are read, or as many as are kept at a time (192 MB); the rest is read for updates. */
   loaded: Promise<void>;
   height(x: number, y: number): number;
   normal(x: number, y: number): Vector;
   cellAt(x: number, y: number): Cell;
   pick(origin: ArrayLike<number>, direction: ArrayLike<number>, farthest?: number): Hit | null;
   camera(place: Place, width: number, height: number): Camera;
+  /** Rejects with a TerrainError once the terrain was ended. */
   update(camera: Camera, options?: { budget?: number; exact?: boolean }): Promise<Update>;
   gaussians(tile: number, level: number): Promise<Gaussians>;
   orders(tile: number, level: number): Promise<Order[]>;

@@ -17,7 +17,7 @@ const BUDGET = 1_000_000; // Gaussians of an update
 
 /**
  * Open a terrain: the address of a page folder or a bundle, its zip, or its files. Resolves when its manifest is read;
- * `loaded` does when its chunks are too.
+ * `loaded` does when its chunks are too, as many as the cache holds.
  *
  * @param {string | URL | Blob | Iterable<File>} where
  * @param {{ onProgress?: (progress: import("./data/bundle.js").Progress) => void, onError?: (error: Error) => void }} [options]
@@ -30,6 +30,10 @@ export async function load(where, { onProgress, onError = console.error } = {}) 
   /** @type {import("./worker/frame_builder.js").FrameAnswer | null} */
   let frame = null;
   let arrived = 0; // chunks that were posted to painters
+  let ended = false;
+  const checkRunning = () => {
+    if (ended) throw new PageError("The terrain was ended: load it again.");
+  };
   const open = openTerrain(files, {
     onRecords(records) {
       arrived += 1;
@@ -47,6 +51,7 @@ export async function load(where, { onProgress, onError = console.error } = {}) 
     unit: manifest.unit, tileSide: manifest.tile_side, eyeFloor: manifest.eye_floor, lift: open.lift,
     levels: manifest.levels.length, tiles: manifest.tiles.length, directions: manifest.directions,
     materials: manifest.materials.map(({ name }) => name), objects: (manifest.objects ?? []).map(({ name }) => name),
+    feet: (manifest.objects ?? []).map(({ ground }) => ground),
     loaded,
     ...createGround(open),
     ...createChunkReader(open),
@@ -55,8 +60,10 @@ export async function load(where, { onProgress, onError = console.error } = {}) 
     /** @param {import("./terrain/camera.js").Camera} camera @param {{ budget?: number, exact?: boolean }} [options] */
     async update(camera, { budget = BUDGET, exact = false } = {}) {
       if (!(budget > 0)) throw new RangeError(`budget: ${budget} is not above 0`);
+      checkRunning();
       open.client.ask(checkCamera(camera), budget, exact);
       await open.client.answered();
+      checkRunning(); // the end lets whoever waits go on
       return describeUpdate(/** @type {NonNullable<typeof frame>} */ (frame));
     },
     /** @param {WebGL2RenderingContext} gl */
@@ -67,6 +74,7 @@ export async function load(where, { onProgress, onError = console.error } = {}) 
       return made.painter;
     },
     end() {
+      ended = true;
       for (const { painter } of [...painters]) painter.end();
       open.end();
     },

@@ -37,7 +37,7 @@ export function createChunkReader({ manifest, source }) {
     /** @param {number} tile @param {number} level @returns {Promise<Gaussians>} */
     async gaussians(tile, level) {
       const { records, centres, count } = await read(tile, level), object = objects[tile - tiles.length];
-      const foot = object ? [manifest.tile_side / 2, manifest.tile_side / 2, object.ground] : [0, 0, 0];
+      const middle = object ? manifest.tile_side / 2 : 0, foot = [middle, middle, 0]; // its z counts from the foot already
       return { count, centres: centres.map((v, k) => v - foot[k % 3]), ...decodeRecords(records, count, encoding) };
     },
     /** @param {number} tile @param {number} level @returns {Promise<Order[]>} */
