@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tifffile
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -214,6 +215,52 @@ def test_a_height_that_is_not_finite_is_named(tmp_path):
     image_files.write_exr(tmp_path / "map.exr", {"Y": values})
     with pytest.raises(InputError, match=r"map\.exr: the height in row 1, column 2 is not finite"):
         heights.read_height_map(tmp_path / "map.exr")
+
+
+def tiff_map(folder, values, no_data=None):
+    tags = [] if no_data is None else [(42113, "s", 0, no_data, True)]
+    tifffile.imwrite(folder / "map.tif", np.array([values, values]), extratags=tags)
+    return folder / "map.tif"
+
+
+@pytest.mark.parametrize("value, height", [(1e36, 1e6), (-3.4028234663852886e38, 1.0)])
+def test_a_height_that_the_factor_makes_too_large_is_named(tmp_path, value, height):
+    path = tiff_map(tmp_path, np.float32([0, 1, value]))
+    with pytest.raises(
+        InputError, match=r"map\.tif: the height in row 0, column 2 times heights\.height is beyond 1e\+09"
+    ):
+        heights.surface_from_config({"kind": "image", "file": str(path), "width": 6.0, "height": height}, 2.8)
+
+
+@pytest.mark.parametrize("kind", [np.int8, np.int16, np.int32])
+def test_integers_with_a_sign_are_refused(tmp_path, kind):
+    with pytest.raises(InputError, match=r"map\.tif: its integers have a sign \(int\d*\); save it as float32"):
+        heights.read_height_map(tiff_map(tmp_path, np.array([1, -2, 3], kind)))
+
+
+@pytest.mark.parametrize(
+    "values, no_data",
+    [
+        (np.float32([1, 2, -9999]), "-9999"),
+        (np.float32([1, 2, -3.4028234663852886e38]), "-3.4028234663852886e+38"),
+        (np.uint16([1, 2, 65535]), "65535"),
+        (np.uint16([1, 2, 0]), "0"),
+        (np.uint8([1, 2, 255]), "255"),
+    ],
+)
+def test_a_pixel_without_data_is_no_height(tmp_path, values, no_data):
+    path = tiff_map(tmp_path, values, no_data)
+    with pytest.raises(
+        InputError, match=r"map\.tif: the height in row 0, column 2 is marked as no data \(2 such\); fill"
+    ):
+        heights.read_height_map(path)
+
+
+@pytest.mark.parametrize("no_data", ["-9999", "nan", "none", "65533"])
+def test_a_map_without_such_pixels_is_read(tmp_path, no_data):
+    values = np.uint16([1, 65534, 65535])
+    found = heights.read_height_map(tiff_map(tmp_path, values, no_data))
+    np.testing.assert_allclose(found[0] * 65535, values, atol=0.01)
 
 
 def test_a_file_that_is_no_image_is_named(tmp_path):

@@ -8,18 +8,20 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import OpenImageIO as oiio
+import tifffile
 from jaxtyping import Float, Float16, Float32, UInt16
 from numpy import ndarray as Array
 from scipy.ndimage import map_coordinates
 from scipy.sparse import csr_array
 
 from dav_gswt.errors import InputError
-from dav_gswt.files import atomic_file
+from dav_gswt.files import UNREADABLE, atomic_file
 
 _log = logging.getLogger(__name__)
 
 AT_ONCE = 2_000_000  # values that are averaged at a time
 MAX_PIXELS = 200_000_000  # of a photo: more is a broken header, or more than two cores should work on
+GDAL_NODATA = 42113  # tag of a TIFF
 PREVIEW = "colours"  # in an EXR's header: its R, G and B are other channels in colours
 RAMP = (  # colours of a preview from low to high, linear light: as viridis of Matplotlib has them
     (0.058, 0.000, 0.089),
@@ -102,10 +104,27 @@ def _read_colours(path: Path | str) -> tuple[Float32[Array, "h w 3"], Float32[Ar
 def read_channel(path: Path | str) -> Float32[Array, "h w"]:
     """The first channel, upright, integers scaled to [0, 1]; neither clipped nor checked for finite values.
 
-    Raises: InputError: missing, not an image, cut short, or too large.
+    Raises: InputError: missing, not an image, cut short, too large, or integers with a sign, which have no white.
     """
     file, spec = _open_image(path)
+    if str(spec.format).startswith("int"):
+        file.close()
+        raise InputError(f"{path}: its integers have a sign ({spec.format}); save it as float32, or as unsigned 16 bit")
     return np.ascontiguousarray(_apply_orientation(_read_pixels(file, path, 1)[..., 0], _read_orientation(spec)))
+
+
+def read_no_data(path: Path | str) -> float | None:
+    """The value of pixels without data that a TIFF names (GDAL's tag), scaled as `read_channel` scales pixels.
+
+    None: it names none, or the file is no TIFF. Any file that `read_channel` reads may be given.
+    """
+    try:
+        with tifffile.TiffFile(path) as file:
+            page = file.pages.first
+            value, dtype = float(page.tags[GDAL_NODATA].value), np.dtype(page.dtype)
+    except (*UNREADABLE, tifffile.TiffFileError, struct.error):
+        return None
+    return value / np.iinfo(dtype).max if dtype.kind == "u" else value
 
 
 def write_png(path: Path | str, image: Float[Array, "h w c"]) -> None:

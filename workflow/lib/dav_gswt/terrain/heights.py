@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float, Float32, Int64
+from jaxtyping import Bool, Float, Float32, Int64
 from numpy import ndarray as Array
 
 from dav_gswt.errors import InputError
@@ -22,6 +22,7 @@ HILLS = 3  # axis of the hash of octave 0, after west, south and centre; octave 
 GAIN = 0.4  # height of an octave over that of the one twice as wide
 SHIFT = (0.37, 0.71)  # of each octave against the last, in its own cells; else all are 0 at the corners of the first
 STEEPEST = 2.75  # upper bound of the slope of the noise, per cell, over all gradients at the corners
+FARTHEST = 1e9  # units from 0 to a height: more is refused by the page too
 MAX_SIDE = 4096  # pixels along a side of a height map: every WebGL2 device in use takes textures of this size
 
 
@@ -156,7 +157,7 @@ def wrap_index(index: Int64[Array, "*n"], n: int, beyond: str) -> Int64[Array, "
 def surface_from_config(entry: dict, side: float) -> HeightField:
     """The surface that the config's `heights` describes; side: of a tile, the unit of hills and of the sphere.
 
-    Raises: InputError: the image cannot be read, is not an image, is too large, or has pixels that are not finite.
+    Raises: InputError: the image cannot be read (`read_height_map`), or its heights are beyond all bounds.
     """
     if entry["kind"] == "flat":
         return FlatSurface()
@@ -164,22 +165,32 @@ def surface_from_config(entry: dict, side: float) -> HeightField:
         return make_sphere(entry["radius"], side)
     if entry["kind"] == "hills":
         return Hills(entry["height"] * side, entry["wavelength"] * side, entry.get("octaves", 4), entry.get("seed", 0))
-    pixels = read_height_map(locate_path(entry["file"])) * np.float32(entry["height"])
+    with np.errstate(over="ignore"):  # what becomes infinite is refused
+        pixels = read_height_map(path := locate_path(entry["file"])) * np.float32(entry["height"])
+    bad = ~(np.abs(pixels) <= FARTHEST)
+    _refuse_pixels(path, bad, f"times heights.height is beyond {FARTHEST:g} units", "lower heights.height, or fill it")
     return HeightMap(pixels, float(entry["width"]), entry.get("beyond", "mirror"))
 
 
 def read_height_map(path: Path | str) -> Float32[Array, "rows columns"]:
     """The first channel of a height map: integers scaled to [0, 1], floats unchanged.
 
-    Raises: InputError: not readable, more than MAX_SIDE pixels along a side (checked before allocation), or a pixel is
-    not finite.
+    Raises: InputError: not readable, more than MAX_SIDE pixels along a side (checked before allocation), integers with
+    a sign, or a pixel is not finite or without data.
     """
     check_height_map(path)
     pixels = image_files.read_channel(path)
-    if len(bad := np.argwhere(~np.isfinite(pixels))):
-        row, column = bad[0]
-        raise InputError(f"{path}: the height in row {row}, column {column} is not finite ({len(bad)} such); fill it")
+    _refuse_pixels(path, ~np.isfinite(pixels), "is not finite", "fill it")
+    missing = image_files.read_no_data(path)
+    if missing is not None:
+        _refuse_pixels(path, np.isclose(pixels, missing, 1e-6, 0), "is marked as no data", "fill it, or cut it off")
     return pixels
+
+
+def _refuse_pixels(path: Path | str, bad: Bool[Array, "rows columns"], fault: str, remedy: str) -> None:
+    if len(places := np.argwhere(bad)):
+        row, column = places[0]
+        raise InputError(f"{path}: the height in row {row}, column {column} {fault} ({len(places)} such); {remedy}")
 
 
 def check_height_map(path: Path | str) -> None:
