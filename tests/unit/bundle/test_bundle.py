@@ -155,6 +155,8 @@ def test_the_zip_reads_back_as_the_tiles(bundle, tiles):
         np.testing.assert_allclose(mine.log_scales, source.log_scales, atol=1e-6)
         np.testing.assert_allclose(mine.sh[:, 0], source.sh[:, 0], atol=1e-6)
         np.testing.assert_allclose(mine.opacity_logits, source.opacity_logits)
+        columns = (mine.means, mine.log_scales, mine.quats, mine.opacity_logits, mine.sh)
+        assert all(each.base is None or each.base.nbytes == each.nbytes for each in columns)  # no view of all 62
 
 
 def rezipped(path, change):

@@ -137,9 +137,9 @@ def _read_entry(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, side: float, r
     return GaussianField(
         (values[:, :3] / scale).astype(np.float32),
         (values[:, 55:58] - np.log(scale)).astype(np.float32),
-        values[:, 58:],
-        values[:, 54],
-        values[:, None, 6:9],
+        values[:, 58:].copy(),  # a view would keep all 62 columns in memory
+        values[:, 54].copy(),
+        values[:, None, 6:9].copy(),
         np.zeros(n, np.float32),
         np.zeros(n, bool),
     )
