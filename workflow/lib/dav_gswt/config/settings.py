@@ -38,7 +38,9 @@ class HeightMap(ConfigModel):
     """A height map from an image."""
 
     kind: Literal["image"]
-    file: Text = key("grey image of unsigned integers (16 bits: PNG, TIFF) or of floats (EXR, TIFF), at most 4096 pixels a side")
+    file: Text = key(
+        "grey image of unsigned integers (16 bits: PNG, TIFF) or of floats (EXR, TIFF), at most 4096 pixels a side"
+    )
     width: float = key(
         "of the whole image; its middle lies at the world's origin", unit="world units", ge=0.001, le=1e7
     )
