@@ -21,6 +21,7 @@ from dav_gswt.images import image_files
 from dav_gswt.raster import render
 from dav_gswt.terrain import endless, finite
 from dav_gswt.terrain.finite import Area
+from dav_gswt.terrain.sphere import make_sphere
 
 PLACE = Georeference(47.1, 11.3, 600.0, 20.0, metres_per_unit=1.0)
 AREA = Area(0, -1, 6, 5)
@@ -67,6 +68,12 @@ def read_meshes(path):
         assert primitive["mode"] == 4
         vertices = values[primitive["attributes"]["POSITION"]] @ Y_UP
         yield node, vertices, values[primitive["indices"]].reshape(-1, 3)
+
+
+def test_a_planet_is_refused_before_any_work(cover_bundle, terrain, sets, settings):
+    planet = replace(terrain, heights=make_sphere(8.0, terrain.side))
+    with pytest.raises(InputError, match="heights: a rectangle of cells is cut from a plane"):
+        ground_files.check_ground(planet, cover_bundle.manifest, sets, PLACE, settings)
 
 
 def test_heights_are_those_that_a_camera_above_sees(terrain, surface):

@@ -8,7 +8,7 @@ from dav_gswt.bundle import store
 from dav_gswt.geometry import cameras
 from dav_gswt.images.metrics import psnr
 from dav_gswt.raster import render
-from dav_gswt.terrain import endless, finite, stills
+from dav_gswt.terrain import classes, endless, finite, scatter, stills
 
 HILLS = {"kind": "hills", "height": 0.4, "wavelength": 4}
 
@@ -49,3 +49,19 @@ def test_positions_far_out_are_as_near(bundle):
     terrain = endless.terrain_from_bundle(bundle, {"kind": "flat"})
     field = finite.collect_cells(terrain, 10**6, -(10**6), 2, 2, 0)
     assert np.abs(field.means).max() < 3 * SIDE and np.isfinite(field.means).all()
+
+
+def test_a_wide_area_is_counted_in_slices(bundle, monkeypatch):
+    """The same counts and blocks, while no more cells are known at a time than a slice has."""
+    area, eye = finite.Area(-7, 3, 12, 11), np.array([0.0, 0.0, 2.0])
+    whole = endless.terrain_from_bundle(bundle, HILLS)
+    counts = finite.count_gaussians(whole, finite.list_grid(whole, area, eye))
+    monkeypatch.setattr(finite, "SLICE", 20)
+    monkeypatch.setattr(classes, "SLICE", 20)
+    monkeypatch.setattr(classes, "CACHED", 40)
+    monkeypatch.setattr(scatter, "CACHED", 40)
+    sliced = endless.terrain_from_bundle(bundle, HILLS)
+    np.testing.assert_array_equal(finite.count_cells(sliced, area, eye), counts)
+    assert len(sliced.classes._known) <= 40 and len(sliced.scatter._known) <= 40
+    blocks = finite.list_blocks(sliced, area, eye)
+    assert sum(map(len, blocks)) == len(counts) and len(sliced.scatter._known) <= 40

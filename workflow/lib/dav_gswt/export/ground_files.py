@@ -20,7 +20,7 @@ from dav_gswt.export.terrain_area import choose_area, find_metres, find_origin, 
 from dav_gswt.files import atomic_folder, write_json
 from dav_gswt.geometry.georeference import Georeference
 from dav_gswt.terrain.endless import EndlessTerrain
-from dav_gswt.terrain.finite import Area
+from dav_gswt.terrain.finite import Area, require_plane
 from dav_gswt.tiles.build import TileSet
 
 Mesh = tuple[str, Array, Array, dict[str, Any]]  # name, vertices, triangles, extras
@@ -39,7 +39,7 @@ def export_ground(
     Of an area within a radius it is the rectangle about it: a height field has four corners.
 
     Args:   sets: the tiles of all materials. reference: where the scene lies on earth, if it is known.
-    Raises: InputError: an area whose height field has too many points, or metres of a terrain without a scale.
+    Raises: InputError: a planet, an area whose height field has too many points, metres of a terrain without a scale.
     """
     area = check_ground(terrain, manifest, sets, reference, settings)
     origin = find_origin(terrain, area)
@@ -79,6 +79,7 @@ def check_ground(
     settings: Mapping[str, Any],
 ) -> Area:
     """The cells that `export_ground` takes, before any work. Raises: InputError: as there."""
+    require_plane(terrain)
     area, _ = choose_area(resolve_lengths(settings, terrain.side, find_metres(manifest, reference)))
     check_points(area, choose_steps(sets))
     return area

@@ -41,6 +41,7 @@ SHIFT = (0.37, 0.71)  # of each octave against the last, in its own cells
 TURN = (0.8, 0.6)  # cosine and sine by which each octave is turned against the last: gradient noise prefers its axes
 CONTRAST = 3.0  # the jitter is its noise times this, cut at -1 and 1
 FARTHEST = 4.0  # weights by which a score falls at most outside of a range
+SLICE = 4096  # cells that are looked at at once
 CACHED = 32768  # cells whose materials, and where there are several also scores, are kept
 
 
@@ -109,6 +110,9 @@ class Classes:
         A difference of scores is bilinear in each square of the lattice, so it is largest at a corner of it; jitter
         changes it by twice the amplitude at most, height by `most`.
         """
+        if len(i) > SLICE:  # what is known of cells takes 2 kB each: of a wide area it is kept for some at a time
+            parts = [self.materials_in(i[k : k + SLICE], j[k : k + SLICE]) for k in range(0, len(i), SLICE)]
+            return np.concatenate(parts)
         cells = list(zip(i.tolist(), j.tolist(), strict=True))
         if len(self._known) + len(cells) > CACHED:
             self._known.clear()

@@ -26,6 +26,7 @@ from dav_gswt.terrain.visibility import (
 )
 
 BLOCK = 65_536  # Gaussians that are placed at once, about
+SLICE = 4096  # cells that are counted at once
 
 Part = tuple[GaussianField, Int[Array, "n"]]  # Gaussians, and the level of each
 Placer = Callable[[], GaussianField]
@@ -70,10 +71,15 @@ def list_cells(
 
     Raises: InputError: the terrain is a sphere.
     """
-    if isinstance(terrain.heights, Sphere):
-        raise InputError("heights: a rectangle of cells is cut from a plane: choose another surface than `sphere`")
+    require_plane(terrain)
     i, j = (v.ravel() for v in np.meshgrid(west + np.arange(columns), south + np.arange(rows)))
     return i, j, *choose_tiles(terrain, i, j)
+
+
+def require_plane(terrain: EndlessTerrain) -> None:
+    """Refuse a planet, of which no rectangle of cells can be cut. Raises: InputError."""
+    if isinstance(terrain.heights, Sphere):
+        raise InputError("heights: a rectangle of cells is cut from a plane: choose another surface than `sphere`")
 
 
 def keep_level(terrain: EndlessTerrain, level: int) -> EndlessTerrain:
@@ -93,7 +99,13 @@ def list_grid(terrain: EndlessTerrain, area: Area, eye: Float[Array, "3"]) -> Gr
 
 def count_cells(terrain: EndlessTerrain, area: Area, eye: Float[Array, "3"]) -> Int64[Array, "n"]:
     """Most Gaussians of each cell of an area, objects included. Where materials meet or levels fade there are fewer."""
-    return count_gaussians(terrain, list_grid(terrain, area, eye))
+    return count_in_slices(terrain, list_grid(terrain, area, eye))
+
+
+def count_in_slices(terrain: EndlessTerrain, cells: GridCells) -> Int64[Array, "n"]:
+    """`count_gaussians` of many cells, SLICE at a time: so memory does not grow with what is known of each of them."""
+    slices = [cells[first : first + SLICE] for first in range(0, len(cells), SLICE)]
+    return np.concatenate([np.zeros(0, np.int64), *(count_gaussians(terrain, some) for some in slices)])
 
 
 def collect_cells(terrain: EndlessTerrain, west: int, south: int, columns: int, rows: int, level: int) -> GaussianField:
@@ -111,7 +123,7 @@ def list_blocks(terrain: EndlessTerrain, area: Area, eye: Float[Array, "3"]) -> 
     cells = list_grid(terrain, area, eye)
     if not len(cells):
         return []
-    block = np.cumsum(count_gaussians(terrain, cells)) // BLOCK
+    block = np.cumsum(count_in_slices(terrain, cells)) // BLOCK
     return [cells[rows] for rows in np.split(np.arange(len(cells)), np.flatnonzero(np.diff(block)) + 1)]
 
 
