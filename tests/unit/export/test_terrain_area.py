@@ -64,7 +64,7 @@ def test_too_much_is_refused_with_the_area_that_fits(cover_terrain, export_setti
         terrain_area.check_size(cover_terrain, plan(cover_terrain, given), limits(name), max_gb)
     columns, rows = map(int, re.search(r"; (\d+) x (\d+) fit", str(told.value)).groups())
     fits = plan(cover_terrain, given, columns=columns, rows=rows)
-    assert 0 < terrain_area.check_size(cover_terrain, fits, limits(name), max_gb) <= 20_000
+    assert 0 < terrain_area.check_size(cover_terrain, fits, limits(name), max_gb)[name] <= 20_000
     wider = plan(cover_terrain, given, columns=columns + 4, rows=rows + 4)
     with pytest.raises(InputError):
         terrain_area.check_size(cover_terrain, wider, limits(name), max_gb)
@@ -78,11 +78,20 @@ def test_where_not_one_cell_fits_the_message_says_so(cover_terrain, export_setti
 @pytest.mark.parametrize("name", sorted(terrain_area.ALL_LEVELS))
 def test_a_set_of_all_levels_is_counted_by_the_finest(cover_terrain, export_settings, name):
     fine, coarse = (plan(cover_terrain, export_settings, level=level) for level in (0, 1))
-    most = terrain_area.check_size(cover_terrain, fine, limits(name), 1.0)
+    most = terrain_area.check_size(cover_terrain, fine, limits(name), 1.0)[name]
     bound = 1e-9 * (most - 1) * terrain_area.LIMITS[name].bytes
-    assert terrain_area.check_size(cover_terrain, coarse, limits("ply"), bound) < most
+    assert terrain_area.check_size(cover_terrain, coarse, limits("ply"), bound)["ply"] < most
     with pytest.raises(InputError, match=rf"export: {name}: 3 x 2 cells have up to {most} Gaussians"):
         terrain_area.check_size(cover_terrain, coarse, limits(name), bound)
+
+
+@pytest.mark.parametrize("name", sorted(terrain_area.ALL_LEVELS))
+def test_the_log_counts_each_format_by_the_levels_that_it_holds(cover_terrain, export_settings, name):
+    coarse, both = plan(cover_terrain, export_settings, level=1), limits("ply") | limits(name)
+    counts = terrain_area.check_size(cover_terrain, coarse, both, 1.0)
+    assert counts["ply"] < counts[name]
+    said = terrain_area.describe_size(counts, both)
+    assert f"ply {counts['ply']} Gaussians" in said and f"{name} (finest level) {counts[name]} Gaussians" in said
 
 
 def test_tiles_without_compression_are_larger(export_settings):
@@ -112,7 +121,8 @@ def test_a_radius_that_is_too_large_is_refused_with_the_one_that_fits(cover_terr
         terrain_area.check_size(cover_terrain, plan(cover_terrain, given), limits("ply"), max_gb)
     fits = float(re.search(r"; ([\d.]+) tiles fit: set export\.radius", str(told.value))[1])
     assert (
-        terrain_area.check_size(cover_terrain, plan(cover_terrain, given, radius=fits), limits("ply"), max_gb) <= 20_000
+        terrain_area.check_size(cover_terrain, plan(cover_terrain, given, radius=fits), limits("ply"), max_gb)["ply"]
+        <= 20_000
     )
     with pytest.raises(InputError):
         terrain_area.check_size(cover_terrain, plan(cover_terrain, given, radius=fits + 1), limits("ply"), max_gb)
@@ -131,6 +141,11 @@ def test_metres_become_tile_sides():
         ({"centre": [0.0, "1m"]}, None, r"export\.centre: 1m: the scale of this terrain is not known"),
         ({"radius": "6000m"}, 1.0, r"export\.radius: 1500 tile sides; more than 0 and at most 500"),
         ({"radius": "0m"}, 1.0, r"export\.radius: 0 tile sides"),
+        (
+            {"radius": 1e-17, "centre": [3.0, 3.0]},
+            None,
+            r"export\.radius: 1e-17 tile sides touch no cell; make it larger",
+        ),
         ({"centre": ["99999999999m", 0.0]}, 1.0, r"export\.centre lies beyond"),
     ],
 )

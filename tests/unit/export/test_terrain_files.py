@@ -144,5 +144,14 @@ def test_the_converter_is_given_a_ply_and_all_levels(
     facts = export(cover_bundle, cover_terrain, settings, tmp_path / "out")
     counts = [len(finite.collect_cells(cover_terrain, -1, -1, 3, 2, level)) for level in (0, 1)]
     assert [[word for word in words if type(word) is int] for words in asked] == [[facts["gaussians"]], counts]
+    assert facts["gaussians_by_format"] == {"sog": facts["gaussians"], "streamed_sog": sum(counts)}
     assert asked[1][-2:] == ["-X", "4"]  # a tile's side
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["terrain.json", "terrain_sog"]
+
+
+def test_a_tileset_counts_all_levels(cover_bundle, cover_terrain, export_settings, tmp_path):
+    settings = export_settings | {"formats": ["ply", "3dtiles"], "level": 1}
+    facts = export(cover_bundle, cover_terrain, settings, tmp_path / "out")
+    counts = [len(finite.collect_cells(cover_terrain, -1, -1, 3, 2, level)) for level in (0, 1)]
+    assert facts["gaussians"] == counts[1]
+    assert facts["gaussians_by_format"] == {"ply": counts[1], "3dtiles": sum(counts)}

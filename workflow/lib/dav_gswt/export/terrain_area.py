@@ -111,6 +111,9 @@ def resolve_lengths(settings: Mapping[str, Any], side: float, metres: float | No
         found["radius"] = resolve("radius", found["radius"])
         if not 0 < found["radius"] <= MAX_CELLS / 2:
             raise InputError(f"export.radius: {found['radius']:g} tile sides; more than 0 and at most {MAX_CELLS // 2}")
+        area, _ = choose_area(found)
+        if not len(area):  # the distance to the cells beside it rounds to the radius
+            raise InputError(f"export.radius: {found['radius']:g} tile sides touch no cell; make it larger")
     return found
 
 
@@ -136,19 +139,26 @@ def choose_limits(settings: Mapping[str, Any]) -> dict[str, FileLimit]:
     return {name: (LIMITS | plain)[name] for name in settings["formats"]}
 
 
-def check_size(terrain: EndlessTerrain, wanted: TerrainExport, limits: Mapping[str, FileLimit], max_gb: float) -> int:
-    """The number of Gaussians, at most. Raises: InputError: more than a file may have, with the area that fits."""
-    asked = _count(terrain, wanted, wanted.area)
+def check_size(
+    terrain: EndlessTerrain, wanted: TerrainExport, limits: Mapping[str, FileLimit], max_gb: float
+) -> dict[str, int]:
+    """The number of Gaussians at most, by format: of the finest level where a format has all levels.
+
+    Raises: InputError: more than a file may have, with the area that fits.
+    """
+    fine, counts, known = replace(wanted, level=0), {}, {}
     for name, limit in limits.items():
-        limited = replace(wanted, level=0) if name in ALL_LEVELS else wanted
-        count = asked if limited is wanted else _count(terrain, limited, wanted.area)
+        limited = fine if name in ALL_LEVELS else wanted
+        if limited.level not in known:
+            known[limited.level] = _count(terrain, limited, wanted.area)
+        count = counts[name] = known[limited.level]
         most = int(max_gb * 1e9) // limit.bytes
         bound = min(most, limit.gaussians or most)
         if count > bound:
             why = f"export.max_gb: {max_gb:g} allows" if bound == most else f"the format {name} holds"
             size = f"{_describe(wanted.area)} up to {count} Gaussians, {why} {bound}"
             raise InputError(f"export: {name}: {size}; {_suggest(terrain, limited, bound)}")
-    return asked
+    return counts
 
 
 def _suggest(terrain: EndlessTerrain, wanted: TerrainExport, bound: int) -> str:
@@ -186,7 +196,8 @@ def _count(terrain: EndlessTerrain, wanted: TerrainExport, area: Area) -> int:
     return int(count_cells(wanted.select(terrain), area, wanted.eye).sum())
 
 
-def describe_size(count: int, limits: Mapping[str, FileLimit]) -> str:
+def describe_size(counts: Mapping[str, int], limits: Mapping[str, FileLimit]) -> str:
     """What an export takes, for the log."""
-    files = ", ".join(f"{name} {count * limit.bytes / 1e6:.0f} MB" for name, limit in limits.items())
-    return f"up to {count} Gaussians; at most {files}; {count * spool.BYTES / 1e6:.0f} MB of disk on the way"
+    each = [(f"{name} (finest level)" if name in ALL_LEVELS else name, counts[name], limits[name]) for name in limits]
+    files = ", ".join(f"{name} {count} Gaussians, {count * limit.bytes / 1e6:.0f} MB" for name, count, limit in each)
+    return f"at most: {files}; {max(counts.values()) * spool.BYTES / 1e6:.0f} MB of disk on the way"

@@ -3,7 +3,7 @@
 import logging
 import shutil
 from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -65,8 +65,8 @@ def export_terrain(
     settings = resolve_lengths(settings, terrain.side, find_metres(manifest, reference))
     wanted, formats = plan_export(terrain, settings, manifest.eye_floor), settings["formats"]
     limits = choose_limits(settings)
-    count = check_size(terrain, wanted, limits, settings["max_gb"])
-    _log.info("%s", describe_size(count, limits))
+    counts = check_size(terrain, wanted, limits, settings["max_gb"])
+    _log.info("%s", describe_size(counts, limits))
     if {"sog", "streamed_sog"} & set(formats):
         sog.find_converter("terrain")
     if "usd" in formats:
@@ -77,12 +77,15 @@ def export_terrain(
             for name in formats:
                 own = settings["axes"] == "own" or name in FIXED_AXES
                 facts["files"][name] = axes = OWN_AXES[name] if own else settings["axes"]
+                facts["gaussians_by_format"][name] = len(placed)
                 _write_format(name, placed, folder, AXES[axes], settings, facts)
+        held = facts["gaussians_by_format"]  # these two hold all levels
         if "streamed_sog" in formats:
-            _write_streamed(terrain, wanted, folder, AXES[facts["files"]["streamed_sog"]], threads)
+            rotation = AXES[facts["files"]["streamed_sog"]]
+            held["streamed_sog"] = _write_streamed(terrain, wanted, folder, rotation, threads)
         if "3dtiles" in formats:
             spz = settings["tile_compression"] == "spz"
-            _write_tileset(terrain, wanted, folder, facts, reference, spz, threads)
+            held["3dtiles"] = _write_tileset(terrain, wanted, folder, facts, reference, spz, threads)
         write_json(folder / f"{NAME}.json", facts)
 
 
@@ -114,17 +117,19 @@ def _write_format(
 
 def _write_streamed(
     terrain: EndlessTerrain, wanted: TerrainExport, folder: Path, rotation: Float[Array, "3 3"], threads: int
-) -> None:
-    """Every level of the area in one set, whose chunks are about as large as a tile."""
-    sources = []
+) -> int:
+    """Every level of the area in one set, with chunks about as large as a tile; returns the number of Gaussians."""
+    sources, count = [], 0
     for level in range(len(terrain.switches)):
         with _placed(terrain, replace(wanted, level=level), folder, threads) as placed:
+            count += len(placed)
             sources.append(folder / f".level{level}.ply")
             ply.write_ply(placed, sources[-1], rotation)
     (folder / f"{NAME}_sog").mkdir()
     sog.convert_streamed(sources, folder / f"{NAME}_sog/lod-meta.json", terrain.side, "terrain")
     for source in sources:
         source.unlink()
+    return count
 
 
 def _write_tileset(
@@ -135,16 +140,21 @@ def _write_tileset(
     reference: Georeference | None,
     spz: bool,
     threads: int,
-) -> None:
-    """Every level of the area as 3D Tiles."""
+) -> int:
+    """Every level of the area as 3D Tiles; returns the number of Gaussians."""
+    counts = []
 
-    def place(area: Area, level: int) -> AbstractContextManager[Spool]:
-        return _placed(terrain, replace(wanted, area=area, level=level), folder, threads)
+    @contextmanager
+    def place(area: Area, level: int) -> Iterator[Spool]:
+        with _placed(terrain, replace(wanted, area=area, level=level), folder, threads) as placed:
+            counts.append(len(placed))
+            yield placed
 
     errors = tiles_3d.measure_errors(terrain)
     transform = tiles_3d.place_on_globe(reference, wanted.origin) if reference else None
     kept = {key: facts[key] for key in KEPT}
     tiles_3d.write_tileset(folder / f"{NAME}_3dtiles", wanted.area, errors, place, kept, transform, spz)
+    return sum(counts)
 
 
 def _describe(
@@ -164,6 +174,7 @@ def _describe(
         "eye": (wanted.eye - wanted.origin).tolist(),
         "level": "by_distance" if wanted.level is None else wanted.level,
         "gaussians": count,
+        "gaussians_by_format": {},
         "files": {},
     }
 
