@@ -159,6 +159,11 @@ def test_a_rig_that_speaks_otherwise_is_left_alone(shoot, answers, said):
     assert {verb for _, verb in device.seen} == {"HELLO", "STOP"}
 
 
+def test_numbers_with_a_plus_sign_are_numbers(shoot):
+    answer = "OK 1 -180 +180 +0.0 +90.000 +1000 +8000 +0 +45 +4000"
+    assert "dry run" in shoot(Faults(answers={"HELLO": answer}), dry_run=True)[1]
+
+
 def test_photos_before_a_fault_are_kept_and_not_taken_again(shoot):
     first, ended, store = shoot(Faults(unasked_during_move={3: "LIMIT pan"}))
     assert ("limit switch" in ended, first.last, held(store)) == (True, "STOP", [1, 1, 0, 0])

@@ -38,7 +38,7 @@ WRITE_TIMEOUT = 5.0  # seconds, at least, after which a line that takes no byte 
 TIMEOUT_FACTOR = {"SHOOT": 5.0}  # of a verb's answer: cameras block while they expose
 UNHOMED = ("HELLO", "HOME", "STOP")  # verbs that need no known position: a restart before them does not matter
 STOPPED = "the rig's stop button is pressed; release it when the way is clear, then run the same again"
-_NUMBER = re.compile(r"-?[0-9]{1,7}(\.[0-9]{1,6})?")
+_NUMBER = re.compile(r"[+-]?[0-9]{1,7}(\.[0-9]{1,6})?")
 _LINE = re.compile(rb"([\x20-\x7e]+)\*([0-9A-Fa-f]{4})\r?\n")
 
 
