@@ -157,13 +157,29 @@ def test_ground_too_steep_for_altitudes_above_a_plane_is_refused(site, requested
         frame = replace(FRAME, georeference=replace(FRAME.georeference, slope=slope))
         return Site("moor", {"drone": flight}, frame, site.photos, site.store)
 
-    # the farthest pose is 1.3 x 20 m from where the drone takes off: 10 degrees are 4.7 m, 2 degrees 0.9 m
-    with pytest.raises(InputError, match=r"slopes by 10.0 degrees, .* up to 4\.\d m"):
-        drone.take_photos(on(10.0), requested)
+    # the farthest of the high poses is 0.8 x 20 m from where the drone takes off: 10 degrees are 2.9 m
+    high = requested[:3]
+    with pytest.raises(InputError, match=r"slopes by 10.0 degrees, .* up to 2\.9 m; set scenes.moor.drone.clearance"):
+        drone.take_photos(on(10.0), high)
     with pytest.raises(InputError, match="fly this mission"):
-        drone.take_photos(on(10.0, clearance=12), requested)
+        drone.take_photos(on(10.0, clearance=12), high)
     with pytest.raises(InputError, match="fly this mission"):
         drone.take_photos(on(2.0), requested)
+
+
+def test_a_pose_that_could_be_in_the_slope_is_refused_by_name_however_high_the_clearance(site, requested):
+    frame = replace(FRAME, georeference=replace(FRAME.georeference, slope=10.0))
+
+    def said(**flight):
+        with pytest.raises(InputError) as raised:
+            drone.take_photos(Site("moor", {"drone": flight}, frame, site.photos, site.store), requested)
+        return str(raised.value)
+
+    # pose_4 and pose_5 are planned at 3.5 and 3.1 m, 27 m from where the drone takes off: 4.8 m off
+    message = said(clearance=12)
+    assert "pose_4, pose_5 by more than half" in message and "drone.min_altitude to 10 or more" in message
+    assert "drone.clearance" not in message and not (site.store.folder / "mission.plan").exists()
+    assert "drone.clearance to 10 or more and scenes.moor.drone.min_altitude to 10 or more" in said()
 
 
 def test_the_same_poses_give_the_same_file(site, requested):

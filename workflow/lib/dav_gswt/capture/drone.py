@@ -64,15 +64,23 @@ def take_photos(site: Site, requested: list[RequestedPose]) -> None:
 def _check_level(
     site: Site, place: Georeference, missing: list[RequestedPose], home: Float[Array, "2"], rules: qgc_plan.FlightRules
 ) -> None:
-    """Check that the ground is level enough, as a mission assumes.
+    """Check that the ground is level enough, as a mission assumes: `altitude` is wrong by distance times slope.
 
-    Raises: InputError: altitudes would be wrong by more than half the clearance.
+    Raises: InputError: a pose is off by more than half its altitude, or by more than half the clearance.
     """
-    reach = max(float(np.linalg.norm(camera.centre[:2] - home)) for _, camera in missing) * place.metres_per_unit
-    off = reach * np.tan(np.radians(place.slope))
-    if off > rules.clearance / 2:
-        raise InputError(
-            f"scenes.{site.name}: the ground slopes by {place.slope:.1f} degrees, so that altitudes of a mission over "
-            f"level ground would be wrong by up to {off:.1f} m; set scenes.{site.name}.drone.clearance "
-            f"above {2 * off:.0f} if there is room to spare everywhere, or take agent: handheld"
-        )
+    at = place.metres_per_unit * np.stack([camera.centre for _, camera in missing])
+    off = np.linalg.norm(at[:, :2] - place.metres_per_unit * home, axis=1) * np.tan(np.radians(place.slope))
+    low, worst, drone = off > at[:, 2] / 2, float(off.max()), f"scenes.{site.name}.drone"
+    enough = f"{np.ceil(2 * worst):.0f} or more"
+    remedies = [f"{drone}.clearance to {enough}"] if worst > rules.clearance / 2 else []
+    if low.any():
+        remedies.append(f"{drone}.min_altitude to {enough}")
+    if not remedies:
+        return
+    names = ", ".join(pose.name for (pose, _), short in zip(missing, low, strict=True) if short)
+    raise InputError(
+        f"scenes.{site.name}: the ground slopes by {place.slope:.1f} degrees, so that altitudes of a mission over "
+        f"level ground would be wrong by up to {worst:.1f} m"
+        + (f", and of {names} by more than half" if names else "")
+        + f"; set {' and '.join(remedies)} if there is room to spare everywhere, or take agent: handheld"
+    )
