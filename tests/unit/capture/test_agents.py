@@ -19,7 +19,7 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
-from dav_gswt.photos.capture_record import read_capture_record, write_capture_record
+from dav_gswt.photos.capture_record import CapturedPhoto, read_capture_record, write_capture_record
 from dav_gswt.photos.synthetic import scene as synthetic
 from dav_gswt.photos.training_views import read_captured_views
 from dav_gswt.photos.view_split import ViewSplit
@@ -140,7 +140,7 @@ def test_a_damaged_record_is_named_whoever_reads_it(tmp_path):
     record = store.add(picture(tmp_path / "in.png"), "serial", one, one[1], WHEN).photo.with_name("shot.json")
     record.write_text('{"photo": "photo.png"}')
     with pytest.raises(InputError, match=r"shot\.json: not the record of a photo"):
-        store.list_digests()
+        store.list_digests([one[1]])
 
 
 def test_poses_differ_but_not_by_rounding():
@@ -231,6 +231,37 @@ def test_a_photo_is_taken_over_once(site, monkeypatch):
     for _ in range(2):
         assert drop_folder.import_dropped_photos(site, requested(0.0), "handheld") == []
     assert len(read_records(site.store)) == 1
+
+
+def test_the_same_file_dropped_twice_is_one_photo(site, monkeypatch, caplog):
+    drop(site, {"x.png": 0.1, "y.png": 0.1}, monkeypatch)
+    folder = drop_folder.make_drop_folder(site)
+    shutil.copyfile(folder / "x.png", folder / "y.png")
+    assert len(drop_folder.import_dropped_photos(site, requested(0.0, 0.2), "plan")) == 1
+    assert [record["source"] for record in read_records(site.store)] == ["x.png"]
+    assert "y.png: the same photo as x.png" in caplog.text
+
+
+def test_a_photo_stored_for_a_pose_no_longer_asked_for_is_placed_again(site, monkeypatch):
+    drop(site, {"x.png": 0.1}, monkeypatch)
+    assert drop_folder.import_dropped_photos(site, requested(0.0), "plan") == []
+    used = replace(site, requested=(at(0.0),))
+    assert len(drop_folder.import_dropped_photos(used, requested(0.2), "plan")) == 1  # an earlier round has it
+    assert drop_folder.import_dropped_photos(site, requested(0.2), "plan") == []
+    assert len(read_records(site.store)) == 2
+
+
+def test_an_agent_knows_the_poses_of_this_round_and_the_earlier_ones(site, tmp_path, monkeypatch):
+    (before,) = requested(3.0)
+    (tmp_path / "before").mkdir()
+    record = CapturedPhoto("a.png", before[0], before[1], at(3.1), 0.0)
+    write_capture_record(tmp_path / "before", "handheld", [record])
+    now, seen = requested(0.0, 1.0), []
+    monkeypatch.setattr(agents.candidates, "list_remaining", lambda *_: now)
+    monkeypatch.setitem(AGENTS, "handheld", lambda request: seen.extend(request.site.requested) or [])
+    chosen = [pose for pose, _ in now]
+    agents.capture_views(site, ViewSplit((), (), ()), [tmp_path / "before"], chosen, tmp_path / "capture")
+    assert [pose_key(camera) for camera in seen] == [pose_key(at(x)) for x in (3.0, 0.0, 1.0)]
 
 
 def test_an_empty_drop_folder_leaves_all_poses_missing(site):

@@ -5,7 +5,7 @@ wrap such a function in `StoreAgent`.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dav_gswt.capture import drone, handheld, render, replay, serial_rig
@@ -13,7 +13,7 @@ from dav_gswt.capture.interface import CaptureAgent, CaptureRequest, RequestedPo
 from dav_gswt.capture.site import Site
 from dav_gswt.geometry.poses import Pose
 from dav_gswt.images import image_files
-from dav_gswt.photos.capture_record import CapturedPhoto, write_capture_record
+from dav_gswt.photos.capture_record import CapturedPhoto, read_capture_record, write_capture_record
 from dav_gswt.photos.lenses import undistort_scene_photo
 from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.views import candidates
@@ -54,6 +54,8 @@ def capture_views(site: Site, split: ViewSplit, before: list, chosen: list[Pose]
     """
     remaining = candidates.list_remaining(site.scene, site.frame, site.photos / "sparse", split, before)
     requested = candidates.select_by_name(remaining, chosen)
+    earlier = [photo.requested for capture in before for photo in read_capture_record(capture)]
+    site = replace(site, requested=(*earlier, *(camera for _, camera in requested)))
     folder.mkdir(parents=True, exist_ok=True)
     agent = site.scene["agent"]
     photos = AGENTS[agent](CaptureRequest(site, requested, remaining, folder)) if requested else []

@@ -28,11 +28,12 @@ def make_drop_folder(site: Site) -> Path:
 
 
 def import_dropped_photos(site: Site, requested: list[RequestedPose], agent: str) -> list[RequestedPose]:
-    """Copy dropped photos into the store, nearest first. Returns the poses that still lack photos."""
-    known = site.store.list_digests()
-    folder = make_drop_folder(site)
-    here = image_files.list_photos(folder) if any(not p.name.startswith(".") for p in folder.iterdir()) else []
-    paths = [p for p in here if digest_files(p) not in known]  # cameras use names again
+    """Copy dropped photos into the store, nearest first. Returns the poses that still lack photos.
+
+    A photo that is stored for a pose of this round or of an earlier one (`Site.requested`) is in use and left alone;
+    one that was stored for a pose that is no longer asked for is localised again. Of equal files the first counts.
+    """
+    paths = _list_new_photos(site, requested)
     found = [(p, camera) for p, camera in zip(paths, localize_photos(site.photos, paths), strict=True) if camera]
     for path in sorted(set(paths) - {p for p, _ in found}):
         _log.warning("%s: it could not be localised; it must overlap photos of the scene", path.name)
@@ -51,6 +52,20 @@ def import_dropped_photos(site: Site, requested: list[RequestedPose], agent: str
     for path in sorted(set(places) - set(assigned)):
         _log.warning("%s: it is near no requested pose; it is not used", path.name)
     return [(pose, camera) for pose, camera in requested if need[pose.name] > 0]
+
+
+def _list_new_photos(site: Site, requested: list[RequestedPose]) -> list[Path]:
+    """The dropped photos that no pose of the run has yet, each once: by content, as cameras use names again."""
+    folder = make_drop_folder(site)
+    here = image_files.list_photos(folder) if any(not p.name.startswith(".") for p in folder.iterdir()) else []
+    used, new = site.store.list_digests([*site.requested, *(camera for _, camera in requested)]), {}
+    for path in here:
+        digest = digest_files(path)
+        if digest in new:
+            _log.warning("%s: the same photo as %s; it counts once", path.name, new[digest].name)
+        elif digest not in used:
+            new[digest] = path
+    return list(new.values())
 
 
 def _read_time(path: Path) -> str:

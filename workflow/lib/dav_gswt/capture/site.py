@@ -14,6 +14,7 @@ class Site:
 
     name, scene: its name and entry in the config. photos: its photos/ folder. store: photos taken by devices and
     people. field: the reconstruction so far, a .ply. shot_list_template: of the page that `handheld` writes.
+    requested: the cameras that this round and the earlier ones ask for: a dropped photo stored for one is in use.
     """
 
     name: str
@@ -23,6 +24,7 @@ class Site:
     store: PhotoStore
     field: Path | str | None = None
     shot_list_template: Path | str | None = None
+    requested: tuple[Camera, ...] = ()
 
     @property
     def burst(self) -> int:

@@ -8,6 +8,7 @@ import fcntl
 import hashlib
 import shutil
 import tempfile
+from collections.abc import Iterable
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -63,9 +64,10 @@ class PhotoStore:
             made.rename(place)
         return _read_photo(place)
 
-    def list_digests(self) -> set[str]:
-        """The digests of all stored photos. Raises: InputError: a damaged record, by name."""
-        return {_read_record(path.parent)["sha256"] for path in sorted(self.folder.glob("*/[0-9]*/shot.json"))}
+    def list_digests(self, requested: Iterable[Camera]) -> set[str]:
+        """The digests of the stored photos of requested poses. Raises: InputError: a damaged record, by name."""
+        homes = sorted({self.folder / pose_key(camera) for camera in requested})
+        return {_read_record(path.parent)["sha256"] for home in homes for path in sorted(home.glob("[0-9]*/shot.json"))}
 
     @contextmanager
     def locked(self):
