@@ -6,6 +6,8 @@ from fixtures.frames import scene_frame
 
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import cameras
+from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
+from dav_gswt.photos.view_split import ViewSplit
 from dav_gswt.views import candidates
 
 FRAME = scene_frame(kind="photos", flying_height=5.0, exemplar=(10.0, 20.0, 4.0))
@@ -68,6 +70,16 @@ def test_a_route_has_stops_along_it_with_headings_to_all_sides():
     assert all(camera.forward[2] == pytest.approx(-0.5) for _, camera in found)
     headings = np.degrees([np.arctan2(camera.forward[1], camera.forward[0]) for _, camera in found[:4]]) % 360
     assert headings == pytest.approx([0, 90, 180, 270], abs=1e-6)
+
+
+def test_photos_are_asked_for_with_the_lens_of_most_pictures(tmp_path):
+    turned = cameras.pinhole([0.0, 0.0, 5.0], [0.0, 1.0, 0.0], 40, 60, 50.0)
+    none = np.zeros(0, int)
+    points = np.zeros((0, 3)), np.zeros((0, 3), np.float32), none, none, np.zeros((0, 2))
+    write_colmap_model(ColmapModel(("a.png", "b.png", "c.png"), (turned, LENS, LENS), *points), tmp_path)
+    scene = {"agent": "handheld", "candidates": 4, "min_elevation": 30.0}
+    found = candidates.list_remaining(scene, FRAME, tmp_path, ViewSplit(("a.png",), (), ()), [])
+    assert {(camera.width, camera.height) for _, camera in found} == {(60, 40)}
 
 
 def test_a_route_without_length_is_refused():

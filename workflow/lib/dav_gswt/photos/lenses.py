@@ -4,6 +4,8 @@ photos/lenses.json holds, for each lens, the distorted camera at the picture's s
 pinhole camera of its pictures. A scene without lenses.json has exact pinhole cameras: its photos are its pictures.
 """
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,6 +35,12 @@ class Lens:
 def pinhole_parameters(camera: Camera) -> tuple[float, ...]:
     """What of a camera is its lens, not its place."""
     return (camera.fx, camera.fy, camera.cx, camera.cy, float(camera.width), float(camera.height))
+
+
+def find_main_camera(cameras: Sequence[Camera]) -> Camera:
+    """The first camera with the lens of most pictures; of equally common lenses the first. cameras: of all pictures."""
+    kinds = [tuple(round(value, 5) for value in pinhole_parameters(camera)) for camera in cameras]
+    return cameras[kinds.index(Counter(kinds).most_common(1)[0][0])]
 
 
 def write_lenses(folder: Path | str, lenses: list[Lens]) -> None:

@@ -18,6 +18,7 @@ from dav_gswt.geometry.poses import Pose, pose_of_camera
 from dav_gswt.geometry.scene_frame import SceneFrame
 from dav_gswt.photos.capture_record import read_capture_record
 from dav_gswt.photos.colmap_model import read_colmap_model
+from dav_gswt.photos.lenses import find_main_camera
 from dav_gswt.photos.synthetic import scene as synthetic
 from dav_gswt.photos.view_split import ViewSplit
 
@@ -34,7 +35,8 @@ def list_remaining(
 ) -> Candidates:
     """List the candidates of a scene that earlier captures have not used.
 
-    split: views.json. captures: folders of earlier rounds.
+    split: views.json. captures: folders of earlier rounds. Where photos are yet to be taken, all candidates have the
+    lens of most pictures, the one that further photos are localised with.
     """
     if scene["agent"] == "render":
         listed = list_rendered(scene, frame)
@@ -44,7 +46,7 @@ def list_remaining(
         if scene["agent"] == "replay":
             listed = [(pose_of_camera(name, at[name], frame), at[name]) for name in split.pool]
         else:
-            listed = list_poses(scene, frame, at[split.start[0]])
+            listed = list_poses(scene, frame, find_main_camera(known.cameras))
     used = {name for folder in captures for name in _used_names(folder)}
     return [(pose, camera) for pose, camera in listed if pose.name not in used]
 

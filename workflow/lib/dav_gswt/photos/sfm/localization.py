@@ -16,9 +16,8 @@ from dav_gswt.errors import InputError
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.images import image_files
 from dav_gswt.logs import progress
-from dav_gswt.photos import lenses
 from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
-from dav_gswt.photos.lenses import pinhole_parameters, read_lenses, undistort_scene_photo
+from dav_gswt.photos.lenses import find_main_camera, undistort_scene_photo
 from dav_gswt.photos.sfm.features import enter_camera, enter_image, extract_features, match_image_pairs
 from dav_gswt.photos.sfm.pairs import compare_descriptions, describe_photos
 
@@ -47,7 +46,7 @@ def localize_photos(photos: Path, paths: list[Path], seed: int = 0) -> list[Came
 def _localize_photos(
     known: ColmapModel, photos: Path, paths: list[Path], scratch: Path, seed: int
 ) -> list[Camera | None]:
-    pinhole = _find_main_camera(known, photos)
+    pinhole = find_main_camera(known.cameras)
     new = [_write_undistorted(path, photos, pinhole, scratch / f"new_{i:04d}.png") for i, path in enumerate(paths)]
     old = [f"old_{i:05d}.png" for i in range(len(known.names))]  # without blanks, as COLMAP's lists want them
     for name, copy in zip(progress(known.names, "read pictures"), old, strict=True):
@@ -62,14 +61,6 @@ def _localize_photos(
     with closing(pycolmap.Database.open(database)) as store:
         seen = _match_features_to_points(known, store)
         return [_estimate_pose(names.index(name), seen, known, pinhole, store, seed) if name else None for name in new]
-
-
-def _find_main_camera(known: ColmapModel, photos: Path) -> Camera:
-    """A camera with the lens of most pictures."""
-    kinds = read_lenses(photos)
-    if not kinds:
-        return known.cameras[0]
-    return next(c for c in known.cameras if np.allclose(pinhole_parameters(c), kinds[0].pinhole, atol=lenses.SAME))
 
 
 def _write_undistorted(path: Path, photos: Path, pinhole: Camera, out: Path) -> str | None:
