@@ -8,7 +8,7 @@ from fixtures.random_field import random_field
 from plyfile import PlyData, PlyElement
 
 from dav_gswt.errors import InputError
-from dav_gswt.field import GaussianField, concatenate_fields, read_field, write_field
+from dav_gswt.field import HEADER_BYTES, GaussianField, concatenate_fields, read_field, write_field
 
 NAMES = ["x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", *(f"scale_{i}" for i in range(3))]
 NAMES += [f"rot_{i}" for i in range(4)]
@@ -103,6 +103,59 @@ def test_a_header_with_a_false_count_is_refused_before_anything_is_allocated(tmp
     path.write_bytes(path.read_bytes().replace(b"element vertex 3", b"element vertex " + count))
     with pytest.raises(InputError, match="a.ply"):
         read_field(path)
+
+
+def with_comment(path, line):
+    path.write_bytes(path.read_bytes().replace(b"element vertex", line + b"\nelement vertex", 1))
+
+
+@pytest.mark.parametrize(
+    "line", [b"comment " + b"x" * HEADER_BYTES, b"comment end_header"], ids=["long", "a false end"]
+)
+def test_a_comment_does_not_hide_a_false_count(tmp_path, line, monkeypatch):
+    path = foreign(tmp_path / "a.ply")
+    with_comment(path, line)
+    path.write_bytes(path.read_bytes().replace(b"element vertex 3", b"element vertex 9999999999"))
+    monkeypatch.setattr(PlyData, "read", lambda *_: pytest.fail("the vertices are allocated"))
+    with pytest.raises(InputError, match="a.ply"):
+        read_field(path)
+
+
+def test_a_comment_that_names_the_end_of_the_header_is_read_over(tmp_path):
+    path = foreign(tmp_path / "a.ply")
+    with_comment(path, b"comment end_header")
+    assert len(read_field(path)) == 3
+
+
+def with_list(path, name):
+    """A foreign field whose property of this name is a list of two numbers."""
+    kinds = [(other, "O" if other == name else "<f4") for other in [*NAMES, "uncertainty", "ground", "imagined"]]
+    table = np.ones(3, kinds)
+    for row in table:
+        row[name] = np.zeros(2, np.float32)
+    PlyData([PlyElement.describe(table, "vertex", val_types={name: "f4"})]).write(str(path))
+    return path
+
+
+@pytest.mark.parametrize("name", ["x", "f_dc_1", "rot_3", "uncertainty", "ground", "imagined"])
+def test_a_property_that_is_a_list_is_refused_by_name(tmp_path, name):
+    with pytest.raises(InputError, match=rf"a.ply: property {name} is a list; export it again"):
+        read_field(with_list(tmp_path / "a.ply", name))
+
+
+@pytest.mark.parametrize("value", [-0.1, 1.1, 1e30, np.nan, np.inf])
+def test_an_uncertainty_outside_0_to_1_is_refused_with_its_index(tmp_path, value):
+    path = foreign(tmp_path / "a.ply", extra=["uncertainty"], change={(0, "uncertainty"): 1, (2, "uncertainty"): value})
+    with pytest.raises(InputError, match="a.ply.*uncertainty of Gaussian 2 "):
+        read_field(path)
+
+
+def test_an_uncertainty_that_rounding_puts_beyond_1_is_clipped(tmp_path):
+    values = np.float32([1 + 2e-7, 1, -1e-7])
+    path = foreign(
+        tmp_path / "a.ply", extra=["uncertainty"], change={(i, "uncertainty"): v for i, v in enumerate(values)}
+    )
+    assert read_field(path).uncertainty.tolist() == [1, 1, 0]
 
 
 @pytest.mark.parametrize(

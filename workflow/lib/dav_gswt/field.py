@@ -14,6 +14,7 @@ from dav_gswt.files import UNREADABLE, atomic_file
 
 SH0 = 0.28209479177387814  # the constant real spherical harmonic, 1 / (2 sqrt(pi))
 HEADER_BYTES = 1 << 16  # a header is no longer than this
+ROUNDING = 1e-5  # that an uncertainty may lie outside 0 to 1
 
 
 @dataclass(frozen=True)
@@ -122,8 +123,10 @@ def write_field(field: GaussianField, path: Path | str, plain: bool = False) -> 
 def read_field(path: Path | str) -> GaussianField:
     """Read a 3DGS PLY. In files of other programs `uncertainty`, `ground` and `imagined` are 0.
 
-    Raises: InputError: the file is not a PLY, a property is missing, a value is not finite, or `imagined` is neither
-    0 nor 1; with the index of the first such Gaussian.
+    An uncertainty outside 0 to 1 by no more than ROUNDING is clipped.
+    Raises: InputError: the file is not a PLY, its header is longer than HEADER_BYTES, a property is missing or a list,
+    a value is not finite, an uncertainty is outside 0 to 1, or `imagined` is neither 0 nor 1; with the index of the
+    first such Gaussian.
     """
     path = Path(path)
     rows = _vertices(path)
@@ -138,7 +141,7 @@ def read_field(path: Path | str) -> GaussianField:
     n = len(rows)
     shs = np.concatenate([columns["dc"][:, None], columns["rest"].reshape(n, 3, k - 1).transpose(0, 2, 1)], 1)
     ours = ("uncertainty", "ground", "imagined")
-    extra = {name: rows[name] if name in _property_names(rows) else np.zeros(n) for name in ours}
+    extra = {name: _column(rows, name, path) if name in _property_names(rows) else np.zeros(n) for name in ours}
     if len(bad := np.flatnonzero((extra["imagined"] != 0) & (extra["imagined"] != 1))):
         raise InputError(f"{path}: imagined of Gaussian {bad[0]} is neither 0 nor 1; write the field again")
     return GaussianField(
@@ -147,7 +150,7 @@ def read_field(path: Path | str) -> GaussianField:
         quats,
         columns["opacity_logits"][:, 0],
         np.ascontiguousarray(shs, np.float32),
-        _finite(np.asarray(extra["uncertainty"], np.float32), "uncertainty", path),
+        _clip_uncertainty(np.asarray(extra["uncertainty"], np.float32), path),
         np.asarray(extra["ground"]).astype(bool),
         np.asarray(extra["imagined"]).astype(bool),
     )
@@ -168,10 +171,16 @@ def _vertices(path: Path) -> Array:
 
 
 def _check_counts(path: Path) -> None:
-    """Raises: InputError: the header announces more values than the file has bytes."""
+    """Raises: InputError: the header has no end, or announces more values than the file has bytes."""
     with path.open("rb") as file:
-        header, end, _ = file.read(HEADER_BYTES).partition(b"end_header")
-    room = path.stat().st_size - len(header) - len(end)
+        begin = file.read(HEADER_BYTES)
+    end = re.search(rb"[\r\n]end_header\b", begin)  # at the start of a line: a comment may name it too
+    if not end:
+        raise InputError(
+            f"{path}: no end_header in the first {HEADER_BYTES} bytes; not a PLY, or one with too long comments: "
+            "export it again without them"
+        )
+    header, room = begin[: end.start()], path.stat().st_size - end.end()
     announced = 0
     for count, properties in re.findall(rb"element\s+\S+\s+(\d+)((?:(?!element\s)[\s\S])*)", header):
         announced += int(count) * max(1, properties.count(b"property"))
@@ -190,9 +199,25 @@ def _stack(rows: Array, names: list[str], path: Path) -> Float32[Array, "n m"]:
     out = np.empty((len(rows), len(names)), np.float32)
     for j, name in enumerate(names):
         with np.errstate(over="ignore"):
-            out[:, j] = rows[name]
+            out[:, j] = _column(rows, name, path)
         _finite(out[:, j], name, path)
     return out
+
+
+def _column(rows: Array, name: str, path: Path) -> Array:
+    """A property's values, one a Gaussian."""
+    if rows.dtype[name].hasobject:
+        raise InputError(f"{path}: property {name} is a list; export it again with one number a Gaussian")
+    return rows[name]
+
+
+def _clip_uncertainty(values: Float32[Array, "n"], path: Path) -> Float32[Array, "n"]:
+    _finite(values, "uncertainty", path)
+    if len(bad := np.flatnonzero((values < -ROUNDING) | (values > 1 + ROUNDING))):
+        raise InputError(
+            f"{path}: uncertainty of Gaussian {bad[0]} is {values[bad[0]]:g}; write numbers from 0 to 1, or none at all"
+        )
+    return np.clip(values, 0, 1)
 
 
 def _finite(values: Array, name: str, path: Path) -> Array:
