@@ -183,6 +183,7 @@ def first(change):
         ),
         pytest.param(first(lambda d: b"ply\n" + bytes(2000)), "not a tile of the GSWT renderer", id="no such PLY"),
         pytest.param(first(lambda d: d[:-4] + b"\xff\xff\xff\x7f"), "a value is not finite", id="not finite"),
+        pytest.param(first(lambda d: d[:-16] + bytes(16)), "splat 59 has a zero quaternion", id="no rotation"),
         pytest.param(lambda entries: entries.pop(), "not a whole set", id="a tile is missing"),
         pytest.param(lambda entries: entries.append(("up/../lod0_tile_00.ply", entries[0][1])), "twice", id="twice"),
         pytest.param(lambda entries: entries.clear(), "not a whole set", id="empty"),

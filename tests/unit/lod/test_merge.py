@@ -85,3 +85,25 @@ def test_merging_does_not_depend_on_the_order(scene):
 
 def test_nothing_merges_to_nothing():
     assert len(merge.merge_by_voxel(things(1)[:0], 0.5)) == 0
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("change", [{"opacity_logits": -800.0}, {"log_scales": -400.0}], ids=["clear", "tiny"])
+def test_gaussians_that_weigh_nothing_are_left_out(change):
+    """Alone in their voxel they would be divided by 0."""
+    faint = things(2, seed=1)
+    faint = replace(faint, **{name: np.full_like(getattr(faint, name), value) for name, value in change.items()})
+    faint = replace(faint, means=faint.means + np.float32(10))
+    found = merge.merge_by_voxel(concatenate_fields([things(3), faint]), 0.5)
+    alone = merge.merge_by_voxel(things(3), 0.5)
+    for name, values in vars(alone).items():
+        np.testing.assert_array_equal(getattr(found, name), values)
+    assert len(merge.merge_by_voxel(faint, 0.5)) == 0
+
+
+def test_a_ground_without_objects_merges_whatever_the_degree_of_its_harmonics(scene):
+    field, grid = scene
+    bare = field[field.ground]
+    bare = replace(bare, sh=np.concatenate([bare.sh, np.zeros((len(bare), 3, 3), np.float32)], 1))
+    half, coarse = merge.halve_resolution(*merge.crop_to_blocks(bare, grid, 8))
+    assert half.ground.sum() == coarse.heights.size and half.sh.shape[1] == 1

@@ -95,7 +95,7 @@ def read_gswt(path: Path | str, side: float) -> list[list[GaussianField]]:
     An entry's recorded size is compared with its header before it is unpacked, and all of it with the most that
     the renderer takes. Only base names count, so nothing is written anywhere; other entries are skipped.
     Raises: InputError: no zip, a damaged entry, a header that is not the renderer's, sizes that do not agree, levels or
-    tiles that do not count up from 0, a value that is not finite.
+    tiles that do not count up from 0, a value that is not finite, a zero quaternion.
     """
     found = {}
     try:
@@ -133,6 +133,8 @@ def _read_entry(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, side: float, r
     values = np.frombuffer(data, "<f4").reshape(n, len(PROPERTIES)).astype(np.float32)
     if not np.isfinite(values).all():
         raise InputError(f"{name}: a value is not finite; make the bundle again")
+    if len(zero := np.flatnonzero(~values[:, 58:].any(1))):
+        raise InputError(f"{name}: splat {zero[0]} has a zero quaternion; remove it and try again")
     scale = TILE_WIDTH / side
     return GaussianField(
         (values[:, :3] / scale).astype(np.float32),

@@ -12,6 +12,8 @@ from dav_gswt.reconstruction import discs, underlay
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.reconstruction.top_view import render_top_view
 
+LEAST_WEIGHT = 1e-200  # of a Gaussian that is merged; sums of smaller ones lose their digits, or are 0
+
 
 def crop_to_blocks(field: GaussianField, grid: Ground, block: int) -> tuple[GaussianField, Ground]:
     """Field and grid cut down to whole blocks of cells that start at the exemplar's corner."""
@@ -73,15 +75,16 @@ def merge_by_voxel(field: GaussianField, voxel: float) -> GaussianField:
     """Gaussians of one voxel as one Gaussian with their common mean, covariance, colour and opaque area.
 
     Weights are opacity times the area of the two larger axes, as visible in a picture. The merged opacity keeps
-    the sum of those weights, at most 0.99.
+    the sum of those weights, at most 0.99. Gaussians below LEAST_WEIGHT, which no picture shows, are left out. Colours
+    do not depend on the view.
     """
+    weight = _weigh(field)
+    field, weight = field[weight > LEAST_WEIGHT], weight[weight > LEAST_WEIGHT]
     if not len(field):
-        return field
+        return replace(field, sh=field.sh[:, :1])
     key = np.floor(field.means / voxel).astype(np.int64)
     _, cell = np.unique(key, axis=0, return_inverse=True)
     cell = cell.ravel()
-    scales = np.sort(np.exp(field.log_scales.astype(float)), 1)
-    weight = scales[:, 1] * scales[:, 2] / (1 + np.exp(-field.opacity_logits.astype(float)))
     total = np.bincount(cell, weight)
 
     def mean(values: Float[Array, "n d"]) -> Float[Array, "m d"]:
@@ -103,6 +106,13 @@ def merge_by_voxel(field: GaussianField, voxel: float) -> GaussianField:
         mean(field.uncertainty[:, None].astype(float))[:, 0].astype(np.float32),
         np.zeros(len(centre), bool),
     )
+
+
+def _weigh(field: GaussianField) -> Float[Array, "n"]:
+    """Opacity times the area of the two larger axes."""
+    scales = np.sort(np.exp(field.log_scales.astype(float)), 1)
+    with np.errstate(over="ignore"):  # of the power, for a logit that no double tells from opacity 0
+        return scales[:, 1] * scales[:, 2] / (1 + np.exp(-field.opacity_logits.astype(float)))
 
 
 def compute_covariances(field: GaussianField) -> Float[Array, "n 3 3"]:
