@@ -11,7 +11,9 @@ from dav_gswt.geometry import cameras
 from dav_gswt.lod import build, merge, store
 from dav_gswt.lod.levels import AUTO, Levels
 from dav_gswt.raster import render
+from dav_gswt.reconstruction.objects import make_blobs
 from dav_gswt.reconstruction.observation import mask_to_ground
+from dav_gswt.reconstruction.underlay import find_rows
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +53,30 @@ def test_low_ground_has_no_dark_rim_in_what_coarser_levels_are_fitted_to():
     # a splat's rim of opacity .9 is divided by it, so nothing that counts is darker than the ground itself
     assert counted.mean(1).min() > 0.7 * field.base_colours.mean(1).min()
     assert len(counted) > 0.5 * sum((view.weight >= 0).sum() for view in views) / len(views)
+
+
+def test_a_level_is_as_uncertain_as_what_it_was_merged_from():
+    """So are the objects, of which the fit drops one, and the underlay."""
+    field, grid = merge.crop_to_blocks(made.field(), made.grid(), 4)
+    places, sizes = np.array([[1.0, 1.0, 0.1], [1.5, 1.5, -2.0], [2.0, 2.0, 0.1]]), np.full(3, 0.1)
+    things = replace(make_blobs(places, np.full((3, 3), 0.5), sizes), uncertainty=np.float32([0.25, 0.5, 0.75]))
+    discs = field.ground
+    east = np.where(discs, field.means[:, 0] / 3.2, 0).astype(np.float32)
+    field = field_module.concatenate_fields([replace(field, uncertainty=east), things])
+    level, coarse = build.fit_coarser_level(field, grid, 5, np.random.default_rng(0))
+    n = coarse.heights.size
+    np.testing.assert_allclose(level.uncertainty[:n], coarse.centres[:, 0] / 3.2, atol=1e-6)
+    assert level.uncertainty[-2:].tolist() == [0.25, 0.75]  # the one below the ground is gone
+    under = find_rows(level, coarse)
+    np.testing.assert_allclose(level.uncertainty[under], level.means[under, 0] / 3.2, atol=0.07)  # a coarse cell's
+
+
+def test_coarser_levels_are_fitted_to_the_colours_that_are_shipped():
+    field, grid = made.field(), made.grid()
+    directed = np.random.default_rng(2).normal(0, 0.3, (len(field), 3, 3)).astype(np.float32)
+    glossy = replace(field, sh=np.concatenate([field.sh, directed], 1))
+    for one, two in zip(*(build.render_neighbour_views(f, grid) for f in (field, glossy)), strict=True):
+        np.testing.assert_array_equal(one.image, two.image)
 
 
 def test_levels_are_fitted_while_the_exemplar_has_room():

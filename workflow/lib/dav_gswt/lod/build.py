@@ -5,6 +5,7 @@ discs keep the mean height of the cells they cover: fitted heights are rough, an
 """
 
 import logging
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from dav_gswt.lod.levels import AUTO, MAX_LEVELS, Levels
 from dav_gswt.lod.merge import crop_to_blocks, halve_resolution
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import to_raster_arrays
+from dav_gswt.reconstruction import underlay
 from dav_gswt.reconstruction.fitting import trainer
 from dav_gswt.reconstruction.fitting.plan import FitPlan
 from dav_gswt.reconstruction.ground import Ground
@@ -79,7 +81,10 @@ def _reason_to_drop(finer: GaussianField, level: GaussianField) -> str | None:
 def fit_coarser_level(
     field: GaussianField, grid: Ground, steps: int, rng: np.random.Generator, keep: Path | str | None = None
 ) -> tuple[GaussianField, Ground]:
-    """The next level: half the resolution, about a quarter of the Gaussians, fitted for `steps` steps."""
+    """The next level: half the resolution, about a quarter of the Gaussians, fitted for `steps` steps.
+
+    Uncertainty is that of the Gaussians that were merged: the fit to pictures of them learns nothing of the photos.
+    """
     start, coarse = halve_resolution(*crop_to_blocks(field, grid, 2))
     views = mask_to_ground(render_neighbour_views(field, coarse), coarse)
     objects = start[~start.ground]
@@ -89,7 +94,9 @@ def fit_coarser_level(
     constraints = GroundConstraints(coarse, np.full(coarse.shape, top), smoothing=None)
     plan = FitPlan(steps, len(start))
     options = trainer.FitOptions(f"fit level of {len(start)} Gaussians", keep)
-    level = trainer.fit_field(start, views, plan, constraints, rng, options).field
+    fit = trainer.fit_field(start, views, plan, constraints, rng, options)
+    level = replace(fit.field, uncertainty=start.uncertainty[fit.kept])
+    level = underlay.copy_uncertainty(level, coarse)
     scales = mean_scale([field]), mean_scale([level])
     _log.info("mean scale %.4g to %.4g, %d to %d Gaussians", *scales, len(field), len(level))
     return level, coarse
@@ -100,7 +107,10 @@ def render_neighbour_views(field: GaussianField, coarse: Ground) -> list[Trainin
 
     They are rendered at twice the size and averaged, so that splats finer than a pixel do not alias. Pixels that the
     field hardly covers do not count: over low ground rays pass the field's border before they are below z = 0.
+    Colours are those that are shipped of every level, without their view-dependent part: a level that was fitted to
+    more would show another colour than the level before it.
     """
+    field = replace(field, sh=field.sh[:, :1])
     rasterizer, views = raster.Rasterizer(), []
     for number, camera in enumerate(_neighbour_cameras(coarse)):
         fine = camera.resized(2 * camera.width, 2 * camera.height)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
+from jaxtyping import Bool
 from numpy import ndarray as Array
 
 from dav_gswt import raster
@@ -52,10 +53,15 @@ MIN_PEAK = 0.03  # largest blend weight in any photo, below which a Gaussian is 
 
 @dataclass(frozen=True)
 class FitResult:
-    """A fitted field and the report of the fit."""
+    """A fitted field and the report of the fit.
+
+    kept: which of the last step's Gaussians the field has; of a plan that lets none grow these are the start's, row by
+    row. None: not told.
+    """
 
     field: GaussianField
     report: FitReport
+    kept: Bool[Array, "n"] | None = None
 
 
 @dataclass(frozen=True)
@@ -230,7 +236,7 @@ def _finish(run: TrainingState, task: TrainingTask, what: str) -> FitResult:
     run.report.steps, run.report.gaussians, run.report.degree = run.step, len(field), run.state.sh_degree
     for choice in run.report.choices:
         _log.info("%s: %s is %s: %s", what, choice["what"], choice["value"], choice["why"])
-    return FitResult(field, run.report)
+    return FitResult(field, run.report, alive)
 
 
 def _digest(field: GaussianField, views: list[TrainingView], plan: FitPlan, rng: np.random.Generator) -> str:
