@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from fixtures import ground as made
 
+from dav_gswt import code_digest
 from dav_gswt.field import concatenate_fields, rgb_to_sh
 from dav_gswt.reconstruction import top_view
 from dav_gswt.reconstruction.evaluation import evaluate_field
 from dav_gswt.reconstruction.fitting import descent, snapshot, trainer
+from dav_gswt.reconstruction.fitting.constraints import FreeConstraints
 from dav_gswt.reconstruction.fitting.descent import HostDescent
 from dav_gswt.reconstruction.fitting.plan import FitPlan
 from dav_gswt.reconstruction.fitting.residual import Residual
@@ -88,6 +90,25 @@ def test_a_photo_with_another_exposure_does_not_change_the_field():
     assert gone < 3  # without levelling the common ground would be 5 % too dark: 26 dB at best, 8 dB lost
 
 
+def blind(photo):
+    return replace(photo, image=np.ones_like(photo.image), weight=np.zeros_like(photo.weight))
+
+
+@pytest.mark.parametrize("plan", [FitPlan(30, 1400, half_share=0.3), FitPlan(30, "auto", "auto")])
+def test_photos_without_a_pixel_that_counts_change_nothing(plan):
+    photos = made.photos(4)
+    some = [blind(photos[0]), *photos[:2], *map(blind, photos), *photos[2:]]
+    alone, among = (fitted(plan=plan, photos=p) for p in (photos, some))
+    same(alone.field, among.field)
+    assert alone.report == among.report
+
+
+def test_photos_of_which_no_pixel_counts_leave_the_ground_as_it_was():
+    field = made.field()
+    found = fitted(field, FitPlan(10, 1), photos=[blind(p) for p in made.photos()]).field
+    np.testing.assert_array_equal(found.base_colours[found.ground], field.base_colours[field.ground])
+
+
 class Killed(Exception):
     pass
 
@@ -113,6 +134,45 @@ def test_a_killed_fit_goes_on_from_its_snapshot_and_ends_with_the_same_field(pla
     same(whole.field, again.field)
     assert whole.report == again.report
     assert not list(tmp_path.iterdir())
+
+
+def digest(constraints):
+    return trainer._digest(made.field(), made.photos(1), FitPlan(1, 1), constraints, np.random.default_rng(0))
+
+
+def test_a_snapshot_is_of_one_set_of_constraints():
+    grid, ceiling = made.grid(), np.full((32, 32), 0.5)
+    higher = ceiling.copy()
+    higher[20, 20] = 0.6
+    raised = replace(grid, heights=grid.heights + 0.1)
+    free = [FreeConstraints(0.1, 3.0), FreeConstraints(0.2, 3.0), FreeConstraints(0.1, 4.0)]
+    each = [
+        *free,
+        GroundConstraints(grid, ceiling),
+        GroundConstraints(grid, higher),
+        GroundConstraints(raised, ceiling),
+    ]
+    each += [GroundConstraints(grid, ceiling, None), GroundConstraints(replace(grid, spacing=0.2), ceiling)]
+    assert len({digest(constraints) for constraints in each}) == len(each)
+    assert digest(GroundConstraints(grid, ceiling)) == digest(GroundConstraints(made.grid(), ceiling.copy()))
+
+
+@pytest.mark.parametrize("module", ["trainer", "ground_constraints"])
+def test_a_snapshot_is_of_the_code_that_the_fit_runs(module, monkeypatch):
+    """That of the rasterizer too, which the first of the two imports."""
+    constraints = GroundConstraints(made.grid(), np.full((32, 32), 0.5))
+    before = digest(constraints)
+    monkeypatch.setattr(
+        trainer, "digest_code", lambda path: "another" if path.stem == module else code_digest.digest_code(path)
+    )
+    assert digest(constraints) != before
+
+
+def test_a_snapshot_is_of_the_backend_in_use(monkeypatch):
+    constraints = FreeConstraints(0.1, 3.0)
+    before = digest(constraints)
+    monkeypatch.setattr(trainer.backends, "describe_backend", lambda: {"backend": "another"})
+    assert digest(constraints) != before
 
 
 def test_a_snapshot_that_is_none_costs_nothing(tmp_path, monkeypatch, caplog):

@@ -9,11 +9,11 @@ import json
 import logging
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy import ndarray as Array
 
-import dav_gswt.reconstruction.fitting
 from dav_gswt.files import UNREADABLE, atomic_file
 from dav_gswt.photos.array_file import release_pages
 
@@ -23,18 +23,24 @@ EVERY = 20.0  # seconds between snapshots; results do not depend on them
 
 
 def digest_inputs(*parts) -> str:
-    """Digest of arrays, of the repr of other values, and of this package's code."""
+    """Digest of arrays, of the attributes of objects that have some, and of the repr of other values."""
     state = hashlib.sha256()
-    for path in sorted(Path(dav_gswt.reconstruction.fitting.__file__).parent.glob("*.py")):
-        state.update(path.read_bytes())
     for part in parts:
-        if isinstance(part, np.ndarray):
-            state.update(f"{part.dtype}{part.shape}".encode())
-            state.update(np.ascontiguousarray(part).data)
-            release_pages(part)
-        else:
-            state.update(repr(part).encode())
+        _update(state, part)
     return state.hexdigest()[:32]
+
+
+def _update(state: "hashlib._Hash", part: Any) -> None:
+    if isinstance(part, np.ndarray):
+        state.update(f"{part.dtype}{part.shape}".encode())
+        state.update(np.ascontiguousarray(part).data)
+        release_pages(part)
+    elif hasattr(part, "__dict__"):
+        for name, value in vars(part).items():
+            state.update(name.encode())
+            _update(state, value)
+    else:
+        state.update(f"{part!r};".encode())
 
 
 class SnapshotStore:

@@ -5,6 +5,7 @@ transparency), or the sky where the photo shows it. Each step first fits the pic
 change exposure. The scene's `constraints.Constraints` apply to gradients and parameters.
 """
 
+import inspect
 import logging
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
@@ -16,6 +17,7 @@ from jaxtyping import Bool
 from numpy import ndarray as Array
 
 from dav_gswt import raster
+from dav_gswt.code_digest import digest_code
 from dav_gswt.field import GaussianField
 from dav_gswt.images import channels, image_files
 from dav_gswt.logs import progress
@@ -91,14 +93,16 @@ def fit_field(
 ) -> FitResult:
     """Fit a field to views.
 
-    A view's weight says which of its pixels count.
+    A view's weight says which of its pixels count. Views without any are left out, unless all are: their exposure
+    would count as that of a typical photo, and their steps would be lost.
     Returns: the field, its first `constraints.fixed` Gaussians in their order, and the report.
     Raises: ValueError: no view.
     """
     if not views:
         raise ValueError("a fit needs at least one view")
     what, folder = options.name, options.snapshots
-    store = snapshot.SnapshotStore(folder, _digest(field, views, plan, rng) if folder else "")
+    views = _leave_out_blind(views, what)
+    store = snapshot.SnapshotStore(folder, _digest(field, views, plan, constraints, rng) if folder else "")
     run = _start_training(field, views, plan, rng)
     task = _make_task(len(field), views, plan, constraints, np.random.default_rng(len(views)))
     if stored := store.load():
@@ -117,6 +121,16 @@ def fit_field(
     descent.pull(run)
     store.clear()
     return _finish(run, task, what)
+
+
+def _leave_out_blind(views: list[TrainingView], what: str) -> list[TrainingView]:
+    """The views with a pixel that counts; all, if none has one."""
+    seeing = [view for view in one_by_one(views) if view.weight.any()]
+    if seeing and len(seeing) < len(views):
+        _log.info(
+            "%s: %d of %d photos have no pixel that counts and are left out", what, len(views) - len(seeing), len(views)
+        )
+    return seeing or views
 
 
 def _choose_descent(task: TrainingTask) -> Descent:
@@ -239,10 +253,15 @@ def _finish(run: TrainingState, task: TrainingTask, what: str) -> FitResult:
     return FitResult(field, run.report, alive)
 
 
-def _digest(field: GaussianField, views: list[TrainingView], plan: FitPlan, rng: np.random.Generator) -> str:
+def _digest(
+    field: GaussianField, views: list[TrainingView], plan: FitPlan, constraints: Constraints, rng: np.random.Generator
+) -> str:
+    """Digest of all that a fit's result depends on: its arguments, the code that it runs, and the backend."""
+    code = [digest_code(Path(file)) for file in (__file__, inspect.getfile(type(constraints)))]
     arrays = [a for v in views for a in (v.image, v.weight, v.behind, v.camera.rotation, v.camera.translation)]
     numbers = [(v.camera.fx, v.camera.fy, v.camera.cx, v.camera.cy) for v in views]
-    return snapshot.digest_inputs(*vars(field).values(), *arrays, numbers, plan, rng.bit_generator.state)
+    inputs = field, *arrays, numbers, plan, constraints, rng.bit_generator.state
+    return snapshot.digest_inputs(code, backends.describe_backend(), *inputs)
 
 
 def _to_snapshot(run: TrainingState) -> tuple[dict[str, Array], dict]:
