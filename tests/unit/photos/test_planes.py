@@ -1,5 +1,9 @@
 """A robust plane through points."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from fixtures import photos as synth
@@ -44,3 +48,20 @@ def test_the_plane_moves_with_the_points(rng):
 def test_points_that_fix_no_plane_are_refused(points, rng):
     with pytest.raises(InputError, match="points"):
         fit_plane(points, rng)
+
+
+def test_the_plane_has_the_same_bits_whatever_the_threads_of_blas(root):
+    """BLAS reads their number when it is loaded, so each number needs a process."""
+    code = """if True:
+        import numpy as np
+        from dav_gswt.photos.planes import fit_plane
+        points = np.random.default_rng(1).normal(size=(200_003, 3)) * [1, 1, 0.01]
+        normal, offset, spread = fit_plane(points, np.random.default_rng(0))
+        print(*(value.hex() for value in (*normal.tolist(), offset, spread)))
+    """
+    found = []
+    for threads in ("1", "2", "4"):
+        environment = {**os.environ, "OPENBLAS_NUM_THREADS": threads, "PYTHONPATH": str(root / "workflow/lib")}
+        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+        found.append(done.stdout)
+    assert len(found[0].split()) == 5 and len(set(found)) == 1

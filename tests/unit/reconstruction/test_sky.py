@@ -1,3 +1,6 @@
+import os
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -57,6 +60,25 @@ def test_the_sky_is_found_whatever_stands_before_it():
     basis = sky.harmonics.basis(directions, sky.DEGREE)
     np.testing.assert_allclose(basis @ coefficients, heavens(directions), atol=0.03)
     assert deviation < 0.01
+
+
+def test_the_sky_has_the_same_bits_whatever_the_threads_of_blas(root):
+    """BLAS reads their number when it is loaded, so each number needs a process."""
+    code = """if True:
+        import numpy as np
+        from dav_gswt.reconstruction import sky
+        rng = np.random.default_rng(1)
+        directions = rng.normal(size=(100_003, 3))
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        coefficients, deviation = sky.fit_sky(directions, rng.uniform(0, 1, (100_003, 3)).astype(np.float32))
+        print(*(value.hex() for value in (*coefficients.ravel().tolist(), deviation)))
+    """
+    found = []
+    for threads in ("1", "2", "4"):
+        environment = {**os.environ, "OPENBLAS_NUM_THREADS": threads, "PYTHONPATH": str(root / "workflow/lib")}
+        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+        found.append(done.stdout)
+    assert len(found[0].split()) == 49 and len(set(found)) == 1
 
 
 def test_sky_counts_and_what_stands_against_it_says_nothing():

@@ -19,6 +19,7 @@ def fit_plane(
     is the standard deviation where residuals are normal; so hills and trees may be up to half of the points.
     up: a direction roughly upwards, where one is known: then only planes within 45 degrees of level are tried, and n
     points upwards.
+    Sums are in one order: those of BLAS depend on the number of its threads.
     Raises: InputError: fewer than three points, all on one line, or none in such a plane.
     """
     if len(points) < 3:
@@ -36,14 +37,14 @@ def fit_plane(
         raise InputError("the points lie in no level plane, or all on one line: they do not determine the ground")
     normals = normals[proper] / lengths[proper, None]
     offsets = np.einsum("ti,ti->t", normals, a[proper])
-    medians = np.median(np.abs(sample @ normals.T - offsets), axis=0)
+    medians = np.median(np.abs(np.einsum("ni,ti->nt", sample, normals) - offsets), axis=0)
     normal, offset = normals[medians.argmin()], offsets[medians.argmin()]
     scale = 1.4826 * medians.min() + 1e-12 * np.abs(sample).max()
     for _ in range(10):
-        weight = (1 + ((centred @ normal - offset) / scale) ** 2) ** -2
-        centre = weight @ centred / weight.sum()
-        spread = (centred - centre) * weight[:, None]
-        normal = np.linalg.eigh(spread.T @ (centred - centre))[1][:, 0]
+        weight = (1 + ((np.einsum("ni,i->n", centred, normal) - offset) / scale) ** 2) ** -2
+        centre = np.einsum("n,ni->i", weight, centred) / weight.sum()
+        away = centred - centre
+        normal = np.linalg.eigh(np.einsum("ni,nj->ij", away * weight[:, None], away))[1][:, 0]
         offset = normal @ centre
     if up is not None and normal @ up < 0:
         normal, offset = -normal, -offset

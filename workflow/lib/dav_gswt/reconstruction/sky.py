@@ -65,15 +65,19 @@ def _sample_sky(
 
 
 def fit_sky(directions: Float[Array, "n 3"], colours: Float32[Array, "n 3"]) -> tuple[Float[Array, "16 3"], float]:
-    """Coefficients of the sky with the least absolute deviation, and the median deviation."""
+    """Coefficients of the sky with the least absolute deviation, and the median deviation.
+
+    Sums are in one order: those of BLAS depend on the number of its threads.
+    """
     basis = harmonics.basis(directions, DEGREE)
     weight, residual = np.ones(len(basis)), np.zeros(len(basis))
     coefficients = np.zeros((basis.shape[1], 3))
     ridge = RIDGE * len(basis) * np.diag([0.0] + [1.0] * (basis.shape[1] - 1))
     for _ in range(ROUNDS):
         weighted = basis * weight[:, None]
-        coefficients = np.linalg.solve(basis.T @ weighted + ridge * weight.mean(), weighted.T @ colours)
-        residual = np.abs(basis @ coefficients - colours).max(1)
+        squares = np.einsum("nk,nl->kl", weighted, basis) + ridge * weight.mean()
+        coefficients = np.linalg.solve(squares, np.einsum("nk,nc->kc", weighted, colours))
+        residual = np.abs(np.einsum("nk,kc->nc", basis, coefficients) - colours).max(1)
         weight = 1 / np.maximum(residual, 0.01)
     return coefficients, float(np.median(residual))
 
@@ -97,7 +101,7 @@ def _mask_sky(
     modelled: TrainingView, view: TrainingView, directions, rising, coefficients, bound: float
 ) -> TrainingView:
     sky = np.full(view.image.shape, np.nan, np.float32)
-    sky[rising] = np.clip(harmonics.basis(directions[rising], DEGREE) @ coefficients, 0, 1)
+    sky[rising] = np.clip(np.einsum("nk,kc->nc", harmonics.basis(directions[rising], DEGREE), coefficients), 0, 1)
     with np.errstate(invalid="ignore"):
         agrees = rising & (np.abs(sky - view.image).max(-1) <= bound)
     other = rising & ~agrees
