@@ -8,6 +8,7 @@ from dav_gswt.field import rgb_to_sh
 from dav_gswt.geometry import cameras
 from dav_gswt.photos.training_views import TrainingView
 from dav_gswt.raster import render
+from dav_gswt.reconstruction import coarse
 from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
 from dav_gswt.reconstruction.evaluation import evaluate_field
 from dav_gswt.reconstruction.fit_settings import CoarseSettings
@@ -24,6 +25,14 @@ def test_a_coarse_field_from_photos_alone():
     assert found.grid.cells % 32 == 0
     assert found.report.steps == QUALITY.steps
     assert evaluate_field(found.field, mask_to_ground(photos[:1], found.grid))["psnr"] == pytest.approx(30, abs=12)
+
+
+def test_a_free_fit_starts_with_points_from_everywhere_and_room_to_grow():
+    points = np.sort(np.random.default_rng(0).uniform(0, 1, (4000, 3)), axis=0)
+    quality, rng = replace(QUALITY, max_gaussians=1000), np.random.default_rng(1)
+    start, _ = coarse._start_from_points(points, np.full((4000, 3), 0.5, np.float32), quality, rng)
+    assert len(start) == int(coarse.START_SHARE * 1000)
+    assert start.means[:, 0].min() < 0.05 and start.means[:, 0].max() > 0.95
 
 
 def test_a_scene_without_a_ground_is_fitted_as_free_gaussians():

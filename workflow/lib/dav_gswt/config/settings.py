@@ -159,7 +159,7 @@ class Preset(ConfigModel):
         "preset whose rounds choose the photos; this one then fits all of them at once. Left out: its own", None
     )
     sh_degree: Annotated[int, Field(ge=0, le=3)] | Auto = key(
-        "of the spherical harmonics of colour", 0, renamed="degree"
+        "of the spherical harmonics of colour; tiles show their constant part", 0, renamed="degree"
     )
     pose_rate: float = key(
         "first learning rate of the cameras' rotations; 0: they are held", 0, unit="radians", ge=0, le=0.01

@@ -121,10 +121,10 @@ def read_no_data(path: Path | str) -> float | None:
     try:
         with tifffile.TiffFile(path) as file:
             page = file.pages.first
-            value, dtype = float(page.tags[GDAL_NODATA].value), np.dtype(page.dtype)
+            value, dtype = float(page.tags[GDAL_NODATA].value), page.dtype
     except (*UNREADABLE, tifffile.TiffFileError, struct.error):
         return None
-    return value / np.iinfo(dtype).max if dtype.kind == "u" else value
+    return value / np.iinfo(dtype).max if dtype is not None and dtype.kind == "u" else value
 
 
 def write_png(path: Path | str, image: Float[Array, "h w c"]) -> None:

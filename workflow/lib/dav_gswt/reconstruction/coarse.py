@@ -35,6 +35,7 @@ _log = logging.getLogger(__name__)
 
 BAND = 0.1  # flying heights within which points belong to a ground with objects on it
 BLOCK = 32  # the exemplar's side is a multiple of it, in cells: six levels halve it five times
+START_SHARE = 0.9  # of the Gaussians that a free fit may have, that it starts with at most
 NEIGHBOURS = 12  # of a point on the map
 MIN_EXPLAINED = 0.6  # share of the points that a height field must explain, or the scene has no ground
 MUCH_WIDER = 2.0  # discs than the preset asks for, from which on the log says so
@@ -116,7 +117,7 @@ def _fit_free_field(
 ) -> Reconstruction:
     """Fit Gaussians that no ground holds, for a scene without a ground."""
     plan = settings.plan_coarse_fit(len(given.views), HALF_SHARE)
-    start, constraints = _start_from_points(given.points, given.colours, settings)
+    start, constraints = _start_from_points(given.points, given.colours, settings, rng)
     real = given.frame.kind == "photos"
     views = equalize_exposure(given.views, thin_places(given.points)) if real else given.views
     fit = trainer.fit_field(start, views, plan, constraints, rng, replace(options, name="fit free field"))
@@ -133,13 +134,16 @@ def finish_field(fitted: GaussianField, grid: Ground, views: list[TrainingView])
 
 
 def _start_from_points(
-    points: Float[Array, "n 3"], colours: Float[Array, "n 3"], settings: CoarseSettings
+    points: Float[Array, "n 3"], colours: Float[Array, "n 3"], settings: CoarseSettings, rng: np.random.Generator
 ) -> tuple[GaussianField, FreeConstraints]:
-    """Gaussians as large as the points are apart, for a scene without a ground."""
+    """Gaussians as large as the points are apart, for a scene without a ground; of many points some, at random, so that
+    the fit has room to grow."""
+    room = len(points) if settings.max_gaussians == AUTO else int(START_SHARE * settings.gaussian_limit)
+    if len(points) > room:
+        kept = np.sort(rng.choice(len(points), room, replace=False))
+        points, colours = points[kept], colours[kept]
     apart = np.asarray(cKDTree(points).query(points, k=min(4, len(points)))[0])[:, 1:].mean(1)
     start = objects.make_blobs(points, colours, np.clip(0.5 * apart, 1e-6, None), logit=0.0)
-    if settings.max_gaussians != AUTO:
-        start = start[: settings.gaussian_limit]
     return start, FreeConstraints(float(np.median(apart)), extent_of(points))
 
 

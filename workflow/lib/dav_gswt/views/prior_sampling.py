@@ -21,7 +21,7 @@ from dav_gswt.views.uncertainty.texture import image_gradient
 
 _log = logging.getLogger(__name__)
 
-BATCH = 16  # poses sampled at a time
+BATCH = 4  # poses sampled at a time: as fast as more at once, and few enough that every thread has some
 CHEAP = 2  # denoising steps of the first of two stages
 FEW = 2 * (staging.TOP + staging.BATCH)  # up to so many poses a single stage costs less
 

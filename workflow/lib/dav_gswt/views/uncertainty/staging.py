@@ -12,7 +12,7 @@ from dav_gswt.views.uncertainty.weighting import robust_scale
 TOP = 20  # poses whose order matters: as many as a round may take
 BATCH = 16  # poses scored in full at a time
 RATIO = 0.95  # quantile of full over cheap values that bounds the full values of other poses
-RANKING = ("w2_sq", "lpips", "single", "residual")  # terms by which policies rank; so does their sum
+RANKING = ("w2_sq", "lpips", "single")  # terms by which policies rank; so does their sum
 
 
 @dataclass(frozen=True)
