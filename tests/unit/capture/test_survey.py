@@ -1,4 +1,5 @@
 import json
+import re
 
 import numpy as np
 import pytest
@@ -124,6 +125,14 @@ def test_a_flight_longer_than_a_battery_becomes_several_files(tmp_path):
 def test_more_photos_than_anyone_flies_are_refused():
     with pytest.raises(InputError, match="more than 2000 photos"):
         survey.plan_exhaustive(500.0, [5.0], LENS)
+
+
+def test_a_flight_too_small_for_gps_says_what_is_large_enough(tmp_path, capsys):
+    out = str(tmp_path / "a.plan")
+    assert survey.main(["start", out, *WHERE]) == 0
+    times = float(re.search(r"--side ([0-9.]+) times as large", capsys.readouterr().out)[1])
+    assert survey.main(["start", out, *WHERE[:-1], str(20 * times)]) == 0
+    assert "GPS" not in capsys.readouterr().out
 
 
 def test_what_cannot_be_flown_is_said(tmp_path, capsys):

@@ -20,6 +20,7 @@ from dav_gswt.files import write_json
 from dav_gswt.geometry import camera_layouts
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.geometry.georeference import Georeference
+from dav_gswt.photos.sfm import gps
 
 ELEVATION = 65.0  # degrees: of the circles of a start flight
 ELEVATIONS = (90.0, 65.0, 45.0)  # of an exhaustive flight
@@ -179,6 +180,22 @@ def count_least_views(views: list[qgc_plan.NamedCamera], side: float, cells: int
     return int(count.min())
 
 
+def describe_missing_spread(views: list[qgc_plan.NamedCamera]) -> str | None:
+    """What to change where the photos are taken so near to each other that GPS cannot place them; None: nothing."""
+    spread, least = (
+        gps.measure_spread(np.array([camera.centre for _, camera in views]))[0],
+        gps.LEAST_SPREAD * gps.ACROSS,
+    )
+    if spread >= least:
+        return None
+    times = np.ceil(100 * least / max(spread, 1e-6)) / 100
+    return (
+        f"These photos are taken within {spread:.1f} m, which is within the error of GPS receivers: their positions will "
+        f"give neither scale nor north, and no mission can be flown to further poses. --heights or --side {times:.2f} "
+        f"times as large give the {least:.0f} m that it takes."
+    )
+
+
 def plan_from_options(options: argparse.Namespace) -> tuple[list[qgc_plan.SurveyFlight], list[qgc_plan.NamedCamera]]:
     """Plan the flights of the command line. Raises: InputError: impossible options, with what is possible."""
     lens, side = Lens(options.fov, options.aspect), options.side
@@ -258,6 +275,8 @@ def main(arguments: list[str] | None = None) -> int:
     except (InputError, OSError) as error:
         print(error, file=sys.stderr)
         return 1
+    if advice := describe_missing_spread(views):
+        print(advice)
     fewest = count_least_views(views, options.side)
     print(
         f"Every place of the square is in {fewest} or more. Take off from the ground near {flown[0].describe_home()}."
