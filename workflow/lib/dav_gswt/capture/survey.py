@@ -190,9 +190,9 @@ def describe_missing_spread(views: list[qgc_plan.NamedCamera]) -> str | None:
         return None
     times = np.ceil(100 * least / max(spread, 1e-6)) / 100
     return (
-        f"These photos are taken within {spread:.1f} m, which is within the error of GPS receivers: their positions will "
-        f"give neither scale nor north, and no mission can be flown to further poses. --heights or --side {times:.2f} "
-        f"times as large give the {least:.0f} m that it takes."
+        f"These photos are taken within {spread:.1f} m, which is within the error of GPS receivers: their positions "
+        f"will give neither scale nor north, and no mission can be flown to further poses. --heights or --side "
+        f"{times:.2f} times as large give the {least:.0f} m that it takes."
     )
 
 
