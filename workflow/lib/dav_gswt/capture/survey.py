@@ -182,10 +182,8 @@ def count_least_views(views: list[qgc_plan.NamedCamera], side: float, cells: int
 
 def describe_missing_spread(views: list[qgc_plan.NamedCamera]) -> str | None:
     """What to change where the photos are taken so near to each other that GPS cannot place them; None: nothing."""
-    spread, least = (
-        gps.measure_spread(np.array([camera.centre for _, camera in views]))[0],
-        gps.LEAST_SPREAD * gps.ACROSS,
-    )
+    spread, _ = gps.measure_spread(np.array([camera.centre for _, camera in views]))
+    least = gps.LEAST_SPREAD * gps.ACROSS
     if spread >= least:
         return None
     times = np.ceil(100 * least / max(spread, 1e-6)) / 100
