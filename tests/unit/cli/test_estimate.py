@@ -116,7 +116,7 @@ def test_a_short_run_is_told_no_preset(config):
 
 def test_a_long_run_is_told_the_best_preset_that_is_short_enough(config):
     config["scenes"]["desert"] |= {"preset": "reference"}
-    speed = MachineSpeed(6.0, 1.0)
+    speed = MachineSpeed(7.0, 1.0)
     jobs = {name: estimate.count_jobs(config, name) for name in PRESETS}
     times = {name: estimate_seconds(jobs[name], describe_work(config, name), speed) for name in PRESETS}
     assert times["reference"] > estimate.LONG
