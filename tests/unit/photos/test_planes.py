@@ -1,12 +1,9 @@
 """A robust plane through points."""
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from fixtures import photos as synth
+from fixtures.blas_threads import print_with_threads
 
 from dav_gswt.errors import InputError
 from dav_gswt.photos.planes import fit_plane
@@ -51,7 +48,6 @@ def test_points_that_fix_no_plane_are_refused(points, rng):
 
 
 def test_the_plane_has_the_same_bits_whatever_the_threads_of_blas(root):
-    """BLAS reads their number when it is loaded, so each number needs a process."""
     code = """if True:
         import numpy as np
         from dav_gswt.photos.planes import fit_plane
@@ -59,9 +55,5 @@ def test_the_plane_has_the_same_bits_whatever_the_threads_of_blas(root):
         normal, offset, spread = fit_plane(points, np.random.default_rng(0))
         print(*(value.hex() for value in (*normal.tolist(), offset, spread)))
     """
-    found = []
-    for threads in ("1", "2", "4"):
-        environment = {**os.environ, "OPENBLAS_NUM_THREADS": threads, "PYTHONPATH": str(root / "workflow/lib")}
-        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-        found.append(done.stdout)
+    found = print_with_threads(root, code)
     assert len(found[0].split()) == 5 and len(set(found)) == 1

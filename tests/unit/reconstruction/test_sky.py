@@ -1,10 +1,8 @@
-import os
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 from fixtures import ground as made
+from fixtures.blas_threads import print_with_threads
 
 from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry import cameras
@@ -63,7 +61,6 @@ def test_the_sky_is_found_whatever_stands_before_it():
 
 
 def test_the_sky_has_the_same_bits_whatever_the_threads_of_blas(root):
-    """BLAS reads their number when it is loaded, so each number needs a process."""
     code = """if True:
         import numpy as np
         from dav_gswt.reconstruction import sky
@@ -73,11 +70,7 @@ def test_the_sky_has_the_same_bits_whatever_the_threads_of_blas(root):
         coefficients, deviation = sky.fit_sky(directions, rng.uniform(0, 1, (100_003, 3)).astype(np.float32))
         print(*(value.hex() for value in (*coefficients.ravel().tolist(), deviation)))
     """
-    found = []
-    for threads in ("1", "2", "4"):
-        environment = {**os.environ, "OPENBLAS_NUM_THREADS": threads, "PYTHONPATH": str(root / "workflow/lib")}
-        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-        found.append(done.stdout)
+    found = print_with_threads(root, code)
     assert len(found[0].split()) == 49 and len(set(found)) == 1
 
 

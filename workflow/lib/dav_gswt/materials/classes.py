@@ -17,10 +17,8 @@ from dav_gswt.materials.surroundings import Surroundings
 MAX_MATERIALS = 4
 LEAST_SHARE = 0.05  # of the exemplar, of a material
 LEAST_WIDTH = 0.13  # of its side: a disc so wide lies in a material
-WOOD, WOODED = (
-    0.16,
-    1 / 3,
-)  # width, of the side, of growth without plain ground; its share of all, from which it is none
+WOOD = 0.16  # of its side: growth so wide without plain ground is no texture, as the crowns of a wood
+WOODED = 1 / 3  # of all growth, that is so wide at least
 RIM = 1 / 128  # of the side: width of the blurred rim of shade and of other excluded ground
 HALO = 2 * segmentation.GRAIN  # of the side, from the ground: so far reaches the grain's contrast of a thing
 LITTLE = 0.02  # of the exemplar: so little that stands out of one rough material is left in it

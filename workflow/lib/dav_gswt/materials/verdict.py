@@ -20,8 +20,8 @@ def judge_material(name: str, areas: float, filled: float) -> MaterialVerdict:
 
     Args: areas: how many tiles' areas of it were photographed. filled: share of its exemplar that is made of patches.
     """
-    seen = f"{name} was photographed on {_format_areas(areas)} tile areas"
     areas *= 1 + ROUNDING
+    seen = f"{name} was photographed on {_format_areas(areas)} tile areas"
     if areas >= GOOD:
         return MaterialVerdict("good", seen)
     times = math.ceil(10 * GOOD / max(areas, 0.1)) / 10  # up, for "1.0 times" asks for nothing
