@@ -171,14 +171,16 @@ def _vertices(path: Path) -> Array:
 
 
 def _check_counts(path: Path) -> None:
-    """Raises: InputError: the header has no end, or announces more values than the file has bytes."""
+    """Raises: InputError: no PLY, a header without end, or one that announces more values than the file has bytes."""
     with path.open("rb") as file:
         begin = file.read(HEADER_BYTES)
+    if not begin.startswith(b"ply"):
+        raise InputError(f"{path}: not a readable PLY (it does not begin with 'ply'); export or copy it again")
     end = re.search(rb"[\r\n]end_header\b", begin)  # at the start of a line: a comment may name it too
     if not end:
         raise InputError(
-            f"{path}: no end_header in the first {HEADER_BYTES} bytes; not a PLY, or one with too long comments: "
-            "export it again without them"
+            f"{path}: not a readable PLY (no end_header in the first {HEADER_BYTES} bytes); "
+            "export it again, without long comments"
         )
     header, room = begin[: end.start()], path.stat().st_size - end.end()
     announced = 0
