@@ -11,8 +11,8 @@ WEST, SOUTH, CENTRE = 0, 1, 2  # axis of a hash: colour of the west edge, of the
 
 
 def hash_cell(
-    i: int | Int64[Array, "*cells"], j: int | Int64[Array, "*cells"], axis: int, salt: int
-) -> int | Int64[Array, "*cells"]:
+    i: int | Int64[Array, "*#cells"], j: int | Int64[Array, "*#cells"], axis: int | Int64[Array, "*#cells"], salt: int
+) -> int | Int64[Array, "..."]:
     """32 well mixed bits for cell (i, j): one round of the finaliser of MurmurHash3 for each coordinate.
 
     h = mix(mix(i 0x8da6b343 ^ axis 0xcb1ab31f ^ salt) + j 0xd8163841), all modulo 2^32: negative coordinates count in

@@ -23,6 +23,7 @@ GAIN = 0.4  # height of an octave over that of the one twice as wide
 SHIFT = (0.37, 0.71)  # of each octave against the last, in its own cells; else all are 0 at the corners of the first
 STEEPEST = 2.75  # upper bound of the slope of the noise, per cell, over all gradients at the corners
 FARTHEST = 1e9  # units from 0 to a height: more is refused by the page too
+BLOCK = 4096  # points whose noise is computed at once: their intermediate values stay in the cache
 MAX_SIDE = 4096  # pixels along a side of a height map: every WebGL2 device in use takes textures of this size
 
 
@@ -87,14 +88,22 @@ class Hills:
         return STEEPEST * rise / self.wavelength
 
     def at(self, x: Float[Array, "n"], y: Float[Array, "n"]) -> tuple[Float[Array, "n"], Float[Array, "n 2"]]:
+        height, slope = np.empty(len(x)), np.empty((len(x), 2))
+        for first in range(0, len(x), BLOCK):
+            block = slice(first, first + BLOCK)
+            height[block], slope[block] = self._sum_octaves(x[block], y[block])
+        return height, slope
+
+    def _sum_octaves(self, x: Float[Array, "n"], y: Float[Array, "n"]):
+        octaves = np.arange(self.octaves)[:, None]
+        cells = 2.0**octaves / self.wavelength
+        noise, gradient = gradient_noise(
+            x * cells + octaves * SHIFT[0], y * cells + octaves * SHIFT[1], HILLS + octaves, self.salt
+        )
         height, slope = np.zeros(len(x)), np.zeros((len(x), 2))
         for octave, amplitude in enumerate(self._amplitudes()):
-            cells = 2.0**octave / self.wavelength
-            noise = gradient_noise(
-                x * cells + octave * SHIFT[0], y * cells + octave * SHIFT[1], HILLS + octave, self.salt
-            )
-            height += amplitude * noise[0]
-            slope += amplitude * cells * noise[1]
+            height += amplitude * noise[octave]
+            slope += amplitude * cells[octave] * gradient[octave]
         return height, slope
 
     def _amplitudes(self) -> list[float]:
@@ -209,24 +218,28 @@ def _spline_weights(u: Float[Array, "n"]):
     return pixel.astype(np.int64), weights, (-before, -2 * t, after)
 
 
-def gradient_noise(x: Float[Array, "n"], y: Float[Array, "n"], axis: int, salt: int):
-    """Gradient noise and its gradient; x and y in cells, axis of their hash."""
+def gradient_noise(
+    x: Float[Array, "*n"], y: Float[Array, "*n"], axis: int | Int64[Array, "#octaves 1"], salt: int
+) -> tuple[Float[Array, "*n"], Float[Array, "*n 2"]]:
+    """Gradient noise and its gradient; x and y in cells, axis of their hash. All corners are hashed at once: a call
+    for few points costs as much as its number of operations.
+    """
     i, j = np.floor(x), np.floor(y)
     u, v = x - i, y - j
-    i, j = i.astype(np.int64), j.astype(np.int64)
+    step = np.arange(2).reshape(2, *[1] * x.ndim)
+    bits = np.asarray(hash_cell(i.astype(np.int64) + step, j.astype(np.int64) + step[:, None], axis, salt))
+    east, north = (bits & 0xFFFF) / 32767.5 - 1, (bits >> 16) / 32767.5 - 1
+    planes = east * (u - step) + north * (v - step[:, None])
     fade_x, fade_y, turn_x, turn_y = smoothstep(u), smoothstep(v), _smoothstep_slope(u), _smoothstep_slope(v)
-    value, by_x, by_y = np.zeros(len(x)), np.zeros(len(x)), np.zeros(len(x))
+    value, by_x, by_y = np.zeros(x.shape), np.zeros(x.shape), np.zeros(x.shape)
     for b in (0, 1):
         for a in (0, 1):
-            bits = hash_cell(i + a, j + b, axis, salt)
-            east, north = (bits & 0xFFFF) / 32767.5 - 1, (bits >> 16) / 32767.5 - 1
-            plane = east * (u - a) + north * (v - b)
             across, along = (fade_x if a else 1 - fade_x), (fade_y if b else 1 - fade_y)
-            weight = across * along
+            weight, plane = across * along, planes[b, a]
             value += weight * plane
-            by_x += weight * east + (turn_x if a else -turn_x) * along * plane
-            by_y += weight * north + across * (turn_y if b else -turn_y) * plane
-    return value, np.stack([by_x, by_y], 1)
+            by_x += weight * east[b, a] + (turn_x if a else -turn_x) * along * plane
+            by_y += weight * north[b, a] + across * (turn_y if b else -turn_y) * plane
+    return value, np.stack([by_x, by_y], -1)
 
 
 def smoothstep(t):

@@ -168,8 +168,9 @@ def render_patches(
     picture, codes, *sides = rendering.render_pieces(terrain, pieces, crop.camera, placed.colour, recolourings)
     patch = np.where(codes.max(-1) > MIN_SHARE, codes.argmax(-1), -1)
     tile = (sides[0][..., :2] > 0.5) @ np.array([1, 2]) if border else np.zeros_like(patch)
+    (middle,) = [piece for piece in pieces if piece.cell == _find_middle(placed, crop)]
     own = [
-        render_patch(placed, terrain, crop, placed.origins[p], mean_correction(placed, crop, p), pieces)
+        render_patch(placed, terrain, crop, placed.origins[p], mean_correction(placed, crop, p), middle)
         for p in patches
     ]
     return RenderedCrop(crop, picture, patches, patch, tile, np.stack(own), crop.box - placed.origins[patches][:, None])
@@ -181,19 +182,22 @@ def render_patch(
     crop: Crop,
     origin: Int[Array, "2"],
     correction: Float[Array, "4"],
-    pieces: list[rendering.Piece] | None = None,
+    template: rendering.Piece | None = None,
 ) -> Float32[Array, "h w 3"]:
     """The picture of the exemplar alone, with its corner in that cell of the terrain.
 
-    correction: added to all its colours and heights. pieces: the terrain's in the crop, if they are known.
+    correction: added to all its colours and heights. template: the terrain's cell under the crop's middle, if known.
     """
     footprint = _make_footprint(placed, crop)
-    pieces = pieces or rendering.collect_pieces(terrain, crop.camera, footprint, placed.tiles)
-    middle = tuple(v // placed.plan.side for v in crop.at)
-    (template,) = [piece for piece in pieces if piece.cell == middle]
+    template = template or rendering.describe_cell(terrain, crop.camera.centre, _find_middle(placed, crop))
     corner = np.array([*(origin * placed.spacing), 0.0])
     piece = rendering.make_patch_piece(placed.source.levels, corner, template, correction, footprint)
     return rendering.render_pieces(terrain, [piece], crop.camera, placed.colour)[0]
+
+
+def _find_middle(placed: PlacedTiles, crop: Crop) -> tuple[int, int]:
+    """The cell of the terrain under the crop's middle."""
+    return crop.at[0] // placed.plan.side, crop.at[1] // placed.plan.side
 
 
 def _make_footprint(placed: PlacedTiles, crop: Crop) -> Footprint:

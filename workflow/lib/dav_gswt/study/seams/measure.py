@@ -25,6 +25,7 @@ from dav_gswt.study.seams.crops import Crop, RenderedCrop, View
 from dav_gswt.study.seams.density import seam_density
 from dav_gswt.study.seams.exemplar import ExemplarMaps
 from dav_gswt.study.seams.placed_tiles import PlacedTiles
+from dav_gswt.study.seams.places import Place
 from dav_gswt.terrain import heights
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.tiles.build import TileSet
@@ -111,18 +112,28 @@ def measure_crops(placed: PlacedTiles, straight: PlacedTiles, weights: Weights |
 
 def _sample_borders(placed: PlacedTiles, terrain: EndlessTerrain, view: View, rng) -> list[SampledCrop]:
     """Crops that show a border alone, and if these are too few, some with a cut as well."""
-    alone, others = [], []
-    for place in places.sample_borders(placed, rng)[:MAX_BORDER_PLACES]:
-        if (crop := crops.make_crop(placed, terrain, view, place.at)) and (patches := crops.find_patches(placed, crop)):
-            (others if len(patches) > 1 else alone).append((place, crop, patches))
     samples = []
-    for place, crop, patches in alone + others:
+    for place, crop, patches in _find_borders(placed, terrain, view, rng):
         shown = crops.render_patches(placed, terrain, crop, patches, border=True)
         if shown.shows_patch:
             samples.append(SampledCrop("border", len(samples), place.cluster, shown))
         if len(samples) == BORDERS:
             return samples
     return _require_enough(samples, BORDERS, "borders")
+
+
+def _find_borders(
+    placed: PlacedTiles, terrain: EndlessTerrain, view: View, rng
+) -> Iterator[tuple[Place, Crop, list[int]]]:
+    """Crops on borders and their patches: those of one patch, as they are found, then those with a cut as well."""
+    others = []
+    for place in places.sample_borders(placed, rng)[:MAX_BORDER_PLACES]:
+        if (crop := crops.make_crop(placed, terrain, view, place.at)) and (patches := crops.find_patches(placed, crop)):
+            if len(patches) > 1:
+                others.append((place, crop, patches))
+            else:
+                yield place, crop, patches
+    yield from others
 
 
 def _sample_cuts(

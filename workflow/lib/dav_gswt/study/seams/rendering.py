@@ -15,7 +15,7 @@ from dav_gswt.bundle.manifest import Sky
 from dav_gswt.field import SH0, GaussianField
 from dav_gswt.geometry.cameras import Camera
 from dav_gswt.study.seams.spatial_index import Footprint, SpatialIndex
-from dav_gswt.terrain import placement, splats, visibility
+from dav_gswt.terrain import draw_order, placement, splats, visibility
 from dav_gswt.terrain.backdrop import Backdrop
 from dav_gswt.terrain.endless import EndlessTerrain
 
@@ -54,6 +54,19 @@ def collect_pieces(
             direction = placement.cell_direction(terrain, i, j, tile, eye)
             pieces.append(Piece(parts, corner, direction, bool(cells.close[k]), (i, j)))
     return pieces
+
+
+def describe_cell(terrain: EndlessTerrain, eye: Float[Array, "3"], cell: tuple[int, int]) -> Piece:
+    """The piece of a cell without its Gaussians, of the levels that it is drawn with."""
+    i, j = (np.array([v], np.int64) for v in cell)
+    tile, materials = visibility.choose_tiles(terrain, i, j)
+    at = (int(np.floor(eye[0] / terrain.side)), int(np.floor(eye[1] / terrain.side)))
+    close = draw_order.in_near_block(i, j, at)
+    cells = visibility.GridCells(i, j, tile, materials, close, *visibility.measure_distances(terrain, i, j, eye))
+    levels = np.flatnonzero(visibility.active_levels(terrain, cells)[:, 0]).tolist()
+    parts = {level: terrain.tiles[level, int(tile[0])][:0] for level in levels}
+    direction = placement.cell_direction(terrain, *cell, int(tile[0]), eye)
+    return Piece(parts, np.array([*cell, 0.0]) * terrain.side, direction, bool(close[0]), cell)
 
 
 def make_patch_piece(
