@@ -97,7 +97,7 @@ def test_dense_growth_of_several_colours_is_texture():
     assert (found.number, found.excluded.mean() < 0.02) == (1, True)
 
 
-@pytest.mark.parametrize("rows", [slice(0, 24), slice(50, 78)])
+@pytest.mark.parametrize("rows", [slice(0, 24), slice(48, 80)])
 def test_a_wood_of_many_colours_is_no_texture_of_the_ground_beside_it(rows):
     """Crowns and the dark between them, in classes of which none is wide, over a fifth of the ground and more."""
     labels, rng = np.zeros((128, 128), int), np.random.default_rng(3)
@@ -110,6 +110,14 @@ def test_a_wood_of_many_colours_is_no_texture_of_the_ground_beside_it(rows):
     labels[(rng.random(labels.shape) < 0.45) & meadow] = 2
     growth = classes.find_growth(labels, [0])
     assert not growth[wood].any() and growth[meadow].mean() > 0.4
+
+
+def test_swathes_of_flowers_of_many_kinds_are_texture():
+    """Flowers over a fifth of the side, and plain ground hardly wider than a material's least."""
+    labels, rng = np.zeros((128, 128), int), np.random.default_rng(3)
+    swathes = (np.arange(128) + 35) % 44 < 26
+    labels[:, swathes] = rng.integers(1, 6, (32, 32)).repeat(4, 0).repeat(4, 1)[:, swathes]
+    assert (classes.find_growth(labels, [0]) == swathes).all()
 
 
 def things_on(ground, thing, size=128, number=8):

@@ -17,8 +17,9 @@ from dav_gswt.materials.surroundings import Surroundings
 MAX_MATERIALS = 4
 LEAST_SHARE = 0.05  # of the exemplar, of a material
 LEAST_WIDTH = 0.13  # of its side: a disc so wide lies in a material
-WOOD = 0.16  # of its side: growth so wide without plain ground is no texture, as the crowns of a wood
-WOODED = 1 / 3  # of all growth, that is so wide at least
+WOOD = 0.24  # of its side: growth so wide without plain ground is no texture, as the crowns of a wood
+WOODED = 0.2  # of all growth, that is so wide at least
+CROWNS = 0.16  # of its side: beside a wood growth so wide is no texture either
 RIM = 1 / 128  # of the side: width of the blurred rim of shade and of other excluded ground
 HALO = 2 * segmentation.GRAIN  # of the side, from the ground: so far reaches the grain's contrast of a thing
 LITTLE = 0.02  # of the exemplar: so little that stands out of one rough material is left in it
@@ -216,9 +217,9 @@ def find_growth(classes: Int[Array, "m m"], chosen: list[int]) -> Bool[Array, "m
     growth = np.isin(
         classes, [number for number, width in widths.items() if width < LEAST_WIDTH * m and number not in chosen]
     )
-    wood = _find_wide_parts(growth, WOOD * m)
-    if wood.sum() > WOODED * growth.sum() and max(widths[number] for number in chosen) >= LEAST_WIDTH * m:
-        growth &= ~wood
+    wooded = _find_wide_parts(growth, WOOD * m).sum() > WOODED * growth.sum()
+    if wooded and max(widths[number] for number in chosen) >= LEAST_WIDTH * m:
+        growth &= ~_find_wide_parts(growth, CROWNS * m)
     return growth if growth.mean() > objects.DENSE else np.zeros_like(growth)
 
 
