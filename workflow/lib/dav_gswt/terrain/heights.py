@@ -221,8 +221,9 @@ def _spline_weights(u: Float[Array, "n"]):
 def gradient_noise(
     x: Float[Array, "*n"], y: Float[Array, "*n"], axis: int | Int64[Array, "#octaves 1"], salt: int
 ) -> tuple[Float[Array, "*n"], Float[Array, "*n 2"]]:
-    """Gradient noise and its gradient; x and y in cells, axis of their hash. All corners are hashed at once: a call
-    for few points costs as much as its number of operations.
+    """Gradient noise and its gradient; x and y in cells, axis of their hash.
+
+    All corners are hashed at once: for few points the number of NumPy calls is what costs.
     """
     i, j = np.floor(x), np.floor(y)
     u, v = x - i, y - j
