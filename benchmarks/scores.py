@@ -30,6 +30,8 @@ TARGETS = {
     "score_1000_seconds": 120,
     "score_1000_full_seconds": 480,
     "score_draft_seconds": 30,
+    "score_quick_seconds": 8,
+    "score_quick_1000_seconds": 40,
     "score_peak_mb": 3000,
     "score_top20_overlap": 0.9,
 }
@@ -64,7 +66,11 @@ def perceptual() -> dict[str, float]:
 
 
 def pools() -> dict[str, float]:
-    """A field fitted from few photos and hemispheres of poses over it, from conditions to terms: M = 5, 8 steps."""
+    """A field fitted from few photos and hemispheres of poses over it, from conditions to terms.
+
+    As the config's priors `terrain` (five samples, 8 steps) and `terrain-quick` (two samples, two steps). The best 20
+    are compared with those of all poses in full, by the same noise and by another.
+    """
     made, rng = make_world(WORLD), np.random.default_rng(0)
     photos = examples.take_photos(made, rng)
     field = examples.fit_field(made, photos, rng)
@@ -72,7 +78,7 @@ def pools() -> dict[str, float]:
     model = prior_sampling.load_prior({"model": "terrain"})
     known = conditions.prepare_photos(photos, made.frame, model.size)
 
-    def scored(count: int, staged: bool):
+    def scored(count: int, staged: bool, samples: int = 5, steps: int = 8, seed: int = 0):
         places = camera_layouts.hemisphere(count, 30.0, FLYING_HEIGHT)
         cameras = [
             camera_layouts.orbit(*place, made.frame.exemplar.centre, 96, 96, examples.FIELD_OF_VIEW) for place in places
@@ -80,7 +86,7 @@ def pools() -> dict[str, float]:
         pool = [(pose_of_camera(f"pose_{i:04d}", c, made.frame), c) for i, c in enumerate(cameras)]
         start = time.perf_counter()
         told = conditions.build_condition(field, pool, known, FLYING_HEIGHT, model.size)
-        ask = PriorConfig(model, 5, 8, 0.15, weights=given, staged=staged)
+        ask = PriorConfig(model, samples, steps, 0.15, seed, given, staged)
         everywhere = np.ones((count, model.size, model.size), np.float32)
         terms, _ = prior_sampling.sample_terms(ask, told, [pose.name for pose, _ in pool], everywhere)
         return time.perf_counter() - start, uncertainty.combine_terms(
@@ -90,18 +96,24 @@ def pools() -> dict[str, float]:
     draft, _ = scored(250, staged=True)
     seconds, some = scored(1000, staged=True)
     full, whole = scored(1000, staged=False)
-    best = [set(np.argsort(-u)[:TOP]) for u in (some, whole)]
+    _, other = scored(1000, staged=True, seed=1)
+    quick, _ = scored(250, False, 2, 2)
+    quick_all, rough = scored(1000, False, 2, 2)
+    best, *others = [set(np.argsort(-u)[:TOP]) for u in (whole, some, other, rough)]
+    names = "score_top20_overlap", "score_top20_overlap_other_noise", "score_quick_top20_overlap"
     return {
         "score_draft_seconds": draft,
         "score_1000_seconds": seconds,
         "score_1000_full_seconds": full,
-        "score_top20_overlap": len(best[0] & best[1]) / TOP,
+        "score_quick_seconds": quick,
+        "score_quick_1000_seconds": quick_all,
+        **{name: len(best & those) / TOP for name, those in zip(names, others, strict=True)},
         "score_peak_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
 
 
 def main() -> None:
-    report_figures(w2() | perceptual() | pools(), TARGETS)
+    report_figures({**w2(), **perceptual(), **pools()}, TARGETS)
 
 
 if __name__ == "__main__":

@@ -36,6 +36,7 @@ class LatentModel:
         network.denoiser.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]: torch lacks it
         self.network, self.facts = network.eval().requires_grad_(False), facts or {}
         self.layers = dropout.replace_dropout(network.denoiser)
+        self._encoded: tuple[Condition, Float32[Tensor, "b c hz wz"]] | None = None
 
     @classmethod
     def open(cls: type[Model], path: Path | str) -> Model:
@@ -67,7 +68,13 @@ class LatentModel:
 
     def encode_render(self, condition: Condition) -> Float32[Array, "b c hz wz"]:
         """See `Prior`."""
-        return self.encode(pack_render(condition)).numpy()
+        return self._encode_render(condition).numpy()
+
+    def _encode_render(self, condition: Condition) -> Float32[Tensor, "b c hz wz"]:
+        """Latents of the field's render; those of the last condition are remembered, as scoring asks for them twice."""
+        if self._encoded is None or self._encoded[0] is not condition:
+            self._encoded = condition, self.encode(pack_render(condition))
+        return self._encoded[1]
 
     def estimate_variances(self, latents: Float32[Array, "*n c hz wz"]) -> Float32[Array, "*n c hz wz"]:
         """See `Prior`."""
@@ -83,7 +90,7 @@ class LatentModel:
         Raises:  ValueError: the condition is not finite, see `Condition.check`.
         """
         condition.check()
-        render, photo = (self.encode(p) for p in (pack_render(condition), pack_photo(condition.photo)))
+        render, photo = self._encode_render(condition), self.encode(pack_photo(condition.photo))
         opacity = average_opacity(torch.from_numpy(condition.alpha))
         valid = torch.ones_like(opacity) if known is None else torch.from_numpy(known).float()[:, None]
         with torch.inference_mode():
@@ -132,7 +139,7 @@ class TerrainPrior(LatentModel):
         known: Bool[Array, "b h w"] | None = None,
     ) -> Float32[Array, "b c hz wz"]:
         """Add a little noise to the latents of the render and remove it again: `sampler.repair_latents`."""
-        latents = self.encode(pack_render(condition))
+        latents = self._encode_render(condition)
         denoise, sampling = self.make_denoiser(condition, known), Sampling(1, 0.0, steps, seed)
         return sampler.repair_latents(denoise, self.layers, self.schedule, latents, strength, sampling)
 

@@ -84,8 +84,10 @@ def _describe_views(rows: Reader) -> dict:
     table = rows("ablation")
     budget = {row["variant"]: row for row in table if row["sweep"] == "budget"}
     compared = {row["variant"]: row for row in table if row["sweep"] == "estimators"}
-    paired = [row for row in rows("view_comparison") if row["policy"] == "coverage-error" and row["scene"] == "every"]
+    worth = rows("view_comparison")
+    paired = [row for row in worth if row["policy"] == "coverage-error" and row["scene"] == "every"]
     default = {r["measure"]: Difference(float(r["mean"]), float(r["low"]), float(r["high"])) for r in paired}
+    [real] = [r for r in worth if r["policy"] == "w2-lpips" and r["scene"] == "every" and r["measure"] == "psnr"]
     psnr = {variant: float(row["psnr"]) for variant, row in budget.items()}
     hundred = {row["policy"]: -float(row["gap"]) for row in rows("hundred_benchmark")}
     return {
@@ -97,6 +99,8 @@ def _describe_views(rows: Reader) -> dict:
         "hundred_spread_out": hundred["farthest"],
         "random": Difference(psnr["w2-lpips"] - psnr["random"]),
         "spread_out": _compare(budget["w2-lpips"], "psnr"),
+        "spread_out_real": Difference(float(real["mean"]), float(real["low"]), float(real["high"])),
+        "starts": int(real["units"]),
         "default": default["psnr"],
         "default_worst": default["worst_psnr"],
     }

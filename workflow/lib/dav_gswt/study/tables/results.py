@@ -57,6 +57,7 @@ def format_results(tables: dict[str, list[dict]], figures: dict[str, str]) -> st
         "orientation, not for comparison.",
         "## Timing",
         format_table(["scene", *_heads(TIMING)], [[row["scene"], *_cells(row, TIMING)] for row in tables["timing"]]),
+        "Seconds and minutes hold for the machine and for what ran beside the jobs. "
         "Reconstruction is scoring, choosing and fitting, without the taking of photos; render, sort and update are "
         "the page's in a headless browser, which without a graphics card draws in software "
         "(`docs/research/data/frames.csv`; "
