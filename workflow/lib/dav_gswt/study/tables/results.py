@@ -61,7 +61,7 @@ def format_results(tables: dict[str, list[dict]], figures: dict[str, str]) -> st
         "Reconstruction is scoring, choosing and fitting, without the taking of photos; render, sort and update are "
         "the page's in a headless browser, which without a graphics card draws in software "
         "(`docs/research/data/frames.csv`; "
-        "empty where `snakemake frame_times` was not run). "
+        "empty unless `study.tables.viewer` asks for them). "
         "The paper's percentages are left out: it does not say of what they are.",
         "## Levels of detail",
         format_table(*_levels(tables["lod"])),
