@@ -16,6 +16,7 @@ Row = dict
 Reader = Callable[[str], list[Row]]
 FEW = 2  # pairs, of which an interval is no more than their range
 LEVEL = 0.05
+CHOSEN = {"p_drop": 0.15, "lam": 0.1}  # by the paper
 
 
 @dataclass(frozen=True)
@@ -132,6 +133,8 @@ def _describe_settings(rows: Reader) -> dict:
         "k_values": [int(value) for value in k_values],
         "k_gain": psnr["k"][-1] - psnr["k"][-2],
         "spread": [max(psnr[name]) - min(psnr[name]) for name in ("p_drop", "lam", "tau")],
+        "best": [max(sorted(of[name]), key=lambda value, name=name: float(of[name][value]["psnr"])) for name in CHOSEN],
+        "chosen_by_paper": list(CHOSEN.values()),
         "tau_values": [min(of["tau"]), max(of["tau"])],
         "tau_orders": round(max(orders) / min(orders), 1),
     }
