@@ -64,8 +64,7 @@ rule render_grid:
     """Twenty by twenty tiles, from above and at a walker's height: is there a grid?"""
     input:
         manifest="<results>/<bundle>/davgswt.json",
-        seams="<results>/<tiles>/seams.json",
-        tiles="<results>/<tiles>/tiles",
+        chunks="<results>/<bundle>/chunks",
     output:
         pictures=expand(
             "<results>/<seams>/{shot}_{surface}.png",
@@ -84,6 +83,7 @@ rule render_grid:
         runtime=per_attempt("20m"),
     params:
         size=lookup(dpath="stills", within=config),
+        schema=BUNDLE_SCHEMA,
         source=code_of("study/render_grid"),
     script:
         "../../scripts/study/render_grid.py"

@@ -142,14 +142,12 @@ def _describe_settings(rows: Reader) -> dict:
 
 def _describe_seams(rows: Reader) -> dict:
     """Ways to cut, less cuts by colour, and the ablation of gamma."""
-
-    def read(name: str) -> dict[str, Difference]:
-        chosen = [row for row in rows(name) if row["measure"] == "seam_lpips" and row["scene"] == "every"]
-        return {row["variant"]: _read_difference(row, "difference", "difference") for row in chosen}
-
+    less = [row for row in rows("seam_ablation") if row["measure"] == "seam_lpips"]
+    every = [row for row in less if row["scene"] == "every"]
+    cuts = {row["variant"]: _read_difference(row, "difference", "difference") for row in every}
     [ablated] = [r for r in rows("ablation") if (r["sweep"], r["variant"]) == ("seams", "semantic-nogamma")]
     gamma = _compare(ablated, "seam_lpips")
-    return {"cuts": read("seam_ablation"), "mixed": read("seam_ablation_mixed"), "gamma": gamma}
+    return {"cuts": cuts, "seam_scenes": len({row["scene"] for row in less}) - 1, "gamma": gamma}
 
 
 def _describe_frames(rows: Reader) -> dict:
