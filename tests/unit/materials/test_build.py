@@ -11,6 +11,7 @@ from dav_gswt.materials.filling import CellSources
 from dav_gswt.materials.objects import Footprint
 from dav_gswt.reconstruction import top_view, underlay
 from dav_gswt.reconstruction.objects import make_blobs
+from dav_gswt.tiles.texture import Pattern
 
 
 @pytest.fixture(scope="module")
@@ -213,6 +214,32 @@ def test_the_verdict_on_a_set_is_that_of_the_material_that_covers_most():
     judged = {name: verdict.judge_material(name, areas, 0.3) for name, areas in (("sand", 0.5), ("rock", 8.0))}
     assert verdict.judge_set(judged, {"sand": 0.4, "rock": 0.6}, 0.2, 0).grade == "good"
     assert verdict.judge_set(judged, {"sand": 0.6, "rock": 0.4}, 0.2, 0).grade == "no"
+
+
+@pytest.mark.parametrize(("areas", "grade"), [(8.0, "marginal"), (3.0, "marginal"), (0.5, "no")])
+def test_a_pattern_makes_a_good_verdict_marginal_and_says_what_may_break(areas, grade):
+    judged = verdict.judge_material("bricks", areas, 0.0, Pattern(40.0, 0.35))
+    assert judged.grade == grade and "(correlation 0.35): rows and lines may break" in judged.reason
+    plain = verdict.judge_material("sand", 8.0, 0.0)
+    whole = verdict.judge_set({"bricks": judged, "sand": plain}, {"bricks": 0.4, "sand": 0.6}, 0.0, 0, ["bricks"])
+    assert whole.grade == "good" and whole.reason.endswith("rows and lines of bricks may break where patches meet")
+
+
+@pytest.mark.parametrize("mixed", [False, True])
+def test_ground_with_a_pattern_is_judged_as_such(mixed):
+    field = made.field(mixed=mixed)
+    stripes = (
+        np.sin(2 * np.pi * (field.means[:, 0] + 0.3 * field.means[:, 1]) / (6 * made.SPACING)) > 0
+    ) & field.ground
+    sh = field.sh.copy()
+    sh[stripes, 0] += 0.3
+    found = build.find_materials(replace(field, sh=sh), made.grid(), 0)
+    assert found.materials[0].pattern is not None and "may break" in found.materials[0].verdict.reason
+    assert found.verdict.grade != "good" and "may break where patches meet" in found.verdict.reason
+
+
+def test_ground_without_a_pattern_is_not(found):
+    assert all(each.pattern is None for each in found.materials) and "may break" not in found.verdict.reason
 
 
 def test_tiles_made_for_two_areas_of_a_material_have_two():

@@ -1,4 +1,4 @@
-"""The scale of a texture, on noise whose correlation is known, and what follows for tiles."""
+"""The scale of a texture, on noise whose correlation is known, what follows for tiles, and patterns."""
 
 from dataclasses import replace
 
@@ -39,6 +39,50 @@ def test_a_stripe_as_wide_as_the_ground_is_finite():
     ground = np.zeros((30, 30, 3))
     ground[:, 15:] = 1
     assert 0 < texture.measure_texture_scale(ground) < 30
+
+
+def lay_bricks(course=8, turn=17, cells=224):
+    """Bricks twice as long as their courses are high, each of its own tone, with joints, turned by some degrees."""
+    y, x = np.mgrid[:cells, :cells].astype(float)
+    angle = np.radians(turn)
+    along, across = np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x
+    row = np.floor(across / course)
+    along = along + row % 2 * course
+    column = np.floor(along / (2 * course))
+    tones = np.random.default_rng(1).normal(0.5, 0.05, (500, 500))[row.astype(int) % 500, column.astype(int) % 500]
+    joint = (along - column * 2 * course < 1.2) | (across - row * course < 1.2)
+    grain = np.random.default_rng(2).normal(0, 0.03, (cells, cells))
+    return np.repeat(gaussian_filter(np.where(joint, 0.35, tones) + grain, 0.7)[..., None], 3, -1)
+
+
+@pytest.mark.parametrize("turn", [0, 17, 60])
+def test_courses_of_brick_are_a_pattern_however_they_are_turned(turn):
+    found = texture.find_pattern(lay_bricks(turn=turn))
+    assert found is not None and found.correlation > 0.25
+    assert 0.2 * 224 <= found.distance <= 224 / 3
+
+
+def test_a_pattern_repeats_at_whole_courses():
+    found = texture.find_pattern(lay_bricks(turn=0))
+    rows, halves = np.meshgrid(np.arange(12), np.arange(24))  # a lag along a course is half a brick for each odd row
+    same = np.hypot(8 * rows, 8 * halves)[(rows + halves) % 2 == 0]
+    assert found is not None and np.abs(same - found.distance).min() < 1
+
+
+def test_furrows_and_a_bold_line_across_the_ground_are_patterns():
+    y, x = np.mgrid[:224, :224].astype(float)
+    for lines in (0.15 * np.sin(2 * np.pi * (x + 0.4 * y) / 14), 0.5 * (np.abs(x + 0.2 * y - 130) < 6)):
+        assert texture.find_pattern(noise(2, 224) + lines[..., None]) is not None
+
+
+@pytest.mark.parametrize("width", [1, 3, 6, 10])
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_has_no_pattern_however_coarse_it_is(width, seed):
+    assert texture.find_pattern(noise(width, 224, seed)) is None
+
+
+def test_even_ground_has_no_pattern():
+    assert texture.find_pattern(np.full((64, 64, 3), 0.3)) is None
 
 
 def test_tiles_get_smaller_and_strips_wider_with_the_scale():

@@ -23,6 +23,7 @@ from dav_gswt.materials.model import MaterialInfo
 from dav_gswt.materials.verdict import MaterialVerdict
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.tiles import energy, layout, patches, texture
+from dav_gswt.tiles.texture import Pattern
 
 _log = logging.getLogger(__name__)
 
@@ -40,7 +41,7 @@ PATCH, SMALLEST_PATCH = 3.0, 8  # side of a filling patch, in scales of the text
 class Material:
     """A material: what it is, its exemplar (a field whose grid has no margin), and whether there is enough of it.
 
-    filled: share of the exemplar's cells that show copies of others.
+    filled: share of the exemplar's cells that show copies of others. pattern: see `texture.find_pattern`.
     """
 
     info: MaterialInfo
@@ -48,6 +49,7 @@ class Material:
     grid: Ground
     filled: float
     verdict: MaterialVerdict
+    pattern: Pattern | None = None
 
 
 @dataclass(frozen=True)
@@ -132,7 +134,8 @@ def find_materials(
     strips = int(classes.kinds.max()) + 1 - classes.number
     verdicts = {each.info.name: each.verdict for each in materials}
     shares = {each.info.name: each.info.share for each in materials}
-    judged = verdict.judge_set(verdicts, shares, float(classes.excluded.mean()), max(strips, 0))
+    patterned = [each.info.name for each in materials if each.pattern]
+    judged = verdict.judge_set(verdicts, shares, float(classes.excluded.mean()), max(strips, 0), patterned)
     return _report(FoundMaterials(maps, classes, parts.tile_side, materials, objects, judged))
 
 
@@ -149,12 +152,13 @@ def _keep_whole(field: GaussianField, grid: Ground, maps: GroundMaps) -> FoundMa
     side = choose_tile_side(maps, [everything])
     colour = [float(value) for value in maps.colour.mean((0, 1))]
     info = MaterialInfo("material0", 1.0, maps.cells * grid.spacing, colour, None, None)
-    judged = verdict.judge_material(info.name, (maps.cells / side) ** 2, 0.0)
+    pattern = texture.find_pattern(maps.colour)
+    judged = verdict.judge_material(info.name, (maps.cells / side) ** 2, 0.0, pattern)
     classes = GroundClasses(
         np.zeros(maps.known.shape, int), np.zeros(maps.known.shape, int), [], nothing, ["material0"]
     )
-    material = Material(info, field, grid, 0.0, judged)
-    judged_set = verdict.judge_set({info.name: judged}, {info.name: 1.0}, 0.0, 0)
+    material = Material(info, field, grid, 0.0, judged, pattern)
+    judged_set = verdict.judge_set({info.name: judged}, {info.name: 1.0}, 0.0, 0, [info.name] if pattern else [])
     return _report(FoundMaterials(maps, classes, None, [material], [], judged_set))
 
 
@@ -207,8 +211,9 @@ def _make_material(parts: _Parts, number: int, own: Bool[Array, "m m"]) -> Mater
     colour = [float(value) for value in parts.maps.colour[own].mean(0)]
     share, (fray, bend) = float(parts.classes.shares[number]), _measure_borders(parts, number)
     info = MaterialInfo(parts.classes.names[number], share, patch_scale, colour, fray, bend)
-    judged = verdict.judge_material(info.name, float(own.sum()) / parts.tile_side**2, filled)
-    return Material(info, made, made_grid, filled, judged)
+    pattern = texture.find_pattern(_blur_others(window, source))
+    judged = verdict.judge_material(info.name, float(own.sum()) / parts.tile_side**2, filled, pattern)
+    return Material(info, made, made_grid, filled, judged, pattern)
 
 
 def _fill_window(
@@ -254,10 +259,15 @@ def _choose_patch(maps: GroundMaps, source: Bool[Array, "m m"]) -> int:
 
 
 def _texture_scale(maps: GroundMaps, source: Bool[Array, "m m"]) -> float:
-    """Scale of the texture in cells; cells of other ground have the blurred colour of the source."""
+    """Scale of the texture in cells."""
+    return texture.measure_texture_scale(_blur_others(maps, source))
+
+
+def _blur_others(maps: GroundMaps, source: Bool[Array, "m m"]) -> Float[Array, "m m 3"]:
+    """The colours of a source; cells of other ground have its blurred colour."""
     blur = texture.TREND * len(source)
     soft = [extraction.blur_over(layer, source, blur) for layer in np.moveaxis(maps.colour, -1, 0)]
-    return texture.measure_texture_scale(np.where(source[..., None], maps.colour, np.dstack(soft)))
+    return np.where(source[..., None], maps.colour, np.dstack(soft))
 
 
 def _measure_borders(parts: _Parts, number: int) -> tuple[float | None, float | None]:

@@ -1,7 +1,10 @@
-"""Verdict on each material and on the set: is there enough of it for a terrain, and what would help."""
+"""Verdict on each material and on the set: is there enough of it for a terrain, can it be cut, what would help."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from dav_gswt.tiles.texture import Pattern
 
 GOOD, MARGINAL = 4.0, 2.0  # tile areas that were photographed
 ROUNDING = 1e-6  # of areas: tiles are made so large that the scarcest material has MARGINAL of them
@@ -15,11 +18,20 @@ class MaterialVerdict:
     reason: str
 
 
-def judge_material(name: str, areas: float, filled: float) -> MaterialVerdict:
-    """The verdict on a material.
+def judge_material(name: str, areas: float, filled: float, pattern: Pattern | None = None) -> MaterialVerdict:
+    """The verdict on a material: by its area, and at most marginal where it has a pattern that cuts may break.
 
     Args: areas: how many tiles' areas of it were photographed. filled: share of its exemplar that is made of patches.
     """
+    judged = _judge_area(name, areas, filled)
+    if pattern is None:
+        return judged
+    broken = f"it has a pattern (correlation {pattern.correlation:.2f}): rows and lines may break where patches meet"
+    grade = "marginal" if judged.grade == "good" else judged.grade
+    return replace(judged, grade=grade, reason=f"{judged.reason}; {broken}")
+
+
+def _judge_area(name: str, areas: float, filled: float) -> MaterialVerdict:
     areas *= 1 + ROUNDING
     seen = f"{name} was photographed on {_format_areas(areas)} tile areas"
     if areas >= GOOD:
@@ -39,12 +51,17 @@ def _format_areas(areas: float) -> str:
 
 
 def judge_set(
-    verdicts: dict[str, MaterialVerdict], shares: dict[str, float], excluded: float, strips: int
+    verdicts: dict[str, MaterialVerdict],
+    shares: dict[str, float],
+    excluded: float,
+    strips: int,
+    patterned: Sequence[str] = (),
 ) -> MaterialVerdict:
     """The verdict on all: that of the material that covers most. Those of which there is too little are named.
 
     Args:
         verdicts, shares: by the materials' names.
+        patterned: names of those that have a pattern.
         excluded: share of ground that is shown nowhere.
         strips: paths, roads and the like, among it.
     """
@@ -57,4 +74,5 @@ def judge_set(
     many = "1 material" if len(verdicts) == 1 else f"{len(verdicts)} materials"
     scarce = [name for name, verdict in verdicts.items() if verdict.grade == "no"]
     lacking = f"; of {' and '.join(scarce)} there is too little" if scarce else ""
-    return MaterialVerdict(grade, f"{many}, {excluded:.0%} of the ground is shown nowhere{crossing}{lacking}")
+    rows = f"; rows and lines of {' and '.join(patterned)} may break where patches meet" if patterned else ""
+    return MaterialVerdict(grade, f"{many}, {excluded:.0%} of the ground is shown nowhere{crossing}{lacking}{rows}")
