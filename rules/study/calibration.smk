@@ -1,7 +1,8 @@
 """Calibration: do scores of candidate poses say where a field is wrong?
 
 In: a field, its scores, and what some candidates truly show. Out: calibration.json and calibration.csv of a round;
-docs/research/data/calibration.csv and figures/calibration.png of all that the config's `study.calibration` names.
+docs/research/data/calibration.csv and figures/calibration.png of all that the config's `study.calibration` names:
+`snakemake calibration`.
 """
 
 
@@ -109,3 +110,13 @@ rule plot_calibration:
         source=code_of("study/plot_calibration"),
     script:
         "../../scripts/study/plot_calibration.py"
+
+
+rule calibration:
+    """Compare scores with what is true, in every round of the config's `study.calibration`."""
+    input:
+        rules.plot_calibration.output,
+
+
+localrules:
+    calibration,
