@@ -7,7 +7,7 @@ from dav_gswt.study.seams.repetition import LAGS
 from dav_gswt.study.seams.summary import EVERY, MEASURES
 
 SHOT_CAPTIONS = {  # by the names of rule render_grid
-    "grid_flat": "20 x 20 tiles from above",
+    "grid_flat": "from above",
     "grid_hilly": "the same on hills",
     "walker_flat": "a walker",
     "walker_hilly": "the same on hills",
