@@ -11,7 +11,6 @@ from dav_gswt.materials.filling import CellSources
 from dav_gswt.materials.objects import Footprint
 from dav_gswt.reconstruction import top_view, underlay
 from dav_gswt.reconstruction.objects import make_blobs
-from dav_gswt.tiles.texture import Pattern
 
 
 @pytest.fixture(scope="module")
@@ -218,7 +217,7 @@ def test_the_verdict_on_a_set_is_that_of_the_material_that_covers_most():
 
 @pytest.mark.parametrize(("areas", "grade"), [(8.0, "marginal"), (3.0, "marginal"), (0.5, "no")])
 def test_a_pattern_makes_a_good_verdict_marginal_and_says_what_may_break(areas, grade):
-    judged = verdict.judge_material("bricks", areas, 0.0, Pattern(40.0, 0.35))
+    judged = verdict.judge_material("bricks", areas, 0.0, 0.35)
     assert judged.grade == grade and "(correlation 0.35): rows and lines may break" in judged.reason
     plain = verdict.judge_material("sand", 8.0, 0.0)
     whole = verdict.judge_set({"bricks": judged, "sand": plain}, {"bricks": 0.4, "sand": 0.6}, 0.0, 0, ["bricks"])

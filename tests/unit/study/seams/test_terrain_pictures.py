@@ -19,7 +19,9 @@ def bundle(tmp_path_factory, root):
 def test_the_grid_shows_every_material_and_the_objects(bundle, surface, monkeypatch):
     monkeypatch.setattr(pictures, "SQUARE", 200)
     monkeypatch.setattr(pictures, "TILES", 4)
-    seen = pictures.render_terrain_picture(bundle, "grid", surface, {})
+    shots = pictures.render_terrain_pictures(bundle, surface, {"width": 32, "height": 18})
+    assert list(shots) == ["grid", "walker"] and shots["walker"].shape == (18, 32, 3)
+    seen = shots["grid"]
     assert seen.shape == (200, 200, 3) and np.isfinite(seen).all()
     for colour in (SAND, GRASS, LEAF):
         assert (np.abs(seen - colour).max(-1) < 0.08).mean() > 0.002

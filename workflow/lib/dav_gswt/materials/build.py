@@ -23,7 +23,6 @@ from dav_gswt.materials.model import MaterialInfo
 from dav_gswt.materials.verdict import MaterialVerdict
 from dav_gswt.reconstruction.ground import Ground
 from dav_gswt.tiles import energy, layout, patches, texture
-from dav_gswt.tiles.texture import Pattern
 
 _log = logging.getLogger(__name__)
 
@@ -41,7 +40,7 @@ PATCH, SMALLEST_PATCH = 3.0, 8  # side of a filling patch, in scales of the text
 class Material:
     """A material: what it is, its exemplar (a field whose grid has no margin), and whether there is enough of it.
 
-    filled: share of the exemplar's cells that show copies of others. pattern: see `texture.find_pattern`.
+    filled: share of the exemplar's cells that show copies of others. pattern: see `texture.measure_pattern`.
     """
 
     info: MaterialInfo
@@ -49,7 +48,7 @@ class Material:
     grid: Ground
     filled: float
     verdict: MaterialVerdict
-    pattern: Pattern | None = None
+    pattern: float | None = None
 
 
 @dataclass(frozen=True)
@@ -152,7 +151,7 @@ def _keep_whole(field: GaussianField, grid: Ground, maps: GroundMaps) -> FoundMa
     side = choose_tile_side(maps, [everything])
     colour = [float(value) for value in maps.colour.mean((0, 1))]
     info = MaterialInfo("material0", 1.0, maps.cells * grid.spacing, colour, None, None)
-    pattern = texture.find_pattern(maps.colour)
+    pattern = texture.measure_pattern(maps.colour)
     judged = verdict.judge_material(info.name, (maps.cells / side) ** 2, 0.0, pattern)
     classes = GroundClasses(
         np.zeros(maps.known.shape, int), np.zeros(maps.known.shape, int), [], nothing, ["material0"]
@@ -211,7 +210,7 @@ def _make_material(parts: _Parts, number: int, own: Bool[Array, "m m"]) -> Mater
     colour = [float(value) for value in parts.maps.colour[own].mean(0)]
     share, (fray, bend) = float(parts.classes.shares[number]), _measure_borders(parts, number)
     info = MaterialInfo(parts.classes.names[number], share, patch_scale, colour, fray, bend)
-    pattern = texture.find_pattern(_blur_others(window, source))
+    pattern = texture.measure_pattern(_blur_others(window, source))
     judged = verdict.judge_material(info.name, float(own.sum()) / parts.tile_side**2, filled, pattern)
     return Material(info, made, made_grid, filled, judged, pattern)
 

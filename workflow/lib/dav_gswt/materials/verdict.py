@@ -4,8 +4,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from dav_gswt.tiles.texture import Pattern
-
 GOOD, MARGINAL = 4.0, 2.0  # tile areas that were photographed
 ROUNDING = 1e-6  # of areas: tiles are made so large that the scarcest material has MARGINAL of them
 
@@ -18,15 +16,18 @@ class MaterialVerdict:
     reason: str
 
 
-def judge_material(name: str, areas: float, filled: float, pattern: Pattern | None = None) -> MaterialVerdict:
+def judge_material(name: str, areas: float, filled: float, pattern: float | None = None) -> MaterialVerdict:
     """The verdict on a material: by its area, and at most marginal where it has a pattern that cuts may break.
 
-    Args: areas: how many tiles' areas of it were photographed. filled: share of its exemplar that is made of patches.
+    Args:
+        areas: how many tiles' areas of it were photographed.
+        filled: share of its exemplar that is made of patches.
+        pattern: its correlation, see `texture.measure_pattern`.
     """
     judged = _judge_area(name, areas, filled)
     if pattern is None:
         return judged
-    broken = f"it has a pattern (correlation {pattern.correlation:.2f}): rows and lines may break where patches meet"
+    broken = f"it has a pattern (correlation {pattern:.2f}): rows and lines may break where patches meet"
     grade = "marginal" if judged.grade == "good" else judged.grade
     return replace(judged, grade=grade, reason=f"{judged.reason}; {broken}")
 

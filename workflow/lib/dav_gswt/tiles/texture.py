@@ -5,8 +5,6 @@ they are large there are few: tiles of half the exemplar would all show the same
 Smaller tiles have more places to choose from.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray as Array
@@ -16,8 +14,8 @@ TREND = 0.1  # of the exemplar's side: what is wider is no texture
 FARTHEST = 1 / 3  # of the exemplar's side that is measured: beyond it too few cells are compared
 RELATED = 0.1  # correlation below which cells count as unrelated
 FAR = 0.2  # of the exemplar's side from which on only a regular pattern correlates
-REGULAR = 0.2  # 27 materials of nine scenes without a pattern reach 0.13, courses of brick 0.35, furrows 0.6
-CHANCE = 8.0  # times the scale over the side: noise reaches 6.6 (60 pictures of five scales)
+REGULAR = 0.2  # 27 exemplars of ten scenes without a pattern have at most 0.13, one of brick has 0.43
+CHANCE = 8.0  # times the scale over the side: noise reaches 7 (60 pictures of five scales)
 # scales, as shares of the exemplar's side, between which tiles get smaller
 SCALES = 0.017, 0.027
 TILES = 0.5, 0.38
@@ -32,41 +30,23 @@ def measure_texture_scale(colour: Float[Array, "m m c"]) -> float:
     That area is 2 pi sum_d r(d) d with the autocorrelation r at a distance of d cells, in the mean over all directions,
     up to where it first falls below RELATED. (Noise blurred by s cells: r = exp(-d^2 / 4 s^2), a scale of 1.9 s.)
     """
-    m = len(colour)
-    correlation, distance = _correlate(colour)
-    distance = np.rint(distance).astype(int).ravel()
-    count = int(m * FARTHEST) + 1
-    r = (np.bincount(distance, correlation.ravel()) / np.bincount(distance))[:count]
-    if r[0] <= ROUNDING:
-        return 0.0
-    r /= r[0]
-    end = np.argmax(r < RELATED) if (r < RELATED).any() else count
-    return float(np.sqrt(2 * (r * np.arange(count))[:end].sum()))
+    return _measure_scale(*_correlate(colour))
 
 
-@dataclass(frozen=True)
-class Pattern:
-    """What repeats itself in a ground: how far apart, in cells, colours are alike again, and their correlation."""
+def measure_pattern(colour: Float[Array, "m m c"]) -> float | None:
+    """Correlation of a ground's regular pattern, such as courses of brick, furrows or a bold line; None without one.
 
-    distance: float
-    correlation: float
-
-
-def find_pattern(colour: Float[Array, "m m c"]) -> Pattern | None:
-    """The regular pattern of a ground, such as courses of brick, furrows or a bold line across it; None without one.
-
-    Its autocorrelation somewhere from FAR to FARTHEST of the side, in any direction, is above REGULAR and above what
-    noise of the ground's own scale reaches by chance.
+    The highest autocorrelation from FAR to FARTHEST of the side, in any direction, if it is above REGULAR and above
+    what noise of the ground's own scale reaches by chance.
     """
     m = len(colour)
     correlation, distance = _correlate(colour)
     if correlation[0, 0] <= ROUNDING:
         return None
     counted = (distance >= FAR * m) & (distance <= FARTHEST * m)
-    best = int(np.argmax(np.where(counted, correlation, -np.inf)))
-    found = Pattern(float(distance.flat[best]), float(correlation.flat[best] / correlation[0, 0]))
-    by_chance = CHANCE * measure_texture_scale(colour) / m
-    return found if found.correlation > max(REGULAR, by_chance) else None
+    highest = float(correlation[counted].max() / correlation[0, 0])
+    by_chance = CHANCE * _measure_scale(correlation, distance) / m
+    return highest if highest > max(REGULAR, by_chance) else None
 
 
 def choose_sizes(scale: float) -> tuple[float, float]:
@@ -74,6 +54,18 @@ def choose_sizes(scale: float) -> tuple[float, float]:
     the exemplar's side."""
     tile = float(np.interp(scale, SCALES, TILES))
     return tile, float(np.clip(AROUND * scale / tile, *STRIPS))
+
+
+def _measure_scale(correlation: Float[Array, "k k"], distance: Float[Array, "k k"]) -> float:
+    """`measure_texture_scale` of what `_correlate` gives."""
+    distances = np.rint(distance).astype(int).ravel()
+    count = int(len(correlation) // 2 * FARTHEST) + 1
+    r = (np.bincount(distances, correlation.ravel()) / np.bincount(distances))[:count]
+    if r[0] <= ROUNDING:
+        return 0.0
+    r /= r[0]
+    end = np.argmax(r < RELATED) if (r < RELATED).any() else count
+    return float(np.sqrt(2 * (r * np.arange(count))[:end].sum()))
 
 
 def _correlate(colour: Float[Array, "m m c"]) -> tuple[Float[Array, "k k"], Float[Array, "k k"]]:
