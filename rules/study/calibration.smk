@@ -34,7 +34,6 @@ rule calibrate_coarse:
     """Compare the scores of some candidates with the true error of the field there."""
     input:
         unpack(prior_weights),
-        unpack(regressor_weights),
         unpack(true_candidates),
         field="<results>/<coarse>/field.ply",
         ground="<results>/<coarse>/ground.exr",
@@ -71,7 +70,6 @@ rule calibrate_coarse:
 use rule calibrate_coarse as calibrate_round with:
     input:
         unpack(prior_weights),
-        unpack(regressor_weights),
         unpack(true_candidates),
         field="<results>/<round>/field.ply",
         ground="<results>/<round>/ground.exr",

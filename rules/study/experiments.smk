@@ -342,14 +342,6 @@ def true_candidates(wildcards):
     return {"truth": "<results>/<photos>/candidates"}
 
 
-def regressor_weights(wildcards):
-    """Networks without diffusion, to compare the project's own prior with."""
-    entry = config["priors"].get(wildcards.prior, {})
-    count = STUDY["calibration"]["regressors"] if entry.get("model") == "terrain" else 0
-    files = expand("<results>/prior/regressor{member}.safetensors", member=range(count))
-    return {"regressors": files} if files else {}
-
-
 def refining_prior(wildcards):
     """The weights of the prior that repairs cuts."""
     return {"weights": terrain_weights(STUDY["refine"]["prior"])}

@@ -1,18 +1,14 @@
 """The project's own prior: its training, and how good it is on worlds that it was not trained on.
 
 In: nothing of a scene. Out: results/prior/examples/part{part}.npz, what it learns from (part p holds views of the synthetic worlds 20 p to
-20 p + 19); results/prior/terrain.safetensors, its weights; regressor{member}.safetensors, a deterministic network of its shape as a
-control; docs/research/data/prior_trial.csv and figures/prior_*.png. `make prior` trains it: hours.
+20 p + 19); results/prior/terrain.safetensors, its weights, which `make prior` trains: hours; docs/research/data/prior_trial.csv and
+figures/prior_samples.png, of the weights that come with the library.
 """
 
 WORLDS_A_PART, VIEWS_A_WORLD = 20, 16
 PARTS = 32  # of examples that the prior is trained on; later ones are for evaluation
 CODER = dict(steps=6000, batch=16, rate=2e-3, seed=0)
 DENOISER = dict(steps=8000, batch=24, rate=6e-4, seed=1)
-# Nothing random to learn: it is done sooner. The first is compared with the prior; the second only shows how far two such
-# networks lie apart.
-REGRESSORS = [dict(steps=steps, batch=24, rate=6e-4, seed=100 + i) for i, steps in enumerate((4000, 2000))]
-MEMBERS = len(REGRESSORS)
 HELD_OUT = range(40, 44)  # parts of worlds that nothing was trained on
 TRIAL = dict(m=5, p_drop=0.15, steps=8, seed=0)  # as the config asks the prior
 
@@ -62,48 +58,17 @@ rule train_prior:
         "../../scripts/study/train_prior.py"
 
 
-rule train_regressor:
-    """Train a deterministic network of the prior's shape on the same examples."""
-    input:
-        examples=expand("<results>/prior/examples/part{part}.npz", part=range(PARTS)),
-        coded="<results>/prior/terrain.safetensors",
-    output:
-        weights="<results>/prior/regressor{member}.safetensors",
-        losses="<results>/prior/regressor{member}_losses.csv",
-    log:
-        "<logs>/prior/train_regressor{member}.log",
-    benchmark:
-        "<benchmarks>/prior/train_regressor{member}.tsv"
-    wildcard_constraints:
-        member="|".join(map(str, range(MEMBERS))),
-    threads: 2
-    resources:
-        mem_mb=per_attempt(4000),
-        runtime=per_attempt("4h"),
-    params:
-        coder=CODER,
-        denoiser=lambda wildcards: REGRESSORS[int(wildcards.member)],
-        keep=lambda wildcards: f"{SNAPSHOTS}/prior/regressor{wildcards.member}",
-        source=code_of("study/train_prior"),
-    script:
-        "../../scripts/study/train_prior.py"
-
-
 rule evaluate_prior:
     """How near the prior comes to the truth, and what its uncertainty is worth, on worlds that it was not trained on.
 
     Columns on LPIPS are empty with `lpips: none`.
     """
     input:
-        weights="<results>/prior/terrain.safetensors",
-        regressors=expand("<results>/prior/regressor{member}.safetensors", member=range(MEMBERS)),
-        losses=["<results>/prior/terrain_losses.csv"]
-        + expand("<results>/prior/regressor{member}_losses.csv", member=range(MEMBERS)),
+        weights=lambda wildcards: terrain_weights("terrain"),
         examples=expand("<results>/prior/examples/part{part}.npz", part=HELD_OUT),
         lpips=lambda wildcards: list(lpips_weights(wildcards).values()),
     output:
         table="docs/research/data/prior_trial.csv",
-        losses="docs/research/figures/prior_losses.png",
         samples="docs/research/figures/prior_samples.png",
     log:
         "<logs>/prior/evaluate_prior.log",

@@ -5,7 +5,7 @@ from dav_gswt.logs import logging_to
 from dav_gswt.photos.view_split import read_view_split
 from dav_gswt.provenance import record_provenance
 from dav_gswt.study import csv_tables
-from dav_gswt.study.calibration import controls, judging
+from dav_gswt.study.calibration import judging
 from dav_gswt.views import candidates, pose_maps, prior_sampling, scores
 
 with logging_to(snakemake.log[0]):
@@ -15,10 +15,9 @@ with logging_to(snakemake.log[0]):
     judged = judging.read_target(paths, params.scene, split, captures, params.size)
     remaining = candidates.list_remaining(params.scene, judged.frame, paths.model, split, captures)
     prior = prior_sampling.open_scoring_prior(params.prior, params.p_drop, params.seed, paths.get("lpips"))
-    others = controls.open_regressors(paths.get("regressors", []))
     scored = scores.read_scores(paths.scores), pose_maps.read_pose_maps(paths.maps)[0]
     some = judging.choose_candidates(judged, remaining, scored[0], paths, params.poses)
-    found, rows = judging.calibrate_scores(judged, *some, scored, params.lam, params.seed, prior, others)
+    found, rows = judging.calibrate_scores(judged, *some, scored, params.lam, params.seed, prior)
     csv_tables.write_table(snakemake.output.poses, rows)
     inputs = {name: paths[name] for name in ("field", "ground", "scores", "maps", "views")}
     about = {name: getattr(params, name) for name in ("prior", "p_drop", "lam", "seed", "poses")}

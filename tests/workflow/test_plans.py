@@ -64,10 +64,10 @@ def test_a_prior_is_asked_once_for_every_lam(planned, tmp_path, axis, values, sc
 
 
 def test_scores_are_judged_by_truth_that_is_drawn_once_a_scene(planned, tmp_path):
-    (tmp_path / "few.yaml").write_text("study: {calibration: {scenes: [desert, planet], rounds: 2, regressors: 1}}")
+    (tmp_path / "few.yaml").write_text("study: {calibration: {scenes: [desert, planet], rounds: 2}}")
     plan = planned(tmp_path, "calibration", configs=(USUAL, tmp_path / "few.yaml"))
     assert plan["render_candidates"] == plan["calibrate_coarse"] == 2 and plan["calibrate_round"] == 4
-    assert plan["train_regressor"] == plan["plot_calibration"] == 1
+    assert plan["plot_calibration"] == 1
 
 
 SHORT = {"all", "convert_lpips_weights", "make_contact_sheet"}  # jobs that no estimate counts

@@ -11,12 +11,10 @@ from fixtures import ground as patch
 from dav_gswt.errors import InputError
 from dav_gswt.geometry import poses
 from dav_gswt.images import image_files
-from dav_gswt.prior import weights
 from dav_gswt.prior.networks import Network
 from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt.raster import render
 from dav_gswt.study.calibration import controls, judging
-from dav_gswt.study.prior.regressor import Regressor
 from dav_gswt.views import oracle, prior_sampling, scoring
 from dav_gswt.views.prior_sampling import PriorConfig
 
@@ -24,17 +22,12 @@ AGENT = {"agent": "replay"}
 
 
 @pytest.fixture(scope="module")
-def files(tmp_path_factory):
-    """Weights that learned nothing: the prior's, and those of two regressors with its coder."""
-    folder, found = tmp_path_factory.mktemp("weights"), {}
+def model():
+    """A prior that learned nothing."""
     torch.manual_seed(0)
     network = Network()
-    for name in ("prior", "regressor0", "regressor1"):
-        found[name] = folder / f"{name}.safetensors"
-        network.denoiser = Network().denoiser
-        torch.nn.init.normal_(network.denoiser.conv_out.weight, std=0.1)
-        weights.save_weights(network, found[name], {"regressor": str(name != "prior")})
-    return found
+    torch.nn.init.normal_(network.denoiser.conv_out.weight, std=0.1)
+    return TerrainPrior(network)
 
 
 def pool(count=12):
@@ -54,11 +47,11 @@ def replayed(tmp_path):
     return judged, tmp_path
 
 
-def judge(replayed, prior=None, regressors=(), count=12):
+def judge(replayed, prior=None, count=12):
     judged, folder = replayed
     found = scoring.score_poses(judged.field, judged.grid, pool(), judged.taken, judged.frame, prior)
     some = judging.choose_candidates(judged, pool(), found.scores, {"images": folder}, count)
-    return judging.calibrate_scores(judged, *some, (found.scores, found.maps), 0.1, 0, prior, regressors)
+    return judging.calibrate_scores(judged, *some, (found.scores, found.maps), 0.1, 0, prior)
 
 
 def test_a_score_that_knows_where_the_field_is_wrong_ranks_well(replayed):
@@ -70,11 +63,10 @@ def test_a_score_that_knows_where_the_field_is_wrong_ranks_well(replayed):
     assert all(row["error"] > 0.02 for row in table)
 
 
-def test_with_a_prior_its_terms_and_its_controls_are_judged_too(replayed, files):
-    prior = PriorConfig(TerrainPrior.open(files["prior"]), 2, 2, 0.2)
-    regressors = controls.open_regressors([files["regressor0"], files["regressor1"]])
-    found, table = judge(replayed, prior, regressors, count=9)
-    others = {"spread", "residual", "regressor_dropout", "regressor_residual", "ensemble"}
+def test_with_a_prior_its_terms_and_its_controls_are_judged_too(replayed, model):
+    prior = PriorConfig(model, 2, 2, 0.2)
+    found, table = judge(replayed, prior, count=9)
+    others = {"spread", "residual"}
     assert set(found["scores"]) == {"opacity", "coverage", "w2_sq", "gradient", "u", "low", "far"} | others
     assert set(table[0]) == {"pose", "error"} | set(found["scores"]) and len(table) == found["poses"] == 9
     assert all(found["scores"][name]["pixel_spearman"] is not None for name in others)
@@ -105,17 +97,19 @@ def test_truth_that_was_drawn_once_is_what_is_compared(replayed, tmp_path):
         oracle.read_truth(pool(), tmp_path / "truth")
 
 
-def test_controls_are_what_they_say(files):
-    prior = PriorConfig(TerrainPrior.open(files["prior"]), 3, 2, 0.2, seed=4)
-    one, two = controls.open_regressors([files["regressor0"], files["regressor1"]])
+def test_controls_are_what_they_say(model):
+    """From `sample` itself: how far samples from other noises lie apart, and their mean from the render."""
+    prior = PriorConfig(model, 3, 2, 0.2, seed=4)
     judged = judging.CalibrationTarget(AGENT, patch.field(), patch.grid(), patch.FRAME, patch.photos(), 96)
     condition, counts = scoring.build_conditions(judged.field, judged.grid, pool(2), judged.taken, judged.frame, 64)
-    found = controls.control_maps(prior, [one, two], condition)
-    codes = [r.predict(condition) for r in (one, two)]
-    np.testing.assert_allclose(found["ensemble"], ((codes[0] - codes[1]) ** 2).sum(1), rtol=1e-4, atol=1e-6)
-    assert set(controls.control_maps(prior, [one], condition)) == set(found) - {"ensemble"}
-    assert set(controls.control_maps(prior, [], condition)) == {"spread", "residual"}
-    assert controls.control_maps(replace(prior, model=Other()), [], condition) == {}
+    found = controls.control_maps(prior, condition)
+    drawn = model.sample(condition, 3, 0.0, 2, 4, common=False)
+    pairs = [((drawn[:, i] - drawn[:, j]) ** 2).sum(1) for i, j in ((0, 1), (0, 2), (1, 2))]
+    np.testing.assert_allclose(found["spread"], np.mean(pairs, 0), rtol=1e-4)
+    apart = ((drawn.mean(1) - model.encode_render(condition)) ** 2).sum(1)
+    np.testing.assert_allclose(found["residual"], apart, rtol=1e-4)
+    assert set(found) == {"spread", "residual"}
+    assert controls.control_maps(replace(prior, model=Other()), condition) == {}
     assert counts.shape == (2, 64, 64) and 0 < counts.mean() < 1
     assert prior_sampling.weighted_mean(found["spread"], counts).shape == (2,)
 
@@ -132,9 +126,3 @@ class Other(SimpleNamespace):
     def encode_render(self, condition): ...
 
     def estimate_variances(self, latents): ...
-
-
-def test_a_priors_weights_are_no_regressors(files):
-    with pytest.raises(InputError, match=r"prior\.safetensors: not the weights of a regressor"):
-        controls.open_regressors([files["prior"]])
-    assert isinstance(controls.open_regressors([files["regressor0"]])[0], Regressor)

@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 import torch
 
-from dav_gswt.errors import InputError
 from dav_gswt.images import lpips, lpips_weights
 from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.networks import LATENT, SIZE, Network
 from dav_gswt.prior.terrain import TerrainPrior
 from dav_gswt.study.prior import evaluation
 from dav_gswt.study.prior.evaluation import COLUMNS, Estimate, Setting
-from dav_gswt.study.prior.regressor import Regressor
 from dav_gswt.study.prior.training.example_files import Examples
 
 OFF = np.float32([0.125, 0.25, 0.375, 0.5])
@@ -48,17 +46,6 @@ def prior():
 
 
 @pytest.fixture(scope="module")
-def regressors(prior):
-    found = []
-    for seed in (8, 9):
-        torch.manual_seed(seed)
-        network = Network()
-        network.autoencoder.load_state_dict(prior.network.autoencoder.state_dict())
-        found.append(Regressor(network))
-    return found
-
-
-@pytest.fixture(scope="module")
 def random_weights():
     rng = np.random.default_rng(0)
     drawn = [rng.normal(0, (2 / np.prod(s[1:])) ** 0.5, s).astype(np.float32) for s in lpips_weights.KERNELS]
@@ -67,8 +54,8 @@ def random_weights():
 
 
 @pytest.fixture(scope="module")
-def rows(prior, regressors, random_weights):
-    return evaluation.evaluate_prior(made(3), prior, regressors, TINY, random_weights)
+def rows(prior, random_weights):
+    return evaluation.evaluate_prior(made(3), prior, TINY, random_weights)
 
 
 def found(rows, what):
@@ -180,11 +167,6 @@ def test_every_method_has_its_rows_and_every_row_all_columns(rows):
         "w2_sq": 6,  # five shares at 2 steps, one more number of steps
         "gradient": 1,
         "lpips": 1,
-        "regressor": 2,
-        "residual of regressor": 2,
-        "dropout of regressor": 5,
-        "mean of regressors": 1,
-        "ensemble": 1,
     }
     for row in rows:
         assert (row["psnr"] is None) == (row["lpips"] is None) == (row["ause"] is not None)
@@ -200,16 +182,14 @@ def test_the_field_as_it_is_has_the_values_worked_by_hand(rows):
         assert opacity[f"{by}spearman"] == pytest.approx(1) and opacity[f"{by}ause"] == pytest.approx(0, abs=1e-9)
 
 
-def test_pictures_in_the_table_are_those_of_the_networks(rows, prior, regressors, random_weights):
+def test_pictures_in_the_table_are_those_of_the_networks(rows, prior, random_weights):
     views = made(3)
     truth = views.rgba[..., :3]
     single = prior.decode(prior.sample(views.condition, 1, 0.0, 4, 0)).rgba[:, 0, ..., :3]
-    both = [r.decode(r.predict(views.condition)).rgba[..., :3] for r in regressors]
-    mean = np.mean(both, 0)
+    noises = prior.decode(prior.sample(views.condition, 2, 0.0, 2, 0, common=False)).rgba[..., :3]
     expected = {
         ("sample", "steps=4"): single,
-        ("regressor", "member=1"): both[1],
-        ("mean of regressors", "members=2"): mean,
+        ("mean of samples", "m=2 noises steps=2"): noises.mean(1),
     }
     for (what, how), picture in expected.items():
         (row,) = [r for r in found(rows, what) if r["setting"] == how]
@@ -219,21 +199,15 @@ def test_pictures_in_the_table_are_those_of_the_networks(rows, prior, regressors
         assert row["lpips"] == pytest.approx(apart.mean(), rel=1e-4)
 
 
-def test_the_mean_of_pictures_is_nearer_than_its_pictures_are_on_average(rows):
-    """In squares, so in PSNR all the more: it holds for every set of pictures."""
-    mean, members = found(rows, "mean of regressors")[0]["psnr"], [row["psnr"] for row in found(rows, "regressor")]
-    assert mean > np.mean(members)
-
-
-def test_without_lpips_weights_and_regressors_their_rows_and_columns_are_absent(prior):
+def test_without_lpips_weights_their_row_and_column_are_absent(prior):
     rows = evaluation.evaluate_prior(made(2), prior, setting=TINY)
     assert all(row["lpips"] is None for row in rows)
-    assert not {row["what"] for row in rows} & {"lpips", "regressor", "ensemble", "dropout of regressor"}
+    assert "lpips" not in {row["what"] for row in rows}
 
 
-def test_the_batch_size_does_not_change_the_scores(rows, prior, regressors, random_weights, monkeypatch):
+def test_the_batch_size_does_not_change_the_scores(rows, prior, random_weights, monkeypatch):
     monkeypatch.setattr(evaluation, "BATCH", 2)
-    for one, two in zip(rows, evaluation.evaluate_prior(made(3), prior, regressors, TINY, random_weights), strict=True):
+    for one, two in zip(rows, evaluation.evaluate_prior(made(3), prior, TINY, random_weights), strict=True):
         assert one["what"] == two["what"] and one["setting"] == two["setting"]
         for name in ("psnr", "lpips", "ause"):
             assert (one[name] is None) == (two[name] is None)
@@ -247,12 +221,6 @@ def test_a_residual_is_0_where_the_render_is_what_is_predicted(prior):
     code[1, 2, 5, 6] += 2
     apart = evaluation.compute_residual(prior, views, code)
     assert apart[1, 5, 6] == pytest.approx(4 / LATENT[0], rel=1e-5) and np.count_nonzero(apart) == 1
-
-
-def test_a_regressor_with_another_autoencoder_is_refused_by_its_number(prior, regressors):
-    torch.manual_seed(10)
-    with pytest.raises(InputError, match="regressor 1 has another autoencoder"):
-        evaluation.evaluate_prior(made(2), prior, [regressors[0], Regressor(Network())], TINY)
 
 
 def test_an_evaluation_without_views_is_refused(prior):

@@ -1,46 +1,19 @@
 import numpy as np
-import pytest
 import torch
 
 from dav_gswt.images import image_files
 from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.networks import LATENT, SIZE, Network
 from dav_gswt.prior.terrain import TerrainPrior
-from dav_gswt.study import csv_tables
 from dav_gswt.study.prior import plots
 from dav_gswt.study.prior.evaluation import Setting
-from dav_gswt.study.prior.regressor import Regressor
 from dav_gswt.study.prior.training.example_files import Examples
-
-
-def test_losses_come_back_by_file_and_what_was_trained(tmp_path):
-    rows = [{"trained": what, "step": i + 1, "loss": i + 0.5} for what in ("coder", "denoiser") for i in range(3)]
-    csv_tables.write_table(tmp_path / "terrain_losses.csv", rows)
-    csv_tables.write_table(tmp_path / "regressor0_losses.csv", rows[3:])
-    found = plots.read_losses([tmp_path / f"{name}_losses.csv" for name in ("terrain", "regressor0")])
-    assert list(found) == ["terrain: coder", "terrain: denoiser", "regressor0: denoiser"]
-    assert all(values.tolist() == [0.5, 1.5, 2.5] for values in found.values())
-
-
-@pytest.mark.parametrize("count, wide", [(1, 1), (50, 1), (300, 3)])
-def test_smoothing_keeps_a_straight_line_where_it_is(count, wide):
-    step, mean = plots.smooth(2.0 * np.arange(1, count + 1))
-    assert len(step) == count - wide + 1
-    np.testing.assert_allclose(mean, 2 * step)
 
 
 def test_colours_stand_over_grey_where_nothing_is():
     rgba = np.float32([[0.2, 0.4, 0.6, 1.0], [0, 0, 0, 0]]).reshape(2, 1, 1, 4)
     found = plots.composite_over_grey(rgba).reshape(2, 3)
     np.testing.assert_allclose(found, [[0.2, 0.4, 0.6], [plots.GREY] * 3], atol=1e-6)
-
-
-def test_the_plot_of_losses_is_a_picture_and_the_same_each_time(tmp_path):
-    curves = {"terrain: coder": np.exp(-np.arange(200) / 50), "regressor0: denoiser": np.full(100, 0.5)}
-    for name in ("a.png", "b.png"):
-        plots.plot_losses(curves, tmp_path / name)
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-    assert image_files.read_photo(tmp_path / "a.png").std() > 0.05
 
 
 def test_a_gallery_shows_what_was_given_what_is_true_and_what_was_guessed(tmp_path):
@@ -50,11 +23,11 @@ def test_a_gallery_shows_what_was_given_what_is_true_and_what_was_guessed(tmp_pa
     drawn = [rng.uniform(0, 1, shape).astype(np.float32) for shape in shapes]
     drawn[5][..., 3] = drawn[5][..., 3] > 0.5
     torch.manual_seed(0)
-    prior, regressor = TerrainPrior(Network()), Regressor(Network())
-    columns = plots.make_gallery(Examples(Condition(*drawn[:5]), *drawn[5:]), prior, regressor, Setting(m=4, steps=1))
+    prior = TerrainPrior(Network())
+    columns = plots.make_gallery(Examples(Condition(*drawn[:5]), *drawn[5:]), prior, Setting(m=4, steps=1))
     assert list(columns)[:3] == ["photo given", "render given", "truth"]
-    assert list(columns)[3:8] == ["sample 1", "sample 2", "sample 3", "mean of 4", "regressor"]
-    assert all(values.shape == (*s, 3) for values in list(columns.values())[:8])
+    assert list(columns)[3:7] == ["sample 1", "sample 2", "sample 3", "mean of 4"]
+    assert all(values.shape == (*s, 3) for values in list(columns.values())[:7])
     assert not np.allclose(columns["sample 1"], columns["sample 2"])
     error, uncertainty = columns["error of render"], columns["uncertainty (w2_sq)"]
     np.testing.assert_array_equal(np.isnan(error), drawn[5][..., 3] == 0)

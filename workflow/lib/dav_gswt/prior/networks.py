@@ -26,7 +26,7 @@ TIMES = 1000  # steps of the diffusion in training
 
 
 class Network(nn.Module):
-    """All trained networks. The diffusion model and the regressor that it is compared with have this architecture."""
+    """All trained networks."""
 
     denoiser: nn.Module
     scale: Tensor

@@ -59,10 +59,10 @@ def sample_latents(
         schedule.set_timesteps(s.steps)
         return _denoise_steps(denoise, schedule, start, schedule.timesteps, rows)
 
-    return run_with_masks(run, layers, noises, views, sampling)
+    return _run_with_masks(run, layers, noises, views, sampling)
 
 
-def run_with_masks(
+def _run_with_masks(
     run: Trajectory, layers: list[HeldDropout], starts: Float[Tensor, "k c h w"], views: int, sampling: Sampling
 ) -> Float32[Array, "b m c h w"]:
     """Run m trajectories of each of `views` views, each under a dropout mask that it holds throughout.

@@ -2,7 +2,6 @@
 
 import copy
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 import torch
@@ -10,7 +9,6 @@ from jaxtyping import Bool, Float32
 from numpy import ndarray as Array
 from torch import Tensor
 
-from dav_gswt.errors import InputError
 from dav_gswt.prior import dropout, sampler, weights
 from dav_gswt.prior.interface import Condition, DecodedViews
 from dav_gswt.prior.networks import CELL, LATENT, SIZE, Network, make_schedule
@@ -19,37 +17,26 @@ from dav_gswt.prior.sampler import Denoiser, Sampling
 DEPTH_SCALE = 0.5  # of inverse depth: the plane is 1 at half a flying height, where it is clipped
 BATCH = 256  # pictures that are encoded or decoded at a time
 
-Model = TypeVar("Model", bound="LatentModel")
 
+class TerrainPrior:
+    """The `Prior` of the model in a weights file. facts: metadata of the file about its training."""
 
-class LatentModel:
-    """What the terrain prior and the regressor share: a network from a file, its condition, encoding and decoding.
-
-    facts: metadata of the file about its training.
-    """
-
-    size = SIZE
-    is_regressor = False  # what the metadata of a file must say
+    name, size = "terrain", SIZE
 
     def __init__(self, network: Network, facts: dict[str, str] | None = None):
         # a fifth faster on CPUs, equal but for rounding
         network.denoiser.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]: torch lacks it
         self.network, self.facts = network.eval().requires_grad_(False), facts or {}
-        self.layers = dropout.replace_dropout(network.denoiser)
+        self.layers, self.schedule = dropout.replace_dropout(network.denoiser), make_schedule()
         self._encoded: tuple[Condition, Float32[Tensor, "b c hz wz"]] | None = None
 
     @classmethod
-    def open(cls: type[Model], path: Path | str) -> Model:
-        """Raises: InputError: see weights.load_weights; or the file is a regressor's and should be the prior's, or the
-        reverse."""
+    def open(cls, path: Path | str) -> "TerrainPrior":
+        """Raises: InputError: see weights.load_weights."""
         network = Network()
-        facts = weights.load_weights(network, path)
-        if facts.get("regressor", "False") != str(cls.is_regressor):
-            kinds = ("a regressor", "the prior") if cls.is_regressor else ("the prior", "a regressor")
-            raise InputError(f"{path}: not the weights of {kinds[0]} but of {kinds[1]}; they have the same shape")
-        return cls(network, facts)
+        return cls(network, weights.load_weights(network, path))
 
-    def copy(self: Model) -> Model:
+    def copy(self) -> "TerrainPrior":
         """A copy that shares no state with this one."""
         return copy.deepcopy(self)
 
@@ -104,16 +91,6 @@ class LatentModel:
             )
 
         return denoise
-
-
-class TerrainPrior(LatentModel):
-    """The `Prior` of the model in a weights file."""
-
-    name = "terrain"
-
-    def __init__(self, network: Network, facts: dict[str, str] | None = None):
-        super().__init__(network, facts)
-        self.schedule = make_schedule()
 
     def sample(
         self,

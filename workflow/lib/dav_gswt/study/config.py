@@ -132,7 +132,6 @@ class Calibration(ConfigModel):
     policy: Policy = key("which chooses the views between the rounds")
     rounds: int = key("the last round that is measured; 0 is the coarse field", ge=0, le=100)
     poses: int = key("candidates that are compared", ge=8, le=10_000)
-    regressors: int = key("networks without diffusion to compare the prior with; they are trained first", ge=0, le=2)
 
 
 class PolicySet(ConfigModel):

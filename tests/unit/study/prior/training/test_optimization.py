@@ -58,11 +58,6 @@ def test_a_training_that_was_killed_ends_with_the_same_weights(tmp_path, monkeyp
     assert not list(tmp_path.iterdir())
 
 
-def test_the_regressor_learns_to_copy(tmp_path):
-    losses = optimization.train_denoiser(network(), codes(), TrainingPlan(10, 4, 2e-3, 0), tmp_path / "r", regress=True)
-    assert losses[-1] < losses[0]
-
-
 def test_masks_hide_bands_and_blocks_of_some_examples():
     known = optimization.draw_masks(400, torch.Generator().manual_seed(0))
     hidden = (known == 0).any(dim=(1, 2, 3))

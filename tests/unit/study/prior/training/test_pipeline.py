@@ -3,7 +3,6 @@ import numpy as np
 from dav_gswt.prior.interface import Condition
 from dav_gswt.prior.networks import SIZE
 from dav_gswt.prior.terrain import TerrainPrior
-from dav_gswt.study.prior.regressor import Regressor
 from dav_gswt.study.prior.training import example_files, optimization, pipeline
 from dav_gswt.study.prior.training.example_files import Examples
 from dav_gswt.study.prior.training.optimization import TrainingPlan
@@ -40,19 +39,7 @@ def test_examples_become_weights_and_an_interrupted_training_resumes(tmp_path, m
     one, two = (TerrainPrior.open(tmp_path / f"{name}.safetensors") for name in ("whole", "killed"))
     for (name, a), b in zip(one.network.state_dict().items(), two.network.state_dict().values(), strict=True):
         np.testing.assert_array_equal(a.numpy(), b.numpy(), name)
-    assert one.facts == {"examples": "12", "regressor": "False"}
-
-
-def test_a_regressor_takes_the_given_autoencoder(tmp_path):
-    parts = [part(tmp_path / "0.npz", 0)]
-    plan = TrainingPlan(1, 2, 1e-3, 0)
-    pipeline.train_prior(parts, tmp_path / "prior.safetensors", (plan, plan), tmp_path / "a")
-    given = tmp_path / "prior.safetensors"
-    losses = pipeline.train_prior(parts, tmp_path / "regressor.safetensors", (plan, plan), tmp_path / "b", given)
-    assert losses.autoencoder == [] and len(losses.denoiser) == 1
-    one, two = TerrainPrior.open(given).network, Regressor.open(tmp_path / "regressor.safetensors").network
-    assert np.array_equal(one.autoencoder.decoder[0].weight, two.autoencoder.decoder[0].weight)
-    assert not np.array_equal(one.condition_encoder.place, two.condition_encoder.place)
+    assert one.facts == {"examples": "12"}
 
 
 def test_pictures_are_stored_as_bytes_and_near_depths_are_clipped(tmp_path):

@@ -1,6 +1,5 @@
 """Collects scores of candidates and the true error there, and compares them with `measures`."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,12 +49,11 @@ def calibrate_scores(
     lam: float,
     seed: int,
     prior: PriorConfig | None = None,
-    regressors: Sequence = (),
 ) -> tuple[dict, list[dict]]:
     """Compare scores with true errors. Returns the content of calibration.json, and a row per candidate.
 
-    some, views: candidates and their true pictures. scored: scores and maps. lam: weight of LPIPS in u. prior,
-    regressors: for the estimates of `controls`.
+    some, views: candidates and their true pictures. scored: scores and maps. lam: weight of LPIPS in u. prior: also for
+    the estimates of `controls`.
     """
     row = {name: i for i, name in enumerate(scored[0].names)}
     terms, shown = _select_terms(*scored, [row[pose.name] for pose, _ in some], lam)
@@ -65,7 +63,7 @@ def calibrate_scores(
     if prior is not None and some:
         given = judged.field, judged.grid, some, judged.taken, judged.frame
         condition, masks = build_conditions(*given, prior.model.size)
-        others = controls.control_maps(prior, regressors, condition)
+        others = controls.control_maps(prior, condition)
         shown |= others
         # `residual` takes the place of the scores' term: that of samples from other noises, whatever was asked for them
         terms |= {name: prior_sampling.weighted_mean(m, masks) for name, m in others.items()}

@@ -1,1 +1,1 @@
-"""The prior on worlds that it was not trained on, and its regressor control."""
+"""The prior on worlds that it was not trained on."""

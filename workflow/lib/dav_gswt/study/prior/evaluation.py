@@ -1,26 +1,22 @@
 """Evaluation of the prior on held-out worlds: the accuracy of its pictures, and of its uncertainty.
 
-It is compared with cheaper estimates: the render itself, its opacity, and deterministic regressors with the
-architecture of the prior. Accuracy is measured where the truth is opaque. Uncertainty is evaluated by how it ranks
-views, and cells of the latent, by the true error of the render.
+It is compared with cheaper estimates: the render itself and its opacity. Accuracy is measured where the truth is
+opaque. Uncertainty is evaluated by how it ranks views, and cells of the latent, by the true error of the render.
 """
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
-import torch
 from jaxtyping import Bool, Float, Float32
 from numpy import ndarray as Array
 
-from dav_gswt.errors import InputError
 from dav_gswt.images import lpips, metrics
 from dav_gswt.images.lpips_weights import Weights
 from dav_gswt.logs import progress
 from dav_gswt.prior.networks import LATENT, SIZE
-from dav_gswt.prior.terrain import LatentModel, TerrainPrior, pack_render, pack_truth
-from dav_gswt.study.prior.regressor import Regressor
+from dav_gswt.prior.terrain import TerrainPrior, pack_render, pack_truth
 from dav_gswt.study.prior.training.example_files import Examples
 from dav_gswt.views.uncertainty import ause, gradient_map, spearman, w2_sq
 from dav_gswt.views.uncertainty.texture import LUMINANCE
@@ -111,7 +107,6 @@ def select_evenly(made: Examples, count: int) -> Examples:
 def evaluate_prior(
     made: Examples,
     prior: TerrainPrior,
-    regressors: Sequence[Regressor] = (),
     setting: Setting | None = None,
     weights: Weights | None = None,
 ) -> list[dict]:
@@ -121,11 +116,9 @@ def evaluate_prior(
     render; ground_: of the mean over the cells where the truth is opaque; cell_: of the cells of all views; covered_:
     of the cells that the render covers, where opacity says little. seconds: per view.
     weights: of LPIPS.
-    Raises: ValueError: no view; see `compute_truth`, `TerrainPrior.sample`. InputError: a regressor with another
-    autoencoder than the prior's, by its number.
+    Raises: ValueError: no view; see `compute_truth`, `TerrainPrior.sample`.
     """
     setting = setting or Setting()
-    _require_same_autoencoder(prior, regressors)
     if not len(made):
         raise ValueError("there is no view to evaluate the prior on")
     if setting.m < 2:
@@ -134,7 +127,7 @@ def evaluate_prior(
     parts: dict[tuple[str, str], list[dict[str, Array]]] = {}
     for start in progress(range(0, len(made), BATCH), "evaluate prior"):
         rows = slice(start, start + BATCH)
-        for estimate in make_estimates(made[rows], prior, regressors, setting, weights):
+        for estimate in make_estimates(made[rows], prior, setting, weights):
             scores = score_estimate(estimate, truth[rows], weights)
             parts.setdefault((estimate.what, estimate.setting), []).append(scores)
     return [
@@ -144,15 +137,8 @@ def evaluate_prior(
     ]
 
 
-def _require_same_autoencoder(prior: TerrainPrior, regressors: Sequence[Regressor]) -> None:
-    for i, regressor in enumerate(regressors):
-        both = ([*n.autoencoder.parameters(), n.scale] for n in (prior.network, regressor.network))
-        if not all(torch.equal(a, b) for a, b in zip(*both, strict=True)):
-            raise InputError(f"regressor {i} has another autoencoder than the prior: train it on the prior's latents")
-
-
 def make_estimates(
-    made: Examples, prior: TerrainPrior, regressors: Sequence[Regressor], setting: Setting, weights: Weights | None
+    made: Examples, prior: TerrainPrior, setting: Setting, weights: Weights | None
 ) -> Iterator[Estimate]:
     """The estimates of all methods, in the order of the table."""
     yield Estimate("render", "", 0.0, picture=made.condition.colour)
@@ -162,7 +148,6 @@ def make_estimates(
     yield Estimate("coder", "", seconds + more, picture=picture)
     yield from _estimate_from_noises(made, prior, setting)
     yield from _estimate_from_dropout(made, prior, setting, weights)
-    yield from _estimate_from_regressors(made, regressors, setting)
 
 
 def _encode_truth(made: Examples, prior: TerrainPrior) -> Float32[Array, "b c h w"]:
@@ -211,25 +196,6 @@ def _estimate_from_pictures(
         yield Estimate("lpips", how, seconds + more, uncertainty=apart)
 
 
-def _estimate_from_regressors(made: Examples, regressors: Sequence[Regressor], setting: Setting) -> Iterator[Estimate]:
-    codes, shown, total, drawn = [], [], 0.0, 0.0
-    for i, regressor in enumerate(regressors):
-        code, seconds = measure_time(regressor.predict, made.condition)
-        picture, more = measure_time(decode_colours, regressor, code)
-        yield Estimate("regressor", f"member={i}", seconds + more, picture=picture)
-        yield Estimate("residual of regressor", f"member={i}", seconds, cells=compute_residual(regressor, made, code))
-        codes.append(code)
-        shown.append(picture)
-        total, drawn = total + seconds, drawn + more
-    for p_drop in P_DROPS if regressors else ():
-        latents, seconds = measure_time(regressors[0].sample, made.condition, setting.m, p_drop, setting.seed)
-        yield Estimate("dropout of regressor", f"m={setting.m} p_drop={p_drop}", seconds, cells=w2_sq(latents)[1])
-    if len(regressors) > 1:
-        how = f"members={len(regressors)}"
-        yield Estimate("mean of regressors", how, total + drawn, picture=np.mean(shown, 0))
-        yield Estimate("ensemble", how, total, cells=w2_sq(np.stack(codes, 1))[1])
-
-
 def measure_time(function: Callable, *given, **named):
     """The result of a function, and the seconds that it took."""
     begun = time.perf_counter()
@@ -237,12 +203,12 @@ def measure_time(function: Callable, *given, **named):
     return value, time.perf_counter() - begun
 
 
-def decode_colours(learned: LatentModel, latents: Float32[Array, "*n c h w"]) -> Float32[Array, "*n s s 3"]:
+def decode_colours(learned: TerrainPrior, latents: Float32[Array, "*n c h w"]) -> Float32[Array, "*n s s 3"]:
     """Colours over black of latents."""
     return np.ascontiguousarray(learned.decode(latents).rgba[..., :3])
 
 
-def compute_residual(learned: LatentModel, made: Examples, code: Float32[Array, "b c h w"]) -> Float32[Array, "b h w"]:
+def compute_residual(learned: TerrainPrior, made: Examples, code: Float32[Array, "b c h w"]) -> Float32[Array, "b h w"]:
     """Mean squared difference between a latent of the view and that of the render, per cell."""
     return ((code - learned.encode(pack_render(made.condition)).numpy()) ** 2).mean(1)
 

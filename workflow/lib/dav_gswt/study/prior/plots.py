@@ -1,60 +1,24 @@
-"""Plots of the prior: training losses, and samples of held-out views."""
+"""A plot of the prior: samples of held-out views."""
 
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.images import figures
 from dav_gswt.prior.terrain import TerrainPrior
-from dav_gswt.study import csv_tables
 from dav_gswt.study.prior.evaluation import Setting, opaque_mask
-from dav_gswt.study.prior.regressor import Regressor
 from dav_gswt.study.prior.training.example_files import Examples
 from dav_gswt.views.uncertainty import w2_sq
 
-WIDE = 0.01  # share of the steps over which a loss is averaged
 GREY = 0.75  # background of pictures
 SAMPLES = 3  # shown per view
 INCH = 1.25  # side of a picture in a plot
 HIGHEST = 0.98  # quantile of a map at which its colours end
 
 
-def read_losses(paths: list[Path | str]) -> dict[str, Float[Array, "_"]]:
-    """Losses of every step, by file and trained network."""
-    found: dict[str, list[float]] = {}
-    for path in paths:
-        name = Path(path).stem.removesuffix("_losses")
-        for row in csv_tables.read_table(path, numbers=["loss"]):
-            found.setdefault(f"{name}: {row['trained']}", []).append(row["loss"])
-    return {name: np.array(values) for name, values in found.items()}
-
-
-def smooth(values: Float[Array, "n"]) -> tuple[Float[Array, "k"], Float[Array, "k"]]:
-    """Means over a sliding window of WIDE of the steps, and the step in the middle of each."""
-    wide = max(1, round(WIDE * len(values)))
-    means = np.convolve(values, np.full(wide, 1 / wide), "valid")
-    return 1 + (wide - 1) / 2 + np.arange(len(means)), means
-
-
-def plot_losses(curves: dict[str, Float[Array, "_"]], path: Path | str) -> None:
-    """Plot the losses against the step. They are of different kinds: levels do not compare."""
-    figure = figures.make_figure(7.2, 4.2)
-    axes = figure.add_subplot()
-    for name, values in curves.items():
-        axes.plot(*smooth(values), label=name, linewidth=1.2)
-    axes.set_yscale("log")
-    axes.set_xlabel("step")
-    axes.set_ylabel(f"loss, mean over {100 * WIDE:.0f} % of the steps")
-    axes.grid(alpha=0.3, which="both")
-    axes.legend(frameon=False)
-    figures.save_figure(figure, path)
-
-
-def make_gallery(
-    made: Examples, prior: TerrainPrior, regressor: Regressor | None, setting: Setting
-) -> dict[str, Array]:
+def make_gallery(made: Examples, prior: TerrainPrior, setting: Setting) -> dict[str, Array]:
     """Columns of pictures (n s s 3) and maps (n h w) by title: condition, truth and samples.
 
     The error of the render is NaN where the truth is not opaque.
@@ -72,8 +36,6 @@ def make_gallery(
     }
     columns |= {f"sample {i + 1}": composite_over_grey(noises[:, i]) for i in range(min(SAMPLES, setting.m))}
     columns[f"mean of {setting.m}"] = composite_over_grey(noises.mean(1))
-    if regressor is not None:
-        columns["regressor"] = composite_over_grey(regressor.decode(regressor.predict(given)).rgba)
     return columns | {"error of render": np.where(opaque_mask(made), apart, np.nan), "uncertainty (w2_sq)": uncertainty}
 
 

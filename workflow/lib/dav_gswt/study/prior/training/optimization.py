@@ -1,4 +1,4 @@
-"""Optimization of the prior's networks: first the autoencoder, then the denoiser of its latents (or the regressor).
+"""Optimization of the prior's networks: first the autoencoder, then the denoiser of its latents.
 
 Every step draws its batch, noise, masks and dropout from the seed and the number of the step alone, so an interrupted
 training resumes from its checkpoint and ends with the same weights. The final weights are running means.
@@ -79,13 +79,8 @@ def train_autoencoder(
     return losses
 
 
-def train_denoiser(
-    network: Network, examples: EncodedExamples, plan: TrainingPlan, checkpoint: Path, regress: bool = False
-) -> list[float]:
-    """Train the denoiser to predict the velocity of noisy latents; returns the loss of every step.
-
-    regress: train a regressor instead, which predicts the latent itself from zeros at time 0.
-    """
+def train_denoiser(network: Network, examples: EncodedExamples, plan: TrainingPlan, checkpoint: Path) -> list[float]:
+    """Train the denoiser to predict the velocity of noisy latents; returns the loss of every step."""
     schedule, layers = make_schedule(), dropout.replace_dropout(network.denoiser)
     trained = nn.ModuleDict({"denoiser": network.denoiser, "condition_encoder": network.condition_encoder})
 
@@ -99,13 +94,10 @@ def train_denoiser(
         inputs = examples.render[rows] * known, opacity, tokens
         p_drop = MOST_DROPOUT * max(0.0, 1.5 * float(torch.rand((), generator=rng)) - 0.5)
         with dropout.hold_masks(layers, plan.batch, p_drop, plan.seed * 1_000_003 + step):
-            if regress:
-                zero = torch.zeros_like(time)
-                return (network.predict_velocity(torch.zeros_like(truth), zero, *inputs) - truth).square().mean()
             noisy, velocity = schedule.add_noise(truth, noise, time), schedule.get_velocity(truth, noise, time)
             return (network.predict_velocity(noisy, time, *inputs) - velocity).square().mean()
 
-    return train(trained, loss, plan, checkpoint, "train regressor" if regress else "train denoiser")
+    return train(trained, loss, plan, checkpoint, "train denoiser")
 
 
 def draw_masks(count: int, rng: torch.Generator) -> Float[Tensor, "n 1 h w"]:

@@ -1,4 +1,4 @@
-"""The training pipeline: from files of examples to the weights of the prior, or of a regressor to compare it with."""
+"""The training pipeline: from files of examples to the weights of the prior."""
 
 import json
 from collections.abc import Sequence
@@ -36,7 +36,7 @@ class Pictures:
 
 @dataclass(frozen=True)
 class Losses:
-    """The loss of every step. autoencoder: empty if its weights were given."""
+    """The loss of every step."""
 
     autoencoder: list[float]
     denoiser: list[float]
@@ -47,34 +47,26 @@ def train_prior(
     out: Path | str,
     plans: tuple[TrainingPlan, TrainingPlan],
     checkpoints: Path,
-    given_autoencoder: Path | str | None = None,
 ) -> Losses:
     """Train on the examples of some files and write the weights.
 
-    Args:    plans: of the autoencoder and of the denoiser. checkpoints: a folder. given_autoencoder: a file of weights:
-             take its autoencoder and train a regressor (see `train_denoiser`) on its latents.
+    Args:    plans: of the autoencoder and of the denoiser. checkpoints: a folder.
     """
     plan, denoiser_plan = plans
     torch.manual_seed(plan.seed)
     network, pictures = Network(), load_pictures(files)
     checkpoints.mkdir(parents=True, exist_ok=True)
-    losses, done = [], checkpoints / "autoencoder_done.safetensors"
-    if given_autoencoder:
-        weights.load_weights(network, given_autoencoder)
-        torch.manual_seed(denoiser_plan.seed)
-        fresh = Network()
-        network.denoiser, network.condition_encoder = fresh.denoiser, fresh.condition_encoder
-    elif not done.exists():
+    done = checkpoints / "autoencoder_done.safetensors"
+    if not done.exists():
         every = torch.cat([pictures.truth, pictures.render, pictures.photo])
         losses = optimization.train_autoencoder(network, every, plan, checkpoints / "autoencoder.safetensors")
         weights.save_weights(network, done, {"losses": json.dumps(losses)}, torch.float32)
     else:
         losses = json.loads(weights.load_weights(network, done)["losses"])
-    regress = bool(given_autoencoder)
     denoiser_losses = optimization.train_denoiser(
-        network, encode_pictures(network, pictures), denoiser_plan, checkpoints / "denoiser.safetensors", regress
+        network, encode_pictures(network, pictures), denoiser_plan, checkpoints / "denoiser.safetensors"
     )
-    weights.save_weights(network, out, {"examples": str(len(pictures)), "regressor": str(regress)})
+    weights.save_weights(network, out, {"examples": str(len(pictures))})
     done.unlink(missing_ok=True)
     return Losses(losses, denoiser_losses)
 
