@@ -124,7 +124,7 @@ def _list_other_ways(first: Approach, solution: SfmSolution, scene: SfmScene) ->
         freed = ratio is not None and not np.isclose(ratio, 1, rtol=1e-9)
         return list_alternatives(first, freed, scene.positions is not None)
     if solution.unsure and solution.unsure >= UNSURE * len(scene.photos):
-        _log.info("%d photos have no place, though they match others", solution.unsure)
+        _log.info("photos without a place, though they match others: %d", solution.unsure)
         return [Approach(other_mapper(first.mapper))]
     return []
 
