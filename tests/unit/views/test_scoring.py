@@ -175,6 +175,25 @@ def test_a_prior_sees_the_middle_square_and_the_nearest_photo():
     assert square.width == 40
 
 
+def test_a_prior_is_not_shown_what_no_photo_shows():
+    """The south half was guessed: the prior sees a hole there; the geometric terms see the whole field."""
+    whole = patch.field()
+    south = whole.means[:, 1] < 1.6
+    guessed = replace(whole, uncertainty=np.where(south, 1, 0.5).astype(np.float32))
+    given = patch.grid(), pool(), patch.photos(), patch.FRAME
+    condition, masks = scoring.build_conditions(guessed, *given, 32)
+    hole, _ = scoring.build_conditions(whole[np.flatnonzero(~south)], *given, 32)
+    assert all(
+        np.array_equal(a, b) for a, b in zip(condition[:].__dict__.values(), hole.__dict__.values(), strict=True)
+    )
+    above = condition.alpha[0] * (masks[0] > 0)
+    assert above[:12].mean() > 0.5 and above[20:].max() < 0.05
+    known = scoring.score_poses(guessed, *given).scores.terms["coverage"]
+    assert np.array_equal(known, scored().scores.terms["coverage"])
+    nothing = replace(whole, uncertainty=np.ones(len(whole), np.float32))
+    assert scoring.build_conditions(nothing, *given, 32)[0].alpha.max() == 0
+
+
 def test_poses_below_the_ground_or_inside_an_object_are_left_out(caplog):
     block = replace(
         patch.field()[:1],

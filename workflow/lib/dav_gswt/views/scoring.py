@@ -30,6 +30,7 @@ from dav_gswt.views.uncertainty.weighting import Quantiles, Scales, normalise
 
 WIDTH = 96  # pixels along the longer side of a picture for scoring
 PHOTO_WIDTH = 384  # pixels across a captured photo that conditions a prior, before cropping and shrinking
+UNSEEN = 0.99  # uncertainty of a Gaussian from which on no photo so far shows it
 SHOWN = 16  # candidates whose maps are written for display
 
 
@@ -93,11 +94,14 @@ def score_poses(
 def build_conditions(
     field: GaussianField, grid: Ground, candidates: Candidates, taken: list[TrainingView], frame: SceneFrame, size: int
 ) -> tuple[Condition, Float32[Array, "n s s"]]:
-    """Build the conditions of a prior at the candidates, and masks of pixels that look at the modelled ground (1)."""
-    known = conditions.prepare_photos(taken, frame, size)
+    """Build the conditions of a prior at the candidates, and masks of pixels that look at the modelled ground (1).
+
+    What no photo shows is left out of the renders: the field there is a smooth guess, which a prior takes as seen.
+    """
+    known, shown = conditions.prepare_photos(taken, frame, size), field[np.flatnonzero(field.uncertainty < UNSEEN)]
     squares = [conditions.crop_camera(camera).resized(size, size) for _, camera in candidates]
     masks = np.stack([ground_mask(grid, camera) for camera in squares])
-    return conditions.build_condition(field, candidates, known, frame.flying_height, size), masks
+    return conditions.build_condition(shown, candidates, known, frame.flying_height, size), masks
 
 
 def _score_geometry(
