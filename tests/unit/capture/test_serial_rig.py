@@ -10,8 +10,6 @@ import pytest
 from fixtures.frames import scene_frame
 from fixtures.photo_store import read_records
 from fixtures.simulated_rig import Faults, SimulatedRig
-from hypothesis import given
-from hypothesis import strategies as st
 
 from dav_gswt.capture import inbox, rig_limits, serial_protocol, serial_rig
 from dav_gswt.capture.rig_geometry import Mount
@@ -297,56 +295,6 @@ def test_a_missing_inbox_port_or_table_is_said(shoot, tmp_path):
         serial_rig.take_photos(site, [])
 
 
-def test_a_port_that_is_in_use_is_refused(tmp_path):
-    with (
-        SimulatedRig(tmp_path) as device,
-        serial_protocol.open_line(device.port, 115200, 1.0, 1),
-        pytest.raises(InputError, match="does not open"),
-        serial_protocol.open_line(device.port, 115200, 1.0, 1),
-    ):
-        pass
-
-
-def test_the_checksum_is_that_of_the_standard():
-    assert serial_protocol.frame_line("123456789") == b"123456789*29B1\n"
-
-
-@given(st.text(st.characters(min_codepoint=32, max_codepoint=126), min_size=1, max_size=100), st.data())
-def test_a_line_survives_and_a_damaged_one_does_not(text, data):
-    sent = serial_protocol.frame_line(text)
-    assert serial_protocol.unframe_line(sent) == text
-    at = data.draw(st.integers(0, len(sent) - 1))
-    assert serial_protocol.unframe_line(sent[:at] + sent[at + 1 :]) in (None, text)
-    byte = data.draw(st.integers(0, 255).filter(lambda b: b != sent[at]))
-    assert serial_protocol.unframe_line(sent[:at] + bytes([byte]) + sent[at + 1 :]) in (
-        None,
-        text,
-    )  # text: a digit in lower case
-
-
-@given(st.binary(max_size=200))
-def test_noise_is_no_line(noise):
-    assert (
-        serial_protocol.unframe_line(noise) is None
-        or serial_protocol.frame_line(serial_protocol.unframe_line(noise))[:-1].lower() in noise.lower()
-    )
-
-
-@given(*[st.tuples(*[st.floats(-10, 10, width=32) for _ in range(3)]) for _ in range(2)])
-def test_the_exact_test_of_a_move_agrees_with_many_points_on_it(a, b):
-    limits = {axis: [-20, 20] for axis in rig_limits.AXES}
-    zones = [{"pan": [-3, 1], "tilt": [0, 2], "radius": [-1, 4]}]
-    there = rig_limits.combine_limits(limits, zones, np.array([[-20.0, 20]] * 3))
-    a, b = np.array(a), np.array(b)
-    points = a + np.linspace(0, 1, 2001)[:, None] * (b - a)
-    box = there.zones[0]
-    depth = np.minimum(points - box[:, 0], box[:, 1] - points).min(1).max()  # how deep the deepest point is inside
-    met = rig_limits._touched_zones(there, a, b)[0]
-    apart = 0.5 * np.abs(b - a).max() / 2000
-    assert met if depth >= 0 else True
-    assert not met or depth >= -apart - 1e-9
-
-
 @pytest.mark.parametrize(
     "changed, said",
     [
@@ -383,13 +331,6 @@ def test_axes_and_cameras_are_each_others_inverse(place):
     np.testing.assert_allclose(back.rotation, camera.rotation, atol=2e-5)
     np.testing.assert_allclose(back.translation, camera.translation, atol=1e-4)
     assert mount.find_violation(camera) is None
-
-
-def test_a_pan_goes_the_short_way_round_where_the_limits_let_it():
-    limits = {"pan": [-270, 270], "tilt": [0, 90], "radius": [1, 9]}
-    there = rig_limits.combine_limits(limits, [], np.array([[-1e6, 1e6]] * 3))
-    [stop] = rig_limits.plan_route(there, np.array([-170.0, 45.0, 5.0]), np.array([170.0, 45.0, 5.0]))
-    assert stop[0] == -190.0
 
 
 def test_only_poses_where_the_rig_may_stand_are_candidates():

@@ -1,6 +1,6 @@
 """Scores of poses over a small ground, with a prior whose samples disagree by a known amount."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
@@ -183,9 +183,7 @@ def test_a_prior_is_not_shown_what_no_photo_shows():
     given = patch.grid(), pool(), patch.photos(), patch.FRAME
     condition, masks = scoring.build_conditions(guessed, *given, 32)
     hole, _ = scoring.build_conditions(whole[np.flatnonzero(~south)], *given, 32)
-    assert all(
-        np.array_equal(a, b) for a, b in zip(condition[:].__dict__.values(), hole.__dict__.values(), strict=True)
-    )
+    assert all(map(np.array_equal, astuple(condition), astuple(hole)))
     above = condition.alpha[0] * (masks[0] > 0)
     assert above[:12].mean() > 0.5 and above[20:].max() < 0.05
     known = scoring.score_poses(guessed, *given).scores.terms["coverage"]
