@@ -139,7 +139,7 @@ def test_random_depends_on_its_generator_only():
 def test_with_fewer_candidates_than_k_all_are_chosen_with_a_warning(policy, caplog):
     terms = dict(w2_sq=[0.0, 1], gradient=[1.0, 2], lpips=[1.0, 1], single=[0.1, 0])
     assert sorted(chosen(policy, scored(0, 90, **terms), 5, information=Sharing([1.0, 2.0]))) == ["p0", "p1"]
-    assert "only 2 candidates" in caplog.text
+    assert "all candidates that are left are taken: 2" in caplog.text
     assert chosen(policy, scored(), 5) == []
     assert "no candidate pose is left" in caplog.text
 

@@ -43,7 +43,7 @@ def select_poses(policy: str, scores: Scores, inputs: SelectionInput) -> list[Po
         _log.warning("no candidate pose is left: no photo is taken, the field stays as it is")
         return []
     if inputs.k > len(scores):
-        _log.warning("asked for %d poses; only %d candidates are left: all are taken", inputs.k, len(scores))
+        _log.warning("%d poses were asked for; all candidates that are left are taken: %d", inputs.k, len(scores))
         inputs = replace(inputs, k=len(scores))
     return [scores.poses[i] for i in POLICIES[policy](scores, inputs)[: inputs.k]]
 
