@@ -134,7 +134,9 @@ def test_what_is_wrong_is_named(config, keys, value, message):
         pytest.param(["stop", "worth"], 0.05, "'worth' is called 'marginal_gain' now", id="a key of stop"),
         pytest.param(["complete"], True, "'complete' is called 'inpaint' now", id="a key of its own"),
         pytest.param(["sweeps"], {}, "sweeps: is called `study.sweeps` now", id="a table of the study"),
-        pytest.param(["trials"], {}, "trials: is called `study.fit_profiles` now", id="a renamed table of the study"),
+        pytest.param(
+            ["benchmark"], {}, "benchmark: is called `study.view_benchmark` now", id="a renamed table of the study"
+        ),
     ],
 )
 def test_a_renamed_key_comes_with_its_new_name(root, keys, value, message):

@@ -1,16 +1,14 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from fixtures import ground as made
 
 from dav_gswt.field import concatenate_fields
 from dav_gswt.geometry.scene_frame import write_scene_frame
 from dav_gswt.images import image_files
 from dav_gswt.photos.colmap_model import ColmapModel, write_colmap_model
-from dav_gswt.reconstruction.coarse import Reconstruction, StartViews, fit_coarse_field
+from dav_gswt.reconstruction.coarse import StartViews, fit_coarse_field
 from dav_gswt.reconstruction.fit_settings import CoarseSettings
-from dav_gswt.reconstruction.fitting.plan import FitReport
 from dav_gswt.reconstruction.objects import make_blobs
 from dav_gswt.study import fit_profile
 
@@ -66,19 +64,3 @@ def test_haze_is_counted_and_what_stands_low_is_not():
     high = make_blobs(np.array([[1.6, 1.6, 2.0]]), np.full((1, 3), 0.5), np.full(1, 0.3))
     assert fit_profile.measure_haze(concatenate_fields([made.field(), low]), made.grid(), photos) == 0
     assert fit_profile.measure_haze(concatenate_fields([made.field(), high]), made.grid(), photos) > 0.01
-
-
-def test_stills_are_pictures_of_the_exemplar():
-    grid = made.grid()
-    seen = fit_profile.render_stills(Reconstruction(made.field(), grid, FitReport()), made.FRAME, 96, 64)
-    assert seen["oblique"].shape == (64, 96, 3)
-    true = made.look(np.array([1.6]), np.array([1.6]))[0]
-    assert seen["oblique"][32, 48] == pytest.approx(true, abs=0.15)  # a pixel is 0.13 of the stripes' slope
-
-
-def test_a_plot_is_a_picture_and_the_same_each_time(tmp_path):
-    rows = [{"seconds": float(i), "psnr_colour_corrected": 30.0 + i} for i in range(5)]
-    for name in ("a.png", "b.png"):
-        fit_profile.plot_fit_times({"dunes": rows}, tmp_path / name)
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-    assert image_files.read_photo(tmp_path / "a.png").std() > 0.05

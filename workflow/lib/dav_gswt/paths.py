@@ -214,10 +214,8 @@ STUDY_TABLES = {
     "frames": "frames",
     "calibration": "calibration",
     "benchmark": "view_benchmark",
-    "trials": "fit_profiles",
     "seam_study": "seams",
     "perceptual_study": "forced_choice",
     "sweeps": "sweeps",
     "tradeoff": "tradeoff",
-    "auto": "auto",
 }

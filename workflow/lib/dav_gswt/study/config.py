@@ -12,7 +12,7 @@ from dav_gswt.config.load import check_config, check_model
 from dav_gswt.config.model import Policy
 from dav_gswt.config.settings import Flight, Heights
 from dav_gswt.errors import InputError
-from dav_gswt.study.config_fits import Comparison, FitProfile, GainBound, Names, PresetCosts, Refits, Scale, Seeds
+from dav_gswt.study.config_fits import Comparison, GainBound, Names, PresetCosts, Refits, Scale, Seeds
 from dav_gswt.study.seams import replicates
 from dav_gswt.study.sweeps import grid
 from dav_gswt.study.tables import checks
@@ -294,7 +294,6 @@ class StudyConfig(ConfigModel):
     view_benchmark: ViewBenchmark | None = key("policies", None, renamed="benchmark")
     refits: dict[Name, Refits] = key("by scene: photos in rounds against photos at once", {})
     gain_bound: dict[Name, GainBound] = key("by scene: policies beside the best choice there is", {})
-    fit_profiles: dict[Name, FitProfile] = key("by scene: fits that are measured while they run", {}, renamed="trials")
     compare: Comparison | None = key("another program's fit beside ours", None)
     scale: Scale | None = key("how costs grow", None)
     seams: Seams | None = key("seams and repetition", None, renamed="seam_study")

@@ -11,12 +11,6 @@ Seeds = Annotated[list[Seed], Field(min_length=1)]
 Names = Annotated[list[Name], Field(min_length=1)]
 
 
-class FitProfile(Preset):
-    """A fit whose test photos are measured while it runs."""
-
-    margin: float = key("ground fitted around the exemplar, as a share of its side", ge=0, le=100)
-
-
 class Refits(Preset):
     """`snakemake refits`: photos taken in rounds against one fit to all of them, with the same number of steps."""
 
@@ -57,10 +51,11 @@ class Scale(ConfigModel):
     tiles: Amounts = key("numbers of tiles in view")
 
 
-class Comparison(FitProfile):
+class Comparison(Preset):
     """`make compare OPENSPLAT=<program>`: other programs' fits beside ours, of the same photos."""
 
     scene: Name = key("whose photos are fitted")
+    margin: float = key("ground fitted around the exemplar, as a share of its side", ge=0, le=100)
     opensplat: str = key("the program, as one calls it", "opensplat")
     gsplat_steps: int = key("steps of gsplat's trainer, on a GPU", ge=1, le=100_000)
     seconds: float = key("that it may take", gt=0, le=100_000)

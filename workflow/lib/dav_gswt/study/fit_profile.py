@@ -1,4 +1,4 @@
-"""A fit that is watched: how well it shows photos it has not seen, second by second, and what it looks like elsewhere.
+"""A fit that is watched: how well it shows photos it has not seen, second by second.
 
 Of photos every tenth by name, from the sixth, is for testing; of synthetic scenes those that ground.json names, by
 group. Time spent on measuring is not counted.
@@ -16,9 +16,8 @@ from scipy.spatial import cKDTree
 
 from dav_gswt import raster
 from dav_gswt.field import GaussianField
-from dav_gswt.geometry import cameras
 from dav_gswt.geometry.scene_frame import SceneFrame, Square, read_scene_frame
-from dav_gswt.images import figures, metrics
+from dav_gswt.images import metrics
 from dav_gswt.photos.colmap_model import ColmapModel, read_colmap_model
 from dav_gswt.photos.training_views import TrainingView, mask_outside_ground, read_training_view
 from dav_gswt.reconstruction.coarse import Reconstruction, StartViews, fit_coarse_field
@@ -29,8 +28,6 @@ from dav_gswt.reconstruction.ground import WHOLE, Ground
 FIRST_TEST, EACH = 5, 10
 FREE = 0.1  # flying heights above the ground from which space is free
 NEAR = 3.0  # spacings to a matched point within which a Gaussian may stand in it
-LOW = 0.06  # discs that the low eye stands above the ground, over the picture's width
-SKY = np.array([0.62, 0.75, 0.95], np.float32)
 
 
 @dataclass(frozen=True)
@@ -138,57 +135,3 @@ def measure_test_groups(photos: PhotoSet, made: Reconstruction) -> dict[str, flo
         g: measure_quality(lambda v: raster.render(made.field, v.camera).colour, v) for g, v in photos.tests.items()
     }
     return {group: metrics["psnr"] for group, metrics in seen.items()}
-
-
-def render_stills(
-    made: Reconstruction, frame: SceneFrame, width: int = 768, height: int = 512
-) -> dict[str, Float32[Array, "h w 3"]]:
-    """What nobody photographed: from 45 degrees at the flying height, and from as low as the photos' detail allows.
-
-    Low: a disc in the middle of the picture is some eight pixels wide, so all detail that there is shows, and no more.
-    """
-    square, up = frame.exemplar, frame.flying_height
-    middle = np.array([square.west, square.south, 0.0]) + 0.5 * square.side * np.array([1, 1, 0.0])
-    middle[2] = float(made.grid.height_at(middle[None])[0])
-    low = LOW * width * made.grid.spacing
-    places = {
-        "oblique": (middle + up * np.array([0.0, -0.7, 0.7]), middle, 50.0),
-        "low": (middle + [0.0, -2 * low, low], middle + [0.0, 2 * low, 0.5 * low], 60.0),
-    }
-    out = {}
-    for name, (eye, at, angle) in places.items():
-        seen = raster.render(made.field, cameras.pinhole(eye, at, width, height, angle), antialiased=True)
-        out[name] = np.clip(seen.colour + (1 - seen.alpha)[..., None] * SKY, 0, 1)
-    return out
-
-
-def describe_trial(found: Trial, photos: PhotoSet) -> dict:
-    """What a trial measured, in numbers."""
-    made, last = found.made, found.curve[-1]
-    return {
-        "photos": len(photos.train),
-        "last": last,
-        "seconds_to": {str(d): find_time_to(found.curve, d) for d in (30.0, 33.0, 34.0)},
-        "free_space_opacity": measure_haze(made.field, made.grid, photos),
-        "away_psnr": measure_test_groups(photos, made),
-        "choices": made.report.choices,
-    }
-
-
-def plot_fit_times(curves: dict[str, list[dict[str, float]]], path: Path | str) -> None:
-    """PSNR of test photos (colour-corrected) against seconds of fitting, a line a scene."""
-    figure = figures.make_figure(6.4, 4.0)
-    axes = figure.add_subplot()
-    for scene, rows in curves.items():
-        x, y = ([row[k] for row in rows] for k in ("seconds", "psnr_colour_corrected"))
-        (line,) = axes.plot(x, y, label=scene)
-        axes.annotate(
-            f"{y[-1]:.1f} dB", (x[-1], y[-1]), xytext=(4, 0), textcoords="offset points", color=line.get_color()
-        )
-    axes.set_xlabel("seconds of fitting (looking at the photos included)")
-    axes.set_ylabel("PSNR of test photos, colour-corrected (dB)")
-    axes.set_xlim(left=0)
-    axes.margins(x=0.12)
-    axes.grid(alpha=0.3)
-    axes.legend(frameon=False)
-    figures.save_figure(figure, path)
