@@ -7,6 +7,7 @@ In: bundles and tiles. Out: presort.csv beside each bundle; results/tables/preso
 rule measure_presort:
     """What pre-sorted orders, levels and rounding do to a picture, against all Gaussians sorted exactly."""
     input:
+        unpack(materials_of),
         manifest="<results>/<bundle>/davgswt.json",
         chunks="<results>/<bundle>/chunks",
         seams="<results>/<tiles>/seams.json",
@@ -22,6 +23,7 @@ rule measure_presort:
         mem_mb=per_attempt(4000),
         runtime=per_attempt("20m"),
     params:
+        seed=integer("seed"),
         schema=BUNDLE_SCHEMA,
         source=code_of("study/measure_presort"),
     script:

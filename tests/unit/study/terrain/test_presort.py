@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fixtures.land_covers import cover_content
 from fixtures.splats import rough_ground
 from fixtures.tile_sets import report_of
 
@@ -17,11 +18,12 @@ SCHEMA = Path(__file__).parents[4] / "workflow/schemas/davgswt.schema.json"
 SIDE = 4.0
 
 
-def tile_set(levels) -> TileSet:
+def content_of(levels) -> BundleContent:
     fields = [[rough_ground(tile, 32 >> level, SIDE) for tile in range(16)] for level in range(levels)]
-    return TileSet(
+    tiles = TileSet(
         SIDE, SIDE / 32, fields, np.zeros((16, 32, 32), np.uint8), np.zeros((16, 9, 2), int), np.zeros(16), report_of()
     )
+    return BundleContent.of_one_material(tiles)
 
 
 @pytest.fixture(autouse=True)
@@ -30,8 +32,8 @@ def small(monkeypatch):
     monkeypatch.setattr(presort, "HEIGHT", 36)
 
 
-def bundled(tiles, folder, **more):
-    build.write_bundle(BundleContent.of_one_material(tiles), folder, build.BundleOptions(tau=1.0, **more), SCHEMA, {})
+def bundled(content, folder, **more):
+    build.write_bundle(content, folder, build.BundleOptions(tau=1.0, **more), SCHEMA, {})
     return store.read_bundle(folder, SCHEMA)
 
 
@@ -40,9 +42,9 @@ def of(rows, shortcut):
 
 
 def test_every_shortcut_has_a_price_of_its_own(tmp_path):
-    tiles = tile_set(2)
+    content = content_of(2)
     # coarse discs begin where one is twelve pixels wide: within what is placed
-    rows = presort.measure_approximations(tiles, bundled(tiles, tmp_path / "bundle", level_pixels=12.0))
+    rows = presort.measure_approximations(content, bundled(content, tmp_path / "bundle", level_pixels=12.0))
     assert [(r["view"], r["shortcut"]) for r in rows] == [
         (v.name, s) for v in presort.VIEWS for s in presort.APPROXIMATIONS
     ]
@@ -54,17 +56,23 @@ def test_every_shortcut_has_a_price_of_its_own(tmp_path):
 
 
 def test_one_level_costs_nothing(tmp_path):
-    tiles = tile_set(1)
-    rows = presort.measure_approximations(tiles, bundled(tiles, tmp_path / "bundle"))
+    content = content_of(1)
+    rows = presort.measure_approximations(content, bundled(content, tmp_path / "bundle"))
     assert set(of(rows, "levels").values()) == {None}
 
 
+def test_objects_and_all_materials_are_in_both_pictures(tmp_path):
+    content = cover_content()
+    rows = presort.measure_approximations(content, bundled(content, tmp_path / "bundle"))
+    assert min(v for v in of(rows, "rounding").values() if v is not None) > 40, "one lacks what the other has"
+
+
 def test_orders_of_another_direction_cost_more(tmp_path):
-    tiles = tile_set(1)
-    good = bundled(tiles, tmp_path / "bundle")
+    content = content_of(1)
+    good = bundled(content, tmp_path / "bundle")
     away = [[0.0, 0.0, -1.0]] * len(good.manifest.directions)
     bad = replace(good, manifest=replace(good.manifest, directions=away))  # from above only
-    found = [of(presort.measure_approximations(tiles, bundle), "presorting")["walker"] for bundle in (good, bad)]
+    found = [of(presort.measure_approximations(content, bundle), "presorting")["walker"] for bundle in (good, bad)]
     assert found[0] is None or found[0] > found[1]
 
 

@@ -1,6 +1,7 @@
 """Errors of the page's approximations: pre-sorted orders, levels and rounding, one at a time and together.
 
-The reference of a view is drawn from the tiles as they were cut, at their finest level, all Gaussians sorted by depth.
+The reference of a view is drawn from the tiles as they were cut and the objects as they were fitted, at their finest
+level, all Gaussians sorted by depth.
 """
 
 from dataclasses import replace
@@ -11,13 +12,13 @@ from jaxtyping import Float32
 from numpy import ndarray as Array
 
 from dav_gswt.bundle import order_directions
+from dav_gswt.bundle.content import BundleContent
 from dav_gswt.bundle.store import Bundle
 from dav_gswt.images import figures
 from dav_gswt.logs import progress
 from dav_gswt.terrain import endless, stills
 from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.stills import SHOTS, Shot
-from dav_gswt.tiles.build import TileSet
 
 VIEWS = (Shot("near", (0.5, 0.5), 1.0, 40.0, 60.0), *SHOTS[:2])  # walker and oblique: the stills'
 APPROXIMATIONS = ("presorting", "levels", "rounding", "all")
@@ -28,27 +29,29 @@ TARGET_PSNR = 40.0  # dB
 Picture = Float32[Array, "h w 3"]
 
 
-def measure_approximations(tiles: TileSet, bundle: Bundle) -> list[dict]:
+def measure_approximations(content: BundleContent, bundle: Bundle) -> list[dict]:
     """A row for each view and approximation: `psnr` (None for equal pictures) and `change`, the largest difference in
     8-bit steps.
 
     presorting: in the tiles' orders, against sorted exactly, both with levels and rounding. levels: against the finest
-    level alone. rounding: read from the bundle, against the tiles. all: the page's picture against the reference. The
-    ground is flat.
+    level alone. rounding: read from the bundle, against what it was made of. all: the page's picture against the
+    reference. The ground is flat.
     """
     rows = []
     for shot in progress(VIEWS, "measure approximations"):
-        for approximation, pair in zip(APPROXIMATIONS, _render_pairs(tiles, bundle, shot), strict=True):
+        for approximation, pair in zip(APPROXIMATIONS, _render_pairs(content, bundle, shot), strict=True):
             row = {"view": shot.name, "shortcut": approximation, "psnr": order_directions.compute_psnr([pair])}
             rows.append(row | {"change": 255 * float(np.abs(pair[0] - pair[1]).max())})
     return rows
 
 
-def _render_pairs(tiles: TileSet, bundle: Bundle, shot: Shot) -> list[tuple[Picture, Picture]]:
+def _render_pairs(content: BundleContent, bundle: Bundle, shot: Shot) -> list[tuple[Picture, Picture]]:
     """Pictures with each approximation and without it."""
     manifest, flat = bundle.manifest, {"kind": "flat"}
     rounded = replace(endless.terrain_from_bundle(bundle, flat), reach=REACH)
-    cut = replace(endless.terrain_from_fields(tiles.fields, manifest, flat), reach=REACH)
+    tiles = [content.tile_fields(level) for level in range(content.levels)]
+    objects = [each.fields for each in content.objects]
+    cut = replace(endless.terrain_from_fields(tiles, manifest, flat, objects), reach=REACH)
 
     def render(terrain: EndlessTerrain, exact: bool) -> Picture:
         camera = stills.shot_camera(shot, terrain, manifest.eye_floor, WIDTH, HEIGHT)
