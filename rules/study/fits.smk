@@ -3,6 +3,7 @@
 In: the photos of the scenes of the config's `study.refits`. Out: docs/research/data/refits_{scene}.csv. `snakemake refits`.
 """
 
+
 rule compare_refits:
     """Fit photos in rounds of several sizes, and at once."""
     input:
