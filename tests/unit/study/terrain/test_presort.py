@@ -46,13 +46,13 @@ def test_every_shortcut_has_a_price_of_its_own(tmp_path):
     # coarse discs begin where one is twelve pixels wide: within what is placed
     rows = presort.measure_approximations(content, bundled(content, tmp_path / "bundle", level_pixels=12.0))
     assert [(r["view"], r["shortcut"]) for r in rows] == [
-        (v.name, s) for v in presort.VIEWS for s in presort.APPROXIMATIONS
+        (v.name, s) for v in presort.VIEWS for s in presort.APPROXIMATIONS if s != "objects"
     ]
     assert all(20 < r["psnr"] < 100 for r in rows if r["psnr"] is not None)
     assert min(of(rows, "rounding").values()) > 45
     assert of(rows, "levels")["walker"] < of(rows, "rounding")["walker"], "coarse discs are seen, rounding is not"
     for view, found in of(rows, "all").items():
-        assert found < 3 + min(v for s in presort.APPROXIMATIONS[:3] if (v := of(rows, s)[view]) is not None)
+        assert found < 3 + min(v for s in presort.APPROXIMATIONS[:-1] if (v := of(rows, s).get(view)) is not None)
 
 
 def test_one_level_costs_nothing(tmp_path):
@@ -65,6 +65,7 @@ def test_objects_and_all_materials_are_in_both_pictures(tmp_path):
     content = cover_content()
     rows = presort.measure_approximations(content, bundled(content, tmp_path / "bundle"))
     assert min(v for v in of(rows, "rounding").values() if v is not None) > 40, "one lacks what the other has"
+    assert of(rows, "objects") != of(rows, "presorting"), "the ground alone"
 
 
 def test_orders_of_another_direction_cost_more(tmp_path):

@@ -1,4 +1,4 @@
-"""Errors of the page's approximations: pre-sorted orders, levels and rounding, one at a time and together.
+"""Errors of the page's approximations: pre-sorted orders, objects drawn after the ground, levels and rounding.
 
 The reference of a view is drawn from the tiles as they were cut and the objects as they were fitted, at their finest
 level, all Gaussians sorted by depth.
@@ -21,7 +21,7 @@ from dav_gswt.terrain.endless import EndlessTerrain
 from dav_gswt.terrain.stills import SHOTS, Shot
 
 VIEWS = (Shot("near", (0.5, 0.5), 1.0, 40.0, 60.0), *SHOTS[:2])  # walker and oblique: the stills'
-APPROXIMATIONS = ("presorting", "levels", "rounding", "all")
+APPROXIMATIONS = ("presorting", "objects", "levels", "rounding", "all")
 WIDTH, HEIGHT = 640, 360
 REACH = 16  # radius of the terrain in tile sides, limited by the Gaussians of the finest level
 TARGET_PSNR = 40.0  # dB
@@ -33,19 +33,20 @@ def measure_approximations(content: BundleContent, bundle: Bundle) -> list[dict]
     """A row for each view and approximation: `psnr` (None for equal pictures) and `change`, the largest difference in
     8-bit steps.
 
-    presorting: in the tiles' orders, against sorted exactly, both with levels and rounding. levels: against the finest
-    level alone. rounding: read from the bundle, against what it was made of. all: the page's picture against the
-    reference. The ground is flat.
+    presorting: the ground in the tiles' orders, against sorted exactly, both with levels and rounding. objects: the
+    same with objects, which the page draws after their ground and depth puts partly under it; no row without objects.
+    levels: against the finest level alone. rounding: read from the bundle, against what it was made of. all: the page's
+    picture against the reference. The terrain is flat.
     """
     rows = []
     for shot in progress(VIEWS, "measure approximations"):
-        for approximation, pair in zip(APPROXIMATIONS, _render_pairs(content, bundle, shot), strict=True):
+        for approximation, pair in _render_pairs(content, bundle, shot).items():
             row = {"view": shot.name, "shortcut": approximation, "psnr": order_directions.compute_psnr([pair])}
             rows.append(row | {"change": 255 * float(np.abs(pair[0] - pair[1]).max())})
     return rows
 
 
-def _render_pairs(content: BundleContent, bundle: Bundle, shot: Shot) -> list[tuple[Picture, Picture]]:
+def _render_pairs(content: BundleContent, bundle: Bundle, shot: Shot) -> dict[str, tuple[Picture, Picture]]:
     """Pictures with each approximation and without it."""
     manifest, flat = bundle.manifest, {"kind": "flat"}
     rounded = replace(endless.terrain_from_bundle(bundle, flat), reach=REACH)
@@ -63,7 +64,11 @@ def _render_pairs(content: BundleContent, bundle: Bundle, shot: Shot) -> list[tu
         render(cut, True),
         render(keep_finest(cut), True),
     )
-    return [(page, sorted_), (levels, reference), (sorted_, levels), (page, reference)]
+    ground = {"presorting": (page, sorted_)}
+    if objects:
+        bare = replace(rounded, scatter=None, objects=[], extents=[])
+        ground = {"presorting": (render(bare, False), render(bare, True)), "objects": (page, sorted_)}
+    return ground | {"levels": (levels, reference), "rounding": (sorted_, levels), "all": (page, reference)}
 
 
 def keep_finest(terrain: EndlessTerrain) -> EndlessTerrain:
