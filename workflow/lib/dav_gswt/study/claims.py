@@ -90,7 +90,7 @@ def _describe_views(rows: Reader) -> dict:
     default = {r["measure"]: Difference(float(r["mean"]), float(r["low"]), float(r["high"])) for r in paired}
     [real] = [r for r in worth if r["policy"] == "w2-lpips" and r["scene"] == "every" and r["measure"] == "psnr"]
     psnr = {variant: float(row["psnr"]) for variant, row in budget.items()}
-    hundred = {row["policy"]: -float(row["gap"]) for row in rows("hundred_benchmark")}
+    hundred = {r["policy"]: -float(r["gap"]) for r in rows("hundred_benchmark") if r["scene"] == "desert_100"}
     return {
         "chosen": {variant: _compare(compared[variant], "psnr") for variant in ("w2", "grad-lpips", "single")},
         "photos": int(float(budget["w2-lpips"]["photos"])),

@@ -18,6 +18,7 @@ KINDS = {  # of cells: what grows, its unit, and the cost beside the seconds
 }
 TITLES = {"seconds": "s", "prepare_seconds": "s before the first step", "step_seconds": "s a step", "peak_mb": "MB"}
 COUNTS = {"gaussians": "Gaussians", "steps": "steps"}  # of a fit
+SHORT = 60  # largest over smallest value up to which an axis has more labels than powers of ten
 LAST = 3  # points that an exponent is fitted to: small cells are mostly fixed costs
 COLUMNS = (
     "kind",
@@ -115,5 +116,17 @@ def plot_growth(rows: list[dict], path: Path | str) -> None:
             axis.set_xlabel(unit)
             axis.set_ylabel(label)
             axis.grid(True, which="both", alpha=0.2)
+            _label_plainly(axis.xaxis)
+            _label_plainly(axis.yaxis)
     axes[0, 0].legend()
     save_figure(figure, path)
+
+
+def _label_plainly(axis) -> None:
+    """Label powers of ten as 10k; on a short axis 2 and 5 times them, too. Minor ticks have no label."""
+    from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter  # here, not above: see `figures.make_figure`
+
+    low, high = axis.get_view_interval()
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < SHORT * low else (1,)))
+    axis.set_major_formatter(EngFormatter(sep="") if low >= 1 else "{x:g}")
+    axis.set_minor_formatter(NullFormatter())
