@@ -70,9 +70,28 @@ def quote_gains() -> list[str]:
         f"({signed(gain('psnr', *orbit))} and {signed(gain('psnr', *path))} dB) and better by "
         f"{short(gain('worst_psnr', *orbit))} and {short(gain('worst_psnr', *path))} dB in the worst tenth",
         f"{short(-gain('psnr', 'copr_dunes_views'))} dB on copr_dunes ({interval('coverage-error')}, five starts)",
+        *quote_other_pools(),
         f"is {short(-gain('psnr', 'copr_dunes_views', policy='oracle'))} dB below ({interval('oracle')})",
         f"is {short(-gain('psnr', 'copr_dunes_views', policy='w2-lpips'))} dB below spreading",
         f"{short(-gain('worst_psnr', 'copr_dunes_views', policy='w2-lpips'))} dB below. When",
+    ]
+
+
+def quote_other_pools() -> list[str]:
+    """What the default of new photos loses or gains on other pools of given photos."""
+
+    def less(table: str, scene: str) -> dict[str, float]:
+        (row,) = read_rows(table, measure="psnr", policy="coverage-error", scene=scene)
+        return {key: float(row[key]) for key in ("mean", "low", "high") if row[key]}
+
+    hundred, pool = (less("hundred_comparison", scene)["mean"] for scene in ("desert_100", "desert_pool"))
+    part = less("development_comparison", "caliterra_earthworks")
+    whole = less("development_comparison", "caliterra_earthworks_pool")
+    return [
+        f"{short(-hundred)} on [a hundred photos](#at-the-papers-number-of-photos) and {short(-pool)} on 48 of desert",
+        f"{short(-part['mean'])} on the exemplar of caliterra_earthworks "
+        f"({short(-part['high'])} to {short(-part['low'])}, three starts",
+        f"it gains {short(whole['mean'])} ({short(whole['low'])} to {short(whole['high'])})",
     ]
 
 
