@@ -73,7 +73,7 @@ def quote_gains() -> list[str]:
         *quote_other_pools(),
         f"is {short(-gain('psnr', 'copr_dunes_views', policy='oracle'))} dB below ({interval('oracle')})",
         f"is {short(-gain('psnr', 'copr_dunes_views', policy='w2-lpips'))} dB below spreading",
-        f"{short(-gain('worst_psnr', 'copr_dunes_views', policy='w2-lpips'))} dB below. When",
+        f"{short(-gain('worst_psnr', 'copr_dunes_views', policy='w2-lpips'))} dB below.",
     ]
 
 
