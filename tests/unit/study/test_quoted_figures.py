@@ -1,10 +1,11 @@
 """Figures that pages quote are those of the tables: each sentence is made from its table and looked for."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+from dav_gswt.study import csv_tables
 
 ROOT = Path(__file__).resolve().parents[3]
 VIEWS, README, PHOTOS, SETTINGS = "docs/active-views.md", "README.md", "docs/photos.md", "docs/settings.md"
@@ -19,8 +20,8 @@ GROUPS = {
 
 def read_rows(table: str, **where: str) -> list[dict]:
     """The rows of a table with these values in their columns."""
-    with (ROOT / f"docs/research/data/{table}.csv").open(newline="", encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if all(row[key] == value for key, value in where.items())]
+    read = csv_tables.read_table(ROOT / f"docs/research/data/{table}.csv")
+    rows = [row for row in read if all(row[key] == value for key, value in where.items())]
     assert rows, f"{table}.csv has no row with {where}"
     return rows
 
