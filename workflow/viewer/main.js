@@ -80,6 +80,7 @@ async function start() {
       if (!first) element("storyButton", HTMLButtonElement).hidden = true; // it is of the page's own terrain
       if (first) await paint.keep.follow(parsePaint(location.hash), false).catch((error) => viewer.fail(error));
     },
+    onSize: (bytes) => hud.askToLoad(bytes),
     onPaint() {
       paint.note();
       firstView.showTerrain();

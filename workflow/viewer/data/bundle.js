@@ -2,7 +2,7 @@
 
 import { isCoordinate } from "./checks.js";
 import { PageError, REMAKE } from "./errors.js";
-import { CACHE_BYTES, listChunks } from "./layout.js";
+import { listChunks, viewRoom } from "./layout.js";
 import { findFault, NAME, pickKnown } from "./manifest.js";
 import { indexType, RECORD } from "./records.js";
 
@@ -76,7 +76,8 @@ export async function readPictures({ classes }, source) {
 }
 
 /**
- * The chunks to read first, the coarsest level first: all, or as many as the cache holds.
+ * The chunks to read first, the coarsest level first: all, or the coarsest level alone if the set does not fit into the
+ * cache. The worker then asks for what a view needs.
  *
  * @param {Manifest} manifest
  * @returns {QueueItem[]}
@@ -84,11 +85,7 @@ export async function readPictures({ classes }, source) {
 export function initialChunks(manifest) {
   const queue = listChunks(manifest);
   queue.sort((a, b) => b.entry.level - a.entry.level || a.tile - b.tile);
-  let sum = 0;
-  return queue.filter(({ entry }) => {
-    sum += entry.bytes;
-    return sum <= CACHE_BYTES;
-  });
+  return viewRoom(manifest) ? queue.filter(({ entry }) => entry.level === manifest.levels.length - 1) : queue;
 }
 
 /**

@@ -47,6 +47,20 @@ export function recordRows(manifest) {
 }
 
 /**
+ * What a view may use of the chunk cache in a set that does not fit into it: half, so that turning around or walking a
+ * few steps finds the chunks of the previous view. null: the whole set fits.
+ *
+ * @param {Manifest} manifest
+ * @returns {{ bytes: number, rows: number } | null}
+ */
+export function viewRoom(manifest) {
+  const chunks = listChunks(manifest), rows = recordRows(manifest);
+  const allBytes = chunks.reduce((sum, { entry }) => sum + entry.bytes, 0);
+  const allRows = chunks.reduce((sum, { entry }) => sum + Math.ceil(entry.count / ROW), 0);
+  return allBytes <= CACHE_BYTES && allRows <= rows ? null : { bytes: CACHE_BYTES / 2, rows: rows / 2 };
+}
+
+/**
  * Pages of the order texture: three times what all orders of a set take, within bounds.
  *
  * @param {Manifest} manifest

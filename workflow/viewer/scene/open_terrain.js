@@ -6,12 +6,15 @@ import { chunkKey, listChunks } from "../data/layout.js";
 import { createHeights } from "../terrain/heights.js";
 import { createWorkerClient } from "../worker/worker_client.js";
 
+const MOST_PENDING = 12; // chunks on their way while a view waits for more: it may have changed before they arrive
+const TURN = 4; // milliseconds until what is pending is looked at again
+
 /**
  * What is read before anything is drawn.
  * @typedef {{ source: import("../data/source.js").Source, manifest: import("../data/manifest.js").Manifest,
  *   pixels: Float32Array | null, pictures: import("../terrain/classes.js").Pictures }} TerrainFiles
  *
- * @typedef {import("../worker/worker_client.js").Handlers} Handlers
+ * @typedef {Omit<import("../worker/worker_client.js").Handlers, "onRefused">} Handlers
  * @typedef {ReturnType<typeof openTerrain>} OpenTerrain
  */
 
@@ -33,31 +36,49 @@ export async function readTerrain(source) {
  * @param {Handlers} handlers
  */
 export function openTerrain({ source, manifest, pixels, pictures }, { onRecords, onFrame, onError }) {
-  let whole = false; // everything was read that the cache holds
+  let begun = false; // the first chunks were read
+  /** @type {import("../worker/frame_builder.js").FrameAnswer | null} */
+  let last = null;
+  /** @type {unknown} */
+  let failure = null; // of reading a chunk that a view needs
   /** @type {Set<number>} */
-  const pending = new Set(); // keys of chunks that are being read again
+  const pending = new Set(); // keys of chunks that are being read, or on their way to the worker
   const stop = new AbortController();
   const client = createWorkerClient({ manifest, pixels, pictures }, {
-    onRecords,
+    onRecords(records) {
+      pending.delete(chunkKey(records.tile, records.level));
+      onRecords(records);
+    },
+    onRefused: ({ tile, level }) => pending.delete(chunkKey(tile, level)),
     onFrame(frame) {
+      last = frame;
       onFrame(frame);
-      if (whole) readMissing(frame.missing);
+      if (begun) readMissing(frame.missing);
     },
     onError,
   });
-  /** @param {import("../data/bundle.js").Chunk} chunk */
-  const take = (chunk) => client.add(chunk);
 
-  /** Read chunks that were evicted from the cache, in a set larger than it. @param {number[]} missing */
+  /**
+   * Read chunks. Those that fail stay pending, so they are not requested in every frame.
+   *
+   * @param {import("../data/bundle.js").QueueItem[]} queue
+   * @param {(progress: import("../data/bundle.js").Progress) => void} [onProgress]
+   */
+  function read(queue, onProgress) {
+    for (const { tile, entry } of queue) pending.add(chunkKey(tile, entry.level));
+    return readChunks(queue, source, { take: (chunk) => client.add(chunk), onProgress, signal: stop.signal });
+  }
+
+  /** Read chunks that a view needs, the coarsest first, a few at a time. @param {number[]} missing */
   function readMissing(missing) {
-    const keys = missing.filter((key) => !pending.has(key));
-    if (!keys.length) return;
-    for (const key of keys) pending.add(key);
-    const queue = listChunks(manifest).filter(({ tile, entry }) => keys.includes(chunkKey(tile, entry.level)));
-    readChunks(queue, source, { take, signal: stop.signal }).then(() => {
-      for (const key of keys) pending.delete(key);
-    }, (error) => { // and its chunks stay pending: they are not asked for in every frame
-      if (!stop.signal.aborted) onError(error);
+    const keys = new Set(missing.filter((key) => !pending.has(key))), room = MOST_PENDING - pending.size;
+    if (!keys.size || room <= 0) return;
+    const queue = listChunks(manifest).filter(({ tile, entry }) => keys.has(chunkKey(tile, entry.level)));
+    queue.sort((a, b) => b.entry.level - a.entry.level);
+    read(queue.slice(0, room)).catch((error) => {
+      if (stop.signal.aborted) return;
+      failure = error;
+      onError(error);
     });
   }
 
@@ -66,19 +87,39 @@ export function openTerrain({ source, manifest, pixels, pictures }, { onRecords,
     /** Mean height of the ground of its tiles above the surface. */
     lift: mean(manifest.classes?.rise.ground ?? [0]),
     /**
-     * Read the chunks, the coarsest level first. Returns: were they read, and not ended meanwhile? Throws a PageError.
+     * Read the first chunks, the coarsest level first. Returns: were they read, and not ended meanwhile? Throws a PageError.
      *
      * @param {(progress: import("../data/bundle.js").Progress) => void} [onProgress]
      */
     async readAll(onProgress) {
       try {
-        await readChunks(initialChunks(manifest), source, { take, onProgress, signal: stop.signal });
+        await read(initialChunks(manifest), onProgress);
       } catch (error) {
         if (stop.signal.aborted) return false;
         throw error;
       }
-      whole = true;
+      begun = true;
       return true;
+    },
+    /**
+     * Ask the worker for the exact frame of a camera until no chunk of it is missing; while the first chunks are read,
+     * once. Throws what the reading throws.
+     *
+     * @param {import("../terrain/camera.js").Camera} camera
+     * @param {number} budget
+     * @param {() => void} [check] throws to give up
+     */
+    async askForAll(camera, budget, check = () => {}) {
+      do {
+        client.ask(camera, budget, true);
+        await client.answered();
+        check();
+        while (begun && last?.missing.length && pending.size && !stop.signal.aborted) {
+          if (failure) throw failure;
+          await new Promise((done) => setTimeout(done, TURN));
+          check();
+        }
+      } while (begun && last?.missing.length && !stop.signal.aborted);
     },
     /** Stop the worker and all reading. */
     end() {

@@ -3,6 +3,9 @@
 // Over the budget all level distances are multiplied by one factor, so every place is drawn coarser by as much, and the
 // last cells come nearer by less. A level whose distance falls below the eye's height above the ground is replaced by
 // the next coarser one everywhere, so ground covers the picture under any budget.
+//
+// In a set that does not fit into the chunk cache, a second factor limits the chunks that a view needs to a part of the
+// cache. Both factors then depend on the camera alone, not on what has arrived: at rest a view asks for each chunk once.
 
 import { REACH } from "./cells.js";
 import { cellsInFrustum } from "./frustum.js";
@@ -16,7 +19,8 @@ import { findReach } from "./sphere_cells.js";
  * Level distances and reach under a factor.
  * @typedef {{ shrink: number, switches: number[], bands: number[], reach: number }} Distances
  *
- * What to draw: cells back to front, their number of Gaussians, and missing chunks (16 tile + level).
+ * What to draw: cells back to front, their number of Gaussians, and missing chunks (16 tile + level). shrink: the factor
+ * that the budget asks for.
  * @typedef {Distances & { cells: Cell[], count: number, missing: Set<number> }} Selection
  */
 
@@ -36,22 +40,43 @@ export function selectCells(terrain, camera, budget) {
   const { sphere, sphereCells, side } = terrain, above = eyeHeight(terrain, camera);
   const least = sphere ? above : 0, reach = sphere ? findReach(terrain, sphere, camera.eye) : REACH * side;
   const cells = sphereCells ? sphereCells(camera, reach) : cellsInFrustum(terrain, camera, reach);
-  for (const cell of cells) cell.arrived = arrivedLevels(terrain, cell.tiles);
+  const findLevels = terrain.room ? obtainableLevels : arrivedLevels;
+  for (const cell of cells) cell.arrived = findLevels(terrain, cell.tiles);
   /** @param {Distances} distances */
   const cost = (distances) =>
     cells.reduce((sum, cell) => (chooseLevels(terrain, cell, distances) ? sum + cell.count : sum), 0);
-  let distances = distancesAt(terrain, above, [least, reach], 1);
-  if (cost(distances) > budget) {
-    let low = Math.log(leastShrink(terrain, above)), high = 0;
-    for (let k = 0; k < BISECTIONS; k++) {
-      const middle = (low + high) / 2;
-      if (cost(distancesAt(terrain, above, [least, reach], Math.exp(middle))) <= budget) low = middle;
-      else high = middle;
-    }
-    distances = distancesAt(terrain, above, [least, reach], Math.exp(low));
+  /** @param {number} shrink */
+  const at = (shrink) => distancesAt(terrain, above, [least, reach], shrink);
+  const smallest = leastShrink(terrain, above);
+  const shrink = largestFactor(smallest, 1, (factor) => cost(at(factor)) <= budget);
+  let distances = at(shrink);
+  if (terrain.room) {
+    const fitting = largestFactor(smallest, shrink, (factor) => fitsRoom(terrain, cells, at(factor)));
+    distances = { ...at(fitting), shrink, reach: distances.reach };
+    setWish(terrain, cells, distances);
+    for (const cell of cells) cell.arrived = arrivedLevels(terrain, cell.tiles);
   }
   const kept = cells.filter((cell) => chooseLevels(terrain, cell, distances));
-  return { ...distances, ...nearestCells(kept, budget, distances.reach), missing: missingChunks(terrain, kept) };
+  const missing = terrain.room ? missingWishes(terrain) : missingChunks(terrain, kept);
+  return { ...distances, ...nearestCells(kept, budget, distances.reach), missing };
+}
+
+/**
+ * The largest factor between two that passes a test; the smallest factor counts as passing.
+ *
+ * @param {number} smallest
+ * @param {number} largest
+ * @param {(factor: number) => boolean} passes
+ */
+function largestFactor(smallest, largest, passes) {
+  if (smallest >= largest || passes(largest)) return largest;
+  let low = Math.log(smallest), high = Math.log(largest);
+  for (let k = 0; k < BISECTIONS; k++) {
+    const middle = (low + high) / 2;
+    if (passes(Math.exp(middle))) low = middle;
+    else high = middle;
+  }
+  return Math.exp(low);
 }
 
 /**
@@ -100,6 +125,53 @@ function arrivedLevels({ tiles }, numbers) {
   return arrived;
 }
 
+/** Bits of the levels that all tiles have or can get. @param {TerrainTables} terrain @param {number[]} numbers */
+function obtainableLevels({ tiles }, numbers) {
+  let lost = 0;
+  for (let k = 0; k < numbers.length; k++) lost |= tiles[numbers[k]].lost;
+  return ~lost;
+}
+
+/**
+ * Set the wish of a view: the levels of each tile and object that it shows when all of them have arrived. An object's
+ * levels are taken from the distances of its cell, widened by the object's extent.
+ *
+ * @param {TerrainTables} terrain
+ * @param {Cell[]} cells with their obtainable levels
+ * @param {Distances} distances
+ */
+function setWish(terrain, cells, { switches, bands, reach }) {
+  const { wish, tiles, objects, heights } = terrain, span = { nearest: 0, farthest: 0, lo: 0, hi: 0, whole: false, missing: 0 };
+  wish.fill(0);
+  for (const cell of cells) {
+    if (cell.nearest >= reach) continue;
+    if (pickLevels(terrain, cell, cell.arrived, switches, bands)) {
+      for (const tile of cell.tiles) wish[tile] |= (2 << cell.hi) - (1 << cell.lo);
+    }
+    for (const { tile, number, size } of cell.things) {
+      const extent = objects[number].extent * size * (1 + heights.steepest);
+      span.nearest = cell.nearest - extent;
+      span.farthest = cell.farthest + extent;
+      if (pickLevels(terrain, span, ~tiles[tile].lost, switches, bands)) wish[tile] |= (2 << span.hi) - (1 << span.lo);
+    }
+  }
+}
+
+/** Do the chunks that a view needs fit into its room? @param {TerrainTables} terrain @param {Cell[]} cells @param {Distances} distances */
+function fitsRoom(terrain, cells, distances) {
+  const { tiles, wish, room } = terrain;
+  setWish(terrain, cells, distances);
+  let bytes = 0, rows = 0;
+  for (let tile = 0; tile < tiles.length; tile++) {
+    for (let level = 0; wish[tile] >> level; level++) {
+      if (!((wish[tile] >> level) & 1)) continue;
+      bytes += tiles[tile].bytes[level];
+      rows += tiles[tile].rows[level];
+    }
+  }
+  return room === null || (bytes <= room.bytes && rows <= room.rows);
+}
+
 /**
  * Set a cell's levels and their count. Returns: is there anything to draw?
  *
@@ -143,6 +215,14 @@ export function pickLevels({ levels }, span, arrived, switches, bands) {
   span.lo = lo;
   span.hi = hi;
   return true;
+}
+
+/** Chunks that the wish of a view names and that have not arrived. @param {TerrainTables} terrain */
+function missingWishes({ tiles, wish }) {
+  /** @type {Set<number>} */
+  const chunks = new Set();
+  for (let tile = 0; tile < tiles.length; tile++) addMissing(chunks, tile, wish[tile] & ~tiles[tile].arrived);
+  return chunks;
 }
 
 /** @param {TerrainTables} terrain @param {Cell[]} cells */

@@ -36,7 +36,7 @@ export function placeObjects(terrain, camera, { cells, switches, bands, missing 
       aimThing(thing, terrain, eye, i0, j0);
       if (isOutside(planes, norms, thing)) continue;
       const drawn = pickLevels(terrain, thing, arrived, switches, bands);
-      if (thing.missing) addMissing(missing, thing.tile, thing.missing);
+      if (thing.missing && !terrain.room) addMissing(missing, thing.tile, thing.missing);
       if (!drawn) continue;
       orderThing(thing, terrain);
       const east = nearestTouched(thing.i - i0, thing.u, thing.radius);

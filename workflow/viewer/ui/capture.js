@@ -6,7 +6,6 @@ import { cameraAt } from "../terrain/camera.js";
 
 /**
  * @typedef {import("./viewer.js").Viewer} Viewer
- * @typedef {import("./viewer.js").Scene} Scene
  * @typedef {import("../draw/renderer.js").Renderer} Renderer
  * @typedef {import("../draw/sliced_picture.js").SlicedPicture} SlicedPicture
  * @typedef {(place: import("../terrain/camera.js").Place, budget: number, onProgress: (share: number) => void)
@@ -14,7 +13,6 @@ import { cameraAt } from "../terrain/camera.js";
  */
 
 const STRIP = 64; // rows that are read from the GPU at once
-const ROUNDS = 100; // of asking for chunks that were evicted from the cache
 const TURN = 4; // milliseconds until the GPU is looked at again
 const FULL = "A picture of this size does not fit into this device's graphics memory. Choose a smaller one.";
 
@@ -42,7 +40,7 @@ export async function capturing(viewer, { width, height, signal }, work) {
   try {
     await work(async (place, budget, onProgress) => {
       const camera = cameraAt(place, width, height, scene.heights);
-      await askForAll(scene, camera, budget, check);
+      await scene.askForAll(camera, budget, check);
       picture.begin(camera, viewer.drawOptions(scene, camera));
       if (viewer.gl.getError() === viewer.gl.OUT_OF_MEMORY) throw new PageError(FULL);
       while (!picture.advance(performance.now())) {
@@ -58,27 +56,6 @@ export async function capturing(viewer, { width, height, signal }, work) {
     canvas.width = canvas.height = 0; // some browsers keep the memory for long otherwise
     viewer.suspended = false;
     viewer.redraw();
-  }
-}
-
-/**
- * Ask the worker for the frame of a camera until no chunk of it is missing.
- *
- * @param {Scene} scene
- * @param {import("../terrain/camera.js").Camera} camera
- * @param {number} budget
- * @param {() => void} check
- */
-async function askForAll(scene, camera, budget, check) {
-  for (let round = 0; round < ROUNDS; round++) {
-    scene.client.ask(camera, budget, true);
-    await scene.client.answered();
-    check();
-    if (!scene.frame?.missing.length) return;
-    while (scene.pending.size) {
-      await new Promise((done) => setTimeout(done, TURN));
-      check();
-    }
   }
 }
 

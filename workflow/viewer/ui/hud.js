@@ -7,6 +7,8 @@ import { createNumbers } from "./numbers.js";
 /** @typedef {ReturnType<typeof createHud>} Hud */
 
 const EVERY = 250; // milliseconds between updates
+const ASKED = 50e6; // bytes: a phone loads more only when its user agrees
+const PHONE = 600; // CSS pixels of the shorter side of the screen, fewer than a tablet's
 const READ = 4000; // milliseconds that a message stays
 
 export function createHud() {
@@ -26,6 +28,24 @@ export function createHud() {
       if (now - announced < EVERY) return; // a screen reader reads every change of the status aloud
       announced = now;
       status.textContent = `Loading ${megabytes(bytes)} of ${megabytes(total)} MB`;
+    },
+    /**
+     * On a phone, ask before much is downloaded. Resolves when the person agrees, at once where nothing is asked.
+     *
+     * @param {number} bytes
+     * @returns {Promise<void>}
+     */
+    askToLoad(bytes) {
+      const isPhone = matchMedia("(pointer: coarse)").matches && Math.min(screen.width, screen.height) < PHONE;
+      if (!isPhone || bytes <= ASKED) return Promise.resolve();
+      const agree = element("agree", HTMLButtonElement);
+      status.textContent = "This terrain is large. On a mobile network the download may cost you.";
+      agree.textContent = `Load up to ${Math.round(bytes / 1e6)} MB`;
+      agree.hidden = false;
+      return new Promise((done) => agree.addEventListener("click", () => {
+        agree.hidden = true;
+        done();
+      }, { once: true }));
     },
     /** All is loaded. */
     showLoaded() {

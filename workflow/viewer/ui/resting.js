@@ -22,7 +22,7 @@ export function createResting(viewer) {
   function finish({ picture, rest }, { frame }) {
     viewer.show(picture);
     rest.finish(budget, frame?.shrink === 1);
-    if (!rest.whole) return;
+    if (!rest.whole || frame?.missing.length) return; // a chunk that arrives begins anew
     viewer.hud.showRefining(null);
     viewer.options.onWhole();
     handOver(); // now: the next turn may find the canvas empty
@@ -58,7 +58,8 @@ export function createResting(viewer) {
     },
     /** Is the finest picture of the place shown? */
     get whole() {
-      return !viewer.stale && (viewer.scene?.renderer?.rest.whole ?? false);
+      const { renderer, frame } = viewer.scene ?? {};
+      return !viewer.stale && !frame?.missing.length && (renderer?.rest.whole ?? false);
     },
     /** How much of it is drawn, 0 to 1. */
     get done() {

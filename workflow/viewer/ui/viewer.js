@@ -1,6 +1,7 @@
 // The viewer: an open bundle, the walker in it, and what the worker and the GPU make of both.
 
 import { PageError } from "../data/errors.js";
+import { listChunks } from "../data/layout.js";
 import { BUDGET, createFramePacing } from "../draw/frame_pacing.js";
 import { createFrameStats } from "../draw/frame_stats.js";
 import { OVERLAYS } from "../draw/overlays.js";
@@ -30,10 +31,11 @@ import { createWalker, moveTo } from "./walker.js";
  *   painting: import("./painting.js").Painting }} Scene
  *
  * still: draw only when asked, for tests and screenshots; firstBudget: of the first picture then; onFirstScene: called
- * when the first bundle's manifest is read; onScene: called, and awaited, when any is, `first` or not; onPaint: something
+ * when the first bundle's manifest is read; onScene: called, and awaited, when any is, `first` or not; onSize: called,
+ * and awaited, before the page's own chunks are read, with their bytes; onPaint: something
  * was painted or set; onPicture: a picture was drawn; onWhole: one of all Gaussians.
  * @typedef {{ still: boolean, firstBudget: number, onFirstScene: (walker: Walker) => void,
- *   onScene: (scene: Scene, first: boolean) => Promise<void>, onPaint: () => void, onPicture: () => void,
+ *   onScene: (scene: Scene, first: boolean) => Promise<void>, onSize: (bytes: number) => Promise<void>, onPaint: () => void, onPicture: () => void,
  *   onWhole: () => void }} Options
  */
 
@@ -118,6 +120,7 @@ export class Viewer {
     this.#showLegend();
     this.drawFrame(); // sky and far ground at once
     await this.options.onScene(this.scene, first);
+    if (first) await this.options.onSize(listChunks(manifest).reduce((sum, { entry }) => sum + entry.bytes, 0));
     if (this.scene !== scene || !await terrain.readAll((progress) => this.hud.showProgress(progress))) return; // another one was opened
     this.loaded = true;
     if (this.options.still) await this.settle(this.options.firstBudget);
@@ -211,8 +214,8 @@ export class Viewer {
   async settle(budget = BUDGET.most) {
     await this.#restored;
     const renderer = this.scene?.renderer;
-    this.askWorker(budget, true);
-    await this.scene?.client.answered();
+    this.stale = false;
+    if (this.scene) await this.scene.askForAll(this.camera(this.scene), budget);
     this.drawFrame();
     // the context may be lost without an event yet, or be back and empty
     if (this.gl.isContextLost() || renderer !== this.scene?.renderer) {

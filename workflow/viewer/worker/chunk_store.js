@@ -1,10 +1,14 @@
-// Chunks at hand: their bytes in the worker, their rows in the record texture. Where a set is larger than the cache,
-// the least recently drawn chunks are evicted.
+// Chunks at hand: their bytes in the worker, their rows in the record texture. If a set is larger than the cache, the
+// least recently drawn chunks are evicted, but never those of the coarsest level. No chunk is read more than MOST_READS
+// times: a chunk that is evicted after its last reading is lost, and a coarser level is drawn instead.
 
 import { CACHE_BYTES, chunkKey, CODE_SHIFT, ROW } from "../data/layout.js";
 import { parseChunk } from "../data/records.js";
 import { RIM } from "../terrain/frustum.js";
 import { createPagePool } from "./page_pool.js";
+
+const MOST_READS = 3;
+export const WISHED = 0.5; // added to the stamp of chunks that a view needs: they outlive what stands in for them
 
 /**
  * entries: of each Gaussian its index in the record texture and its level; rows: in that texture.
@@ -22,6 +26,9 @@ import { createPagePool } from "./page_pool.js";
 export function createChunkStore(terrain, { encoding }, rows, onEvict) {
   /** @type {Map<number, StoredChunk>} */
   const chunks = new Map();
+  /** @type {Map<number, number>} */
+  const reads = new Map(); // by key
+  const coarsest = terrain.levels - 1;
   let bytes = 0;
   /** @param {number} key */
   const stored = (key) => /** @type {StoredChunk} */ (chunks.get(key));
@@ -30,8 +37,13 @@ export function createChunkStore(terrain, { encoding }, rows, onEvict) {
     chunks.delete(key);
     bytes -= buffer.byteLength;
     terrain.tiles[tile].arrived &= ~(1 << level);
+    noteAbsence(tile, level);
     onEvict(tile);
   });
+  /** @param {number} tile @param {number} level */
+  const noteAbsence = (tile, level) => {
+    if ((reads.get(chunkKey(tile, level)) ?? 0) >= MOST_READS) terrain.tiles[tile].lost |= 1 << level;
+  };
   /** @param {number} stamp */
   const evictOldest = (stamp) => {
     /** @type {number | null} */
@@ -42,17 +54,34 @@ export function createChunkStore(terrain, { encoding }, rows, onEvict) {
     if (oldest !== null) pool.evictWhere((key) => key === oldest);
     return oldest !== null;
   };
+  /**
+   * Rows for a chunk, or null if everything else was used at this stamp or later.
+   *
+   * @param {number} key
+   * @param {{ count: number, buffer: ArrayBuffer }} chunk
+   * @param {number} stamp
+   */
+  const allocate = (key, { count, buffer }, stamp) => {
+    while (bytes + buffer.byteLength > CACHE_BYTES) if (!evictOldest(stamp)) return null;
+    return pool.allocate(key, Math.ceil(count / ROW), stamp, count);
+  };
   return {
     /**
-     * Add a chunk. Returns: is there room for it, beside what is being drawn?
+     * Add a chunk. Returns: is there room for it? What is being drawn is evicted only for a chunk that the view needs.
      *
      * @param {import("../data/bundle.js").Chunk} chunk
      * @param {number} stamp
      */
-    add({ tile, level, count, buffer }, stamp) {
-      while (bytes + buffer.byteLength > CACHE_BYTES && evictOldest(stamp));
-      const key = chunkKey(tile, level), room = pool.allocate(key, Math.ceil(count / ROW), stamp, count)?.pages;
-      if (!room) return false;
+    add(chunk, stamp) {
+      const { tile, level, count, buffer } = chunk, key = chunkKey(tile, level);
+      const needed = (terrain.wish[tile] >> level) & 1;
+      reads.set(key, (reads.get(key) ?? 0) + 1);
+      const entry = allocate(key, chunk, stamp) ?? (needed ? allocate(key, chunk, stamp + WISHED) : null);
+      if (!entry) {
+        noteAbsence(tile, level);
+        return false;
+      }
+      const room = entry.pages;
       const mark = level << CODE_SHIFT, entries = new Uint32Array(count), parsed = parseChunk(buffer, count, encoding);
       for (let k = 0; k < count; k++) entries[k] = mark | (room[k >> 10] * ROW + (k & (ROW - 1)));
       const object = terrain.objects[tile - (terrain.tiles.length - terrain.objects.length)];
@@ -63,6 +92,7 @@ export function createChunkStore(terrain, { encoding }, rows, onEvict) {
       chunks.set(key, { tile, level, count, buffer, ...parsed, entries, rows: room, stamp });
       bytes += buffer.byteLength;
       terrain.tiles[tile].arrived |= 1 << level;
+      this.touch(tile, level, needed ? stamp + WISHED : stamp);
       return true;
     },
     /**
@@ -73,15 +103,16 @@ export function createChunkStore(terrain, { encoding }, rows, onEvict) {
      */
     get: (tile, level) => stored(chunkKey(tile, level)),
     /**
-     * Mark a chunk as drawn.
+     * Mark a chunk as used.
      *
      * @param {number} tile
      * @param {number} level
      * @param {number} stamp
      */
     touch(tile, level, stamp) {
-      stored(chunkKey(tile, level)).stamp = stamp;
-      pool.use(chunkKey(tile, level), stamp);
+      const last = level === coarsest ? Infinity : stamp;
+      stored(chunkKey(tile, level)).stamp = last;
+      pool.use(chunkKey(tile, level), last);
     },
     all: () => chunks.values(),
     get bytes() {

@@ -8,7 +8,7 @@ import { placeObjects } from "../terrain/object_placement.js";
 import { bend, dot, FACES, rateOf } from "../terrain/sphere.js";
 import { cellMark, createBlockList, createPlaceList } from "./block_list.js";
 import { createBorders } from "./borders.js";
-import { createChunkStore } from "./chunk_store.js";
+import { createChunkStore, WISHED } from "./chunk_store.js";
 import { createNearSorter } from "./near_sort.js";
 import { adjustCover, paintPoints } from "./repaint.js";
 import { createSortedBatches } from "./sorted_batches.js";
@@ -56,7 +56,7 @@ export function createFrameBuilder(manifest, heights, pictures) {
   let stamp = 0;
   const ahead = { i0: 0, j0: 0, row: REACH + 1 }; // of the window about the eye, the next row to cover
 
-  /** Mark the chunks of what is drawn. @param {Cell[]} cells @param {Groups} groups */
+  /** Mark the chunks that are drawn, and those that the view needs. @param {Cell[]} cells @param {Groups} groups */
   function touch(cells, groups) {
     levels.fill(0);
     for (let k = 0; k < cells.length; k++) {
@@ -67,6 +67,11 @@ export function createFrameBuilder(manifest, heights, pictures) {
     for (let tile = 0; tile < levels.length; tile++) {
       for (let level = 0; levels[tile] >> level; level++) {
         if ((levels[tile] >> level) & 1) store.touch(tile, level, stamp);
+      }
+      if (!terrain.room) continue;
+      const there = terrain.wish[tile] & terrain.tiles[tile].arrived;
+      for (let level = 0; there >> level; level++) {
+        if ((there >> level) & 1) store.touch(tile, level, stamp + WISHED);
       }
     }
   }

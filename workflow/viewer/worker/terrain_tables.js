@@ -1,6 +1,6 @@
 // Tables of a terrain for the worker: sizes and orders of its tiles and objects, level distances, classes, scatter.
 
-import { NEAR } from "../data/layout.js";
+import { NEAR, ROW, viewRoom } from "../data/layout.js";
 import { deviationOf } from "../data/records.js";
 import { shareOfRange, uncertaintyRange } from "../data/uncertainty.js";
 import { RING } from "../terrain/cell_ring.js";
@@ -13,9 +13,10 @@ import { createFraying } from "../terrain/sphere_edges.js";
 
 /**
  * A tile, or an object: these are numbered after the tiles. uncertainty: in 255ths of the set's range; counts, orders:
- * by level; arrived: bits of the levels at hand; alone: a list of its own number.
- * @typedef {{ uncertainty: number, arrived: number, counts: number[], orders: number[][],
- *   alone: number[] }} TileTable
+ * by level, as are bytes and rows of the record texture; arrived: bits of the levels at hand; lost: bits of the levels
+ * that were evicted and are not read again; alone: a list of its own number.
+ * @typedef {{ uncertainty: number, arrived: number, lost: number, counts: number[], orders: number[][],
+ *   bytes: number[], rows: number[], alone: number[] }} TileTable
  *
  * An object. ground: z of the foot; extent: largest distance of a Gaussian's rim from the foot, as far as is known.
  * @typedef {{ ground: number, extent: number }} ObjectTable
@@ -26,14 +27,16 @@ import { createFraying } from "../terrain/sphere_edges.js";
  *
  * sphere, sphereCells: null on a plane. variants: centres of a material's tiles; each: tiles of a material; z: range of heights of tiles, rims included;
  * most: largest size of an object; cells, window: arrays that each view uses again; deviations: standard deviation by
- * byte.
+ * byte. room: what a view may use of the cache, or null if all chunks fit; wish: bits of the levels of each tile and
+ * object that the last view needs, where room limits it.
  * @typedef {{ side: number, salt: number, directions: number[][], variants: number, each: number, levels: number,
  *   tiles: TileTable[], objects: ObjectTable[], classes: import("../terrain/classes.js").Classes | null,
  *   scatter: import("../terrain/scatter.js").Scatter | null, most: number,
  *   heights: import("../terrain/heights.js").HeightField, largest: number, deviations: ArrayLike<number>,
  *   switches: number[], bands: number[], z: number[], near: number, cache: import("../terrain/cells.js").CellCache,
  *   cells: import("../terrain/frustum.js").Cell[], window: Int32Array, sphere: import("../terrain/sphere.js").Sphere | null,
- *   sphereCells: ReturnType<typeof createSphereCells> | null, keeper: Keeper | null }} TerrainTables
+ *   sphereCells: ReturnType<typeof createSphereCells> | null, keeper: Keeper | null,
+ *   room: { bytes: number, rows: number } | null, wish: Uint16Array }} TerrainTables
  */
 
 /**
@@ -49,8 +52,9 @@ export function createTerrainTables(manifest, heights, pictures) {
   const tiles = owners.map(({ chunks, uncertainty }, number) => {
     const byLevel = [...chunks].sort((a, b) => a.level - b.level);
     return {
-      uncertainty: Math.round(255 * shareOfRange(uncertainty ?? range[0], range)), arrived: 0, alone: [number],
+      uncertainty: Math.round(255 * shareOfRange(uncertainty ?? range[0], range)), arrived: 0, lost: 0, alone: [number],
       counts: byLevel.map((chunk) => chunk.count), orders: byLevel.map((chunk) => chunk.orders),
+      bytes: byLevel.map((chunk) => chunk.bytes), rows: byLevel.map((chunk) => Math.ceil(chunk.count / ROW)),
     };
   });
   const each = manifest.tiles.length / materials.length, largest = deviationOf(encoding, 255);
@@ -71,6 +75,7 @@ export function createTerrainTables(manifest, heights, pictures) {
       Math.max(...manifest.tiles.map((tile) => tile.z[1])) + beyond,
     ],
     near: NEAR * manifest.eye_floor, cache: createCellCache(levels.length), cells: [], window: new Int32Array(RING * RING),
+    room: viewRoom(manifest), wish: new Uint16Array(tiles.length),
   };
   if (sphere) tables.sphereCells = createSphereCells(tables, sphere);
   return tables;

@@ -6,6 +6,7 @@ const WIDER = 1.25; // times the picture's size, so that a turn finds tiles befo
  * @typedef {import("./worker.js").Request} Request
  * @typedef {import("./worker.js").Reply} Reply
  * @typedef {{ onRecords: (records: import("./worker.js").Records) => void,
+ *   onRefused: (chunk: import("./worker.js").Refused) => void,
  *   onFrame: (frame: import("./frame_builder.js").FrameAnswer) => void, onError: (error: Error) => void }} Handlers
  * @typedef {ReturnType<typeof createWorkerClient>} WorkerClient
  */
@@ -14,7 +15,7 @@ const WIDER = 1.25; // times the picture's size, so that a turn finds tiles befo
  * @param {Omit<import("./worker.js").Begin, "kind">} bundle
  * @param {Handlers} handlers
  */
-export function createWorkerClient(bundle, { onRecords, onFrame, onError }) {
+export function createWorkerClient(bundle, { onRecords, onRefused, onFrame, onError }) {
   const worker = new Worker(new URL("./worker.js", import.meta.url), { type: "module" });
   let id = 0, answered = 0, busy = false, ended = false;
   /** @type {{ id: number, resolve: () => void, reject: (error: Error) => void }[]} */
@@ -41,6 +42,7 @@ export function createWorkerClient(bundle, { onRecords, onFrame, onError }) {
     if (reply.kind === "failed") fail(Object.assign(new Error(reply.message), { name: reply.name }));
     else if (reply.kind === "frame") takeFrame(reply.frame);
     else if (reply.kind === "records") onRecords(reply);
+    else onRefused(reply);
   });
   worker.addEventListener("error", (event) => {
     event.preventDefault();

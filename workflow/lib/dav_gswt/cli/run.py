@@ -169,7 +169,7 @@ def report_result(given: dict, done: str, overlays: list[Path]) -> None:
         f"""
 {done}.
   stills   {terrain}/*.png
-  page     {page}
+  page     {page} ({_measure_folder(page) / 1e6:.0f} MB)
   tiles    {tiles}/tiles/*.ply (for any splat viewer)
            {bundle}/gswt.zip (for the public GSWT renderer)
   field    {tiles.parent}/field.ply
@@ -180,6 +180,11 @@ Next:
            another scene of config/scenes; docs/photos.md says how to add your own photos""",
         flush=True,
     )
+
+
+def _measure_folder(folder: Path) -> int:
+    """Bytes of all files below a folder."""
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
 
 
 def view(given: dict, port: int) -> int:
