@@ -5,13 +5,15 @@ PORT ?= 8000
 WORKERS ?= 2
 EXAMPLES ?= 2000
 SEED ?= 0
+COUNT ?= 20
 OPENSPLAT ?= opensplat
 PYTHON ?= python3
 # Threads that wait sleep: other jobs use the processors too.
 export OMP_WAIT_POLICY ?= PASSIVE
 BIN := .venv/bin
 
-.PHONY: setup reference run view gallery test compare bench docs prior compiler sanitize faults fuzz
+.PHONY: setup reference run view gallery test test-all test-study lint lint-code lint-types lint-viewer lint-docs mutants \
+  compare bench docs prior compiler sanitize faults fuzz
 .DELETE_ON_ERROR:
 
 # .venv alone
@@ -27,8 +29,47 @@ view: .venv/installed
 gallery: .venv/installed
 	@$(BIN)/python -m dav_gswt.cli.gallery
 
+# A worker takes a whole module, since its tests share what they look at.
+PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadscope --no-loadscope-reorder --durations 20 $(PYTEST_OPTIONS)
+
+# about 5 minutes: everything that people use
 test: .venv/installed-test
-	@$(BIN)/python -m pytest -n $(WORKERS) --no-loadscope-reorder --durations 20 $(TESTS)
+	@$(PYTEST) $(TESTS)
+
+# about 20 minutes: also interrupted runs, Slurm, Firefox, real photos, fuzzing
+test-all: .venv/installed-test
+	@$(PYTEST) -m "not study" $(TESTS)
+
+# about 15 minutes: the tests of the study
+test-study: .venv/installed-test
+	@$(PYTEST) -m study $(TESTS)
+
+# formatters, linters, types, the documentation; all of them, also if one fails
+lint: .venv/installed-test
+	@$(MAKE) --no-print-directory --keep-going --jobs $(WORKERS) lint-types lint-code lint-viewer lint-docs
+
+CORE := $(wildcard workflow/lib/dav_gswt/raster/core/*.cpp workflow/lib/dav_gswt/raster/core/*.h)
+
+lint-code:
+	@$(BIN)/ruff check --quiet .
+	@$(BIN)/ruff format --check --quiet .
+	@$(BIN)/snakefmt --check --quiet Snakefile rules
+	@$(BIN)/clang-format --dry-run -Werror $(CORE)
+	@$(BIN)/lint-imports --no-cache >.venv/lint-imports.log || { cat .venv/lint-imports.log; exit 1; }
+
+lint-types:
+	@$(BIN)/pyright --level error
+
+lint-viewer:
+	@cd tests/browser && npm install --no-save --no-audit --no-fund --silent && npm run --silent lint && npm run --silent types
+
+lint-docs:
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet --site-dir .venv/site
+	@! grep -rlE '<(script|link|img)[^>]+(src|href)="?https?:' .venv/site --include=*.html # pages load nothing from a network
+
+# hours: COUNT deliberate faults, drawn by SEED, each tested by `make test`, survivors by `make test-all`
+mutants: .venv/installed-test
+	@$(BIN)/python tests/mutants --seed $(SEED) --count $(COUNT)
 
 # minutes: the rasterizer's tests on a core built with AddressSanitizer and UBSan, then on one with ThreadSanitizer
 sanitize: .venv/installed-test
@@ -43,7 +84,7 @@ faults: .venv/installed-test
 fuzz: .venv/installed-test
 	@mkdir -p results
 	@FUZZ_EXAMPLES=$(EXAMPLES) FUZZ_SEED=$(SEED) FUZZ_TABLE=results/fuzz.md \
-	  $(BIN)/python -m pytest tests/fuzz --hypothesis-seed=$(SEED) -q && cat results/fuzz.md
+	  $(BIN)/python -m pytest tests/fuzz -m "" --hypothesis-seed=$(SEED) -q && cat results/fuzz.md
 
 # OpenSplat's fit beside ours, of the same photos; OPENSPLAT: the program, which you build yourself
 compare: .venv/installed

@@ -1,6 +1,7 @@
-"""What all tests share: where the repository is, its real photos, one headless Chromium."""
+"""What all tests share: the repository, its real photos, one headless Chromium, the list of skipped tests."""
 
 import signal
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import settings
 from dav_gswt.study.terrain.browser import FLAGS, chromium_path
 
 ROOT = Path(__file__).parents[1]
+pytest_plugins = ["fixtures.workflow_runs"]
 
 settings.register_profile("untimed", deadline=None)  # no test asserts times: machines are shared
 settings.load_profile("untimed")
@@ -17,36 +19,16 @@ settings.load_profile("untimed")
 # a shell that starts a command in the background has it ignore Ctrl-C, and so would the runs that tests interrupt
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-GROUPS = {  # of tests/workflow, beside "runs"
-    "plans": {"test_plans.py", "test_documented_targets.py", "test_profiles.py", "test_snakemake_internals.py"},
-    "disturbed runs": {"test_interrupted.py", "test_slurm.py"},
-}
 
-
-_GROUP_OF_FILE = {name: group for group, files in GROUPS.items() for name in files}
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config, log):
-    """With several workers (pytest -n), one takes a whole group: what its tests share is then made once.
-
-    A group is a folder; whole runs are two groups, and plans share nothing with them.
-    """
-    from xdist.scheduler import LoadScopeScheduling
-
-    class GroupScheduling(LoadScopeScheduling):
-        def _split_scope(self, nodeid):
-            folder, name = nodeid.split("::")[0].rsplit("/", 1)
-            return _GROUP_OF_FILE.get(name, "runs") if folder == "tests/workflow" else folder
-
-    return GroupScheduling(config, log)
-
-
-def pytest_collection_modifyitems(items):
-    """Whole runs come first, as they take longest, then the check of types, which else one worker ends with."""
-    folders = [ROOT / "tests/workflow", ROOT / "tests/unit"]
-    rank = {folder: k for k, folder in enumerate(folders)}
-    items.sort(key=lambda item: rank.get(item.path.parent, len(rank)))  # stable: else the order stays
+def pytest_terminal_summary(terminalreporter):
+    """List what was not tested, and how to install what is missing."""
+    reasons = Counter(
+        report.longrepr[2].removeprefix("Skipped: ") for report in terminalreporter.stats.get("skipped", [])
+    )
+    if reasons:
+        terminalreporter.section("not tested on this machine")
+    for reason, count in sorted(reasons.items()):
+        terminalreporter.write_line(f"{count} test{'s' if count > 1 else ''}: {reason}")
 
 
 @pytest.fixture(scope="session")
@@ -62,17 +44,17 @@ def photo_sets():
 
 @pytest.fixture(scope="session")
 def gswt_checker():
-    """The public renderer's checker of gswt.zip, where it is at hand."""
+    """The public renderer's checker of gswt.zip, if it is there."""
     script = ROOT.parent / "shared/tools/check_gswt_zip.py"
     if not script.is_file():
-        pytest.skip("the public renderer's checker is not at hand")
+        pytest.skip("needs the checker of the public renderer, which is not part of the repository")
     return script
 
 
 @pytest.fixture(scope="session")
 def playwright():
     """What starts browsers; there can be one in a session."""
-    module = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    module = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install playwright")
     with module.sync_playwright() as started:
         yield started
 
@@ -80,7 +62,7 @@ def playwright():
 @pytest.fixture(scope="session")
 def chromium(playwright):
     if not (path := chromium_path()):
-        pytest.skip("no chromium on this machine: apt-get install chromium")
+        pytest.skip("needs Chromium: apt-get install chromium")
     browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
     yield browser
     browser.close()

@@ -18,6 +18,7 @@ from fixtures.runs import TINY
 
 from dav_gswt.files import digest_files
 
+pytestmark = pytest.mark.slow
 ARGUMENTS = ("--cores", "1", "--configfile", TINY)
 ALONE = {"DAV_GSWT_THREADS": "1", "OMP_NUM_THREADS": "1"}
 BRANCH = "results/desert/seed0/draft"

@@ -14,6 +14,7 @@ from fixtures.slurm_node import NotStarted, slurm
 
 from dav_gswt.files import digest_files, read_json, write_json
 
+pytestmark = pytest.mark.slow
 COARSE = "results/desert/seed{}/draft/coarse"
 FEW = (
     "study: {sweeps: {few: {scenes: [desert], vary: {k: [1, 2]}, fixed: {policy: farthest, rounds: 1}, "
