@@ -1,5 +1,6 @@
-"""The smallest experiment, run through every stage: what is there, and what it looks like."""
+"""The smallest experiment, run through every stage: what is there, what it looks like, what a change makes again."""
 
+import json
 import subprocess
 import sys
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 from fixtures.page_visit import Visit
-from fixtures.runs import TINY
+from fixtures.runs import TINY, USUAL
 from jsonschema import Draft202012Validator
 
 from dav_gswt.field import read_field
@@ -18,6 +19,7 @@ from dav_gswt.reconstruction import ground
 from dav_gswt.study.terrain.browser import served
 from dav_gswt.terrain.stills import SHOTS
 
+CONFIGS = (USUAL, TINY)
 ENOUGH = 150_000  # Gaussians of a picture that has few pixels; software draws it
 RULES = {
     "photos": ["render_photos", "report_photos", "split_views"],
@@ -27,6 +29,23 @@ RULES = {
     "tiles": ["cut_tiles", "bundle_tiles"],
     "terrain": ["make_page", "render_terrain", "make_contact_sheet"],
 }
+LOOK = {"make_page", "render_terrain", "make_contact_sheet"}
+TILES = {"cut_tiles", "bundle_tiles"} | LOOK
+LEVELS = {"make_levels"} | TILES
+LAST_ROUND = {"select_poses", "capture_views", "update_field", "score_round", "evaluate_round"}
+FIT = {"fit_coarse", "evaluate_coarse", "score_coarse"} | LAST_ROUND
+TABLE = [  # changed keys, and the rules that must run again on a finished run of the synthetic scene
+    ({"stills": {"width": 320, "height": 180}}, LOOK),
+    ({"heights": {"kind": "hills", "height": 2, "wavelength": 20}}, LOOK),
+    ({"tau": 0.3}, {"bundle_tiles"} | LOOK),
+    ({"tilings": {"semantic": {"slope": 3}}}, TILES),
+    ({"levels": 2, "presets": {"draft": {"level_steps": 11}}}, LEVELS),
+    ({"k": 3}, LAST_ROUND | LEVELS),
+    ({"presets": {"draft": {"steps": 61}}}, FIT | LEVELS),
+    ({"seeds": [1]}, {"split_views"} | FIT | LEVELS),
+    ({"scenes": {"desert": {"seed": 101}}}, {"render_photos", "report_photos", "split_views"} | FIT | LEVELS),
+    ({"scenes": {"planet": {"seed": 7}}, "priors": {"terrain": {"samples": 3}}}, set()),
+]
 
 
 @pytest.fixture(
@@ -164,3 +183,19 @@ def test_the_public_renderers_checker_finds_no_fault(made, gswt_checker):
     command = [sys.executable, gswt_checker, made.bundle / "gswt.zip"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0 and " 0 faults" in done.stdout, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("change, rules", TABLE, ids=[json.dumps(change) for change, _ in TABLE])
+def test_a_changed_key_makes_again_what_reads_it(tiny, planned, tmp_path, change, rules):
+    (tmp_path / "change.json").write_text(json.dumps(change))
+    plan = planned(tiny.folder, configs=(*CONFIGS, tmp_path / "change.json"))
+    assert set(plan) - {"all"} == rules
+
+
+def test_a_second_run_plans_nothing(tiny, planned):
+    assert not planned(tiny.folder, configs=CONFIGS)
+
+
+def test_another_round_goes_on_from_the_last_one(tiny, planned):
+    plan = planned(tiny.folder, "--config", "rounds=2", configs=CONFIGS)
+    assert not {"fit_coarse", "score_coarse"} & set(plan) and plan["update_field"] == plan["evaluate_round"] == 1

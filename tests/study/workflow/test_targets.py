@@ -45,13 +45,21 @@ EXPERIMENTS = {  # target: settings of the study, jobs
         {"calibration": {"scenes": ["desert", "planet"], "rounds": 2}},
         dict(render_candidates=2, calibrate_coarse=2, calibrate_round=4, plot_calibration=1),
     ),
-    "seams": (  # three ways to cut with the scene's own, all of the same levels
-        {"seams": {"scenes": ["desert"], "tilings": ["colour", "semantic"], "baseline": "colour", "replicates": 1}},
+    "seams": (  # two ways to cut, of the same levels
+        {
+            "seams": {
+                "scenes": ["desert"],
+                "tilings": ["colour", "semantic"],
+                "baseline": "colour",
+                "replicates": 1,
+                "compared_replicates": 1,
+            }
+        },
         dict(make_levels=1, cut_tiles=2, measure_seams=2, render_grid=1, plot_cuts=1, gather_seams=1),
     ),
-    "perceptual_kit": (  # a seam that is in two pairs is cut once
+    "perceptual_kit": (  # tiles that are in two pairs are cut once; `floor` cuts nothing
         {"forced_choice": {"scenes": ["desert"], "pairs": [["semantic", "colour"], ["semantic", "floor"]]}},
-        dict(render_pairs=1, make_levels=1, cut_tiles=3, make_kit=1, evaluate_answers=0),
+        dict(render_pairs=1, make_levels=1, cut_tiles=2, make_kit=1, evaluate_answers=0),
     ),
     "view_benchmark": (  # all photos are one round, whatever k is
         {
@@ -70,5 +78,6 @@ EXPERIMENTS = {  # target: settings of the study, jobs
 def test_an_experiment_plans_what_its_cells_share_once(planned, tmp_path, target):
     study, wanted = EXPERIMENTS[target]
     (tmp_path / "few.yaml").write_text(yaml.safe_dump({"study": study}))
-    plan = planned(tmp_path, target, configs=(USUAL, tmp_path / "few.yaml"))
+    tiny = [TINY] if target == "seams" else []
+    plan = planned(tmp_path, target, configs=(USUAL, *tiny, tmp_path / "few.yaml"))
     assert {rule: plan[rule] for rule in wanted} == wanted
